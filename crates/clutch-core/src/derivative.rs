@@ -1,0 +1,133 @@
+//! The paper's "Kalman filter": a smoothed backward difference.
+//!
+//! ```text
+//! ė_k = (1 − K_Kal) ė_{k−1} + K_Kal (e_k − e_{k−1}) / T            (5)
+//! ```
+//!
+//! It is a first-order low-pass on the backward difference; nothing is estimated. The
+//! difference is taken in integers, so it stays exact however far the shaft has turned.
+
+use crate::error::require;
+use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
+
+/// Parameters of (5); `Default` = 0.2, the value that reproduces the paper's figures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct SmoothedDerivativeParams<T = f64> {
+    /// `K_Kal` in (5): share of the newest difference, above 0 and at most 1 (no smoothing).
+    /// The paper gives 0.2 to 1.
+    #[doc(alias = "K_Kal")]
+    pub smoothing: T,
+}
+
+impl<T: Real> Default for SmoothedDerivativeParams<T> {
+    fn default() -> Self {
+        SmoothedDerivativeParams { smoothing: T::from_f64(0.2) }
+    }
+}
+
+/// The filter (5), checked.
+#[doc(alias = "kalman")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmoothedDerivative<T> {
+    keep: T,
+    scale: T,
+}
+
+/// What (5) remembers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DerivativeState<T> {
+    previous: FixedCounts,
+    rate: T,
+}
+
+impl<T: Real> DerivativeState<T> {
+    /// At an error that does not change.
+    #[must_use]
+    pub fn at(error: FixedCounts) -> Self {
+        DerivativeState { previous: error, rate: T::ZERO }
+    }
+}
+
+impl<T: Real> SmoothedDerivative<T> {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// `smoothing` outside ]0, 1]; `period` out of range.
+    pub fn new(
+        p: &SmoothedDerivativeParams<T>,
+        encoder: Encoder,
+        period: Micros,
+    ) -> Result<Self, ParamError<T>> {
+        require(
+            "smoothing",
+            p.smoothing,
+            p.smoothing > T::ZERO && p.smoothing <= T::ONE,
+            "a number above 0 and at most 1",
+        )?;
+        let period = period.period::<T>()?;
+        Ok(SmoothedDerivative {
+            keep: T::ONE - p.smoothing,
+            scale: p.smoothing * encoder.radians_per_count() / period,
+        })
+    }
+
+    /// One sample: the error `e_k` in, `ė_k` out, rad/s.
+    #[inline]
+    pub fn update(&self, state: &mut DerivativeState<T>, error: FixedCounts) -> T {
+        let difference: T = error.minus(state.previous);
+        state.previous = error;
+        state.rate = self.keep * state.rate + self.scale * difference;
+        state.rate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn filter(smoothing: f64) -> SmoothedDerivative<f64> {
+        SmoothedDerivative::new(&SmoothedDerivativeParams { smoothing }, Encoder::PAPER, Micros(1000))
+            .unwrap()
+    }
+
+    #[test]
+    fn without_smoothing_it_is_the_backward_difference() {
+        let mut s = DerivativeState::at(FixedCounts(0));
+        let one_count_per_ms = filter(1.0).update(&mut s, FixedCounts::from_counts(1));
+        assert!((one_count_per_ms.to_degrees() - 18.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_step_in_the_slope_is_reached_by_1_minus_0_8_to_the_n() {
+        let (f, mut s) = (filter(0.2), DerivativeState::at(FixedCounts(0)));
+        for n in 1..50 {
+            let rate = f.update(&mut s, FixedCounts::from_counts(n));
+            let expected = 18.0_f64.to_radians() * (1.0 - 0.8_f64.powi(n as i32));
+            assert!((rate - expected).abs() < 1e-12, "sample {n}");
+        }
+    }
+
+    #[test]
+    fn the_rate_is_the_same_after_a_million_turns() {
+        let far = FixedCounts::from_counts(20_000_000_000);
+        let (f, mut near, mut away) =
+            (filter(0.2), DerivativeState::at(FixedCounts(0)), DerivativeState::at(far));
+        for n in 1..100 {
+            let step = FixedCounts(n * 7282);
+            assert_eq!(f.update(&mut near, step), f.update(&mut away, far.plus(step)));
+        }
+    }
+
+    #[test]
+    fn smoothing_outside_its_range_is_named() {
+        for bad in [0.0, 1.1, f64::NAN] {
+            let e = SmoothedDerivative::<f64>::new(
+                &SmoothedDerivativeParams { smoothing: bad },
+                Encoder::PAPER,
+                Micros(1000),
+            );
+            assert_eq!(e.unwrap_err().field, "smoothing");
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! Computed-torque control: the plant (1) solved for the voltage.
+//!
+//! ```text
+//! τ = −K (K_p e + K_d ė)                                          (10)
+//! u = [T_u − J (θ̈_d − τ) − C_d θ̇] / (μ(θ̇) K_COF)                  (9), (11)
+//! ```
+//!
+//! `θ̇` is the measured velocity, `θ̇_d − ė`, and `μ` is taken without its sign: a shaft at
+//! rest is about to move, so `μ = μ_s` there.
+
+use super::output::{Output, OutputParams, OutputState};
+use super::{Command, Controller, Tick};
+use crate::error::require;
+use crate::{Micros, ParamError, Plant, PlantParams, Real};
+
+/// Gains of (11) and the plant that the law believes in; `Default` = Tables 1 and 2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct CtcParams<T = f64> {
+    /// `K` in (10), no unit.
+    #[doc(alias = "K")]
+    pub outer_gain: T,
+    /// `K_p` in (10), 1/s².
+    pub kp: T,
+    /// `K_d` in (10), 1/s.
+    pub kd: T,
+    /// The believed plant. It differs from the true one wherever friction is not known.
+    pub model: PlantParams<T>,
+}
+
+impl<T: Real> Default for CtcParams<T> {
+    fn default() -> Self {
+        CtcParams {
+            outer_gain: T::from_i32(90),
+            kp: T::from_i32(100),
+            kd: T::from_f64(0.7),
+            model: PlantParams::default(),
+        }
+    }
+}
+
+/// The law (11), checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ctc<T> {
+    params: CtcParams<T>,
+    model: Plant<T>,
+    output: Output<T>,
+}
+
+/// Intermediate terms of (11).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CtcTerms<T> {
+    /// `τ` in (10), rad/s².
+    pub accel_demand: T,
+    /// `T_f` in (8): friction torque asked for, N m.
+    pub friction_torque: T,
+    /// `|μ(θ̇)|` by the model.
+    pub mu: T,
+}
+
+impl<T: Real> Ctc<T> {
+    /// Checks gains, model and output stage.
+    ///
+    /// # Errors
+    /// A gain negative or not finite; a bad model (also one with `mu_static` or `mu_dynamic`
+    /// 0, by which (11) divides); a bad output stage or period.
+    pub fn new(p: &CtcParams<T>, output: &OutputParams<T>, period: Micros) -> Result<Self, ParamError<T>> {
+        require("outer_gain", p.outer_gain, p.outer_gain >= T::ZERO, "a finite number of at least 0")?;
+        require("kp", p.kp, p.kp >= T::ZERO, "a finite number of at least 0 1/s²")?;
+        require("kd", p.kd, p.kd >= T::ZERO, "a finite number of at least 0 1/s")?;
+        let model = Plant::new(&p.model)?;
+        let f = &p.model.friction;
+        require("mu_static", f.mu_static, f.mu_static > T::ZERO, "a number above 0: the law divides by it")?;
+        require(
+            "mu_dynamic",
+            f.mu_dynamic,
+            f.mu_dynamic > T::ZERO,
+            "a number above 0: the law divides by it",
+        )?;
+        Ok(Ctc { params: *p, model, output: Output::new(output, period)? })
+    }
+
+    /// Gains and model.
+    #[must_use]
+    pub fn params(&self) -> &CtcParams<T> {
+        &self.params
+    }
+
+    /// The output stage.
+    #[must_use]
+    pub fn output(&self) -> &Output<T> {
+        &self.output
+    }
+
+    #[inline]
+    fn terms(&self, tick: &Tick<T>) -> (T, CtcTerms<T>) {
+        let (p, m) = (&self.params, self.model.params());
+        let velocity = tick.velocity();
+        let accel_demand = -(p.outer_gain * (p.kp * tick.error + p.kd * tick.error_rate));
+        let friction_torque = m.drive_torque
+            - m.inertia * (tick.target_acceleration - accel_demand)
+            - m.viscous_damping * velocity;
+        let mu = self.model.friction().magnitude(velocity);
+        (friction_torque / (mu * m.brake_gain), CtcTerms { accel_demand, friction_torque, mu })
+    }
+}
+
+impl<T: Real> Controller<T> for Ctc<T> {
+    type State = OutputState<T>;
+    type Terms = CtcTerms<T>;
+
+    fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
+        self.output.start(self.terms(tick).0, applied)
+    }
+
+    #[inline]
+    fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
+        let (demand, terms) = self.terms(tick);
+        let (voltage, limit) = self.output.apply(state, demand);
+        Command { voltage, limit, terms }
+    }
+}

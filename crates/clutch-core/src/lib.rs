@@ -1,0 +1,36 @@
+//! Slow, smooth motion of shafts restrained by friction: the control core.
+#![no_std]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::indexing_slicing,
+        clippy::float_cmp_const
+    )
+)]
+
+#[cfg(test)]
+extern crate std;
+
+mod codes;
+mod derivative;
+mod error;
+mod friction;
+pub mod law;
+mod plant;
+mod real;
+pub mod reference;
+mod servo;
+mod velocity;
+
+pub use codes::{Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros};
+pub use derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeParams};
+pub use error::ParamError;
+pub use friction::{BrakeGeometry, Stribeck, StribeckParams};
+pub use plant::{GRAVITY, Plant, PlantParams};
+pub use real::{Real, sin_cos_turns};
+pub use reference::Target;
+pub use servo::{Daq, Servo, ServoOutput, ServoParams, ServoState};
+pub use velocity::{VelocityParams, VelocitySource, VelocityState};

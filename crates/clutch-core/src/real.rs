@@ -1,0 +1,321 @@
+//! The scalar of the control path: `f32` on a board, `f64` on a host.
+//!
+//! Elementary functions come from [`libm`] on every target, also under std, and nothing here
+//! is fused into a multiply-add. So one input gives one output, bit for bit, on x86-64, ARM
+//! and RISC-V: the simulator runs the arithmetic of the board.
+
+use core::fmt::{Debug, Display};
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for f32 {}
+    impl Sealed for f64 {}
+}
+
+/// `f32` or `f64`; sealed.
+///
+/// ```
+/// use clutch_core::Real;
+/// fn sgn<T: Real>(x: T) -> T { x.sgn() }
+/// assert_eq!(sgn(-2.0_f32), -1.0);
+/// assert_eq!(sgn(0.0_f64), 0.0); // the field's convention here: sgn(0) = 0
+/// ```
+pub trait Real:
+    sealed::Sealed
+    + Copy
+    + Default
+    + PartialEq
+    + PartialOrd
+    + Debug
+    + Display
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    /// 0.
+    const ZERO: Self;
+    /// 1.
+    const ONE: Self;
+    /// π.
+    const PI: Self;
+
+    /// The nearest value to `x`.
+    fn from_f64(x: f64) -> Self;
+    /// This value in double precision (exact).
+    fn to_f64(self) -> f64;
+    /// The nearest value to the integer `n`.
+    fn from_i32(n: i32) -> Self;
+    /// The nearest value to the integer `n`.
+    fn from_i64(n: i64) -> Self;
+    /// The nearest value to the integer `n`.
+    fn from_u64(n: u64) -> Self;
+    /// The integer part, saturating; NaN gives 0.
+    fn to_i64(self) -> i64;
+    /// The integer part, saturating at 0 and 65 535; NaN gives 0.
+    fn to_u16(self) -> u16;
+    /// |self|.
+    fn abs(self) -> Self;
+    /// e to the power of self.
+    fn exp(self) -> Self;
+    /// self to the power of `n`.
+    fn powf(self, n: Self) -> Self;
+    /// Square root; NaN for a negative argument.
+    fn sqrt(self) -> Self;
+    /// Largest integer not above self.
+    fn floor(self) -> Self;
+    /// The larger of the two; the other one if one is NaN.
+    fn max(self, other: Self) -> Self;
+    /// The smaller of the two; the other one if one is NaN.
+    fn min(self, other: Self) -> Self;
+    /// Neither infinite nor NaN.
+    fn is_finite(self) -> bool;
+    /// Sine and cosine for |self| ≤ π/4, without double precision in `f32`.
+    ///
+    /// Outside that range the result is not a sine.
+    fn sin_cos_octant(self) -> (Self, Self);
+
+    /// The sign: −1, 0 or 1; `sgn(0) = 0`, and 0 for NaN.
+    #[inline]
+    fn sgn(self) -> Self {
+        if self > Self::ZERO {
+            Self::ONE
+        } else if self < Self::ZERO {
+            -Self::ONE
+        } else {
+            Self::ZERO
+        }
+    }
+
+    /// `sat(self)` of (30): the identity between −1 and 1, the sign outside; 0 for NaN.
+    #[inline]
+    fn sat(self) -> Self {
+        if self >= Self::ONE {
+            Self::ONE
+        } else if self <= -Self::ONE {
+            -Self::ONE
+        } else if self.is_finite() {
+            self
+        } else {
+            Self::ZERO
+        }
+    }
+
+    /// Limits self to `[lo, hi]` and never panics; NaN gives `lo`.
+    #[inline]
+    fn limit(self, lo: Self, hi: Self) -> Self {
+        self.max(lo).min(hi)
+    }
+}
+
+impl Real for f64 {
+    const ZERO: f64 = 0.0;
+    const ONE: f64 = 1.0;
+    const PI: f64 = core::f64::consts::PI;
+
+    #[inline]
+    fn from_f64(x: f64) -> f64 {
+        x
+    }
+    #[inline]
+    fn to_f64(self) -> f64 {
+        self
+    }
+    #[inline]
+    fn from_i32(n: i32) -> f64 {
+        f64::from(n)
+    }
+    #[inline]
+    fn from_i64(n: i64) -> f64 {
+        n as f64
+    }
+    #[inline]
+    fn from_u64(n: u64) -> f64 {
+        n as f64
+    }
+    #[inline]
+    fn to_i64(self) -> i64 {
+        self as i64
+    }
+    #[inline]
+    fn to_u16(self) -> u16 {
+        self as u16
+    }
+    #[inline]
+    fn abs(self) -> f64 {
+        libm::fabs(self)
+    }
+    #[inline]
+    fn exp(self) -> f64 {
+        libm::exp(self)
+    }
+    #[inline]
+    fn powf(self, n: f64) -> f64 {
+        libm::pow(self, n)
+    }
+    #[inline]
+    fn sqrt(self) -> f64 {
+        libm::sqrt(self)
+    }
+    #[inline]
+    fn floor(self) -> f64 {
+        libm::floor(self)
+    }
+    #[inline]
+    fn max(self, other: f64) -> f64 {
+        libm::fmax(self, other)
+    }
+    #[inline]
+    fn min(self, other: f64) -> f64 {
+        libm::fmin(self, other)
+    }
+    #[inline]
+    fn is_finite(self) -> bool {
+        f64::is_finite(self)
+    }
+    #[inline]
+    fn sin_cos_octant(self) -> (f64, f64) {
+        libm::sincos(self)
+    }
+}
+
+impl Real for f32 {
+    const ZERO: f32 = 0.0;
+    const ONE: f32 = 1.0;
+    const PI: f32 = core::f32::consts::PI;
+
+    #[inline]
+    fn from_f64(x: f64) -> f32 {
+        x as f32
+    }
+    #[inline]
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+    #[inline]
+    fn from_i32(n: i32) -> f32 {
+        n as f32
+    }
+    #[inline]
+    fn from_i64(n: i64) -> f32 {
+        n as f32
+    }
+    #[inline]
+    fn from_u64(n: u64) -> f32 {
+        n as f32
+    }
+    #[inline]
+    fn to_i64(self) -> i64 {
+        self as i64
+    }
+    #[inline]
+    fn to_u16(self) -> u16 {
+        self as u16
+    }
+    #[inline]
+    fn abs(self) -> f32 {
+        libm::fabsf(self)
+    }
+    #[inline]
+    fn exp(self) -> f32 {
+        libm::expf(self)
+    }
+    #[inline]
+    fn powf(self, n: f32) -> f32 {
+        libm::powf(self, n)
+    }
+    #[inline]
+    fn sqrt(self) -> f32 {
+        libm::sqrtf(self)
+    }
+    #[inline]
+    fn floor(self) -> f32 {
+        libm::floorf(self)
+    }
+    #[inline]
+    fn max(self, other: f32) -> f32 {
+        libm::fmaxf(self, other)
+    }
+    #[inline]
+    fn min(self, other: f32) -> f32 {
+        libm::fminf(self, other)
+    }
+    #[inline]
+    fn is_finite(self) -> bool {
+        f32::is_finite(self)
+    }
+    /// Taylor series to x⁹ and x¹⁰: the remainder at π/4 is below 2e-9. `libm::sinf` works in
+    /// double precision inside, which costs a thousand instructions on a Cortex-M4F.
+    #[inline]
+    fn sin_cos_octant(self) -> (f32, f32) {
+        let x2 = self * self;
+        let sin = self
+            * (1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 * (1.0 / 362_880.0)))));
+        let cos = 1.0
+            + x2 * (-0.5
+                + x2 * (1.0 / 24.0
+                    + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40_320.0 + x2 * (-1.0 / 3_628_800.0)))));
+        (sin, cos)
+    }
+}
+
+/// Sine and cosine of a phase given in 2⁻⁶⁴ turns, so that whole turns wrap exactly.
+///
+/// ```
+/// let (s, c) = clutch_core::sin_cos_turns::<f64>(1 << 62); // a quarter turn
+/// assert_eq!((s, c), (1.0, 0.0));
+/// ```
+pub fn sin_cos_turns<T: Real>(phase: u64) -> (T, T) {
+    // The nearest quarter turn, and what is left: within ±1/8 turn.
+    let quarter = phase.wrapping_add(1 << 61) >> 62;
+    let rest = phase.wrapping_sub(quarter << 62) as i64;
+    // 2π · 2⁻⁶⁴ rad per unit.
+    let unit = T::from_f64(core::f64::consts::TAU / 18_446_744_073_709_551_616.0);
+    let (s, c) = (T::from_i64(rest) * unit).sin_cos_octant();
+    match quarter & 3 {
+        0 => (s, c),
+        1 => (c, -s),
+        2 => (-s, -c),
+        _ => (-c, s),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sine_of_a_phase_agrees_with_libm_all_round_the_circle() {
+        for i in 0..10_000_u64 {
+            let phase = i.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            let angle = phase as f64 / 18_446_744_073_709_551_616.0 * core::f64::consts::TAU;
+            let (s, c) = sin_cos_turns::<f64>(phase);
+            assert!((s - libm::sin(angle)).abs() < 1e-15, "sin {angle}");
+            assert!((c - libm::cos(angle)).abs() < 1e-15, "cos {angle}");
+            let (s, c) = sin_cos_turns::<f32>(phase);
+            assert!((f64::from(s) - libm::sin(angle)).abs() < 1.2e-7, "sinf {angle}");
+            assert!((f64::from(c) - libm::cos(angle)).abs() < 1.2e-7, "cosf {angle}");
+        }
+    }
+
+    #[test]
+    fn limit_sends_nan_to_the_lower_end_and_never_panics() {
+        assert_eq!(f64::NAN.limit(1.0, 2.0), 1.0);
+        assert_eq!(5.0_f32.limit(2.0, 1.0), 1.0); // even for an empty interval
+    }
+
+    #[test]
+    fn sat_is_the_identity_inside_and_the_sign_outside() {
+        assert_eq!(0.25_f64.sat(), 0.25);
+        assert_eq!(f64::INFINITY.sat(), 1.0);
+        assert_eq!((-3.0_f32).sat(), -1.0);
+        assert_eq!(f32::NAN.sat(), 0.0);
+    }
+}

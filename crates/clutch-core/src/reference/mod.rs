@@ -1,0 +1,179 @@
+//! Planned paths: where the shaft shall be at each tick, with velocity and acceleration.
+//!
+//! Positions are fixed-point counts (2⁻¹⁶ count, 64 bit) and depend on the tick's number, not
+//! on a sum over ticks: a ramp is as exact after a month as after a second. Velocity and
+//! acceleration are the analytic derivatives, in rad/s and rad/s².
+//!
+//! | reference | velocity | acceleration |
+//! |---|---|---|
+//! | hold | 0 | 0 |
+//! | ramp | jumps at the start | 0 |
+//! | trapezoid | continuous | jumps |
+//! | jerk-limited | continuous | continuous, jerk bounded |
+//! | minimum jerk | continuous | continuous (Flash and Hogan 1985) |
+//! | sine, chirp | continuous | continuous |
+//! | table, linear | jumps at knots | 0 |
+//! | table, cubic | continuous | jumps at knots; never overshoots (Fritsch and Butland 1984) |
+
+mod profile;
+mod table;
+mod wave;
+
+pub use profile::{JerkLimited, MinimumJerk, Trapezoid};
+pub use table::{Interpolation, Knot, Table};
+pub use wave::{Chirp, Sine};
+
+use crate::error::require;
+use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
+use profile::Profile;
+use wave::Wave;
+
+/// Where the shaft shall be now.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Target<T> {
+    /// `θ_d`, in 2⁻¹⁶ counts from the encoder's zero.
+    pub position: FixedCounts,
+    /// `θ̇_d`, rad/s.
+    pub velocity: T,
+    /// `θ̈_d`, rad/s².
+    pub acceleration: T,
+}
+
+/// Which path, and its parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ReferenceParams<'a, T = f64> {
+    /// Stay at the start.
+    Hold,
+    /// Constant rate from the first tick, rad/s; the paper's path.
+    Ramp(T),
+    /// Rest to rest with bounded velocity and acceleration.
+    Trapezoid(Trapezoid<T>),
+    /// Rest to rest with bounded velocity, acceleration and jerk.
+    JerkLimited(JerkLimited<T>),
+    /// Rest to rest with the least jerk over a given time.
+    MinimumJerk(MinimumJerk<T>),
+    /// A sine on a ramp.
+    Sine(Sine<T>),
+    /// A sine of rising or falling frequency on a ramp.
+    Chirp(Chirp<T>),
+    /// Points in time.
+    Table(Table<'a>),
+}
+
+/// A checked path.
+///
+/// ```
+/// use clutch_core::{Encoder, FixedCounts, Micros, reference::{Reference, ReferenceParams}};
+/// let two_deg_s = 2.0_f64.to_radians();
+/// let ramp = Reference::new(&ReferenceParams::Ramp(two_deg_s), FixedCounts(0), Encoder::PAPER, Micros(1000))?;
+/// let after_9_s = ramp.at(9_000); // 18° are 1000 counts
+/// assert!((after_9_s.position.0 - (1000 << 16)).abs() <= 1);
+/// assert_eq!(after_9_s.velocity, two_deg_s);
+/// # Ok::<(), clutch_core::ParamError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference<'a, T> {
+    kind: Kind<'a, T>,
+    start: FixedCounts,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind<'a, T> {
+    Profile(Profile<T>),
+    Wave(Wave<T>),
+    Table(Table<'a>, table::Scale<T>),
+}
+
+impl<'a, T: Real> Reference<'a, T> {
+    /// A path from `start`, the position at tick 0.
+    ///
+    /// # Errors
+    /// The first parameter out of range, by name.
+    pub fn new(
+        p: &ReferenceParams<'a, T>,
+        start: FixedCounts,
+        encoder: Encoder,
+        period: Micros,
+    ) -> Result<Self, ParamError<T>> {
+        let seconds = period.period::<T>()?;
+        let scale = Scale { counts_per_radian: encoder.counts_per_radian(), period: seconds };
+        let kind = match p {
+            ReferenceParams::Hold => Kind::Profile(Profile::ramp(T::ZERO, scale)),
+            ReferenceParams::Ramp(rate) => {
+                Kind::Profile(Profile::ramp(within_a_turn_per_tick("rate", *rate, scale)?, scale))
+            }
+            ReferenceParams::Trapezoid(p) => Kind::Profile(Profile::trapezoid(p, scale)?),
+            ReferenceParams::JerkLimited(p) => Kind::Profile(Profile::jerk_limited(p, scale)?),
+            ReferenceParams::MinimumJerk(p) => Kind::Profile(Profile::minimum_jerk(p, scale)?),
+            ReferenceParams::Sine(p) => Kind::Wave(Wave::sine(p, scale)?),
+            ReferenceParams::Chirp(p) => Kind::Wave(Wave::chirp(p, scale)?),
+            ReferenceParams::Table(table) => {
+                table.check()?;
+                Kind::Table(*table, table::Scale::new(encoder, period))
+            }
+        };
+        Ok(Reference { kind, start })
+    }
+
+    /// The target at a tick.
+    #[must_use]
+    pub fn at(&self, tick: u64) -> Target<T> {
+        let target = match &self.kind {
+            Kind::Profile(p) => p.at(tick),
+            Kind::Wave(w) => w.at(tick),
+            Kind::Table(t, scale) => t.at(tick, scale),
+        };
+        Target { position: target.position.plus(self.start), ..target }
+    }
+}
+
+/// What turns radians and seconds into counts and ticks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Scale<T> {
+    counts_per_radian: T,
+    /// s
+    period: T,
+}
+
+/// Fractional bits of a rate in counts per tick: 2⁻⁴⁰ count per tick is 1e-9 count per hour
+/// at 1 kHz.
+const RATE_BITS: u32 = 40;
+
+impl<T: Real> Scale<T> {
+    /// rad/s to 2⁻⁴⁰ counts per tick.
+    fn rate(&self, radians_per_second: T) -> i64 {
+        let counts_per_tick = radians_per_second * self.counts_per_radian * self.period;
+        (counts_per_tick * T::from_i64(1 << RATE_BITS)).floor().to_i64()
+    }
+
+    /// A small distance in radians to fixed-point counts.
+    fn distance(&self, radians: T) -> FixedCounts {
+        FixedCounts::from_real(radians * self.counts_per_radian)
+    }
+
+    fn seconds(&self, ticks: u64) -> T {
+        T::from_u64(ticks) * self.period
+    }
+}
+
+/// `rate · ticks`, exact.
+fn advance(rate: i64, ticks: u64) -> FixedCounts {
+    let product = i128::from(rate).wrapping_mul(i128::from(ticks));
+    FixedCounts((product >> (RATE_BITS - FixedCounts::FRACTION_BITS)) as i64)
+}
+
+/// A rate that 2⁻⁴⁰ counts per tick in 64 bits can hold.
+fn within_a_turn_per_tick<T: Real>(
+    field: &'static str,
+    rate: T,
+    scale: Scale<T>,
+) -> Result<T, ParamError<T>> {
+    let counts_per_tick = (rate * scale.counts_per_radian * scale.period).abs();
+    require(
+        field,
+        rate,
+        counts_per_tick < T::from_i32(4_000_000),
+        "a finite rate below 4e6 counts per period, rad/s",
+    )
+}

@@ -1,0 +1,138 @@
+//! A path through points in time.
+
+use super::Target;
+use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
+
+/// A point of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Knot {
+    /// Time from the start, µs.
+    pub time_us: u64,
+    /// Position relative to the start.
+    pub position: FixedCounts,
+}
+
+/// How to go from point to point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Interpolation {
+    /// Straight lines: the velocity jumps at each point.
+    Linear,
+    /// Monotone cubics (Fritsch and Butland 1984): the velocity is continuous and a rising
+    /// table never runs backwards, which a brake could not follow.
+    #[default]
+    Cubic,
+}
+
+/// Points and interpolation. Before the first point the path rests there, after the last too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Table<'a> {
+    /// Points with rising times.
+    pub knots: &'a [Knot],
+    /// How to go from point to point.
+    pub interpolation: Interpolation,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scale<T> {
+    radians_per_count: T,
+    period_us: u64,
+}
+
+impl<T: Real> Scale<T> {
+    pub(super) fn new(encoder: Encoder, period: Micros) -> Self {
+        Scale { radians_per_count: encoder.radians_per_count(), period_us: u64::from(period.0) }
+    }
+}
+
+/// One interval: length in s, rise in counts.
+#[derive(Clone, Copy)]
+struct Interval<T> {
+    length: T,
+    rise: T,
+}
+
+impl<T: Real> Interval<T> {
+    fn slope(self) -> T {
+        self.rise / self.length
+    }
+}
+
+impl Table<'_> {
+    pub(super) fn check<T: Real>(&self) -> Result<(), ParamError<T>> {
+        if self.knots.is_empty() {
+            return Err(ParamError { field: "knots", value: T::ZERO, expected: "at least one point" });
+        }
+        let rising = |w: &[Knot]| matches!(w, [a, b] if a.time_us < b.time_us);
+        match self.knots.windows(2).position(|w| !rising(w)) {
+            None => Ok(()),
+            Some(i) => Err(ParamError {
+                field: "knots",
+                value: T::from_u64(i as u64 + 1),
+                expected: "times that rise from point to point; the value is the number (from 0) of the point that does not",
+            }),
+        }
+    }
+
+    fn interval<T: Real>(&self, first: usize) -> Option<Interval<T>> {
+        let (a, b) = (self.knots.get(first)?, self.knots.get(first.checked_add(1)?)?);
+        Some(Interval {
+            length: T::from_u64(b.time_us.wrapping_sub(a.time_us)) / T::from_i32(1_000_000),
+            rise: b.position.minus(a.position),
+        })
+    }
+
+    /// The slope at a point, counts/s: a weighted harmonic mean of both sides; 0 at an extremum
+    /// and at the ends, where the path comes from rest and goes to rest.
+    fn slope<T: Real>(&self, at: usize) -> T {
+        let before = at.checked_sub(1).and_then(|i| self.interval::<T>(i));
+        match (before, self.interval::<T>(at)) {
+            (Some(l), Some(r)) => {
+                let (dl, dr) = (l.slope(), r.slope());
+                if dl * dr <= T::ZERO {
+                    return T::ZERO;
+                }
+                let two = T::from_i32(2);
+                let (wl, wr) = (two * r.length + l.length, r.length + two * l.length);
+                (wl + wr) / (wl / dl + wr / dr)
+            }
+            _ => T::ZERO,
+        }
+    }
+
+    pub(super) fn at<T: Real>(&self, tick: u64, scale: &Scale<T>) -> Target<T> {
+        let time = tick.saturating_mul(scale.period_us);
+        let after = self.knots.partition_point(|k| k.time_us <= time);
+        let Some(last) = after.checked_sub(1) else {
+            let position = self.knots.first().map_or(FixedCounts(0), |k| k.position);
+            return Target { position, ..Target::default() };
+        };
+        let Some(knot) = self.knots.get(last) else { return Target::default() };
+        let Some(interval) = self.interval::<T>(last) else {
+            return Target { position: knot.position, ..Target::default() };
+        };
+        let h = interval.length;
+        let s = T::from_u64(time.wrapping_sub(knot.time_us)) / T::from_i32(1_000_000) / h;
+        let (moved, velocity, acceleration) = match self.interpolation {
+            Interpolation::Linear => (s * interval.rise, interval.slope(), T::ZERO),
+            Interpolation::Cubic => {
+                let (m0, m1) = (self.slope::<T>(last) * h, self.slope::<T>(last.wrapping_add(1)) * h);
+                // Hermite: p = s (m0 + s (c2 + s c3)).
+                let (two, three) = (T::from_i32(2), T::from_i32(3));
+                let c2 = three * interval.rise - two * m0 - m1;
+                let c3 = m0 + m1 - two * interval.rise;
+                (
+                    s * (m0 + s * (c2 + s * c3)),
+                    (m0 + s * (two * c2 + s * three * c3)) / h,
+                    (two * c2 + T::from_i32(6) * s * c3) / (h * h),
+                )
+            }
+        };
+        Target {
+            position: knot.position.plus(FixedCounts::from_real(moved)),
+            velocity: velocity * scale.radians_per_count,
+            acceleration: acceleration * scale.radians_per_count,
+        }
+    }
+}

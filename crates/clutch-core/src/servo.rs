@@ -1,0 +1,227 @@
+//! The servo: encoder counts and target in, DAC code and terms out.
+//!
+//! ```text
+//! counts ─► unwrap ─► e ─┬──────────► law ─► limits ─► DAC code
+//! target ───────────────┴─► ė (5) ──┘
+//! ```
+//!
+//! The same type runs in the simulator, in the loop on Linux and on a board. It owns no clock
+//! and no I/O; [`Daq`] is the environment it needs.
+
+use crate::law::{Command, Controller, Law, LawParams, OutputParams, Tick};
+use crate::velocity::{VelocityParams, VelocitySource, VelocityState};
+use crate::{
+    Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros, ParamError, Plant, PlantParams, Real,
+    Target,
+};
+
+/// The data-acquisition board: one encoder, one converter.
+pub trait Daq {
+    /// What can go wrong.
+    type Error;
+    /// The encoder's counts now.
+    ///
+    /// # Errors
+    /// The board's own.
+    fn read(&mut self) -> Result<Counts, Self::Error>;
+    /// Gives the converter a code.
+    ///
+    /// # Errors
+    /// The board's own.
+    fn write(&mut self, code: DacCode) -> Result<(), Self::Error>;
+}
+
+/// Everything a servo is built from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoParams<T = f64> {
+    /// Sampling period `T`.
+    pub period: Micros,
+    /// The encoder.
+    pub encoder: Encoder,
+    /// The converter.
+    pub dac: DacParams<T>,
+    /// Where the error rate comes from.
+    pub velocity: VelocityParams<T>,
+    /// What an observer believes of the plant.
+    pub model: PlantParams<T>,
+    /// The law and its gains.
+    pub law: LawParams<T>,
+    /// Output limits and bumpless start.
+    pub output: OutputParams<T>,
+}
+
+impl<T: Real> ServoParams<T> {
+    /// The paper's hardware with the given law: 1 ms, 20 000 counts/rev, 12 bit over ±10 V.
+    #[must_use]
+    pub fn paper(law: LawParams<T>) -> Self {
+        ServoParams {
+            period: Micros(1000),
+            encoder: Encoder::PAPER,
+            dac: DacParams::default(),
+            velocity: VelocityParams::default(),
+            model: PlantParams::default(),
+            law,
+            output: OutputParams::default(),
+        }
+    }
+}
+
+/// A checked servo; never changes in a tick.
+///
+/// ```
+/// use clutch_core::{Counts, FixedCounts, Servo, ServoParams, Target};
+/// use clutch_core::law::{LawParams, PdParams};
+/// let servo = Servo::<f32>::new(&ServoParams::paper(LawParams::Pd(PdParams::default())))?;
+/// let target = Target { position: FixedCounts::from_counts(100), velocity: 0.0, acceleration: 0.0 };
+/// let mut state = servo.start(Counts(100), &target, 0.0);
+/// let out = servo.tick(&mut state, Counts(101), &target); // one count ahead: brake
+/// assert!(out.command.voltage > 0.0);
+/// # Ok::<(), clutch_core::ParamError<f32>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Servo<T, C = Law<T>> {
+    law: C,
+    velocity: VelocitySource<T>,
+    encoder: Encoder,
+    dac: Dac<T>,
+    period: Micros,
+    radians_per_count: T,
+}
+
+/// What a servo remembers; a clone is a snapshot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ServoState<T, S> {
+    /// Unwrapped position, counts.
+    position: i64,
+    last: Counts,
+    velocity: VelocityState<T>,
+    law: S,
+    applied: T,
+}
+
+/// What a tick gives.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ServoOutput<T, Terms> {
+    /// The code for the converter.
+    pub code: DacCode,
+    /// The voltage that the code stands for, V.
+    pub voltage: T,
+    /// What the law was given.
+    pub tick: Tick<T>,
+    /// What the law answered.
+    pub command: Command<T, Terms>,
+}
+
+impl<T: Real> Servo<T> {
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// The first parameter out of range, by name.
+    pub fn new(p: &ServoParams<T>) -> Result<Self, ParamError<T>> {
+        Servo::with_law(p, Law::new(&p.law, &p.output, p.period)?)
+    }
+}
+
+impl<T: Real, C: Controller<T>> Servo<T, C> {
+    /// A servo around a law of your own; `p.law` and `p.output` are not used.
+    ///
+    /// # Errors
+    /// The first parameter out of range, by name.
+    pub fn with_law(p: &ServoParams<T>, law: C) -> Result<Self, ParamError<T>> {
+        let model = Plant::new(&p.model)?;
+        Ok(Servo {
+            law,
+            velocity: VelocitySource::new(&p.velocity, &model, p.encoder, p.period)?,
+            encoder: p.encoder,
+            dac: Dac::new(&p.dac)?,
+            period: p.period,
+            radians_per_count: p.encoder.radians_per_count(),
+        })
+    }
+
+    /// The law.
+    #[must_use]
+    pub fn law(&self) -> &C {
+        &self.law
+    }
+
+    /// The encoder.
+    #[must_use]
+    pub fn encoder(&self) -> Encoder {
+        self.encoder
+    }
+
+    /// The converter.
+    #[must_use]
+    pub fn dac(&self) -> &Dac<T> {
+        &self.dac
+    }
+
+    /// The sampling period.
+    #[must_use]
+    pub fn period(&self) -> Micros {
+        self.period
+    }
+
+    /// The state for a start at `counts` (which becomes the unwrapped position) while the brake
+    /// is at `applied` volts and the shaft moves with the target.
+    #[must_use]
+    pub fn start(&self, counts: Counts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
+        let position = i64::from(counts.0);
+        let tick = self.measure(position, target, T::ZERO);
+        ServoState {
+            position,
+            last: counts,
+            velocity: self.velocity.start(FixedCounts::from_counts(position), target, applied),
+            law: self.law.start(&tick, applied),
+            applied,
+        }
+    }
+
+    /// One period.
+    #[inline]
+    pub fn tick(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        counts: Counts,
+        target: &Target<T>,
+    ) -> ServoOutput<T, C::Terms> {
+        state.position = state.position.wrapping_add(i64::from(counts.since(state.last)));
+        state.last = counts;
+        let position = FixedCounts::from_counts(state.position);
+        let error_rate = self.velocity.update(&mut state.velocity, position, target, state.applied);
+        let tick = self.measure(state.position, target, error_rate);
+        let command = self.law.update(&mut state.law, &tick);
+        let code = self.dac.code(command.voltage);
+        state.applied = self.dac.volts(code);
+        ServoOutput { code, voltage: state.applied, tick, command }
+    }
+
+    /// Reads the board, ticks, writes the board.
+    ///
+    /// # Errors
+    /// The board's own. After a failed read nothing has changed; after a failed write the
+    /// servo's state has moved on by the tick whose code was lost.
+    pub fn run<D: Daq>(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        daq: &mut D,
+        target: &Target<T>,
+    ) -> Result<ServoOutput<T, C::Terms>, D::Error> {
+        let counts = daq.read()?;
+        let output = self.tick(state, counts, target);
+        daq.write(output.code)?;
+        Ok(output)
+    }
+
+    #[inline]
+    fn measure(&self, position: i64, target: &Target<T>, error_rate: T) -> Tick<T> {
+        let counts: T = target.position.minus(FixedCounts::from_counts(position));
+        Tick {
+            error: counts * self.radians_per_count,
+            error_rate,
+            target_velocity: target.velocity,
+            target_acceleration: target.acceleration,
+        }
+    }
+}
