@@ -4,7 +4,7 @@
 //! as integers and only then converted, because an absolute angle in `f32` loses its
 //! derivative within a minute at 100 °/s.
 
-use crate::error::require;
+use crate::error::{cast, require};
 use crate::{ParamError, Real};
 
 /// Encoder counts as the counter gives them; wraps.
@@ -146,6 +146,8 @@ pub struct DacParams<T = f64> {
     /// Voltage one step above the highest code, V.
     pub highest: T,
 }
+
+cast!(DacParams { lowest, highest } keep { bits });
 
 impl<T: Real> Default for DacParams<T> {
     /// The paper's converter: 12 bit over ±10 V, 4.88 mV a step.

@@ -7,7 +7,7 @@
 //! It is a first-order low-pass on the backward difference; nothing is estimated. The
 //! difference is taken in integers, so it stays exact however far the shaft has turned.
 
-use crate::error::require;
+use crate::error::{cast, require};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 
 /// Parameters of (5); `Default` = 0.2, the value that reproduces the paper's figures.
@@ -19,6 +19,8 @@ pub struct SmoothedDerivativeParams<T = f64> {
     #[doc(alias = "K_Kal")]
     pub smoothing: T,
 }
+
+cast!(SmoothedDerivativeParams { smoothing });
 
 impl<T: Real> Default for SmoothedDerivativeParams<T> {
     fn default() -> Self {

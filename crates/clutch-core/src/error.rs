@@ -30,6 +30,24 @@ impl<T: fmt::Display> fmt::Display for ParamError<T> {
 
 impl<T: fmt::Debug + fmt::Display> core::error::Error for ParamError<T> {}
 
+/// Gives parameter structs a `cast` to the other scalar.
+macro_rules! cast {
+    ($name:ident { $($field:ident),* } $(keep { $($kept:ident),* })? $(nested { $($inner:ident),* })?) => {
+        impl<T: $crate::Real> $name<T> {
+            /// The same in another scalar, each number rounded to the nearest.
+            #[must_use]
+            pub fn cast<U: $crate::Real>(&self) -> $name<U> {
+                $name {
+                    $($field: U::from_f64(self.$field.to_f64()),)*
+                    $($($kept: self.$kept,)*)?
+                    $($($inner: self.$inner.cast(),)*)?
+                }
+            }
+        }
+    };
+}
+pub(crate) use cast;
+
 /// `Ok` if `holds` and `value` is finite.
 pub(crate) fn require<T: Real>(
     field: &'static str,

@@ -9,7 +9,7 @@
 //! (2) is Stribeck's curve as Lacraru et al. write it. Two readings are settled here:
 //! `sgn(0) = 0`, and a pad can only push, so a negative voltage gives no normal force.
 
-use crate::error::require;
+use crate::error::{cast, require};
 use crate::{ParamError, Real};
 
 /// Parameters of (2); `Default` = Table 1.
@@ -28,6 +28,8 @@ pub struct StribeckParams<T = f64> {
     #[doc(alias = "delta")]
     pub stribeck_exponent: T,
 }
+
+cast!(StribeckParams { mu_static, mu_dynamic, stribeck_velocity, stribeck_exponent });
 
 impl<T: Real> Default for StribeckParams<T> {
     fn default() -> Self {

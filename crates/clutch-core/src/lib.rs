@@ -19,6 +19,8 @@ mod derivative;
 mod error;
 mod friction;
 pub mod law;
+#[cfg(feature = "linalg")]
+mod observer;
 mod plant;
 mod real;
 pub mod reference;
@@ -29,6 +31,8 @@ pub use codes::{Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros};
 pub use derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeParams};
 pub use error::ParamError;
 pub use friction::{BrakeGeometry, Stribeck, StribeckParams};
+#[cfg(feature = "linalg")]
+pub use observer::{Estimate, Observer, ObserverGains, ObserverParams, ObserverState};
 pub use plant::{GRAVITY, Plant, PlantParams};
 pub use real::{Real, sin_cos_turns};
 pub use reference::Target;

@@ -6,7 +6,7 @@
 //!
 //! At rest the shaft stays at rest while `|T_u| ≤ μ_s K_COF v_a`.
 
-use crate::error::require;
+use crate::error::{cast, require};
 use crate::friction::{Stribeck, StribeckParams};
 use crate::{ParamError, Real};
 
@@ -32,6 +32,8 @@ pub struct PlantParams<T = f64> {
     /// The friction law (2).
     pub friction: StribeckParams<T>,
 }
+
+cast!(PlantParams { inertia, drive_torque, viscous_damping, brake_gain } nested { friction });
 
 impl<T: Real> Default for PlantParams<T> {
     fn default() -> Self {

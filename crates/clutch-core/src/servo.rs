@@ -8,6 +8,7 @@
 //! The same type runs in the simulator, in the loop on Linux and on a board. It owns no clock
 //! and no I/O; [`Daq`] is the environment it needs.
 
+use crate::error::cast;
 use crate::law::{Command, Controller, Law, LawParams, OutputParams, Tick};
 use crate::velocity::{VelocityParams, VelocitySource, VelocityState};
 use crate::{
@@ -42,13 +43,15 @@ pub struct ServoParams<T = f64> {
     pub dac: DacParams<T>,
     /// Where the error rate comes from.
     pub velocity: VelocityParams<T>,
-    /// What an observer believes of the plant.
+    /// What the computed-torque law and an observer believe of the plant.
     pub model: PlantParams<T>,
     /// The law and its gains.
     pub law: LawParams<T>,
     /// Output limits and bumpless start.
     pub output: OutputParams<T>,
 }
+
+cast!(ServoParams { } keep { period, encoder } nested { dac, velocity, model, law, output });
 
 impl<T: Real> ServoParams<T> {
     /// The paper's hardware with the given law: 1 ms, 20 000 counts/rev, 12 bit over ±10 V.
@@ -91,8 +94,8 @@ pub struct Servo<T, C = Law<T>> {
 /// What a servo remembers; a clone is a snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ServoState<T, S> {
-    /// Unwrapped position, counts.
-    position: i64,
+    /// Unwrapped position.
+    position: FixedCounts,
     last: Counts,
     velocity: VelocityState<T>,
     law: S,
@@ -118,7 +121,7 @@ impl<T: Real> Servo<T> {
     /// # Errors
     /// The first parameter out of range, by name.
     pub fn new(p: &ServoParams<T>) -> Result<Self, ParamError<T>> {
-        Servo::with_law(p, Law::new(&p.law, &p.output, p.period)?)
+        Servo::with_law(p, Law::new(&p.law, &p.model, &p.output, p.period)?)
     }
 }
 
@@ -167,12 +170,12 @@ impl<T: Real, C: Controller<T>> Servo<T, C> {
     /// is at `applied` volts and the shaft moves with the target.
     #[must_use]
     pub fn start(&self, counts: Counts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
-        let position = i64::from(counts.0);
+        let position = FixedCounts::from_counts(i64::from(counts.0));
         let tick = self.measure(position, target, T::ZERO);
         ServoState {
             position,
             last: counts,
-            velocity: self.velocity.start(FixedCounts::from_counts(position), target, applied),
+            velocity: self.velocity.start(position, target, applied),
             law: self.law.start(&tick, applied),
             applied,
         }
@@ -186,11 +189,23 @@ impl<T: Real, C: Controller<T>> Servo<T, C> {
         counts: Counts,
         target: &Target<T>,
     ) -> ServoOutput<T, C::Terms> {
-        state.position = state.position.wrapping_add(i64::from(counts.since(state.last)));
+        let moved = FixedCounts::from_counts(i64::from(counts.since(state.last)));
         state.last = counts;
-        let position = FixedCounts::from_counts(state.position);
+        self.tick_at(state, state.position.plus(moved), target)
+    }
+
+    /// One period with a position finer than a count: an interpolating encoder, or the ideal
+    /// sensor of a simulation. Use this or [`Servo::tick`] on one state, not both in turn.
+    #[inline]
+    pub fn tick_at(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        position: FixedCounts,
+        target: &Target<T>,
+    ) -> ServoOutput<T, C::Terms> {
+        state.position = position;
         let error_rate = self.velocity.update(&mut state.velocity, position, target, state.applied);
-        let tick = self.measure(state.position, target, error_rate);
+        let tick = self.measure(position, target, error_rate);
         let command = self.law.update(&mut state.law, &tick);
         let code = self.dac.code(command.voltage);
         state.applied = self.dac.volts(code);
@@ -215,8 +230,8 @@ impl<T: Real, C: Controller<T>> Servo<T, C> {
     }
 
     #[inline]
-    fn measure(&self, position: i64, target: &Target<T>, error_rate: T) -> Tick<T> {
-        let counts: T = target.position.minus(FixedCounts::from_counts(position));
+    fn measure(&self, position: FixedCounts, target: &Target<T>, error_rate: T) -> Tick<T> {
+        let counts: T = target.position.minus(position);
         Tick {
             error: counts * self.radians_per_count,
             error_rate,

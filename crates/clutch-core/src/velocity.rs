@@ -23,6 +23,18 @@ impl<T: Real> Default for VelocityParams<T> {
     }
 }
 
+impl<T: Real> VelocityParams<T> {
+    /// The same in another scalar, each number rounded to the nearest.
+    #[must_use]
+    pub fn cast<U: Real>(&self) -> VelocityParams<U> {
+        match self {
+            VelocityParams::SmoothedDerivative(p) => VelocityParams::SmoothedDerivative(p.cast()),
+            #[cfg(feature = "linalg")]
+            VelocityParams::Observer(p) => VelocityParams::Observer(p.cast()),
+        }
+    }
+}
+
 /// A checked velocity source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]

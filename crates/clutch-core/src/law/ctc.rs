@@ -9,11 +9,11 @@
 //! rest is about to move, so `μ = μ_s` there.
 
 use super::output::{Output, OutputParams, OutputState};
-use super::{Command, Controller, Tick};
-use crate::error::require;
+use super::{Command, Controller, Terms, Tick};
+use crate::error::{cast, require};
 use crate::{Micros, ParamError, Plant, PlantParams, Real};
 
-/// Gains of (11) and the plant that the law believes in; `Default` = Tables 1 and 2.
+/// Gains of (11); `Default` = Table 2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct CtcParams<T = f64> {
@@ -24,18 +24,13 @@ pub struct CtcParams<T = f64> {
     pub kp: T,
     /// `K_d` in (10), 1/s.
     pub kd: T,
-    /// The believed plant. It differs from the true one wherever friction is not known.
-    pub model: PlantParams<T>,
 }
+
+cast!(CtcParams { outer_gain, kp, kd });
 
 impl<T: Real> Default for CtcParams<T> {
     fn default() -> Self {
-        CtcParams {
-            outer_gain: T::from_i32(90),
-            kp: T::from_i32(100),
-            kd: T::from_f64(0.7),
-            model: PlantParams::default(),
-        }
+        CtcParams { outer_gain: T::from_i32(90), kp: T::from_i32(100), kd: T::from_f64(0.7) }
     }
 }
 
@@ -58,18 +53,32 @@ pub struct CtcTerms<T> {
     pub mu: T,
 }
 
+impl<T: Real> Terms<T> for CtcTerms<T> {
+    fn columns(&self) -> [(&'static str, T); 3] {
+        [
+            ("accel_demand_rad_s2", self.accel_demand),
+            ("friction_torque_demand_nm", self.friction_torque),
+            ("mu_model", self.mu),
+        ]
+    }
+}
+
 impl<T: Real> Ctc<T> {
-    /// Checks gains, model and output stage.
+    /// Checks gains, the plant that the law believes in, and output stage.
     ///
     /// # Errors
     /// A gain negative or not finite; a bad model (also one with `mu_static` or `mu_dynamic`
     /// 0, by which (11) divides); a bad output stage or period.
-    pub fn new(p: &CtcParams<T>, output: &OutputParams<T>, period: Micros) -> Result<Self, ParamError<T>> {
+    pub fn new(
+        p: &CtcParams<T>,
+        model: &PlantParams<T>,
+        output: &OutputParams<T>,
+        period: Micros,
+    ) -> Result<Self, ParamError<T>> {
         require("outer_gain", p.outer_gain, p.outer_gain >= T::ZERO, "a finite number of at least 0")?;
         require("kp", p.kp, p.kp >= T::ZERO, "a finite number of at least 0 1/s²")?;
         require("kd", p.kd, p.kd >= T::ZERO, "a finite number of at least 0 1/s")?;
-        let model = Plant::new(&p.model)?;
-        let f = &p.model.friction;
+        let f = &model.friction;
         require("mu_static", f.mu_static, f.mu_static > T::ZERO, "a number above 0: the law divides by it")?;
         require(
             "mu_dynamic",
@@ -77,13 +86,19 @@ impl<T: Real> Ctc<T> {
             f.mu_dynamic > T::ZERO,
             "a number above 0: the law divides by it",
         )?;
-        Ok(Ctc { params: *p, model, output: Output::new(output, period)? })
+        Ok(Ctc { params: *p, model: Plant::new(model)?, output: Output::new(output, period)? })
     }
 
-    /// Gains and model.
+    /// The gains.
     #[must_use]
     pub fn params(&self) -> &CtcParams<T> {
         &self.params
+    }
+
+    /// The believed plant. It differs from the true one wherever friction is not known.
+    #[must_use]
+    pub fn model(&self) -> &Plant<T> {
+        &self.model
     }
 
     /// The output stage.

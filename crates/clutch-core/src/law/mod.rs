@@ -17,7 +17,7 @@ pub use output::{Limit, Output, OutputParams, OutputState};
 pub use pd::{Pd, PdParams, PdTerms};
 pub use smc::{Smc, SmcParams, SmcSignParams, SmcTerms};
 
-use crate::{Micros, ParamError, Real};
+use crate::{Micros, ParamError, PlantParams, Real};
 
 /// What a law is given each period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,12 +52,18 @@ pub struct Command<T, Terms> {
     pub terms: Terms,
 }
 
+/// The intermediate terms of a law, as a log shows them.
+pub trait Terms<T>: Copy + Default {
+    /// Names with units, and values; the same names on every tick of one law.
+    fn columns(&self) -> [(&'static str, T); 3];
+}
+
 /// A control law sampled at a fixed period.
 pub trait Controller<T> {
     /// What the law remembers. `Default` = at rest; a clone is a snapshot.
     type State: Clone + Default;
     /// Its intermediate terms.
-    type Terms: Copy + Default;
+    type Terms: Terms<T>;
 
     /// The state for a start at `tick` while the brake is at `applied` volts.
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State;
@@ -81,11 +87,25 @@ pub enum LawParams<T = f64> {
     SmcSign(SmcSignParams<T>),
 }
 
+impl<T: Real> LawParams<T> {
+    /// The same in another scalar, each number rounded to the nearest.
+    #[must_use]
+    pub fn cast<U: Real>(&self) -> LawParams<U> {
+        match self {
+            LawParams::Pd(p) => LawParams::Pd(p.cast()),
+            LawParams::Ctc(p) => LawParams::Ctc(p.cast()),
+            LawParams::Smc(p) => LawParams::Smc(p.cast()),
+            LawParams::SmcSign(p) => LawParams::SmcSign(p.cast()),
+        }
+    }
+}
+
 /// The closed set of laws: what a configuration file, the wire and a log can name.
 ///
 /// ```
 /// use clutch_core::{Micros, law::{Controller, Law, LawParams, SmcParams, Tick}};
-/// let law = Law::<f64>::new(&LawParams::Smc(SmcParams::default()), &Default::default(), Micros(1000))?;
+/// let params = LawParams::Smc(SmcParams::default());
+/// let law = Law::<f64>::new(&params, &Default::default(), &Default::default(), Micros(1000))?;
 /// let mut state = Default::default();
 /// // The shaft is 0.1° ahead: the surface is beyond the layer, the brake gets K_p = 3 V.
 /// let tick = Tick { error: -0.1_f64.to_radians(), ..Tick::default() };
@@ -121,37 +141,30 @@ impl<T: Real> Default for LawTerms<T> {
     }
 }
 
-impl<T: Real> LawTerms<T> {
-    /// Names, units and values of the terms, for a log's columns; as many for one law always.
-    #[must_use]
-    pub fn columns(&self) -> [(&'static str, T); 3] {
+impl<T: Real> Terms<T> for LawTerms<T> {
+    fn columns(&self) -> [(&'static str, T); 3] {
         match self {
-            LawTerms::Pd(t) => [
-                ("proportional_v", t.proportional),
-                ("derivative_v", t.derivative),
-                ("demand_v", t.proportional + t.derivative),
-            ],
-            LawTerms::Ctc(t) => [
-                ("accel_demand_rad_s2", t.accel_demand),
-                ("friction_torque_demand_nm", t.friction_torque),
-                ("mu_model", t.mu),
-            ],
-            LawTerms::Smc(t) => {
-                [("surface_rad_s", t.surface), ("switching_v", t.switching), ("damping_v", t.damping)]
-            }
+            LawTerms::Pd(t) => t.columns(),
+            LawTerms::Ctc(t) => t.columns(),
+            LawTerms::Smc(t) => t.columns(),
         }
     }
 }
 
 impl<T: Real> Law<T> {
-    /// Checks gains and output stage.
+    /// Checks gains, believed plant (which only [`Ctc`] needs) and output stage.
     ///
     /// # Errors
     /// As the chosen law's constructor.
-    pub fn new(p: &LawParams<T>, output: &OutputParams<T>, period: Micros) -> Result<Self, ParamError<T>> {
+    pub fn new(
+        p: &LawParams<T>,
+        model: &PlantParams<T>,
+        output: &OutputParams<T>,
+        period: Micros,
+    ) -> Result<Self, ParamError<T>> {
         Ok(match p {
             LawParams::Pd(p) => Law::Pd(Pd::new(p, output, period)?),
-            LawParams::Ctc(p) => Law::Ctc(Ctc::new(p, output, period)?),
+            LawParams::Ctc(p) => Law::Ctc(Ctc::new(p, model, output, period)?),
             LawParams::Smc(p) => Law::Smc(Smc::new(p, output, period)?),
             LawParams::SmcSign(p) => Law::Smc(Smc::with_sign(p, output, period)?),
         })

@@ -1,6 +1,6 @@
 //! The end that all laws share: bumpless start, limits, and what a non-number becomes.
 
-use crate::error::require;
+use crate::error::{cast, require};
 use crate::{Micros, ParamError, Real};
 
 /// Output stage of a law; `Default` = the paper's 0 to 10 V without bumpless start, braking
@@ -18,6 +18,8 @@ pub struct OutputParams<T = f64> {
     /// law's first demand decays, s; 0 starts with the law's own demand.
     pub bumpless_time: T,
 }
+
+cast!(OutputParams { lowest, highest, on_invalid, bumpless_time });
 
 impl<T: Real> Default for OutputParams<T> {
     fn default() -> Self {

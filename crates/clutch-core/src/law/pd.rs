@@ -8,8 +8,8 @@
 //! has to let go; as printed it holds harder and the shaft never comes back.
 
 use super::output::{Output, OutputParams, OutputState};
-use super::{Command, Controller, Tick};
-use crate::error::require;
+use super::{Command, Controller, Terms, Tick};
+use crate::error::{cast, require};
 use crate::{Micros, ParamError, Real};
 
 /// Gains of (4); `Default` = Table 2.
@@ -21,6 +21,8 @@ pub struct PdParams<T = f64> {
     /// `K_d` in (4), V s/rad.
     pub kd: T,
 }
+
+cast!(PdParams { kp, kd });
 
 impl<T: Real> Default for PdParams<T> {
     fn default() -> Self {
@@ -42,6 +44,16 @@ pub struct PdTerms<T> {
     pub proportional: T,
     /// `−K_d ė`, V.
     pub derivative: T,
+}
+
+impl<T: Real> Terms<T> for PdTerms<T> {
+    fn columns(&self) -> [(&'static str, T); 3] {
+        [
+            ("proportional_v", self.proportional),
+            ("derivative_v", self.derivative),
+            ("demand_v", self.proportional + self.derivative),
+        ]
+    }
 }
 
 impl<T: Real> Pd<T> {

@@ -9,8 +9,8 @@
 //! `ε` divides `σ` (rad/s) and `σ ė` (rad²/s²) alike; the paper gives it no unit.
 
 use super::output::{Output, OutputParams, OutputState};
-use super::{Command, Controller, Tick};
-use crate::error::require;
+use super::{Command, Controller, Terms, Tick};
+use crate::error::{cast, require};
 use crate::{Micros, ParamError, Real};
 
 /// Gains of (31); `Default` = Table 2.
@@ -29,6 +29,9 @@ pub struct SmcParams<T = f64> {
     #[doc(alias = "epsilon")]
     pub boundary: T,
 }
+
+cast!(SmcParams { kp, kd, slope, boundary });
+cast!(SmcSignParams { kp, kd, slope });
 
 impl<T: Real> Default for SmcParams<T> {
     fn default() -> Self {
@@ -86,6 +89,12 @@ pub struct SmcTerms<T> {
     pub switching: T,
     /// `−K_d sat(σ ė/ε) ė`, V.
     pub damping: T,
+}
+
+impl<T: Real> Terms<T> for SmcTerms<T> {
+    fn columns(&self) -> [(&'static str, T); 3] {
+        [("surface_rad_s", self.surface), ("switching_v", self.switching), ("damping_v", self.damping)]
+    }
 }
 
 impl<T: Real> Smc<T> {

@@ -23,7 +23,7 @@ pub use profile::{JerkLimited, MinimumJerk, Trapezoid};
 pub use table::{Interpolation, Knot, Table};
 pub use wave::{Chirp, Sine};
 
-use crate::error::require;
+use crate::error::{cast, require};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 use profile::Profile;
 use wave::Wave;
@@ -38,6 +38,8 @@ pub struct Target<T> {
     /// `θ̈_d`, rad/s².
     pub acceleration: T,
 }
+
+cast!(Target { velocity, acceleration } keep { position });
 
 /// Which path, and its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,3 @@
+//! The `clutch` command.
+
+fn main() {}

@@ -1,0 +1,251 @@
+//! Engines: what moves the shaft from one sample to the next.
+//!
+//! ```text
+//!            |T| > μ_s K_COF v_a m(θ)                 ω reaches 0 and
+//!           ┌───── break-away ──────► Slip ±1 ──┐     |T| ≤ μ_s K_COF v_a m(θ)
+//!         Stuck                                 │
+//!           └◄──────────── stop ────────────────┘     (else Slip ∓1)
+//! ```
+//!
+//! A stuck shaft has velocity exactly 0 and does not move at all. Stop and break-away are found
+//! as roots, not as a threshold on a small velocity. All engines work from one [`Model`] and one
+//! [`Input`]; which one runs is chosen by [`EngineKind`].
+
+mod dormand_prince;
+mod exact_flow;
+
+pub use dormand_prince::DormandPrince;
+pub use exact_flow::ExactFlow;
+
+use crate::drive::Drive;
+use crate::rig::Ripple;
+use clutch_core::Plant;
+
+/// Whether the shaft is stuck, and which way it slips.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// Held by friction: velocity exactly 0.
+    Stuck,
+    /// Velocity at or above 0, friction torque negative.
+    Forward,
+    /// Velocity at or below 0, friction torque positive.
+    Backward,
+}
+
+impl Motion {
+    /// Sign of the velocity.
+    pub(crate) fn sign(self) -> f64 {
+        match self {
+            Motion::Stuck => 0.0,
+            Motion::Forward => 1.0,
+            Motion::Backward => -1.0,
+        }
+    }
+
+    fn along(torque: f64) -> Motion {
+        if torque > 0.0 { Motion::Forward } else { Motion::Backward }
+    }
+}
+
+/// The state of the shaft.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shaft {
+    /// `θ`, rad.
+    pub position: f64,
+    /// `θ̇`, rad/s.
+    pub velocity: f64,
+    /// Stuck or slipping.
+    pub motion: Motion,
+}
+
+impl Shaft {
+    /// A shaft at a position and a velocity; at rest it is stuck until the first check.
+    #[must_use]
+    pub fn new(position: f64, velocity: f64) -> Self {
+        let motion = if velocity == 0.0 { Motion::Stuck } else { Motion::along(velocity) };
+        Shaft { position, velocity, motion }
+    }
+}
+
+/// What an engine integrates: the plant (1), with friction that may vary along the disc.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Inertia, damping, brake gain, friction law.
+    pub plant: Plant<f64>,
+    /// Friction along the disc; none = even.
+    pub ripple: Option<Ripple>,
+}
+
+impl Model {
+    /// Factor on friction at a position.
+    #[inline]
+    pub(crate) fn friction_factor(&self, position: f64) -> f64 {
+        self.ripple.as_ref().map_or(1.0, |r| r.factor(position))
+    }
+
+    /// `|T|` that friction holds at rest, N m.
+    #[inline]
+    pub(crate) fn break_away_torque(&self, position: f64, volts: f64) -> f64 {
+        self.plant.break_away_torque(volts) * self.friction_factor(position)
+    }
+}
+
+/// The brake's voltage between two samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Volts {
+    /// Held, V.
+    Held(f64),
+    /// On the way from one voltage to another through a first-order actuator.
+    Lag {
+        /// At the sample, V.
+        from: f64,
+        /// Commanded, V.
+        to: f64,
+        /// Time constant, s.
+        time_constant: f64,
+    },
+}
+
+impl Volts {
+    /// `s` seconds after the sample, V.
+    #[inline]
+    pub(crate) fn at(self, s: f64) -> f64 {
+        match self {
+            Volts::Held(v) => v,
+            Volts::Lag { from, to, time_constant } => to + (from - to) * libm::exp(-s / time_constant),
+        }
+    }
+}
+
+/// What acts on the shaft between two samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// Time of the sample, s.
+    pub time: f64,
+    /// Length of the interval, s.
+    pub duration: f64,
+    /// Brake voltage.
+    pub volts: Volts,
+    /// Driving torque.
+    pub drive: &'a Drive,
+    /// Torque noise, held over the interval, N m.
+    pub noise: f64,
+}
+
+impl Input<'_> {
+    /// Driving torque `s` seconds after the sample, N m.
+    #[inline]
+    pub(crate) fn torque(&self, s: f64) -> f64 {
+        self.drive.torque(self.time + s) + self.noise
+    }
+
+    /// Voltage and torque stay the same over the interval.
+    pub(crate) fn is_constant(&self) -> bool {
+        matches!(self.volts, Volts::Held(_)) && self.drive.is_constant()
+    }
+}
+
+/// What happened between two samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// When, s.
+    pub time: f64,
+    /// What.
+    pub kind: EventKind,
+    /// Where, rad.
+    pub position: f64,
+    /// Driving torque then, N m.
+    pub torque: f64,
+}
+
+/// Kinds of events.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// The shaft came to rest and is held.
+    Stick,
+    /// The shaft broke away.
+    BreakAway,
+}
+
+/// An engine gave up.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum EngineError {
+    /// Too many steps or events in one interval.
+    #[error(
+        "the motion after t = {time} s needs more than {limit} steps in one sampling period: \
+         a parameter of the rig is out of all proportion (a tiny inertia or Stribeck velocity?)"
+    )]
+    TooManySteps {
+        /// Start of the interval, s.
+        time: f64,
+        /// The limit.
+        limit: u32,
+    },
+    /// The state is no longer a number.
+    #[error("the motion after t = {time} s left the range of numbers")]
+    NotFinite {
+        /// Start of the interval, s.
+        time: f64,
+    },
+}
+
+/// Moves a shaft over an interval.
+pub trait Engine {
+    /// Moves `shaft` to the end of the interval and adds what happened to `events`.
+    ///
+    /// # Errors
+    /// If the motion cannot be followed; the shaft is then where it was last sure.
+    fn advance(
+        &mut self,
+        model: &Model,
+        input: &Input<'_>,
+        shaft: &mut Shaft,
+        events: &mut Vec<Event>,
+    ) -> Result<(), EngineError>;
+}
+
+/// Which engine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EngineKind {
+    /// The exact flow where the rig allows it, else Dormand–Prince.
+    #[default]
+    Auto,
+    /// Dormand and Prince's 5(4) pair, the paper's solver, with events: takes every rig.
+    DormandPrince,
+    /// The closed form of the motion between samples: Stribeck exponent 1, friction even along
+    /// the disc, torque and voltage held between samples.
+    ExactFlow,
+}
+
+/// Longest time without an event that a search for break-away may step over, as a share of the
+/// interval, where torque or voltage change within it.
+const BREAK_AWAY_STEPS: u32 = 8;
+
+/// The first instant after `s` at which a stuck shaft breaks away, if it does before the end.
+///
+/// The instant given back is on the far side of the root: there the torque exceeds friction.
+fn break_away(model: &Model, input: &Input<'_>, position: f64, s: f64) -> Option<f64> {
+    let excess = |s: f64| input.torque(s).abs() - model.break_away_torque(position, input.volts.at(s));
+    if excess(s) > 0.0 {
+        return Some(s);
+    }
+    if input.is_constant() {
+        return None;
+    }
+    let step = (input.duration - s) / f64::from(BREAK_AWAY_STEPS);
+    let mut before = s;
+    for i in 1..=BREAK_AWAY_STEPS {
+        let mut after = if i == BREAK_AWAY_STEPS { input.duration } else { s + step * f64::from(i) };
+        if excess(after) > 0.0 {
+            // Halving to the last bit of an interval of a millisecond: below 1e-18 s.
+            for _ in 0..52 {
+                let middle = 0.5 * (before + after);
+                if excess(middle) > 0.0 { after = middle } else { before = middle }
+            }
+            return Some(after);
+        }
+        before = after;
+    }
+    None
+}

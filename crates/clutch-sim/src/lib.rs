@@ -1,0 +1,12 @@
+//! Event-exact simulation of a brake-restrained shaft under a sampled control law.
+
+pub mod drive;
+pub mod engine;
+pub mod metrics;
+pub mod paper;
+pub mod rig;
+pub mod run;
+
+pub use metrics::Metrics;
+pub use rig::RigParams;
+pub use run::{Run, RunError, RunParams, RunSpec, Start, simulate, simulate_servo};

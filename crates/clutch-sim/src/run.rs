@@ -1,0 +1,329 @@
+//! One run: rig, servo and path in closed loop.
+
+use crate::engine::{
+    DormandPrince, Engine, EngineError, EngineKind, Event, EventKind, ExactFlow, Input, Motion, Shaft, Volts,
+};
+use crate::metrics::{Metrics, MetricsBuilder, MetricsSample};
+use crate::rig::{Rig, RigParams};
+use clutch_core::law::{Controller, LawParams, OutputParams, Terms};
+use clutch_core::reference::{Reference, ReferenceParams};
+use clutch_core::{
+    Counts, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, VelocityParams,
+};
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use std::collections::VecDeque;
+
+/// How the shaft begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// On the path: at its velocity, the brake at the voltage that keeps it. (12) and (13)
+    /// assume a path without jumps.
+    #[default]
+    OnPath,
+    /// Held at rest.
+    Rest,
+}
+
+/// When and how long.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunParams {
+    /// Length, s.
+    pub duration: f64,
+    /// What is left out of the figures at the start, s.
+    pub settle: f64,
+    /// How the shaft begins.
+    pub start: Start,
+    /// Position at which shaft and path begin, counts; none = somewhere within the first count,
+    /// drawn from the seed. Where the path lies between the encoder's edges decides how often a
+    /// slow shaft sticks, and nobody mounts an encoder to a fraction of a count.
+    pub start_counts: Option<f64>,
+    /// Seed of everything random: start, ripple phases, noise, a hand.
+    pub seed: u64,
+    /// Which engine.
+    pub engine: EngineKind,
+}
+
+impl Default for RunParams {
+    fn default() -> Self {
+        RunParams {
+            duration: 5.0,
+            settle: 1.0,
+            start: Start::OnPath,
+            start_counts: None,
+            seed: 1,
+            engine: EngineKind::Auto,
+        }
+    }
+}
+
+/// Everything a run is made of, SI and radians.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSpec<'a> {
+    /// The rig.
+    pub rig: RigParams,
+    /// Sampling period.
+    pub period: Micros,
+    /// Where the law's error rate comes from.
+    pub velocity: VelocityParams,
+    /// What law and observer believe of the plant.
+    pub model: PlantParams,
+    /// The law.
+    pub law: LawParams,
+    /// Output limits and bumpless start.
+    pub output: OutputParams,
+    /// The path.
+    pub reference: ReferenceParams<'a>,
+    /// When and how long.
+    pub run: RunParams,
+}
+
+impl<'a> RunSpec<'a> {
+    /// The paper's sampling and filter, its nominal model, on a rig.
+    #[must_use]
+    pub fn new(rig: RigParams, law: LawParams, reference: ReferenceParams<'a>) -> Self {
+        RunSpec {
+            rig,
+            period: Micros(1000),
+            velocity: VelocityParams::default(),
+            model: PlantParams::default(),
+            law,
+            output: OutputParams::default(),
+            reference,
+            run: RunParams::default(),
+        }
+    }
+
+    /// The servo's parameters.
+    ///
+    /// # Errors
+    /// Field `counts_per_rev`.
+    pub fn servo(&self) -> Result<ServoParams, ParamError> {
+        Ok(ServoParams {
+            period: self.period,
+            encoder: Encoder::new(self.rig.counts_per_rev)?,
+            dac: self.rig.dac,
+            velocity: self.velocity,
+            model: self.model,
+            law: self.law,
+            output: self.output,
+        })
+    }
+}
+
+/// A run could not be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RunError {
+    /// A parameter is out of range.
+    #[error(transparent)]
+    Param(#[from] ParamError),
+    /// The engine cannot take the rig.
+    #[error("engine = exact_flow needs {0}; use engine = dormand_prince or auto")]
+    Engine(&'static str),
+    /// The engine gave up.
+    #[error(transparent)]
+    Motion(#[from] EngineError),
+}
+
+/// The samples of a run, one column each; SI and radians.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// Time, s.
+    pub time: Vec<f64>,
+    /// `θ_d`, rad.
+    pub target_position: Vec<f64>,
+    /// `θ`, rad.
+    pub position: Vec<f64>,
+    /// `θ̇`, rad/s.
+    pub velocity: Vec<f64>,
+    /// `e = θ_d − θ`, rad.
+    pub error: Vec<f64>,
+    /// Encoder counts.
+    pub counts: Vec<i32>,
+    /// `e` as the law saw it, rad.
+    pub measured_error: Vec<f64>,
+    /// `ė` as the law saw it, rad/s.
+    pub error_rate: Vec<f64>,
+    /// DAC code.
+    pub code: Vec<u16>,
+    /// Voltage commanded, V.
+    pub voltage: Vec<f64>,
+    /// Whether the shaft was stuck at the sample.
+    pub stuck: Vec<bool>,
+    /// The law's terms: names and columns.
+    pub terms: [(&'static str, Vec<f64>); 3],
+}
+
+/// A run's outcome.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Samples.
+    pub trace: Trace,
+    /// Sticks and break-aways, in order.
+    pub events: Vec<Event>,
+    /// Figures.
+    pub metrics: Metrics,
+    /// Which engine ran.
+    pub engine: EngineKind,
+}
+
+/// Runs the law of the specification, in the scalar `T`.
+///
+/// # Errors
+/// A parameter out of range, an engine that cannot take the rig, a motion it cannot follow.
+pub fn simulate<T: Real>(spec: &RunSpec<'_>) -> Result<Run, RunError> {
+    let servo = Servo::<T>::new(&spec.servo()?.cast()).map_err(to_f64)?;
+    simulate_servo(spec, &servo)
+}
+
+/// Runs a servo around any law; the specification's own law is not used.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_servo<T: Real, C: Controller<T>>(
+    spec: &RunSpec<'_>,
+    servo: &Servo<T, C>,
+) -> Result<Run, RunError> {
+    let rig = Rig::new(&spec.rig, spec.run.seed)?;
+    let constant = rig.drive.is_constant();
+    let refused = ExactFlow::refuses(&rig.model, constant, spec.rig.actuator_time_constant.is_some());
+    match (spec.run.engine, refused) {
+        (EngineKind::ExactFlow, Some(needs)) => Err(RunError::Engine(needs)),
+        (EngineKind::DormandPrince, _) | (EngineKind::Auto, Some(_)) => {
+            run(spec, servo, &rig, DormandPrince::default(), EngineKind::DormandPrince)
+        }
+        (EngineKind::ExactFlow | EngineKind::Auto, None) => {
+            run(spec, servo, &rig, ExactFlow, EngineKind::ExactFlow)
+        }
+    }
+}
+
+fn run<T: Real, C: Controller<T>, E: Engine>(
+    spec: &RunSpec<'_>,
+    servo: &Servo<T, C>,
+    rig: &Rig,
+    mut engine: E,
+    kind: EngineKind,
+) -> Result<Run, RunError> {
+    let period: f64 = spec.period.period()?;
+    let p = &spec.run;
+    if !(p.duration >= period && p.duration <= 1e6) {
+        return Err(
+            ParamError { field: "duration", value: p.duration, expected: "one period to 1e6 s" }.into()
+        );
+    }
+    if !(p.settle >= 0.0 && p.settle < p.duration) {
+        return Err(ParamError {
+            field: "settle",
+            value: p.settle,
+            expected: "at least 0 s and less than the duration",
+        }
+        .into());
+    }
+    let ticks = libm::rint(p.duration / period) as u64;
+    // The path is planned in double precision and rounded to the law's scalar at each tick, so
+    // that runs in both scalars follow one path.
+    let start = match p.start_counts {
+        Some(counts) if counts.abs() < 1e9 => FixedCounts::from_real(counts),
+        Some(value) => {
+            return Err(ParamError {
+                field: "start_counts",
+                value,
+                expected: "a finite number below 1e9 counts",
+            }
+            .into());
+        }
+        None => FixedCounts(Pcg64::seed_from_u64(p.seed ^ 0x0073_7461_7274).random_range(0..1 << 16)),
+    };
+    let reference = Reference::new(&spec.reference, start, rig.encoder, spec.period)?;
+    let to_radians = |p: FixedCounts| p.minus::<f64>(FixedCounts(0)) * rig.encoder.radians_per_count::<f64>();
+    let per_radian: f64 = rig.encoder.counts_per_radian();
+
+    let first = reference.at(0);
+    let velocity = if p.start == Start::OnPath { first.velocity } else { 0.0 };
+    let mut shaft = Shaft::new(to_radians(first.position), velocity);
+    let mut volts = rig.sliding_voltage(velocity);
+    let counts_at = |position: f64| Counts(libm::floor(position * per_radian) as i64 as i32);
+    let mut state = servo.start(counts_at(shaft.position), &first.cast(), T::from_f64(volts));
+    let mut pending: VecDeque<f64> = std::iter::repeat_n(volts, spec.rig.delay_ticks as usize).collect();
+    let mut noise = Pcg64::seed_from_u64(p.seed ^ 0x006e_6f69_7365);
+
+    let mut trace = Trace::default();
+    let mut events = Vec::new();
+    let mut figures = MetricsBuilder::new(period, p.settle);
+    for k in 0..ticks {
+        let time = k as f64 * period;
+        let target = reference.at(k);
+        let counts = counts_at(shaft.position);
+        let out = if spec.rig.encoder_quantised {
+            servo.tick(&mut state, counts, &target.cast())
+        } else {
+            let fine = FixedCounts::from_real(shaft.position * per_radian);
+            servo.tick_at(&mut state, fine, &target.cast())
+        };
+        let commanded =
+            if spec.rig.dac_quantised { rig.dac.volts(out.code) } else { out.command.voltage.to_f64() };
+        let target_position = to_radians(target.position);
+        let error = target_position - shaft.position;
+        figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage: commanded });
+        trace.time.push(time);
+        trace.target_position.push(target_position);
+        trace.position.push(shaft.position);
+        trace.velocity.push(shaft.velocity);
+        trace.error.push(error);
+        trace.counts.push(counts.0);
+        trace.measured_error.push(out.tick.error.to_f64());
+        trace.error_rate.push(out.tick.error_rate.to_f64());
+        trace.code.push(out.code.0);
+        trace.voltage.push(commanded);
+        trace.stuck.push(shaft.motion == Motion::Stuck);
+        for (column, (name, value)) in trace.terms.iter_mut().zip(out.command.terms.columns()) {
+            column.0 = name;
+            column.1.push(value.to_f64());
+        }
+
+        pending.push_back(commanded);
+        let arriving = pending.pop_front().unwrap_or(commanded);
+        let input = Input {
+            time,
+            duration: period,
+            volts: match spec.rig.actuator_time_constant {
+                None => Volts::Held(arriving),
+                Some(time_constant) => Volts::Lag { from: volts, to: arriving, time_constant },
+            },
+            drive: &rig.drive,
+            noise: if spec.rig.torque_noise > 0.0 {
+                let x: f64 = StandardNormal.sample(&mut noise);
+                spec.rig.torque_noise * x
+            } else {
+                0.0
+            },
+        };
+        let seen = events.len();
+        let was_stuck = shaft.motion == Motion::Stuck;
+        engine.advance(&rig.model, &input, &mut shaft, &mut events)?;
+        volts = input.volts.at(period);
+        figures.stuck(time, stuck_time(was_stuck, time, period, &events[seen..]));
+        events[seen..].iter().for_each(|e| figures.event(e));
+    }
+    Ok(Run { trace, events, metrics: figures.finish(), engine: kind })
+}
+
+/// Time spent stuck within one interval.
+fn stuck_time(mut stuck: bool, begin: f64, period: f64, events: &[Event]) -> f64 {
+    let (mut since, mut sum) = (begin, 0.0);
+    for e in events {
+        if stuck && e.kind == EventKind::BreakAway {
+            sum += e.time - since;
+        }
+        stuck = e.kind == EventKind::Stick;
+        since = e.time;
+    }
+    if stuck { sum + (begin + period - since) } else { sum }
+}
+
+fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
+    ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }
+}
