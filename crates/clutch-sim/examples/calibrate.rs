@@ -19,26 +19,25 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 /// Seeds of the runs that the fit sees; `clutch reproduce` uses others (1 to 10).
-const FIT_SEEDS: [u64; 6] = [101, 102, 103, 104, 105, 106];
+const FIT_SEEDS: std::ops::RangeInclusive<u64> = 101..=120;
 /// Table 3: rate in °/s, reduction in per cent.
 const TABLE3: [(f64, f64); 3] = [(10.0, 88.6), (6.0, 88.9), (2.0, 83.8)];
-const OFFSPRING: usize = 16;
+const OFFSPRING: usize = 12;
 
 /// What is searched, in the order of [`NAMES`].
-type Point = [f64; 8];
-const NAMES: [&str; 8] = [
+type Point = [f64; 6];
+const NAMES: [&str; 6] = [
     "mu_static",
     "mu_dynamic",
     "stribeck_velocity",
     "load factor",
     "ripple amplitude",
-    "ripple wave number",
-    "torque noise (N m)",
-    "actuator time constant (s)",
+    "ripple wave number (1/rad)",
 ];
-const LOWEST: Point = [0.12, 0.08, 2e-4, 0.9, 0.0, 20.0, 1e-6, 1e-5];
-const HIGHEST: Point = [0.30, 0.25, 2e-2, 1.1, 0.2, 800.0, 5e-3, 2e-3];
-const START: Point = [0.194, 0.105, 0.00103, 1.033, 0.12, 164.0, 1e-5, 5e-5];
+const LOWEST: Point = [0.12, 0.08, 2e-4, 0.9, 0.0, 20.0];
+const HIGHEST: Point = [0.30, 0.25, 2e-2, 1.1, 0.2, 800.0];
+/// Where the search starts: a rig found by hand that behaves roughly like the experiment.
+const START: Point = [0.194, 0.105, 0.00103, 1.033, 0.12, 164.0];
 
 fn rig(x: &Point) -> RigParams {
     RigParams {
@@ -50,8 +49,6 @@ fn rig(x: &Point) -> RigParams {
         },
         drive: DriveParams::Weight { mass: 0.2 * x[3], gravity: GRAVITY, pulley_radius: 0.024 },
         ripple: Some(RippleParams { amplitude: x[4], wave_number: x[5], waves: 4 }),
-        torque_noise: x[6],
-        actuator_time_constant: Some(x[7]),
         delay_ticks: 1,
         ..RigParams::paper()
     }
@@ -82,9 +79,9 @@ fn score(x: &Point) -> Score {
         pd_smooth: 0.0,
         pd_error_deg: 0.0,
     };
-    let n = FIT_SEEDS.len() as f64;
+    let n = FIT_SEEDS.count() as f64;
     let mean = |f: &dyn Fn(u64) -> Option<f64>| -> Option<f64> {
-        FIT_SEEDS.iter().map(|s| f(*s)).sum::<Option<f64>>().map(|sum| sum / n)
+        FIT_SEEDS.map(f).sum::<Option<f64>>().map(|sum| sum / n)
     };
     let cycles = |law, rate| move |seed| measure(x, law, rate, seed).map(|m| m.stick_slip_cycles_per_s);
     let mut loss = 0.0;
@@ -142,7 +139,7 @@ fn argument(name: &str, default: u64) -> u64 {
 }
 
 fn main() {
-    let (generations, seed) = (argument("--generations", 120), argument("--seed", 1));
+    let (generations, seed) = (argument("--generations", 40), argument("--seed", 1));
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut best = START;
     let mut best_score = score(&best);

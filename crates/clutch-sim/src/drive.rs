@@ -28,9 +28,9 @@ pub enum DriveParams {
         /// Root mean square of the random part, N m.
         rms: f64,
         /// Lower end of the band, Hz.
-        lowest: f64,
+        lowest_frequency: f64,
         /// Upper end of the band, Hz.
-        highest: f64,
+        highest_frequency: f64,
     },
 }
 
@@ -96,7 +96,7 @@ impl Drive {
                 }
                 Ok(Drive::Table(points.clone()))
             }
-            DriveParams::Hand { mean, rms, lowest, highest } => {
+            DriveParams::Hand { mean, rms, lowest_frequency: lowest, highest_frequency: highest } => {
                 if !mean.is_finite() {
                     return bad("mean", *mean, "a finite torque, N m");
                 }
@@ -104,11 +104,11 @@ impl Drive {
                     return bad("rms", *rms, "a finite torque of at least 0 N m");
                 }
                 if !(*lowest >= 0.0 && lowest.is_finite()) {
-                    return bad("lowest", *lowest, "a finite frequency of at least 0 Hz");
+                    return bad("lowest_frequency", *lowest, "a finite frequency of at least 0 Hz");
                 }
                 if !(highest > lowest && *highest <= 50.0) {
                     return bad(
-                        "highest",
+                        "highest_frequency",
                         *highest,
                         "a frequency above the lowest and at most 50 Hz (a hand is slower)",
                     );
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_hand_has_its_mean_and_rms_and_repeats_with_its_seed() {
-        let p = DriveParams::Hand { mean: 0.05, rms: 0.01, lowest: 0.2, highest: 5.0 };
+        let p = DriveParams::Hand { mean: 0.05, rms: 0.01, lowest_frequency: 0.2, highest_frequency: 5.0 };
         let d = Drive::new(&p, 7).unwrap();
         let n = 200_000;
         let (mut sum, mut square) = (0.0, 0.0);
@@ -211,7 +211,7 @@ mod tests {
         assert_eq!(Drive::new(&weight(f64::NAN), 0).unwrap_err().field, "mass");
         let table = DriveParams::Table(vec![(0.0, 1.0), (0.0, 2.0)]);
         assert_eq!(Drive::new(&table, 0).unwrap_err().field, "points");
-        let hand = DriveParams::Hand { mean: 0.0, rms: 0.01, lowest: 2.0, highest: 1.0 };
-        assert_eq!(Drive::new(&hand, 0).unwrap_err().field, "highest");
+        let hand = DriveParams::Hand { mean: 0.0, rms: 0.01, lowest_frequency: 2.0, highest_frequency: 1.0 };
+        assert_eq!(Drive::new(&hand, 0).unwrap_err().field, "highest_frequency");
     }
 }

@@ -6,7 +6,9 @@ pub mod metrics;
 pub mod paper;
 pub mod rig;
 pub mod run;
+pub mod scenario;
 
 pub use metrics::Metrics;
 pub use rig::RigParams;
 pub use run::{Run, RunError, RunParams, RunSpec, Start, simulate, simulate_servo};
+pub use scenario::{Scenario, ScenarioError};

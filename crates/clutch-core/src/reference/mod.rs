@@ -2,7 +2,8 @@
 //!
 //! Positions are fixed-point counts (2⁻¹⁶ count, 64 bit) and depend on the tick's number, not
 //! on a sum over ticks: a ramp is as exact after a month as after a second. Velocity and
-//! acceleration are the analytic derivatives, in rad/s and rad/s².
+//! acceleration are the analytic derivatives, in rad/s and rad/s². In `f32` a path stays within
+//! 2e-6 of its way of the one in `f64`; straight lines of a table agree to the last bit.
 //!
 //! | reference | velocity | acceleration |
 //! |---|---|---|
@@ -17,6 +18,8 @@
 
 mod profile;
 mod table;
+#[cfg(test)]
+mod tests;
 mod wave;
 
 pub use profile::{JerkLimited, MinimumJerk, Trapezoid};
@@ -138,15 +141,15 @@ struct Scale<T> {
     period: T,
 }
 
-/// Fractional bits of a rate in counts per tick: 2⁻⁴⁰ count per tick is 1e-9 count per hour
-/// at 1 kHz.
+/// Fractional bits of a rate in counts per tick: half of 2⁻⁴⁰ count per tick is 0.0012 counts
+/// in 30 days at 1 kHz.
 const RATE_BITS: u32 = 40;
 
 impl<T: Real> Scale<T> {
-    /// rad/s to 2⁻⁴⁰ counts per tick.
+    /// rad/s to the nearest multiple of 2⁻⁴⁰ counts per tick.
     fn rate(&self, radians_per_second: T) -> i64 {
         let counts_per_tick = radians_per_second * self.counts_per_radian * self.period;
-        (counts_per_tick * T::from_i64(1 << RATE_BITS)).floor().to_i64()
+        (counts_per_tick * T::from_i64(1 << RATE_BITS) + T::from_f64(0.5)).floor().to_i64()
     }
 
     /// A small distance in radians to fixed-point counts.

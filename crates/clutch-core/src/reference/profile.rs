@@ -55,6 +55,10 @@ struct Piece<T> {
 }
 
 impl<T: Real> Piece<T> {
+    fn resting(first_tick: u64, base: FixedCounts) -> Self {
+        Piece { first_tick, base, rate: 0, velocity: T::ZERO, c: [T::ZERO; 4] }
+    }
+
     /// Position `ticks` whole ticks and `rest` seconds after the first tick.
     fn position(&self, ticks: u64, rest: T, scale: &Scale<T>) -> FixedCounts {
         let tau = scale.seconds(ticks) + rest;
@@ -79,7 +83,7 @@ impl<T: Real> Piece<T> {
 /// Seven pieces of a jerk-limited move and the rest after it.
 const PIECES: usize = 8;
 
-/// A path of polynomial pieces that begins at position 0.
+/// A path of polynomial pieces that begins at position 0; unused ones repeat the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Profile<T> {
     pieces: [Piece<T>; PIECES],
@@ -87,23 +91,9 @@ pub(super) struct Profile<T> {
 }
 
 impl<T: Real> Profile<T> {
-    fn at_rest(scale: Scale<T>) -> Self {
-        let rest = Piece {
-            first_tick: u64::MAX, // never begins
-            base: FixedCounts(0),
-            rate: 0,
-            velocity: T::ZERO,
-            c: [T::ZERO; 4],
-        };
-        Profile { pieces: [rest; PIECES], scale }
-    }
-
     pub(super) fn ramp(rate: T, scale: Scale<T>) -> Self {
-        let mut profile = Profile::at_rest(scale);
-        if let Some(first) = profile.pieces.first_mut() {
-            *first = Piece { first_tick: 0, rate: scale.rate(rate), velocity: rate, ..*first };
-        }
-        profile
+        let first = Piece { rate: scale.rate(rate), velocity: rate, ..Piece::resting(0, FixedCounts(0)) };
+        Profile { pieces: [first; PIECES], scale }
     }
 
     pub(super) fn trapezoid(p: &Trapezoid<T>, scale: Scale<T>) -> Result<Self, ParamError<T>> {
@@ -116,6 +106,8 @@ impl<T: Real> Profile<T> {
             "a finite number above 0 rad/s²",
         )?;
         let length = p.distance.abs();
+        require("speed", speed, ends(length / speed, scale), ENOUGH)?;
+        require("acceleration", a, ends((length / a).sqrt(), scale), ENOUGH)?;
         let speed = speed.min((length * a).sqrt());
         let rise = speed / a;
         let cruise = if speed > T::ZERO { (length / speed - rise).max(T::ZERO) } else { T::ZERO };
@@ -129,7 +121,7 @@ impl<T: Real> Profile<T> {
 
     pub(super) fn jerk_limited(p: &JerkLimited<T>, scale: Scale<T>) -> Result<Self, ParamError<T>> {
         require_distance(p.distance, scale)?;
-        let mut v = require_speed(p.speed, scale)?;
+        let speed = require_speed(p.speed, scale)?;
         let a = require(
             "acceleration",
             p.acceleration,
@@ -138,23 +130,23 @@ impl<T: Real> Profile<T> {
         )?;
         let j = require("jerk", p.jerk, p.jerk > T::ZERO, "a finite number above 0 rad/s³")?;
         let (length, two) = (p.distance.abs(), T::from_i32(2));
-        // Time to build up the acceleration, and to reach speed v.
-        let times = |v: T| {
-            let reaches_a = v * j > a * a;
-            let ramp = if reaches_a { a / j } else { (v / j).sqrt() };
-            (ramp, if reaches_a { ramp + v / a } else { two * ramp })
-        };
-        let (_, rise) = times(v);
-        if length < v * rise {
-            // Too short to reach v: the peak for which rise and fall make up the distance.
+        // The time of half the move if nothing but the jerk were bounded.
+        let by_jerk = (length / (two * j)).powf(T::ONE / T::from_i32(3));
+        require("speed", speed, ends(length / speed, scale), ENOUGH)?;
+        require("acceleration", a, ends((length / a).sqrt(), scale), ENOUGH)?;
+        require("jerk", j, ends(by_jerk, scale), ENOUGH)?;
+        // The peak speed for which rise and fall alone make up the distance.
+        let highest = if j * by_jerk <= a {
+            j * by_jerk * by_jerk
+        } else {
             let ramp = a / j;
-            v = a / two * ((ramp * ramp + T::from_i32(4) * length / a).sqrt() - ramp);
-            if v * j < a * a {
-                let ramp = (length / (two * j)).powf(T::ONE / T::from_i32(3));
-                v = j * ramp * ramp;
-            }
-        }
-        let (ramp, rise) = times(v);
+            a / two * ((ramp * ramp + T::from_i32(4) * length / a).sqrt() - ramp)
+        };
+        let v = speed.min(highest);
+        // Time to build up the acceleration, and to reach speed v.
+        let reaches_a = v * j > a * a;
+        let ramp = if reaches_a { a / j } else { (v / j).sqrt() };
+        let rise = if reaches_a { ramp + v / a } else { two * ramp };
         let flat = (rise - two * ramp).max(T::ZERO);
         let cruise = if v > T::ZERO { (length / v - rise).max(T::ZERO) } else { T::ZERO };
         let sign = p.distance.sgn();
@@ -175,8 +167,8 @@ impl<T: Real> Profile<T> {
         let d = require(
             "duration",
             p.duration,
-            p.duration >= scale.period,
-            "a finite time of at least one period, s",
+            p.duration >= scale.period && p.duration <= T::from_i32(1_000_000),
+            "a time of at least one period and at most 1e6 s", // its fifth power must fit f32
         )?;
         // The steepest point of the polynomial is 15/8 of the mean rate.
         within_a_turn_per_tick("duration", T::from_f64(1.875) * p.distance / d, scale)
@@ -185,8 +177,8 @@ impl<T: Real> Profile<T> {
         let c4 = T::from_i32(-15) * p.distance / (d * d * d * d);
         let c5 = T::from_i32(6) * p.distance / (d * d * d * d * d);
         let mut builder = Builder::new(scale);
-        builder.piece([T::ZERO, c3, c4, c5]);
-        builder.time = d;
+        builder.push(Piece { c: [T::ZERO, c3, c4, c5], ..Piece::resting(0, FixedCounts(0)) });
+        (builder.ticks, builder.rest) = builder.split(d);
         Ok(builder.stop(p.distance))
     }
 
@@ -206,72 +198,91 @@ impl<T: Real> Profile<T> {
 }
 
 /// Adds piece after piece, carrying position and velocity across their borders.
+///
+/// Time is whole ticks and a rest, so that a long path in `f32` loses nothing at its borders.
 struct Builder<T> {
     profile: Profile<T>,
     used: usize,
-    /// End of the last piece, s.
-    time: T,
-    /// Position and velocity there.
+    /// Whole ticks before the end of the last piece.
+    ticks: u64,
+    /// From there to the end, s: at least 0, below a period.
+    rest: T,
+    /// Position and velocity at the end.
     position: FixedCounts,
     velocity: T,
 }
 
 impl<T: Real> Builder<T> {
     fn new(scale: Scale<T>) -> Self {
-        let profile = Profile::at_rest(scale);
-        Builder { profile, used: 0, time: T::ZERO, position: FixedCounts(0), velocity: T::ZERO }
+        let profile = Profile { pieces: [Piece::resting(0, FixedCounts(0)); PIECES], scale };
+        Builder { profile, used: 0, ticks: 0, rest: T::ZERO, position: FixedCounts(0), velocity: T::ZERO }
+    }
+
+    /// The first tick at or after the end of the last piece, and how far away it is, s.
+    fn next_tick(&self) -> (u64, T) {
+        if self.rest > T::ZERO {
+            (self.ticks.saturating_add(1), (self.profile.scale.period - self.rest).max(T::ZERO))
+        } else {
+            (self.ticks, T::ZERO)
+        }
+    }
+
+    /// A time in whole ticks and a rest.
+    fn split(&self, duration: T) -> (u64, T) {
+        let period = self.profile.scale.period;
+        let whole = (duration / period).floor().max(T::ZERO);
+        (whole.to_i64() as u64, (duration - whole * period).max(T::ZERO).min(period))
     }
 
     /// A piece of constant jerk; one that takes no time is left out.
     fn add(mut self, duration: T, acceleration: T, jerk: T) -> Self {
-        if duration > T::ZERO {
-            let c3 = jerk / T::from_i32(6);
-            let c2 = acceleration / T::from_i32(2);
-            let (piece, late) = self.piece([c2, c3, T::ZERO, T::ZERO]);
-            // Where this piece ends: whole ticks after its first, and a rest (negative where it
-            // ends before its first tick).
+        let c3 = jerk / T::from_i32(6);
+        let c2 = acceleration / T::from_i32(2);
+        let (two, three) = (T::from_i32(2), T::from_i32(3));
+        let moved = |v: T, t: T| t * (v + t * (c2 + t * c3));
+        let faster = |t: T| t * (two * c2 + t * three * c3);
+        let scale = self.profile.scale;
+        let (first_tick, late) = self.next_tick();
+        if duration > late {
+            // The same polynomial, seen from its first tick.
+            let velocity = self.velocity + faster(late);
+            let piece = self.push(Piece {
+                first_tick,
+                base: self.position.plus(scale.distance(moved(self.velocity, late))),
+                rate: scale.rate(velocity),
+                velocity,
+                c: [c2 + three * c3 * late, c3, T::ZERO, T::ZERO],
+            });
             let span = duration - late;
-            let ticks = (span / self.profile.scale.period).floor().max(T::ZERO);
-            let rest = span - ticks * self.profile.scale.period;
-            self.position = piece.position(ticks.to_i64() as u64, rest, &self.profile.scale);
+            let (ticks, rest) = self.split(span);
+            self.ticks = first_tick.saturating_add(ticks);
+            self.rest = rest;
+            self.position = piece.position(ticks, rest, &scale);
             self.velocity = piece.velocity(span);
-            self.time += duration;
+        } else if duration > T::ZERO {
+            // Over before a tick sees it. It must not be extrapolated to that tick: a piece may
+            // be this short because its acceleration or jerk is beyond measure.
+            self.position = self.position.plus(scale.distance(moved(self.velocity, duration)));
+            self.velocity += faster(duration);
+            self.rest += duration;
         }
         self
     }
 
-    /// Begins a piece now; gives it back, and how long before its first tick it began, s.
-    fn piece(&mut self, c: [T; 4]) -> (Piece<T>, T) {
-        let scale = self.profile.scale;
-        let before = (self.time / scale.period).floor();
-        let exact = before * scale.period >= self.time;
-        let first = if exact { before } else { before + T::ONE };
-        let late = first * scale.period - self.time;
-        // The same polynomial, seen from its first tick. Only pieces of constant jerk begin
-        // between ticks, so c4 and c5 need no shift.
-        let [c2, c3, c4, c5] = c;
-        let (two, three) = (T::from_i32(2), T::from_i32(3));
-        let velocity = self.velocity + late * (two * c2 + late * three * c3);
-        let moved = late * (self.velocity + late * (c2 + late * c3));
-        let piece = Piece {
-            first_tick: first.to_i64() as u64,
-            base: self.position.plus(scale.distance(moved)),
-            rate: scale.rate(velocity),
-            velocity,
-            c: [c2 + three * c3 * late, c3, c4, c5],
-        };
+    fn push(&mut self, piece: Piece<T>) -> Piece<T> {
         if let Some(slot) = self.profile.pieces.get_mut(self.used) {
             *slot = piece;
             self.used += 1;
         }
-        (piece, late)
+        piece
     }
 
     /// At rest from here on, exactly at the distance asked for.
     fn stop(mut self, distance: T) -> Profile<T> {
-        self.position = self.profile.scale.distance(distance);
-        self.velocity = T::ZERO;
-        self.piece([T::ZERO; 4]);
+        let piece = Piece::resting(self.next_tick().0, self.profile.scale.distance(distance));
+        while self.used < PIECES {
+            self.push(piece);
+        }
         self.profile
     }
 }
@@ -284,4 +295,12 @@ fn require_distance<T: Real>(distance: T, scale: Scale<T>) -> Result<T, ParamErr
 fn require_speed<T: Real>(speed: T, scale: Scale<T>) -> Result<T, ParamError<T>> {
     require("speed", speed, speed > T::ZERO, "a finite number above 0 rad/s")?;
     within_a_turn_per_tick("speed", speed, scale)
+}
+
+/// What a bound must be.
+const ENOUGH: &str = "enough to end within 1e15 periods";
+
+/// Whether a time is one that ticks can count; not if it is NaN.
+fn ends<T: Real>(time: T, scale: Scale<T>) -> bool {
+    time < scale.period * T::from_f64(1e15)
 }

@@ -46,16 +46,26 @@ impl<T: Real> Scale<T> {
     }
 }
 
-/// One interval: length in s, rise in counts.
+/// One interval between points.
 #[derive(Clone, Copy)]
 struct Interval<T> {
+    length_us: u64,
+    rise: FixedCounts,
+    /// s
     length: T,
-    rise: T,
 }
 
 impl<T: Real> Interval<T> {
-    fn slope(self) -> T {
-        self.rise / self.length
+    /// Counts per second.
+    fn slope(&self) -> T {
+        self.rise.minus::<T>(FixedCounts(0)) / self.length
+    }
+
+    /// The rise within the first `us` of the interval along a straight line; exact but for the
+    /// rounding down.
+    fn along(&self, us: u64) -> FixedCounts {
+        let product = i128::from(self.rise.0).wrapping_mul(i128::from(us));
+        FixedCounts(product.checked_div_euclid(i128::from(self.length_us)).unwrap_or(0) as i64)
     }
 }
 
@@ -65,22 +75,29 @@ impl Table<'_> {
             return Err(ParamError { field: "knots", value: T::ZERO, expected: "at least one point" });
         }
         let rising = |w: &[Knot]| matches!(w, [a, b] if a.time_us < b.time_us);
-        match self.knots.windows(2).position(|w| !rising(w)) {
-            None => Ok(()),
-            Some(i) => Err(ParamError {
+        if let Some(i) = self.knots.windows(2).position(|w| !rising(w)) {
+            return Err(ParamError {
                 field: "knots",
                 value: T::from_u64(i as u64 + 1),
                 expected: "times that rise from point to point; the value is the number (from 0) of the point that does not",
+            });
+        }
+        // So that no difference between two points overflows.
+        match self.knots.iter().position(|k| k.position.0.unsigned_abs() >= 1 << 62) {
+            None => Ok(()),
+            Some(i) => Err(ParamError {
+                field: "knots",
+                value: T::from_u64(i as u64),
+                expected: "positions below 7e13 counts; the value is the number (from 0) of the point beyond",
             }),
         }
     }
 
     fn interval<T: Real>(&self, first: usize) -> Option<Interval<T>> {
         let (a, b) = (self.knots.get(first)?, self.knots.get(first.checked_add(1)?)?);
-        Some(Interval {
-            length: T::from_u64(b.time_us.wrapping_sub(a.time_us)) / T::from_i32(1_000_000),
-            rise: b.position.minus(a.position),
-        })
+        let length_us = b.time_us.wrapping_sub(a.time_us);
+        let rise = FixedCounts(b.position.0.wrapping_sub(a.position.0));
+        Some(Interval { length_us, rise, length: T::from_u64(length_us) / T::from_i32(1_000_000) })
     }
 
     /// The slope at a point, counts/s: a weighted harmonic mean of both sides; 0 at an extremum
@@ -112,25 +129,30 @@ impl Table<'_> {
         let Some(interval) = self.interval::<T>(last) else {
             return Target { position: knot.position, ..Target::default() };
         };
+        let since = time.wrapping_sub(knot.time_us);
         let h = interval.length;
-        let s = T::from_u64(time.wrapping_sub(knot.time_us)) / T::from_i32(1_000_000) / h;
-        let (moved, velocity, acceleration) = match self.interpolation {
-            Interpolation::Linear => (s * interval.rise, interval.slope(), T::ZERO),
+        let chord = interval.slope();
+        // The straight line in integers; a cubic adds its deviation, which vanishes at the points.
+        let line = knot.position.plus(interval.along(since));
+        let (deviation, velocity, acceleration) = match self.interpolation {
+            Interpolation::Linear => (T::ZERO, chord, T::ZERO),
             Interpolation::Cubic => {
-                let (m0, m1) = (self.slope::<T>(last) * h, self.slope::<T>(last.wrapping_add(1)) * h);
-                // Hermite: p = s (m0 + s (c2 + s c3)).
+                let s = T::from_u64(since) / T::from_i32(1_000_000) / h;
                 let (two, three) = (T::from_i32(2), T::from_i32(3));
-                let c2 = three * interval.rise - two * m0 - m1;
-                let c3 = m0 + m1 - two * interval.rise;
+                // Slopes at both points relative to the chord. Hermite:
+                // p = line + h s (1 − s) [(1 − s) m0 − s m1]
+                let (m0, m1) = (self.slope::<T>(last) - chord, self.slope::<T>(last.wrapping_add(1)) - chord);
+                let (c2, c3) = (-(two * m0 + m1), m0 + m1);
+                let left = T::ONE - s;
                 (
-                    s * (m0 + s * (c2 + s * c3)),
-                    (m0 + s * (two * c2 + s * three * c3)) / h,
-                    (two * c2 + T::from_i32(6) * s * c3) / (h * h),
+                    h * s * left * (left * m0 - s * m1),
+                    chord + m0 + s * (two * c2 + s * three * c3),
+                    (two * c2 + T::from_i32(6) * s * c3) / h,
                 )
             }
         };
         Target {
-            position: knot.position.plus(FixedCounts::from_real(moved)),
+            position: line.plus(FixedCounts::from_real(deviation)),
             velocity: velocity * scale.radians_per_count,
             acceleration: acceleration * scale.radians_per_count,
         }

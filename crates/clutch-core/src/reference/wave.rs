@@ -66,7 +66,8 @@ impl<T: Real> Wave<T> {
     pub(super) fn chirp(p: &Chirp<T>, scale: Scale<T>) -> Result<Self, ParamError<T>> {
         let from = require_frequency("from", p.from, scale)?;
         let to = require_frequency("to", p.to, scale)?;
-        let ticks = (p.duration / scale.period).floor();
+        // The nearest: 0.3 s are 300 ms, though 0.3/0.001 is a hair less.
+        let ticks = (p.duration / scale.period + T::from_f64(0.5)).floor();
         require(
             "duration",
             p.duration,

@@ -1,0 +1,431 @@
+//! What a set of gains guarantees over all plants within bounds.
+//!
+//! # The sound certificate
+//!
+//! With `σ = f e + ė` and the plant (1),
+//!
+//! ```text
+//! σ̇ = f ė + θ̈_d − [T_u − μ K_COF v_a − C_d θ̇] / J
+//! ```
+//!
+//! the surface is reached at a rate of at least `γ` if `σ σ̇ ≤ −γ |σ|`. A brake gives two very
+//! different sides:
+//!
+//! * **shaft ahead** (`σ < 0`), the brake is on with `K_p + K_d |ė|` volts. At the worst corner
+//!   (`J_max`, `T_max`, weakest brake `μ_min K_min`) this suffices if
+//!   `K_p ≥ [T_max + J_max (a_d + γ)] / (μ_min K_min)` and `K_d ≥ J_max f / (μ_min K_min)`.
+//! * **shaft behind** (`σ > 0`), the brake can only let go. What is left is
+//!   `|ė| ≤ [T_min − C_max v_d − J_max (a_d + γ)] / (J_max f)`, and no gain buys more.
+//!
+//! Three additions. The saturation of (31) weakens the `K_d` term to `K_d ė²` where
+//! `|ė| < 1 rad/s`, so that up to `(J_max f / μ_min K_min)² / (4 K_d)` volts of `f |ė|` fall to
+//! `K_p`. The voltage ends at `u_max`, which bounds `|ė|` on the ahead side too. And a law that
+//! is affine in `σ` and saturates, as PD with `f = K_p/K_d` is and as CTC is, obeys the same two
+//! conditions outside the layer in which it does not saturate: with `u_max` in place of `K_p`.
+//!
+//! Outside the layer `|σ|` falls; once inside, `|e| ≤ layer / f`. The certificate speaks of
+//! continuous time and an exact sensor: sampling, encoder steps and delay come on top.
+//!
+//! # The paper's conditions
+//!
+//! [`paper_conditions`] gives (26)–(28) as printed. They divide by the strongest brake instead
+//! of the weakest and let the voltage be negative: (26) is negative for the paper's own plant,
+//! so that any `K_p` passes, and (28) overstates the reaching rate.
+
+use crate::bounds::Bounds;
+use crate::error::require;
+use crate::law::Law;
+use crate::{ParamError, Real};
+
+/// What the path and the start ask for, and the reaching rate wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Demand<T = f64> {
+    /// `v_d` (23g): highest velocity of the path, rad/s.
+    pub velocity: T,
+    /// `a_d` (23g): highest acceleration of the path, rad/s².
+    pub acceleration: T,
+    /// `γ` in (15): reaching rate wanted, rad/s².
+    pub reach_rate: T,
+    /// `|ė|` at the start, rad/s: 0 on the path, the path's velocity from rest.
+    pub start_error_rate: T,
+}
+
+/// Why gains are not certified.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Shortfall {
+    /// `K_p` is too small: the weakest brake does not stop the strongest drive.
+    Kp,
+    /// `K_d` is too small: it does not pay for `f |ė|`.
+    Kd,
+    /// The highest voltage is too small.
+    Voltage,
+    /// The drive is too weak for the path: the released shaft does not catch up.
+    Drive,
+    /// The start's error rate is beyond what either side can follow.
+    Start,
+    /// The law has no sliding surface: PD or CTC without `K_d`, or SMC output that never ends.
+    Surface,
+}
+
+/// What is guaranteed, with the worst corner and the margins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Certificate<T = f64> {
+    /// `f`: slope of the law's sliding surface, 1/s.
+    pub slope: T,
+    /// Thickness of the layer around the surface in which nothing is claimed, rad/s.
+    pub layer: T,
+    /// Worst corner of the ahead side: inertia, kg m².
+    pub worst_inertia: T,
+    /// Worst corner of the ahead side: driving torque, N m.
+    pub worst_torque: T,
+    /// Worst corner of the ahead side: weakest brake `μ_min K_min`, N m/V.
+    pub weakest_brake: T,
+    /// Worst corner of the behind side: driving torque, N m.
+    pub least_torque: T,
+    /// `K_p` needed, V.
+    pub kp_required: T,
+    /// Part of it that falls to `K_p` because (31) weakens the `K_d` term, V.
+    pub kp_for_boundary: T,
+    /// `K_p` given, V; for PD and CTC the highest voltage.
+    pub kp_given: T,
+    /// `K_d` needed, V s/rad; 0 for PD and CTC.
+    pub kd_required: T,
+    /// `K_d` given, V s/rad; 0 for PD and CTC.
+    pub kd_given: T,
+    /// Largest `γ` that the ahead side allows at `ė = 0`, rad/s²; negative if even 0 is too much.
+    pub reach_rate_possible: T,
+    /// `|ė|` up to which the ahead side holds before the voltage ends, rad/s.
+    pub error_rate_ahead: T,
+    /// `|ė|` up to which the behind side holds, rad/s.
+    pub error_rate_behind: T,
+    /// Bound on `|e|` once inside the layer, rad.
+    pub error_bound: T,
+    /// `γ` certified, rad/s².
+    pub reach_rate: T,
+    /// What is missing; none = certified.
+    pub shortfall: Option<Shortfall>,
+}
+
+/// A law as both sides see it.
+struct Form<T> {
+    slope: T,
+    layer: T,
+    kp: T,
+    /// `K_d` and the boundary's weakening of it; none for an affine law.
+    kd: Option<T>,
+    weakened: bool,
+}
+
+fn form<T: Real>(law: &Law<T>, demand: &Demand<T>) -> Option<Form<T>> {
+    let highest = law.output().highest();
+    match law {
+        Law::Smc(l) => Some(Form {
+            slope: l.slope(),
+            layer: l.boundary(),
+            kp: l.kp(),
+            kd: Some(l.kd()),
+            weakened: l.boundary() > T::ZERO,
+        }),
+        Law::Pd(l) => {
+            let p = l.params();
+            (p.kd > T::ZERO && p.kp > T::ZERO).then(|| Form {
+                slope: p.kp / p.kd,
+                layer: highest / p.kd,
+                kp: highest,
+                kd: None,
+                weakened: false,
+            })
+        }
+        Law::Ctc(l) => {
+            let (p, m) = (l.params(), l.model().params());
+            // (11) is u = [T − J θ̈_d − C θ̇ − J K K_d σ] / (μ K_COF) with the model's values.
+            let gain = m.inertia * p.outer_gain * p.kd;
+            (gain > T::ZERO && p.kp > T::ZERO).then(|| {
+                let mu = m.friction.mu_static.max(m.friction.mu_dynamic);
+                let inertia = m.inertia * demand.acceleration;
+                let drag = m.viscous_damping * (demand.velocity + demand.velocity);
+                let upper = highest * mu * m.brake_gain - m.drive_torque + inertia + drag;
+                let lower = m.drive_torque + inertia;
+                Form {
+                    slope: p.kp / p.kd,
+                    layer: upper.max(lower) / gain,
+                    kp: highest,
+                    kd: None,
+                    weakened: false,
+                }
+            })
+        }
+    }
+}
+
+/// The sound certificate of a law over all plants within bounds.
+///
+/// ```
+/// use clutch_core::certificate::{Demand, certify};
+/// use clutch_core::law::{Law, LawParams, SmcSignParams};
+/// use clutch_core::{Bounds, Micros, PlantParams, Tolerances};
+/// let plant = PlantParams::<f64>::default();
+/// let params = LawParams::SmcSign(SmcSignParams::default());
+/// let law = Law::new(&params, &plant, &Default::default(), Micros(1000))?;
+/// let bounds = Bounds::around(&plant, &Tolerances::default())?;
+/// let c = certify(&law, &bounds, &Demand::default())?;
+/// assert!((c.kp_required - 2.242286).abs() < 1e-6);
+/// assert!(c.shortfall.is_none()); // the paper's K_p is 3
+/// # Ok::<(), clutch_core::ParamError>(())
+/// ```
+///
+/// # Errors
+/// A demand negative or not finite, by name.
+pub fn certify<T: Real>(
+    law: &Law<T>,
+    bounds: &Bounds<T>,
+    demand: &Demand<T>,
+) -> Result<Certificate<T>, ParamError<T>> {
+    for (field, value, expected) in [
+        ("velocity", demand.velocity, "a finite number of at least 0 rad/s"),
+        ("acceleration", demand.acceleration, "a finite number of at least 0 rad/s²"),
+        ("reach_rate", demand.reach_rate, "a finite number of at least 0 rad/s²"),
+        ("start_error_rate", demand.start_error_rate, "a finite number of at least 0 rad/s"),
+    ] {
+        require(field, value, value >= T::ZERO, expected)?;
+    }
+    let (lowest, highest) = (law.output().lowest(), law.output().highest());
+    let brake = bounds.weakest_brake();
+    let inertia = bounds.inertia.high;
+    let torque = bounds.drive_torque.high;
+    let form_of = form(law, demand);
+    let missing = form_of.is_none();
+    let Form { slope, layer, kp, kd, weakened } =
+        form_of.unwrap_or(Form { slope: T::ZERO, layer: T::ZERO, kp: highest, kd: None, weakened: false });
+
+    // Ahead: the brake against the strongest drive.
+    let kd_required = if kd.is_some() { inertia * slope / brake } else { T::ZERO };
+    let kp_for_boundary = match kd {
+        Some(kd) if weakened && kd > T::ZERO => kd_required * kd_required / (T::from_i32(4) * kd),
+        _ => T::ZERO,
+    };
+    let base = (torque + inertia * (demand.acceleration + demand.reach_rate)) / brake;
+    let kp_required = base + kp_for_boundary;
+    let reach_rate_possible =
+        ((kp.min(highest) - kp_for_boundary) * brake - torque) / inertia - demand.acceleration;
+    let per_rate = |left: T| if slope > T::ZERO { left / slope } else { T::ZERO };
+    let error_rate_ahead = per_rate((highest - base) * brake / inertia);
+
+    // Behind: the released shaft against the path.
+    let least_torque = bounds.drive_torque.low - bounds.strongest_brake() * lowest;
+    let left = (least_torque - bounds.viscous_damping.high * demand.velocity) / inertia;
+    let error_rate_behind = per_rate(left - demand.acceleration - demand.reach_rate);
+
+    let shortfall = if missing {
+        Some(Shortfall::Surface)
+    } else if kp < kp_required {
+        Some(Shortfall::Kp)
+    } else if kd.is_some_and(|kd| kd < kd_required) {
+        Some(Shortfall::Kd)
+    } else if highest < kp_required {
+        Some(Shortfall::Voltage)
+    } else if error_rate_behind <= T::ZERO {
+        Some(Shortfall::Drive)
+    } else if demand.start_error_rate > error_rate_behind.min(error_rate_ahead) {
+        Some(Shortfall::Start)
+    } else {
+        None
+    };
+    Ok(Certificate {
+        slope,
+        layer,
+        worst_inertia: inertia,
+        worst_torque: torque,
+        weakest_brake: brake,
+        least_torque,
+        kp_required,
+        kp_for_boundary,
+        kp_given: kp,
+        kd_required,
+        kd_given: kd.unwrap_or(T::ZERO),
+        reach_rate_possible,
+        error_rate_ahead,
+        error_rate_behind,
+        error_bound: per_rate(layer),
+        reach_rate: demand.reach_rate,
+        shortfall,
+    })
+}
+
+impl<T: Real> Certificate<T> {
+    /// All conditions hold.
+    #[must_use]
+    pub fn certified(&self) -> bool {
+        self.shortfall.is_none()
+    }
+
+    /// The bound (15) on the time until the layer is reached from `σ`, s; none where nothing is
+    /// certified or the certified rate is 0. `σ` in rad/s.
+    #[must_use]
+    pub fn reaching_time(&self, surface: T) -> Option<T> {
+        let outside = (surface.abs() - self.layer).max(T::ZERO);
+        if self.certified() && self.reach_rate > T::ZERO { Some(outside / self.reach_rate) } else { None }
+    }
+}
+
+/// The paper's own conditions, as printed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PaperConditions<T = f64> {
+    /// Right side of (26), V.
+    pub kp: T,
+    /// Right side of (27), V s/rad.
+    pub kd: T,
+    /// (28), rad/s².
+    pub gamma: T,
+}
+
+/// (26)–(28) for a `K_p` and a slope `f`, as printed. They are not sound: see the module's page.
+#[must_use]
+pub fn paper_conditions<T: Real>(
+    bounds: &Bounds<T>,
+    demand: &Demand<T>,
+    kp: T,
+    slope: T,
+) -> PaperConditions<T> {
+    let brake = (bounds.mu_static.high + bounds.mu_dynamic.high) * bounds.brake_gain.high;
+    let (inertia, torque) = (bounds.inertia.low, bounds.drive_torque.low);
+    let drag = bounds.viscous_damping.high * demand.velocity;
+    PaperConditions {
+        kp: (inertia * demand.acceleration + drag - torque) / brake,
+        kd: (bounds.inertia.high * slope - bounds.viscous_damping.high) / brake,
+        gamma: (kp * brake - inertia * demand.acceleration + drag - torque) / inertia,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{CtcParams, LawParams, OutputParams, PdParams, SmcParams, SmcSignParams};
+    use crate::{Micros, PlantParams, Tolerances};
+
+    fn law(p: LawParams) -> Law<f64> {
+        Law::new(&p, &PlantParams::default(), &OutputParams::default(), Micros(1000)).unwrap()
+    }
+
+    fn bounds(t: Tolerances) -> Bounds {
+        Bounds::around(&PlantParams::default(), &t).unwrap()
+    }
+
+    fn at_2_deg_s() -> Demand {
+        Demand { velocity: 2.0_f64.to_radians(), ..Demand::default() }
+    }
+
+    #[test]
+    fn table_2_needs_2_2423_volts_and_follows_22_65_degrees_per_second_when_behind() {
+        let c = certify(
+            &law(LawParams::SmcSign(SmcSignParams::default())),
+            &bounds(Tolerances::default()),
+            &at_2_deg_s(),
+        )
+        .unwrap();
+        assert!((c.kp_required - 2.242286).abs() < 1e-6);
+        assert!((c.error_rate_behind.to_degrees() - 22.65).abs() < 0.01);
+        assert!((c.reach_rate_possible - 9.36).abs() < 0.005, "the true γ of K_p = 3");
+        assert!(c.certified());
+    }
+
+    #[test]
+    fn the_boundary_layer_takes_another_fiftieth_of_a_volt() {
+        let c = certify(
+            &law(LawParams::Smc(SmcParams::default())),
+            &bounds(Tolerances::default()),
+            &at_2_deg_s(),
+        )
+        .unwrap();
+        // c = J f/(μK) = 0.119/0.021; c²/(4·400)
+        assert!((c.kp_for_boundary - (0.119_f64 / 0.021).powi(2) / 1600.0).abs() < 1e-12);
+        assert!((c.kp_required - 2.242286 - c.kp_for_boundary).abs() < 1e-6);
+        assert!((c.error_bound.to_degrees() - (0.1_f64 / 70.0).to_degrees()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn twenty_per_cent_of_friction_and_brake_gain_ask_for_more_than_the_papers_kp() {
+        let t = Tolerances { friction: 0.2, brake_gain: 0.2, drive_torque: 0.1, ..Tolerances::default() };
+        let c =
+            certify(&law(LawParams::SmcSign(SmcSignParams::default())), &bounds(t), &at_2_deg_s()).unwrap();
+        assert!((c.kp_required - 3.854).abs() < 5e-4);
+        assert_eq!(c.shortfall, Some(Shortfall::Kp));
+    }
+
+    #[test]
+    fn the_papers_conditions_come_out_as_printed() {
+        let p = paper_conditions(&bounds(Tolerances::default()), &at_2_deg_s(), 3.0, 70.0);
+        assert!((p.kp - -0.9603).abs() < 5e-5, "(26)");
+        assert!((p.kd - 2.40816).abs() < 5e-6, "(27)");
+        assert!((p.gamma - 58.79).abs() < 5e-3, "(28)");
+    }
+
+    #[test]
+    fn gains_that_pass_the_papers_conditions_fail_the_sound_ones() {
+        let weak = SmcParams { kp: 1.0, kd: 3.0, ..SmcParams::default() };
+        let p = paper_conditions(&bounds(Tolerances::default()), &at_2_deg_s(), weak.kp, weak.slope);
+        assert!(weak.kp > p.kp && weak.kd > p.kd);
+        let c = certify(&law(LawParams::Smc(weak)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
+        assert_eq!(c.shortfall, Some(Shortfall::Kp));
+    }
+
+    #[test]
+    fn pd_saturates_0_2_rad_per_s_off_its_surface_which_bounds_its_error_to_0_115_degrees() {
+        let c =
+            certify(&law(LawParams::Pd(PdParams::default())), &bounds(Tolerances::default()), &at_2_deg_s())
+                .unwrap();
+        assert_eq!((c.slope, c.layer), (100.0, 0.2));
+        assert!((c.error_bound.to_degrees() - 0.1146).abs() < 1e-4);
+        assert!(c.certified());
+        let no_kd = PdParams { kd: 0.0, ..PdParams::default() };
+        let c = certify(&law(LawParams::Pd(no_kd)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
+        assert_eq!(c.shortfall, Some(Shortfall::Surface));
+    }
+
+    #[test]
+    fn ctc_is_certified_like_any_law_that_saturates() {
+        let c = certify(
+            &law(LawParams::Ctc(CtcParams::default())),
+            &bounds(Tolerances::default()),
+            &at_2_deg_s(),
+        )
+        .unwrap();
+        assert!(c.certified());
+        assert!((c.slope - 100.0 / 0.7).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_reaching_time_is_the_distance_over_the_rate() {
+        let d = Demand { reach_rate: 5.0, ..at_2_deg_s() };
+        let c =
+            certify(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d).unwrap();
+        assert!(c.certified());
+        assert!((c.reaching_time(-1.1).unwrap() - 0.2).abs() < 1e-12);
+        let c = certify(
+            &law(LawParams::Smc(SmcParams::default())),
+            &bounds(Tolerances::default()),
+            &at_2_deg_s(),
+        )
+        .unwrap();
+        assert_eq!(c.reaching_time(-1.1), None);
+    }
+
+    #[test]
+    fn a_start_from_rest_at_100_degrees_per_second_is_beyond_what_letting_go_can_follow() {
+        let v = 100.0_f64.to_radians();
+        let d = Demand { velocity: v, start_error_rate: v, ..Demand::default() };
+        let c =
+            certify(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d).unwrap();
+        assert_eq!(c.shortfall, Some(Shortfall::Start));
+    }
+
+    #[test]
+    fn bad_demands_and_tolerances_are_named() {
+        let l = law(LawParams::Smc(SmcParams::default()));
+        let bad = Demand { reach_rate: f64::NAN, ..Demand::default() };
+        assert_eq!(certify(&l, &bounds(Tolerances::default()), &bad).unwrap_err().field, "reach_rate");
+        let t = Tolerances { friction: 1.0, ..Tolerances::default() };
+        assert_eq!(Bounds::around(&PlantParams::default(), &t).unwrap_err().field, "friction");
+    }
+}

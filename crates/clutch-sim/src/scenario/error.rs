@@ -1,0 +1,268 @@
+//! What is wrong with a scenario: file, key, value, what is expected, what to do.
+
+use super::file::File;
+use clutch_core::ParamError;
+use serde::Serialize;
+use std::fmt;
+use toml::{Table, Value};
+
+/// What is wrong with a scenario.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScenarioError {
+    /// The file, or the name of a built-in scenario.
+    pub origin: String,
+    /// The key with its tables, as `law.smc.kp_v`; empty if it is about the whole file.
+    pub key: String,
+    /// The value, as the file has it; empty if there is none.
+    pub value: String,
+    /// What is wrong or expected.
+    pub message: String,
+}
+
+impl fmt::Display for ScenarioError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.origin)?;
+        match (self.key.is_empty(), self.value.is_empty()) {
+            (true, _) => write!(f, "{}", self.message),
+            (false, true) => write!(f, "{}: {}", self.key, self.message),
+            (false, false) => write!(f, "{} = {}: {}", self.key, self.value, self.message),
+        }
+    }
+}
+
+impl std::error::Error for ScenarioError {}
+
+impl ScenarioError {
+    pub(super) fn syntax(origin: &str, e: &toml::de::Error) -> Self {
+        // The library's message shows the line with a marker below it.
+        ScenarioError::new(origin, "", "", format!("this is not TOML:\n{e}"))
+    }
+
+    pub(super) fn value(origin: &str, key: &str, value: &str, expected: &str) -> Self {
+        ScenarioError::new(origin, key, value, format!("expected {expected}"))
+    }
+
+    fn new(origin: &str, key: &str, value: &str, message: String) -> Self {
+        ScenarioError { origin: origin.into(), key: key.into(), value: value.into(), message }
+    }
+}
+
+/// Finds the key of a parameter that a constructor refused.
+#[derive(Clone, Debug)]
+pub(super) struct Locator {
+    origin: String,
+    /// The whole file with every default filled in.
+    table: Table,
+}
+
+impl Locator {
+    pub(super) fn new(origin: &str, file: &File) -> Self {
+        Locator { origin: origin.into(), table: to_table(file) }
+    }
+
+    /// The error of a parameter somewhere in the table `section` ("" = the whole file).
+    pub(super) fn at(&self, section: &str, e: &ParamError) -> ScenarioError {
+        let stem = if e.field == "knots" { "points" } else { e.field };
+        let root = if section.is_empty() {
+            Some(&self.table)
+        } else {
+            self.table.get(section).and_then(Value::as_table)
+        };
+        let found = root.and_then(|t| find(t, section, stem));
+        let (key, value) = match found {
+            // A table's own text would be long; the core says which point.
+            Some((key, Value::Array(_))) => (key, format!("(point {})", e.value)),
+            Some((key, value)) => (key, shown(value)),
+            None => (format!("{section}.{}", e.field), e.value.to_string()),
+        };
+        ScenarioError::value(&self.origin, &key, &value, e.expected)
+    }
+
+    pub(super) fn path(&self, message: String) -> ScenarioError {
+        let kind = self.table.get("reference").and_then(Value::as_table).and_then(|t| t.keys().next());
+        let key = kind.map_or("reference".to_owned(), |k| format!("reference.{k}"));
+        ScenarioError::new(&self.origin, &key, "", message)
+    }
+
+    pub(super) fn message(&self, key: &str, message: String) -> ScenarioError {
+        ScenarioError::new(&self.origin, key, "", message)
+    }
+}
+
+/// The key `stem` or `stem_<unit>` in a table or the tables below it.
+fn find<'a>(table: &'a Table, path: &str, stem: &str) -> Option<(String, &'a Value)> {
+    let join = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    let is_stem = |key: &str| key == stem || key.strip_prefix(stem).is_some_and(|rest| rest.starts_with('_'));
+    if let Some((key, value)) = table.iter().find(|(key, value)| !value.is_table() && is_stem(key)) {
+        return Some((join(key), value));
+    }
+    table.iter().find_map(|(key, value)| find(value.as_table()?, &join(key), stem))
+}
+
+/// A value as a file would have it.
+pub(super) fn shown(value: &Value) -> String {
+    match value {
+        Value::Float(x) => x.to_string(),
+        other => other.to_string(),
+    }
+}
+
+/// A struct of this crate as a table. None of them holds what TOML cannot.
+pub(super) fn to_table<T: Serialize>(value: &T) -> Table {
+    Table::try_from(value).unwrap_or_default()
+}
+
+/// Puts a value, written as in the file, at a dotted key.
+pub(super) fn set(origin: &str, table: &mut Table, key: &str, text: &str) -> Result<(), ScenarioError> {
+    let origin = format!("{origin} with --set {key}={text}");
+    let value = match format!("x = {text}").parse::<Table>() {
+        Ok(mut t) => t.remove("x").unwrap_or(Value::String(text.into())),
+        // A bare word is a string, as shells make quoting hard.
+        Err(_) if text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') => Value::String(text.into()),
+        Err(_) => {
+            return Err(ScenarioError::value(
+                &origin,
+                key,
+                text,
+                "a TOML value: a number, true, \"text\" or [a, list]",
+            ));
+        }
+    };
+    let mut at = table;
+    let mut parts = key.split('.').peekable();
+    while let Some(part) = parts.next() {
+        if part.is_empty() {
+            return Err(ScenarioError::new(
+                &origin,
+                "",
+                "",
+                format!("\"{key}\" is not a key: expected one like law.smc.kp_v"),
+            ));
+        }
+        if parts.peek().is_none() {
+            at.insert(part.to_owned(), value);
+            return Ok(());
+        }
+        let next = at.entry(part).or_insert_with(|| Value::Table(Table::new()));
+        match next {
+            Value::Table(t) => at = t,
+            _ => return Err(ScenarioError::new(&origin, "", "", format!("{part} is not a table"))),
+        }
+    }
+    Ok(())
+}
+
+/// A file's table as the struct, with the key, the value and a likely correction in errors.
+pub(super) fn deserialize(origin: &str, table: &Table) -> Result<File, ScenarioError> {
+    serde_path_to_error::deserialize(Value::Table(table.clone())).map_err(|e| {
+        let path = e.path().to_string();
+        let path = if path == "." { String::new() } else { path };
+        let message = e.inner().message().to_owned();
+        let names = quoted(&message);
+        if message.starts_with("unknown field") || message.starts_with("unknown variant") {
+            let (unknown, known) = match names.split_first() {
+                Some((u, k)) => (*u, k),
+                None => ("", &[][..]),
+            };
+            // The path ends with the unknown key for a struct, and not for a choice of tables.
+            let key = if path.rsplit('.').next() == Some(unknown) {
+                path
+            } else if path.is_empty() {
+                unknown.to_owned()
+            } else {
+                format!("{path}.{unknown}")
+            };
+            let value = lookup(table, &key).filter(|v| !v.is_table()).map(shown).unwrap_or_default();
+            let hint = correction(unknown, lookup(table, &key), known);
+            let list = known.join(", ");
+            return ScenarioError::new(
+                origin,
+                &key,
+                &value,
+                format!("unknown key{hint}; expected one of: {list}"),
+            );
+        }
+        if message.starts_with("missing field") {
+            let missing = names.first().copied().unwrap_or_default();
+            let key = if path.is_empty() { missing.to_owned() } else { format!("{path}.{missing}") };
+            return ScenarioError::new(
+                origin,
+                &key,
+                "",
+                "missing; add it (docs/scenario.md lists every key)".into(),
+            );
+        }
+        let value = lookup(table, &path).filter(|v| !v.is_table()).map(shown).unwrap_or_default();
+        ScenarioError::new(origin, &path, &value, message)
+    })
+}
+
+fn quoted(message: &str) -> Vec<&str> {
+    message.split('`').skip(1).step_by(2).collect()
+}
+
+fn lookup<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
+    let mut parts = path.split('.');
+    let mut value = table.get(parts.next()?)?;
+    for part in parts {
+        value = value.as_table()?.get(part)?;
+    }
+    Some(value)
+}
+
+/// Units that keys end with, and their size in SI.
+const UNITS: [(&str, f64); 16] = [
+    ("deg_s2", core::f64::consts::PI / 180.0),
+    ("deg_s", core::f64::consts::PI / 180.0),
+    ("deg", core::f64::consts::PI / 180.0),
+    ("rad_s2", 1.0),
+    ("rad_s", 1.0),
+    ("rad", 1.0),
+    ("us", 1e-6),
+    ("ms", 1e-3),
+    ("s", 1.0),
+    ("mv", 1e-3),
+    ("v", 1.0),
+    ("mnm", 1e-3),
+    ("nm", 1.0),
+    ("hz", 1.0),
+    ("m", 1.0),
+    ("mm", 1e-3),
+];
+
+/// Splits a key into stem and unit, the longest unit that fits.
+fn unit_of(key: &str) -> Option<(&str, f64)> {
+    let mut units: Vec<_> = UNITS.iter().collect();
+    units.sort_by_key(|(name, _)| std::cmp::Reverse(name.len()));
+    units.into_iter().find_map(|(name, size)| Some((key.strip_suffix(name)?.strip_suffix('_')?, *size)))
+}
+
+/// What was probably meant: the same key in another unit, with the value in it, or the nearest
+/// name.
+fn correction(unknown: &str, value: Option<&Value>, known: &[&str]) -> String {
+    let number = value.and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)));
+    if let Some((stem, size)) = unit_of(unknown) {
+        let same =
+            known.iter().find_map(|k| unit_of(k).filter(|(s, _)| *s == stem).map(|(_, size)| (k, size)));
+        if let Some((key, own)) = same {
+            return match number {
+                Some(x) => format!(
+                    ": the unit is wrong here; {unknown} = {x} would be {key} = {:.6}",
+                    x * size / own
+                ),
+                None => format!(": did you mean {key}?"),
+            };
+        }
+    }
+    if let Some(key) =
+        known.iter().find(|k| k.strip_prefix(unknown).is_some_and(|rest| rest.starts_with('_')))
+    {
+        return format!(": did you mean {key}? (keys end with their unit)");
+    }
+    let near = known
+        .iter()
+        .map(|k| (strsim::jaro_winkler(unknown, k), k))
+        .filter(|(likeness, _)| *likeness > 0.8)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    near.map_or(String::new(), |(_, k)| format!(": did you mean {k}?"))
+}

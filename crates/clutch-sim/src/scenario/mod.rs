@@ -1,0 +1,303 @@
+//! Scenarios: a TOML file that describes rig, law, path, sampling, run and seed.
+//!
+//! The rig begins as a copy of the one that `rig.base` names; every key in the file overrides
+//! its value. Unknown keys are errors. `docs/scenario.md` lists all keys.
+
+mod error;
+mod file;
+
+pub use error::ScenarioError;
+pub use file::ScalarKind;
+
+use crate::rig::{Rig, RigParams};
+use crate::run::{Run, RunError, RunSpec, Start, simulate};
+use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
+use clutch_core::law::{Law, LawParams};
+use clutch_core::reference::{Knot, Reference};
+use clutch_core::{
+    Bounds, Envelope, FixedCounts, Micros, Obstacle, ParamError, Plant, Servo, Tolerances, check_path,
+};
+use error::Locator;
+use file::File;
+use toml::{Table, Value};
+
+/// A built-in scenario.
+#[derive(Clone, Copy, Debug)]
+pub struct BuiltIn {
+    /// Its name.
+    pub name: &'static str,
+    /// Its file.
+    pub toml: &'static str,
+}
+
+macro_rules! built_in {
+    ($($name:literal),* $(,)?) => {
+        /// The built-in scenarios.
+        pub const BUILT_IN: &[BuiltIn] = &[$(BuiltIn {
+            name: $name,
+            toml: include_str!(concat!("../../scenarios/", $name, ".toml")),
+        }),*];
+    };
+}
+built_in!(
+    "pd_2",
+    "ctc_2",
+    "smc_2",
+    "bench_pd_2",
+    "bench_smc_2",
+    "observer_smc_2",
+    "minimum_jerk",
+    "hand_guided",
+    "f32_smc_2",
+);
+
+/// A checked scenario.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// Its title.
+    pub name: String,
+    /// Scalar that the servo runs in.
+    pub scalar: ScalarKind,
+    spec: RunSpec<'static>,
+    reference: file::ReferenceFile,
+    knots: Vec<Knot>,
+    tolerances: Tolerances,
+    reach_rate: f64,
+    locator: Locator,
+}
+
+/// What can be said of a scenario before it runs.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What the path asks for.
+    pub envelope: Envelope<f64>,
+    /// What is known of the plant.
+    pub bounds: Bounds,
+    /// What the gains guarantee.
+    pub certificate: Certificate,
+    /// The paper's own conditions; for the sliding-mode laws, for which it states them.
+    pub paper: Option<PaperConditions>,
+    /// The demand that both were asked.
+    pub demand: Demand,
+}
+
+impl Scenario {
+    /// Reads a scenario; `origin` (a file's name) is what errors begin with, and each of `set`
+    /// (`("law.smc.kp_v", "4")`) overrides a key.
+    ///
+    /// # Errors
+    /// What is wrong, where, and what is expected.
+    pub fn parse(origin: &str, text: &str, set: &[(String, String)]) -> Result<Scenario, ScenarioError> {
+        let mut table: Table = text.parse().map_err(|e| ScenarioError::syntax(origin, &e))?;
+        for (key, value) in set {
+            error::set(origin, &mut table, key, value)?;
+        }
+        merge_base(origin, &mut table)?;
+        let file: File = error::deserialize(origin, &table)?;
+        Scenario::check(origin, &file)
+    }
+
+    /// The built-in scenario of that name.
+    #[must_use]
+    pub fn built_in(name: &str) -> Option<Result<Scenario, ScenarioError>> {
+        BUILT_IN.iter().find(|b| b.name == name).map(|b| Scenario::parse(b.name, b.toml, &[]))
+    }
+
+    fn check(origin: &str, file: &File) -> Result<Scenario, ScenarioError> {
+        let locator = Locator::new(origin, file);
+        let rig = file.rig.params().map_err(|e| locator.at("rig", &e))?;
+        let run = file.run.params();
+        let model = file.model.params();
+        let checked = Rig::new(&rig, run.seed).map_err(|e| locator.at("rig", &e))?;
+        Bounds::around(&model, &Tolerances::default()).map_err(|e| locator.at("model", &e))?;
+        let tolerances = file.bounds.tolerances();
+        Bounds::around(&model, &tolerances).map_err(|e| locator.at("bounds", &e))?;
+        let knots = file.reference.knots(checked.encoder).map_err(|e| locator.at("reference", &e))?;
+        let spec = RunSpec {
+            rig,
+            period: Micros(file.sampling.period_us),
+            velocity: file.velocity.params(),
+            model,
+            law: file.law.params(),
+            output: file.output.params(),
+            // Replaced at each use by the file's own path, which borrows the knots.
+            reference: clutch_core::reference::ReferenceParams::Hold,
+            run,
+        };
+        let scenario = Scenario {
+            name: file.name.clone(),
+            scalar: file.sampling.scalar,
+            spec,
+            reference: file.reference.clone(),
+            knots,
+            tolerances,
+            reach_rate: file.bounds.reach_rate_rad_s2,
+            locator,
+        };
+        scenario.check_parts()?;
+        Ok(scenario)
+    }
+
+    /// Builds each part once, so that whatever is wrong is said before anything runs.
+    fn check_parts(&self) -> Result<(), ScenarioError> {
+        let (spec, at) = (self.spec(), &self.locator);
+        spec.period.period::<f64>().map_err(|e| at.at("sampling", &e))?;
+        clutch_core::law::Output::new(&spec.output, spec.period).map_err(|e| at.at("output", &e))?;
+        let law = Law::new(&spec.law, &spec.model, &spec.output, spec.period);
+        law.map_err(|e| at.at(if e.field.starts_with("mu_") { "model" } else { "law" }, &e))?;
+        let servo = spec.servo().map_err(|e| at.at("rig", &e))?;
+        Servo::<f64>::new(&servo).map_err(|e| at.at("velocity", &e))?;
+        Servo::<f32>::new(&servo.cast()).map_err(|e| {
+            let wide = ParamError { field: e.field, value: f64::from(e.value), expected: e.expected };
+            at.at("", &wide)
+        })?;
+        let run = spec.run;
+        let bad = |field, value, expected| Err(at.at("run", &ParamError { field, value, expected }));
+        if !(run.duration >= spec.period.seconds() && run.duration <= 1e6) {
+            return bad("duration", run.duration, "at least one period and at most 1e6 s");
+        }
+        if !(run.settle >= 0.0 && run.settle < run.duration) {
+            return bad("settle", run.settle, "at least 0 s and less than the duration");
+        }
+        self.path().map_err(|e| at.at("reference", &e))?;
+        self.plan().map(|_| ())
+    }
+
+    /// The specification of the run.
+    #[must_use]
+    pub fn spec(&self) -> RunSpec<'_> {
+        RunSpec { reference: self.reference.params(&self.knots), ..self.spec.clone() }
+    }
+
+    /// The number of ticks in the run.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        libm::rint(self.spec.run.duration / self.spec.period.seconds::<f64>()) as u64
+    }
+
+    fn path(&self) -> Result<Reference<'_, f64>, ParamError> {
+        let encoder = clutch_core::Encoder::new::<f64>(self.spec.rig.counts_per_rev)?;
+        Reference::new(&self.reference.params(&self.knots), FixedCounts(0), encoder, self.spec.period)
+    }
+
+    /// Path and gains against the bounds of the believed plant.
+    ///
+    /// # Errors
+    /// A path that a brake cannot follow, or one above the rig's speed limit.
+    pub fn plan(&self) -> Result<Plan, ScenarioError> {
+        let (spec, at) = (self.spec(), &self.locator);
+        let param = |section: &'static str| move |e: ParamError| at.at(section, &e);
+        let path = self.path().map_err(param("reference"))?;
+        let bounds = Bounds::around(&spec.model, &self.tolerances).map_err(param("bounds"))?;
+        let law = Law::new(&spec.law, &spec.model, &spec.output, spec.period).map_err(param("law"))?;
+        let first = path.at(0).velocity;
+        let start_velocity = if spec.run.start == Start::OnPath { first } else { 0.0 };
+        let envelope = check_path(&path, self.ticks(), spec.period, start_velocity, &bounds, law.output())
+            .map_err(|e| {
+                let at_time = format!("a brake cannot follow the path from t = {:.4} s on", e.time);
+                let (asked, available) = (e.asked, e.available);
+                at.path(match e.obstacle {
+                    Obstacle::Reverse => format!(
+                        "{at_time}: it runs backwards at {:.4} °/s, and a brake drives nothing; keep the velocity at or above 0",
+                        -asked.to_degrees()
+                    ),
+                    Obstacle::Acceleration => format!(
+                        "{at_time}: it accelerates at {:.5} °/s², and the weight grants {:.5} °/s²; accelerate more slowly",
+                        asked.to_degrees(),
+                        available.to_degrees()
+                    ),
+                    Obstacle::Voltage => format!(
+                        "{at_time}: it needs {asked:.4} V of braking, and output.highest_v = {available}; decelerate more slowly or raise the limit"
+                    ),
+                    Obstacle::NotFinite => format!("{at_time}: its velocity or acceleration is not a number"),
+                })
+            })?;
+        let limit = spec.rig.speed_limit;
+        if envelope.velocity > limit * (1.0 + 1e-9) {
+            return Err(at.path(format!(
+                "the path's velocity of {:.4} °/s is above rig.speed_limit_deg_s = {:.4}; lower it or raise the limit (angles here are in degrees: 1 rad/s is 57.3 °/s)",
+                envelope.velocity.to_degrees(),
+                limit.to_degrees()
+            )));
+        }
+        let demand = Demand {
+            velocity: envelope.velocity,
+            acceleration: envelope.largest_acceleration(),
+            reach_rate: self.reach_rate,
+            start_error_rate: (first - start_velocity).abs(),
+        };
+        let certificate = certify(&law, &bounds, &demand).map_err(param("bounds"))?;
+        let paper = match &spec.law {
+            LawParams::Smc(p) => Some(paper_conditions(&bounds, &demand, p.kp, p.slope)),
+            LawParams::SmcSign(p) => Some(paper_conditions(&bounds, &demand, p.kp, p.slope)),
+            _ => None,
+        };
+        Ok(Plan { envelope, bounds, certificate, paper, demand })
+    }
+
+    /// Runs it.
+    ///
+    /// # Errors
+    /// An engine that the rig does not allow, or a motion that cannot be followed.
+    pub fn run(&self) -> Result<Run, ScenarioError> {
+        let spec = self.spec();
+        let run = match self.scalar {
+            ScalarKind::F32 => simulate::<f32>(&spec),
+            ScalarKind::F64 => simulate::<f64>(&spec),
+        };
+        run.map_err(|e| match e {
+            RunError::Param(e) => self.locator.at("", &e),
+            RunError::Engine(_) => self.locator.message("run.engine", e.to_string()),
+            RunError::Motion(_) => self.locator.message("rig", e.to_string()),
+        })
+    }
+
+    /// The plant as the rig really is, with its mean driving torque.
+    ///
+    /// # Errors
+    /// None for a checked scenario.
+    pub fn true_plant(&self) -> Result<Plant<f64>, ScenarioError> {
+        let rig = Rig::new(&self.spec.rig, self.spec.run.seed).map_err(|e| self.locator.at("rig", &e))?;
+        Ok(rig.model.plant)
+    }
+}
+
+/// Lays the file's rig over the one that `rig.base` names.
+fn merge_base(origin: &str, table: &mut Table) -> Result<(), ScenarioError> {
+    let Some(Value::Table(own)) = table.get_mut("rig") else { return Ok(()) };
+    let expected = format!("the name of a rig: {}", RigParams::NAMES.join(", "));
+    let name = match own.get("base") {
+        Some(Value::String(name)) => name.clone(),
+        other => {
+            let value = other.map_or("missing".to_owned(), error::shown);
+            return Err(ScenarioError::value(origin, "rig.base", &value, &expected));
+        }
+    };
+    let Some(base) = RigParams::named(&name) else {
+        return Err(ScenarioError::value(origin, "rig.base", &format!("\"{name}\""), &expected));
+    };
+    let mut merged = error::to_table(&file::RigFile::new(&name, &base));
+    // Alternatives: naming one drops the base's other.
+    if let (Some(Value::Table(own)), Some(Value::Table(base))) = (own.get("drive"), merged.get("drive"))
+        && own.keys().any(|k| !base.contains_key(k))
+    {
+        merged.remove("drive");
+    }
+    if own.contains_key("brake_geometry") {
+        merged.remove("brake_gain_nm_v");
+    }
+    overlay(&mut merged, std::mem::take(own));
+    *own = merged;
+    Ok(())
+}
+
+fn overlay(base: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (base.get_mut(&key), value) {
+            (Some(Value::Table(b)), Value::Table(o)) => overlay(b, o),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+}
