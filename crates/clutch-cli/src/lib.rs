@@ -1,4 +1,138 @@
-//! What the `clutch` command is made of: drawing, reports, and the verbs.
+//! What the `clutch` command is made of: the verbs, drawing, reports.
+//!
+//! The verbs hold no control or friction of their own: they call `clutch-sim` and show what it
+//! says.
 
+mod certify;
 pub mod plot;
 pub mod report;
+mod reproduce;
+mod scenario;
+mod sim;
+mod table;
+
+use anyhow::Context;
+use clap::{Args, Parser, Subcommand};
+use clutch_sim::scenario::BUILT_IN;
+use clutch_sim::{Scenario, ScenarioError};
+use std::ffi::OsString;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Slow, smooth motion of shafts restrained by friction.
+///
+/// Simulates a shaft that a weight drives and a computer brakes, certifies the gains of its
+/// control law, and reproduces the paper that this is built on.
+///
+/// Exit codes: 0 done; 1 an error, which is printed; 2 from `certify`: not certified; 64 the
+/// command line could not be understood.
+#[derive(Parser)]
+#[command(name = "clutch", version, max_term_width = 100)]
+#[command(after_help = "Example:\n  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario")]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Sim(sim::Sim),
+    Scenario(scenario::ScenarioVerb),
+    Certify(certify::Certify),
+    Reproduce(reproduce::Reproduce),
+}
+
+/// A scenario and what to change in it.
+#[derive(Args)]
+struct ScenarioArgs {
+    /// Scenario file, or the name of a built-in scenario (`clutch scenario list`).
+    #[arg(value_name = "SCENARIO.toml")]
+    scenario: PathBuf,
+    /// Overrides a key of the scenario; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    set: Vec<(String, String)>,
+}
+
+fn key_value(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE, as law.smc.kp_v=4")?;
+    Ok((key.trim().to_owned(), value.trim().to_owned()))
+}
+
+impl ScenarioArgs {
+    fn load(&self) -> anyhow::Result<Scenario> {
+        let path = &self.scenario;
+        let name = path.to_string_lossy();
+        let built_in = BUILT_IN.iter().find(|b| b.name == name);
+        if let (Some(b), false) = (built_in, path.exists()) {
+            return Ok(Scenario::parse(b.name, b.toml, &self.set)?);
+        }
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            let hint = match e.kind() {
+                ErrorKind::NotFound => "no such file, and no built-in scenario of that name; `clutch scenario list` \
+                     shows those, `clutch scenario new FILE` writes one to begin with"
+                    .to_owned(),
+                ErrorKind::InvalidData => "not a text file: expected TOML in UTF-8".to_owned(),
+                _ => e.to_string(),
+            };
+            anyhow::anyhow!("{name}: {hint}")
+        })?;
+        Scenario::parse(&name, &text, &self.set).map_err(|e: ScenarioError| e.into())
+    }
+}
+
+/// How a verb ended, if not with an error.
+enum Outcome {
+    /// Exit code 0.
+    Done,
+    /// Exit code 2.
+    NotCertified,
+    /// Exit code 1, though everything ran.
+    Failed,
+}
+
+/// Runs the command with its arguments, the program's name first.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(e) => {
+            let asked_for = !e.use_stderr(); // --help, --version
+            let _ = e.print(); // nobody is left to be told
+            return if asked_for { ExitCode::SUCCESS } else { ExitCode::from(64) };
+        }
+    };
+    let outcome = match cli.verb {
+        Verb::Sim(v) => v.run(),
+        Verb::Scenario(v) => v.run(),
+        Verb::Certify(v) => v.run(),
+        Verb::Reproduce(v) => v.run(),
+    };
+    match outcome {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::NotCertified) => ExitCode::from(2),
+        Ok(Outcome::Failed) => ExitCode::FAILURE,
+        Err(e) => {
+            let _ = writeln!(std::io::stderr(), "clutch: {e:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Prints to standard output. A reader that has gone away (`| head`) is not an error.
+fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("standard output"),
+    }
+}
+
+/// Writes a file; errors name it.
+fn write(path: &Path, bytes: impl AsRef<[u8]>) -> anyhow::Result<()> {
+    std::fs::write(path, bytes).with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// Pretty JSON with a line end.
+fn json(value: &impl serde::Serialize) -> anyhow::Result<String> {
+    Ok(serde_json::to_string_pretty(value)? + "\n")
+}

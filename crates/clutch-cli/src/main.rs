@@ -1,3 +1,7 @@
-//! The `clutch` command.
+//! The `clutch` command: see `clutch --help`.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    clutch_cli::main(std::env::args_os())
+}

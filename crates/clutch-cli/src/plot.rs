@@ -9,12 +9,13 @@
 //! a million samples is thus the true one, and no narrow peak is lost. A value that is not a number,
 //! not finite or beyond ±1e150 is a gap. A point between two gaps is a dot.
 
+use ab_glyph::{Font, FontRef, Glyph, PxScale, ScaleFont, point};
 use anyhow::{Context, bail};
 use plotters::coord::Shift;
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
+use plotters::style::FontTransform;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{FontTransform, register_font};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -68,8 +69,8 @@ impl Figure {
         let (width, height) = layout.size;
         let mut text = String::new();
         {
-            let backend = SVGBackend::with_string(&mut text, layout.units(UNITS));
-            let canvas = Canvas { area: backend.into_drawing_area(), em: 1.24, ascent: 0.76, whole: true };
+            let backend = SVGBackend::with_string(&mut text, layout.units(Kind::Vector));
+            let canvas = Canvas { area: backend.into_drawing_area(), kind: Kind::Vector };
             canvas.figure(self, &layout).context("cannot draw an SVG")?;
             canvas.area.present().context("cannot draw an SVG")?;
         }
@@ -77,8 +78,12 @@ impl Figure {
         // so that no label is touched.
         let Some((head, body)) = text.split_once('>') else { bail!("the SVG has no root") };
         let family = format!(" font-family=\"{FAMILY}\"");
-        let body = body.replace(" opacity=\"1\"", "").replace(&family, "").replace(">\n", ">");
-        let (w, h) = layout.units(UNITS);
+        let body = body
+            .replace(" opacity=\"1\"", "")
+            .replace(&family, "")
+            .replace(">\n", ">")
+            .replace("\n</text>", "</text>");
+        let (w, h) = layout.units(Kind::Vector);
         let head = head.replacen(
             &format!("width=\"{w}\" height=\"{h}\""),
             &format!("width=\"{width}\" height=\"{height}\""),
@@ -93,34 +98,16 @@ impl Figure {
     /// The font cannot be read (it is built in), or the figure is too large to draw.
     pub fn png(&self) -> anyhow::Result<Vec<u8>> {
         let layout = Layout::new(self)?;
-        let (width, height) = layout.units(UNITS);
+        let (width, height) = layout.units(Kind::Raster);
         let mut pixels = vec![255; 3 * width as usize * height as usize];
         {
             let backend = BitMapBackend::with_buffer(&mut pixels, (width, height));
-            let canvas = Canvas {
-                area: backend.into_drawing_area(),
-                em: FONT_HEIGHT,
-                ascent: 0.5 * FONT_HEIGHT,
-                whole: false,
-            };
+            let canvas = Canvas { area: backend.into_drawing_area(), kind: Kind::Raster };
             canvas.figure(self, &layout).context("cannot draw a PNG")?;
             canvas.area.present().context("cannot draw a PNG")?;
         }
-        // Drawn at twice the resolution and averaged: smooth edges.
-        let (wide, row) = (width as usize * 3, width as usize / 2);
-        let mut small = Vec::with_capacity(pixels.len() / 4);
-        for pair in pixels.chunks_exact(2 * wide) {
-            let (upper, lower) = pair.split_at(wide);
-            for i in 0..row {
-                for c in 0..3 {
-                    let at = 6 * i + c;
-                    let sum = [upper[at], upper[at + 3], lower[at], lower[at + 3]].map(u16::from);
-                    small.push(((sum.iter().sum::<u16>() + 2) / 4) as u8);
-                }
-            }
-        }
         let mut file = Vec::new();
-        let mut encoder = png::Encoder::new(&mut file, width / 2, height / 2);
+        let mut encoder = png::Encoder::new(&mut file, width, height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_pixel_dims(Some(png::PixelDimensions {
@@ -129,7 +116,7 @@ impl Figure {
             unit: png::Unit::Meter,
         }));
         let mut writer = encoder.write_header()?;
-        writer.write_image_data(&small)?;
+        writer.write_image_data(&pixels)?;
         writer.finish()?;
         Ok(file)
     }
@@ -150,27 +137,23 @@ impl Figure {
     }
 }
 
-/// Units per CSS pixel in which both formats are drawn: plotters takes whole numbers only.
-const UNITS: u32 = 4;
 /// Size of a panel, px.
 const PANEL: (f64, f64) = (600.0, 350.0);
-/// Largest drawing, px: its bitmap takes 1.3 GB while it is drawn.
-const LARGEST: f64 = 27e6;
+/// Largest drawing, px: some 100 panels, 250 MB of pixels.
+const LARGEST: f64 = 21e6;
 /// 192 dpi.
 const PIXELS_PER_METRE: u32 = 7559;
 /// Beyond this a value is no datum: squares and differences stay finite.
 const BEYOND: f64 = 1e150;
 
 const FAMILY: &str = "DejaVu Sans, sans-serif";
-/// Ascent and descent of DejaVu Sans, em: what plotters takes for the size of a font.
-const FONT_HEIGHT: f64 = 1.164;
 /// Type sizes, px.
 const FIGURE_TITLE: f64 = 19.0;
 const PANEL_TITLE: f64 = 16.0;
 const LABEL: f64 = 15.0;
 const TICK: f64 = 14.0;
 
-/// Okabe and Ito's palette without yellow, which is lost on white. Dark against dark first.
+/// Okabe and Ito's palette without yellow, which is lost on white; the eighth curve has the first's colour.
 const PALETTE: [RGBColor; 7] = [
     RGBColor(0x00, 0x72, 0xb2),
     RGBColor(0xd5, 0x5e, 0x00),
@@ -233,10 +216,10 @@ impl Axis {
         let rough = (hi - lo) / count;
         let mut power = rough.log10().floor() as i32;
         let mantissa = rough / 10_f64.powi(power);
-        let round = match mantissa {
-            m if m <= 1.0 => 1,
-            m if m <= 2.0 => 2,
-            m if m <= 5.0 => 5,
+        let round = match mantissa * mantissa {
+            m if m <= 2.0 => 1,
+            m if m <= 10.0 => 2,
+            m if m <= 50.0 => 5,
             _ => {
                 power += 1;
                 1
@@ -274,6 +257,21 @@ impl Axis {
         Axis::new(lo, hi, count)
     }
 
+    /// Takes marks away until their labels stand apart on a horizontal axis of that length.
+    fn thin_out(&mut self, length: f64) -> anyhow::Result<()> {
+        for count in (1..6).rev() {
+            let mut labels = 0.0_f64;
+            for (_, label) in &self.ticks {
+                labels = labels.max(text_width(label, TICK)?);
+            }
+            if (labels + 16.0) * (self.ticks.len() as f64 - 1.0) <= length {
+                break;
+            }
+            *self = Axis::new(self.lo, self.hi, f64::from(count));
+        }
+        Ok(())
+    }
+
     /// `×10⁻⁶`, if the labels are divided.
     fn factor(&self) -> Option<String> {
         if self.exponent == 0 {
@@ -302,13 +300,43 @@ impl Axis {
     }
 }
 
-/// Width of a text in px.
+/// DejaVu Sans.
+fn font() -> anyhow::Result<&'static FontRef<'static>> {
+    static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
+    FONT.get_or_init(|| FontRef::try_from_slice(dejavu::sans::regular()).ok())
+        .as_ref()
+        .context("the built-in font DejaVu Sans cannot be read")
+}
+
+/// The letters of a text, the first at 0, and its width; in the unit of `em`, the type size.
+fn typeset(text: &str, em: f64) -> anyhow::Result<(Vec<Glyph>, f32)> {
+    let font = font()?;
+    let scale = font.units_per_em().map_or(1.0, |units| font.height_unscaled() / units) * em as f32;
+    let scaled = font.as_scaled(PxScale::from(scale));
+    let (mut pen, mut glyphs): (f32, Vec<Glyph>) = (0.0, Vec::new());
+    for letter in text.chars() {
+        let id = font.glyph_id(letter);
+        pen += glyphs.last().map_or(0.0, |last| scaled.kern(last.id, id));
+        let mut glyph = id.with_scale_and_position(scale, point(pen, 0.0));
+        if ('\u{300}'..='\u{314}').contains(&letter)
+            && let Some(last) = glyphs.last()
+        {
+            // An accent of its own, as on θ̇: above the letter, in its middle.
+            let ink = |g: &Glyph| font.outline_glyph(g.clone()).map(|o| o.px_bounds());
+            if let (Some(below), Some(above)) = (ink(last), ink(&glyph)) {
+                glyph.position.x += 0.5 * (below.min.x + below.max.x - above.min.x - above.max.x);
+                glyph.position.y -= (above.max.y - below.min.y + 0.05 * scale).max(0.0);
+            }
+        }
+        glyphs.push(glyph);
+        pen += scaled.h_advance(id);
+    }
+    Ok((glyphs, pen))
+}
+
+/// Width of a text in the unit of its type size.
 fn text_width(text: &str, size: f64) -> anyhow::Result<f64> {
-    // Measured large: plotters gives whole pixels.
-    const LARGE: f64 = 1000.0;
-    let font = FontDesc::new(FontFamily::Name(FAMILY), LARGE * FONT_HEIGHT, FontStyle::Normal);
-    let ((left, _), (right, _)) = font.layout_box(text)?;
-    Ok(f64::from(right - left) * size / LARGE)
+    Ok(f64::from(typeset(text, size)?.1))
 }
 
 /// A text made to fit: its size reduced by at most a third, then its end left out.
@@ -346,8 +374,20 @@ struct Placed {
     title: f64,
     /// From the vertical axis to the baseline of its name.
     y_label: f64,
-    /// Lines of the legend: number, label and left end of each entry, and the baseline.
-    legend: Vec<(usize, String, f64, f64)>,
+    /// Baseline of the legend's first line.
+    legend: f64,
+    entries: Vec<Entry>,
+}
+
+/// A curve's name in the legend.
+#[derive(Clone, Debug)]
+struct Entry {
+    number: usize,
+    label: String,
+    /// Line of the legend, from 0.
+    line: usize,
+    /// Left end within the line, px.
+    left: f64,
 }
 
 /// Where everything goes.
@@ -378,17 +418,10 @@ mod space {
 
 impl Layout {
     fn new(figure: &Figure) -> anyhow::Result<Layout> {
-        static FONT: OnceLock<bool> = OnceLock::new();
-        let usable =
-            FONT.get_or_init(|| register_font(FAMILY, FontStyle::Normal, dejavu::sans::regular()).is_ok());
-        if !usable {
-            bail!("the built-in font DejaVu Sans cannot be read");
-        }
-
         let columns = figure.columns.clamp(1, figure.panels.len().max(1));
         let rows = figure.panels.len().div_ceil(columns);
         let head = if figure.title.is_empty() { 0.0 } else { space::FIGURE_TITLE };
-        let axes: Vec<(Axis, Axis)> = figure.panels.iter().map(axes).collect();
+        let mut axes: Vec<(Axis, Axis)> = figure.panels.iter().map(axes).collect();
 
         let mut labels = 0.0_f64;
         for (_, label) in axes.iter().flat_map(|(_, y)| &y.ticks) {
@@ -397,6 +430,9 @@ impl Layout {
         let named = figure.panels.iter().any(|p| !p.y_label.is_empty());
         let left = labels + if named { 19.0 + LABEL } else { 10.0 };
         let width = PANEL.0 - left - space::RIGHT;
+        for (x, _) in &mut axes {
+            x.thin_out(width)?;
+        }
 
         let mut panels = Vec::new();
         let mut top = space::EDGE + head;
@@ -406,13 +442,13 @@ impl Layout {
             for panel in &figure.panels[these.clone()] {
                 legends.push(legend(panel, width)?);
             }
-            let lines = legends.iter().map(|(lines, _)| *lines).max().unwrap_or(0) as f64;
+            let lines = legends.iter().flatten().map(|e| e.line + 1).max().unwrap_or(0) as f64;
             let titled = figure.panels[these.clone()].iter().any(|p| !p.title.is_empty());
             let divided = axes[these.clone()].iter().any(|(_, y)| y.exponent != 0);
             let legend_top = top + if titled { space::PANEL_TITLE } else { 10.0 };
             let area_top = legend_top + space::LINE * (lines + if divided { 1.0 } else { 0.0 });
             let bottom = area_top + PANEL.1 - space::PANEL_TITLE - space::BELOW;
-            for (column, (index, (_, legend))) in these.zip(legends).enumerate() {
+            for (column, (index, entries)) in these.zip(legends).enumerate() {
                 let from = space::EDGE + column as f64 * PANEL.0 + left;
                 let (x, y) = axes[index].clone();
                 panels.push(Placed {
@@ -421,12 +457,8 @@ impl Layout {
                     area: Area { left: from, top: area_top, right: from + width, bottom },
                     title: top + 18.0,
                     y_label: labels + 19.0,
-                    legend: legend
-                        .into_iter()
-                        .map(|(number, label, line, at)| {
-                            (number, label, from + at, legend_top + space::LINE * line as f64 + 11.0)
-                        })
-                        .collect(),
+                    legend: legend_top + 11.0,
+                    entries,
                 });
             }
             top = bottom + space::BELOW;
@@ -438,8 +470,8 @@ impl Layout {
         Ok(Layout { size: (width.ceil() as u32, height.ceil() as u32), panels })
     }
 
-    fn units(&self, units: u32) -> (u32, u32) {
-        (self.size.0 * units, self.size.1 * units)
+    fn units(&self, kind: Kind) -> (u32, u32) {
+        (self.size.0 * kind.units(), self.size.1 * kind.units())
     }
 }
 
@@ -450,34 +482,33 @@ fn axes(panel: &Panel) -> (Axis, Axis) {
     let x = Axis::over_data(lo, hi, 6.0, 0.02);
     let fixed = panel.y_range.filter(|&range| widen(Some(range)) == range && drawable(&range));
     let y = match fixed {
-        Some((lo, hi)) => Axis::new(lo, hi, 5.0),
+        Some((lo, hi)) => Axis::new(lo, hi, 5.5),
         None => {
             let (lo, hi) = widen(extent(points().map(|p| p.1).chain(panel.lines.iter().copied())));
             let room = 0.05 * (hi - lo);
-            Axis::over_data(lo - room, hi + room, 5.0, 0.05)
+            Axis::over_data(lo - room, hi + room, 5.5, 0.05)
         }
     };
     (x, y)
 }
 
-/// How many lines a legend takes, and for each entry: number of the series, label, line, left end.
-#[allow(clippy::type_complexity)]
-fn legend(panel: &Panel, width: f64) -> anyhow::Result<(usize, Vec<(usize, String, usize, f64)>)> {
+/// The legend of a panel, in lines of that width: none for a single curve.
+fn legend(panel: &Panel, width: f64) -> anyhow::Result<Vec<Entry>> {
     if panel.series.len() < 2 {
-        return Ok((0, Vec::new()));
+        return Ok(Vec::new());
     }
     let (swatch, gap, next) = space::SWATCH;
-    let (mut line, mut at, mut entries) = (0, 0.0, Vec::new());
+    let (mut line, mut left, mut entries) = (0, 0.0, Vec::new());
     for (number, series) in panel.series.iter().enumerate() {
         let (label, _) = fit(&series.label, TICK, width - swatch - gap)?;
         let needed = swatch + gap + text_width(&label, TICK)?;
-        if at > 0.0 && at + needed > width {
-            (line, at) = (line + 1, 0.0);
+        if left > 0.0 && left + needed > width {
+            (line, left) = (line + 1, 0.0);
         }
-        entries.push((number, label, line, at));
-        at += needed + next;
+        entries.push(Entry { number, label, line, left });
+        left += needed + next;
     }
-    Ok((line + 1, entries))
+    Ok(entries)
 }
 
 /// Of points in px, those that decide the picture: of each run within one pixel column the first,
@@ -569,24 +600,32 @@ impl Trail {
     }
 }
 
-/// A plotters drawing with what its backends see differently.
+/// What a drawing is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// Lines and texts.
+    Vector,
+    /// Pixels.
+    Raster,
+}
+
+impl Kind {
+    /// Units per CSS pixel: plotters takes whole numbers only.
+    fn units(self) -> u32 {
+        match self {
+            Kind::Vector => 4,
+            Kind::Raster => 2,
+        }
+    }
+}
+
+/// A plotters drawing.
 struct Canvas<DB: DrawingBackend> {
     area: DrawingArea<DB, Shift>,
-    /// What the backend wants to be told for a font of one em.
-    em: f64,
-    /// From where the backend puts a text's top to its baseline, em.
-    ascent: f64,
-    /// Whether the backend draws a bent line well in one go. The bitmap backend fills the outline of a
-    /// wide one by the even-odd rule, and leaves holes where it crosses itself.
-    whole: bool,
+    kind: Kind,
 }
 
 type Drawn<DB> = Result<(), DrawingAreaErrorKind<<DB as DrawingBackend>::ErrorType>>;
-
-/// px to units.
-fn units(px: f64) -> i32 {
-    (px * f64::from(UNITS)).round() as i32
-}
 
 /// The middle of a pixel: lines there are sharp.
 fn middle(px: f64) -> f64 {
@@ -594,29 +633,86 @@ fn middle(px: f64) -> f64 {
 }
 
 impl<DB: DrawingBackend> Canvas<DB> {
+    /// px to units.
+    fn units(&self, px: f64) -> f64 {
+        px * f64::from(self.kind.units())
+    }
+
+    /// px to the nearest unit.
+    fn place(&self, (x, y): (f64, f64)) -> (i32, i32) {
+        (self.units(x).round() as i32, self.units(y).round() as i32)
+    }
+
     fn line(&self, points: &[(f64, f64)], color: RGBColor, width: f64) -> Drawn<DB> {
-        let mut path: Vec<(i32, i32)> = points.iter().map(|p| (units(p.0), units(p.1))).collect();
+        match self.kind {
+            Kind::Vector => self.path(points, color, width),
+            Kind::Raster => points.windows(2).try_for_each(|w| self.stroke(w[0], w[1], color, width, true)),
+        }
+    }
+
+    fn straight(&self, from: (f64, f64), to: (f64, f64), color: RGBColor, width: f64) -> Drawn<DB> {
+        match self.kind {
+            Kind::Vector => self.path(&[from, to], color, width),
+            Kind::Raster => self.stroke(from, to, color, width, false),
+        }
+    }
+
+    fn path(&self, points: &[(f64, f64)], color: RGBColor, width: f64) -> Drawn<DB> {
+        let mut path: Vec<(i32, i32)> = points.iter().map(|p| self.place(*p)).collect();
         path.dedup();
-        let style = ShapeStyle { color: color.into(), filled: true, stroke_width: units(width) as u32 };
-        if self.whole {
-            return self.area.draw(&PathElement::new(path, style));
-        }
-        for pair in path.windows(2) {
-            self.area.draw(&PathElement::new(pair, style))?;
-        }
-        for corner in path.get(1..path.len().saturating_sub(1)).unwrap_or_default() {
-            self.area.draw(&Circle::new(*corner, units(width) / 2, style))?;
+        let stroke_width = self.units(width).round() as u32;
+        let style = ShapeStyle { color: color.into(), filled: true, stroke_width };
+        self.area.draw(&PathElement::new(path, style))
+    }
+
+    /// A straight line in pixels, each as dark as the line covers it. plotters draws wide lines uneven
+    /// in width and with holes where they bend.
+    fn stroke(
+        &self,
+        from: (f64, f64),
+        to: (f64, f64),
+        color: RGBColor,
+        width: f64,
+        round_ends: bool,
+    ) -> Drawn<DB> {
+        let [from, to] = [from, to].map(|p| (self.units(p.0), self.units(p.1)));
+        let steep = (to.1 - from.1).abs() > (to.0 - from.0).abs();
+        let turn = |p: (f64, f64)| if steep { (p.1, p.0) } else { p };
+        let (a, b) = (turn(from), turn(to));
+        let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+        let (square, half) = (dx * dx + dy * dy, 0.5 * self.units(width));
+        // Along the longer side; across it as far as the line can reach.
+        let reach = 1.5 * half + 1.0;
+        for i in (a.0.min(b.0) - half).floor() as i32..=(a.0.max(b.0) + half).ceil() as i32 {
+            let x = f64::from(i) + 0.5 - a.0;
+            let centre = a.1 + if dx == 0.0 { 0.0 } else { dy * (x / dx).clamp(0.0, 1.0) };
+            for j in (centre - reach).floor() as i32..=(centre + reach).ceil() as i32 {
+                let y = f64::from(j) + 0.5 - a.1;
+                let share = if square > 0.0 { (x * dx + y * dy) / square } else { 0.0 };
+                if !round_ends && !(0.0..=1.0).contains(&share) {
+                    continue;
+                }
+                let share = share.clamp(0.0, 1.0);
+                let (beside_x, beside_y) = (x - share * dx, y - share * dy);
+                let distance = (beside_x * beside_x + beside_y * beside_y).sqrt();
+                let cover = (half + 0.5 - distance).clamp(0.0, 1.0);
+                if cover > 0.0 {
+                    self.area.draw_pixel(if steep { (j, i) } else { (i, j) }, &color.mix(cover))?;
+                }
+            }
         }
         Ok(())
     }
 
-    fn straight(&self, from: (f64, f64), to: (f64, f64), color: RGBColor, width: f64) -> Drawn<DB> {
-        self.line(&[from, to], color, width)
-    }
-
     fn dot(&self, at: (f64, f64), color: RGBColor) -> Drawn<DB> {
-        let style = ShapeStyle { color: color.into(), filled: true, stroke_width: 0 };
-        self.area.draw(&Circle::new((units(at.0), units(at.1)), units(2.5), style))
+        let size = 5.0;
+        match self.kind {
+            Kind::Vector => {
+                let radius = self.units(0.5 * size).round() as i32;
+                self.area.draw(&Circle::new(self.place(at), radius, color.filled()))
+            }
+            Kind::Raster => self.stroke(at, at, color, size, true),
+        }
     }
 
     /// A text by its anchor on the baseline; `upwards` = turned a quarter to the left.
@@ -627,28 +723,64 @@ impl<DB: DrawingBackend> Canvas<DB> {
         anchor: HPos,
         (size, color): (f64, RGBColor),
         upwards: bool,
-    ) -> Drawn<DB> {
+    ) -> anyhow::Result<()>
+    where
+        DB::ErrorType: 'static,
+    {
         if text.is_empty() {
             return Ok(());
         }
-        let mut font =
-            FontDesc::new(FontFamily::Name(FAMILY), size * f64::from(UNITS) * self.em, FontStyle::Normal);
-        let (mut x, mut y) = at;
-        if upwards {
-            font = font.transform(FontTransform::Rotate270);
-            x -= self.ascent * size;
-        } else {
-            y -= self.ascent * size;
+        // Control characters are no part of XML.
+        let text = &text.replace(char::is_control, " ");
+        let em = self.units(size);
+        if self.kind == Kind::Vector {
+            // To plotters a font's size is 1.24 em, and the top of a text 0.76 em above its baseline.
+            let mut font = FontDesc::new(FontFamily::Name(FAMILY), 1.24 * em, FontStyle::Normal);
+            let ascent = 0.76 * size;
+            let (mut x, mut y) = at;
+            if upwards {
+                font = font.transform(FontTransform::Rotate270);
+                x -= ascent;
+            } else {
+                y -= ascent;
+            }
+            let style = TextStyle::from(font).color(&color).pos(Pos::new(anchor, VPos::Top));
+            return Ok(self.area.draw_text(text, &style, self.place((x, y)))?);
         }
-        let style = TextStyle::from(font).color(&color).pos(Pos::new(anchor, VPos::Top));
-        self.area.draw_text(text, &style, (units(x), units(y)))
+        // Not through plotters: it forgets the space left of a letter, and an accent lands beside it.
+        let (font, (glyphs, width)) = (font()?, typeset(text, em)?);
+        let start = match anchor {
+            HPos::Left => 0.0,
+            HPos::Center => -0.5 * width,
+            HPos::Right => -width,
+        };
+        let at = (self.units(at.0), self.units(at.1));
+        for mut glyph in glyphs {
+            // The space between letters is no whole number of pixels, and need not be.
+            glyph.position.x += start + if upwards { -at.1 } else { at.0 } as f32;
+            glyph.position.y += if upwards { at.0 } else { at.1 } as f32;
+            let Some(letter) = font.outline_glyph(glyph) else { continue };
+            let bounds = letter.px_bounds();
+            let (left, top) = (bounds.min.x as i32, bounds.min.y as i32);
+            let mut drawn = Ok(());
+            letter.draw(|x, y, cover| {
+                let (x, y) = (left + x as i32, top + y as i32);
+                let (x, y) = if upwards { (y, -1 - x) } else { (x, y) };
+                if drawn.is_ok() && cover > 0.0 {
+                    let color = color.mix(f64::from(cover.min(1.0)));
+                    drawn = self.area.draw_pixel((x, y), &color);
+                }
+            });
+            drawn?;
+        }
+        Ok(())
     }
 
     fn figure(&self, figure: &Figure, layout: &Layout) -> anyhow::Result<()>
     where
         DB::ErrorType: 'static,
     {
-        let (width, height) = layout.units(UNITS);
+        let (width, height) = layout.units(self.kind);
         self.area.draw(&Rectangle::new([(0, 0), (width as i32, height as i32)], WHITE.filled()))?;
         if !figure.title.is_empty() {
             let from = layout.panels.first().map_or(space::EDGE, |p| p.area.left);
@@ -673,18 +805,17 @@ impl<DB: DrawingBackend> Canvas<DB> {
         let (low, high) = (middle(bottom), middle(top));
         let (near, far) = (middle(left), middle(right));
 
-        for (x, _) in &placed.x.ticks {
+        let empty = !panel.series.iter().any(|s| s.points.iter().any(drawable));
+        for (x, _) in placed.x.ticks.iter().filter(|_| !empty) {
             self.straight((column(*x), high), (column(*x), low), GRID, 1.0)?;
         }
-        for (y, _) in &placed.y.ticks {
+        for (y, _) in placed.y.ticks.iter().filter(|_| !empty) {
             let zero = y.abs() < 1e-9 * (placed.y.hi - placed.y.lo);
             self.straight((near, row(*y)), (far, row(*y)), if zero { ZERO } else { GRID }, 1.0)?;
         }
 
-        let mut empty = true;
         for (series, color) in panel.series.iter().zip(PALETTE.iter().cycle()) {
             let trail = Trail::new(&series.points, panel.step, placed);
-            empty &= !series.points.iter().any(drawable);
             for line in &trail.lines {
                 self.line(line, *color, 1.25)?;
             }
@@ -733,11 +864,257 @@ impl<DB: DrawingBackend> Canvas<DB> {
             self.text(&factor, (left, top - 8.0), HPos::Left, (TICK, INK), false)?;
         }
         let (swatch, gap, _) = space::SWATCH;
-        for (number, label, from, baseline) in &placed.legend {
+        for Entry { number, label, line, left: from } in &placed.entries {
+            let (from, baseline) = (left + from, placed.legend + space::LINE * *line as f64);
             let (color, y) = (PALETTE[number % PALETTE.len()], middle(baseline - 0.3 * TICK));
-            self.straight((*from, y), (from + swatch, y), color, 2.0)?;
-            self.text(label, (from + swatch + gap, *baseline), HPos::Left, (TICK, INK), false)?;
+            self.straight((from, y), (from + swatch, y), color, 2.0)?;
+            self.text(label, (from + swatch + gap, baseline), HPos::Left, (TICK, INK), false)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(label: &str, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
+        Series { label: label.to_owned(), points: points.into_iter().collect() }
+    }
+
+    fn panel(series: Vec<Series>) -> Panel {
+        Panel {
+            title: "PD, 2 °/s".to_owned(),
+            x_label: "time / s".to_owned(),
+            y_label: "error / °".to_owned(),
+            series,
+            ..Panel::default()
+        }
+    }
+
+    fn figure(panels: Vec<Panel>) -> Figure {
+        Figure { title: "Figure 8 <&> \"e\" & θ̇".to_owned(), columns: 2, panels }
+    }
+
+    fn wave(n: u32) -> impl Iterator<Item = (f64, f64)> {
+        (0..n).map(move |i| (f64::from(i) * 1e-3, (f64::from(i) * 0.7).sin() + (f64::from(i) * 0.013).cos()))
+    }
+
+    /// Texts of an SVG document.
+    fn texts(svg: &str) -> Vec<String> {
+        let document = roxmltree::Document::parse(svg).expect("well-formed");
+        document.descendants().filter_map(|n| n.text().map(str::trim)).map(str::to_owned).collect()
+    }
+
+    fn labels(lo: f64, hi: f64) -> Vec<String> {
+        Axis::new(lo, hi, 5.0).ticks.into_iter().map(|t| t.1).collect()
+    }
+
+    #[test]
+    fn an_svg_is_well_formed_and_shows_its_labels() {
+        let two = vec![series("PD <1>", wave(500)), series("SMC & more", wave(200))];
+        let svg = figure(vec![panel(two), panel(vec![series("alone", wave(50))])]).svg().unwrap();
+        let texts = texts(&svg);
+        for label in
+            ["Figure 8 <&> \"e\" & θ̇", "PD, 2 °/s", "time / s", "error / °", "PD <1>", "SMC & more", "0.2"]
+        {
+            assert!(texts.iter().any(|t| t == label), "{label} is missing in {texts:?}");
+        }
+        assert!(!texts.iter().any(|t| t == "alone"), "a single curve needs no legend");
+        assert!(!svg.contains(" id="));
+        assert!(
+            svg.starts_with("<svg width=\"1228\" height=\"440\" viewBox=\"0 0 4912 1760\" xmlns="),
+            "{svg:.120}"
+        );
+    }
+
+    #[test]
+    fn the_same_data_give_the_same_bytes() {
+        let figure = figure(vec![panel(vec![series("e", wave(3000)), series("f", wave(20))])]);
+        assert_eq!(figure.svg().unwrap(), figure.svg().unwrap());
+        assert_eq!(figure.png().unwrap(), figure.png().unwrap());
+    }
+
+    #[test]
+    fn a_png_has_twice_the_size_and_the_colours() {
+        let png = figure(vec![panel(vec![series("e", wave(3000))])]).png().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((info.width, info.height), (2 * 628, 2 * 418));
+        assert_eq!(pixels[..3], [255; 3]);
+        let blue = pixels.chunks(3).filter(|p| *p == [0x00, 0x72, 0xb2]).count();
+        assert!(blue > 10_000, "{blue}");
+    }
+
+    #[test]
+    fn a_line_in_pixels_is_as_wide_as_it_should_be() {
+        for (dx, dy) in [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8), (-0.8, 0.6), (0.96, -0.28)] {
+            let mut pixels = vec![255; 3 * 400 * 400];
+            let canvas = Canvas {
+                area: BitMapBackend::with_buffer(&mut pixels, (400, 400)).into_drawing_area(),
+                kind: Kind::Raster,
+            };
+            let (from, to) = ((100.0 - 50.0 * dx, 100.0 - 50.0 * dy), (100.0 + 50.0 * dx, 100.0 + 50.0 * dy));
+            canvas.stroke(from, to, BLACK, 2.0, true).unwrap();
+            canvas.area.present().unwrap();
+            drop(canvas);
+            let ink: f64 = pixels.iter().map(|p| f64::from(255 - p)).sum::<f64>() / (3.0 * 255.0);
+            // 200 × 4 pixels and two half discs of radius 2.
+            let area = 800.0 + 4.0 * std::f64::consts::PI;
+            assert!((ink / area - 1.0).abs() < 0.02, "{dx} {dy}: {ink} of {area}");
+        }
+    }
+
+    #[test]
+    fn strange_data_make_a_picture() {
+        let (nan, inf) = (f64::NAN, f64::INFINITY);
+        let odd: Vec<Vec<(f64, f64)>> = vec![
+            vec![],
+            vec![(1.0, 2.0)],
+            vec![(0.0, 0.0)],
+            vec![(0.0, 0.3); 4],
+            vec![(0.0, 0.3), (1.0, 0.3), (2.0, 0.3)],
+            vec![(nan, 1.0), (1.0, nan), (nan, nan)],
+            vec![(0.0, 1.0), (1.0, nan), (2.0, 2.0), (3.0, inf), (4.0, -inf), (5.0, 1.0), (6.0, 2.0)],
+            vec![(inf, 0.0), (-inf, 1.0)],
+            vec![(0.0, f64::MAX), (1.0, f64::MIN), (2.0, 1e149), (3.0, -1e149)],
+            vec![(0.0, 5e-324), (1e-320, 0.0)],
+            vec![(1.7e9, 1.0), (1.7e9 + 1e-3, 1.0 + 1e-15)],
+            vec![(3.0, 1.0), (1.0, 5.0), (2.0, -1.0)],
+        ];
+        for points in odd {
+            for step in [false, true] {
+                for y_range in [None, Some((0.5, 1.5)), Some((1.0, 1.0)), Some((nan, 2.0)), Some((inf, -inf))]
+                {
+                    let lines = vec![1.0, nan, inf, 7.0];
+                    let panel = Panel { step, y_range, lines, ..panel(vec![series("odd", points.clone())]) };
+                    let svg = figure(vec![panel]).svg().unwrap();
+                    let none = !points.iter().any(drawable);
+                    assert_eq!(texts(&svg).iter().any(|t| t == "no data"), none, "{points:?}");
+                    assert!(!svg.contains("NaN") && !svg.contains("inf"), "{points:?}");
+                }
+            }
+            figure(vec![panel(vec![series("odd", points)])]).png().unwrap();
+        }
+        for columns in [0, 1, 9] {
+            let empty = Figure { columns, ..figure(vec![]) };
+            assert!(texts(&empty.svg().unwrap()).iter().any(|t| t.starts_with("Figure 8")));
+            empty.png().unwrap();
+        }
+        let control = Panel { title: "a\u{0}b\nc".to_owned(), ..panel(vec![]) };
+        assert!(texts(&figure(vec![control]).svg().unwrap()).iter().any(|t| t == "a b c"));
+    }
+
+    #[test]
+    fn a_gap_parts_a_curve_and_a_lone_point_is_a_dot() {
+        let points =
+            [(0.0, 0.0), (1.0, 1.0), (2.0, f64::NAN), (3.0, 0.5), (4.0, f64::NAN), (5.0, 1.0), (6.0, 0.0)];
+        let panel = panel(vec![series("e", points)]);
+        let layout = Layout::new(&figure(vec![panel.clone()])).unwrap();
+        let trail = Trail::new(&panel.series[0].points, false, &layout.panels[0]);
+        assert_eq!(trail.lines.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);
+        assert_eq!(trail.dots.len(), 1);
+    }
+
+    #[test]
+    fn decimation_keeps_the_extremes_of_every_column() {
+        let mut points: Vec<(f64, f64)> = wave(100_000).map(|(x, y)| (5.0 * x, y)).collect();
+        points[54_321].1 = 40.0;
+        points[7].1 = -40.0;
+        let kept = decimate(&points);
+        assert!(kept.len() <= 4 * 501, "{}", kept.len());
+        for column in 0..500 {
+            let of =
+                |p: &[(f64, f64)]| extent(p.iter().filter(|p| p.0.floor() == f64::from(column)).map(|p| p.1));
+            assert_eq!(of(&kept), of(&points), "column {column}");
+        }
+        assert!(kept.windows(2).all(|w| w[0].0 < w[1].0), "the order is lost");
+        assert_eq!((kept.first(), kept.last()), (points.first(), points.last()));
+        let few = [(0.2, 1.0), (0.9, 2.0), (5.0, 3.0), (0.1, 4.0)];
+        assert_eq!(decimate(&few), few);
+    }
+
+    #[test]
+    fn long_curves_make_small_files() {
+        let six =
+            (0..6).map(|_| panel(vec![series("e", wave(100_000)), series("f", wave(60_000))])).collect();
+        let svg = Figure { columns: 3, ..figure(six) }.svg().unwrap();
+        assert!(svg.len() < 300_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn stairs_hold_a_value_until_the_next() {
+        let panel = Panel { step: true, ..panel(vec![series("u", [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)])]) };
+        let layout = Layout::new(&figure(vec![panel.clone()])).unwrap();
+        let trail = Trail::new(&panel.series[0].points, true, &layout.panels[0]);
+        let [line] = trail.lines.as_slice() else { panic!("{trail:?}") };
+        assert_eq!(line.len(), 5);
+        assert!(line.windows(2).all(|w| w[0].0 == w[1].0 || w[0].1 == w[1].1));
+    }
+
+    #[test]
+    fn nothing_is_drawn_outside_the_axes() {
+        let panel = Panel { y_range: Some((-0.5, 0.5)), ..panel(vec![series("e", wave(4000))]) };
+        let layout = Layout::new(&figure(vec![panel.clone()])).unwrap();
+        let Area { left, top, right, bottom } = layout.panels[0].area;
+        let trail = Trail::new(&panel.series[0].points, false, &layout.panels[0]);
+        assert!(trail.lines.len() > 10);
+        for (x, y) in trail.lines.iter().flatten() {
+            assert!(*x >= left - 1e-9 && *x <= right + 1e-9 && *y >= top - 1e-9 && *y <= bottom + 1e-9);
+        }
+    }
+
+    #[test]
+    fn tick_labels_are_round() {
+        assert_eq!(labels(0.0, 0.5), ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
+        assert_eq!(labels(-0.05, 0.12), ["−0.05", "0.00", "0.05", "0.10"]);
+        assert_eq!(labels(0.0, 5.0), ["0", "1", "2", "3", "4", "5"]);
+        assert_eq!(labels(0.0, 20_000.0), ["0", "5000", "10000", "15000", "20000"]);
+        let small = Axis::new(0.0, 5e-6, 5.0);
+        assert_eq!(
+            small.ticks.iter().map(|t| t.1.as_str()).collect::<Vec<_>>(),
+            ["0", "1", "2", "3", "4", "5"]
+        );
+        assert_eq!(small.factor().unwrap(), "×10⁻⁶");
+        let large = Axis::new(-4e12, 4e12, 4.0);
+        assert_eq!(large.ticks.iter().map(|t| t.1.as_str()).collect::<Vec<_>>(), ["−4", "−2", "0", "2", "4"]);
+        assert_eq!(large.factor().unwrap(), "×10¹²");
+        // Runs end one sample before the round time; the axis does not.
+        assert_eq!(Axis::over_data(0.0, 4.999, 6.0, 0.02).hi, 5.0);
+        assert_eq!(Axis::over_data(0.0, 4.7, 6.0, 0.02).hi, 4.7);
+    }
+
+    #[test]
+    fn a_long_text_is_made_to_fit() {
+        let (kept, size) = fit("short", 16.0, 500.0).unwrap();
+        assert_eq!((kept.as_str(), size), ("short", 16.0));
+        let (cut, size) = fit(&"a very long title ".repeat(9), 16.0, 500.0).unwrap();
+        assert!(cut.ends_with('…') && text_width(&cut, size).unwrap() <= 500.0, "{cut}");
+        assert_eq!(fit("W", 16.0, 1.0).unwrap().0, "…");
+    }
+
+    #[test]
+    fn a_figure_is_saved_by_its_ending() {
+        let dir = std::env::temp_dir().join(format!("clutch-plot-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let figure = figure(vec![panel(vec![series("e", wave(100))])]);
+        figure.save(&dir.join("a.svg")).unwrap();
+        figure.save(&dir.join("a.PNG")).unwrap();
+        assert_eq!(std::fs::read_to_string(dir.join("a.svg")).unwrap(), figure.svg().unwrap());
+        assert_eq!(std::fs::read(dir.join("a.PNG")).unwrap(), figure.png().unwrap());
+        for wrong in ["figure8.pdf", "figure8", ".svg"] {
+            let error = figure.save(&dir.join(wrong)).unwrap_err().to_string();
+            assert!(error.contains(wrong) && error.contains(".svg or .png"), "{error}");
+        }
+        let error = figure.save(&dir.join("missing").join("a.svg")).unwrap_err().to_string();
+        assert!(error.contains("missing"), "{error}");
+        std::fs::remove_dir_all(dir).unwrap();
+    }
+
+    #[test]
+    fn a_figure_that_is_too_large_is_refused() {
+        let error = figure(vec![Panel::default(); 200]).svg().unwrap_err().to_string();
+        assert!(error.contains("200 panels"), "{error}");
     }
 }

@@ -156,9 +156,11 @@ fn decay_integrals<T: Real>(x: T) -> (T, T) {
     }
     // The formulas cancel for small x. Nested series; 1/20! is below the last bit of 1/2.
     let (mut g1, mut g2) = (T::ZERO, T::ZERO);
-    for n in (1..=20).rev() {
-        g1 = T::ONE - x * g1 / T::from_i32(n + 1);
-        g2 = T::ONE - x * g2 / T::from_i32(n + 2);
+    let mut n = T::from_i32(21);
+    for _ in 0..20 {
+        g1 = T::ONE - x * g1 / n;
+        g2 = T::ONE - x * g2 / (n + T::ONE);
+        n -= T::ONE;
     }
     (g1, g2 / T::from_i32(2))
 }
@@ -203,8 +205,8 @@ impl<T: Real> Observer<T> {
     /// An observer with gains found elsewhere, for the same plant, encoder and period.
     ///
     /// # Errors
-    /// Fields `position_gain`, `velocity_gain`, `disturbance_gain`: one that is not positive and
-    /// finite, or (the last) with which the error would not die away; `period` out of range.
+    /// Fields `position`, `velocity`, `disturbance`: one that is not positive and finite, or (the
+    /// last) with which the error would not die away; `period` out of range.
     pub fn with_gains(
         gains: &ObserverGains<T>,
         plant: &Plant<T>,
@@ -212,13 +214,13 @@ impl<T: Real> Observer<T> {
         period: Micros,
     ) -> Result<Self, ParamError<T>> {
         let ObserverGains { position, velocity, disturbance } = *gains;
-        require("position_gain", position, position > T::ZERO, "a finite number above 0")?;
-        require("velocity_gain", velocity, velocity > T::ZERO, "a finite number above 0 1/s")?;
-        require("disturbance_gain", disturbance, disturbance > T::ZERO, "a finite number above 0 N m/rad")?;
+        require("position", position, position > T::ZERO, "a finite number above 0")?;
+        require("velocity", velocity, velocity > T::ZERO, "a finite number above 0 1/s")?;
+        require("disturbance", disturbance, disturbance > T::ZERO, "a finite number above 0 N m/rad")?;
         let p = plant.params();
         let model = Model::new(p.inertia, p.viscous_damping, period.period()?);
         require(
-            "disturbance_gain",
+            "disturbance",
             disturbance,
             error_dies_away(gains, &model),
             "three gains with which the error dies away: smaller ones, N m/rad",
@@ -571,11 +573,11 @@ mod tests {
         let with = |g| Observer::with_gains(&g, &plant(), Encoder::PAPER, MS);
         assert_eq!(with(good), Ok(observer()));
         for (bad, field) in [
-            (ObserverGains { position: f64::NAN, ..good }, "position_gain"),
-            (ObserverGains { velocity: -1.0, ..good }, "velocity_gain"),
-            (ObserverGains { disturbance: 0.0, ..good }, "disturbance_gain"),
-            (ObserverGains { disturbance: 100.0 * good.disturbance, ..good }, "disturbance_gain"),
-            (ObserverGains { position: 2.1, ..good }, "disturbance_gain"),
+            (ObserverGains { position: f64::NAN, ..good }, "position"),
+            (ObserverGains { velocity: -1.0, ..good }, "velocity"),
+            (ObserverGains { disturbance: 0.0, ..good }, "disturbance"),
+            (ObserverGains { disturbance: 100.0 * good.disturbance, ..good }, "disturbance"),
+            (ObserverGains { position: 2.1, ..good }, "disturbance"),
         ] {
             assert_eq!(with(bad).unwrap_err().field, field);
         }

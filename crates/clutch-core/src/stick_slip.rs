@@ -24,7 +24,7 @@ pub struct StickSlipParams<T = f64> {
 
 impl<T: Real> Default for StickSlipParams<T> {
     fn default() -> Self {
-        StickSlipParams { gap: T::from_f64(1.25), ticks: 3 }
+        StickSlipParams { gap: T::from_f64(1.25), ticks: 6 }
     }
 }
 

@@ -1,4 +1,4 @@
-//! What drives the shaft: a weight, a table over time, or a hand.
+//! What drives the shaft: a weight, a spring, a table over time, or a hand.
 
 use clutch_core::ParamError;
 use rand::{RngExt, SeedableRng};
@@ -15,6 +15,13 @@ pub enum DriveParams {
         gravity: f64,
         /// `R_p`, m.
         pulley_radius: f64,
+    },
+    /// A spring: `stiffness · (rest − θ)`.
+    Spring {
+        /// N m/rad.
+        stiffness: f64,
+        /// Angle at which it pulls no more, rad from the start.
+        rest: f64,
     },
     /// Torque at points in time, straight lines between, constant outside.
     Table(
@@ -42,6 +49,13 @@ const HAND_SINES: u32 = 48;
 pub enum Drive {
     /// Constant, N m.
     Constant(f64),
+    /// `stiffness · (rest − θ)`, N m/rad and rad.
+    Spring {
+        /// N m/rad.
+        stiffness: f64,
+        /// rad
+        rest: f64,
+    },
     /// (s, N m), straight lines between.
     Table(Vec<(f64, f64)>),
     /// Mean and sines.
@@ -73,6 +87,15 @@ impl Drive {
                     }
                 }
                 Ok(Drive::Constant(mass * gravity * pulley_radius))
+            }
+            DriveParams::Spring { stiffness, rest } => {
+                if !(*stiffness > 0.0 && stiffness.is_finite()) {
+                    return bad("stiffness", *stiffness, "a finite number above 0 N m/rad");
+                }
+                if !rest.is_finite() {
+                    return bad("rest", *rest, "a finite angle, rad");
+                }
+                Ok(Drive::Spring { stiffness: *stiffness, rest: *rest })
             }
             DriveParams::Table(points) => {
                 if points.is_empty() {
@@ -129,11 +152,12 @@ impl Drive {
         }
     }
 
-    /// Torque at a time, N m.
+    /// Torque at a time (s) and a position (rad from the start), N m.
     #[must_use]
-    pub fn torque(&self, t: f64) -> f64 {
+    pub fn torque(&self, t: f64, position: f64) -> f64 {
         match self {
             Drive::Constant(torque) => *torque,
+            Drive::Spring { stiffness, rest } => stiffness * (rest - position),
             Drive::Table(points) => {
                 let after = points.partition_point(|p| p.0 <= t);
                 if after == 0 {
@@ -151,26 +175,10 @@ impl Drive {
         }
     }
 
-    /// Does not change with time.
+    /// Changes neither with time nor with position.
     #[must_use]
     pub fn is_constant(&self) -> bool {
         matches!(self, Drive::Constant(_))
-    }
-
-    /// Lowest and highest torque that can come, N m: of a hand, the mean ± the sum of all sines
-    /// would never come; ± 4 rms is given.
-    #[must_use]
-    pub fn range(&self) -> (f64, f64) {
-        match self {
-            Drive::Constant(torque) => (*torque, *torque),
-            Drive::Table(points) => points
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), (_, x)| (lo.min(*x), hi.max(*x))),
-            Drive::Hand { mean, sines } => {
-                let rms = libm::sqrt(sines.iter().map(|(a, _, _)| 0.5 * a * a).sum());
-                (mean - 4.0 * rms, mean + 4.0 * rms)
-            }
-        }
     }
 }
 
@@ -181,10 +189,9 @@ mod tests {
     #[test]
     fn a_table_is_straight_between_its_points_and_constant_outside() {
         let d = Drive::new(&DriveParams::Table(vec![(1.0, 0.1), (2.0, 0.3)]), 0).unwrap();
-        assert_eq!(d.torque(0.0), 0.1);
-        assert!((d.torque(1.25) - 0.15).abs() < 1e-15);
-        assert_eq!(d.torque(9.0), 0.3);
-        assert_eq!(d.range(), (0.1, 0.3));
+        assert_eq!(d.torque(0.0, 0.0), 0.1);
+        assert!((d.torque(1.25, 0.0) - 0.15).abs() < 1e-15);
+        assert_eq!(d.torque(9.0, 0.0), 0.3);
     }
 
     #[test]
@@ -194,7 +201,7 @@ mod tests {
         let n = 200_000;
         let (mut sum, mut square) = (0.0, 0.0);
         for i in 0..n {
-            let x = d.torque(f64::from(i) * 0.005) - 0.05;
+            let x = d.torque(f64::from(i) * 0.005, 0.0) - 0.05;
             sum += x;
             square += x * x;
         }

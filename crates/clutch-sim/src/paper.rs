@@ -169,7 +169,7 @@ fn spec(column: Column, law: PaperLaw, rate_deg_s: f64, seed: u64) -> RunSpec<'s
 /// The bench's plant as a law would know it after a perfect measurement.
 fn known_model(bench: &RigParams) -> PlantParams {
     let friction: StribeckParams = bench.friction;
-    let drive = crate::drive::Drive::new(&bench.drive, 0).map_or(0.0, |d| d.torque(0.0));
+    let drive = crate::drive::Drive::new(&bench.drive, 0).map_or(0.0, |d| d.torque(0.0, 0.0));
     PlantParams {
         inertia: bench.inertia,
         drive_torque: drive,

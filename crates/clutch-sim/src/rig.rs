@@ -174,7 +174,7 @@ impl RigParams {
 /// A checked rig.
 #[derive(Clone, Debug)]
 pub struct Rig {
-    /// What engines integrate.
+    /// What engines integrate; its driving torque is the one at the start.
     pub model: Model,
     /// What drives the shaft.
     pub drive: Drive,
@@ -194,10 +194,9 @@ impl Rig {
     pub fn new(p: &RigParams, seed: u64) -> Result<Rig, ParamError> {
         let bad = |field, value, expected| Err(ParamError { field, value, expected });
         let drive = Drive::new(&p.drive, seed)?;
-        let (low, high) = drive.range();
         let plant = Plant::new(&PlantParams {
             inertia: p.inertia,
-            drive_torque: 0.5 * (low + high),
+            drive_torque: drive.torque(0.0, 0.0),
             viscous_damping: p.viscous_damping,
             brake_gain: p.brake_gain,
             friction: p.friction,
@@ -227,7 +226,7 @@ impl Rig {
     }
 
     /// Voltage that holds the sliding shaft at a velocity, V: friction and viscous drag carry
-    /// the mean driving torque.
+    /// the driving torque of the start.
     #[must_use]
     pub fn sliding_voltage(&self, velocity: f64) -> f64 {
         let p = self.model.plant.params();

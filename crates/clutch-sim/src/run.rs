@@ -8,7 +8,8 @@ use crate::rig::{Rig, RigParams};
 use clutch_core::law::{Controller, LawParams, OutputParams, Terms};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
-    Counts, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, VelocityParams,
+    Counts, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, StickSlip,
+    StickSlipParams, StickSlipState, VelocityParams,
 };
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -134,6 +135,8 @@ pub struct Trace {
     pub time: Vec<f64>,
     /// `θ_d`, rad.
     pub target_position: Vec<f64>,
+    /// `θ̇_d`, rad/s.
+    pub target_velocity: Vec<f64>,
     /// `θ`, rad.
     pub position: Vec<f64>,
     /// `θ̇`, rad/s.
@@ -165,8 +168,22 @@ pub struct Run {
     pub events: Vec<Event>,
     /// Figures.
     pub metrics: Metrics,
+    /// Stick-slip as the encoder shows it: what a loop on hardware would count.
+    pub detected: Detected,
     /// Which engine ran.
     pub engine: EngineKind,
+}
+
+/// What the [`StickSlip`] detector saw on the encoder's counts.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Detected {
+    /// Stick-slip cycles per second, after settling.
+    pub stick_slip_cycles_per_s: f64,
+    /// Share of the time that the shaft was seen stuck, after settling.
+    pub stick_time_fraction: f64,
+    /// Ticks at which the detector called the shaft stuck, in order.
+    #[serde(skip)]
+    pub ticks: Vec<u64>,
 }
 
 /// Runs the law of the specification, in the scalar `T`.
@@ -244,6 +261,7 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
     let first = reference.at(0);
     let velocity = if p.start == Start::OnPath { first.velocity } else { 0.0 };
     let mut shaft = Shaft::new(to_radians(first.position), velocity);
+    let origin = shaft.position;
     let mut volts = rig.sliding_voltage(velocity);
     let counts_at = |position: f64| Counts(libm::floor(position * per_radian) as i64 as i32);
     let mut state = servo.start(counts_at(shaft.position), &first.cast(), T::from_f64(volts));
@@ -253,6 +271,10 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
     let mut trace = Trace::default();
     let mut events = Vec::new();
     let mut figures = MetricsBuilder::new(period, p.settle);
+    let detector = StickSlip::<f64>::new(&StickSlipParams::default(), rig.encoder, spec.period)?;
+    let mut seen_by_encoder = StickSlipState::default();
+    let mut before_settling = (0, 0);
+    let mut detected = Detected::default();
     for k in 0..ticks {
         let time = k as f64 * period;
         let target = reference.at(k);
@@ -270,6 +292,7 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
         figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage: commanded });
         trace.time.push(time);
         trace.target_position.push(target_position);
+        trace.target_velocity.push(target.velocity);
         trace.position.push(shaft.position);
         trace.velocity.push(shaft.velocity);
         trace.error.push(error);
@@ -284,11 +307,18 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
             column.1.push(value.to_f64());
         }
 
+        if detector.update(&mut seen_by_encoder, counts, target.velocity) {
+            detected.ticks.push(k);
+        }
+        if time < p.settle {
+            before_settling = (seen_by_encoder.cycles(), seen_by_encoder.stuck_ticks());
+        }
         pending.push_back(commanded);
         let arriving = pending.pop_front().unwrap_or(commanded);
         let input = Input {
             time,
             duration: period,
+            origin,
             volts: match spec.rig.actuator_time_constant {
                 None => Volts::Held(arriving),
                 Some(time_constant) => Volts::Lag { from: volts, to: arriving, time_constant },
@@ -308,7 +338,12 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
         figures.stuck(time, stuck_time(was_stuck, time, period, &events[seen..]));
         events[seen..].iter().for_each(|e| figures.event(e));
     }
-    Ok(Run { trace, events, metrics: figures.finish(), engine: kind })
+    let metrics = figures.finish();
+    let measured = metrics.measured_s.max(period);
+    detected.stick_slip_cycles_per_s = (seen_by_encoder.cycles() - before_settling.0) as f64 / measured;
+    detected.stick_time_fraction =
+        (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured;
+    Ok(Run { trace, events, metrics, detected, engine: kind })
 }
 
 /// Time spent stuck within one interval.

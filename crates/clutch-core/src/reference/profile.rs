@@ -184,10 +184,10 @@ impl<T: Real> Profile<T> {
 
     pub(super) fn at(&self, tick: u64) -> Target<T> {
         // Of the pieces that have begun, the last; pieces shorter than a tick are passed over.
-        let Some(piece) = self.pieces.iter().rev().find(|p| p.first_tick <= tick) else {
+        let begun = |p: &Piece<T>| Some((*p, tick.checked_sub(p.first_tick)?));
+        let Some((piece, ticks)) = self.pieces.iter().rev().find_map(begun) else {
             return Target::default();
         };
-        let ticks = tick - piece.first_tick;
         let tau = self.scale.seconds(ticks);
         Target {
             position: piece.position(ticks, T::ZERO, &self.scale),
@@ -272,7 +272,7 @@ impl<T: Real> Builder<T> {
     fn push(&mut self, piece: Piece<T>) -> Piece<T> {
         if let Some(slot) = self.profile.pieces.get_mut(self.used) {
             *slot = piece;
-            self.used += 1;
+            self.used = self.used.saturating_add(1);
         }
         piece
     }

@@ -54,7 +54,7 @@ impl Slip<'_> {
         let speed = (self.sign * velocity).max(0.0);
         let mu = self.model.plant.friction().magnitude(speed) * self.model.friction_factor(position);
         let brake = self.sign * mu * p.brake_gain * self.input.volts.at(s).max(0.0);
-        [velocity, (self.input.torque(s) - brake - p.viscous_damping * velocity) * self.inverse_inertia]
+        [velocity, (self.input.torque(s, position) - brake - p.viscous_damping * velocity) * self.inverse_inertia]
     }
 
     /// One step of length `h`; the state at its end, its error over the tolerance, and the rate
@@ -91,12 +91,12 @@ impl Engine for DormandPrince {
         let mut s = 0.0;
         let mut steps = 0;
         let event =
-            |kind, s: f64, position| Event { time: input.time + s, kind, position, torque: input.torque(s) };
+            |kind, s: f64, position| Event { time: input.time + s, kind, position, torque: input.torque(s, position) };
         while s < end {
             if shaft.motion == Motion::Stuck {
                 let Some(instant) = break_away(model, input, shaft.position, s) else { return Ok(()) };
                 s = instant;
-                shaft.motion = Motion::along(input.torque(s));
+                shaft.motion = Motion::along(input.torque(s, shaft.position));
                 events.push(event(EventKind::BreakAway, s, shaft.position));
             }
             let inverse_inertia = 1.0 / model.plant.params().inertia;
@@ -129,7 +129,7 @@ impl Engine for DormandPrince {
                     s += instant;
                     shaft.position = to[0];
                     shaft.velocity = 0.0;
-                    let torque = input.torque(s);
+                    let torque = input.torque(s, to[0]);
                     if torque.abs() <= model.break_away_torque(to[0], input.volts.at(s)) {
                         shaft.motion = Motion::Stuck;
                         events.push(event(EventKind::Stick, s, shaft.position));

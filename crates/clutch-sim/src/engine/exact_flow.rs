@@ -8,7 +8,7 @@
 //!
 //! 1. `ω > 37 v_s`: the last term is below half an ulp of `μ_d`; the rest is linear, with
 //!    velocity, position and the instant of leaving the range in closed form.
-//! 2. below: with the viscous drag frozen at the middle of a short interval,
+//! 2. below: with the viscous drag frozen at the mean velocity of a short interval,
 //!    `a = (T − b μ_d − C ω_m)/J`, `k = b Δμ/J` and `z = exp(ω/v_s)`, the equation is
 //!    `ż = (a z − k)/v_s`: linear again. Velocity and the instant of stopping cost a logarithm;
 //!    the position is a Gauss–Legendre sum over the velocity.
@@ -18,8 +18,10 @@ use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, 
 
 /// Speed, in Stribeck velocities, above which the exponential is lost in rounding.
 const LINEAR_ABOVE: f64 = 37.0;
+/// Length of an interval of frozen drag against the Stribeck term's own time.
+const SHARE: f64 = 0.1;
 /// Intervals of frozen drag per sampling period, at most.
-const SUB_INTERVALS: f64 = 8.0;
+const SUB_INTERVALS: f64 = 64.0;
 /// Pieces in one interval before the engine gives up.
 const PIECE_LIMIT: u32 = 10_000;
 
@@ -129,10 +131,6 @@ impl Flow {
         if y.abs() < 1e-12 { -self.v_s * e / d } else { self.v_s / a * libm::log1p(-y) }
     }
 
-    fn frozen(&self, middle: f64) -> f64 {
-        self.drive - self.drag * middle
-    }
-
     /// The next piece of motion from speed `w0`, no longer than `left`.
     fn piece(&self, w0: f64, left: f64, period: f64) -> Piece {
         let edge = LINEAR_ABOVE * self.v_s;
@@ -145,30 +143,34 @@ impl Flow {
             let velocity = if reached.is_some() { to } else { velocity };
             return Piece { time, velocity, distance, stops: plain && reached.is_some() };
         }
-        // Within the layer: short against the layer's own time v_s/k, but not shorter than an
-        // eighth of the period.
-        let scale = self.v_s / self.stribeck.abs();
-        let a0 = self.frozen(w0);
-        let mut time = left.min(scale.max(period / SUB_INTERVALS)).min(30.0 * self.v_s / a0.abs());
-        let mut a = a0;
-        let mut velocity = self.layer(w0, a, time);
-        if velocity > 0.0 {
-            a = self.frozen(0.5 * (w0 + velocity));
-            velocity = self.layer(w0, a, time);
+        // Within the layer: short against the time in which the Stribeck term changes at the
+        // lowest speed that this interval can see.
+        let mut a = self.drive - self.drag * w0;
+        let lowest = (w0 - (a.abs() + self.stribeck.abs()) * left).max(0.0);
+        let change = self.v_s / (self.stribeck.abs() * libm::exp(-lowest / self.v_s));
+        let longest =
+            left.min((SHARE * change).max(period / SUB_INTERVALS)).min(30.0 * self.v_s / a.abs());
+        let mut piece = self.frozen(w0, a, longest);
+        // The drag's impulse is that of the mean velocity; two rounds settle it.
+        for _ in 0..2 {
+            a = self.drive - self.drag * piece.distance / piece.time;
+            piece = self.frozen(w0, a, longest);
         }
+        // Where the velocity changes, drag that is spread evenly acts too early or too late: the
+        // leading term of what that does to the position.
+        piece.distance += self.drag * (piece.velocity - w0) * piece.time * piece.time / 12.0;
+        piece
+    }
+
+    /// Motion in the layer at a given acceleration without Stribeck term, until `time` or the
+    /// stop.
+    fn frozen(&self, w0: f64, a: f64, time: f64) -> Piece {
+        let velocity = self.layer(w0, a, time);
         let stops = velocity <= 0.0;
-        if stops {
-            a = self.frozen(0.5 * w0);
-            time = self.layer_stop(w0, a).min(time);
-            velocity = 0.0;
-        }
-        let distance = time
-            * NODES
-                .iter()
-                .zip(WEIGHTS)
-                .map(|(node, weight)| weight * self.layer(w0, a, node * time))
-                .sum::<f64>();
-        Piece { time, velocity, distance, stops }
+        let time = if stops { self.layer_stop(w0, a).min(time) } else { time };
+        let sum: f64 =
+            NODES.iter().zip(WEIGHTS).map(|(node, weight)| weight * self.layer(w0, a, node * time)).sum();
+        Piece { time, velocity: velocity.max(0.0), distance: time * sum, stops }
     }
 }
 
@@ -184,7 +186,7 @@ impl Engine for ExactFlow {
             Volts::Held(v) => v,
             Volts::Lag { from, .. } => from, // refused when the run was set up
         };
-        let (p, torque) = (model.plant.params(), input.torque(0.0));
+        let (p, torque) = (model.plant.params(), input.torque(0.0, shaft.position));
         let (brake, holds) = (p.brake_gain * volts.max(0.0), model.break_away_torque(0.0, volts));
         let mut s = 0.0;
         let event = |kind, s: f64, position| Event { time: input.time + s, kind, position, torque };

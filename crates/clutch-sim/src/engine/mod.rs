@@ -124,6 +124,8 @@ pub struct Input<'a> {
     pub time: f64,
     /// Length of the interval, s.
     pub duration: f64,
+    /// Position at which the run began, rad: what a spring's angle counts from.
+    pub origin: f64,
     /// Brake voltage.
     pub volts: Volts,
     /// Driving torque.
@@ -135,8 +137,8 @@ pub struct Input<'a> {
 impl Input<'_> {
     /// Driving torque `s` seconds after the sample, N m.
     #[inline]
-    pub(crate) fn torque(&self, s: f64) -> f64 {
-        self.drive.torque(self.time + s) + self.noise
+    pub(crate) fn torque(&self, s: f64, position: f64) -> f64 {
+        self.drive.torque(self.time + s, position - self.origin) + self.noise
     }
 
     /// Voltage and torque stay the same over the interval.
@@ -226,7 +228,7 @@ const BREAK_AWAY_STEPS: u32 = 8;
 ///
 /// The instant given back is on the far side of the root: there the torque exceeds friction.
 fn break_away(model: &Model, input: &Input<'_>, position: f64, s: f64) -> Option<f64> {
-    let excess = |s: f64| input.torque(s).abs() - model.break_away_torque(position, input.volts.at(s));
+    let excess = |s: f64| input.torque(s, position).abs() - model.break_away_torque(position, input.volts.at(s));
     if excess(s) > 0.0 {
         return Some(s);
     }

@@ -108,6 +108,13 @@ pub(super) struct WeightFile {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+pub(super) struct SpringFile {
+    stiffness_nm_rad: f64,
+    rest_deg: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct DriveTableFile {
     points_s_nm: Vec<(f64, f64)>,
 }
@@ -125,6 +132,7 @@ pub(super) struct HandFile {
 #[serde(rename_all = "snake_case")]
 pub(super) enum DriveFile {
     Weight(WeightFile),
+    Spring(SpringFile),
     Table(DriveTableFile),
     Hand(HandFile),
 }
@@ -192,6 +200,9 @@ impl RigFile {
                     gravity_m_s2: *gravity,
                     pulley_radius_m: *pulley_radius,
                 }),
+                DriveParams::Spring { stiffness, rest } => {
+                    DriveFile::Spring(SpringFile { stiffness_nm_rad: *stiffness, rest_deg: rest.to_degrees() })
+                }
                 DriveParams::Table(points) => {
                     DriveFile::Table(DriveTableFile { points_s_nm: points.clone() })
                 }
@@ -248,6 +259,9 @@ impl RigFile {
                     gravity: w.gravity_m_s2,
                     pulley_radius: w.pulley_radius_m,
                 },
+                DriveFile::Spring(s) => {
+                    DriveParams::Spring { stiffness: s.stiffness_nm_rad, rest: s.rest_deg.to_radians() }
+                }
                 DriveFile::Table(t) => DriveParams::Table(t.points_s_nm.clone()),
                 DriveFile::Hand(h) => DriveParams::Hand {
                     mean: h.mean_nm,

@@ -1,0 +1,193 @@
+//! `clutch certify`.
+
+use crate::table::{number, quantities};
+use crate::{Outcome, ScenarioArgs, json, print};
+use clap::Args;
+use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
+use clutch_core::law::LawParams;
+use clutch_core::{Bounds, Interval};
+use clutch_sim::Scenario;
+use clutch_sim::scenario::Plan;
+use serde_json::{Value, json as value};
+
+/// Checks a scenario's gains against every plant within its bounds.
+///
+/// Exit code 0: certified; 2: not certified.
+#[derive(Args)]
+#[command(after_help = "Example:\n  clutch certify smc_2 --set bounds.friction_percent=20\n\n\
+    docs/theory.md derives the conditions and says what they do not cover.")]
+pub(crate) struct Certify {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+    /// Prints the certificate as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Certify {
+    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+        let scenario = self.scenario.load()?;
+        let plan = scenario.plan()?;
+        print(&if self.json { json(&as_json(&scenario, &plan))? } else { text(&scenario, &plan) })?;
+        Ok(if plan.certificate.certified() { Outcome::Done } else { Outcome::NotCertified })
+    }
+}
+
+fn reason(s: Shortfall) -> &'static str {
+    match s {
+        Shortfall::Kp => "K_p is too small: the weakest brake does not stop the strongest drive",
+        Shortfall::Kd => "K_d is too small: it does not pay for f |ė|",
+        Shortfall::Voltage => "output.highest_v is too small for the brake to stop the strongest drive",
+        Shortfall::Drive => "the drive is too weak for the path: a released shaft does not catch up",
+        Shortfall::Start => "the start's error rate is more than brake or drive can follow: start on the path, or slower",
+        Shortfall::Surface => "the law has no sliding surface: K_p and K_d must both be above 0",
+        _ => "not certified",
+    }
+}
+
+fn law_name(p: &LawParams) -> &'static str {
+    match p {
+        LawParams::Pd(_) => "PD (4)",
+        LawParams::Ctc(_) => "CTC (11)",
+        LawParams::Smc(_) => "SMC (31), with boundary layer",
+        LawParams::SmcSign(_) => "SMC (29), with the sign function",
+        _ => "law",
+    }
+}
+
+fn range(i: &Interval) -> String {
+    #[allow(clippy::float_cmp, reason = "an interval of one point is exactly that")]
+    if i.low == i.high { number(i.low) } else { format!("{} … {}", number(i.low), number(i.high)) }
+}
+
+fn text(scenario: &Scenario, plan: &Plan) -> String {
+    let (c, b, d) = (&plan.certificate, &plan.bounds, &plan.demand);
+    let deg = |x: f64| number(x.to_degrees());
+    let law = scenario.spec().law;
+    let is_smc = plan.paper.is_some();
+    let mut out = format!("{}\n{}\n\n", scenario.name, law_name(&law));
+    out += &quantities(
+        "Bounds",
+        &[
+            ("inertia J", range(&b.inertia), "kg m²"),
+            ("driving torque M g R_p", range(&b.drive_torque), "N m"),
+            ("viscous damping C_d", range(&b.viscous_damping), "N m s/rad"),
+            ("brake gain K_COF", range(&b.brake_gain), "N m/V"),
+            ("friction mu_s", range(&b.mu_static), ""),
+            ("friction mu_d", range(&b.mu_dynamic), ""),
+            ("path: velocity v_d", deg(d.velocity), "°/s"),
+            ("path: acceleration a_d", deg(d.acceleration), "°/s²"),
+            ("reaching rate γ wanted", number(d.reach_rate), "rad/s²"),
+        ],
+    );
+    out += &quantities(
+        "\nShaft ahead: the brake stops it (worst corner: strongest drive, weakest brake)",
+        &[
+            ("worst corner: torque", number(c.worst_torque), "N m"),
+            ("worst corner: inertia", number(c.worst_inertia), "kg m²"),
+            ("worst corner: brake mu K_COF", number(c.weakest_brake), "N m/V"),
+            (if is_smc { "K_p required" } else { "voltage required" }, number(c.kp_required), "V"),
+            ("    of which for the boundary layer", number(c.kp_for_boundary), "V"),
+            (if is_smc { "K_p given" } else { "voltage given (highest)" }, number(c.kp_given), "V"),
+            ("    margin", number(100.0 * (c.kp_given / c.kp_required - 1.0)), "%"),
+            ("reaching rate γ possible", number(c.reach_rate_possible), "rad/s²"),
+            ("holds up to an error rate of", deg(c.error_rate_ahead), "°/s"),
+        ],
+    );
+    if is_smc {
+        out += quantities(
+            "",
+            &[
+                ("K_d required", number(c.kd_required), "V s/rad"),
+                ("K_d given", number(c.kd_given), "V s/rad"),
+                ("    margin", number(100.0 * (c.kd_given / c.kd_required - 1.0)), "%"),
+            ],
+        )
+        .trim_start_matches('\n');
+    }
+    out += &quantities(
+        "\nShaft behind: the brake lets go (worst corner: weakest drive)",
+        &[
+            ("worst corner: torque", number(c.least_torque), "N m"),
+            ("holds up to an error rate of", deg(c.error_rate_behind), "°/s"),
+            ("error rate at the start", deg(d.start_error_rate), "°/s"),
+        ],
+    );
+    out += &quantities(
+        "\nOnce there",
+        &[
+            ("sliding surface: slope f", number(c.slope), "1/s"),
+            ("layer around it", number(c.layer), "rad/s"),
+            ("error stays below", deg(c.error_bound), "°"),
+        ],
+    );
+    if let Some(p) = &plan.paper {
+        out += &quantities(
+            "\nThe paper's own conditions, as printed (not sound: docs/theory.md)",
+            &[
+                ("(26) K_p above", number(p.kp), "V"),
+                ("(27) K_d above", number(p.kd), "V s/rad"),
+                ("(28) reaching rate γ", number(p.gamma), "rad/s²"),
+            ],
+        );
+    }
+    out += &match c.shortfall {
+        None => "\ncertified (continuous time, exact sensor: sampling, encoder steps and delay come on top)\n".to_owned(),
+        Some(s) => format!("\nNOT certified: {}\n", reason(s)),
+    };
+    out
+}
+
+fn as_json(scenario: &Scenario, plan: &Plan) -> Value {
+    let (b, d) = (&plan.bounds, &plan.demand);
+    let c: &Certificate = &plan.certificate;
+    let pair = |i: &Interval| value!([i.low, i.high]);
+    let paper = |p: &PaperConditions| value!({"kp_26_v": p.kp, "kd_27_v_s_rad": p.kd, "gamma_28_rad_s2": p.gamma});
+    value!({
+        "scenario": scenario.name,
+        "version": env!("CARGO_PKG_VERSION"),
+        "law": law_name(&scenario.spec().law),
+        "certified": c.certified(),
+        "reason": c.shortfall.map(reason),
+        "bounds": bounds_json(b, &pair),
+        "demand": {
+            "velocity_rad_s": d.velocity,
+            "acceleration_rad_s2": d.acceleration,
+            "reach_rate_rad_s2": d.reach_rate,
+            "start_error_rate_rad_s": d.start_error_rate,
+        },
+        "ahead": {
+            "torque_nm": c.worst_torque,
+            "inertia_kg_m2": c.worst_inertia,
+            "brake_nm_v": c.weakest_brake,
+            "kp_required_v": c.kp_required,
+            "kp_for_boundary_v": c.kp_for_boundary,
+            "kp_given_v": c.kp_given,
+            "kd_required_v_s_rad": c.kd_required,
+            "kd_given_v_s_rad": c.kd_given,
+            "reach_rate_possible_rad_s2": c.reach_rate_possible,
+            "error_rate_limit_rad_s": c.error_rate_ahead,
+        },
+        "behind": {
+            "torque_nm": c.least_torque,
+            "error_rate_limit_rad_s": c.error_rate_behind,
+        },
+        "layer": {
+            "slope_1_s": c.slope,
+            "thickness_rad_s": c.layer,
+            "error_bound_rad": c.error_bound,
+        },
+        "paper": plan.paper.as_ref().map(paper),
+    })
+}
+
+fn bounds_json(b: &Bounds, pair: &dyn Fn(&Interval) -> Value) -> Value {
+    value!({
+        "inertia_kg_m2": pair(&b.inertia),
+        "drive_torque_nm": pair(&b.drive_torque),
+        "viscous_damping_nm_s_rad": pair(&b.viscous_damping),
+        "brake_gain_nm_v": pair(&b.brake_gain),
+        "mu_static": pair(&b.mu_static),
+        "mu_dynamic": pair(&b.mu_dynamic),
+    })
+}

@@ -1,0 +1,72 @@
+//! `clutch scenario`.
+
+use crate::{Outcome, print};
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use clutch_sim::scenario::{BUILT_IN, BuiltIn};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Hands out the built-in scenarios.
+#[derive(Args)]
+#[command(after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml")]
+pub(crate) struct ScenarioVerb {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Lists their names and titles.
+    #[command(after_help = "Example:\n  clutch scenario list")]
+    List,
+    /// Prints one.
+    #[command(after_help = "Example:\n  clutch scenario show smc_2 > mine.toml")]
+    Show {
+        /// Its name.
+        name: String,
+    },
+    /// Writes one to a new file, as a beginning of your own.
+    #[command(after_help = "Example:\n  clutch scenario new mine.toml --from bench_pd_2")]
+    New {
+        /// The file, which must not exist yet.
+        file: PathBuf,
+        /// The built-in scenario to begin with.
+        #[arg(long, value_name = "NAME", default_value = "smc_2")]
+        from: String,
+    },
+}
+
+fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
+    BUILT_IN.iter().find(|b| b.name == name).with_context(|| {
+        let names: Vec<&str> = BUILT_IN.iter().map(|b| b.name).collect();
+        format!("no built-in scenario is called {name}; expected one of: {}", names.join(", "))
+    })
+}
+
+impl ScenarioVerb {
+    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+        match self.verb {
+            Verb::List => {
+                let lines: Vec<String> = BUILT_IN
+                    .iter()
+                    .map(|b| {
+                        let title = b.toml.lines().find_map(|l| l.strip_prefix("name = "));
+                        format!("{:16} {}", b.name, title.unwrap_or_default().trim_matches('"'))
+                    })
+                    .collect();
+                print(&(lines.join("\n") + "\n"))?;
+            }
+            Verb::Show { name } => print(find(&name)?.toml)?,
+            Verb::New { file, from } => {
+                let text = find(&from)?.toml;
+                let shown = file.display();
+                // Never over a file that is there.
+                let mut out = std::fs::File::create_new(&file).with_context(|| format!("{shown}: cannot be created"))?;
+                out.write_all(text.as_bytes()).with_context(|| format!("{shown}: cannot be written"))?;
+                print(&format!("wrote {shown}; run it with: clutch sim {shown}\n"))?;
+            }
+        }
+        Ok(Outcome::Done)
+    }
+}

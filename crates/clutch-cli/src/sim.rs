@@ -1,0 +1,238 @@
+//! `clutch sim`.
+
+use crate::plot::{Figure, Panel, Series};
+use crate::table::{number, quantities};
+use crate::{Outcome, ScenarioArgs, json, print};
+use anyhow::Context;
+use clap::Args;
+use clutch_sim::engine::EngineKind;
+use clutch_sim::run::Detected;
+use clutch_sim::scenario::{Plan, ScalarKind};
+use clutch_sim::{Metrics, Run, Scenario};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Simulates a scenario and prints how well the shaft followed its path.
+#[derive(Args)]
+#[command(after_help = "Example:\n  clutch sim smc_2 --set law.smc.kp_v=4 --csv run.csv --plot run.svg\n\n\
+    Columns of the CSV are in SI units and radians; docs/scenario.md explains them.")]
+pub(crate) struct Sim {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+    /// Prints the summary as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Writes every sample to a CSV file.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draws error, velocity and voltage over time.
+    #[arg(long, value_name = "FILE.svg|png")]
+    plot: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    scenario: &'a str,
+    version: &'static str,
+    engine: EngineKind,
+    scalar: ScalarKind,
+    seed: u64,
+    metrics: Metrics,
+    detected: &'a Detected,
+    reaching: Reaching,
+    path: Path,
+    certified: bool,
+}
+
+/// When the sliding surface was reached.
+#[derive(Serialize)]
+struct Reaching {
+    /// Time until σ = f e + ė was first within the law's layer, s.
+    time_s: Option<f64>,
+    /// The bound (15) from the certificate, s.
+    bound_s: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Path {
+    highest_velocity_rad_s: f64,
+    highest_acceleration_rad_s2: f64,
+    highest_deceleration_rad_s2: f64,
+    highest_voltage_v: f64,
+    velocity_jump_rad_s: f64,
+}
+
+impl Sim {
+    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+        let scenario = self.scenario.load()?;
+        let plan = scenario.plan()?;
+        let run = scenario.run()?;
+        if let Some(file) = &self.csv {
+            csv(&run, file)?;
+        }
+        if let Some(file) = &self.plot {
+            figure(&scenario, &run).save(file)?;
+        }
+        let summary = Summary {
+            scenario: &scenario.name,
+            version: env!("CARGO_PKG_VERSION"),
+            engine: run.engine,
+            scalar: scenario.scalar,
+            seed: scenario.spec().run.seed,
+            metrics: run.metrics,
+            detected: &run.detected,
+            reaching: reaching(&run, &plan),
+            path: Path {
+                highest_velocity_rad_s: plan.envelope.velocity,
+                highest_acceleration_rad_s2: plan.envelope.acceleration,
+                highest_deceleration_rad_s2: plan.envelope.deceleration,
+                highest_voltage_v: plan.envelope.highest_voltage,
+                velocity_jump_rad_s: plan.envelope.velocity_jump,
+            },
+            certified: plan.certificate.certified(),
+        };
+        print(&if self.json { json(&summary)? } else { text(&summary, &run) })?;
+        Ok(Outcome::Done)
+    }
+}
+
+fn reaching(run: &Run, plan: &Plan) -> Reaching {
+    let t = &run.trace;
+    let c = &plan.certificate;
+    let surface = |i: usize| c.slope * t.error[i] + t.target_velocity[i] - t.velocity[i];
+    // A law without a layer never is within it; a count's worth of velocity stands in.
+    let within = c.layer.max(1e-3);
+    let first = (0..t.time.len()).find(|i| surface(*i).abs() <= within);
+    let start = if t.time.is_empty() { 0.0 } else { surface(0) };
+    Reaching {
+        time_s: if c.slope > 0.0 { first.map(|i| t.time[i]) } else { None },
+        bound_s: c.reaching_time(start),
+    }
+}
+
+fn text(s: &Summary<'_>, run: &Run) -> String {
+    let m = &s.metrics;
+    let deg = |x: f64| number(x.to_degrees());
+    let scalar = match s.scalar {
+        ScalarKind::F32 => "f32",
+        ScalarKind::F64 => "f64",
+    };
+    let engine = match s.engine {
+        EngineKind::ExactFlow => "exact flow",
+        EngineKind::DormandPrince | EngineKind::Auto => "Dormand–Prince",
+    };
+    let title = format!(
+        "{}\n{} ticks, seed {}, servo in {scalar}, engine {engine}; figures over {} s after settling",
+        s.scenario,
+        run.trace.time.len(),
+        s.seed,
+        number(m.measured_s)
+    );
+    let optional = |x: Option<f64>| x.map_or("–".to_owned(), number);
+    let mut rows = vec![
+        ("max |error|", deg(m.max_error_rad), "°"),
+        ("RMS error", deg(m.rms_error_rad), "°"),
+        ("mean error (target − position)", deg(m.mean_error_rad), "°"),
+        ("integral of |error|", deg(m.iae_rad_s), "° s"),
+        ("stick-slip", number(m.stick_slip_cycles_per_s), "cycles/s"),
+        ("stick-slip seen by the encoder", number(s.detected.stick_slip_cycles_per_s), "cycles/s"),
+        ("time stuck", number(100.0 * m.stick_time_fraction), "%"),
+        ("stair height", deg(m.stair_height_rad), "°"),
+        ("torque at break-away", optional(m.break_away_torque_nm.map(|t| 1e3 * t)), "mN m"),
+        ("voltage variation", number(m.control_variation_v_s), "V/s"),
+        ("jerk RMS", number(m.jerk_rms_rad_s3), "rad/s³"),
+    ];
+    if let Some(time) = s.reaching.time_s {
+        rows.push(("sliding surface reached after", number(time), "s"));
+        if let Some(bound) = s.reaching.bound_s {
+            rows.push(("    bound (15)", number(bound), "s"));
+        }
+    }
+    let certified = if s.certified { "certified" } else { "not certified: see `clutch certify`" };
+    rows.push(("gains", certified.to_owned(), ""));
+    let jump = s.path.velocity_jump_rad_s;
+    let mut text = quantities(&title, &rows);
+    if jump > 1e-9 {
+        text += &format!(
+            "note: the path's velocity jumps by {} °/s more than the drive can follow at once; the shaft catches up\n",
+            deg(jump)
+        );
+    }
+    text
+}
+
+fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
+    let t = &run.trace;
+    let wrong = || format!("{}: cannot be written", file.display());
+    let mut out = csv::Writer::from_path(file).with_context(wrong)?;
+    let mut header = vec![
+        "time_s",
+        "target_position_rad",
+        "target_velocity_rad_s",
+        "position_rad",
+        "velocity_rad_s",
+        "error_rad",
+        "counts",
+        "measured_error_rad",
+        "error_rate_rad_s",
+        "code",
+        "voltage_v",
+        "stuck",
+    ];
+    header.extend(t.terms.iter().map(|(name, _)| *name));
+    out.write_record(&header).with_context(wrong)?;
+    for i in 0..t.time.len() {
+        let floats = |xs: &[f64]| xs.iter().map(f64::to_string).collect::<Vec<_>>();
+        let mut row = floats(&[
+            t.time[i],
+            t.target_position[i],
+            t.target_velocity[i],
+            t.position[i],
+            t.velocity[i],
+            t.error[i],
+        ]);
+        row.push(t.counts[i].to_string());
+        row.extend(floats(&[t.measured_error[i], t.error_rate[i]]));
+        row.push(t.code[i].to_string());
+        row.push(t.voltage[i].to_string());
+        row.push(u8::from(t.stuck[i]).to_string());
+        row.extend(t.terms.iter().map(|(_, values)| values[i].to_string()));
+        out.write_record(&row).with_context(wrong)?;
+    }
+    out.flush().with_context(wrong)
+}
+
+fn figure(scenario: &Scenario, run: &Run) -> Figure {
+    let t = &run.trace;
+    let over_time = |label: &str, values: &[f64], factor: f64| Series {
+        label: label.to_owned(),
+        points: t.time.iter().zip(values).map(|(t, y)| (*t, y * factor)).collect(),
+    };
+    let degrees = 1.0_f64.to_degrees();
+    let panel = |title: &str, y_label: &str, series: Vec<Series>, step: bool| Panel {
+        title: title.to_owned(),
+        x_label: "time (s)".to_owned(),
+        y_label: y_label.to_owned(),
+        series,
+        y_range: None,
+        step,
+        lines: Vec::new(),
+    };
+    Figure {
+        title: scenario.name.clone(),
+        columns: 1,
+        panels: vec![
+            panel("Position error", "error (°)", vec![over_time("error", &t.error, degrees)], false),
+            panel(
+                "Velocity",
+                "velocity (°/s)",
+                vec![
+                    over_time("shaft", &t.velocity, degrees),
+                    over_time("target", &t.target_velocity, degrees),
+                ],
+                false,
+            ),
+            panel("Brake", "voltage (V)", vec![over_time("voltage", &t.voltage, 1.0)], true),
+        ],
+    }
+}

@@ -1,0 +1,443 @@
+//! Proof by linking: no function of clutch-core can panic.
+//!
+//! The panic handler calls a symbol that does not exist. If the optimiser leaves one path to a
+//! panic, the link fails; if the image links, there is none, and no sum in clutch-core overflows
+//! either. Everything that goes in is opaque, and what a constructor has checked is made opaque
+//! again before it is used, so a tick is proven for any bits in its coefficients.
+//!
+//! ```text
+//! cargo build --release --manifest-path tests/no_panic/Cargo.toml --target thumbv7em-none-eabihf
+//! ```
+//!
+//! links; with `--features control`, which adds a panic, it must not. The image is never run. To
+//! find a surviving path, link it all the same and look for the callers of `core::panicking`:
+//!
+//! ```text
+//! RUSTFLAGS="-C link-arg=--defsym=__panic_path_survived=0" cargo build …
+//! llvm-objdump -d -l --demangle <image>
+//! ```
+//!
+//! Not covered: `Display` and `Debug`, because `core` formats floats with code that can panic.
+//! They belong in a host's error message, not in a tick.
+#![no_std]
+#![no_main]
+
+use clutch_core::certificate::{Demand, certify, paper_conditions};
+use clutch_core::law::{
+    Command, Controller, Ctc, CtcParams, Law, LawParams, LawTerms, Limit, Output, OutputParams, Pd, PdParams,
+    Smc, SmcParams, SmcSignParams, Terms, Tick,
+};
+use clutch_core::reference::{
+    Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, Reference, ReferenceParams, Sine, Table, Trapezoid,
+};
+use clutch_core::{
+    Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams, Daq, DerivativeState, Encoder, FixedCounts,
+    Micros, Observer, ObserverGains, ObserverParams, Plant, PlantParams, Real, Servo, ServoParams,
+    SmoothedDerivative, SmoothedDerivativeParams, StickSlip, StickSlipParams, StickSlipState, Stribeck,
+    StribeckParams, Target, Tolerances, VelocityParams, VelocitySource, check_path, sin_cos_turns,
+};
+use core::hint::black_box;
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    unsafe extern "C" {
+        fn __panic_path_survived() -> !;
+    }
+    // SAFETY: never linked, so never called.
+    unsafe { __panic_path_survived() }
+}
+
+/// Whatever the optimiser must not know.
+static mut INPUT: u64 = 0;
+
+fn word() -> u64 {
+    // SAFETY: nothing writes, and there is one thread.
+    unsafe { core::ptr::read_volatile(&raw const INPUT) }
+}
+
+/// Any number, also one that is not a number.
+fn real<T: Real>() -> T {
+    T::from_f64(f64::from_bits(word()))
+}
+
+fn fixed() -> FixedCounts {
+    FixedCounts(word() as i64)
+}
+
+fn micros() -> Micros {
+    Micros(word() as u32)
+}
+
+/// The same value, of which the optimiser knows nothing any more.
+fn opaque<X>(x: X) -> X {
+    black_box(x)
+}
+
+/// Takes a result, so that it has to be computed.
+fn sink<X>(x: X) {
+    black_box(&x);
+}
+
+/// Takes either outcome of a constructor; gives back what it made, opaque.
+fn made<X, E>(result: Result<X, E>) -> Option<X> {
+    match opaque(result) {
+        Ok(x) => Some(x),
+        Err(e) => {
+            sink(e);
+            None
+        }
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn _start() -> ! {
+    all::<f32, f64>();
+    all::<f64, f32>();
+    #[cfg(feature = "control")]
+    control();
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+/// A list of everything; a new module of clutch-core gets its function here.
+///
+/// `U` is the other scalar, for the casts.
+fn all<T: Real, U: Real>() {
+    scalar::<T>();
+    codes::<T>();
+    friction::<T>();
+    plant::<T>();
+    velocity::<T>();
+    observer::<T>();
+    laws::<T>();
+    references::<T>();
+    servo::<T>();
+    casts::<T, U>();
+    certificate::<T>();
+    feasibility::<T>();
+    stick_slip::<T>();
+}
+
+/// The negative control.
+#[cfg(feature = "control")]
+fn control() {
+    let table = opaque([1_u8, 2, 3]);
+    sink(table[word() as usize]);
+}
+
+fn scalar<T: Real>() {
+    let (x, y) = (real::<T>(), real::<T>());
+    sink([x.abs(), x.exp(), x.powf(y), x.sqrt(), x.floor(), x.max(y), x.min(y), x.sgn(), x.sat()]);
+    sink([x.limit(y, real()), x + y, x - y, x * y, x / y, -x]);
+    sink((x.is_finite(), x.to_f64(), x.to_i64(), x.to_u16(), x.sin_cos_octant()));
+    sink([T::from_i32(word() as i32), T::from_i64(word() as i64), T::from_u64(word())]);
+    sink(sin_cos_turns::<T>(word()));
+}
+
+fn encoder<T: Real>() -> Encoder {
+    made(Encoder::new::<T>(word() as u32)).unwrap_or(Encoder::PAPER)
+}
+
+fn codes<T: Real>() {
+    sink(Counts(word() as i32).since(Counts(word() as i32)));
+    sink(FixedCounts::from_counts(word() as i64).plus(fixed()));
+    sink(FixedCounts::from_real(real::<T>()).minus::<T>(fixed()));
+    sink(micros().seconds::<T>());
+    sink(made(micros().period::<T>()));
+    let e = encoder::<T>();
+    sink((e.counts_per_rev(), e.radians_per_count::<T>(), e.counts_per_radian::<T>()));
+    if let Some(dac) = made(Dac::new(&dac_params::<T>())) {
+        sink((dac.code(real()), dac.volts(DacCode(word() as u16)), dac.step()));
+    }
+}
+
+fn dac_params<T: Real>() -> DacParams<T> {
+    sink(DacParams::<T>::default());
+    DacParams { bits: word() as u8, lowest: real(), highest: real() }
+}
+
+fn stribeck_params<T: Real>() -> StribeckParams<T> {
+    sink(StribeckParams::<T>::default());
+    StribeckParams {
+        mu_static: real(),
+        mu_dynamic: real(),
+        stribeck_velocity: real(),
+        stribeck_exponent: real(),
+    }
+}
+
+fn friction<T: Real>() {
+    if let Some(s) = made(Stribeck::new(&stribeck_params::<T>())) {
+        sink((*s.params(), s.magnitude(real()), s.coefficient(real())));
+    }
+    let geometry = BrakeGeometry::<T> {
+        inner_radius: real(),
+        torque_constant: real(),
+        pad_area: real(),
+        lever_area: real(),
+        armature_resistance: real(),
+        contact_radius: real(),
+    };
+    sink(made(geometry.brake_gain()));
+}
+
+fn plant_params<T: Real>() -> PlantParams<T> {
+    sink(PlantParams::<T>::default());
+    PlantParams {
+        inertia: real(),
+        drive_torque: real(),
+        viscous_damping: real(),
+        brake_gain: real(),
+        friction: stribeck_params(),
+    }
+}
+
+fn plant<T: Real>() {
+    if let Some(p) = made(Plant::new(&plant_params::<T>())) {
+        sink((*p.params(), *p.friction()));
+        sink([p.brake_torque(real(), real()), p.break_away_torque(real()), p.acceleration(real(), real())]);
+        sink([p.holding_voltage_static(), p.holding_voltage_sliding()]);
+    }
+}
+
+fn target<T: Real>() -> Target<T> {
+    Target { position: fixed(), velocity: real(), acceleration: real() }
+}
+
+/// One of the closed set, by an opaque choice.
+fn velocity_params<T: Real>() -> VelocityParams<T> {
+    match word() {
+        0 => VelocityParams::default(),
+        1 => VelocityParams::SmoothedDerivative(SmoothedDerivativeParams { smoothing: real() }),
+        _ => VelocityParams::Observer(ObserverParams { disturbance_walk: real() }),
+    }
+}
+
+fn velocity<T: Real>() {
+    let p = SmoothedDerivativeParams::<T> { smoothing: real() };
+    if let Some(d) = made(SmoothedDerivative::new(&p, encoder::<T>(), micros())) {
+        let mut state = opaque(DerivativeState::at(fixed()));
+        sink(d.update(&mut state, fixed()));
+        sink(state);
+    }
+    let Some(plant) = made(Plant::new(&plant_params::<T>())) else { return };
+    if let Some(v) = made(VelocitySource::new(&velocity_params(), &plant, encoder::<T>(), micros())) {
+        let mut state = opaque(v.start(fixed(), &target(), real()));
+        sink(v.update(&mut state, fixed(), &target(), real()));
+        sink(state);
+    }
+}
+
+fn observer<T: Real>() {
+    let Some(plant) = made(Plant::new(&plant_params::<T>())) else { return };
+    sink(ObserverParams::<T>::default());
+    let p = ObserverParams { disturbance_walk: real() };
+    sink(made(Observer::new(&p, &plant, encoder::<T>(), micros())));
+    let gains = ObserverGains { position: real(), velocity: real(), disturbance: real() };
+    if let Some(o) = made(Observer::with_gains(&gains, &plant, encoder::<T>(), micros())) {
+        let mut state = opaque(o.start(fixed(), real(), real()));
+        sink(o.update(&mut state, fixed(), real()));
+        sink((state, *o.gains()));
+    }
+}
+
+fn output_params<T: Real>() -> OutputParams<T> {
+    sink(OutputParams::<T>::default());
+    OutputParams { lowest: real(), highest: real(), on_invalid: real(), bumpless_time: real() }
+}
+
+fn law_params<T: Real>() -> LawParams<T> {
+    match word() {
+        0 => LawParams::Pd(PdParams { kp: real(), kd: real() }),
+        1 => LawParams::Ctc(CtcParams { outer_gain: real(), kp: real(), kd: real() }),
+        2 => LawParams::Smc(SmcParams { kp: real(), kd: real(), slope: real(), boundary: real() }),
+        3 => LawParams::SmcSign(SmcSignParams { kp: real(), kd: real(), slope: real() }),
+        4 => LawParams::Pd(PdParams::default()),
+        5 => LawParams::Ctc(CtcParams::default()),
+        6 => LawParams::Smc(SmcParams::default()),
+        _ => LawParams::SmcSign(SmcSignParams::default()),
+    }
+}
+
+/// Start and update of any law.
+fn runs<T: Real, C: Controller<T>>(law: Option<C>) {
+    let Some(law) = law else { return };
+    let tick =
+        Tick { error: real::<T>(), error_rate: real(), target_velocity: real(), target_acceleration: real() };
+    sink(tick.velocity());
+    let mut state = opaque(law.start(&tick, real()));
+    let Command { voltage, limit, terms } = law.update(&mut state, &tick);
+    sink((voltage, limit == Limit::Invalid, terms.columns()));
+    sink(state);
+}
+
+fn laws<T: Real>() {
+    sink(LawTerms::<T>::default());
+    let (model, out) = (plant_params::<T>(), output_params::<T>());
+    if let Some(o) = made(Output::new(&out, micros())) {
+        let mut state = opaque(o.start(real(), real()));
+        sink((o.lowest(), o.highest(), o.apply(&mut state, real())));
+        sink(state);
+    }
+    let law = made(Law::new(&law_params(), &model, &out, micros()));
+    sink(law.as_ref().map(|l| *l.output()));
+    runs(law);
+    // Each law also alone: a board may hold only one.
+    let pd = made(Pd::new(&PdParams { kp: real(), kd: real() }, &out, micros()));
+    sink(pd.as_ref().map(|l| (*l.params(), *l.output())));
+    runs(pd);
+    let p = CtcParams { outer_gain: real(), kp: real(), kd: real() };
+    let ctc = made(Ctc::new(&p, &model, &out, micros()));
+    sink(ctc.as_ref().map(|l| (*l.params(), *l.model(), *l.output())));
+    runs(ctc);
+    let p = SmcParams { kp: real(), kd: real(), slope: real(), boundary: real() };
+    let smc = made(Smc::new(&p, &out, micros()));
+    sink(smc.as_ref().map(|l| ([l.kp(), l.kd(), l.slope(), l.boundary()], *l.output())));
+    runs(smc);
+    let p = SmcSignParams { kp: real(), kd: real(), slope: real() };
+    runs(made(Smc::with_sign(&p, &out, micros())));
+}
+
+fn reference_params<T: Real>(knots: &[Knot]) -> ReferenceParams<'_, T> {
+    match word() {
+        0 => ReferenceParams::Hold,
+        1 => ReferenceParams::Ramp(real()),
+        2 => ReferenceParams::Trapezoid(Trapezoid { distance: real(), speed: real(), acceleration: real() }),
+        3 => ReferenceParams::JerkLimited(JerkLimited {
+            distance: real(),
+            speed: real(),
+            acceleration: real(),
+            jerk: real(),
+        }),
+        4 => ReferenceParams::MinimumJerk(MinimumJerk { distance: real(), duration: real() }),
+        5 => {
+            ReferenceParams::Sine(Sine { rate: real(), amplitude: real(), frequency: real(), phase: real() })
+        }
+        6 => ReferenceParams::Chirp(Chirp {
+            rate: real(),
+            amplitude: real(),
+            from: real(),
+            to: real(),
+            duration: real(),
+            phase: real(),
+        }),
+        7 => ReferenceParams::Table(Table { knots, interpolation: Interpolation::Linear }),
+        _ => ReferenceParams::Table(Table { knots, interpolation: Interpolation::Cubic }),
+    }
+}
+
+fn references<T: Real>() {
+    let knot = || Knot { time_us: word(), position: fixed() };
+    let knots = opaque([knot(), knot(), knot(), knot()]);
+    let knots = opaque(knots.get(..word() as usize).unwrap_or(&knots));
+    if let Some(r) = made(Reference::<T>::new(&reference_params(knots), fixed(), encoder::<T>(), micros())) {
+        sink(r.at(word()));
+    }
+}
+
+fn bounds<T: Real>() -> Option<Bounds<T>> {
+    let t = Tolerances {
+        inertia: real(),
+        drive_torque: real(),
+        viscous_damping: real(),
+        brake_gain: real(),
+        friction: real(),
+    };
+    made(Bounds::around(&plant_params::<T>(), &t))
+}
+
+fn certificate<T: Real>() {
+    sink((Tolerances::<T>::default(), Demand::<T>::default()));
+    let Some(b) = bounds::<T>() else { return };
+    sink([b.weakest_brake(), b.strongest_brake()]);
+    let demand =
+        Demand { velocity: real::<T>(), acceleration: real(), reach_rate: real(), start_error_rate: real() };
+    sink(paper_conditions(&b, &demand, real(), real()));
+    let Some(law) = made(Law::new(&law_params(), &plant_params(), &output_params(), micros())) else {
+        return;
+    };
+    if let Some(c) = made(certify(&law, &b, &demand)) {
+        sink((c.certified(), c.reaching_time(real())));
+    }
+}
+
+fn feasibility<T: Real>() {
+    let (Some(b), Some(out)) = (bounds::<T>(), made(Output::new(&output_params(), micros()))) else { return };
+    let knots = opaque([Knot { time_us: word(), position: fixed() }; 3]);
+    let Some(path) = made(Reference::new(&reference_params(&knots), fixed(), encoder::<T>(), micros()))
+    else {
+        return;
+    };
+    if let Some(e) = made(check_path(&path, word(), micros(), real(), &b, &out)) {
+        sink(e.largest_acceleration());
+    }
+}
+
+fn stick_slip<T: Real>() {
+    sink(StickSlipParams::<T>::default());
+    let p = StickSlipParams { gap: real::<T>(), ticks: word() as u32 };
+    if let Some(d) = made(StickSlip::new(&p, encoder::<T>(), micros())) {
+        let mut state = opaque(StickSlipState::default());
+        sink(d.update(&mut state, Counts(word() as i32), real()));
+        sink((state.stuck(), state.cycles(), state.stuck_ticks(), state.ticks(), state.stair()));
+        sink(state);
+    }
+}
+
+/// A board of opaque answers.
+struct Board;
+
+impl Daq for Board {
+    type Error = u8;
+    fn read(&mut self) -> Result<Counts, u8> {
+        if word() == 0 { Err(0) } else { Ok(Counts(word() as i32)) }
+    }
+    fn write(&mut self, code: DacCode) -> Result<(), u8> {
+        sink(code);
+        if word() == 0 { Err(1) } else { Ok(()) }
+    }
+}
+
+fn servo<T: Real>() {
+    sink(ServoParams::<T>::paper(law_params()));
+    let p = ServoParams::<T> {
+        period: micros(),
+        encoder: encoder::<T>(),
+        dac: dac_params(),
+        velocity: velocity_params(),
+        model: plant_params(),
+        law: law_params(),
+        output: output_params(),
+    };
+    turns(made(Servo::new(&p)));
+    if let Some(pd) = made(Pd::new(&PdParams { kp: real(), kd: real() }, &p.output, p.period)) {
+        turns(made(Servo::with_law(&p, pd)));
+    }
+}
+
+fn turns<T: Real, C: Controller<T>>(servo: Option<Servo<T, C>>) {
+    let Some(servo) = servo else { return };
+    sink((servo.encoder(), *servo.dac(), servo.period()));
+    black_box(servo.law());
+    let mut state = opaque(servo.start(Counts(word() as i32), &target(), real()));
+    sink(servo.tick(&mut state, Counts(word() as i32), &target()));
+    sink(servo.tick_at(&mut state, fixed(), &target()));
+    sink(servo.run(&mut state, &mut Board, &target()));
+    sink(state);
+}
+
+fn casts<T: Real, U: Real>() {
+    sink(target::<T>().cast::<U>());
+    sink(ObserverGains::<T> { position: real(), velocity: real(), disturbance: real() }.cast::<U>());
+    let p = ServoParams::<T> {
+        dac: dac_params(),
+        velocity: velocity_params(),
+        model: plant_params(),
+        output: output_params(),
+        ..ServoParams::paper(law_params())
+    };
+    sink(p.cast::<U>());
+    sink(StickSlipParams::<T> { gap: real(), ticks: word() as u32 }.cast::<U>());
+    sink(Tolerances::<T>::default().cast::<U>());
+}

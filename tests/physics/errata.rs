@@ -1,0 +1,108 @@
+//! What the paper prints and what is true: each erratum with the run that shows it.
+
+use clutch_core::law::{Command, Controller, Limit, LawParams, OutputState, PdParams, PdTerms, SmcParams, SmcSignParams, Tick};
+use clutch_core::reference::ReferenceParams;
+use clutch_core::{Servo, StribeckParams};
+use clutch_sim::{RigParams, RunSpec, Start, simulate, simulate_servo};
+
+fn ramp(rig: RigParams, law: LawParams) -> RunSpec<'static> {
+    RunSpec::new(rig, law, ReferenceParams::Ramp(2.0_f64.to_radians()))
+}
+
+fn last_error_deg(run: &clutch_sim::Run) -> f64 {
+    run.trace.error.last().unwrap().to_degrees()
+}
+
+/// (4) as printed, without the minus.
+struct Printed;
+
+impl Controller<f64> for Printed {
+    type State = OutputState<f64>;
+    type Terms = PdTerms<f64>;
+    fn start(&self, _: &Tick<f64>, _: f64) -> Self::State {
+        OutputState::default()
+    }
+    fn update(&self, _: &mut Self::State, tick: &Tick<f64>) -> Command<f64, PdTerms<f64>> {
+        let gains = PdParams::<f64>::default();
+        let terms = PdTerms { proportional: gains.kp * tick.error, derivative: gains.kd * tick.error_rate };
+        let voltage = (terms.proportional + terms.derivative).clamp(0.0, 10.0);
+        Command { voltage, limit: Limit::None, terms }
+    }
+}
+
+#[test]
+fn equation_4_as_printed_lets_the_shaft_run_away() {
+    let spec = ramp(RigParams::paper(), LawParams::Pd(PdParams::default()));
+    let servo = Servo::with_law(&spec.servo().unwrap(), Printed).unwrap();
+    let run = simulate_servo(&spec, &servo).unwrap();
+    // Ahead by a hair, it lets go for good: free fall for five seconds.
+    assert!(last_error_deg(&run) < -1000.0, "error {}°", last_error_deg(&run));
+    let with_minus = simulate::<f64>(&spec).unwrap();
+    assert!(with_minus.metrics.max_error_rad.to_degrees() < 0.12);
+}
+
+#[test]
+fn a_switching_gain_of_2_2_volts_diverges_and_2_3_holds() {
+    let law = |kp| LawParams::Smc(SmcParams { kp, ..SmcParams::default() });
+    let run = simulate::<f64>(&ramp(RigParams::ideal(), law(2.2))).unwrap();
+    assert!(last_error_deg(&run) < -1.0, "K_p = 2.2 V, below the certificate's 2.26 V: {}°", last_error_deg(&run));
+    let run = simulate::<f64>(&ramp(RigParams::ideal(), law(2.3))).unwrap();
+    assert!(run.metrics.max_error_rad.to_degrees() < 0.15, "K_p = 2.3 V, above it");
+}
+
+#[test]
+fn gains_that_satisfy_26_and_27_run_away() {
+    let law = LawParams::Smc(SmcParams { kp: 1.0, kd: 3.0, ..SmcParams::default() });
+    let mut spec = ramp(RigParams::ideal(), law);
+    spec.run.duration = 2.0;
+    let run = simulate::<f64>(&spec).unwrap();
+    assert!(last_error_deg(&run) < -20.0, "after 2 s at 2 °/s: {}°", last_error_deg(&run));
+}
+
+#[test]
+fn the_boundary_layer_weakens_the_damping_term_where_the_certificate_says_so() {
+    // Between 2.2423 V (sufficient for the sign function) and 2.2624 V (with the boundary layer)
+    // the sign law may rely on K_d |ė| at any speed; (31) has only K_d ė² there.
+    let sign = LawParams::SmcSign(SmcSignParams { kp: 2.25, ..SmcSignParams::default() });
+    let run = simulate::<f64>(&ramp(RigParams::ideal(), sign)).unwrap();
+    assert!(run.metrics.max_error_rad.to_degrees() < 0.15, "sign function at 2.25 V holds");
+    // At σ = −ε and ė = c/(2 K_d), the demand of (31) falls short of T + f J |ė| by c²/(4 K_d).
+    let (kd, slope, boundary, brake, inertia) = (400.0, 70.0, 0.1, 0.15 * 0.14, 0.0017);
+    let c = inertia * slope / brake;
+    let rate = -c / (2.0 * kd);
+    let at_the_edge = Tick { error: (-boundary - rate) / slope, error_rate: rate, ..Tick::default() };
+    let law = |kp| {
+        let p = SmcParams { kp, ..SmcParams::<f64>::default() };
+        clutch_core::law::Smc::new(&p, &Default::default(), clutch_core::Micros(1000)).unwrap()
+    };
+    let volts = law(2.25).update(&mut Default::default(), &at_the_edge).voltage;
+    let needed = 0.047088 / brake + c * rate.abs();
+    assert!(volts < needed, "{volts} V against {needed} V: K_p = 2.25 V is not enough with the layer");
+    let volts = law(2.2625).update(&mut Default::default(), &at_the_edge).voltage;
+    assert!(volts >= needed, "{volts} V against {needed} V: the certificate's K_p is");
+}
+
+#[test]
+fn the_stribeck_velocity_read_in_degrees_per_second_sticks_at_2_degrees_per_second_too() {
+    let mut rig = RigParams::paper();
+    rig.friction = StribeckParams { stribeck_velocity: 0.001_f64.to_radians(), ..rig.friction };
+    let run = simulate::<f64>(&ramp(rig, LawParams::Pd(PdParams::default()))).unwrap();
+    // The unit is not printed. Both readings stick at 2 °/s; the figures are not told apart by it.
+    assert!(run.metrics.stick_slip_cycles_per_s > 10.0, "{}", run.metrics.stick_slip_cycles_per_s);
+}
+
+#[test]
+fn without_the_encoders_steps_nothing_sticks_at_2_degrees_per_second() {
+    let rig = RigParams { encoder_quantised: false, ..RigParams::paper() };
+    let run = simulate::<f64>(&ramp(rig, LawParams::Pd(PdParams::default()))).unwrap();
+    assert_eq!(run.metrics.stick_slip_cycles_per_s, 0.0, "the quantised derivative is what starts the cycles");
+}
+
+#[test]
+fn a_ramp_from_rest_is_caught_up_with() {
+    let mut spec = ramp(RigParams::paper(), LawParams::Smc(SmcParams::default()));
+    spec.run.start = Start::Rest;
+    let run = simulate::<f64>(&spec).unwrap();
+    assert!(run.trace.stuck[0], "it begins at rest");
+    assert!(run.metrics.max_error_rad.to_degrees() < 0.15, "after the first second");
+}

@@ -1,0 +1,118 @@
+//! What every law of the core must do, whatever its gains.
+
+use clutch_core::law::{
+    Controller, CtcParams, Law, LawParams, Limit, OutputParams, OutputState, PdParams, SmcParams, SmcSignParams, Tick,
+};
+use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, Target};
+use proptest::prelude::*;
+
+fn laws() -> impl Strategy<Value = LawParams> {
+    let gain = 0.0_f64..1e4;
+    prop_oneof![
+        (gain.clone(), gain.clone()).prop_map(|(kp, kd)| LawParams::Pd(PdParams { kp, kd })),
+        (0.0..200.0_f64, gain.clone(), gain.clone())
+            .prop_map(|(outer_gain, kp, kd)| LawParams::Ctc(CtcParams { outer_gain, kp, kd })),
+        (gain.clone(), gain.clone(), 1.0..500.0_f64, 1e-3..10.0_f64)
+            .prop_map(|(kp, kd, slope, boundary)| LawParams::Smc(SmcParams { kp, kd, slope, boundary })),
+        (gain.clone(), gain, 1.0..500.0_f64)
+            .prop_map(|(kp, kd, slope)| LawParams::SmcSign(SmcSignParams { kp, kd, slope })),
+    ]
+}
+
+fn law(p: &LawParams) -> Law<f64> {
+    Law::new(p, &PlantParams::default(), &OutputParams::default(), Micros(1000)).unwrap()
+}
+
+fn any_tick() -> impl Strategy<Value = Tick<f64>> {
+    (any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>()).prop_map(|(a, b, c, d)| Tick {
+        error: a,
+        error_rate: b,
+        target_velocity: c,
+        target_acceleration: d,
+    })
+}
+
+fn small_tick() -> impl Strategy<Value = Tick<f64>> {
+    (-0.1_f64..0.1, -1.0_f64..1.0).prop_map(|(error, error_rate)| Tick {
+        error,
+        error_rate,
+        target_velocity: 0.05,
+        target_acceleration: 0.0,
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, rng_seed: proptest::test_runner::RngSeed::Fixed(2), ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_measurement_makes_a_law_leave_its_limits(p in laws(), tick in any_tick()) {
+        let c = law(&p).update(&mut OutputState::default(), &tick);
+        prop_assert!((0.0..=10.0).contains(&c.voltage));
+        if c.limit == Limit::Invalid { prop_assert_eq!(c.voltage, 10.0, "a brake that cannot know, brakes"); }
+    }
+
+    #[test]
+    fn a_law_answers_again_after_the_wildest_measurement(p in laws(), wild in any_tick(), tick in small_tick()) {
+        let law = law(&p);
+        let mut state = OutputState::default();
+        law.update(&mut state, &wild);
+        let after = law.update(&mut state, &tick);
+        let fresh = law.update(&mut OutputState::default(), &tick);
+        prop_assert_eq!(after, fresh);
+    }
+
+    #[test]
+    fn a_shaft_further_ahead_is_never_braked_less(p in laws(), tick in small_tick(), further in 0.0_f64..0.1) {
+        // At one error rate; the K_d term of (31) turns with the sign of σ, so ė = 0 there.
+        let tick = Tick { error_rate: 0.0, ..tick };
+        let ahead = Tick { error: tick.error - further, ..tick };
+        let volts = |t| law(&p).update(&mut OutputState::default(), t).voltage;
+        prop_assert!(volts(&ahead) >= volts(&tick));
+    }
+
+    #[test]
+    fn one_input_gives_one_output(p in laws(), tick in any_tick()) {
+        let law = law(&p);
+        let a = law.update(&mut OutputState::default(), &tick);
+        let b = law.update(&mut OutputState::default(), &tick);
+        prop_assert_eq!(a.voltage.to_bits(), b.voltage.to_bits());
+    }
+
+    #[test]
+    fn the_boundary_layer_is_the_sign_function_outside_itself(tick in small_tick(), boundary in 1e-3_f64..0.5) {
+        let sat = law(&LawParams::Smc(SmcParams { boundary, ..SmcParams::default() }));
+        let sign = law(&LawParams::SmcSign(SmcSignParams::default()));
+        let sigma = 70.0 * tick.error + tick.error_rate;
+        prop_assume!(sigma.abs() > boundary && (sigma * tick.error_rate).abs() > boundary);
+        let volts = |l: &Law<f64>| l.update(&mut OutputState::default(), &tick).voltage;
+        prop_assert_eq!(volts(&sat), volts(&sign));
+    }
+
+    #[test]
+    fn a_bumpless_start_begins_at_the_voltage_it_finds(p in laws(), tick in small_tick(), applied in 0.0_f64..10.0) {
+        let out = OutputParams { bumpless_time: 0.05, ..OutputParams::default() };
+        let law = Law::new(&p, &PlantParams::default(), &out, Micros(1000)).unwrap();
+        let mut state = law.start(&tick, applied);
+        let first = law.update(&mut state, &tick).voltage;
+        // A demand of 1e6 V loses ten digits of the volts added to it.
+        prop_assert!((first - applied).abs() < 1e-6, "{first} instead of {applied}");
+    }
+
+    #[test]
+    fn a_servo_started_anywhere_on_the_counter_gives_the_same_codes(offset in any::<i32>(), p in laws()) {
+        let servo = Servo::<f64>::new(&ServoParams::paper(p)).unwrap();
+        let codes = |zero: i32| {
+            let target = |k: i64| Target {
+                position: FixedCounts::from_counts(i64::from(zero)).plus(FixedCounts(k * 7281)),
+                velocity: 0.0349,
+                acceleration: 0.0,
+            };
+            let mut state = servo.start(Counts(zero), &target(0), 2.0);
+            (0..50).map(|k| {
+                let counts = Counts(zero.wrapping_add(k / 7));
+                servo.tick(&mut state, counts, &target(i64::from(k))).code
+            }).collect::<Vec<_>>()
+        };
+        prop_assert_eq!(codes(0), codes(offset));
+    }
+}

@@ -1,0 +1,9 @@
+//! The physics: acceptance cases with analytic answers, the paper's errata, engine against
+//! engine.
+
+mod acceptance;
+mod detector;
+mod engines;
+mod errata;
+mod laws;
+mod single_precision;

@@ -1,0 +1,2 @@
+//! Scenario files: what they say, and what is said of bad ones.
+
