@@ -96,7 +96,7 @@ fn the_exact_flow_says_which_rigs_it_cannot_take() {
         s
     };
     let paper = RigParams::paper;
-    let ripple = Some(RippleParams { amplitude: 0.1, wave_number: 100.0, waves: 2 });
+    let ripple = Some(RippleParams { rms: 0.1, lowest: 100, highest: 200, spacing: 100 });
     for (rig, word) in [
         (RigParams { friction: StribeckParams { stribeck_exponent: 2.0, ..paper().friction }, ..paper() }, "exponent"),
         (RigParams { ripple, ..paper() }, "along the disc"),

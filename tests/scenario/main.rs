@@ -1,2 +1,219 @@
 //! Scenario files: what they say, and what is said of bad ones.
 
+use clutch_sim::Scenario;
+use clutch_sim::scenario::BUILT_IN;
+use proptest::prelude::*;
+
+const GOOD: &str = r#"
+name = "test"
+[rig]
+base = "paper"
+[law.smc]
+[reference.ramp]
+rate_deg_s = 2.0
+"#;
+
+fn parse(text: &str) -> Result<Scenario, String> {
+    Scenario::parse("my.toml", text, &[]).map_err(|e| e.to_string())
+}
+
+fn with(key: &str, value: &str) -> Result<Scenario, String> {
+    // The origin of an error names the override too; what follows is the same as from a file.
+    Scenario::parse("my.toml", GOOD, &[(key.into(), value.into())]).map_err(|e| e.to_string())
+}
+
+/// The error begins with file and key, shows the value, and says each of the words.
+#[track_caller]
+fn refuses(result: Result<Scenario, String>, begin: &str, words: &[&str]) {
+    let message = result.map(|s| s.name).expect_err("must be refused");
+    assert!(message.starts_with(begin), "{message}");
+    for word in words {
+        assert!(message.contains(word), "{message}\nlacks: {word}");
+    }
+}
+
+#[test]
+fn every_built_in_scenario_is_good_and_runs() {
+    for b in BUILT_IN {
+        let s = Scenario::built_in(b.name).unwrap().unwrap_or_else(|e| panic!("{e}"));
+        let run = s.run().unwrap_or_else(|e| panic!("{e}"));
+        assert!(run.metrics.max_error_rad.to_degrees() < 0.5, "{}: {:?}", b.name, run.metrics);
+        assert!(s.plan().unwrap().certificate.certified(), "{}", b.name);
+    }
+}
+
+#[test]
+fn every_complete_scenario_in_the_docs_is_good() {
+    let docs = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs");
+    let mut checked = 0;
+    for entry in std::fs::read_dir(docs).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "md") {
+            continue;
+        }
+        let page = std::fs::read_to_string(&path).unwrap();
+        for block in page.split("```toml\n").skip(1) {
+            let text = block.split("```").next().unwrap();
+            if text.contains("[rig]") {
+                Scenario::parse(&path.display().to_string(), text, &[]).unwrap_or_else(|e| panic!("{e}\n{text}"));
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked >= 3, "the docs show how to write a scenario: {checked}");
+}
+
+#[test]
+fn a_negative_inertia_is_refused() {
+    refuses(with("rig.inertia_kg_m2", "-0.0017"), "my.toml: rig.inertia_kg_m2 = -0.0017: ", &["above 0 kg m²"]);
+}
+
+#[test]
+fn a_gain_that_is_not_a_number_is_refused() {
+    refuses(with("law.smc.kp_v", "nan"), "my.toml: law.smc.kp_v = NaN: ", &["finite", "V"]);
+}
+
+#[test]
+fn a_zero_period_is_refused() {
+    refuses(with("sampling.period_us", "0"), "my.toml: sampling.period_us = 0: ", &["1 to 1 000 000 µs"]);
+}
+
+#[test]
+fn an_unknown_key_is_refused_with_the_nearest_one() {
+    refuses(with("law.smc.slop_1_s", "70.0"), "my.toml: law.smc.slop_1_s = 70: ", &["did you mean slope_1_s?"]);
+    refuses(with("rig.inertia", "0.1"), "my.toml: rig.inertia = 0.1: ", &["did you mean inertia_kg_m2?", "unit"]);
+    refuses(with("sample.period_us", "1000"), "my.toml: sample: ", &["did you mean sampling?"]);
+}
+
+#[test]
+fn a_wrong_type_is_refused() {
+    refuses(with("law.smc.kp_v", "\"three\""), "my.toml: law.smc.kp_v = \"three\": ", &["expected a number"]);
+    refuses(with("run.seed", "-1"), "my.toml: run.seed = -1: ", &["whole number"]);
+    refuses(with("run.engine", "fast"), "my.toml: run.engine = \"fast\": ", &["auto", "dormand_prince", "exact_flow"]);
+    refuses(with("law", "3"), "my.toml: law = 3: ", &["[law.smc]"]);
+    refuses(with("rig.encoder.quantised", "1"), "my.toml: rig.encoder.quantised = 1: ", &["true or false"]);
+}
+
+#[test]
+fn a_unit_slip_is_refused_with_the_value_in_the_right_unit() {
+    refuses(
+        with("reference.ramp.rate_rad_s", "2"),
+        "my.toml: reference.ramp.rate_rad_s = 2: ",
+        &["unit", "rate_deg_s = 114.591559"],
+    );
+    refuses(with("run.duration_ms", "500"), "my.toml: run.duration_ms = 500: ", &["duration_s = 0.5"]);
+    // 2 rad/s typed as °/s of a shaft whose rig ends at 100 °/s.
+    let text = GOOD.replace("base = \"paper\"", "base = \"paper\"\nspeed_limit_deg_s = 100.0");
+    let text = text.replace("rate_deg_s = 2.0", "rate_deg_s = 114.6");
+    refuses(parse(&text), "my.toml: reference.ramp: ", &["114.6000 °/s", "rig.speed_limit_deg_s = 100", "1 rad/s is 57.3"]);
+}
+
+#[test]
+fn a_path_that_a_brake_cannot_follow_is_refused_where_it_cannot() {
+    refuses(with("reference.ramp.rate_deg_s", "-2.0"), "my.toml: reference.ramp: ", &["t = 0.0000 s", "runs backwards"]);
+    let steep = "name = \"x\"\n[rig]\nbase = \"paper\"\n[law.pd]\n[reference.trapezoid]\ndistance_deg = 300.0\nspeed_deg_s = 300.0\nacceleration_deg_s2 = 3000.0\n";
+    refuses(parse(steep), "my.toml: reference.trapezoid: ", &["accelerates at 3000", "the weight grants", "°/s²"]);
+    // 2.5 V brake the paper's shaft with 3 rad/s² = 182 °/s².
+    let weak = "name = \"x\"\n[rig]\nbase = \"paper\"\n[law.pd]\n[reference.trapezoid]\ndistance_deg = 300.0\nspeed_deg_s = 300.0\nacceleration_deg_s2 = 500.0\n[output]\nhighest_v = 2.5\non_invalid_v = 2.5\n";
+    refuses(parse(weak), "my.toml: reference.trapezoid: ", &["V of braking", "output.highest_v = 2.5"]);
+}
+
+#[test]
+fn two_laws_or_none_are_refused() {
+    refuses(with("law.pd.kp_v_rad", "1.0"), "my.toml: law: ", &["exactly one", "[law.smc]", "[law.pd]"]);
+    refuses(parse(&GOOD.replace("[law.smc]\n", "")), "my.toml: law: ", &["missing"]);
+}
+
+#[test]
+fn a_rig_without_a_base_or_with_an_unknown_one_is_refused() {
+    refuses(parse(&GOOD.replace("base = \"paper\"\n", "")), "my.toml: rig.base = missing: ", &["ideal, paper, bench"]);
+    refuses(with("rig.base", "real"), "my.toml: rig.base = \"real\": ", &["ideal, paper, bench"]);
+}
+
+#[test]
+fn a_table_with_times_that_do_not_rise_names_the_point() {
+    let text = GOOD.replace("[reference.ramp]\nrate_deg_s = 2.0", "[reference.table]\npoints_s_deg = [[0.0, 0.0], [2.0, 1.0], [1.0, 2.0]]");
+    refuses(parse(&text), "my.toml: reference.table.points_s_deg = (point 2): ", &["rise"]);
+}
+
+#[test]
+fn what_is_not_toml_is_shown_with_its_line() {
+    refuses(parse("name = \"x\"\n[rig\n"), "my.toml: ", &["not TOML", "line 2"]);
+}
+
+#[test]
+fn naming_another_drive_replaces_the_weight_of_the_base() {
+    let text = format!("{GOOD}\n[rig.drive.spring]\nstiffness_nm_rad = 0.01\nrest_deg = 300.0\n[model]\ndrive_torque_nm = 0.05\n");
+    assert!(parse(&text).is_ok(), "{:?}", parse(&text).map(|s| s.name));
+}
+
+#[test]
+fn the_geometry_of_the_brake_stands_for_its_gain() {
+    let geometry = "[rig.brake_geometry]\ninner_radius_m = 0.045\ntorque_constant_nm_a = 0.05\npad_area_m2 = 0.04\nlever_area_m2 = 0.032\narmature_resistance_ohm = 0.6\ncontact_radius_m = 0.034\n";
+    let s = parse(&format!("{GOOD}\n{geometry}")).unwrap();
+    let gain = 0.045 * 0.05 * 0.04 / (0.032 * 0.6 * 0.034);
+    assert!((s.spec().rig.brake_gain - gain).abs() < 1e-15);
+    let both = GOOD.replace("base = \"paper\"", "base = \"paper\"\nbrake_gain_nm_v = 0.14");
+    refuses(parse(&format!("{both}\n{geometry}")), "my.toml: rig.brake_gain_nm_v = 0.14: ", &["not both"]);
+}
+
+/// Bytes that a file might hold: pieces of real scenarios, cut, repeated and peppered.
+fn mangled() -> impl Strategy<Value = String> {
+    (0..BUILT_IN.len(), any::<prop::sample::Index>(), any::<prop::sample::Index>(), ".{0,12}").prop_map(
+        |(which, a, b, noise)| {
+            let text: Vec<char> = BUILT_IN[which].toml.chars().collect();
+            let (a, b) = (a.index(text.len()), b.index(text.len()));
+            let (a, b) = (a.min(b), a.max(b));
+            text[..a].iter().chain(noise.chars().collect::<Vec<_>>().iter()).chain(&text[b..]).collect()
+        },
+    )
+}
+
+fn any_key() -> impl Strategy<Value = &'static str> {
+    prop::sample::select(vec![
+        "rig.inertia_kg_m2", "rig.viscous_damping_nm_s_rad", "rig.brake_gain_nm_v", "rig.torque_noise_nm",
+        "rig.delay_ticks", "rig.actuator_time_constant_s", "rig.speed_limit_deg_s", "rig.friction.mu_static",
+        "rig.friction.stribeck_velocity_rad_s", "rig.friction.stribeck_exponent", "rig.encoder.counts_per_rev",
+        "rig.dac.bits", "rig.dac.highest_v", "model.mu_dynamic", "model.drive_torque_nm", "law.smc.kp_v",
+        "law.smc.slope_1_s", "law.smc.boundary_rad_s", "velocity.smoothed_derivative.smoothing",
+        "output.highest_v", "output.bumpless_time_s", "reference.ramp.rate_deg_s", "sampling.period_us",
+        "bounds.friction_percent", "bounds.reach_rate_rad_s2", "run.duration_s", "run.settle_s", "run.start_counts",
+        "run.seed",
+    ])
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, rng_seed: proptest::test_runner::RngSeed::Fixed(3), ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_file_makes_the_reader_panic(text in mangled()) {
+        if let Err(message) = parse(&text) {
+            prop_assert!(message.starts_with("my.toml: "));
+        }
+    }
+
+    #[test]
+    fn every_number_at_every_key_is_taken_or_refused_by_that_name(key in any_key(), value in any::<f64>()) {
+        // What is taken must run: a tenth of a second is enough to meet it.
+        let set = [(key.to_owned(), format!("{value:?}")), ("run.duration_s".into(), "0.1".into()), ("run.settle_s".into(), "0".into())];
+        let set = if key.starts_with("run.d") || key.starts_with("run.se") { &set[..1] } else { &set[..] };
+        match Scenario::parse("my.toml", GOOD, set) {
+            Ok(s) if s.ticks() < 10_000 => {
+                if let Err(e) = s.run() {
+                    prop_assert!(e.to_string().starts_with("my.toml: "), "{e}");
+                }
+            }
+            Ok(_) => {}
+            Err(e) => prop_assert!(e.to_string().starts_with("my.toml: "), "{e}"),
+        }
+    }
+
+    #[test]
+    fn scaling_a_key_by_a_likely_slip_never_panics(key in any_key(), factor in prop::sample::select(vec![57.3, 1.0 / 57.3, 1000.0, 1e-3, 10.0, 0.1, -1.0])) {
+        let base = Scenario::parse("my.toml", GOOD, &[]).unwrap().spec().rig.inertia;
+        let set = [(key.to_owned(), format!("{:?}", base * factor))];
+        if let Ok(s) = Scenario::parse("my.toml", GOOD, &set) && s.ticks() < 10_000 {
+            let _ = s.run();
+        }
+    }
+}

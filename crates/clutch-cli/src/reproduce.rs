@@ -68,7 +68,7 @@ impl Reproduce {
         let held = outcome.claims.iter().filter(|c| c.holds).count();
         let verdict = if unexpected.is_empty() {
             let rest = outcome.claims.len() - held;
-            format!("{held} of {} statements hold, {rest} fail as documented", outcome.claims.len())
+            format!("{held} of {} statements hold, {rest} not, as documented", outcome.claims.len())
         } else {
             format!("not as documented: {}", unexpected.join(", "))
         };
@@ -155,10 +155,11 @@ fn settings() -> Vec<(String, String)> {
             "Bench: along the disc",
             bench.ripple.map_or("even".to_owned(), |r| {
                 format!(
-                    "{} waves of ±{} % each, wave number {} 1/rad and its multiples",
-                    r.waves,
-                    number(100.0 * r.amplitude),
-                    number(r.wave_number)
+                    "±{} % (rms), waves of {} to {} per turn, {} apart, random phases",
+                    number(100.0 * r.rms),
+                    r.lowest,
+                    r.highest,
+                    r.spacing
                 )
             }),
         ),

@@ -1,12 +1,11 @@
 //! Plain tables for a terminal.
 
-use comfy_table::presets::NOTHING;
-use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Width};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
 
 /// Rows of name, value and unit, under a title.
 pub(crate) fn quantities(title: &str, rows: &[(&str, String, &str)]) -> String {
     let mut table = Table::new();
-    table.load_preset(NOTHING).set_content_arrangement(ContentArrangement::Disabled);
+    table.load_style(TableStyle::new()).set_content_arrangement(ContentArrangement::Disabled);
     for (name, value, unit) in rows {
         table.add_row(vec![format!("  {name}"), value.clone(), (*unit).to_owned()]);
     }

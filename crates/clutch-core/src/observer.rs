@@ -23,8 +23,8 @@
 //! | 20 ± 10 °/s at 10 Hz | 1.60 | 1.00 | 1.34 | 2.22 °/s |
 //! | 20 ± 10 °/s at 20 Hz | 6.19 | 2.80 | 1.79 | 3.66 °/s |
 //!
-//! At a constant speed any slower observer looks better; the default is the one that wins in
-//! every row against (5).
+//! At a constant speed any slower observer looks better; the default is the one of the three
+//! that wins in every row against (5). A tick takes 25 ns on an x86-64 host, (5) takes 2.4 ns.
 
 use crate::error::{cast, require};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Plant, Real};
@@ -555,6 +555,36 @@ mod tests {
     fn a_wild_jump_in_the_counts_is_forgotten_in_300_ticks() {
         recovers::<f32>();
         recovers::<f64>();
+    }
+
+    #[test]
+    fn an_estimate_that_overflows_starts_anew_at_rest() {
+        let extreme = PlantParams {
+            inertia: 1e-20_f32,
+            drive_torque: 1e30,
+            viscous_damping: 0.0,
+            ..PlantParams::default()
+        };
+        let p = ObserverParams::default();
+        let o = Observer::new(&p, &Plant::new(&extreme).unwrap(), Encoder::PAPER, MS).unwrap();
+        let mut state = o.start(FixedCounts(0), 1.0, 0.0);
+        for k in 0..3 {
+            // 1e30 N m on 1e-20 kg m² for 1 ms is beyond f32.
+            let e = o.update(&mut state, FixedCounts::from_counts(k), 0.0);
+            assert_eq!((e.velocity, e.disturbance_torque), (0.0, 1e30));
+        }
+    }
+
+    #[test]
+    fn a_voltage_that_presses_no_pad_brakes_nothing() {
+        let o = observer::<f64>();
+        let fall = |volts: f64| {
+            let mut state = o.start(FixedCounts(0), 0.5, volts);
+            (1..50).map(|k| o.update(&mut state, FixedCounts::from_counts(k), volts)).last().unwrap()
+        };
+        assert_eq!(fall(-3.0), fall(0.0));
+        assert_eq!(fall(f64::NAN), fall(0.0));
+        assert_ne!(fall(3.0), fall(0.0));
     }
 
     #[test]

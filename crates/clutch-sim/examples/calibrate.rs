@@ -19,7 +19,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 /// Seeds of the runs that the fit sees; `clutch reproduce` uses others (1 to 10).
-const FIT_SEEDS: std::ops::RangeInclusive<u64> = 101..=120;
+const FIT_SEEDS: std::ops::RangeInclusive<u64> = 101..=116;
 /// Table 3: rate in °/s, reduction in per cent.
 const TABLE3: [(f64, f64); 3] = [(10.0, 88.6), (6.0, 88.9), (2.0, 83.8)];
 const OFFSPRING: usize = 12;
@@ -31,13 +31,18 @@ const NAMES: [&str; 6] = [
     "mu_dynamic",
     "stribeck_velocity",
     "load factor",
-    "ripple amplitude",
-    "ripple wave number (1/rad)",
+    "ripple rms",
+    "ripple spacing (waves per turn; the band is 4 to 16 spacings)",
 ];
-const LOWEST: Point = [0.12, 0.08, 2e-4, 0.9, 0.0, 20.0];
-const HIGHEST: Point = [0.30, 0.25, 2e-2, 1.1, 0.2, 800.0];
+const LOWEST: Point = [0.12, 0.08, 2e-4, 0.9, 0.0, 10.0];
+const HIGHEST: Point = [0.30, 0.25, 2e-2, 1.1, 0.19, 150.0];
 /// Where the search starts: a rig found by hand that behaves roughly like the experiment.
-const START: Point = [0.194, 0.105, 0.00103, 1.033, 0.12, 164.0];
+const START: Point = [0.194, 0.105, 0.00103, 1.033, 0.167, 41.0];
+
+fn ripple(x: &Point) -> RippleParams {
+    let spacing = x[5].round() as u32;
+    RippleParams { rms: x[4], lowest: 4 * spacing, highest: 16 * spacing, spacing }
+}
 
 fn rig(x: &Point) -> RigParams {
     RigParams {
@@ -48,7 +53,7 @@ fn rig(x: &Point) -> RigParams {
             stribeck_exponent: 1.0,
         },
         drive: DriveParams::Weight { mass: 0.2 * x[3], gravity: GRAVITY, pulley_radius: 0.024 },
-        ripple: Some(RippleParams { amplitude: x[4], wave_number: x[5], waves: 4 }),
+        ripple: Some(ripple(x)),
         delay_ticks: 1,
         ..RigParams::paper()
     }

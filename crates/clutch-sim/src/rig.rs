@@ -6,22 +6,28 @@ use clutch_core::{Dac, DacParams, Encoder, GRAVITY, ParamError, Plant, PlantPara
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Friction that varies along the disc: a sum of waves with random phases.
+/// Friction that varies along the disc: a band of waves with equal amplitudes and random phases.
+///
+/// A disc is closed, so each wave fits a whole number of times into a turn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RippleParams {
-    /// Amplitude of each wave, as a share of the friction.
-    pub amplitude: f64,
-    /// Wave number of the first wave, 1/rad: waves per turn over 2π. The others are its multiples.
-    pub wave_number: f64,
-    /// How many waves.
-    pub waves: u32,
+    /// Root mean square of the variation, as a share of the friction.
+    pub rms: f64,
+    /// Waves per turn of the longest wave; a multiple of the spacing.
+    pub lowest: u32,
+    /// Waves per turn of the shortest wave; a multiple of the spacing.
+    pub highest: u32,
+    /// Waves per turn from one wave to the next: the pattern repeats that often in a turn.
+    pub spacing: u32,
 }
 
-/// The factor `1 + Σ_j amplitude · sin(j · wave_number · θ + φ_j)` on friction.
+/// The factor `1 + amplitude Σ_n sin(n θ + φ_n)` on friction, `n = lowest … highest`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ripple {
     amplitude: f64,
-    wave_number: f64,
+    spacing: f64,
+    /// Multiples of the spacing before the first wave.
+    skipped: u32,
     /// Sine and cosine of each wave's phase.
     phases: Vec<(f64, f64)>,
 }
@@ -30,42 +36,50 @@ impl Ripple {
     /// Checks the parameters; `seed` decides the phases.
     ///
     /// # Errors
-    /// `waves` outside 1…32; `wave_number` not above 0; an `amplitude` with which friction could
-    /// reach 0 or below.
+    /// `spacing` 0; `lowest` or `highest` no multiple of it, out of order, or more than 64 waves;
+    /// an `rms` with which friction could reach 0.
     pub fn new(p: &RippleParams, seed: u64) -> Result<Ripple, ParamError> {
         let bad = |field, value, expected| Err(ParamError { field, value, expected });
-        if !(1..=32).contains(&p.waves) {
-            return bad("waves", f64::from(p.waves), "1 to 32 waves");
+        if p.spacing == 0 {
+            return bad("spacing", 0.0, "at least 1 wave per turn");
         }
-        if !(p.wave_number > 0.0 && p.wave_number.is_finite()) {
-            return bad("wave_number", p.wave_number, "a finite number above 0 1/rad");
+        if p.lowest == 0 || p.lowest % p.spacing != 0 {
+            return bad("lowest", f64::from(p.lowest), "a multiple of the spacing, above 0 waves per turn");
         }
-        if !(p.amplitude >= 0.0 && p.amplitude * f64::from(p.waves) < 1.0) {
-            return bad("amplitude", p.amplitude, "at least 0 and, times the number of waves, below 1");
+        if p.highest < p.lowest || p.highest % p.spacing != 0 || (p.highest - p.lowest) / p.spacing >= 64 {
+            return bad(
+                "highest",
+                f64::from(p.highest),
+                "a multiple of the spacing, not below the lowest and less than 64 spacings above it, waves per turn",
+            );
+        }
+        let waves = (p.highest - p.lowest) / p.spacing + 1;
+        let amplitude = p.rms * libm::sqrt(2.0 / f64::from(waves));
+        if !(p.rms >= 0.0 && amplitude * f64::from(waves) < 1.0) {
+            return bad("rms", p.rms, "at least 0 and, times the root of twice the number of waves, below 1");
         }
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x7269_7070_6c65);
         let phases =
-            (0..p.waves).map(|_| libm::sincos(core::f64::consts::TAU * rng.random::<f64>())).collect();
-        Ok(Ripple { amplitude: p.amplitude, wave_number: p.wave_number, phases })
+            (0..waves).map(|_| libm::sincos(core::f64::consts::TAU * rng.random::<f64>())).collect();
+        Ok(Ripple { amplitude, spacing: f64::from(p.spacing), skipped: p.lowest / p.spacing - 1, phases })
     }
 
     /// The factor at a position.
     #[must_use]
     pub fn factor(&self, position: f64) -> f64 {
-        // sin(jx + φ) from sin x, cos x by the addition theorem: one sine for all waves.
-        let (s1, c1) = libm::sincos(self.wave_number * position);
-        let (mut s, mut c, mut sum) = (s1, c1, 0.0);
+        // The sines of all multiples from one sine and cosine, by the addition theorem.
+        let (s1, c1) = libm::sincos(self.spacing * position);
+        let next = |(s, c): (f64, f64)| (s * c1 + c * s1, c * c1 - s * s1);
+        let mut wave = (s1, c1);
+        for _ in 0..self.skipped {
+            wave = next(wave);
+        }
+        let mut sum = 0.0;
         for (sp, cp) in &self.phases {
-            sum += s * cp + c * sp;
-            (s, c) = (s * c1 + c * s1, c * c1 - s * s1);
+            sum += wave.0 * cp + wave.1 * sp;
+            wave = next(wave);
         }
         1.0 + self.amplitude * sum
-    }
-
-    /// Largest departure from 1 that the factor can have.
-    #[must_use]
-    pub fn largest(&self) -> f64 {
-        self.amplitude * self.phases.len() as f64
     }
 }
 
@@ -144,13 +158,13 @@ impl RigParams {
     pub fn bench() -> Self {
         RigParams {
             friction: StribeckParams {
-                mu_static: 0.194,
+                mu_static: 0.172,
                 mu_dynamic: 0.105,
-                stribeck_velocity: 0.00103,
+                stribeck_velocity: 0.00107,
                 stribeck_exponent: 1.0,
             },
-            ripple: Some(RippleParams { amplitude: 0.12, wave_number: 164.0, waves: 4 }),
-            drive: DriveParams::Weight { mass: 0.2 * 1.033, gravity: GRAVITY, pulley_radius: 0.024 },
+            ripple: Some(RippleParams { rms: 0.167, lowest: 164, highest: 656, spacing: 41 }),
+            drive: DriveParams::Weight { mass: 0.2 * 1.044, gravity: GRAVITY, pulley_radius: 0.024 },
             delay_ticks: 1,
             ..RigParams::paper()
         }
@@ -232,5 +246,63 @@ impl Rig {
         let p = self.model.plant.params();
         let mu = self.model.plant.friction().magnitude(velocity);
         ((p.drive_torque - p.viscous_damping * velocity) / (mu * p.brake_gain)).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn friction_along_the_disc_has_its_rms_closes_after_a_turn_and_repeats_with_its_seed() {
+        let p = RippleParams { rms: 0.15, lowest: 160, highest: 640, spacing: 40 };
+        let r = Ripple::new(&p, 3).unwrap();
+        let n = 100_000;
+        let tau = core::f64::consts::TAU;
+        let square: f64 = (0..n).map(|i| (r.factor(tau * f64::from(i) / f64::from(n)) - 1.0).powi(2)).sum();
+        assert!(((square / f64::from(n)).sqrt() - 0.15).abs() < 1e-9);
+        assert!((r.factor(0.3) - r.factor(0.3 + tau)).abs() < 1e-10);
+        assert_eq!(r, Ripple::new(&p, 3).unwrap());
+        assert_ne!(r, Ripple::new(&p, 4).unwrap());
+    }
+
+    #[test]
+    fn the_recurrence_is_the_sum_of_sines() {
+        let p = RippleParams { rms: 0.1, lowest: 82, highest: 246, spacing: 41 };
+        let r = Ripple::new(&p, 9).unwrap();
+        for i in 0..100 {
+            let x = f64::from(i) * 0.37;
+            let direct: f64 = r
+                .phases
+                .iter()
+                .enumerate()
+                .map(|(j, (sp, cp))| libm::sin(41.0 * (j + 2) as f64 * x + libm::atan2(*sp, *cp)))
+                .sum();
+            assert!((r.factor(x) - 1.0 - r.amplitude * direct).abs() < 1e-11);
+        }
+    }
+
+    #[test]
+    fn each_bad_parameter_is_named() {
+        let good = RippleParams { rms: 0.1, lowest: 160, highest: 640, spacing: 40 };
+        for (bad, field) in [
+            (RippleParams { rms: 0.4, ..good.clone() }, "rms"),
+            (RippleParams { rms: f64::NAN, ..good.clone() }, "rms"),
+            (RippleParams { lowest: 170, ..good.clone() }, "lowest"),
+            (RippleParams { highest: 120, ..good.clone() }, "highest"),
+            (RippleParams { spacing: 0, ..good.clone() }, "spacing"),
+        ] {
+            assert_eq!(Ripple::new(&bad, 1).unwrap_err().field, field);
+        }
+        let rig = RigParams::paper;
+        for (bad, field) in [
+            (RigParams { torque_noise: -1.0, ..rig() }, "torque_noise"),
+            (RigParams { delay_ticks: 1001, ..rig() }, "delay_ticks"),
+            (RigParams { actuator_time_constant: Some(0.0), ..rig() }, "actuator_time_constant"),
+            (RigParams { speed_limit: f64::NAN, ..rig() }, "speed_limit"),
+            (RigParams { counts_per_rev: 0, ..rig() }, "counts_per_rev"),
+        ] {
+            assert_eq!(Rig::new(&bad, 1).unwrap_err().field, field);
+        }
     }
 }

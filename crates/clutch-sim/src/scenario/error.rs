@@ -154,47 +154,67 @@ pub(super) fn set(origin: &str, table: &mut Table, key: &str, text: &str) -> Res
 
 /// A file's table as the struct, with the key, the value and a likely correction in errors.
 pub(super) fn deserialize(origin: &str, table: &Table) -> Result<File, ScenarioError> {
+    one_of_each_choice(origin, table)?;
     serde_path_to_error::deserialize(Value::Table(table.clone())).map_err(|e| {
         let path = e.path().to_string();
         let path = if path == "." { String::new() } else { path };
-        let message = e.inner().message().to_owned();
-        let names = quoted(&message);
+        let message = e.inner().message();
+        let names = quoted(message);
+        let (unknown, known) = names.split_first().map_or(("", &[][..]), |(u, k)| (*u, k));
+        let under = |path: &str, key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+        let shown_at = |key: &str| lookup(table, key).filter(|v| !v.is_table()).map(shown).unwrap_or_default();
+        let list = known.join(", ");
         if message.starts_with("unknown field") || message.starts_with("unknown variant") {
-            let (unknown, known) = match names.split_first() {
-                Some((u, k)) => (*u, k),
-                None => ("", &[][..]),
-            };
+            // A word that is none of its choices is a value.
+            if lookup(table, &path).is_some_and(Value::is_str) {
+                let hint = correction(unknown, None, known);
+                return ScenarioError::value(origin, &path, &shown_at(&path), &format!("one of: {list}{hint}"));
+            }
             // The path ends with the unknown key for a struct, and not for a choice of tables.
-            let key = if path.rsplit('.').next() == Some(unknown) {
-                path
-            } else if path.is_empty() {
-                unknown.to_owned()
-            } else {
-                format!("{path}.{unknown}")
-            };
-            let value = lookup(table, &key).filter(|v| !v.is_table()).map(shown).unwrap_or_default();
+            let key = if path.rsplit('.').next() == Some(unknown) { path } else { under(&path, unknown) };
             let hint = correction(unknown, lookup(table, &key), known);
-            let list = known.join(", ");
-            return ScenarioError::new(
-                origin,
-                &key,
-                &value,
-                format!("unknown key{hint}; expected one of: {list}"),
-            );
+            let message = format!("unknown key{hint}; expected one of: {list}");
+            return ScenarioError::new(origin, &key, &shown_at(&key), message);
         }
         if message.starts_with("missing field") {
-            let missing = names.first().copied().unwrap_or_default();
-            let key = if path.is_empty() { missing.to_owned() } else { format!("{path}.{missing}") };
-            return ScenarioError::new(
-                origin,
-                &key,
-                "",
-                "missing; add it (docs/scenario.md lists every key)".into(),
-            );
+            let message = "missing; add it (docs/scenario.md lists every key)".to_owned();
+            return ScenarioError::new(origin, &under(&path, unknown), "", message);
         }
-        let value = lookup(table, &path).filter(|v| !v.is_table()).map(shown).unwrap_or_default();
-        ScenarioError::new(origin, &path, &value, message)
+        let expected = message.rsplit_once("expected ").map_or(message, |(_, e)| e);
+        ScenarioError::value(origin, &path, &shown_at(&path), &plain(expected))
     })
+}
+
+/// What serde calls a type, in words.
+fn plain(expected: &str) -> String {
+    match expected {
+        "f64" => "a number".into(),
+        "u8" | "u32" | "u64" | "usize" => "a whole number of at least 0".into(),
+        "a string" => "a text in quotes".into(),
+        "a boolean" => "true or false".into(),
+        "string only" => "a table that names a choice, as [law.smc]".into(),
+        e if e.starts_with("struct") => "a table".into(),
+        e => e.into(),
+    }
+}
+
+/// Exactly one table may stand where a file chooses between several.
+fn one_of_each_choice(origin: &str, table: &Table) -> Result<(), ScenarioError> {
+    for key in ["law", "velocity", "reference", "rig.drive"] {
+        match lookup(table, key) {
+            Some(Value::Table(t)) if t.len() == 1 => {}
+            Some(Value::Table(t)) => {
+                let found = if t.is_empty() {
+                    "none".to_owned()
+                } else {
+                    t.keys().map(|k| format!("[{key}.{k}]")).collect::<Vec<_>>().join(", ")
+                };
+                return Err(ScenarioError::new(origin, key, "", format!("expected exactly one table below it; found {found}")));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 fn quoted(message: &str) -> Vec<&str> {

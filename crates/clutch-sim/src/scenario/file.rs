@@ -93,9 +93,10 @@ pub(super) struct GeometryFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RippleFile {
-    amplitude: f64,
-    wave_number_1_rad: f64,
-    waves: u32,
+    rms: f64,
+    lowest_waves_per_turn: u32,
+    highest_waves_per_turn: u32,
+    spacing_waves_per_turn: u32,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -190,9 +191,10 @@ impl RigFile {
             speed_limit_deg_s: p.speed_limit.to_degrees(),
             friction: FrictionFile::new(&p.friction),
             ripple: p.ripple.as_ref().map(|r| RippleFile {
-                amplitude: r.amplitude,
-                wave_number_1_rad: r.wave_number,
-                waves: r.waves,
+                rms: r.rms,
+                lowest_waves_per_turn: r.lowest,
+                highest_waves_per_turn: r.highest,
+                spacing_waves_per_turn: r.spacing,
             }),
             drive: match &p.drive {
                 DriveParams::Weight { mass, gravity, pulley_radius } => DriveFile::Weight(WeightFile {
@@ -249,9 +251,10 @@ impl RigFile {
             },
             friction: self.friction.params(),
             ripple: self.ripple.as_ref().map(|r| RippleParams {
-                amplitude: r.amplitude,
-                wave_number: r.wave_number_1_rad,
-                waves: r.waves,
+                rms: r.rms,
+                lowest: r.lowest_waves_per_turn,
+                highest: r.highest_waves_per_turn,
+                spacing: r.spacing_waves_per_turn,
             }),
             drive: match &self.drive {
                 DriveFile::Weight(w) => DriveParams::Weight {

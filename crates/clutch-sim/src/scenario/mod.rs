@@ -111,7 +111,10 @@ impl Scenario {
         let checked = Rig::new(&rig, run.seed).map_err(|e| locator.at("rig", &e))?;
         Bounds::around(&model, &Tolerances::default()).map_err(|e| locator.at("model", &e))?;
         let tolerances = file.bounds.tolerances();
-        Bounds::around(&model, &tolerances).map_err(|e| locator.at("bounds", &e))?;
+        Bounds::around(&model, &tolerances).map_err(|e| {
+            let expected = "at least 0 and below 100 %";
+            locator.at("bounds", &ParamError { expected, ..e })
+        })?;
         let knots = file.reference.knots(checked.encoder).map_err(|e| locator.at("reference", &e))?;
         let spec = RunSpec {
             rig,
