@@ -32,9 +32,7 @@ fn a1_holding_voltages_and_free_motion_of_the_papers_shaft() {
 #[test]
 fn a2_a_constant_brake_stops_the_shaft_at_the_analytic_instant() {
     let flat = StribeckParams { mu_static: 0.15, mu_dynamic: 0.15, ..StribeckParams::default() };
-    for (damping, instant, angle_deg) in
-        [(0.001, 0.0504770714, Some(2.5113638)), (0.0, 0.0512339, None)]
-    {
+    for (damping, instant, angle_deg) in [(0.001, 0.0504770714, Some(2.5113638)), (0.0, 0.0512339, None)] {
         let params = PlantParams { friction: flat, viscous_damping: damping, ..PlantParams::default() };
         // Without damping: t = J ω0 / (μ K v − T), exactly.
         let exact = 0.0017 * 100.0_f64.to_radians() / (0.15 * 0.14 * 5.0 - params.drive_torque);
@@ -70,7 +68,10 @@ fn a3_on_a_ramp_the_offset_is_what_the_gains_and_the_holding_voltage_make_it() {
         // The brake is on while the shaft is ahead: e is negative.
         let measured = -run.metrics.mean_error_rad.to_degrees();
         assert_near(&format!("{name} at {rate} °/s: offset in °"), measured, offset_deg, 1e-5 * offset_deg);
-        assert_eq!(run.metrics.stick_slip_cycles_per_s, 0.0, "{name} at {rate} °/s never sticks on an ideal rig");
+        assert_eq!(
+            run.metrics.stick_slip_cycles_per_s, 0.0,
+            "{name} at {rate} °/s never sticks on an ideal rig"
+        );
     }
 }
 

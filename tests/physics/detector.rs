@@ -40,11 +40,15 @@ fn measure(rig: &RigParams, law: LawParams, rate: f64) -> (f64, f64, f64, f64) {
         spec.run.seed = seed;
         let run = simulate::<f64>(&spec).unwrap();
         let true_sticks = sticks(&run);
-        let called: Vec<f64> = run.detected.ticks.iter().map(|k| *k as f64 * 1e-3).filter(|t| *t >= 1.0).collect();
+        let called: Vec<f64> =
+            run.detected.ticks.iter().map(|k| *k as f64 * 1e-3).filter(|t| *t >= 1.0).collect();
         calls += called.len();
         // A call is right if the shaft was stuck at some time in the silence that led to it.
         let window = visible(rate) + 2e-3;
-        hits += called.iter().filter(|t| true_sticks.iter().any(|(a, b)| **t >= *a && **t - window <= *b)).count();
+        hits += called
+            .iter()
+            .filter(|t| true_sticks.iter().any(|(a, b)| **t >= *a && **t - window <= *b))
+            .count();
         let long: Vec<_> = true_sticks.iter().filter(|(a, b)| b - a >= visible(rate)).collect();
         wanted += long.len();
         found += long.iter().filter(|(a, b)| called.iter().any(|t| *t >= *a && *t <= *b + 2e-3)).count();
@@ -63,7 +67,9 @@ fn the_detector_agrees_with_the_truth_within_the_stated_band() {
         for (law_name, law) in [("PD", pd), ("SMC", smc)] {
             for rate in [2.0, 6.0, 10.0, 20.0] {
                 let (precision, recall, seen, truth) = measure(&rig, law, rate);
-                println!("{name:5} {law_name:3} {rate:4} °/s: precision {precision:.3} recall {recall:.3} cycles/s {seen:.2} of {truth:.2}");
+                println!(
+                    "{name:5} {law_name:3} {rate:4} °/s: precision {precision:.3} recall {recall:.3} cycles/s {seen:.2} of {truth:.2}"
+                );
             }
         }
     }

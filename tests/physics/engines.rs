@@ -53,7 +53,9 @@ fn stick_slip_at_20_degrees_per_second_is_the_same_motion_in_both_engines() {
 
 #[test]
 fn the_same_voltages_move_the_shaft_the_same_way_in_both_engines() {
-    for (rate, gains) in [(2.0, PdParams { kd: 5.0, ..PdParams::default() }), (20.0, PdParams { kp: 20_000.0, kd: 5.0 })] {
+    for (rate, gains) in
+        [(2.0, PdParams { kd: 5.0, ..PdParams::default() }), (20.0, PdParams { kp: 20_000.0, kd: 5.0 })]
+    {
         let [closed, _] = both(ideal_pd(rate, gains, Start::Rest));
         let drive = Drive::Constant(PlantParams::<f64>::default().drive_torque);
         let begin = Shaft::new(closed.trace.position[0], 0.0);
@@ -61,7 +63,12 @@ fn the_same_voltages_move_the_shaft_the_same_way_in_both_engines() {
             let mut shaft = begin;
             let m = model(&PlantParams::default());
             let volts = closed.trace.voltage.iter();
-            volts.map(|v| { advance(engine.as_mut(), &m, &drive, *v, &mut shaft, 1); shaft.position }).collect::<Vec<_>>()
+            volts
+                .map(|v| {
+                    advance(engine.as_mut(), &m, &drive, *v, &mut shaft, 1);
+                    shaft.position
+                })
+                .collect::<Vec<_>>()
         });
         let apart = a.iter().zip(&b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
         assert!(apart <= 1e-9, "{rate} °/s: {apart:e} rad apart");
@@ -98,7 +105,10 @@ fn the_exact_flow_says_which_rigs_it_cannot_take() {
     let paper = RigParams::paper;
     let ripple = Some(RippleParams { rms: 0.1, lowest: 100, highest: 200, spacing: 100 });
     for (rig, word) in [
-        (RigParams { friction: StribeckParams { stribeck_exponent: 2.0, ..paper().friction }, ..paper() }, "exponent"),
+        (
+            RigParams { friction: StribeckParams { stribeck_exponent: 2.0, ..paper().friction }, ..paper() },
+            "exponent",
+        ),
         (RigParams { ripple, ..paper() }, "along the disc"),
         (RigParams { drive: DriveParams::Table(vec![(0.0, 0.05)]), ..paper() }, "constant"),
         (RigParams { actuator_time_constant: Some(1e-3), ..paper() }, "lag"),

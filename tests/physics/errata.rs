@@ -1,6 +1,8 @@
 //! What the paper prints and what is true: each erratum with the run that shows it.
 
-use clutch_core::law::{Command, Controller, Limit, LawParams, OutputState, PdParams, PdTerms, SmcParams, SmcSignParams, Tick};
+use clutch_core::law::{
+    Command, Controller, LawParams, Limit, OutputState, PdParams, PdTerms, SmcParams, SmcSignParams, Tick,
+};
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Servo, StribeckParams};
 use clutch_sim::{RigParams, RunSpec, Start, simulate, simulate_servo};
@@ -45,7 +47,11 @@ fn equation_4_as_printed_lets_the_shaft_run_away() {
 fn a_switching_gain_of_2_2_volts_diverges_and_2_3_holds() {
     let law = |kp| LawParams::Smc(SmcParams { kp, ..SmcParams::default() });
     let run = simulate::<f64>(&ramp(RigParams::ideal(), law(2.2))).unwrap();
-    assert!(last_error_deg(&run) < -1.0, "K_p = 2.2 V, below the certificate's 2.26 V: {}°", last_error_deg(&run));
+    assert!(
+        last_error_deg(&run) < -1.0,
+        "K_p = 2.2 V, below the certificate's 2.26 V: {}°",
+        last_error_deg(&run)
+    );
     let run = simulate::<f64>(&ramp(RigParams::ideal(), law(2.3))).unwrap();
     assert!(run.metrics.max_error_rad.to_degrees() < 0.15, "K_p = 2.3 V, above it");
 }
@@ -95,7 +101,10 @@ fn the_stribeck_velocity_read_in_degrees_per_second_sticks_at_2_degrees_per_seco
 fn without_the_encoders_steps_nothing_sticks_at_2_degrees_per_second() {
     let rig = RigParams { encoder_quantised: false, ..RigParams::paper() };
     let run = simulate::<f64>(&ramp(rig, LawParams::Pd(PdParams::default()))).unwrap();
-    assert_eq!(run.metrics.stick_slip_cycles_per_s, 0.0, "the quantised derivative is what starts the cycles");
+    assert_eq!(
+        run.metrics.stick_slip_cycles_per_s, 0.0,
+        "the quantised derivative is what starts the cycles"
+    );
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! What every law of the core must do, whatever its gains.
 
 use clutch_core::law::{
-    Controller, CtcParams, Law, LawParams, Limit, OutputParams, OutputState, PdParams, SmcParams, SmcSignParams, Tick,
+    Controller, CtcParams, Law, LawParams, Limit, OutputParams, OutputState, PdParams, SmcParams,
+    SmcSignParams, Tick,
 };
 use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, Target};
 use proptest::prelude::*;
@@ -14,8 +15,11 @@ fn laws() -> impl Strategy<Value = LawParams> {
             .prop_map(|(outer_gain, kp, kd)| LawParams::Ctc(CtcParams { outer_gain, kp, kd })),
         (gain.clone(), gain.clone(), 1.0..500.0_f64, 1e-3..10.0_f64)
             .prop_map(|(kp, kd, slope, boundary)| LawParams::Smc(SmcParams { kp, kd, slope, boundary })),
-        (gain.clone(), gain, 1.0..500.0_f64)
-            .prop_map(|(kp, kd, slope)| LawParams::SmcSign(SmcSignParams { kp, kd, slope })),
+        (gain.clone(), gain, 1.0..500.0_f64).prop_map(|(kp, kd, slope)| LawParams::SmcSign(SmcSignParams {
+            kp,
+            kd,
+            slope
+        })),
     ]
 }
 

@@ -55,7 +55,8 @@ fn every_complete_scenario_in_the_docs_is_good() {
         for block in page.split("```toml\n").skip(1) {
             let text = block.split("```").next().unwrap();
             if text.contains("[rig]") {
-                Scenario::parse(&path.display().to_string(), text, &[]).unwrap_or_else(|e| panic!("{e}\n{text}"));
+                Scenario::parse(&path.display().to_string(), text, &[])
+                    .unwrap_or_else(|e| panic!("{e}\n{text}"));
                 checked += 1;
             }
         }
@@ -65,7 +66,11 @@ fn every_complete_scenario_in_the_docs_is_good() {
 
 #[test]
 fn a_negative_inertia_is_refused() {
-    refuses(with("rig.inertia_kg_m2", "-0.0017"), "my.toml: rig.inertia_kg_m2 = -0.0017: ", &["above 0 kg m²"]);
+    refuses(
+        with("rig.inertia_kg_m2", "-0.0017"),
+        "my.toml: rig.inertia_kg_m2 = -0.0017: ",
+        &["above 0 kg m²"],
+    );
 }
 
 #[test]
@@ -80,8 +85,16 @@ fn a_zero_period_is_refused() {
 
 #[test]
 fn an_unknown_key_is_refused_with_the_nearest_one() {
-    refuses(with("law.smc.slop_1_s", "70.0"), "my.toml: law.smc.slop_1_s = 70: ", &["did you mean slope_1_s?"]);
-    refuses(with("rig.inertia", "0.1"), "my.toml: rig.inertia = 0.1: ", &["did you mean inertia_kg_m2?", "unit"]);
+    refuses(
+        with("law.smc.slop_1_s", "70.0"),
+        "my.toml: law.smc.slop_1_s = 70: ",
+        &["did you mean slope_1_s?"],
+    );
+    refuses(
+        with("rig.inertia", "0.1"),
+        "my.toml: rig.inertia = 0.1: ",
+        &["did you mean inertia_kg_m2?", "unit"],
+    );
     refuses(with("sample.period_us", "1000"), "my.toml: sample: ", &["did you mean sampling?"]);
 }
 
@@ -89,7 +102,11 @@ fn an_unknown_key_is_refused_with_the_nearest_one() {
 fn a_wrong_type_is_refused() {
     refuses(with("law.smc.kp_v", "\"three\""), "my.toml: law.smc.kp_v = \"three\": ", &["expected a number"]);
     refuses(with("run.seed", "-1"), "my.toml: run.seed = -1: ", &["whole number"]);
-    refuses(with("run.engine", "fast"), "my.toml: run.engine = \"fast\": ", &["auto", "dormand_prince", "exact_flow"]);
+    refuses(
+        with("run.engine", "fast"),
+        "my.toml: run.engine = \"fast\": ",
+        &["auto", "dormand_prince", "exact_flow"],
+    );
     refuses(with("law", "3"), "my.toml: law = 3: ", &["[law.smc]"]);
     refuses(with("rig.encoder.quantised", "1"), "my.toml: rig.encoder.quantised = 1: ", &["true or false"]);
 }
@@ -105,14 +122,26 @@ fn a_unit_slip_is_refused_with_the_value_in_the_right_unit() {
     // 2 rad/s typed as °/s of a shaft whose rig ends at 100 °/s.
     let text = GOOD.replace("base = \"paper\"", "base = \"paper\"\nspeed_limit_deg_s = 100.0");
     let text = text.replace("rate_deg_s = 2.0", "rate_deg_s = 114.6");
-    refuses(parse(&text), "my.toml: reference.ramp: ", &["114.6000 °/s", "rig.speed_limit_deg_s = 100", "1 rad/s is 57.3"]);
+    refuses(
+        parse(&text),
+        "my.toml: reference.ramp: ",
+        &["114.6000 °/s", "rig.speed_limit_deg_s = 100", "1 rad/s is 57.3"],
+    );
 }
 
 #[test]
 fn a_path_that_a_brake_cannot_follow_is_refused_where_it_cannot() {
-    refuses(with("reference.ramp.rate_deg_s", "-2.0"), "my.toml: reference.ramp: ", &["t = 0.0000 s", "runs backwards"]);
+    refuses(
+        with("reference.ramp.rate_deg_s", "-2.0"),
+        "my.toml: reference.ramp: ",
+        &["t = 0.0000 s", "runs backwards"],
+    );
     let steep = "name = \"x\"\n[rig]\nbase = \"paper\"\n[law.pd]\n[reference.trapezoid]\ndistance_deg = 300.0\nspeed_deg_s = 300.0\nacceleration_deg_s2 = 3000.0\n";
-    refuses(parse(steep), "my.toml: reference.trapezoid: ", &["accelerates at 3000", "the weight grants", "°/s²"]);
+    refuses(
+        parse(steep),
+        "my.toml: reference.trapezoid: ",
+        &["accelerates at 3000", "the weight grants", "°/s²"],
+    );
     // 2.5 V brake the paper's shaft with 3 rad/s² = 182 °/s².
     let weak = "name = \"x\"\n[rig]\nbase = \"paper\"\n[law.pd]\n[reference.trapezoid]\ndistance_deg = 300.0\nspeed_deg_s = 300.0\nacceleration_deg_s2 = 500.0\n[output]\nhighest_v = 2.5\non_invalid_v = 2.5\n";
     refuses(parse(weak), "my.toml: reference.trapezoid: ", &["V of braking", "output.highest_v = 2.5"]);
@@ -126,13 +155,20 @@ fn two_laws_or_none_are_refused() {
 
 #[test]
 fn a_rig_without_a_base_or_with_an_unknown_one_is_refused() {
-    refuses(parse(&GOOD.replace("base = \"paper\"\n", "")), "my.toml: rig.base = missing: ", &["ideal, paper, bench"]);
+    refuses(
+        parse(&GOOD.replace("base = \"paper\"\n", "")),
+        "my.toml: rig.base = missing: ",
+        &["ideal, paper, bench"],
+    );
     refuses(with("rig.base", "real"), "my.toml: rig.base = \"real\": ", &["ideal, paper, bench"]);
 }
 
 #[test]
 fn a_table_with_times_that_do_not_rise_names_the_point() {
-    let text = GOOD.replace("[reference.ramp]\nrate_deg_s = 2.0", "[reference.table]\npoints_s_deg = [[0.0, 0.0], [2.0, 1.0], [1.0, 2.0]]");
+    let text = GOOD.replace(
+        "[reference.ramp]\nrate_deg_s = 2.0",
+        "[reference.table]\npoints_s_deg = [[0.0, 0.0], [2.0, 1.0], [1.0, 2.0]]",
+    );
     refuses(parse(&text), "my.toml: reference.table.points_s_deg = (point 2): ", &["rise"]);
 }
 
@@ -143,7 +179,9 @@ fn what_is_not_toml_is_shown_with_its_line() {
 
 #[test]
 fn naming_another_drive_replaces_the_weight_of_the_base() {
-    let text = format!("{GOOD}\n[rig.drive.spring]\nstiffness_nm_rad = 0.01\nrest_deg = 300.0\n[model]\ndrive_torque_nm = 0.05\n");
+    let text = format!(
+        "{GOOD}\n[rig.drive.spring]\nstiffness_nm_rad = 0.01\nrest_deg = 300.0\n[model]\ndrive_torque_nm = 0.05\n"
+    );
     assert!(parse(&text).is_ok(), "{:?}", parse(&text).map(|s| s.name));
 }
 
@@ -171,13 +209,34 @@ fn mangled() -> impl Strategy<Value = String> {
 
 fn any_key() -> impl Strategy<Value = &'static str> {
     prop::sample::select(vec![
-        "rig.inertia_kg_m2", "rig.viscous_damping_nm_s_rad", "rig.brake_gain_nm_v", "rig.torque_noise_nm",
-        "rig.delay_ticks", "rig.actuator_time_constant_s", "rig.speed_limit_deg_s", "rig.friction.mu_static",
-        "rig.friction.stribeck_velocity_rad_s", "rig.friction.stribeck_exponent", "rig.encoder.counts_per_rev",
-        "rig.dac.bits", "rig.dac.highest_v", "model.mu_dynamic", "model.drive_torque_nm", "law.smc.kp_v",
-        "law.smc.slope_1_s", "law.smc.boundary_rad_s", "velocity.smoothed_derivative.smoothing",
-        "output.highest_v", "output.bumpless_time_s", "reference.ramp.rate_deg_s", "sampling.period_us",
-        "bounds.friction_percent", "bounds.reach_rate_rad_s2", "run.duration_s", "run.settle_s", "run.start_counts",
+        "rig.inertia_kg_m2",
+        "rig.viscous_damping_nm_s_rad",
+        "rig.brake_gain_nm_v",
+        "rig.torque_noise_nm",
+        "rig.delay_ticks",
+        "rig.actuator_time_constant_s",
+        "rig.speed_limit_deg_s",
+        "rig.friction.mu_static",
+        "rig.friction.stribeck_velocity_rad_s",
+        "rig.friction.stribeck_exponent",
+        "rig.encoder.counts_per_rev",
+        "rig.dac.bits",
+        "rig.dac.highest_v",
+        "model.mu_dynamic",
+        "model.drive_torque_nm",
+        "law.smc.kp_v",
+        "law.smc.slope_1_s",
+        "law.smc.boundary_rad_s",
+        "velocity.smoothed_derivative.smoothing",
+        "output.highest_v",
+        "output.bumpless_time_s",
+        "reference.ramp.rate_deg_s",
+        "sampling.period_us",
+        "bounds.friction_percent",
+        "bounds.reach_rate_rad_s2",
+        "run.duration_s",
+        "run.settle_s",
+        "run.start_counts",
         "run.seed",
     ])
 }

@@ -39,7 +39,9 @@ fn reason(s: Shortfall) -> &'static str {
         Shortfall::Kd => "K_d is too small: it does not pay for f |ė|",
         Shortfall::Voltage => "output.highest_v is too small for the brake to stop the strongest drive",
         Shortfall::Drive => "the drive is too weak for the path: a released shaft does not catch up",
-        Shortfall::Start => "the start's error rate is more than brake or drive can follow: start on the path, or slower",
+        Shortfall::Start => {
+            "the start's error rate is more than brake or drive can follow: start on the path, or slower"
+        }
         Shortfall::Surface => "the law has no sliding surface: K_p and K_d must both be above 0",
         _ => "not certified",
     }
@@ -132,7 +134,10 @@ fn text(scenario: &Scenario, plan: &Plan) -> String {
         );
     }
     out += &match c.shortfall {
-        None => "\ncertified (continuous time, exact sensor: sampling, encoder steps and delay come on top)\n".to_owned(),
+        None => {
+            "\ncertified (continuous time, exact sensor: sampling, encoder steps and delay come on top)\n"
+                .to_owned()
+        }
         Some(s) => format!("\nNOT certified: {}\n", reason(s)),
     };
     out
@@ -142,7 +147,8 @@ fn as_json(scenario: &Scenario, plan: &Plan) -> Value {
     let (b, d) = (&plan.bounds, &plan.demand);
     let c: &Certificate = &plan.certificate;
     let pair = |i: &Interval| value!([i.low, i.high]);
-    let paper = |p: &PaperConditions| value!({"kp_26_v": p.kp, "kd_27_v_s_rad": p.kd, "gamma_28_rad_s2": p.gamma});
+    let paper =
+        |p: &PaperConditions| value!({"kp_26_v": p.kp, "kd_27_v_s_rad": p.kd, "gamma_28_rad_s2": p.gamma});
     value!({
         "scenario": scenario.name,
         "version": env!("CARGO_PKG_VERSION"),

@@ -29,7 +29,9 @@ use std::process::ExitCode;
 /// command line could not be understood.
 #[derive(Parser)]
 #[command(name = "clutch", version, max_term_width = 100)]
-#[command(after_help = "Example:\n  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario")]
+#[command(
+    after_help = "Example:\n  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario"
+)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
@@ -69,9 +71,11 @@ impl ScenarioArgs {
         }
         let text = std::fs::read_to_string(path).map_err(|e| {
             let hint = match e.kind() {
-                ErrorKind::NotFound => "no such file, and no built-in scenario of that name; `clutch scenario list` \
+                ErrorKind::NotFound => {
+                    "no such file, and no built-in scenario of that name; `clutch scenario list` \
                      shows those, `clutch scenario new FILE` writes one to begin with"
-                    .to_owned(),
+                        .to_owned()
+                }
                 ErrorKind::InvalidData => "not a text file: expected TOML in UTF-8".to_owned(),
                 _ => e.to_string(),
             };

@@ -168,14 +168,8 @@ fn settings() -> Vec<(String, String)> {
 }
 
 fn table3_cells(rows: &[Table3Row]) -> Vec<Vec<String>> {
-    let header = [
-        "Rate (°/s)",
-        "PD (cycles/s)",
-        "SMC (cycles/s)",
-        "Reduction (%)",
-        "Spread (points)",
-        "Paper (%)",
-    ];
+    let header =
+        ["Rate (°/s)", "PD (cycles/s)", "SMC (cycles/s)", "Reduction (%)", "Spread (points)", "Paper (%)"];
     let mut cells = vec![header.map(str::to_owned).to_vec()];
     cells.extend(rows.iter().map(|r| {
         vec![

@@ -9,7 +9,9 @@ use std::path::PathBuf;
 
 /// Hands out the built-in scenarios.
 #[derive(Args)]
-#[command(after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml")]
+#[command(
+    after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml"
+)]
 pub(crate) struct ScenarioVerb {
     #[command(subcommand)]
     verb: Verb,
@@ -62,7 +64,8 @@ impl ScenarioVerb {
                 let text = find(&from)?.toml;
                 let shown = file.display();
                 // Never over a file that is there.
-                let mut out = std::fs::File::create_new(&file).with_context(|| format!("{shown}: cannot be created"))?;
+                let mut out = std::fs::File::create_new(&file)
+                    .with_context(|| format!("{shown}: cannot be created"))?;
                 out.write_all(text.as_bytes()).with_context(|| format!("{shown}: cannot be written"))?;
                 print(&format!("wrote {shown}; run it with: clutch sim {shown}\n"))?;
             }

@@ -1,4 +1,21 @@
-//! Slow, smooth motion of shafts restrained by friction: the control core.
+#![doc = include_str!("../../../README.md")]
+//!
+//! # The crate
+//!
+//! | module | what |
+//! |---|---|
+//! | [`law`] | PD (4), CTC (11), SMC (29) and (31): parameters → law → state |
+//! | [`Servo`] | encoder counts and target in, DAC code and terms out |
+//! | [`Stribeck`], [`Plant`] | friction (2) and the shaft (1) |
+//! | [`SmoothedDerivative`], `Observer` | where the velocity comes from |
+//! | [`reference`](mod@reference) | planned paths in fixed-point counts |
+//! | [`check_path`] | whether a brake can follow a path |
+//! | [`certificate`] | what gains guarantee over all plants within [`Bounds`] |
+//! | [`StickSlip`] | stick-slip seen from encoder counts |
+//!
+//! No allocation, no `unsafe`, no reachable panic (a link test shows it), and the same bits on
+//! every target for one scalar type. Features: `linalg` (the observer, on nalgebra), `serde`.
+//! Formatting of errors is outside of the no-panic promise: `core` formats floats.
 #![no_std]
 #![cfg_attr(
     test,
@@ -7,7 +24,8 @@
         clippy::expect_used,
         clippy::panic,
         clippy::indexing_slicing,
-        clippy::float_cmp_const
+        clippy::float_cmp_const,
+        clippy::disallowed_methods
     )
 )]
 

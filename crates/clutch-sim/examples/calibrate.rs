@@ -74,6 +74,10 @@ struct Score {
     pd_error_deg: f64,
 }
 
+fn square(x: f64) -> f64 {
+    x * x
+}
+
 fn score(x: &Point) -> Score {
     let pd = LawParams::Pd(PdParams::default());
     let smc = LawParams::Smc(SmcParams::default());
@@ -94,17 +98,17 @@ fn score(x: &Point) -> Score {
     for (i, (rate, target)) in TABLE3.into_iter().enumerate() {
         let (Some(p), Some(s)) = (mean(&cycles(pd, rate)), mean(&cycles(smc, rate))) else { return worst };
         // Fewer than 5 cycles per s under PD are not the paper's "highly noticeable".
-        loss += ((5.0 - p).max(0.0)).powi(2);
+        loss += square((5.0 - p).max(0.0));
         reductions[i] = 100.0 * (1.0 - s / p.max(1e-9));
-        loss += ((reductions[i] - target).abs() / 2.0).powi(2).min(1e4);
+        loss += square((reductions[i] - target) / 2.0).min(1e4);
         pd_cycles[i] = p;
     }
     let (Some(a), Some(b)) = (mean(&cycles(pd, 20.0)), mean(&cycles(pd, 100.0))) else { return worst };
     let pd_smooth = a + b;
-    loss += (10.0 * pd_smooth).powi(2);
+    loss += square(10.0 * pd_smooth);
     let error = |seed| measure(x, pd, 2.0, seed).map(|m| m.max_error_rad.to_degrees());
     let Some(pd_error_deg) = mean(&error) else { return worst };
-    loss += ((pd_error_deg - 0.08) / 0.005).powi(2);
+    loss += square((pd_error_deg - 0.08) / 0.005);
     Score { loss, reductions, pd_cycles, pd_smooth, pd_error_deg }
 }
 
@@ -159,7 +163,7 @@ fn main() {
                     if rng.random::<f64>() < 0.5 {
                         let step: f64 = StandardNormal.sample(&mut rng);
                         let relative = if i == 3 { 0.1 } else { 1.0 };
-                        x[i] = (x[i] * (width * relative * step).exp()).clamp(LOWEST[i], HIGHEST[i]);
+                        x[i] = (x[i] * libm::exp(width * relative * step)).clamp(LOWEST[i], HIGHEST[i]);
                     }
                 }
                 x

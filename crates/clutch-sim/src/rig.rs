@@ -43,10 +43,10 @@ impl Ripple {
         if p.spacing == 0 {
             return bad("spacing", 0.0, "at least 1 wave per turn");
         }
-        if p.lowest == 0 || p.lowest % p.spacing != 0 {
+        if p.lowest == 0 || !p.lowest.is_multiple_of(p.spacing) {
             return bad("lowest", f64::from(p.lowest), "a multiple of the spacing, above 0 waves per turn");
         }
-        if p.highest < p.lowest || p.highest % p.spacing != 0 || (p.highest - p.lowest) / p.spacing >= 64 {
+        if p.highest < p.lowest || !p.highest.is_multiple_of(p.spacing) || (p.highest - p.lowest) / p.spacing >= 64 {
             return bad(
                 "highest",
                 f64::from(p.highest),
@@ -59,8 +59,7 @@ impl Ripple {
             return bad("rms", p.rms, "at least 0 and, times the root of twice the number of waves, below 1");
         }
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x7269_7070_6c65);
-        let phases =
-            (0..waves).map(|_| libm::sincos(core::f64::consts::TAU * rng.random::<f64>())).collect();
+        let phases = (0..waves).map(|_| libm::sincos(core::f64::consts::TAU * rng.random::<f64>())).collect();
         Ok(Ripple { amplitude, spacing: f64::from(p.spacing), skipped: p.lowest / p.spacing - 1, phases })
     }
 
@@ -259,8 +258,9 @@ mod tests {
         let r = Ripple::new(&p, 3).unwrap();
         let n = 100_000;
         let tau = core::f64::consts::TAU;
-        let square: f64 = (0..n).map(|i| (r.factor(tau * f64::from(i) / f64::from(n)) - 1.0).powi(2)).sum();
-        assert!(((square / f64::from(n)).sqrt() - 0.15).abs() < 1e-9);
+        let off = |i: i32| r.factor(tau * f64::from(i) / f64::from(n)) - 1.0;
+        let square: f64 = (0..n).map(|i| off(i) * off(i)).sum();
+        assert!((libm::sqrt(square / f64::from(n)) - 0.15).abs() < 1e-9);
         assert!((r.factor(0.3) - r.factor(0.3 + tau)).abs() < 1e-10);
         assert_eq!(r, Ripple::new(&p, 3).unwrap());
         assert_ne!(r, Ripple::new(&p, 4).unwrap());
@@ -290,7 +290,7 @@ mod tests {
             (RippleParams { rms: f64::NAN, ..good.clone() }, "rms"),
             (RippleParams { lowest: 170, ..good.clone() }, "lowest"),
             (RippleParams { highest: 120, ..good.clone() }, "highest"),
-            (RippleParams { spacing: 0, ..good.clone() }, "spacing"),
+            (RippleParams { spacing: 0, ..good }, "spacing"),
         ] {
             assert_eq!(Ripple::new(&bad, 1).unwrap_err().field, field);
         }

@@ -54,7 +54,10 @@ impl Slip<'_> {
         let speed = (self.sign * velocity).max(0.0);
         let mu = self.model.plant.friction().magnitude(speed) * self.model.friction_factor(position);
         let brake = self.sign * mu * p.brake_gain * self.input.volts.at(s).max(0.0);
-        [velocity, (self.input.torque(s, position) - brake - p.viscous_damping * velocity) * self.inverse_inertia]
+        [
+            velocity,
+            (self.input.torque(s, position) - brake - p.viscous_damping * velocity) * self.inverse_inertia,
+        ]
     }
 
     /// One step of length `h`; the state at its end, its error over the tolerance, and the rate
@@ -90,8 +93,12 @@ impl Engine for DormandPrince {
         let end = input.duration;
         let mut s = 0.0;
         let mut steps = 0;
-        let event =
-            |kind, s: f64, position| Event { time: input.time + s, kind, position, torque: input.torque(s, position) };
+        let event = |kind, s: f64, position| Event {
+            time: input.time + s,
+            kind,
+            position,
+            torque: input.torque(s, position),
+        };
         while s < end {
             if shaft.motion == Motion::Stuck {
                 let Some(instant) = break_away(model, input, shaft.position, s) else { return Ok(()) };

@@ -27,7 +27,7 @@ const PIECE_LIMIT: u32 = 10_000;
 
 /// Gauss–Legendre, five points on [0, 1].
 const NODES: [f64; 5] =
-    [0.046_910_077_030_668_0, 0.230_765_344_947_158_45, 0.5, 0.769_234_655_052_841_55, 0.953_089_922_969_332];
+    [0.046_910_077_030_668_0, 0.230_765_344_947_158_45, 0.5, 0.769_234_655_052_841_5, 0.953_089_922_969_332];
 const WEIGHTS: [f64; 5] = [
     0.118_463_442_528_094_54,
     0.239_314_335_249_683_23,
@@ -148,8 +148,7 @@ impl Flow {
         let mut a = self.drive - self.drag * w0;
         let lowest = (w0 - (a.abs() + self.stribeck.abs()) * left).max(0.0);
         let change = self.v_s / (self.stribeck.abs() * libm::exp(-lowest / self.v_s));
-        let longest =
-            left.min((SHARE * change).max(period / SUB_INTERVALS)).min(30.0 * self.v_s / a.abs());
+        let longest = left.min((SHARE * change).max(period / SUB_INTERVALS)).min(30.0 * self.v_s / a.abs());
         let mut piece = self.frozen(w0, a, longest);
         // The drag's impulse is that of the mean velocity; two rounds settle it.
         for _ in 0..2 {

@@ -228,7 +228,8 @@ const BREAK_AWAY_STEPS: u32 = 8;
 ///
 /// The instant given back is on the far side of the root: there the torque exceeds friction.
 fn break_away(model: &Model, input: &Input<'_>, position: f64, s: f64) -> Option<f64> {
-    let excess = |s: f64| input.torque(s, position).abs() - model.break_away_torque(position, input.volts.at(s));
+    let excess =
+        |s: f64| input.torque(s, position).abs() - model.break_away_torque(position, input.volts.at(s));
     if excess(s) > 0.0 {
         return Some(s);
     }

@@ -161,14 +161,21 @@ pub(super) fn deserialize(origin: &str, table: &Table) -> Result<File, ScenarioE
         let message = e.inner().message();
         let names = quoted(message);
         let (unknown, known) = names.split_first().map_or(("", &[][..]), |(u, k)| (*u, k));
-        let under = |path: &str, key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
-        let shown_at = |key: &str| lookup(table, key).filter(|v| !v.is_table()).map(shown).unwrap_or_default();
+        let under =
+            |path: &str, key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+        let shown_at =
+            |key: &str| lookup(table, key).filter(|v| !v.is_table()).map(shown).unwrap_or_default();
         let list = known.join(", ");
         if message.starts_with("unknown field") || message.starts_with("unknown variant") {
             // A word that is none of its choices is a value.
             if lookup(table, &path).is_some_and(Value::is_str) {
                 let hint = correction(unknown, None, known);
-                return ScenarioError::value(origin, &path, &shown_at(&path), &format!("one of: {list}{hint}"));
+                return ScenarioError::value(
+                    origin,
+                    &path,
+                    &shown_at(&path),
+                    &format!("one of: {list}{hint}"),
+                );
             }
             // The path ends with the unknown key for a struct, and not for a choice of tables.
             let key = if path.rsplit('.').next() == Some(unknown) { path } else { under(&path, unknown) };
@@ -209,7 +216,12 @@ fn one_of_each_choice(origin: &str, table: &Table) -> Result<(), ScenarioError> 
                 } else {
                     t.keys().map(|k| format!("[{key}.{k}]")).collect::<Vec<_>>().join(", ")
                 };
-                return Err(ScenarioError::new(origin, key, "", format!("expected exactly one table below it; found {found}")));
+                return Err(ScenarioError::new(
+                    origin,
+                    key,
+                    "",
+                    format!("expected exactly one table below it; found {found}"),
+                ));
             }
             _ => {}
         }

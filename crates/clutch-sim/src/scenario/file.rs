@@ -202,9 +202,10 @@ impl RigFile {
                     gravity_m_s2: *gravity,
                     pulley_radius_m: *pulley_radius,
                 }),
-                DriveParams::Spring { stiffness, rest } => {
-                    DriveFile::Spring(SpringFile { stiffness_nm_rad: *stiffness, rest_deg: rest.to_degrees() })
-                }
+                DriveParams::Spring { stiffness, rest } => DriveFile::Spring(SpringFile {
+                    stiffness_nm_rad: *stiffness,
+                    rest_deg: rest.to_degrees(),
+                }),
                 DriveParams::Table(points) => {
                     DriveFile::Table(DriveTableFile { points_s_nm: points.clone() })
                 }
@@ -596,7 +597,7 @@ impl ReferenceFile {
                     return Err(bad(*time, "times of at least 0 s"));
                 }
                 let counts = angle.to_radians() * encoder.counts_per_radian::<f64>();
-                if !(counts.abs() < 1e12) {
+                if !counts.is_finite() || counts.abs() >= 1e12 {
                     return Err(bad(*angle, "finite angles below 1e12 counts, °"));
                 }
                 let time_us = libm::rint(time * 1e6) as u64;

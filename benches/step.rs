@@ -1,0 +1,92 @@
+//! One step: each law by itself, the velocity sources, and the servo's whole tick, in `f32` and
+//! `f64`.
+#![allow(missing_docs, reason = "criterion's macros make public items")]
+
+use clutch_core::law::{
+    Controller, CtcParams, Law, LawParams, OutputParams, OutputState, PdParams, SmcParams, SmcSignParams,
+    Tick,
+};
+use clutch_core::{
+    Counts, FixedCounts, Micros, ObserverParams, PlantParams, Real, Servo, ServoParams,
+    SmoothedDerivativeParams, Target, VelocityParams,
+};
+use criterion::{Criterion, criterion_group, criterion_main};
+use std::hint::black_box;
+
+fn laws<T: Real>() -> [(&'static str, LawParams<T>); 4] {
+    [
+        ("pd", LawParams::Pd(PdParams::default())),
+        ("ctc", LawParams::Ctc(CtcParams::default())),
+        ("smc", LawParams::Smc(SmcParams::default())),
+        ("smc_sign", LawParams::SmcSign(SmcSignParams::default())),
+    ]
+}
+
+/// Sixty-four measurements around a path, so that no branch is always the same.
+fn ticks<T: Real>() -> Vec<Tick<T>> {
+    (0..64)
+        .map(|i| {
+            let x = f64::from((i * 37) % 64 - 32) / 32.0;
+            Tick {
+                error: T::from_f64(0.002 * x),
+                error_rate: T::from_f64(0.2 * x * x - 0.05),
+                target_velocity: T::from_f64(0.035),
+                target_acceleration: T::ZERO,
+            }
+        })
+        .collect()
+}
+
+fn law_step<T: Real>(c: &mut Criterion, scalar: &str) {
+    let mut group = c.benchmark_group(format!("law/{scalar}"));
+    for (name, params) in laws::<T>() {
+        let law = Law::new(&params, &PlantParams::default(), &OutputParams::default(), Micros(1000))
+            .expect("Table 2 is in range");
+        let (ticks, mut state, mut i) = (ticks::<T>(), OutputState::default(), 0);
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                i = (i + 1) % 64;
+                law.update(&mut state, black_box(&ticks[i]))
+            });
+        });
+    }
+    group.finish();
+}
+
+fn servo_tick<T: Real>(c: &mut Criterion, scalar: &str) {
+    let mut group = c.benchmark_group(format!("servo/{scalar}"));
+    let sources = [
+        ("", VelocityParams::SmoothedDerivative(SmoothedDerivativeParams::default())),
+        ("_observer", VelocityParams::Observer(ObserverParams::default())),
+    ];
+    for (name, params) in laws::<T>() {
+        for (suffix, velocity) in sources {
+            let params = ServoParams { velocity, ..ServoParams::paper(params) };
+            let servo = Servo::new(&params).expect("the paper's servo is in range");
+            // 2 °/s: a count each ninth tick.
+            let target = |k: i64| Target {
+                position: FixedCounts(k * 7282),
+                velocity: T::from_f64(2.0_f64.to_radians()),
+                acceleration: T::ZERO,
+            };
+            let (mut state, mut k) = (servo.start(Counts(0), &target(0), T::from_f64(2.25)), 0_i64);
+            group.bench_function(format!("{name}{suffix}"), |b| {
+                b.iter(|| {
+                    k += 1;
+                    servo.tick(&mut state, black_box(Counts((k / 9) as i32)), black_box(&target(k)))
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+fn all(c: &mut Criterion) {
+    law_step::<f32>(c, "f32");
+    law_step::<f64>(c, "f64");
+    servo_tick::<f32>(c, "f32");
+    servo_tick::<f64>(c, "f64");
+}
+
+criterion_group!(benches, all);
+criterion_main!(benches);

@@ -1,0 +1,158 @@
+//! The command as a user meets it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn clutch(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_clutch")).args(args).output().expect("the command starts")
+}
+
+fn out(o: &Output) -> String {
+    String::from_utf8(o.stdout.clone()).expect("UTF-8")
+}
+
+fn err(o: &Output) -> String {
+    String::from_utf8(o.stderr.clone()).expect("UTF-8")
+}
+
+/// A folder of this test's own.
+fn folder(name: &str) -> PathBuf {
+    let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&dir); // there is none the first time
+    std::fs::create_dir_all(&dir).expect("a folder for the test");
+    dir
+}
+
+#[test]
+fn the_help_of_every_verb_has_an_example() {
+    for verb in [
+        &["--help"][..],
+        &["sim", "--help"],
+        &["scenario", "--help"],
+        &["scenario", "list", "--help"],
+        &["scenario", "show", "--help"],
+        &["scenario", "new", "--help"],
+        &["certify", "--help"],
+        &["reproduce", "--help"],
+    ] {
+        let o = clutch(verb);
+        assert!(o.status.success());
+        assert!(out(&o).contains("Example:\n  clutch "), "{verb:?}:\n{}", out(&o));
+    }
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named_with_what_to_do() {
+    let o = clutch(&["sim", "missing.toml"]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).starts_with("clutch: missing.toml: no such file"), "{}", err(&o));
+    assert!(err(&o).contains("clutch scenario new FILE"));
+    assert!(out(&o).is_empty());
+}
+
+#[test]
+fn a_folder_or_bytes_instead_of_a_scenario_are_named() {
+    let dir = folder("not_text");
+    let o = clutch(&["sim", dir.to_str().unwrap()]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("not_text"), "{}", err(&o));
+    let file = dir.join("bytes.toml");
+    std::fs::write(&file, [0xff, 0xfe, 0x00]).unwrap();
+    let o = clutch(&["sim", file.to_str().unwrap()]);
+    assert!(err(&o).contains("expected TOML in UTF-8"), "{}", err(&o));
+}
+
+#[test]
+fn a_bad_value_names_file_key_value_and_expectation_and_nothing_is_printed_as_a_result() {
+    let o = clutch(&["sim", "smc_2", "--set", "rig.inertia_kg_m2=-1"]);
+    assert_eq!(o.status.code(), Some(1));
+    assert_eq!(err(&o), "clutch: smc_2: rig.inertia_kg_m2 = -1: expected a finite number above 0 kg m²\n");
+    assert!(out(&o).is_empty());
+}
+
+#[test]
+fn a_command_line_that_is_not_understood_exits_with_64() {
+    for args in [&["simulate"][..], &["sim"], &["sim", "smc_2", "--set", "kp"]] {
+        let o = clutch(args);
+        assert_eq!(o.status.code(), Some(64), "{args:?}");
+        assert!(!err(&o).is_empty());
+    }
+}
+
+#[test]
+fn certify_exits_with_0_for_certified_and_2_for_not() {
+    let o = clutch(&["certify", "smc_2"]);
+    assert_eq!(o.status.code(), Some(0));
+    let text = out(&o);
+    for words in ["K_p required", "2.2624", "worst corner", "margin", "(26)", "-0.96027", "\ncertified"] {
+        assert!(text.contains(words), "lacks {words}:\n{text}");
+    }
+    let bounds = ["--set", "bounds.friction_percent=20", "--set", "bounds.brake_gain_percent=20", "--set", "bounds.drive_torque_percent=10"];
+    let o = clutch(&[&["certify", "smc_2"][..], &bounds].concat());
+    assert_eq!(o.status.code(), Some(2));
+    assert!(out(&o).contains("NOT certified: K_p is too small"), "{}", out(&o));
+}
+
+#[test]
+fn json_is_all_that_standard_output_holds() {
+    for (args, key) in [
+        (&["sim", "smc_2", "--json"][..], "/metrics/max_error_rad"),
+        (&["certify", "smc_2", "--json"], "/ahead/kp_required_v"),
+    ] {
+        let o = clutch(args);
+        let value: serde_json::Value = serde_json::from_slice(&o.stdout).expect("only JSON");
+        assert!(value.pointer(key).is_some_and(|v| v.is_number()), "{args:?} {value}");
+        assert!(err(&o).is_empty());
+    }
+}
+
+#[test]
+fn a_run_writes_its_samples_and_its_figure() {
+    let dir = folder("sim");
+    let (csv, svg, png) = (dir.join("run.csv"), dir.join("run.svg"), dir.join("run.png"));
+    let o = clutch(&["sim", "smc_2", "--csv", csv.to_str().unwrap(), "--plot", svg.to_str().unwrap()]);
+    assert!(o.status.success(), "{}", err(&o));
+    let rows = std::fs::read_to_string(&csv).unwrap();
+    assert!(rows.starts_with("time_s,target_position_rad,"));
+    assert_eq!(rows.lines().count(), 5001);
+    assert!(std::fs::read_to_string(&svg).unwrap().contains("</svg>"));
+    assert!(clutch(&["sim", "smc_2", "--plot", png.to_str().unwrap()]).status.success());
+    assert!(std::fs::read(&png).unwrap().starts_with(b"\x89PNG"));
+    let o = clutch(&["sim", "smc_2", "--plot", "run.jpg"]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("run.jpg") && err(&o).contains(".svg or .png"), "{}", err(&o));
+    let o = clutch(&["sim", "smc_2", "--csv", "no/such/folder/run.csv"]);
+    assert!(err(&o).starts_with("clutch: no/such/folder/run.csv: cannot be written"), "{}", err(&o));
+}
+
+#[test]
+fn a_new_scenario_never_overwrites_a_file() {
+    let file = folder("new").join("mine.toml");
+    let name = file.to_str().unwrap();
+    assert!(clutch(&["scenario", "new", name, "--from", "bench_pd_2"]).status.success());
+    assert!(clutch(&["sim", name]).status.success());
+    let before = std::fs::read(&file).unwrap();
+    let o = clutch(&["scenario", "new", name]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("cannot be created"), "{}", err(&o));
+    assert_eq!(std::fs::read(&file).unwrap(), before);
+    let o = clutch(&["scenario", "show", "nothing"]);
+    assert!(err(&o).contains("expected one of: pd_2"), "{}", err(&o));
+}
+
+#[test]
+fn a_path_that_a_brake_cannot_follow_is_said_in_words() {
+    let o = clutch(&["sim", "minimum_jerk", "--set", "reference.minimum_jerk.duration_s=0.4"]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("reference.minimum_jerk: a brake cannot follow the path from t = "), "{}", err(&o));
+}
+
+#[test]
+fn reproduce_names_a_folder_that_it_cannot_make() {
+    let dir = folder("reproduce");
+    let file = dir.join("a_file");
+    std::fs::write(&file, "x").unwrap();
+    let o = clutch(&["reproduce", "--out", file.join("below").to_str().unwrap()]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("a_file/below: cannot be made"), "{}", err(&o));
+}

@@ -1,0 +1,85 @@
+//! The developer's verbs: `cargo xtask --help`. CI calls the same ones.
+
+mod python;
+mod run;
+mod test;
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand};
+use run::{cargo, root};
+
+/// The developer's verbs.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Format, lints and documentation, all without a warning.
+    Check,
+    /// All tests. Installs what they need: Rust targets, a private virtual environment in .venv,
+    /// and on Debian, as root, the package that makes such environments.
+    Test,
+    /// What CI runs: check, then test.
+    Ci,
+    /// Benchmarks (criterion). What follows goes to them: `cargo xtask bench -- law`.
+    Bench {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        rest: Vec<String>,
+    },
+    /// The API documentation, in target/doc.
+    Docs,
+    /// Finds the rig `bench` anew (docs/bench-rig.md): about half an hour on two cores.
+    Calibrate {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        rest: Vec<String>,
+    },
+    /// Draws the README's figures again, with `clutch reproduce`.
+    Figures,
+}
+
+fn main() -> Result<()> {
+    match Cli::parse().verb {
+        Verb::Check => check(),
+        Verb::Test => test::all(),
+        Verb::Ci => {
+            check()?;
+            test::all()
+        }
+        Verb::Bench { rest } => cargo(["bench", "--package", "clutch-benches", "--"]).args(rest).run(),
+        Verb::Docs => docs(),
+        Verb::Calibrate { rest } => {
+            let example = ["run", "--release", "--package", "clutch-sim", "--example", "calibrate", "--"];
+            cargo(example).args(rest).run()
+        }
+        Verb::Figures => figures(),
+    }
+}
+
+fn check() -> Result<()> {
+    cargo(["fmt", "--all", "--check"]).run()?;
+    cargo(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]).run()?;
+    // Each set of features of the core by itself: the workspace turns them all on.
+    for features in ["", "linalg", "serde"] {
+        cargo(["clippy", "--package", "clutch-core", "--features", features, "--", "-D", "warnings"])
+            .run()?;
+    }
+    docs()
+}
+
+fn docs() -> Result<()> {
+    cargo(["doc", "--workspace", "--no-deps", "--exclude", "xtask"]).env("RUSTDOCFLAGS", "-D warnings").run()
+}
+
+fn figures() -> Result<()> {
+    let (out, kept) = (root().join("target/figures"), root().join("docs/figures"));
+    cargo(["run", "--release", "--", "reproduce", "--out"]).arg(&out).run()?;
+    std::fs::create_dir_all(&kept)?;
+    for name in ["fig8.svg", "fig9.svg", "fig10.svg"] {
+        std::fs::copy(out.join(name), kept.join(name)).with_context(|| format!("copying {name}"))?;
+    }
+    Ok(())
+}

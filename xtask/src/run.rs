@@ -1,0 +1,87 @@
+//! Running programs, with what they print passed on.
+
+use anyhow::{Context, Result, bail};
+use std::ffi::OsStr;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The workspace's root.
+pub(crate) fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().map(Path::to_path_buf).unwrap_or_default()
+}
+
+/// A program to run in the root.
+pub(crate) struct Program(Command);
+
+pub(crate) fn program(name: impl AsRef<OsStr>) -> Program {
+    let mut command = Command::new(name);
+    command.current_dir(root());
+    Program(command)
+}
+
+/// The cargo that runs this.
+pub(crate) fn cargo<const N: usize>(args: [&str; N]) -> Program {
+    program(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())).args(args)
+}
+
+impl Program {
+    pub(crate) fn arg(mut self, arg: impl AsRef<OsStr>) -> Self {
+        self.0.arg(arg);
+        self
+    }
+
+    pub(crate) fn args<S: AsRef<OsStr>>(mut self, args: impl IntoIterator<Item = S>) -> Self {
+        self.0.args(args);
+        self
+    }
+
+    pub(crate) fn env(mut self, key: &str, value: impl AsRef<OsStr>) -> Self {
+        self.0.env(key, value);
+        self
+    }
+
+    fn shown(&self) -> String {
+        let words = std::iter::once(self.0.get_program()).chain(self.0.get_args());
+        words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ")
+    }
+
+    fn announce(&self) -> String {
+        let shown = self.shown();
+        println!("\n$ {shown}");
+        shown
+    }
+
+    /// Runs it; an error if it fails.
+    pub(crate) fn run(mut self) -> Result<()> {
+        let shown = self.announce();
+        let status = self.0.status().with_context(|| format!("cannot start: {shown}"))?;
+        if !status.success() {
+            bail!("failed ({status}): {shown}");
+        }
+        Ok(())
+    }
+
+    /// Runs it, hands each line of its output to `line`, and says whether it succeeded.
+    pub(crate) fn lines(mut self, mut line: impl FnMut(&str)) -> Result<bool> {
+        let shown = self.announce();
+        let mut child =
+            self.0.stdout(Stdio::piped()).spawn().with_context(|| format!("cannot start: {shown}"))?;
+        if let Some(out) = child.stdout.take() {
+            for text in BufReader::new(out).lines() {
+                let text = text?;
+                println!("{text}");
+                line(&text);
+            }
+        }
+        Ok(child.wait()?.success())
+    }
+
+    /// Runs it unseen; whether it succeeded, and what it printed on either stream.
+    pub(crate) fn quietly(mut self) -> Result<(bool, String)> {
+        let shown = self.announce();
+        let output = self.0.output().with_context(|| format!("cannot start: {shown}"))?;
+        let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        Ok((output.status.success(), text.into_owned()))
+    }
+}

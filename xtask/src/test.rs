@@ -1,0 +1,131 @@
+//! All tests, and their number at the end.
+
+use crate::python;
+use crate::run::{cargo, program, root};
+use anyhow::{Result, bail};
+
+/// What the core must compile for: a core without atomics, one with a floating-point unit, and
+/// RISC-V.
+const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
+
+#[derive(Default)]
+struct Tally {
+    passed: u64,
+    failed: u64,
+    skipped: u64,
+}
+
+impl Tally {
+    /// Reads the closing lines of libtest (`test result: ok. 3 passed; 0 failed; …`) and of
+    /// pytest (`3 passed, 1 skipped in 2.1s`).
+    fn read(&mut self, line: &str) {
+        let closing = line.starts_with("test result:") || (line.contains(" in ") && line.contains("passed"));
+        if !closing {
+            return;
+        }
+        let words: Vec<&str> = line.split([' ', ';', ',', '=']).filter(|w| !w.is_empty()).collect();
+        for pair in words.windows(2) {
+            let [count, word] = pair else { continue };
+            let Ok(count) = count.parse::<u64>() else { continue };
+            match *word {
+                "passed" => self.passed += count,
+                "failed" | "errors" | "error" => self.failed += count,
+                "ignored" | "skipped" => self.skipped += count,
+                _ => {}
+            }
+        }
+    }
+
+    fn check(&mut self, name: &str, holds: bool) {
+        println!("{name}: {}", if holds { "ok" } else { "FAILED" });
+        if holds { self.passed += 1 } else { self.failed += 1 }
+    }
+}
+
+/// Runs everything, counts, and fails at the end if anything failed.
+pub(crate) fn all() -> Result<()> {
+    let mut tally = Tally::default();
+    let mut sound = true;
+
+    let mut rust = |args: &[&str]| -> Result<()> {
+        sound &= cargo(["test"]).args(args).lines(|l| tally.read(l))?;
+        Ok(())
+    };
+    rust(&["--workspace", "--no-fail-fast"])?;
+    // The core as firmware takes it, without the features that the workspace turns on.
+    rust(&["--package", "clutch-core", "--lib", "--no-fail-fast"])?;
+
+    let embedded = targets()?;
+    for target in embedded {
+        for features in ["", "linalg"] {
+            let build = [
+                "build",
+                "--release",
+                "--package",
+                "clutch-core",
+                "--target",
+                target,
+                "--features",
+                features,
+            ];
+            let (built, text) = cargo(build).quietly()?;
+            if !built {
+                println!("{text}");
+            }
+            let with = if features.is_empty() { "no feature" } else { features };
+            tally.check(&format!("clutch-core builds for {target} with {with}"), built);
+        }
+    }
+    if embedded.contains(&"thumbv7em-none-eabihf") {
+        no_panic(&mut tally)?;
+    }
+
+    cargo(["build", "--release", "--package", "clutch-cli"]).run()?;
+    let python = python::interpreter()?;
+    sound &= program(python)
+        .args(["-m", "pytest", "--color=no", "-q", "python/tests"])
+        .env("CLUTCH_BIN", root().join("target/release/clutch"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .lines(|l| tally.read(l))?;
+
+    let Tally { passed, failed, skipped } = tally;
+    println!("\n{passed} passed, {failed} failed, {skipped} skipped");
+    if failed > 0 || !sound {
+        bail!("tests failed");
+    }
+    Ok(())
+}
+
+/// Adds the embedded targets. Without rustup they are skipped on a user's machine, not in CI.
+fn targets() -> Result<&'static [&'static str]> {
+    match program("rustup").args(["target", "add"]).args(TARGETS).quietly() {
+        Ok((true, _)) => Ok(&TARGETS),
+        other if std::env::var_os("CI").is_none() => {
+            let why = other.map_or_else(|e| e.to_string(), |(_, text)| text);
+            println!("skipped: builds for embedded targets, because rustup cannot add them: {}", why.trim());
+            Ok(&[])
+        }
+        other => bail!("rustup cannot add the targets {TARGETS:?}: {other:?}"),
+    }
+}
+
+/// The core links without a reachable panic; the same with one put in does not.
+fn no_panic(tally: &mut Tally) -> Result<()> {
+    let image = || {
+        cargo(["build", "--release", "--manifest-path", "tests/no_panic/Cargo.toml"]).args([
+            "--target",
+            "thumbv7em-none-eabihf",
+            "--target-dir",
+            "target/no_panic",
+        ])
+    };
+    let (links, text) = image().quietly()?;
+    if !links {
+        println!("{text}");
+    }
+    tally.check("no panic is reachable in clutch-core (link test)", links);
+    let (links, text) = image().args(["--features", "control"]).quietly()?;
+    let refused = !links && text.contains("__panic_path_survived");
+    tally.check("the link test sees a panic that is put in (control)", refused);
+    Ok(())
+}
