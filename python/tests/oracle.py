@@ -10,6 +10,7 @@ Symbols and signs: ``e = target - position``; a positive voltage presses the pad
 import math
 from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -88,10 +89,8 @@ class Plant:
         Below zero, where only a trial step beyond the stop looks, the curve goes on smoothly
         (and is cut off far out), so that the stop lies inside a smooth piece.
         """
-        if self.delta == 1.0:
-            ratio = max(speed / self.v_s, -2.0)
-        else:
-            ratio = abs(speed / self.v_s) ** self.delta
+        ratio = speed / self.v_s
+        ratio = max(ratio, -2.0) if self.delta == 1.0 else abs(ratio) ** self.delta
         return self.mu_d + (self.mu_s - self.mu_d) * math.exp(-ratio)
 
     def holds(self, volts):
@@ -128,7 +127,7 @@ def break_away(plant, brake, t0, position, s, period):
     if brake.lag is None and not isinstance(plant.drive, Table):
         return None
     grid = np.union1d(np.linspace(s, period, 41), [t - t0 for t in plant.drive.knots(t0 + s, t0 + period)])
-    for a, b in zip(grid[:-1], grid[1:], strict=True):
+    for a, b in pairwise(grid):
         if excess(b) > 0.0:
             return brentq(excess, a, b, xtol=1e-18, rtol=1e-15)
     return None
@@ -292,7 +291,8 @@ class Loop:
             position = state[0]
             counts = self.encoder.read(position) if self.encoder else 0
             e = goal - (self.encoder.angle(counts) if self.encoder else position)
-            rate = (1.0 - self.smoothing) * rate + self.smoothing * (e - (e if last is None else last)) / PERIOD
+            difference = 0.0 if last is None else (e - last) / PERIOD
+            rate = (1.0 - self.smoothing) * rate + self.smoothing * difference  # (5)
             last = e
             volts = min(max(law.demand(e, rate, speed), self.lowest), self.highest)
             code = dac.code(volts) if dac else 0
@@ -303,7 +303,7 @@ class Loop:
             state, seen = advance(plant, brake, k * PERIOD, state)
             actual = brake(PERIOD)
             events += seen
-        names = "time position velocity stuck counts error rate code voltage".split()
+        names = ("time", "position", "velocity", "stuck", "counts", "error", "rate", "code", "voltage")
         columns = dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True))
         return Result(columns, events)
 

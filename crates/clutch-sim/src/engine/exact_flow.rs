@@ -8,20 +8,21 @@
 //!
 //! 1. `ω > 37 v_s`: the last term is below half an ulp of `μ_d`; the rest is linear, with
 //!    velocity, position and the instant of leaving the range in closed form.
-//! 2. below: with the viscous drag frozen at the mean velocity of a short interval,
-//!    `a = (T − b μ_d − C ω_m)/J`, `k = b Δμ/J` and `z = exp(ω/v_s)`, the equation is
-//!    `ż = (a z − k)/v_s`: linear again. Velocity and the instant of stopping cost a logarithm;
-//!    the position is a Gauss–Legendre sum over the velocity.
+//! 2. below: with the viscous drag frozen at a velocity `ω_m`, `a = (T − b μ_d − C ω_m)/J`,
+//!    `k = b Δμ/J` and `z = exp(ω/v_s)`, the equation is `ż = (a z − k)/v_s`: linear again.
+//!    Velocity, and the instant at which it has a given value, cost a logarithm. What the drag
+//!    does beyond its frozen value is a perturbation, `δω̇ = −(C/J)(ω − ω_m) + (k/v_s) e^{−ω/v_s}
+//!    δω`, which the same quadrature integrates that gives the position: Gauss–Legendre on pieces
+//!    that end at fixed multiples of `v_s`, where the curve bends.
 //! 3. stuck: nothing to integrate; break-away is a comparison.
 
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, Volts, break_away};
 
 /// Speed, in Stribeck velocities, above which the exponential is lost in rounding.
 const LINEAR_ABOVE: f64 = 37.0;
-/// Length of an interval of frozen drag against the Stribeck term's own time.
-const SHARE: f64 = 0.1;
-/// Intervals of frozen drag per sampling period, at most.
-const SUB_INTERVALS: f64 = 64.0;
+/// Speeds, in Stribeck velocities, at which pieces end: above the first the curve is nearly
+/// straight, below the second it bends most.
+const BORDERS: [f64; 2] = [8.0, 2.5];
 /// Pieces in one interval before the engine gives up.
 const PIECE_LIMIT: u32 = 10_000;
 
@@ -84,6 +85,39 @@ fn decay_mean(x: f64) -> f64 {
     if x.abs() < 1e-300 { 1.0 } else { -libm::expm1(-x) / x }
 }
 
+/// Motion in the layer with the drag frozen.
+#[derive(Clone, Copy)]
+struct Frozen {
+    w0: f64,
+    /// `exp(−w0/v_s)`
+    inverse_z0: f64,
+    a: f64,
+    k: f64,
+    v_s: f64,
+}
+
+impl Frozen {
+    /// Velocity after `t`; negative where the shaft has stopped before.
+    fn velocity(&self, t: f64) -> f64 {
+        let y = -(self.k * t / self.v_s) * self.inverse_z0 * decay_mean(self.a * t / self.v_s);
+        if y <= -1.0 { -1.0 } else { self.w0 + self.a * t + self.v_s * libm::log1p(y) }
+    }
+
+    /// The instant at which the velocity is `to`; meaningful only if it ever is.
+    fn reaches(&self, to: f64) -> f64 {
+        // z(t) = z1 where e^{at/v} = (a z1 − k)/(a z0 − k); everything over z0.
+        let rise = libm::expm1((to - self.w0) / self.v_s);
+        let d = self.a - self.k * self.inverse_z0;
+        let y = self.a * rise / d;
+        if y.abs() < 1e-12 { self.v_s * rise / d } else { self.v_s / self.a * libm::log1p(y) }
+    }
+
+    /// How much a deviation of the velocity at `t` has grown when the velocity is `w1` at `t1`.
+    fn growth(&self, t: f64, w: f64, t1: f64, w1: f64) -> f64 {
+        libm::exp((w - w1 + self.a * (t1 - t)) / self.v_s)
+    }
+}
+
 impl Flow {
     /// Velocity and distance after `t` where the Stribeck term is nothing.
     fn linear(&self, w0: f64, t: f64) -> (f64, f64) {
@@ -115,24 +149,8 @@ impl Flow {
         (share < 1.0).then(|| -libm::log1p(-share) / self.drag)
     }
 
-    /// Velocity after `t` with the drag frozen, where `a` is the acceleration without Stribeck
-    /// term; not above 0 where the shaft has stopped before.
-    fn layer(&self, w0: f64, a: f64, t: f64) -> f64 {
-        let x = a * t / self.v_s;
-        let y = -(self.stribeck * t / self.v_s) * libm::exp(-w0 / self.v_s) * decay_mean(x);
-        if y <= -1.0 { -1.0 } else { w0 + a * t + self.v_s * libm::log1p(y) }
-    }
-
-    /// The instant at which the velocity with the drag frozen reaches 0.
-    fn layer_stop(&self, w0: f64, a: f64) -> f64 {
-        let e = libm::expm1(w0 / self.v_s); // z0 − 1
-        let d = a * (e + 1.0) - self.stribeck;
-        let y = a * e / d;
-        if y.abs() < 1e-12 { -self.v_s * e / d } else { self.v_s / a * libm::log1p(-y) }
-    }
-
     /// The next piece of motion from speed `w0`, no longer than `left`.
-    fn piece(&self, w0: f64, left: f64, period: f64) -> Piece {
+    fn piece(&self, w0: f64, left: f64) -> Piece {
         let edge = LINEAR_ABOVE * self.v_s;
         let plain = self.stribeck == 0.0;
         if plain || w0 > edge {
@@ -143,33 +161,59 @@ impl Flow {
             let velocity = if reached.is_some() { to } else { velocity };
             return Piece { time, velocity, distance, stops: plain && reached.is_some() };
         }
-        // Within the layer: short against the time in which the Stribeck term changes at the
-        // lowest speed that this interval can see.
-        let mut a = self.drive - self.drag * w0;
-        let lowest = (w0 - (a.abs() + self.stribeck.abs()) * left).max(0.0);
-        let change = self.v_s / (self.stribeck.abs() * libm::exp(-lowest / self.v_s));
-        let longest = left.min((SHARE * change).max(period / SUB_INTERVALS)).min(30.0 * self.v_s / a.abs());
-        let mut piece = self.frozen(w0, a, longest);
-        // The drag's impulse is that of the mean velocity; two rounds settle it.
-        for _ in 0..2 {
-            a = self.drive - self.drag * piece.distance / piece.time;
-            piece = self.frozen(w0, a, longest);
+        // In the layer. With frozen drag the velocity rises or falls throughout.
+        let inverse_z0 = libm::exp(-w0 / self.v_s);
+        let frozen = |at: f64| Frozen {
+            w0,
+            inverse_z0,
+            a: self.drive - self.drag * at,
+            k: self.stribeck,
+            v_s: self.v_s,
+        };
+        let longest = left.min(30.0 * self.v_s / (self.drive - self.drag * w0).abs());
+        let guess = frozen(w0).velocity(longest);
+        let rising = guess > w0;
+        let border = if rising {
+            BORDERS.iter().rev().map(|b| b * self.v_s).find(|b| *b > w0 && *b < guess)
+        } else {
+            BORDERS.iter().map(|b| b * self.v_s).find(|b| *b < w0 && *b > guess)
+        };
+        let to = border.unwrap_or(guess.max(0.0));
+        let middle = 0.5 * (w0 + to);
+        let flow = frozen(middle);
+        let mut time = longest;
+        let mut velocity = flow.velocity(time);
+        let mut stops = false;
+        match border {
+            Some(border) if (velocity > border) == rising => {
+                (time, velocity) = (flow.reaches(border).clamp(0.0, time), border);
+            }
+            _ if velocity <= 0.0 => {
+                (time, velocity) = (flow.reaches(0.0).clamp(0.0, time), 0.0);
+                stops = true;
+            }
+            _ => {}
         }
-        // Where the velocity changes, drag that is spread evenly acts too early or too late: the
-        // leading term of what that does to the position.
-        piece.distance += self.drag * (piece.velocity - w0) * piece.time * piece.time / 12.0;
-        piece
-    }
-
-    /// Motion in the layer at a given acceleration without Stribeck term, until `time` or the
-    /// stop.
-    fn frozen(&self, w0: f64, a: f64, time: f64) -> Piece {
-        let velocity = self.layer(w0, a, time);
-        let stops = velocity <= 0.0;
-        let time = if stops { self.layer_stop(w0, a).min(time) } else { time };
-        let sum: f64 =
-            NODES.iter().zip(WEIGHTS).map(|(node, weight)| weight * self.layer(w0, a, node * time)).sum();
-        Piece { time, velocity: velocity.max(0.0), distance: time * sum, stops }
+        let (mut mean, mut deviation, mut shift) = (0.0, 0.0, 0.0);
+        for (node, weight) in NODES.iter().zip(WEIGHTS) {
+            let t = node * time;
+            let w = flow.velocity(t);
+            let growth = flow.growth(t, w, time, velocity);
+            mean += weight * w;
+            deviation += weight * (w - middle) * growth;
+            // Simpson over what is left of the piece; half-way the growth is near its root.
+            let sum = 1.0 + 4.0 * libm::sqrt(growth) + growth;
+            shift += weight * (w - middle) * (time - t) * sum / 6.0;
+        }
+        let deviation = -self.drag * time * deviation;
+        let distance = time * (mean - self.drag * shift);
+        if stops {
+            // A deviation at the end is a stop a little later or earlier.
+            let rate = flow.a - flow.k;
+            let time = (time - deviation / rate).clamp(0.0, left);
+            return Piece { time, velocity: 0.0, distance, stops };
+        }
+        Piece { time, velocity: (velocity + deviation).max(0.0), distance, stops }
     }
 }
 
@@ -207,7 +251,7 @@ impl Engine for ExactFlow {
                 stribeck: brake * (p.friction.mu_static - p.friction.mu_dynamic) / p.inertia,
                 v_s: p.friction.stribeck_velocity,
             };
-            let piece = flow.piece(sign * shaft.velocity, input.duration - s, input.duration);
+            let piece = flow.piece(sign * shaft.velocity, input.duration - s);
             s += piece.time;
             shaft.position += sign * piece.distance;
             shaft.velocity = sign * piece.velocity;
