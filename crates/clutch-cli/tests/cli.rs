@@ -87,7 +87,14 @@ fn certify_exits_with_0_for_certified_and_2_for_not() {
     for words in ["K_p required", "2.2624", "worst corner", "margin", "(26)", "-0.96027", "\ncertified"] {
         assert!(text.contains(words), "lacks {words}:\n{text}");
     }
-    let bounds = ["--set", "bounds.friction_percent=20", "--set", "bounds.brake_gain_percent=20", "--set", "bounds.drive_torque_percent=10"];
+    let bounds = [
+        "--set",
+        "bounds.friction_percent=20",
+        "--set",
+        "bounds.brake_gain_percent=20",
+        "--set",
+        "bounds.drive_torque_percent=10",
+    ];
     let o = clutch(&[&["certify", "smc_2"][..], &bounds].concat());
     assert_eq!(o.status.code(), Some(2));
     assert!(out(&o).contains("NOT certified: K_p is too small"), "{}", out(&o));
@@ -144,7 +151,11 @@ fn a_new_scenario_never_overwrites_a_file() {
 fn a_path_that_a_brake_cannot_follow_is_said_in_words() {
     let o = clutch(&["sim", "minimum_jerk", "--set", "reference.minimum_jerk.duration_s=0.4"]);
     assert_eq!(o.status.code(), Some(1));
-    assert!(err(&o).contains("reference.minimum_jerk: a brake cannot follow the path from t = "), "{}", err(&o));
+    assert!(
+        err(&o).contains("reference.minimum_jerk: a brake cannot follow the path from t = "),
+        "{}",
+        err(&o)
+    );
 }
 
 #[test]

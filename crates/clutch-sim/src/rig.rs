@@ -46,7 +46,10 @@ impl Ripple {
         if p.lowest == 0 || !p.lowest.is_multiple_of(p.spacing) {
             return bad("lowest", f64::from(p.lowest), "a multiple of the spacing, above 0 waves per turn");
         }
-        if p.highest < p.lowest || !p.highest.is_multiple_of(p.spacing) || (p.highest - p.lowest) / p.spacing >= 64 {
+        if p.highest < p.lowest
+            || !p.highest.is_multiple_of(p.spacing)
+            || (p.highest - p.lowest) / p.spacing >= 64
+        {
             return bad(
                 "highest",
                 f64::from(p.highest),
@@ -157,13 +160,13 @@ impl RigParams {
     pub fn bench() -> Self {
         RigParams {
             friction: StribeckParams {
-                mu_static: 0.172,
-                mu_dynamic: 0.105,
-                stribeck_velocity: 0.00107,
+                mu_static: 0.229,
+                mu_dynamic: 0.101,
+                stribeck_velocity: 0.00081,
                 stribeck_exponent: 1.0,
             },
-            ripple: Some(RippleParams { rms: 0.167, lowest: 164, highest: 656, spacing: 41 }),
-            drive: DriveParams::Weight { mass: 0.2 * 1.044, gravity: GRAVITY, pulley_radius: 0.024 },
+            ripple: Some(RippleParams { rms: 0.119, lowest: 152, highest: 608, spacing: 38 }),
+            drive: DriveParams::Weight { mass: 0.2 * 1.038, gravity: GRAVITY, pulley_radius: 0.024 },
             delay_ticks: 1,
             ..RigParams::paper()
         }
