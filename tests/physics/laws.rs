@@ -4,7 +4,10 @@ use clutch_core::law::{
     Controller, CtcParams, Law, LawParams, Limit, OutputParams, OutputState, PdParams, SmcParams,
     SmcSignParams, Tick,
 };
+use clutch_core::reference::ReferenceParams;
 use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, Target};
+use clutch_core::{ObserverParams, SmoothedDerivativeParams, VelocityParams};
+use clutch_sim::{RigParams, RunSpec, simulate};
 use proptest::prelude::*;
 
 fn laws() -> impl Strategy<Value = LawParams> {
@@ -43,6 +46,31 @@ fn small_tick() -> impl Strategy<Value = Tick<f64>> {
         target_velocity: 0.05,
         target_acceleration: 0.0,
     })
+}
+
+#[test]
+fn every_law_follows_with_either_velocity_source_in_either_scalar() {
+    for law in [
+        LawParams::Pd(PdParams::default()),
+        LawParams::Ctc(CtcParams::default()),
+        LawParams::Smc(SmcParams::default()),
+        LawParams::SmcSign(SmcSignParams::default()),
+    ] {
+        for velocity in [
+            VelocityParams::SmoothedDerivative(SmoothedDerivativeParams::default()),
+            VelocityParams::Observer(ObserverParams::default()),
+        ] {
+            let path = ReferenceParams::Ramp(20.0_f64.to_radians());
+            let mut spec = RunSpec::new(RigParams::paper(), law, path);
+            spec.velocity = velocity;
+            spec.run.duration = 2.0;
+            for metrics in [simulate::<f64>(&spec).unwrap().metrics, simulate::<f32>(&spec).unwrap().metrics]
+            {
+                let error = metrics.max_error_rad.to_degrees();
+                assert!(error < 0.2, "{law:?} with {velocity:?}: {error}°");
+            }
+        }
+    }
 }
 
 proptest! {

@@ -32,6 +32,8 @@ enum Verb {
     },
     /// The API documentation, in target/doc.
     Docs,
+    /// Builds with the oldest Rust that the manifests name; installs it.
+    Msrv,
     /// Finds the rig `bench` anew (docs/bench-rig.md): about half an hour on two cores.
     Calibrate {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -51,6 +53,10 @@ fn main() -> Result<()> {
         }
         Verb::Bench { rest } => cargo(["bench", "--package", "clutch-benches", "--"]).args(rest).run(),
         Verb::Docs => docs(),
+        Verb::Msrv => {
+            check_with("1.89.0", &["--workspace", "--all-targets"])?;
+            check_with("1.85.0", &["--package", "clutch-core", "--features", "serde"])
+        }
         Verb::Calibrate { rest } => {
             let example = ["run", "--release", "--package", "clutch-sim", "--example", "calibrate", "--"];
             cargo(example).args(rest).run()
@@ -68,6 +74,15 @@ fn check() -> Result<()> {
             .run()?;
     }
     docs()
+}
+
+/// `rustup run` and not `cargo +version`, which a cargo started by cargo does not take.
+fn check_with(version: &str, args: &[&str]) -> Result<()> {
+    run::program("rustup").args(["toolchain", "install", version, "--profile", "minimal"]).run()?;
+    run::program("rustup")
+        .args(["run", version, "cargo", "check", "--target-dir", "target/msrv"])
+        .args(args)
+        .run()
 }
 
 fn docs() -> Result<()> {

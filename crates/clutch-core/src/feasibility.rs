@@ -159,3 +159,86 @@ pub fn check_path<T: Real>(
     }
     Ok(envelope)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::OutputParams;
+    use crate::reference::{JerkLimited, ReferenceParams, Sine, Trapezoid};
+    use crate::{Encoder, FixedCounts, PlantParams, Tolerances};
+
+    const PERIOD: Micros = Micros(1000);
+
+    fn check(
+        p: &ReferenceParams<'_>,
+        start: f64,
+        tolerance: Tolerances,
+    ) -> Result<Envelope<f64>, Infeasible<f64>> {
+        let path = Reference::new(p, FixedCounts(0), Encoder::PAPER, PERIOD).unwrap();
+        let bounds = Bounds::around(&PlantParams::default(), &tolerance).unwrap();
+        let output = Output::new(&OutputParams::default(), PERIOD).unwrap();
+        check_path(&path, 5000, PERIOD, start, &bounds, &output)
+    }
+
+    #[test]
+    fn holding_the_papers_shaft_takes_1_68_volts_and_sliding_it_2_24() {
+        let e = check(&ReferenceParams::Hold, 0.0, Tolerances::default()).unwrap();
+        assert!((e.holding_voltage - 1.681714).abs() < 1e-6);
+        assert!((e.highest_voltage - 1.681714).abs() < 1e-6);
+        let v = 2.0_f64.to_radians();
+        let e = check(&ReferenceParams::Ramp(v), v, Tolerances::default()).unwrap();
+        assert!((e.highest_voltage - (0.047088 - 0.001 * v) / 0.021).abs() < 1e-9);
+        assert_eq!(e.velocity_jump, 0.0);
+    }
+
+    #[test]
+    fn a_ramp_from_rest_jumps_by_what_the_weight_cannot_do_in_a_period() {
+        let v = 2.0_f64.to_radians();
+        let e = check(&ReferenceParams::Ramp(v), 0.0, Tolerances::default()).unwrap();
+        let followed = (0.047088 - 0.001 * v) / 0.0017 * 1e-3;
+        assert!((e.velocity_jump - (v - followed)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_weight_accelerates_the_shaft_with_27_7_rad_per_s2_and_not_more() {
+        let path = |a| ReferenceParams::Trapezoid(Trapezoid { distance: 1.0, speed: 2.0, acceleration: a });
+        let e = check(&path(24.0), 0.0, Tolerances::default()).unwrap();
+        assert!((e.acceleration - 24.0).abs() < 1e-9 && e.velocity_jump < 1e-9);
+        let error = check(&path(27.7), 0.0, Tolerances::default()).unwrap_err();
+        assert_eq!(error.obstacle, Obstacle::Acceleration);
+        assert!(error.tick == 0 && error.available < 27.7);
+        // With a weight that may be 10 % lighter, 24.9 rad/s² are left.
+        let error = check(&path(25.5), 0.0, Tolerances { drive_torque: 0.1, ..Tolerances::default() });
+        assert_eq!(error.unwrap_err().obstacle, Obstacle::Acceleration);
+    }
+
+    #[test]
+    fn a_brake_drives_nothing_back() {
+        let sine = ReferenceParams::Sine(Sine { rate: 0.1, amplitude: 0.02, frequency: 1.0, phase: -0.25 });
+        let error = check(&sine, 0.1, Tolerances::default()).unwrap_err();
+        assert_eq!(error.obstacle, Obstacle::Reverse);
+        // v = 0.1 + 0.1257 sin(2π t) passes 0 at t = 0.5 + asin(0.1/0.12566)/2π.
+        let t = 0.5 + libm::asin(0.1 / (0.02 * core::f64::consts::TAU)) / core::f64::consts::TAU;
+        assert!((error.time - t).abs() < 2e-3, "{} s instead of {t} s", error.time);
+        let slower =
+            ReferenceParams::Sine(Sine { rate: 0.13, amplitude: 0.02, frequency: 1.0, phase: -0.25 });
+        assert!(check(&slower, 0.13, Tolerances::default()).is_ok());
+    }
+
+    #[test]
+    fn deceleration_costs_voltage_at_the_weakest_brake() {
+        let path = |a| {
+            ReferenceParams::JerkLimited(JerkLimited {
+                distance: 1.0,
+                speed: 1.0,
+                acceleration: a,
+                jerk: 1000.0,
+            })
+        };
+        let e = check(&path(10.0), 0.0, Tolerances::default()).unwrap();
+        let at_peak = (0.047088 + 0.0017 * 10.0) / 0.021;
+        assert!((e.highest_voltage - at_peak).abs() < 0.05, "{} V instead of {at_peak} V", e.highest_voltage);
+        let loose = Tolerances { friction: 0.5, brake_gain: 0.5, ..Tolerances::default() };
+        assert_eq!(check(&path(10.0), 0.0, loose).unwrap_err().obstacle, Obstacle::Voltage);
+    }
+}

@@ -240,3 +240,73 @@ impl<T: Real, C: Controller<T>> Servo<T, C> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::PdParams;
+
+    /// A board that gives counts and keeps codes, until it fails.
+    struct Board {
+        counts: Counts,
+        code: Option<DacCode>,
+        reads: bool,
+        writes: bool,
+    }
+
+    impl Daq for Board {
+        type Error = &'static str;
+        fn read(&mut self) -> Result<Counts, &'static str> {
+            if self.reads { Ok(self.counts) } else { Err("read") }
+        }
+        fn write(&mut self, code: DacCode) -> Result<(), &'static str> {
+            if self.writes {
+                self.code = Some(code);
+                Ok(())
+            } else {
+                Err("write")
+            }
+        }
+    }
+
+    fn servo() -> Servo<f64> {
+        Servo::new(&ServoParams::paper(LawParams::Pd(PdParams::default()))).unwrap()
+    }
+
+    fn target(counts: i64) -> Target<f64> {
+        Target { position: FixedCounts::from_counts(counts), velocity: 0.0, acceleration: 0.0 }
+    }
+
+    #[test]
+    fn a_board_gets_the_code_of_the_tick() {
+        let servo = servo();
+        let mut state = servo.start(Counts(0), &target(0), 0.0);
+        let mut board = Board { counts: Counts(2), code: None, reads: true, writes: true };
+        let out = servo.run(&mut state, &mut board, &target(0)).unwrap();
+        assert_eq!(board.code, Some(out.code));
+        // Two counts ahead: 5000 V/rad · 6.28e-4 rad + 50 V s/rad · 0.2 · 0.628 rad/s = 9.42 V.
+        assert!((out.command.voltage - 9.424_777_960_769).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_failed_read_changes_nothing_and_a_failed_write_is_told() {
+        let servo = servo();
+        let mut state = servo.start(Counts(0), &target(0), 0.0);
+        let before = state;
+        let mut board = Board { counts: Counts(2), code: None, reads: false, writes: false };
+        assert_eq!(servo.run(&mut state, &mut board, &target(0)), Err("read"));
+        assert_eq!(state, before);
+        board.reads = true;
+        assert_eq!(servo.run(&mut state, &mut board, &target(0)), Err("write"));
+        assert_eq!(board.code, None);
+    }
+
+    #[test]
+    fn counts_that_wrap_are_a_shaft_that_turns_on() {
+        let servo = servo();
+        let start = i64::from(i32::MAX);
+        let mut state = servo.start(Counts(i32::MAX), &target(start), 0.0);
+        let out = servo.tick(&mut state, Counts(i32::MIN), &target(start + 1));
+        assert_eq!(out.tick.error, 0.0);
+    }
+}
