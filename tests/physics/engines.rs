@@ -81,7 +81,7 @@ fn smooth_slip_is_the_same_motion_in_both_engines() {
         let path = ReferenceParams::Ramp(20.0_f64.to_radians());
         let runs = both(RunSpec::new(RigParams::ideal(), law, path));
         let apart = furthest_apart(&runs);
-        assert!(apart <= 1e-11, "{apart:e} rad apart after 5 s");
+        assert!(apart <= 5e-11, "{apart:e} rad apart after 5 s");
     }
 }
 

@@ -38,7 +38,8 @@ fn every_built_in_scenario_is_good_and_runs() {
         let s = Scenario::built_in(b.name).unwrap().unwrap_or_else(|e| panic!("{e}"));
         let run = s.run().unwrap_or_else(|e| panic!("{e}"));
         assert!(run.metrics.max_error_rad.to_degrees() < 0.5, "{}: {:?}", b.name, run.metrics);
-        assert!(s.plan().unwrap().certificate.certified(), "{}", b.name);
+        // CTC saturates too far off its surface: docs/theory.md.
+        assert_eq!(s.plan().unwrap().certificate.certified(), b.name != "ctc_2", "{}", b.name);
     }
 }
 

@@ -42,6 +42,11 @@ fn reason(s: Shortfall) -> &'static str {
         Shortfall::Start => {
             "the start's error rate is more than brake or drive can follow: start on the path, or slower"
         }
+        Shortfall::Layer => {
+            "the law saturates so far off its surface that the error rate there may exceed what brake or drive can \
+             follow: raise K_d (PD, CTC), or thin the boundary (SMC), or follow a slower path"
+        }
+        Shortfall::Slope => "the surface's slope f is below C_d/J: raise K_p against K_d",
         Shortfall::Surface => "the law has no sliding surface: K_p and K_d must both be above 0",
         _ => "not certified",
     }
@@ -112,11 +117,11 @@ fn text(scenario: &Scenario, plan: &Plan) -> String {
         &[
             ("worst corner: torque", number(c.least_torque), "N m"),
             ("holds up to an error rate of", deg(c.error_rate_behind), "°/s"),
-            ("error rate at the start", deg(d.start_error_rate), "°/s"),
+            ("error rate at the start or a jump", deg(d.start_error_rate), "°/s"),
         ],
     );
     out += &quantities(
-        "\nOnce there",
+        "\nWith both",
         &[
             ("sliding surface: slope f", number(c.slope), "1/s"),
             ("layer around it", number(c.layer), "rad/s"),

@@ -17,14 +17,19 @@
 //! * **shaft behind** (`σ > 0`), the brake can only let go. What is left is
 //!   `|ė| ≤ [T_min − C_max v_d − J_max (a_d + γ)] / (J_max f)`, and no gain buys more.
 //!
-//! Three additions. The saturation of (31) weakens the `K_d` term to `K_d ė²` where
+//! Four additions. The saturation of (31) weakens the `K_d` term to `K_d ė²` where
 //! `|ė| < 1 rad/s`, so that up to `(J_max f / μ_min K_min)² / (4 K_d)` volts of `f |ė|` fall to
-//! `K_p`. The voltage ends at `u_max`, which bounds `|ė|` on the ahead side too. And a law that
-//! is affine in `σ` and saturates, as PD with `f = K_p/K_d` is and as CTC is, obeys the same two
+//! `K_p`. The voltage ends at `u_max`, which bounds `|ė|` on the ahead side too. A law that is
+//! affine in `σ` and saturates, as PD with `f = K_p/K_d` is and as CTC is, obeys the same two
 //! conditions outside the layer in which it does not saturate: with `u_max` in place of `K_p`.
+//! And the bounds on `|ė|` must keep holding: with `S` the larger of the layer and the start's
+//! `|ė|`, the region `|σ| ≤ S`, `|e| ≤ S/f` is never left if both sides hold for every `ė` in it,
+//! which is `|ė| ≤ 2 S`, and `ė ≤ v_d` for a shaft that never runs backwards.
 //!
-//! Outside the layer `|σ|` falls; once inside, `|e| ≤ layer / f`. The certificate speaks of
-//! continuous time and an exact sensor: sampling, encoder steps and delay come on top.
+//! So `|e| ≤ S/f` from a start on the path, and `|σ|` falls at `γ` until it is within the layer,
+//! while the shaft moves. A shaft that is stuck ahead waits for the path: `σ̇ = f θ̇_d + θ̈_d`.
+//! The certificate speaks of continuous time and an exact sensor: sampling, encoder steps and
+//! delay come on top.
 //!
 //! # The paper's conditions
 //!
@@ -46,7 +51,8 @@ pub struct Demand<T = f64> {
     pub acceleration: T,
     /// `γ` in (15): reaching rate wanted, rad/s².
     pub reach_rate: T,
-    /// `|ė|` at the start, rad/s: 0 on the path, the path's velocity from rest.
+    /// Largest jump of `ė`, rad/s: at the start (0 on the path, the path's velocity from rest) or
+    /// where the path's velocity jumps.
     pub start_error_rate: T,
 }
 
@@ -62,8 +68,12 @@ pub enum Shortfall {
     Voltage,
     /// The drive is too weak for the path: the released shaft does not catch up.
     Drive,
-    /// The start's error rate is beyond what either side can follow.
+    /// The start's error rate, or a jump of the path, is beyond what the two sides can follow.
     Start,
+    /// The layer is so thick that `|ė|` within it may exceed what the two sides can follow.
+    Layer,
+    /// `f` is below `C_max/J_min`: the viscous damping decides instead of the surface.
+    Slope,
     /// The law has no sliding surface: PD or CTC without `K_d`, or SMC output that never ends.
     Surface,
 }
@@ -99,7 +109,7 @@ pub struct Certificate<T = f64> {
     pub error_rate_ahead: T,
     /// `|ė|` up to which the behind side holds, rad/s.
     pub error_rate_behind: T,
-    /// Bound on `|e|` once inside the layer, rad.
+    /// `S/f`: bound on `|e|` from a start at `e = 0`, rad; meaningful only if certified.
     pub error_bound: T,
     /// `γ` certified, rad/s².
     pub reach_rate: T,
@@ -117,7 +127,8 @@ struct Form<T> {
     weakened: bool,
 }
 
-fn form<T: Real>(law: &Law<T>, demand: &Demand<T>) -> Option<Form<T>> {
+/// `fastest` gives the largest `|ė|` that the ahead side allows for a slope, rad/s.
+fn form<T: Real>(law: &Law<T>, demand: &Demand<T>, fastest: impl Fn(T) -> T) -> Option<Form<T>> {
     let highest = law.output().highest();
     match law {
         Law::Smc(l) => Some(Form {
@@ -144,7 +155,8 @@ fn form<T: Real>(law: &Law<T>, demand: &Demand<T>) -> Option<Form<T>> {
             (gain > T::ZERO && p.kp > T::ZERO).then(|| {
                 let mu = m.friction.mu_static.max(m.friction.mu_dynamic);
                 let inertia = m.inertia * demand.acceleration;
-                let drag = m.viscous_damping * (demand.velocity + demand.velocity);
+                let slope = p.kp / p.kd;
+                let drag = m.viscous_damping * (demand.velocity + fastest(slope));
                 let upper = highest * mu * m.brake_gain - m.drive_torque + inertia + drag;
                 let lower = m.drive_torque + inertia;
                 Form {
@@ -194,7 +206,10 @@ pub fn certify<T: Real>(
     let brake = bounds.weakest_brake();
     let inertia = bounds.inertia.high;
     let torque = bounds.drive_torque.high;
-    let form_of = form(law, demand);
+    let base = (torque + inertia * (demand.acceleration + demand.reach_rate)) / brake;
+    let per_rate = |left: T, slope: T| if slope > T::ZERO { left / slope } else { T::ZERO };
+    let ahead = |slope: T| per_rate((highest - base) * brake / inertia, slope);
+    let form_of = form(law, demand, ahead);
     let missing = form_of.is_none();
     let Form { slope, layer, kp, kd, weakened } =
         form_of.unwrap_or(Form { slope: T::ZERO, layer: T::ZERO, kp: highest, kd: None, weakened: false });
@@ -205,17 +220,22 @@ pub fn certify<T: Real>(
         Some(kd) if weakened && kd > T::ZERO => kd_required * kd_required / (T::from_i32(4) * kd),
         _ => T::ZERO,
     };
-    let base = (torque + inertia * (demand.acceleration + demand.reach_rate)) / brake;
     let kp_required = base + kp_for_boundary;
     let reach_rate_possible =
         ((kp.min(highest) - kp_for_boundary) * brake - torque) / inertia - demand.acceleration;
-    let per_rate = |left: T| if slope > T::ZERO { left / slope } else { T::ZERO };
-    let error_rate_ahead = per_rate((highest - base) * brake / inertia);
+    let error_rate_ahead = ahead(slope);
 
     // Behind: the released shaft against the path.
     let least_torque = bounds.drive_torque.low - bounds.strongest_brake() * lowest;
     let left = (least_torque - bounds.viscous_damping.high * demand.velocity) / inertia;
-    let error_rate_behind = per_rate(left - demand.acceleration - demand.reach_rate);
+    let error_rate_behind = per_rate(left - demand.acceleration - demand.reach_rate, slope);
+
+    // The region that is never left.
+    let follows = |region: T| {
+        let rate = region + region;
+        rate <= error_rate_ahead && rate.min(demand.velocity) <= error_rate_behind
+    };
+    let region = layer.max(demand.start_error_rate);
 
     let shortfall = if missing {
         Some(Shortfall::Surface)
@@ -227,7 +247,11 @@ pub fn certify<T: Real>(
         Some(Shortfall::Voltage)
     } else if error_rate_behind <= T::ZERO {
         Some(Shortfall::Drive)
-    } else if demand.start_error_rate > error_rate_behind.min(error_rate_ahead) {
+    } else if slope * bounds.inertia.low < bounds.viscous_damping.high {
+        Some(Shortfall::Slope)
+    } else if !follows(layer) {
+        Some(Shortfall::Layer)
+    } else if !follows(region) {
         Some(Shortfall::Start)
     } else {
         None
@@ -247,7 +271,7 @@ pub fn certify<T: Real>(
         reach_rate_possible,
         error_rate_ahead,
         error_rate_behind,
-        error_bound: per_rate(layer),
+        error_bound: per_rate(region, slope),
         reach_rate: demand.reach_rate,
         shortfall,
     })
@@ -384,14 +408,18 @@ mod tests {
     }
 
     #[test]
-    fn ctc_is_certified_like_any_law_that_saturates() {
+    fn ctc_saturates_too_far_off_its_surface_to_be_certified() {
         let c = certify(
             &law(LawParams::Ctc(CtcParams::default())),
             &bounds(Tolerances::default()),
             &at_2_deg_s(),
         )
         .unwrap();
-        assert!(c.certified());
+        assert_eq!(c.shortfall, Some(Shortfall::Layer));
+        // (μ_s K u_max − T + C ω)/(J K K_d), at the highest ω that the ahead side allows.
+        let speed = 2.0_f64.to_radians() + c.error_rate_ahead;
+        let layer = (0.2 * 0.14 * 10.0 - 0.047088 + 0.001 * speed) / (0.0017 * 90.0 * 0.7);
+        assert!((c.layer - layer).abs() < 1e-9, "{} instead of {layer}", c.layer);
         assert!((c.slope - 100.0 / 0.7).abs() < 1e-12);
     }
 
@@ -418,6 +446,26 @@ mod tests {
         let c =
             certify(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d).unwrap();
         assert_eq!(c.shortfall, Some(Shortfall::Start));
+    }
+
+    #[test]
+    fn pd_is_certified_up_to_15_8_degrees_per_second_and_smc_to_100() {
+        let certified = |p: LawParams, rate: f64| {
+            let d = Demand { velocity: rate.to_radians(), ..Demand::default() };
+            certify(&law(p), &bounds(Tolerances::default()), &d).unwrap().shortfall
+        };
+        // T − C v = J f v for the released shaft: v = T/(J f + C) = 0.2754 rad/s.
+        let limit = (0.047088_f64 / (0.0017 * 100.0 + 0.001)).to_degrees();
+        assert_eq!(certified(LawParams::Pd(PdParams::default()), limit - 0.01), None);
+        assert_eq!(certified(LawParams::Pd(PdParams::default()), limit + 0.01), Some(Shortfall::Layer));
+        assert_eq!(certified(LawParams::Smc(SmcParams::default()), 100.0), None);
+    }
+
+    #[test]
+    fn a_slope_below_the_viscous_rate_is_not_certified() {
+        let slow = SmcParams { slope: 0.5, ..SmcParams::default() };
+        let c = certify(&law(LawParams::Smc(slow)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
+        assert_eq!(c.shortfall, Some(Shortfall::Slope));
     }
 
     #[test]

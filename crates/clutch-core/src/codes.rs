@@ -1,8 +1,8 @@
 //! Raw codes of the hardware, and how they scale: encoder counts, DAC codes, microseconds.
 //!
 //! Each is a type of its own; arithmetic across them does not compile. Angles are subtracted
-//! as integers and only then converted, because an absolute angle in `f32` loses its
-//! derivative within a minute at 100 °/s.
+//! as integers and only then converted: after a minute at 100 °/s the step of an absolute angle
+//! in `f32` is 7.6e-6 rad, and a difference over 1 ms is coarse by 0.44 °/s.
 
 use crate::error::{cast, require};
 use crate::{ParamError, Real};

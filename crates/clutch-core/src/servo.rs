@@ -171,10 +171,16 @@ impl<T: Real, C: Controller<T>> Servo<T, C> {
     #[must_use]
     pub fn start(&self, counts: Counts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
         let position = FixedCounts::from_counts(i64::from(counts.0));
+        ServoState { last: counts, ..self.start_at(position, target, applied) }
+    }
+
+    /// As [`Servo::start`], for [`Servo::tick_at`].
+    #[must_use]
+    pub fn start_at(&self, position: FixedCounts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
         let tick = self.measure(position, target, T::ZERO);
         ServoState {
             position,
-            last: counts,
+            last: Counts::default(),
             velocity: self.velocity.start(position, target, applied),
             law: self.law.start(&tick, applied),
             applied,

@@ -1,9 +1,9 @@
 //! Finds the `bench` rig: the stand-in for the paper's experiment.
 //!
 //! An evolution strategy over the parameters in which a real bench differs from the paper's own
-//! simulation. It is fitted to Table 3, to the PD controller's smooth motion at 20 and 100 °/s
-//! and its error at 2 °/s, and to the computed-torque controller's stick-slip just below 20 °/s;
-//! every other statement of section 4 stays out of the fit. Same arguments, same result.
+//! simulation. It is fitted to Table 3, to the PD controller's smooth motion and error at 20 and
+//! 100 °/s and its error at 2 °/s, and to the computed-torque controller's stick-slip just below
+//! 20 °/s; every other statement of section 4 stays out of the fit. Same arguments, same result.
 //!
 //! `cargo xtask calibrate [--generations N] [--seed S]`
 
@@ -37,7 +37,7 @@ const NAMES: [&str; 6] = [
 const LOWEST: Point = [0.12, 0.08, 2e-4, 0.9, 0.0, 10.0];
 const HIGHEST: Point = [0.30, 0.25, 2e-2, 1.1, 0.19, 150.0];
 /// Where the search starts: a rig found by hand that behaves roughly like the experiment.
-const START: Point = [0.194, 0.105, 0.00103, 1.033, 0.167, 41.0];
+const START: Point = [0.21, 0.104, 0.00105, 1.047, 0.145, 35.0];
 
 fn ripple(x: &Point) -> RippleParams {
     let spacing = x[5].round() as u32;
@@ -72,6 +72,7 @@ struct Score {
     pd_cycles: [f64; 3],
     pd_smooth: f64,
     pd_error_deg: f64,
+    pd_fast_error_deg: f64,
     ctc_cycles: f64,
 }
 
@@ -89,6 +90,7 @@ fn score(x: &Point) -> Score {
         pd_cycles: [0.0; 3],
         pd_smooth: 0.0,
         pd_error_deg: 0.0,
+        pd_fast_error_deg: 0.0,
         ctc_cycles: 0.0,
     };
     let n = FIT_SEEDS.count() as f64;
@@ -109,19 +111,28 @@ fn score(x: &Point) -> Score {
     let (Some(a), Some(b)) = (mean(&cycles(pd, 20.0)), mean(&cycles(pd, 100.0))) else { return worst };
     let pd_smooth = a + b;
     loss += square(10.0 * pd_smooth);
-    // "Any rate less than 20 °/s": at 15 °/s a cycle in a second and more is enough.
+    // "Under 0.12°", with room for other seeds.
+    let error_at = |rate| {
+        FIT_SEEDS
+            .map(|seed| measure(x, pd, rate, seed).map(|m| m.max_error_rad.to_degrees()))
+            .try_fold(0.0, |worst: f64, e| e.map(|e| worst.max(e)))
+    };
+    let (Some(a), Some(b)) = (error_at(20.0), error_at(100.0)) else { return worst };
+    let pd_fast_error_deg = a.max(b);
+    loss += square((pd_fast_error_deg - 0.11).max(0.0) / 0.005);
+    // "Any rate less than 20 °/s": at 15 °/s a cycle in two seconds and more is enough.
     let Some(ctc_cycles) = mean(&cycles(ctc, 15.0)) else { return worst };
-    loss += square(5.0 * (1.0 - ctc_cycles).max(0.0));
+    loss += square(5.0 * (0.5 - ctc_cycles).max(0.0));
     let error = |seed| measure(x, pd, 2.0, seed).map(|m| m.max_error_rad.to_degrees());
     let Some(pd_error_deg) = mean(&error) else { return worst };
     loss += square((pd_error_deg - 0.08) / 0.005);
-    Score { loss, reductions, pd_cycles, pd_smooth, pd_error_deg, ctc_cycles }
+    Score { loss, reductions, pd_cycles, pd_smooth, pd_error_deg, pd_fast_error_deg, ctc_cycles }
 }
 
 fn report(x: &Point, s: &Score) {
     println!(
         "loss {:.3}: reduction {:.1} {:.1} {:.1} % (88.6 88.9 83.8), PD {:.1} {:.1} {:.1} cycles/s, \
-         {:.2} at 20 and 100 °/s, PD error at 2 °/s {:.4}°, \
+         {:.2} at 20 and 100 °/s, PD error at 2 °/s {:.4}°, from 20 °/s up {:.4}°, \
          CTC {:.2} cycles/s at 15 °/s",
         s.loss,
         s.reductions[0],
@@ -132,6 +143,7 @@ fn report(x: &Point, s: &Score) {
         s.pd_cycles[2],
         s.pd_smooth,
         s.pd_error_deg,
+        s.pd_fast_error_deg,
         s.ctc_cycles
     );
     for (name, value) in NAMES.iter().zip(x) {

@@ -175,6 +175,16 @@ impl Drive {
         }
     }
 
+    /// Times strictly between two others at which the torque has a corner, s.
+    pub(crate) fn corners(&self, from: f64, to: f64) -> impl Iterator<Item = f64> + '_ {
+        let points = match self {
+            Drive::Table(points) => points.as_slice(),
+            _ => &[],
+        };
+        let first = points.partition_point(|p| p.0 <= from);
+        points.iter().skip(first).map(|p| p.0).take_while(move |t| *t < to)
+    }
+
     /// Changes neither with time nor with position.
     #[must_use]
     pub fn is_constant(&self) -> bool {

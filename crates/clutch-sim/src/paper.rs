@@ -443,7 +443,7 @@ fn claims(m: &Measured) -> Vec<Claim> {
                 m.least_cycles(Simulation, Pd, &slow),
                 "cycles/s",
                 occurs,
-                "least of 10, 6, 2 °/s, mean of ten seeds. On the paper's own model PD begins to stick between 6.5 and 6 °/s; the paper shows 2 °/s only",
+                "least of 10, 6, 2 °/s, mean of ten seeds. On the paper's own model PD begins to stick between 6 and 7 °/s, depending on where the path lies between the encoder's edges (docs/theory.md); the paper shows 2 °/s only",
             ),
             0.0,
             0.99,

@@ -160,13 +160,13 @@ impl RigParams {
     pub fn bench() -> Self {
         RigParams {
             friction: StribeckParams {
-                mu_static: 0.229,
-                mu_dynamic: 0.101,
-                stribeck_velocity: 0.00081,
+                mu_static: 0.199,
+                mu_dynamic: 0.105,
+                stribeck_velocity: 0.00123,
                 stribeck_exponent: 1.0,
             },
-            ripple: Some(RippleParams { rms: 0.119, lowest: 152, highest: 608, spacing: 38 }),
-            drive: DriveParams::Weight { mass: 0.2 * 1.038, gravity: GRAVITY, pulley_radius: 0.024 },
+            ripple: Some(RippleParams { rms: 0.17, lowest: 128, highest: 512, spacing: 32 }),
+            drive: DriveParams::Weight { mass: 0.2 * 1.054, gravity: GRAVITY, pulley_radius: 0.024 },
             delay_ticks: 1,
             ..RigParams::paper()
         }

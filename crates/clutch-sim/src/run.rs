@@ -264,7 +264,12 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
     let origin = shaft.position;
     let mut volts = rig.sliding_voltage(velocity);
     let counts_at = |position: f64| Counts(libm::floor(position * per_radian) as i64 as i32);
-    let mut state = servo.start(counts_at(shaft.position), &first.cast(), T::from_f64(volts));
+    let fine_at = |position: f64| FixedCounts::from_real(position * per_radian);
+    let mut state = if spec.rig.encoder_quantised {
+        servo.start(counts_at(shaft.position), &first.cast(), T::from_f64(volts))
+    } else {
+        servo.start_at(fine_at(shaft.position), &first.cast(), T::from_f64(volts))
+    };
     let mut pending: VecDeque<f64> = std::iter::repeat_n(volts, spec.rig.delay_ticks as usize).collect();
     let mut noise = Pcg64::seed_from_u64(p.seed ^ 0x006e_6f69_7365);
 
@@ -282,8 +287,7 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
         let out = if spec.rig.encoder_quantised {
             servo.tick(&mut state, counts, &target.cast())
         } else {
-            let fine = FixedCounts::from_real(shaft.position * per_radian);
-            servo.tick_at(&mut state, fine, &target.cast())
+            servo.tick_at(&mut state, fine_at(shaft.position), &target.cast())
         };
         let commanded =
             if spec.rig.dac_quantised { rig.dac.volts(out.code) } else { out.command.voltage.to_f64() };

@@ -76,7 +76,7 @@ impl<T: Real> Output<T> {
             "on_invalid",
             p.on_invalid,
             p.on_invalid >= p.lowest && p.on_invalid <= p.highest,
-            "a voltage between the lowest and the highest, V",
+            "a voltage from the lowest to the highest, V (it does not follow them)",
         )?;
         require(
             "bumpless_time",

@@ -83,7 +83,7 @@ impl Slip<'_> {
 }
 
 impl Engine for DormandPrince {
-    fn advance(
+    fn advance_smooth(
         &mut self,
         model: &Model,
         input: &Input<'_>,

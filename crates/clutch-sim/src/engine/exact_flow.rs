@@ -23,6 +23,8 @@ const LINEAR_ABOVE: f64 = 37.0;
 /// Speeds, in Stribeck velocities, at which pieces end: above the first the curve is nearly
 /// straight, below the second it bends most.
 const BORDERS: [f64; 2] = [8.0, 2.5];
+/// Error of the velocity from which a piece is taken a second time, rad/s.
+const SQUARE: f64 = 1e-10;
 /// Pieces in one interval before the engine gives up.
 const PIECE_LIMIT: u32 = 10_000;
 
@@ -105,11 +107,19 @@ impl Frozen {
 
     /// The instant at which the velocity is `to`; meaningful only if it ever is.
     fn reaches(&self, to: f64) -> f64 {
-        // z(t) = z1 where e^{at/v} = (a z1 − k)/(a z0 − k); everything over z0.
-        let rise = libm::expm1((to - self.w0) / self.v_s);
+        // z(t) = z1 where e^{at/v} = (a z1 − k)/(a z0 − k).
         let d = self.a - self.k * self.inverse_z0;
+        let rise = libm::expm1((to - self.w0) / self.v_s);
         let y = self.a * rise / d;
-        if y.abs() < 1e-12 { self.v_s * rise / d } else { self.v_s / self.a * libm::log1p(y) }
+        if y.abs() < 1e-12 {
+            self.v_s * rise / d
+        } else if y.abs() < 0.5 {
+            self.v_s / self.a * libm::log1p(y)
+        } else {
+            // The same with ln(z1/z0) taken out: y near −1 has lost its digits.
+            let fall = -self.k * self.inverse_z0 * libm::expm1((self.w0 - to) / self.v_s);
+            ((to - self.w0) + self.v_s * libm::log1p(fall / d)) / self.a
+        }
     }
 
     /// How much a deviation of the velocity at `t` has grown when the velocity is `w1` at `t1`.
@@ -180,12 +190,33 @@ impl Flow {
         };
         let to = border.unwrap_or(guess.max(0.0));
         let middle = 0.5 * (w0 + to);
-        let flow = frozen(middle);
+        let (piece, better) = self.frozen_piece(frozen(middle), middle, longest, border, left);
+        // Where the layer blows the drag's deviation up, its square counts: freeze the drag at the
+        // velocity at which nothing deviates, to first order, by the end.
+        if better.1 > SQUARE {
+            self.frozen_piece(frozen(better.0), better.0, longest, border, left).0
+        } else {
+            piece
+        }
+    }
+
+    /// A piece with the drag frozen at `middle` and the rest of it as a perturbation; the velocity
+    /// at which freezing leaves no deviation at the end, and what the square of the deviation
+    /// does to the velocity.
+    fn frozen_piece(
+        &self,
+        flow: Frozen,
+        middle: f64,
+        longest: f64,
+        border: Option<f64>,
+        left: f64,
+    ) -> (Piece, (f64, f64)) {
+        let w0 = flow.w0;
         let mut time = longest;
         let mut velocity = flow.velocity(time);
         let mut stops = false;
         match border {
-            Some(border) if (velocity > border) == rising => {
+            Some(border) if (velocity > border) == (border > w0) => {
                 (time, velocity) = (flow.reaches(border).clamp(0.0, time), border);
             }
             _ if velocity <= 0.0 => {
@@ -194,31 +225,35 @@ impl Flow {
             }
             _ => {}
         }
-        let (mut mean, mut deviation, mut shift) = (0.0, 0.0, 0.0);
+        let (mut mean, mut deviation, mut shift, mut total) = (0.0, 0.0, 0.0, 0.0);
         for (node, weight) in NODES.iter().zip(WEIGHTS) {
             let t = node * time;
             let w = flow.velocity(t);
             let growth = flow.growth(t, w, time, velocity);
             mean += weight * w;
+            total += weight * growth;
             deviation += weight * (w - middle) * growth;
             // Simpson over what is left of the piece; half-way the growth is near its root.
             let sum = 1.0 + 4.0 * libm::sqrt(growth) + growth;
             shift += weight * (w - middle) * (time - t) * sum / 6.0;
         }
+        let better = middle + deviation / total;
         let deviation = -self.drag * time * deviation;
+        let square = deviation * deviation / self.v_s;
         let distance = time * (mean - self.drag * shift);
-        if stops {
+        let piece = if stops {
             // A deviation at the end is a stop a little later or earlier.
-            let rate = flow.a - flow.k;
-            let time = (time - deviation / rate).clamp(0.0, left);
-            return Piece { time, velocity: 0.0, distance, stops };
-        }
-        Piece { time, velocity: (velocity + deviation).max(0.0), distance, stops }
+            let time = (time - deviation / (flow.a - flow.k)).clamp(0.0, left);
+            Piece { time, velocity: 0.0, distance, stops }
+        } else {
+            Piece { time, velocity: (velocity + deviation).max(0.0), distance, stops }
+        };
+        (piece, (better, square))
     }
 }
 
 impl Engine for ExactFlow {
-    fn advance(
+    fn advance_smooth(
         &mut self,
         model: &Model,
         input: &Input<'_>,

@@ -141,6 +141,17 @@ impl Input<'_> {
         self.drive.torque(self.time + s, position - self.origin) + self.noise
     }
 
+    /// The part from `from` to `to` seconds after the sample.
+    fn part(&self, from: f64, to: f64) -> Self {
+        let volts = match self.volts {
+            Volts::Held(v) => Volts::Held(v),
+            lag @ Volts::Lag { to, time_constant, .. } => {
+                Volts::Lag { from: lag.at(from), to, time_constant }
+            }
+        };
+        Input { time: self.time + from, duration: to - from, volts, ..*self }
+    }
+
     /// Voltage and torque stay the same over the interval.
     pub(crate) fn is_constant(&self) -> bool {
         matches!(self.volts, Volts::Held(_)) && self.drive.is_constant()
@@ -193,6 +204,19 @@ pub enum EngineError {
 
 /// Moves a shaft over an interval.
 pub trait Engine {
+    /// Moves `shaft` to the end of an interval in which the driving torque has no corner, and
+    /// adds what happened to `events`.
+    ///
+    /// # Errors
+    /// If the motion cannot be followed; the shaft is then where it was last sure.
+    fn advance_smooth(
+        &mut self,
+        model: &Model,
+        input: &Input<'_>,
+        shaft: &mut Shaft,
+        events: &mut Vec<Event>,
+    ) -> Result<(), EngineError>;
+
     /// Moves `shaft` to the end of the interval and adds what happened to `events`.
     ///
     /// # Errors
@@ -203,7 +227,18 @@ pub trait Engine {
         input: &Input<'_>,
         shaft: &mut Shaft,
         events: &mut Vec<Event>,
-    ) -> Result<(), EngineError>;
+    ) -> Result<(), EngineError> {
+        // No step goes over a corner of a torque table: neither the pair's error estimate nor the
+        // search for break-away would see a short pulse.
+        let end = input.time + input.duration;
+        let mut s = 0.0;
+        for corner in input.drive.corners(input.time, end) {
+            let at = corner - input.time;
+            self.advance_smooth(model, &input.part(s, at), shaft, events)?;
+            s = at;
+        }
+        self.advance_smooth(model, &input.part(s, input.duration), shaft, events)
+    }
 }
 
 /// Which engine.

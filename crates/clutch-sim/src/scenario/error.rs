@@ -169,7 +169,7 @@ pub(super) fn deserialize(origin: &str, table: &Table) -> Result<File, ScenarioE
         if message.starts_with("unknown field") || message.starts_with("unknown variant") {
             // A word that is none of its choices is a value.
             if lookup(table, &path).is_some_and(Value::is_str) {
-                let hint = correction(unknown, None, known);
+                let hint = nearest(unknown, known);
                 return ScenarioError::value(
                     origin,
                     &path,
@@ -291,6 +291,11 @@ fn correction(unknown: &str, value: Option<&Value>, known: &[&str]) -> String {
     {
         return format!(": did you mean {key}? (keys end with their unit)");
     }
+    nearest(unknown, known)
+}
+
+/// The most alike of the known names, if one is much alike.
+fn nearest(unknown: &str, known: &[&str]) -> String {
     let near = known
         .iter()
         .map(|k| (strsim::jaro_winkler(unknown, k), k))

@@ -227,7 +227,7 @@ impl Scenario {
             velocity: envelope.velocity,
             acceleration: envelope.largest_acceleration(),
             reach_rate: self.reach_rate,
-            start_error_rate: (first - start_velocity).abs(),
+            start_error_rate: (first - start_velocity).abs().max(envelope.velocity_jump),
         };
         let certificate = certify(&law, &bounds, &demand).map_err(param("bounds"))?;
         let paper = match &spec.law {
