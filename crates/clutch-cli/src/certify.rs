@@ -40,7 +40,8 @@ fn reason(s: Shortfall) -> &'static str {
         Shortfall::Voltage => "output.highest_v is too small for the brake to stop the strongest drive",
         Shortfall::Drive => "the drive is too weak for the path: a released shaft does not catch up",
         Shortfall::Start => {
-            "the start's error rate is more than brake or drive can follow: start on the path, or slower"
+            "the start's error rate, or a jump of the path's velocity, is more than brake or drive can follow: start \
+             on the path, or slower, or take a path without jumps"
         }
         Shortfall::Layer => {
             "the law saturates so far off its surface that the error rate there may exceed what brake or drive can \
@@ -125,7 +126,11 @@ fn text(scenario: &Scenario, plan: &Plan) -> String {
         &[
             ("sliding surface: slope f", number(c.slope), "1/s"),
             ("layer around it", number(c.layer), "rad/s"),
-            ("error stays below", deg(c.error_bound), "°"),
+            (
+                if c.certified() { "error stays below" } else { "error bound, were it certified" },
+                deg(c.error_bound),
+                "°",
+            ),
         ],
     );
     if let Some(p) = &plan.paper {
