@@ -67,9 +67,16 @@ fn the_detector_agrees_with_the_truth_within_the_stated_band() {
         for (law_name, law) in [("PD", pd), ("SMC", smc)] {
             for rate in [2.0, 6.0, 10.0, 20.0] {
                 let (precision, recall, seen, truth) = measure(&rig, law, rate);
-                println!(
-                    "{name:5} {law_name:3} {rate:4} °/s: precision {precision:.3} recall {recall:.3} cycles/s {seen:.2} of {truth:.2}"
+                let row = format!(
+                    "| {name} | {law_name} | {rate} | {precision:.2} | {recall:.2} | {seen:.1} | {truth:.1} |"
                 );
+                println!("{row}");
+                // The stated band: cycles per second within 4 and 20 % of the truth.
+                assert!((seen - truth).abs() <= 4.0 + 0.2 * truth, "{row}");
+                // Where sticks are common, most calls are right and most long sticks are called.
+                if truth >= 10.0 {
+                    assert!(precision >= 0.75 && recall >= 0.9, "{row}");
+                }
             }
         }
     }

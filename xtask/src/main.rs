@@ -34,7 +34,7 @@ enum Verb {
     Docs,
     /// Builds with the oldest Rust that the manifests name; installs it.
     Msrv,
-    /// Finds the rig `bench` anew (docs/bench-rig.md): about half an hour on two cores.
+    /// Finds the rig `bench` anew (docs/bench-rig.md): some minutes on two cores.
     Calibrate {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,

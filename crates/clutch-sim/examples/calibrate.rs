@@ -168,7 +168,7 @@ fn argument(name: &str, default: u64) -> u64 {
 }
 
 fn main() {
-    let (generations, seed) = (argument("--generations", 30), argument("--seed", 1));
+    let (generations, seed) = (argument("--generations", 8), argument("--seed", 1));
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut best = START;
     let mut best_score = score(&best);

@@ -428,14 +428,14 @@ fn claims(m: &Measured) -> Vec<Claim> {
             at_most(0.12),
             "worst of ten seeds at 100 and 20 °/s",
         ),
-        claim(
+        fitted(claim(
             "pd-error-exp",
             "PD, experiment: error under 0.12° from 20 °/s up",
             m.worst_error(Experiment, Pd, &[100.0, 20.0]),
             "°",
             at_most(0.12),
             "worst of ten seeds at 100 and 20 °/s",
-        ),
+        )),
         deviates(
             claim(
                 "pd-slow-sim",
@@ -536,14 +536,14 @@ fn claims(m: &Measured) -> Vec<Claim> {
             occurs,
             "mean of ten seeds",
         ),
-        claim(
+        fitted(claim(
             "ctc-slow-exp",
             "CTC, experiment: stick-slip at any rate below 20 °/s",
             m.least_cycles(Experiment, Ctc, &[15.0, 10.0, 6.0, 2.0]),
             "cycles/s",
             at_least(0.1),
             "least of 15, 10, 6, 2 °/s; mean of ten seeds; a cycle in ten seconds is enough for \"exhibits\"",
-        ),
+        )),
         claim(
             "ctc-error-exp",
             "CTC, experiment: error much higher than in simulation",

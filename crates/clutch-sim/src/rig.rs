@@ -160,13 +160,13 @@ impl RigParams {
     pub fn bench() -> Self {
         RigParams {
             friction: StribeckParams {
-                mu_static: 0.199,
-                mu_dynamic: 0.105,
-                stribeck_velocity: 0.00123,
+                mu_static: 0.203,
+                mu_dynamic: 0.104,
+                stribeck_velocity: 0.00144,
                 stribeck_exponent: 1.0,
             },
-            ripple: Some(RippleParams { rms: 0.17, lowest: 128, highest: 512, spacing: 32 }),
-            drive: DriveParams::Weight { mass: 0.2 * 1.054, gravity: GRAVITY, pulley_radius: 0.024 },
+            ripple: Some(RippleParams { rms: 0.15, lowest: 136, highest: 544, spacing: 34 }),
+            drive: DriveParams::Weight { mass: 0.2 * 1.047, gravity: GRAVITY, pulley_radius: 0.024 },
             delay_ticks: 1,
             ..RigParams::paper()
         }
