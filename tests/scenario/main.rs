@@ -1,6 +1,7 @@
 //! Scenario files: what they say, and what is said of bad ones.
 
 use clutch_sim::Scenario;
+use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::BUILT_IN;
 use proptest::prelude::*;
 
@@ -36,7 +37,7 @@ fn refuses(result: Result<Scenario, String>, begin: &str, words: &[&str]) {
 fn every_built_in_scenario_is_good_and_runs() {
     for b in BUILT_IN {
         let s = Scenario::built_in(b.name).unwrap().unwrap_or_else(|e| panic!("{e}"));
-        let run = s.run().unwrap_or_else(|e| panic!("{e}"));
+        let run = s.run(UNWATCHED).unwrap_or_else(|e| panic!("{e}"));
         assert!(run.metrics.max_error_rad.to_degrees() < 0.5, "{}: {:?}", b.name, run.metrics);
         // CTC saturates too far off its surface: docs/theory.md.
         assert_eq!(s.plan().unwrap().certificate.certified(), b.name != "ctc_2", "{}", b.name);
@@ -146,6 +147,13 @@ fn a_path_that_a_brake_cannot_follow_is_refused_where_it_cannot() {
     // 2.5 V brake the paper's shaft with 3 rad/s² = 182 °/s².
     let weak = "name = \"x\"\n[rig]\nbase = \"paper\"\n[law.pd]\n[reference.trapezoid]\ndistance_deg = 300.0\nspeed_deg_s = 300.0\nacceleration_deg_s2 = 500.0\n[output]\nhighest_v = 2.5\non_invalid_v = 2.5\n";
     refuses(parse(weak), "my.toml: reference.trapezoid: ", &["V of braking", "output.highest_v = 2.5"]);
+}
+
+#[test]
+fn a_run_that_does_not_fit_into_memory_is_refused() {
+    refuses(with("run.duration_s", "1e5"), "my.toml: run.duration_s = 100000: ", &["10 million"]);
+    refuses(with("run.duration_s", "1e300"), "my.toml: run.duration_s = ", &["10 million"]);
+    refuses(with("run.duration_s", "inf"), "my.toml: run.duration_s = inf: ", &["10 million"]);
 }
 
 #[test]
@@ -259,7 +267,7 @@ proptest! {
         let set = if key.starts_with("run.d") || key.starts_with("run.se") { &set[..1] } else { &set[..] };
         match Scenario::parse("my.toml", GOOD, set) {
             Ok(s) if s.ticks() < 10_000 => {
-                if let Err(e) = s.run() {
+                if let Err(e) = s.run(UNWATCHED) {
                     prop_assert!(e.to_string().starts_with("my.toml: "), "{e}");
                 }
             }
@@ -273,7 +281,7 @@ proptest! {
         let base = Scenario::parse("my.toml", GOOD, &[]).unwrap().spec().rig.inertia;
         let set = [(key.to_owned(), format!("{:?}", base * factor))];
         if let Ok(s) = Scenario::parse("my.toml", GOOD, &set) && s.ticks() < 10_000 {
-            let _ = s.run();
+            let _ = s.run(UNWATCHED);
         }
     }
 }

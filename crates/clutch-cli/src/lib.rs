@@ -13,8 +13,10 @@ mod table;
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
+use clutch_sim::progress::Report;
 use clutch_sim::scenario::BUILT_IN;
 use clutch_sim::{Scenario, ScenarioError};
+use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -120,6 +122,20 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Runs long work under a progress bar; the bar shows on a terminal only.
+fn with_progress<T>(unit: &str, work: impl FnOnce(Report<'_>) -> T) -> T {
+    let style = ProgressStyle::with_template(&format!(
+        "{{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{eta}} left"
+    ));
+    let bar = ProgressBar::no_length().with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let result = work(&|p| {
+        bar.set_length(p.total);
+        bar.inc(p.finished);
+    });
+    bar.finish_and_clear();
+    result
 }
 
 /// Prints to standard output. A reader that has gone away (`| head`) is not an error.

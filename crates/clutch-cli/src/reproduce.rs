@@ -3,11 +3,10 @@
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{ReportFigure, claims_table, html};
 use crate::table::number;
-use crate::{Outcome, json, print, write};
+use crate::{Outcome, json, print, with_progress, write};
 use anyhow::Context;
 use clap::Args;
 use clutch_sim::paper::{self, FigureData, SEEDS, Table3Row};
-use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
 /// Reproduces the paper: figures 8 to 10, Table 3, and every statement of its section 4.
@@ -26,16 +25,7 @@ impl Reproduce {
     pub(crate) fn run(self) -> anyhow::Result<Outcome> {
         let dir = &self.out;
         std::fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
-        // Shown on a terminal only; the library hides it elsewhere.
-        let bar = ProgressBar::no_length().with_style(
-            ProgressStyle::with_template("{wide_bar} {pos}/{len} runs, {eta} left")
-                .unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
-        let outcome = paper::reproduce(&|p| {
-            bar.set_length(p.total as u64);
-            bar.inc(p.finished as u64);
-        })?;
-        bar.finish_and_clear();
+        let outcome = with_progress("runs", paper::reproduce)?;
 
         let mut figures = Vec::new();
         for data in &outcome.figures {

@@ -6,8 +6,9 @@ use crate::{Outcome, ScenarioArgs, json, print};
 use anyhow::Context;
 use clap::Args;
 use clutch_sim::engine::EngineKind;
+use clutch_sim::metrics::Reaching;
 use clutch_sim::run::Detected;
-use clutch_sim::scenario::{Plan, ScalarKind};
+use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Metrics, Run, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -44,15 +45,6 @@ struct Summary<'a> {
     certified: bool,
 }
 
-/// When the sliding surface was reached.
-#[derive(Serialize)]
-struct Reaching {
-    /// Time until σ = f e + ė was first within the law's layer, s.
-    time_s: Option<f64>,
-    /// The bound (15) from the certificate, s.
-    bound_s: Option<f64>,
-}
-
 #[derive(Serialize)]
 struct Path {
     highest_velocity_rad_s: f64,
@@ -66,7 +58,7 @@ impl Sim {
     pub(crate) fn run(self) -> anyhow::Result<Outcome> {
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
-        let run = scenario.run()?;
+        let run = crate::with_progress("samples", |progress| scenario.run(progress))?;
         if let Some(file) = &self.csv {
             csv(&run, file)?;
         }
@@ -81,7 +73,7 @@ impl Sim {
             seed: scenario.spec().run.seed,
             metrics: run.metrics,
             detected: &run.detected,
-            reaching: reaching(&run, &plan),
+            reaching: Reaching::new(&run.trace, &plan.certificate),
             path: Path {
                 highest_velocity_rad_s: plan.envelope.velocity,
                 highest_acceleration_rad_s2: plan.envelope.acceleration,
@@ -93,20 +85,6 @@ impl Sim {
         };
         print(&if self.json { json(&summary)? } else { text(&summary, &run) })?;
         Ok(Outcome::Done)
-    }
-}
-
-fn reaching(run: &Run, plan: &Plan) -> Reaching {
-    let t = &run.trace;
-    let c = &plan.certificate;
-    let surface = |i: usize| c.slope * t.error[i] + t.target_velocity[i] - t.velocity[i];
-    // A law without a layer never is within it; a count's worth of velocity stands in.
-    let within = c.layer.max(1e-3);
-    let first = (0..t.time.len()).find(|i| surface(*i).abs() <= within);
-    let start = if t.time.is_empty() { 0.0 } else { surface(0) };
-    Reaching {
-        time_s: if c.slope > 0.0 { first.map(|i| t.time[i]) } else { None },
-        bound_s: c.reaching_time(start),
     }
 }
 

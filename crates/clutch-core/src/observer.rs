@@ -82,7 +82,7 @@ pub struct Estimate<T> {
 /// let observer = Observer::new(&ObserverParams::default(), &plant, Encoder::PAPER, Micros(1000))?;
 /// // 20 °/s under the brake that balances the weight.
 /// let (rate, volts) = (20.0_f64.to_radians(), plant.holding_voltage_sliding());
-/// let mut state = observer.start(FixedCounts::from_counts(0), 0.0, volts);
+/// let mut state = observer.start(FixedCounts::from_counts(0), 0.0);
 /// let mut velocity = 0.0;
 /// for tick in 1..500 {
 ///     let counts = (rate * 1e-3 * tick as f64 * 20_000.0 / core::f64::consts::TAU) as i64;
@@ -243,10 +243,9 @@ impl<T: Real> Observer<T> {
     }
 
     /// The state for a shaft at `position` that moves at `velocity`, rad/s, driven by the
-    /// plant's drive torque. The `volts` on the brake so far are already in the velocity.
+    /// plant's drive torque.
     #[must_use]
-    pub fn start(&self, position: FixedCounts, velocity: T, volts: T) -> ObserverState<T> {
-        let _ = volts;
+    pub fn start(&self, position: FixedCounts, velocity: T) -> ObserverState<T> {
         ObserverState {
             last: position,
             estimate: Estimate {
@@ -283,11 +282,8 @@ impl<T: Real> Observer<T> {
         let finite = estimate.position_offset.is_finite()
             && estimate.velocity.is_finite()
             && estimate.disturbance_torque.is_finite();
-        *state = if finite {
-            ObserverState { last: position, estimate }
-        } else {
-            self.start(position, T::ZERO, volts)
-        };
+        *state =
+            if finite { ObserverState { last: position, estimate } } else { self.start(position, T::ZERO) };
         state.estimate
     }
 }
@@ -402,7 +398,7 @@ mod tests {
             SmoothedDerivative::<f64>::new(&SmoothedDerivativeParams::default(), Encoder::PAPER, MS).unwrap();
         let (rate, ripple) = (rate.to_radians(), ripple.to_radians());
         let (volts, omega) = (balance(rate), core::f64::consts::TAU * hz);
-        let mut so = o.start(FixedCounts(0), rate, volts);
+        let mut so = o.start(FixedCounts(0), rate);
         let mut sf = DerivativeState::at(FixedCounts(0));
         let (mut by_observer, mut by_difference) = (0.0, 0.0);
         for k in 1..=202_000 {
@@ -469,7 +465,7 @@ mod tests {
             // Backwards, the brake would add to the weight: nothing but a hand at the pulley
             // keeps that rate, and the observer has to find its torque.
             let volts = balance(rate);
-            let mut state = o.start(FixedCounts(0), 0.0, volts);
+            let mut state = o.start(FixedCounts(0), 0.0);
             let (mut velocity, mut torque) = (0.0, 0.0);
             for k in 1..=2000 {
                 let e = o.update(&mut state, read(rate * f64::from(k) * 1e-3), volts);
@@ -491,7 +487,7 @@ mod tests {
         // than the model's.
         let (o, p) = (observer::<f64>(), *plant::<f64>().params());
         let (d, c, decay) = (1.3 * p.drive_torque, p.viscous_damping, p.viscous_damping / p.inertia);
-        let mut state = o.start(FixedCounts(0), 0.0, 0.0);
+        let mut state = o.start(FixedCounts(0), 0.0);
         let mut mean = 0.0;
         for k in 1..=1000 {
             let t = f64::from(k) * 1e-3;
@@ -508,7 +504,7 @@ mod tests {
     fn the_model_of_a_stuck_shaft_rests() {
         let o = observer::<f64>();
         let volts = 1.2 * plant::<f64>().holding_voltage_sliding();
-        let mut state = o.start(FixedCounts(0), 0.5, volts);
+        let mut state = o.start(FixedCounts(0), 0.5);
         for k in 0..400 {
             let e = o.update(&mut state, FixedCounts(0), volts);
             assert!(k < 200 || (e.velocity.abs() < 1e-9 && e.position_offset > 0.0), "tick {k}: {e:?}");
@@ -520,8 +516,8 @@ mod tests {
         let (single, double) = (observer::<f32>(), observer::<f64>());
         let far = FixedCounts::from_counts(20_000_000_000);
         let volts = balance(0.35);
-        let mut s32 = single.start(far, 0.0, volts as f32);
-        let mut s64 = double.start(far, 0.0, volts);
+        let mut s32 = single.start(far, 0.0);
+        let mut s64 = double.start(far, 0.0);
         for k in 0..5000 {
             let counts = read(0.35 * f64::from(k) * 1e-3 + 0.01 * libm::sin(f64::from(k) * 0.03)).plus(far);
             let a = single.update(&mut s32, counts, volts as f32);
@@ -536,7 +532,7 @@ mod tests {
         let o = observer::<T>();
         let rate = 0.35;
         let volts = T::from_f64(balance(rate));
-        let mut state = o.start(FixedCounts(0), T::from_f64(rate), volts);
+        let mut state = o.start(FixedCounts(0), T::from_f64(rate));
         for k in 1..2000 {
             let mut counts = read(rate * f64::from(k) * 1e-3);
             if k == 500 {
@@ -567,7 +563,7 @@ mod tests {
         };
         let p = ObserverParams::default();
         let o = Observer::new(&p, &Plant::new(&extreme).unwrap(), Encoder::PAPER, MS).unwrap();
-        let mut state = o.start(FixedCounts(0), 1.0, 0.0);
+        let mut state = o.start(FixedCounts(0), 1.0);
         for k in 0..3 {
             // 1e30 N m on 1e-20 kg m² for 1 ms is beyond f32.
             let e = o.update(&mut state, FixedCounts::from_counts(k), 0.0);
@@ -579,7 +575,7 @@ mod tests {
     fn a_voltage_that_presses_no_pad_brakes_nothing() {
         let o = observer::<f64>();
         let fall = |volts: f64| {
-            let mut state = o.start(FixedCounts(0), 0.5, volts);
+            let mut state = o.start(FixedCounts(0), 0.5);
             (1..50).map(|k| o.update(&mut state, FixedCounts::from_counts(k), volts)).last().unwrap()
         };
         assert_eq!(fall(-3.0), fall(0.0));
@@ -654,7 +650,7 @@ mod tests {
             };
             let walk = ObserverParams { disturbance_walk: f64::from_bits(walk) };
             if let Ok(o) = Plant::new(&p).and_then(|p| Observer::new(&walk, &p, Encoder::PAPER, MS)) {
-                let mut state = o.start(FixedCounts(0), 0.0, 0.0);
+                let mut state = o.start(FixedCounts(0), 0.0);
                 for k in 0..20 {
                     prop_assert!(!o.update(&mut state, FixedCounts::from_counts(k), 1.0).velocity.is_nan());
                 }
@@ -666,8 +662,8 @@ mod tests {
             samples in proptest::collection::vec((any::<i64>(), any::<u64>()), 1..60)
         ) {
             let (single, double) = (observer::<f32>(), observer::<f64>());
-            let mut s32 = single.start(FixedCounts(0), f32::NAN, 0.0);
-            let mut s64 = double.start(FixedCounts(0), f64::INFINITY, 0.0);
+            let mut s32 = single.start(FixedCounts(0), f32::NAN);
+            let mut s64 = double.start(FixedCounts(0), f64::INFINITY);
             let numbers = |e: Estimate<f64>| {
                 Vec::from([e.position_offset, e.velocity, e.disturbance_torque]).iter().all(|x| x.is_finite())
             };

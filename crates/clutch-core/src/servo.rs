@@ -181,7 +181,7 @@ impl<T: Real, C: Controller<T>> Servo<T, C> {
         ServoState {
             position,
             last: Counts::default(),
-            velocity: self.velocity.start(position, target, applied),
+            velocity: self.velocity.start(position, target),
             law: self.law.start(&tick, applied),
             applied,
         }

@@ -77,15 +77,14 @@ impl<T: Real> VelocitySource<T> {
         })
     }
 
-    /// On the path: the shaft moves at the target's velocity under a brake at `volts`.
+    /// On the path: the shaft moves at the target's velocity.
     #[must_use]
-    pub fn start(&self, position: FixedCounts, target: &Target<T>, volts: T) -> VelocityState<T> {
-        let _ = volts;
+    pub fn start(&self, position: FixedCounts, target: &Target<T>) -> VelocityState<T> {
         VelocityState {
             derivative: DerivativeState::at(FixedCounts(target.position.0.wrapping_sub(position.0))),
             #[cfg(feature = "linalg")]
             observer: match self {
-                VelocitySource::Observer(o) => o.start(position, target.velocity, volts),
+                VelocitySource::Observer(o) => o.start(position, target.velocity),
                 VelocitySource::SmoothedDerivative(_) => ObserverState::default(),
             },
         }

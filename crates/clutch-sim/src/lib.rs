@@ -4,6 +4,7 @@ pub mod drive;
 pub mod engine;
 pub mod metrics;
 pub mod paper;
+pub mod progress;
 pub mod rig;
 pub mod run;
 pub mod scenario;

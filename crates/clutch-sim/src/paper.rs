@@ -6,6 +6,7 @@
 //! which the first second does not count.
 
 use crate::metrics::Metrics;
+use crate::progress::{Progress, Report};
 use crate::rig::RigParams;
 use crate::run::{RunError, RunSpec, simulate};
 use clutch_core::law::{CtcParams, LawParams, PdParams, SmcParams};
@@ -264,14 +265,14 @@ pub fn reduction(smc_cycles: f64, pd_cycles: f64) -> f64 {
 ///
 /// # Errors
 /// None with the built-in rigs; an engine's if one were changed out of all proportion.
-pub fn reproduce(progress: &(dyn Fn(Progress) + Sync)) -> Result<Outcome, RunError> {
+pub fn reproduce(progress: Report<'_>) -> Result<Outcome, RunError> {
     let jobs: Vec<(Column, PaperLaw, f64, u64)> = RUNS
         .iter()
         .flat_map(|(column, law, rates)| {
             rates.iter().flat_map(move |r| SEEDS.iter().map(move |s| (*column, *law, *r, *s)))
         })
         .collect();
-    let total = jobs.len();
+    let total = jobs.len() as u64;
     progress(Progress { total, finished: 0 });
     let results: Vec<_> = jobs
         .par_iter()
@@ -312,15 +313,6 @@ pub fn reproduce(progress: &(dyn Fn(Progress) + Sync)) -> Result<Outcome, RunErr
         .collect();
     let table3 = TABLE3.iter().map(|(rate, paper)| table3_row(&measured, *rate, *paper)).collect();
     Ok(Outcome { figures, table3, claims: claims(&measured) })
-}
-
-/// How far [`reproduce`] is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
-    /// Runs in all.
-    pub total: usize,
-    /// Runs finished since the last report.
-    pub finished: usize,
 }
 
 fn table3_row(m: &Measured, rate: f64, paper: f64) -> Table3Row {

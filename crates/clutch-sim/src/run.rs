@@ -4,6 +4,7 @@ use crate::engine::{
     DormandPrince, Engine, EngineError, EngineKind, Event, EventKind, ExactFlow, Input, Motion, Shaft, Volts,
 };
 use crate::metrics::{Metrics, MetricsBuilder, MetricsSample};
+use crate::progress::{Progress, Report, UNWATCHED};
 use crate::rig::{Rig, RigParams};
 use clutch_core::law::{Controller, LawParams, OutputParams, Terms};
 use clutch_core::reference::{Reference, ReferenceParams};
@@ -57,6 +58,37 @@ impl Default for RunParams {
             seed: 1,
             engine: EngineKind::Auto,
         }
+    }
+}
+
+/// Samples that a run may have: it keeps each of them, about a hundred bytes.
+const LONGEST: u64 = 10_000_000;
+/// Samples between two reports of progress.
+const REPORT_EVERY: u64 = 65_536;
+
+impl RunParams {
+    /// The number of ticks.
+    #[must_use]
+    pub fn ticks(&self, period: Micros) -> u64 {
+        libm::rint(self.duration / period.seconds::<f64>()) as u64
+    }
+
+    /// Checks duration and settling time against the period.
+    ///
+    /// # Errors
+    /// `period` out of range; `duration` shorter than a period or longer than 10 million of
+    /// them; `settle` negative or not less than the duration.
+    pub fn check(&self, period: Micros) -> Result<(), ParamError> {
+        let shortest: f64 = period.period()?;
+        let bad = |field, value, expected| Err(ParamError { field, value, expected });
+        if !(self.duration >= shortest && self.duration.is_finite() && self.ticks(period) <= LONGEST) {
+            let expected = "at least one period and at most 10 million: a run keeps every sample, s";
+            return bad("duration", self.duration, expected);
+        }
+        if !(self.settle >= 0.0 && self.settle < self.duration) {
+            return bad("settle", self.settle, "at least 0 s and less than the duration");
+        }
+        Ok(())
     }
 }
 
@@ -191,8 +223,16 @@ pub struct Detected {
 /// # Errors
 /// A parameter out of range, an engine that cannot take the rig, a motion it cannot follow.
 pub fn simulate<T: Real>(spec: &RunSpec<'_>) -> Result<Run, RunError> {
+    simulate_watched::<T>(spec, UNWATCHED)
+}
+
+/// As [`simulate`], and tells of its progress, in samples.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_watched<T: Real>(spec: &RunSpec<'_>, progress: Report<'_>) -> Result<Run, RunError> {
     let servo = Servo::<T>::new(&spec.servo()?.cast()).map_err(to_f64)?;
-    simulate_servo(spec, &servo)
+    simulate_servo(spec, &servo, progress)
 }
 
 /// Runs a servo around any law; the specification's own law is not used.
@@ -202,6 +242,7 @@ pub fn simulate<T: Real>(spec: &RunSpec<'_>) -> Result<Run, RunError> {
 pub fn simulate_servo<T: Real, C: Controller<T>>(
     spec: &RunSpec<'_>,
     servo: &Servo<T, C>,
+    progress: Report<'_>,
 ) -> Result<Run, RunError> {
     let rig = Rig::new(&spec.rig, spec.run.seed)?;
     let constant = rig.drive.is_constant();
@@ -209,10 +250,10 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
     match (spec.run.engine, refused) {
         (EngineKind::ExactFlow, Some(needs)) => Err(RunError::Engine(needs)),
         (EngineKind::DormandPrince, _) | (EngineKind::Auto, Some(_)) => {
-            run(spec, servo, &rig, DormandPrince::default(), EngineKind::DormandPrince)
+            run(spec, servo, &rig, DormandPrince::default(), EngineKind::DormandPrince, progress)
         }
         (EngineKind::ExactFlow | EngineKind::Auto, None) => {
-            run(spec, servo, &rig, ExactFlow, EngineKind::ExactFlow)
+            run(spec, servo, &rig, ExactFlow, EngineKind::ExactFlow, progress)
         }
     }
 }
@@ -223,23 +264,12 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
     rig: &Rig,
     mut engine: E,
     kind: EngineKind,
+    progress: Report<'_>,
 ) -> Result<Run, RunError> {
-    let period: f64 = spec.period.period()?;
     let p = &spec.run;
-    if !(p.duration >= period && p.duration <= 1e6) {
-        return Err(
-            ParamError { field: "duration", value: p.duration, expected: "one period to 1e6 s" }.into()
-        );
-    }
-    if !(p.settle >= 0.0 && p.settle < p.duration) {
-        return Err(ParamError {
-            field: "settle",
-            value: p.settle,
-            expected: "at least 0 s and less than the duration",
-        }
-        .into());
-    }
-    let ticks = libm::rint(p.duration / period) as u64;
+    p.check(spec.period)?;
+    let period: f64 = spec.period.seconds();
+    let ticks = p.ticks(spec.period);
     // The path is planned in double precision and rounded to the law's scalar at each tick, so
     // that runs in both scalars follow one path.
     let start = match p.start_counts {
@@ -281,6 +311,9 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
     let mut before_settling = (0, 0);
     let mut detected = Detected::default();
     for k in 0..ticks {
+        if k % REPORT_EVERY == 0 {
+            progress(Progress { total: ticks, finished: REPORT_EVERY.min(ticks - k) });
+        }
         let time = k as f64 * period;
         let target = reference.at(k);
         let counts = counts_at(shaft.position);

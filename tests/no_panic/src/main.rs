@@ -226,7 +226,7 @@ fn velocity<T: Real>() {
     }
     let Some(plant) = made(Plant::new(&plant_params::<T>())) else { return };
     if let Some(v) = made(VelocitySource::new(&velocity_params(), &plant, encoder::<T>(), micros())) {
-        let mut state = opaque(v.start(fixed(), &target(), real()));
+        let mut state = opaque(v.start(fixed(), &target()));
         sink(v.update(&mut state, fixed(), &target(), real()));
         sink(state);
     }
@@ -239,7 +239,7 @@ fn observer<T: Real>() {
     sink(made(Observer::new(&p, &plant, encoder::<T>(), micros())));
     let gains = ObserverGains { position: real(), velocity: real(), disturbance: real() };
     if let Some(o) = made(Observer::with_gains(&gains, &plant, encoder::<T>(), micros())) {
-        let mut state = opaque(o.start(fixed(), real(), real()));
+        let mut state = opaque(o.start(fixed(), real()));
         sink(o.update(&mut state, fixed(), real()));
         sink((state, *o.gains()));
     }

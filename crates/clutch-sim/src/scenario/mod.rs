@@ -9,8 +9,9 @@ mod file;
 pub use error::ScenarioError;
 pub use file::ScalarKind;
 
+use crate::progress::Report;
 use crate::rig::{Rig, RigParams};
-use crate::run::{Run, RunError, RunSpec, Start, simulate};
+use crate::run::{Run, RunError, RunSpec, Start, simulate_watched};
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::law::{Law, LawParams};
 use clutch_core::reference::{Knot, Reference};
@@ -154,14 +155,7 @@ impl Scenario {
             let wide = ParamError { field: e.field, value: f64::from(e.value), expected: e.expected };
             at.at("", &wide)
         })?;
-        let run = spec.run;
-        let bad = |field, value, expected| Err(at.at("run", &ParamError { field, value, expected }));
-        if !(run.duration >= spec.period.seconds() && run.duration <= 1e6) {
-            return bad("duration", run.duration, "at least one period and at most 1e6 s");
-        }
-        if !(run.settle >= 0.0 && run.settle < run.duration) {
-            return bad("settle", run.settle, "at least 0 s and less than the duration");
-        }
+        spec.run.check(spec.period).map_err(|e| at.at("run", &e))?;
         self.path().map_err(|e| at.at("reference", &e))?;
         self.plan().map(|_| ())
     }
@@ -175,7 +169,7 @@ impl Scenario {
     /// The number of ticks in the run.
     #[must_use]
     pub fn ticks(&self) -> u64 {
-        libm::rint(self.spec.run.duration / self.spec.period.seconds::<f64>()) as u64
+        self.spec.run.ticks(self.spec.period)
     }
 
     fn path(&self) -> Result<Reference<'_, f64>, ParamError> {
@@ -238,15 +232,15 @@ impl Scenario {
         Ok(Plan { envelope, bounds, certificate, paper, demand })
     }
 
-    /// Runs it.
+    /// Runs it, telling of its progress in samples.
     ///
     /// # Errors
     /// An engine that the rig does not allow, or a motion that cannot be followed.
-    pub fn run(&self) -> Result<Run, ScenarioError> {
+    pub fn run(&self, progress: Report<'_>) -> Result<Run, ScenarioError> {
         let spec = self.spec();
         let run = match self.scalar {
-            ScalarKind::F32 => simulate::<f32>(&spec),
-            ScalarKind::F64 => simulate::<f64>(&spec),
+            ScalarKind::F32 => simulate_watched::<f32>(&spec, progress),
+            ScalarKind::F64 => simulate_watched::<f64>(&spec, progress),
         };
         run.map_err(|e| match e {
             RunError::Param(e) => self.locator.at("", &e),
