@@ -19,7 +19,6 @@ fn parse(text: &str) -> Result<Scenario, String> {
 }
 
 fn with(key: &str, value: &str) -> Result<Scenario, String> {
-    // The origin of an error names the override too; what follows is the same as from a file.
     Scenario::parse("my.toml", GOOD, &[(key.into(), value.into())]).map_err(|e| e.to_string())
 }
 
@@ -142,11 +141,35 @@ fn a_path_that_a_brake_cannot_follow_is_refused_where_it_cannot() {
     refuses(
         parse(steep),
         "my.toml: reference.trapezoid: ",
-        &["accelerates at 3000", "the weight grants", "°/s²"],
+        &["accelerates at 3000", "the drive grants", "°/s²"],
     );
     // 2.5 V brake the paper's shaft with 3 rad/s² = 182 °/s².
     let weak = "name = \"x\"\n[rig]\nbase = \"paper\"\n[law.pd]\n[reference.trapezoid]\ndistance_deg = 300.0\nspeed_deg_s = 300.0\nacceleration_deg_s2 = 500.0\n[output]\nhighest_v = 2.5\non_invalid_v = 2.5\n";
     refuses(parse(weak), "my.toml: reference.trapezoid: ", &["V of braking", "output.highest_v = 2.5"]);
+}
+
+#[test]
+fn output_limits_that_the_converter_does_not_reach_are_refused() {
+    refuses(with("rig.dac.highest_v", "2.0"), "my.toml: output.highest_v = 10: ", &["converter"]);
+    refuses(with("rig.dac.lowest_v", "1.0"), "my.toml: output.lowest_v = 0: ", &["converter"]);
+    let bench =
+        [("rig.base".to_owned(), "bench".to_owned()), ("rig.dac.highest_v".to_owned(), "-20.0".to_owned())];
+    let error = Scenario::parse("my.toml", GOOD, &bench).unwrap_err().to_string();
+    assert!(error.starts_with("my.toml: rig.dac.highest_v = -20: "), "{error}");
+}
+
+#[test]
+fn a_rig_outside_the_bounds_of_the_certificate_is_told() {
+    let outside = |key: &str, value: &str| {
+        let s = with(key, value).unwrap();
+        s.outside_bounds(&s.plan().unwrap().bounds).unwrap()
+    };
+    assert!(outside("rig.base", "paper").is_empty());
+    assert!(
+        outside("rig.drive.weight.mass_kg", "0.3").iter().any(|l| l.starts_with("driving torque is 0.07063"))
+    );
+    let bench = outside("rig.base", "bench");
+    assert!(bench.iter().any(|l| l.starts_with("dynamic friction")), "{bench:?}");
 }
 
 #[test]
@@ -261,27 +284,52 @@ proptest! {
     }
 
     #[test]
-    fn every_number_at_every_key_is_taken_or_refused_by_that_name(key in any_key(), value in any::<f64>()) {
-        // What is taken must run: a tenth of a second is enough to meet it.
-        let set = [(key.to_owned(), format!("{value:?}")), ("run.duration_s".into(), "0.1".into()), ("run.settle_s".into(), "0".into())];
-        let set = if key.starts_with("run.d") || key.starts_with("run.se") { &set[..1] } else { &set[..] };
-        match Scenario::parse("my.toml", GOOD, set) {
+    fn every_number_at_every_key_is_taken_or_refused_by_that_name(
+        key in any_key(), value in any::<f64>(), whole in any::<i64>(), integer in any::<bool>(),
+        base in prop::sample::select(vec!["paper", "bench"]),
+    ) {
+        let value = if integer { whole.to_string() } else { format!("{value:?}") };
+        let mut set = vec![("rig.base".to_owned(), base.to_owned()), (key.to_owned(), value)];
+        if !key.starts_with("run.") {
+            // What is taken must run: a tenth of a second is enough to meet it.
+            set.extend([("run.duration_s".into(), "0.1".into()), ("run.settle_s".into(), "0".into())]);
+        }
+        match Scenario::parse("my.toml", GOOD, &set) {
             Ok(s) if s.ticks() < 10_000 => {
                 if let Err(e) = s.run(UNWATCHED) {
                     prop_assert!(e.to_string().starts_with("my.toml: "), "{e}");
                 }
             }
             Ok(_) => {}
-            Err(e) => prop_assert!(e.to_string().starts_with("my.toml: "), "{e}"),
+            // The key itself, or one that it contradicts.
+            Err(e) => {
+                let partners = ["output.", "reference.ramp", "run.settle_s", "rig.dac.", "law: ", "velocity.", "bounds.", "model."];
+                let e = e.to_string();
+                let named = e.starts_with(&format!("my.toml: {key}"));
+                prop_assert!(named || partners.iter().any(|p| e.starts_with(&format!("my.toml: {p}"))), "{key}: {e}");
+            }
         }
     }
 
     #[test]
-    fn scaling_a_key_by_a_likely_slip_never_panics(key in any_key(), factor in prop::sample::select(vec![57.3, 1.0 / 57.3, 1000.0, 1e-3, 10.0, 0.1, -1.0])) {
-        let base = Scenario::parse("my.toml", GOOD, &[]).unwrap().spec().rig.inertia;
-        let set = [(key.to_owned(), format!("{:?}", base * factor))];
+    fn scaling_a_key_by_a_likely_slip_never_panics(
+        key in any_key(), factor in prop::sample::select(vec![57.3, 1.0 / 57.3, 1000.0, 1e-3, 10.0, 0.1, -1.0]),
+    ) {
+        // Values of the base rig and of Table 2, in the order of magnitude of the key.
+        let value = match key.rsplit('.').next().unwrap() {
+            "inertia_kg_m2" => 0.0017,
+            "kp_v" => 3.0,
+            "slope_1_s" => 70.0,
+            "boundary_rad_s" => 0.1,
+            "rate_deg_s" => 2.0,
+            "brake_gain_nm_v" => 0.14,
+            "drive_torque_nm" => 0.047,
+            "highest_v" => 10.0,
+            _ => 0.2,
+        };
+        let set = [(key.to_owned(), format!("{:?}", value * factor))];
         if let Ok(s) = Scenario::parse("my.toml", GOOD, &set) && s.ticks() < 10_000 {
-            let _ = s.run(UNWATCHED);
+            let _ = s.run(UNWATCHED); // an error is as good; a panic is not
         }
     }
 }

@@ -28,20 +28,32 @@ impl Certify {
     pub(crate) fn run(self) -> anyhow::Result<Outcome> {
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
-        print(&if self.json { json(&as_json(&scenario, &plan))? } else { text(&scenario, &plan) })?;
+        let outside = scenario.outside_bounds(&plan.bounds)?;
+        let shown = if self.json {
+            json(&as_json(&scenario, &plan, &outside))?
+        } else {
+            text(&scenario, &plan, &outside)
+        };
+        print(&shown)?;
         Ok(if plan.certificate.certified() { Outcome::Done } else { Outcome::NotCertified })
     }
 }
 
 fn reason(s: Shortfall) -> &'static str {
     match s {
-        Shortfall::Kp => "K_p is too small: the weakest brake does not stop the strongest drive",
+        Shortfall::Kp => {
+            "K_p is too small for the worst corner: the weakest brake against the strongest drive, at the path's \
+             acceleration and the reaching rate wanted"
+        }
         Shortfall::Kd => "K_d is too small: it does not pay for f |ė|",
         Shortfall::Voltage => "output.highest_v is too small for the brake to stop the strongest drive",
         Shortfall::Drive => "the drive is too weak for the path: a released shaft does not catch up",
         Shortfall::Start => {
-            "the start's error rate, or a jump of the path's velocity, is more than brake or drive can follow: start \
-             on the path, or slower, or take a path without jumps"
+            "the start's error rate is more than brake or drive can follow: start on the path, or slower"
+        }
+        Shortfall::Jump => {
+            "the path's velocity jumps on the way, which no brake follows at once: smooth it (a table: interpolation = \
+             \"cubic\")"
         }
         Shortfall::Layer => {
             "the law saturates so far off its surface that the error rate there may exceed what brake or drive can \
@@ -59,7 +71,6 @@ fn law_name(p: &LawParams) -> &'static str {
         LawParams::Ctc(_) => "CTC (11)",
         LawParams::Smc(_) => "SMC (31), with boundary layer",
         LawParams::SmcSign(_) => "SMC (29), with the sign function",
-        _ => "law",
     }
 }
 
@@ -68,7 +79,7 @@ fn range(i: &Interval) -> String {
     if i.low == i.high { number(i.low) } else { format!("{} … {}", number(i.low), number(i.high)) }
 }
 
-fn text(scenario: &Scenario, plan: &Plan) -> String {
+fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
     let (c, b, d) = (&plan.certificate, &plan.bounds, &plan.demand);
     let deg = |x: f64| number(x.to_degrees());
     let law = scenario.spec().law;
@@ -118,7 +129,7 @@ fn text(scenario: &Scenario, plan: &Plan) -> String {
         &[
             ("worst corner: torque", number(c.least_torque), "N m"),
             ("holds up to an error rate of", deg(c.error_rate_behind), "°/s"),
-            ("error rate at the start or a jump", deg(d.start_error_rate), "°/s"),
+            ("error rate at the start", deg(d.start_error_rate), "°/s"),
         ],
     );
     out += &quantities(
@@ -150,10 +161,16 @@ fn text(scenario: &Scenario, plan: &Plan) -> String {
         }
         Some(s) => format!("\nNOT certified: {}\n", reason(s)),
     };
+    if !outside.is_empty() {
+        out += "\nThe scenario's rig lies outside these bounds; the certificate does not speak of it:\n";
+        for line in outside {
+            out += &format!("  {line}\n");
+        }
+    }
     out
 }
 
-fn as_json(scenario: &Scenario, plan: &Plan) -> Value {
+fn as_json(scenario: &Scenario, plan: &Plan, outside: &[String]) -> Value {
     let (b, d) = (&plan.bounds, &plan.demand);
     let c: &Certificate = &plan.certificate;
     let pair = |i: &Interval| value!([i.low, i.high]);
@@ -165,12 +182,14 @@ fn as_json(scenario: &Scenario, plan: &Plan) -> Value {
         "law": law_name(&scenario.spec().law),
         "certified": c.certified(),
         "reason": c.shortfall.map(reason),
+        "rig_outside_bounds": outside,
         "bounds": bounds_json(b, &pair),
         "demand": {
             "velocity_rad_s": d.velocity,
             "acceleration_rad_s2": d.acceleration,
             "reach_rate_rad_s2": d.reach_rate,
             "start_error_rate_rad_s": d.start_error_rate,
+            "velocity_jump_rad_s": d.velocity_jump,
         },
         "ahead": {
             "torque_nm": c.worst_torque,

@@ -127,13 +127,33 @@ impl Figure {
     /// Another ending, as [`svg`](Self::svg) and [`png`](Self::png), or the file cannot be written; the
     /// file is named.
     pub fn save(&self, path: &Path) -> anyhow::Result<()> {
-        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        let bytes = match ending.as_deref() {
-            Some("svg") => self.svg()?.into_bytes(),
-            Some("png") => self.png()?,
-            _ => bail!("cannot draw {}: the name of a figure must end in .svg or .png", path.display()),
+        let bytes = match check_ending(path)? {
+            Ending::Svg => self.svg()?.into_bytes(),
+            Ending::Png => self.png()?,
         };
         std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+    }
+}
+
+/// How a figure is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// `.svg`
+    Svg,
+    /// `.png`
+    Png,
+}
+
+/// What the name of a figure's file asks for.
+///
+/// # Errors
+/// An ending other than `.svg` and `.png`; the file is named.
+pub fn check_ending(path: &Path) -> anyhow::Result<Ending> {
+    let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    match ending.as_deref() {
+        Some("svg") => Ok(Ending::Svg),
+        Some("png") => Ok(Ending::Png),
+        _ => bail!("cannot draw {}: the name of a figure must end in .svg or .png", path.display()),
     }
 }
 

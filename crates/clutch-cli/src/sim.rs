@@ -1,6 +1,6 @@
 //! `clutch sim`.
 
-use crate::plot::{Figure, Panel, Series};
+use crate::plot::{self, Figure, Panel, Series};
 use crate::table::{number, quantities};
 use crate::{Outcome, ScenarioArgs, json, print};
 use anyhow::Context;
@@ -43,6 +43,7 @@ struct Summary<'a> {
     reaching: Reaching,
     path: Path,
     certified: bool,
+    rig_outside_bounds: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -56,6 +57,19 @@ struct Path {
 
 impl Sim {
     pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+        if let Some(file) = &self.plot {
+            plot::check_ending(file)?; // before a long run, not after
+        }
+        let files = [Some(&self.scenario.scenario), self.csv.as_ref(), self.plot.as_ref()];
+        let files: Vec<&PathBuf> = files.into_iter().flatten().collect();
+        for (i, file) in files.iter().enumerate() {
+            if files[..i].iter().any(|other| same_file(other, file)) {
+                anyhow::bail!(
+                    "{}: named twice; scenario, --csv and --plot must be different files",
+                    file.display()
+                );
+            }
+        }
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let run = crate::with_progress("samples", |progress| scenario.run(progress))?;
@@ -79,13 +93,19 @@ impl Sim {
                 highest_acceleration_rad_s2: plan.envelope.acceleration,
                 highest_deceleration_rad_s2: plan.envelope.deceleration,
                 highest_voltage_v: plan.envelope.highest_voltage,
-                velocity_jump_rad_s: plan.envelope.velocity_jump,
+                velocity_jump_rad_s: plan.envelope.start_jump.max(plan.envelope.velocity_jump),
             },
             certified: plan.certificate.certified(),
+            rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
         };
         print(&if self.json { json(&summary)? } else { text(&summary, &run) })?;
         Ok(Outcome::Done)
     }
+}
+
+/// The same place, also by another way of writing it.
+fn same_file(a: &PathBuf, b: &PathBuf) -> bool {
+    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 fn text(s: &Summary<'_>, run: &Run) -> String {
@@ -126,13 +146,17 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
             rows.push(("    bound (15)", number(bound), "s"));
         }
     }
-    let certified = if s.certified { "certified" } else { "not certified: see `clutch certify`" };
-    rows.push(("gains", certified.to_owned(), ""));
+    let certified = match (s.certified, s.rig_outside_bounds.is_empty()) {
+        (true, true) => "certified",
+        (true, false) => "certified for the model, not for this rig: see `clutch certify`",
+        (false, _) => "not certified: see `clutch certify`",
+    };
     let jump = s.path.velocity_jump_rad_s;
     let mut text = quantities(&title, &rows);
+    text += &format!("gains: {certified}\n");
     if jump > 1e-9 {
         text += &format!(
-            "note: the path's velocity jumps by {} °/s more than the drive can follow at once; the shaft catches up\n",
+            "note: the path's velocity jumps by {} °/s, which no brake follows at once; the shaft catches up\n",
             deg(jump)
         );
     }

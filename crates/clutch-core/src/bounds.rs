@@ -46,7 +46,7 @@ pub struct Bounds<T = f64> {
     pub inertia: Interval<T>,
     /// `(M g R_p)_1 … (M g R_p)_2` (23b), N m.
     pub drive_torque: Interval<T>,
-    /// `0 … C_d1` (23c), N m s/rad.
+    /// Up to `C_d1` (23c), N m s/rad.
     pub viscous_damping: Interval<T>,
     /// `K_COF1 … K_COF2` (23h), N m/V.
     pub brake_gain: Interval<T>,

@@ -51,9 +51,10 @@ pub struct Demand<T = f64> {
     pub acceleration: T,
     /// `γ` in (15): reaching rate wanted, rad/s².
     pub reach_rate: T,
-    /// Largest jump of `ė`, rad/s: at the start (0 on the path, the path's velocity from rest) or
-    /// where the path's velocity jumps.
+    /// `|ė|` at the start, rad/s: 0 on the path, the path's velocity from rest.
     pub start_error_rate: T,
+    /// Largest jump of the path's velocity on the way, rad/s.
+    pub velocity_jump: T,
 }
 
 /// Why gains are not certified.
@@ -68,8 +69,10 @@ pub enum Shortfall {
     Voltage,
     /// The drive is too weak for the path: the released shaft does not catch up.
     Drive,
-    /// The start's error rate, or a jump of the path, is beyond what the two sides can follow.
+    /// The start's error rate is beyond what the two sides can follow.
     Start,
+    /// The path's velocity jumps on the way: (12) and (13) assume that it does not.
+    Jump,
     /// The layer is so thick that `|ė|` within it may exceed what the two sides can follow.
     Layer,
     /// `f` is below `C_max/J_min`: the viscous damping decides instead of the surface.
@@ -199,6 +202,7 @@ pub fn certify<T: Real>(
         ("acceleration", demand.acceleration, "a finite number of at least 0 rad/s²"),
         ("reach_rate", demand.reach_rate, "a finite number of at least 0 rad/s²"),
         ("start_error_rate", demand.start_error_rate, "a finite number of at least 0 rad/s"),
+        ("velocity_jump", demand.velocity_jump, "a finite number of at least 0 rad/s"),
     ] {
         require(field, value, value >= T::ZERO, expected)?;
     }
@@ -249,6 +253,8 @@ pub fn certify<T: Real>(
         Some(Shortfall::Drive)
     } else if slope * bounds.inertia.low < bounds.viscous_damping.high {
         Some(Shortfall::Slope)
+    } else if demand.velocity_jump > T::ZERO {
+        Some(Shortfall::Jump)
     } else if !follows(layer) {
         Some(Shortfall::Layer)
     } else if !follows(region) {
@@ -466,6 +472,14 @@ mod tests {
         let slow = SmcParams { slope: 0.5, ..SmcParams::default() };
         let c = certify(&law(LawParams::Smc(slow)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
         assert_eq!(c.shortfall, Some(Shortfall::Slope));
+    }
+
+    #[test]
+    fn a_path_whose_velocity_jumps_on_the_way_is_not_certified() {
+        let d = Demand { velocity_jump: 0.01, ..at_2_deg_s() };
+        let c =
+            certify(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d).unwrap();
+        assert_eq!(c.shortfall, Some(Shortfall::Jump));
     }
 
     #[test]

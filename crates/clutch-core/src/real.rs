@@ -1,7 +1,7 @@
 //! The scalar of the control path: `f32` on a board, `f64` on a host.
 //!
-//! Elementary functions come from [`libm`] on every target, also under std, and nothing here
-//! is fused into a multiply-add. So one input gives one output, bit for bit, on x86-64, ARM
+//! Elementary functions come from [`libm`] on every target, also under std (but for sine and
+//! cosine in `f32`, a short series of basic operations), and nothing here is fused into a multiply-add. So one input gives one output, bit for bit, on x86-64, ARM
 //! and RISC-V: the simulator runs the arithmetic of the board.
 
 use core::fmt::{Debug, Display};

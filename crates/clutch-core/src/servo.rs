@@ -8,7 +8,7 @@
 //! The same type runs in the simulator, in the loop on Linux and on a board. It owns no clock
 //! and no I/O; [`Daq`] is the environment it needs.
 
-use crate::error::cast;
+use crate::error::{cast, require};
 use crate::law::{Command, Controller, Law, LawParams, OutputParams, Tick};
 use crate::velocity::{VelocityParams, VelocitySource, VelocityState};
 use crate::{
@@ -69,6 +69,21 @@ impl<T: Real> ServoParams<T> {
     }
 }
 
+impl<T: Real> ServoParams<T> {
+    /// Whether the converter reaches the output's limits.
+    ///
+    /// # Errors
+    /// Field `lowest` or `highest` of the output.
+    pub fn check_output(&self) -> Result<(), ParamError<T>> {
+        let (out, dac) = (&self.output, &self.dac);
+        let expected = "a voltage that the converter reaches: not above the top of its range, V";
+        require("highest", out.highest, out.highest <= dac.highest, expected)?;
+        let expected = "a voltage that the converter reaches: not below the bottom of its range, V";
+        require("lowest", out.lowest, out.lowest >= dac.lowest, expected)?;
+        Ok(())
+    }
+}
+
 /// A checked servo; never changes in a tick.
 ///
 /// ```
@@ -119,8 +134,10 @@ impl<T: Real> Servo<T> {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// The first parameter out of range, by name.
+    /// The first parameter out of range, by name; also output limits (`lowest`, `highest`) beyond
+    /// the converter's range, at which it would clip unseen.
     pub fn new(p: &ServoParams<T>) -> Result<Self, ParamError<T>> {
+        p.check_output()?;
         Servo::with_law(p, Law::new(&p.law, &p.model, &p.output, p.period)?)
     }
 }

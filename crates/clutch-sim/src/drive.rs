@@ -160,17 +160,30 @@ impl Drive {
             Drive::Spring { stiffness, rest } => stiffness * (rest - position),
             Drive::Table(points) => {
                 let after = points.partition_point(|p| p.0 <= t);
-                if after == 0 {
-                    points[0].1
-                } else if after == points.len() {
-                    points[after - 1].1
-                } else {
-                    let ((t0, a), (t1, b)) = (points[after - 1], points[after]);
-                    a + (b - a) * (t - t0) / (t1 - t0)
+                match (after.checked_sub(1).and_then(|i| points.get(i)), points.get(after)) {
+                    (Some((t0, a)), Some((t1, b))) => a + (b - a) * (t - t0) / (t1 - t0),
+                    (Some((_, end)), None) | (None, Some((_, end))) => *end,
+                    (None, None) => 0.0,
                 }
             }
             Drive::Hand { mean, sines } => {
                 mean + sines.iter().map(|(a, w, phase)| a * libm::sin(w * t + phase)).sum::<f64>()
+            }
+        }
+    }
+
+    /// Lowest and highest torque that can come, N m: of a spring all, of a hand the mean ± 4 rms.
+    #[must_use]
+    pub fn range(&self) -> (f64, f64) {
+        match self {
+            Drive::Constant(torque) => (*torque, *torque),
+            Drive::Spring { .. } => (f64::NEG_INFINITY, f64::INFINITY),
+            Drive::Table(points) => points
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), (_, x)| (lo.min(*x), hi.max(*x))),
+            Drive::Hand { mean, sines } => {
+                let rms = libm::sqrt(sines.iter().map(|(a, _, _)| 0.5 * a * a).sum());
+                (mean - 4.0 * rms, mean + 4.0 * rms)
             }
         }
     }

@@ -44,16 +44,21 @@ impl Ripple {
             return bad("spacing", 0.0, "at least 1 wave per turn");
         }
         if p.lowest == 0 || !p.lowest.is_multiple_of(p.spacing) {
-            return bad("lowest", f64::from(p.lowest), "a multiple of the spacing, above 0 waves per turn");
+            return bad(
+                "lowest_waves_per_turn",
+                f64::from(p.lowest),
+                "a multiple of the spacing, above 0 waves per turn",
+            );
         }
         if p.highest < p.lowest
             || !p.highest.is_multiple_of(p.spacing)
             || (p.highest - p.lowest) / p.spacing >= 64
+            || p.highest / p.spacing > 1000
         {
             return bad(
-                "highest",
+                "highest_waves_per_turn",
                 f64::from(p.highest),
-                "a multiple of the spacing, not below the lowest and less than 64 spacings above it, waves per turn",
+                "a multiple of the spacing, not below the lowest, less than 64 spacings above it and at most 1000 spacings, waves per turn",
             );
         }
         let waves = (p.highest - p.lowest) / p.spacing + 1;
@@ -82,6 +87,12 @@ impl Ripple {
             wave = next(wave);
         }
         1.0 + self.amplitude * sum
+    }
+
+    /// Largest departure from 1 that the factor can have.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        self.amplitude * self.phases.len() as f64
     }
 }
 
@@ -247,7 +258,9 @@ impl Rig {
     pub fn sliding_voltage(&self, velocity: f64) -> f64 {
         let p = self.model.plant.params();
         let mu = self.model.plant.friction().magnitude(velocity);
-        ((p.drive_torque - p.viscous_damping * velocity) / (mu * p.brake_gain)).max(0.0)
+        let volts = (p.drive_torque - p.viscous_damping * velocity) / (mu * p.brake_gain);
+        // Without friction there is no such voltage.
+        if volts.is_finite() { volts.max(0.0).min(self.params.dac.highest) } else { 0.0 }
     }
 }
 
@@ -291,8 +304,8 @@ mod tests {
         for (bad, field) in [
             (RippleParams { rms: 0.4, ..good.clone() }, "rms"),
             (RippleParams { rms: f64::NAN, ..good.clone() }, "rms"),
-            (RippleParams { lowest: 170, ..good.clone() }, "lowest"),
-            (RippleParams { highest: 120, ..good.clone() }, "highest"),
+            (RippleParams { lowest: 170, ..good.clone() }, "lowest_waves_per_turn"),
+            (RippleParams { highest: 120, ..good.clone() }, "highest_waves_per_turn"),
             (RippleParams { spacing: 0, ..good }, "spacing"),
         ] {
             assert_eq!(Ripple::new(&bad, 1).unwrap_err().field, field);

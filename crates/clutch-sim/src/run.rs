@@ -85,8 +85,13 @@ impl RunParams {
             let expected = "at least one period and at most 10 million: a run keeps every sample, s";
             return bad("duration", self.duration, expected);
         }
-        if !(self.settle >= 0.0 && self.settle < self.duration) {
-            return bad("settle", self.settle, "at least 0 s and less than the duration");
+        if !(self.settle >= 0.0 && self.settle <= self.duration - shortest) {
+            return bad("settle", self.settle, "at least 0 s and at least a period less than the duration");
+        }
+        if let Some(counts) = self.start_counts
+            && (!counts.is_finite() || counts.abs() >= 1e9)
+        {
+            return bad("start_counts", counts, "a finite number below 1e9 counts");
         }
         Ok(())
     }
@@ -126,6 +131,19 @@ impl<'a> RunSpec<'a> {
             output: OutputParams::default(),
             reference,
             run: RunParams::default(),
+        }
+    }
+
+    /// The engine that runs on a rig: the exact flow where `auto` may take it.
+    ///
+    /// # Errors
+    /// The exact flow is asked for and cannot take the rig.
+    pub fn engine(&self, rig: &Rig) -> Result<EngineKind, RunError> {
+        let lags = self.rig.actuator_time_constant.is_some();
+        match (self.run.engine, ExactFlow::refuses(&rig.model, rig.drive.is_constant(), lags)) {
+            (EngineKind::ExactFlow, Some(needs)) => Err(RunError::Engine(needs)),
+            (EngineKind::DormandPrince, _) | (EngineKind::Auto, Some(_)) => Ok(EngineKind::DormandPrince),
+            (EngineKind::ExactFlow | EngineKind::Auto, None) => Ok(EngineKind::ExactFlow),
         }
     }
 
@@ -245,16 +263,22 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
     progress: Report<'_>,
 ) -> Result<Run, RunError> {
     let rig = Rig::new(&spec.rig, spec.run.seed)?;
-    let constant = rig.drive.is_constant();
-    let refused = ExactFlow::refuses(&rig.model, constant, spec.rig.actuator_time_constant.is_some());
-    match (spec.run.engine, refused) {
-        (EngineKind::ExactFlow, Some(needs)) => Err(RunError::Engine(needs)),
-        (EngineKind::DormandPrince, _) | (EngineKind::Auto, Some(_)) => {
+    if servo.period() != spec.period {
+        let value = f64::from(servo.period().0);
+        return Err(
+            ParamError { field: "period", value, expected: "a servo with the run's period, µs" }.into()
+        );
+    }
+    if servo.encoder() != rig.encoder {
+        let value = f64::from(servo.encoder().counts_per_rev());
+        let expected = "a servo with the rig's encoder, counts per revolution";
+        return Err(ParamError { field: "counts_per_rev", value, expected }.into());
+    }
+    match spec.engine(&rig)? {
+        EngineKind::DormandPrince | EngineKind::Auto => {
             run(spec, servo, &rig, DormandPrince::default(), EngineKind::DormandPrince, progress)
         }
-        (EngineKind::ExactFlow | EngineKind::Auto, None) => {
-            run(spec, servo, &rig, ExactFlow, EngineKind::ExactFlow, progress)
-        }
+        EngineKind::ExactFlow => run(spec, servo, &rig, ExactFlow, EngineKind::ExactFlow, progress),
     }
 }
 
@@ -273,15 +297,7 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
     // The path is planned in double precision and rounded to the law's scalar at each tick, so
     // that runs in both scalars follow one path.
     let start = match p.start_counts {
-        Some(counts) if counts.abs() < 1e9 => FixedCounts::from_real(counts),
-        Some(value) => {
-            return Err(ParamError {
-                field: "start_counts",
-                value,
-                expected: "a finite number below 1e9 counts",
-            }
-            .into());
-        }
+        Some(counts) => FixedCounts::from_real(counts),
         None => FixedCounts(Pcg64::seed_from_u64(p.seed ^ 0x0073_7461_7274).random_range(0..1 << 16)),
     };
     let reference = Reference::new(&spec.reference, start, rig.encoder, spec.period)?;
@@ -289,6 +305,15 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
     let per_radian: f64 = rig.encoder.counts_per_radian();
 
     let first = reference.at(0);
+    if i32::try_from(first.position.0 >> FixedCounts::FRACTION_BITS).is_err() {
+        let value = to_radians(first.position);
+        return Err(ParamError {
+            field: "points",
+            value,
+            expected: "a path that begins within ±2³¹ counts, rad",
+        }
+        .into());
+    }
     let velocity = if p.start == Start::OnPath { first.velocity } else { 0.0 };
     let mut shaft = Shaft::new(to_radians(first.position), velocity);
     let origin = shaft.position;

@@ -75,7 +75,6 @@ pub trait Controller<T> {
 /// Which law, and its gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[non_exhaustive]
 pub enum LawParams<T = f64> {
     /// Proportional–derivative (4).
     Pd(PdParams<T>),
@@ -113,7 +112,6 @@ impl<T: Real> LawParams<T> {
 /// # Ok::<(), clutch_core::ParamError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Law<T> {
     /// Proportional–derivative (4).
     Pd(Pd<T>),
@@ -125,7 +123,6 @@ pub enum Law<T> {
 
 /// The terms of whichever law ran.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum LawTerms<T> {
     /// Of (4).
     Pd(PdTerms<T>),

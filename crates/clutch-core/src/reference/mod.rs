@@ -12,7 +12,7 @@
 //! | trapezoid | continuous | jumps |
 //! | jerk-limited | continuous | continuous, jerk bounded |
 //! | minimum jerk | continuous | continuous (Flash and Hogan 1985) |
-//! | sine, chirp | continuous | continuous |
+//! | sine, chirp | continuous; may jump at the start | continuous; jumps at a chirp's end |
 //! | table, linear | jumps at knots | 0 |
 //! | table, cubic | continuous | jumps at knots; never overshoots (Fritsch and Butland 1984) |
 
@@ -106,7 +106,7 @@ impl<'a, T: Real> Reference<'a, T> {
         let kind = match p {
             ReferenceParams::Hold => Kind::Profile(Profile::ramp(T::ZERO, scale)),
             ReferenceParams::Ramp(rate) => {
-                Kind::Profile(Profile::ramp(within_a_turn_per_tick("rate", *rate, scale)?, scale))
+                Kind::Profile(Profile::ramp(representable_rate("rate", *rate, scale)?, scale))
             }
             ReferenceParams::Trapezoid(p) => Kind::Profile(Profile::trapezoid(p, scale)?),
             ReferenceParams::JerkLimited(p) => Kind::Profile(Profile::jerk_limited(p, scale)?),
@@ -169,11 +169,7 @@ fn advance(rate: i64, ticks: u64) -> FixedCounts {
 }
 
 /// A rate that 2⁻⁴⁰ counts per tick in 64 bits can hold.
-fn within_a_turn_per_tick<T: Real>(
-    field: &'static str,
-    rate: T,
-    scale: Scale<T>,
-) -> Result<T, ParamError<T>> {
+fn representable_rate<T: Real>(field: &'static str, rate: T, scale: Scale<T>) -> Result<T, ParamError<T>> {
     let counts_per_tick = (rate * scale.counts_per_radian * scale.period).abs();
     require(
         field,

@@ -1,6 +1,6 @@
 //! Paths made of polynomial pieces: ramp, trapezoid, jerk-limited, minimum jerk.
 
-use super::{Scale, Target, advance, within_a_turn_per_tick};
+use super::{Scale, Target, advance, representable_rate};
 use crate::error::require;
 use crate::{FixedCounts, ParamError, Real};
 
@@ -171,7 +171,7 @@ impl<T: Real> Profile<T> {
             "a time of at least one period and at most 1e6 s", // its fifth power must fit f32
         )?;
         // The steepest point of the polynomial is 15/8 of the mean rate.
-        within_a_turn_per_tick("duration", T::from_f64(1.875) * p.distance / d, scale)
+        representable_rate("duration", T::from_f64(1.875) * p.distance / d, scale)
             .map_err(|e| ParamError { value: d, ..e })?;
         let c3 = T::from_i32(10) * p.distance / (d * d * d);
         let c4 = T::from_i32(-15) * p.distance / (d * d * d * d);
@@ -294,7 +294,7 @@ fn require_distance<T: Real>(distance: T, scale: Scale<T>) -> Result<T, ParamErr
 
 fn require_speed<T: Real>(speed: T, scale: Scale<T>) -> Result<T, ParamError<T>> {
     require("speed", speed, speed > T::ZERO, "a finite number above 0 rad/s")?;
-    within_a_turn_per_tick("speed", speed, scale)
+    representable_rate("speed", speed, scale)
 }
 
 /// What a bound must be.

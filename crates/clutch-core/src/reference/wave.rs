@@ -1,6 +1,6 @@
 //! Sine and chirp on a ramp. The phase is an integer in 2⁻⁶⁴ turns, so it never drifts.
 
-use super::{Scale, Target, advance, within_a_turn_per_tick};
+use super::{Scale, Target, advance, representable_rate};
 use crate::error::require;
 use crate::{ParamError, Real, sin_cos_turns};
 
@@ -86,7 +86,7 @@ impl<T: Real> Wave<T> {
         last_tick: u64,
         scale: Scale<T>,
     ) -> Result<Self, ParamError<T>> {
-        within_a_turn_per_tick("rate", rate, scale)?;
+        representable_rate("rate", rate, scale)?;
         let counts = (amplitude * scale.counts_per_radian).abs();
         require(
             "amplitude",

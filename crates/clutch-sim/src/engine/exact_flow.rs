@@ -260,10 +260,11 @@ impl Engine for ExactFlow {
         shaft: &mut Shaft,
         events: &mut Vec<Event>,
     ) -> Result<(), EngineError> {
-        let volts = match input.volts {
-            Volts::Held(v) => v,
-            Volts::Lag { from, .. } => from, // refused when the run was set up
-        };
+        let lags = matches!(input.volts, Volts::Lag { .. });
+        if let Some(needs) = ExactFlow::refuses(model, input.drive.is_constant(), lags) {
+            return Err(EngineError::Refused(needs));
+        }
+        let volts = input.volts.at(0.0);
         let (p, torque) = (model.plant.params(), input.torque(0.0, shaft.position));
         let (brake, holds) = (p.brake_gain * volts.max(0.0), model.break_away_torque(0.0, volts));
         let mut s = 0.0;

@@ -194,6 +194,12 @@ pub enum EngineError {
         /// The limit.
         limit: u32,
     },
+    /// The engine cannot take the rig.
+    #[error("the exact flow needs {0}")]
+    Refused(
+        /// What it needs.
+        &'static str,
+    ),
     /// The state is no longer a number.
     #[error("the motion after t = {time} s left the range of numbers")]
     NotFinite {

@@ -199,7 +199,9 @@ fn plain(expected: &str) -> String {
         "u8" | "u32" | "u64" | "usize" => "a whole number of at least 0".into(),
         "a string" => "a text in quotes".into(),
         "a boolean" => "true or false".into(),
-        "string only" => "a table that names a choice, as [law.smc]".into(),
+        "string only" | "newtype variant" | "unit variant" => {
+            "a table that names a choice, as [law.smc]".into()
+        }
         e if e.starts_with("struct") => "a table".into(),
         e => e.into(),
     }

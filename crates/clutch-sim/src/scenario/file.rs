@@ -592,13 +592,14 @@ impl ReferenceFile {
         let bad = |value, expected| ParamError { field: "points", value, expected };
         t.points_s_deg
             .iter()
-            .map(|(time, angle)| {
+            .enumerate()
+            .map(|(i, (time, angle))| {
                 if !(*time >= 0.0 && *time < 1e12) {
-                    return Err(bad(*time, "times of at least 0 s"));
+                    return Err(bad(i as f64, "times of at least 0 s"));
                 }
                 let counts = angle.to_radians() * encoder.counts_per_radian::<f64>();
                 if !counts.is_finite() || counts.abs() >= 1e12 {
-                    return Err(bad(*angle, "finite angles below 1e12 counts, °"));
+                    return Err(bad(i as f64, "finite angles below 1e12 counts, °"));
                 }
                 let time_us = libm::rint(time * 1e6) as u64;
                 Ok(Knot { time_us, position: FixedCounts::from_real(counts) })

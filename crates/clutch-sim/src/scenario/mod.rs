@@ -10,13 +10,14 @@ pub use error::ScenarioError;
 pub use file::ScalarKind;
 
 use crate::progress::Report;
-use crate::rig::{Rig, RigParams};
+use crate::rig::{Rig, RigParams, Ripple};
 use crate::run::{Run, RunError, RunSpec, Start, simulate_watched};
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
-use clutch_core::law::{Law, LawParams};
+use clutch_core::law::{Law, LawParams, Output};
 use clutch_core::reference::{Knot, Reference};
 use clutch_core::{
-    Bounds, Envelope, FixedCounts, Micros, Obstacle, ParamError, Plant, Servo, Tolerances, check_path,
+    Bounds, Dac, Envelope, FixedCounts, Interval, Micros, Obstacle, ParamError, Plant, Real, Tolerances,
+    VelocitySource, check_path,
 };
 use error::Locator;
 use file::File;
@@ -146,18 +147,34 @@ impl Scenario {
     fn check_parts(&self) -> Result<(), ScenarioError> {
         let (spec, at) = (self.spec(), &self.locator);
         spec.period.period::<f64>().map_err(|e| at.at("sampling", &e))?;
-        clutch_core::law::Output::new(&spec.output, spec.period).map_err(|e| at.at("output", &e))?;
-        let law = Law::new(&spec.law, &spec.model, &spec.output, spec.period);
-        law.map_err(|e| at.at(if e.field.starts_with("mu_") { "model" } else { "law" }, &e))?;
-        let servo = spec.servo().map_err(|e| at.at("rig", &e))?;
-        Servo::<f64>::new(&servo).map_err(|e| at.at("velocity", &e))?;
-        Servo::<f32>::new(&servo.cast()).map_err(|e| {
-            let wide = ParamError { field: e.field, value: f64::from(e.value), expected: e.expected };
-            at.at("", &wide)
-        })?;
+        match self.scalar {
+            ScalarKind::F32 => self.check_servo::<f32>(&spec)?,
+            ScalarKind::F64 => self.check_servo::<f64>(&spec)?,
+        }
         spec.run.check(spec.period).map_err(|e| at.at("run", &e))?;
+        let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| at.at("rig", &e))?;
+        spec.engine(&rig).map_err(|e| at.message("run.engine", e.to_string()))?;
         self.path().map_err(|e| at.at("reference", &e))?;
         self.plan().map(|_| ())
+    }
+
+    /// The servo part by part, in the scalar that it runs in.
+    fn check_servo<T: Real>(&self, spec: &RunSpec<'_>) -> Result<(), ScenarioError> {
+        let at = |section: &'static str| {
+            move |e: ParamError<T>| {
+                let value = e.value.to_f64();
+                self.locator.at(section, &ParamError { field: e.field, value, expected: e.expected })
+            }
+        };
+        let servo = spec.servo().map_err(|e| self.locator.at("rig", &e))?.cast::<T>();
+        let model = Plant::new(&servo.model).map_err(at("model"))?;
+        Output::new(&servo.output, servo.period).map_err(at("output"))?;
+        servo.check_output().map_err(at("output"))?;
+        Law::new(&servo.law, &servo.model, &servo.output, servo.period)
+            .map_err(|e| at(if e.field.starts_with("mu_") { "model" } else { "law" })(e))?;
+        VelocitySource::new(&servo.velocity, &model, servo.encoder, servo.period).map_err(at("velocity"))?;
+        Dac::new(&servo.dac).map_err(at("rig"))?;
+        Ok(())
     }
 
     /// The specification of the run.
@@ -198,13 +215,17 @@ impl Scenario {
                         "{at_time}: it runs backwards at {:.4} °/s, and a brake drives nothing; keep the velocity at or above 0",
                         -asked.to_degrees()
                     ),
+                    Obstacle::Acceleration if available <= 0.0 => format!(
+                        "{at_time}: with output.lowest_v = {} the brake never lets go enough for the drive to keep the path; lower it",
+                        spec.output.lowest
+                    ),
                     Obstacle::Acceleration => format!(
-                        "{at_time}: it accelerates at {:.5} °/s², and the weight grants {:.5} °/s²; accelerate more slowly",
+                        "{at_time}: it accelerates at {:.5} °/s², and the drive grants {:.5} °/s²; accelerate more slowly",
                         asked.to_degrees(),
                         available.to_degrees()
                     ),
                     Obstacle::Voltage => format!(
-                        "{at_time}: it needs {asked:.4} V of braking, and output.highest_v = {available}; decelerate more slowly or raise the limit"
+                        "{at_time}: it needs {asked:.4} V of braking, and output.highest_v = {available}; decelerate more slowly, drive it with less torque, or raise the limit"
                     ),
                     Obstacle::NotFinite => format!("{at_time}: its velocity or acceleration is not a number"),
                 })
@@ -221,7 +242,8 @@ impl Scenario {
             velocity: envelope.velocity,
             acceleration: envelope.largest_acceleration(),
             reach_rate: self.reach_rate,
-            start_error_rate: (first - start_velocity).abs().max(envelope.velocity_jump),
+            start_error_rate: envelope.start_jump,
+            velocity_jump: envelope.velocity_jump,
         };
         let certificate = certify(&law, &bounds, &demand).map_err(param("bounds"))?;
         let paper = match &spec.law {
@@ -249,13 +271,40 @@ impl Scenario {
         })
     }
 
-    /// The plant as the rig really is, with its mean driving torque.
+    /// Where the rig lies outside the bounds that the certificate was asked for: a line each.
+    /// The certificate says nothing of such a rig.
     ///
     /// # Errors
     /// None for a checked scenario.
-    pub fn true_plant(&self) -> Result<Plant<f64>, ScenarioError> {
+    pub fn outside_bounds(&self, bounds: &Bounds) -> Result<Vec<String>, ScenarioError> {
         let rig = Rig::new(&self.spec.rig, self.spec.run.seed).map_err(|e| self.locator.at("rig", &e))?;
-        Ok(rig.model.plant)
+        let p = rig.model.plant.params();
+        let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+        let (low, high) = rig.drive.range();
+        let mut lines = Vec::new();
+        let mut check = |name: &str, low: f64, high: f64, bound: &Interval| {
+            // A hair's breadth for what °, % and products round.
+            let slack = 1e-9 * bound.high.abs();
+            if low < bound.low - slack || high > bound.high + slack {
+                let range = |a: f64, b: f64| {
+                    if b - a <= slack { format!("{a:.5}") } else { format!("{a:.5} … {b:.5}") }
+                };
+                lines.push(format!(
+                    "{name} is {}, bounds {}",
+                    range(low, high),
+                    range(bound.low, bound.high)
+                ));
+            }
+        };
+        let friction = |mu: f64| (mu * (1.0 - swing), mu * (1.0 + swing));
+        let (s, d) = (friction(p.friction.mu_static), friction(p.friction.mu_dynamic));
+        check("inertia", p.inertia, p.inertia, &bounds.inertia);
+        check("driving torque", low, high, &bounds.drive_torque);
+        check("viscous damping", p.viscous_damping, p.viscous_damping, &bounds.viscous_damping);
+        check("brake gain", p.brake_gain, p.brake_gain, &bounds.brake_gain);
+        check("static friction", s.0, s.1, &bounds.mu_static);
+        check("dynamic friction", d.0, d.1, &bounds.mu_dynamic);
+        Ok(lines)
     }
 }
 
