@@ -283,7 +283,8 @@ class Loop:
         plant, law, dac = self.plant, self.law, self.dac
         velocity = 0.0 if self.at_rest else target_velocity[0]
         state = (target[0], velocity, 0 if velocity == 0.0 else 1)
-        actual = plant.sliding_voltage(velocity)
+        # Held at rest: a quarter above the static limit, which is the sliding voltage at rest.
+        actual = (1.25 if self.at_rest else 1.0) * plant.sliding_voltage(velocity)
         waiting = deque([actual] * self.delay)
         rate, last = 0.0, None
         rows, events = [], []

@@ -109,6 +109,20 @@ fn without_the_encoders_steps_nothing_sticks_at_2_degrees_per_second() {
 }
 
 #[test]
+fn a_start_at_rest_is_held_until_the_first_voltage_arrives_wherever_the_disc_is_smooth() {
+    for seed in 1..=20 {
+        let mut spec =
+            ramp(RigParams { delay_ticks: 5, ..RigParams::bench() }, LawParams::Smc(SmcParams::default()));
+        spec.run.start = Start::Rest;
+        spec.run.seed = seed;
+        spec.run.duration = 1.5;
+        let run = simulate::<f64>(&spec).unwrap();
+        assert!(run.trace.stuck[..=5].iter().all(|s| *s), "seed {seed} slipped before the brake let go");
+        assert!(run.events.iter().all(|e| e.time >= 5e-3));
+    }
+}
+
+#[test]
 fn a_ramp_from_rest_is_caught_up_with() {
     let mut spec = ramp(RigParams::paper(), LawParams::Smc(SmcParams::default()));
     spec.run.start = Start::Rest;

@@ -167,3 +167,38 @@ fn reproduce_names_a_folder_that_it_cannot_make() {
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).contains("a_file/below: cannot be made"), "{}", err(&o));
 }
+
+#[test]
+fn the_errors_that_the_docs_show_are_the_errors_that_come() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/scenario.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let mut checked = 0;
+    for block in page.split("```text\n").skip(1) {
+        let block = block.split("```").next().unwrap();
+        for example in block.split("$ clutch ").skip(1) {
+            let (command, shown) = example.split_once('\n').unwrap();
+            let shown = shown.trim();
+            if !shown.starts_with("clutch: ") {
+                continue;
+            }
+            let line = format!("'{}' {command}", env!("CARGO_BIN_EXE_clutch"));
+            let o = Command::new("sh").args(["-c", &line]).current_dir(folder("docs")).output().unwrap();
+            assert_eq!(err(&o).trim(), shown, "$ clutch {command}");
+            checked += 1;
+        }
+    }
+    assert!(checked >= 10, "{checked}");
+}
+
+#[test]
+fn no_file_is_written_over_another_of_the_same_command() {
+    let file = folder("same").join("mine.toml");
+    let name = file.to_str().unwrap();
+    assert!(clutch(&["scenario", "new", name]).status.success());
+    let before = std::fs::read(&file).unwrap();
+    let o = clutch(&["sim", name, "--csv", name]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("named twice"), "{}", err(&o));
+    assert_eq!(std::fs::read(&file).unwrap(), before);
+    assert!(err(&clutch(&["sim", "smc_2", "--csv", "x.svg", "--plot", "x.svg"])).contains("named twice"));
+}

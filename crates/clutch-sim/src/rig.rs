@@ -252,6 +252,15 @@ impl Rig {
         })
     }
 
+    /// Voltage that holds the resting shaft wherever it is on the disc, V: a quarter more than the
+    /// static limit, within the converter's range.
+    #[must_use]
+    pub fn resting_voltage(&self) -> f64 {
+        let swing = self.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+        let volts = 1.25 * self.model.plant.holding_voltage_static() / (1.0 - swing);
+        if volts.is_finite() { volts.min(self.params.dac.highest) } else { 0.0 }
+    }
+
     /// Voltage that holds the sliding shaft at a velocity, V: friction and viscous drag carry
     /// the driving torque of the start.
     #[must_use]

@@ -25,7 +25,7 @@ pub enum Start {
     /// assume a path without jumps.
     #[default]
     OnPath,
-    /// Held at rest.
+    /// Held at rest, with a quarter more than the voltage that this takes.
     Rest,
 }
 
@@ -317,7 +317,8 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
     let velocity = if p.start == Start::OnPath { first.velocity } else { 0.0 };
     let mut shaft = Shaft::new(to_radians(first.position), velocity);
     let origin = shaft.position;
-    let mut volts = rig.sliding_voltage(velocity);
+    let mut volts =
+        if p.start == Start::Rest { rig.resting_voltage() } else { rig.sliding_voltage(velocity) };
     let counts_at = |position: f64| Counts(libm::floor(position * per_radian) as i64 as i32);
     let fine_at = |position: f64| FixedCounts::from_real(position * per_radian);
     let mut state = if spec.rig.encoder_quantised {

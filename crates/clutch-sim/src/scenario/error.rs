@@ -92,7 +92,10 @@ impl Locator {
 /// The key `stem` or `stem_<unit>` in a table or the tables below it.
 fn find<'a>(table: &'a Table, path: &str, stem: &str) -> Option<(String, &'a Value)> {
     let join = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
-    let is_stem = |key: &str| key == stem || key.strip_prefix(stem).is_some_and(|rest| rest.starts_with('_'));
+    let is_stem = |key: &str| {
+        let unit = key.strip_prefix(stem).and_then(|rest| rest.strip_prefix('_'));
+        key == stem || unit.is_some_and(|u| KEY_UNITS.contains(&u))
+    };
     if let Some((key, value)) = table.iter().find(|(key, value)| !value.is_table() && is_stem(key)) {
         return Some((join(key), value));
     }
@@ -244,42 +247,55 @@ fn lookup<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
     Some(value)
 }
 
-/// Units that keys end with, and their size in SI.
-const UNITS: [(&str, f64); 16] = [
-    ("deg_s2", core::f64::consts::PI / 180.0),
-    ("deg_s", core::f64::consts::PI / 180.0),
-    ("deg", core::f64::consts::PI / 180.0),
-    ("rad_s2", 1.0),
-    ("rad_s", 1.0),
-    ("rad", 1.0),
-    ("us", 1e-6),
-    ("ms", 1e-3),
-    ("s", 1.0),
-    ("mv", 1e-3),
-    ("v", 1.0),
-    ("mnm", 1e-3),
-    ("nm", 1.0),
-    ("hz", 1.0),
-    ("m", 1.0),
-    ("mm", 1e-3),
+/// Units with which keys of a scenario end.
+const KEY_UNITS: [&str; 30] = [
+    "kg_m2", "nm_s_rad", "nm_v", "nm", "s", "deg_s", "rad_s", "kg", "m_s2", "m", "m2", "nm_rad", "deg", "hz",
+    "v", "nm_a", "ohm", "v_rad", "v_s_rad", "1_s2", "1_s", "deg_s2", "deg_s3", "us", "percent", "nm_rt_s",
+    "s_nm", "s_deg", "rad_s2", "turns",
 ];
 
-/// Splits a key into stem and unit, the longest unit that fits.
-fn unit_of(key: &str) -> Option<(&str, f64)> {
-    let mut units: Vec<_> = UNITS.iter().collect();
-    units.sort_by_key(|(name, _)| std::cmp::Reverse(name.len()));
-    units.into_iter().find_map(|(name, size)| Some((key.strip_suffix(name)?.strip_suffix('_')?, *size)))
+const DEGREE: f64 = core::f64::consts::PI / 180.0;
+/// Units that are often mistaken for one another, the longer first: what they measure, and their
+/// size in SI.
+const UNITS: [(&str, &str, f64); 18] = [
+    ("deg_s3", "jerk", DEGREE),
+    ("rad_s3", "jerk", 1.0),
+    ("deg_s2", "acceleration", DEGREE),
+    ("rad_s2", "acceleration", 1.0),
+    ("deg_s", "velocity", DEGREE),
+    ("rad_s", "velocity", 1.0),
+    ("deg", "angle", DEGREE),
+    ("rad", "angle", 1.0),
+    ("us", "time", 1e-6),
+    ("ms", "time", 1e-3),
+    ("s", "time", 1.0),
+    ("mv", "voltage", 1e-3),
+    ("v", "voltage", 1.0),
+    ("mnm", "torque", 1e-3),
+    ("nm", "torque", 1.0),
+    ("hz", "frequency", 1.0),
+    ("mm", "length", 1e-3),
+    ("m", "length", 1.0),
+];
+
+/// Splits a key into stem, what its unit measures, and the unit's size.
+fn unit_of(key: &str) -> Option<(&str, &'static str, f64)> {
+    UNITS
+        .iter()
+        .find_map(|(name, kind, size)| Some((key.strip_suffix(name)?.strip_suffix('_')?, *kind, *size)))
 }
 
 /// What was probably meant: the same key in another unit, with the value in it, or the nearest
 /// name.
 fn correction(unknown: &str, value: Option<&Value>, known: &[&str]) -> String {
     let number = value.and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)));
-    if let Some((stem, size)) = unit_of(unknown) {
-        let same =
-            known.iter().find_map(|k| unit_of(k).filter(|(s, _)| *s == stem).map(|(_, size)| (k, size)));
+    if let Some((stem, kind, size)) = unit_of(unknown) {
+        let same = known.iter().find_map(|k| {
+            let (other, what, own) = unit_of(k)?;
+            (other == stem && what == kind).then_some((k, own))
+        });
         if let Some((key, own)) = same {
-            return match number {
+            return match number.filter(|x| x.is_finite()) {
                 Some(x) => format!(
                     ": the unit is wrong here; {unknown} = {x} would be {key} = {:.6}",
                     x * size / own
