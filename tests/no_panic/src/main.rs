@@ -354,8 +354,13 @@ fn certificate<T: Real>() {
     sink((Tolerances::<T>::default(), Demand::<T>::default()));
     let Some(b) = bounds::<T>() else { return };
     sink([b.weakest_brake(), b.strongest_brake()]);
-    let demand =
-        Demand { velocity: real::<T>(), acceleration: real(), reach_rate: real(), start_error_rate: real() };
+    let demand = Demand {
+        velocity: real::<T>(),
+        acceleration: real(),
+        reach_rate: real(),
+        start_error_rate: real(),
+        velocity_jump: real(),
+    };
     sink(paper_conditions(&b, &demand, real(), real()));
     let Some(law) = made(Law::new(&law_params(), &plant_params(), &output_params(), micros())) else {
         return;
@@ -425,6 +430,7 @@ fn turns<T: Real, C: Controller<T>>(servo: Option<Servo<T, C>>) {
     black_box(servo.law());
     let mut state = opaque(servo.start(Counts(word() as i32), &target(), real()));
     sink(servo.tick(&mut state, Counts(word() as i32), &target()));
+    sink(servo.start_at(fixed(), &target(), real()));
     sink(servo.tick_at(&mut state, fixed(), &target()));
     sink(servo.run(&mut state, &mut Board, &target()));
     sink(state);
