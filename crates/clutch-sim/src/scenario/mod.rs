@@ -215,7 +215,7 @@ impl Scenario {
                         "{at_time}: it runs backwards at {:.4} °/s, and a brake drives nothing; keep the velocity at or above 0",
                         -asked.to_degrees()
                     ),
-                    Obstacle::Acceleration if available <= 0.0 => format!(
+                    Obstacle::Acceleration if available <= 0.0 && spec.output.lowest > 0.0 => format!(
                         "{at_time}: with output.lowest_v = {} the brake never lets go enough for the drive to keep the path; lower it",
                         spec.output.lowest
                     ),
