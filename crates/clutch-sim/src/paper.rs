@@ -561,7 +561,7 @@ fn claims(m: &Measured) -> Vec<Claim> {
                 m.cycles(Experiment, Ctc, 15.0),
                 "cycles/s",
                 occurs,
-                "mean of ten seeds at 15 °/s. It sticks there on some discs and not on others, and less than once a second on the whole: more of it would take a rougher disc, on which PD leaves its 0.12°",
+                "mean of ten seeds at 15 °/s. It sticks there on some discs and not on others, and less than once a second on the whole: on the rougher disc that was tried it sticks more, and PD leaves its 0.12°",
             ),
             0.01,
             0.99,
