@@ -4,7 +4,11 @@
 //! says.
 
 mod certify;
+mod daq;
+mod log;
+mod loop_verb;
 pub mod plot;
+mod replay;
 pub mod report;
 mod reproduce;
 mod scenario;
@@ -27,12 +31,16 @@ use std::process::ExitCode;
 /// Simulates a shaft that a weight drives and a computer brakes, certifies the gains of its
 /// control law, and reproduces the paper that this is built on.
 ///
-/// Exit codes: 0 done; 1 an error, which is printed; 2 from `certify`: not certified; 64 the
-/// command line could not be understood.
+/// Drives a shaft over a serial line to a data-acquisition board, or to a simulated one; logs,
+/// and replays its logs.
+///
+/// Exit codes: 0 done; 1 an error, which is printed; 2 not certified; 3 from `loop`: ended by a
+/// fault, from `replay`: the outputs differ; 4 from `loop`: stopped by a signal; 64 the command
+/// line could not be understood.
 #[derive(Parser)]
 #[command(name = "clutch", version, max_term_width = 100)]
 #[command(
-    after_help = "Example:\n  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario"
+    after_help = "Example:\n  clutch loop                        # the loop on a simulated board\n  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario"
 )]
 struct Cli {
     #[command(subcommand)]
@@ -41,6 +49,10 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Verb {
+    Loop(loop_verb::Loop),
+    Daq(daq::Daq),
+    Replay(replay::Replay),
+    Log(log::Log),
     Sim(sim::Sim),
     Scenario(scenario::ScenarioVerb),
     Certify(certify::Certify),
@@ -95,6 +107,10 @@ enum Outcome {
     NotCertified,
     /// Exit code 1, though everything ran.
     Failed,
+    /// Exit code 3.
+    Fault,
+    /// Exit code 4.
+    Stopped,
 }
 
 /// Runs the command with its arguments, the program's name first.
@@ -108,6 +124,10 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let outcome = match cli.verb {
+        Verb::Loop(v) => v.run(),
+        Verb::Daq(v) => v.run(),
+        Verb::Replay(v) => v.run(),
+        Verb::Log(v) => v.run(),
         Verb::Sim(v) => v.run(),
         Verb::Scenario(v) => v.run(),
         Verb::Certify(v) => v.run(),
@@ -117,6 +137,8 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::NotCertified) => ExitCode::from(2),
         Ok(Outcome::Failed) => ExitCode::FAILURE,
+        Ok(Outcome::Fault) => ExitCode::from(3),
+        Ok(Outcome::Stopped) => ExitCode::from(4),
         Err(e) => {
             let _ = writeln!(std::io::stderr(), "clutch: {e:#}");
             ExitCode::FAILURE

@@ -5,6 +5,8 @@ use crate::table::{number, quantities};
 use crate::{Outcome, ScenarioArgs, json, print};
 use anyhow::Context;
 use clap::Args;
+use clutch_core::{Real, Servo};
+use clutch_loop::{records, replay, setup};
 use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::Reaching;
 use clutch_sim::run::Detected;
@@ -26,6 +28,9 @@ pub(crate) struct Sim {
     /// Writes every sample to a CSV file.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Writes every sample, command and the shaft's true motion to an MCAP log.
+    #[arg(long, value_name = "FILE.mcap")]
+    log: Option<PathBuf>,
     /// Draws error, velocity and voltage over time.
     #[arg(long, value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
@@ -60,12 +65,12 @@ impl Sim {
         if let Some(file) = &self.plot {
             plot::check_ending(file)?; // before a long run, not after
         }
-        let files = [Some(&self.scenario.scenario), self.csv.as_ref(), self.plot.as_ref()];
+        let files = [Some(&self.scenario.scenario), self.csv.as_ref(), self.plot.as_ref(), self.log.as_ref()];
         let files: Vec<&PathBuf> = files.into_iter().flatten().collect();
         for (i, file) in files.iter().enumerate() {
             if files[..i].iter().any(|other| same_file(other, file)) {
                 anyhow::bail!(
-                    "{}: named twice; scenario, --csv and --plot must be different files",
+                    "{}: named twice; scenario, --csv, --log and --plot must be different files",
                     file.display()
                 );
             }
@@ -75,6 +80,12 @@ impl Sim {
         let run = crate::with_progress("samples", |progress| scenario.run(progress))?;
         if let Some(file) = &self.csv {
             csv(&run, file)?;
+        }
+        if let Some(file) = &self.log {
+            match scenario.scalar {
+                ScalarKind::F32 => log::<f32>(&scenario, &run, file)?,
+                ScalarKind::F64 => log::<f64>(&scenario, &run, file)?,
+            }
         }
         if let Some(file) = &self.plot {
             figure(&scenario, &run).save(file)?;
@@ -161,6 +172,24 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         );
     }
     text
+}
+
+fn log<T: Real>(scenario: &Scenario, run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
+    let spec = scenario.spec();
+    let servo = Servo::<T>::new(&spec.servo()?.cast())
+        .map_err(|e| anyhow::anyhow!("{} = {}: {}", e.field, e.value.to_f64(), e.expected))?;
+    let mut header =
+        setup::header(scenario, &servo, clutch_log::Source::Simulation, "", env!("CARGO_PKG_VERSION"));
+    let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
+    header.extra.push((replay::START_VOLTAGE.to_owned(), bits));
+    let mut log = clutch_log::LogWriter::create(file, &header)?;
+    for tick in records::of_simulation(run, servo.dac(), spec.period) {
+        for record in &tick {
+            log.write(record)?;
+        }
+    }
+    log.finish()?;
+    Ok(())
 }
 
 fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {

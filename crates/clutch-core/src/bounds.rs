@@ -37,6 +37,8 @@ pub struct Tolerances<T = f64> {
     pub friction: T,
 }
 
+cast!(Interval { low, high });
+cast!(Bounds { } nested { inertia, drive_torque, viscous_damping, brake_gain, mu_static, mu_dynamic });
 cast!(Tolerances { inertia, drive_torque, viscous_damping, brake_gain, friction });
 
 /// The bounds (23) on the plant.

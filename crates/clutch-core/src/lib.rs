@@ -12,6 +12,7 @@
 //! | [`check_path`] | whether a brake can follow a path |
 //! | [`certificate`] | what gains guarantee over all plants within [`Bounds`] |
 //! | [`StickSlip`] | stick-slip seen from encoder counts |
+//! | [`supervisor`] | what may reach the law, and when control ends in the [`SafeState`] |
 //!
 //! No allocation, no `unsafe`, no reachable panic (a link test shows it), and the same bits on
 //! every target for one scalar type. Features: `linalg` (the observer, on nalgebra), `serde`.
@@ -45,8 +46,10 @@ mod observer;
 mod plant;
 mod real;
 pub mod reference;
+mod safe_state;
 mod servo;
 mod stick_slip;
+pub mod supervisor;
 mod velocity;
 
 pub use bounds::{Bounds, Interval, Tolerances};
@@ -60,6 +63,8 @@ pub use observer::{Estimate, Observer, ObserverGains, ObserverParams, ObserverSt
 pub use plant::{GRAVITY, Plant, PlantParams};
 pub use real::{Real, sin_cos_turns};
 pub use reference::Target;
+pub use safe_state::{SafeCodes, SafeKind, SafeRun, SafeState};
 pub use servo::{Daq, Servo, ServoOutput, ServoParams, ServoState};
 pub use stick_slip::{StickSlip, StickSlipParams, StickSlipState};
+pub use supervisor::{Supervisor, SupervisorParams, SupervisorState};
 pub use velocity::{VelocityParams, VelocitySource, VelocityState};

@@ -112,6 +112,8 @@ pub struct ServoState<T, S> {
     /// Unwrapped position.
     position: FixedCounts,
     last: Counts,
+    /// `θ_d − θ` of the last tick.
+    error: FixedCounts,
     velocity: VelocityState<T>,
     law: S,
     applied: T,
@@ -198,6 +200,7 @@ impl<T: Real, C: Controller<T>> Servo<T, C> {
         ServoState {
             position,
             last: Counts::default(),
+            error: FixedCounts(target.position.0.wrapping_sub(position.0)),
             velocity: self.velocity.start(position, target),
             law: self.law.start(&tick, applied),
             applied,
@@ -227,12 +230,35 @@ impl<T: Real, C: Controller<T>> Servo<T, C> {
         target: &Target<T>,
     ) -> ServoOutput<T, C::Terms> {
         state.position = position;
+        state.error = FixedCounts(target.position.0.wrapping_sub(position.0));
         let error_rate = self.velocity.update(&mut state.velocity, position, target, state.applied);
         let tick = self.measure(position, target, error_rate);
         let command = self.law.update(&mut state.law, &tick);
         let code = self.dac.code(command.voltage);
         state.applied = self.dac.volts(code);
         ServoOutput { code, voltage: state.applied, tick, command }
+    }
+
+    /// Catches up with a sample that the link lost: `step` of `steps` periods lie between the
+    /// last sample and the next, whose counts are `next`. The error is taken to have gone there
+    /// in a straight line, so that its rate (5) is the mean one and not `steps` times as large.
+    pub fn bridge(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        next: (Counts, &Target<T>),
+        target: &Target<T>,
+        (step, steps): (u32, u32),
+    ) {
+        // What the encoder said and what the brake got: neither is of this step's making.
+        let before = (state.position, state.last, state.applied);
+        let moved = FixedCounts::from_counts(i64::from(next.0.since(state.last)));
+        let end = next.1.position.0.wrapping_sub(state.position.plus(moved).0);
+        let left = i64::from(steps.saturating_sub(step).saturating_add(1).max(1));
+        // Each step closes its share of what is left.
+        let share = end.wrapping_sub(state.error.0).checked_div(left).unwrap_or(0);
+        let error = state.error.0.wrapping_add(share);
+        let _ = self.tick_at(state, FixedCounts(target.position.0.wrapping_sub(error)), target);
+        (state.position, state.last, state.applied) = before;
     }
 
     /// Reads the board, ticks, writes the board.
@@ -331,5 +357,114 @@ mod tests {
         let mut state = servo.start(Counts(i32::MAX), &target(start), 0.0);
         let out = servo.tick(&mut state, Counts(i32::MIN), &target(start + 1));
         assert_eq!(out.tick.error, 0.0);
+    }
+
+    /// A path of `rate` counts a period, and counts that lag it by `lag(tick)`.
+    fn followed<T: Real>(rate: i64, lag: impl Fn(i64) -> i64) -> impl Fn(i64) -> (Counts, Target<T>) {
+        let per_count: T = Encoder::PAPER.radians_per_count();
+        move |k| {
+            let position = FixedCounts::from_counts(rate * k);
+            let velocity = T::from_i64(1000 * rate) * per_count;
+            (Counts((rate * k - lag(k)) as i32), Target { position, velocity, acceleration: T::ZERO })
+        }
+    }
+
+    type LawState<T> = <Law<T> as Controller<T>>::State;
+
+    /// Ticks 0 to `before` one by one, then `lost` samples bridged, then one tick.
+    fn across<T: Real>(
+        servo: &Servo<T>,
+        run: &impl Fn(i64) -> (Counts, Target<T>),
+        before: i64,
+        lost: u32,
+    ) -> (ServoState<T, LawState<T>>, Tick<T>) {
+        let (counts, goal) = run(0);
+        let mut state = servo.start(counts, &goal, T::ZERO);
+        for k in 0..=before {
+            let (counts, goal) = run(k);
+            servo.tick(&mut state, counts, &goal);
+        }
+        let (next, goal) = run(before + i64::from(lost) + 1);
+        for step in 1..=lost {
+            let passed = run(before + i64::from(step)).1;
+            servo.bridge(&mut state, (next, &goal), &passed, (step, lost + 1));
+        }
+        let out = servo.tick(&mut state, next, &goal);
+        (state, out.tick)
+    }
+
+    fn a_straight_error_is_bridged_exactly<T: Real>() {
+        let servo = Servo::<T>::new(&ServoParams::paper(LawParams::Pd(PdParams::default()))).unwrap();
+        // The shaft loses four counts each period: whatever is lost, nothing is guessed wrong.
+        for rate in [-3, 0, 5] {
+            let run = followed::<T>(rate, |k| 4 * k);
+            for lost in 0..8 {
+                let bridged = across(&servo, &run, 20, lost);
+                let seen = across(&servo, &run, 20 + i64::from(lost), 0);
+                assert_eq!(bridged, seen, "{lost} samples lost at {rate} counts a period");
+            }
+        }
+    }
+
+    #[test]
+    fn lost_samples_of_an_error_that_goes_in_a_straight_line_leave_no_trace() {
+        a_straight_error_is_bridged_exactly::<f32>();
+        a_straight_error_is_bridged_exactly::<f64>();
+    }
+
+    #[test]
+    fn a_bridged_gap_gives_the_mean_error_rate_and_not_that_of_one_period() {
+        let p = ServoParams {
+            velocity: VelocityParams::SmoothedDerivative(crate::SmoothedDerivativeParams { smoothing: 1.0 }),
+            ..ServoParams::paper(LawParams::Pd(PdParams::default()))
+        };
+        let servo = Servo::<f64>::new(&p).unwrap();
+        // On the path up to tick 5, 12 counts behind at tick 9: three samples lost, four periods.
+        let run = followed(1, |k| if k > 5 { 12 } else { 0 });
+        let (_, tick) = across(&servo, &run, 5, 3);
+        let count = 0.018_f64.to_radians();
+        assert!((tick.error_rate - 3.0 * count / 1e-3).abs() < 1e-9, "{} rad/s", tick.error_rate);
+        assert!((tick.error - 12.0 * count).abs() < 1e-12);
+        // Without the bridge it would be the whole of it in one period.
+        let (counts, goal) = run(5);
+        let mut state = servo.start(counts, &goal, 0.0);
+        let (next, goal) = run(9);
+        let plain = servo.tick(&mut state, next, &goal).tick.error_rate;
+        assert!((plain - 12.0 * count / 1e-3).abs() < 1e-9, "{plain} rad/s");
+    }
+
+    #[test]
+    fn a_bridge_keeps_what_the_encoder_said_and_what_the_brake_got() {
+        let servo = servo();
+        let mut state = servo.start(Counts(7), &target(7), 3.0);
+        let before = state;
+        servo.bridge(&mut state, (Counts(i32::MIN), &target(900)), &target(400), (1, 2));
+        let kept = |s: &ServoState<f64, _>| (s.position, s.last, s.applied);
+        assert_eq!(kept(&state), kept(&before));
+        assert_ne!(state, before, "filter and law have gone on");
+    }
+
+    #[test]
+    fn a_gap_across_the_wrap_of_the_counter_is_bridged_like_any_other() {
+        let servo = servo();
+        let rates = [i64::from(i32::MAX) - 22, 1000].map(|origin| {
+            let run = |k: i64| (Counts((origin + k) as i32), target(origin + k + k % 3));
+            across(&servo, &run, 20, 3).1
+        });
+        assert_eq!(rates[0], rates[1]);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_step_of_a_bridge_is_too_odd_to_take(
+            last: i32, next: i32, at: i64, goal: i64, step: u32, steps: u32,
+        ) {
+            let servo = servo();
+            let to = |position| Target { position: FixedCounts(position), ..target(0) };
+            let mut state = servo.start(Counts(last), &to(at), 0.0);
+            servo.bridge(&mut state, (Counts(next), &to(goal)), &to(at), (step, steps));
+            let out = servo.tick(&mut state, Counts(next), &to(goal));
+            proptest::prop_assert!(out.command.voltage >= 0.0 && out.command.voltage <= 10.0);
+        }
     }
 }

@@ -3,6 +3,7 @@
 pub mod drive;
 pub mod engine;
 pub mod metrics;
+pub mod moving_rig;
 pub mod paper;
 pub mod progress;
 pub mod rig;
@@ -10,6 +11,7 @@ pub mod run;
 pub mod scenario;
 
 pub use metrics::Metrics;
+pub use moving_rig::MovingRig;
 pub use rig::RigParams;
 pub use run::{Run, RunError, RunParams, RunSpec, Start, simulate, simulate_servo};
 pub use scenario::{Scenario, ScenarioError};

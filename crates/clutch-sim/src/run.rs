@@ -1,21 +1,18 @@
 //! One run: rig, servo and path in closed loop.
 
-use crate::engine::{
-    DormandPrince, Engine, EngineError, EngineKind, Event, EventKind, ExactFlow, Input, Motion, Shaft, Volts,
-};
+use crate::engine::{EngineError, EngineKind, Event, EventKind, ExactFlow, Motion};
 use crate::metrics::{Metrics, MetricsBuilder, MetricsSample};
+use crate::moving_rig::MovingRig;
 use crate::progress::{Progress, Report, UNWATCHED};
 use crate::rig::{Rig, RigParams};
-use clutch_core::law::{Controller, LawParams, OutputParams, Terms};
+use clutch_core::law::{Controller, LawParams, Limit, OutputParams, Terms};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
-    Counts, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, StickSlip,
+    Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, StickSlip,
     StickSlipParams, StickSlipState, VelocityParams,
 };
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use std::collections::VecDeque;
 
 /// How the shaft begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -71,6 +68,15 @@ impl RunParams {
     #[must_use]
     pub fn ticks(&self, period: Micros) -> u64 {
         libm::rint(self.duration / period.seconds::<f64>()) as u64
+    }
+
+    /// Where shaft and path begin.
+    #[must_use]
+    pub fn start_position(&self) -> FixedCounts {
+        match self.start_counts {
+            Some(counts) => FixedCounts::from_real(counts),
+            None => FixedCounts(Pcg64::seed_from_u64(self.seed ^ 0x0073_7461_7274).random_range(0..1 << 16)),
+        }
     }
 
     /// Checks duration and settling time against the period.
@@ -185,8 +191,12 @@ pub struct Trace {
     pub time: Vec<f64>,
     /// `θ_d`, rad.
     pub target_position: Vec<f64>,
+    /// `θ_d`, 2⁻¹⁶ counts.
+    pub target_fixed: Vec<FixedCounts>,
     /// `θ̇_d`, rad/s.
     pub target_velocity: Vec<f64>,
+    /// `θ̈_d`, rad/s².
+    pub target_acceleration: Vec<f64>,
     /// `θ`, rad.
     pub position: Vec<f64>,
     /// `θ̇`, rad/s.
@@ -203,6 +213,12 @@ pub struct Trace {
     pub code: Vec<u16>,
     /// Voltage commanded, V.
     pub voltage: Vec<f64>,
+    /// Voltage that the law answered, before the converter, V.
+    pub demand: Vec<f64>,
+    /// Whether a limit of the output decided it.
+    pub limit: Vec<Limit>,
+    /// Voltage on the brake before the first tick, V.
+    pub start_voltage: f64,
     /// Whether the shaft was stuck at the sample.
     pub stuck: Vec<bool>,
     /// The law's terms: names and columns.
@@ -274,35 +290,16 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
         let expected = "a servo with the rig's encoder, counts per revolution";
         return Err(ParamError { field: "counts_per_rev", value, expected }.into());
     }
-    match spec.engine(&rig)? {
-        EngineKind::DormandPrince | EngineKind::Auto => {
-            run(spec, servo, &rig, DormandPrince::default(), EngineKind::DormandPrince, progress)
-        }
-        EngineKind::ExactFlow => run(spec, servo, &rig, ExactFlow, EngineKind::ExactFlow, progress),
-    }
-}
-
-fn run<T: Real, C: Controller<T>, E: Engine>(
-    spec: &RunSpec<'_>,
-    servo: &Servo<T, C>,
-    rig: &Rig,
-    mut engine: E,
-    kind: EngineKind,
-    progress: Report<'_>,
-) -> Result<Run, RunError> {
+    let kind = spec.engine(&rig)?;
     let p = &spec.run;
     p.check(spec.period)?;
     let period: f64 = spec.period.seconds();
     let ticks = p.ticks(spec.period);
     // The path is planned in double precision and rounded to the law's scalar at each tick, so
     // that runs in both scalars follow one path.
-    let start = match p.start_counts {
-        Some(counts) => FixedCounts::from_real(counts),
-        None => FixedCounts(Pcg64::seed_from_u64(p.seed ^ 0x0073_7461_7274).random_range(0..1 << 16)),
-    };
-    let reference = Reference::new(&spec.reference, start, rig.encoder, spec.period)?;
-    let to_radians = |p: FixedCounts| p.minus::<f64>(FixedCounts(0)) * rig.encoder.radians_per_count::<f64>();
-    let per_radian: f64 = rig.encoder.counts_per_radian();
+    let reference = Reference::new(&spec.reference, p.start_position(), rig.encoder, spec.period)?;
+    let encoder = rig.encoder;
+    let to_radians = |p: FixedCounts| p.minus::<f64>(FixedCounts(0)) * encoder.radians_per_count::<f64>();
 
     let first = reference.at(0);
     if i32::try_from(first.position.0 >> FixedCounts::FRACTION_BITS).is_err() {
@@ -315,24 +312,18 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
         .into());
     }
     let velocity = if p.start == Start::OnPath { first.velocity } else { 0.0 };
-    let mut shaft = Shaft::new(to_radians(first.position), velocity);
-    let origin = shaft.position;
-    let mut volts =
-        if p.start == Start::Rest { rig.resting_voltage() } else { rig.sliding_voltage(velocity) };
-    let counts_at = |position: f64| Counts(libm::floor(position * per_radian) as i64 as i32);
-    let fine_at = |position: f64| FixedCounts::from_real(position * per_radian);
+    let volts = if p.start == Start::Rest { rig.resting_voltage() } else { rig.sliding_voltage(velocity) };
+    let mut moving = MovingRig::new(rig, kind, p.seed, (to_radians(first.position), velocity), volts);
     let mut state = if spec.rig.encoder_quantised {
-        servo.start(counts_at(shaft.position), &first.cast(), T::from_f64(volts))
+        servo.start(moving.counts(), &first.cast(), T::from_f64(volts))
     } else {
-        servo.start_at(fine_at(shaft.position), &first.cast(), T::from_f64(volts))
+        servo.start_at(moving.fine_counts(), &first.cast(), T::from_f64(volts))
     };
-    let mut pending: VecDeque<f64> = std::iter::repeat_n(volts, spec.rig.delay_ticks as usize).collect();
-    let mut noise = Pcg64::seed_from_u64(p.seed ^ 0x006e_6f69_7365);
 
-    let mut trace = Trace::default();
+    let mut trace = Trace { start_voltage: volts, ..Trace::default() };
     let mut events = Vec::new();
     let mut figures = MetricsBuilder::new(period, p.settle);
-    let detector = StickSlip::<f64>::new(&StickSlipParams::default(), rig.encoder, spec.period)?;
+    let detector = StickSlip::<f64>::new(&StickSlipParams::default(), encoder, spec.period)?;
     let mut seen_by_encoder = StickSlipState::default();
     let mut before_settling = (0, 0);
     let mut detected = Detected::default();
@@ -342,20 +333,28 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
         }
         let time = k as f64 * period;
         let target = reference.at(k);
-        let counts = counts_at(shaft.position);
+        moving.set_time(time);
+        moving.begin_period();
+        let shaft = *moving.shaft();
+        let counts = moving.counts();
         let out = if spec.rig.encoder_quantised {
             servo.tick(&mut state, counts, &target.cast())
         } else {
-            servo.tick_at(&mut state, fine_at(shaft.position), &target.cast())
+            servo.tick_at(&mut state, moving.fine_counts(), &target.cast())
         };
-        let commanded =
-            if spec.rig.dac_quantised { rig.dac.volts(out.code) } else { out.command.voltage.to_f64() };
+        let commanded = if spec.rig.dac_quantised {
+            moving.rig().dac.volts(out.code)
+        } else {
+            out.command.voltage.to_f64()
+        };
         let target_position = to_radians(target.position);
         let error = target_position - shaft.position;
         figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage: commanded });
         trace.time.push(time);
         trace.target_position.push(target_position);
+        trace.target_fixed.push(target.position);
         trace.target_velocity.push(target.velocity);
+        trace.target_acceleration.push(target.acceleration);
         trace.position.push(shaft.position);
         trace.velocity.push(shaft.velocity);
         trace.error.push(error);
@@ -364,6 +363,8 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
         trace.error_rate.push(out.tick.error_rate.to_f64());
         trace.code.push(out.code.0);
         trace.voltage.push(commanded);
+        trace.demand.push(out.command.voltage.to_f64());
+        trace.limit.push(out.command.limit);
         trace.stuck.push(shaft.motion == Motion::Stuck);
         for (column, (name, value)) in trace.terms.iter_mut().zip(out.command.terms.columns()) {
             column.0 = name;
@@ -376,30 +377,12 @@ fn run<T: Real, C: Controller<T>, E: Engine>(
         if time < p.settle {
             before_settling = (seen_by_encoder.cycles(), seen_by_encoder.stuck_ticks());
         }
-        pending.push_back(commanded);
-        let arriving = pending.pop_front().unwrap_or(commanded);
-        let input = Input {
-            time,
-            duration: period,
-            origin,
-            volts: match spec.rig.actuator_time_constant {
-                None => Volts::Held(arriving),
-                Some(time_constant) => Volts::Lag { from: volts, to: arriving, time_constant },
-            },
-            drive: &rig.drive,
-            noise: if spec.rig.torque_noise > 0.0 {
-                let x: f64 = StandardNormal.sample(&mut noise);
-                spec.rig.torque_noise * x
-            } else {
-                0.0
-            },
-        };
-        let seen = events.len();
+        moving.command(commanded);
         let was_stuck = shaft.motion == Motion::Stuck;
-        engine.advance(&rig.model, &input, &mut shaft, &mut events)?;
-        volts = input.volts.at(period);
-        figures.stuck(time, stuck_time(was_stuck, time, period, &events[seen..]));
-        events[seen..].iter().for_each(|e| figures.event(e));
+        let seen = moving.advance(period)?;
+        figures.stuck(time, stuck_time(was_stuck, time, period, seen));
+        seen.iter().for_each(|e| figures.event(e));
+        events.extend_from_slice(seen);
     }
     let metrics = figures.finish();
     let measured = metrics.measured_s.max(period);

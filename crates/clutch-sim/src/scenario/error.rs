@@ -62,7 +62,11 @@ impl Locator {
 
     /// The error of a parameter somewhere in the table `section` ("" = the whole file).
     pub(super) fn at(&self, section: &str, e: &ParamError) -> ScenarioError {
-        let stem = if e.field == "knots" { "points" } else { e.field };
+        let stem = match e.field {
+            "knots" => "points",
+            "volts_per_s" => "rate",
+            field => field,
+        };
         let root = if section.is_empty() {
             Some(&self.table)
         } else {
@@ -76,6 +80,33 @@ impl Locator {
             None => (format!("{section}.{}", e.field), e.value.to_string()),
         };
         ScenarioError::value(&self.origin, &key, &value, e.expected)
+    }
+
+    /// The whole file with every default filled in: keys with their tables, and values.
+    pub(super) fn flattened(&self) -> Vec<(String, String)> {
+        fn walk(table: &Table, path: &str, out: &mut Vec<(String, String)>) {
+            for (key, value) in table {
+                let key = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                match value {
+                    Value::Table(t) => {
+                        if t.is_empty() {
+                            out.push((key, "{}".to_owned()));
+                        } else {
+                            walk(t, &key, out);
+                        }
+                    }
+                    value => out.push((key, shown(value))),
+                }
+            }
+        }
+        let mut out = Vec::new();
+        walk(&self.table, "", &mut out);
+        out
+    }
+
+    /// The whole file with every default filled in, as TOML.
+    pub(super) fn canonical(&self) -> String {
+        self.table.to_string()
     }
 
     pub(super) fn path(&self, message: String) -> ScenarioError {
@@ -212,7 +243,7 @@ fn plain(expected: &str) -> String {
 
 /// Exactly one table may stand where a file chooses between several.
 fn one_of_each_choice(origin: &str, table: &Table) -> Result<(), ScenarioError> {
-    for key in ["law", "velocity", "reference", "rig.drive"] {
+    for key in ["law", "velocity", "reference", "rig.drive", "safety.on_fault"] {
         match lookup(table, key) {
             Some(Value::Table(t)) if t.len() == 1 => {}
             Some(Value::Table(t)) => {
@@ -248,10 +279,10 @@ fn lookup<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
 }
 
 /// Units with which keys of a scenario end.
-const KEY_UNITS: [&str; 30] = [
+const KEY_UNITS: [&str; 32] = [
     "kg_m2", "nm_s_rad", "nm_v", "nm", "s", "deg_s", "rad_s", "kg", "m_s2", "m", "m2", "nm_rad", "deg", "hz",
     "v", "nm_a", "ohm", "v_rad", "v_s_rad", "1_s2", "1_s", "deg_s2", "deg_s3", "us", "percent", "nm_rt_s",
-    "s_nm", "s_deg", "rad_s2", "turns",
+    "s_nm", "s_deg", "rad_s2", "turns", "v_s", "counts",
 ];
 
 const DEGREE: f64 = core::f64::consts::PI / 180.0;

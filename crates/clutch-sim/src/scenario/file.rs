@@ -3,6 +3,7 @@
 //! Every key that has a unit carries it as a suffix. A unit in the file other than SI (°, %, µs)
 //! is turned into SI here and nowhere else.
 
+use super::Safety;
 use crate::drive::DriveParams;
 use crate::engine::EngineKind;
 use crate::rig::{RigParams, RippleParams};
@@ -12,8 +13,8 @@ use clutch_core::reference::{
     Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, ReferenceParams, Sine, Table, Trapezoid,
 };
 use clutch_core::{
-    BrakeGeometry, DacParams, Encoder, FixedCounts, ObserverParams, ParamError, PlantParams,
-    SmoothedDerivativeParams, StribeckParams, Tolerances, VelocityParams,
+    BrakeGeometry, DacParams, Encoder, FixedCounts, Micros, ObserverParams, ParamError, PlantParams,
+    SafeState, SmoothedDerivativeParams, StribeckParams, SupervisorParams, Tolerances, VelocityParams,
 };
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +49,9 @@ pub(super) struct File {
     pub(super) bounds: BoundsFile,
     #[serde(default)]
     pub(super) run: RunFile,
+    /// Only what drives a board needs it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) safety: Option<SafetyFile>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -681,6 +685,137 @@ impl BoundsFile {
             viscous_damping: self.viscous_damping_percent / 100.0,
             brake_gain: self.brake_gain_percent / 100.0,
             friction: self.friction_percent / 100.0,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct HoldStateFile {
+    volts_v: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RampStateFile {
+    rate_v_s: f64,
+    volts_v: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ReleaseStateFile {}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct HoldThenReleaseStateFile {
+    volts_v: f64,
+    after_s: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum SafeStateFile {
+    Hold(HoldStateFile),
+    Ramp(RampStateFile),
+    Release(ReleaseStateFile),
+    HoldThenRelease(HoldThenReleaseStateFile),
+}
+
+impl SafeStateFile {
+    fn params(&self) -> SafeState {
+        match self {
+            SafeStateFile::Hold(p) => SafeState::Hold { volts: p.volts_v },
+            SafeStateFile::Ramp(p) => SafeState::Ramp { volts_per_s: p.rate_v_s, volts: p.volts_v },
+            SafeStateFile::Release(_) => SafeState::Release,
+            SafeStateFile::HoldThenRelease(p) => {
+                SafeState::HoldThenRelease { volts: p.volts_v, after: p.after_s }
+            }
+        }
+    }
+}
+
+/// What the supervisor watches, and how long the board waits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct LimitsFile {
+    jump_deg: f64,
+    jumps: u32,
+    good_samples: u32,
+    following_error_deg: f64,
+    following_time_s: f64,
+    saturation_time_s: f64,
+    stand_still_counts: f64,
+    friction_margin: f64,
+    lost: u32,
+    late: u32,
+    disorder: u32,
+    silence_cycles: u32,
+    watchdog_cycles: u32,
+    valid_cycles: u32,
+    deadline_us: u32,
+    overruns: u32,
+}
+
+impl Default for LimitsFile {
+    fn default() -> Self {
+        let p = SupervisorParams::<f64>::new(SafeState::Release);
+        let degrees = |x: f64| (x.to_degrees() * 1e9).round() / 1e9;
+        LimitsFile {
+            jump_deg: degrees(p.jump),
+            jumps: p.jumps,
+            good_samples: p.good_samples,
+            following_error_deg: degrees(p.following_error),
+            following_time_s: p.following_time,
+            saturation_time_s: p.saturation_time,
+            stand_still_counts: p.stand_still,
+            friction_margin: p.friction_margin,
+            lost: p.lost,
+            late: p.late,
+            disorder: p.disorder,
+            silence_cycles: p.silence_cycles,
+            watchdog_cycles: 3,
+            valid_cycles: 2,
+            deadline_us: p.deadline.0,
+            overruns: p.overruns,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SafetyFile {
+    pub(super) reason: String,
+    on_fault: SafeStateFile,
+    #[serde(default)]
+    limits: LimitsFile,
+}
+
+impl SafetyFile {
+    pub(super) fn safety(&self, speed_limit: f64) -> Safety {
+        let l = &self.limits;
+        Safety {
+            reason: self.reason.clone(),
+            watchdog_cycles: l.watchdog_cycles,
+            valid_cycles: l.valid_cycles,
+            supervisor: SupervisorParams {
+                on_fault: self.on_fault.params(),
+                speed_limit,
+                jump: l.jump_deg.to_radians(),
+                jumps: l.jumps,
+                good_samples: l.good_samples,
+                following_error: l.following_error_deg.to_radians(),
+                following_time: l.following_time_s,
+                saturation_time: l.saturation_time_s,
+                stand_still: l.stand_still_counts,
+                friction_margin: l.friction_margin,
+                lost: l.lost,
+                late: l.late,
+                disorder: l.disorder,
+                silence_cycles: l.silence_cycles,
+                deadline: Micros(l.deadline_us),
+                overruns: l.overruns,
+            },
         }
     }
 }

@@ -16,8 +16,8 @@ use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, pa
 use clutch_core::law::{Law, LawParams, Output};
 use clutch_core::reference::{Knot, Reference};
 use clutch_core::{
-    Bounds, Dac, Envelope, FixedCounts, Interval, Micros, Obstacle, ParamError, Plant, Real, Tolerances,
-    VelocitySource, check_path,
+    Bounds, Dac, Envelope, FixedCounts, Interval, Micros, Obstacle, ParamError, Plant, Real, Supervisor,
+    SupervisorParams, Tolerances, VelocitySource, check_path,
 };
 use error::Locator;
 use file::File;
@@ -51,7 +51,22 @@ built_in!(
     "minimum_jerk",
     "hand_guided",
     "f32_smc_2",
+    "board_smc_2",
+    "board_minimum_jerk",
 );
+
+/// How a run on a board ends, and what ends it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Safety {
+    /// Why this safe state is the right one for this rig, in the operator's words.
+    pub reason: String,
+    /// Limits and safe state.
+    pub supervisor: SupervisorParams,
+    /// Periods without a valid code after which the board goes to the safe state by itself.
+    pub watchdog_cycles: u32,
+    /// Periods after its sample during which a code is valid.
+    pub valid_cycles: u32,
+}
 
 /// A checked scenario.
 #[derive(Clone, Debug)]
@@ -65,6 +80,7 @@ pub struct Scenario {
     knots: Vec<Knot>,
     tolerances: Tolerances,
     reach_rate: f64,
+    safety: Option<Safety>,
     locator: Locator,
 }
 
@@ -137,6 +153,7 @@ impl Scenario {
             knots,
             tolerances,
             reach_rate: file.bounds.reach_rate_rad_s2,
+            safety: file.safety.as_ref().map(|s| s.safety(checked.params.speed_limit)),
             locator,
         };
         scenario.check_parts()?;
@@ -155,7 +172,36 @@ impl Scenario {
         let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| at.at("rig", &e))?;
         spec.engine(&rig).map_err(|e| at.message("run.engine", e.to_string()))?;
         self.path().map_err(|e| at.at("reference", &e))?;
-        self.plan().map(|_| ())
+        let plan = self.plan()?;
+        self.safety.as_ref().map_or(Ok(()), |s| self.check_safety(s, &plan))
+    }
+
+    fn check_safety(&self, safety: &Safety, plan: &Plan) -> Result<(), ScenarioError> {
+        let (spec, at) = (self.spec(), &self.locator);
+        let wrong = |e: ParamError| at.at("safety", &e);
+        if safety.reason.trim().is_empty() {
+            let message =
+                "expected why this safe state is right for this rig, as \"a weight drives the shaft\"";
+            return Err(at.message("safety.reason", message.to_owned()));
+        }
+        let servo = spec.servo().map_err(|e| at.at("rig", &e))?;
+        Supervisor::new(&safety.supervisor, &servo, &plan.bounds).map_err(wrong)?;
+        let cycles = |field, n: u32, low: u32, expected| {
+            let bad = ParamError { field, value: f64::from(n), expected };
+            if (low..=1000).contains(&n) { Ok(()) } else { Err(wrong(bad)) }
+        };
+        cycles("watchdog_cycles", safety.watchdog_cycles, 2, "2 to 1000 periods")?;
+        cycles("valid_cycles", safety.valid_cycles, 1, "1 to 1000 periods")?;
+        // A brake that is to hold must hold the strongest drive with the weakest brake.
+        let b = &plan.bounds;
+        let needed = b.drive_torque.high / b.weakest_brake();
+        match safety.supervisor.on_fault.holding_voltage() {
+            Some(volts) if volts < needed => Err(at.at(
+                "safety",
+                &ParamError { field: "volts", value: volts, expected: "a voltage that stops the strongest drive with the weakest brake of [bounds] (`clutch certify` prints it as the voltage of a path at rest); twice as much is usual" },
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// The servo part by part, in the scalar that it runs in.
@@ -175,6 +221,34 @@ impl Scenario {
         VelocitySource::new(&servo.velocity, &model, servo.encoder, servo.period).map_err(at("velocity"))?;
         Dac::new(&servo.dac).map_err(at("rig"))?;
         Ok(())
+    }
+
+    /// How a run on a board ends.
+    ///
+    /// # Errors
+    /// The scenario has no table `[safety]`.
+    pub fn safety(&self) -> Result<&Safety, ScenarioError> {
+        self.safety.as_ref().ok_or_else(|| {
+            self.locator.message(
+                "safety",
+                "missing; a run on a board needs a safe state, and there is no default. For a shaft that a weight or a spring drives:\n\n\
+                 [safety]\nreason = \"a weight drives the shaft\"\n\n[safety.on_fault.hold]\nvolts_v = 4.5\n\n\
+                 docs/safety.md says how to choose"
+                    .to_owned(),
+            )
+        })
+    }
+
+    /// Every key with its tables, and its value, defaults filled in.
+    #[must_use]
+    pub fn parameters(&self) -> Vec<(String, String)> {
+        self.locator.flattened()
+    }
+
+    /// The scenario as TOML with every default filled in; parsing it gives the same scenario.
+    #[must_use]
+    pub fn canonical(&self) -> String {
+        self.locator.canonical()
     }
 
     /// The specification of the run.

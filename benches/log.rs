@@ -1,0 +1,188 @@
+//! The log: what a record costs the log thread, against the mcap crate as it comes, and what it
+//! costs the loop to hand a record over.
+//!
+//! Each iteration writes a whole run of 10 000 ticks, sample and command, to a file and finishes
+//! it; `elements` are records. `LogWriter` closes a chunk each 100 ms of log time (100 ticks), so
+//! it compresses worse and asks the system more often than the others; that is in its figures.
+#![allow(missing_docs, reason = "criterion's macros make public items")]
+
+use clutch_log::{CHANNELS, CommandRecord, Header, LogWriter, Record, SampleRecord, encode};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::hint::black_box;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+const TICKS: u64 = 10_000;
+
+/// What a run logs: counts that step, a path, and terms whose last bits look like noise.
+fn records() -> Vec<Record> {
+    (0..TICKS)
+        .flat_map(|tick| {
+            let (time_ns, t) = (tick * 1_000_000, tick as f64 * 1e-3);
+            let error = 1e-3 * (6.0 * t).sin() + 1e-5 * (977.0 * t).sin();
+            let rate = 6e-3 * (6.0 * t).cos() + 1e-2 * (977.0 * t).cos();
+            let demand = 4.0 + 300.0 * error + 2.0 * rate;
+            let sample = SampleRecord {
+                tick,
+                time_ns,
+                sequence: tick as u16,
+                board_time_us: (tick * 1000 + tick % 3) as u32,
+                counts: (tick / 9) as i32,
+                age_us: 110 + (tick * 7919 % 23) as u32,
+                lateness_us: 4 + (tick * 104_729 % 11) as u32,
+                ..SampleRecord::default()
+            };
+            let command = CommandRecord {
+                tick,
+                time_ns,
+                state: 3,
+                code: (demand * 409.5) as u16,
+                voltage: (demand * 409.5).floor() / 409.5,
+                demand,
+                target_fixed: (tick * 7282) as i64,
+                target_position: 0.035 * t,
+                target_velocity: 0.035,
+                error,
+                error_rate: rate,
+                terms: [rate + 5.0 * error, 4.0 + error, demand - 4.0],
+                ..CommandRecord::default()
+            };
+            [Record::Sample(sample), Record::Command(command)]
+        })
+        .collect()
+}
+
+/// In memory where there is such a folder, so that the disk is not what is measured.
+fn file() -> PathBuf {
+    let memory = Path::new("/dev/shm");
+    let folder = if memory.is_dir() { memory.into() } else { std::env::temp_dir() };
+    folder.join(format!("clutch-bench-{}.mcap", std::process::id()))
+}
+
+/// The channels as the mcap crate wants them, with the schemas of our own file.
+fn channels(path: &Path) -> Vec<Arc<mcap::Channel<'static>>> {
+    LogWriter::create(path, &Header::default()).and_then(LogWriter::finish).expect("an empty log");
+    let bytes = std::fs::read(path).expect("the empty log");
+    let summary = mcap::Summary::read(&bytes).expect("a summary").expect("a summary");
+    let find = |topic| summary.channels.values().find(|c| c.topic == topic).expect("a channel").clone();
+    vec![find(CHANNELS[0].topic), find(CHANNELS[1].topic)]
+}
+
+fn write(c: &mut Criterion) {
+    let (records, path) = (records(), file());
+    let channels = channels(&path);
+    let channel_of = |r: &Record| usize::from(matches!(r, Record::Command(_)));
+    let mut group = c.benchmark_group("log/write");
+    group.throughput(Throughput::Elements(records.len() as u64)).sample_size(20);
+
+    group.bench_function("log_writer", |b| {
+        b.iter(|| {
+            let mut log = LogWriter::create(&path, &Header::default()).expect("a file");
+            for r in &records {
+                log.write(r).expect("space");
+            }
+            log.finish().expect("space")
+        });
+    });
+    let size = |name: &str| {
+        let bytes = std::fs::metadata(&path).expect("the file").len();
+        println!("log/write/{name}: {:.1} bytes in the file per record", bytes as f64 / records.len() as f64);
+    };
+    size("log_writer");
+
+    // The crate's own way: Writer::new, a Message with its channel for each record.
+    group.bench_function("mcap_default", |b| {
+        b.iter(|| {
+            let file = BufWriter::new(File::create(&path).expect("a file"));
+            let mut writer = mcap::Writer::new(file).expect("space");
+            for r in &records {
+                let mut data = Vec::new();
+                encode(r, &mut data);
+                writer
+                    .write(&mcap::Message {
+                        channel: Arc::clone(&channels[channel_of(r)]),
+                        sequence: r.tick() as u32,
+                        log_time: r.time_ns(),
+                        publish_time: r.time_ns(),
+                        data: Cow::Owned(data),
+                    })
+                    .expect("space");
+            }
+            writer.finish().expect("space")
+        });
+    });
+    size("mcap_default");
+
+    // Its fast way: known channels, one buffer, no threads.
+    group.bench_function("mcap_known_channel", |b| {
+        b.iter(|| {
+            let file = BufWriter::new(File::create(&path).expect("a file"));
+            let mut writer = mcap::WriteOptions::new().compression_threads(0).create(file).expect("space");
+            let ids: Vec<u16> = channels
+                .iter()
+                .map(|c| {
+                    let schema = c.schema.as_ref().expect("a schema");
+                    let schema =
+                        writer.add_schema(&schema.name, &schema.encoding, &schema.data).expect("space");
+                    writer
+                        .add_channel(schema, &c.topic, &c.message_encoding, &BTreeMap::new())
+                        .expect("space")
+                })
+                .collect();
+            let mut data = Vec::new();
+            for r in &records {
+                data.clear();
+                encode(r, &mut data);
+                let header = mcap::records::MessageHeader {
+                    channel_id: ids[channel_of(r)],
+                    sequence: r.tick() as u32,
+                    log_time: r.time_ns(),
+                    publish_time: r.time_ns(),
+                };
+                writer.write_to_known_channel(&header, &data).expect("space");
+            }
+            writer.finish().expect("space")
+        });
+    });
+    size("mcap_known_channel");
+
+    // The part of it that is the message itself.
+    group.bench_function("encode_only", |b| {
+        let mut data = Vec::new();
+        b.iter(|| {
+            for r in &records {
+                data.clear();
+                encode(black_box(r), &mut data);
+            }
+            black_box(data.len())
+        });
+    });
+    group.finish();
+    let _ = std::fs::remove_file(path);
+}
+
+/// What the loop pays for a record: a push into the ring, the consumer on the same core.
+fn ring(c: &mut Criterion) {
+    let records = records();
+    let mut group = c.benchmark_group("log/ring");
+    group.throughput(Throughput::Elements(4096)).bench_function("push_4096_records", |b| {
+        let (mut producer, mut consumer) = rtrb::RingBuffer::<Record>::new(4096);
+        b.iter_batched(
+            || while consumer.pop().is_ok() {},
+            |()| {
+                for r in &records[..4096] {
+                    producer.push(black_box(*r)).expect("room for all");
+                }
+            },
+            BatchSize::PerIteration,
+        );
+    });
+    group.finish();
+}
+
+criterion_group!(benches, write, ring);
+criterion_main!(benches);

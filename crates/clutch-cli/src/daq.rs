@@ -1,0 +1,103 @@
+//! `clutch daq`.
+
+use crate::{Outcome, ScenarioArgs, print};
+use anyhow::Context;
+use clap::Args;
+use clutch_loop::daq::{self, DaqNotice, DaqOptions};
+use clutch_loop::faults::Fault;
+use clutch_loop::port::{Address, ClientEvent, Endpoint, Listener, PseudoTerminal};
+use clutch_loop::realtime::WaitMode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Simulates a board in real time: a pseudo-terminal or a TCP address to drive with `clutch loop`.
+///
+/// Prints the path to connect to, then tells of clients and of its state until it is interrupted.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  clutch daq board_smc_2\n  clutch daq board_smc_2 --listen tcp://127.0.0.1:5000\n  \
+    clutch daq board_smc_2 --fault freeze:at=2 --fault drop:p=0.01,way=up\n\n\
+    Faults: drop, duplicate, corrupt, reorder, silence, delay (ms), jitter (ms), freeze, jump (counts), loss, dac-stuck \
+    (volts = a number or last), reset; each with at (s after arming), for (s), p (probability), way (up, down, both)."
+)]
+pub(crate) struct Daq {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+    /// Listens on a TCP address of this machine instead of a pseudo-terminal.
+    #[arg(long, value_name = "tcp://HOST:PORT")]
+    listen: Option<Address>,
+    /// Breaks something; may be given several times.
+    #[arg(long, value_name = "KIND:KEY=VALUE,…")]
+    fault: Vec<Fault>,
+    /// Seed of the faults that hit at random.
+    #[arg(long, default_value_t = 1)]
+    fault_seed: u64,
+    /// Lets the board's clock wait, up to half a second, for a controller that a busy machine holds up. Without it a
+    /// controller that is silent for the watchdog's time meets the safe state, as on hardware.
+    #[arg(long)]
+    patient: bool,
+}
+
+impl Daq {
+    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+        let scenario = self.scenario.load()?;
+        scenario.safety()?;
+        if self.patient && !self.fault.is_empty() {
+            anyhow::bail!(
+                "--patient and --fault: a board that waits for its controller would hide the fault; give one of them"
+            );
+        }
+        let stop = stop_flag()?;
+        let mut endpoint: Box<dyn Endpoint> = match &self.listen {
+            None => Box::new(PseudoTerminal::open().context("a pseudo-terminal could not be opened")?.0),
+            Some(Address::Tcp(address)) => Box::new(Listener::bind(*address)?),
+            Some(other) => anyhow::bail!("--listen {other}: expected a TCP address, as tcp://127.0.0.1:5000"),
+        };
+        let address = endpoint.address();
+        let path = match &address {
+            Address::Serial { path, .. } => path.display().to_string(),
+            Address::Tcp(_) => address.to_string(),
+        };
+        let mut text = format!(
+            "{path}\n{}: simulated board; connect with: clutch loop {} --port {path}\n",
+            scenario.name,
+            self.scenario.scenario.display()
+        );
+        for fault in &self.fault {
+            text += &format!("fault: {fault} (seconds after arming; seed {})\n", self.fault_seed);
+        }
+        print(&text)?;
+        let options = DaqOptions {
+            faults: self.fault,
+            seed: self.fault_seed,
+            patient: self.patient,
+            wait: WaitMode::Sleep,
+        };
+        let report = daq::run(&scenario, &options, endpoint.as_mut(), &stop, |notice| {
+            // A terminal that has gone away does not stop a board.
+            let _ = print(&match notice {
+                DaqNotice::Client(ClientEvent::Connected) => "client connected\n".to_owned(),
+                DaqNotice::Client(ClientEvent::Left) => "client left\n".to_owned(),
+                DaqNotice::State(state, time) => format!("{time:10.6} s  {state:?}\n"),
+            });
+        })?;
+        let mut text = format!("stopped after {} samples", report.samples);
+        if report.waits > 0 {
+            text += &format!(
+                "; the board's clock waited {} times for the controller, {:.3} s in all",
+                report.waits, report.waited
+            );
+        }
+        print(&(text + "\n"))?;
+        Ok(Outcome::Done)
+    }
+}
+
+/// Set by Ctrl-C and SIGTERM.
+pub(crate) fn stop_flag() -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP] {
+        signal_hook::flag::register(signal, stop.clone()).context("signals could not be caught")?;
+    }
+    Ok(stop)
+}

@@ -1,0 +1,50 @@
+//! `clutch log`.
+
+use crate::{Outcome, print};
+use clap::{Args, Subcommand};
+use clutch_log::Limits;
+use std::path::PathBuf;
+
+/// Looks into logs, and saves those that were cut.
+#[derive(Args)]
+pub(crate) struct Log {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Says what a log holds: channels, time, scenario, and whether it was finished.
+    #[command(after_help = "Example:\n  clutch log info run.mcap")]
+    Info {
+        /// The log.
+        #[arg(value_name = "LOG.mcap")]
+        log: PathBuf,
+    },
+    /// Writes a finished log from one that was cut, by a crash or a full disk.
+    #[command(after_help = "Example:\n  clutch log recover run.mcap recovered.mcap")]
+    Recover {
+        /// The log that was cut.
+        #[arg(value_name = "LOG.mcap")]
+        from: PathBuf,
+        /// The new file.
+        #[arg(value_name = "NEW.mcap")]
+        to: PathBuf,
+    },
+}
+
+impl Log {
+    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+        let text = match self.verb {
+            Verb::Info { log } => clutch_log::info(&log, &Limits::default())?.to_string(),
+            Verb::Recover { from, to } => {
+                if to.exists() {
+                    anyhow::bail!("{}: exists already; name a new file", to.display());
+                }
+                clutch_log::recover(&from, &to, &Limits::default())?.to_string()
+            }
+        };
+        print(&(text.trim_end().to_owned() + "\n"))?;
+        Ok(Outcome::Done)
+    }
+}

@@ -1,0 +1,599 @@
+//! `clutch loop`.
+
+use crate::daq::stop_flag;
+use crate::table::{number, quantities};
+use crate::{Outcome, ScenarioArgs, key_value, print};
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use clutch_core::supervisor::{Cause, State};
+use clutch_core::{DacCode, Real, SafeState};
+use clutch_log::Source;
+use clutch_loop::daq::{self, DaqOptions, DaqReport};
+use clutch_loop::faults::Fault;
+use clutch_loop::port::{Address, DeviceKind, Endpoint, Port, PseudoTerminal, SerialOptions};
+use clutch_loop::preflight::Talk;
+use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode, describe_system};
+use clutch_loop::replay::PRESENT_CODE;
+use clutch_loop::run::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Watch};
+use clutch_loop::setup::{self, Setup};
+use clutch_loop::sim_board::{PATIENT_BOARD, STRICT_BOARD};
+use clutch_node::ControlNode;
+use clutch_sim::Scenario;
+use clutch_sim::scenario::ScalarKind;
+use clutch_wire::{BoardState, Hello};
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PaceArg {
+    /// The board's sample starts a cycle.
+    Sample,
+    /// This machine's clock starts a cycle.
+    Clock,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum OverrunsArg {
+    /// Late answers are counted; many within a short time end control.
+    Manage,
+    /// The first late answer ends control.
+    Fault,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum WaitArg {
+    /// The kernel wakes the loop.
+    Sleep,
+    /// The loop wakes early and spins.
+    Spin,
+}
+
+/// Closes the loop on a board over a serial line, or on a simulated one.
+///
+/// Without --port it starts the simulated board in the background and runs over a real
+/// pseudo-terminal. It checks board, path and gains, says what it will do, arms, and runs to the
+/// path's end; Ctrl-C ends in the safe state.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  clutch loop\n  clutch loop mine.toml --port /dev/ttyACM0 --log run.mcap\n  \
+    clutch loop --fault freeze:at=2 --strict\n\n\
+    Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run, and the brake is in the \
+    safe state; 4 stopped by Ctrl-C or SIGTERM, likewise. docs/loop.md is the guide, docs/safety.md says what is watched."
+)]
+pub(crate) struct Loop {
+    /// Scenario file, or the name of a built-in scenario; board_smc_2 if none is given.
+    #[arg(value_name = "SCENARIO.toml", default_value = "board_smc_2")]
+    scenario: PathBuf,
+    /// Overrides a key of the scenario; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    set: Vec<(String, String)>,
+    /// The board's port; without it a board is simulated.
+    #[arg(long, value_name = "PATH|tcp://HOST:PORT")]
+    port: Option<Address>,
+    /// Line rate of the port, baud; no effect on USB, pseudo-terminals and TCP.
+    #[arg(long)]
+    baud: Option<u32>,
+    /// Writes an MCAP log.
+    #[arg(long, value_name = "FILE.mcap")]
+    log: Option<PathBuf>,
+    /// Length of the run instead of run.duration_s, s.
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+    /// Runs a law that is not certified for the scenario's bounds.
+    #[arg(long)]
+    uncertified: bool,
+    /// Cycles per second instead of sampling.period_us, Hz.
+    #[arg(long, alias = "update_rate", value_name = "HZ")]
+    update_rate: Option<f64>,
+    /// Keeps all memory in RAM.
+    #[arg(long, alias = "lock_memory", value_name = "BOOL", default_value_t = true, action = clap::ArgAction::Set)]
+    lock_memory: bool,
+    /// Keeps the control thread on this core.
+    #[arg(long, alias = "cpu_affinity", value_name = "CORE")]
+    cpu_affinity: Option<usize>,
+    /// Priority of the control thread under SCHED_FIFO, 1 to 99; 0 stays with the ordinary scheduler.
+    #[arg(long, alias = "thread_priority", default_value_t = clutch_loop::realtime::DEFAULT_PRIORITY,
+        value_parser = clap::value_parser!(u8).range(0..=99))]
+    thread_priority: u8,
+    /// What a late answer does.
+    #[arg(long, value_enum, default_value = "manage")]
+    overruns: OverrunsArg,
+    /// What starts a cycle.
+    #[arg(long, value_enum, default_value = "sample")]
+    pace: PaceArg,
+    /// How the loop waits.
+    #[arg(long, value_enum, default_value = "sleep")]
+    wait: WaitArg,
+    /// How long before a sample spinning begins, with --wait spin, µs.
+    #[arg(long, default_value_t = 150, value_name = "US")]
+    spin_us: u32,
+    /// Breaks something on the simulated board; see `clutch daq --help`.
+    #[arg(long, value_name = "KIND:KEY=VALUE,…", conflicts_with = "port")]
+    fault: Vec<Fault>,
+    /// Seed of the faults that hit at random.
+    #[arg(long, default_value_t = 1)]
+    fault_seed: u64,
+    /// Keeps the simulated board's clock from waiting when this machine stalls: as on hardware.
+    #[arg(long, conflicts_with = "port")]
+    strict: bool,
+    /// Prints the summary as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The simulated board, beside the loop.
+struct Background {
+    stop: Arc<AtomicBool>,
+    thread: std::thread::JoinHandle<Result<DaqReport, daq::DaqError>>,
+}
+
+impl Background {
+    fn start(scenario: &Scenario, options: DaqOptions) -> anyhow::Result<(Background, Address)> {
+        let (mut terminal, _) = PseudoTerminal::open().context("a pseudo-terminal could not be opened")?;
+        let address = terminal.address();
+        let stop = Arc::new(AtomicBool::new(false));
+        let (scenario, flag) = (scenario.clone(), stop.clone());
+        let thread = std::thread::Builder::new()
+            .name("clutch-board".to_owned())
+            .spawn(move || daq::run(&scenario, &options, &mut terminal, &flag, |_| ()))
+            .context("the simulated board could not be started")?;
+        Ok((Background { stop, thread }, address))
+    }
+
+    fn end(self) -> anyhow::Result<DaqReport> {
+        self.stop.store(true, Ordering::Relaxed);
+        match self.thread.join() {
+            Ok(report) => Ok(report?),
+            Err(_) => bail!("the simulated board came to a bad end; please report this as a defect"),
+        }
+    }
+}
+
+impl Loop {
+    pub(crate) fn run(mut self) -> anyhow::Result<Outcome> {
+        if let Some(duration) = self.duration {
+            self.set.push(("run.duration_s".to_owned(), format!("{duration:?}")));
+        }
+        if let Some(rate) = self.update_rate {
+            let period = 1e6 / rate;
+            if !(period.is_finite()
+                && (1.0..=1e6).contains(&period)
+                && (period - period.round()).abs() < 1e-6)
+            {
+                bail!(
+                    "--update-rate {rate}: expected a rate whose period is a whole number of µs, 1 to 1 000 000 Hz"
+                );
+            }
+            self.set.push(("sampling.period_us".to_owned(), format!("{}", period.round())));
+        }
+        if matches!(self.overruns, OverrunsArg::Fault) {
+            self.set.push(("safety.limits.overruns".to_owned(), "1".to_owned()));
+        }
+        let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone() };
+        let scenario = args.load()?;
+        if let Some(log) = &self.log
+            && log.canonicalize().is_ok_and(|l| self.scenario.canonicalize().is_ok_and(|s| s == l))
+        {
+            bail!("{}: is the scenario; name another file for the log", log.display());
+        }
+        match scenario.scalar {
+            ScalarKind::F32 => self.run_in::<f32>(&scenario),
+            ScalarKind::F64 => self.run_in::<f64>(&scenario),
+        }
+    }
+
+    fn say(&self, text: &str) -> anyhow::Result<()> {
+        // With --json standard output is for the summary.
+        if self.json {
+            let _ = std::io::stderr().write_all(text.as_bytes());
+            return Ok(());
+        }
+        print(text)
+    }
+
+    fn run_in<T: Real>(&self, scenario: &Scenario) -> anyhow::Result<Outcome> {
+        let safety = scenario.safety()?;
+        let plan = scenario.plan()?;
+        let certified = plan.certificate.certified();
+        if !certified && !self.uncertified {
+            print(&format!(
+                "{}: the gains are not certified for these bounds and this path, so nothing was started.\n\
+                 `clutch certify {}` says why; --uncertified runs it all the same.\n",
+                scenario.name,
+                self.scenario.display()
+            ))?;
+            return Ok(Outcome::NotCertified);
+        }
+        let stop = stop_flag()?;
+        // A log on a limited disk must end the log and not the loop.
+        let ignored = Arc::new(AtomicBool::new(false));
+        signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
+            .context("signals could not be caught")?;
+
+        // The board.
+        let (background, address) = match &self.port {
+            Some(address) => (None, address.clone()),
+            None => {
+                let options = DaqOptions {
+                    faults: self.fault.clone(),
+                    seed: self.fault_seed,
+                    patient: !self.strict && self.fault.is_empty(),
+                    wait: WaitMode::Sleep,
+                };
+                let (board, address) = Background::start(scenario, options)?;
+                (Some(board), address)
+            }
+        };
+        let outcome = self.on_board::<T>(scenario, &address, certified, safety, &plan, &stop);
+        let board = background.map(Background::end).transpose();
+        let (report, log_line) = outcome?;
+        let board = board?;
+        let stopped = stop.load(Ordering::Relaxed);
+        let text = if self.json {
+            crate::json(&as_json(scenario, &report, certified, board.as_ref()))?
+        } else {
+            summary(scenario, &report, &log_line, board.as_ref())
+        };
+        print(&text)?;
+        Ok(match (report.state, report.port_error.is_some(), stopped) {
+            (State::Faulted, _, _) | (_, true, _) => Outcome::Fault,
+            (State::Ready, _, _) => Outcome::Failed,
+            (_, _, true) => Outcome::Stopped,
+            _ => Outcome::Done,
+        })
+    }
+
+    fn on_board<T: Real>(
+        &self,
+        scenario: &Scenario,
+        address: &Address,
+        certified: bool,
+        safety: &clutch_sim::scenario::Safety,
+        plan: &clutch_sim::scenario::Plan,
+        stop: &Arc<AtomicBool>,
+    ) -> anyhow::Result<(LoopReport, String)> {
+        let spec = scenario.spec();
+        let opened = Port::open(address, &SerialOptions { baud: self.baud, low_latency: true })?;
+        let (mut port, mut notes) = (opened.port, opened.notes);
+        // A sample and its answer, each cycle.
+        let period = Duration::from_micros(u64::from(spec.period.0));
+        if port.kind().has_line_rate() {
+            notes.extend(port.check_baud((15, 20), period)?);
+        }
+        // Who is there?
+        let setup = Setup::<T>::new(scenario, 0)?;
+        let mut node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
+        let hello = Talk::new(&mut port, &mut node).discover(Duration::from_secs(2))?;
+        let lines = setup::misfits(scenario, &hello);
+        if !lines.is_empty() {
+            let address = address.to_string();
+            return Err(clutch_loop::preflight::PreflightError::Misfit { address, lines }.into());
+        }
+        let mut setup = Setup::<T>::new(scenario, hello.run.wrapping_add(1).max(1))?;
+        if hello.board == PATIENT_BOARD {
+            // Its clock waits when this machine stalls, and so does our patience.
+            setup.control.silence = clutch_core::Micros(400_000);
+        }
+        let mut node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
+        self.say(&self.plan_text(scenario, &hello, address, port.kind(), certified, safety, plan))?;
+        for note in &notes {
+            self.say(&format!("note: {note}\n"))?;
+        }
+
+        // The log before the board is armed: what cannot be logged is known before anything moves.
+        let watch = Arc::new(Watch { stop: stop.clone(), ..Watch::default() });
+        let present = match BoardState::from_u8(hello.state) {
+            Some(BoardState::Boot) => DacCode(hello.boot_code),
+            _ => setup.supervisor.safe_codes().hold,
+        };
+        let log = match &self.log {
+            None => None,
+            Some(path) => {
+                let version = env!("CARGO_PKG_VERSION");
+                let mut header =
+                    setup::header(scenario, &setup.servo, Source::Loop, &address.to_string(), version);
+                header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
+                header.extra.push(("board".to_owned(), format!("{:08x}", hello.board)));
+                header.extra.push(("certified".to_owned(), certified.to_string()));
+                Some(LogThread::start(path, &header, watch.clone())?)
+            }
+        };
+        let (log, ring) = log.map_or((None, None), |(thread, ring)| (Some(thread), Some(ring)));
+
+        // Consent was starting this command.
+        let mut talk = Talk::new(&mut port, &mut node);
+        talk.configure(present)?;
+        let clock = talk.clock()?;
+        if stop.load(Ordering::Relaxed) {
+            bail!("stopped before the board was armed; it is as it was");
+        }
+        let path = setup::path::<T>(scenario)?;
+        let spin_us = self.spin_us;
+        let options = LoopOptions {
+            realtime: RealtimeOptions {
+                thread_priority: self.thread_priority,
+                lock_memory: self.lock_memory,
+                cpu_affinity: self.cpu_affinity,
+                wait: match self.wait {
+                    WaitArg::Sleep => WaitMode::Sleep,
+                    WaitArg::Spin => WaitMode::SleepSpin { spin_us },
+                },
+            },
+            pace: match self.pace {
+                PaceArg::Sample => Pace::Sample,
+                PaceArg::Clock => Pace::Clock,
+            },
+            settle: spec.run.settle,
+            hooks: (|| (), || ()),
+        };
+        let (ticks, detector) = (setup.ticks, setup.detector);
+        let show = std::io::stderr().is_terminal();
+        let report = std::thread::scope(|scope| {
+            let (node, port, path, watched) = (&mut node, &mut port, &path, &*watch);
+            let control = std::thread::Builder::new().name("clutch-control".to_owned()).spawn_scoped(
+                scope,
+                move || {
+                    run::run(
+                        Configured { node, port, path, ring, watch: watched, ticks, clock, detector },
+                        &options,
+                    )
+                },
+            );
+            let control = control.context("the control thread could not be started")?;
+            let mut refused_told = false;
+            while !control.is_finished() {
+                if show {
+                    status(&watch, spec.period.0, ticks);
+                }
+                if watch.log_ended.load(Ordering::Relaxed) && !refused_told {
+                    refused_told = true;
+                    let _ = writeln!(std::io::stderr(), "\nthe log has ended early; the loop goes on");
+                }
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            if show {
+                let _ = write!(std::io::stderr(), "\r\x1b[K");
+            }
+            control.join().map_err(|_| anyhow::anyhow!("the control thread came to a bad end; the board's watchdog has put the brake into the safe state. Please report this as a defect"))
+        })?;
+        let mut line = match log.map(LogThread::finish) {
+            None => String::new(),
+            Some(Ok(summary)) => {
+                let path = self.log.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
+                format!("log: {path}, {} records; clutch replay {path}\n", summary.records)
+            }
+            Some(Err(error)) => format!("log: {error}\n"),
+        };
+        for note in &report.notes {
+            line += &format!("note: {note}\n");
+        }
+        Ok((report, line))
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "one text from everything that is known before a run")]
+    fn plan_text(
+        &self,
+        scenario: &Scenario,
+        hello: &Hello,
+        address: &Address,
+        kind: DeviceKind,
+        certified: bool,
+        safety: &clutch_sim::scenario::Safety,
+        plan: &clutch_sim::scenario::Plan,
+    ) -> String {
+        let spec = scenario.spec();
+        let board = match hello.board {
+            PATIENT_BOARD => "simulated; its clock waits when this machine stalls".to_owned(),
+            STRICT_BOARD => "simulated, in real time".to_owned(),
+            serial => format!("number {serial:08x}"),
+        };
+        let safe = match safety.supervisor.on_fault {
+            SafeState::Hold { volts } => format!("hold with {} V", number(volts)),
+            SafeState::Ramp { volts_per_s, volts } => {
+                format!("ramp by {} V/s to {} V, and hold", number(volts_per_s), number(volts))
+            }
+            SafeState::Release => "release".to_owned(),
+            SafeState::HoldThenRelease { volts, after } => {
+                format!("hold with {} V for {} s, then release", number(volts), number(after))
+            }
+        };
+        let (boot, holds) = setup::boot_output(scenario, hello, plan);
+        let system = describe_system();
+        let mut text = format!("{}\n", scenario.name);
+        let mut row = |name: &str, value: String| text += &format!("  {name:<12}{value}\n");
+        row("port", format!("{address}, {}", kind.describe()));
+        row(
+            "board",
+            format!(
+                "{board}; {} counts/rev, {} bit, powers up at {} V",
+                hello.counts_per_rev,
+                hello.dac_bits,
+                number(boot)
+            ),
+        );
+        row("loop", format!("{} µs, answers due within {} µs", spec.period.0, safety.supervisor.deadline.0));
+        row(
+            "path",
+            format!(
+                "{} s, up to {} °/s",
+                number(spec.run.duration),
+                number(plan.envelope.velocity.to_degrees())
+            ),
+        );
+        row(
+            "gains",
+            if certified {
+                "certified for the bounds given".into()
+            } else {
+                "NOT certified; run all the same, as asked".into()
+            },
+        );
+        row("safe state", format!("{safe}: {}", safety.reason));
+        row("watchdog", format!("{} cycles on the board", safety.watchdog_cycles));
+        if let Some(first) = system.first() {
+            row("system", first.clone());
+        }
+        if !holds {
+            text += "note: the board powers up at a voltage that does not hold the shaft; set its power-up output to the safe state's\n";
+        }
+        if hello.board != PATIENT_BOARD && hello.board != STRICT_BOARD {
+            text +=
+                "note: a brake that a motor presses lets go when its power fails; no software changes that\n";
+        }
+        text
+    }
+}
+
+fn status(watch: &Watch, period_us: u32, ticks: u64) {
+    let time = |n: u64| n as f64 * f64::from(period_us) / 1e6;
+    let load = |a: &std::sync::atomic::AtomicI64| a.load(Ordering::Relaxed) as f64;
+    let line = format!(
+        "\r\x1b[K{:7.2} of {:.2} s   error {:+8.4}°   {:6.3} V   lost {}   late {}",
+        time(watch.tick.load(Ordering::Relaxed)),
+        time(ticks),
+        (load(&watch.error_nrad) * 1e-9).to_degrees(),
+        load(&watch.millivolts) / 1e3,
+        watch.lost.load(Ordering::Relaxed),
+        watch.late_answers.load(Ordering::Relaxed),
+    );
+    let _ = std::io::stderr().write_all(line.as_bytes()); // a terminal that has gone away
+}
+
+/// What ended control, in words.
+fn cause_text(report: &LoopReport) -> String {
+    let v = report.value;
+    match report.cause {
+        Cause::Done => "the path is done".into(),
+        Cause::Operator => "stopped by the operator".into(),
+        Cause::Lost => format!("{v} samples lost within 128 cycles"),
+        Cause::Late => "too many samples or answers came late".into(),
+        Cause::Duplicated => format!("{v} samples came twice within 128 cycles"),
+        Cause::Reordered => format!("{v} samples came out of order within 128 cycles"),
+        Cause::Jump => format!("the encoder jumped, by {v} counts at last"),
+        Cause::StandStill => format!(
+            "the encoder shows no movement, though the shaft must have gone {} °: encoder frozen, or shaft blocked",
+            number(v.to_degrees())
+        ),
+        Cause::FollowingError => format!("following error of {} °", number(v.to_degrees())),
+        Cause::Saturation => "the brake's voltage was at its limit for too long".into(),
+        Cause::NotFinite => "the law's demand was not a number".into(),
+        Cause::Deadline => format!("answers came too late, the last after {v} µs"),
+        Cause::Silence => "the board fell silent".into(),
+        Cause::Board => match v as u8 {
+            1 => "the board's watchdog went off: it got no valid answer in time".into(),
+            2 => "the board sees no encoder".into(),
+            3 => "the board's converter does not follow".into(),
+            _ => "the board went to its safe state by itself".into(),
+        },
+        Cause::Target => {
+            "the path's target is not a number, or moves faster than rig.speed_limit_deg_s".into()
+        }
+        Cause::None => "control did not begin".into(),
+    }
+}
+
+fn summary(scenario: &Scenario, r: &LoopReport, log_line: &str, board: Option<&DaqReport>) -> String {
+    let m = &r.metrics;
+    let deg = |x: f64| number(x.to_degrees());
+    let us = |ns: u64| number(ns as f64 / 1e3);
+    let latency = |s: &CycleSummary| {
+        format!("{} / {} / {} / {}", us(s.p50_ns), us(s.p99_ns), us(s.p99_9_ns), us(s.max_ns))
+    };
+    let title = format!(
+        "{}\n{} ticks; figures over {} s after settling, from the encoder",
+        scenario.name,
+        r.ticks,
+        number(m.measured_s)
+    );
+    let mut text = quantities(
+        &title,
+        &[
+            ("max |error|", deg(m.max_error_rad), "°"),
+            ("RMS error", deg(m.rms_error_rad), "°"),
+            ("mean error (target − position)", deg(m.mean_error_rad), "°"),
+            ("stick-slip seen by the encoder", number(r.stick_slip_cycles_per_s), "cycles/s"),
+            ("voltage variation", number(m.control_variation_v_s), "V/s"),
+            ("samples received", r.link.received.to_string(), ""),
+            ("samples lost", r.lost.to_string(), ""),
+            (
+                "samples late / twice / out of order",
+                format!("{} / {} / {}", r.link.late, r.link.duplicated, r.link.reordered),
+                "",
+            ),
+            ("frames with errors", r.link.bad_frames.to_string(), ""),
+            ("samples not believed", r.implausible.to_string(), ""),
+            ("deadline misses", r.deadline_misses.to_string(), ""),
+            ("answer after p50 / p99 / p99.9 / max", latency(&r.response), "µs"),
+            ("cycle time p50 / p99 / p99.9 / max", latency(&r.interval), "µs"),
+        ],
+    );
+    if r.log_dropped > 0 {
+        text += &format!("the log dropped {} records: its thread did not keep up\n", r.log_dropped);
+    }
+    if let Some(board) = board
+        && board.waits > 0
+    {
+        text += &format!(
+            "the simulated board's clock waited {} times for the loop, {:.3} s in all: this machine stalled\n",
+            board.waits, board.waited
+        );
+    }
+    text += log_line;
+    if let Some(error) = &r.port_error {
+        text += &format!("{error}\n");
+    }
+    let safe = match (r.state, r.board_safe) {
+        (State::Released, true) => "the brake is released",
+        (_, true) => "the board is in its safe state",
+        (_, false) => "the board did not confirm its safe state; its watchdog takes it there",
+    };
+    if r.cause == Cause::None {
+        let why = r.refused.as_ref().map_or("it did not answer".to_owned(), clutch_loop::preflight::why);
+        return text + &format!("the board was not armed: {why}\n");
+    }
+    let fault = if r.state == State::Faulted { "FAULT: " } else { "" };
+    text += &format!("{fault}{}; {safe}\n", cause_text(r));
+    text
+}
+
+fn as_json(
+    scenario: &Scenario,
+    r: &LoopReport,
+    certified: bool,
+    board: Option<&DaqReport>,
+) -> serde_json::Value {
+    let latency = |s: &CycleSummary| {
+        serde_json::json!({
+            "p50_us": s.p50_ns as f64 / 1e3, "p99_us": s.p99_ns as f64 / 1e3,
+            "p99_9_us": s.p99_9_ns as f64 / 1e3, "max_us": s.max_ns as f64 / 1e3, "count": s.count,
+        })
+    };
+    serde_json::json!({
+        "scenario": scenario.name,
+        "version": env!("CARGO_PKG_VERSION"),
+        "state": format!("{:?}", r.state),
+        "cause": format!("{:?}", r.cause),
+        "cause_text": cause_text(r),
+        "value": r.value,
+        "certified": certified,
+        "ticks": r.ticks,
+        "metrics": r.metrics,
+        "stick_slip_cycles_per_s": r.stick_slip_cycles_per_s,
+        "samples": {
+            "received": r.link.received, "lost": r.lost, "late": r.link.late, "duplicated": r.link.duplicated,
+            "reordered": r.link.reordered, "implausible": r.implausible,
+        },
+        "bad_frames": r.link.bad_frames,
+        "deadline_misses": r.deadline_misses,
+        "response": latency(&r.response),
+        "cycle": latency(&r.interval),
+        "log_dropped": r.log_dropped,
+        "board_safe": r.board_safe,
+        "board_waits": board.map(|b| b.waits),
+        "port_error": r.port_error,
+        "notes": r.notes,
+    })
+}

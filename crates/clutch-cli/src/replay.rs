@@ -1,0 +1,160 @@
+//! `clutch replay`.
+
+use crate::plot::{self, Figure, Panel, Series};
+use crate::table::{number, quantities};
+use crate::{Outcome, key_value, print};
+use clap::Args;
+use clutch_log::{CommandRecord, Limits, Log};
+use clutch_loop::replay::replay;
+use clutch_sim::Scenario;
+use std::path::PathBuf;
+
+/// Feeds a log's encoder counts to its law again and compares every output bit for bit.
+///
+/// With --set the law gets other parameters: an open-loop replay, which answers what those would
+/// have commanded on the same counts, not how the shaft would have moved.
+///
+/// Exit code 0: identical, or replayed with --set; 3: the outputs differ.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  clutch replay run.mcap\n  clutch replay run.mcap --set law.smc.kp_v=4 --plot compare.svg"
+)]
+pub(crate) struct Replay {
+    /// The log.
+    #[arg(value_name = "LOG.mcap")]
+    log: PathBuf,
+    /// Overrides a key of the log's scenario; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    set: Vec<(String, String)>,
+    /// Draws both commands and their difference over time.
+    #[arg(long, value_name = "FILE.svg|png")]
+    plot: Option<PathBuf>,
+}
+
+impl Replay {
+    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+        if let Some(file) = &self.plot {
+            plot::check_ending(file)?;
+        }
+        let log = clutch_log::read(&self.log, &Limits::default())?;
+        let origin = format!("{}: its scenario", self.log.display());
+        let scenario = Scenario::parse(&origin, &log.header.scenario_toml, &self.set)?;
+        let replayed = replay(&log, &scenario)?;
+        if let Some(file) = &self.plot {
+            figure(&log, &replayed.commands).save(file)?;
+        }
+        let n = replayed.commands.len();
+        let mut text = String::new();
+        if !log.complete {
+            text += "the log was cut; what is readable is replayed\n";
+        }
+        if replayed.dropped > 0 {
+            text += &format!(
+                "the log dropped {} records; a difference after the first gap says nothing of the law\n",
+                replayed.dropped
+            );
+        }
+        if !self.set.is_empty() {
+            text += &compare(&log.commands, &replayed.commands);
+            print(&text)?;
+            return Ok(Outcome::Done);
+        }
+        let outcome = match &replayed.first {
+            None => {
+                text += &format!("identical over {n} ticks\n");
+                Outcome::Done
+            }
+            Some(d) => {
+                text += &format!(
+                    "differs: tick {}, {}: logged {:?}, replayed {:?}\n",
+                    d.tick, d.field, d.logged, d.replayed
+                );
+                if log.header.version != env!("CARGO_PKG_VERSION") {
+                    text += &format!(
+                        "the log was written by version {}, this is {}\n",
+                        log.header.version,
+                        env!("CARGO_PKG_VERSION")
+                    );
+                }
+                Outcome::Fault
+            }
+        };
+        print(&text)?;
+        Ok(outcome)
+    }
+}
+
+fn compare(logged: &[CommandRecord], replayed: &[CommandRecord]) -> String {
+    let pairs = || logged.iter().zip(replayed);
+    let largest =
+        |f: fn(&CommandRecord) -> f64| pairs().map(|(a, b)| (f(a) - f(b)).abs()).fold(0.0, f64::max);
+    let n = pairs().count().max(1) as f64;
+    let square: f64 = pairs().map(|(a, b)| (a.voltage - b.voltage) * (a.voltage - b.voltage)).sum();
+    let differ = pairs().filter(|(a, b)| a.code != b.code).count();
+    let variation =
+        |c: &[CommandRecord]| c.windows(2).map(|w| (w[1].voltage - w[0].voltage).abs()).sum::<f64>();
+    let mut text = quantities(
+        &format!("{} ticks replayed with other parameters, open loop", n),
+        &[
+            ("ticks with another code", differ.to_string(), ""),
+            ("largest difference of the voltage", number(largest(|c| c.voltage)), "V"),
+            ("RMS difference of the voltage", number((square / n).sqrt()), "V"),
+            ("largest difference of the error rate", number(largest(|c| c.error_rate)), "rad/s"),
+            ("voltage variation, logged", number(variation(logged)), "V"),
+            ("voltage variation, replayed", number(variation(replayed)), "V"),
+        ],
+    );
+    let early = pairs().find(|(a, b)| a.state != b.state);
+    if let Some((a, b)) = early {
+        let name = |s: u8| clutch_log::names::STATES.iter().find(|(n, _)| *n == s).map_or("?", |(_, n)| n);
+        text += &format!(
+            "from tick {} on the supervisor would have been {} instead of {}\n",
+            a.tick,
+            name(b.state),
+            name(a.state)
+        );
+    }
+    text
+}
+
+fn figure(log: &Log, replayed: &[CommandRecord]) -> Figure {
+    let series = |label: &str, of: &dyn Fn(usize) -> f64| Series {
+        label: label.to_owned(),
+        points: (0..replayed.len().min(log.commands.len()))
+            .map(|i| (log.commands[i].time_ns as f64 / 1e9, of(i)))
+            .collect(),
+    };
+    let panel = |title: &str, y_label: &str, series| Panel {
+        title: title.to_owned(),
+        x_label: "time (s)".to_owned(),
+        y_label: y_label.to_owned(),
+        series,
+        y_range: None,
+        step: true,
+        lines: Vec::new(),
+    };
+    Figure {
+        title: format!("Replay of {}", log.header.scenario_name),
+        columns: 1,
+        panels: vec![
+            panel(
+                "Brake",
+                "voltage (V)",
+                vec![
+                    series("logged", &|i| log.commands[i].voltage),
+                    series("replayed", &|i| replayed[i].voltage),
+                ],
+            ),
+            panel(
+                "Difference",
+                "voltage (V)",
+                vec![series("replayed − logged", &|i| replayed[i].voltage - log.commands[i].voltage)],
+            ),
+            panel(
+                "Position error",
+                "error (°)",
+                vec![series("logged", &|i| log.commands[i].error.to_degrees())],
+            ),
+        ],
+    }
+}

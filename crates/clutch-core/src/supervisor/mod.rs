@@ -1,0 +1,436 @@
+//! The supervisor: what may reach the law, and when control has to end.
+//!
+//! ```text
+//!                 connect                arm (consent)         first sample
+//!  Disconnected ──────────► Ready ─────────────────► Armed ─────────────────► Running
+//!       ▲                    ▲ ▲                       │                        │  │
+//!       │ disconnect         │ │ acknowledge (consent) │ stop                   │  │ a check
+//!       │ (from any)         │ │                       ▼                   stop │  │ fails
+//!       │                    │ └───────────── Holding / Released ◄──────────────┘  ▼
+//!       └─────────────       └─────────────────────────────────────────────── Faulted
+//! ```
+//!
+//! Holding and Released are the ends that were wanted: the safe state with the brake on, or let
+//! go. Faulted is the safe state with a cause, and latches: nothing but an acknowledgement
+//! followed by a new consent leads back to Running. A check may fail in Ready and Armed too.
+//!
+//! Every sample passes a gate before it touches the law: sequence, board's status, plausible
+//! counts, plausible target. What does not pass is not answered; the board keeps its code for at
+//! most its watchdog's three cycles, then goes to the safe state by itself. After a sample that
+//! was refused the law answers again once [`SupervisorParams::good_samples`] have passed in a row.
+//!
+//! | check | fails when |
+//! |---|---|
+//! | [`Cause::Lost`] | samples are missing more often than allowed in a window |
+//! | [`Cause::Late`] | samples or answers come too late, more often than allowed |
+//! | [`Cause::Duplicated`], [`Cause::Reordered`] | so |
+//! | [`Cause::Jump`] | counts depart from dead reckoning by more than a shaft can, more often than allowed |
+//! | [`Cause::StandStill`] | the brake is open, the drive must have moved the shaft, and no count came |
+//! | [`Cause::FollowingError`] | the error exceeds its limit, which grows with the speed |
+//! | [`Cause::Saturation`] | the output is at a limit for too long |
+//! | [`Cause::NotFinite`] | the law's measurement, terms or demand are not numbers |
+//! | [`Cause::Target`] | the target is not a number, or moves faster than the speed limit |
+//! | [`Cause::Deadline`] | the answer was late, more often than allowed |
+//! | [`Cause::Silence`] | no sample for so many cycles |
+//! | [`Cause::Board`] | the board reports a fault, or is not driving although it should |
+//!
+//! The supervisor owns no clock. What it is told is what a log records, so a replay decides the
+//! same at every tick.
+
+mod params;
+mod state;
+
+pub use params::SupervisorParams;
+pub use state::{Arrival, BoardMode, Cause, Checks, Cycle, Sample, State, SupervisorState};
+
+use crate::law::{Controller, Limit, Terms};
+use crate::safe_state::{SafeCodes, SafeRun};
+use crate::{Bounds, Dac, DacCode, ParamError, Real, Servo, ServoOutput, ServoParams, Target};
+use params::Limits;
+
+/// A checked supervisor; never changes in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Supervisor<T> {
+    limits: Limits<T>,
+    safe: SafeCodes,
+    checks: Checks,
+}
+
+impl<T: Real> Supervisor<T> {
+    /// Checks the parameters. `bounds` say how little the drive and how much the brake may do:
+    /// a shaft that must have moved although no count came is what [`Cause::StandStill`] means.
+    ///
+    /// # Errors
+    /// The first parameter out of range, by name.
+    pub fn new(
+        p: &SupervisorParams<T>,
+        servo: &ServoParams<T>,
+        bounds: &Bounds<T>,
+    ) -> Result<Self, ParamError<T>> {
+        let dac = Dac::new(&servo.dac)?;
+        Ok(Supervisor {
+            safe: SafeCodes::new(&p.on_fault, &dac, servo.period)?,
+            limits: Limits::new(p, servo, bounds)?,
+            checks: Checks::ALL,
+        })
+    }
+
+    /// The same with fewer checks. For the campaign that shows that each of them is needed, and
+    /// for nothing else.
+    #[must_use]
+    pub fn with_checks(mut self, checks: Checks) -> Self {
+        self.checks = checks;
+        self
+    }
+
+    /// The safe state, in the converter's codes.
+    #[must_use]
+    pub fn safe_codes(&self) -> &SafeCodes {
+        &self.safe
+    }
+
+    /// The link is up and the board is configured.
+    pub fn connect<S>(&self, s: &mut SupervisorState<T, S>) {
+        if s.state == State::Disconnected {
+            s.state = State::Ready;
+        }
+    }
+
+    /// The link is gone. From Armed and Running this is a fault.
+    pub fn disconnect<S>(&self, s: &mut SupervisorState<T, S>) {
+        if matches!(s.state, State::Armed | State::Running) {
+            self.fault(s, Cause::Silence, T::ZERO);
+        }
+        if s.state != State::Faulted {
+            s.state = State::Disconnected;
+        }
+    }
+
+    /// Consent: from Ready to Armed. `present` is the code that the converter has. Whether it
+    /// was possible. What was seen before is forgotten, so that a run depends on its own samples.
+    pub fn arm<S: Default>(&self, s: &mut SupervisorState<T, S>, present: DacCode) -> bool {
+        let ready = s.state == State::Ready;
+        if ready {
+            *s = SupervisorState { state: State::Armed, code: present, ..SupervisorState::default() };
+        }
+        ready
+    }
+
+    /// Consent to leave Faulted, Holding or Released: to Ready, with everything forgotten.
+    pub fn acknowledge<S: Default>(&self, s: &mut SupervisorState<T, S>) {
+        if matches!(s.state, State::Faulted | State::Holding | State::Released) {
+            let code = s.code;
+            *s = SupervisorState { state: State::Ready, code, ..SupervisorState::default() };
+        }
+    }
+
+    /// An end that was wanted: the safe state without a fault.
+    pub fn stop<S>(&self, s: &mut SupervisorState<T, S>, cause: Cause) {
+        if matches!(s.state, State::Armed | State::Running | State::Ready) {
+            s.cause = cause;
+            self.make_safe(s);
+            s.state = State::Holding;
+            self.advance_safe(s);
+        }
+    }
+
+    /// The board says that it has gone to its safe state by itself; `value` is its own reason.
+    pub fn board_fault<S>(&self, s: &mut SupervisorState<T, S>, value: T) {
+        self.check(s, Self::why_safe(s), value);
+    }
+
+    /// Answers that came too late explain a watchdog that bit.
+    fn why_safe<S>(s: &SupervisorState<T, S>) -> Cause {
+        if s.late.count() > 0 { Cause::Late } else { Cause::Board }
+    }
+
+    /// No sample for `cycles` periods.
+    pub fn silence<S>(&self, s: &mut SupervisorState<T, S>, cycles: u32) {
+        if cycles >= self.limits.silence_cycles {
+            self.check(s, Cause::Silence, T::from_u64(u64::from(cycles)));
+        }
+    }
+
+    /// One sample: judged, and if it may pass, given to the servo. `target` is the path.
+    ///
+    /// The answer, if there is one, belongs on the wire at once.
+    pub fn sample<C: Controller<T>>(
+        &self,
+        servo: &Servo<T, C>,
+        s: &mut SupervisorState<T, C::State>,
+        sample: &Sample,
+        target: impl Fn(u64) -> Target<T>,
+    ) -> Cycle<T, C::Terms> {
+        let from = s.state;
+        let fresh_fault = s.cause;
+        let mut cycle = Cycle { tick: s.tick, from, ..Cycle::default() };
+        self.judge(servo, s, sample, &target, &mut cycle);
+        if matches!(s.state, State::Faulted | State::Holding | State::Released) {
+            cycle.answer = None;
+            // A fault of this very cycle has taken its first step already.
+            if cycle.arrival.is_fresh() && s.cause == fresh_fault {
+                self.advance_safe(s);
+            }
+        }
+        cycle.state = s.state;
+        cycle.cause = s.cause;
+        cycle.value = s.value;
+        cycle.code = s.code;
+        cycle
+    }
+
+    fn judge<C: Controller<T>>(
+        &self,
+        servo: &Servo<T, C>,
+        s: &mut SupervisorState<T, C::State>,
+        sample: &Sample,
+        target: &impl Fn(u64) -> Target<T>,
+        cycle: &mut Cycle<T, C::Terms>,
+    ) {
+        let l = &self.limits;
+        // Sequence.
+        let ahead = if s.started { sample.sequence.wrapping_sub(s.sequence) as i16 } else { 1 };
+        if ahead <= 0 {
+            let (history, cause, arrival) = if ahead == 0 {
+                (&mut s.duplicated, Cause::Duplicated, Arrival::Duplicate)
+            } else {
+                (&mut s.reordered, Cause::Reordered, Arrival::Reordered)
+            };
+            cycle.arrival = arrival;
+            history.mark();
+            if history.count() >= l.disorder {
+                let count = history.count();
+                self.check(s, cause, T::from_u64(u64::from(count)));
+            }
+            return;
+        }
+        let periods = ahead.unsigned_abs();
+        let first = !s.started;
+        s.started = true;
+        s.sequence = sample.sequence;
+        s.pass_time(periods);
+        if s.state == State::Running {
+            s.tick = s.tick.wrapping_add(u64::from(periods));
+            cycle.tick = s.tick;
+        }
+        if periods > 1 {
+            let lost = u32::from(periods) - 1;
+            s.lost_total = s.lost_total.wrapping_add(u64::from(lost));
+            s.lost.mark_many(lost);
+            if lost >= l.silence_cycles {
+                self.check(s, Cause::Silence, T::from_u64(u64::from(lost)));
+            }
+            if s.lost.count() >= l.lost {
+                let count = s.lost.count();
+                self.check(s, Cause::Lost, T::from_u64(u64::from(count)));
+            }
+        }
+        cycle.arrival = if sample.superseded { Arrival::Late } else { Arrival::Fresh };
+
+        // Time.
+        if sample.superseded || sample.command_late {
+            s.late.mark();
+            if s.late.count() >= l.late {
+                let count = s.late.count();
+                self.check(s, Cause::Late, T::from_u64(u64::from(count)));
+            }
+        }
+        if sample.lateness > l.deadline {
+            s.deadline_misses = s.deadline_misses.wrapping_add(1);
+            s.overrun.mark();
+            if s.overrun.count() >= l.overruns {
+                self.check(s, Cause::Deadline, T::from_u64(u64::from(sample.lateness.0)));
+            }
+        }
+
+        // Board.
+        let commanding = matches!(s.state, State::Armed | State::Running);
+        if sample.encoder_fault || sample.converter_fault {
+            self.check(s, Cause::Board, T::ZERO);
+        } else if commanding && sample.board != BoardMode::Driving {
+            self.check(s, Self::why_safe(s), T::ZERO);
+        }
+
+        // Counts, against dead reckoning from the last two that passed.
+        let moved = sample.counts.since(s.counts);
+        let mut elapsed = u32::from(periods);
+        if first || !s.reckoned {
+            s.counts = sample.counts;
+            s.reckoned = true;
+            s.unpassed = 0;
+            s.rate = 0;
+        } else {
+            s.unpassed = s.unpassed.saturating_add(u32::from(periods));
+            let n = i32::try_from(s.unpassed).unwrap_or(i32::MAX);
+            let expected = s.rate.saturating_mul(n);
+            let off = moved.saturating_sub(expected).unsigned_abs();
+            // The longer ago, the less dead reckoning knows: an eighth more with each period.
+            let allowed = l.jump.saturating_mul(s.unpassed.saturating_add(7)) / 8;
+            if off > allowed {
+                cycle.arrival = Arrival::Implausible;
+                s.rejected_total = s.rejected_total.wrapping_add(1);
+                s.recovering = l.good_samples;
+                s.jump.mark();
+                if s.jump.count() >= l.jumps {
+                    self.check(s, Cause::Jump, T::from_u64(u64::from(off)));
+                }
+                return;
+            }
+            s.rate = moved.checked_div(n).unwrap_or(0);
+            s.counts = sample.counts;
+            // With those of samples that were refused in between.
+            elapsed = s.unpassed;
+            s.unpassed = 0;
+        }
+        if s.state == State::Running {
+            self.stand_still(s, moved, elapsed);
+        }
+
+        // Recovery after a sample that was refused.
+        if s.recovering > 0 {
+            s.recovering -= 1;
+            if s.recovering > 0 {
+                return;
+            }
+        }
+        if s.state == State::Armed {
+            s.state = State::Running;
+            s.tick = 0;
+            s.served = None;
+            cycle.tick = 0;
+        }
+        if s.state != State::Running {
+            return;
+        }
+
+        // Target.
+        let goal = target(s.tick);
+        cycle.target = goal;
+        if !l.believes(s.last_target.as_ref(), &goal, s.tick, s.served.unwrap_or(s.tick)) {
+            self.check(s, Cause::Target, goal.velocity);
+            return;
+        }
+        s.last_target = Some(goal);
+
+        // Law.
+        let since_served = match s.served {
+            None => {
+                let applied = servo.dac().volts(s.code);
+                s.servo = servo.start(sample.counts, &goal, applied);
+                s.voltages = [applied; 4];
+                1
+            }
+            Some(served) => {
+                let steps = s.tick.saturating_sub(served);
+                // More than that is silence.
+                let steps = u32::try_from(steps).unwrap_or(1).min(l.silence_cycles.saturating_add(8));
+                for step in 1..steps {
+                    let passed = target(served.wrapping_add(u64::from(step)));
+                    servo.bridge(&mut s.servo, (sample.counts, &goal), &passed, (step, steps));
+                }
+                steps
+            }
+        };
+        let out = servo.tick(&mut s.servo, sample.counts, &goal);
+        s.served = Some(s.tick);
+        cycle.output = Some(out);
+        if !finite(&out) {
+            self.check(s, Cause::NotFinite, out.command.voltage);
+        }
+        let error = out.tick.error.abs();
+        if error > l.following_error + l.following_time * goal.velocity.abs() {
+            self.check(s, Cause::FollowingError, out.tick.error);
+        }
+        let resting = goal.velocity.abs() <= l.still;
+        let saturated = match out.command.limit {
+            Limit::None => false,
+            // At the end of a path a shaft that has come too far rests there under full brake.
+            Limit::Highest => !resting,
+            Limit::Lowest | Limit::Invalid => true,
+        };
+        s.saturated = if saturated { s.saturated.saturating_add(since_served) } else { 0 };
+        if s.saturated >= l.saturation_cycles {
+            self.check(s, Cause::Saturation, out.command.voltage);
+        }
+        if s.state != State::Running {
+            return;
+        }
+        s.code = out.code;
+        s.voltages = [out.voltage, s.voltages[0], s.voltages[1], s.voltages[2]];
+        cycle.answer = (!sample.superseded).then_some(out.code);
+    }
+
+    /// A count has come: the slowest shaft that can have made the last counts.
+    fn reckon_slowest<S>(&self, s: &mut SupervisorState<T, S>) {
+        let l = &self.limits;
+        // Over four periods it went one count less at least, and may have braked since their middle.
+        let counts = s.recent.iter().fold(0_i32, |sum, n| sum.saturating_add(*n)).saturating_sub(1);
+        let mean = T::from_i32(counts) * l.radians_per_count / (l.period * T::from_i32(4));
+        let [a, b, c, d] = s.voltages;
+        let highest = a.max(b).max(c).max(d);
+        let braking = l.brake * highest + l.drag * mean.abs() - l.drive;
+        let lost = braking.max(T::ZERO) * l.period * T::from_i32(2);
+        s.expected_velocity = (mean - lost).max(T::ZERO);
+        s.expected_travel = T::ZERO;
+    }
+
+    /// Moves a shaft that has the least drive and the most brake that the bounds allow, from the
+    /// last count on. When even that one has gone some counts, an encoder that shows none
+    /// is not telling the truth, or something blocks the shaft.
+    fn stand_still<S>(&self, s: &mut SupervisorState<T, S>, moved: i32, periods: u32) {
+        let l = &self.limits;
+        s.recent = if periods == 1 { [moved, s.recent[0], s.recent[1], s.recent[2]] } else { [0; 4] };
+        if moved != 0 {
+            return self.reckon_slowest(s);
+        }
+        // A code may be a cycle on its way, and one may have been lost: the highest of three counts.
+        let volts = s.voltages[0].max(s.voltages[1]).max(s.voltages[2]);
+        let seconds = l.period * T::from_u64(u64::from(periods));
+        let acceleration = l.drive - l.brake * volts - l.drag * s.expected_velocity;
+        let before = s.expected_velocity;
+        s.expected_velocity = (before + acceleration * seconds).max(T::ZERO);
+        s.expected_travel += T::from_f64(0.5) * (before + s.expected_velocity) * seconds;
+        if s.expected_travel > l.stand_still {
+            self.check(s, Cause::StandStill, s.expected_travel);
+        }
+    }
+
+    fn check<S>(&self, s: &mut SupervisorState<T, S>, cause: Cause, value: T) {
+        let watched = matches!(s.state, State::Ready | State::Armed | State::Running);
+        // The first cause is the one that is told.
+        if watched && self.checks.has(cause) {
+            self.fault(s, cause, value);
+        }
+    }
+
+    fn fault<S>(&self, s: &mut SupervisorState<T, S>, cause: Cause, value: T) {
+        self.make_safe(s);
+        self.advance_safe(s);
+        s.state = State::Faulted;
+        s.cause = cause;
+        s.value = value;
+    }
+
+    fn make_safe<S>(&self, s: &mut SupervisorState<T, S>) {
+        s.safe = SafeRun::begin(s.code);
+    }
+
+    fn advance_safe<S>(&self, s: &mut SupervisorState<T, S>) {
+        // Asked before the step: whether this code is the one that lets go.
+        let released = s.safe.released(&self.safe);
+        s.code = s.safe.next(&self.safe);
+        if s.state == State::Holding && released {
+            s.state = State::Released;
+        }
+    }
+}
+
+fn finite<T: Real, X: Terms<T>>(out: &ServoOutput<T, X>) -> bool {
+    let [a, b, c] = out.command.terms.columns();
+    let t = &out.tick;
+    let all = [a.1, b.1, c.1, t.error, t.error_rate, out.command.voltage, out.voltage];
+    out.command.limit != Limit::Invalid && all.iter().all(|x| x.is_finite())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,324 @@
+//! What the supervisor is told, remembers and answers.
+
+use crate::law::LawTerms;
+use crate::safe_state::SafeRun;
+use crate::{Counts, DacCode, Micros, Real, ServoOutput, ServoState, Target};
+
+/// Where control stands; see the [module](super)'s diagram.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum State {
+    /// No link.
+    #[default]
+    Disconnected = 0,
+    /// Samples come; the board's output is not ours.
+    Ready = 1,
+    /// Consent is given; the next sample starts the law.
+    Armed = 2,
+    /// The law answers.
+    Running = 3,
+    /// Ended as wanted, brake on.
+    Holding = 4,
+    /// Ended as wanted, brake let go.
+    Released = 5,
+    /// Ended by a check, latched.
+    Faulted = 6,
+}
+
+/// Why control ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Cause {
+    /// It has not.
+    #[default]
+    None = 0,
+    /// Too many samples lost.
+    Lost = 1,
+    /// Too many samples or answers late.
+    Late = 2,
+    /// Too many samples twice.
+    Duplicated = 3,
+    /// Too many samples out of order.
+    Reordered = 4,
+    /// Counts that no shaft can have moved.
+    Jump = 5,
+    /// No count although the shaft must have moved.
+    StandStill = 6,
+    /// Too far from the path.
+    FollowingError = 7,
+    /// Too long at a limit of the output.
+    Saturation = 8,
+    /// A measurement, term or demand that is not a number.
+    NotFinite = 9,
+    /// Too many answers later than the deadline.
+    Deadline = 10,
+    /// No sample for too long.
+    Silence = 11,
+    /// The board reports a fault, or has gone to its safe state by itself.
+    Board = 12,
+    /// A target that is not a number or moves too fast.
+    Target = 13,
+    /// An operator's stop.
+    Operator = 14,
+    /// The path is done.
+    Done = 15,
+}
+
+impl Cause {
+    /// Every cause that is a check's.
+    pub const CHECKS: [Cause; 13] = [
+        Cause::Lost,
+        Cause::Late,
+        Cause::Duplicated,
+        Cause::Reordered,
+        Cause::Jump,
+        Cause::StandStill,
+        Cause::FollowingError,
+        Cause::Saturation,
+        Cause::NotFinite,
+        Cause::Deadline,
+        Cause::Silence,
+        Cause::Board,
+        Cause::Target,
+    ];
+}
+
+/// A set of checks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Checks(u16);
+
+impl Checks {
+    /// All of them.
+    pub const ALL: Checks = Checks(u16::MAX);
+
+    /// All but one.
+    #[must_use]
+    pub fn without(self, cause: Cause) -> Checks {
+        Checks(self.0 & !Checks::bit(cause))
+    }
+
+    /// Whether a check is on.
+    #[must_use]
+    pub fn has(self, cause: Cause) -> bool {
+        self.0 & Checks::bit(cause) != 0
+    }
+
+    fn bit(cause: Cause) -> u16 {
+        1_u16.wrapping_shl(cause as u32)
+    }
+}
+
+/// What the board says of itself with a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BoardMode {
+    /// Configured, output as it was.
+    #[default]
+    Ready,
+    /// Armed or running: takes codes.
+    Driving,
+    /// In its safe state, or as it was at power-up.
+    Safe,
+}
+
+/// A sample as it came over the link.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sample {
+    /// Running number of the board's periods; wraps.
+    pub sequence: u16,
+    /// Encoder counts.
+    pub counts: Counts,
+    /// The board's state.
+    pub board: BoardMode,
+    /// The board sees no encoder.
+    pub encoder_fault: bool,
+    /// The board's converter does not do what it is told.
+    pub converter_fault: bool,
+    /// The board refused the last code because it came too late.
+    pub command_late: bool,
+    /// A newer sample has arrived already: this one is not answered.
+    pub superseded: bool,
+    /// Time that the answer to the sample before took.
+    pub lateness: Micros,
+}
+
+/// What became of a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Arrival {
+    /// In order and in time.
+    #[default]
+    Fresh = 0,
+    /// It did not come.
+    Missing = 1,
+    /// Came before.
+    Duplicate = 2,
+    /// Older than one that came before.
+    Reordered = 3,
+    /// A newer one was there already.
+    Late = 4,
+    /// Its counts are not believed.
+    Implausible = 5,
+}
+
+impl Arrival {
+    /// Whether a period of the board has passed with it.
+    #[must_use]
+    pub fn is_fresh(self) -> bool {
+        matches!(self, Arrival::Fresh | Arrival::Late | Arrival::Implausible)
+    }
+}
+
+/// What a sample led to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cycle<T, Terms = LawTerms<T>> {
+    /// Period of the run, from 0 at the first answer.
+    pub tick: u64,
+    /// What became of the sample.
+    pub arrival: Arrival,
+    /// State before.
+    pub from: State,
+    /// State after.
+    pub state: State,
+    /// Why control ended, if it has.
+    pub cause: Cause,
+    /// The quantity that the check saw, in its unit: a count of events, counts, µs, rad or V.
+    pub value: T,
+    /// The code to send; none where a sample is not to be answered.
+    pub answer: Option<DacCode>,
+    /// The code that the converter has or is to have.
+    pub code: DacCode,
+    /// The path's target, where the law was asked.
+    pub target: Target<T>,
+    /// What the servo gave, where it was asked.
+    pub output: Option<ServoOutput<T, Terms>>,
+}
+
+/// Which of the last 128 periods something happened in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct History(u128);
+
+impl History {
+    /// Marks the present period.
+    pub(super) fn mark(&mut self) {
+        // A period that has a mark already marks one before it: each event counts.
+        self.0 |= self.0.wrapping_add(1);
+    }
+
+    pub(super) fn mark_many(&mut self, events: u32) {
+        for _ in 0..events.min(128) {
+            self.mark();
+        }
+    }
+
+    pub(super) fn pass(&mut self, periods: u16) {
+        self.0 = self.0.checked_shl(u32::from(periods)).unwrap_or(0);
+    }
+
+    pub(super) fn count(self) -> u32 {
+        self.0.count_ones()
+    }
+}
+
+/// What the supervisor and its servo remember; a clone is a snapshot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SupervisorState<T, S> {
+    pub(super) state: State,
+    pub(super) cause: Cause,
+    pub(super) value: T,
+    pub(super) code: DacCode,
+    pub(super) safe: SafeRun,
+    pub(super) servo: ServoState<T, S>,
+    pub(super) tick: u64,
+    /// The tick that the law was last asked for.
+    pub(super) served: Option<u64>,
+    pub(super) last_target: Option<Target<T>>,
+    pub(super) started: bool,
+    pub(super) sequence: u16,
+    pub(super) counts: Counts,
+    pub(super) reckoned: bool,
+    /// Counts per period between the last two samples that passed.
+    pub(super) rate: i32,
+    /// Periods since the last sample that passed.
+    pub(super) unpassed: u32,
+    pub(super) recovering: u32,
+    pub(super) saturated: u32,
+    /// V, the newest first.
+    pub(super) voltages: [T; 4],
+    /// Counts of the last four periods, the newest first.
+    pub(super) recent: [i32; 4],
+    /// rad/s, rad
+    pub(super) expected_velocity: T,
+    pub(super) expected_travel: T,
+    pub(super) lost: History,
+    pub(super) late: History,
+    pub(super) duplicated: History,
+    pub(super) reordered: History,
+    pub(super) jump: History,
+    pub(super) overrun: History,
+    pub(super) lost_total: u64,
+    pub(super) rejected_total: u64,
+    pub(super) deadline_misses: u64,
+}
+
+impl<T: Real, S> SupervisorState<T, S> {
+    pub(super) fn pass_time(&mut self, periods: u16) {
+        for history in [
+            &mut self.lost,
+            &mut self.late,
+            &mut self.duplicated,
+            &mut self.reordered,
+            &mut self.jump,
+            &mut self.overrun,
+        ] {
+            history.pass(periods);
+        }
+    }
+
+    /// Where control stands.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// Why control ended, if it has.
+    #[must_use]
+    pub fn cause(&self) -> Cause {
+        self.cause
+    }
+
+    /// What the check that ended it saw; see [`Cycle::value`].
+    #[must_use]
+    pub fn value(&self) -> T {
+        self.value
+    }
+
+    /// The code that the converter has or is to have.
+    #[must_use]
+    pub fn code(&self) -> DacCode {
+        self.code
+    }
+
+    /// Period of the run, from 0 at the first answer.
+    #[must_use]
+    pub fn tick(&self) -> u64 {
+        self.tick
+    }
+
+    /// Samples lost since the start.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.lost_total
+    }
+
+    /// Samples refused as implausible since the start.
+    #[must_use]
+    pub fn rejected(&self) -> u64 {
+        self.rejected_total
+    }
+
+    /// Answers later than the deadline since the start.
+    #[must_use]
+    pub fn deadline_misses(&self) -> u64 {
+        self.deadline_misses
+    }
+}

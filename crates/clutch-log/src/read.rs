@@ -1,0 +1,102 @@
+//! A whole log in memory.
+
+use crate::error::LogError;
+use crate::record::{CommandRecord, EventRecord, Header, LinkRecord, Record, SampleRecord, TruthRecord};
+use crate::scan::{Damage, Each, End, Limits, Scanned, scan_bytes, scan_file};
+use std::path::Path;
+
+/// A log, each channel in the order of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Log {
+    /// What the log says of itself.
+    pub header: Header,
+    /// Channel `/sample`.
+    pub samples: Vec<SampleRecord>,
+    /// Channel `/command`.
+    pub commands: Vec<CommandRecord>,
+    /// Channel `/event`.
+    pub events: Vec<EventRecord>,
+    /// Channel `/link`.
+    pub links: Vec<LinkRecord>,
+    /// Channel `/truth`.
+    pub truths: Vec<TruthRecord>,
+    /// Finished by its writer and without damage. If not, see `end` and `damage`.
+    pub complete: bool,
+    /// How the file ends.
+    pub end: End,
+    /// The first damaged place that was skipped.
+    pub damage: Option<Damage>,
+    /// How many damaged places were skipped.
+    pub damaged: u64,
+    /// Size of the file, bytes.
+    pub file_bytes: u64,
+    /// Bytes of it that gave nothing.
+    pub left_out_bytes: u64,
+}
+
+impl Log {
+    /// Records of all channels.
+    #[must_use]
+    pub fn records(&self) -> usize {
+        self.samples.len() + self.commands.len() + self.events.len() + self.links.len() + self.truths.len()
+    }
+}
+
+/// Reads a log, also one that was cut: then `complete` is false.
+///
+/// # Errors
+/// No such file, or no log; more than `limits` allow; a header that cannot be read.
+pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Log, LogError> {
+    let path = path.as_ref();
+    collect(path, limits, |each| scan_file(path, limits, false, each))
+}
+
+/// Reads a log in memory.
+///
+/// # Errors
+/// As for [`read`], except those of the system.
+pub fn read_bytes(bytes: &[u8], limits: &Limits) -> Result<Log, LogError> {
+    let path = Path::new("<memory>");
+    collect(path, limits, |each| scan_bytes(bytes, path, limits, each))
+}
+
+fn collect(
+    path: &Path,
+    limits: &Limits,
+    scan: impl FnOnce(Each<'_>) -> Result<Scanned, LogError>,
+) -> Result<Log, LogError> {
+    let (mut samples, mut commands, mut events, mut links, mut truths) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut records = 0;
+    let seen = scan(&mut |_, record| {
+        records += 1;
+        if records > limits.max_records {
+            let (path, limit) = (path.into(), limits.max_records);
+            return Err(LogError::Limit { path, what: "records", value: records, limit });
+        }
+        match record {
+            Record::Sample(r) => samples.push(r),
+            Record::Command(r) => commands.push(r),
+            Record::Event(r) => events.push(r),
+            Record::Link(r) => links.push(r),
+            Record::Truth(r) => truths.push(r),
+        }
+        Ok(())
+    })?;
+    let complete = seen.complete();
+    let Scanned { header, end, damage, damaged, file_bytes, left_out_bytes, .. } = seen;
+    Ok(Log {
+        header,
+        samples,
+        commands,
+        events,
+        links,
+        truths,
+        complete,
+        end,
+        damage,
+        damaged,
+        file_bytes,
+        left_out_bytes,
+    })
+}

@@ -1,0 +1,249 @@
+//! Faults on request: what, when, how often.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Which way frames go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// From the board to the controller.
+    Up,
+    /// From the controller to the board.
+    Down,
+    /// Both.
+    Both,
+}
+
+impl Direction {
+    fn covers(self, way: Direction) -> bool {
+        self == Direction::Both || self == way
+    }
+}
+
+/// Where a converter can be stuck.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StuckAt {
+    /// Where it is when the fault begins.
+    Last,
+    /// At a voltage, V.
+    Volts(f64),
+}
+
+/// What goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultKind {
+    /// Frames vanish.
+    Drop,
+    /// Frames come twice.
+    Duplicate,
+    /// Frames get one to eight wrong bits.
+    Corrupt,
+    /// Frames come later, s.
+    Delay(f64),
+    /// Frames come later by a random time up to this, s.
+    Jitter(f64),
+    /// Neighbouring frames change places.
+    Reorder,
+    /// Nothing comes through.
+    Silence,
+    /// The encoder's counts stay.
+    EncoderFreeze,
+    /// The encoder's counts are off by this.
+    EncoderJump(i32),
+    /// The encoder's cable is off: counts 0, and the board sees it.
+    EncoderLoss,
+    /// The converter does not follow.
+    DacStuck(StuckAt),
+    /// The board starts anew.
+    Reset,
+}
+
+/// A fault and when it is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fault {
+    /// What goes wrong.
+    pub kind: FaultKind,
+    /// When it begins, s after the board was armed.
+    pub at: f64,
+    /// How long it lasts, s.
+    pub lasting: f64,
+    /// Probability with which each frame or period within that time is hit.
+    pub probability: f64,
+    /// Which frames.
+    pub direction: Direction,
+}
+
+impl Fault {
+    /// A fault that begins at `at` (s after arming), stays and always hits, both ways.
+    #[must_use]
+    pub fn new(kind: FaultKind, at: f64) -> Self {
+        Fault { kind, at, lasting: f64::INFINITY, probability: 1.0, direction: Direction::Both }
+    }
+
+    /// Whether it is there `time` seconds after arming.
+    #[must_use]
+    pub fn active(&self, time: f64) -> bool {
+        time >= self.at && time < self.at + self.lasting
+    }
+
+    /// Whether it concerns frames that go `way`.
+    #[must_use]
+    pub fn covers(&self, way: Direction) -> bool {
+        self.direction.covers(way)
+    }
+}
+
+/// Why a fault could not be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "fault \"{text}\": {problem}\nexpected KIND:KEY=VALUE,…, as drop:p=0.05 or freeze:at=2 or delay:at=1,for=0.1,ms=5\n\
+         kinds: drop, duplicate, corrupt, reorder, silence, delay (ms), jitter (ms), freeze, jump (counts), loss, dac-stuck (volts = a number or last), reset\n\
+         keys: at (s after arming), for (s), p (probability per frame or period), way (up = from the board, down = to it, both)"
+)]
+pub struct FaultError {
+    text: String,
+    problem: String,
+}
+
+impl FromStr for Fault {
+    type Err = FaultError;
+
+    fn from_str(text: &str) -> Result<Self, FaultError> {
+        let bad = |problem: String| FaultError { text: text.to_owned(), problem };
+        let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
+        let mut fault = Fault::new(FaultKind::Drop, 0.0);
+        let (mut ms, mut counts, mut volts, mut when) = (None, None, None, false);
+        for pair in rest.split(',').filter(|p| !p.is_empty()) {
+            let (key, value) = pair.split_once('=').ok_or_else(|| bad(format!("\"{pair}\" has no =")))?;
+            let number = || {
+                value
+                    .parse::<f64>()
+                    .ok()
+                    .filter(|x| x.is_finite())
+                    .ok_or_else(|| bad(format!("{key} = {value} is not a number")))
+            };
+            let at_least_0 = |x: f64| {
+                if x >= 0.0 { Ok(x) } else { Err(bad(format!("{key} = {value} is below 0"))) }
+            };
+            match key {
+                "at" => (fault.at, when) = (at_least_0(number()?)?, true),
+                "for" => fault.lasting = at_least_0(number()?)?,
+                "p" => {
+                    fault.probability = number()?;
+                    when = true;
+                    if !(0.0..=1.0).contains(&fault.probability) {
+                        return Err(bad(format!("p = {value} is not a probability: expected 0 to 1")));
+                    }
+                }
+                "way" => {
+                    fault.direction = match value {
+                        "up" => Direction::Up,
+                        "down" => Direction::Down,
+                        "both" => Direction::Both,
+                        _ => return Err(bad(format!("way = {value}: expected up, down or both"))),
+                    }
+                }
+                "ms" => ms = Some(at_least_0(number()?)? / 1000.0),
+                "counts" => {
+                    let n = value.parse::<i32>();
+                    counts = Some(n.map_err(|_| bad(format!("counts = {value} is not a whole number")))?);
+                }
+                "volts" if value == "last" => volts = Some(StuckAt::Last),
+                "volts" => volts = Some(StuckAt::Volts(number()?)),
+                _ => return Err(bad(format!("unknown key {key}"))),
+            }
+        }
+        let needs = |key: &str| bad(format!("{kind} needs {key}"));
+        fault.kind = match kind {
+            "drop" => FaultKind::Drop,
+            "duplicate" => FaultKind::Duplicate,
+            "corrupt" => FaultKind::Corrupt,
+            "reorder" => FaultKind::Reorder,
+            "silence" => FaultKind::Silence,
+            "delay" => FaultKind::Delay(ms.take().ok_or_else(|| needs("ms"))?),
+            "jitter" => FaultKind::Jitter(ms.take().ok_or_else(|| needs("ms"))?),
+            "freeze" => FaultKind::EncoderFreeze,
+            "jump" => FaultKind::EncoderJump(counts.take().ok_or_else(|| needs("counts"))?),
+            "loss" => FaultKind::EncoderLoss,
+            "dac-stuck" => FaultKind::DacStuck(volts.take().ok_or_else(|| needs("volts"))?),
+            "reset" => FaultKind::Reset,
+            _ => return Err(bad(format!("unknown kind {kind}"))),
+        };
+        if ms.is_some() || counts.is_some() || volts.is_some() {
+            return Err(bad(format!("a key that {kind} does not have")));
+        }
+        if !when {
+            return Err(bad("neither at nor p is given".to_owned()));
+        }
+        Ok(fault)
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.kind {
+            FaultKind::Drop => write!(f, "drop")?,
+            FaultKind::Duplicate => write!(f, "duplicate")?,
+            FaultKind::Corrupt => write!(f, "corrupt")?,
+            FaultKind::Delay(s) => write!(f, "delay of {} ms", s * 1000.0)?,
+            FaultKind::Jitter(s) => write!(f, "jitter up to {} ms", s * 1000.0)?,
+            FaultKind::Reorder => write!(f, "reorder")?,
+            FaultKind::Silence => write!(f, "silence")?,
+            FaultKind::EncoderFreeze => write!(f, "encoder frozen")?,
+            FaultKind::EncoderJump(n) => write!(f, "encoder jump of {n} counts")?,
+            FaultKind::EncoderLoss => write!(f, "encoder lost")?,
+            FaultKind::DacStuck(StuckAt::Last) => write!(f, "DAC stuck where it is")?,
+            FaultKind::DacStuck(StuckAt::Volts(v)) => write!(f, "DAC stuck at {v} V")?,
+            FaultKind::Reset => write!(f, "board reset")?,
+        }
+        if self.probability < 1.0 {
+            write!(f, ", p = {}", self.probability)?;
+        }
+        match self.direction {
+            Direction::Up => write!(f, ", from the board")?,
+            Direction::Down => write!(f, ", to the board")?,
+            Direction::Both => {}
+        }
+        if self.lasting.is_finite() {
+            write!(f, ", for {} s", self.lasting)?;
+        }
+        write!(f, ", from {} s", self.at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_are_read_and_told() {
+        let fault: Fault = "delay:at=1,for=0.1,ms=5,p=0.5,way=up".parse().unwrap();
+        assert_eq!(fault.kind, FaultKind::Delay(0.005));
+        assert!(fault.active(1.05) && !fault.active(1.2) && !fault.active(0.9));
+        assert!(fault.covers(Direction::Up) && !fault.covers(Direction::Down));
+        assert_eq!(fault.to_string(), "delay of 5 ms, p = 0.5, from the board, for 0.1 s, from 1 s");
+        let stuck: Fault = "dac-stuck:at=1,volts=last".parse().unwrap();
+        assert_eq!(stuck.kind, FaultKind::DacStuck(StuckAt::Last));
+    }
+
+    #[test]
+    fn a_bad_fault_says_what_is_wrong() {
+        for (text, problem) in [
+            ("", "unknown kind"),
+            ("explode:at=1", "unknown kind explode"),
+            ("drop", "neither at nor p"),
+            ("drop:p=2", "p = 2 is not a probability"),
+            ("drop:p=x", "p = x is not a number"),
+            ("drop:at=-1", "below 0"),
+            ("drop:at=1,ms=3", "a key that drop does not have"),
+            ("delay:at=1", "delay needs ms"),
+            ("jump:at=1,counts=1.5", "not a whole number"),
+            ("drop:at", "has no ="),
+            ("drop:at=1,where=up", "unknown key where"),
+            ("drop:at=nan", "not a number"),
+        ] {
+            let error = text.parse::<Fault>().unwrap_err().to_string();
+            assert!(error.contains(problem), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Before a run: who is on the line, and does it fit.
+
+use crate::port::{Port, PortError};
+use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
+use crate::setup::SetupError;
+use clutch_core::law::Law;
+use clutch_core::{Real, Target};
+use clutch_node::{ControlNode, Notice, Outbox};
+use clutch_wire::{Hello, Refusal, Refused};
+use rustix::fd::AsFd;
+use std::time::Duration;
+
+/// A run could not begin.
+#[derive(Debug, thiserror::Error)]
+pub enum PreflightError {
+    /// The port.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// The scenario.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// Nobody answers.
+    #[error(
+        "{address}: nothing answers. Is this the board's port, is the board powered, and does it speak at this baud \
+         rate? `clutch daq SCENARIO` starts a simulated board to try with"
+    )]
+    Silent {
+        /// The port.
+        address: String,
+    },
+    /// Somebody talks, but not this protocol.
+    #[error(
+        "{address}: {bytes} bytes came, and not one frame among them. Another device is on this port, or it runs at \
+         another baud rate; a clutch board answers with frames as docs/wire.md has them"
+    )]
+    Foreign {
+        /// The port.
+        address: String,
+        /// Bytes heard.
+        bytes: u64,
+    },
+    /// Our own words come back.
+    #[error(
+        "{address}: what is sent comes back. The port echoes: a loop-back plug, a terminal with echo, or a cable that \
+         joins transmit and receive; a board answers instead"
+    )]
+    Echo {
+        /// The port.
+        address: String,
+    },
+    /// The board speaks another version.
+    #[error(
+        "{address}: the board speaks version {board} of the protocol, this program version {}. Flash a firmware of \
+         this release, or use the release that fits the board",
+        clutch_wire::VERSION
+    )]
+    Version {
+        /// The port.
+        address: String,
+        /// The board's version.
+        board: u32,
+    },
+    /// The same version with other messages.
+    #[error(
+        "{address}: the board's message table differs (its hash ends with {board:08x}, this program's with {:08x}). \
+         Flash a firmware of this release, or use the release that fits the board",
+        clutch_wire::SCHEMA as u32
+    )]
+    Schema {
+        /// The port.
+        address: String,
+        /// Low half of the board's hash.
+        board: u32,
+    },
+    /// The board does not fit the scenario.
+    #[error("{address}: the board does not fit the scenario:\n  {}\nCorrect the scenario, or connect the board that it describes", .lines.join("\n  "))]
+    Misfit {
+        /// The port.
+        address: String,
+        /// What differs.
+        lines: Vec<String>,
+    },
+    /// The board said no.
+    #[error("{address}: the board refused to be {what}: {why}")]
+    Refused {
+        /// The port.
+        address: String,
+        /// What was asked: "configured" or "armed".
+        what: &'static str,
+        /// Why.
+        why: String,
+    },
+    /// The board stopped answering.
+    #[error(
+        "{address}: the board answered at first and then no more, when it was to be {what}. Unplugged, or reset?"
+    )]
+    Lost {
+        /// The port.
+        address: String,
+        /// What was asked.
+        what: &'static str,
+    },
+}
+
+/// The board's reason in words.
+#[must_use]
+pub fn why(m: &Refused) -> String {
+    match Refusal::from_u8(m.reason) {
+        Some(Refusal::State) => {
+            "another controller drives it now; stop that one first (a board whose controller has died is free after its watchdog's time)".into()
+        }
+        Some(Refusal::Run) => "the number of the run is spent; start again".into(),
+        Some(Refusal::Config) => format!("it has another configuration (its hash ends with {:08x})", m.value),
+        Some(Refusal::Period) => format!("it cannot sample each {} µs", m.value),
+        Some(Refusal::Watchdog) => format!("its watchdog cannot be set to {} µs", m.value),
+        Some(Refusal::Safe) => "it does not know the safe state, or its converter has no such code".into(),
+        Some(Refusal::Busy) => "it is busy".into(),
+        _ => format!("reason {}, value {}", m.reason, m.value),
+    }
+}
+
+/// A line with a controller's state machine at its end, spoken to step by step.
+pub struct Talk<'a, T: Real> {
+    port: &'a mut Port,
+    node: &'a mut ControlNode<T, Law<T>>,
+    out: Outbox,
+    bytes: u64,
+    echo: bool,
+}
+
+/// A board's clock against ours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ClockOffset {
+    /// Ours minus the board's, µs.
+    pub offset_us: i64,
+    /// Round trip of the request that gave it, µs.
+    pub round_trip_us: u64,
+}
+
+impl<'a, T: Real> Talk<'a, T> {
+    /// On an open port.
+    pub fn new(port: &'a mut Port, node: &'a mut ControlNode<T, Law<T>>) -> Self {
+        Talk { port, node, out: Outbox::default(), bytes: 0, echo: false }
+    }
+
+    fn address(&self) -> String {
+        self.port.address().to_string()
+    }
+
+    /// Sends what `ask` puts out, again every 100 ms, until `answer` gives something.
+    fn exchange<R>(
+        &mut self,
+        patience: Duration,
+        ask: impl Fn(&mut ControlNode<T, Law<T>>, &mut Outbox),
+        mut answer: impl FnMut(&Notice<T, clutch_core::law::LawTerms<T>>) -> Option<R>,
+    ) -> Result<Option<R>, PreflightError> {
+        let rest = |_: u64| Target {
+            position: clutch_core::FixedCounts(0),
+            velocity: T::ZERO,
+            acceleration: T::ZERO,
+        };
+        let end = monotonic_ns() + patience.as_nanos() as u64;
+        let mut again = 0;
+        let mut buffer = [0; 1024];
+        let mut found = None;
+        loop {
+            let now = monotonic_ns();
+            if now >= end {
+                return Ok(None);
+            }
+            if now >= again {
+                again = now + 100_000_000;
+                ask(self.node, &mut self.out);
+            }
+            if !self.out.as_bytes().is_empty() {
+                self.port.write(self.out.as_bytes()).map_err(|e| self.port.explain(&e))?;
+                self.out.clear();
+            }
+            if wait_readable(self.port.as_fd(), again.min(end), WaitMode::Sleep) == Readiness::Timeout {
+                continue;
+            }
+            let count = self.port.read(&mut buffer).map_err(|e| self.port.explain(&e))?;
+            self.bytes += count as u64;
+            let echo = &mut self.echo;
+            let bytes = buffer.get(..count).unwrap_or(&[]);
+            self.node.receive(monotonic_ns(), bytes, &rest, &mut self.out, &mut |n| {
+                *echo |= matches!(n, Notice::Echo);
+                if found.is_none() {
+                    found = answer(&n);
+                }
+            });
+            if found.is_some() {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// Who is there?
+    ///
+    /// # Errors
+    /// Silence, noise, an echo, another version; each says what to do.
+    pub fn discover(&mut self, patience: Duration) -> Result<Hello, PreflightError> {
+        enum Said {
+            Hello(Box<Hello>),
+            No(Refused),
+        }
+        let nonce = (monotonic_ns() / 1000) as u32;
+        let said = self.exchange(
+            patience,
+            |node, out| node.discover(nonce, out),
+            |n| match n {
+                Notice::Hello(m) if m.nonce == nonce => Some(Said::Hello(Box::new(*m))),
+                Notice::Refused(m) if m.request == clutch_wire::Discover::KIND => Some(Said::No(*m)),
+                _ => None,
+            },
+        )?;
+        let address = self.address();
+        match said {
+            Some(Said::Hello(hello)) => Ok(*hello),
+            Some(Said::No(m)) if m.reason == Refusal::Version as u8 => {
+                Err(PreflightError::Version { address, board: m.value })
+            }
+            Some(Said::No(m)) => Err(PreflightError::Schema { address, board: m.value }),
+            None if self.echo => Err(PreflightError::Echo { address }),
+            None if self.bytes > 0 => Err(PreflightError::Foreign { address, bytes: self.bytes }),
+            None => Err(PreflightError::Silent { address }),
+        }
+    }
+
+    /// Tells the board of the run.
+    ///
+    /// # Errors
+    /// The board refuses, or is silent.
+    pub fn configure(&mut self, present: clutch_core::DacCode) -> Result<(), PreflightError> {
+        let said = self.exchange(
+            Duration::from_secs(1),
+            |node, out| node.configure(present, out),
+            |n| match n {
+                Notice::Configured => Some(None),
+                Notice::Refused(m) if m.request == clutch_wire::Configure::KIND => Some(Some(*m)),
+                _ => None,
+            },
+        )?;
+        self.verdict(said, "configured")
+    }
+
+    fn verdict(&self, said: Option<Option<Refused>>, what: &'static str) -> Result<(), PreflightError> {
+        let address = self.address();
+        match said {
+            Some(None) => Ok(()),
+            Some(Some(m)) => Err(PreflightError::Refused { address, what, why: why(&m) }),
+            None => Err(PreflightError::Lost { address, what }),
+        }
+    }
+
+    /// The board's clock against ours: the request with the shortest round trip of some.
+    ///
+    /// # Errors
+    /// The board is silent.
+    pub fn clock(&mut self) -> Result<ClockOffset, PreflightError> {
+        let mut best: Option<ClockOffset> = None;
+        for nonce in 0..8 {
+            let sent = monotonic_ns();
+            let answer = self.exchange(
+                Duration::from_millis(90),
+                |node, out| node.ping(nonce, out),
+                |n| match n {
+                    Notice::Pong(n, time_us) if *n == nonce => Some((*time_us, monotonic_ns())),
+                    _ => None,
+                },
+            )?;
+            let Some((time_us, received)) = answer else { continue };
+            let offset = ClockOffset::new(sent, received, time_us);
+            if best.is_none_or(|b| offset.round_trip_us < b.round_trip_us) {
+                best = Some(offset);
+            }
+        }
+        best.ok_or_else(|| PreflightError::Lost { address: self.address(), what: "asked for its time" })
+    }
+}
+
+impl ClockOffset {
+    /// From one request: sent and answered at these times of ours (ns), and the board's clock (µs).
+    #[must_use]
+    pub fn new(sent_ns: u64, received_ns: u64, board_us: u32) -> Self {
+        let middle_us = (sent_ns / 2 + received_ns / 2) / 1000;
+        ClockOffset {
+            offset_us: middle_us as i64 - i64::from(board_us),
+            round_trip_us: received_ns.saturating_sub(sent_ns) / 1000,
+        }
+    }
+
+    /// How old a sample of the board's clock is at a time of ours (ns), µs.
+    #[must_use]
+    pub fn age_us(&self, board_us: u32, now_ns: u64) -> u32 {
+        // The board's clock wraps after 71 minutes: the difference is taken in its 32 bits.
+        let now = (now_ns / 1000) as i64 - self.offset_us;
+        let age = (now as u32).wrapping_sub(board_us);
+        // A clock that runs a little ahead gives samples of the future.
+        if age > u32::MAX / 2 { 0 } else { age }
+    }
+}

@@ -1,0 +1,247 @@
+//! Replay: the recorded counts to the recorded law, every output compared bit for bit.
+
+use crate::records;
+use crate::setup::{self, Setup, SetupError};
+use clutch_core::supervisor::{Arrival, BoardMode, Cause, Cycle, Sample, State};
+use clutch_core::{Counts, DacCode, FixedCounts, Micros, Real, SupervisorState, Target};
+use clutch_log::{CommandRecord, EventKind, EventRecord, Log, SampleRecord, Source};
+use clutch_sim::Scenario;
+use clutch_sim::scenario::ScalarKind;
+use clutch_wire::{BoardState, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE};
+
+/// A log could not be replayed.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// Its scenario.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// It does not say something that a replay needs.
+    #[error("the log lacks {0}: it was not written by `clutch loop` or `clutch sim --log`")]
+    Lacks(&'static str),
+    /// Its samples do not determine the law's inputs.
+    #[error(
+        "the log is of a run with an ideal sensor (rig.encoder.quantised = false), and holds whole counts only; it cannot be replayed"
+    )]
+    Ideal,
+    /// Samples and commands do not belong together.
+    #[error(
+        "the log has {samples} samples and {commands} commands, where each sample has one: it is damaged"
+    )]
+    Unpaired {
+        /// Samples.
+        samples: usize,
+        /// Commands.
+        commands: usize,
+    },
+}
+
+/// The first tick and field that differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Tick.
+    pub tick: u64,
+    /// Field of the channel `/command`.
+    pub field: &'static str,
+    /// In the log.
+    pub logged: f64,
+    /// In the replay.
+    pub replayed: f64,
+}
+
+/// A replay.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    /// The commands of the replay, one for each that was logged.
+    pub commands: Vec<CommandRecord>,
+    /// The first difference, if there is one.
+    pub first: Option<Difference>,
+    /// Records that the log dropped.
+    pub dropped: u64,
+}
+
+/// Fields of a command that have to agree; times do not.
+fn fields(c: &CommandRecord) -> [(&'static str, u64, f64); 16] {
+    let real = |name, x: f64| (name, x.to_bits(), x);
+    let whole = |name, x: u64| (name, x, x as f64);
+    [
+        whole("tick", c.tick),
+        whole("state", c.state.into()),
+        whole("source", c.source.into()),
+        whole("code", c.code.into()),
+        real("voltage_v", c.voltage),
+        real("demand_v", c.demand),
+        whole("limit", c.limit.into()),
+        ("target_counts_x65536", c.target_fixed as u64, c.target_fixed as f64),
+        real("target_position_rad", c.target_position),
+        real("target_velocity_rad_s", c.target_velocity),
+        real("target_acceleration_rad_s2", c.target_acceleration),
+        real("error_rad", c.error),
+        real("error_rate_rad_s", c.error_rate),
+        real("term 1", c.terms[0]),
+        real("term 2", c.terms[1]),
+        real("term 3", c.terms[2]),
+    ]
+}
+
+/// Replays a log under a scenario: its own, or one with other parameters.
+///
+/// # Errors
+/// The scenario is not one for a run like the log's.
+pub fn replay(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayError> {
+    match scenario.scalar {
+        ScalarKind::F32 => replay_in::<f32>(log, scenario),
+        ScalarKind::F64 => replay_in::<f64>(log, scenario),
+    }
+}
+
+fn replay_in<T: Real>(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayError> {
+    if log.samples.len() != log.commands.len() && log.complete {
+        let (samples, commands) = (log.samples.len(), log.commands.len());
+        return Err(ReplayError::Unpaired { samples, commands });
+    }
+    let pairs = log.samples.len().min(log.commands.len());
+    let samples = log.samples.get(..pairs).unwrap_or(&[]);
+    let commands = match log.header.source {
+        Source::Simulation => simulated::<T>(log, samples, scenario)?,
+        Source::Loop | Source::Replay => looped::<T>(log, samples, scenario)?,
+    };
+    let first = log.commands.iter().zip(&commands).find_map(|(logged, replayed)| {
+        let pairs = fields(logged).into_iter().zip(fields(replayed));
+        pairs.into_iter().find_map(|(a, b)| {
+            (a.1 != b.1).then(|| Difference { tick: logged.tick, field: a.0, logged: a.2, replayed: b.2 })
+        })
+    });
+    let dropped = log.links.iter().map(|l| l.log_dropped).max().unwrap_or(0);
+    Ok(Replay { commands, first, dropped })
+}
+
+fn extra<'a>(log: &'a Log, key: &str) -> Option<&'a str> {
+    log.header.extra.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str())
+}
+
+/// Key of the header under which the code at arming stands.
+pub const PRESENT_CODE: &str = "present_code";
+/// Key of the header under which a simulation's voltage at the start stands: its bits, in hex.
+pub const START_VOLTAGE: &str = "start_voltage_bits";
+
+fn seen(s: &SampleRecord) -> Sample {
+    Sample {
+        sequence: s.sequence,
+        counts: Counts(s.counts),
+        board: match BoardState::from_u8(s.status & 0x07) {
+            Some(BoardState::Ready) => BoardMode::Ready,
+            Some(BoardState::Armed | BoardState::Running) => BoardMode::Driving,
+            _ => BoardMode::Safe,
+        },
+        encoder_fault: s.status & STATUS_ENCODER_FAULT != 0,
+        converter_fault: s.status & STATUS_DAC_FAULT != 0,
+        command_late: s.status & STATUS_LATE != 0,
+        superseded: s.superseded,
+        lateness: Micros(s.lateness_us),
+    }
+}
+
+fn looped<T: Real>(
+    log: &Log,
+    samples: &[SampleRecord],
+    scenario: &Scenario,
+) -> Result<Vec<CommandRecord>, ReplayError> {
+    let present = extra(log, PRESENT_CODE).and_then(|v| v.parse().ok());
+    let present = present.ok_or(ReplayError::Lacks("the code at arming"))?;
+    let setup = Setup::<T>::new(scenario, 0)?;
+    let (servo, supervisor) = (&setup.servo, &setup.supervisor);
+    let path = setup::path::<T>(scenario)?;
+    let radians = servo.encoder().radians_per_count::<f64>();
+    let mut state = SupervisorState::default();
+    supervisor.connect(&mut state);
+    supervisor.arm(&mut state, DacCode(present));
+    let mut origin = FixedCounts(0);
+    // Ends that no sample brought, in order.
+    let ended = EventKind::Ended as u8;
+    let mut ends = log.events.iter().filter(|e| e.kind == ended).peekable();
+    let mut commands = Vec::with_capacity(samples.len());
+    for sample in samples {
+        let safe = seen(sample).board == BoardMode::Safe;
+        // The board's own report comes just before the first sample that shows its safe state;
+        // what else ended control came between two wake-ups.
+        let own = |e: &EventRecord| e.cause == Cause::Board as u8 || e.cause == Cause::Late as u8;
+        let before =
+            |e: &&EventRecord| e.time_ns < sample.time_ns || (e.time_ns == sample.time_ns && own(e) && safe);
+        while let Some(end) = ends.next_if(before) {
+            match end.cause {
+                c if c == Cause::Silence as u8 => supervisor.silence(&mut state, u32::MAX),
+                c if c == Cause::Done as u8 => supervisor.stop(&mut state, Cause::Done),
+                c if c == Cause::Operator as u8 => supervisor.stop(&mut state, Cause::Operator),
+                _ => supervisor.board_fault(&mut state, T::from_f64(end.value)),
+            }
+        }
+        if state.state() == State::Armed {
+            origin = FixedCounts::from_counts(i64::from(sample.counts));
+        }
+        let target = |tick: u64| {
+            let target = path(tick);
+            Target { position: target.position.plus(origin), ..target }
+        };
+        let cycle = supervisor.sample(servo, &mut state, &seen(sample), target);
+        commands.push(records::command(sample.time_ns, &cycle, servo.dac(), radians));
+    }
+    Ok(commands)
+}
+
+fn simulated<T: Real>(
+    log: &Log,
+    samples: &[SampleRecord],
+    scenario: &Scenario,
+) -> Result<Vec<CommandRecord>, ReplayError> {
+    let spec = scenario.spec();
+    if !spec.rig.encoder_quantised {
+        return Err(ReplayError::Ideal);
+    }
+    let volts = extra(log, START_VOLTAGE).and_then(|v| u64::from_str_radix(v, 16).ok());
+    let volts = f64::from_bits(volts.ok_or(ReplayError::Lacks("the voltage at the start"))?);
+    let params = spec.servo().map_err(SetupError::from)?.cast::<T>();
+    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| {
+        SetupError::from(clutch_core::ParamError {
+            field: e.field,
+            value: e.value.to_f64(),
+            expected: e.expected,
+        })
+    })?;
+    let start = spec.run.start_position();
+    let path =
+        clutch_core::reference::Reference::<f64>::new(&spec.reference, start, servo.encoder(), spec.period)
+            .map_err(SetupError::from)?;
+    let radians = servo.encoder().radians_per_count::<f64>();
+    let Some(first) = samples.first() else { return Ok(Vec::new()) };
+    let mut state = servo.start(Counts(first.counts), &path.at(0).cast(), T::from_f64(volts));
+    Ok(samples
+        .iter()
+        .map(|sample| {
+            let target = path.at(sample.tick).cast();
+            let output = servo.tick(&mut state, Counts(sample.counts), &target);
+            let cycle = simulated_cycle(sample.tick, target, output);
+            records::command(sample.time_ns, &cycle, servo.dac(), radians)
+        })
+        .collect())
+}
+
+/// A tick of a simulation, in the form of a loop's.
+#[must_use]
+pub fn simulated_cycle<T: Real, X>(
+    tick: u64,
+    target: Target<T>,
+    output: clutch_core::ServoOutput<T, X>,
+) -> Cycle<T, X> {
+    Cycle {
+        tick,
+        arrival: Arrival::Fresh,
+        from: State::Running,
+        state: State::Running,
+        cause: Cause::None,
+        value: T::ZERO,
+        answer: Some(output.code),
+        code: output.code,
+        target,
+        output: Some(output),
+    }
+}

@@ -1,0 +1,560 @@
+//! The loop: control thread, log thread, and what they tell each other.
+//!
+//! ```text
+//!   port ◄──► control thread ──ring──► log thread ──► file
+//!                  │  ▲
+//!          atomics │  │ stop
+//!                  ▼  │
+//!             whoever watches
+//! ```
+//!
+//! Between its first and its last cycle the control thread allocates nothing, takes no lock, and
+//! makes no system call but the wait for the next sample, the read and the write.
+
+use crate::port::{Port, PortError};
+use crate::preflight::ClockOffset;
+use crate::realtime::{
+    CycleStats, CycleSummary, Readiness, RealtimeOptions, WaitMode, enter, monotonic_ns, sleep_until,
+    wait_readable,
+};
+use crate::records;
+use clutch_core::law::{Law, LawTerms};
+use clutch_core::supervisor::{Cause, State};
+use clutch_core::{Micros, Real, StickSlip, StickSlipState, Target};
+use clutch_log::{EventKind, EventRecord, Header, LogError, LogWriter, Record};
+use clutch_node::{ControlNode, CycleNotice, LinkCounts, Notice, Outbox};
+use clutch_sim::Metrics;
+use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
+use clutch_wire::{Refused, StopReason};
+use rustix::fd::AsFd;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU64, Ordering};
+use std::time::Duration;
+
+/// What starts a cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// The board's sample: one clock, the board's.
+    #[default]
+    Sample,
+    /// The machine's clock: two clocks, so that now and then a cycle finds no sample or two.
+    Clock,
+}
+
+/// How the loop runs.
+#[derive(Clone, Copy, Debug)]
+pub struct LoopOptions {
+    /// Priority, memory, core, wait.
+    pub realtime: RealtimeOptions,
+    /// What starts a cycle.
+    pub pace: Pace,
+    /// Time left out of the figures, s.
+    pub settle: f64,
+    /// Called on the control thread when its cycles begin and when they have ended.
+    pub hooks: (fn(), fn()),
+}
+
+/// What a watcher sees while the loop runs.
+#[derive(Debug, Default)]
+pub struct Watch {
+    /// Set to end the run in the safe state.
+    pub stop: Arc<AtomicBool>,
+    /// [`State`] as a number.
+    pub state: AtomicU8,
+    /// Ticks so far.
+    pub tick: AtomicU64,
+    /// Error, 1e-9 rad.
+    pub error_nrad: AtomicI64,
+    /// Brake voltage, mV.
+    pub millivolts: AtomicI64,
+    /// Samples lost.
+    pub lost: AtomicU64,
+    /// Answers later than the deadline.
+    pub late_answers: AtomicU64,
+    /// Records that did not fit into the ring.
+    pub log_dropped: AtomicU64,
+    /// Set by the log thread when it could not go on.
+    pub log_ended: AtomicBool,
+}
+
+/// How it went.
+#[derive(Clone, Debug)]
+pub struct LoopReport {
+    /// Where control ended.
+    pub state: State,
+    /// Why.
+    pub cause: Cause,
+    /// What the check that ended it saw.
+    pub value: f64,
+    /// Ticks in which the law was asked.
+    pub ticks: u64,
+    /// Tracking figures, from measured positions.
+    pub metrics: Metrics,
+    /// Stick-slip cycles per second as the encoder shows them, after settling.
+    pub stick_slip_cycles_per_s: f64,
+    /// What the line carried.
+    pub link: LinkCounts,
+    /// Samples lost.
+    pub lost: u64,
+    /// Samples that were not believed.
+    pub implausible: u64,
+    /// Answers later than the deadline.
+    pub deadline_misses: u64,
+    /// Time from a sample's arrival to its answer, ns.
+    pub response: CycleSummary,
+    /// Time between two answers, ns.
+    pub interval: CycleSummary,
+    /// What the system refused.
+    pub notes: Vec<String>,
+    /// Records that did not fit into the ring.
+    pub log_dropped: u64,
+    /// Whether the board said that it is in its safe state.
+    pub board_safe: bool,
+    /// Why the board did not take consent, if it did not.
+    pub refused: Option<Refused>,
+    /// The port's error, if it ended the run.
+    pub port_error: Option<String>,
+}
+
+/// Frames of a log that wait for their thread.
+const RING: usize = 1 << 15;
+/// How long the control thread waits for the board to say that it is safe.
+const FAREWELL: Duration = Duration::from_millis(300);
+
+struct Control<'a, T: Real, P> {
+    node: &'a mut ControlNode<T, Law<T>>,
+    port: &'a mut Port,
+    path: &'a P,
+    ring: Option<rtrb::Producer<Record>>,
+    watch: &'a Watch,
+    out: Outbox,
+    ticks: u64,
+    start_ns: u64,
+    radians: f64,
+    dac: clutch_core::Dac<T>,
+    period: f64,
+    settle: f64,
+    clock: ClockOffset,
+    ping_sent: Option<(u32, u64)>,
+    pings: u32,
+    figures: MetricsBuilder,
+    detector: StickSlip<f64>,
+    sticks: StickSlipState<f64>,
+    sticks_before: u64,
+    answers: u64,
+    response: CycleStats,
+    interval: CycleStats,
+    last_answer_ns: Option<u64>,
+    dropped: u64,
+    board_safe: bool,
+    refused: Option<Refused>,
+}
+
+/// What one call of the node brought, gathered for use after it.
+#[derive(Clone, Copy)]
+struct Batch<T: Real> {
+    cycles: [Option<CycleNotice<T, LawTerms<T>>>; 32],
+    used: usize,
+    ended: Option<Cause>,
+    pong: Option<(u32, u32)>,
+    stopped: bool,
+    refused: Option<Refused>,
+}
+
+impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
+    fn push(&mut self, records: &[Record]) {
+        let Some(ring) = &mut self.ring else { return };
+        // A sample and its command together or not at all.
+        if ring.slots() < records.len() {
+            self.dropped += records.len() as u64;
+            self.watch.log_dropped.store(self.dropped, Ordering::Relaxed);
+            return;
+        }
+        for record in records {
+            let _ = ring.push(*record);
+        }
+    }
+
+    /// One wake-up: read, decide, write. Whether the line is still there.
+    fn cycle(&mut self, arrived_ns: u64, buffer: &mut [u8]) -> Result<(), std::io::Error> {
+        let count = self.port.read(buffer)?;
+        let now = monotonic_ns();
+        let from = self.node.state().state();
+        let mut batch = Batch::<T> {
+            cycles: [const { None }; 32],
+            used: 0,
+            ended: None,
+            pong: None,
+            stopped: false,
+            refused: None,
+        };
+        let mut lost_records = 0;
+        {
+            let mut notices = |n: Notice<T, LawTerms<T>>| match n {
+                Notice::Cycle(n) => match batch.cycles.get_mut(batch.used) {
+                    Some(slot) => {
+                        *slot = Some(n);
+                        batch.used += 1;
+                    }
+                    None => lost_records += 2,
+                },
+                Notice::Ended(cause) => batch.ended = Some(cause),
+                Notice::Pong(nonce, time_us) => batch.pong = Some((nonce, time_us)),
+                Notice::Stopped(_) => batch.stopped = true,
+                Notice::Refused(m) => batch.refused = Some(m),
+                _ => {}
+            };
+            let bytes = buffer.get(..count).unwrap_or(&[]);
+            self.node.receive(now, bytes, self.path, &mut self.out, &mut notices);
+            self.node.poll(now, &mut self.out, &mut notices);
+        }
+        self.dropped += lost_records;
+        if !self.out.as_bytes().is_empty() {
+            self.port.write(self.out.as_bytes())?;
+            self.out.clear();
+            let done = monotonic_ns();
+            let took = done.saturating_sub(arrived_ns);
+            self.node.answered(Micros(u32::try_from(took / 1000).unwrap_or(u32::MAX)));
+            self.response.record(took);
+            if let Some(last) = self.last_answer_ns {
+                self.interval.record(done.saturating_sub(last));
+            }
+            self.last_answer_ns = Some(done);
+        }
+        self.after(now, from, &batch);
+        Ok(())
+    }
+
+    /// What need not be done before the answer is on its way: log, figures, watcher.
+    fn after(&mut self, now: u64, from: State, batch: &Batch<T>) {
+        let time_ns = now.saturating_sub(self.start_ns);
+        self.refused = self.refused.or(batch.refused);
+        // What came before consent is not of the run.
+        let of_run = |n: &&CycleNotice<T, LawTerms<T>>| n.cycle.from != State::Ready;
+        for n in batch.cycles.iter().take(batch.used).flatten().filter(of_run) {
+            let age = self.clock.age_us(n.sample.time_us, now);
+            let mut records = [Record::Sample(records::sample(time_ns, age, n)); 3];
+            records[1] = Record::Command(records::command(time_ns, &n.cycle, &self.dac, self.radians));
+            let change = records::change(time_ns, &n.cycle);
+            let used = if let Some(change) = change {
+                records[2] = change;
+                3
+            } else {
+                2
+            };
+            self.push(&records[..used]);
+            self.board_safe |= matches!(n.sample.status & 0x07, 4 | 5);
+            if let Some(out) = &n.cycle.output {
+                let time = n.cycle.tick as f64 * self.period;
+                let error = out.tick.error.to_f64();
+                let velocity = out.tick.velocity().to_f64();
+                let voltage = out.voltage.to_f64();
+                self.answers += 1;
+                self.figures.sample(time, MetricsSample { error, velocity, voltage });
+                let counts = clutch_core::Counts(n.sample.counts);
+                self.detector.update(&mut self.sticks, counts, n.cycle.target.velocity.to_f64());
+                if time < self.settle {
+                    self.sticks_before = self.sticks.cycles();
+                }
+                self.watch.error_nrad.store((error * 1e9) as i64, Ordering::Relaxed);
+                self.watch.millivolts.store((voltage * 1e3) as i64, Ordering::Relaxed);
+            }
+        }
+        self.board_safe |= batch.stopped;
+        let state = self.node.state();
+        if let Some(cause) = batch.ended {
+            let value = state.value().to_f64();
+            let record = records::ended(time_ns, state.tick(), from, state.state(), cause, value);
+            self.push(&[record]);
+        }
+        if let (Some((nonce, time_us)), Some((sent, sent_ns))) = (batch.pong, self.ping_sent)
+            && nonce == sent
+        {
+            let offset = ClockOffset::new(sent_ns, now, time_us);
+            // A slow answer says little of the board's clock.
+            if offset.round_trip_us <= self.clock.round_trip_us + 200 {
+                self.clock = ClockOffset { round_trip_us: self.clock.round_trip_us, ..offset };
+            }
+            self.ping_sent = None;
+        }
+        let state = self.node.state();
+        let w = self.watch;
+        w.state.store(state.state() as u8, Ordering::Relaxed);
+        w.tick.store(state.tick(), Ordering::Relaxed);
+        w.lost.store(state.lost(), Ordering::Relaxed);
+        w.late_answers.store(state.deadline_misses(), Ordering::Relaxed);
+    }
+
+    /// Once a second: the link's counters, the board's clock.
+    fn housekeeping(&mut self, now: u64) {
+        let state = self.node.state();
+        let others = (state.lost(), state.rejected(), state.deadline_misses(), self.dropped);
+        let link = records::link(now.saturating_sub(self.start_ns), state.tick(), self.node.counts(), others);
+        self.push(&[Record::Link(link)]);
+        self.pings = self.pings.wrapping_add(1);
+        self.node.ping(self.pings, &mut self.out);
+        self.ping_sent = Some((self.pings, now));
+    }
+
+    fn end(&mut self, reason: StopReason) {
+        let from = self.node.state().state();
+        self.node.stop(reason, &mut self.out);
+        let state = self.node.state();
+        let now = monotonic_ns().saturating_sub(self.start_ns);
+        let record = records::ended(now, state.tick(), from, state.state(), state.cause(), 0.0);
+        self.push(&[record]);
+    }
+}
+
+/// A log that is written beside the loop.
+pub struct LogThread {
+    path: std::path::PathBuf,
+    thread: std::thread::JoinHandle<Result<clutch_log::Summary, LogError>>,
+}
+
+impl LogThread {
+    /// Starts a thread that writes what comes through the ring.
+    ///
+    /// # Errors
+    /// The file cannot be created.
+    pub fn start(
+        path: &Path,
+        header: &Header,
+        watch: Arc<Watch>,
+    ) -> Result<(LogThread, rtrb::Producer<Record>), LogError> {
+        let mut writer = LogWriter::create(path, header)?;
+        let (producer, mut consumer) = rtrb::RingBuffer::<Record>::new(RING);
+        let thread = std::thread::spawn(move || {
+            let mut failed = None;
+            loop {
+                // Asked before the ring is emptied: what was pushed before the end is seen.
+                let last = consumer.is_abandoned();
+                while let Ok(record) = consumer.pop() {
+                    if failed.is_none()
+                        && let Err(error) = writer.write(&record)
+                    {
+                        watch.log_ended.store(true, Ordering::Relaxed);
+                        failed = Some(error);
+                    }
+                }
+                if last {
+                    break;
+                }
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            match failed {
+                Some(error) => Err(error),
+                None => writer.finish(),
+            }
+        });
+        Ok((LogThread { path: path.to_owned(), thread }, producer))
+    }
+
+    /// Waits until everything is in the file.
+    ///
+    /// # Errors
+    /// The file could not be written to its end.
+    pub fn finish(self) -> Result<clutch_log::Summary, LogError> {
+        let LogThread { path, thread } = self;
+        thread.join().unwrap_or(Err(LogError::Closed { path, written: 0 }))
+    }
+}
+
+/// Everything that a run needs, after the pre-flight: the board is configured.
+pub struct Configured<'a, T: Real, P> {
+    /// The controller.
+    pub node: &'a mut ControlNode<T, Law<T>>,
+    /// The open port.
+    pub port: &'a mut Port,
+    /// The path.
+    pub path: &'a P,
+    /// Where records go, if anywhere.
+    pub ring: Option<rtrb::Producer<Record>>,
+    /// What a watcher sees.
+    pub watch: &'a Watch,
+    /// Ticks of the run.
+    pub ticks: u64,
+    /// The board's clock.
+    pub clock: ClockOffset,
+    /// What sees stick-slip in the counts.
+    pub detector: StickSlip<f64>,
+}
+
+/// Gives consent and runs the cycles until the path's end, a stop, or a fault, on the calling thread.
+pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
+    configured: Configured<'_, T, P>,
+    options: &LoopOptions,
+) -> LoopReport {
+    let servo = configured.node.servo();
+    let (encoder, period) = (servo.encoder(), servo.period());
+    let dac = *servo.dac();
+    let seconds: f64 = period.seconds();
+    let period_ns = u64::from(period.0) * 1000;
+    let mut buffer = [0_u8; 2048];
+    let notes = enter(&options.realtime);
+    let mut c = Control {
+        path: configured.path,
+        ring: configured.ring,
+        watch: configured.watch,
+        out: Outbox::default(),
+        ticks: configured.ticks,
+        start_ns: monotonic_ns(),
+        radians: encoder.radians_per_count(),
+        dac,
+        period: seconds,
+        settle: options.settle,
+        clock: configured.clock,
+        ping_sent: None,
+        pings: 0,
+        figures: MetricsBuilder::new(seconds, options.settle),
+        detector: configured.detector,
+        sticks: StickSlipState::default(),
+        sticks_before: 0,
+        answers: 0,
+        response: CycleStats::new(),
+        interval: CycleStats::new(),
+        last_answer_ns: None,
+        dropped: 0,
+        board_safe: false,
+        refused: None,
+        node: configured.node,
+        port: configured.port,
+    };
+    (options.hooks.0)();
+    let mut port_error = None;
+    let mut next_clock = monotonic_ns() + period_ns;
+    let mut next_second = monotonic_ns() + 1_000_000_000;
+    let mut farewell: Option<u64> = None;
+    let mode = options.realtime.wait;
+    // Consent, once this thread is what it is going to be: the board's watchdog starts with it.
+    let (mut ask_again, give_up) = (0, monotonic_ns() + 1_000_000_000);
+    loop {
+        // Wait.
+        let arrived = match options.pace {
+            _ if c.node.state().state() == State::Ready => {
+                let now = monotonic_ns();
+                if c.refused.is_some() || now >= give_up {
+                    break;
+                }
+                if now >= ask_again {
+                    ask_again = now + 100_000_000;
+                    c.node.arm(&mut c.out);
+                    if let Err(error) = c.port.write(c.out.as_bytes()) {
+                        port_error = Some(error);
+                        break;
+                    }
+                    c.out.clear();
+                }
+                let _ = wait_readable(c.port.as_fd(), now + 10_000_000, WaitMode::Sleep);
+                monotonic_ns()
+            }
+            Pace::Sample => {
+                let until = c.node.poll_at().unwrap_or_else(|| monotonic_ns() + 20_000_000);
+                // Spinning is for the moment at which the sample is due.
+                let until = match (mode, c.last_answer_ns) {
+                    (WaitMode::SleepSpin { spin_us }, Some(last)) => {
+                        until.min(last + period_ns + u64::from(spin_us) * 500)
+                    }
+                    _ => until,
+                };
+                match wait_readable(c.port.as_fd(), until, mode) {
+                    Readiness::HungUp => {
+                        port_error = Some(std::io::Error::from(std::io::ErrorKind::BrokenPipe));
+                        break;
+                    }
+                    Readiness::Readable | Readiness::Timeout => {}
+                }
+                monotonic_ns()
+            }
+            Pace::Clock => {
+                sleep_until(next_clock, mode);
+                let woke = monotonic_ns();
+                let due = next_clock;
+                // Cycles that were missed stay missed.
+                while next_clock <= woke {
+                    next_clock += period_ns;
+                }
+                due
+            }
+        };
+        // Read, decide, write.
+        if let Err(error) = c.cycle(arrived, &mut buffer) {
+            port_error = Some(error);
+            break;
+        }
+        // Ends.
+        let now = monotonic_ns();
+        match c.node.state().state() {
+            State::Ready => {}
+            State::Running | State::Armed => {
+                if c.watch.stop.load(Ordering::Relaxed) {
+                    c.end(StopReason::Operator);
+                } else if c.node.state().state() == State::Running && c.node.state().tick() + 1 >= c.ticks {
+                    c.end(StopReason::Done);
+                } else if now >= next_second {
+                    next_second += 1_000_000_000;
+                    c.housekeeping(now);
+                }
+            }
+            _ => {
+                let until = *farewell.get_or_insert(now + FAREWELL.as_nanos() as u64);
+                if c.board_safe || now >= until {
+                    break;
+                }
+            }
+        }
+        if !c.out.as_bytes().is_empty() {
+            if let Err(error) = c.port.write(c.out.as_bytes()) {
+                port_error = Some(error);
+                break;
+            }
+            c.out.clear();
+        }
+    }
+    (options.hooks.1)();
+    let port_error = port_error.map(|e| {
+        let from = c.node.state().state();
+        c.node.disconnect();
+        let state = c.node.state();
+        let now = monotonic_ns().saturating_sub(c.start_ns);
+        let record = EventRecord {
+            tick: state.tick(),
+            time_ns: now,
+            kind: EventKind::PortLost as u8,
+            from: from as u8,
+            to: state.state() as u8,
+            cause: state.cause() as u8,
+            value: 0.0,
+        };
+        c.push(&[Record::Event(record)]);
+        let explained: PortError = c.port.explain(&e);
+        explained.to_string()
+    });
+    let now = monotonic_ns();
+    c.housekeeping(now);
+    c.out.clear();
+    let state = c.node.state();
+    let metrics = c.figures.finish();
+    let measured = metrics.measured_s.max(seconds);
+    let _ = c.watch.log_dropped.fetch_max(c.dropped, Ordering::Relaxed);
+    LoopReport {
+        state: state.state(),
+        cause: state.cause(),
+        value: state.value().to_f64(),
+        ticks: c.answers,
+        metrics,
+        stick_slip_cycles_per_s: (c.sticks.cycles() - c.sticks_before) as f64 / measured,
+        link: *c.node.counts(),
+        lost: state.lost(),
+        implausible: state.rejected(),
+        deadline_misses: state.deadline_misses(),
+        response: c.response.summary(),
+        interval: c.interval.summary(),
+        notes,
+        log_dropped: c.dropped,
+        board_safe: c.board_safe,
+        refused: c.refused,
+        port_error,
+    }
+}

@@ -1,0 +1,223 @@
+//! From a scenario to what runs: servo, supervisor, path, numbers for the wire and the log.
+
+use clutch_core::law::{Controller, Terms, Tick};
+use clutch_core::reference::Reference;
+use clutch_core::supervisor::Checks;
+use clutch_core::{
+    DacCode, FixedCounts, Micros, ParamError, Real, Servo, ServoParams, StickSlip, StickSlipParams,
+    Supervisor, SupervisorParams, Target,
+};
+use clutch_log::{Header, Source};
+use clutch_node::ControlParams;
+use clutch_sim::scenario::{Plan, ScalarKind};
+use clutch_sim::{Scenario, ScenarioError};
+use clutch_wire::Hello;
+
+/// FNV-1a, 64 bit: for telling apart, not for secrets.
+#[must_use]
+pub fn fnv1a(text: &str) -> u64 {
+    text.bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// Hash of the whole scenario, defaults filled in: what the board echoes.
+#[must_use]
+pub fn config_hash(scenario: &Scenario) -> u64 {
+    fnv1a(&scenario.canonical())
+}
+
+/// Hash of what decides the law's answers: law, model, velocity, output, sampling, encoder,
+/// converter. Two logs with the same hash come from the same law.
+#[must_use]
+pub fn law_hash(scenario: &Scenario) -> u64 {
+    let tables = ["law.", "model.", "velocity.", "output.", "sampling.", "rig.encoder.", "rig.dac."];
+    let mut text = String::new();
+    for (key, value) in scenario.parameters() {
+        if tables.iter().any(|t| key.starts_with(t)) {
+            text += &format!("{key}={value}\n");
+        }
+    }
+    fnv1a(&text)
+}
+
+/// A run could not be set up.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum SetupError {
+    /// The scenario.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// A parameter.
+    #[error(transparent)]
+    Param(#[from] ParamError),
+}
+
+fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
+    ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }
+}
+
+/// What a run on a board is made of, in the scalar `T`.
+#[derive(Clone, Debug)]
+pub struct Setup<T: Real> {
+    /// The servo's parameters, for one built around another law.
+    pub params: ServoParams<T>,
+    /// The servo.
+    pub servo: Servo<T>,
+    /// The supervisor.
+    pub supervisor: Supervisor<T>,
+    /// Numbers for the wire.
+    pub control: ControlParams,
+    /// What sees stick-slip in the counts.
+    pub detector: StickSlip<f64>,
+    /// Ticks of the run.
+    pub ticks: u64,
+}
+
+impl<T: Real> Setup<T> {
+    /// Of a scenario; `run` is the run's number on the wire.
+    ///
+    /// # Errors
+    /// The scenario has no safe state.
+    pub fn new(scenario: &Scenario, run: u16) -> Result<Self, SetupError> {
+        Setup::with_checks(scenario, run, Checks::ALL)
+    }
+
+    /// The same with fewer of the supervisor's checks: for the campaign that shows that each is
+    /// needed.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn with_checks(scenario: &Scenario, run: u16, checks: Checks) -> Result<Self, SetupError> {
+        let spec = scenario.spec();
+        let safety = scenario.safety()?;
+        let plan = scenario.plan()?;
+        let servo_params = spec.servo()?.cast::<T>();
+        let limits: SupervisorParams<T> = safety.supervisor.cast();
+        let bounds = plan.bounds.cast::<T>();
+        let cycles = |n: u32| Micros(spec.period.0.saturating_mul(n));
+        Ok(Setup {
+            params: servo_params,
+            servo: Servo::new(&servo_params).map_err(to_f64)?,
+            supervisor: Supervisor::new(&limits, &servo_params, &bounds).map_err(to_f64)?.with_checks(checks),
+            control: ControlParams {
+                run,
+                config: config_hash(scenario),
+                watchdog: cycles(safety.watchdog_cycles),
+                valid: cycles(safety.valid_cycles),
+                silence: cycles(safety.supervisor.silence_cycles),
+            },
+            detector: StickSlip::new(&StickSlipParams::default(), servo_params.encoder, spec.period)?,
+            ticks: scenario.ticks(),
+        })
+    }
+}
+
+/// The scenario's path from the count on which a run begins: its first point lies within that
+/// count, where the simulation's does.
+///
+/// # Errors
+/// None for a checked scenario.
+pub fn path<T: Real>(scenario: &Scenario) -> Result<impl Fn(u64) -> Target<T> + '_, SetupError> {
+    let spec = scenario.spec();
+    let encoder = clutch_core::Encoder::new::<f64>(spec.rig.counts_per_rev)?;
+    let within = spec.run.start_position().0 & ((1 << FixedCounts::FRACTION_BITS) - 1);
+    let reference = Reference::<f64>::new(&spec.reference, FixedCounts(within), encoder, spec.period)?;
+    // Planned in double precision and rounded, as in the simulation: both scalars follow one path.
+    let first = reference.at(0).position.0 >> FixedCounts::FRACTION_BITS;
+    let first = FixedCounts::from_counts(first);
+    Ok(move |tick: u64| {
+        let target = reference.at(tick);
+        let position = FixedCounts(target.position.0.wrapping_sub(first.0));
+        Target { position, ..target }.cast()
+    })
+}
+
+/// The scalar of a scenario, as a log names it.
+#[must_use]
+pub fn scalar_name(scalar: ScalarKind) -> &'static str {
+    match scalar {
+        ScalarKind::F32 => "f32",
+        ScalarKind::F64 => "f64",
+    }
+}
+
+/// A log's header for a run of a scenario.
+#[must_use]
+pub fn header<T: Real>(
+    scenario: &Scenario,
+    servo: &Servo<T>,
+    source: Source,
+    port: &str,
+    version: &str,
+) -> Header {
+    // The names depend on the law and not on what it is asked.
+    let (law, tick) = (servo.law(), Tick::default());
+    let terms = law.update(&mut law.start(&tick, T::ZERO), &tick).terms;
+    let names = terms.columns().map(|(name, _)| name.to_owned());
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    Header {
+        scenario_name: scenario.name.clone(),
+        scenario_toml: scenario.canonical(),
+        parameters: scenario.parameters(),
+        version: version.to_owned(),
+        law_hash: law_hash(scenario),
+        port: port.to_owned(),
+        source,
+        scalar: scalar_name(scenario.scalar).to_owned(),
+        period_us: scenario.spec().period.0,
+        term_names: names,
+        started_unix_ns: now.map_or(0, |t| u64::try_from(t.as_nanos()).unwrap_or(u64::MAX)),
+        ..Header::default()
+    }
+}
+
+/// Why a board does not fit a scenario: a line each; empty if it does.
+#[must_use]
+pub fn misfits(scenario: &Scenario, hello: &Hello) -> Vec<String> {
+    let spec = scenario.spec();
+    let mut lines = Vec::new();
+    let mut differ = |what: &str, board: String, key: &str, ours: String| {
+        if board != ours {
+            lines.push(format!("{what}: the board has {board}, the scenario {key} = {ours}"));
+        }
+    };
+    differ(
+        "encoder",
+        hello.counts_per_rev.to_string(),
+        "rig.encoder.counts_per_rev",
+        spec.rig.counts_per_rev.to_string(),
+    );
+    differ("converter", hello.dac_bits.to_string(), "rig.dac.bits", spec.rig.dac.bits.to_string());
+    let volts = |mv: i32| format!("{:.3} V", f64::from(mv) / 1000.0);
+    let ours = |v: f64| format!("{v:.3} V");
+    differ("converter", volts(hello.dac_lowest_mv), "rig.dac.lowest_v", ours(spec.rig.dac.lowest));
+    differ("converter", volts(hello.dac_highest_mv), "rig.dac.highest_v", ours(spec.rig.dac.highest));
+    let period = spec.period.0;
+    if period < hello.period_min_us || period > hello.period_max_us {
+        lines.push(format!(
+            "period: the board samples each {} to {} µs, the scenario sampling.period_us = {period}",
+            hello.period_min_us, hello.period_max_us
+        ));
+    }
+    if let Ok(safety) = scenario.safety() {
+        let watchdog = u64::from(safety.watchdog_cycles) * u64::from(period);
+        if watchdog > u64::from(hello.watchdog_max_us) {
+            lines.push(format!(
+                "watchdog: the board's reaches {} µs, the scenario asks for {watchdog} µs",
+                hello.watchdog_max_us
+            ));
+        }
+    }
+    lines
+}
+
+/// Volts at which the board powers up, and whether that is what the scenario's safe state wants.
+#[must_use]
+pub fn boot_output(scenario: &Scenario, hello: &Hello, plan: &Plan) -> (f64, bool) {
+    let spec = scenario.spec();
+    let volts = clutch_core::Dac::new(&spec.rig.dac).map_or(0.0, |d| d.volts(DacCode(hello.boot_code)));
+    let holds = scenario.safety().is_ok_and(|s| match s.supervisor.on_fault.holding_voltage() {
+        Some(_) => volts + 1e-9 >= plan.envelope.holding_voltage,
+        None => true,
+    });
+    (volts, holds)
+}

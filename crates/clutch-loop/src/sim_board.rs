@@ -1,0 +1,285 @@
+//! The simulated board: a rig that moves, the board's state machine, and broken hardware on
+//! request. It knows no clock of its own: the times it is given are its time, ns.
+
+use crate::faults::{Fault, FaultKind, StuckAt};
+use clutch_core::{Counts, Dac, DacCode, FixedCounts, ParamError, SafeCodes};
+use clutch_node::{BoardNode, BoardParams, Outbox};
+use clutch_sim::engine::{EngineError, Motion};
+use clutch_sim::rig::Rig;
+use clutch_sim::{MovingRig, RunError, Scenario, ScenarioError};
+use clutch_wire::BoardState;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// The simulated board could not go on.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum SimBoardError {
+    /// The scenario does not say how a run on a board ends, or is wrong.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The rig cannot be simulated so.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A parameter of the board.
+    #[error(transparent)]
+    Param(#[from] ParamError),
+    /// The engine gave up.
+    #[error(transparent)]
+    Motion(#[from] EngineError),
+}
+
+/// Serial number of a simulated board whose clock waits for a controller that a busy machine
+/// holds up.
+pub const PATIENT_BOARD: u32 = 0;
+/// Serial number of a simulated board that keeps real time.
+pub const STRICT_BOARD: u32 = 1;
+
+/// A board on a rig, both simulated.
+pub struct SimBoard {
+    params: BoardParams,
+    node: BoardNode,
+    rig: MovingRig,
+    dac: Dac<f64>,
+    faults: Vec<Fault>,
+    rng: Pcg64,
+    /// Board time, ns, up to which the rig has moved; none before the first sample.
+    moved_ns: Option<u64>,
+    next_sample_ns: Option<u64>,
+    started_ns: u64,
+    samples: u64,
+    armed_ns: Option<u64>,
+    frozen: Option<Counts>,
+    stuck_at: Option<f64>,
+    reset_done: bool,
+    first_hit_ns: Option<u64>,
+}
+
+/// The converter in whole millivolts, as the wire tells it.
+fn millivolts(volts: f64) -> i32 {
+    (volts * 1000.0).round() as i32
+}
+
+impl SimBoard {
+    /// A board at power-up on the scenario's rig, its shaft at rest under the safe state's
+    /// voltage. A patient one tells the controller that its clock may wait.
+    ///
+    /// # Errors
+    /// The scenario has no safe state, or its rig cannot be simulated.
+    pub fn new(
+        scenario: &Scenario,
+        faults: &[Fault],
+        boot: u32,
+        patient: bool,
+    ) -> Result<Self, SimBoardError> {
+        let spec = scenario.spec();
+        let safety = scenario.safety()?;
+        let rig = Rig::new(&spec.rig, spec.run.seed)?;
+        let engine = spec.engine(&rig)?;
+        let dac = Dac::new(&spec.rig.dac)?;
+        let codes = SafeCodes::new(&safety.supervisor.on_fault, &dac, spec.period)?;
+        let params = BoardParams {
+            board: if patient { PATIENT_BOARD } else { STRICT_BOARD },
+            boot,
+            counts_per_rev: spec.rig.counts_per_rev,
+            dac_bits: spec.rig.dac.bits,
+            dac_lowest_mv: millivolts(spec.rig.dac.lowest),
+            dac_highest_mv: millivolts(spec.rig.dac.highest),
+            period_min_us: 100,
+            period_max_us: 1_000_000,
+            watchdog_max_us: 10_000_000,
+            boot_code: codes.hold.0,
+        };
+        let node = BoardNode::new(&params)?;
+        let start = spec.run.start_position().minus::<f64>(FixedCounts(0));
+        let start = start * rig.encoder.radians_per_count::<f64>();
+        let volts = dac.volts(codes.hold);
+        Ok(SimBoard {
+            params,
+            node,
+            rig: MovingRig::new(rig, engine, spec.run.seed, (start, 0.0), volts),
+            dac,
+            faults: faults.to_vec(),
+            rng: Pcg64::seed_from_u64(spec.run.seed ^ 0x0062_6f61_7264),
+            moved_ns: None,
+            next_sample_ns: None,
+            started_ns: 0,
+            samples: 0,
+            armed_ns: None,
+            frozen: None,
+            stuck_at: None,
+            reset_done: false,
+            first_hit_ns: None,
+        })
+    }
+
+    /// The board's state machine.
+    #[must_use]
+    pub fn node(&self) -> &BoardNode {
+        &self.node
+    }
+
+    /// The rig.
+    #[must_use]
+    pub fn rig(&self) -> &MovingRig {
+        &self.rig
+    }
+
+    /// Whether the shaft is stuck now.
+    #[must_use]
+    pub fn stuck(&self) -> bool {
+        self.rig.shaft().motion == Motion::Stuck
+    }
+
+    /// The voltage at the converter's output now, V; a stuck converter's own.
+    #[must_use]
+    pub fn volts(&self) -> f64 {
+        self.stuck_at.unwrap_or_else(|| self.dac.volts(self.node.code()))
+    }
+
+    /// Seconds since the controller's consent; none before.
+    #[must_use]
+    pub fn armed_for(&self, now_ns: u64) -> Option<f64> {
+        self.armed_ns.map(|t| now_ns.saturating_sub(t) as f64 / 1e9)
+    }
+
+    /// When a fault of the board's hardware first showed, ns.
+    #[must_use]
+    pub fn first_hit_ns(&self) -> Option<u64> {
+        self.first_hit_ns
+    }
+
+    /// Samples taken.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// When [`SimBoard::step`] has to be called next, ns.
+    #[must_use]
+    pub fn next_ns(&self) -> Option<u64> {
+        let watchdog = self.node.watchdog_at().map(|at| self.unwrap_us(at));
+        match (self.next_sample_ns, watchdog) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// The board's clock of 32 bits, near the time up to which the rig has moved.
+    fn unwrap_us(&self, at_us: u32) -> u64 {
+        let now_us = self.moved_ns.unwrap_or(0) / 1000;
+        let ahead = at_us.wrapping_sub(now_us as u32) as i32;
+        (now_us as i64 + i64::from(ahead)).max(0) as u64 * 1000
+    }
+
+    /// Bytes from the controller arrive.
+    ///
+    /// # Errors
+    /// The engine gave up.
+    pub fn receive(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outbox) -> Result<(), SimBoardError> {
+        self.move_to(now_ns)?;
+        let before = self.node.state();
+        self.node.receive((now_ns / 1000) as u32, bytes, out);
+        if self.node.state() == BoardState::Armed && before != BoardState::Armed {
+            self.armed_ns = Some(now_ns);
+        }
+        if before != self.node.state() && self.node.state() == BoardState::Ready {
+            // Sampling starts, or starts anew.
+            self.next_sample_ns = Some(now_ns);
+            self.started_ns = now_ns;
+            self.samples = 0;
+            self.moved_ns = Some(now_ns);
+        }
+        Ok(())
+    }
+
+    /// What is due by now: a sample, the watchdog, a fault.
+    ///
+    /// # Errors
+    /// The engine gave up.
+    pub fn step(&mut self, now_ns: u64, out: &mut Outbox) -> Result<(), SimBoardError> {
+        self.move_to(now_ns)?;
+        let now_us = (now_ns / 1000) as u32;
+        self.node.poll(now_us, out);
+        let Some(due) = self.next_sample_ns.filter(|t| *t <= now_ns) else { return Ok(()) };
+        let Some(period_us) = self.node.period_us() else {
+            self.next_sample_ns = None;
+            return Ok(());
+        };
+        // Periods that a slow machine has left out stay out: a board does not catch up.
+        self.samples += 1;
+        self.next_sample_ns = Some(due + u64::from(period_us) * 1000);
+        self.rig.set_time((due - self.started_ns) as f64 / 1e9);
+        self.rig.begin_period();
+        let time = self.armed_for(now_ns);
+        let mut counts = self.rig.counts();
+        let (mut loss, mut freeze, mut stick, mut reset) = (false, false, None, false);
+        for i in 0..self.faults.len() {
+            let fault = self.faults[i];
+            let active = time.is_some_and(|t| fault.active(t));
+            let own = !matches!(
+                fault.kind,
+                FaultKind::Drop
+                    | FaultKind::Duplicate
+                    | FaultKind::Corrupt
+                    | FaultKind::Delay(_)
+                    | FaultKind::Jitter(_)
+                    | FaultKind::Reorder
+                    | FaultKind::Silence
+            );
+            if !own || !active || !self.rng.random_bool(fault.probability) {
+                continue;
+            }
+            match fault.kind {
+                FaultKind::EncoderFreeze => freeze = true,
+                FaultKind::EncoderJump(n) => counts = Counts(counts.0.wrapping_add(n)),
+                FaultKind::EncoderLoss => loss = true,
+                FaultKind::DacStuck(at) => stick = Some(at),
+                FaultKind::Reset => reset = true,
+                _ => continue,
+            }
+            self.first_hit_ns.get_or_insert(now_ns);
+        }
+        self.stuck_at = match (stick, self.stuck_at) {
+            (Some(StuckAt::Volts(v)), _) => Some(v),
+            (Some(StuckAt::Last), None) => Some(self.dac.volts(self.node.code())),
+            (Some(StuckAt::Last), already) => already,
+            (None, _) => None,
+        };
+        self.frozen = if freeze { Some(self.frozen.unwrap_or(counts)) } else { None };
+        if reset && !self.reset_done {
+            self.reset_done = true;
+            self.params.boot = self.params.boot.wrapping_add(1);
+            self.node = BoardNode::new(&self.params)?;
+            self.next_sample_ns = None;
+            self.apply();
+            return Ok(());
+        }
+        let counts = if loss { Counts(0) } else { self.frozen.unwrap_or(counts) };
+        self.node.sample(now_us, counts, loss, false, out);
+        self.apply();
+        Ok(())
+    }
+
+    /// Moves the rig under the voltage that has been there, then sets the present one.
+    fn move_to(&mut self, now_ns: u64) -> Result<(), SimBoardError> {
+        self.apply();
+        if let Some(since) = self.moved_ns
+            && now_ns > since
+        {
+            self.rig.advance((now_ns - since) as f64 / 1e9)?;
+            self.moved_ns = Some(now_ns);
+        }
+        Ok(())
+    }
+
+    fn apply(&mut self) {
+        let volts = self.volts();
+        self.rig.command(volts);
+    }
+
+    /// The code that the converter has been given.
+    #[must_use]
+    pub fn code(&self) -> DacCode {
+        self.node.code()
+    }
+}

@@ -1,0 +1,290 @@
+//! Controller, line and simulated board in virtual time: what the fault campaign runs.
+//!
+//! The same state machines, frames and rig as in real time; only the clock is computed. A run of
+//! one second takes some milliseconds and repeats bit for bit.
+
+use crate::faults::{Direction, Fault};
+use crate::line::Line;
+use crate::records;
+use crate::sim_board::{SimBoard, SimBoardError};
+use clutch_core::law::Controller;
+use clutch_core::supervisor::{Cause, State};
+use clutch_core::{Micros, Real, Servo, Supervisor, Target};
+use clutch_log::Record;
+use clutch_node::{ControlNode, ControlParams, Notice, Outbox};
+use clutch_sim::Scenario;
+use clutch_wire::{BoardState, StopReason};
+
+/// Time that a controller takes for an answer, over a part of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stall {
+    /// When it begins, s after arming.
+    pub at: f64,
+    /// Until when, s after arming.
+    pub until: f64,
+    /// How long each answer takes then, s.
+    pub answer: f64,
+}
+
+/// How a run in virtual time is made.
+#[derive(Clone, Debug)]
+pub struct WorldParams {
+    /// One way, ns.
+    pub latency_ns: u64,
+    /// What goes wrong on line and board.
+    pub faults: Vec<Fault>,
+    /// A controller that is too slow.
+    pub stall: Option<Stall>,
+    /// Seed of the line's faults.
+    pub seed: u64,
+    /// Whether records are kept.
+    pub record: bool,
+    /// Time after arming at which the run ends, s; the safe state is watched until then.
+    pub duration: f64,
+    /// Whether an end that nothing forced is followed by an orderly stop.
+    pub ticks: u64,
+}
+
+/// What became of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// Why the controller ended control.
+    pub cause: Option<Cause>,
+    /// When the fault first showed, s after arming.
+    pub hit: Option<f64>,
+    /// When the controller faulted, s after arming.
+    pub tripped: Option<f64>,
+    /// When the board's safe output was in force, s after arming.
+    pub safe: Option<f64>,
+    /// How far the shaft went beyond the path's position at the moment of the safe output, rad.
+    pub overrun: f64,
+    /// Largest distance between shaft and path until the end or the safe output, rad.
+    pub largest_error: f64,
+    /// Lowest and highest voltage that the board was told, V.
+    pub volts: (f64, f64),
+    /// Ticks in which the law answered.
+    pub answers: u64,
+    /// Samples lost on the line.
+    pub lost: u64,
+    /// What a log would hold.
+    pub records: Vec<Record>,
+    /// The code that the converter had when the controller was armed.
+    pub present: u16,
+    /// True errors, one per sample from arming on, rad.
+    pub errors: Vec<f64>,
+    /// The board's state at the end.
+    pub board: Option<BoardState>,
+}
+
+/// Controller, line and board.
+pub struct World<T: Real, C: Controller<T>> {
+    board: SimBoard,
+    node: ControlNode<T, C>,
+    up: Line,
+    down: Line,
+    params: WorldParams,
+    now_ns: u64,
+}
+
+impl<T: Real, C: Controller<T>> World<T, C> {
+    /// A controller around a servo, and the scenario's rig on a board.
+    ///
+    /// # Errors
+    /// As [`SimBoard::new`].
+    pub fn new(
+        scenario: &Scenario,
+        params: WorldParams,
+        control: ControlParams,
+        servo: Servo<T, C>,
+        supervisor: Supervisor<T>,
+    ) -> Result<Self, SimBoardError> {
+        let line = |way| Line::new(way, params.latency_ns, &params.faults, params.seed);
+        Ok(World {
+            board: SimBoard::new(scenario, &params.faults, 1, false)?,
+            node: ControlNode::new(control, servo, supervisor),
+            up: line(Direction::Up),
+            down: line(Direction::Down),
+            params,
+            now_ns: 0,
+        })
+    }
+
+    /// Discovers, configures, arms, and runs to the end.
+    ///
+    /// # Errors
+    /// The engine gave up.
+    pub fn run(mut self, path: &impl Fn(u64) -> Target<T>) -> Result<Outcome, SimBoardError> {
+        let mut outcome = Outcome { volts: (f64::INFINITY, f64::NEG_INFINITY), ..Outcome::default() };
+        let (mut out, mut up) = (Outbox::default(), Outbox::default());
+        let radians = self.node.servo().encoder().radians_per_count::<f64>();
+        let dac = *self.node.servo().dac();
+        let period_ns = u64::from(self.node.servo().period().0) * 1000;
+        let (mut configured, mut armed, mut ready_samples) = (false, false, 0);
+        let mut origin_ns = 0;
+        let mut safe_at: Option<u64> = None;
+        let mut busy_until = 0;
+        let (mut sampled, mut first_sample) = (0, None);
+        self.node.discover(1, &mut out);
+        let present = self.board.code();
+        outcome.present = present.0;
+        self.node.configure(present, &mut out);
+        self.down.send(0, None, out.as_bytes());
+        out.clear();
+        let mut end_ns = u64::MAX;
+        loop {
+            // What comes next.
+            let host = self.up.next_ns().map(|t| t.max(busy_until));
+            let poll = self.node.poll_at().map(|t| t.max(busy_until));
+            let times = [self.board.next_ns(), host, self.down.next_ns(), poll];
+            let Some(next) = times.into_iter().flatten().min() else { break };
+            self.now_ns = next.max(self.now_ns);
+            if self.now_ns >= end_ns {
+                self.now_ns = end_ns;
+                self.board.step(end_ns, &mut up)?;
+                break;
+            }
+            let now = self.now_ns;
+            let before = self.board.armed_for(now);
+
+            // The board: its clock first, then what has arrived.
+            if self.board.next_ns().is_some_and(|t| t <= now) {
+                self.board.step(now, &mut up)?;
+            }
+            while let Some(bytes) = self.down.arrived(now) {
+                self.board.receive(now, &bytes, &mut up)?;
+                if self.board.next_ns().is_some_and(|t| t <= now) {
+                    self.board.step(now, &mut up)?;
+                }
+            }
+            if before.is_none() && self.board.armed_for(now).is_some() {
+                origin_ns = now;
+                end_ns = now + (self.params.duration * 1e9) as u64;
+            }
+            let armed_for = self.board.armed_for(now);
+            self.up.send(now, armed_for, up.as_bytes());
+            up.clear();
+            if self.board.samples() != sampled {
+                sampled = self.board.samples();
+                if let Some(first) = first_sample
+                    && safe_at.is_none()
+                {
+                    let error = self.target(path, sampled - first) - self.board.rig().shaft().position;
+                    outcome.largest_error = outcome.largest_error.max(error.abs());
+                    outcome.errors.push(error);
+                }
+            }
+            let safe_now = matches!(
+                self.board.node().state(),
+                BoardState::Stopped | BoardState::Faulted | BoardState::Boot
+            );
+            if armed_for.is_some() && safe_now && safe_at.is_none() {
+                safe_at = Some(now);
+                outcome.safe = armed_for;
+            }
+
+            // The controller.
+            if now < busy_until {
+                continue;
+            }
+            let mut records = Vec::new();
+            let mut cycles = 0_u64;
+            let time_ns = now.saturating_sub(origin_ns);
+            let from = self.node.state().state();
+            let mut ended = None;
+            {
+                let armed_now = &mut armed;
+                let mut notices = |n: Notice<T, C::Terms>| match n {
+                    Notice::Configured => configured = true,
+                    Notice::Armed => *armed_now = true,
+                    Notice::Cycle(n) => {
+                        cycles += 1;
+                        if *armed_now {
+                            outcome.answers += u64::from(n.cycle.answer.is_some());
+                            let volts = dac.volts(n.cycle.code).to_f64();
+                            outcome.volts = (outcome.volts.0.min(volts), outcome.volts.1.max(volts));
+                            records.push(Record::Sample(records::sample(time_ns, 0, &n)));
+                            records.push(Record::Command(records::command(time_ns, &n.cycle, &dac, radians)));
+                            records.extend(records::change(time_ns, &n.cycle));
+                        }
+                    }
+                    Notice::Ended(cause) => ended = Some(cause),
+                    _ => {}
+                };
+                while let Some(bytes) = self.up.arrived(now) {
+                    self.node.receive(now, &bytes, path, &mut out, &mut notices);
+                }
+                self.node.poll(now, &mut out, &mut notices);
+            }
+            if configured && !armed {
+                ready_samples += cycles;
+                if cycles > 0 && ready_samples == 3 {
+                    self.node.arm(&mut out);
+                }
+            }
+            let state = self.node.state().state();
+            let tick = self.node.state().tick();
+            if state == State::Running && first_sample.is_none() {
+                first_sample = Some(sampled);
+            }
+            if let Some(cause) = ended {
+                records.push(records::ended(
+                    time_ns,
+                    tick,
+                    from,
+                    state,
+                    cause,
+                    self.node.state().value().to_f64(),
+                ));
+            }
+            if state == State::Faulted && outcome.tripped.is_none() {
+                outcome.tripped = armed_for;
+                outcome.cause = Some(self.node.state().cause());
+            }
+            if state == State::Running && tick + 1 >= self.params.ticks {
+                self.node.stop(StopReason::Done, &mut out);
+                let to = self.node.state().state();
+                records.push(records::ended(time_ns, tick, state, to, Cause::Done, 0.0));
+            }
+            if self.params.record {
+                outcome.records.append(&mut records);
+            }
+            if !out.as_bytes().is_empty() {
+                let answer =
+                    self.params.stall.filter(|s| armed_for.is_some_and(|t| t >= s.at && t < s.until));
+                let takes = answer.map_or(0, |s| (s.answer * 1e9) as u64);
+                busy_until = now.saturating_add(takes);
+                self.node.answered(Micros((takes / 1000) as u32));
+                self.down.send(busy_until, armed_for, out.as_bytes());
+                out.clear();
+            }
+            // Nothing to come: a board that has started anew, and a controller that has given up.
+            if end_ns == u64::MAX && now > 1_000 * period_ns {
+                break;
+            }
+        }
+        outcome.lost = self.node.state().lost();
+        outcome.board = Some(self.board.node().state());
+        outcome.hit = [self.up.hits().1, self.down.hits().1, self.board.first_hit_ns()]
+            .into_iter()
+            .flatten()
+            .min()
+            .map(|t| t.saturating_sub(origin_ns) as f64 / 1e9);
+        let at_end = self.board.rig().shaft().position;
+        outcome.overrun =
+            outcome.overrun.max(self.beyond(at_end, path, safe_at.unwrap_or(self.now_ns), origin_ns));
+        Ok(outcome)
+    }
+
+    /// How far a position lies beyond the path's at a time.
+    fn beyond(&self, position: f64, path: &impl Fn(u64) -> Target<T>, at_ns: u64, origin_ns: u64) -> f64 {
+        let period_ns = u64::from(self.node.servo().period().0) * 1000;
+        let tick = at_ns.saturating_sub(origin_ns) / period_ns;
+        position - self.target(path, tick)
+    }
+
+    fn target(&self, path: &impl Fn(u64) -> Target<T>, tick: u64) -> f64 {
+        let radians = self.node.servo().encoder().radians_per_count::<f64>();
+        let position = path(tick).position.plus(self.node.origin());
+        position.minus::<f64>(clutch_core::FixedCounts(0)) * radians
+    }
+}

@@ -1,0 +1,399 @@
+//! The board's end: samples out, codes in, a watchdog.
+//!
+//! ```text
+//!            Configure            Arm            first Actuate
+//!   Boot ───────────────► Ready ───────► Armed ───────────────► Running
+//!                         ▲  ▲             │ │                    │ │
+//!                         │  └─ Configure ─┼─┴── Stop ── Stopped ◄┘ │
+//!                         │                └── watchdog ─┐          │ watchdog, Stop{fault}
+//!                         └──────── Configure ────── Faulted ◄──────┘
+//! ```
+//!
+//! `docs/wire.md` is the specification; this is one implementation, the one that the simulated
+//! board and the firmware run.
+
+use crate::outbox::Outbox;
+use clutch_core::{Counts, DacCode, ParamError, SafeCodes, SafeKind, SafeRun};
+use clutch_wire::{
+    Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, Hello, Message,
+    Pong, Refusal, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, StopReason,
+    Stopped, VERSION,
+};
+
+/// What a board is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BoardParams {
+    /// Its serial number; 0 is the simulated board, whose clock may wait for the controller.
+    pub board: u32,
+    /// A number that changes at each power-up.
+    pub boot: u32,
+    /// Encoder counts per revolution.
+    pub counts_per_rev: u32,
+    /// Converter: bits.
+    pub dac_bits: u8,
+    /// Converter: voltage of code 0, mV.
+    pub dac_lowest_mv: i32,
+    /// Converter: voltage one step above its highest code, mV.
+    pub dac_highest_mv: i32,
+    /// Shortest sampling period, µs.
+    pub period_min_us: u32,
+    /// Longest sampling period, µs.
+    pub period_max_us: u32,
+    /// Longest time that the watchdog can be set to, µs.
+    pub watchdog_max_us: u32,
+    /// Output at power-up: the safe output of the rig that the board is built into.
+    pub boot_code: u16,
+}
+
+/// Samples that an Actuate may answer.
+const RECENT: usize = 8;
+
+/// The board's state machine. Times are the board's clock, µs; it wraps.
+#[derive(Clone, Debug)]
+pub struct BoardNode {
+    params: BoardParams,
+    decoder: Decoder,
+    state: BoardState,
+    run: u16,
+    config: u64,
+    period_us: u32,
+    watchdog_us: u32,
+    safe: SafeCodes,
+    safe_run: SafeRun,
+    code: DacCode,
+    sequence: u16,
+    /// Times of the last samples, by the low bits of their sequence; none before there was one.
+    recent: [Option<u32>; RECENT],
+    /// When the last code was applied, or consent given.
+    fed_us: u32,
+    /// Sequence that the last applied code answered.
+    answered: Option<u16>,
+    late: bool,
+    safe_under_way: bool,
+    /// Sequence of the first sample after consent.
+    armed_at: u16,
+}
+
+impl BoardNode {
+    /// A board at power-up.
+    ///
+    /// # Errors
+    /// `dac_bits` outside 1…16, `dac_highest` not above `dac_lowest`, `boot_code` above the
+    /// converter's top, periods of 0 or out of order, a watchdog shorter than two periods.
+    pub fn new(p: &BoardParams) -> Result<Self, ParamError<f64>> {
+        let check = |field, value: f64, holds: bool, expected| {
+            if holds { Ok(()) } else { Err(ParamError { field, value, expected }) }
+        };
+        let bits = f64::from(p.dac_bits);
+        check("dac_bits", bits, (1..=16).contains(&p.dac_bits), "1 to 16 bits")?;
+        let highest = f64::from(p.dac_highest_mv);
+        let expected = "a voltage above the lowest, mV";
+        check("dac_highest", highest, p.dac_highest_mv > p.dac_lowest_mv, expected)?;
+        let board = BoardNode {
+            params: *p,
+            decoder: Decoder::new(),
+            state: BoardState::Boot,
+            run: 0,
+            config: 0,
+            period_us: 0,
+            watchdog_us: 0,
+            safe: SafeCodes { hold: DacCode(p.boot_code), ..SafeCodes::default() },
+            safe_run: SafeRun::default(),
+            code: DacCode(p.boot_code),
+            sequence: 0,
+            recent: [None; RECENT],
+            fed_us: 0,
+            answered: None,
+            late: false,
+            safe_under_way: false,
+            armed_at: 0,
+        };
+        let code = f64::from(p.boot_code);
+        check("boot_code", code, p.boot_code <= board.top(), "a code that the converter has")?;
+        let shortest = f64::from(p.period_min_us);
+        let ordered = p.period_min_us > 0 && p.period_min_us <= p.period_max_us;
+        check("period_min", shortest, ordered, "above 0 µs and not above the longest period")?;
+        let watchdog = f64::from(p.watchdog_max_us);
+        let holds = p.watchdog_max_us / 2 >= p.period_min_us;
+        check("watchdog_max", watchdog, holds, "at least two of the shortest periods, µs")?;
+        Ok(board)
+    }
+
+    /// The code that the converter is to give now.
+    #[must_use]
+    pub fn code(&self) -> DacCode {
+        self.code
+    }
+
+    /// Where the board stands.
+    #[must_use]
+    pub fn state(&self) -> BoardState {
+        self.state
+    }
+
+    /// The sampling period, µs; none before one was configured.
+    #[must_use]
+    pub fn period_us(&self) -> Option<u32> {
+        (self.state != BoardState::Boot).then_some(self.period_us)
+    }
+
+    /// When [`BoardNode::poll`] has to be called at the latest; none while nothing is watched.
+    #[must_use]
+    pub fn watchdog_at(&self) -> Option<u32> {
+        self.driving().then(|| self.fed_us.wrapping_add(self.watchdog_us))
+    }
+
+    /// Whether the newest sample has been answered, or needs no answer.
+    #[must_use]
+    pub fn is_answered(&self) -> bool {
+        let awaited = self.driving() && self.sequence != self.armed_at;
+        !awaited || self.answered == Some(self.sequence.wrapping_sub(1))
+    }
+
+    fn driving(&self) -> bool {
+        matches!(self.state, BoardState::Armed | BoardState::Running)
+    }
+
+    fn top(&self) -> u16 {
+        ((1_u32 << self.params.dac_bits.min(16)) - 1) as u16
+    }
+
+    /// Bytes from the controller.
+    pub fn receive(&mut self, now_us: u32, bytes: &[u8], out: &mut Outbox) {
+        // A code that comes after the watchdog's time does not undo what the watchdog does.
+        self.poll(now_us, out);
+        for byte in bytes {
+            // A frame that is not whole is dropped without a word.
+            if let Some(Ok(message)) = self.decoder.push(*byte) {
+                self.message(now_us, &message, out);
+            }
+        }
+    }
+
+    /// A sampling period begins: the encoder's counts, and what the board sees of its hardware.
+    pub fn sample(
+        &mut self,
+        now_us: u32,
+        counts: Counts,
+        encoder_fault: bool,
+        converter_fault: bool,
+        out: &mut Outbox,
+    ) {
+        if self.state == BoardState::Boot {
+            return;
+        }
+        // The safe output goes on through Ready, until a new run takes over; the period in which it
+        // begins has its first step already.
+        let begun = self.safe_under_way;
+        self.poll(now_us, out);
+        if self.driving() && (encoder_fault || converter_fault) {
+            let cause = if encoder_fault { BoardFault::Encoder } else { BoardFault::Converter };
+            self.fault(now_us, cause, 0, out);
+        } else if begun {
+            self.code = self.safe_run.next(&self.safe);
+        }
+        let flag = |on: bool, bit: u8| if on { bit } else { 0 };
+        let status = self.state as u8
+            | flag(encoder_fault, STATUS_ENCODER_FAULT)
+            | flag(converter_fault, STATUS_DAC_FAULT)
+            | flag(self.late, STATUS_LATE);
+        self.late = false;
+        out.push(&Message::Sample(Sample {
+            run: self.run,
+            sequence: self.sequence,
+            time_us: now_us,
+            counts: counts.0,
+            status,
+        }));
+        if let Some(slot) = self.recent.get_mut(usize::from(self.sequence) % RECENT) {
+            *slot = Some(now_us);
+        }
+        self.sequence = self.sequence.wrapping_add(1);
+    }
+
+    /// Looks at the clock: the watchdog.
+    pub fn poll(&mut self, now_us: u32, out: &mut Outbox) {
+        let silent = now_us.wrapping_sub(self.fed_us);
+        if self.driving() && silent >= self.watchdog_us {
+            self.fault(now_us, BoardFault::Watchdog, silent, out);
+        }
+    }
+
+    fn fault(&mut self, now_us: u32, cause: BoardFault, value: u32, out: &mut Outbox) {
+        self.make_safe(BoardState::Faulted);
+        let sequence = self.sequence.wrapping_sub(1);
+        let cause = cause as u8;
+        out.push(&Message::Fault(Fault { run: self.run, sequence, time_us: now_us, cause, value }));
+    }
+
+    fn make_safe(&mut self, state: BoardState) {
+        self.safe_run = SafeRun::begin(self.code);
+        self.code = self.safe_run.next(&self.safe);
+        self.safe_under_way = true;
+        self.state = state;
+    }
+
+    fn message(&mut self, now_us: u32, message: &Message, out: &mut Outbox) {
+        match message {
+            Message::Discover(m) => self.discover(m, out),
+            Message::Configure(m) => self.configure(m, out),
+            Message::Arm(m) => self.arm(now_us, m, out),
+            Message::Actuate(m) if m.run == self.run && self.driving() => self.actuate(now_us, m, out),
+            Message::Stop(m) => {
+                if m.run != self.run || self.state == BoardState::Boot {
+                    return;
+                }
+                if self.driving() {
+                    let fault = m.reason == StopReason::Fault as u8;
+                    self.make_safe(if fault { BoardState::Faulted } else { BoardState::Stopped });
+                }
+                let stopped = Stopped { run: self.run, reason: m.reason, code: self.code.0 };
+                out.push(&Message::Stopped(stopped));
+            }
+            Message::Ping(m) => {
+                out.push(&Message::Pong(Pong { run: m.run, nonce: m.nonce, time_us: now_us }));
+            }
+            // Another board's frames: an echo, or two boards on one line.
+            _ => {}
+        }
+    }
+
+    fn discover(&self, m: &Discover, out: &mut Outbox) {
+        let request = Discover::KIND;
+        let refusal = if m.version != VERSION {
+            Some((Refusal::Version, u32::from(VERSION)))
+        } else if m.schema != SCHEMA {
+            Some((Refusal::Schema, SCHEMA as u32))
+        } else {
+            None
+        };
+        if let Some((reason, value)) = refusal {
+            out.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
+            return;
+        }
+        let p = &self.params;
+        out.push(&Message::Hello(Hello {
+            nonce: m.nonce,
+            version: VERSION,
+            schema: SCHEMA,
+            board: p.board,
+            boot: p.boot,
+            counts_per_rev: p.counts_per_rev,
+            dac_bits: p.dac_bits,
+            dac_lowest_mv: p.dac_lowest_mv,
+            dac_highest_mv: p.dac_highest_mv,
+            period_min_us: p.period_min_us,
+            period_max_us: p.period_max_us,
+            watchdog_max_us: p.watchdog_max_us,
+            boot_code: p.boot_code,
+            state: self.state as u8,
+            run: self.run,
+            config: self.config,
+        }));
+    }
+
+    fn configure(&mut self, m: &Configure, out: &mut Outbox) {
+        let p = &self.params;
+        let safe_kind = clutch_wire::SafeKind::from_u8(m.safe_kind);
+        let codes_fit = m.hold_code <= self.top() && m.release_code <= self.top();
+        let never_arrives = safe_kind == Some(clutch_wire::SafeKind::Ramp) && m.ramp_step == 0;
+        let again = self.state == BoardState::Ready && m.run == self.run && m.config == self.config;
+        let spent = m.run == self.run && self.state != BoardState::Boot && !again;
+        let refusal = if self.driving() {
+            Some((Refusal::State, self.state as u32))
+        } else if spent {
+            Some((Refusal::Run, u32::from(self.run)))
+        } else if m.period_us < p.period_min_us || m.period_us > p.period_max_us {
+            Some((Refusal::Period, m.period_us))
+        } else if m.watchdog_us / 2 < m.period_us || m.watchdog_us > p.watchdog_max_us {
+            Some((Refusal::Watchdog, m.watchdog_us))
+        } else if safe_kind.is_none() || !codes_fit || never_arrives {
+            Some((Refusal::Safe, u32::from(m.safe_kind)))
+        } else {
+            None
+        };
+        if let Some((reason, value)) = refusal {
+            let request = Configure::KIND;
+            out.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
+            return;
+        }
+        if !again {
+            self.run = m.run;
+            self.config = m.config;
+            self.period_us = m.period_us;
+            self.watchdog_us = m.watchdog_us;
+            self.safe = SafeCodes {
+                kind: match safe_kind {
+                    Some(clutch_wire::SafeKind::Ramp) => SafeKind::Ramp,
+                    Some(clutch_wire::SafeKind::Release) => SafeKind::Release,
+                    Some(clutch_wire::SafeKind::HoldThenRelease) => SafeKind::HoldThenRelease,
+                    Some(clutch_wire::SafeKind::Hold) | None => SafeKind::Hold,
+                },
+                hold: DacCode(m.hold_code),
+                release: DacCode(m.release_code),
+                ramp_step: m.ramp_step,
+                hold_periods: m.hold_periods,
+            };
+            self.state = BoardState::Ready;
+            self.sequence = 0;
+            self.recent = [None; RECENT];
+            self.answered = None;
+            self.late = false;
+        }
+        let boot = self.params.boot;
+        out.push(&Message::Configured(Configured { run: self.run, config: self.config, boot }));
+    }
+
+    fn arm(&mut self, now_us: u32, m: &Arm, out: &mut Outbox) {
+        let again = self.state == BoardState::Armed;
+        let refusal = if self.state != BoardState::Ready && !again {
+            Some((Refusal::State, self.state as u32))
+        } else if m.run != self.run {
+            Some((Refusal::Run, u32::from(self.run)))
+        } else if m.config != self.config {
+            Some((Refusal::Config, self.config as u32))
+        } else {
+            None
+        };
+        if let Some((reason, value)) = refusal {
+            let request = Arm::KIND;
+            out.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
+            return;
+        }
+        if !again {
+            self.state = BoardState::Armed;
+            self.safe_under_way = false;
+            self.fed_us = now_us;
+            self.armed_at = self.sequence;
+        }
+        out.push(&Message::Armed(Armed { run: self.run, config: self.config }));
+    }
+
+    fn actuate(&mut self, now_us: u32, m: &clutch_wire::Actuate, out: &mut Outbox) {
+        if m.code > self.top() {
+            let refused = Refused {
+                request: clutch_wire::Actuate::KIND,
+                reason: Refusal::Code as u8,
+                value: u32::from(m.code),
+            };
+            out.push(&Message::Refused(refused));
+            return;
+        }
+        // A code that answers what a later one has answered already changes nothing.
+        if self.answered.is_some_and(|last| (m.sequence.wrapping_sub(last) as i16) <= 0) {
+            return;
+        }
+        let behind = self.sequence.wrapping_sub(1).wrapping_sub(m.sequence);
+        let taken = self.recent.get(usize::from(m.sequence) % RECENT).copied().flatten();
+        let taken = taken.filter(|_| usize::from(behind) < RECENT);
+        match taken {
+            Some(time) if now_us.wrapping_sub(time) <= u32::from(m.valid_us) => {
+                self.answered = Some(m.sequence);
+                self.code = DacCode(m.code);
+                self.fed_us = now_us;
+                self.state = BoardState::Running;
+            }
+            _ => self.late = true,
+        }
+    }
+}

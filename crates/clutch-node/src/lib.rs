@@ -1,0 +1,20 @@
+//! Both ends of the serial line, as state machines without I/O and without a clock.
+//!
+//! ```text
+//!  encoder ─► BoardNode ──Sample──► ControlNode ─► supervisor ─► servo
+//!  pad     ◄─ watchdog  ◄─Actuate──             ◄─────────────────┘
+//! ```
+//!
+//! [`BoardNode`] is what a data-acquisition board does: it samples, applies codes, and goes to the
+//! safe state by itself when the controller falls silent. [`ControlNode`] is what drives it. Bytes
+//! and times go in, bytes and notices come out; the Linux loop, the simulated board, the tests in
+//! virtual time and firmware run the same two. No allocation, no `unsafe`, no reachable panic.
+#![no_std]
+
+mod board;
+mod control;
+mod outbox;
+
+pub use board::{BoardNode, BoardParams};
+pub use control::{ControlNode, ControlParams, CycleNotice, LinkCounts, Notice};
+pub use outbox::Outbox;

@@ -1,0 +1,146 @@
+//! A rig that moves on step by step: sensor out, voltage in, time on.
+//!
+//! [`crate::simulate`] steps it from sample to sample; the simulated board steps it by the real
+//! clock, with voltages that change between samples.
+
+use crate::engine::{DormandPrince, Engine, EngineError, EngineKind, Event, ExactFlow, Input, Shaft, Volts};
+use crate::rig::Rig;
+use clutch_core::{Counts, FixedCounts};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use std::collections::VecDeque;
+
+/// A rig in motion.
+pub struct MovingRig {
+    rig: Rig,
+    engine: Box<dyn Engine + Send>,
+    shaft: Shaft,
+    /// Where the motion began, rad.
+    origin: f64,
+    time: f64,
+    /// At the pad, V.
+    volts: f64,
+    /// On the way to the pad, V.
+    arriving: f64,
+    commanded: f64,
+    line: VecDeque<f64>,
+    noise: Pcg64,
+    torque_noise: f64,
+    events: Vec<Event>,
+}
+
+impl MovingRig {
+    /// A shaft at `position` (rad) and `velocity` (rad/s), with `volts` on the brake since long.
+    ///
+    /// `engine` must be one that takes the rig: see [`crate::RunSpec::engine`].
+    #[must_use]
+    pub fn new(
+        rig: Rig,
+        engine: EngineKind,
+        seed: u64,
+        (position, velocity): (f64, f64),
+        volts: f64,
+    ) -> Self {
+        let delay = rig.params.delay_ticks as usize;
+        MovingRig {
+            engine: match engine {
+                EngineKind::ExactFlow => Box::new(ExactFlow),
+                EngineKind::DormandPrince | EngineKind::Auto => Box::new(DormandPrince::default()),
+            },
+            rig,
+            shaft: Shaft::new(position, velocity),
+            origin: position,
+            time: 0.0,
+            volts,
+            arriving: volts,
+            commanded: volts,
+            line: std::iter::repeat_n(volts, delay.saturating_sub(1)).collect(),
+            noise: Pcg64::seed_from_u64(seed ^ 0x006e_6f69_7365),
+            torque_noise: 0.0,
+            events: Vec::new(),
+        }
+    }
+
+    /// The rig.
+    #[must_use]
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// The shaft now.
+    #[must_use]
+    pub fn shaft(&self) -> &Shaft {
+        &self.shaft
+    }
+
+    /// Time since the start, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// What an encoder that floors to whole counts shows.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        let per_radian: f64 = self.rig.encoder.counts_per_radian();
+        Counts(libm::floor(self.shaft.position * per_radian) as i64 as i32)
+    }
+
+    /// What an ideal sensor shows.
+    #[must_use]
+    pub fn fine_counts(&self) -> FixedCounts {
+        FixedCounts::from_real(self.shaft.position * self.rig.encoder.counts_per_radian::<f64>())
+    }
+
+    /// A sampling period begins: a voltage comes out of the delay line, the torque noise gets its
+    /// next value.
+    pub fn begin_period(&mut self) {
+        if self.rig.params.delay_ticks > 0 {
+            self.line.push_back(self.commanded);
+            self.arriving = self.line.pop_front().unwrap_or(self.commanded);
+        }
+        if self.rig.params.torque_noise > 0.0 {
+            let x: f64 = StandardNormal.sample(&mut self.noise);
+            self.torque_noise = self.rig.params.torque_noise * x;
+        }
+    }
+
+    /// The converter gives this voltage from now on, V.
+    pub fn command(&mut self, volts: f64) {
+        self.commanded = volts;
+        if self.rig.params.delay_ticks == 0 {
+            self.arriving = volts;
+        }
+    }
+
+    /// Time passes, s; what happened in it.
+    ///
+    /// # Errors
+    /// A motion that the engine cannot follow.
+    pub fn advance(&mut self, duration: f64) -> Result<&[Event], EngineError> {
+        self.events.clear();
+        if duration > 0.0 {
+            let input = Input {
+                time: self.time,
+                duration,
+                origin: self.origin,
+                volts: match self.rig.params.actuator_time_constant {
+                    None => Volts::Held(self.arriving),
+                    Some(time_constant) => Volts::Lag { from: self.volts, to: self.arriving, time_constant },
+                },
+                drive: &self.rig.drive,
+                noise: self.torque_noise,
+            };
+            self.engine.advance(&self.rig.model, &input, &mut self.shaft, &mut self.events)?;
+            self.volts = input.volts.at(duration);
+            self.time += duration;
+        }
+        Ok(&self.events)
+    }
+
+    /// Time is told anew, s: a sum of many periods drifts, a product does not.
+    pub fn set_time(&mut self, time: f64) {
+        self.time = time;
+    }
+}

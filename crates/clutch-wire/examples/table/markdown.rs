@@ -1,0 +1,60 @@
+//! The tables of docs/wire.md.
+
+use clutch_wire::{CODES, Direction, MAX_BODY, MAX_FRAME, SCHEMA, STATUS, TABLE, VERSION};
+use std::fmt::Write as _;
+
+const BEGIN: &str = "<!-- table:begin -->\n";
+const END: &str = "<!-- table:end -->";
+
+/// All tables, from the first line to the last.
+pub(crate) fn tables() -> String {
+    let mut out = String::new();
+    write_all(&mut out).expect("a String takes all");
+    out
+}
+
+fn write_all(out: &mut String) -> std::fmt::Result {
+    writeln!(
+        out,
+        "Version {VERSION}, schema `{SCHEMA:#018x}`. The longest frame has {MAX_BODY} bytes before"
+    )?;
+    writeln!(out, "stuffing and {MAX_FRAME} on the wire.\n")?;
+    writeln!(out, "| kind | name | sent by | bytes before stuffing | bytes on the wire |")?;
+    writeln!(out, "|---|---|---|---|---|")?;
+    for m in TABLE {
+        let by = if m.direction == Direction::ToBoard { "host" } else { "board" };
+        writeln!(out, "| `{:#04x}` | {} | {by} | {} | {} |", m.kind, m.name, m.length, m.length + 2)?;
+    }
+    for m in TABLE {
+        writeln!(out, "\n### `{:#04x}` {}\n\n{}\n", m.kind, m.name, m.doc.trim())?;
+        writeln!(out, "| offset | field | type | unit | meaning |")?;
+        writeln!(out, "|---|---|---|---|---|")?;
+        for f in m.fields {
+            let unit = if f.unit.is_empty() { "–" } else { f.unit };
+            writeln!(out, "| {} | `{}` | `{}` | {unit} | {} |", f.offset, f.name, f.ty, f.doc.trim())?;
+        }
+        writeln!(out, "| {} | CRC | `u32` | – | Of all bytes before it. |", m.length - 4)?;
+    }
+    for set in CODES {
+        writeln!(out, "\n### {}\n\n{}\n", set.name, set.doc.trim())?;
+        writeln!(out, "| number | name | meaning |")?;
+        writeln!(out, "|---|---|---|")?;
+        for v in set.values {
+            writeln!(out, "| {} | {} | {} |", v.value, v.name, v.doc.trim())?;
+        }
+    }
+    writeln!(out, "\n### Bits of `Sample.status`\n")?;
+    writeln!(out, "| bits | name | meaning |")?;
+    writeln!(out, "|---|---|---|")?;
+    for v in STATUS {
+        writeln!(out, "| `{:#04x}` | {} | {} |", v.value, v.name, v.doc.trim())?;
+    }
+    Ok(())
+}
+
+/// The document with its tables as they are now.
+pub(crate) fn replaced(document: &str) -> Result<String, String> {
+    let parts = document.split_once(BEGIN).and_then(|(head, rest)| Some((head, rest.split_once(END)?.1)));
+    let (head, tail) = parts.ok_or_else(|| format!("expected a document with {BEGIN:?} and {END:?}"))?;
+    Ok(format!("{head}{BEGIN}\n{}\n{END}{tail}", tables()))
+}

@@ -1,0 +1,749 @@
+/* The serial DAQ protocol, for boards in C99 or C++11. Generated from the table of clutch-wire:
+ *     cargo run -p clutch-wire --example table -- header
+ * Do not edit. What the fields mean and what a board must do: docs/wire.md.
+ *
+ * Works with any byte order and alignment: nothing is cast, bytes are put together one by one.
+ * SPDX-License-Identifier: MIT OR Apache-2.0
+ */
+#ifndef CLUTCH_WIRE_H
+#define CLUTCH_WIRE_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#define CLUTCH_VERSION 1u
+#define CLUTCH_SCHEMA UINT64_C(0xbaa0a79fbd366494)
+#define CLUTCH_MAX_BODY 64u  /* longest frame before stuffing, bytes */
+#define CLUTCH_MAX_FRAME 66u /* longest frame on the wire, bytes */
+
+/* BoardState: What the board is doing. */
+#define CLUTCH_BOARD_STATE_BOOT 0u /* Powered up; never configured since; the output is boot_code. */
+#define CLUTCH_BOARD_STATE_READY 1u /* Configured; samples go out; the output is left as it was. */
+#define CLUTCH_BOARD_STATE_ARMED 2u /* The host has consented; the first Actuate starts the run. */
+#define CLUTCH_BOARD_STATE_RUNNING 3u /* The output follows the host. */
+#define CLUTCH_BOARD_STATE_STOPPED 4u /* Stopped by the host; the safe output is on. */
+#define CLUTCH_BOARD_STATE_FAULTED 5u /* A fault is latched; the safe output is on. */
+
+/* SafeKind: How the board goes to its safe output. */
+#define CLUTCH_SAFE_KIND_HOLD 0u /* hold_code at once. */
+#define CLUTCH_SAFE_KIND_RAMP 1u /* From the present code to hold_code, by ramp_step each period. */
+#define CLUTCH_SAFE_KIND_RELEASE 2u /* release_code at once. */
+#define CLUTCH_SAFE_KIND_HOLD_THEN_RELEASE 3u /* hold_code at once, release_code after hold_periods. */
+
+/* BoardFault: Why the board went to its safe output by itself. */
+#define CLUTCH_BOARD_FAULT_WATCHDOG 1u /* No Actuate was applied for watchdog_us; value is the time since the last one, us. */
+#define CLUTCH_BOARD_FAULT_ENCODER 2u /* The encoder's reading cannot be trusted; value is the board's own detail. */
+#define CLUTCH_BOARD_FAULT_CONVERTER 3u /* The converter did not take a code; value is the board's own detail. */
+
+/* StopReason: Why the host stops the run. */
+#define CLUTCH_STOP_REASON_DONE 0u /* The run is over. */
+#define CLUTCH_STOP_REASON_OPERATOR 1u /* Somebody asked for it. */
+#define CLUTCH_STOP_REASON_FAULT 2u /* The host saw a fault; the board latches it. */
+
+/* Refusal: Why the board does not do what a frame asks for. */
+#define CLUTCH_REFUSAL_VERSION 1u /* Another version of the protocol; value is the board's. */
+#define CLUTCH_REFUSAL_SCHEMA 2u /* Another table of messages; value is the low 32 bits of the board's schema hash. */
+#define CLUTCH_REFUSAL_RUN 3u /* The run number is not a new one (Configure) or not the configured one; value is the board's. */
+#define CLUTCH_REFUSAL_CONFIG 4u /* The configuration hash is not the configured one; value is the low 32 bits of the board's. */
+#define CLUTCH_REFUSAL_STATE 5u /* Not in this state; value is the state. */
+#define CLUTCH_REFUSAL_PERIOD 6u /* The period is out of the board's range; value is the period asked for, us. */
+#define CLUTCH_REFUSAL_WATCHDOG 7u /* The watchdog time is below two periods or above the board's limit; value is the time asked for, us. */
+#define CLUTCH_REFUSAL_SAFE 8u /* No such safe output: unknown kind, or a code above the converter's top; value is the kind. */
+#define CLUTCH_REFUSAL_LATE 9u /* Came too late. A board of version 1 shows this in Sample.status instead; value is the delay, us. */
+#define CLUTCH_REFUSAL_BUSY 10u /* Cannot be done just now: ask again; value is 0. */
+#define CLUTCH_REFUSAL_CODE 11u /* The code is above the converter's top; value is the code. */
+
+/* Bits of the field status of Sample. */
+#define CLUTCH_STATUS_STATE 0x07u /* The bits that hold the BoardState. */
+#define CLUTCH_STATUS_ENCODER_FAULT 0x08u /* The encoder's reading cannot be trusted. */
+#define CLUTCH_STATUS_DAC_FAULT 0x10u /* The converter did not take the last code. */
+#define CLUTCH_STATUS_LATE 0x20u /* An Actuate since the sample before came too late and was not applied. */
+
+/* Integers, little-endian. */
+static inline void clutch_put_u8(uint8_t *at, uint8_t value)
+{
+    at[0] = value;
+}
+
+static inline void clutch_put_u16(uint8_t *at, uint16_t value)
+{
+    at[0] = (uint8_t)(value & 0xffu);
+    at[1] = (uint8_t)(value >> 8);
+}
+
+static inline void clutch_put_u32(uint8_t *at, uint32_t value)
+{
+    clutch_put_u16(at, (uint16_t)(value & 0xffffu));
+    clutch_put_u16(at + 2, (uint16_t)(value >> 16));
+}
+
+static inline void clutch_put_u64(uint8_t *at, uint64_t value)
+{
+    clutch_put_u32(at, (uint32_t)(value & 0xffffffffu));
+    clutch_put_u32(at + 4, (uint32_t)(value >> 32));
+}
+
+static inline void clutch_put_i32(uint8_t *at, int32_t value)
+{
+    clutch_put_u32(at, (uint32_t)value);
+}
+
+static inline uint8_t clutch_get_u8(const uint8_t *at)
+{
+    return at[0];
+}
+
+static inline uint16_t clutch_get_u16(const uint8_t *at)
+{
+    return (uint16_t)(at[0] | ((unsigned)at[1] << 8));
+}
+
+static inline uint32_t clutch_get_u32(const uint8_t *at)
+{
+    return clutch_get_u16(at) | ((uint32_t)clutch_get_u16(at + 2) << 16);
+}
+
+static inline uint64_t clutch_get_u64(const uint8_t *at)
+{
+    return clutch_get_u32(at) | ((uint64_t)clutch_get_u32(at + 4) << 32);
+}
+
+static inline int32_t clutch_get_i32(const uint8_t *at)
+{
+    uint32_t bits = clutch_get_u32(at);
+    int32_t value;
+    memcpy(&value, &bits, sizeof value); /* a cast would depend on the compiler */
+    return value;
+}
+
+/* CRC-32/ISO-HDLC: that of Ethernet and zip. */
+static inline uint32_t clutch_crc32(const uint8_t *bytes, size_t count)
+{
+    uint32_t crc = 0xffffffffu;
+    size_t i;
+    int bit;
+    for (i = 0; i < count; i++) {
+        crc ^= bytes[i];
+        for (bit = 0; bit < 8; bit++)
+            crc = (crc >> 1) ^ ((crc & 1u) ? 0xedb88320u : 0u);
+    }
+    return crc ^ 0xffffffffu;
+}
+
+/* Adds the CRC to a body of `length` bytes (CRC included), stuffs it; bytes on the wire. */
+static inline size_t clutch_frame(uint8_t *wire, uint8_t *body, size_t length)
+{
+    size_t i, code = 0; /* where the present block's code goes */
+    uint8_t distance = 1;
+    clutch_put_u32(body + length - 4, clutch_crc32(body, length - 4));
+    for (i = 0; i < length; i++) {
+        if (body[i] == 0) {
+            wire[code] = distance;
+            code = i + 1;
+            distance = 1;
+        } else {
+            wire[i + 1] = body[i];
+            distance++;
+        }
+    }
+    wire[code] = distance;
+    wire[length + 1] = 0;
+    return length + 2;
+}
+
+/* Discover: Asks the board who it is. Any state. The layout is the same in all versions. */
+#define CLUTCH_DISCOVER_KIND 0x01u
+#define CLUTCH_DISCOVER_LENGTH 18u
+#define CLUTCH_DISCOVER_NONCE 1u
+#define CLUTCH_DISCOVER_VERSION 5u
+#define CLUTCH_DISCOVER_SCHEMA 6u
+typedef struct {
+    uint32_t nonce; /* Number that the answer echoes. */
+    uint8_t version; /* The host's version of the protocol. */
+    uint64_t schema; /* The host's schema hash. */
+} clutch_discover_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_discover(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_discover_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_DISCOVER_KIND;
+    clutch_put_u32(body + CLUTCH_DISCOVER_NONCE, m->nonce);
+    clutch_put_u8(body + CLUTCH_DISCOVER_VERSION, m->version);
+    clutch_put_u64(body + CLUTCH_DISCOVER_SCHEMA, m->schema);
+    return clutch_frame(wire, body, CLUTCH_DISCOVER_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_DISCOVER_KIND. */
+static inline void clutch_get_discover(const uint8_t *body, clutch_discover_t *m)
+{
+    m->nonce = clutch_get_u32(body + CLUTCH_DISCOVER_NONCE);
+    m->version = clutch_get_u8(body + CLUTCH_DISCOVER_VERSION);
+    m->schema = clutch_get_u64(body + CLUTCH_DISCOVER_SCHEMA);
+}
+
+/* Configure: Prepares a run: period, watchdog and safe output. Starts the samples. */
+#define CLUTCH_CONFIGURE_KIND 0x02u
+#define CLUTCH_CONFIGURE_LENGTH 36u
+#define CLUTCH_CONFIGURE_RUN 1u
+#define CLUTCH_CONFIGURE_CONFIG 3u
+#define CLUTCH_CONFIGURE_PERIOD_US 11u
+#define CLUTCH_CONFIGURE_WATCHDOG_US 15u
+#define CLUTCH_CONFIGURE_SAFE_KIND 19u
+#define CLUTCH_CONFIGURE_HOLD_CODE 20u
+#define CLUTCH_CONFIGURE_RELEASE_CODE 22u
+#define CLUTCH_CONFIGURE_RAMP_STEP 24u
+#define CLUTCH_CONFIGURE_HOLD_PERIODS 28u
+typedef struct {
+    uint16_t run; /* Number of the new run; other than that of the run before. */
+    uint64_t config; /* The host's hash of the scenario; the board stores and echoes it. */
+    uint32_t period_us; /* Time from sample to sample. [us] */
+    uint32_t watchdog_us; /* Longest time without an applied Actuate while armed or running. [us] */
+    uint8_t safe_kind; /* How to go to the safe output: a SafeKind. */
+    uint16_t hold_code; /* The code that holds. [DAC code] */
+    uint16_t release_code; /* The code that releases. [DAC code] */
+    uint32_t ramp_step; /* Step of the ramp to hold_code. [2^-16 DAC codes per period] */
+    uint32_t hold_periods; /* How long HoldThenRelease holds. [periods] */
+} clutch_configure_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_configure(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_configure_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_CONFIGURE_KIND;
+    clutch_put_u16(body + CLUTCH_CONFIGURE_RUN, m->run);
+    clutch_put_u64(body + CLUTCH_CONFIGURE_CONFIG, m->config);
+    clutch_put_u32(body + CLUTCH_CONFIGURE_PERIOD_US, m->period_us);
+    clutch_put_u32(body + CLUTCH_CONFIGURE_WATCHDOG_US, m->watchdog_us);
+    clutch_put_u8(body + CLUTCH_CONFIGURE_SAFE_KIND, m->safe_kind);
+    clutch_put_u16(body + CLUTCH_CONFIGURE_HOLD_CODE, m->hold_code);
+    clutch_put_u16(body + CLUTCH_CONFIGURE_RELEASE_CODE, m->release_code);
+    clutch_put_u32(body + CLUTCH_CONFIGURE_RAMP_STEP, m->ramp_step);
+    clutch_put_u32(body + CLUTCH_CONFIGURE_HOLD_PERIODS, m->hold_periods);
+    return clutch_frame(wire, body, CLUTCH_CONFIGURE_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_CONFIGURE_KIND. */
+static inline void clutch_get_configure(const uint8_t *body, clutch_configure_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_CONFIGURE_RUN);
+    m->config = clutch_get_u64(body + CLUTCH_CONFIGURE_CONFIG);
+    m->period_us = clutch_get_u32(body + CLUTCH_CONFIGURE_PERIOD_US);
+    m->watchdog_us = clutch_get_u32(body + CLUTCH_CONFIGURE_WATCHDOG_US);
+    m->safe_kind = clutch_get_u8(body + CLUTCH_CONFIGURE_SAFE_KIND);
+    m->hold_code = clutch_get_u16(body + CLUTCH_CONFIGURE_HOLD_CODE);
+    m->release_code = clutch_get_u16(body + CLUTCH_CONFIGURE_RELEASE_CODE);
+    m->ramp_step = clutch_get_u32(body + CLUTCH_CONFIGURE_RAMP_STEP);
+    m->hold_periods = clutch_get_u32(body + CLUTCH_CONFIGURE_HOLD_PERIODS);
+}
+
+/* Arm: Consent to the run that was configured. */
+#define CLUTCH_ARM_KIND 0x03u
+#define CLUTCH_ARM_LENGTH 15u
+#define CLUTCH_ARM_RUN 1u
+#define CLUTCH_ARM_CONFIG 3u
+typedef struct {
+    uint16_t run; /* The configured run. */
+    uint64_t config; /* The configured hash. */
+} clutch_arm_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_arm(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_arm_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_ARM_KIND;
+    clutch_put_u16(body + CLUTCH_ARM_RUN, m->run);
+    clutch_put_u64(body + CLUTCH_ARM_CONFIG, m->config);
+    return clutch_frame(wire, body, CLUTCH_ARM_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_ARM_KIND. */
+static inline void clutch_get_arm(const uint8_t *body, clutch_arm_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_ARM_RUN);
+    m->config = clutch_get_u64(body + CLUTCH_ARM_CONFIG);
+}
+
+/* Actuate: A code for the converter, in answer to a sample. */
+#define CLUTCH_ACTUATE_KIND 0x04u
+#define CLUTCH_ACTUATE_LENGTH 13u
+#define CLUTCH_ACTUATE_RUN 1u
+#define CLUTCH_ACTUATE_SEQUENCE 3u
+#define CLUTCH_ACTUATE_CODE 5u
+#define CLUTCH_ACTUATE_VALID_US 7u
+typedef struct {
+    uint16_t run; /* The configured run. */
+    uint16_t sequence; /* Sequence number of the sample it answers. */
+    uint16_t code; /* The code to put out. [DAC code] */
+    uint16_t valid_us; /* Not applied if it arrives later than this after that sample was taken. [us] */
+} clutch_actuate_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_actuate(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_actuate_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_ACTUATE_KIND;
+    clutch_put_u16(body + CLUTCH_ACTUATE_RUN, m->run);
+    clutch_put_u16(body + CLUTCH_ACTUATE_SEQUENCE, m->sequence);
+    clutch_put_u16(body + CLUTCH_ACTUATE_CODE, m->code);
+    clutch_put_u16(body + CLUTCH_ACTUATE_VALID_US, m->valid_us);
+    return clutch_frame(wire, body, CLUTCH_ACTUATE_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_ACTUATE_KIND. */
+static inline void clutch_get_actuate(const uint8_t *body, clutch_actuate_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_ACTUATE_RUN);
+    m->sequence = clutch_get_u16(body + CLUTCH_ACTUATE_SEQUENCE);
+    m->code = clutch_get_u16(body + CLUTCH_ACTUATE_CODE);
+    m->valid_us = clutch_get_u16(body + CLUTCH_ACTUATE_VALID_US);
+}
+
+/* Stop: Ends the run: safe output. */
+#define CLUTCH_STOP_KIND 0x05u
+#define CLUTCH_STOP_LENGTH 8u
+#define CLUTCH_STOP_RUN 1u
+#define CLUTCH_STOP_REASON 3u
+typedef struct {
+    uint16_t run; /* The configured run. */
+    uint8_t reason; /* Why: a StopReason. */
+} clutch_stop_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_stop(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_stop_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_STOP_KIND;
+    clutch_put_u16(body + CLUTCH_STOP_RUN, m->run);
+    clutch_put_u8(body + CLUTCH_STOP_REASON, m->reason);
+    return clutch_frame(wire, body, CLUTCH_STOP_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_STOP_KIND. */
+static inline void clutch_get_stop(const uint8_t *body, clutch_stop_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_STOP_RUN);
+    m->reason = clutch_get_u8(body + CLUTCH_STOP_REASON);
+}
+
+/* Ping: Asks for the board's time. Any state. */
+#define CLUTCH_PING_KIND 0x06u
+#define CLUTCH_PING_LENGTH 11u
+#define CLUTCH_PING_RUN 1u
+#define CLUTCH_PING_NONCE 3u
+typedef struct {
+    uint16_t run; /* The host's run; the answer echoes it. */
+    uint32_t nonce; /* Number that the answer echoes. */
+} clutch_ping_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_ping(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_ping_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_PING_KIND;
+    clutch_put_u16(body + CLUTCH_PING_RUN, m->run);
+    clutch_put_u32(body + CLUTCH_PING_NONCE, m->nonce);
+    return clutch_frame(wire, body, CLUTCH_PING_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_PING_KIND. */
+static inline void clutch_get_ping(const uint8_t *body, clutch_ping_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_PING_RUN);
+    m->nonce = clutch_get_u32(body + CLUTCH_PING_NONCE);
+}
+
+/* Hello: Who the board is, what it can do, and what it is doing. Answers Discover. */
+#define CLUTCH_HELLO_KIND 0x81u
+#define CLUTCH_HELLO_LENGTH 64u
+#define CLUTCH_HELLO_NONCE 1u
+#define CLUTCH_HELLO_VERSION 5u
+#define CLUTCH_HELLO_SCHEMA 6u
+#define CLUTCH_HELLO_BOARD 14u
+#define CLUTCH_HELLO_BOOT 18u
+#define CLUTCH_HELLO_COUNTS_PER_REV 22u
+#define CLUTCH_HELLO_DAC_BITS 26u
+#define CLUTCH_HELLO_DAC_LOWEST_MV 27u
+#define CLUTCH_HELLO_DAC_HIGHEST_MV 31u
+#define CLUTCH_HELLO_PERIOD_MIN_US 35u
+#define CLUTCH_HELLO_PERIOD_MAX_US 39u
+#define CLUTCH_HELLO_WATCHDOG_MAX_US 43u
+#define CLUTCH_HELLO_BOOT_CODE 47u
+#define CLUTCH_HELLO_STATE 49u
+#define CLUTCH_HELLO_RUN 50u
+#define CLUTCH_HELLO_CONFIG 52u
+typedef struct {
+    uint32_t nonce; /* The nonce of Discover. */
+    uint8_t version; /* The board's version of the protocol. */
+    uint64_t schema; /* The board's schema hash. */
+    uint32_t board; /* The board's own serial number. */
+    uint32_t boot; /* Another number at each power-up. */
+    uint32_t counts_per_rev; /* Encoder counts per revolution, after quadrature. [counts per revolution] */
+    uint8_t dac_bits; /* Resolution of the converter. [bits] */
+    int32_t dac_lowest_mv; /* Output at code 0. [mV] */
+    int32_t dac_highest_mv; /* Output one step above the highest code. [mV] */
+    uint32_t period_min_us; /* Shortest period. [us] */
+    uint32_t period_max_us; /* Longest period. [us] */
+    uint32_t watchdog_max_us; /* Longest watchdog time. [us] */
+    uint16_t boot_code; /* The code put out from power-up to the first safe output or run. [DAC code] */
+    uint8_t state; /* What the board is doing: a BoardState. */
+    uint16_t run; /* The latched run; 0 if none since power-up. */
+    uint64_t config; /* The latched hash; 0 if none since power-up. */
+} clutch_hello_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_hello(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_hello_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_HELLO_KIND;
+    clutch_put_u32(body + CLUTCH_HELLO_NONCE, m->nonce);
+    clutch_put_u8(body + CLUTCH_HELLO_VERSION, m->version);
+    clutch_put_u64(body + CLUTCH_HELLO_SCHEMA, m->schema);
+    clutch_put_u32(body + CLUTCH_HELLO_BOARD, m->board);
+    clutch_put_u32(body + CLUTCH_HELLO_BOOT, m->boot);
+    clutch_put_u32(body + CLUTCH_HELLO_COUNTS_PER_REV, m->counts_per_rev);
+    clutch_put_u8(body + CLUTCH_HELLO_DAC_BITS, m->dac_bits);
+    clutch_put_i32(body + CLUTCH_HELLO_DAC_LOWEST_MV, m->dac_lowest_mv);
+    clutch_put_i32(body + CLUTCH_HELLO_DAC_HIGHEST_MV, m->dac_highest_mv);
+    clutch_put_u32(body + CLUTCH_HELLO_PERIOD_MIN_US, m->period_min_us);
+    clutch_put_u32(body + CLUTCH_HELLO_PERIOD_MAX_US, m->period_max_us);
+    clutch_put_u32(body + CLUTCH_HELLO_WATCHDOG_MAX_US, m->watchdog_max_us);
+    clutch_put_u16(body + CLUTCH_HELLO_BOOT_CODE, m->boot_code);
+    clutch_put_u8(body + CLUTCH_HELLO_STATE, m->state);
+    clutch_put_u16(body + CLUTCH_HELLO_RUN, m->run);
+    clutch_put_u64(body + CLUTCH_HELLO_CONFIG, m->config);
+    return clutch_frame(wire, body, CLUTCH_HELLO_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_HELLO_KIND. */
+static inline void clutch_get_hello(const uint8_t *body, clutch_hello_t *m)
+{
+    m->nonce = clutch_get_u32(body + CLUTCH_HELLO_NONCE);
+    m->version = clutch_get_u8(body + CLUTCH_HELLO_VERSION);
+    m->schema = clutch_get_u64(body + CLUTCH_HELLO_SCHEMA);
+    m->board = clutch_get_u32(body + CLUTCH_HELLO_BOARD);
+    m->boot = clutch_get_u32(body + CLUTCH_HELLO_BOOT);
+    m->counts_per_rev = clutch_get_u32(body + CLUTCH_HELLO_COUNTS_PER_REV);
+    m->dac_bits = clutch_get_u8(body + CLUTCH_HELLO_DAC_BITS);
+    m->dac_lowest_mv = clutch_get_i32(body + CLUTCH_HELLO_DAC_LOWEST_MV);
+    m->dac_highest_mv = clutch_get_i32(body + CLUTCH_HELLO_DAC_HIGHEST_MV);
+    m->period_min_us = clutch_get_u32(body + CLUTCH_HELLO_PERIOD_MIN_US);
+    m->period_max_us = clutch_get_u32(body + CLUTCH_HELLO_PERIOD_MAX_US);
+    m->watchdog_max_us = clutch_get_u32(body + CLUTCH_HELLO_WATCHDOG_MAX_US);
+    m->boot_code = clutch_get_u16(body + CLUTCH_HELLO_BOOT_CODE);
+    m->state = clutch_get_u8(body + CLUTCH_HELLO_STATE);
+    m->run = clutch_get_u16(body + CLUTCH_HELLO_RUN);
+    m->config = clutch_get_u64(body + CLUTCH_HELLO_CONFIG);
+}
+
+/* Configured: The run is prepared; samples follow. Answers Configure. */
+#define CLUTCH_CONFIGURED_KIND 0x82u
+#define CLUTCH_CONFIGURED_LENGTH 19u
+#define CLUTCH_CONFIGURED_RUN 1u
+#define CLUTCH_CONFIGURED_CONFIG 3u
+#define CLUTCH_CONFIGURED_BOOT 11u
+typedef struct {
+    uint16_t run; /* The run. */
+    uint64_t config; /* The hash. */
+    uint32_t boot; /* As in Hello: the host sees a board that was reset in between. */
+} clutch_configured_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_configured(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_configured_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_CONFIGURED_KIND;
+    clutch_put_u16(body + CLUTCH_CONFIGURED_RUN, m->run);
+    clutch_put_u64(body + CLUTCH_CONFIGURED_CONFIG, m->config);
+    clutch_put_u32(body + CLUTCH_CONFIGURED_BOOT, m->boot);
+    return clutch_frame(wire, body, CLUTCH_CONFIGURED_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_CONFIGURED_KIND. */
+static inline void clutch_get_configured(const uint8_t *body, clutch_configured_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_CONFIGURED_RUN);
+    m->config = clutch_get_u64(body + CLUTCH_CONFIGURED_CONFIG);
+    m->boot = clutch_get_u32(body + CLUTCH_CONFIGURED_BOOT);
+}
+
+/* Armed: The consent is taken. Answers Arm. */
+#define CLUTCH_ARMED_KIND 0x83u
+#define CLUTCH_ARMED_LENGTH 15u
+#define CLUTCH_ARMED_RUN 1u
+#define CLUTCH_ARMED_CONFIG 3u
+typedef struct {
+    uint16_t run; /* The run. */
+    uint64_t config; /* The hash. */
+} clutch_armed_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_armed(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_armed_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_ARMED_KIND;
+    clutch_put_u16(body + CLUTCH_ARMED_RUN, m->run);
+    clutch_put_u64(body + CLUTCH_ARMED_CONFIG, m->config);
+    return clutch_frame(wire, body, CLUTCH_ARMED_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_ARMED_KIND. */
+static inline void clutch_get_armed(const uint8_t *body, clutch_armed_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_ARMED_RUN);
+    m->config = clutch_get_u64(body + CLUTCH_ARMED_CONFIG);
+}
+
+/* Sample: A measurement, one each period. */
+#define CLUTCH_SAMPLE_KIND 0x84u
+#define CLUTCH_SAMPLE_LENGTH 18u
+#define CLUTCH_SAMPLE_RUN 1u
+#define CLUTCH_SAMPLE_SEQUENCE 3u
+#define CLUTCH_SAMPLE_TIME_US 5u
+#define CLUTCH_SAMPLE_COUNTS 9u
+#define CLUTCH_SAMPLE_STATUS 13u
+typedef struct {
+    uint16_t run; /* The run. */
+    uint16_t sequence; /* 0 after Configure, then one more each period; wraps. */
+    uint32_t time_us; /* When it was taken, by the board's clock; wraps. [us] */
+    int32_t counts; /* The encoder's counter; wraps. [counts] */
+    uint8_t status; /* BoardState and flags. */
+} clutch_sample_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_sample(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_sample_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_SAMPLE_KIND;
+    clutch_put_u16(body + CLUTCH_SAMPLE_RUN, m->run);
+    clutch_put_u16(body + CLUTCH_SAMPLE_SEQUENCE, m->sequence);
+    clutch_put_u32(body + CLUTCH_SAMPLE_TIME_US, m->time_us);
+    clutch_put_i32(body + CLUTCH_SAMPLE_COUNTS, m->counts);
+    clutch_put_u8(body + CLUTCH_SAMPLE_STATUS, m->status);
+    return clutch_frame(wire, body, CLUTCH_SAMPLE_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_SAMPLE_KIND. */
+static inline void clutch_get_sample(const uint8_t *body, clutch_sample_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_SAMPLE_RUN);
+    m->sequence = clutch_get_u16(body + CLUTCH_SAMPLE_SEQUENCE);
+    m->time_us = clutch_get_u32(body + CLUTCH_SAMPLE_TIME_US);
+    m->counts = clutch_get_i32(body + CLUTCH_SAMPLE_COUNTS);
+    m->status = clutch_get_u8(body + CLUTCH_SAMPLE_STATUS);
+}
+
+/* Fault: The board went to its safe output by itself. */
+#define CLUTCH_FAULT_KIND 0x85u
+#define CLUTCH_FAULT_LENGTH 18u
+#define CLUTCH_FAULT_RUN 1u
+#define CLUTCH_FAULT_SEQUENCE 3u
+#define CLUTCH_FAULT_TIME_US 5u
+#define CLUTCH_FAULT_CAUSE 9u
+#define CLUTCH_FAULT_VALUE 10u
+typedef struct {
+    uint16_t run; /* The run. */
+    uint16_t sequence; /* Sequence number of the newest sample. */
+    uint32_t time_us; /* When, by the board's clock. [us] */
+    uint8_t cause; /* Why: a BoardFault. */
+    uint32_t value; /* Detail of the cause. */
+} clutch_fault_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_fault(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_fault_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_FAULT_KIND;
+    clutch_put_u16(body + CLUTCH_FAULT_RUN, m->run);
+    clutch_put_u16(body + CLUTCH_FAULT_SEQUENCE, m->sequence);
+    clutch_put_u32(body + CLUTCH_FAULT_TIME_US, m->time_us);
+    clutch_put_u8(body + CLUTCH_FAULT_CAUSE, m->cause);
+    clutch_put_u32(body + CLUTCH_FAULT_VALUE, m->value);
+    return clutch_frame(wire, body, CLUTCH_FAULT_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_FAULT_KIND. */
+static inline void clutch_get_fault(const uint8_t *body, clutch_fault_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_FAULT_RUN);
+    m->sequence = clutch_get_u16(body + CLUTCH_FAULT_SEQUENCE);
+    m->time_us = clutch_get_u32(body + CLUTCH_FAULT_TIME_US);
+    m->cause = clutch_get_u8(body + CLUTCH_FAULT_CAUSE);
+    m->value = clutch_get_u32(body + CLUTCH_FAULT_VALUE);
+}
+
+/* Stopped: The run is over. Answers Stop. */
+#define CLUTCH_STOPPED_KIND 0x86u
+#define CLUTCH_STOPPED_LENGTH 10u
+#define CLUTCH_STOPPED_RUN 1u
+#define CLUTCH_STOPPED_REASON 3u
+#define CLUTCH_STOPPED_CODE 4u
+typedef struct {
+    uint16_t run; /* The run. */
+    uint8_t reason; /* The reason of Stop. */
+    uint16_t code; /* The code that is put out now. [DAC code] */
+} clutch_stopped_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_stopped(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_stopped_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_STOPPED_KIND;
+    clutch_put_u16(body + CLUTCH_STOPPED_RUN, m->run);
+    clutch_put_u8(body + CLUTCH_STOPPED_REASON, m->reason);
+    clutch_put_u16(body + CLUTCH_STOPPED_CODE, m->code);
+    return clutch_frame(wire, body, CLUTCH_STOPPED_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_STOPPED_KIND. */
+static inline void clutch_get_stopped(const uint8_t *body, clutch_stopped_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_STOPPED_RUN);
+    m->reason = clutch_get_u8(body + CLUTCH_STOPPED_REASON);
+    m->code = clutch_get_u16(body + CLUTCH_STOPPED_CODE);
+}
+
+/* Pong: The board's time. Answers Ping. */
+#define CLUTCH_PONG_KIND 0x87u
+#define CLUTCH_PONG_LENGTH 15u
+#define CLUTCH_PONG_RUN 1u
+#define CLUTCH_PONG_NONCE 3u
+#define CLUTCH_PONG_TIME_US 7u
+typedef struct {
+    uint16_t run; /* The run of Ping. */
+    uint32_t nonce; /* The nonce of Ping. */
+    uint32_t time_us; /* When Ping was taken, by the board's clock. [us] */
+} clutch_pong_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_pong(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_pong_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_PONG_KIND;
+    clutch_put_u16(body + CLUTCH_PONG_RUN, m->run);
+    clutch_put_u32(body + CLUTCH_PONG_NONCE, m->nonce);
+    clutch_put_u32(body + CLUTCH_PONG_TIME_US, m->time_us);
+    return clutch_frame(wire, body, CLUTCH_PONG_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_PONG_KIND. */
+static inline void clutch_get_pong(const uint8_t *body, clutch_pong_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_PONG_RUN);
+    m->nonce = clutch_get_u32(body + CLUTCH_PONG_NONCE);
+    m->time_us = clutch_get_u32(body + CLUTCH_PONG_TIME_US);
+}
+
+/* Refused: The board does not do what a frame asks for. The layout is the same in all versions. */
+#define CLUTCH_REFUSED_KIND 0x88u
+#define CLUTCH_REFUSED_LENGTH 11u
+#define CLUTCH_REFUSED_REQUEST 1u
+#define CLUTCH_REFUSED_REASON 2u
+#define CLUTCH_REFUSED_VALUE 3u
+typedef struct {
+    uint8_t request; /* Kind of the frame that is refused. */
+    uint8_t reason; /* Why: a Refusal. */
+    uint32_t value; /* Detail of the reason. */
+} clutch_refused_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_refused(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_refused_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_REFUSED_KIND;
+    clutch_put_u8(body + CLUTCH_REFUSED_REQUEST, m->request);
+    clutch_put_u8(body + CLUTCH_REFUSED_REASON, m->reason);
+    clutch_put_u32(body + CLUTCH_REFUSED_VALUE, m->value);
+    return clutch_frame(wire, body, CLUTCH_REFUSED_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_REFUSED_KIND. */
+static inline void clutch_get_refused(const uint8_t *body, clutch_refused_t *m)
+{
+    m->request = clutch_get_u8(body + CLUTCH_REFUSED_REQUEST);
+    m->reason = clutch_get_u8(body + CLUTCH_REFUSED_REASON);
+    m->value = clutch_get_u32(body + CLUTCH_REFUSED_VALUE);
+}
+
+/* Bytes before stuffing of a frame of this kind, CRC included; 0 for a kind that is not known. */
+static inline size_t clutch_length(uint8_t kind)
+{
+    switch (kind) {
+    case CLUTCH_DISCOVER_KIND: return CLUTCH_DISCOVER_LENGTH;
+    case CLUTCH_CONFIGURE_KIND: return CLUTCH_CONFIGURE_LENGTH;
+    case CLUTCH_ARM_KIND: return CLUTCH_ARM_LENGTH;
+    case CLUTCH_ACTUATE_KIND: return CLUTCH_ACTUATE_LENGTH;
+    case CLUTCH_STOP_KIND: return CLUTCH_STOP_LENGTH;
+    case CLUTCH_PING_KIND: return CLUTCH_PING_LENGTH;
+    case CLUTCH_HELLO_KIND: return CLUTCH_HELLO_LENGTH;
+    case CLUTCH_CONFIGURED_KIND: return CLUTCH_CONFIGURED_LENGTH;
+    case CLUTCH_ARMED_KIND: return CLUTCH_ARMED_LENGTH;
+    case CLUTCH_SAMPLE_KIND: return CLUTCH_SAMPLE_LENGTH;
+    case CLUTCH_FAULT_KIND: return CLUTCH_FAULT_LENGTH;
+    case CLUTCH_STOPPED_KIND: return CLUTCH_STOPPED_LENGTH;
+    case CLUTCH_PONG_KIND: return CLUTCH_PONG_LENGTH;
+    case CLUTCH_REFUSED_KIND: return CLUTCH_REFUSED_LENGTH;
+    default: return 0;
+    }
+}
+
+/* What clutch_push says besides a kind. */
+#define CLUTCH_NOTHING 0        /* no frame ends here */
+#define CLUTCH_BAD_COBS (-1)    /* a code points past the end */
+#define CLUTCH_TOO_LONG (-2)    /* more bytes than the longest frame; said once */
+#define CLUTCH_TOO_SHORT (-3)   /* shorter than a kind and a CRC */
+#define CLUTCH_BAD_CRC (-4)     /* the checksum does not hold */
+#define CLUTCH_UNKNOWN_KIND (-5)
+#define CLUTCH_BAD_LENGTH (-6)  /* not the length of its kind */
+
+/* Finds frames in a stream of bytes. All zero to start with. */
+typedef struct {
+    uint8_t body[CLUTCH_MAX_BODY];
+    uint8_t length;   /* bytes in body */
+    uint8_t count;    /* bytes since the delimiter */
+    uint8_t left;     /* bytes of the block still to come */
+    uint8_t dropping; /* too long: drop up to the delimiter */
+} clutch_decoder_t;
+
+/* Takes a byte. A kind (> 0): a frame is in d->body until the next byte. An error (< 0): a frame was dropped. */
+static inline int clutch_push(clutch_decoder_t *d, uint8_t byte)
+{
+    uint8_t length = d->length, count = d->count, left = d->left, dropping = d->dropping;
+    size_t expected;
+    if (byte != 0) {
+        if (dropping)
+            return CLUTCH_NOTHING;
+        if (count >= CLUTCH_MAX_FRAME - 1u) {
+            d->dropping = 1;
+            return CLUTCH_TOO_LONG;
+        }
+        d->count++;
+        if (left > 0) {
+            d->left--;
+            d->body[d->length++] = byte;
+        } else {
+            if (count > 0)
+                d->body[d->length++] = 0;
+            d->left = (uint8_t)(byte - 1u);
+        }
+        return CLUTCH_NOTHING;
+    }
+    d->length = d->count = d->left = d->dropping = 0;
+    if (count == 0 || dropping)
+        return CLUTCH_NOTHING;
+    if (left > 0)
+        return CLUTCH_BAD_COBS;
+    if (length < 5)
+        return CLUTCH_TOO_SHORT;
+    if (clutch_crc32(d->body, length - 4u) != clutch_get_u32(d->body + length - 4))
+        return CLUTCH_BAD_CRC;
+    expected = clutch_length(d->body[0]);
+    if (expected == 0)
+        return CLUTCH_UNKNOWN_KIND;
+    if (expected != length)
+        return CLUTCH_BAD_LENGTH;
+    return d->body[0];
+}
+
+#endif

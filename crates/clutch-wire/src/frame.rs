@@ -1,0 +1,222 @@
+//! Frames: stuffing, checksum, and the decoder that finds them again in any stream of bytes.
+
+use crate::message::{LONGEST, Message, Put};
+use core::fmt;
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+/// A kilobyte of table: a board that cannot spare it writes its own loop (docs/wire.md has one).
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// The longest frame before stuffing, bytes.
+pub const MAX_BODY: usize = LONGEST;
+
+/// The longest frame on the wire, bytes: one of stuffing and the delimiter come on top.
+pub const MAX_FRAME: usize = MAX_BODY + 2;
+
+// Below 254 bytes COBS costs exactly one byte, and a code of 0xFF cannot be complete: there is one
+// way only to stuff a frame. The table's lengths and the decoder's counters are bytes.
+const _: () = assert!(MAX_FRAME < 254, "a frame must fit one block of COBS");
+
+/// The bytes of one frame, delimiter included.
+#[derive(Clone, Copy)]
+pub struct Frame {
+    bytes: [u8; MAX_FRAME],
+    length: usize,
+}
+
+impl Frame {
+    /// The bytes for the wire.
+    #[inline]
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+}
+
+/// The frame of a message.
+#[must_use]
+pub fn encode(message: &Message) -> Frame {
+    let mut body = [0; MAX_BODY];
+    let length = message.put(&mut Put::new(&mut body));
+    let (content, rest) = body.split_at_mut_checked(length).unwrap_or_default();
+    Put::new(rest).bytes(CRC.checksum(content).to_le_bytes());
+    stuff(&body, length.wrapping_add(4))
+}
+
+/// COBS, from the end to the start: each zero, and the place in front of the first byte, gets the
+/// distance to the next zero; the end counts as one.
+fn stuff(body: &[u8; MAX_BODY], length: usize) -> Frame {
+    let mut bytes = [0; MAX_FRAME];
+    let mut distance = 1_u8;
+    let [first, places @ ..] = &mut bytes;
+    let mut end = length;
+    // Not `zip(…).rev()`: that keeps a check of its own that can panic.
+    while let Some(i) = end.checked_sub(1) {
+        end = i;
+        let (Some(place), Some(&byte)) = (places.get_mut(i), body.get(i)) else { continue };
+        if byte == 0 {
+            *place = distance;
+            distance = 1;
+        } else {
+            *place = byte;
+            distance = distance.wrapping_add(1);
+        }
+    }
+    *first = distance;
+    Frame { bytes, length: length.wrapping_add(2) }
+}
+
+/// Why bytes were dropped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameError {
+    /// The stuffing is wrong: a code points past the end of the frame.
+    Cobs,
+    /// More bytes without a delimiter than the longest frame has. Said once; the rest is dropped
+    /// without a word.
+    TooLong,
+    /// Shorter than a kind and a CRC.
+    TooShort,
+    /// The checksum does not hold.
+    Crc {
+        /// As the frame says.
+        expected: u32,
+        /// As its bytes say.
+        computed: u32,
+    },
+    /// Not the length that its kind has. Bytes before stuffing.
+    Length {
+        /// Kind of the frame.
+        kind: u8,
+        /// Length of that kind, bytes.
+        expected: u8,
+        /// Length of the frame, bytes.
+        got: u8,
+    },
+    /// A kind that is not in the table.
+    UnknownKind(u8),
+}
+
+impl fmt::Display for FrameError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            FrameError::Cobs => f.write_str("stuffing: a code points past the end of the frame"),
+            FrameError::TooLong => {
+                write!(f, "length: more than {} bytes without a delimiter (0x00)", MAX_FRAME - 1)
+            }
+            FrameError::TooShort => f.write_str("length: expected at least 5 bytes, a kind and a CRC"),
+            FrameError::Crc { expected, computed } => {
+                write!(f, "CRC = {expected:#010x}: expected {computed:#010x}, which the bytes give")
+            }
+            FrameError::Length { kind, expected, got } => {
+                write!(f, "length = {got} bytes: expected {expected} for kind {kind:#04x}")
+            }
+            FrameError::UnknownKind(kind) => {
+                write!(f, "kind = {kind:#04x}: expected one of the table (schema {:#018x})", crate::SCHEMA)
+            }
+        }
+    }
+}
+
+impl core::error::Error for FrameError {}
+
+/// Finds frames in a stream of bytes, in constant memory.
+///
+/// It starts as if a delimiter had just come. Whatever happened before, the next delimiter puts it
+/// in step again: garbage costs at most the one frame that it runs into.
+#[derive(Clone, Copy, Debug)]
+pub struct Decoder {
+    body: [u8; MAX_BODY],
+    /// Bytes in `body`.
+    length: u8,
+    /// Bytes since the delimiter.
+    count: u8,
+    /// Bytes of the present block still to come.
+    left: u8,
+    /// Too long: drop up to the delimiter.
+    dropping: bool,
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Decoder::new()
+    }
+}
+
+impl Decoder {
+    /// In step, nothing read.
+    #[must_use]
+    pub const fn new() -> Decoder {
+        Decoder { body: [0; MAX_BODY], length: 0, count: 0, left: 0, dropping: false }
+    }
+
+    /// Takes a byte; a message or an error if a frame ends here. Two delimiters in a row are no
+    /// frame and no error.
+    #[inline]
+    pub fn push(&mut self, byte: u8) -> Option<Result<Message, FrameError>> {
+        if byte == 0 {
+            return self.finish();
+        }
+        if self.dropping {
+            return None;
+        }
+        if usize::from(self.count) >= MAX_FRAME - 1 {
+            self.dropping = true;
+            return Some(Err(FrameError::TooLong));
+        }
+        self.count = self.count.wrapping_add(1);
+        if self.left > 0 {
+            self.left = self.left.wrapping_sub(1);
+            self.append(byte);
+        } else {
+            // A code. Each but the first stands where a zero was.
+            if self.count > 1 {
+                self.append(0);
+            }
+            self.left = byte.wrapping_sub(1);
+        }
+        None
+    }
+
+    /// One byte less than `count` gets here: the body has room.
+    #[inline]
+    fn append(&mut self, byte: u8) {
+        if let Some(place) = self.body.get_mut(usize::from(self.length)) {
+            *place = byte;
+        }
+        self.length = self.length.wrapping_add(1);
+    }
+
+    fn finish(&mut self) -> Option<Result<Message, FrameError>> {
+        let (length, count, left, dropping) = (self.length, self.count, self.left, self.dropping);
+        (self.length, self.count, self.left, self.dropping) = (0, 0, 0, false);
+        if count == 0 || dropping {
+            return None;
+        }
+        if left > 0 {
+            return Some(Err(FrameError::Cobs));
+        }
+        Some(parse(self.body.get(..usize::from(length)).unwrap_or_default()))
+    }
+}
+
+/// The checksum first: what it does not vouch for says nothing about kind and length.
+fn parse(body: &[u8]) -> Result<Message, FrameError> {
+    let Some((content, crc)) = body.split_last_chunk::<4>() else {
+        return Err(FrameError::TooShort);
+    };
+    let Some((&kind, fields)) = content.split_first() else {
+        return Err(FrameError::TooShort);
+    };
+    let (expected, computed) = (u32::from_le_bytes(*crc), CRC.checksum(content));
+    if expected != computed {
+        return Err(FrameError::Crc { expected, computed });
+    }
+    let Some(length) = Message::length(kind) else {
+        return Err(FrameError::UnknownKind(kind));
+    };
+    if length != body.len() {
+        // Both are below 254, see MAX_FRAME.
+        return Err(FrameError::Length { kind, expected: length as u8, got: body.len() as u8 });
+    }
+    Message::take(kind, fields).ok_or(FrameError::UnknownKind(kind))
+}

@@ -1,0 +1,407 @@
+//! The one table of messages: structs, lengths, coding, description and schema hash come from it.
+
+/// Who sends a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// From the host to the board; kinds below 0x80.
+    ToBoard,
+    /// From the board to the host; kinds from 0x80.
+    ToHost,
+}
+
+/// A message as the table describes it.
+#[derive(Clone, Copy, Debug)]
+pub struct MessageInfo {
+    /// Name, as the struct's.
+    pub name: &'static str,
+    /// First byte of its frame.
+    pub kind: u8,
+    /// Who sends it.
+    pub direction: Direction,
+    /// Bytes before stuffing: kind, fields and CRC. On the wire two more.
+    pub length: u8,
+    /// What it says.
+    pub doc: &'static str,
+    /// Its fields in order.
+    pub fields: &'static [FieldInfo],
+}
+
+/// A field as the table describes it.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldInfo {
+    /// Name, as the struct's.
+    pub name: &'static str,
+    /// `u8`, `u16`, `u32`, `u64` or `i32`; little-endian.
+    pub ty: &'static str,
+    /// Where it starts, bytes from the start of the frame before stuffing (the kind is at 0).
+    pub offset: u8,
+    /// Its unit; empty for a plain number.
+    pub unit: &'static str,
+    /// What it says.
+    pub doc: &'static str,
+}
+
+/// Bytes before stuffing that are no fields: kind and CRC.
+const AROUND: usize = 1 + 4;
+
+/// Writes fields one after the other. What does not fit is left out, which the lengths of the
+/// table rule out; this way nothing can panic.
+pub(crate) struct Put<'a> {
+    rest: &'a mut [u8],
+}
+
+impl<'a> Put<'a> {
+    pub(crate) fn new(rest: &'a mut [u8]) -> Self {
+        Put { rest }
+    }
+
+    #[inline]
+    pub(crate) fn bytes<const N: usize>(&mut self, bytes: [u8; N]) {
+        if let Some((head, tail)) = core::mem::take(&mut self.rest).split_first_chunk_mut::<N>() {
+            *head = bytes;
+            self.rest = tail;
+        }
+    }
+}
+
+/// The next `N` bytes.
+#[inline]
+fn next<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+    let (head, tail) = rest.split_first_chunk::<N>()?;
+    *rest = tail;
+    Some(*head)
+}
+
+macro_rules! messages {
+    ($(
+        $(#[doc = $doc:literal])+
+        $kind:literal $direction:ident $name:ident {
+            $($(#[doc = $field_doc:literal])+ $field:ident: $ty:ident $([$unit:literal])?,)+
+        }
+    )+) => {
+        $(
+            $(#[doc = $doc])+
+            #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+            pub struct $name {
+                $(
+                    $(#[doc = $field_doc])+
+                    $(#[doc = concat!("\n\nUnit: ", $unit, ".")])?
+                    pub $field: $ty,
+                )+
+            }
+
+            impl $name {
+                /// First byte of the frame.
+                pub const KIND: u8 = $kind;
+                /// Bytes before stuffing: kind, fields and CRC.
+                pub const LENGTH: usize = AROUND $(+ size_of::<$ty>())+;
+
+                #[inline]
+                fn put(&self, out: &mut Put<'_>) {
+                    out.bytes([$kind]);
+                    $(out.bytes(self.$field.to_le_bytes());)+
+                }
+
+                #[inline]
+                fn take(mut rest: &[u8]) -> Option<Self> {
+                    Some($name { $($field: <$ty>::from_le_bytes(next(&mut rest)?),)+ })
+                }
+            }
+        )+
+
+        /// What one frame says.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Message {
+            $($(#[doc = $doc])+ $name($name),)+
+        }
+
+        impl Message {
+            /// Writes kind and fields; the length of both, bytes.
+            #[inline]
+            pub(crate) fn put(&self, out: &mut Put<'_>) -> usize {
+                match self {
+                    $(Message::$name(message) => {
+                        message.put(out);
+                        $name::LENGTH.wrapping_sub(4)
+                    })+
+                }
+            }
+
+            /// Bytes before stuffing of a frame of this kind; nothing for a kind that is not in the table.
+            #[inline]
+            pub(crate) fn length(kind: u8) -> Option<usize> {
+                match kind {
+                    $($kind => Some($name::LENGTH),)+
+                    _ => None,
+                }
+            }
+
+            /// Reads the fields of a frame of this kind.
+            #[inline]
+            pub(crate) fn take(kind: u8, fields: &[u8]) -> Option<Message> {
+                match kind {
+                    $($kind => $name::take(fields).map(Message::$name),)+
+                    _ => None,
+                }
+            }
+        }
+
+        /// The table: every message, its layout and its meaning.
+        pub const TABLE: &[MessageInfo] = &[$(MessageInfo {
+            name: stringify!($name),
+            kind: $kind,
+            direction: Direction::$direction,
+            length: $name::LENGTH as u8,
+            doc: concat!($($doc),+),
+            fields: {
+                #[allow(unused_assignments, reason = "the last field's end starts no other field")]
+                const FIELDS: &[FieldInfo] = {
+                    let mut end = 1;
+                    &[$({
+                        let offset = end;
+                        end += size_of::<$ty>() as u8;
+                        FieldInfo {
+                            name: stringify!($field),
+                            ty: stringify!($ty),
+                            offset,
+                            unit: concat!("" $(, $unit)?),
+                            doc: concat!($($field_doc),+),
+                        }
+                    }),+]
+                };
+                FIELDS
+            },
+        }),+];
+
+        /// The longest frame before stuffing, bytes.
+        pub(crate) const LONGEST: usize = {
+            let mut longest = 0;
+            $(if $name::LENGTH > longest {
+                longest = $name::LENGTH;
+            })+
+            longest
+        };
+    };
+}
+
+messages! {
+    /// Asks the board who it is. Any state. The layout is the same in all versions.
+    0x01 ToBoard Discover {
+        /// Number that the answer echoes.
+        nonce: u32,
+        /// The host's version of the protocol.
+        version: u8,
+        /// The host's schema hash.
+        schema: u64,
+    }
+
+    /// Prepares a run: period, watchdog and safe output. Starts the samples.
+    0x02 ToBoard Configure {
+        /// Number of the new run; other than that of the run before.
+        run: u16,
+        /// The host's hash of the scenario; the board stores and echoes it.
+        config: u64,
+        /// Time from sample to sample.
+        period_us: u32 ["µs"],
+        /// Longest time without an applied `Actuate` while armed or running.
+        watchdog_us: u32 ["µs"],
+        /// How to go to the safe output: a `SafeKind`.
+        safe_kind: u8,
+        /// The code that holds.
+        hold_code: u16 ["DAC code"],
+        /// The code that releases.
+        release_code: u16 ["DAC code"],
+        /// Step of the ramp to `hold_code`.
+        ramp_step: u32 ["2⁻¹⁶ DAC codes per period"],
+        /// How long `HoldThenRelease` holds.
+        hold_periods: u32 ["periods"],
+    }
+
+    /// Consent to the run that was configured.
+    0x03 ToBoard Arm {
+        /// The configured run.
+        run: u16,
+        /// The configured hash.
+        config: u64,
+    }
+
+    /// A code for the converter, in answer to a sample.
+    0x04 ToBoard Actuate {
+        /// The configured run.
+        run: u16,
+        /// Sequence number of the sample it answers.
+        sequence: u16,
+        /// The code to put out.
+        code: u16 ["DAC code"],
+        /// Not applied if it arrives later than this after that sample was taken.
+        valid_us: u16 ["µs"],
+    }
+
+    /// Ends the run: safe output.
+    0x05 ToBoard Stop {
+        /// The configured run.
+        run: u16,
+        /// Why: a `StopReason`.
+        reason: u8,
+    }
+
+    /// Asks for the board's time. Any state.
+    0x06 ToBoard Ping {
+        /// The host's run; the answer echoes it.
+        run: u16,
+        /// Number that the answer echoes.
+        nonce: u32,
+    }
+
+    /// Who the board is, what it can do, and what it is doing. Answers `Discover`.
+    0x81 ToHost Hello {
+        /// The nonce of `Discover`.
+        nonce: u32,
+        /// The board's version of the protocol.
+        version: u8,
+        /// The board's schema hash.
+        schema: u64,
+        /// The board's own serial number.
+        board: u32,
+        /// Another number at each power-up.
+        boot: u32,
+        /// Encoder counts per revolution, after quadrature.
+        counts_per_rev: u32 ["counts per revolution"],
+        /// Resolution of the converter.
+        dac_bits: u8 ["bits"],
+        /// Output at code 0.
+        dac_lowest_mv: i32 ["mV"],
+        /// Output one step above the highest code.
+        dac_highest_mv: i32 ["mV"],
+        /// Shortest period.
+        period_min_us: u32 ["µs"],
+        /// Longest period.
+        period_max_us: u32 ["µs"],
+        /// Longest watchdog time.
+        watchdog_max_us: u32 ["µs"],
+        /// The code put out from power-up to the first safe output or run.
+        boot_code: u16 ["DAC code"],
+        /// What the board is doing: a `BoardState`.
+        state: u8,
+        /// The latched run; 0 if none since power-up.
+        run: u16,
+        /// The latched hash; 0 if none since power-up.
+        config: u64,
+    }
+
+    /// The run is prepared; samples follow. Answers `Configure`.
+    0x82 ToHost Configured {
+        /// The run.
+        run: u16,
+        /// The hash.
+        config: u64,
+        /// As in `Hello`: the host sees a board that was reset in between.
+        boot: u32,
+    }
+
+    /// The consent is taken. Answers `Arm`.
+    0x83 ToHost Armed {
+        /// The run.
+        run: u16,
+        /// The hash.
+        config: u64,
+    }
+
+    /// A measurement, one each period.
+    0x84 ToHost Sample {
+        /// The run.
+        run: u16,
+        /// 0 after `Configure`, then one more each period; wraps.
+        sequence: u16,
+        /// When it was taken, by the board's clock; wraps.
+        time_us: u32 ["µs"],
+        /// The encoder's counter; wraps.
+        counts: i32 ["counts"],
+        /// `BoardState` and flags.
+        status: u8,
+    }
+
+    /// The board went to its safe output by itself.
+    0x85 ToHost Fault {
+        /// The run.
+        run: u16,
+        /// Sequence number of the newest sample.
+        sequence: u16,
+        /// When, by the board's clock.
+        time_us: u32 ["µs"],
+        /// Why: a `BoardFault`.
+        cause: u8,
+        /// Detail of the cause.
+        value: u32,
+    }
+
+    /// The run is over. Answers `Stop`.
+    0x86 ToHost Stopped {
+        /// The run.
+        run: u16,
+        /// The reason of `Stop`.
+        reason: u8,
+        /// The code that is put out now.
+        code: u16 ["DAC code"],
+    }
+
+    /// The board's time. Answers `Ping`.
+    0x87 ToHost Pong {
+        /// The run of `Ping`.
+        run: u16,
+        /// The nonce of `Ping`.
+        nonce: u32,
+        /// When `Ping` was taken, by the board's clock.
+        time_us: u32 ["µs"],
+    }
+
+    /// The board does not do what a frame asks for. The layout is the same in all versions.
+    0x88 ToHost Refused {
+        /// Kind of the frame that is refused.
+        request: u8,
+        /// Why: a `Refusal`.
+        reason: u8,
+        /// Detail of the reason.
+        value: u32,
+    }
+}
+
+/// FNV-1a, 64 bit, one piece of text after the other.
+const fn fnv(mut hash: u64, mut text: &[u8]) -> u64 {
+    while let [byte, rest @ ..] = text {
+        hash = (hash ^ *byte as u64).wrapping_mul(0x0000_0100_0000_01b3);
+        text = rest;
+    }
+    hash
+}
+
+/// A hexadecimal digit, lower case.
+const fn digit(value: u8) -> u8 {
+    if value < 10 { b'0'.wrapping_add(value) } else { b'a'.wrapping_add(value.wrapping_sub(10)) }
+}
+
+/// FNV-1a (64 bit) over the canonical text of [`TABLE`]: a line per message in order, of its kind
+/// as two hexadecimal digits, its name, and `name:type` of each field, with one space between and
+/// a line feed at the end.
+///
+/// The line of `Ping`, for one: `06 Ping run:u16 nonce:u32`. Two ends with the same hash agree on
+/// every byte of every frame.
+pub const SCHEMA: u64 = {
+    let mut hash = 0xcbf2_9ce4_8422_2325;
+    let mut table = TABLE;
+    while let [message, others @ ..] = table {
+        hash = fnv(hash, &[digit(message.kind >> 4), digit(message.kind & 15), b' ']);
+        hash = fnv(hash, message.name.as_bytes());
+        let mut fields = message.fields;
+        while let [field, rest @ ..] = fields {
+            hash = fnv(hash, b" ");
+            hash = fnv(hash, field.name.as_bytes());
+            hash = fnv(hash, b":");
+            hash = fnv(hash, field.ty.as_bytes());
+            fields = rest;
+        }
+        hash = fnv(hash, b"\n");
+        table = others;
+    }
+    hash
+};
