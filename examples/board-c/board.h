@@ -17,7 +17,7 @@ extern "C" {
 
 /* What the board is. `Hello` tells it to the host. */
 typedef struct {
-    uint32_t board;           /* its serial number; not 0, that is the simulated board */
+    uint32_t board;           /* its serial number; 0 and 1 are the simulated boards */
     uint32_t boot;            /* another number at each power-up */
     uint32_t counts_per_rev;  /* encoder counts per revolution, after quadrature */
     uint8_t dac_bits;         /* converter: bits, 1 to 16 */

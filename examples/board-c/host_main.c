@@ -190,7 +190,7 @@ int main(int argc, char **argv)
         perror("pseudo-terminal");
         return 1;
     }
-    params.board = 1;
+    params.board = 99; /* 0 and 1 are the simulated boards of `clutch daq` */
     params.boot = (uint32_t)time(NULL) ^ ((uint32_t)getpid() << 16);
     params.counts_per_rev = COUNTS_PER_REV;
     params.dac_bits = DAC_BITS;

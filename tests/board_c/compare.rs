@@ -223,6 +223,7 @@ impl Host {
             10 => m.period_us = u32::MAX,
             11 => m.run = random.next() as u16,
             12 => m.ramp_step = 0,
+            13 => (m.period_us, m.watchdog_us) = (limit, p.watchdog_max_us),
             _ => {}
         }
         m
@@ -256,7 +257,11 @@ impl Host {
                 let wild = random.chance(1, 30);
                 Message::Actuate(Actuate {
                     run,
-                    sequence: if wild { random.next() as u16 } else { self.newest.wrapping_sub(old) },
+                    sequence: match random.below(2) {
+                        0 if wild => random.next() as u16,
+                        1 if wild => self.newest ^ 0x8000, // neither newer nor older
+                        _ => self.newest.wrapping_sub(old),
+                    },
                     code: if random.chance(1, 30) {
                         self.top.saturating_add(random.range(0, 2) as u16)
                     } else {
@@ -350,7 +355,12 @@ fn sequence(seed: u64) -> Vec<(Event, Shown)> {
     let first = board.take(&power);
     let mut steps = vec![(power, first)];
     let zero = Configure {
-        run: random.next() as u16,
+        // 0 is what a board has at power-up: as the first run, and as one that was never configured.
+        run: match random.below(4) {
+            0 => 0,
+            1 => u16::MAX,
+            _ => random.next() as u16,
+        },
         config: 0,
         period_us: 1000,
         watchdog_us: 3000,
@@ -479,8 +489,7 @@ const EXPECTED: [&str; 25] = [
 /// `CLUTCH_BOARD_SEQUENCES=100000 cargo test --release -p clutch-tests --test board_c -- same` runs more.
 #[test]
 fn the_board_in_c_does_the_same_as_the_board_in_rust() {
-    let Some(program) =
-        compiled("board_c_driver", &["examples/board-c/board.c", "tests/board_c/driver.c"])
+    let Some(program) = compiled("board_c_driver", &["examples/board-c/board.c", "tests/board_c/driver.c"])
     else {
         return;
     };

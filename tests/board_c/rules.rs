@@ -126,7 +126,11 @@ fn a_new_run_starts_with_a_clean_slate() {
     let Some(s) = shown(running(RUN, 700), after) else { return };
     let [Message::Sample(sample)] = s[7].messages()[..] else { panic!("{s:?}") };
     assert_eq!((sample.sequence, sample.status & STATUS_LATE), (0, 0));
-    assert_eq!((s[8].code, s[8].configurations), (55, 2), "sequence 0 is not older than that of the last run");
+    assert_eq!(
+        (s[8].code, s[8].configurations),
+        (55, 2),
+        "sequence 0 is not older than that of the last run"
+    );
 }
 
 #[test]
@@ -171,6 +175,14 @@ fn the_safe_output_goes_on_in_ready_with_the_fields_of_the_run_that_ended() {
     ];
     let Some(s) = shown(running(ramp, 700), after) else { return };
     assert_eq!(codes(&s), [800, 800, 900, 1000, 1000]);
+}
+
+#[test]
+fn a_ramp_whose_step_is_a_hair_longer_than_the_way_does_not_go_beyond() {
+    let ramp = Configure { safe_kind: 1, hold_code: 600, ramp_step: (100 << 16) + 1, ..RUN };
+    let after = vec![frame(400, Message::Stop(Stop { run: 1, reason: 0 })), tick(1000)];
+    let Some(s) = shown(running(ramp, 700), after) else { return };
+    assert_eq!(codes(&s), [600, 600]);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The developer's verbs: `cargo xtask --help`. CI calls the same ones.
 
+mod fuzz;
 mod python;
 mod run;
 mod test;
@@ -39,6 +40,26 @@ enum Verb {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,
     },
+    /// Fuzzes what reads bytes from outside, for so many seconds each; installs cargo-fuzz and a
+    /// nightly compiler.
+    Fuzz {
+        /// Seconds for each target.
+        #[arg(default_value_t = 60)]
+        seconds: u32,
+    },
+    /// Runs the fault campaign. With the default seeds it writes the table of docs/safety.md anew.
+    Campaign {
+        /// Seeds; each gives about 180 runs.
+        seeds: Option<u64>,
+        /// The first seed.
+        #[arg(default_value_t = 1)]
+        first: u64,
+    },
+    /// How late a thread wakes here, against cyclictest (benches/latency).
+    Latency {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        rest: Vec<String>,
+    },
     /// Draws the README's figures again, with `clutch reproduce`.
     Figures,
 }
@@ -60,6 +81,11 @@ fn main() -> Result<()> {
         Verb::Calibrate { rest } => {
             let example = ["run", "--release", "--package", "clutch-sim", "--example", "calibrate", "--"];
             cargo(example).args(rest).run()
+        }
+        Verb::Fuzz { seconds } => fuzz::all(seconds),
+        Verb::Campaign { seeds, first } => campaign(seeds, first),
+        Verb::Latency { rest } => {
+            run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
         Verb::Figures => figures(),
     }
@@ -96,5 +122,24 @@ fn figures() -> Result<()> {
     for name in ["fig8.svg", "fig9.svg", "fig10.svg"] {
         std::fs::copy(out.join(name), kept.join(name)).with_context(|| format!("copying {name}"))?;
     }
+    Ok(())
+}
+
+fn campaign(seeds: Option<u64>, first: u64) -> Result<()> {
+    let example = ["run", "--release", "--package", "clutch-loop", "--example", "campaign", "--"];
+    if let Some(seeds) = seeds {
+        return cargo(example).args([seeds.to_string(), first.to_string()]).run();
+    }
+    let (done, text) = cargo(example).quietly()?;
+    let table: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
+    if !done {
+        anyhow::bail!("the campaign failed:\n{text}");
+    }
+    let page = root().join("docs/safety.md");
+    let old = std::fs::read_to_string(&page)?;
+    let (begin, end) = ("<!-- campaign:begin -->", "<!-- campaign:end -->");
+    let split = old.split_once(begin).and_then(|(head, rest)| Some((head, rest.split_once(end)?.1)));
+    let (head, tail) = split.context("docs/safety.md has lost the markers of its table")?;
+    std::fs::write(&page, format!("{head}{begin}\n{}\n{end}{tail}", table.join("\n")))?;
     Ok(())
 }

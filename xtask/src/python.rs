@@ -27,7 +27,8 @@ pub(crate) fn interpreter() -> Result<PathBuf> {
     Ok(python)
 }
 
-fn install_debian(package: &str) -> Result<()> {
+/// Installs a package of Debian, as root.
+pub(crate) fn install_debian(package: &str) -> Result<()> {
     let (root, id) = program("id").arg("-u").quietly()?;
     if !root || id.trim() != "0" {
         bail!("please install {package} (Debian and Ubuntu: sudo apt-get install {package})");

@@ -1,5 +1,6 @@
 //! All tests, and their number at the end.
 
+use crate::fuzz;
 use crate::python;
 use crate::run::{cargo, program, root};
 use anyhow::{Result, bail};
@@ -46,6 +47,14 @@ impl Tally {
 pub(crate) fn all() -> Result<()> {
     let mut tally = Tally::default();
     let mut sound = true;
+    // Tests that need a program skip themselves without it, on a user's machine and not in CI.
+    if std::env::var_os("CI").is_some() {
+        for name in ["gcc", "strace"] {
+            if program(name).args(["--version"]).quietly().is_err() {
+                python::install_debian(name)?;
+            }
+        }
+    }
 
     let mut rust = |args: &[&str]| -> Result<()> {
         sound &= cargo(["test"]).args(args).lines(|l| tally.read(l))?;
@@ -80,7 +89,20 @@ pub(crate) fn all() -> Result<()> {
         no_panic(&mut tally)?;
     }
 
+    if std::env::var_os("CI").is_some() {
+        fuzz::install()?;
+        for target in fuzz::TARGETS {
+            tally.check(&format!("fuzzing {target} for 20 s finds nothing"), fuzz::one(target, 20)?);
+        }
+    } else {
+        println!(
+            "skipped: fuzzing, which needs a nightly compiler; `cargo xtask fuzz` installs it and fuzzes"
+        );
+        tally.skipped += fuzz::TARGETS.len() as u64;
+    }
+
     cargo(["build", "--release", "--package", "clutch-cli"]).run()?;
+    cargo(["build", "--release", "--package", "clutch-log", "--example", "write_demo"]).run()?;
     let python = python::interpreter()?;
     sound &= program(python)
         .args(["-m", "pytest", "--color=no", "-q", "python/tests"])

@@ -79,6 +79,9 @@ impl Daq {
                 DaqNotice::Client(ClientEvent::Connected) => "client connected\n".to_owned(),
                 DaqNotice::Client(ClientEvent::Left) => "client left\n".to_owned(),
                 DaqNotice::State(state, time) => format!("{time:10.6} s  {state:?}\n"),
+                DaqNotice::Faulted(silent) => {
+                    format!("              {:.3} ms after the last code that was applied\n", silent * 1e3)
+                }
             });
         })?;
         let mut text = format!("stopped after {} samples", report.samples);

@@ -466,3 +466,76 @@ impl<T: Real> Controller<T> for BrokenLaw<T> {
         self.law.update(&mut state.0, &if broken { Tick { error_rate: nan, ..*tick } } else { *tick })
     }
 }
+
+/// What the runs of one case came to.
+#[derive(Clone, Debug, Default)]
+struct Row {
+    runs: u64,
+    longest: f64,
+    overrun: f64,
+    causes: std::collections::BTreeMap<String, u64>,
+}
+
+/// The table of `docs/safety.md`: what the runs of each case came to.
+#[derive(Clone, Debug, Default)]
+pub struct Table {
+    rows: std::collections::BTreeMap<usize, Row>,
+}
+
+impl Table {
+    /// Takes a run in.
+    pub fn add(&mut self, run: &RunId, outcome: &Outcome) {
+        let row = self.rows.entry(run.case).or_default();
+        row.runs += 1;
+        if let (Some(safe), Some(hit)) = (outcome.safe, outcome.hit) {
+            row.longest = row.longest.max((safe - hit).max(0.0));
+        }
+        // The bench's own limit is twice the paper rig's; the column is in the paper rig's terms.
+        let speed = PATHS[run.path].3 / 20.0;
+        let scale = speed * speed * if run.on_bench() { 2.0 } else { 1.0 };
+        row.overrun = row.overrun.max(outcome.overrun.to_degrees() / scale);
+        let cause = outcome.cause.map_or("–".to_owned(), |c| format!("{c:?}"));
+        *row.causes.entry(cause).or_default() += 1;
+    }
+}
+
+impl std::fmt::Display for Table {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(
+            f,
+            "| fault | hazards | runs | limit | safe after, at most | overrun, at most | cause named (runs) |"
+        )?;
+        writeln!(f, "|---|---|---|---|---|---|---|")?;
+        for (case, row) in &self.rows {
+            let case = &CASES[*case];
+            let (limit, took, overrun) = match case.expected {
+                Expected::Safe { within, avoidable, .. } => {
+                    let overrun =
+                        if avoidable { format!("{:.3}°", row.overrun) } else { "not avoidable".into() };
+                    (format!("{:.1} ms", within * 1e3), format!("{:.2} ms", row.longest * 1e3), overrun)
+                }
+                Expected::BoardSafe { within } => (
+                    format!("{:.1} ms, by the board alone", within * 1e3),
+                    format!("{:.2} ms", row.longest * 1e3),
+                    format!("{:.3}°", row.overrun),
+                ),
+                Expected::Tolerated => ("goes on".into(), "–".into(), "–".into()),
+            };
+            let causes: Vec<String> = row.causes.iter().map(|(c, n)| format!("{c} {n}")).collect();
+            let watchdog = if case.watchdog_cycles == 3 {
+                String::new()
+            } else {
+                format!(" (watchdog of {} cycles)", case.watchdog_cycles)
+            };
+            writeln!(
+                f,
+                "| {}{watchdog} | {} | {} | {limit} | {took} | {overrun} | {} |",
+                case.name,
+                case.hazards,
+                row.runs,
+                causes.join(", ")
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -46,6 +46,9 @@ pub enum DaqNotice {
     Client(ClientEvent),
     /// The board's state changed, at a time of its own clock, s.
     State(BoardState, f64),
+    /// The board went to its safe state on a fault, so long after the last code that it applied
+    /// (after consent, if there was none), s.
+    Faulted(f64),
 }
 
 /// How it went.
@@ -142,6 +145,10 @@ pub fn run(
         if board.node().state() != state {
             state = board.node().state();
             notice(DaqNotice::State(state, now as f64 / 1e9));
+            if state == BoardState::Faulted {
+                let silent = ((now / 1000) as u32).wrapping_sub(board.node().fed_us());
+                notice(DaqNotice::Faulted(f64::from(silent) / 1e6));
+            }
         }
         if !out.as_bytes().is_empty() {
             up.send(now, board.armed_for(now), out.as_bytes());

@@ -216,6 +216,13 @@ impl<'a, T: Real> Talk<'a, T> {
         )?;
         let address = self.address();
         match said {
+            // A board should have refused; one that did not is not understood either.
+            Some(Said::Hello(hello)) if hello.version != clutch_wire::VERSION => {
+                Err(PreflightError::Version { address, board: hello.version.into() })
+            }
+            Some(Said::Hello(hello)) if hello.schema != clutch_wire::SCHEMA => {
+                Err(PreflightError::Schema { address, board: hello.schema as u32 })
+            }
             Some(Said::Hello(hello)) => Ok(*hello),
             Some(Said::No(m)) if m.reason == Refusal::Version as u8 => {
                 Err(PreflightError::Version { address, board: m.value })

@@ -108,7 +108,7 @@ fn replay_in<T: Real>(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayEr
     let first = log.commands.iter().zip(&commands).find_map(|(logged, replayed)| {
         let pairs = fields(logged).into_iter().zip(fields(replayed));
         pairs.into_iter().find_map(|(a, b)| {
-            (a.1 != b.1).then(|| Difference { tick: logged.tick, field: a.0, logged: a.2, replayed: b.2 })
+            (a.1 != b.1).then_some(Difference { tick: logged.tick, field: a.0, logged: a.2, replayed: b.2 })
         })
     });
     let dropped = log.links.iter().map(|l| l.log_dropped).max().unwrap_or(0);

@@ -60,6 +60,8 @@ pub struct BoardNode {
     watchdog_us: u32,
     safe: SafeCodes,
     safe_run: SafeRun,
+    /// The safe output of the run that ended: it goes on while the next one is configured.
+    ending: SafeCodes,
     code: DacCode,
     sequence: u16,
     /// Times of the last samples, by the low bits of their sequence; none before there was one.
@@ -99,6 +101,7 @@ impl BoardNode {
             watchdog_us: 0,
             safe: SafeCodes { hold: DacCode(p.boot_code), ..SafeCodes::default() },
             safe_run: SafeRun::default(),
+            ending: SafeCodes::default(),
             code: DacCode(p.boot_code),
             sequence: 0,
             recent: [None; RECENT],
@@ -141,6 +144,12 @@ impl BoardNode {
     #[must_use]
     pub fn watchdog_at(&self) -> Option<u32> {
         self.driving().then(|| self.fed_us.wrapping_add(self.watchdog_us))
+    }
+
+    /// When the last code was applied, or consent given.
+    #[must_use]
+    pub fn fed_us(&self) -> u32 {
+        self.fed_us
     }
 
     /// Whether the newest sample has been answered, or needs no answer.
@@ -190,7 +199,7 @@ impl BoardNode {
             let cause = if encoder_fault { BoardFault::Encoder } else { BoardFault::Converter };
             self.fault(now_us, cause, 0, out);
         } else if begun {
-            self.code = self.safe_run.next(&self.safe);
+            self.code = self.safe_run.next(&self.ending);
         }
         let flag = |on: bool, bit: u8| if on { bit } else { 0 };
         let status = self.state as u8
@@ -228,7 +237,8 @@ impl BoardNode {
 
     fn make_safe(&mut self, state: BoardState) {
         self.safe_run = SafeRun::begin(self.code);
-        self.code = self.safe_run.next(&self.safe);
+        self.ending = self.safe;
+        self.code = self.safe_run.next(&self.ending);
         self.safe_under_way = true;
         self.state = state;
     }
@@ -299,7 +309,9 @@ impl BoardNode {
         let never_arrives = safe_kind == Some(clutch_wire::SafeKind::Ramp) && m.ramp_step == 0;
         let again = self.state == BoardState::Ready && m.run == self.run && m.config == self.config;
         let spent = m.run == self.run && self.state != BoardState::Boot && !again;
-        let refusal = if self.driving() {
+        let refusal = if again {
+            None // the answer was lost; what else the frame says changes nothing
+        } else if self.driving() {
             Some((Refusal::State, self.state as u32))
         } else if spent {
             Some((Refusal::Run, u32::from(self.run)))

@@ -100,6 +100,8 @@ pub struct ControlNode<T: Real, C: Controller<T> = Law<T>> {
     /// Where the path begins: the counts of the first sample that is answered.
     origin: FixedCounts,
     last_sample_ns: Option<u64>,
+    /// The supervisor has been told of this silence.
+    silence_told: bool,
     lateness: Micros,
     stopping: Option<StopReason>,
 }
@@ -118,6 +120,7 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
             present: supervisor.safe_codes().hold,
             origin: FixedCounts::default(),
             last_sample_ns: None,
+            silence_told: false,
             lateness: Micros(0),
             stopping: None,
         }
@@ -186,6 +189,9 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
 
     /// Ends control as wanted: `Done` or `Operator`.
     pub fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
+        if self.stopping.is_some() {
+            return; // what ended control first is what the board is told, again and again
+        }
         let cause = if reason == StopReason::Done { Cause::Done } else { Cause::Operator };
         self.supervisor.stop(&mut self.state, cause);
         self.send_stop(reason, out);
@@ -207,12 +213,13 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
     pub fn poll_at(&self) -> Option<u64> {
         let watched = matches!(self.state.state(), State::Ready | State::Armed | State::Running);
         let silence = u64::from(self.params.silence.0).saturating_mul(1000);
-        self.last_sample_ns.filter(|_| watched).map(|t| t.saturating_add(silence))
+        self.last_sample_ns.filter(|_| watched && !self.silence_told).map(|t| t.saturating_add(silence))
     }
 
     /// Looks at the clock: silence.
     pub fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
         if self.poll_at().is_some_and(|at| now_ns >= at) {
+            self.silence_told = true;
             self.supervisor.silence(&mut self.state, u32::MAX);
             self.after_fault(out, notices);
         }
@@ -310,6 +317,7 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
         }
         self.counts.received = self.counts.received.wrapping_add(1);
         self.last_sample_ns = Some(now_ns);
+        self.silence_told = false;
         let board = BoardState::from_u8(sample.status & 0x07);
         let seen = Seen {
             sequence: sample.sequence,
@@ -322,7 +330,9 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
             encoder_fault: sample.status & STATUS_ENCODER_FAULT != 0,
             converter_fault: sample.status & STATUS_DAC_FAULT != 0,
             command_late: sample.status & STATUS_LATE != 0,
-            superseded,
+            // Before consent no answer is due: samples that pile up while the control thread starts
+            // say nothing of the line.
+            superseded: superseded && self.state.state() != State::Ready,
             lateness: self.lateness,
         };
         let lateness = core::mem::take(&mut self.lateness);

@@ -19,7 +19,7 @@
 
 /* BoardState: What the board is doing. */
 #define CLUTCH_BOARD_STATE_BOOT 0u /* Powered up; never configured since; the output is boot_code. */
-#define CLUTCH_BOARD_STATE_READY 1u /* Configured; samples go out; the output is left as it was. */
+#define CLUTCH_BOARD_STATE_READY 1u /* Configured; samples go out; the output is as it was, or a safe output goes on. */
 #define CLUTCH_BOARD_STATE_ARMED 2u /* The host has consented; the first Actuate starts the run. */
 #define CLUTCH_BOARD_STATE_RUNNING 3u /* The output follows the host. */
 #define CLUTCH_BOARD_STATE_STOPPED 4u /* Stopped by the host; the safe output is on. */
@@ -377,7 +377,7 @@ typedef struct {
     uint32_t nonce; /* The nonce of Discover. */
     uint8_t version; /* The board's version of the protocol. */
     uint64_t schema; /* The board's schema hash. */
-    uint32_t board; /* The board's own serial number. */
+    uint32_t board; /* The board's own serial number; 0 and 1 are simulated boards. */
     uint32_t boot; /* Another number at each power-up. */
     uint32_t counts_per_rev; /* Encoder counts per revolution, after quadrature. [counts per revolution] */
     uint8_t dac_bits; /* Resolution of the converter. [bits] */

@@ -65,7 +65,7 @@ codes! {
     BoardState {
         /// Powered up; never configured since; the output is `boot_code`.
         Boot = 0,
-        /// Configured; samples go out; the output is left as it was.
+        /// Configured; samples go out; the output is as it was, or a safe output goes on.
         Ready = 1,
         /// The host has consented; the first `Actuate` starts the run.
         Armed = 2,

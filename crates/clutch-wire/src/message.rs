@@ -261,7 +261,7 @@ messages! {
         version: u8,
         /// The board's schema hash.
         schema: u64,
-        /// The board's own serial number.
+        /// The board's own serial number; 0 and 1 are simulated boards.
         board: u32,
         /// Another number at each power-up.
         boot: u32,

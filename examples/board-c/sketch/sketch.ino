@@ -22,21 +22,26 @@
 static const uint32_t BAUD = 921600;
 static const uint16_t BOOT_CODE = 1844;       /* 4.5 V of 0 to 10 V: choose what is safe on your rig */
 static const uint32_t HANG_US = 20000;        /* the hardware watchdog resets a program that hangs so long */
-static const uint32_t BOARD_ID = 4711;        /* the board's own serial number; not 0 */
+static const uint32_t BOARD_ID = 4711;        /* the board's own serial number; 0 and 1 are taken */
 
 static HardwareTimer *sampling;
 static uint32_t configurations;
 static volatile bool pending;                 /* a sample was taken and is not sent yet */
-static volatile bool overrun;                 /* the one before was not sent when the next was taken */
 static volatile uint32_t taken_us;
 static volatile int32_t taken_counts;
+
+/* The board's clock. Not micros(): that is put together from two counters, and in an interrupt it can be a
+ * millisecond behind. */
+static uint32_t clock_us()
+{
+    return TIM5->CNT;
+}
 
 /* The interrupt does nothing but take the sample: time and counts belong together. */
 static void take_sample()
 {
-    taken_us = micros();
+    taken_us = clock_us();
     taken_counts = (int32_t)TIM2->CNT;
-    overrun = pending;
     pending = true;
 }
 
@@ -86,6 +91,16 @@ static void start_encoder()
     TIM2->CR1 = TIM_CR1_CEN;
 }
 
+/* 32 bits, 1 MHz. The timers run at the core's clock on this board. */
+static void start_clock()
+{
+    __HAL_RCC_TIM5_CLK_ENABLE();
+    TIM5->PSC = SystemCoreClock / 1000000 - 1;
+    TIM5->ARR = 0xFFFFFFFF;
+    TIM5->EGR = TIM_EGR_UG;
+    TIM5->CR1 = TIM_CR1_CEN;
+}
+
 /* Another number at each power-up. */
 static uint32_t next_boot()
 {
@@ -105,6 +120,7 @@ void setup()
     digitalWrite(PB5, HIGH);
 
     start_encoder();
+    start_clock();
     Serial.begin(BAUD);
     board_params_t params;
     params.board = BOARD_ID;
@@ -144,7 +160,7 @@ void loop()
     IWatchdog.reload();
     /* The order keeps the times that board.c sees from going back: the clock is read first, and a sample
      * taken before that is served before the byte. */
-    uint32_t now = micros();
+    uint32_t now = clock_us();
     serve_sample();
     board_poll(now);
     if (Serial.available() > 0)

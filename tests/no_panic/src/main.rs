@@ -1,7 +1,7 @@
-//! Proof by linking: no function of clutch-core can panic.
+//! Proof by linking: no function of clutch-core, clutch-wire and clutch-node can panic.
 //!
 //! The panic handler calls a symbol that does not exist. If the optimiser leaves one path to a
-//! panic, the link fails; if the image links, there is none, and no sum in clutch-core overflows
+//! panic, the link fails; if the image links, there is none, and no sum in them overflows
 //! either. Everything that goes in is opaque, and what a constructor has checked is made opaque
 //! again before it is used, so a tick is proven for any bits in its coefficients.
 //!
@@ -33,12 +33,16 @@ use clutch_core::law::{
 use clutch_core::reference::{
     Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, Reference, ReferenceParams, Sine, Table, Trapezoid,
 };
+use clutch_core::supervisor::{BoardMode, Cause, Checks, Sample, SupervisorState};
 use clutch_core::{
     Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams, Daq, DerivativeState, Encoder, FixedCounts,
-    Micros, Observer, ObserverGains, ObserverParams, Plant, PlantParams, Real, Servo, ServoParams,
-    SmoothedDerivative, SmoothedDerivativeParams, StickSlip, StickSlipParams, StickSlipState, Stribeck,
-    StribeckParams, Target, Tolerances, VelocityParams, VelocitySource, check_path, sin_cos_turns,
+    Interval, Micros, Observer, ObserverGains, ObserverParams, Plant, PlantParams, Real, SafeCodes, SafeKind,
+    SafeRun, SafeState, Servo, ServoParams, SmoothedDerivative, SmoothedDerivativeParams, StickSlip,
+    StickSlipParams, StickSlipState, Stribeck, StribeckParams, Supervisor, SupervisorParams, Target,
+    Tolerances, VelocityParams, VelocitySource, check_path, sin_cos_turns,
 };
+use clutch_node::{BoardNode, BoardParams, ControlNode, ControlParams, Outbox};
+use clutch_wire::{BoardState, Decoder, StopReason, encode};
 use core::hint::black_box;
 
 #[panic_handler]
@@ -96,6 +100,8 @@ fn made<X, E>(result: Result<X, E>) -> Option<X> {
 extern "C" fn _start() -> ! {
     all::<f32, f64>();
     all::<f64, f32>();
+    wire();
+    board();
     #[cfg(feature = "control")]
     control();
     loop {
@@ -103,7 +109,7 @@ extern "C" fn _start() -> ! {
     }
 }
 
-/// A list of everything; a new module of clutch-core gets its function here.
+/// A list of everything; a new module gets its function here.
 ///
 /// `U` is the other scalar, for the casts.
 fn all<T: Real, U: Real>() {
@@ -120,6 +126,9 @@ fn all<T: Real, U: Real>() {
     certificate::<T>();
     feasibility::<T>();
     stick_slip::<T>();
+    safe_state::<T, U>();
+    supervisor::<T, U>();
+    control_node::<T>();
 }
 
 /// The negative control.
@@ -409,15 +418,7 @@ impl Daq for Board {
 
 fn servo<T: Real>() {
     sink(ServoParams::<T>::paper(law_params()));
-    let p = ServoParams::<T> {
-        period: micros(),
-        encoder: encoder::<T>(),
-        dac: dac_params(),
-        velocity: velocity_params(),
-        model: plant_params(),
-        law: law_params(),
-        output: output_params(),
-    };
+    let p = servo_params::<T>();
     turns(made(Servo::new(&p)));
     if let Some(pd) = made(Pd::new(&PdParams { kp: real(), kd: real() }, &p.output, p.period)) {
         turns(made(Servo::with_law(&p, pd)));
@@ -432,6 +433,8 @@ fn turns<T: Real, C: Controller<T>>(servo: Option<Servo<T, C>>) {
     sink(servo.tick(&mut state, Counts(word() as i32), &target()));
     sink(servo.start_at(fixed(), &target(), real()));
     sink(servo.tick_at(&mut state, fixed(), &target()));
+    let (next, steps) = (target(), (word() as u32, word() as u32));
+    servo.bridge(&mut state, (Counts(word() as i32), &next), &target(), steps);
     sink(servo.run(&mut state, &mut Board, &target()));
     sink(state);
 }
@@ -449,4 +452,212 @@ fn casts<T: Real, U: Real>() {
     sink(p.cast::<U>());
     sink(StickSlipParams::<T> { gap: real(), ticks: word() as u32 }.cast::<U>());
     sink(Tolerances::<T>::default().cast::<U>());
+    sink(Interval::<T> { low: real(), high: real() }.cast::<U>());
+    sink(bounds::<T>().map(|b| b.cast::<U>()));
+}
+
+fn flag() -> bool {
+    word() != 0
+}
+
+/// One of the closed set, by an opaque choice.
+fn on_fault<T: Real>() -> SafeState<T> {
+    match word() {
+        0 => SafeState::Hold { volts: real() },
+        1 => SafeState::Ramp { volts_per_s: real(), volts: real() },
+        2 => SafeState::Release,
+        _ => SafeState::HoldThenRelease { volts: real(), after: real() },
+    }
+}
+
+fn safe_state<T: Real, U: Real>() {
+    let state = opaque(on_fault::<T>());
+    sink((state.cast::<U>(), state.holding_voltage()));
+    let Some(dac) = made(Dac::new(&dac_params::<T>())) else { return };
+    sink(made(SafeCodes::new(&state, &dac, micros())));
+    // Any numbers, also such as no constructor gives: a board takes them from the wire.
+    let codes = SafeCodes {
+        kind: match word() {
+            0 => SafeKind::Hold,
+            1 => SafeKind::Ramp,
+            2 => SafeKind::Release,
+            _ => SafeKind::HoldThenRelease,
+        },
+        hold: DacCode(word() as u16),
+        release: DacCode(word() as u16),
+        ramp_step: word() as u32,
+        hold_periods: word() as u32,
+    };
+    let mut run = opaque(SafeRun::begin(DacCode(word() as u16)));
+    sink((run.next(&codes), run.released(&codes)));
+    sink(run);
+}
+
+fn servo_params<T: Real>() -> ServoParams<T> {
+    ServoParams {
+        period: micros(),
+        encoder: encoder::<T>(),
+        dac: dac_params(),
+        velocity: velocity_params(),
+        model: plant_params(),
+        law: law_params(),
+        output: output_params(),
+    }
+}
+
+fn supervisor_params<T: Real>() -> SupervisorParams<T> {
+    sink(SupervisorParams::new(on_fault::<T>()));
+    SupervisorParams {
+        on_fault: on_fault(),
+        speed_limit: real(),
+        jump: real(),
+        jumps: word() as u32,
+        good_samples: word() as u32,
+        following_error: real(),
+        following_time: real(),
+        saturation_time: real(),
+        stand_still: real(),
+        friction_margin: real(),
+        lost: word() as u32,
+        late: word() as u32,
+        disorder: word() as u32,
+        silence_cycles: word() as u32,
+        deadline: micros(),
+        overruns: word() as u32,
+    }
+}
+
+fn checked_supervisor<T: Real>() -> Option<(Servo<T>, Supervisor<T>)> {
+    let (servo, limits) = (servo_params::<T>(), supervisor_params::<T>());
+    let supervisor = made(Supervisor::new(&limits, &servo, &bounds()?))?;
+    Some((made(Servo::new(&servo))?, supervisor))
+}
+
+fn supervisor<T: Real, U: Real>() {
+    sink(supervisor_params::<T>().cast::<U>());
+    let Some((servo, v)) = checked_supervisor::<T>() else { return };
+    sink(v.with_checks(Checks::ALL.without(Cause::Jump)));
+    black_box(v.safe_codes());
+    let mut state = SupervisorState::default();
+    v.connect(&mut state);
+    sink(v.arm(&mut state, DacCode(word() as u16)));
+    // Whatever it has seen: no field is known any more.
+    let mut state = opaque(state);
+    let sample = Sample {
+        sequence: word() as u16,
+        counts: Counts(word() as i32),
+        board: match word() {
+            0 => BoardMode::Ready,
+            1 => BoardMode::Driving,
+            _ => BoardMode::Safe,
+        },
+        encoder_fault: flag(),
+        converter_fault: flag(),
+        command_late: flag(),
+        superseded: flag(),
+        lateness: micros(),
+    };
+    let cycle = v.sample(&servo, &mut state, &sample, |_| target());
+    sink((cycle, cycle.arrival.is_fresh()));
+    v.silence(&mut state, word() as u32);
+    v.board_fault(&mut state, real());
+    v.stop(&mut state, Cause::Done);
+    v.disconnect(&mut state);
+    v.acknowledge(&mut state);
+    sink((state.state(), state.cause(), state.value(), state.code(), state.tick()));
+    sink((state.lost(), state.rejected(), state.deadline_misses()));
+}
+
+/// A number of bytes that only the run knows.
+fn bytes(store: &[u8; 64]) -> &[u8] {
+    store.get(..word() as usize).unwrap_or(store)
+}
+
+fn any_bytes() -> [u8; 64] {
+    let mut bytes = [0; 64];
+    bytes.iter_mut().for_each(|b| *b = word() as u8);
+    opaque(bytes)
+}
+
+fn wire() {
+    let mut decoder = opaque(Decoder::new());
+    for byte in bytes(&any_bytes()) {
+        let heard = decoder.push(*byte);
+        // What the decoder gives, the encoder takes: any kind, any fields.
+        if let Some(Ok(message)) = opaque(heard) {
+            black_box(encode(&message).as_bytes());
+        }
+    }
+    sink(decoder);
+}
+
+fn drain(out: &mut Outbox) {
+    black_box(out.as_bytes());
+    sink(out.dropped());
+    out.clear();
+}
+
+fn board() {
+    let params = BoardParams {
+        board: word() as u32,
+        boot: word() as u32,
+        counts_per_rev: word() as u32,
+        dac_bits: word() as u8,
+        dac_lowest_mv: word() as i32,
+        dac_highest_mv: word() as i32,
+        period_min_us: word() as u32,
+        period_max_us: word() as u32,
+        watchdog_max_us: word() as u32,
+        boot_code: word() as u16,
+    };
+    let Some(mut node) = made(BoardNode::new(&params)) else { return };
+    let mut out = opaque(Outbox::default());
+    loop {
+        node.receive(word() as u32, bytes(&any_bytes()), &mut out);
+        node = opaque(node);
+        node.sample(word() as u32, Counts(word() as i32), flag(), flag(), &mut out);
+        node = opaque(node);
+        node.poll(word() as u32, &mut out);
+        sink((node.code(), node.state() == BoardState::Running, node.period_us(), node.watchdog_at()));
+        sink(node.is_answered());
+        drain(&mut out);
+        if flag() {
+            return;
+        }
+    }
+}
+
+fn control_node<T: Real>() {
+    let Some((servo, supervisor)) = checked_supervisor::<T>() else { return };
+    let params = ControlParams {
+        run: word() as u16,
+        config: word(),
+        watchdog: micros(),
+        valid: micros(),
+        silence: micros(),
+    };
+    let mut node = opaque(ControlNode::new(params, servo, supervisor));
+    let mut out = opaque(Outbox::default());
+    let path = |_| target();
+    loop {
+        node.discover(word() as u32, &mut out);
+        node.configure(DacCode(word() as u16), &mut out);
+        node.arm(&mut out);
+        node.ping(word() as u32, &mut out);
+        node.receive(word(), bytes(&any_bytes()), &path, &mut out, &mut |notice| sink(notice));
+        node = opaque(node);
+        node.answered(micros());
+        node.poll(word(), &mut out, &mut |notice| sink(notice));
+        sink((node.poll_at(), node.origin(), *node.counts(), node.state().state()));
+        sink(node.servo().period());
+        drain(&mut out);
+        match word() {
+            0 => node.stop(StopReason::Done, &mut out),
+            1 => node.stop(StopReason::Operator, &mut out),
+            2 => node.disconnect(),
+            3 => return,
+            _ => {}
+        }
+        node = opaque(node);
+    }
 }

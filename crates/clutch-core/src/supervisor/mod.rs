@@ -355,9 +355,12 @@ impl<T: Real> Supervisor<T> {
         if s.state != State::Running {
             return;
         }
+        if sample.superseded {
+            return;
+        }
         s.code = out.code;
         s.voltages = [out.voltage, s.voltages[0], s.voltages[1], s.voltages[2]];
-        cycle.answer = (!sample.superseded).then_some(out.code);
+        cycle.answer = Some(out.code);
     }
 
     /// A count has come: the slowest shaft that can have made the last counts.

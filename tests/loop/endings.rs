@@ -1,0 +1,75 @@
+//! Runs that end before their time.
+
+use crate::harness::{Board, alone, clutch, folder, read_log, replays_identically, start};
+use rustix::process::Signal;
+use std::path::PathBuf;
+use std::time::Duration;
+
+fn logged(name: &str) -> PathBuf {
+    folder(name).join("run.mcap")
+}
+
+fn a_signal_ends_in_the_safe_state(name: &str, signal: Signal) {
+    let _alone = alone();
+    let log = logged(name);
+    let board = Board::start(&["board_smc_2", "--patient"]);
+    let running =
+        start(clutch(&["loop", "board_smc_2", "--port", &board.port, "--log", log.to_str().unwrap()]));
+    let _ = board.wait_for(0, "Running");
+    std::thread::sleep(Duration::from_millis(300));
+    running.signal(signal);
+    let _ = running.done().expect(4).prints(&[
+        "stopped by the operator",
+        "the board is in its safe state",
+        "clutch replay ",
+    ]);
+    let _ = board.wait_for(0, "Stopped");
+    let read = read_log(&log);
+    assert!(read.complete, "{:?}", read.end);
+    let operator = clutch_log::names::CAUSES.iter().find(|(_, name)| *name == "Operator").unwrap().0;
+    assert!(read.events.iter().any(|event| event.cause == operator), "{:?}", read.events);
+    replays_identically(&log);
+    assert!(!board.end().contains("Faulted"));
+}
+
+#[test]
+fn sigterm_ends_in_the_safe_state_with_a_whole_log() {
+    a_signal_ends_in_the_safe_state("sigterm", Signal::TERM);
+}
+
+#[test]
+fn ctrl_c_ends_in_the_safe_state_with_a_whole_log() {
+    a_signal_ends_in_the_safe_state("sigint", Signal::INT);
+}
+
+fn an_unplugged_port_is_told(name: &str, listen: &[&str]) {
+    let _alone = alone();
+    let log = logged(name);
+    let mut board = Board::start(&[&["board_smc_2", "--patient"], listen].concat());
+    let running =
+        start(clutch(&["loop", "board_smc_2", "--port", &board.port, "--log", log.to_str().unwrap()]));
+    let _ = board.wait_for(0, "Running");
+    std::thread::sleep(Duration::from_millis(300));
+    board.kill();
+    let _ = running.done().expect(3).prints(&[
+        &board.port,
+        "unplugged, or the board's program has ended",
+        "check cable and power, start the board, then start again",
+        "the board did not confirm its safe state; its watchdog takes it there",
+    ]);
+    let read = read_log(&log);
+    assert!(read.complete, "{:?}", read.end);
+    let lost = clutch_log::EventKind::PortLost as u8;
+    assert!(read.events.iter().any(|event| event.kind == lost), "{:?}", read.events);
+    replays_identically(&log);
+}
+
+#[test]
+fn a_pseudo_terminal_that_goes_away_is_told_as_unplugged() {
+    an_unplugged_port_is_told("unplugged-pty", &[]);
+}
+
+#[test]
+fn a_tcp_connection_that_goes_away_is_told_as_unplugged() {
+    an_unplugged_port_is_told("unplugged-tcp", &["--listen", "tcp://127.0.0.1:0"]);
+}

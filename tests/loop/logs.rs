@@ -1,0 +1,152 @@
+//! Logs of simulations and loops: replayed, compared, damaged, cut short.
+
+use crate::harness::{
+    alone, beside_others, clutch, folder, program, read_log, replays_identically, run, start,
+};
+use clutch_log::{LogWriter, Record};
+use clutch_sim::Scenario;
+use clutch_sim::scenario::BUILT_IN;
+use std::path::Path;
+use std::process::Command;
+
+#[test]
+fn the_log_of_every_simulation_with_an_encoder_replays_identically() {
+    let _guard = beside_others();
+    let folder = folder("sim-logs");
+    let mut replayed = 0;
+    for built_in in BUILT_IN {
+        let scenario = Scenario::parse(built_in.name, built_in.toml, &[]).unwrap();
+        let log = folder.join(format!("{}.mcap", built_in.name));
+        let path = log.to_str().unwrap();
+        let _ = run(&["sim", built_in.name, "--log", path]).expect(0);
+        let read = read_log(&log);
+        assert!(read.complete && read.commands.len() as u64 == scenario.ticks(), "{}", built_in.name);
+        if scenario.spec().rig.encoder_quantised {
+            replays_identically(&log);
+            replayed += 1;
+        } else {
+            let _ = run(&["replay", path]).expect(1).says(&["ideal sensor", "cannot be replayed"]);
+        }
+    }
+    assert!(replayed >= 3, "{replayed}");
+}
+
+/// Half a second of the loop on a simulated board.
+fn short_loop(log: &Path) {
+    let args = [
+        "loop",
+        "board_smc_2",
+        "--duration",
+        "0.5",
+        "--set",
+        "run.settle_s=0",
+        "--log",
+        log.to_str().unwrap(),
+    ];
+    let _ = run(&args).expect(0).prints(&["the path is done"]);
+}
+
+#[test]
+fn other_parameters_are_compared_and_drawn() {
+    let _alone = alone();
+    let folder = folder("replay-set");
+    let (log, plot) = (folder.join("run.mcap"), folder.join("compare.svg"));
+    short_loop(&log);
+    replays_identically(&log);
+    let path = log.to_str().unwrap();
+    let args = ["replay", path, "--set", "law.smc.kp_v=4", "--plot", plot.to_str().unwrap()];
+    let done =
+        run(&args).expect(0).prints(&["with other parameters, open loop", "RMS difference of the voltage"]);
+    let row = done.out.lines().find(|l| l.contains("ticks with another code")).expect("the row");
+    let other: u64 = row.split_whitespace().last().and_then(|n| n.parse().ok()).expect("a number");
+    assert!(other > 100, "{}", done.out);
+    let svg = std::fs::read_to_string(&plot).unwrap();
+    assert!(svg.starts_with("<svg") || svg.contains("<svg "), "{}", &svg[..100.min(svg.len())]);
+    assert!(svg.contains("replayed"));
+    let _ = run(&["replay", path, "--set", "law.smc.kp=4"]).expect(1).says(&["unknown key"]);
+}
+
+#[test]
+fn one_changed_count_is_found_with_its_tick_and_field() {
+    let _alone = alone();
+    let folder = folder("replay-damaged");
+    let (log, damaged) = (folder.join("run.mcap"), folder.join("damaged.mcap"));
+    short_loop(&log);
+    let read = read_log(&log);
+    let at = 300;
+    let tick = read.samples[at].tick;
+    let mut header = read.header.clone();
+    header.extra.sort();
+    let mut writer = LogWriter::create(&damaged, &header).unwrap();
+    let mut events = read.events.iter().peekable();
+    for (i, (sample, command)) in read.samples.iter().zip(&read.commands).enumerate() {
+        while let Some(event) = events.next_if(|event| event.time_ns < sample.time_ns) {
+            writer.write(&Record::Event(*event)).unwrap();
+        }
+        let mut sample = *sample;
+        sample.counts += i32::from(i == at);
+        writer.write(&Record::Sample(sample)).unwrap();
+        writer.write(&Record::Command(*command)).unwrap();
+    }
+    for event in events {
+        writer.write(&Record::Event(*event)).unwrap();
+    }
+    let _ = writer.finish().unwrap();
+    let found = run(&["replay", damaged.to_str().unwrap()]).expect(3);
+    let found = found.prints(&[&format!("differs: tick {tick}, "), "logged ", "replayed "]);
+    let field = found.out.split(&format!("tick {tick}, ")).nth(1).and_then(|t| t.split(':').next());
+    assert!(
+        ["code", "voltage_v", "demand_v", "error_rad"].contains(&field.unwrap()),
+        "the first field that a count reaches: {}",
+        found.out
+    );
+}
+
+/// What every run with a log that was cut short has to show.
+#[track_caller]
+fn cut_short(out: &str, err: &str) {
+    assert!(out.contains("the path is done"), "{out}\n{err}");
+    assert!(out.contains("no space for the log"), "{out}\n{err}");
+    assert!(err.contains("the log has ended early; the loop goes on"), "{out}\n{err}");
+}
+
+#[test]
+fn a_log_that_may_not_grow_ends_and_the_loop_goes_on() {
+    let _alone = alone();
+    let log = folder("file-size").join("run.mcap");
+    // 64 blocks of 512 or 1024 bytes: the header fits, two seconds do not.
+    let mut command = Command::new("sh");
+    command.args(["-c", "ulimit -f 64; exec \"$@\"", "sh"]).arg(program());
+    command.args(["loop", "board_smc_2", "--duration", "2", "--log"]).arg(&log);
+    let done = start(command).done().expect(0);
+    cut_short(&done.out, &done.err);
+    let read = read_log(&log);
+    assert!(!read.complete && read.samples.len() > 50 && read.samples.len() < 1990, "{}", read.samples.len());
+    replays_identically(&log);
+    let saved = log.with_file_name("saved.mcap");
+    let _ =
+        start(clutch(&["log", "recover", log.to_str().unwrap(), saved.to_str().unwrap()])).done().expect(0);
+    assert!(read_log(&saved).complete);
+}
+
+#[test]
+fn a_full_disk_ends_the_log_and_the_loop_goes_on() {
+    let _alone = alone();
+    let folder = folder("disk-full");
+    // A disk of its own, that nobody but these processes sees.
+    let mount = "mount -t tmpfs -o size=64k none \"$1\"";
+    let may = Command::new("unshare").args(["-m", "sh", "-c", mount, "sh"]).arg(&folder).output();
+    if !may.is_ok_and(|done| done.status.success()) {
+        println!("skipped: this user may not mount a disk of his own");
+        return;
+    }
+    let script = format!(
+        "{mount} && \"$2\" loop board_smc_2 --duration 2 --log \"$1/run.mcap\"; code=$?; \
+         \"$2\" log info \"$1/run.mcap\"; exit $code"
+    );
+    let mut command = Command::new("unshare");
+    command.args(["-m", "sh", "-c", &script, "sh"]).arg(&folder).arg(program());
+    let done = start(command).done().expect(0);
+    cut_short(&done.out, &done.err);
+    assert!(done.out.contains("/sample"), "{}", done.out);
+}

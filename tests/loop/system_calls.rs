@@ -1,0 +1,91 @@
+//! What the control thread asks of the kernel while it runs, as strace sees it.
+
+use crate::harness::{alone, folder, program, start};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+/// The system calls of the control thread in order, without those that begin and end the run.
+fn cycles(trace: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(trace).unwrap();
+    let named = |line: &&str| line.contains("PR_SET_NAME") && line.contains("\"clutch-control\"");
+    let thread = text.lines().find(named).expect("the control thread gives itself its name");
+    let thread = thread.split_whitespace().next().unwrap().to_owned() + " ";
+    let calls: Vec<&str> = text
+        .lines()
+        .filter(|line| line.starts_with(&thread))
+        // thread, time of day, call
+        .filter_map(|line| line.split_whitespace().nth(2))
+        .filter_map(|call| call.split_once('('))
+        .map(|(name, _)| name)
+        .filter(|name| !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_'))
+        .collect();
+    let writes: Vec<usize> =
+        calls.iter().enumerate().filter(|(_, name)| **name == "write").map(|(i, _)| i).collect();
+    assert!(writes.len() > 900, "{} writes in a second of 1 kHz", writes.len());
+    calls[writes[100]..writes[writes.len() - 10]].iter().map(|name| (*name).to_owned()).collect()
+}
+
+fn traced(pace: &str) -> Option<Vec<String>> {
+    let works = Command::new("strace").args(["-o", "/dev/null", "true"]).output();
+    if !works.is_ok_and(|done| done.status.success()) {
+        assert!(
+            std::env::var_os("CI").is_none(),
+            "strace is missing or may not trace: CI must not skip this"
+        );
+        println!("skipped: strace is missing, or may not trace");
+        return None;
+    }
+    let trace = folder(&format!("strace-{pace}")).join("trace");
+    let mut command = Command::new("strace");
+    command.args(["-f", "-tt", "-e", "trace=all", "-o"]).arg(&trace).arg(program());
+    command.args(["loop", "board_smc_2", "--duration", "1", "--set", "run.settle_s=0", "--pace", pace]);
+    let log = trace.with_file_name("run.mcap");
+    command.arg("--log").arg(log);
+    let _ = start(command).done().expect(0);
+    Some(cycles(&trace))
+}
+
+fn count(calls: &[String]) -> BTreeMap<&str, usize> {
+    let mut counts = BTreeMap::new();
+    for call in calls {
+        *counts.entry(call.as_str()).or_insert(0) += 1;
+    }
+    counts
+}
+
+/// Between two writes of an answer there is at most so much. A ping once a second is one write more.
+fn per_cycle(calls: &[String], name: &str) -> usize {
+    calls
+        .split(|call| call == "write")
+        .map(|cycle| cycle.iter().filter(|c| *c == name).count())
+        .max()
+        .unwrap_or(0)
+}
+
+#[test]
+fn a_cycle_paced_by_the_sample_is_one_wait_one_read_one_write() {
+    let _alone = alone();
+    let Some(calls) = traced("sample") else { return };
+    let counts = count(&calls);
+    println!("{counts:?}");
+    let (reads, writes, waits) = (counts["read"], counts["write"], counts["ppoll"]);
+    assert!(counts.keys().all(|name| ["read", "write", "ppoll"].contains(name)), "{counts:?}");
+    assert!(reads <= writes + writes / 100 && waits <= writes + writes / 50 + 2, "{counts:?}");
+    assert!(per_cycle(&calls, "read") <= 2 && per_cycle(&calls, "ppoll") <= 3, "{counts:?}");
+}
+
+#[test]
+fn a_cycle_paced_by_the_clock_is_one_sleep_one_read_one_write() {
+    let _alone = alone();
+    let Some(calls) = traced("clock") else { return };
+    let counts = count(&calls);
+    println!("{counts:?}");
+    let allowed = ["read", "write", "ppoll", "clock_nanosleep"];
+    assert!(counts.keys().all(|name| allowed.contains(name)), "{counts:?}");
+    // The two clocks drift: a cycle may find no sample, and then sleeps and reads once more.
+    let (reads, sleeps) = (counts["read"], counts["clock_nanosleep"]);
+    assert!(sleeps <= reads + 2, "{counts:?}");
+    assert!(counts["write"] <= reads + 2, "{counts:?}");
+    assert!(counts.get("ppoll").copied().unwrap_or(0) == 0, "{counts:?}");
+}
