@@ -333,7 +333,7 @@ pub(crate) fn replays_identically(log: &Path) {
 
 /// Repeats a run that the machine, and not the loop, has spoilt.
 pub(crate) fn unless_held_up<R>(what: &str, mut attempt: impl FnMut() -> Result<R, String>) -> R {
-    const ATTEMPTS: usize = 8;
+    const ATTEMPTS: usize = 12;
     let mut reasons = String::new();
     for _ in 0..ATTEMPTS {
         match attempt() {

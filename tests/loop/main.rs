@@ -12,4 +12,5 @@ mod logs;
 mod ports;
 mod refusals;
 mod same_as_simulation;
+mod start;
 mod system_calls;

@@ -28,7 +28,7 @@ fn hello(asked: &Discover) -> Hello {
         boot: 1,
         counts_per_rev: 20_000,
         dac_bits: 12,
-        dac_lowest_mv: 0,
+        dac_lowest_mv: -10_000,
         dac_highest_mv: 10_000,
         period_min_us: 100,
         period_max_us: 1_000_000,

@@ -54,7 +54,7 @@ impl ScenarioVerb {
                     .iter()
                     .map(|b| {
                         let title = b.toml.lines().find_map(|l| l.strip_prefix("name = "));
-                        format!("{:16} {}", b.name, title.unwrap_or_default().trim_matches('"'))
+                        format!("{:20} {}", b.name, title.unwrap_or_default().trim_matches('"'))
                     })
                     .collect();
                 print(&(lines.join("\n") + "\n"))?;

@@ -90,10 +90,8 @@ named! {
         Ended = 1,
         /// The ring was full: `value` records were dropped.
         LogDropped = 2,
-        /// The log ended before the run, on a full disk for one.
-        LogEnded = 3,
         /// The port is gone.
-        PortLost = 4,
+        PortLost = 3,
     }
 }
 

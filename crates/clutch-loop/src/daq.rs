@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Longest time for which a patient board waits.
-pub const PATIENCE: Duration = Duration::from_millis(500);
+pub const PATIENCE: Duration = Duration::from_secs(5);
 
 /// How far before the sample a patient board's clock waits, ns.
 const WAIT_NS: u64 = 100_000;
@@ -86,7 +86,7 @@ pub fn run(
     stop: &AtomicBool,
     mut notice: impl FnMut(DaqNotice),
 ) -> Result<DaqReport, DaqError> {
-    let patient = options.patient && options.faults.is_empty();
+    let patient = options.patient && !options.faults.iter().any(|f| f.kind.silences());
     let boot = (monotonic_ns() / 1000) as u32;
     let mut board = SimBoard::new(scenario, &options.faults, boot, patient)?;
     let mut up = Line::new(Direction::Up, 0, &options.faults, options.seed);
@@ -98,11 +98,13 @@ pub fn run(
     let mut out = Outbox::default();
     let mut buffer = [0; 1024];
     let mut state = board.node().state();
+    let mut present = false;
     let mut waiting_since: Option<u64> = None;
     // Bytes that the line did not take at once.
     let mut unsent: Vec<u8> = Vec::new();
     while !stop.load(Ordering::Relaxed) {
         while let Some(event) = endpoint.service()? {
+            present = event == ClientEvent::Connected;
             notice(DaqNotice::Client(event));
             if event == ClientEvent::Left {
                 waiting_since = None;
@@ -131,7 +133,7 @@ pub fn run(
         if board.next_ns().is_some_and(|due| due <= now) {
             let wall = monotonic_ns();
             let since = *waiting_since.get_or_insert(wall);
-            let held_up = patient && !board.node().is_answered();
+            let held_up = patient && present && !board.node().is_answered();
             if held_up && wall - since < PATIENCE.as_nanos() as u64 {
                 // The clock stands still, a little before the sample, until the answer comes.
                 slipped = wall - now + WAIT_NS;

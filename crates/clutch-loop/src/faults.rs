@@ -58,6 +58,28 @@ pub enum FaultKind {
     Reset,
 }
 
+impl FaultKind {
+    /// Whether it is the line's (or the whole board's), so that a controller does not answer. A board
+    /// whose clock waits for its controller would hide such a fault.
+    #[must_use]
+    pub fn silences(self) -> bool {
+        match self {
+            FaultKind::Drop
+            | FaultKind::Duplicate
+            | FaultKind::Corrupt
+            | FaultKind::Delay(_)
+            | FaultKind::Jitter(_)
+            | FaultKind::Reorder
+            | FaultKind::Silence
+            | FaultKind::Reset => true,
+            FaultKind::EncoderFreeze
+            | FaultKind::EncoderJump(_)
+            | FaultKind::EncoderLoss
+            | FaultKind::DacStuck(_) => false,
+        }
+    }
+}
+
 /// A fault and when it is there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {

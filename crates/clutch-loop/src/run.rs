@@ -89,10 +89,8 @@ pub struct LoopReport {
     pub value: f64,
     /// Ticks in which the law was asked.
     pub ticks: u64,
-    /// Tracking figures, from measured positions.
+    /// Tracking figures from the encoder, sticking as [`StickSlip`] sees it; no torque.
     pub metrics: Metrics,
-    /// Stick-slip cycles per second as the encoder shows them, after settling.
-    pub stick_slip_cycles_per_s: f64,
     /// What the line carried.
     pub link: LinkCounts,
     /// Samples lost.
@@ -109,6 +107,8 @@ pub struct LoopReport {
     pub notes: Vec<String>,
     /// Records that did not fit into the ring.
     pub log_dropped: u64,
+    /// Writes that the line took only in part: its buffer was full.
+    pub cut_writes: u64,
     /// Whether the board said that it is in its safe state.
     pub board_safe: bool,
     /// Why the board did not take consent, if it did not.
@@ -144,14 +144,17 @@ struct Control<'a, T: Real, P> {
     figures: MetricsBuilder,
     detector: StickSlip<f64>,
     sticks: StickSlipState<f64>,
-    sticks_before: u64,
+    /// Cycles and ticks stuck before the figures begin.
+    sticks_before: (u64, u64),
     answers: u64,
     response: CycleStats,
     interval: CycleStats,
     last_answer_ns: Option<u64>,
     dropped: u64,
+    dropped_told: u64,
     board_safe: bool,
     refused: Option<Refused>,
+    cut: u64,
 }
 
 /// What one call of the node brought, gathered for use after it.
@@ -168,11 +171,24 @@ struct Batch<T: Real> {
 impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
     fn push(&mut self, records: &[Record]) {
         let Some(ring) = &mut self.ring else { return };
-        // A sample and its command together or not at all.
-        if ring.slots() < records.len() {
+        // A sample and its command together or not at all; after a gap its event comes first.
+        let gap = self.dropped - self.dropped_told;
+        if ring.slots() < records.len() + usize::from(gap > 0) {
             self.dropped += records.len() as u64;
             self.watch.log_dropped.store(self.dropped, Ordering::Relaxed);
             return;
+        }
+        if gap > 0
+            && let Some(first) = records.first()
+        {
+            self.dropped_told = self.dropped;
+            let _ = ring.push(Record::Event(EventRecord {
+                tick: first.tick(),
+                time_ns: first.time_ns(),
+                kind: EventKind::LogDropped as u8,
+                value: gap as f64,
+                ..EventRecord::default()
+            }));
         }
         for record in records {
             let _ = ring.push(*record);
@@ -213,10 +229,9 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
             self.node.receive(now, bytes, self.path, &mut self.out, &mut notices);
             self.node.poll(now, &mut self.out, &mut notices);
         }
-        self.dropped += lost_records;
+        self.dropped += if self.ring.is_some() { lost_records } else { 0 };
         if !self.out.as_bytes().is_empty() {
-            self.port.write(self.out.as_bytes())?;
-            self.out.clear();
+            self.send()?;
             let done = monotonic_ns();
             let took = done.saturating_sub(arrived_ns);
             self.node.answered(Micros(u32::try_from(took / 1000).unwrap_or(u32::MAX)));
@@ -227,6 +242,18 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
             self.last_answer_ns = Some(done);
         }
         self.after(now, from, &batch);
+        Ok(())
+    }
+
+    /// Writes what is to be written. What the line does not take is lost, and counted: its frame
+    /// fails its check, and the next answer is worth more.
+    fn send(&mut self) -> Result<(), std::io::Error> {
+        let bytes = self.out.as_bytes();
+        if !bytes.is_empty() {
+            let written = self.port.write(bytes)?;
+            self.cut += u64::from(written < bytes.len());
+            self.out.clear();
+        }
         Ok(())
     }
 
@@ -259,7 +286,7 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
                 let counts = clutch_core::Counts(n.sample.counts);
                 self.detector.update(&mut self.sticks, counts, n.cycle.target.velocity.to_f64());
                 if time < self.settle {
-                    self.sticks_before = self.sticks.cycles();
+                    self.sticks_before = (self.sticks.cycles(), self.sticks.stuck_ticks());
                 }
                 self.watch.error_nrad.store((error * 1e9) as i64, Ordering::Relaxed);
                 self.watch.millivolts.store((voltage * 1e3) as i64, Ordering::Relaxed);
@@ -423,14 +450,16 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
         figures: MetricsBuilder::new(seconds, options.settle),
         detector: configured.detector,
         sticks: StickSlipState::default(),
-        sticks_before: 0,
+        sticks_before: (0, 0),
         answers: 0,
         response: CycleStats::new(),
         interval: CycleStats::new(),
         last_answer_ns: None,
         dropped: 0,
+        dropped_told: 0,
         board_safe: false,
         refused: None,
+        cut: 0,
         node: configured.node,
         port: configured.port,
     };
@@ -447,17 +476,16 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
         let arrived = match options.pace {
             _ if c.node.state().state() == State::Ready => {
                 let now = monotonic_ns();
-                if c.refused.is_some() || now >= give_up {
+                if c.refused.is_some() || now >= give_up || c.watch.stop.load(Ordering::Relaxed) {
                     break;
                 }
                 if now >= ask_again {
                     ask_again = now + 100_000_000;
                     c.node.arm(&mut c.out);
-                    if let Err(error) = c.port.write(c.out.as_bytes()) {
+                    if let Err(error) = c.send() {
                         port_error = Some(error);
                         break;
                     }
-                    c.out.clear();
                 }
                 let _ = wait_readable(c.port.as_fd(), now + 10_000_000, WaitMode::Sleep);
                 monotonic_ns()
@@ -517,12 +545,9 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
                 }
             }
         }
-        if !c.out.as_bytes().is_empty() {
-            if let Err(error) = c.port.write(c.out.as_bytes()) {
-                port_error = Some(error);
-                break;
-            }
-            c.out.clear();
+        if let Err(error) = c.send() {
+            port_error = Some(error);
+            break;
         }
     }
     (options.hooks.1)();
@@ -548,8 +573,12 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
     c.housekeeping(now);
     c.out.clear();
     let state = c.node.state();
-    let metrics = c.figures.finish();
+    let mut metrics = c.figures.finish();
     let measured = metrics.measured_s.max(seconds);
+    // On hardware the encoder's silence is all that is seen of sticking.
+    metrics.stick_slip_cycles_per_s = (c.sticks.cycles() - c.sticks_before.0) as f64 / measured;
+    metrics.stick_time_fraction = (c.sticks.stuck_ticks() - c.sticks_before.1) as f64 * seconds / measured;
+    metrics.stair_height_rad = f64::from(c.sticks.stair()) * c.radians;
     let _ = c.watch.log_dropped.fetch_max(c.dropped, Ordering::Relaxed);
     LoopReport {
         state: state.state(),
@@ -557,7 +586,6 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
         value: state.value().to_f64(),
         ticks: c.answers,
         metrics,
-        stick_slip_cycles_per_s: (c.sticks.cycles() - c.sticks_before) as f64 / measured,
         link: *c.node.counts(),
         lost: state.lost(),
         implausible: state.rejected(),
@@ -566,6 +594,7 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
         interval: c.interval.summary(),
         notes,
         log_dropped: c.dropped,
+        cut_writes: c.cut,
         board_safe: c.board_safe,
         refused: c.refused,
         port_error,

@@ -216,16 +216,7 @@ impl SimBoard {
         for i in 0..self.faults.len() {
             let fault = self.faults[i];
             let active = time.is_some_and(|t| fault.active(t));
-            let own = !matches!(
-                fault.kind,
-                FaultKind::Drop
-                    | FaultKind::Duplicate
-                    | FaultKind::Corrupt
-                    | FaultKind::Delay(_)
-                    | FaultKind::Jitter(_)
-                    | FaultKind::Reorder
-                    | FaultKind::Silence
-            );
+            let own = !fault.kind.silences() || fault.kind == FaultKind::Reset;
             if !own || !active || !self.rng.random_bool(fault.probability) {
                 continue;
             }

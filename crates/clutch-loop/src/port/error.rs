@@ -88,7 +88,7 @@ pub enum PortError {
         source: io::Error,
     },
     /// The TCP address is open to other machines.
-    #[error("tcp://{to}: other machines could reach this address, and whoever does moves the shaft; expected a loopback address, as tcp://127.0.0.1:{}, unless remote access is asked for", to.port())]
+    #[error("tcp://{to}: other machines could reach this address, and whoever does moves the shaft; expected a loopback address, as tcp://127.0.0.1:{}", to.port())]
     NotLoopback {
         /// The address.
         to: SocketAddr,

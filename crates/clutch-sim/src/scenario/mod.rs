@@ -196,9 +196,9 @@ impl Scenario {
         let b = &plan.bounds;
         let needed = b.drive_torque.high / b.weakest_brake();
         match safety.supervisor.on_fault.holding_voltage() {
-            Some(volts) if volts < needed => Err(at.at(
-                "safety",
-                &ParamError { field: "volts", value: volts, expected: "a voltage that stops the strongest drive with the weakest brake of [bounds] (`clutch certify` prints it as the voltage of a path at rest); twice as much is usual" },
+            Some(volts) if volts < needed => Err(at.message(
+                "safety.on_fault",
+                format!("holds with {volts} V, and the strongest drive against the weakest brake of [bounds] needs {needed:.4} V; twice as much is usual"),
             )),
             _ => Ok(()),
         }
