@@ -199,7 +199,7 @@ impl Loop {
         let plan = scenario.plan()?;
         let certified = plan.certificate.certified();
         if !certified && !self.uncertified {
-            print(&format!(
+            self.say(&format!(
                 "{}: the gains are not certified for these bounds and this path, so nothing was started.\n\
                  `clutch certify {}` says why; --uncertified runs it all the same.\n",
                 scenario.name,

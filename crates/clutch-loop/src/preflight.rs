@@ -227,7 +227,10 @@ impl<'a, T: Real> Talk<'a, T> {
             Some(Said::No(m)) if m.reason == Refusal::Version as u8 => {
                 Err(PreflightError::Version { address, board: m.value })
             }
-            Some(Said::No(m)) => Err(PreflightError::Schema { address, board: m.value }),
+            Some(Said::No(m)) if m.reason == Refusal::Schema as u8 => {
+                Err(PreflightError::Schema { address, board: m.value })
+            }
+            Some(Said::No(m)) => Err(PreflightError::Refused { address, what: "known", why: why(&m) }),
             None if self.echo => Err(PreflightError::Echo { address }),
             None if self.bytes > 0 => Err(PreflightError::Foreign { address, bytes: self.bytes }),
             None => Err(PreflightError::Silent { address }),

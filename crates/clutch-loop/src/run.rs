@@ -235,11 +235,13 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
             let done = monotonic_ns();
             let took = done.saturating_sub(arrived_ns);
             self.node.answered(Micros(u32::try_from(took / 1000).unwrap_or(u32::MAX)));
-            self.response.record(took);
-            if let Some(last) = self.last_answer_ns {
-                self.interval.record(done.saturating_sub(last));
+            if batch.cycles.iter().take(batch.used).flatten().any(|n| n.cycle.answer.is_some()) {
+                self.response.record(took);
+                if let Some(last) = self.last_answer_ns {
+                    self.interval.record(done.saturating_sub(last));
+                }
+                self.last_answer_ns = Some(done);
             }
-            self.last_answer_ns = Some(done);
         }
         self.after(now, from, &batch);
         Ok(())
