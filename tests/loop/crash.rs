@@ -35,6 +35,7 @@ fn after_kill_9_at_twenty_random_instants_the_board_is_safe_and_the_log_is_recov
             let from = board.heard();
             // What the loop itself watches is not the subject, and must not end it before the kill.
             let patience = ["--set", "safety.limits.late=120", "--set", "safety.limits.silence_cycles=50"];
+            let _ = std::fs::remove_file(&log); // of an attempt that the machine spoiled
             let args = ["loop", "board_smc_2", "--port", &board.port, "--log", log.to_str().unwrap()];
             let mut controller = start(clutch(&[&args[..], &patience].concat()));
             // A controller that is gone before the board runs was held up in its first cycles.

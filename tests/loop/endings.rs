@@ -73,3 +73,32 @@ fn a_pseudo_terminal_that_goes_away_is_told_as_unplugged() {
 fn a_tcp_connection_that_goes_away_is_told_as_unplugged() {
     an_unplugged_port_is_told("unplugged-tcp", &["--listen", "tcp://127.0.0.1:0"]);
 }
+
+#[test]
+fn every_stall_of_the_loop_is_counted_and_harmless() {
+    const STALLS: u64 = 10;
+    let _alone = alone();
+    // A strict board; limits so loose that a stall of 15 ms ends nothing.
+    let limits = [
+        "--set=safety.limits.silence_cycles=400",
+        "--set=safety.limits.watchdog_cycles=400",
+        "--set=safety.limits.valid_cycles=60",
+        "--set=safety.limits.late=128",
+        "--set=safety.limits.overruns=128",
+        "--set=safety.limits.following_error_deg=20",
+    ];
+    let board = Board::start(&[&["board_smc_2"], &limits[..]].concat());
+    let arguments = ["loop", "board_smc_2", "--port", &board.port, "--duration", "4", "--json"];
+    let running = start(clutch(&[&arguments[..], &limits[..]].concat()));
+    let _ = board.wait_for(0, "Running");
+    for _ in 0..STALLS {
+        std::thread::sleep(Duration::from_millis(120));
+        running.signal(Signal::STOP);
+        std::thread::sleep(Duration::from_millis(15));
+        running.signal(Signal::CONT);
+    }
+    let done = running.done().expect(0);
+    let misses = done.json()["deadline_misses"].as_u64().unwrap();
+    // The machine's own stalls are counted, too.
+    assert!(misses >= STALLS, "{misses} misses counted for {STALLS} stalls");
+}

@@ -29,6 +29,7 @@ fn ends_with(name: &str, fault: &str, causes: &[(&str, &str)], latest: u64) {
             path,
             "--json",
         ];
+        let _ = std::fs::remove_file(path); // of an attempt that the machine spoiled
         let done = run(&args);
         let report = done.json();
         let ticks = report["ticks"].as_u64().expect("a number");

@@ -131,7 +131,8 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let (ticks, detector) = (setup.ticks, setup.detector);
     let report = std::thread::scope(|scope| {
         let (node, port, watch, path) = (&mut node, &mut port, &*watch, &path);
-        let configured = Configured { node, port, path, ring: Some(ring), watch, ticks, clock, detector };
+        let configured =
+            Configured { node, port, path, ring: Some(ring), watch, ticks, clock, detector, patient: true };
         scope.spawn(move || run::run(configured, &options)).join().unwrap()
     });
     stop.store(true, Ordering::Relaxed);

@@ -60,7 +60,7 @@ fn each_run_leaves_a_log_that_replays_bit_for_bit() {
     let folder = std::env::temp_dir().join(format!("clutch-campaign-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let path = folder.join("run.mcap");
-    for run in runs(SEEDS.0, 2) {
+    for run in runs(SEEDS.0, SEEDS.1) {
         // A law or a path that a test breaks is not in the log; what it led to is.
         let broken_inside = matches!(
             run.case().broken,

@@ -140,7 +140,14 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(Outcome::Fault) => ExitCode::from(3),
         Ok(Outcome::Stopped) => ExitCode::from(4),
         Err(e) => {
-            let _ = writeln!(std::io::stderr(), "clutch: {e:#}");
+            // Some errors tell their source themselves.
+            let mut text = e.to_string();
+            for source in e.chain().skip(1).map(ToString::to_string) {
+                if !text.contains(&source) {
+                    text += &format!(": {source}");
+                }
+            }
+            let _ = writeln!(std::io::stderr(), "clutch: {text}");
             ExitCode::FAILURE
         }
     }
@@ -167,6 +174,17 @@ fn print(text: &str) -> anyhow::Result<()> {
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
         other => other.context("standard output"),
     }
+}
+
+/// Version and commit, as logs tell it.
+const BUILD: &str = env!("CLUTCH_BUILD");
+
+/// A log is never written over: it may be the only record of a run.
+fn new_log(path: &Path) -> anyhow::Result<()> {
+    if path.exists() {
+        anyhow::bail!("{}: exists already; name a new file for the log", path.display());
+    }
+    Ok(())
 }
 
 /// Writes a file; errors name it.

@@ -207,6 +207,9 @@ impl Loop {
             ))?;
             return Ok(Outcome::NotCertified);
         }
+        if let Some(log) = &self.log {
+            crate::new_log(log)?;
+        }
         let stop = stop_flag()?;
         // A log on a limited disk must end the log and not the loop.
         let ignored = Arc::new(AtomicBool::new(false));
@@ -235,11 +238,12 @@ impl Loop {
         let text = if self.json {
             crate::json(&as_json(scenario, &report, certified, board.as_ref()))?
         } else {
-            summary(scenario, &report, &log_line, board.as_ref())
+            summary(scenario, &report, &log_line, board.as_ref(), (stopped, self.fault.len()))
         };
         print(&text)?;
         Ok(match (report.state, report.port_error.is_some(), stopped) {
             (State::Faulted, _, _) | (_, true, _) => Outcome::Fault,
+            (State::Ready, _, true) => Outcome::Stopped,
             (State::Ready, _, _) => Outcome::Failed,
             (_, _, true) => Outcome::Stopped,
             _ => Outcome::Done,
@@ -273,6 +277,18 @@ impl Loop {
             return Err(clutch_loop::preflight::PreflightError::Misfit { address, lines }.into());
         }
         let mut setup = Setup::<T>::new(scenario, hello.run.wrapping_add(1).max(1))?;
+        let simulated = hello.board == PATIENT_BOARD || hello.board == STRICT_BOARD;
+        if simulated && !matches!(port.kind(), DeviceKind::PseudoTerminal | DeviceKind::Tcp) {
+            let line = format!(
+                "board: its serial number {} is kept for simulated boards; give it another",
+                hello.board
+            );
+            return Err(clutch_loop::preflight::PreflightError::Misfit {
+                address: address.to_string(),
+                lines: vec![line],
+            }
+            .into());
+        }
         if hello.board == PATIENT_BOARD {
             // Its clock waits when this machine stalls, and so does our patience.
             setup.control.silence = clutch_core::Micros(5_500_000);
@@ -292,11 +308,11 @@ impl Loop {
         let log = match &self.log {
             None => None,
             Some(path) => {
-                let version = env!("CARGO_PKG_VERSION");
+                let version = crate::BUILD;
                 let mut header =
                     setup::header(scenario, &setup.servo, Source::Loop, &address.to_string(), version);
                 header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
-                header.extra.push(("board".to_owned(), format!("{:08x}", hello.board)));
+                header.extra.push(("board".to_owned(), board_text(&hello)));
                 header.extra.push(("certified".to_owned(), certified.to_string()));
                 Some(LogThread::start(path, &header, watch.clone())?)
             }
@@ -308,7 +324,7 @@ impl Loop {
         talk.configure(present)?;
         let clock = talk.clock()?;
         if stop.load(Ordering::Relaxed) {
-            bail!("stopped before the board was armed; it is as it was");
+            // Not armed: the run below sees the same flag before it asks for consent.
         }
         let path = setup::path::<T>(scenario)?;
         let spin_us = self.spin_us;
@@ -329,7 +345,7 @@ impl Loop {
             settle: spec.run.settle,
             hooks: (|| (), || ()),
         };
-        let (ticks, detector) = (setup.ticks, setup.detector);
+        let (ticks, detector, patient) = (setup.ticks, setup.detector, hello.board == PATIENT_BOARD);
         let show = std::io::stderr().is_terminal();
         let report = std::thread::scope(|scope| {
             let (node, port, path, watched) = (&mut node, &mut port, &path, &*watch);
@@ -337,7 +353,17 @@ impl Loop {
                 scope,
                 move || {
                     run::run(
-                        Configured { node, port, path, ring, watch: watched, ticks, clock, detector },
+                        Configured {
+                            node,
+                            port,
+                            path,
+                            ring,
+                            watch: watched,
+                            patient,
+                            ticks,
+                            clock,
+                            detector,
+                        },
                         &options,
                     )
                 },
@@ -385,11 +411,7 @@ impl Loop {
         plan: &clutch_sim::scenario::Plan,
     ) -> String {
         let spec = scenario.spec();
-        let board = match hello.board {
-            PATIENT_BOARD => "simulated; its clock waits when this machine stalls".to_owned(),
-            STRICT_BOARD => "simulated, in real time".to_owned(),
-            serial => format!("number {serial:08x}"),
-        };
+        let board = board_text(hello);
         let safe = match safety.supervisor.on_fault {
             SafeState::Hold { volts } => format!("hold with {} V", number(volts)),
             SafeState::Ramp { volts_per_s, volts } => {
@@ -447,6 +469,14 @@ impl Loop {
     }
 }
 
+fn board_text(hello: &Hello) -> String {
+    match hello.board {
+        PATIENT_BOARD => "simulated; its clock waits when this machine stalls".to_owned(),
+        STRICT_BOARD => "simulated, in real time".to_owned(),
+        serial => format!("number {serial:08x}"),
+    }
+}
+
 fn status(watch: &Watch, period_us: u32, ticks: u64) {
     let time = |n: u64| n as f64 * f64::from(period_us) / 1e6;
     let load = |a: &std::sync::atomic::AtomicI64| a.load(Ordering::Relaxed) as f64;
@@ -495,7 +525,13 @@ fn cause_text(report: &LoopReport) -> String {
     }
 }
 
-fn summary(scenario: &Scenario, r: &LoopReport, log_line: &str, board: Option<&DaqReport>) -> String {
+fn summary(
+    scenario: &Scenario,
+    r: &LoopReport,
+    log_line: &str,
+    board: Option<&DaqReport>,
+    (stopped, faults): (bool, usize),
+) -> String {
     let m = &r.metrics;
     let deg = |x: f64| number(x.to_degrees());
     let us = |ns: u64| number(ns as f64 / 1e3);
@@ -544,6 +580,9 @@ fn summary(scenario: &Scenario, r: &LoopReport, log_line: &str, board: Option<&D
             board.waits, board.waited
         );
     }
+    if board.is_some_and(|b| b.hits == 0) && faults > 0 {
+        text += "the fault that was asked for had not begun\n";
+    }
     text += log_line;
     if let Some(error) = &r.port_error {
         text += &format!("{error}\n");
@@ -555,6 +594,9 @@ fn summary(scenario: &Scenario, r: &LoopReport, log_line: &str, board: Option<&D
     };
     if r.cause == Cause::None {
         let why = r.refused.as_ref().map_or("it did not answer".to_owned(), clutch_loop::preflight::why);
+        if stopped {
+            return text + "stopped before the board was armed; its output is as it was\n";
+        }
         return text + &format!("the board was not armed: {why}\n");
     }
     let fault = if r.state == State::Faulted { "FAULT: " } else { "" };

@@ -69,11 +69,11 @@ impl Replay {
                     "differs: tick {}, {}: logged {:?}, replayed {:?}\n",
                     d.tick, d.field, d.logged, d.replayed
                 );
-                if log.header.version != env!("CARGO_PKG_VERSION") {
+                if log.header.version != crate::BUILD {
                     text += &format!(
                         "the log was written by version {}, this is {}\n",
                         log.header.version,
-                        env!("CARGO_PKG_VERSION")
+                        crate::BUILD
                     );
                 }
                 Outcome::Fault

@@ -75,6 +75,9 @@ impl Sim {
                 );
             }
         }
+        if let Some(log) = &self.log {
+            crate::new_log(log)?;
+        }
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let run = crate::with_progress("samples", |progress| scenario.run(progress))?;
@@ -178,8 +181,7 @@ fn log<T: Real>(scenario: &Scenario, run: &Run, file: &std::path::Path) -> anyho
     let spec = scenario.spec();
     let servo = Servo::<T>::new(&spec.servo()?.cast())
         .map_err(|e| anyhow::anyhow!("{} = {}: {}", e.field, e.value.to_f64(), e.expected))?;
-    let mut header =
-        setup::header(scenario, &servo, clutch_log::Source::Simulation, "", env!("CARGO_PKG_VERSION"));
+    let mut header = setup::header(scenario, &servo, clutch_log::Source::Simulation, "", crate::BUILD);
     let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
     header.extra.push((replay::START_VOLTAGE.to_owned(), bits));
     let mut log = clutch_log::LogWriter::create(file, &header)?;

@@ -135,8 +135,13 @@ impl FromStr for Fault {
         let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
         let mut fault = Fault::new(FaultKind::Drop, 0.0);
         let (mut ms, mut counts, mut volts, mut when) = (None, None, None, false);
+        let mut seen = Vec::new();
         for pair in rest.split(',').filter(|p| !p.is_empty()) {
             let (key, value) = pair.split_once('=').ok_or_else(|| bad(format!("\"{pair}\" has no =")))?;
+            if seen.contains(&key) {
+                return Err(bad(format!("{key} is given twice")));
+            }
+            seen.push(key);
             let number = || {
                 value
                     .parse::<f64>()
@@ -263,6 +268,7 @@ mod tests {
             ("drop:at", "has no ="),
             ("drop:at=1,where=up", "unknown key where"),
             ("drop:at=nan", "not a number"),
+            ("drop:p=0.1,p=0.2", "p is given twice"),
         ] {
             let error = text.parse::<Fault>().unwrap_err().to_string();
             assert!(error.contains(problem), "{text}: {error}");

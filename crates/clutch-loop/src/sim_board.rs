@@ -76,6 +76,14 @@ impl SimBoard {
         let rig = Rig::new(&spec.rig, spec.run.seed)?;
         let engine = spec.engine(&rig)?;
         let dac = Dac::new(&spec.rig.dac)?;
+        for fault in faults {
+            if let FaultKind::DacStuck(StuckAt::Volts(volts)) = fault.kind
+                && !(volts >= spec.rig.dac.lowest && volts <= spec.rig.dac.highest)
+            {
+                let expected = "a voltage that the scenario's converter has, V (fault dac-stuck)";
+                return Err(ParamError { field: "volts", value: volts, expected }.into());
+            }
+        }
         let codes = SafeCodes::new(&safety.supervisor.on_fault, &dac, spec.period)?;
         let params = BoardParams {
             board: if patient { PATIENT_BOARD } else { STRICT_BOARD },
