@@ -265,9 +265,11 @@ pub(super) fn set_low_latency(fd: impl AsFd) -> io::Result<()> {
 }
 
 /// The terminal in which the user typed the command: its settings are not ours to change.
+///
+/// The kernel names the session of a terminal only to a process that terminal controls. The number itself is not
+/// looked at: where the session began outside of a container it is zero.
 pub(super) fn is_own_terminal(fd: impl AsFd) -> bool {
-    match (rustix::termios::tcgetsid(fd), rustix::process::getsid(None)) {
-        (Ok(theirs), Ok(ours)) => theirs == ours,
-        _ => false,
-    }
+    let mut session: libc::pid_t = 0;
+    // SAFETY: the kernel writes one process identifier to `session`, which lives through the call; `fd` is open.
+    unsafe { libc::ioctl(fd.as_fd().as_raw_fd(), libc::TIOCGSID as _, &mut session as *mut libc::pid_t) == 0 }
 }
