@@ -6,7 +6,7 @@ use clutch_core::law::{
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Servo, StribeckParams};
 use clutch_sim::progress::UNWATCHED;
-use clutch_sim::{RigParams, RunSpec, Start, simulate, simulate_servo};
+use clutch_sim::{Keep, RigParams, RunSpec, Start, simulate, simulate_servo};
 
 fn ramp(rig: RigParams, law: LawParams) -> RunSpec<'static> {
     RunSpec::new(rig, law, ReferenceParams::Ramp(2.0_f64.to_radians()))
@@ -37,7 +37,7 @@ impl Controller<f64> for Printed {
 fn equation_4_as_printed_lets_the_shaft_run_away() {
     let spec = ramp(RigParams::paper(), LawParams::Pd(PdParams::default()));
     let servo = Servo::with_law(&spec.servo().unwrap(), Printed).unwrap();
-    let run = simulate_servo(&spec, &servo, UNWATCHED).unwrap();
+    let run = simulate_servo(&spec, &servo, Keep::Trace, UNWATCHED).unwrap();
     // Ahead by a hair, it lets go for good: free fall for five seconds.
     assert!(last_error_deg(&run) < -1000.0, "error {}°", last_error_deg(&run));
     let with_minus = simulate::<f64>(&spec).unwrap();

@@ -6,7 +6,7 @@ use clutch_loop::campaign::{CASES, Expected, RunId, Table, runs};
 use clutch_loop::replay::{PRESENT_CODE, replay};
 use clutch_loop::setup::{self, Setup};
 use clutch_loop::world::{World, WorldParams};
-use clutch_sim::Scenario;
+use clutch_sim::{Keep, Scenario};
 use std::collections::BTreeSet;
 
 /// The first seed and the number of seeds: 12 seeds are more than 2 000 runs.
@@ -116,7 +116,7 @@ fn without_latency_the_loop_is_the_simulation_bit_for_bit() {
 }
 
 fn equal(scenario: &Scenario, what: &str) {
-    let run = scenario.run(clutch_sim::progress::UNWATCHED).expect("a simulation");
+    let run = scenario.run(Keep::Trace, clutch_sim::progress::UNWATCHED).expect("a simulation");
     let outcome = match scenario.scalar {
         clutch_sim::scenario::ScalarKind::F32 => world::<f32>(scenario),
         clutch_sim::scenario::ScalarKind::F64 => world::<f64>(scenario),

@@ -1,8 +1,8 @@
 //! Scenario files: what they say, and what is said of bad ones.
 
-use clutch_sim::Scenario;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::BUILT_IN;
+use clutch_sim::{Keep, Scenario};
 use proptest::prelude::*;
 
 const GOOD: &str = r#"
@@ -36,7 +36,7 @@ fn refuses(result: Result<Scenario, String>, begin: &str, words: &[&str]) {
 fn every_built_in_scenario_is_good_and_runs() {
     for b in BUILT_IN {
         let s = Scenario::built_in(b.name).unwrap().unwrap_or_else(|e| panic!("{e}"));
-        let run = s.run(UNWATCHED).unwrap_or_else(|e| panic!("{e}"));
+        let run = s.run(Keep::Trace, UNWATCHED).unwrap_or_else(|e| panic!("{e}"));
         assert!(run.metrics.max_error_rad.to_degrees() < 0.5, "{}: {:?}", b.name, run.metrics);
         // CTC saturates too far off its surface: docs/theory.md.
         assert_eq!(s.plan().unwrap().certificate.certified(), b.name != "ctc_2", "{}", b.name);
@@ -296,7 +296,7 @@ proptest! {
         }
         match Scenario::parse("my.toml", GOOD, &set) {
             Ok(s) if s.ticks() < 10_000 => {
-                if let Err(e) = s.run(UNWATCHED) {
+                if let Err(e) = s.run(Keep::Trace, UNWATCHED) {
                     prop_assert!(e.to_string().starts_with("my.toml: "), "{e}");
                 }
             }
@@ -329,7 +329,7 @@ proptest! {
         };
         let set = [(key.to_owned(), format!("{:?}", value * factor))];
         if let Ok(s) = Scenario::parse("my.toml", GOOD, &set) && s.ticks() < 10_000 {
-            let _ = s.run(UNWATCHED); // an error is as good; a panic is not
+            let _ = s.run(Keep::Trace, UNWATCHED); // an error is as good; a panic is not
         }
     }
 }

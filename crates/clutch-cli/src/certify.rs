@@ -6,8 +6,8 @@ use clap::Args;
 use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
 use clutch_core::law::LawParams;
 use clutch_core::{Bounds, Interval};
-use clutch_sim::Scenario;
 use clutch_sim::scenario::Plan;
+use clutch_sim::{Scenario, ScenarioError};
 use serde_json::{Value, json as value};
 
 /// Checks a scenario's gains against every plant within its bounds.
@@ -29,11 +29,8 @@ impl Certify {
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;
-        let shown = if self.json {
-            json(&as_json(&scenario, &plan, &outside))?
-        } else {
-            text(&scenario, &plan, &outside)
-        };
+        let shown =
+            if self.json { json(&certificate(&scenario)?)? } else { text(&scenario, &plan, &outside) };
         print(&shown)?;
         Ok(if plan.certificate.certified() { Outcome::Done } else { Outcome::NotCertified })
     }
@@ -170,13 +167,19 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
     out
 }
 
-fn as_json(scenario: &Scenario, plan: &Plan, outside: &[String]) -> Value {
+/// A scenario's certificate: the object that `--json` prints, described in `docs/scenario.md`.
+///
+/// # Errors
+/// A path that a brake cannot follow.
+pub fn certificate(scenario: &Scenario) -> Result<Value, ScenarioError> {
+    let plan = scenario.plan()?;
+    let outside = scenario.outside_bounds(&plan.bounds)?;
     let (b, d) = (&plan.bounds, &plan.demand);
     let c: &Certificate = &plan.certificate;
     let pair = |i: &Interval| value!([i.low, i.high]);
     let paper =
         |p: &PaperConditions| value!({"kp_26_v": p.kp, "kd_27_v_s_rad": p.kd, "gamma_28_rad_s2": p.gamma});
-    value!({
+    Ok(value!({
         "scenario": scenario.name,
         "version": env!("CARGO_PKG_VERSION"),
         "law": law_name(&scenario.spec().law),
@@ -213,7 +216,7 @@ fn as_json(scenario: &Scenario, plan: &Plan, outside: &[String]) -> Value {
             "error_bound_rad": c.error_bound,
         },
         "paper": plan.paper.as_ref().map(paper),
-    })
+    }))
 }
 
 fn bounds_json(b: &Bounds, pair: &dyn Fn(&Interval) -> Value) -> Value {

@@ -3,7 +3,7 @@
 //! The verbs hold no control or friction of their own: they call `clutch-sim` and show what it
 //! says.
 
-mod certify;
+pub mod certify;
 mod daq;
 mod log;
 mod loop_verb;
@@ -17,14 +17,13 @@ mod table;
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
+use clutch_sim::Scenario;
 use clutch_sim::progress::Report;
-use clutch_sim::scenario::BUILT_IN;
-use clutch_sim::{Scenario, ScenarioError};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Slow, smooth motion of shafts restrained by friction.
 ///
@@ -77,25 +76,7 @@ fn key_value(text: &str) -> Result<(String, String), String> {
 
 impl ScenarioArgs {
     fn load(&self) -> anyhow::Result<Scenario> {
-        let path = &self.scenario;
-        let name = path.to_string_lossy();
-        let built_in = BUILT_IN.iter().find(|b| b.name == name);
-        if let (Some(b), false) = (built_in, path.exists()) {
-            return Ok(Scenario::parse(b.name, b.toml, &self.set)?);
-        }
-        let text = std::fs::read_to_string(path).map_err(|e| {
-            let hint = match e.kind() {
-                ErrorKind::NotFound => {
-                    "no such file, and no built-in scenario of that name; `clutch scenario list` \
-                     shows those, `clutch scenario new FILE` writes one to begin with"
-                        .to_owned()
-                }
-                ErrorKind::InvalidData => "not a text file: expected TOML in UTF-8".to_owned(),
-                _ => e.to_string(),
-            };
-            anyhow::anyhow!("{name}: {hint}")
-        })?;
-        Scenario::parse(&name, &text, &self.set).map_err(|e: ScenarioError| e.into())
+        Ok(Scenario::load(&self.scenario, &self.set)?)
     }
 }
 
@@ -113,14 +94,15 @@ enum Outcome {
     Stopped,
 }
 
-/// Runs the command with its arguments, the program's name first.
-pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+/// Runs the command with its arguments, the program's name first; its exit code.
+#[must_use]
+pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,
         Err(e) => {
             let asked_for = !e.use_stderr(); // --help, --version
             let _ = e.print(); // nobody is left to be told
-            return if asked_for { ExitCode::SUCCESS } else { ExitCode::from(64) };
+            return if asked_for { 0 } else { 64 };
         }
     };
     let outcome = match cli.verb {
@@ -134,11 +116,11 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Reproduce(v) => v.run(),
     };
     match outcome {
-        Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::NotCertified) => ExitCode::from(2),
-        Ok(Outcome::Failed) => ExitCode::FAILURE,
-        Ok(Outcome::Fault) => ExitCode::from(3),
-        Ok(Outcome::Stopped) => ExitCode::from(4),
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::Failed) => 1,
+        Ok(Outcome::NotCertified) => 2,
+        Ok(Outcome::Fault) => 3,
+        Ok(Outcome::Stopped) => 4,
         Err(e) => {
             // Some errors tell their source themselves.
             let mut text = e.to_string();
@@ -148,7 +130,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
                 }
             }
             let _ = writeln!(std::io::stderr(), "clutch: {text}");
-            ExitCode::FAILURE
+            1
         }
     }
 }
@@ -162,6 +144,7 @@ fn with_progress<T>(unit: &str, work: impl FnOnce(Report<'_>) -> T) -> T {
     let result = work(&|p| {
         bar.set_length(p.total);
         bar.inc(p.finished);
+        ControlFlow::Continue(())
     });
     bar.finish_and_clear();
     result
@@ -177,7 +160,7 @@ fn print(text: &str) -> anyhow::Result<()> {
 }
 
 /// Version and commit, as logs tell it.
-const BUILD: &str = env!("CLUTCH_BUILD");
+pub const BUILD: &str = env!("CLUTCH_BUILD");
 
 /// A log is never written over: it may be the only record of a run.
 fn new_log(path: &Path) -> anyhow::Result<()> {

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    clutch_cli::main(std::env::args_os())
+    ExitCode::from(clutch_cli::main(std::env::args_os()))
 }

@@ -5,13 +5,12 @@ use crate::table::{number, quantities};
 use crate::{Outcome, ScenarioArgs, json, print};
 use anyhow::Context;
 use clap::Args;
-use clutch_core::{Real, Servo};
-use clutch_loop::{records, replay, setup};
+use clutch_loop::records;
 use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::Reaching;
 use clutch_sim::run::Detected;
 use clutch_sim::scenario::ScalarKind;
-use clutch_sim::{Metrics, Run, Scenario};
+use clutch_sim::{Keep, Metrics, Run, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -80,15 +79,12 @@ impl Sim {
         }
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
-        let run = crate::with_progress("samples", |progress| scenario.run(progress))?;
+        let run = crate::with_progress("samples", |progress| scenario.run(Keep::Trace, progress))?;
         if let Some(file) = &self.csv {
             csv(&run, file)?;
         }
         if let Some(file) = &self.log {
-            match scenario.scalar {
-                ScalarKind::F32 => log::<f32>(&scenario, &run, file)?,
-                ScalarKind::F64 => log::<f64>(&scenario, &run, file)?,
-            }
+            records::save_simulation(file, &scenario, &run, crate::BUILD)?;
         }
         if let Some(file) = &self.plot {
             figure(&scenario, &run).save(file)?;
@@ -175,23 +171,6 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         );
     }
     text
-}
-
-fn log<T: Real>(scenario: &Scenario, run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
-    let spec = scenario.spec();
-    let servo = Servo::<T>::new(&spec.servo()?.cast())
-        .map_err(|e| anyhow::anyhow!("{} = {}: {}", e.field, e.value.to_f64(), e.expected))?;
-    let mut header = setup::header(scenario, &servo, clutch_log::Source::Simulation, "", crate::BUILD);
-    let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
-    header.extra.push((replay::START_VOLTAGE.to_owned(), bits));
-    let mut log = clutch_log::LogWriter::create(file, &header)?;
-    for tick in records::of_simulation(run, servo.dac(), spec.period) {
-        for record in &tick {
-            log.write(record)?;
-        }
-    }
-    log.finish()?;
-    Ok(())
 }
 
 fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {

@@ -1,14 +1,19 @@
 //! What a log gets of each sample, of the link and of the shaft.
 
+use crate::replay::START_VOLTAGE;
+use crate::setup::{self, SetupError};
 use clutch_core::law::{Limit, Terms};
 use clutch_core::supervisor::{Cause, Cycle, State};
-use clutch_core::{Dac, FixedCounts, Real};
+use clutch_core::{Dac, FixedCounts, Real, Servo};
 use clutch_log::{
-    CommandRecord, CommandSource, EventKind, EventRecord, LinkRecord, Record, SampleRecord, TruthRecord,
+    CommandRecord, CommandSource, EventKind, EventRecord, LinkRecord, LogError, LogWriter, Record,
+    SampleRecord, Source, TruthRecord,
 };
 use clutch_node::{CycleNotice, LinkCounts};
-use clutch_sim::MovingRig;
 use clutch_sim::engine::Motion;
+use clutch_sim::scenario::ScalarKind;
+use clutch_sim::{MovingRig, Scenario};
+use std::path::Path;
 
 /// Of a sample: as it came.
 #[must_use]
@@ -102,7 +107,7 @@ pub fn ended(time_ns: u64, tick: u64, from: State, to: State, cause: Cause, valu
 }
 
 /// Of a simulation: every sample with its command and the shaft's true state.
-pub fn of_simulation<T: Real>(
+fn of_simulation<T: Real>(
     run: &clutch_sim::Run,
     dac: &Dac<T>,
     period: clutch_core::Micros,
@@ -150,6 +155,56 @@ pub fn of_simulation<T: Real>(
             }),
         ]
     })
+}
+
+/// Writes a simulation as a log, with the channels that a loop writes and the shaft's true motion;
+/// `version` is the build's.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn save_simulation(
+    path: &Path,
+    scenario: &Scenario,
+    run: &clutch_sim::Run,
+    version: &str,
+) -> Result<(), SaveError> {
+    match scenario.scalar {
+        ScalarKind::F32 => save_in::<f32>(path, scenario, run, version),
+        ScalarKind::F64 => save_in::<f64>(path, scenario, run, version),
+    }
+}
+
+/// A simulation could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum SaveError {
+    /// The file.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The scenario.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+}
+
+fn save_in<T: Real>(
+    path: &Path,
+    scenario: &Scenario,
+    run: &clutch_sim::Run,
+    version: &str,
+) -> Result<(), SaveError> {
+    let spec = scenario.spec();
+    let params = spec.servo().map_err(SetupError::from)?;
+    let servo = Servo::<T>::new(&params.cast()).map_err(|e| SetupError::from(setup::to_f64(e)))?;
+    let mut header = setup::header(scenario, &servo, Source::Simulation, "", version);
+    let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
+    header.extra.push((START_VOLTAGE.to_owned(), bits));
+    let mut log = LogWriter::create(path, &header)?;
+    for tick in of_simulation(run, servo.dac(), spec.period) {
+        for record in &tick {
+            log.write(record)?;
+        }
+    }
+    log.finish()?;
+    Ok(())
 }
 
 /// The link's counters; `(lost, implausible, deadline misses, dropped by the log)` come from

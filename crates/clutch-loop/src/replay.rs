@@ -41,7 +41,7 @@ pub struct Difference {
     /// Tick.
     pub tick: u64,
     /// Field of the channel `/command`.
-    pub field: &'static str,
+    pub field: String,
     /// In the log.
     pub logged: f64,
     /// In the replay.
@@ -60,9 +60,9 @@ pub struct Replay {
 }
 
 /// Fields of a command that have to agree; times do not.
-fn fields(c: &CommandRecord) -> [(&'static str, u64, f64); 16] {
-    let real = |name, x: f64| (name, x.to_bits(), x);
-    let whole = |name, x: u64| (name, x, x as f64);
+fn fields<'a>(c: &CommandRecord, terms: &'a [String; 3]) -> [(&'a str, u64, f64); 16] {
+    let real = |name: &'a str, x: f64| (name, x.to_bits(), x);
+    let whole = |name: &'a str, x: u64| (name, x, x as f64);
     [
         whole("tick", c.tick),
         whole("state", c.state.into()),
@@ -77,9 +77,9 @@ fn fields(c: &CommandRecord) -> [(&'static str, u64, f64); 16] {
         real("target_acceleration_rad_s2", c.target_acceleration),
         real("error_rad", c.error),
         real("error_rate_rad_s", c.error_rate),
-        real("term 1", c.terms[0]),
-        real("term 2", c.terms[1]),
-        real("term 3", c.terms[2]),
+        real(&terms[0], c.terms[0]),
+        real(&terms[1], c.terms[1]),
+        real(&terms[2], c.terms[2]),
     ]
 }
 
@@ -106,9 +106,15 @@ fn replay_in<T: Real>(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayEr
         Source::Loop | Source::Replay => looped::<T>(log, samples, scenario)?,
     };
     let first = log.commands.iter().zip(&commands).find_map(|(logged, replayed)| {
-        let pairs = fields(logged).into_iter().zip(fields(replayed));
+        let terms = &log.header.term_names;
+        let pairs = fields(logged, terms).into_iter().zip(fields(replayed, terms));
         pairs.into_iter().find_map(|(a, b)| {
-            (a.1 != b.1).then_some(Difference { tick: logged.tick, field: a.0, logged: a.2, replayed: b.2 })
+            (a.1 != b.1).then_some(Difference {
+                tick: logged.tick,
+                field: a.0.to_owned(),
+                logged: a.2,
+                replayed: b.2,
+            })
         })
     });
     let dropped = log.links.iter().map(|l| l.log_dropped).max().unwrap_or(0);

@@ -51,7 +51,7 @@ pub enum SetupError {
     Param(#[from] ParamError),
 }
 
-fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
+pub(crate) fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
     ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }
 }
 

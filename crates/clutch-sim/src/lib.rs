@@ -9,9 +9,10 @@ pub mod progress;
 pub mod rig;
 pub mod run;
 pub mod scenario;
+pub mod sweep;
 
 pub use metrics::Metrics;
 pub use moving_rig::MovingRig;
 pub use rig::RigParams;
-pub use run::{Run, RunError, RunParams, RunSpec, Start, simulate, simulate_servo};
+pub use run::{Keep, Run, RunError, RunParams, RunSpec, Start, simulate, simulate_servo};
 pub use scenario::{Scenario, ScenarioError};

@@ -15,6 +15,7 @@ use clutch_core::{PlantParams, StribeckParams};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 /// Seeds of every run.
 pub const SEEDS: [u64; 10] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10];
@@ -270,7 +271,7 @@ pub fn reduction(smc_cycles: f64, pd_cycles: f64) -> f64 {
 /// Runs everything, on all cores; `progress` is told of each finished run.
 ///
 /// # Errors
-/// None with the built-in rigs; an engine's if one were changed out of all proportion.
+/// [`RunError::Stopped`]; no other with the built-in rigs.
 pub fn reproduce(progress: Report<'_>) -> Result<Outcome, RunError> {
     let jobs: Vec<(Column, PaperLaw, f64, u64)> = RUNS
         .iter()
@@ -279,12 +280,16 @@ pub fn reproduce(progress: Report<'_>) -> Result<Outcome, RunError> {
         })
         .collect();
     let total = jobs.len() as u64;
-    progress(Progress { total, finished: 0 });
+    let tell = |finished| match progress(Progress { total, finished }) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(RunError::Stopped),
+    };
+    tell(0)?;
     let results: Vec<_> = jobs
         .par_iter()
         .map(|(column, law, rate, seed)| {
             let run = simulate::<f64>(&spec(*column, *law, *rate, *seed))?;
-            progress(Progress { total, finished: 1 });
+            tell(1)?;
             // The first seed's traces are the figures.
             let wanted = FIGURES.iter().any(|(_, l, rates)| l == law && rates.contains(rate));
             let panel =

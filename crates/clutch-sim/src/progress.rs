@@ -1,4 +1,6 @@
-//! How far long work is.
+//! How far long work is, and whether it goes on.
+
+use std::ops::ControlFlow;
 
 /// A report of progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,8 +11,8 @@ pub struct Progress {
     pub finished: u64,
 }
 
-/// What is told of progress.
-pub type Report<'a> = &'a (dyn Fn(Progress) + Sync);
+/// What is told of progress; its answer `Break` ends the work with [`crate::RunError::Stopped`].
+pub type Report<'a> = &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync);
 
 /// For work whose progress nobody watches.
-pub const UNWATCHED: Report<'static> = &|_| {};
+pub const UNWATCHED: Report<'static> = &|_| ControlFlow::Continue(());

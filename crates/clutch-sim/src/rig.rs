@@ -41,7 +41,7 @@ impl Ripple {
     pub fn new(p: &RippleParams, seed: u64) -> Result<Ripple, ParamError> {
         let bad = |field, value, expected| Err(ParamError { field, value, expected });
         if p.spacing == 0 {
-            return bad("spacing", 0.0, "at least 1 wave per turn");
+            return bad("spacing_waves_per_turn", 0.0, "at least 1 wave per turn");
         }
         if p.lowest == 0 || !p.lowest.is_multiple_of(p.spacing) {
             return bad(
@@ -252,6 +252,23 @@ impl Rig {
         })
     }
 
+    /// `θ̈` of (1) at a time (s), a position from the encoder's zero at the start (rad), a velocity
+    /// (rad/s) and a voltage at the pad, rad/s²; 0 at rest as long as friction holds. Torque noise,
+    /// delay and lag, which are not the shaft's, are left out.
+    #[must_use]
+    pub fn acceleration(&self, time: f64, position: f64, velocity: f64, volts: f64) -> f64 {
+        let p = self.model.plant.params();
+        let factor = self.model.friction_factor(position);
+        let torque = self.drive.torque(time, position);
+        let friction = if velocity == 0.0 {
+            let holds = self.model.break_away_torque(position, volts);
+            torque.max(-holds).min(holds)
+        } else {
+            factor * self.model.plant.brake_torque(velocity, volts)
+        };
+        (torque - friction - p.viscous_damping * velocity) / p.inertia
+    }
+
     /// Voltage that holds the resting shaft wherever it is on the disc, V: a quarter more than the
     /// static limit, within the converter's range.
     #[must_use]
@@ -315,7 +332,7 @@ mod tests {
             (RippleParams { rms: f64::NAN, ..good.clone() }, "rms"),
             (RippleParams { lowest: 170, ..good.clone() }, "lowest_waves_per_turn"),
             (RippleParams { highest: 120, ..good.clone() }, "highest_waves_per_turn"),
-            (RippleParams { spacing: 0, ..good }, "spacing"),
+            (RippleParams { spacing: 0, ..good }, "spacing_waves_per_turn"),
         ] {
             assert_eq!(Ripple::new(&bad, 1).unwrap_err().field, field);
         }

@@ -8,7 +8,7 @@ use crate::rig::{Rig, RigParams};
 use clutch_core::law::{Controller, LawParams, Limit, OutputParams, Terms};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
-    Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, StickSlip,
+    Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, ServoState, StickSlip,
     StickSlipParams, StickSlipState, VelocityParams,
 };
 use rand::{RngExt, SeedableRng};
@@ -60,8 +60,8 @@ impl Default for RunParams {
 
 /// Samples that a run may have: it keeps each of them, about a hundred bytes.
 const LONGEST: u64 = 10_000_000;
-/// Samples between two reports of progress.
-const REPORT_EVERY: u64 = 65_536;
+/// Samples between two reports of progress: some milliseconds, so that whoever stops a run waits no longer.
+const REPORT_EVERY: u64 = 16_384;
 
 impl RunParams {
     /// The number of ticks.
@@ -153,6 +153,32 @@ impl<'a> RunSpec<'a> {
         }
     }
 
+    /// Rig and path as a run begins.
+    ///
+    /// # Errors
+    /// A parameter out of range; an engine that cannot take the rig.
+    pub fn prepare(&self) -> Result<Prepared<'a>, RunError> {
+        let p = &self.run;
+        let rig = Rig::new(&self.rig, p.seed)?;
+        let engine = self.engine(&rig)?;
+        p.check(self.period)?;
+        let encoder = rig.encoder;
+        // The path is planned in double precision and rounded to the law's scalar at each tick, so
+        // that runs in both scalars follow one path.
+        let reference = Reference::new(&self.reference, p.start_position(), encoder, self.period)?;
+        let first = reference.at(0);
+        let begin = first.position.minus::<f64>(FixedCounts(0)) * encoder.radians_per_count::<f64>();
+        if i32::try_from(first.position.0 >> FixedCounts::FRACTION_BITS).is_err() {
+            let expected = "a path that begins within ±2³¹ counts, rad";
+            return Err(ParamError { field: "points", value: begin, expected }.into());
+        }
+        let velocity = if p.start == Start::OnPath { first.velocity } else { 0.0 };
+        let volts =
+            if p.start == Start::Rest { rig.resting_voltage() } else { rig.sliding_voltage(velocity) };
+        let moving = MovingRig::new(rig, engine, p.seed, (begin, velocity), volts);
+        Ok(Prepared { reference, moving, volts, engine })
+    }
+
     /// The servo's parameters.
     ///
     /// # Errors
@@ -182,6 +208,43 @@ pub enum RunError {
     /// The engine gave up.
     #[error(transparent)]
     Motion(#[from] EngineError),
+    /// Whoever watched the progress ended it.
+    #[error("stopped before its end")]
+    Stopped,
+}
+
+/// What a run keeps besides its figures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keep {
+    /// Every sample and event.
+    Trace,
+    /// Nothing: for sweeps, whose traces would fill the memory.
+    Figures,
+}
+
+/// A rig and a path at the start of a run.
+pub struct Prepared<'a> {
+    /// The path.
+    pub reference: Reference<'a, f64>,
+    /// The rig, at the path's beginning.
+    pub moving: MovingRig,
+    /// Voltage on the brake before the first tick, V.
+    pub volts: f64,
+    /// Which engine moves the rig.
+    pub engine: EngineKind,
+}
+
+impl Prepared<'_> {
+    /// The servo's state for the first tick.
+    #[must_use]
+    pub fn servo_state<T: Real, C: Controller<T>>(&self, servo: &Servo<T, C>) -> ServoState<T, C::State> {
+        let (first, volts) = (self.reference.at(0), T::from_f64(self.volts));
+        if self.moving.rig().params.encoder_quantised {
+            servo.start(self.moving.counts(), &first.cast(), volts)
+        } else {
+            servo.start_at(self.moving.fine_counts(), &first.cast(), volts)
+        }
+    }
 }
 
 /// The samples of a run, one column each; SI and radians.
@@ -225,6 +288,33 @@ pub struct Trace {
     pub terms: [(&'static str, Vec<f64>); 3],
 }
 
+impl Trace {
+    /// Without samples, and with room for so many: growing copies everything, again and again.
+    fn with_capacity(n: usize) -> Self {
+        let reals = || Vec::with_capacity(n);
+        Trace {
+            time: reals(),
+            target_position: reals(),
+            target_fixed: Vec::with_capacity(n),
+            target_velocity: reals(),
+            target_acceleration: reals(),
+            position: reals(),
+            velocity: reals(),
+            error: reals(),
+            counts: Vec::with_capacity(n),
+            measured_error: reals(),
+            error_rate: reals(),
+            code: Vec::with_capacity(n),
+            voltage: reals(),
+            demand: reals(),
+            limit: Vec::with_capacity(n),
+            start_voltage: 0.0,
+            stuck: Vec::with_capacity(n),
+            terms: [("", reals()), ("", reals()), ("", reals())],
+        }
+    }
+}
+
 /// A run's outcome.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
@@ -257,70 +347,54 @@ pub struct Detected {
 /// # Errors
 /// A parameter out of range, an engine that cannot take the rig, a motion it cannot follow.
 pub fn simulate<T: Real>(spec: &RunSpec<'_>) -> Result<Run, RunError> {
-    simulate_watched::<T>(spec, UNWATCHED)
+    simulate_watched::<T>(spec, Keep::Trace, UNWATCHED)
 }
 
-/// As [`simulate`], and tells of its progress, in samples.
+/// As [`simulate`], keeps what is asked for, and tells of its progress, in samples.
 ///
 /// # Errors
-/// As [`simulate`].
-pub fn simulate_watched<T: Real>(spec: &RunSpec<'_>, progress: Report<'_>) -> Result<Run, RunError> {
+/// As [`simulate`]; [`RunError::Stopped`].
+pub fn simulate_watched<T: Real>(
+    spec: &RunSpec<'_>,
+    keep: Keep,
+    progress: Report<'_>,
+) -> Result<Run, RunError> {
     let servo = Servo::<T>::new(&spec.servo()?.cast()).map_err(to_f64)?;
-    simulate_servo(spec, &servo, progress)
+    simulate_servo(spec, &servo, keep, progress)
 }
 
 /// Runs a servo around any law; the specification's own law is not used.
 ///
 /// # Errors
-/// As [`simulate`].
+/// As [`simulate_watched`].
 pub fn simulate_servo<T: Real, C: Controller<T>>(
     spec: &RunSpec<'_>,
     servo: &Servo<T, C>,
+    keep: Keep,
     progress: Report<'_>,
 ) -> Result<Run, RunError> {
-    let rig = Rig::new(&spec.rig, spec.run.seed)?;
+    let encoder = Encoder::new::<f64>(spec.rig.counts_per_rev)?;
     if servo.period() != spec.period {
         let value = f64::from(servo.period().0);
         return Err(
             ParamError { field: "period", value, expected: "a servo with the run's period, µs" }.into()
         );
     }
-    if servo.encoder() != rig.encoder {
+    if servo.encoder() != encoder {
         let value = f64::from(servo.encoder().counts_per_rev());
         let expected = "a servo with the rig's encoder, counts per revolution";
         return Err(ParamError { field: "counts_per_rev", value, expected }.into());
     }
-    let kind = spec.engine(&rig)?;
+    let prepared = spec.prepare()?;
+    let mut state = prepared.servo_state(servo);
+    let Prepared { reference, mut moving, volts, engine } = prepared;
     let p = &spec.run;
-    p.check(spec.period)?;
     let period: f64 = spec.period.seconds();
     let ticks = p.ticks(spec.period);
-    // The path is planned in double precision and rounded to the law's scalar at each tick, so
-    // that runs in both scalars follow one path.
-    let reference = Reference::new(&spec.reference, p.start_position(), rig.encoder, spec.period)?;
-    let encoder = rig.encoder;
     let to_radians = |p: FixedCounts| p.minus::<f64>(FixedCounts(0)) * encoder.radians_per_count::<f64>();
 
-    let first = reference.at(0);
-    if i32::try_from(first.position.0 >> FixedCounts::FRACTION_BITS).is_err() {
-        let value = to_radians(first.position);
-        return Err(ParamError {
-            field: "points",
-            value,
-            expected: "a path that begins within ±2³¹ counts, rad",
-        }
-        .into());
-    }
-    let velocity = if p.start == Start::OnPath { first.velocity } else { 0.0 };
-    let volts = if p.start == Start::Rest { rig.resting_voltage() } else { rig.sliding_voltage(velocity) };
-    let mut moving = MovingRig::new(rig, kind, p.seed, (to_radians(first.position), velocity), volts);
-    let mut state = if spec.rig.encoder_quantised {
-        servo.start(moving.counts(), &first.cast(), T::from_f64(volts))
-    } else {
-        servo.start_at(moving.fine_counts(), &first.cast(), T::from_f64(volts))
-    };
-
-    let mut trace = Trace { start_voltage: volts, ..Trace::default() };
+    let kept = if keep == Keep::Trace { usize::try_from(ticks).unwrap_or(0) } else { 0 };
+    let mut trace = Trace { start_voltage: volts, ..Trace::with_capacity(kept) };
     let mut events = Vec::new();
     let mut figures = MetricsBuilder::new(period, p.settle);
     let detector = StickSlip::<f64>::new(&StickSlipParams::default(), encoder, spec.period)?;
@@ -329,7 +403,10 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
     let mut detected = Detected::default();
     for k in 0..ticks {
         if k % REPORT_EVERY == 0 {
-            progress(Progress { total: ticks, finished: REPORT_EVERY.min(ticks - k) });
+            let told = progress(Progress { total: ticks, finished: REPORT_EVERY.min(ticks - k) });
+            if told.is_break() {
+                return Err(RunError::Stopped);
+            }
         }
         let time = k as f64 * period;
         let target = reference.at(k);
@@ -350,28 +427,30 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
         let target_position = to_radians(target.position);
         let error = target_position - shaft.position;
         figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage: commanded });
-        trace.time.push(time);
-        trace.target_position.push(target_position);
-        trace.target_fixed.push(target.position);
-        trace.target_velocity.push(target.velocity);
-        trace.target_acceleration.push(target.acceleration);
-        trace.position.push(shaft.position);
-        trace.velocity.push(shaft.velocity);
-        trace.error.push(error);
-        trace.counts.push(counts.0);
-        trace.measured_error.push(out.tick.error.to_f64());
-        trace.error_rate.push(out.tick.error_rate.to_f64());
-        trace.code.push(out.code.0);
-        trace.voltage.push(commanded);
-        trace.demand.push(out.command.voltage.to_f64());
-        trace.limit.push(out.command.limit);
-        trace.stuck.push(shaft.motion == Motion::Stuck);
-        for (column, (name, value)) in trace.terms.iter_mut().zip(out.command.terms.columns()) {
-            column.0 = name;
-            column.1.push(value.to_f64());
+        if keep == Keep::Trace {
+            trace.time.push(time);
+            trace.target_position.push(target_position);
+            trace.target_fixed.push(target.position);
+            trace.target_velocity.push(target.velocity);
+            trace.target_acceleration.push(target.acceleration);
+            trace.position.push(shaft.position);
+            trace.velocity.push(shaft.velocity);
+            trace.error.push(error);
+            trace.counts.push(counts.0);
+            trace.measured_error.push(out.tick.error.to_f64());
+            trace.error_rate.push(out.tick.error_rate.to_f64());
+            trace.code.push(out.code.0);
+            trace.voltage.push(commanded);
+            trace.demand.push(out.command.voltage.to_f64());
+            trace.limit.push(out.command.limit);
+            trace.stuck.push(shaft.motion == Motion::Stuck);
+            for (column, (name, value)) in trace.terms.iter_mut().zip(out.command.terms.columns()) {
+                column.0 = name;
+                column.1.push(value.to_f64());
+            }
         }
 
-        if detector.update(&mut seen_by_encoder, counts, target.velocity) {
+        if detector.update(&mut seen_by_encoder, counts, target.velocity) && keep == Keep::Trace {
             detected.ticks.push(k);
         }
         if time < p.settle {
@@ -382,14 +461,16 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
         let seen = moving.advance(period)?;
         figures.stuck(time, stuck_time(was_stuck, time, period, seen));
         seen.iter().for_each(|e| figures.event(e));
-        events.extend_from_slice(seen);
+        if keep == Keep::Trace {
+            events.extend_from_slice(seen);
+        }
     }
     let metrics = figures.finish();
     let measured = metrics.measured_s.max(period);
     detected.stick_slip_cycles_per_s = (seen_by_encoder.cycles() - before_settling.0) as f64 / measured;
     detected.stick_time_fraction =
         (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured;
-    Ok(Run { trace, events, metrics, detected, engine: kind })
+    Ok(Run { trace, events, metrics, detected, engine })
 }
 
 /// Time spent stuck within one interval.

@@ -104,9 +104,9 @@ impl Locator {
         out
     }
 
-    /// The whole file with every default filled in, as TOML.
-    pub(super) fn canonical(&self) -> String {
-        self.table.to_string()
+    /// The whole file with every default filled in.
+    pub(super) fn table(&self) -> &Table {
+        &self.table
     }
 
     pub(super) fn path(&self, message: String) -> ScenarioError {
@@ -146,32 +146,33 @@ pub(super) fn to_table<T: Serialize>(value: &T) -> Table {
     Table::try_from(value).unwrap_or_default()
 }
 
-/// Puts a value, written as in the file, at a dotted key.
-pub(super) fn set(origin: &str, table: &mut Table, key: &str, text: &str) -> Result<(), ScenarioError> {
-    let origin = format!("{origin} with --set {key}={text}");
-    let value = match format!("x = {text}").parse::<Table>() {
-        Ok(mut t) => t.remove("x").unwrap_or(Value::String(text.into())),
+/// A value, written as in the file.
+pub(super) fn read_value(origin: &str, key: &str, text: &str) -> Result<Value, ScenarioError> {
+    match format!("x = {text}").parse::<Table>() {
+        Ok(mut t) => Ok(t.remove("x").unwrap_or(Value::String(text.into()))),
         // A bare word is a string, as shells make quoting hard.
-        Err(_) if text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') => Value::String(text.into()),
-        Err(_) => {
-            return Err(ScenarioError::value(
-                &origin,
-                key,
-                text,
-                "a TOML value: a number, true, \"text\" or [a, list]",
-            ));
+        Err(_) if text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') => {
+            Ok(Value::String(text.into()))
         }
+        Err(_) => {
+            let origin = format!("{origin} with --set {key}={text}");
+            let expected = "a TOML value: a number, true, \"text\" or [a, list]";
+            Err(ScenarioError::value(&origin, key, text, expected))
+        }
+    }
+}
+
+/// Puts a value at a dotted key.
+pub(super) fn set(origin: &str, table: &mut Table, key: &str, value: Value) -> Result<(), ScenarioError> {
+    let wrong = |message: String| {
+        let origin = format!("{origin} with {key} = {}", shown(&value));
+        ScenarioError::new(&origin, "", "", message)
     };
     let mut at = table;
     let mut parts = key.split('.').peekable();
     while let Some(part) = parts.next() {
         if part.is_empty() {
-            return Err(ScenarioError::new(
-                &origin,
-                "",
-                "",
-                format!("\"{key}\" is not a key: expected one like law.smc.kp_v"),
-            ));
+            return Err(wrong(format!("\"{key}\" is not a key: expected one like law.smc.kp_v")));
         }
         if parts.peek().is_none() {
             at.insert(part.to_owned(), value);
@@ -180,7 +181,7 @@ pub(super) fn set(origin: &str, table: &mut Table, key: &str, text: &str) -> Res
         let next = at.entry(part).or_insert_with(|| Value::Table(Table::new()));
         match next {
             Value::Table(t) => at = t,
-            _ => return Err(ScenarioError::new(&origin, "", "", format!("{part} is not a table"))),
+            _ => return Err(wrong(format!("{part} is not a table"))),
         }
     }
     Ok(())
@@ -269,7 +270,7 @@ fn quoted(message: &str) -> Vec<&str> {
     message.split('`').skip(1).step_by(2).collect()
 }
 
-fn lookup<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
+pub(super) fn lookup<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
     let mut parts = path.split('.');
     let mut value = table.get(parts.next()?)?;
     for part in parts {

@@ -5,13 +5,15 @@
 
 mod error;
 mod file;
+mod section;
 
 pub use error::ScenarioError;
 pub use file::ScalarKind;
+pub use section::check_section;
 
 use crate::progress::Report;
 use crate::rig::{Rig, RigParams, Ripple};
-use crate::run::{Run, RunError, RunSpec, Start, simulate_watched};
+use crate::run::{Keep, Run, RunError, RunSpec, Start, simulate_watched};
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::law::{Law, LawParams, Output};
 use clutch_core::reference::{Knot, Reference};
@@ -21,6 +23,8 @@ use clutch_core::{
 };
 use error::Locator;
 use file::File;
+use std::io::ErrorKind;
+use std::path::Path;
 use toml::{Table, Value};
 
 /// A built-in scenario.
@@ -82,6 +86,36 @@ pub struct Scenario {
     reach_rate: f64,
     safety: Option<Safety>,
     locator: Locator,
+    /// Made once: it walks the whole path.
+    plan: Option<Plan>,
+}
+
+/// A scenario could not be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// The system's answer.
+    #[error("{name}: {}", io_text(source))]
+    Io {
+        /// The file.
+        name: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// What is in the file.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+}
+
+fn io_text(e: &std::io::Error) -> String {
+    match e.kind() {
+        ErrorKind::NotFound => {
+            "no such file, and no built-in scenario of that name; `clutch scenario list` shows those, \
+             `clutch scenario new FILE` writes one to begin with"
+                .to_owned()
+        }
+        ErrorKind::InvalidData => "not a text file: expected TOML in UTF-8".to_owned(),
+        _ => e.to_string(),
+    }
 }
 
 /// What can be said of a scenario before it runs.
@@ -106,9 +140,23 @@ impl Scenario {
     /// # Errors
     /// What is wrong, where, and what is expected.
     pub fn parse(origin: &str, text: &str, set: &[(String, String)]) -> Result<Scenario, ScenarioError> {
-        let mut table: Table = text.parse().map_err(|e| ScenarioError::syntax(origin, &e))?;
+        let read = |(key, text): &(String, String)| Ok((key.clone(), error::read_value(origin, key, text)?));
+        let values = set.iter().map(read).collect::<Result<Vec<_>, ScenarioError>>()?;
+        Scenario::from_table(origin, read_table(origin, text)?, &values)
+    }
+
+    /// As [`Scenario::parse`], from a table that is already read, with values for the keys to
+    /// override.
+    ///
+    /// # Errors
+    /// What is wrong, where, and what is expected.
+    pub fn from_table(
+        origin: &str,
+        mut table: Table,
+        set: &[(String, Value)],
+    ) -> Result<Scenario, ScenarioError> {
         for (key, value) in set {
-            error::set(origin, &mut table, key, value)?;
+            error::set(origin, &mut table, key, value.clone())?;
         }
         merge_base(origin, &mut table)?;
         let file: File = error::deserialize(origin, &table)?;
@@ -119,6 +167,32 @@ impl Scenario {
     #[must_use]
     pub fn built_in(name: &str) -> Option<Result<Scenario, ScenarioError>> {
         BUILT_IN.iter().find(|b| b.name == name).map(|b| Scenario::parse(b.name, b.toml, &[]))
+    }
+
+    /// Reads the file of that name or, if there is none, the built-in scenario of that name.
+    ///
+    /// # Errors
+    /// The file cannot be read, or what is wrong with the scenario in it.
+    pub fn load(name: &Path, set: &[(String, String)]) -> Result<Scenario, LoadError> {
+        let (origin, text) = Scenario::text(name)?;
+        Ok(Scenario::parse(&origin, &text, set)?)
+    }
+
+    /// The text of that file or, if there is none, of that built-in scenario, and what errors
+    /// call it.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn text(name: &Path) -> Result<(String, String), LoadError> {
+        let origin = name.to_string_lossy().into_owned();
+        let built_in = BUILT_IN.iter().find(|b| b.name == origin);
+        if let (Some(b), false) = (built_in, name.exists()) {
+            return Ok((origin, b.toml.to_owned()));
+        }
+        match std::fs::read_to_string(name) {
+            Ok(text) => Ok((origin, text)),
+            Err(source) => Err(LoadError::Io { name: origin, source }),
+        }
     }
 
     fn check(origin: &str, file: &File) -> Result<Scenario, ScenarioError> {
@@ -145,7 +219,7 @@ impl Scenario {
             reference: clutch_core::reference::ReferenceParams::Hold,
             run,
         };
-        let scenario = Scenario {
+        let mut scenario = Scenario {
             name: file.name.clone(),
             scalar: file.sampling.scalar,
             spec,
@@ -155,13 +229,14 @@ impl Scenario {
             reach_rate: file.bounds.reach_rate_rad_s2,
             safety: file.safety.as_ref().map(|s| s.safety(checked.params.speed_limit)),
             locator,
+            plan: None,
         };
-        scenario.check_parts()?;
+        scenario.plan = Some(scenario.check_parts()?);
         Ok(scenario)
     }
 
     /// Builds each part once, so that whatever is wrong is said before anything runs.
-    fn check_parts(&self) -> Result<(), ScenarioError> {
+    fn check_parts(&self) -> Result<Plan, ScenarioError> {
         let (spec, at) = (self.spec(), &self.locator);
         spec.period.period::<f64>().map_err(|e| at.at("sampling", &e))?;
         match self.scalar {
@@ -172,26 +247,18 @@ impl Scenario {
         let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| at.at("rig", &e))?;
         spec.engine(&rig).map_err(|e| at.message("run.engine", e.to_string()))?;
         self.path().map_err(|e| at.at("reference", &e))?;
-        let plan = self.plan()?;
-        self.safety.as_ref().map_or(Ok(()), |s| self.check_safety(s, &plan))
+        let plan = self.make_plan()?;
+        self.safety.as_ref().map_or(Ok(()), |s| self.check_safety(s, &plan))?;
+        Ok(plan)
     }
 
     fn check_safety(&self, safety: &Safety, plan: &Plan) -> Result<(), ScenarioError> {
         let (spec, at) = (self.spec(), &self.locator);
         let wrong = |e: ParamError| at.at("safety", &e);
-        if safety.reason.trim().is_empty() {
-            let message =
-                "expected why this safe state is right for this rig, as \"a weight drives the shaft\"";
-            return Err(at.message("safety.reason", message.to_owned()));
-        }
+        section::check_reason(&safety.reason, at)?;
         let servo = spec.servo().map_err(|e| at.at("rig", &e))?;
         Supervisor::new(&safety.supervisor, &servo, &plan.bounds).map_err(wrong)?;
-        let cycles = |field, n: u32, low: u32, expected| {
-            let bad = ParamError { field, value: f64::from(n), expected };
-            if (low..=1000).contains(&n) { Ok(()) } else { Err(wrong(bad)) }
-        };
-        cycles("watchdog_cycles", safety.watchdog_cycles, 2, "2 to 1000 periods")?;
-        cycles("valid_cycles", safety.valid_cycles, 1, "1 to 1000 periods")?;
+        section::check_cycles(safety).map_err(wrong)?;
         // A brake that is to hold must hold the strongest drive with the weakest brake.
         let b = &plan.bounds;
         let needed = b.drive_torque.high / b.weakest_brake();
@@ -248,7 +315,13 @@ impl Scenario {
     /// The scenario as TOML with every default filled in; parsing it gives the same scenario.
     #[must_use]
     pub fn canonical(&self) -> String {
-        self.locator.canonical()
+        self.table().to_string()
+    }
+
+    /// The scenario as a table with every default filled in.
+    #[must_use]
+    pub fn table(&self) -> &Table {
+        self.locator.table()
     }
 
     /// The specification of the run.
@@ -271,8 +344,12 @@ impl Scenario {
     /// Path and gains against the bounds of the believed plant.
     ///
     /// # Errors
-    /// A path that a brake cannot follow, or one above the rig's speed limit.
+    /// None for a checked scenario.
     pub fn plan(&self) -> Result<Plan, ScenarioError> {
+        self.plan.clone().map_or_else(|| self.make_plan(), Ok)
+    }
+
+    fn make_plan(&self) -> Result<Plan, ScenarioError> {
         let (spec, at) = (self.spec(), &self.locator);
         let param = |section: &'static str| move |e: ParamError| at.at(section, &e);
         let path = self.path().map_err(param("reference"))?;
@@ -328,21 +405,28 @@ impl Scenario {
         Ok(Plan { envelope, bounds, certificate, paper, demand })
     }
 
-    /// Runs it, telling of its progress in samples.
+    /// Runs it, keeping what is asked for and telling of its progress in samples.
     ///
     /// # Errors
-    /// An engine that the rig does not allow, or a motion that cannot be followed.
-    pub fn run(&self, progress: Report<'_>) -> Result<Run, ScenarioError> {
+    /// A motion that cannot be followed; the end of `progress`'s patience.
+    pub fn run(&self, keep: Keep, progress: Report<'_>) -> Result<Run, ScenarioError> {
         let spec = self.spec();
         let run = match self.scalar {
-            ScalarKind::F32 => simulate_watched::<f32>(&spec, progress),
-            ScalarKind::F64 => simulate_watched::<f64>(&spec, progress),
+            ScalarKind::F32 => simulate_watched::<f32>(&spec, keep, progress),
+            ScalarKind::F64 => simulate_watched::<f64>(&spec, keep, progress),
         };
-        run.map_err(|e| match e {
-            RunError::Param(e) => self.locator.at("", &e),
+        run.map_err(|e| self.run_error(&e))
+    }
+
+    /// The error of a run as one of this scenario.
+    #[must_use]
+    pub fn run_error(&self, e: &RunError) -> ScenarioError {
+        match e {
+            RunError::Param(e) => self.locator.at("", e),
             RunError::Engine(_) => self.locator.message("run.engine", e.to_string()),
             RunError::Motion(_) => self.locator.message("rig", e.to_string()),
-        })
+            RunError::Stopped => self.locator.message("", e.to_string()),
+        }
     }
 
     /// Where the rig lies outside the bounds that the certificate was asked for: a line each.
@@ -380,6 +464,10 @@ impl Scenario {
         check("dynamic friction", d.0, d.1, &bounds.mu_dynamic);
         Ok(lines)
     }
+}
+
+fn read_table(origin: &str, text: &str) -> Result<Table, ScenarioError> {
+    text.parse().map_err(|e| ScenarioError::syntax(origin, &e))
 }
 
 /// Lays the file's rig over the one that `rig.base` names.

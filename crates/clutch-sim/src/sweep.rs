@@ -1,0 +1,175 @@
+//! Sweeps: one scenario, many values of its keys, on all cores.
+//!
+//! Each row is a run of its own, with its own seed. Its result depends on nothing but the row: not on
+//! the number of threads, nor on which other rows there are.
+
+use crate::progress::UNWATCHED;
+use crate::run::{Keep, Run};
+use crate::scenario::{Scenario, ScenarioError};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use toml::{Table, Value};
+
+/// A scenario and the keys that change from row to row.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    origin: String,
+    base: Table,
+    keys: Vec<String>,
+    rows: Vec<Vec<Value>>,
+}
+
+/// A row that ran.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Whether the gains are certified for the row's bounds.
+    pub certified: bool,
+    /// Figures, and the trace if it was to be kept.
+    pub run: Run,
+}
+
+/// A sweep's rows and keys do not belong together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("row {row} has {values} values for {keys} keys")]
+pub struct Misfit {
+    /// The row, from 0.
+    pub row: usize,
+    /// Values in it.
+    pub values: usize,
+    /// Keys of the sweep.
+    pub keys: usize,
+}
+
+impl Sweep {
+    /// `rows` of values for the dotted `keys`, over `base`; errors of a row begin with `origin`.
+    ///
+    /// # Errors
+    /// A row that has not one value for each key.
+    pub fn new(origin: &str, base: Table, keys: Vec<String>, rows: Vec<Vec<Value>>) -> Result<Sweep, Misfit> {
+        match rows.iter().position(|row| row.len() != keys.len()) {
+            Some(row) => Err(Misfit { row, values: rows[row].len(), keys: keys.len() }),
+            None => Ok(Sweep { origin: origin.into(), base, keys, rows }),
+        }
+    }
+
+    /// The number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// No rows at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// A row's scenario.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    ///
+    /// # Panics
+    /// There is no such row.
+    pub fn scenario(&self, row: usize) -> Result<Scenario, ScenarioError> {
+        let set: Vec<_> = self.keys.iter().cloned().zip(self.rows[row].iter().cloned()).collect();
+        Scenario::from_table(&self.origin, self.base.clone(), &set)
+    }
+
+    /// Runs all rows on so many threads. `done` is called from these, with each finished row,
+    /// in no order. Once `stop` is set, runs under way end within milliseconds and are not told.
+    pub fn run(
+        &self,
+        threads: usize,
+        keep: Keep,
+        stop: &AtomicBool,
+        done: &(dyn Fn(usize, Result<Row, ScenarioError>) + Sync),
+    ) {
+        let next = AtomicUsize::new(0);
+        let work = || {
+            while !stop.load(Ordering::Relaxed) {
+                let i = next.fetch_add(1, Ordering::Relaxed);
+                if i >= self.rows.len() {
+                    break;
+                }
+                let outcome = self.row(i, keep, stop);
+                if stop.load(Ordering::Relaxed) {
+                    break;
+                }
+                done(i, outcome);
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 1..threads.max(1).min(self.rows.len().max(1)) {
+                scope.spawn(work);
+            }
+            work();
+        });
+    }
+
+    fn row(&self, i: usize, keep: Keep, stop: &AtomicBool) -> Result<Row, ScenarioError> {
+        let scenario = self.scenario(i)?;
+        let certified = scenario.plan()?.certificate.certified();
+        let run = scenario.run(keep, &|p| {
+            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { UNWATCHED(p) }
+        })?;
+        Ok(Row { certified, run })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::BUILT_IN;
+    use std::sync::Mutex;
+
+    fn sweep(rows: &[f64]) -> Sweep {
+        let pd = BUILT_IN.iter().find(|b| b.name == "pd_2").unwrap();
+        let keys = vec!["law.pd.kp_v_rad".to_owned(), "run.duration_s".to_owned()];
+        let rows = rows.iter().map(|kp| vec![Value::Float(*kp), Value::Float(1.5)]).collect();
+        Sweep::new("pd_2", pd.toml.parse().unwrap(), keys, rows).unwrap()
+    }
+
+    fn outcomes(s: &Sweep, threads: usize) -> Vec<Result<crate::Metrics, ScenarioError>> {
+        let found = Mutex::new(vec![None; s.len()]);
+        s.run(threads, Keep::Figures, &AtomicBool::new(false), &|i, r| {
+            found.lock().unwrap()[i] = Some(r.map(|r| r.run.metrics));
+        });
+        found.into_inner().unwrap().into_iter().map(Option::unwrap).collect()
+    }
+
+    #[test]
+    fn a_row_is_what_its_scenario_gives_alone_on_any_number_of_threads() {
+        let s = sweep(&[50.0, 80.0, 110.0, 140.0, 170.0]);
+        let alone: Vec<_> = (0..s.len())
+            .map(|i| Ok(s.scenario(i).unwrap().run(Keep::Trace, UNWATCHED).unwrap().metrics))
+            .collect();
+        for threads in [1, 2, 7] {
+            assert_eq!(outcomes(&s, threads), alone, "{threads} threads");
+        }
+    }
+
+    #[test]
+    fn a_row_that_a_scenario_refuses_is_told_and_the_others_run() {
+        let found = outcomes(&sweep(&[50.0, -1.0, 80.0]), 2);
+        assert!(found[0].is_ok() && found[2].is_ok());
+        assert_eq!(found[1].as_ref().unwrap_err().key, "law.pd.kp_v_rad");
+    }
+
+    #[test]
+    fn a_stopped_sweep_tells_no_unfinished_row() {
+        let (s, stop, told) = (sweep(&[80.0; 50]), AtomicBool::new(false), AtomicUsize::new(0));
+        s.run(2, Keep::Figures, &stop, &|_, r| {
+            r.unwrap();
+            told.fetch_add(1, Ordering::SeqCst);
+            stop.store(true, Ordering::SeqCst);
+        });
+        assert!((1..=2).contains(&told.load(Ordering::SeqCst)));
+    }
+
+    #[test]
+    fn rows_that_do_not_fit_the_keys_are_refused() {
+        let bad = Sweep::new("x", Table::new(), vec!["run.seed".into()], vec![vec![]]).unwrap_err();
+        assert_eq!(bad, Misfit { row: 0, values: 0, keys: 1 });
+    }
+}
