@@ -3,6 +3,7 @@
 mod fuzz;
 mod python;
 mod run;
+mod stubs;
 mod test;
 
 use anyhow::{Context, Result};
@@ -60,6 +61,8 @@ enum Verb {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,
     },
+    /// Generates the type stub of the Python package's native module anew.
+    Stubs,
     /// Draws the README's figures again, with `clutch reproduce`.
     Figures,
 }
@@ -87,6 +90,7 @@ fn main() -> Result<()> {
         Verb::Latency { rest } => {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
+        Verb::Stubs => stubs::generate(false).map(drop),
         Verb::Figures => figures(),
     }
 }

@@ -1,30 +1,133 @@
-//! A private Python environment for the tests.
+//! Python: a private environment for tools, and the wheel in one of its own.
 
-use crate::run::{program, root};
+use crate::run::{cargo, program, root};
 use anyhow::{Context, Result, bail};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// The environment's interpreter, made and filled if need be.
+/// The interpreter of the environment with everything but the wheel, made and filled if need be.
 pub(crate) fn interpreter() -> Result<PathBuf> {
     let venv = root().join(".venv");
     let python = venv.join("bin/python");
     if !python.exists() {
-        let make = || program("python3").args(["-m", "venv"]).arg(&venv).quietly();
-        let (made, text) = make().context("the tests need Python 3.11 or later as `python3`")?;
-        if !made {
-            // Debian keeps ensurepip in a package of its own.
-            install_debian("python3-venv").with_context(|| format!("python3 -m venv failed:\n{text}"))?;
-            let (made, text) = make()?;
-            if !made {
-                bail!("python3 -m venv failed:\n{text}");
-            }
-        }
+        make_environment("python3".as_ref(), &venv, &[])?;
     }
     let requirements = "python/tests/requirements.txt";
     program(&python)
         .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", requirements])
         .run()?;
     Ok(python)
+}
+
+fn make_environment(python: &Path, venv: &Path, args: &[&str]) -> Result<()> {
+    let make = || program(python).args(["-m", "venv"]).args(args).arg(venv).quietly();
+    let (made, text) = make().context("the tests need Python 3.11 or later as `python3`")?;
+    if !made {
+        // Debian keeps ensurepip in a package of its own.
+        install_debian("python3-venv").with_context(|| format!("python3 -m venv failed:\n{text}"))?;
+        let (made, text) = make()?;
+        if !made {
+            bail!("python3 -m venv failed:\n{text}");
+        }
+    }
+    Ok(())
+}
+
+/// A program that is installed beside an interpreter.
+pub(crate) fn beside(python: &Path, name: &str) -> PathBuf {
+    python.with_file_name(name)
+}
+
+/// The wheel in an environment of its own, outside of this tree.
+pub(crate) struct Wheel {
+    /// Its folder, gone when this is dropped.
+    folder: PathBuf,
+    /// Its interpreter.
+    pub(crate) python: PathBuf,
+}
+
+impl Drop for Wheel {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+impl Wheel {
+    /// Builds the source distribution, from it the wheel, and installs that. What the wheel is tested
+    /// with is seen through from `tools`, the environment of [`interpreter`].
+    pub(crate) fn install(tools: &Path) -> Result<Wheel> {
+        let (dist, target) = (root().join("target/dist"), root().join("target"));
+        let _ = std::fs::remove_dir_all(&dist);
+        program(beside(tools, "maturin")).args(["sdist", "--quiet", "--out"]).arg(&dist).run()?;
+        let sdist = the_one(&dist, "tar.gz")?;
+        let pip = |python: &Path| program(python).args(["-m", "pip", "--disable-pip-version-check"]);
+        // Its own build environment would need maturin from the net once more.
+        pip(tools)
+            .args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"])
+            .arg(&dist)
+            .arg(&sdist)
+            .env("CARGO_TARGET_DIR", &target)
+            .env("PATH", path_with(tools)?)
+            .run()?;
+        let folder = std::env::temp_dir().join(format!("clutch-wheel-{}", std::process::id()));
+        make_environment(tools, &folder, &["--clear", "--without-pip"])?;
+        let wheel = Wheel { python: folder.join("bin/python"), folder };
+        pip(tools)
+            .arg("--python")
+            .arg(&wheel.python)
+            .args(["install", "--quiet", "--no-deps"])
+            .arg(the_one(&dist, "whl")?)
+            .run()?;
+        let (found, site) = program(tools)
+            .args(["-c", "import sysconfig; print(sysconfig.get_path('purelib'))"])
+            .quietly()?;
+        let (_, own) = program(&wheel.python)
+            .args(["-c", "import sysconfig; print(sysconfig.get_path('purelib'))"])
+            .quietly()?;
+        if !found {
+            bail!("{} does not tell its packages: {site}", tools.display());
+        }
+        std::fs::write(Path::new(own.trim()).join("tools.pth"), site)?;
+        Ok(wheel)
+    }
+
+    /// A program of the environment, to be run outside of the tree.
+    pub(crate) fn program(&self, tools: &Path) -> Result<crate::run::Program> {
+        Ok(program(&self.python).within(&self.folder).env("PATH", {
+            let mut path = self.folder.join("bin").into_os_string();
+            path.push(":");
+            path.push(path_with(tools)?);
+            path
+        }))
+    }
+}
+
+/// The search path with an interpreter's folder first.
+fn path_with(python: &Path) -> Result<std::ffi::OsString> {
+    let mut path = python.parent().context("an interpreter's folder")?.as_os_str().to_owned();
+    path.push(":");
+    path.push(std::env::var_os("PATH").unwrap_or_default());
+    Ok(path)
+}
+
+/// The only file of that kind in a folder.
+fn the_one(folder: &Path, ending: &str) -> Result<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.to_string_lossy().ends_with(ending) {
+            found.push(path);
+        }
+    }
+    match &found[..] {
+        [one] => Ok(one.clone()),
+        _ => bail!("{}: expected one file *.{ending}, found {}", folder.display(), found.len()),
+    }
+}
+
+/// Builds the binary that the wheel's command is compared with.
+pub(crate) fn binary() -> Result<PathBuf> {
+    cargo(["build", "--release", "--package", "clutch-cli"]).run()?;
+    Ok(root().join("target/release/clutch"))
 }
 
 /// Installs a package of Debian, as root.

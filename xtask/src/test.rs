@@ -3,6 +3,7 @@
 use crate::fuzz;
 use crate::python;
 use crate::run::{cargo, program, root};
+use crate::stubs;
 use anyhow::{Result, bail};
 
 /// What the core must compile for: a core without atomics, one with a floating-point unit, and
@@ -60,7 +61,8 @@ pub(crate) fn all() -> Result<()> {
         sound &= cargo(["test"]).args(args).lines(|l| tally.read(l))?;
         Ok(())
     };
-    rust(&["--workspace", "--no-fail-fast"])?;
+    // The wheel's module only links inside of Python; it is tested there, below.
+    rust(&["--workspace", "--exclude", "clutch-py", "--no-fail-fast"])?;
     // The core as firmware takes it, without the features that the workspace turns on.
     rust(&["--package", "clutch-core", "--lib", "--no-fail-fast"])?;
 
@@ -101,14 +103,7 @@ pub(crate) fn all() -> Result<()> {
         tally.skipped += fuzz::TARGETS.len() as u64;
     }
 
-    cargo(["build", "--release", "--package", "clutch-cli"]).run()?;
-    cargo(["build", "--release", "--package", "clutch-log", "--example", "write_demo"]).run()?;
-    let python = python::interpreter()?;
-    sound &= program(python)
-        .args(["-m", "pytest", "--color=no", "-q", "python/tests"])
-        .env("CLUTCH_BIN", root().join("target/release/clutch"))
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .lines(|l| tally.read(l))?;
+    sound &= python(&mut tally)?;
 
     let Tally { passed, failed, skipped } = tally;
     println!("\n{passed} passed, {failed} failed, {skipped} skipped");
@@ -132,6 +127,43 @@ fn targets() -> Result<&'static [&'static str]> {
 }
 
 /// The core links without a reachable panic; the same with one put in does not.
+/// The wheel: built from its source distribution, installed outside of this tree, tested there.
+fn python(tally: &mut Tally) -> Result<bool> {
+    let binary = python::binary()?;
+    cargo(["build", "--release", "--package", "clutch-log", "--example", "write_demo"]).run()?;
+    let tools = python::interpreter()?;
+    tally.check("the type stub is what the native module gives", stubs::generate(true)?);
+    let tool = |name: &str, args: &[&str]| program(python::beside(&tools, name)).args(args).quietly();
+    let mut quiet = |name: &str, (holds, text): (bool, String)| {
+        if !holds {
+            println!("{text}");
+        }
+        tally.check(name, holds);
+    };
+    quiet(
+        "ruff finds nothing in python, benches/python and docs",
+        tool("ruff", &["check", "python", "benches/python", "docs"])?,
+    );
+    let wheel = python::Wheel::install(&tools)?;
+    let strict = ["-m", "mypy", "--strict", "-p", "clutch"];
+    quiet(
+        "mypy --strict finds nothing in the installed package",
+        wheel.program(&tools)?.args(strict).quietly()?,
+    );
+    let stubtest = ["-m", "mypy.stubtest", "clutch._clutch"];
+    quiet(
+        "the type stub agrees with the module at run time",
+        wheel.program(&tools)?.args(stubtest).quietly()?,
+    );
+    wheel
+        .program(&tools)?
+        .args(["-m", "pytest", "--color=no", "-q"])
+        .arg(root().join("python/tests"))
+        .env("CLUTCH_BIN", binary)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .lines(|l| tally.read(l))
+}
+
 fn no_panic(tally: &mut Tally) -> Result<()> {
     let image = || {
         cargo(["build", "--release", "--manifest-path", "tests/no_panic/Cargo.toml"]).args([

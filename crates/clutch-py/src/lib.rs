@@ -1,0 +1,47 @@
+//! The native module `clutch._clutch`: wrappers around the Rust crates, and nothing of its own.
+//!
+//! `python/clutch` is the public package; what it shows of this module it names `clutch.…`.
+
+mod convert;
+mod log;
+mod paper;
+mod run;
+mod scenario;
+mod stepping;
+mod sweep;
+mod table;
+
+use pyo3::prelude::*;
+
+/// The `clutch` command with these arguments, the program's name first; its exit code.
+#[pyfunction]
+fn main(py: Python<'_>, args: Vec<std::ffi::OsString>) -> u8 {
+    py.detach(|| clutch_cli::main(args))
+}
+
+/// The native half of the package `clutch`.
+#[pymodule]
+mod _clutch {
+    #[pymodule_export]
+    use super::log::{Log, read_log};
+    #[pymodule_export]
+    use super::main;
+    #[pymodule_export]
+    use super::paper::{Paper, reproduce};
+    #[pymodule_export]
+    use super::run::{Run, simulate};
+    #[pymodule_export]
+    use super::scenario::{Scenario, brake_gain, check, rig, scenarios, stribeck};
+    #[pymodule_export]
+    use super::stepping::{Controller, Path, Plant, Target, Tick};
+    #[pymodule_export]
+    use super::sweep::Sweep;
+    #[pymodule_export]
+    use super::table::Table;
+    /// Version of the package.
+    #[pymodule_export]
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
+    /// Version and commit of the build, as logs tell it.
+    #[pymodule_export]
+    const BUILD: &str = clutch_cli::BUILD;
+}

@@ -1,0 +1,188 @@
+//! Simulation: one run, its samples, events and figures.
+
+use crate::convert::{core_error, os_error};
+use crate::scenario::Scenario;
+use crate::stepping::{PythonLaw, event_table, native, output_stage};
+use crate::table::{Column, Table};
+use clutch_core::law::Limit;
+use clutch_core::{ParamError, Servo};
+use clutch_loop::records::{SaveError, save_simulation};
+use clutch_sim::engine::EngineKind;
+use clutch_sim::progress::Progress;
+use clutch_sim::{Keep, Metrics, RunError, ScenarioError, simulate_servo};
+use pyo3::exceptions::{PyFileExistsError, PyRuntimeError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A finished run.
+#[pyclass(frozen, module = "clutch._clutch")]
+pub(crate) struct Run {
+    scenario: Scenario,
+    run: Arc<clutch_sim::Run>,
+    /// A log names the law that ran, which of Python's it cannot.
+    python_law: bool,
+}
+
+/// Ends the work when a signal waits, as Ctrl-C.
+fn unless_interrupted(_: Progress) -> ControlFlow<()> {
+    match Python::attach(|py| py.check_signals()) {
+        Ok(()) => ControlFlow::Continue(()),
+        Err(e) => {
+            Python::attach(|py| e.restore(py));
+            ControlFlow::Break(())
+        }
+    }
+}
+
+/// Runs a scenario; `law`, a callable of a `Tick`, takes the place of its law.
+#[pyfunction]
+#[pyo3(signature = (scenario, law=None))]
+pub(crate) fn simulate(py: Python<'_>, scenario: &Bound<'_, PyAny>, law: Option<Py<PyAny>>) -> PyResult<Run> {
+    let scenario = native(scenario)?;
+    let python_law = law.is_some();
+    let run = match law {
+        None => py.detach(|| scenario.0.run(Keep::Trace, &unless_interrupted)),
+        Some(callable) => with_python_law(py, &scenario, callable)?,
+    };
+    // The signal's exception is set already.
+    if let Some(e) = PyErr::take(py) {
+        return Err(e);
+    }
+    let run = Arc::new(run.map_err(|e| scenario.error(py, &e))?);
+    Ok(Run { scenario, run, python_law })
+}
+
+fn with_python_law(
+    py: Python<'_>,
+    scenario: &Scenario,
+    callable: Py<PyAny>,
+) -> PyResult<Result<clutch_sim::Run, ScenarioError>> {
+    let spec = scenario.0.spec();
+    let wrong = |e: &ParamError| core_error(py, e);
+    let law = PythonLaw::new(callable, output_stage(py, scenario)?, spec.period.seconds());
+    let params = spec.servo().map_err(|e| wrong(&e))?;
+    let servo = Servo::with_law(&params, law).map_err(|e| wrong(&e))?;
+    let run = py.detach(|| simulate_servo(&spec, &servo, Keep::Trace, &unless_interrupted));
+    match servo.law().failure() {
+        Some(e) => Err(e),
+        None => Ok(run.map_err(|e: RunError| scenario.0.run_error(&e))),
+    }
+}
+
+/// Figures by name, with the two that the encoder shows.
+pub(crate) fn figures(
+    m: &Metrics,
+    detected: &clutch_sim::run::Detected,
+) -> [(&'static str, Option<f64>); 13] {
+    [
+        ("measured_s", Some(m.measured_s)),
+        ("max_error_rad", Some(m.max_error_rad)),
+        ("rms_error_rad", Some(m.rms_error_rad)),
+        ("mean_error_rad", Some(m.mean_error_rad)),
+        ("iae_rad_s", Some(m.iae_rad_s)),
+        ("stick_slip_cycles_per_s", Some(m.stick_slip_cycles_per_s)),
+        ("stick_time_fraction", Some(m.stick_time_fraction)),
+        ("stair_height_rad", Some(m.stair_height_rad)),
+        ("break_away_torque_nm", m.break_away_torque_nm),
+        ("control_variation_v_s", Some(m.control_variation_v_s)),
+        ("jerk_rms_rad_s3", Some(m.jerk_rms_rad_s3)),
+        ("detected_stick_slip_cycles_per_s", Some(detected.stick_slip_cycles_per_s)),
+        ("detected_stick_time_fraction", Some(detected.stick_time_fraction)),
+    ]
+}
+
+/// Samples as columns, the memory shared with the run.
+pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)> {
+    let limit = run.trace.limit.iter().map(|l| match l {
+        Limit::None => 0_u16,
+        Limit::Lowest => 1,
+        Limit::Highest => 2,
+        Limit::Invalid => 3,
+    });
+    let limit = Column::own(limit.collect::<Vec<u16>>());
+    let mut columns: Vec<(String, Column)> = vec![
+        ("time_s".into(), Column::part(run, |r| &r.trace.time)),
+        ("target_position_rad".into(), Column::part(run, |r| &r.trace.target_position)),
+        ("target_velocity_rad_s".into(), Column::part(run, |r| &r.trace.target_velocity)),
+        ("target_acceleration_rad_s2".into(), Column::part(run, |r| &r.trace.target_acceleration)),
+        ("position_rad".into(), Column::part(run, |r| &r.trace.position)),
+        ("velocity_rad_s".into(), Column::part(run, |r| &r.trace.velocity)),
+        ("error_rad".into(), Column::part(run, |r| &r.trace.error)),
+        ("counts".into(), Column::part(run, |r| &r.trace.counts)),
+        ("measured_error_rad".into(), Column::part(run, |r| &r.trace.measured_error)),
+        ("error_rate_rad_s".into(), Column::part(run, |r| &r.trace.error_rate)),
+        ("code".into(), Column::part(run, |r| &r.trace.code)),
+        ("voltage_v".into(), Column::part(run, |r| &r.trace.voltage)),
+        ("demand_v".into(), Column::part(run, |r| &r.trace.demand)),
+        ("limit".into(), limit),
+        ("stuck".into(), Column::part(run, |r| &r.trace.stuck)),
+    ];
+    for i in 0..3 {
+        let name = run.trace.terms[i].0;
+        // A law may call a term like a column: PD's demand_v is its sum before the output stage.
+        let name =
+            if columns.iter().any(|(n, _)| n == name) { format!("law_{name}") } else { name.to_owned() };
+        if !run.trace.terms[i].0.is_empty() {
+            columns.push((name, Column::part(run, |r| r.trace.terms[i].1.as_slice())));
+        }
+    }
+    columns
+}
+
+#[pymethods]
+impl Run {
+    /// A row for each sample.
+    #[getter]
+    fn samples(&self) -> Table {
+        Table::of(sample_columns(&self.run))
+    }
+
+    /// Sticks and break-aways.
+    #[getter]
+    fn events(&self) -> Table {
+        event_table(&self.run.events)
+    }
+
+    /// Figures by name.
+    #[getter]
+    fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (name, value) in figures(&self.run.metrics, &self.run.detected) {
+            dict.set_item(name, value)?;
+        }
+        Ok(dict)
+    }
+
+    /// Which engine ran.
+    #[getter]
+    fn engine(&self) -> &'static str {
+        match self.run.engine {
+            EngineKind::ExactFlow => "exact_flow",
+            EngineKind::DormandPrince | EngineKind::Auto => "dormand_prince",
+        }
+    }
+
+    /// Writes the log that `clutch sim --log` writes.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        if self.python_law {
+            return Err(PyRuntimeError::new_err(
+                "a run with a law written in Python has no log: a log holds the law that ran, for its replay",
+            ));
+        }
+        if path.exists() {
+            let text = format!("{}: exists already; a log is never written over", path.display());
+            return Err(PyFileExistsError::new_err(text));
+        }
+        let written = py.detach(|| save_simulation(&path, &self.scenario.0, &self.run, clutch_cli::BUILD));
+        written.map_err(|e| match e {
+            SaveError::Log(e) => crate::convert::log_error(py, &e),
+            SaveError::Setup(e) => {
+                let source = std::io::Error::other(e.to_string());
+                os_error(py, &path, &e.to_string(), &source)
+            }
+        })
+    }
+}

@@ -1,0 +1,222 @@
+//! Checked scenarios, and the checks of single tables.
+
+use crate::convert::{
+    core_error, from_json, from_table, load_error, overrides, param_error, scenario_error, to_table,
+};
+use crate::stepping::Path;
+use clutch_core::{BrakeGeometry, Stribeck};
+use clutch_sim::rig::Rig;
+use clutch_sim::scenario::{BUILT_IN, check_section};
+use clutch_sim::{ScenarioError, Start};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+use std::sync::Arc;
+use toml::{Table, Value};
+
+/// A checked scenario, as the simulator takes it; `clutch.Scenario` is its public face.
+#[pyclass(frozen, module = "clutch._clutch")]
+#[derive(Clone)]
+pub(crate) struct Scenario(pub(crate) Arc<clutch_sim::Scenario>);
+
+impl Scenario {
+    pub(crate) fn error(&self, py: Python<'_>, e: &ScenarioError) -> PyErr {
+        scenario_error(py, e, Some(self.0.table()))
+    }
+}
+
+#[pymethods]
+impl Scenario {
+    /// Checks the tables of a scenario.
+    #[new]
+    #[pyo3(signature = (tables, origin="Scenario"))]
+    fn new(py: Python<'_>, tables: &Bound<'_, PyDict>, origin: &str) -> PyResult<Scenario> {
+        let table = to_table(tables)?;
+        match clutch_sim::Scenario::from_table(origin, table.clone(), &[]) {
+            Ok(s) => Ok(Scenario(Arc::new(s))),
+            Err(e) => Err(scenario_error(py, &e, Some(&table))),
+        }
+    }
+
+    /// Reads a scenario from TOML; errors begin with `origin`.
+    #[staticmethod]
+    #[pyo3(signature = (origin, text, overrides=None))]
+    fn parse(
+        py: Python<'_>,
+        origin: &str,
+        text: &str,
+        overrides: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Scenario> {
+        let set = crate::convert::overrides(overrides)?;
+        parse(py, origin, text, &set)
+    }
+
+    /// Reads a scenario from a file or, if there is none, the built-in one of that name.
+    #[staticmethod]
+    #[pyo3(signature = (name, overrides=None))]
+    fn load(
+        py: Python<'_>,
+        name: std::path::PathBuf,
+        overrides: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Scenario> {
+        let set = self::overrides(overrides)?;
+        let (origin, text) = clutch_sim::Scenario::text(&name).map_err(|e| load_error(py, &e))?;
+        parse(py, &origin, &text, &set)
+    }
+
+    /// Every table with its defaults filled in.
+    fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        from_table(py, self.0.table())
+    }
+
+    /// The scenario's file, defaults filled in.
+    fn to_toml(&self) -> String {
+        self.0.canonical()
+    }
+
+    /// What `clutch certify --json` prints.
+    fn certificate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let found = py.detach(|| clutch_cli::certify::certificate(&self.0));
+        from_json(py, &found.map_err(|e| self.error(py, &e))?)
+    }
+
+    /// The path, sampled.
+    fn path(&self, py: Python<'_>) -> PyResult<Path> {
+        Path::new(py, self)
+    }
+
+    /// The number of ticks in a run.
+    #[getter]
+    fn ticks(&self) -> u64 {
+        self.0.ticks()
+    }
+
+    /// Acceleration of the plant (1) at time, position, velocity and brake voltage, rad/s²;
+    /// 0 at rest while friction holds.
+    fn acceleration(
+        &self,
+        py: Python<'_>,
+        time: f64,
+        position: f64,
+        velocity: f64,
+        voltage: f64,
+    ) -> PyResult<f64> {
+        let spec = self.0.spec();
+        let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| core_error(py, &e))?;
+        Ok(rig.acceleration(time, position, velocity, voltage))
+    }
+
+    /// Position and velocity at which a run begins (rad, rad/s), and the brake's voltage then (V).
+    fn initial(&self, py: Python<'_>) -> PyResult<(f64, f64, f64)> {
+        let spec = self.0.spec();
+        let begun = spec.prepare().map_err(|e| self.error(py, &self.0.run_error(&e)))?;
+        let velocity = if spec.run.start == Start::OnPath { begun.reference.at(0).velocity } else { 0.0 };
+        Ok((begun.moving.shaft().position, velocity, begun.volts))
+    }
+}
+
+fn parse(py: Python<'_>, origin: &str, text: &str, set: &[(String, Value)]) -> PyResult<Scenario> {
+    let table: Table = match text.parse() {
+        Ok(table) => table,
+        // The same text gives the error again, in the scenario's words.
+        Err(_) => match clutch_sim::Scenario::parse(origin, text, &[]) {
+            Ok(s) => return Ok(Scenario(Arc::new(s))),
+            Err(e) => return Err(scenario_error(py, &e, None)),
+        },
+    };
+    match clutch_sim::Scenario::from_table(origin, table.clone(), set) {
+        Ok(s) => Ok(Scenario(Arc::new(s))),
+        Err(e) => {
+            // An overridden value is what the user gave last.
+            match set.iter().find(|(key, _)| *key == e.key) {
+                Some((key, value)) => {
+                    let value = crate::convert::from_toml(py, value)?;
+                    Err(param_error(py, &e.to_string(), key, value))
+                }
+                None => Err(scenario_error(py, &e, Some(&table))),
+            }
+        }
+    }
+}
+
+/// Checks one table by itself: `key` as `law.smc`, `name` what errors call it. Gives the table
+/// back with its defaults filled in.
+#[pyfunction]
+pub(crate) fn check<'py>(
+    py: Python<'py>,
+    key: &str,
+    name: &str,
+    table: &Bound<'py, PyDict>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let table = to_table(table)?;
+    let checked = check_section(name, key, table.clone()).map_err(|e| {
+        // In an object the tables around it have no name.
+        let inner = e.key.strip_prefix(key).map_or(e.key.as_str(), |k| k.trim_start_matches('.'));
+        let e = ScenarioError { key: inner.to_owned(), ..e.clone() };
+        scenario_error(py, &e, Some(&table))
+    })?;
+    from_table(py, &checked)
+}
+
+/// Names of the built-in scenarios.
+///
+/// Examples
+/// --------
+/// >>> import clutch
+/// >>> "smc_2" in clutch.scenarios()
+/// True
+#[pyfunction]
+pub(crate) fn scenarios() -> Vec<&'static str> {
+    BUILT_IN.iter().map(|b| b.name).collect()
+}
+
+/// The table of a built-in rig: `ideal`, `paper`, `bench`.
+#[pyfunction]
+pub(crate) fn rig<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
+    let base = Table::from_iter([("base".to_owned(), Value::String(name.into()))]);
+    let table = check_section("Rig", "rig", base).map_err(|e| scenario_error(py, &e, None))?;
+    from_table(py, &table)
+}
+
+/// The friction coefficient (2) at velocities, rad/s; signed as the velocity.
+#[pyfunction]
+pub(crate) fn stribeck<'py>(
+    py: Python<'py>,
+    table: &Bound<'py, PyDict>,
+    velocity: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let number = |key: &str| -> PyResult<f64> {
+        let value = table.get_item(key)?;
+        value.map_or(Ok(f64::NAN), |v| v.extract())
+    };
+    let params = clutch_core::StribeckParams {
+        mu_static: number("mu_static")?,
+        mu_dynamic: number("mu_dynamic")?,
+        stribeck_velocity: number("stribeck_velocity_rad_s")?,
+        stribeck_exponent: number("stribeck_exponent")?,
+    };
+    let law = Stribeck::<f64>::new(&params).map_err(|e| core_error(py, &e))?;
+    let values = velocity.as_slice()?.iter().map(|v| law.coefficient(*v)).collect();
+    Ok(PyArray1::from_vec(py, values))
+}
+
+/// `K_COF` (18) of a brake's geometry, N m/V.
+#[pyfunction]
+pub(crate) fn brake_gain(py: Python<'_>, table: &Bound<'_, PyDict>) -> PyResult<f64> {
+    let number = |key: &str| -> PyResult<f64> {
+        let value = table.get_item(key)?;
+        value.map_or(Ok(f64::NAN), |v| v.extract())
+    };
+    let geometry = BrakeGeometry {
+        inner_radius: number("inner_radius_m")?,
+        torque_constant: number("torque_constant_nm_a")?,
+        pad_area: number("pad_area_m2")?,
+        lever_area: number("lever_area_m2")?,
+        armature_resistance: number("armature_resistance_ohm")?,
+        contact_radius: number("contact_radius_m")?,
+    };
+    geometry.brake_gain().map_err(|e| {
+        let value = PyString::new(py, &e.value.to_string()).into_any();
+        param_error(py, &e.to_string(), e.field, value)
+    })
+}

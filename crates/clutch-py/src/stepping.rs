@@ -1,0 +1,676 @@
+//! Law and plant stepped by the user, and laws written in Python.
+
+use crate::convert::core_error;
+use crate::scenario::Scenario;
+use crate::table::{Column, Table};
+use clutch_core::law::{Command, Law, LawTerms, Limit, Output, OutputState, Terms};
+use clutch_core::{Counts, Dac, Encoder, FixedCounts, ParamError, Real, Servo, ServoOutput, ServoState, law};
+use clutch_sim::MovingRig;
+use clutch_sim::engine::{Event, EventKind, Motion};
+use clutch_sim::scenario::ScalarKind;
+use pyo3::exceptions::{PyIndexError, PyOverflowError, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyFloat};
+use std::sync::Mutex;
+
+type State<T> = ServoState<T, OutputState<T>>;
+
+fn fixed_to_counts(position: FixedCounts) -> f64 {
+    position.minus::<f64>(FixedCounts(0))
+}
+
+/// A point of a path: what the law is asked to follow at one tick.
+///
+/// Parameters
+/// ----------
+/// position_counts : float
+///     Target position, encoder counts from the encoder's zero; kept to 2⁻¹⁶ counts.
+/// velocity_rad_s : float
+///     Target velocity, rad/s.
+/// acceleration_rad_s2 : float
+///     Target acceleration, rad/s².
+///
+/// Examples
+/// --------
+/// >>> import clutch
+/// >>> clutch.Target(12.5, 0.035)
+/// Target(12.5, 0.035, 0.0)
+#[pyclass(frozen, module = "clutch", eq)]
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct Target(clutch_core::Target<f64>);
+
+#[pymethods]
+impl Target {
+    #[new]
+    #[pyo3(signature = (position_counts, velocity_rad_s=0.0, acceleration_rad_s2=0.0))]
+    fn new(position_counts: f64, velocity_rad_s: f64, acceleration_rad_s2: f64) -> PyResult<Target> {
+        let named = [
+            ("position_counts", position_counts),
+            ("velocity_rad_s", velocity_rad_s),
+            ("acceleration_rad_s2", acceleration_rad_s2),
+        ];
+        if let Some((name, value)) = named.iter().find(|(_, x)| !x.is_finite() || x.abs() >= 1e12) {
+            return Err(PyValueError::new_err(format!(
+                "{name} = {value}: expected a finite number below 1e12"
+            )));
+        }
+        Ok(Target(clutch_core::Target {
+            position: FixedCounts::from_real(position_counts),
+            velocity: velocity_rad_s,
+            acceleration: acceleration_rad_s2,
+        }))
+    }
+
+    /// Target position, counts.
+    #[getter]
+    fn position_counts(&self) -> f64 {
+        fixed_to_counts(self.0.position)
+    }
+
+    /// Target velocity, rad/s.
+    #[getter]
+    fn velocity_rad_s(&self) -> f64 {
+        self.0.velocity
+    }
+
+    /// Target acceleration, rad/s².
+    #[getter]
+    fn acceleration_rad_s2(&self) -> f64 {
+        self.0.acceleration
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (f64, f64, f64)) {
+        let t = slf.get();
+        (slf.get_type().into_any(), (t.position_counts(), t.0.velocity, t.0.acceleration))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Target({:?}, {:?}, {:?})", self.position_counts(), self.0.velocity, self.0.acceleration)
+    }
+}
+
+/// A scenario's path, sampled at its period.
+///
+/// Examples
+/// --------
+/// >>> import clutch
+/// >>> path = clutch.Scenario.load("minimum_jerk").path()
+/// >>> path.at(0).velocity_rad_s
+/// 0.0
+/// >>> len(path) == len(path.table())
+/// True
+#[pyclass(frozen, module = "clutch")]
+pub(crate) struct Path {
+    targets: Vec<clutch_core::Target<f64>>,
+    period: f64,
+    radians_per_count: f64,
+}
+
+impl Path {
+    pub(crate) fn new(py: Python<'_>, scenario: &Scenario) -> PyResult<Path> {
+        let spec = scenario.0.spec();
+        let encoder = Encoder::new::<f64>(spec.rig.counts_per_rev).map_err(|e| core_error(py, &e))?;
+        let begun = spec.prepare().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
+        Ok(Path {
+            targets: (0..scenario.0.ticks()).map(|k| begun.reference.at(k)).collect(),
+            period: spec.period.seconds(),
+            radians_per_count: encoder.radians_per_count(),
+        })
+    }
+}
+
+#[pymethods]
+impl Path {
+    /// The target at a tick of the run, from 0.
+    fn at(&self, tick: usize) -> PyResult<Target> {
+        let n = self.targets.len();
+        let target = self.targets.get(tick);
+        target.map(|t| Target(*t)).ok_or_else(|| {
+            PyIndexError::new_err(format!("tick {tick}: expected one of the run's, 0 to {}", n - 1))
+        })
+    }
+
+    fn __len__(&self) -> usize {
+        self.targets.len()
+    }
+
+    /// Columns time_s, position_rad, velocity_rad_s, acceleration_rad_s2.
+    fn table(&self) -> Table {
+        let of = |f: &dyn Fn(&clutch_core::Target<f64>) -> f64| {
+            Column::own(self.targets.iter().map(f).collect::<Vec<f64>>())
+        };
+        let time: Vec<f64> = (0..self.targets.len()).map(|k| k as f64 * self.period).collect();
+        Table::of([
+            ("time_s", Column::own(time)),
+            ("position_rad", of(&|t| fixed_to_counts(t.position) * self.radians_per_count)),
+            ("velocity_rad_s", of(&|t| t.velocity)),
+            ("acceleration_rad_s2", of(&|t| t.acceleration)),
+        ])
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Path({} ticks of {} s)", self.targets.len(), self.period)
+    }
+}
+
+/// A servo in one scalar, with its state.
+#[derive(Clone)]
+struct Running<T: Real> {
+    servo: Servo<T>,
+    state: State<T>,
+    last: ServoOutput<T, LawTerms<T>>,
+}
+
+#[derive(Clone)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "one lives in each controller; a box would cost each step a cache line"
+)]
+enum Scalar {
+    F32(Running<f32>),
+    F64(Running<f64>),
+}
+
+/// The law of a scenario with all that it remembers, sampled by you: counts and target in,
+/// volts out.
+///
+/// It is the servo that the simulator, the loop and the boards run, bit for bit. It begins as
+/// `clutch.simulate` does.
+///
+/// Parameters
+/// ----------
+/// scenario : Scenario
+///     Law, gains, sampling, encoder, converter; its scalar, f32 or f64.
+///
+/// Examples
+/// --------
+/// The loop of `clutch.simulate`, by hand:
+///
+/// >>> import clutch
+/// >>> scenario = clutch.Scenario.load("smc_2").override({"run.duration_s": 2.0})
+/// >>> law, plant, path = clutch.Controller(scenario), clutch.Plant(scenario), scenario.path()
+/// >>> volts = []
+/// >>> for tick in range(len(path)):
+/// ...     volts.append(law.step(plant.counts, path.at(tick)))
+/// ...     counts = plant.step(volts[-1])
+/// >>> volts == clutch.simulate(scenario).samples["voltage_v"].tolist()
+/// True
+#[pyclass(module = "clutch")]
+#[derive(Clone)]
+pub(crate) struct Controller {
+    running: Scalar,
+    /// Counts are fractions where the rig's sensor is ideal.
+    whole: bool,
+    /// The converter rounds; else the law's own voltage goes out.
+    rounds: bool,
+    dac: Dac<f64>,
+}
+
+fn begin<T: Real>(py: Python<'_>, scenario: &Scenario) -> PyResult<Running<T>> {
+    let spec = scenario.0.spec();
+    let wrong = |e: &ParamError| core_error(py, e);
+    let params = spec.servo().map_err(|e| wrong(&e))?.cast::<T>();
+    let servo = Servo::<T>::new(&params)
+        .map_err(|e| wrong(&ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }))?;
+    let begun = spec.prepare().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
+    Ok(Running { state: begun.servo_state(&servo), servo, last: ServoOutput::default() })
+}
+
+impl<T: Real> Running<T> {
+    fn step(&mut self, counts: f64, whole: bool, target: &Target) -> (u16, f64) {
+        let target = target.0.cast();
+        self.last = if whole {
+            self.servo.tick(&mut self.state, Counts(counts as i64 as i32), &target)
+        } else {
+            self.servo.tick_at(&mut self.state, FixedCounts::from_real(counts), &target)
+        };
+        (self.last.code.0, self.last.command.voltage.to_f64())
+    }
+
+    fn start(&mut self, counts: f64, whole: bool, target: &Target, volts: f64) {
+        let (target, volts) = (target.0.cast(), T::from_f64(volts));
+        self.last = ServoOutput::default();
+        self.state = if whole {
+            self.servo.start(Counts(counts as i64 as i32), &target, volts)
+        } else {
+            self.servo.start_at(FixedCounts::from_real(counts), &target, volts)
+        };
+    }
+
+    fn terms(&self) -> [(&'static str, f64); 3] {
+        self.last.command.terms.columns().map(|(name, x)| (name, x.to_f64()))
+    }
+}
+
+macro_rules! either {
+    ($value:expr, $running:ident => $body:expr) => {
+        match $value {
+            Scalar::F32($running) => $body,
+            Scalar::F64($running) => $body,
+        }
+    };
+}
+
+/// Counts as a number that the law takes: whole ones within 32 bit unless the sensor is ideal.
+fn checked_counts(counts: f64, whole: bool) -> PyResult<f64> {
+    let fits = if whole {
+        counts.fract() == 0.0 && (-2_147_483_648.0..=2_147_483_647.0).contains(&counts)
+    } else {
+        counts.abs() < 1e12
+    };
+    if fits {
+        return Ok(counts);
+    }
+    let expected = if whole { "a whole number of counts within 32 bit" } else { "finite counts below 1e12" };
+    let text = format!("counts = {counts}: expected {expected}");
+    Err(if counts.is_finite() && counts.abs() > 2e9 {
+        PyOverflowError::new_err(text)
+    } else {
+        PyValueError::new_err(text)
+    })
+}
+
+#[pymethods]
+impl Controller {
+    #[new]
+    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Controller> {
+        let scenario = native(scenario)?;
+        let spec = scenario.0.spec();
+        Ok(Controller {
+            running: match scenario.0.scalar {
+                ScalarKind::F32 => Scalar::F32(begin(py, &scenario)?),
+                ScalarKind::F64 => Scalar::F64(begin(py, &scenario)?),
+            },
+            whole: spec.rig.encoder_quantised,
+            rounds: spec.rig.dac_quantised,
+            dac: Dac::new(&spec.rig.dac).map_err(|e| core_error(py, &e))?,
+        })
+    }
+
+    /// Begins anew: the shaft at `counts` moves with the target, the brake has been at `voltage`.
+    #[pyo3(signature = (counts, target, voltage))]
+    fn start(&mut self, counts: f64, target: &Target, voltage: f64) -> PyResult<()> {
+        let whole = self.whole;
+        let counts = checked_counts(counts, whole)?;
+        if !voltage.is_finite() {
+            return Err(PyValueError::new_err(format!("voltage = {voltage}: expected a finite voltage, V")));
+        }
+        either!(&mut self.running, r => r.start(counts, whole, target, voltage));
+        Ok(())
+    }
+
+    /// One sampling period: the encoder's counts and the target in, the brake's voltage out, V.
+    ///
+    /// Parameters
+    /// ----------
+    /// counts : int
+    ///     The encoder's counts; a fraction if the scenario's sensor is ideal.
+    /// target : Target
+    ///     The path now.
+    ///
+    /// Returns
+    /// -------
+    /// float
+    ///     The voltage to command, V, as the converter gives it.
+    fn step(&mut self, counts: f64, target: &Target) -> PyResult<f64> {
+        let whole = self.whole;
+        let counts = checked_counts(counts, whole)?;
+        let (code, volts) = either!(&mut self.running, r => r.step(counts, whole, target));
+        Ok(if self.rounds { self.dac.volts(clutch_core::DacCode(code)) } else { volts })
+    }
+
+    /// Code for the converter at the last step.
+    #[getter]
+    fn code(&self) -> u16 {
+        either!(&self.running, r => r.last.code.0)
+    }
+
+    /// Position error of the last step as the law saw it, rad.
+    #[getter]
+    fn error(&self) -> f64 {
+        either!(&self.running, r => r.last.tick.error.to_f64())
+    }
+
+    /// Its rate as the law saw it, rad/s.
+    #[getter]
+    fn error_rate(&self) -> f64 {
+        either!(&self.running, r => r.last.tick.error_rate.to_f64())
+    }
+
+    /// Whether a limit of the output decided the last voltage.
+    #[getter]
+    fn limited(&self) -> bool {
+        either!(&self.running, r => r.last.command.limit != Limit::None)
+    }
+
+    /// The law's intermediate terms at the last step, by name with unit.
+    #[getter]
+    fn terms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (name, value) in either!(&self.running, r => r.terms()) {
+            dict.set_item(name, value)?;
+        }
+        Ok(dict)
+    }
+
+    /// A snapshot: goes on from here by itself.
+    fn copy(&self) -> Controller {
+        self.clone()
+    }
+
+    fn __copy__(&self) -> Controller {
+        self.clone()
+    }
+}
+
+/// The rig of a scenario, stepped by you: volts in, counts out.
+///
+/// It begins where the scenario's run begins, at its position, velocity and voltage.
+///
+/// Parameters
+/// ----------
+/// scenario : Scenario
+///     Rig, sampling, start, seed, engine.
+///
+/// Examples
+/// --------
+/// Let go, the weight accelerates the shaft:
+///
+/// >>> import clutch
+/// >>> plant = clutch.Plant(clutch.Scenario.load("smc_2"))
+/// >>> start = plant.velocity
+/// >>> for _ in range(10):
+/// ...     counts = plant.step(0.0)
+/// >>> plant.velocity > start
+/// True
+#[pyclass(module = "clutch")]
+pub(crate) struct Plant {
+    moving: Mutex<MovingRig>,
+    period: f64,
+    tick: u64,
+    start_voltage: f64,
+    voltage: f64,
+    whole: bool,
+    rounds: bool,
+    events: Vec<Event>,
+}
+
+impl Plant {
+    fn with<R>(&self, f: impl FnOnce(&MovingRig) -> R) -> PyResult<R> {
+        let moving =
+            self.moving.lock().map_err(|_| PyRuntimeError::new_err("the plant broke in an earlier step"))?;
+        Ok(f(&moving))
+    }
+}
+
+#[pymethods]
+impl Plant {
+    #[new]
+    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Plant> {
+        let scenario = native(scenario)?;
+        let spec = scenario.0.spec();
+        let begun = spec.prepare().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
+        let mut moving = begun.moving;
+        moving.begin_period();
+        Ok(Plant {
+            moving: Mutex::new(moving),
+            period: spec.period.seconds(),
+            tick: 0,
+            start_voltage: begun.volts,
+            voltage: begun.volts,
+            whole: spec.rig.encoder_quantised,
+            rounds: spec.rig.dac_quantised,
+            events: Vec::new(),
+        })
+    }
+
+    /// One sampling period with `voltage` commanded; the counts at its end (a fraction if the
+    /// sensor is ideal).
+    ///
+    /// The rig's converter rounds and limits the voltage, its delay and lag come on top.
+    fn step<'py>(&mut self, py: Python<'py>, voltage: f64) -> PyResult<Bound<'py, PyAny>> {
+        if !voltage.is_finite() {
+            return Err(PyValueError::new_err(format!("voltage = {voltage}: expected a finite voltage, V")));
+        }
+        let (period, rounds) = (self.period, self.rounds);
+        let moving = self
+            .moving
+            .get_mut()
+            .map_err(|_| PyRuntimeError::new_err("the plant broke in an earlier step"))?;
+        let dac = moving.rig().dac;
+        let volts = if rounds { dac.volts(dac.code(voltage)) } else { voltage };
+        moving.command(volts);
+        let seen = moving.advance(period).map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
+        self.events.extend_from_slice(seen);
+        self.voltage = volts;
+        self.tick += 1;
+        moving.set_time(self.tick as f64 * period);
+        moving.begin_period();
+        self.counts(py)
+    }
+
+    /// What the encoder shows: whole counts; a fraction if the scenario's sensor is ideal.
+    #[getter]
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        if self.whole {
+            Ok(self.with(|m| m.counts().0)?.into_pyobject(py)?.into_any())
+        } else {
+            Ok(PyFloat::new(py, self.fine_counts()?).into_any())
+        }
+    }
+
+    /// Position in counts to 2⁻¹⁶ of one: what an ideal sensor shows.
+    #[getter]
+    fn fine_counts(&self) -> PyResult<f64> {
+        self.with(|m| fixed_to_counts(m.fine_counts()))
+    }
+
+    /// True position, rad.
+    #[getter]
+    fn position(&self) -> PyResult<f64> {
+        self.with(|m| m.shaft().position)
+    }
+
+    /// True velocity, rad/s; exactly 0 when stuck.
+    #[getter]
+    fn velocity(&self) -> PyResult<f64> {
+        self.with(|m| m.shaft().velocity)
+    }
+
+    /// Whether friction holds the shaft.
+    #[getter]
+    fn stuck(&self) -> PyResult<bool> {
+        self.with(|m| m.shaft().motion == Motion::Stuck)
+    }
+
+    /// Time since the start, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.tick as f64 * self.period
+    }
+
+    /// Voltage last commanded, as the converter gives it, V.
+    #[getter]
+    fn voltage(&self) -> f64 {
+        self.voltage
+    }
+
+    /// Voltage on the brake at the start, V.
+    #[getter]
+    fn start_voltage(&self) -> f64 {
+        self.start_voltage
+    }
+
+    /// Sticks and break-aways so far: columns time_s, kind, position_rad, torque_nm.
+    fn events(&self) -> Table {
+        event_table(&self.events)
+    }
+}
+
+/// Sticks and break-aways as a table.
+pub(crate) fn event_table(events: &[Event]) -> Table {
+    let of = |f: &dyn Fn(&Event) -> f64| Column::own(events.iter().map(f).collect::<Vec<f64>>());
+    let kind = events.iter().map(|e| match e.kind {
+        EventKind::Stick => "stick",
+        EventKind::BreakAway => "break_away",
+    });
+    Table::of([
+        ("time_s", of(&|e| e.time)),
+        ("kind", Column::text(kind)),
+        ("position_rad", of(&|e| e.position)),
+        ("torque_nm", of(&|e| e.torque)),
+    ])
+}
+
+/// The checked scenario of a `clutch.Scenario`, or the native one itself.
+pub(crate) fn native(scenario: &Bound<'_, PyAny>) -> PyResult<Scenario> {
+    if let Ok(native) = scenario.cast::<Scenario>() {
+        return Ok(native.get().clone());
+    }
+    let inner = scenario.getattr("_native").map_err(|_| {
+        pyo3::exceptions::PyTypeError::new_err(format!(
+            "scenario is of type {}: expected a clutch.Scenario",
+            scenario.get_type()
+        ))
+    })?;
+    Ok(inner.cast::<Scenario>()?.get().clone())
+}
+
+/// What a law written in Python is given each period.
+///
+/// Examples
+/// --------
+/// >>> import clutch
+/// >>> def law(tick):
+/// ...     return 2.24 - 80.0 * tick.error
+/// >>> clutch.simulate("smc_2", law=law).metrics.max_error_rad < 0.01
+/// True
+#[pyclass(frozen, module = "clutch")]
+pub(crate) struct Tick {
+    tick: law::Tick<f64>,
+    time: f64,
+}
+
+#[pymethods]
+impl Tick {
+    /// Position error, target minus position, rad.
+    #[getter]
+    fn error(&self) -> f64 {
+        self.tick.error
+    }
+
+    /// Its rate, from the scenario's derivative (5) or observer, rad/s.
+    #[getter]
+    fn error_rate(&self) -> f64 {
+        self.tick.error_rate
+    }
+
+    /// Target velocity, rad/s.
+    #[getter]
+    fn target_velocity(&self) -> f64 {
+        self.tick.target_velocity
+    }
+
+    /// Target acceleration, rad/s².
+    #[getter]
+    fn target_acceleration(&self) -> f64 {
+        self.tick.target_acceleration
+    }
+
+    /// Measured velocity, rad/s.
+    #[getter]
+    fn velocity(&self) -> f64 {
+        self.tick.velocity()
+    }
+
+    /// Time since the start of the run, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.time
+    }
+
+    fn __repr__(&self) -> String {
+        let t = &self.tick;
+        format!("Tick(time={}, error={}, error_rate={})", self.time, t.error, t.error_rate)
+    }
+}
+
+/// A law written in Python, behind the scenario's output stage.
+pub(crate) struct PythonLaw {
+    callable: Py<PyAny>,
+    output: Output<f64>,
+    period: f64,
+    failure: Mutex<Option<PyErr>>,
+}
+
+/// What it has: the callable remembers for itself.
+#[derive(Clone, Default)]
+pub(crate) struct PythonState {
+    output: OutputState<f64>,
+    ticks: u64,
+}
+
+/// The only term of a law whose inside is not known.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct PythonTerms(f64);
+
+impl Terms<f64> for PythonTerms {
+    fn columns(&self) -> [(&'static str, f64); 3] {
+        [("python_v", self.0), ("", 0.0), ("", 0.0)]
+    }
+}
+
+impl PythonLaw {
+    pub(crate) fn new(callable: Py<PyAny>, output: Output<f64>, period: f64) -> Self {
+        PythonLaw { callable, output, period, failure: Mutex::new(None) }
+    }
+
+    /// The exception that the callable raised first.
+    pub(crate) fn failure(&self) -> Option<PyErr> {
+        self.failure.lock().ok()?.take()
+    }
+
+    fn ask(&self, tick: &law::Tick<f64>, ticks: u64) -> f64 {
+        let Ok(mut failure) = self.failure.lock() else { return f64::NAN };
+        if failure.is_some() {
+            return f64::NAN; // the run is lost, and ends soon
+        }
+        let given = Tick { tick: *tick, time: ticks as f64 * self.period };
+        let asked = Python::attach(|py| -> PyResult<f64> {
+            let answer = self.callable.bind(py).call1((Bound::new(py, given)?,))?;
+            answer.extract::<f64>().map_err(|_| {
+                pyo3::exceptions::PyTypeError::new_err(format!(
+                    "the law answered {answer} at t = {} s: expected a voltage, V",
+                    ticks as f64 * self.period
+                ))
+            })
+        });
+        asked.unwrap_or_else(|e| {
+            *failure = Some(e);
+            f64::NAN
+        })
+    }
+}
+
+impl law::Controller<f64> for PythonLaw {
+    type State = PythonState;
+    type Terms = PythonTerms;
+
+    fn start(&self, _: &law::Tick<f64>, _: f64) -> PythonState {
+        PythonState::default()
+    }
+
+    fn update(&self, state: &mut PythonState, tick: &law::Tick<f64>) -> Command<f64, PythonTerms> {
+        let demand = self.ask(tick, state.ticks);
+        state.ticks += 1;
+        let (voltage, limit) = self.output.apply(&mut state.output, demand);
+        Command { voltage, limit, terms: PythonTerms(demand) }
+    }
+}
+
+/// The output stage of a scenario.
+pub(crate) fn output_stage(py: Python<'_>, scenario: &Scenario) -> PyResult<Output<f64>> {
+    let spec = scenario.0.spec();
+    let law = Law::new(&spec.law, &spec.model, &spec.output, spec.period).map_err(|e| core_error(py, &e))?;
+    Ok(*law.output())
+}

@@ -1,0 +1,207 @@
+//! Sweeps in the background, on all cores.
+
+use crate::convert::{scenario_error, to_table, to_toml};
+use crate::run::{figures, sample_columns};
+use crate::table::{Column, Table};
+use clutch_sim::{Keep, ScenarioError, sweep};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// What a row leaves behind.
+struct Row {
+    metrics: Vec<f64>,
+    error: Option<ScenarioError>,
+    trace: Option<Table>,
+}
+
+/// What the threads of a sweep and Python share.
+struct Shared {
+    rows: Mutex<BTreeMap<usize, Row>>,
+    finished: AtomicUsize,
+    stop: AtomicBool,
+    ended: Mutex<bool>,
+    bell: Condvar,
+}
+
+/// A thread that panicked has left whole rows or none.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A sweep that runs in threads of its own; `clutch.sweep` is its public face.
+#[pyclass(frozen, module = "clutch._clutch")]
+pub(crate) struct Sweep {
+    sweep: Arc<sweep::Sweep>,
+    metrics: Vec<String>,
+    traces: Vec<String>,
+    every: usize,
+    threads: usize,
+    shared: Arc<Shared>,
+    started: AtomicBool,
+}
+
+#[pymethods]
+impl Sweep {
+    /// `rows` of values for the dotted `keys`, over the scenario's tables.
+    #[new]
+    #[pyo3(signature = (tables, keys, rows, metrics, traces=Vec::new(), every=1, threads=None))]
+    fn new(
+        tables: &Bound<'_, PyDict>,
+        keys: Vec<String>,
+        rows: &Bound<'_, PyList>,
+        metrics: Vec<String>,
+        traces: Vec<String>,
+        every: usize,
+        threads: Option<usize>,
+    ) -> PyResult<Sweep> {
+        let base = to_table(tables)?;
+        let rows = rows
+            .iter()
+            .map(|row| row.try_iter()?.map(|v| to_toml(&v?)).collect::<PyResult<Vec<_>>>())
+            .collect::<PyResult<Vec<_>>>()?;
+        let known = figures(&Default::default(), &Default::default());
+        for name in &metrics {
+            if name != "certified" && !known.iter().any(|(n, _)| n == name) {
+                let names: Vec<&str> = known.iter().map(|(n, _)| *n).collect();
+                let text = format!("metrics: \"{name}\": expected certified, {}", names.join(", "));
+                return Err(PyValueError::new_err(text));
+            }
+        }
+        if every == 0 {
+            return Err(PyValueError::new_err("every = 0: expected at least 1 sample"));
+        }
+        if threads == Some(0) {
+            return Err(PyValueError::new_err("threads = 0: expected at least 1"));
+        }
+        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        let sweep = sweep::Sweep::new("sweep", base, keys, rows);
+        Ok(Sweep {
+            sweep: Arc::new(sweep.map_err(|e| PyValueError::new_err(e.to_string()))?),
+            metrics,
+            traces,
+            every,
+            threads: threads.unwrap_or(cores),
+            shared: Arc::new(Shared {
+                rows: Mutex::default(),
+                finished: AtomicUsize::new(0),
+                stop: AtomicBool::new(false),
+                ended: Mutex::new(false),
+                bell: Condvar::new(),
+            }),
+            started: AtomicBool::new(false),
+        })
+    }
+
+    /// Starts the threads; once only.
+    fn start(&self) -> PyResult<()> {
+        if self.started.swap(true, Ordering::SeqCst) {
+            return Err(PyRuntimeError::new_err("the sweep has been started already"));
+        }
+        let (sweep, shared) = (self.sweep.clone(), self.shared.clone());
+        let (metrics, traces, every) = (self.metrics.clone(), self.traces.clone(), self.every);
+        let threads = self.threads;
+        let keep = if traces.is_empty() { Keep::Figures } else { Keep::Trace };
+        let work = move || {
+            let done = |i: usize, outcome: Result<sweep::Row, ScenarioError>| {
+                let row = row(outcome, &metrics, &traces, every);
+                locked(&shared.rows).insert(i, row);
+                shared.finished.fetch_add(1, Ordering::SeqCst);
+            };
+            sweep.run(threads, keep, &shared.stop, &done);
+            *locked(&shared.ended) = true;
+            shared.bell.notify_all();
+        };
+        let spawned = std::thread::Builder::new().name("clutch-sweep".into()).spawn(work);
+        spawned.map(drop).map_err(|e| PyRuntimeError::new_err(format!("no thread for the sweep: {e}")))
+    }
+
+    /// Rows that are done.
+    #[getter]
+    fn finished(&self) -> usize {
+        self.shared.finished.load(Ordering::SeqCst)
+    }
+
+    /// Rows in all.
+    #[getter]
+    fn total(&self) -> usize {
+        self.sweep.len()
+    }
+
+    /// Waits so many seconds at most; whether the sweep has ended.
+    fn wait(&self, py: Python<'_>, seconds: f64) -> bool {
+        let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::ZERO);
+        py.detach(|| {
+            let ended = locked(&self.shared.ended);
+            let waited = self.shared.bell.wait_timeout_while(ended, time, |ended| !*ended);
+            *waited.unwrap_or_else(PoisonError::into_inner).0
+        })
+    }
+
+    /// Ends the sweep: runs under way stop within milliseconds and leave nothing.
+    fn cancel(&self) {
+        self.shared.stop.store(true, Ordering::SeqCst);
+    }
+
+    /// Finished rows: a table (run, each metric, error), traces by row, and for each refused row its error.
+    #[allow(clippy::type_complexity, reason = "what clutch.sweep makes its object of")]
+    fn result<'py>(&self, py: Python<'py>) -> PyResult<(Table, Bound<'py, PyDict>, Vec<(usize, Py<PyAny>)>)> {
+        let mut rows = locked(&self.shared.rows);
+        let run: Vec<i64> = rows.keys().map(|i| *i as i64).collect();
+        let mut columns = vec![("run".to_owned(), Column::own(run))];
+        for (m, name) in self.metrics.iter().enumerate() {
+            let values = rows.values().map(|r| r.metrics[m]);
+            let column = if name == "certified" {
+                Column::own(values.map(|x| x > 0.0).collect::<Vec<bool>>())
+            } else {
+                Column::own(values.collect::<Vec<f64>>())
+            };
+            columns.push((name.clone(), column));
+        }
+        let text = |r: &Row| r.error.as_ref().map_or(String::new(), ToString::to_string);
+        columns.push(("error".to_owned(), Column::text(rows.values().map(text))));
+        let traces = PyDict::new(py);
+        let mut errors = Vec::new();
+        for (i, row) in rows.iter_mut() {
+            if let Some(trace) = row.trace.take() {
+                traces.set_item(i, Bound::new(py, trace)?)?;
+            }
+            if let Some(e) = &row.error {
+                errors.push((*i, scenario_error(py, e, None).into_value(py).into_any()));
+            }
+        }
+        Ok((Table::of(columns), traces, errors))
+    }
+}
+
+fn row(
+    outcome: Result<sweep::Row, ScenarioError>,
+    metrics: &[String],
+    traces: &[String],
+    every: usize,
+) -> Row {
+    match outcome {
+        Ok(sweep::Row { certified, run }) => {
+            let all = figures(&run.metrics, &run.detected);
+            let value = |name: &String| {
+                let found = all.iter().find(|(n, _)| n == name).and_then(|(_, x)| *x);
+                if name == "certified" { f64::from(u8::from(certified)) } else { found.unwrap_or(f64::NAN) }
+            };
+            let metrics = metrics.iter().map(value).collect();
+            let trace = (!traces.is_empty()).then(|| {
+                let columns = sample_columns(&Arc::new(run));
+                let wanted = columns.into_iter().filter(|(n, _)| traces.contains(n));
+                Table::of(wanted.map(|(n, c)| (n, if every == 1 { c } else { c.every(every) })))
+            });
+            Row { metrics, error: None, trace }
+        }
+        Err(e) => {
+            let nothing = |name: &String| if name == "certified" { 0.0 } else { f64::NAN };
+            Row { metrics: metrics.iter().map(nothing).collect(), error: Some(e), trace: None }
+        }
+    }
+}

@@ -1,0 +1,153 @@
+"""Slow, smooth motion of shafts restrained by friction.
+
+A brake can only resist: a weight, a spring or a hand drives a shaft, and a computer decides each millisecond how hard
+a pad presses on a disc. This package scripts experiments with it: simulate, certify, sweep, read logs, replay, plot.
+The physics, the laws and the checks are the Rust crates that drive the hardware; nothing of them is written again
+here.
+
+>>> import clutch
+>>> result = clutch.simulate("smc_2")
+>>> result.metrics.max_error_rad < 0.003
+True
+"""
+
+import importlib
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from clutch import _clutch
+from clutch._clutch import Controller, Path, Plant, Table, Target, Tick, scenarios
+from clutch._errors import ParamError
+from clutch._log import Difference, Log, Replay, read_log, replay
+from clutch._model import (
+    Bounds,
+    BrakeGeometry,
+    Certificate,
+    Chirp,
+    Ctc,
+    Dac,
+    Encoder,
+    HandDrive,
+    Hold,
+    HoldThenRelease,
+    HoldVoltage,
+    JerkLimited,
+    Limits,
+    MinimumJerk,
+    Model,
+    Observer,
+    Output,
+    Pd,
+    Ramp,
+    RampVoltage,
+    Release,
+    Rig,
+    Ripple,
+    RunSettings,
+    Safety,
+    Sampling,
+    Scenario,
+    Sine,
+    Smc,
+    SmcSign,
+    SmoothedDerivative,
+    SpringDrive,
+    StribeckFriction,
+    TableDrive,
+    TablePath,
+    Trapezoid,
+    WeightDrive,
+)
+from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
+from clutch._run import Metrics, Result, simulate
+from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
+
+if TYPE_CHECKING:
+    from clutch import dynamics, executors, gym, plot
+
+__version__ = _clutch.VERSION
+
+__all__ = [
+    "Bounds",
+    "BrakeGeometry",
+    "Certificate",
+    "Chirp",
+    "Controller",
+    "Ctc",
+    "Dac",
+    "Difference",
+    "Encoder",
+    "HandDrive",
+    "Hold",
+    "HoldThenRelease",
+    "HoldVoltage",
+    "JerkLimited",
+    "Limits",
+    "Log",
+    "Metrics",
+    "MinimumJerk",
+    "Model",
+    "Observer",
+    "Output",
+    "PaperFigure",
+    "PaperPanel",
+    "ParamError",
+    "Path",
+    "Pd",
+    "Plant",
+    "Ramp",
+    "RampVoltage",
+    "Release",
+    "Replay",
+    "Reproduction",
+    "Result",
+    "Rig",
+    "Ripple",
+    "RunSettings",
+    "Safety",
+    "Samples",
+    "Sampling",
+    "Scenario",
+    "Sine",
+    "Smc",
+    "SmcSign",
+    "SmoothedDerivative",
+    "SpringDrive",
+    "StribeckFriction",
+    "SweepResult",
+    "Table",
+    "TableDrive",
+    "TablePath",
+    "Target",
+    "Tick",
+    "Trapezoid",
+    "WeightDrive",
+    "__version__",
+    "dynamics",
+    "executors",
+    "grid",
+    "gym",
+    "latin_hypercube",
+    "plot",
+    "read_log",
+    "replay",
+    "reproduce",
+    "samples",
+    "scenarios",
+    "simulate",
+    "sobol",
+    "sweep",
+]
+
+# Each brings a large library along: imported when it is asked for.
+_LATER = {"dynamics", "executors", "gym", "plot"}
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name in _LATER:
+        return importlib.import_module(f"clutch.{name}")
+    raise AttributeError(f"module 'clutch' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,7 @@
+"""`python -m clutch`: the command."""
+
+import sys
+
+from clutch._cli import main
+
+sys.exit(main())

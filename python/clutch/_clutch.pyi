@@ -1,0 +1,598 @@
+"""
+The native half of the package `clutch`.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from os import PathLike
+from typing import Any, Final, SupportsFloat, SupportsIndex, final
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import CapsuleType
+
+from clutch import _model
+from clutch._errors import ParamError
+
+__all__ = ["BUILD", "VERSION", "Controller", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "Sweep", "Table", "Target", "Tick", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "scenarios", "simulate", "stribeck"]
+
+BUILD: Final[str]
+"""
+Version and commit of the build, as logs tell it.
+"""
+
+VERSION: Final[str]
+"""
+Version of the package.
+"""
+
+@final
+class Controller:
+    """
+    The law of a scenario with all that it remembers, sampled by you: counts and target in,
+    volts out.
+
+    It is the servo that the simulator, the loop and the boards run, bit for bit. It begins as
+    `clutch.simulate` does.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Law, gains, sampling, encoder, converter; its scalar, f32 or f64.
+
+    Examples
+    --------
+    The loop of `clutch.simulate`, by hand:
+
+    >>> import clutch
+    >>> scenario = clutch.Scenario.load("smc_2").override({"run.duration_s": 2.0})
+    >>> law, plant, path = clutch.Controller(scenario), clutch.Plant(scenario), scenario.path()
+    >>> volts = []
+    >>> for tick in range(len(path)):
+    ...     volts.append(law.step(plant.counts, path.at(tick)))
+    ...     counts = plant.step(volts[-1])
+    >>> volts == clutch.simulate(scenario).samples["voltage_v"].tolist()
+    True
+    """
+    def __copy__(self, /) -> Controller: ...
+    def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Controller: ...
+    @property
+    def code(self, /) -> int:
+        """
+        Code for the converter at the last step.
+        """
+    def copy(self, /) -> Controller:
+        """
+        A snapshot: goes on from here by itself.
+        """
+    @property
+    def error(self, /) -> float:
+        """
+        Position error of the last step as the law saw it, rad.
+        """
+    @property
+    def error_rate(self, /) -> float:
+        """
+        Its rate as the law saw it, rad/s.
+        """
+    @property
+    def limited(self, /) -> bool:
+        """
+        Whether a limit of the output decided the last voltage.
+        """
+    def start(self, /, counts: SupportsFloat | SupportsIndex, target: Target, voltage: SupportsFloat | SupportsIndex) -> None:
+        """
+        Begins anew: the shaft at `counts` moves with the target, the brake has been at `voltage`.
+        """
+    def step(self, /, counts: SupportsFloat | SupportsIndex, target: Target) -> float:
+        """
+        One sampling period: the encoder's counts and the target in, the brake's voltage out, V.
+
+        Parameters
+        ----------
+        counts : int
+            The encoder's counts; a fraction if the scenario's sensor is ideal.
+        target : Target
+            The path now.
+
+        Returns
+        -------
+        float
+            The voltage to command, V, as the converter gives it.
+        """
+    @property
+    def terms(self, /) -> dict[str, float]:
+        """
+        The law's intermediate terms at the last step, by name with unit.
+        """
+
+@final
+class Log:
+    """
+    A log in memory; `clutch.Log` is its public face.
+    """
+    def channels(self, /) -> dict[str, Table]:
+        """
+        Channels that have records, as tables.
+        """
+    @property
+    def complete(self, /) -> bool:
+        """
+        Finished by its writer and without damage.
+        """
+    @property
+    def damaged(self, /) -> int:
+        """
+        Damaged places that were skipped.
+        """
+    @property
+    def metadata(self, /) -> dict[str, str]:
+        """
+        What the log says of itself, as texts.
+        """
+    def replay(self, /, overrides: Mapping[str, object] | None = None) -> tuple[Table, int, tuple[int, str, float, float] | None]:
+        """
+        The recorded counts to the recorded law: commands of the replay, ticks, and the first difference (tick,
+        field, logged, replayed).
+        """
+    @property
+    def scenario_toml(self, /) -> str:
+        """
+        The scenario's file.
+        """
+
+@final
+class Paper:
+    """
+    Outcome of the paper's runs: claims and Table 3 as lists of dicts, and the figures: number, law,
+    panels (rate in °/s, whether experiment, time in s and error in °).
+    """
+    def as_documented(self, /) -> list[bool]:
+        """
+        Whether each statement holds, or fails as documented.
+        """
+    def claims(self, /) -> list[dict[str, Any]]:
+        """
+        Statements of the paper and what came out: a dict each.
+        """
+    def figures(self, /) -> list[tuple[int, str, list[tuple[float, bool, Table]]]]:
+        """
+        Figures 8, 9, 10: number, law, panels.
+        """
+    def table3(self, /) -> list[dict[str, float]]:
+        """
+        Rows of Table 3: a dict each.
+        """
+
+@final
+class Path:
+    """
+    A scenario's path, sampled at its period.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> path = clutch.Scenario.load("minimum_jerk").path()
+    >>> path.at(0).velocity_rad_s
+    0.0
+    >>> len(path) == len(path.table())
+    True
+    """
+    def __len__(self, /) -> int: ...
+    def __repr__(self, /) -> str: ...
+    def at(self, /, tick: SupportsIndex) -> Target:
+        """
+        The target at a tick of the run, from 0.
+        """
+    def table(self, /) -> Table:
+        """
+        Columns time_s, position_rad, velocity_rad_s, acceleration_rad_s2.
+        """
+
+@final
+class Plant:
+    """
+    The rig of a scenario, stepped by you: volts in, counts out.
+
+    It begins where the scenario's run begins, at its position, velocity and voltage.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Rig, sampling, start, seed, engine.
+
+    Examples
+    --------
+    Let go, the weight accelerates the shaft:
+
+    >>> import clutch
+    >>> plant = clutch.Plant(clutch.Scenario.load("smc_2"))
+    >>> start = plant.velocity
+    >>> for _ in range(10):
+    ...     counts = plant.step(0.0)
+    >>> plant.velocity > start
+    True
+    """
+    def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Plant: ...
+    @property
+    def counts(self, /) -> int | float:
+        """
+        What the encoder shows: whole counts; a fraction if the scenario's sensor is ideal.
+        """
+    def events(self, /) -> Table:
+        """
+        Sticks and break-aways so far: columns time_s, kind, position_rad, torque_nm.
+        """
+    @property
+    def fine_counts(self, /) -> float:
+        """
+        Position in counts to 2⁻¹⁶ of one: what an ideal sensor shows.
+        """
+    @property
+    def position(self, /) -> float:
+        """
+        True position, rad.
+        """
+    @property
+    def start_voltage(self, /) -> float:
+        """
+        Voltage on the brake at the start, V.
+        """
+    def step(self, /, voltage: SupportsFloat | SupportsIndex) -> int | float:
+        """
+        One sampling period with `voltage` commanded; the counts at its end (a fraction if the
+        sensor is ideal).
+
+        The rig's converter rounds and limits the voltage, its delay and lag come on top.
+        """
+    @property
+    def stuck(self, /) -> bool:
+        """
+        Whether friction holds the shaft.
+        """
+    @property
+    def time(self, /) -> float:
+        """
+        Time since the start, s.
+        """
+    @property
+    def velocity(self, /) -> float:
+        """
+        True velocity, rad/s; exactly 0 when stuck.
+        """
+    @property
+    def voltage(self, /) -> float:
+        """
+        Voltage last commanded, as the converter gives it, V.
+        """
+
+@final
+class Run:
+    """
+    A finished run.
+    """
+    @property
+    def engine(self, /) -> str:
+        """
+        Which engine ran.
+        """
+    @property
+    def events(self, /) -> Table:
+        """
+        Sticks and break-aways.
+        """
+    @property
+    def metrics(self, /) -> dict[str, Any]:
+        """
+        Figures by name.
+        """
+    @property
+    def samples(self, /) -> Table:
+        """
+        A row for each sample.
+        """
+    def save(self, /, path: str | PathLike[str]) -> None:
+        """
+        Writes the log that `clutch sim --log` writes.
+        """
+
+@final
+class Scenario:
+    """
+    A checked scenario, as the simulator takes it; `clutch.Scenario` is its public face.
+    """
+    def __new__(cls, /, tables: dict[str, Any], origin: str = "Scenario") -> Scenario:
+        """
+        Checks the tables of a scenario.
+        """
+    def acceleration(self, /, time: SupportsFloat | SupportsIndex, position: SupportsFloat | SupportsIndex, velocity: SupportsFloat | SupportsIndex, voltage: SupportsFloat | SupportsIndex) -> float:
+        """
+        Acceleration of the plant (1) at time, position, velocity and brake voltage, rad/s²;
+        0 at rest while friction holds.
+        """
+    def certificate(self, /) -> dict[str, Any]:
+        """
+        What `clutch certify --json` prints.
+        """
+    def initial(self, /) -> tuple[float, float, float]:
+        """
+        Position and velocity at which a run begins (rad, rad/s), and the brake's voltage then (V).
+        """
+    @staticmethod
+    def load(name: str | PathLike[str], overrides: Mapping[str, object] | None = None) -> Scenario:
+        """
+        Reads a scenario from a file or, if there is none, the built-in one of that name.
+        """
+    @staticmethod
+    def parse(origin: str, text: str, overrides: Mapping[str, object] | None = None) -> Scenario:
+        """
+        Reads a scenario from TOML; errors begin with `origin`.
+        """
+    def path(self, /) -> Path:
+        """
+        The path, sampled.
+        """
+    def tables(self, /) -> dict[str, Any]:
+        """
+        Every table with its defaults filled in.
+        """
+    @property
+    def ticks(self, /) -> int:
+        """
+        The number of ticks in a run.
+        """
+    def to_toml(self, /) -> str:
+        """
+        The scenario's file, defaults filled in.
+        """
+
+@final
+class Sweep:
+    """
+    A sweep that runs in threads of its own; `clutch.sweep` is its public face.
+    """
+    def __new__(cls, /, tables: dict[str, Any], keys: Sequence[str], rows: list[list[object]], metrics: Sequence[str], traces: Sequence[str] = ..., every: SupportsIndex = 1, threads: SupportsIndex | None = None) -> Sweep:
+        """
+        `rows` of values for the dotted `keys`, over the scenario's tables.
+        """
+    def cancel(self, /) -> None:
+        """
+        Ends the sweep: runs under way stop within milliseconds and leave nothing.
+        """
+    @property
+    def finished(self, /) -> int:
+        """
+        Rows that are done.
+        """
+    def result(self, /) -> tuple[Table, dict[int, Table], list[tuple[int, ParamError]]]:
+        """
+        Finished rows: a table (run, each metric, error), traces by row, and for each refused row its error.
+        """
+    def start(self, /) -> None:
+        """
+        Starts the threads; once only.
+        """
+    @property
+    def total(self, /) -> int:
+        """
+        Rows in all.
+        """
+    def wait(self, /, seconds: SupportsFloat | SupportsIndex) -> bool:
+        """
+        Waits so many seconds at most; whether the sweep has ended.
+        """
+
+@final
+class Table:
+    """
+    Named columns of equal length.
+
+    Results, logs and sweeps are tables. Any library that reads Arrow streams takes one as it is
+    (`pyarrow.table(t)`, `polars.DataFrame(t)`, `pandas.DataFrame.from_arrow(t)`), numbers without
+    copying.
+
+    Parameters
+    ----------
+    columns : dict
+        Name to one-dimensional array of numbers, bools or texts, all of one length.
+
+    Raises
+    ------
+    ValueError
+        Columns of unequal length, of more than one dimension, or of another type.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> t = clutch.Table({"time_s": [0.0, 0.001], "counts": [0, 3]})
+    >>> t
+    Table(2 rows: time_s, counts)
+    >>> int(t["counts"].sum())
+    3
+    >>> t.to_pandas()["time_s"].tolist()
+    [0.0, 0.001]
+    """
+    def __arrow_c_stream__(self, /, requested_schema: Any | None = None) -> CapsuleType:
+        """
+        The table as an Arrow C stream: how other libraries read it.
+        """
+    def __contains__(self, name: str, /) -> bool: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __getitem__(self, name: str, /) -> Any:
+        """
+        A column: NumPy's array, read-only and not copied; texts as a list.
+        """
+    def __iter__(self, /) -> Iterator[str]: ...
+    def __len__(self, /) -> int: ...
+    def __ne__(self, value: object, /) -> bool: ...
+    def __new__(cls, /, columns: Mapping[str, ArrayLike]) -> Table: ...
+    def __reduce__(self, /) -> tuple[Any, tuple[dict[str, Any]]]: ...
+    def __repr__(self, /) -> str: ...
+    def _repr_html_(self, /) -> str: ...
+    @property
+    def columns(self, /) -> list[str]:
+        """
+        Names of the columns, in order.
+        """
+    def to_arrow(self, /) -> pa.Table:
+        """
+        As a `pyarrow.Table`, numbers without copying.
+        """
+    def to_dict(self, /) -> dict[str, Any]:
+        """
+        Columns by name, in a dict.
+        """
+    def to_pandas(self, /) -> pd.DataFrame:
+        """
+        As a `pandas.DataFrame`, numbers without copying.
+        """
+    def to_polars(self, /) -> pl.DataFrame:
+        """
+        As a `polars.DataFrame`, numbers without copying.
+        """
+    def to_xarray(self, /, index: str | None = None) -> xr.Dataset:
+        """
+        As an `xarray.Dataset` with one dimension; `index` is the column that becomes its
+        coordinate.
+        """
+
+@final
+class Target:
+    """
+    A point of a path: what the law is asked to follow at one tick.
+
+    Parameters
+    ----------
+    position_counts : float
+        Target position, encoder counts from the encoder's zero; kept to 2⁻¹⁶ counts.
+    velocity_rad_s : float
+        Target velocity, rad/s.
+    acceleration_rad_s2 : float
+        Target acceleration, rad/s².
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Target(12.5, 0.035)
+    Target(12.5, 0.035, 0.0)
+    """
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+    def __new__(cls, /, position_counts: SupportsFloat | SupportsIndex, velocity_rad_s: SupportsFloat | SupportsIndex = 0.0, acceleration_rad_s2: SupportsFloat | SupportsIndex = 0.0) -> Target: ...
+    def __reduce__(self, /) -> tuple[Any, tuple[float, float, float]]: ...
+    def __repr__(self, /) -> str: ...
+    @property
+    def acceleration_rad_s2(self, /) -> float:
+        """
+        Target acceleration, rad/s².
+        """
+    @property
+    def position_counts(self, /) -> float:
+        """
+        Target position, counts.
+        """
+    @property
+    def velocity_rad_s(self, /) -> float:
+        """
+        Target velocity, rad/s.
+        """
+
+@final
+class Tick:
+    """
+    What a law written in Python is given each period.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> def law(tick):
+    ...     return 2.24 - 80.0 * tick.error
+    >>> clutch.simulate("smc_2", law=law).metrics.max_error_rad < 0.01
+    True
+    """
+    def __repr__(self, /) -> str: ...
+    @property
+    def error(self, /) -> float:
+        """
+        Position error, target minus position, rad.
+        """
+    @property
+    def error_rate(self, /) -> float:
+        """
+        Its rate, from the scenario's derivative (5) or observer, rad/s.
+        """
+    @property
+    def target_acceleration(self, /) -> float:
+        """
+        Target acceleration, rad/s².
+        """
+    @property
+    def target_velocity(self, /) -> float:
+        """
+        Target velocity, rad/s.
+        """
+    @property
+    def time(self, /) -> float:
+        """
+        Time since the start of the run, s.
+        """
+    @property
+    def velocity(self, /) -> float:
+        """
+        Measured velocity, rad/s.
+        """
+
+def brake_gain(table: dict[str, Any]) -> float:
+    """
+    `K_COF` (18) of a brake's geometry, N m/V.
+    """
+
+def check(key: str, name: str, table: dict[str, Any]) -> dict[str, Any]:
+    """
+    Checks one table by itself: `key` as `law.smc`, `name` what errors call it. Gives the table
+    back with its defaults filled in.
+    """
+
+def main(args: Sequence[str]) -> int:
+    """
+    The `clutch` command with these arguments, the program's name first; its exit code.
+    """
+
+def read_log(path: str | PathLike[str]) -> Log:
+    """
+    Reads a log, also one that was cut.
+    """
+
+def reproduce(progress: Callable[[int, int], object] | None = None) -> Paper:
+    """
+    Runs the paper; `progress`, if given, is called with finished and total runs.
+    """
+
+def rig(name: str) -> dict[str, Any]:
+    """
+    The table of a built-in rig: `ideal`, `paper`, `bench`.
+    """
+
+def scenarios() -> list[str]:
+    """
+    Names of the built-in scenarios.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> "smc_2" in clutch.scenarios()
+    True
+    """
+
+def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] | None = None) -> Run:
+    """
+    Runs a scenario; `law`, a callable of a `Tick`, takes the place of its law.
+    """
+
+def stribeck(table: dict[str, Any], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+    """
+    The friction coefficient (2) at velocities, rad/s; signed as the velocity.
+    """

@@ -1,0 +1,33 @@
+"""The error of a parameter that is out of range."""
+
+
+class ParamError(ValueError):
+    """A parameter is out of range, of the wrong type, unknown or missing.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, where, and what is expected.
+    field : str, default ""
+        The parameter: within an object its name, as ``kp_v``; within a scenario its dotted key, as
+        ``law.smc.kp_v``. Empty if it is about the whole.
+    value : object, default None
+        The value that was refused, in the parameter's unit.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> try:
+    ...     clutch.Smc(kp_v=-1)
+    ... except clutch.ParamError as error:
+    ...     print(error.field, error.value)
+    kp_v -1
+    """
+
+    field: str
+    value: object
+
+    def __init__(self, message: str, field: str = "", value: object = None) -> None:
+        super().__init__(message)
+        self.field = field
+        self.value = value

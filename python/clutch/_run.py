@@ -1,0 +1,274 @@
+"""Simulation: a scenario in, samples, events and figures out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from html import escape
+from typing import TYPE_CHECKING
+
+from clutch import _clutch
+from clutch._clutch import Table, Tick
+from clutch._model import Scenario
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
+    import pyarrow as pa
+    import xarray as xr
+    from matplotlib.figure import Figure
+    from numpy import float64
+    from numpy.typing import NDArray
+
+ScenarioLike = Scenario | str | os.PathLike[str]
+
+
+def as_scenario(scenario: ScenarioLike, overrides: Mapping[str, object] | None = None) -> Scenario:
+    """Take a scenario, a built-in scenario's name or a file, and override keys of it."""
+    if isinstance(scenario, Scenario):
+        return scenario.override(overrides) if overrides else scenario
+    if isinstance(scenario, str | os.PathLike):
+        return Scenario.load(scenario, overrides or {})
+    kind = type(scenario).__name__
+    raise TypeError(f"scenario is of type {kind}: expected a clutch.Scenario, a built-in name or a path")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metrics:
+    """How well a run went. All figures are taken after the settling time, with the true position.
+
+    Attributes
+    ----------
+    measured_s : float
+        Time over which the figures were taken, s.
+    max_error_rad, rms_error_rad, mean_error_rad : float
+        Largest magnitude, root mean square and mean of the error `e = θ_d − θ`, rad.
+    iae_rad_s : float
+        Integral of the error's magnitude, rad s.
+    stick_slip_cycles_per_s : float
+        Stick-slip cycles (entries into the stuck state) per second.
+    stick_time_fraction : float
+        Share of the time that the shaft was stuck.
+    stair_height_rad : float
+        Largest movement between one stick and the next, rad; 0 with fewer than two.
+    break_away_torque_nm : float or None
+        Mean driving torque at break-away, N m; None if the shaft never broke away.
+    control_variation_v_s : float
+        Total variation of the voltage per second, V/s.
+    jerk_rms_rad_s3 : float
+        Root mean square of the sampled jerk, rad/s³.
+    detected_stick_slip_cycles_per_s, detected_stick_time_fraction : float
+        The same as the encoder shows it: what a loop on hardware would count.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> metrics = clutch.simulate("smc_2").metrics
+    >>> metrics.max_error_rad < 0.003
+    True
+    """
+
+    measured_s: float
+    max_error_rad: float
+    rms_error_rad: float
+    mean_error_rad: float
+    iae_rad_s: float
+    stick_slip_cycles_per_s: float
+    stick_time_fraction: float
+    stair_height_rad: float
+    break_away_torque_nm: float | None
+    control_variation_v_s: float
+    jerk_rms_rad_s3: float
+    detected_stick_slip_cycles_per_s: float
+    detected_stick_time_fraction: float
+
+
+METRICS: tuple[str, ...] = tuple(f.name for f in fields(Metrics))
+
+
+class Result:
+    """A finished run: what :func:`clutch.simulate` returns.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What ran.
+    metrics : Metrics
+        Figures after the settling time.
+    engine : str
+        ``"exact_flow"`` or ``"dormand_prince"``.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> result = clutch.simulate("pd_2")
+    >>> result.samples.columns[:3]
+    ['time_s', 'target_position_rad', 'target_velocity_rad_s']
+    >>> set(result.events["kind"])  == {"stick", "break_away"}
+    True
+    """
+
+    def __init__(self, scenario: Scenario, run: _clutch.Run) -> None:
+        self.scenario = scenario
+        self.metrics = Metrics(**run.metrics)
+        self.engine: str = run.engine
+        self._run = run
+        self._samples: Table | None = None
+        self._events: Table | None = None
+
+    @property
+    def samples(self) -> Table:
+        """A row for each sample; SI units and radians, in docs/scenario.md under CSV."""
+        if self._samples is None:
+            self._samples = self._run.samples
+        return self._samples
+
+    @property
+    def events(self) -> Table:
+        """Sticks and break-aways: time_s, kind (``"stick"``, ``"break_away"``), position_rad, torque_nm."""
+        if self._events is None:
+            self._events = self._run.events
+        return self._events
+
+    @property
+    def time(self) -> NDArray[float64]:
+        """Time of the samples, s, shape (N,)."""
+        time: NDArray[float64] = self.samples["time_s"]
+        return time
+
+    @property
+    def inputs(self) -> NDArray[float64]:
+        """Brake voltage commanded, V, shape (1, N)."""
+        return self._stacked("voltage_v")
+
+    @property
+    def states(self) -> NDArray[float64]:
+        """True position (rad) and velocity (rad/s), shape (2, N)."""
+        return self._stacked("position_rad", "velocity_rad_s")
+
+    @property
+    def outputs(self) -> NDArray[float64]:
+        """True position, rad, shape (1, N)."""
+        return self._stacked("position_rad")
+
+    def _stacked(self, *names: str) -> NDArray[float64]:
+        import numpy as np
+
+        return np.stack([self.samples[name] for name in names])
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the samples as a ``pandas.DataFrame``, without copying."""
+        return self.samples.to_pandas()
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return the samples as a ``polars.DataFrame``, without copying."""
+        return self.samples.to_polars()
+
+    def to_arrow(self) -> pa.Table:
+        """Return the samples as a ``pyarrow.Table``, without copying."""
+        return self.samples.to_arrow()
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the samples as an ``xarray.Dataset`` over ``time_s``; figures are its attributes."""
+        data = self.samples.to_xarray("time_s")
+        numbers = {name: getattr(self.metrics, name) for name in METRICS}
+        data.attrs = {"scenario": self.scenario.name, "engine": self.engine}
+        data.attrs.update({name: value for name, value in numbers.items() if value is not None})
+        return data
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        """Give the samples as an Arrow C stream: how other libraries read them."""
+        return self.samples.__arrow_c_stream__(requested_schema)
+
+    def plot(self) -> Figure:
+        """Draw error, velocity and voltage over time: :func:`clutch.plot.run_overview`."""
+        from clutch import plot
+
+        return plot.run_overview(self)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the run as an MCAP log, the one that ``clutch sim --log`` writes.
+
+        Parameters
+        ----------
+        path : str or path
+            A new file; a log is never written over.
+
+        Raises
+        ------
+        OSError
+            The file is there already, or cannot be written.
+        RuntimeError
+            The law was written in Python: a log holds the law that ran, for its replay.
+
+        Examples
+        --------
+        >>> import clutch, tempfile, pathlib
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     log = pathlib.Path(folder) / "run.mcap"
+        ...     clutch.simulate("smc_2").save(log)
+        ...     clutch.replay(log).identical
+        True
+        """
+        self._run.save(os.fspath(path))
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+    def __repr__(self) -> str:
+        m = self.metrics
+        return (
+            f"<Result {self.scenario.name!r}: {len(self)} samples, max error {m.max_error_rad:.6f} rad, "
+            f"{m.stick_slip_cycles_per_s:.3g} stick-slip cycles/s>"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{name}</td><td>{'–' if value is None else format(value, '.6g')}</td></tr>"
+            for name, value in ((name, getattr(self.metrics, name)) for name in METRICS)
+        )
+        return f"<table><caption>{escape(self.scenario.name)}</caption>{rows}</table>"
+
+
+def simulate(
+    scenario: ScenarioLike,
+    *,
+    law: Callable[[Tick], float] | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> Result:
+    """Simulate a scenario: the same run as ``clutch sim``, bit for bit.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path
+        A scenario, the name of a built-in one, or a TOML file.
+    law : callable, optional
+        A law of your own in place of the scenario's: called with a :class:`clutch.Tick` each period, it answers the
+        brake's voltage, V. It stands behind the scenario's output stage (limits, bumpless start) and runs in double
+        precision. What it remembers is its own affair.
+    overrides : mapping, optional
+        Values for dotted keys of the scenario, as ``{"law.smc.kp_v": 4}``.
+
+    Returns
+    -------
+    Result
+        Samples, events, figures.
+
+    Raises
+    ------
+    ParamError
+        A value that the scenario refuses; its ``field`` is the key.
+    OSError
+        The file cannot be read.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> ours = clutch.simulate("pd_2")
+    >>> own = clutch.simulate("pd_2", law=lambda tick: -80 * tick.error)
+    >>> own.metrics.max_error_rad > ours.metrics.max_error_rad
+    True
+    """
+    checked = as_scenario(scenario, overrides)
+    return Result(checked, _clutch.simulate(checked, law))

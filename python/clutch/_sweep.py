@@ -1,0 +1,858 @@
+"""Sweeps: one scenario, many values of its keys, on all cores or on an executor."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import json
+import math
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+from clutch import _clutch, executors
+from clutch._clutch import Table
+from clutch._errors import ParamError
+from clutch._model import Scenario, _Params
+from clutch._run import METRICS, ScenarioLike, as_scenario
+
+if TYPE_CHECKING:
+    import pandas
+    import polars
+    import pyarrow
+    import xarray
+    from matplotlib.axes import Axes
+
+__all__ = ["Samples", "SweepResult", "grid", "latin_hypercube", "samples", "sobol", "sweep"]
+
+#: A range of values: lowest, highest, and "log" or "int" where they are not to be spread evenly as floats.
+Range = tuple[float, float] | tuple[float, float, Literal["log", "int"]]
+
+#: What a native job gives: a table of its finished rows, traces and refusals by row.
+_Result = tuple[Table, dict[int, Table], list[tuple[int, ParamError]]]
+
+#: Columns kept with ``traces=True``.
+_TRACES = ("time_s", "error_rad", "voltage_v")
+#: Rows of a chunk for an executor that does not tell how many workers it has.
+_CHUNK = 64
+#: Longest time between two looks at Ctrl-C, s.
+_POLL_S = 0.05
+#: A progress bar is shown for sweeps longer than this, s.
+_SHOWN_AFTER_S = 1.0
+
+
+# --- What to run -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Keys of a scenario, and for each run a value of each.
+
+    Made by `grid`, `sobol`, `latin_hypercube` and `samples`.
+
+    Parameters
+    ----------
+    keys
+        Dotted keys of the scenario, with their units, as ``"law.smc.kp_v"``.
+    rows
+        A tuple of values for each run, in the order of the keys.
+    axes
+        Of a full grid: the values of each key, the last of which changes fastest.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.grid({"law.smc.kp_v": [3.0, 4.0], "run.seed": [1, 2]}).rows
+    ((3.0, 1), (3.0, 2), (4.0, 1), (4.0, 2))
+    """
+
+    keys: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...] = field(repr=False)
+    axes: tuple[tuple[Any, ...], ...] | None = field(default=None, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def _crossed(self, key: str, values: tuple[Any, ...]) -> Samples:
+        """Each row with each value of one more key."""
+        if key in self.keys:
+            raise ValueError(f"{key} is swept and given by seeds=; drop one of them")
+        rows = tuple((*row, value) for row in self.rows for value in values)
+        return Samples((*self.keys, key), rows, None if self.axes is None else (*self.axes, values))
+
+
+def grid(parameters: Mapping[str, Iterable[Any]]) -> Samples:
+    """Every combination of the values of each key.
+
+    Parameters
+    ----------
+    parameters
+        Dotted keys of the scenario and the values of each: numbers, choices, or whole tables, as model
+        objects or dicts.
+
+    Returns
+    -------
+    Samples
+        The last key changes fastest.
+
+    Raises
+    ------
+    ValueError
+        No key, or a key without values.
+    TypeError
+        The values of a key are no sequence.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> len(clutch.grid({"law.smc.kp_v": [3.0, 4.0, 5.0], "rig.base": ["paper", "bench"]}))
+    6
+    """
+    axes = {key: _values(key, values) for key, values in parameters.items()}
+    if not axes:
+        raise ValueError("a sweep needs at least one key, as {'law.smc.kp_v': [3.0, 4.0]}")
+    return Samples(tuple(axes), tuple(itertools.product(*axes.values())), tuple(axes.values()))
+
+
+def samples(columns: Any) -> Samples:
+    """The rows of a table, one run each.
+
+    Parameters
+    ----------
+    columns
+        A dict of columns of equal length, a `Table`, or a data frame of pandas or polars; the names of the
+        columns are dotted keys.
+
+    Returns
+    -------
+    Samples
+        In the order of the table.
+
+    Raises
+    ------
+    ValueError
+        No column, or columns of unequal length.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.samples({"law.smc.kp_v": [3.0, 4.0], "law.smc.boundary_rad_s": [0.1, 0.15]}).rows
+    ((3.0, 0.1), (4.0, 0.15))
+    """
+    names = list(columns) if isinstance(columns, Mapping) else list(columns.columns)
+    values = {name: _values(name, columns[name]) for name in names}
+    lengths = {name: len(column) for name, column in values.items()}
+    if not lengths:
+        raise ValueError("a sweep needs at least one column, as {'law.smc.kp_v': [3.0, 4.0]}")
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"columns of unequal length: {lengths}")
+    return Samples(tuple(values), tuple(zip(*values.values(), strict=True)))
+
+
+def sobol(ranges: Mapping[str, Range], n: int, *, seed: int = 1) -> Samples:
+    """Points of a scrambled Sobol sequence, which fill the ranges more evenly than random ones.
+
+    Parameters
+    ----------
+    ranges
+        For each dotted key ``(lowest, highest)``, ``(lowest, highest, "log")`` for values spread evenly over
+        orders of magnitude, or ``(lowest, highest, "int")`` for whole numbers, both ends included.
+    n
+        Number of points. A power of two keeps the sequence's balance.
+    seed
+        Of the scrambling.
+
+    Returns
+    -------
+    Samples
+        The points; needs SciPy.
+
+    Raises
+    ------
+    ValueError
+        A range that is empty, or that reaches to 0 with "log".
+
+    Examples
+    --------
+    >>> import clutch
+    >>> points = clutch.sobol({"law.smc.kp_v": (2, 6), "law.smc.boundary_rad_s": (0.01, 1, "log")}, 4)
+    >>> len(points), all(2 <= kp <= 6 and 0.01 <= layer <= 1 for kp, layer in points.rows)
+    (4, True)
+    """
+    return _spread("Sobol", ranges, n, seed)
+
+
+def latin_hypercube(ranges: Mapping[str, Range], n: int, *, seed: int = 1) -> Samples:
+    """Points of a Latin hypercube: each key's range is cut in ``n`` parts, and each part is hit once.
+
+    Parameters
+    ----------
+    ranges
+        As for `sobol`.
+    n
+        Number of points.
+    seed
+        Of the points.
+
+    Returns
+    -------
+    Samples
+        The points; needs SciPy.
+
+    Raises
+    ------
+    ValueError
+        A range that is empty, or that reaches to 0 with "log".
+
+    Examples
+    --------
+    >>> import clutch
+    >>> points = clutch.latin_hypercube({"rig.delay_ticks": (0, 3, "int")}, 4)
+    >>> sorted(points.rows)
+    [(0,), (1,), (2,), (3,)]
+    """
+    return _spread("LatinHypercube", ranges, n, seed)
+
+
+def _spread(name: str, ranges: Mapping[str, Range], n: int, seed: int) -> Samples:
+    qmc = importlib.import_module("scipy.stats.qmc")
+    scales = [_scale(key, limits) for key, limits in ranges.items()]
+    points = getattr(qmc, name)(d=len(ranges), rng=seed).random(n).tolist()
+    rows = (tuple(scale(x) for scale, x in zip(scales, point, strict=True)) for point in points)
+    return Samples(tuple(ranges), tuple(rows))
+
+
+def _scale(key: str, limits: Range) -> Callable[[float], float]:
+    """What takes 0 … 1 to a range."""
+    low, high = limits[:2]
+    how = limits[2] if len(limits) == 3 else "linear"
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise ValueError(f"{key}: expected a lowest value below the highest, got {low} and {high}")
+    if how == "linear":
+        return lambda x: low + (high - low) * x
+    if how == "int":
+        return lambda x: min(math.floor(low + (high - low + 1) * x), math.floor(high))
+    if how != "log":
+        raise ValueError(f"{key}: expected 'log' or 'int' after the range, got {how!r}")
+    if low <= 0.0:
+        raise ValueError(f"{key}: a range with 'log' must begin above 0, got {low}")
+    return lambda x: low * (high / low) ** x
+
+
+def _values(key: str, values: Any) -> tuple[Any, ...]:
+    if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
+        raise TypeError(f"{key}: expected a sequence of values, got {values!r}")
+    plain = tuple(_plain(key, v) for v in values)
+    if not plain:
+        raise ValueError(f"{key}: no values")
+    return plain
+
+
+def _plain(key: str, value: Any) -> Any:
+    """A key's value as a file could hold it: Python numbers, lists and dicts."""
+    if isinstance(value, _Params):
+        table = value._tables()
+        way = value._key.removeprefix(key).split(".")[1:]
+        if value._key != ".".join([key, *way]):
+            raise TypeError(f"{key}: a {type(value).__name__} stands at {value._key}")
+        for step in reversed(way):
+            table = {step: table}
+        return table
+    if isinstance(value, Mapping):
+        return dict(value)
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+# --- The sweep ---------------------------------------------------------------------------------
+
+
+def sweep(
+    base: ScenarioLike,
+    parameters: Any,
+    *,
+    metrics: str | Sequence[str] | None = None,
+    seeds: int | Iterable[int] | None = None,
+    traces: bool | Sequence[str] | None = None,
+    every: int = 1,
+    threads: int | None = None,
+    executor: Any = None,
+    chunk: int | None = None,
+    progress: bool | Callable[[int, int], object] | None = None,
+    errors: Literal["raise", "keep"] = "raise",
+) -> SweepResult:
+    """Simulate a scenario with many values of its keys.
+
+    Each run is a run of its own. What comes out is the same bit for bit on any number of threads, in chunks
+    of any size and on any executor, and the same as `simulate` gives for the scenario with these values.
+
+    Ctrl-C ends the sweep within a fraction of a second and gives what has finished, with
+    ``interrupted=True``. A chunk whose worker dies is run by another; when the executor itself is gone, the
+    rest is run here, with a warning. No row is lost.
+
+    Parameters
+    ----------
+    base
+        Scenario, name of a built-in one, or file.
+    parameters
+        A mapping of dotted keys to sequences of values: every combination of them, the last key changing
+        fastest. Or `Samples` from `grid`, `sobol`, `latin_hypercube` or `samples`, or a table with a column
+        for each key: `Table`, pandas or polars. Values may be numbers, choices (``"run.engine"``,
+        ``"rig.base"``) and whole tables (``"law": [clutch.Pd(), clutch.Smc()]``, or as dicts).
+    metrics
+        Names of fields of `Metrics`, and "certified", whether the gains are certified for the row's bounds.
+        Default: all of them.
+    seeds
+        A number n for the seeds 1 … n, or seeds: each row is run with each. One run is one draw; compare
+        over several seeds.
+    traces
+        Columns of samples to keep of each run; True for time, error and voltage. Default: none.
+    every
+        Keep one sample of so many, from the first.
+    threads
+        Number of threads here. Default: one for each core.
+    executor
+        Who runs chunks of rows, each on one thread: see `clutch.executors`. Default: threads here.
+    chunk
+        Rows of a chunk. Default: four chunks for each worker, or 64 rows if their number is not known.
+    progress
+        True: a progress bar; False: none; a function: called with the finished and all runs. Default: a bar
+        if somebody watches, on a terminal or in a notebook, and the sweep takes more than a second.
+    errors
+        "raise": a row that the scenario refuses ends the sweep. "keep": it stays, with NaN for figures and
+        the reason in the column "error".
+
+    Returns
+    -------
+    SweepResult
+        A table with a row for each run.
+
+    Raises
+    ------
+    ParamError
+        A row that the scenario refuses, with key, value and the row's number.
+    ValueError
+        Keys, metrics or options that do not exist.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> result = clutch.sweep("pd_2", {"reference.ramp.rate_deg_s": [2.0, 20.0]})
+    >>> result.table["stick_slip_cycles_per_s"].tolist()
+    [55.5, 0.0]
+    """
+    scenario = as_scenario(base)
+    if isinstance(parameters, Samples):
+        chosen = parameters
+    else:
+        chosen = grid(parameters) if isinstance(parameters, Mapping) else samples(parameters)
+    drawn = () if seeds is None else _values("seeds", range(1, seeds + 1) if isinstance(seeds, int) else seeds)
+    if drawn:
+        chosen = chosen._crossed("run.seed", drawn)
+    if errors not in ("raise", "keep"):
+        raise ValueError(f"errors: expected 'raise' or 'keep', got {errors!r}")
+    if every < 1 or (chunk is not None and chunk < 1) or (threads is not None and threads < 1):
+        raise ValueError(f"expected at least 1: every={every}, chunk={chunk}, threads={threads}")
+    work = _Work(
+        tables=scenario._tables(),
+        keys=chosen.keys,
+        metrics=_known_metrics(metrics),
+        traces=_known_traces(traces, scenario, chosen.keys),
+        every=every,
+    )
+    finished = _Finished(scenario, chosen, keep=errors == "keep")
+    importlib.import_module("numpy")  # now, and not when Ctrl-C waits for an answer
+    interrupted = False
+    with _Progress(len(chosen), progress) as show:
+        try:
+            left = list(range(len(chosen)))
+            if executor is not None:
+                left = _run_there(work, finished, executor, chunk, show)
+            if left:
+                _run_here(work, finished, left, threads, show)
+        except KeyboardInterrupt:
+            interrupted = True
+    return SweepResult(
+        base=scenario,
+        samples=chosen,
+        table=finished.table(work.metrics),
+        metrics=tuple(work.metrics),
+        traces=dict(sorted(finished.traces.items())),
+        seeds=max(1, len(drawn)),
+        interrupted=interrupted,
+    )
+
+
+def _known_metrics(metrics: str | Sequence[str] | None) -> list[str]:
+    known = [*METRICS, "certified"]
+    chosen = [metrics] if isinstance(metrics, str) else known if metrics is None else list(metrics)
+    unknown = [m for m in chosen if m not in known]
+    if unknown:
+        raise ValueError(f"unknown metrics {', '.join(unknown)}; there are {', '.join(known)}")
+    return chosen
+
+
+def _known_traces(traces: bool | Sequence[str] | None, scenario: Scenario, keys: Sequence[str]) -> list[str]:
+    chosen = _TRACES if traces is True else traces or ()
+    wanted = [chosen] if isinstance(chosen, str) else list[str](chosen)
+    if wanted and "law" not in keys:  # each law has columns of its own
+        period = 1e-6 * scenario.sampling.period_us
+        one = scenario.override({"run.duration_s": period, "run.settle_s": 0.0})
+        known = _clutch.simulate(one).samples.columns
+        unknown = [name for name in wanted if name not in known]
+        if unknown:
+            raise ValueError(f"unknown traces {', '.join(unknown)}; there are {', '.join(known)}")
+    return wanted
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What all runs of a sweep have in common; it travels to the workers."""
+
+    tables: dict[str, Any]
+    keys: tuple[str, ...]
+    metrics: list[str]
+    traces: list[str]
+    every: int
+
+    def job(self, rows: Sequence[Sequence[Any]], threads: int | None) -> _clutch.Sweep:
+        keys, values = list(self.keys), [list(row) for row in rows]
+        if "rig.base" in keys:
+            # As `Scenario.override`: the tables have every key of the rig, which would hide the base; and
+            # the others change it.
+            i = keys.index("rig.base")
+            keys = ["rig", *keys[:i], *keys[i + 1 :]]
+            values = [[{"base": row[i]}, *row[:i], *row[i + 1 :]] for row in values]
+        return _clutch.Sweep(self.tables, keys, values, self.metrics, self.traces, self.every, threads)
+
+
+class _Finished:
+    """What has run, in the order in which it came."""
+
+    def __init__(self, scenario: Scenario, chosen: Samples, *, keep: bool) -> None:
+        self.scenario, self.samples, self.keep = scenario, chosen, keep
+        self.runs: list[int] = []
+        self.parts: list[Table] = []
+        self.traces: dict[int, Table] = {}
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def add(self, numbers: Sequence[int], result: _Result) -> None:
+        """All rows of a job, whose row i is the sweep's row ``numbers[i]``."""
+        table = result[0]
+        self.runs += [numbers[i] for i in table["run"].tolist()]
+        self.parts.append(table)
+        self.look(numbers, result)
+
+    def look(self, numbers: Sequence[int], result: _Result) -> None:
+        """Take a job's new traces; raise its first refusal, unless refused rows are kept."""
+        _, traces, refused = result
+        self.traces |= {numbers[i]: trace for i, trace in traces.items()}
+        if refused and not self.keep:
+            i, error = refused[0]
+            raise self._named(numbers[i], error)
+
+    def _named(self, number: int, error: ParamError) -> ParamError:
+        """The error with its row, and the value as the user wrote it."""
+        row = dict(zip(self.samples.keys, self.samples.rows[number], strict=True))
+        value = row.get(error.field, error.value)
+        return ParamError(f"row {number}: {error}", error.field, value)
+
+    def table(self, metrics: Sequence[str]) -> Table:
+        import numpy as np
+
+        order = np.argsort(np.asarray(self.runs, dtype=np.int64), kind="stable")
+        runs = [self.runs[i] for i in order]
+        texts = [text for part in self.parts for text in part["error"]]
+        columns: dict[str, Any] = {"run": np.asarray(runs, dtype=np.int64)}
+        for i, key in enumerate(self.samples.keys):
+            columns[key] = _column([self.samples.rows[n][i] for n in runs])
+        for name in metrics:
+            parts = [part[name] for part in self.parts]
+            columns[name] = np.concatenate(parts)[order] if parts else np.empty(0)
+        columns["error"] = [texts[i] for i in order]
+        return Table(columns)
+
+
+def _column(values: list[Any]) -> Any:
+    """Values of a key as a column; what is neither number nor text is shown as JSON."""
+    import numpy as np
+
+    if all(isinstance(v, bool) for v in values):
+        return np.asarray(values, dtype=bool)
+    if all(isinstance(v, int) and not isinstance(v, bool) for v in values):
+        return np.asarray(values, dtype=np.int64)
+    if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
+        return np.asarray(values, dtype=np.float64)
+    return [v if isinstance(v, str) else json.dumps(v) for v in values]
+
+
+def _run_here(work: _Work, finished: _Finished, numbers: list[int], threads: int | None, show: _Progress) -> None:
+    before = len(finished)
+    job = work.job([finished.samples.rows[i] for i in numbers], threads)
+    looked = 0
+    try:
+        job.start()
+        while not job.wait(_POLL_S):
+            show(before + job.finished)
+            # A refused row should end a long sweep early. Looking each time that the finished rows have
+            # doubled costs little more than the look at the end.
+            if not finished.keep and job.finished > 2 * looked:
+                looked = job.finished
+                finished.look(numbers, job.result())
+    finally:
+        job.cancel()
+        finished.add(numbers, job.result())
+    show(len(finished))
+
+
+def _run_there(work: _Work, finished: _Finished, executor: Any, chunk: int | None, show: _Progress) -> list[int]:
+    """Run chunks on an executor; the rows that it could not run."""
+    rows = finished.samples.rows
+    work.job(rows, 1)  # what is wrong with the request itself is said here, not by a worker
+    workers = executors._workers(executor)
+    size = chunk or (max(1, math.ceil(len(rows) / (4 * workers))) if workers else _CHUNK)
+    numbers = [range(i, min(i + size, len(rows))) for i in range(0, len(rows), size)]
+
+    def done(chunk: int, result: _Result) -> None:
+        finished.add(numbers[chunk], result)
+        show(len(finished))
+
+    calls = [(work, rows[n.start : n.stop]) for n in numbers]
+    failed = executors._run(executor, _run_chunk, calls, done)
+    left = [i for chunk in sorted(failed) for i in numbers[chunk]]
+    if failed:
+        why = next(iter(failed.values()))
+        warnings.warn(
+            f"{len(left)} of {len(rows)} rows could not be run by the executor and are run here"
+            f" ({type(why).__name__}: {why})",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    return left
+
+
+def _run_chunk(work: _Work, rows: Sequence[Sequence[Any]], attempt: int) -> _Result:
+    """Run a chunk on one thread of a worker."""
+    job = work.job(rows, 1)
+    try:
+        job.start()
+        while not job.wait(_POLL_S):
+            pass
+    finally:
+        job.cancel()
+    return job.result()
+
+
+class _Progress:
+    """A progress bar where one is wanted."""
+
+    def __init__(self, total: int, wanted: bool | Callable[[int, int], object] | None) -> None:
+        self._total, self._call = total, wanted if callable(wanted) else None
+        self._shown = wanted is True or (wanted is None and _watched())
+        self._begin = time.monotonic() + (0.0 if wanted is True else _SHOWN_AFTER_S)
+        self._bar: Any = None
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __call__(self, finished: int) -> None:
+        if self._call is not None:
+            self._call(finished, self._total)
+        elif self._shown and (self._bar is not None or time.monotonic() >= self._begin):
+            self._bar = self._bar or _bar(self._total, finished)
+            self._bar.update(finished - self._bar.n)
+
+    def __exit__(self, *exception: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+class _Line:
+    """The progress bar of those who have no tqdm: a line that is written over."""
+
+    def __init__(self, total: int) -> None:
+        self.n, self._total = 0, total
+
+    def update(self, more: int) -> None:
+        self.n += more
+        print(f"\r{self.n} of {self._total} runs", end="", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        print(file=sys.stderr)
+
+
+def _bar(total: int, finished: int) -> Any:
+    try:
+        with warnings.catch_warnings():
+            # In a notebook without ipywidgets tqdm warns and falls back to text, which will do.
+            warnings.simplefilter("ignore")
+            tqdm = importlib.import_module("tqdm.auto").tqdm
+    except ImportError:
+        return _Line(total)
+    return tqdm(total=total, initial=finished, unit="run")
+
+
+def _watched() -> bool:
+    """Whether somebody watches: on a terminal, or in a notebook."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return hasattr(shell, "kernel") or (sys.stderr is not None and sys.stderr.isatty())
+
+
+# --- What came out -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, repr=False)
+class SweepResult:
+    """The runs of a sweep.
+
+    Parameters
+    ----------
+    base
+        The scenario that was varied.
+    samples
+        The rows asked for.
+    table
+        A row for each finished run: its number "run", its values of the swept keys, its metrics, and in
+        "error" why the scenario refused it ("" if it did not). Tables as values are shown as JSON.
+    metrics
+        Names of the metrics.
+    traces
+        The samples kept, by number of the run.
+    seeds
+        Number of seeds that each row of values was run with, one after the other.
+    interrupted
+        Whether Ctrl-C ended it before all had run.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> result = clutch.sweep("smc_2", {"law.smc.kp_v": [3.0, 4.0]}, metrics=["max_error_rad"], seeds=2)
+    >>> result
+    <SweepResult: 4 runs over law.smc.kp_v, run.seed>
+    >>> len(result), result.keys, result.table.columns
+    (4, ('law.smc.kp_v', 'run.seed'), ['run', 'law.smc.kp_v', 'run.seed', 'max_error_rad', 'error'])
+    """
+
+    base: Scenario
+    samples: Samples
+    table: Table
+    metrics: tuple[str, ...]
+    traces: dict[int, Table]
+    seeds: int = 1
+    interrupted: bool = False
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The swept keys, dotted.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.sweep("smc_2", {"law.smc.kp_v": [3.0]}).keys
+        ('law.smc.kp_v',)
+        """
+        return self.samples.keys
+
+    @property
+    def total(self) -> int:
+        """Number of runs asked for.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.sweep("smc_2", {"law.smc.kp_v": [3.0]}, seeds=2).total
+        2
+        """
+        return len(self.samples)
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def __repr__(self) -> str:
+        return f"<SweepResult: {self._title()}>"
+
+    def _title(self) -> str:
+        n = f"interrupted, {len(self)} of {self.total}" if self.interrupted else f"{len(self)}"
+        return f"{n} runs over {', '.join(self.keys)}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self._title()}</p>{self.table._repr_html_()}"
+
+    def scenario(self, i: int) -> Scenario:
+        """The scenario of a row of the table.
+
+        Parameters
+        ----------
+        i
+            Row of `table`, from 0.
+
+        Returns
+        -------
+        Scenario
+            The base with the row's values.
+
+        Raises
+        ------
+        IndexError
+            There is no such row.
+        ParamError
+            The scenario refuses the row's values.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.sweep("smc_2", {"law.smc.kp_v": [3.0, 4.0]}).scenario(1).law.kp_v
+        4.0
+        """
+        number = self.table["run"].tolist()[i]
+        return self.base.override(dict(zip(self.keys, self.samples.rows[number], strict=True)))
+
+    def best(self, metric: str) -> tuple[dict[str, Any], Scenario]:
+        """The values with the lowest metric, by magnitude; over several seeds, with the lowest mean.
+
+        Values of which a seed has not finished or was refused are left out, and so are those for which the
+        metric is not a number.
+
+        Parameters
+        ----------
+        metric
+            One of `metrics`.
+
+        Returns
+        -------
+        row : dict
+            The keys' values, and each metric's mean over the seeds.
+        scenario : Scenario
+            The scenario with these values, with the first seed.
+
+        Raises
+        ------
+        ValueError
+            The metric was not taken, or there is no such row.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> row, scenario = clutch.sweep("smc_2", {"law.smc.kp_v": [3.0, 4.0]}).best("rms_error_rad")
+        >>> row["law.smc.kp_v"], scenario.law.kp_v
+        (4.0, 4.0)
+        """
+        if metric not in self.metrics:
+            raise ValueError(f"metric {metric!r} was not taken; there are {', '.join(self.metrics)}")
+        runs, texts = self.table["run"].tolist(), self.table["error"]
+        columns = {name: self.table[name].tolist() for name in self.metrics}
+        groups: dict[int, list[int]] = {}
+        for i, (run, text) in enumerate(zip(runs, texts, strict=True)):
+            if not text:
+                groups.setdefault(run // self.seeds, []).append(i)
+        means = {
+            group: {name: math.fsum(column[i] for i in rows) / len(rows) for name, column in columns.items()}
+            for group, rows in groups.items()
+            if len(rows) == self.seeds
+        }
+        rated = [group for group, mean in means.items() if not math.isnan(mean[metric])]
+        if not rated:
+            raise ValueError(f"no values of which all {self.seeds} runs have finished with a {metric}")
+        group = min(rated, key=lambda g: (abs(means[g][metric]), g))
+        first = runs.index(group * self.seeds)
+        keys = dict(zip(self.keys, self.samples.rows[runs[first]], strict=True))
+        return keys | means[group], self.scenario(first)
+
+    def plot(self, x: str, y: str, value: str, *, ax: Axes | None = None) -> Axes:
+        """A map of a metric over two swept keys: `clutch.plot.sweep_map`.
+
+        Parameters
+        ----------
+        x, y
+            Swept keys.
+        value
+            A metric.
+        ax
+            Where to draw; default: a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> result = clutch.sweep("smc_2", {"law.smc.kp_v": [3, 4], "law.smc.boundary_rad_s": [0.1, 0.15]})
+        >>> axes = result.plot("law.smc.kp_v", "law.smc.boundary_rad_s", "max_error_rad")
+        """
+        from clutch import plot
+
+        return plot.sweep_map(self, x, y, value, ax=ax)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The table as a data frame of pandas.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.sweep("smc_2", {"law.smc.kp_v": [3.0, 4.0]}).to_pandas().shape[0]
+        2
+        """
+        return self.table.to_pandas()
+
+    def to_polars(self) -> polars.DataFrame:
+        """The table as a data frame of polars.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.sweep("smc_2", {"law.smc.kp_v": [3.0, 4.0]}).to_polars().height
+        2
+        """
+        return self.table.to_polars()
+
+    def to_arrow(self) -> pyarrow.Table:
+        """The table as one of Arrow.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.sweep("smc_2", {"law.smc.kp_v": [3.0, 4.0]}).to_arrow().num_rows
+        2
+        """
+        return self.table.to_arrow()
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        return self.table.__arrow_c_stream__(requested_schema)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The metrics with labelled dimensions: those of a full grid have the keys' names, else it is "run".
+
+        Runs that have not finished are NaN.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> result = clutch.sweep("smc_2", {"law.smc.kp_v": [3.0, 4.0]}, seeds=3)
+        >>> dict(result.to_xarray()["max_error_rad"].sizes)
+        {'law.smc.kp_v': 2, 'run.seed': 3}
+        """
+        import numpy as np
+        import xarray
+
+        runs, names = self.table["run"], [*self.metrics, "error"]
+        if self.samples.axes is None:
+            coords = {key: ("run", np.asarray(self.table[key])) for key in self.keys}
+            columns = {name: ("run", np.asarray(self.table[name])) for name in names}
+            return xarray.Dataset(columns, coords={"run": runs} | coords)
+        axes = [np.asarray(_column(list(axis))) for axis in self.samples.axes]
+        shape = [len(axis) for axis in axes]
+        values = {}
+        for name in names:
+            column = np.asarray(self.table[name])
+            if len(self) < self.total:
+                some = column.astype(object if column.dtype.kind == "U" else float)
+                column = np.full(self.total, "" if name == "error" else math.nan, dtype=some.dtype)
+                column[runs] = some
+            values[name] = (self.keys, column.reshape(shape))
+        return xarray.Dataset(values, coords=dict(zip(self.keys, axes, strict=True)))

@@ -1,0 +1,1071 @@
+"""Figures that can be printed: tracking error, stick-slip, friction, gains, logs.
+
+Each function takes what other functions of clutch return and draws it with matplotlib, 85 mm wide (one column
+of a paper) or 170 mm wide. Functions with one panel take ``ax`` and return it; an axes of yours keeps its
+ticks, spines and size. Functions with several panels return the figure. None shows or saves anything: call
+``figure.savefig("x.pdf")``, ``matplotlib.pyplot.show()``, or leave it to the notebook.
+
+Angles are drawn in degrees. The keys of a scenario keep their units, so that what is read from an axis can be
+written into a file. Colours are those of Okabe and Ito, which the colour-blind can tell apart.
+
+matplotlib's settings are changed while a figure is drawn and at no other time. Use the same ones with
+``with matplotlib.rc_context(clutch.plot.STYLE):``.
+
+A run of more than 20 000 samples is thinned before it is drawn over time: of all samples in a column of 1/600
+inch the smallest and the largest remain, so that no stick, spike or stair is lost.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
+
+if TYPE_CHECKING:
+    import numpy as np
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.typing import RcKeyType
+    from numpy.typing import ArrayLike, NDArray
+
+    from clutch._clutch import Table
+    from clutch._log import Log
+    from clutch._model import Scenario, StribeckFriction
+    from clutch._paper import PaperFigure
+    from clutch._run import Result
+    from clutch._sweep import SweepResult
+
+__all__ = [
+    "STYLE",
+    "certificate_region",
+    "log_overview",
+    "paper_figure",
+    "phase_plane",
+    "run_overview",
+    "stick_slip",
+    "stribeck",
+    "sweep_map",
+    "tracking",
+]
+
+_BLUE, _RED, _GREEN, _ORANGE, _SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9"
+_COLOURS = (_BLUE, _RED, _GREEN, _ORANGE, "#CC79A7", _SKY, "#000000")
+_DASHES = ("-", "--", ":", "-.")
+_GREY, _PALE = "0.55", "#CDE3F1"
+_LONG_DASHES = (0, (6, 3))
+_ABOVE: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "columnspacing": 1.2}
+
+#: matplotlib's settings under which everything here is drawn.
+STYLE: dict[RcKeyType, Any] = {
+    "font.size": 8,
+    "text.usetex": False,
+    "axes.titlesize": 8,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8,
+    "axes.linewidth": 0.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": False,
+    "axes.xmargin": 0.0,
+    "axes.formatter.useoffset": False,
+    "axes.prop_cycle": f"cycler('color', {list(_COLOURS)})",
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "legend.handlelength": 1.5,
+    "legend.borderaxespad": 0.2,
+    "lines.linewidth": 0.5,
+    "lines.solid_joinstyle": "round",
+    "hatch.linewidth": 0.4,
+    "figure.dpi": 200,
+    "savefig.dpi": 300,
+    "pdf.fonttype": 42,
+}
+
+_UNITS = {
+    "v": "V",
+    "v_s": "V/s",
+    "v_rad": "V/rad",
+    "v_s_rad": "V s/rad",
+    "s": "s",
+    "us": "µs",
+    "1_s": "1/s",
+    "1_s2": "1/s²",
+    "hz": "Hz",
+    "rad": "rad",
+    "rad_s": "rad/s",
+    "rad_s2": "rad/s²",
+    "rad_s3": "rad/s³",
+    "deg": "°",
+    "deg_s": "°/s",
+    "deg_s2": "°/s²",
+    "deg_s3": "°/s³",
+    "turns": "turns",
+    "counts": "counts",
+    "ticks": "ticks",
+    "cycles": "cycles",
+    "cycles_per_s": "cycles/s",
+    "m": "m",
+    "m2": "m²",
+    "m_s2": "m/s²",
+    "kg": "kg",
+    "kg_m2": "kg m²",
+    "nm": "N m",
+    "nm_v": "N m/V",
+    "nm_a": "N m/A",
+    "nm_rad": "N m/rad",
+    "nm_s_rad": "N m s/rad",
+    "nm_rt_s": "N m/√s",
+    "ohm": "Ω",
+    "percent": "%",
+}
+
+_LONG = 20_000
+_COLUMNS_PER_INCH = 600
+_MM = 1 / 25.4
+# Letters of a legend that fit into 85 mm beside the axis' own.
+_ROW = 52
+
+# Where a law keeps its two gains; the certificate of CTC depends on neither alone.
+_GAINS = {
+    "law.pd": ("kp_v_rad", "kd_v_s_rad"),
+    "law.smc": ("kp_v", "kd_v_s_rad"),
+    "law.smc_sign": ("kp_v", "kd_v_s_rad"),
+}
+_MOST_PAIRS = 3600
+_FINE = 256
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def _styled(draw: Callable[P, T]) -> Callable[P, T]:
+    """Draw under STYLE, and leave matplotlib's settings as they were."""
+
+    @functools.wraps(draw)
+    def styled(*args: P.args, **kwargs: P.kwargs) -> T:
+        import matplotlib
+
+        with matplotlib.rc_context(STYLE):
+            drawn = draw(*args, **kwargs)
+            # The first figure in a notebook makes its backend interactive: a setting to keep.
+            interactive = matplotlib.is_interactive()
+        matplotlib.interactive(interactive)
+        return drawn
+
+    return styled
+
+
+def _panels(
+    rows: int = 1, columns: int = 1, *, width_mm: float = 85, height_mm: float = 60, **more: Any
+) -> tuple[Figure, list[list[Axes]]]:
+    import matplotlib.pyplot as plt
+
+    size = (width_mm * _MM, height_mm * _MM)
+    figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **more)
+    for ax in axes.flat:
+        # Minor ticks are made when the figure is drawn, which is after STYLE has gone.
+        ax.tick_params(which="minor", labelsize=STYLE["xtick.labelsize"], width=0.4, size=1.5)
+    return figure, [list(row) for row in axes]
+
+
+def _one(ax: Axes | None, height_mm: float = 60) -> Axes:
+    return _panels(height_mm=height_mm)[1][0][0] if ax is None else ax
+
+
+def _figure(ax: Axes) -> Figure:
+    return ax.figure.canvas.figure  # the whole one, also where the axes is in a subfigure
+
+
+def _split(name: str) -> tuple[str, str]:
+    """A key or metric without its unit's suffix, and the unit."""
+    if name == "iae_rad_s":  # an integral over time: the one name in which "_s" multiplies
+        return "iae", "rad s"
+    parts = name.split("_")
+    for i in range(1, len(parts)):
+        unit = _UNITS.get("_".join(parts[i:]))
+        if unit:
+            return "_".join(parts[:i]), unit
+    return name, ""
+
+
+def _label(key: str) -> str:
+    """Axis label of a key of the scenario: ``law.smc.kp (V)``."""
+    quantity, unit = _split(key)
+    return f"{quantity} ({unit})" if unit else quantity
+
+
+def _metric(name: str) -> tuple[str, float]:
+    """Label of a metric, angles in degrees, and the factor that takes it there."""
+    if "." in name:
+        return _label(name), 1.0
+    quantity, unit = _split(name)
+    words = quantity.replace("_", " ").replace("stick slip", "stick-slip")
+    degrees = unit.replace("rad", "°")
+    factor = 57.29577951308232 if degrees != unit else 1.0
+    return (f"{words} ({degrees})" if unit else words), factor
+
+
+def _thin(x: NDArray[Any], y: NDArray[Any], columns: int) -> NDArray[np.intp]:
+    """Which samples to draw: the smallest and the largest of each column, the first and the last."""
+    import numpy as np
+
+    edges = np.linspace(x[0], x[-1], columns + 1)[1:-1]
+    column = np.searchsorted(edges, x, side="right")
+    unknown = np.isnan(y)
+    first = np.flatnonzero(np.diff(column, prepend=-1))
+    last = np.append(first[1:], len(x)) - 1
+    lowest = np.lexsort((np.where(unknown, np.inf, y), column))[first]
+    highest = np.lexsort((np.where(unknown, -np.inf, y), column))[last]
+    return np.unique(np.concatenate(([0], lowest, highest, [len(x) - 1])))
+
+
+def _line(ax: Axes, x: NDArray[Any], y: NDArray[Any], **more: Any) -> None:
+    """A line over time, thinned if it is long."""
+    if len(x) > _LONG:
+        keep = _thin(x, y, int(_figure(ax).get_figwidth() * _COLUMNS_PER_INCH))
+        x, y = x[keep], y[keep]
+    ax.plot(x, y, **more)
+
+
+def _zero(ax: Axes) -> None:
+    ax.axhline(0.0, color="0.2", linewidth=0.4, linestyle=_LONG_DASHES, zorder=1)
+
+
+def _legend_above(ax: Axes) -> None:
+    """A legend that covers no data, in one row if its words fit into a column of a paper."""
+    handles, labels = ax.get_legend_handles_labels()
+    sizes = [len(label) + 5 for label in labels]
+    columns = 2 if 2 * max(sizes, default=0) <= _ROW else 1
+    if len(labels) <= 3 and sum(sizes) <= _ROW:
+        columns = len(labels)
+    ax.legend(handles, labels, ncols=columns, markerscale=2.0, **_ABOVE)
+
+
+def _runs(
+    function: str, results: Result | Iterable[Result], labels: Sequence[str] | None
+) -> tuple[list[Result], list[str]]:
+    """One run or several, with a label each."""
+    from clutch._run import Result
+
+    runs = [results] if isinstance(results, Result) else list(results)
+    if not runs:
+        raise ValueError(f"{function}: there is no result to draw")
+    for run in runs:
+        if not isinstance(run, Result):
+            raise TypeError(f"{function}: expected a Result of clutch.simulate, got {run!r}")
+    if labels is None:
+        names = [run.scenario.name for run in runs]
+        if len(set(names)) < len(names):
+            names = [f"{name}, seed {run.scenario.run.seed}" for name, run in zip(names, runs, strict=True)]
+        return runs, names
+    names = [labels] if isinstance(labels, str) else [str(label) for label in labels]
+    if len(names) != len(runs):
+        raise ValueError(f"{function}: labels = {names!r}: expected {len(runs)}, one for each result")
+    return runs, names
+
+
+def _end(runs: list[Result]) -> float:
+    """End of the longest run, a period after its last sample, s."""
+    return max(run.scenario.run.duration_s for run in runs)
+
+
+def _error_deg(result: Result) -> NDArray[np.float64]:
+    import numpy as np
+
+    error: NDArray[np.float64] = np.degrees(result.samples["error_rad"])
+    return error
+
+
+def _sticks(result: Result) -> NDArray[np.float64]:
+    """Start and end of each time in the stuck state, s; those at either end of the run end with it."""
+    import numpy as np
+
+    times, kinds = result.events["time_s"], list(result.events["kind"])
+    starts = [t for t, kind in zip(times, kinds, strict=True) if kind == "stick"]
+    ends = [t for t, kind in zip(times, kinds, strict=True) if kind == "break_away"]
+    if ends and (not starts or ends[0] < starts[0]):
+        starts.insert(0, 0.0)
+    if len(starts) > len(ends):
+        ends.append(result.scenario.run.duration_s)
+    return np.array([starts, ends], dtype=np.float64).T.reshape(-1, 2)
+
+
+def _bars(spans: NDArray[np.float64]) -> list[tuple[float, float]]:
+    return [(start, end - start) for start, end in spans.tolist()]
+
+
+@_styled
+def tracking(
+    results: Result | Iterable[Result], *, labels: Sequence[str] | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw the position error over time, as the paper's figures 8 to 10 do.
+
+    Parameters
+    ----------
+    results : Result or iterable of Result
+        One run, or several to compare. The error is the target less the true position: below zero the shaft
+        is ahead.
+    labels : sequence of str, optional
+        A name for each run; by default the scenarios' names, with the seeds if these are alike.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; by default a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Error in ° over time in s.
+
+    Raises
+    ------
+    ValueError
+        There is no result, or the number of labels is another one.
+    TypeError
+        Something is not a Result.
+
+    Examples
+    --------
+    >>> from clutch import plot, simulate
+    >>> ax = plot.tracking([simulate("pd_2"), simulate("smc_2")], labels=["PD", "sliding mode"])
+    >>> ax.get_ylabel()
+    'error (°)'
+    """
+    runs, names = _runs("tracking", results, labels)
+    ax = _one(ax)
+    _zero(ax)
+    for i, (run, name) in enumerate(zip(runs, names, strict=True)):
+        colour = _COLOURS[i % len(_COLOURS)]
+        dash = _DASHES[i // len(_COLOURS) % len(_DASHES)]
+        _line(ax, run.samples["time_s"], _error_deg(run), color=colour, linestyle=dash, label=name)
+    ax.set(xlabel="time (s)", ylabel="error (°)", xlim=(0.0, _end(runs)))
+    if labels is not None or len(runs) > 1:
+        _legend_above(ax)
+    return ax
+
+
+@_styled
+def paper_figure(figure: PaperFigure) -> Figure:
+    """Draw figure 8, 9 or 10 in the paper's arrangement: a row for each rate, simulation left, bench right.
+
+    Parameters
+    ----------
+    figure : PaperFigure
+        One of ``clutch.reproduce().figures``.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Error in ° over time in s, 170 mm wide.
+
+    Raises
+    ------
+    ValueError
+        The figure has no panels.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> figure = clutch.plot.paper_figure(clutch.reproduce(progress=False).figures[0])
+    >>> len(figure.axes)
+    6
+    """
+    import numpy as np
+
+    rates = list(dict.fromkeys(panel.rate_deg_s for panel in figure.panels))
+    if not rates:
+        raise ValueError(f"paper_figure: figure {figure.number} has no panels")
+    drawing, axes = _panels(len(rates), 2, width_mm=170, height_mm=12 + 46 * len(rates), sharex=True)
+    title = f"Fig. {figure.number}: positional errors with the {figure.law}"
+    drawing.suptitle(title, x=0.01, ha="left", size=9)
+    for panel in figure.panels:
+        time = np.asarray(panel.time_s)
+        ax = axes[rates.index(panel.rate_deg_s)][panel.experiment]
+        side = "(b) bench" if panel.experiment else "(a) simulation"
+        ax.set_title(f"{side}, {panel.rate_deg_s:g} °/s")
+        _zero(ax)
+        _line(ax, time, np.asarray(panel.error_deg), color=_BLUE)
+        ax.set(ylabel="error (°)", xlim=(0.0, 2 * time[-1] - time[-2]))
+    for ax in axes[-1]:
+        ax.set_xlabel("time (s)")
+    drawing.align_ylabels()
+    return drawing
+
+
+@_styled
+def stribeck(friction: StribeckFriction, *, velocity_rad_s: ArrayLike | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the friction coefficient over the velocity, equation (2), with its two levels and its velocity.
+
+    Parameters
+    ----------
+    friction : StribeckFriction
+        The curve, of a rig for one: ``scenario.rig.friction``.
+    velocity_rad_s : array_like, optional
+        Magnitudes of the velocity, rad/s, above 0; by default from 1/100 to 100 times the Stribeck velocity.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; by default a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        μ (no unit) over the magnitude of the velocity in rad/s, which is logarithmic.
+
+    Raises
+    ------
+    ValueError
+        A velocity is not above 0.
+
+    Examples
+    --------
+    >>> from clutch import StribeckFriction, plot
+    >>> plot.stribeck(StribeckFriction()).get_xlabel()
+    '|velocity| (rad/s)'
+    """
+    import numpy as np
+
+    scale = friction.stribeck_velocity_rad_s
+    if velocity_rad_s is None:
+        velocity = scale * np.logspace(-2, 2, 201)
+    else:
+        velocity = np.sort(np.asarray(velocity_rad_s, dtype=np.float64).ravel())
+        if not velocity.size or not velocity[0] > 0 or not np.isfinite(velocity).all():
+            raise ValueError("stribeck: velocity_rad_s: expected velocities above 0: the axis is logarithmic")
+    ax = _one(ax)
+    ax.set_xscale("log")
+    level: dict[str, Any] = {"color": _GREY, "linewidth": 0.5, "linestyle": _LONG_DASHES, "zorder": 1}
+    for value in {friction.mu_static, friction.mu_dynamic}:
+        ax.axhline(value, **level)
+    ax.axvline(scale, **level)
+    ax.plot(velocity, friction.coefficient(velocity), color=_BLUE, linewidth=1.0)
+    # Each level is named at the end where the curve is far from it.
+    left, right = velocity[0], velocity[-1]
+    note: dict[str, Any] = {"textcoords": "offset points", "color": "0.3", "size": 7}
+    ax.annotate(f"static {friction.mu_static:g}", (right, friction.mu_static), (-2, 2), ha="right", **note)
+    ax.annotate(f"dynamic {friction.mu_dynamic:g}", (left, friction.mu_dynamic), (2, 2), **note)
+    at: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "va": "center"}
+    ax.annotate(f"Stribeck velocity\n{scale:g} rad/s", (scale, 0.6), (4, 0), **at, **note)
+    ax.set(xlabel="|velocity| (rad/s)", ylabel="friction coefficient μ", xlim=(left, right))
+    ax.margins(y=0.12)
+    return ax
+
+
+@_styled
+def phase_plane(result: Result, ax: Axes | None = None) -> Axes:
+    """Draw the rate of the error over the error, with the samples at which the shaft was stuck.
+
+    Both are the true ones, which the law sees only through the encoder. Under sliding mode the surface,
+    ``σ = f e + ė = 0``, is the dashed line, and the law's layer, ``|σ| ≤ boundary_rad_s``, is shaded. A run
+    of more than 20 000 samples is drawn whole, as an image within the figure.
+
+    Parameters
+    ----------
+    result : Result
+        A run.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; by default a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Error rate in °/s over error in °.
+
+    Examples
+    --------
+    >>> from clutch import plot, simulate
+    >>> ax = plot.phase_plane(simulate("smc_2"))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('error (°)', 'error rate (°/s)')
+    """
+    import numpy as np
+
+    from clutch._model import Smc, SmcSign
+
+    samples = result.samples
+    error = _error_deg(result)
+    rate = np.degrees(samples["target_velocity_rad_s"] - samples["velocity_rad_s"])
+    stuck = np.asarray(samples["stuck"], dtype=bool)
+    many = len(error) > _LONG
+    ax = _one(ax, 70)
+    ax.margins(x=0.04)
+    ax.plot(error, rate, color=_BLUE, linewidth=0.4, label="path", rasterized=many)
+    if stuck.any():
+        dots: dict[str, Any] = {"marker": ".", "markersize": 2.5, "markeredgewidth": 0, "linestyle": "none"}
+        ax.plot(error[stuck], rate[stuck], color=_RED, label="stuck", zorder=3, rasterized=many, **dots)
+    law = result.scenario.law
+    if isinstance(law, Smc | SmcSign):
+        x, y = np.array(ax.get_xlim()), ax.get_ylim()
+        surface = -law.slope_1_s * x
+        ax.plot(x, surface, color="0.2", linestyle=_LONG_DASHES, label="σ = 0", zorder=3)
+        if isinstance(law, Smc):
+            layer = np.degrees(law.boundary_rad_s)
+            edges = (surface - layer, surface + layer)
+            words = f"|σ| ≤ {law.boundary_rad_s:g} rad/s"
+            ax.fill_between(x, *edges, color="0.92", linewidth=0, label=words, zorder=0)
+            for edge in edges:
+                ax.plot(x, edge, color=_GREY, zorder=1)
+        ax.set(xlim=tuple(x), ylim=y)
+    ax.set(xlabel="error (°)", ylabel="error rate (°/s)")
+    _legend_above(ax)
+    return ax
+
+
+@_styled
+def stick_slip(
+    results: Result | Iterable[Result], *, labels: Sequence[str] | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw when the shaft was stuck: a row for each run, a bar from each stick to its break-away.
+
+    Bars have a rim of 0.2 pt, so that a stick of a millisecond can be seen in a run of minutes. The number at
+    the end of a row is the run's ``metrics.stick_slip_cycles_per_s``, which leaves the settling time out.
+
+    Parameters
+    ----------
+    results : Result or iterable of Result
+        Runs with other seeds, laws or rigs.
+    labels : sequence of str, optional
+        A name for each run; by default the scenarios' names, with the seeds if these are alike.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; by default a new figure, the higher the more runs there are.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Rows over time in s, the first run on top.
+
+    Raises
+    ------
+    ValueError
+        There is no result, or the number of labels is another one.
+    TypeError
+        Something is not a Result.
+
+    Examples
+    --------
+    >>> from clutch import plot, simulate
+    >>> runs = [simulate("smc_2", overrides={"run.seed": seed}) for seed in (1, 2)]
+    >>> ax = plot.stick_slip(runs, labels=["seed 1", "seed 2"])
+    >>> [text.get_text() for text in ax.get_yticklabels()]
+    ['seed 1', 'seed 2']
+    """
+    runs, names = _runs("stick_slip", results, labels)
+    if ax is None:
+        ax = _one(ax, 16 + 6 * len(runs))
+        ax.tick_params(axis="y", length=0)
+        ax.spines["left"].set_visible(False)
+    note: dict[str, Any] = {"textcoords": "offset points", "size": 7}
+    for row, run in enumerate(runs):
+        bars = _bars(_sticks(run))
+        ax.broken_barh(bars, (row - 0.35, 0.7), facecolor=_BLUE, edgecolor=_BLUE, linewidth=0.2, snap=False)
+        cycles = f"{run.metrics.stick_slip_cycles_per_s:.1f}"
+        ax.annotate(cycles, (1, row), (3, 0), xycoords=("axes fraction", "data"), va="center", **note)
+    ax.annotate("cycles/s", (1, 1), (3, 2), xycoords="axes fraction", **note)
+    ax.set_yticks(range(len(runs)), names)
+    ax.set(xlabel="time (s)", xlim=(0.0, _end(runs)), ylim=(len(runs) - 0.4, -0.6))
+    return ax
+
+
+def _swept(column: Any) -> tuple[NDArray[Any], NDArray[np.intp]]:
+    """The values that were swept, in rising order or, for words, as they come; and which one each row has."""
+    import numpy as np
+
+    values = np.asarray(column)
+    if values.dtype.kind in "biuf":
+        return np.unique(values.astype(np.float64), return_inverse=True)
+    words = [str(value) for value in values]
+    places = {word: i for i, word in enumerate(dict.fromkeys(words))}
+    return np.array(list(places)), np.array([places[word] for word in words], dtype=np.intp)
+
+
+def _cells(values: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64], bool]:
+    """Centres and edges of the cells on an axis, and whether they are more even on a logarithmic one."""
+    import numpy as np
+
+    if values.dtype.kind != "f":
+        places = np.arange(len(values), dtype=np.float64)
+        return places, np.append(places, len(values)) - 0.5, False
+    if len(values) == 1:
+        half = 0.05 * abs(values[0]) or 0.5
+        return values, np.array([values[0] - half, values[0] + half]), False
+    log = False
+    if len(values) > 2 and values[0] > 0 and values[-1] >= 10 * values[0]:
+        steps, ratios = np.diff(values), np.diff(np.log(values))
+        log = bool(np.ptp(ratios) / ratios.mean() < np.ptp(steps) / steps.mean())
+    at = np.log(values) if log else values
+    inner = (at[1:] + at[:-1]) / 2
+    edges = np.concatenate(([1.5 * at[0] - 0.5 * at[1]], inner, [1.5 * at[-1] - 0.5 * at[-2]]))
+    return values, np.exp(edges) if log else edges, log
+
+
+def _log(ax: Axes, which: Literal["x", "y"], low: float, high: float) -> None:
+    """A logarithmic axis with plain numbers, 0.02 and not 2 × 10⁻², the more of them the shorter it is."""
+    ax.set(**{f"{which}scale": "log"})
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    labelled = "25" if high < 100 * low else ""
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:.0e}"[0] in labelled else "")
+
+
+@_styled
+def sweep_map(
+    sweep: SweepResult | Table,
+    x: str,
+    y: str,
+    value: str,
+    *,
+    contours: str | None = "stick_slip_cycles_per_s",
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw a metric as a map over two swept keys, with lines of equal stick-slip.
+
+    A cell is the mean over its rows, as of several seeds. Cells without a run, or whose runs were refused,
+    are hatched. An axis is logarithmic where the swept values are spaced so.
+
+    Parameters
+    ----------
+    sweep : SweepResult or Table
+        A sweep over a grid, or a table with the columns named below. A data frame will do.
+    x, y : str
+        Swept keys of the scenario, as ``"law.smc.kp_v"``.
+    value : str
+        The metric to draw, as ``"max_error_rad"``. Angles are drawn in degrees.
+    contours : str, optional
+        The metric of the lines; None for none. The default is left out where the sweep does not have it.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; by default a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Axes in the keys' units; the colour bar has the metric's.
+
+    Raises
+    ------
+    ValueError
+        A column is missing; or another key but ``run.seed`` was swept too, and a mean over it would say
+        nothing; or the rows are no grid.
+
+    Examples
+    --------
+    >>> from clutch import plot, sweep
+    >>> gains = {"law.smc.kp_v": [3.0, 4.0], "law.smc.boundary_rad_s": [0.1, 0.15]}
+    >>> ax = plot.sweep_map(sweep("smc_2", gains), *gains, "max_error_rad")
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('law.smc.kp (V)', 'law.smc.boundary (rad/s)')
+    """
+    import numpy as np
+
+    from clutch._sweep import SweepResult
+
+    table, keys = (sweep.table, sweep.keys) if isinstance(sweep, SweepResult) else (sweep, ())
+    wanted = [x, y, value]
+    if contours is not None and (contours != "stick_slip_cycles_per_s" or contours in table.columns):
+        wanted.append(contours)
+    for name in wanted:
+        if name not in table.columns:
+            raise ValueError(f"sweep_map: {name}: no such column; there are {', '.join(table.columns)}")
+    for key in keys:
+        if key not in (x, y, "run.seed") and len(_swept(table[key])[0]) > 1:
+            raise ValueError(f"sweep_map: {key} was swept too; draw the rows of one of its values at a time")
+
+    (xs, column), (ys, row) = _swept(table[x]), _swept(table[y])
+    shape = (len(ys), len(xs))
+    if shape[0] * shape[1] > 4 * len(set(zip(column.tolist(), row.tolist(), strict=True))):
+        raise ValueError(f"sweep_map: the rows are no grid over {x} and {y}: {shape[1]} by {shape[0]} values")
+
+    def means(name: str, factor: float) -> np.ma.MaskedArray[Any, Any]:
+        values = np.asarray(table[name], dtype=np.float64) * factor
+        good = np.isfinite(values)
+        cell = np.ravel_multi_index((row[good], column[good]), shape)
+        count = np.bincount(cell, minlength=shape[0] * shape[1])
+        total = np.bincount(cell, weights=values[good], minlength=shape[0] * shape[1])
+        return np.ma.masked_invalid(np.where(count, total / np.maximum(count, 1), np.nan).reshape(shape))
+
+    (x_at, x_edges, x_log), (y_at, y_edges, y_log) = _cells(xs), _cells(ys)
+    ax = _one(ax, 70)
+    if x_log:
+        _log(ax, "x", x_edges[0], x_edges[-1])
+    if y_log:
+        _log(ax, "y", y_edges[0], y_edges[-1])
+    ax.patch.set(facecolor="white", edgecolor="0.7", hatch="////")
+    label, factor = _metric(value)
+    # A rim in the cell's own colour closes the hairlines that viewers of PDF show between cells.
+    rim: dict[str, Any] = {"edgecolors": "face", "linewidth": 0.1}
+    mesh = ax.pcolormesh(x_edges, y_edges, means(value, factor), cmap="cividis", **rim)
+    bar = _figure(ax).colorbar(mesh, ax=ax, label=label, pad=0.03)
+    bar.ax.spines["outline"].set_visible(False)
+    if len(wanted) > 3 and min(shape) > 1:
+        _contours(ax, x_at, y_at, wanted[3], means)
+    for axis, words in ((ax.xaxis, xs), (ax.yaxis, ys)):
+        if words.dtype.kind != "f":
+            axis.set_ticks(range(len(words)), list(words))
+    ax.set(xlabel=_label(x), ylabel=_label(y))
+    return ax
+
+
+def _contours(ax: Axes, x: NDArray[Any], y: NDArray[Any], name: str, means: Callable[..., Any]) -> None:
+    from matplotlib.patheffects import AbstractPathEffect, withStroke
+    from matplotlib.ticker import MaxNLocator
+
+    label, factor = _metric(name)
+    grid = means(name, factor)
+    if grid.count() == 0 or grid.min() == grid.max():
+        return
+    levels = MaxNLocator(5).tick_values(grid.min(), grid.max())
+    lines = ax.contour(x, y, grid, levels=levels[1:-1], colors="white", linewidths=0.7)
+    # White alone would be lost on the bright end of the colours.
+    halo: list[AbstractPathEffect] = [withStroke(linewidth=1.4, foreground="0.25")]
+    lines.set_path_effects(halo)
+    for text in ax.clabel(lines, fontsize=6):
+        text.set_path_effects(halo)
+    ax.plot([], [], color=_GREY, linewidth=0.7, label=f"lines: {label}")
+    _legend_above(ax)
+
+
+@_styled
+def certificate_region(
+    scenario: Scenario, *, kp: ArrayLike | None = None, kd: ArrayLike | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw which gains are certified for every plant within the bounds, and where the scenario's own lie.
+
+    ``scenario.override(…).certificate().certified`` is asked for each pair of the gains given, so the border
+    is known to half a step. By default the gains lie around the required ones and the scenario's own, 17 by
+    17, and more are asked for along the border, down to 1/256 of an axis; what is narrower than 1/16 of it
+    may be missed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With the law PD, SMC or SMC with the sign function.
+    kp, kd : array_like, optional
+        Gains to ask for, rising, in the units of ``law.smc.kp_v`` and ``law.smc.kd_v_s_rad``, or of
+        ``law.pd.kp_v_rad`` and ``law.pd.kd_v_s_rad``; both or neither; at most 3600 pairs.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; by default a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Derivative gain over proportional gain. The scenario's own gains are a full dot if they are certified
+        and a ring if not.
+
+    Raises
+    ------
+    ValueError
+        The law is another one; or only one of `kp` and `kd` is given, they do not rise, or are too many.
+    ParamError
+        A gain is not allowed.
+
+    Examples
+    --------
+    >>> from clutch import Scenario, plot
+    >>> ax = plot.certificate_region(Scenario.load("smc_2"), kp=[2.0, 2.5, 3.0], kd=[4.0, 8.0, 16.0])
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('law.smc.kp (V)', 'law.smc.kd (V s/rad)')
+    """
+    import numpy as np
+    from matplotlib.patches import Patch
+
+    law = scenario.law
+    if law._key not in _GAINS:
+        raise ValueError(f"certificate_region: {law._key}: expected one of {', '.join(_GAINS)}")
+    keys = [f"{law._key}.{name}" for name in _GAINS[law._key]]
+    own = [float(getattr(law, name)) for name in _GAINS[law._key]]
+
+    def certified(p: float, d: float) -> bool:
+        return scenario.override({keys[0]: p, keys[1]: d}).certificate().certified
+
+    if kp is None and kd is None:
+        gains = _around(scenario, own)
+        region = _refined(certified, *gains)
+    elif kp is None or kd is None:
+        raise ValueError("certificate_region: expected both kp and kd, or neither")
+    else:
+        gains = (np.asarray(kp, dtype=np.float64), np.asarray(kd, dtype=np.float64))
+        for name, values in zip(("kp", "kd"), gains, strict=True):
+            if values.ndim != 1 or len(values) < 2 or not (np.diff(values) > 0).all():
+                raise ValueError(f"certificate_region: {name}: expected two or more gains that rise")
+        if len(gains[0]) * len(gains[1]) > _MOST_PAIRS:
+            pairs = f"{len(gains[0])} by {len(gains[1])}"
+            raise ValueError(f"certificate_region: {pairs} gains: expected at most {_MOST_PAIRS} pairs")
+        region = np.array([[certified(p, d) for p in gains[0].tolist()] for d in gains[1].tolist()])
+
+    ax = _one(ax, 66)
+    if region.any():
+        ax.contourf(*gains, region, levels=[0.5, 1.5], colors=[_PALE])
+        if not region.all():
+            ax.contour(*gains, region, levels=[0.5], colors=[_BLUE], linewidths=0.7)
+    named = ", ".join(f"{gain:g} {_split(key)[1]}" for gain, key in zip(own, keys, strict=True))
+    good = scenario.certificate().certified
+    (dot,) = ax.plot(
+        *([gain] for gain in own),
+        marker="o",
+        markersize=4,
+        linestyle="none",
+        color=_RED,
+        markerfacecolor=_RED if good else "white",
+        label=f"{named}: {'certified' if good else 'not certified'}",
+    )
+    patch = Patch(facecolor=_PALE, edgecolor=_BLUE, linewidth=0.7, label="certified")
+    ax.legend(handles=[patch, dot], ncols=2, **_ABOVE)
+    _gain_axis(ax, "x", keys[0], gains[0])
+    _gain_axis(ax, "y", keys[1], gains[1])
+    return ax
+
+
+def _gain_axis(ax: Axes, which: Literal["x", "y"], key: str, gains: NDArray[np.float64]) -> None:
+    if gains[0] > 0 and gains[-1] > 20 * gains[0]:
+        _log(ax, which, gains[0], gains[-1])
+    ax.set(**{f"{which}label": _label(key), f"{which}lim": (gains[0], gains[-1])})
+
+
+def _around(scenario: Scenario, own: list[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Gains around the required ones and the scenario's own."""
+    import numpy as np
+
+    if scenario.law._key == "law.pd":  # what its certificate asks for are volts, and no gain
+        kp, kd = (np.geomspace((gain or 1.0) / 20, (gain or 1.0) * 20, _FINE + 1) for gain in own)
+        return kp, kd
+    ahead = scenario.certificate().ahead
+    kp = np.linspace(0.0, max(2.5 * ahead.kp_required_v, 1.3 * own[0]), _FINE + 1)
+    lowest = max(ahead.kd_required_v_s_rad, 1e-3) / 4
+    return kp, np.geomspace(min(lowest, (own[1] or lowest) / 2), max(40 * lowest, 2.5 * own[1]), _FINE + 1)
+
+
+def _refined(
+    certified: Callable[[float, float], bool], kp: NDArray[np.float64], kd: NDArray[np.float64]
+) -> NDArray[np.int8]:
+    """1 where gains are certified, 0 where not: a coarse grid, made finer where its corners differ."""
+    import numpy as np
+
+    step = _FINE // 16
+    region = np.zeros((len(kd), len(kp)), dtype=np.int8)
+    asked = np.zeros(region.shape, dtype=bool)
+    wanted = np.ones((17, 17), dtype=bool)
+    while True:
+        now, known = region[::step, ::step], asked[::step, ::step]
+        for row, column in np.argwhere(wanted & ~known):
+            now[row, column] = certified(float(kp[column * step]), float(kd[row * step]))
+        known |= wanted
+        if step == 1:
+            return region
+        step //= 2
+        finer, known = region[::step, ::step], asked[::step, ::step]
+        # What is not asked for is as its neighbour, until a border turns up beside it.
+        guess = np.repeat(np.repeat(now, 2, axis=0), 2, axis=1)[:-1, :-1]
+        corners = np.stack([now[:-1, :-1], now[:-1, 1:], now[1:, :-1], now[1:, 1:]])
+        wanted = np.zeros(finer.shape, dtype=bool)
+        for row, column in 2 * np.argwhere(np.ptp(corners, axis=0)):
+            wanted[row : row + 3, column : column + 3] = True
+        finer[...] = np.where(known, finer, guess)
+
+
+@_styled
+def run_overview(result: Result) -> Figure:
+    """Draw a run: its error, its velocity with the path's, and the brake's voltage.
+
+    Times at which the shaft was stuck are shaded behind the voltage.
+
+    Parameters
+    ----------
+    result : Result
+        A run.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Three panels over time in s: error in °, velocity in °/s, voltage in V.
+
+    Examples
+    --------
+    >>> from clutch import plot, simulate
+    >>> [ax.get_ylabel() for ax in plot.run_overview(simulate("smc_2")).axes]
+    ['error (°)', 'velocity (°/s)', 'voltage (V)']
+    """
+    import numpy as np
+
+    samples = result.samples
+    time = samples["time_s"]
+    figure, axes = _panels(3, height_mm=105, sharex=True)
+    error, velocity, voltage = (row[0] for row in axes)
+    _zero(error)
+    _line(error, time, _error_deg(result), color=_BLUE)
+    error.set_ylabel("error (°)")
+    _line(velocity, time, np.degrees(samples["velocity_rad_s"]), color=_BLUE, label="shaft")
+    target = np.degrees(samples["target_velocity_rad_s"])
+    _line(velocity, time, target, color=_RED, linewidth=0.8, label="target")
+    velocity.set_ylabel("velocity (°/s)")
+    _legend_above(velocity)
+    spans = _bars(_sticks(result))
+    if spans:
+        shade: dict[str, Any] = {
+            "facecolor": "#F3CDA8",
+            "linewidth": 0,
+            "label": "stuck",
+            "zorder": 0,
+            "snap": False,
+        }
+        voltage.broken_barh(spans, (0, 1), transform=voltage.get_xaxis_transform(), **shade)
+    _line(voltage, time, samples["voltage_v"], color=_BLUE, label="brake")
+    voltage.set(xlabel="time (s)", ylabel="voltage (V)", xlim=(0.0, _end([result])))
+    if spans:
+        _legend_above(voltage)
+    figure.align_ylabels()
+    return figure
+
+
+_STATES = ("Disconnected", "Ready", "Armed", "Running", "Holding", "Released", "Faulted")
+_COUNTERS = (
+    "lost",
+    "late",
+    "duplicated",
+    "reordered",
+    "rejected_frames",
+    "rejected_samples",
+    "deadline_misses",
+    "log_dropped",
+)
+
+
+@_styled
+def log_overview(log: Log) -> Figure:
+    """Draw a log of a simulation or a loop: what was measured, what was commanded, what went wrong.
+
+    Panels without records are left out, so a simulation has no latency and no link. Target and error are
+    drawn where the law answered: a safe state has none. Events are marked through all panels, faults in red.
+
+    Parameters
+    ----------
+    log : Log
+        From `clutch.read_log`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Panels over time in s: position in °, by the encoder; error in °, as the law saw it; voltage in V; the
+        supervisor's state; how long answers took in µs; the link's counters.
+
+    Raises
+    ------
+    ValueError
+        The log has no commands.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from clutch import plot, read_log, simulate
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     simulate("smc_2").save(f"{folder}/run.mcap")
+    ...     figure = plot.log_overview(read_log(f"{folder}/run.mcap"))
+    >>> [ax.get_ylabel() for ax in figure.axes]
+    ['position (°)', 'error (°)', 'voltage (V)', 'state']
+    """
+    import numpy as np
+
+    command = log.channels.get("command")
+    if command is None:
+        raise ValueError("log_overview: the log has no records of commands: there is nothing to draw")
+    sample, event, link = (log.channels.get(name) for name in ("sample", "event", "link"))
+    answered = sample is not None and bool(np.any(sample["lateness_us"]))
+    heights = [2.0, 2.0, 2.0, 1.1] + [1.2] * (answered + (link is not None))
+    figure, axes = _panels(len(heights), height_mm=12 + 15 * sum(heights), sharex=True, height_ratios=heights)
+    position, error, voltage, state, *others = (row[0] for row in axes)
+
+    time = command["time_s"]
+    law = np.array(command["source"]) == "Law"
+    scenario = log.scenario
+    degrees = 360.0 / scenario.rig.encoder.counts_per_rev
+    if sample is not None:
+        seen = np.array(sample["arrival"]) != "Missing"
+        counts = np.unwrap(np.asarray(sample["counts"], dtype=np.int64)[seen], period=2**32)
+        _line(position, sample["time_s"][seen], counts * degrees, color=_BLUE, label="encoder")
+    target = np.where(law, command["target_counts_x65536"] / 65536 * degrees, np.nan)
+    _line(position, time, target, color=_RED, label="target")
+    position.set_ylabel("position (°)")
+    _legend_above(position)
+    _zero(error)
+    _line(error, time, np.where(law, np.degrees(command["error_rad"]), np.nan), color=_BLUE)
+    error.set_ylabel("error (°)")
+    _line(voltage, time, command["voltage_v"], color=_BLUE)
+    voltage.set_ylabel("voltage (V)")
+    _states(state, command, event)
+    if answered and sample is not None:
+        ax = others.pop(0)
+        took = np.asarray(sample["lateness_us"], dtype=np.float64)
+        _line(ax, sample["time_s"][took > 0], took[took > 0], color=_BLUE, label="answer")
+        if scenario.safety is not None:
+            deadline = scenario.safety.limits.deadline_us
+            ax.axhline(deadline, color=_ORANGE, linestyle=_LONG_DASHES, label="deadline")
+            _legend_above(ax)
+        _log(ax, "y", *ax.get_ylim())
+        ax.set_ylabel("answer (µs)")
+    if link is not None:
+        _counters(others.pop(0), link)
+    if event is not None:
+        _events([row[0] for row in axes], event)
+    end = axes[-1][0].get_xlim()[1]
+    axes[-1][0].set(xlabel="time (s)", xlim=(0.0, 1.02 * end))
+    figure.align_ylabels()
+    return figure
+
+
+def _states(ax: Axes, command: Table, event: Table | None) -> None:
+    """The supervisor's state, also after the last command, which only the events tell."""
+    import numpy as np
+
+    time, states = command["time_s"], list(command["state"])
+    if event is not None:
+        time = np.concatenate((time, event["time_s"]))
+        states += list(event["to_state"])
+    order = np.argsort(time, kind="stable")
+    known = [name for name in _STATES if name in states]
+    places = np.array([known.index(name) for name in states])[order]
+    ax.step(time[order], places, where="post", color=_BLUE, linewidth=1.0)
+    ax.set_yticks(range(len(known)), known)
+    ax.set(ylabel="state", ylim=(-0.5, len(known) - 0.5))
+
+
+def _counters(ax: Axes, link: Table) -> None:
+    """What went wrong on the link, added up; only what did."""
+    from matplotlib.ticker import MaxNLocator
+
+    bad = [name for name in _COUNTERS if link[name].any()]
+    for name, colour in zip(bad, _COLOURS + _COLOURS, strict=False):
+        ax.step(link["time_s"], link[name], where="post", color=colour, label=name.replace("_", " "))
+    if bad:
+        _legend_above(ax)
+        ax.yaxis.set_major_locator(MaxNLocator(3, integer=True))
+    else:
+        words = f"none lost, late or refused of {link['received'].max()}"
+        ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", size=7, color="0.3")
+        ax.set_yticks([])
+    ax.set_ylabel("link (count)")
+
+
+def _events(axes: list[Axes], event: Table) -> None:
+    """A line through all panels for each event, with its cause beside the state."""
+    left, right = axes[3].get_xlim()
+    columns = (event[name] for name in ("time_s", "kind", "to_state", "cause"))
+    for time, kind, to, cause in zip(*columns, strict=True):
+        bad = to == "Faulted" or kind in ("PortLost", "LogDropped")
+        for ax in axes:
+            ax.axvline(time, color=_RED if bad else _GREY, linewidth=0.5, zorder=1)
+        words = kind if cause == "None" else cause
+        if words != "StateChange":
+            late = time > (left + right) / 2
+            axes[3].annotate(
+                re.sub(r"(?<=[a-z])(?=[A-Z])", " ", words).lower(),
+                (time, 0.5),
+                (-2 if late else 2, 0),
+                xycoords=("data", "axes fraction"),
+                textcoords="offset points",
+                ha="right" if late else "left",
+                va="center",
+                size=7,
+                color=_RED if bad else "0.3",
+            )

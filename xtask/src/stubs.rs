@@ -1,0 +1,104 @@
+//! The type stub of the native module: generated from the Rust docs, with what PyO3 cannot name
+//! filled in.
+
+use crate::python;
+use crate::run::{program, root};
+use anyhow::{Context, Result, bail};
+
+const STUB: &str = "python/clutch/_clutch.pyi";
+
+/// What the generator writes, and what it means. Each must be found: a change in the module shows.
+const NAMED: &[(&str, &str)] = &[
+    // Its imports: `CapsuleType` is in `types` from Python 3.13 on only.
+    (
+        "from _typeshed import Incomplete, SupportsGetItem\n",
+        "from collections.abc import Callable, Iterator, Mapping, Sequence\n",
+    ),
+    ("from types import CapsuleType\n", ""),
+    (
+        "from typing import Any, Final, SupportsFloat, SupportsIndex, final\n",
+        "from typing import Any, Final, SupportsFloat, SupportsIndex, final\n\n\
+         import numpy as np\nimport pandas as pd\nimport polars as pl\nimport pyarrow as pa\nimport xarray as xr\nfrom numpy.typing import ArrayLike, NDArray\n\
+         from typing_extensions import CapsuleType\n\nfrom clutch import _model\nfrom clutch._errors import ParamError\n",
+    ),
+    ("SupportsGetItem[int, str]", "Sequence[str]"),
+    ("rows: list,", "rows: list[list[object]],"),
+    (
+        "-> tuple[Table, dict, list[tuple[int, Any]]]",
+        "-> tuple[Table, dict[int, Table], list[tuple[int, ParamError]]]",
+    ),
+    (
+        "def __new__(cls, /, scenario: Any) -> Controller",
+        "def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Controller",
+    ),
+    (
+        "def __new__(cls, /, scenario: Any) -> Plant",
+        "def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Plant",
+    ),
+    ("def terms(self, /) -> dict:", "def terms(self, /) -> dict[str, float]:"),
+    ("def channels(self, /) -> dict:", "def channels(self, /) -> dict[str, Table]:"),
+    ("def metadata(self, /) -> dict:", "def metadata(self, /) -> dict[str, str]:"),
+    ("def metrics(self, /) -> dict:", "def metrics(self, /) -> dict[str, Any]:"),
+    ("def counts(self, /) -> Any:", "def counts(self, /) -> int | float:"),
+    (
+        "def step(self, /, voltage: SupportsFloat | SupportsIndex) -> Any:",
+        "def step(self, /, voltage: SupportsFloat | SupportsIndex) -> int | float:",
+    ),
+    ("def claims(self, /) -> Any:", "def claims(self, /) -> list[dict[str, Any]]:"),
+    ("def table3(self, /) -> Any:", "def table3(self, /) -> list[dict[str, float]]:"),
+    ("def certificate(self, /) -> Any:", "def certificate(self, /) -> dict[str, Any]:"),
+    ("def __iter__(self, /) -> Any: ...", "def __iter__(self, /) -> Iterator[str]: ..."),
+    ("columns: dict) -> Table", "columns: Mapping[str, ArrayLike]) -> Table"),
+    ("def to_dict(self, /) -> dict:", "def to_dict(self, /) -> dict[str, Any]:"),
+    ("def to_pandas(self, /) -> Any:", "def to_pandas(self, /) -> pd.DataFrame:"),
+    ("def to_polars(self, /) -> Any:", "def to_polars(self, /) -> pl.DataFrame:"),
+    ("def to_arrow(self, /) -> Any:", "def to_arrow(self, /) -> pa.Table:"),
+    ("index: str | None = None) -> Any:", "index: str | None = None) -> xr.Dataset:"),
+    (
+        "def __reduce__(self, /) -> tuple[Any, tuple[dict]]: ...",
+        "def __reduce__(self, /) -> tuple[Any, tuple[dict[str, Any]]]: ...",
+    ),
+    (
+        "def reproduce(progress: Any | None = None)",
+        "def reproduce(progress: Callable[[int, int], object] | None = None)",
+    ),
+    (
+        "def simulate(scenario: Any, law: Any | None = None)",
+        "def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] | None = None)",
+    ),
+    ("velocity: Incomplete) -> Incomplete", "velocity: NDArray[np.float64]) -> NDArray[np.float64]"),
+    ("table: dict", "table: dict[str, Any]"),
+    ("tables: dict,", "tables: dict[str, Any],"),
+    ("overrides: dict |", "overrides: Mapping[str, object] |"),
+    (") -> dict:", ") -> dict[str, Any]:"),
+];
+
+/// Generates the stub; with `check` only compares.
+pub(crate) fn generate(check: bool) -> Result<bool> {
+    let out = root().join("target/stubs");
+    let python = python::interpreter()?;
+    program(python::beside(&python, "maturin"))
+        .args(["generate-stubs", "--quiet", "--out"])
+        .arg(&out)
+        .run()?;
+    let made = out.join("clutch/_clutch.pyi");
+    let mut text = std::fs::read_to_string(&made).with_context(|| made.display().to_string())?;
+    for (found, named) in NAMED {
+        if !text.contains(found) {
+            bail!(
+                "the generated stub has no longer:\n{found}\nxtask/src/stubs.rs names it; see {}",
+                made.display()
+            );
+        }
+        text = text.replace(found, named);
+    }
+    if check {
+        let kept = std::fs::read_to_string(root().join(STUB)).unwrap_or_default();
+        if kept != text {
+            println!("{STUB} is not what the module gives: run `cargo xtask stubs`");
+        }
+        return Ok(kept == text);
+    }
+    std::fs::write(root().join(STUB), text)?;
+    Ok(true)
+}
