@@ -33,9 +33,7 @@ class Clutch:
 
     def __call__(self, *args, code=0):
         """Run a verb; anything but the expected exit code fails the test."""
-        done = subprocess.run(
-            [self.binary, *map(str, args)], capture_output=True, encoding="utf-8", timeout=120
-        )
+        done = subprocess.run([self.binary, *map(str, args)], capture_output=True, encoding="utf-8", timeout=120)
         if code is not None:
             assert done.returncode == code, f"clutch {args}: exit {done.returncode}\n{done.stderr}"
         return done

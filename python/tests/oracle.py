@@ -162,9 +162,7 @@ def advance(plant, brake, t0, state, period=PERIOD):
         # A corner in the driving torque ends a piece: within each, the motion is smooth.
         until = min([t - t0 for t in plant.drive.knots(t0 + s, t0 + period)], default=period)
         until = until if until - s > 1e-12 else period
-        piece = solve_ivp(
-            rate, (s, until), (0.0, velocity), method="DOP853", rtol=RTOL, atol=ATOL, events=stop
-        )
+        piece = solve_ivp(rate, (s, until), (0.0, velocity), method="DOP853", rtol=RTOL, atol=ATOL, events=stop)
         assert piece.status >= 0, piece.message
         s = piece.t[-1]
         position, velocity = origin + piece.y[0, -1], piece.y[1, -1]

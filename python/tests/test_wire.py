@@ -95,9 +95,7 @@ def test_the_schema_hash_is_that_of_the_printed_tables():
 
 def test_worked_examples_are_golden():
     section = DOCUMENT.split("## A cycle, byte by byte")[1].split("\n## ")[0]
-    frames = [
-        bytes.fromhex(match) for match in re.findall(r"^frame +((?:[0-9a-f]{2} )+) ", section, flags=re.M)
-    ]
+    frames = [bytes.fromhex(match) for match in re.findall(r"^frame +((?:[0-9a-f]{2} )+) ", section, flags=re.M)]
     golden = {row["bytes"]: row["results"] for row in VECTORS}
     assert [golden[frame.hex()] for frame in frames] == [
         "Sample run=1 sequence=256 time_us=256000 counts=-7 status=3",

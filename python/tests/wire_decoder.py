@@ -13,8 +13,7 @@ LAYOUTS = {
     0x01: ("Discover", "nonce:I version:B schema:Q"),
     0x02: (
         "Configure",
-        "run:H config:Q period_us:I watchdog_us:I safe_kind:B hold_code:H release_code:H"
-        " ramp_step:I hold_periods:I",
+        "run:H config:Q period_us:I watchdog_us:I safe_kind:B hold_code:H release_code:H ramp_step:I hold_periods:I",
     ),
     0x03: ("Arm", "run:H config:Q"),
     0x04: ("Actuate", "run:H sequence:H code:H valid_us:H"),

@@ -1,0 +1,274 @@
+"""Sweeps on executors: the same bits as here, and no row lost when workers die."""
+
+import concurrent.futures
+import importlib
+import importlib.util
+import multiprocessing
+import os
+import signal
+import threading
+import time
+import warnings
+
+import pytest
+
+import clutch
+from clutch import executors
+
+#: 48 rows of a few milliseconds each, with traces.
+SAMPLES = clutch.sobol({"law.smc.kp_v": (2, 6), "law.smc.boundary_rad_s": (0.02, 0.5, "log")}, 16)
+OPTIONS = {"seeds": 3, "traces": ["time_s", "error_rad", "voltage_v", "stuck"], "every": 50}
+
+
+@pytest.fixture(scope="module")
+def base():
+    return clutch.Scenario.load("bench_smc_2", {"run.duration_s": 1.5})
+
+
+@pytest.fixture(scope="module")
+def local(base):
+    # Also the trap of forking: after it this process has had native threads.
+    return clutch.sweep(base, SAMPLES, **OPTIONS)
+
+
+def same(a, b):
+    assert a.table == b.table and a.traces == b.traces and list(a.traces) == list(b.traces)
+    assert not b.interrupted
+
+
+def needed(name):
+    """A package that a user may lack; in continuous integration it must be there."""
+    if os.environ.get("CI") is None and importlib.util.find_spec(name) is None:
+        pytest.skip(f"{name} is not installed")
+    return importlib.import_module(name)
+
+
+@pytest.mark.parametrize("chunk", [None, 1, 7, 1000])
+def test_chunks_of_any_size_on_threads_give_the_same_bits(base, local, chunk):
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        same(local, clutch.sweep(base, SAMPLES, executor=pool, chunk=chunk, **OPTIONS))
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
+def test_processes_give_the_same_bits(base, local, method):
+    context = multiprocessing.get_context(method)
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as pool:
+        same(local, clutch.sweep(base, SAMPLES, executor=pool, **OPTIONS))
+
+
+def test_counts_and_codes_come_back_from_a_process_as_they_are_here(base):
+    options = {"traces": ["counts", "code", "limit"], "every": 50}
+    with concurrent.futures.ProcessPoolExecutor(1) as pool:
+        there = clutch.sweep(base, {"run.seed": [1]}, executor=pool, **options)
+    same(clutch.sweep(base, {"run.seed": [1]}, **options), there)
+
+
+def test_a_native_sweep_in_a_forked_child_does_not_hang(base, local):
+    context = multiprocessing.get_context("fork")
+    with concurrent.futures.ProcessPoolExecutor(1, mp_context=context) as pool:
+        future = pool.submit(clutch.sweep, base, SAMPLES, **OPTIONS)
+        same(local, future.result(timeout=30))
+
+
+class Counting:
+    """An executor that notes the rows of each chunk; futures are done at once."""
+
+    def __init__(self, workers=None):
+        self.chunks = []
+        if workers:
+            self._max_workers = workers
+
+    def submit(self, function, *arguments):
+        self.chunks.append(len(arguments[1]))
+        future = concurrent.futures.Future()
+        try:
+            future.set_result(function(*arguments))
+        except Exception as e:
+            future.set_exception(e)
+        return future
+
+
+def test_a_worker_gets_about_four_chunks_and_an_unknown_number_of_workers_64_rows_each(base):
+    short = base.override({"run.duration_s": 0.01, "run.settle_s": 0.0})
+    for executor, chunks in [(Counting(5), [6] * 20), (Counting(), [64, 56])]:
+        clutch.sweep(short, {"run.seed": range(1, 121)}, executor=executor)
+        assert executor.chunks == chunks
+
+
+class Failing(Counting):
+    """Fails the first attempts of every chunk, then runs it; after some submissions it is broken."""
+
+    def __init__(self, failures, lives=10**9, error=None):
+        super().__init__(2)
+        self.failures, self.lives = failures, lives
+        self.error = error or concurrent.futures.BrokenExecutor("the worker died")
+        self.attempts = {}
+
+    def submit(self, function, *arguments):
+        self.lives -= 1
+        if self.lives < 0:
+            raise concurrent.futures.BrokenExecutor("no workers left")
+        key = arguments[1][0]
+        self.attempts[key] = self.attempts.get(key, 0) + 1
+        if self.attempts[key] > self.failures:
+            return super().submit(function, *arguments)
+        future = concurrent.futures.Future()
+        future.set_exception(self.error)
+        return future
+
+
+@pytest.mark.parametrize("error", [None, concurrent.futures.CancelledError(), OSError("link down")])
+def test_a_chunk_is_submitted_three_times_more(base, local, error):
+    executor = Failing(3, error=error)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        same(local, clutch.sweep(base, SAMPLES, executor=executor, **OPTIONS))
+    assert set(executor.attempts.values()) == {4}
+
+
+def test_a_chunk_that_fails_a_fourth_time_runs_here(base, local):
+    with pytest.warns(RuntimeWarning, match="48 of 48 rows .* the worker died") as caught:
+        same(local, clutch.sweep(base, SAMPLES, executor=Failing(4), **OPTIONS))
+    assert caught[0].filename == __file__
+
+
+def test_the_rest_runs_here_when_the_executor_breaks(base, local):
+    with pytest.warns(RuntimeWarning, match="24 of 48 rows .* no workers left"):
+        same(local, clutch.sweep(base, SAMPLES, executor=Failing(0, lives=4), **OPTIONS))
+
+
+def test_an_executor_that_is_shut_down_loses_nothing(base, local):
+    pool = concurrent.futures.ThreadPoolExecutor(2)
+    pool.shutdown()
+    with pytest.warns(RuntimeWarning, match="48 of 48 rows"):
+        same(local, clutch.sweep(base, SAMPLES, executor=pool, **OPTIONS))
+
+
+def test_a_refused_row_is_not_tried_again(base):
+    executor = Failing(0)
+    with pytest.raises(clutch.ParamError, match=r"row 3: .*law\.smc\.kp_v") as caught:
+        clutch.sweep(base, {"law.smc.kp_v": [3.0, 4.0, 5.0, -1.0]}, executor=executor, chunk=2)
+    assert (caught.value.field, caught.value.value) == ("law.smc.kp_v", -1.0)
+    assert set(executor.attempts.values()) == {1}
+    kept = clutch.sweep(base, {"law.smc.kp_v": [3.0, -1.0]}, executor=Failing(0), errors="keep")
+    assert kept.table == clutch.sweep(base, {"law.smc.kp_v": [3.0, -1.0]}, errors="keep").table
+
+
+def test_ctrl_c_cancels_what_has_not_begun(base):
+    class Stuck(Counting):
+        def submit(self, function, *arguments):
+            if not self.chunks:
+                return super().submit(function, *arguments)
+            self.chunks.append(concurrent.futures.Future())
+            return self.chunks[-1]
+
+    executor = Stuck()
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    result = clutch.sweep(base, {"run.seed": range(1, 31)}, executor=executor, chunk=10)
+    assert result.interrupted and len(result) == 10
+    assert all(future.cancelled() for future in executor.chunks[1:])
+
+
+# --- Workers that are killed -------------------------------------------------------------------
+
+
+def killing(pids):
+    """A progress function that kills one of the processes `pids()` while most is still to be done."""
+    killed = []
+
+    def progress(finished, total):
+        if not killed and finished < total // 2:
+            killed.append(sorted(pids())[0])
+            os.kill(killed[0], signal.SIGKILL)
+
+    return progress, killed
+
+
+#: About two seconds of work for two workers.
+LONG = {"run.seed": range(1, 61)}
+
+
+@pytest.fixture(scope="module")
+def long(base):
+    return base.override({"run.duration_s": 10.0})
+
+
+@pytest.fixture(scope="module")
+def long_local(long):
+    return clutch.sweep(long, LONG)
+
+
+def test_a_killed_process_loses_no_row(long, long_local):
+    context = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as pool:
+        progress, killed = killing(lambda: pool._processes)
+        with pytest.warns(RuntimeWarning, match="rows could not be run by the executor"):
+            result = clutch.sweep(long, LONG, executor=pool, chunk=2, progress=progress)
+    assert killed
+    same(long_local, result)
+
+
+@pytest.fixture(scope="module")
+def dask():
+    distributed = needed("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+        yield client
+
+
+def test_dask_gives_the_same_bits(base, local, dask):
+    assert executors._workers(dask) == executors._workers(dask.get_executor()) == 2
+    same(local, clutch.sweep(base, SAMPLES, executor=dask, **OPTIONS))
+    same(local, clutch.sweep(base, SAMPLES, executor=dask.get_executor(), **OPTIONS))
+
+
+def test_a_killed_worker_of_dask_loses_no_row(long, long_local, dask):
+    progress, killed = killing(dask.run(os.getpid).values)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        result = clutch.sweep(long, LONG, executor=dask, chunk=2, progress=progress)
+    assert killed
+    same(long_local, result)
+
+
+@pytest.fixture(scope="module")
+def ray():
+    needed("ray")
+    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+    with executors.RayExecutor(num_cpus=2, include_dashboard=False, log_to_driver=False) as ray:
+        yield ray
+
+
+def test_ray_gives_the_same_bits(base, local, ray):
+    assert ray.num_workers == executors._workers(ray) == 2
+    same(local, clutch.sweep(base, SAMPLES, executor=ray, **OPTIONS))
+
+
+def test_a_killed_worker_of_ray_loses_no_row(long, long_local, ray):
+    # Two tasks at once, so that both workers tell their numbers; eval is a function they surely have.
+    busy = "[__import__('os').getpid(), __import__('time').sleep(0.3)][0]"
+    pids = {future.result() for future in [ray.submit(eval, busy) for _ in range(4)]}
+    progress, killed = killing(lambda: pids)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        result = clutch.sweep(long, LONG, executor=ray, chunk=2, progress=progress)
+    assert killed
+    same(long_local, result)
+
+
+def test_an_exception_on_ray_is_the_functions_own_and_a_task_can_be_cancelled(ray):
+    with pytest.raises(ZeroDivisionError):
+        ray.submit(divmod, 1, 0).result()
+    future = ray.submit(time.sleep, 60)
+    future.cancel()
+    begin = time.monotonic()
+    with pytest.raises(Exception) as caught:
+        future.result()
+    assert type(caught.value).__name__ == "TaskCancelledError"
+    assert future.done() and time.monotonic() - begin < 10
+
+
+def test_a_ray_that_runs_already_is_left_running(ray):
+    with executors.RayExecutor() as second:
+        assert second.submit(abs, -1).result() == 1
+    assert ray.submit(abs, -2).result() == 2

@@ -1,0 +1,166 @@
+"""The environment: Gymnasium's own checks, and the simulator's trajectory bit for bit."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+import clutch
+
+gymnasium = pytest.importorskip("gymnasium")
+
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+import clutch.gym  # noqa: E402
+from clutch.gym import TrackingEnv  # noqa: E402
+
+IDS = ["clutch/Ramp-v0", "clutch/RampBench-v0", "clutch/MinimumJerk-v0"]
+
+
+def run(env, seed, agent):
+    """An episode: observations, rewards, infos, and how it ended."""
+    observation, info = env.reset(seed=seed)
+    observations, rewards, infos = [observation], [], [info]
+    ended = (False, False)
+    while not any(ended):
+        observation, reward, *ended, info = env.step(np.array([agent(observation, info)], np.float32))
+        observations.append(observation)
+        rewards.append(reward)
+        infos.append(info)
+    return np.array(observations), np.array(rewards), infos, tuple(ended)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_gymnasiums_checks_pass(name):
+    with warnings.catch_warnings():
+        # Its advice on normalised actions and infinite bounds: ours are volts and radians.
+        warnings.simplefilter("ignore", UserWarning)
+        check_env(gymnasium.make(name).unwrapped)
+
+
+@pytest.mark.parametrize("scenario", ["smc_2", "bench_smc_2", "pd_2", "f32_smc_2"])
+def test_an_agent_that_plays_the_law_moves_the_shaft_as_simulate_does(scenario):
+    env = TrackingEnv(scenario, overrides={"run.duration_s": 1.5, "run.settle_s": 0.0})
+    observations, _, infos, ended = run(env, 5, lambda _, info: info["law_voltage_v"])
+    result = clutch.simulate(env.scenario.override({"run.seed": 5}))
+    samples = result.samples
+    assert ended == (False, True) and len(infos) == len(samples)
+    for key in ("position_rad", "velocity_rad_s", "counts", "time_s", "stuck", "error_rad"):
+        np.testing.assert_array_equal([info[key] for info in infos], samples[key], err_msg=key)
+    for i, key in enumerate(
+        ["measured_error_rad", "error_rate_rad_s", "target_velocity_rad_s", "target_acceleration_rad_s2"]
+    ):
+        np.testing.assert_array_equal(observations[:, i], samples[key], err_msg=key)
+    np.testing.assert_array_equal(observations[1:, 4], samples["voltage_v"][:-1])
+    sticks = [t for t, kind in zip(result.events["time_s"], result.events["kind"], strict=True) if kind == "stick"]
+    assert infos[-1]["sticks"] == sum(t <= infos[-1]["time_s"] for t in sticks)
+
+
+def test_a_sensor_without_steps_gives_the_same_motion_up_to_the_rounding_of_actions():
+    env = TrackingEnv("smc_2", overrides={"rig.base": "ideal", "run.duration_s": 0.5, "run.settle_s": 0.0})
+    _, _, infos, _ = run(env, 2, lambda _, info: info["law_voltage_v"])
+    samples = clutch.simulate(env.scenario.override({"run.seed": 2})).samples
+    # An action is a float32, and nothing rounds it here to a step of the converter.
+    np.testing.assert_allclose([i["position_rad"] for i in infos], samples["position_rad"], atol=1e-7)
+
+
+def test_a_seed_is_the_scenarios_and_repeats_the_episode():
+    env = TrackingEnv("bench_smc_2", overrides={"run.duration_s": 1.1})
+    noise = np.random.default_rng(1).uniform(1.8, 2.6, 1100)
+
+    def episode(seed):
+        actions = iter(noise)
+        return run(env, seed, lambda *_: next(actions))
+
+    first, again, other = episode(3), episode(3), episode(4)
+    np.testing.assert_array_equal(first[0], again[0])
+    np.testing.assert_array_equal(first[1], again[1])
+    assert first[2] == again[2] and first[2][0]["seed"] == 3
+    assert other[2][0]["position_rad"] != first[2][0]["position_rad"]
+
+
+def test_without_a_seed_each_episode_is_another_one_and_the_series_repeats():
+    env = TrackingEnv("smc_2")
+
+    def seeds():
+        return [env.reset(seed=1)[1]["seed"], *(env.reset()[1]["seed"] for _ in range(3))]
+
+    first = seeds()
+    assert first == seeds() and len(set(first)) == 4
+
+
+def test_the_reward_is_what_its_formula_says():
+    env = TrackingEnv("smc_2", error_weight=0.5, variation_weight=2.0, overrides={"run.duration_s": 1.01})
+    observations, rewards, infos, _ = run(env, 1, lambda _, info: info["law_voltage_v"])
+    counts = np.array([i["error_rad"] for i in infos[1:]]) * 20_000 / math.tau
+    variation = np.abs(np.diff(observations[:, 4]))
+    np.testing.assert_allclose(rewards, -0.5 * counts**2 - 2.0 * variation, rtol=1e-12)
+
+
+def test_a_shaft_let_go_ends_the_episode_and_giving_up_never_pays():
+    env = TrackingEnv("smc_2", max_error_deg=1.0, variation_weight=0.0)
+    _, rewards, infos, ended = run(env, 1, lambda *_: 0.0)
+    assert ended == (True, False)
+    errors = np.abs([i["error_rad"] for i in infos])
+    assert errors[-1] > math.radians(1.0) >= errors[-2]
+    # As if the error had stayed at its limit to the end.
+    at_limit = 1e-3 * (20_000 / 360.0) ** 2
+    assert rewards.sum() < -at_limit * (5000 - len(infos))
+    # A shaft that runs away for 1°: T_u/J (1 − C_d/J t/3 …) t²/2 beyond the ramp.
+    assert infos[-1]["time_s"] == pytest.approx(math.sqrt(2 * math.radians(1.0) / 27.69882), abs=2e-3)
+
+
+def test_voltages_beyond_the_limits_are_cut_and_those_that_are_no_numbers_refused():
+    env = TrackingEnv("smc_2", overrides={"output.highest_v": 5.0, "output.on_invalid_v": 5.0})
+    env.reset(seed=1)
+    assert env.action_space.high[0] == 5.0
+    assert env.step([50.0])[0][4] == 5.0 and env.step([-3.0])[0][4] == 0.0
+    with pytest.raises(ValueError):
+        env.step([math.nan])
+
+
+def test_observations_are_new_arrays_of_the_space():
+    env = TrackingEnv("minimum_jerk")
+    first, _ = env.reset(seed=1)
+    kept = first.copy()
+    second = env.step([2.0])[0]
+    assert first is not second and np.array_equal(first, kept)
+    assert first in env.observation_space and second in env.observation_space
+
+
+def test_bad_arguments_are_named():
+    with pytest.raises(ValueError, match=r"velocity\.observer"):
+        TrackingEnv("observer_smc_2")
+    with pytest.raises(ValueError, match="max_error_deg"):
+        TrackingEnv("smc_2", max_error_deg=0.0)
+    with pytest.raises(ValueError, match="weights"):
+        TrackingEnv("smc_2", error_weight=-1.0)
+    with pytest.raises(clutch.ParamError):
+        TrackingEnv("smc_2", overrides={"law.smc.kp_v": -1})
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_vectors_of_environments_run(mode):
+    envs = gymnasium.make_vec("clutch.gym:clutch/Ramp-v0", num_envs=2, vectorization_mode=mode)
+    try:
+        observations, infos = envs.reset(seed=3)
+        assert observations.shape == (2, 5) and infos["seed"].tolist() == [3, 4]
+        for _ in range(50):
+            observations, _, terminated, _, infos = envs.step(infos["law_voltage_v"][:, None].astype(np.float32))
+        assert not terminated.any()
+        alone = TrackingEnv("smc_2")
+        _, info = alone.reset(seed=4)
+        for _ in range(50):
+            observation, *_, info = alone.step([info["law_voltage_v"]])
+        np.testing.assert_array_equal(observations[1], observation)
+    finally:
+        envs.close()
+
+
+def test_registering_twice_changes_nothing():
+    before = {name: gymnasium.spec(name) for name in IDS}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        clutch.gym.register()
+    assert before == {name: gymnasium.spec(name) for name in IDS}

@@ -1,0 +1,393 @@
+"""Sweeps on this machine: shapes, equality with single runs, refusals, Ctrl-C, progress."""
+
+import io
+import math
+import pickle
+import subprocess
+import sys
+import textwrap
+import warnings
+
+import numpy as np
+import pytest
+
+import clutch
+from clutch import _sweep
+
+FIGURES = [
+    "measured_s",
+    "max_error_rad",
+    "rms_error_rad",
+    "mean_error_rad",
+    "iae_rad_s",
+    "stick_slip_cycles_per_s",
+    "stick_time_fraction",
+    "stair_height_rad",
+    "break_away_torque_nm",
+    "control_variation_v_s",
+    "jerk_rms_rad_s3",
+    "detected_stick_slip_cycles_per_s",
+    "detected_stick_time_fraction",
+]
+#: A run of 0.3 s, so that tests stay short.
+SHORT = {"run.duration_s": 0.3, "run.settle_s": 0.1}
+
+
+@pytest.fixture(scope="module")
+def short():
+    return clutch.Scenario.load("smc_2", SHORT)
+
+
+def alone(base, row):
+    """The figures of one run by itself, NaN for none."""
+    result = clutch.simulate(base.override(row))
+    figures = {name: getattr(result.metrics, name) for name in FIGURES}
+    return {name: math.nan if x is None else x for name, x in figures.items()}, result
+
+
+def assert_rows_are_single_runs(base, result):
+    for i in range(len(result)):
+        figures, run = alone(base, dict(zip(result.keys, result.samples.rows[result.table["run"][i]], strict=True)))
+        for name in FIGURES:
+            np.testing.assert_array_equal(result.table[name][i], figures[name], err_msg=f"row {i}: {name}")
+        assert result.table["certified"][i] == bool(run.scenario.certificate())
+
+
+# --- What is run -------------------------------------------------------------------------------
+
+
+def test_a_row_is_bit_for_bit_what_simulate_gives_for_it():
+    base = clutch.Scenario.load("smc_2", {"run.duration_s": 2.0})
+    result = clutch.sweep(base, {"law.smc.kp_v": [2.0, 3.0, 4.5], "law.smc.boundary_rad_s": [0.05, 0.1]}, seeds=2)
+    assert len(result) == 12
+    assert_rows_are_single_runs(base, result)
+
+
+@pytest.mark.parametrize("name", ["pd_2", "bench_smc_2", "observer_smc_2", "hand_guided", "f32_smc_2"])
+def test_every_kind_of_scenario_sweeps_as_it_runs(name):
+    base = clutch.Scenario.load(name, SHORT)
+    result = clutch.sweep(base, {"output.highest_v": [9.0, 10.0], "output.on_invalid_v": [9.0]}, seeds=2)
+    assert_rows_are_single_runs(base, result)
+    by_name = clutch.sweep(name, {key: [value] for key, value in SHORT.items()}, seeds=2)
+    assert_rows_are_single_runs(clutch.Scenario.load(name), by_name)
+
+
+def test_a_grid_runs_every_combination_with_the_last_key_fastest(short):
+    result = clutch.sweep(short, {"law.smc.kp_v": [3, 4], "run.seed": [7, 5, 6]})
+    assert result.table["law.smc.kp_v"].tolist() == [3, 3, 3, 4, 4, 4]
+    assert result.table["run.seed"].tolist() == [7, 5, 6, 7, 5, 6]
+    assert result.table["run"].tolist() == [0, 1, 2, 3, 4, 5]
+    assert result.table.columns == ["run", "law.smc.kp_v", "run.seed", *FIGURES, "certified", "error"]
+    assert result.table["error"] == [""] * 6
+    assert result.table["run.seed"].dtype == np.int64 and result.table["certified"].dtype == bool
+
+
+def test_seeds_are_crossed_with_every_row(short):
+    by_number = clutch.sweep(short, {"law.smc.kp_v": [3.0, 4.0]}, seeds=3, metrics="max_error_rad")
+    assert by_number.table["run.seed"].tolist() == [1, 2, 3, 1, 2, 3]
+    listed = clutch.sweep(short, {"law.smc.kp_v": [3.0, 4.0]}, seeds=range(1, 4), metrics="max_error_rad")
+    assert listed.table == by_number.table
+    with pytest.raises(ValueError, match=r"run\.seed"):
+        clutch.sweep(short, {"run.seed": [1]}, seeds=2)
+
+
+def test_choices_and_whole_tables_can_be_swept(short):
+    result = clutch.sweep(
+        short,
+        {
+            "law": [clutch.Pd(), {"smc": {"kp_v": 4.0}}, clutch.Ctc()],
+            "rig.base": ["paper", "bench"],
+            "run.engine": ["auto", "dormand_prince"],
+        },
+    )
+    assert result.table["rig.base"] == ["paper", "paper", "bench", "bench"] * 3
+    assert result.table["law"][4] == '{"smc": {"kp_v": 4.0}}'
+    assert isinstance(result.scenario(0).law, clutch.Pd) and isinstance(result.scenario(11).law, clutch.Ctc)
+    assert result.scenario(2).rig == clutch.Rig.bench()
+    assert_rows_are_single_runs(short, result)
+
+
+def test_the_rigs_other_keys_change_the_base_that_is_swept(short):
+    result = clutch.sweep(short, {"rig.delay_ticks": [0, 2], "rig.base": ["bench", "ideal"]})
+    assert result.scenario(2).rig == clutch.Rig.bench().replace(delay_ticks=2)
+    assert_rows_are_single_runs(short, result)
+
+
+def test_an_object_at_the_wrong_key_is_refused(short):
+    with pytest.raises(TypeError, match=r"reference: a Smc stands at law\.smc"):
+        clutch.sweep(short, {"reference": [clutch.Smc()]})
+    friction = clutch.StribeckFriction(mu_static=0.22)
+    assert clutch.sweep(short, {"rig.friction": [friction]}).scenario(0).rig.friction == friction
+
+
+def test_tables_and_data_frames_are_taken_row_by_row(short):
+    columns = {"law.smc.kp_v": [3.0, 4.0, 5.0], "run.seed": [1, 5, 2]}
+    expected = clutch.sweep(short, clutch.samples(columns))
+    assert expected.table["run.seed"].tolist() == [1, 5, 2]
+    arrays = clutch.samples({k: np.array(v) for k, v in columns.items()})
+    assert arrays == clutch.samples(columns) and isinstance(arrays.rows[0][1], int)
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    for table in (clutch.Table(columns), pandas.DataFrame(columns), polars.DataFrame(columns)):
+        assert clutch.sweep(short, table).table == expected.table
+    with pytest.raises(ValueError, match="unequal"):
+        clutch.samples({"law.smc.kp_v": [3.0], "run.seed": [1, 2]})
+
+
+@pytest.mark.parametrize("draw", [clutch.sobol, clutch.latin_hypercube])
+def test_points_fill_their_ranges_on_their_scales(draw):
+    n = 64
+    points = draw({"a": (1, 6), "b": (1e-3, 10.0, "log"), "c": (0, 3, "int")}, n, seed=3)
+    assert (points.keys, len(points), points.axes) == (("a", "b", "c"), n, None)
+    a, b, c = (np.array(x) for x in zip(*points.rows, strict=True))
+    assert a.min() >= 1.0 and a.max() <= 6.0
+    # Even on their scale: as many in each half, or quarter, up to the points on its border.
+    assert abs(np.sum(a < 3.5) - n / 2) <= 2
+    assert abs(np.sum(np.log10(b) < -1.0) - n / 2) <= 2
+    assert all(isinstance(x, int) for *_, x in points.rows)
+    np.testing.assert_allclose(np.bincount(c, minlength=4), n / 4, atol=2)
+    assert draw({"a": (1, 6)}, n, seed=3) == draw({"a": (1, 6)}, n, seed=3)
+    assert draw({"a": (1, 6)}, n, seed=3) != draw({"a": (1, 6)}, n, seed=4)
+
+
+@pytest.mark.parametrize("limits", [(2, 2), (3, 2), (0, 1, "log"), (0, 1, "sqrt"), (0, math.inf)])
+def test_a_bad_range_is_named(limits):
+    with pytest.raises(ValueError, match=r"law\.smc\.kp_v"):
+        clutch.sobol({"law.smc.kp_v": limits}, 4)
+
+
+def test_a_sweep_needs_keys_and_values(short):
+    for parameters, error in [({}, ValueError), ({"law.smc.kp_v": []}, ValueError)]:
+        with pytest.raises(error):
+            clutch.sweep(short, parameters)
+    for bad in (3.0, "abc", {"a": 1}):
+        with pytest.raises(TypeError, match=r"law\.smc\.kp_v"):
+            clutch.sweep(short, {"law.smc.kp_v": bad})
+    with pytest.raises(ValueError, match="rms_errors_rad"):
+        clutch.sweep(short, {"law.smc.kp_v": [3.0]}, metrics=["rms_errors_rad"])
+    for option in ("every", "chunk", "threads"):
+        with pytest.raises(ValueError, match=option):
+            clutch.sweep(short, {"law.smc.kp_v": [3.0]}, **{option: 0})
+
+
+# --- What comes out ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("threads", [1, 2, 7, None])
+def test_the_number_of_threads_changes_nothing(short, threads):
+    samples = clutch.sobol({"law.smc.kp_v": (2, 6), "law.smc.slope_1_s": (20, 200, "log")}, 32)
+    one = clutch.sweep(short, samples, threads=1, traces=["counts", "voltage_v", "stuck"], every=7)
+    more = clutch.sweep(short, samples, threads=threads, traces=["counts", "voltage_v", "stuck"], every=7)
+    assert more.table == one.table and more.traces == one.traces and list(more.traces) == list(range(32))
+
+
+def test_traces_are_the_samples_of_the_single_run(short):
+    result = clutch.sweep(short, {"law.smc.kp_v": [3.0, 4.0]}, traces=True, every=10)
+    samples = clutch.simulate(result.scenario(1)).samples
+    assert result.traces[1].columns == ["time_s", "error_rad", "voltage_v"]
+    for name in result.traces[1].columns:
+        np.testing.assert_array_equal(result.traces[1][name], samples[name][::10])
+    every = clutch.sweep(short, {"law.smc.kp_v": [4.0]}, traces=samples.columns)
+    assert every.traces[0] == samples
+    assert clutch.sweep(short, {"law.smc.kp_v": [3.0]}).traces == {}
+
+
+def test_a_refused_row_is_named_with_its_key_value_and_number(short):
+    with pytest.raises(clutch.ParamError, match=r"row 2: .*law\.smc\.kp_v") as caught:
+        clutch.sweep(short, {"law.smc.kp_v": [3.0, 4.0, -1.0, -2.0]}, threads=1)
+    assert (caught.value.field, caught.value.value) == ("law.smc.kp_v", -1.0)
+    with pytest.raises(clutch.ParamError, match="row 0") as caught:
+        clutch.sweep(short, {"law.smc.kp_w": [3.0]})
+    assert caught.value.field == "law.smc.kp_w"
+
+
+def test_a_refused_row_ends_a_long_sweep_early():
+    long = clutch.Scenario.load("smc_2", {"run.duration_s": 500.0})
+    done = []
+    with pytest.raises(clutch.ParamError, match="row 1"):
+        clutch.sweep(long, {"law.smc.kp_v": [3.0, -1.0, *[3.0] * 2000]}, progress=lambda n, total: done.append(n))
+    assert max(done, default=0) < 1000
+
+
+def test_refused_rows_are_kept_on_request(short):
+    result = clutch.sweep(short, {"law.smc.kp_v": [3.0, -1.0, 4.0]}, errors="keep", traces=True)
+    assert len(result) == 3 and "law.smc.kp_v" in result.table["error"][1]
+    assert [bool(e) for e in result.table["error"]] == [False, True, False]
+    for name in FIGURES:
+        if name != "break_away_torque_nm":
+            assert [math.isnan(x) for x in result.table[name]] == [False, True, False], name
+    assert not result.table["certified"][1]
+    assert sorted(result.traces) == [0, 2]
+    assert result.best("max_error_rad")[0]["law.smc.kp_v"] == 4.0
+    with pytest.raises(ValueError, match="errors"):
+        clutch.sweep(short, {"law.smc.kp_v": [3.0]}, errors="ignore")
+
+
+def test_the_best_values_have_the_lowest_mean_over_the_seeds():
+    result = clutch.sweep("smc_2", {"law.smc.kp_v": [2.5, 3.0, 4.0], "run.duration_s": [2.0]}, seeds=4)
+    means = result.table["stick_slip_cycles_per_s"].reshape(3, 4).mean(axis=1)
+    row, scenario = result.best("stick_slip_cycles_per_s")
+    assert row["law.smc.kp_v"] == [2.5, 3.0, 4.0][int(np.argmin(means))]
+    assert row["stick_slip_cycles_per_s"] == pytest.approx(means.min(), rel=1e-15)
+    assert scenario.law.kp_v == row["law.smc.kp_v"] and scenario.run.seed == 1
+    with pytest.raises(ValueError, match="was not taken"):
+        clutch.sweep("smc_2", {"run.duration_s": [2.0]}, metrics="iae_rad_s").best("max_error_rad")
+
+
+def test_the_best_mean_error_is_the_one_nearest_to_zero(short):
+    result = clutch.sweep(short, {"law.smc.kp_v": [2.5, 3.0, 6.0]})
+    row, _ = result.best("mean_error_rad")
+    assert abs(row["mean_error_rad"]) == np.abs(result.table["mean_error_rad"]).min()
+    assert result.table["mean_error_rad"].max() < 0.0
+
+
+def test_a_grid_becomes_a_dataset_with_named_dimensions(short):
+    pytest.importorskip("xarray")
+    result = clutch.sweep(short, {"law.smc.kp_v": [3.0, 4.0], "rig.base": ["paper", "bench"]}, seeds=3)
+    data = result.to_xarray()
+    assert dict(data.sizes) == {"law.smc.kp_v": 2, "rig.base": 2, "run.seed": 3}
+    one = data["max_error_rad"].sel({"law.smc.kp_v": 4.0, "rig.base": "paper", "run.seed": 3})
+    assert float(one) == result.table["max_error_rad"][8]
+    points = clutch.sweep(short, clutch.sobol({"law.smc.kp_v": (2, 6)}, 4)).to_xarray()
+    assert dict(points.sizes) == {"run": 4} and "law.smc.kp_v" in points.coords
+
+
+def test_the_table_goes_to_data_frames_and_arrow(short):
+    result = clutch.sweep(short, {"law.smc.kp_v": [3.0, 4.0]})
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    pyarrow = pytest.importorskip("pyarrow")
+    expected = result.table["rms_error_rad"].tolist()
+    assert result.to_pandas()["rms_error_rad"].tolist() == expected
+    assert result.to_polars()["rms_error_rad"].to_list() == expected
+    assert result.to_arrow()["rms_error_rad"].to_pylist() == expected
+    assert pyarrow.table(result)["rms_error_rad"].to_pylist() == expected
+    assert polars.DataFrame(result)["rms_error_rad"].to_list() == expected
+    assert isinstance(pandas.DataFrame.from_arrow(result), pandas.DataFrame)
+
+
+def test_a_result_says_what_it_is_and_can_be_kept(short):
+    result = clutch.sweep(short, {"law.smc.kp_v": [3.0, 4.0]}, traces=True)
+    assert repr(result) == "<SweepResult: 2 runs over law.smc.kp_v>"
+    assert "law.smc.kp_v" in result._repr_html_() and len(result) == result.total == 2
+    again = pickle.loads(pickle.dumps(result))
+    assert again.table == result.table and again.traces == result.traces
+    assert again.base == result.base and again.samples == result.samples
+    with pytest.raises(IndexError):
+        result.scenario(2)
+
+
+# --- Ctrl-C and progress -----------------------------------------------------------------------
+
+
+INTERRUPTED = """
+    import os, signal, threading, time
+    import clutch
+
+    base = clutch.Scenario.load("smc_2", {"run.duration_s": %s})
+    executor = None
+    %s
+    sent = []
+    def interrupt():
+        time.sleep(%s)
+        sent.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+    threading.Thread(target=interrupt).start()
+    result = clutch.sweep(base, {"run.seed": range(1, 100_001)}, executor=executor, chunk=20)
+    answered = time.perf_counter() - sent[0]
+    assert result.interrupted and result.total == 100_000, result
+    print(answered, len(result), flush=True)
+    rows = list(result.table["run"])
+    assert rows == sorted(rows) and len(set(rows)) == len(rows)
+    if rows:
+        alone = clutch.simulate(result.scenario(len(rows) - 1)).metrics.rms_error_rad
+        assert result.table["rms_error_rad"][-1] == alone
+    assert "interrupted, %%d of 100000" %% len(result) in repr(result), result
+    os._exit(0)
+"""
+
+
+def interrupted(duration, setup="", after=0.5):
+    """Seconds from Ctrl-C to the answer, and finished runs; the median of three processes."""
+    found = []
+    for _ in range(3):
+        script = textwrap.dedent(INTERRUPTED) % (duration, setup, after)
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, done.stderr
+        seconds, runs = done.stdout.split()
+        found.append((float(seconds), int(runs)))
+    return sorted(found)[1]
+
+
+def test_ctrl_c_gives_the_finished_part_within_a_fifth_of_a_second():
+    seconds, runs = interrupted(2.0)
+    assert runs > 0 and seconds < 0.2
+
+
+def test_ctrl_c_ends_also_a_single_long_run():
+    seconds, runs = interrupted(9_000.0)
+    assert runs == 0 and seconds < 0.2
+
+
+def test_ctrl_c_gives_the_chunks_that_threads_have_finished():
+    setup = "from concurrent.futures import ThreadPoolExecutor; executor = ThreadPoolExecutor(2)"
+    seconds, runs = interrupted(0.5 + 1, setup, after=1.0)
+    assert runs > 0 and runs % 20 == 0 and seconds < 0.5
+
+
+def test_an_interrupted_grid_has_gaps_where_nothing_ran(short):
+    pytest.importorskip("xarray")
+
+    def stop(finished, total):
+        raise KeyboardInterrupt
+
+    long = short.override({"run.duration_s": 20.0})
+    result = clutch.sweep(long, {"law.smc.kp_v": [3.0, 4.0], "run.seed": range(1, 2001)}, progress=stop)
+    assert result.interrupted and len(result) < 4000
+    data = result.to_xarray()
+    assert dict(data.sizes) == {"law.smc.kp_v": 2, "run.seed": 2000}
+    assert int(data["max_error_rad"].notnull().sum()) == len(result)
+
+
+def test_a_function_is_told_the_progress(short):
+    told = []
+    clutch.sweep(short, {"run.seed": range(1, 20)}, progress=lambda n, total: told.append((n, total)))
+    assert told[-1] == (19, 19) and told == sorted(told)
+
+
+def test_an_error_of_the_progress_function_ends_the_sweep(short):
+    def fail(finished, total):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        clutch.sweep(short, {"run.seed": range(1, 200)}, progress=fail)
+
+
+class Terminal(io.StringIO):
+    """A standard error that somebody watches."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("with_tqdm", [True, False])
+def test_a_bar_is_shown_on_a_terminal_only_and_only_for_long_sweeps(short, monkeypatch, with_tqdm):
+    if with_tqdm:
+        pytest.importorskip("tqdm")
+    else:
+        monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    shown = {}
+    for case, after, stream, wanted in [
+        ("long", 0.0, Terminal(), None),
+        ("short", 60.0, Terminal(), None),
+        ("nobody", 0.0, io.StringIO(), None),
+        ("asked", 60.0, io.StringIO(), True),
+        ("off", 0.0, Terminal(), False),
+    ]:
+        monkeypatch.setattr(_sweep, "_SHOWN_AFTER_S", after)
+        monkeypatch.setattr(sys, "stderr", stream)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            clutch.sweep(short, {"run.seed": [1, 2, 3]}, progress=wanted)
+        shown[case] = stream.getvalue()
+    assert "3" in shown["long"] and "3" in shown["asked"]
+    assert shown["short"] == shown["nobody"] == shown["off"] == ""
+    assert ("3 of 3 runs" in shown["long"]) != with_tqdm

@@ -1,0 +1,422 @@
+"""The package is the Rust code: the same bits as the command, whatever way they are asked for."""
+
+import copy
+import json
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import clutch as package
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENARIOS = package.scenarios()
+# Columns of the command's CSV that the package has, too; PD's term demand_v is its law_demand_v.
+RENAMED = {"demand_v": "law_demand_v"}
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_run_is_that_of_the_command_bit_for_bit(clutch, name):
+    summary, csv = clutch.simulate(name)
+    run = package.simulate(name)
+    for column in csv.dtype.names:
+        ours = run.samples[RENAMED.get(column, column)]
+        # The CSV has all digits: equal numbers are equal bits, but for the sign of zero.
+        assert np.array_equal(csv[column], ours.astype(float)), f"{name}: {column} differs"
+    figures = {**summary["metrics"], **{f"detected_{k}": v for k, v in summary["detected"].items()}}
+    assert figures == {k: getattr(run.metrics, k) for k in figures}
+    assert run.engine == summary["engine"]
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_law_and_plant_stepped_by_hand_are_the_simulation_bit_for_bit(name):
+    scenario = package.Scenario.load(name).override({"run.duration_s": 2.0, "run.settle_s": 0.5})
+    run = package.simulate(scenario)
+    law, plant, path = package.Controller(scenario), package.Plant(scenario), scenario.path()
+    seen = {"counts": [], "voltage_v": [], "position_rad": [], "velocity_rad_s": [], "stuck": [], "code": []}
+    for tick in range(len(path)):
+        seen["counts"].append(plant.counts)
+        seen["position_rad"].append(plant.position)
+        seen["velocity_rad_s"].append(plant.velocity)
+        seen["stuck"].append(plant.stuck)
+        voltage = law.step(plant.counts, path.at(tick))
+        seen["voltage_v"].append(voltage)
+        seen["code"].append(law.code)
+        plant.step(voltage)
+    for column, values in seen.items():
+        assert run.samples[column].tolist() == values, f"{name}: {column} differs"
+    assert plant.events() == run.events
+
+
+@pytest.mark.parametrize("rig", ["paper", "ideal"])
+def test_an_ideal_sensor_and_converter_are_stepped_by_hand_as_simulated(rig):
+    scenario = package.Scenario.load("smc_2", {"rig.base": rig, "run.duration_s": 1.5, "run.engine": "dormand_prince"})
+    law, plant, path = package.Controller(scenario), package.Plant(scenario), scenario.path()
+    volts = []
+    for tick in range(len(path)):
+        volts.append(law.step(plant.counts, path.at(tick)))
+        plant.step(volts[-1])
+    assert package.simulate(scenario).samples["voltage_v"].tolist() == volts
+
+
+def test_our_own_law_written_in_python_gives_the_same_run():
+    scenario = package.Scenario.load("pd_2")
+    gains = scenario.law
+
+    def law(tick):
+        # (4) with the brake's sign: ahead of the target (e < 0) it brakes.
+        return -(gains.kp_v_rad * tick.error + gains.kd_v_s_rad * tick.error_rate)
+
+    ours, theirs = package.simulate(scenario), package.simulate(scenario, law=law)
+    assert ours.samples["voltage_v"].tolist() == theirs.samples["voltage_v"].tolist()
+    assert ours.events == theirs.events
+
+
+def test_an_exception_in_a_python_law_ends_the_run_with_it():
+    def broken(tick):
+        if tick.time > 0.5:
+            raise LookupError("no such gain")
+        return 2.0
+
+    with pytest.raises(LookupError, match="no such gain"):
+        package.simulate("pd_2", law=broken)
+    with pytest.raises(TypeError, match=r"answered None at t = 0 s: expected a voltage"):
+        package.simulate("pd_2", law=lambda tick: None)
+
+
+def test_what_a_python_law_asks_for_is_limited_as_the_scenario_says():
+    run = package.simulate("pd_2", law=lambda tick: 1e9 if tick.time < 2 else float("nan"))
+    assert set(run.samples["voltage_v"]) <= {run.samples["voltage_v"].max()}
+    assert run.samples["voltage_v"].max() <= 10.0
+    assert set(run.samples["limit"][:1000]) == {2} and set(run.samples["limit"][-1000:]) == {3}
+
+
+# --- Single and double precision ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["pd_2", "smc_2", "bench_smc_2", "minimum_jerk"])
+def test_single_precision_follows_double_within_an_encoder_count(name):
+    """The law rounds to 24 bits; the loop is chaotic in the counts, so figures are compared, and errors in counts."""
+    scenario = package.Scenario.load(name)
+    double = package.simulate(scenario, overrides={"sampling.scalar": "f64"})
+    single = package.simulate(scenario, overrides={"sampling.scalar": "f32"})
+    count = 2 * np.pi / 20_000
+    apart = abs(double.metrics.rms_error_rad - single.metrics.rms_error_rad)
+    assert apart < 0.5 * count, f"RMS errors {apart / count:.2f} counts apart"
+    # Until the first count that is read otherwise: one unit of the converter at most.
+    same = double.samples["counts"] == single.samples["counts"]
+    until = len(same) if same.all() else int(np.argmin(same))
+    codes = double.samples["code"][:until].astype(int) - single.samples["code"][:until].astype(int)
+    assert until >= 100
+    assert np.abs(codes).max() <= 1, "a code differs by more than one step before the counts do"
+
+
+# --- Tables ---------------------------------------------------------------------------------------
+
+
+def test_a_column_is_the_runs_own_memory_and_read_only():
+    samples = package.simulate("smc_2").samples
+    first, again = samples["position_rad"], samples["position_rad"]
+    assert first.__array_interface__["data"] == again.__array_interface__["data"]
+    assert not first.flags.writeable
+    with pytest.raises(ValueError, match="read-only"):
+        first[0] = 1.0
+
+
+def test_arrow_polars_and_pandas_see_the_same_memory():
+    import polars as pl
+    import pyarrow as pa
+
+    samples = package.simulate("smc_2").samples
+    where = samples["position_rad"].__array_interface__["data"][0]
+    table = pa.table(samples)
+    assert table.num_rows == len(samples) and table.column_names == samples.columns
+    assert table["position_rad"].chunk(0).buffers()[1].address == where
+    series = pl.DataFrame(samples)["position_rad"]
+    assert series.to_numpy(allow_copy=False).__array_interface__["data"][0] == where
+    frame = samples.to_pandas()
+    assert frame["position_rad"].to_numpy().__array_interface__["data"][0] == where
+    assert samples.to_xarray("time_s")["position_rad"].to_numpy().__array_interface__["data"][0] == where
+
+
+def test_a_column_outlives_its_run():
+    column = package.simulate("smc_2").samples["error_rad"]
+    total = column.sum()
+    for _ in range(20):
+        package.simulate("pd_2")
+    assert column.sum() == total
+
+
+def test_a_table_takes_any_array_and_names_what_it_cannot_take():
+    plain = np.arange(6, dtype=np.float64)
+    raw = np.zeros(6 * 8 + 1, dtype=np.uint8)[1:].view(np.float64)  # misaligned
+    raw[:] = plain
+    locked = plain.copy()
+    locked.flags.writeable = False
+    table = package.Table(
+        {
+            "stride": np.repeat(plain, 2)[::2],
+            "reversed": plain[::-1],
+            "single": plain.astype(np.float32),
+            "swapped": plain.astype(">f8"),
+            "misaligned": raw,
+            "locked": locked,
+            "list": [0, 1, 2, 3, 4, 5],
+            "flag": plain > 2,
+            "word": ["a", "b", "c", "d", "e", "f"],
+        }
+    )
+    for name in ("stride", "single", "swapped", "misaligned", "locked", "list"):
+        assert table[name].tolist() == plain.tolist(), name
+    assert table["reversed"].tolist() == plain[::-1].tolist()
+    assert table["word"] == ["a", "b", "c", "d", "e", "f"]
+    for bad, match in (
+        ({"x": np.zeros((2, 2))}, r'column "x" has the shape \(2, 2\): expected one dimension'),
+        ({"x": np.zeros(2), "y": np.zeros(3)}, r'column "y" has 3 rows: expected 2, as many as column "x"'),
+        ({"x": np.zeros(2, dtype=complex)}, r'column "x" has the dtype complex128: expected numbers'),
+    ):
+        with pytest.raises(ValueError, match=match):
+            package.Table(bad)
+    with pytest.raises(KeyError, match="nothing: expected one of the columns stride"):
+        table["nothing"]
+
+
+@pytest.mark.parametrize("clone", [copy.copy, copy.deepcopy, lambda t: pickle.loads(pickle.dumps(t))])
+def test_a_table_comes_back_from_a_copy_with_its_types(clone):
+    samples = package.simulate("smc_2").samples
+    there = clone(samples)
+    assert there == samples
+    assert [there[c].dtype for c in there.columns] == [samples[c].dtype for c in samples.columns]
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(), max_size=20))
+def test_a_table_keeps_every_float_bit_for_bit(values):
+    table = package.Table({"x": np.array(values, dtype=float)})
+    assert table["x"].tobytes() == np.array(values, dtype=float).tobytes()
+    assert pickle.loads(pickle.dumps(table)) == table
+
+
+# --- Logs -----------------------------------------------------------------------------------------
+
+
+def test_a_saved_run_is_the_log_that_the_command_writes_and_replays_identically(clutch, tmp_path):
+    package.simulate("smc_2").save(tmp_path / "ours.mcap")
+    clutch("sim", "smc_2", "--log", tmp_path / "theirs.mcap")
+    ours, theirs = package.read_log(tmp_path / "ours.mcap"), package.read_log(tmp_path / "theirs.mcap")
+    assert ours.channels == theirs.channels and ours.complete
+    assert ours.metadata["law_hash"] == theirs.metadata["law_hash"]
+    replayed = package.replay(ours)
+    assert replayed.identical and replayed.ticks == 5000
+    assert replayed.commands == ours.channels["command"]
+    changed = package.replay(ours, {"law.smc.kp_v": 4})
+    assert not changed.identical and changed.first.tick >= 0
+    assert clutch("replay", tmp_path / "ours.mcap").stdout == "identical over 5000 ticks\n"
+
+
+def test_the_columns_of_a_log_are_those_that_any_mcap_reader_finds(clutch, tmp_path):
+    from mcap.reader import make_reader
+    from mcap_protobuf.decoder import DecoderFactory
+
+    log = tmp_path / "loop.mcap"
+    clutch("loop", "--duration", "2", "--log", log)
+    ours = package.read_log(log)
+    with log.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        messages = {}
+        for _, channel, _, message in reader.iter_decoded_messages():
+            messages.setdefault(channel.topic.strip("/"), []).append(message)
+    assert set(ours.channels) == set(messages) - {"parameters"}
+    for name, table in ours.channels.items():
+        fields = [f.name for f in messages[name][0].DESCRIPTOR.fields]
+        assert table.columns == ["time_s", *fields], name
+        assert len(table) == len(messages[name])
+        for field in messages[name][0].DESCRIPTOR.fields:
+            theirs = [getattr(m, field.name) for m in messages[name]]
+            if field.enum_type is not None:
+                theirs = [field.enum_type.values_by_number[x].name for x in theirs]
+            assert list(table[field.name]) == theirs, f"{name}.{field.name}"
+
+
+def test_a_log_is_never_written_over(tmp_path):
+    run = package.simulate("smc_2")
+    run.save(tmp_path / "run.mcap")
+    with pytest.raises(FileExistsError, match="never written over"):
+        run.save(tmp_path / "run.mcap")
+    with pytest.raises(OSError, match=r"nowhere"):
+        run.save(tmp_path / "nowhere" / "run.mcap")
+    with pytest.raises(RuntimeError, match="written in Python"):
+        package.simulate("pd_2", law=lambda tick: 2.0).save(tmp_path / "own.mcap")
+
+
+def test_what_is_no_log_is_told(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        package.read_log(tmp_path / "nothing.mcap")
+    with pytest.raises(OSError):
+        package.read_log(tmp_path)
+    (tmp_path / "text.mcap").write_text("no log")
+    with pytest.raises(ValueError, match="not a log of clutch"):
+        package.read_log(tmp_path / "text.mcap")
+
+
+# --- Errors ---------------------------------------------------------------------------------------
+
+
+def test_errors_name_field_and_value():
+    with pytest.raises(package.ParamError) as caught:
+        package.simulate("smc_2", overrides={"law.smc.kp_v": -1})
+    assert (caught.value.field, caught.value.value) == ("law.smc.kp_v", -1)
+    with pytest.raises(package.ParamError, match="did you mean kp_v") as caught:
+        package.simulate("smc_2", overrides={"law.smc.kp": 1})
+    assert caught.value.field == "law.smc.kp"
+    with pytest.raises(FileNotFoundError, match="no built-in scenario of that name") as missing:
+        package.simulate("nosuch")
+    assert missing.value.filename == "nosuch"
+    with pytest.raises(TypeError, match=r"expected a clutch\.Scenario"):
+        package.simulate(3)
+    with pytest.raises(TypeError, match=r"expected a clutch\.Scenario"):
+        package.Plant(3)
+
+
+def test_a_file_without_permission_or_text_is_an_error_of_the_system_or_of_the_value(tmp_path):
+    with pytest.raises(IsADirectoryError):
+        package.Scenario.load(tmp_path)
+    (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ValueError, match="not a text file"):
+        package.Scenario.load(tmp_path / "bytes.toml")
+    (tmp_path / "bad.toml").write_text("[rig")
+    with pytest.raises(package.ParamError, match="this is not TOML"):
+        package.Scenario.load(tmp_path / "bad.toml")
+
+
+VALUES = st.one_of(
+    st.floats(), st.integers(-(2**70), 2**70), st.text(max_size=5), st.booleans(), st.just([]), st.just({})
+)
+
+
+def dotted():
+    """Every key of a scenario with a safe state."""
+    tables, here = [], ""
+    for line in package.Scenario.load("board_smc_2").to_toml().splitlines():
+        if line.startswith("["):
+            here = line.strip("[]") + "."
+        elif "=" in line:
+            tables.append(here + line.split(" = ")[0])
+    return tables
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.sampled_from(dotted()), VALUES)
+def test_no_value_of_any_key_is_anything_but_taken_or_named(key, value):
+    """Above all no panic: the native module would raise a BaseException."""
+    overrides = {"run.duration_s": 0.05, "run.settle_s": 0.0, key: value}
+    try:
+        scenario = package.Scenario.load("board_smc_2", overrides)
+        if len(scenario.path()) <= 2000:
+            package.simulate(scenario)
+    except (package.ParamError, TypeError, ValueError) as e:
+        assert str(e)
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), 0.5, 2**31])
+def test_counts_that_no_encoder_has_are_refused(bad):
+    scenario = package.Scenario.load("smc_2")
+    law, target = package.Controller(scenario), scenario.path().at(0)
+    with pytest.raises((ValueError, OverflowError), match=r"counts = .*: expected a whole number of counts"):
+        law.step(bad, target)
+    with pytest.raises(TypeError):
+        law.step("3", target)
+    with pytest.raises(TypeError):
+        law.step(3, (0.0, 0.0, 0.0))
+
+
+def test_a_snapshot_of_a_law_goes_on_by_itself():
+    scenario = package.Scenario.load("smc_2")
+    law, path = package.Controller(scenario), scenario.path()
+    for tick in range(100):
+        law.step(tick // 9, path.at(tick))
+    twin = law.copy()
+    after = [law.step(tick // 9, path.at(tick)) for tick in range(100, 200)]
+    assert [twin.step(tick // 9, path.at(tick)) for tick in range(100, 200)] == after
+
+
+# --- The package as a file ------------------------------------------------------------------------
+
+
+def test_importing_the_package_imports_no_other_library():
+    code = "import clutch, sys; print([m for m in sys.modules if m.split('.')[0] in %r])"
+    heavy = ("numpy", "pandas", "matplotlib", "scipy", "tqdm", "pyarrow", "polars", "xarray", "gymnasium", "control")
+    done = subprocess.run([sys.executable, "-c", code % (heavy,)], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_version_types_and_build_are_those_of_the_crates(clutch):
+    from importlib.metadata import version
+
+    assert package.__version__ == version("clutch-control")
+    assert clutch("--version").stdout == f"clutch {package.__version__}\n"
+    assert (Path(package.__file__).parent / "py.typed").is_file()
+    assert (Path(package.__file__).parent / "_clutch.pyi").is_file()
+    metadata = json.loads(
+        subprocess.run(
+            ["cargo", "metadata", "--no-deps", "--format-version", "1"], cwd=ROOT, capture_output=True, check=True
+        ).stdout
+    )
+    assert {p["version"] for p in metadata["packages"] if p["name"] == "clutch-py"} == {package.__version__}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--help",),
+        ("sim", "smc_2", "--json"),
+        ("sim", "nosuch"),
+        ("sim",),
+        ("certify", "ctc_2"),
+        ("scenario", "list"),
+        ("loop", "smc_2"),
+    ],
+    ids=" ".join,
+)
+def test_the_wheels_command_is_the_binary(clutch, arguments):
+    ours = subprocess.run([sys.executable, "-m", "clutch", *arguments], capture_output=True, text=True)
+    theirs = clutch(*arguments, code=None)
+    assert (ours.returncode, ours.stdout, ours.stderr) == (theirs.returncode, theirs.stdout, theirs.stderr)
+
+
+def test_the_wheels_command_runs_the_loop_and_ends_it_on_ctrl_c(tmp_path):
+    import signal
+    import time
+
+    log = tmp_path / "loop.mcap"
+    loop = subprocess.Popen(
+        [sys.executable, "-m", "clutch", "loop", "--log", str(log)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    deadline = time.monotonic() + 30
+    while not (log.exists() and log.stat().st_size > 20_000) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    loop.send_signal(signal.SIGINT)
+    text = loop.communicate(timeout=30)[0].decode()
+    assert loop.returncode == 4, text
+    assert package.read_log(log).complete
+    assert package.replay(log).identical
+
+
+# --- The paper ------------------------------------------------------------------------------------
+
+
+def test_reproduce_gives_the_commands_claims_and_table(clutch, tmp_path):
+    clutch("reproduce", "--out", tmp_path)
+    theirs = json.loads((tmp_path / "report.json").read_text())
+    paper = package.reproduce(progress=False)
+    assert paper.claims["id"] == [c["id"] for c in theirs["claims"]]
+    assert paper.claims["measured"].tolist() == [c["measured"] for c in theirs["claims"]]
+    assert paper.claims["holds"].tolist() == [c["holds"] for c in theirs["claims"]]
+    assert paper.table3["reduction_percent"].tolist() == [r["reduction_percent"] for r in theirs["table3"]]
+    assert paper.as_documented
+    assert [f.number for f in paper.figures] == [8, 9, 10]
