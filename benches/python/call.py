@@ -1,0 +1,69 @@
+"""A law's step called from Python, against the least that CPython's C API lets such a call cost."""
+
+import importlib.util
+import pathlib
+import subprocess
+import sysconfig
+import tempfile
+from types import ModuleType
+
+import clutch
+from job import COUNTS_PER_TURN, HIGHEST, KD, KP, LOWEST, PERIOD, RATES, SMOOTHING, TURN, toml
+from timing import Candidate
+
+CALLS = 20_000
+
+
+def build_floor() -> ModuleType:
+    """Compiles floor/floor.c with the C compiler of the system and imports it."""
+    source = pathlib.Path(__file__).parent / "floor/floor.c"
+    with tempfile.TemporaryDirectory() as folder:
+        library = pathlib.Path(folder) / ("floor" + sysconfig.get_config_var("EXT_SUFFIX"))
+        include = sysconfig.get_paths()["include"]
+        command = ["cc", "-O3", "-Wall", "-Werror", "-shared", "-fPIC", f"-I{include}", str(source)]
+        subprocess.run([*command, "-o", str(library)], check=True)
+        spec = importlib.util.spec_from_file_location("floor", library)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+
+def candidates(rounds: int) -> list[Candidate]:
+    """Ours, the floor, and the loop around both, which is taken off."""
+    floor = build_floor()
+    per_tick = RATES["J2"] * PERIOD * COUNTS_PER_TURN / TURN
+    ticks = range(CALLS)
+    # The shaft a few counts ahead of the path, as on a ramp; and the numbers a caller would have at hand.
+    counts = [int(per_tick * k) + k % 3 for k in ticks]
+    positions = [per_tick * k for k in ticks]
+
+    ours = clutch.Controller(clutch.Scenario.from_toml(toml("J2")))
+    our_targets = [clutch.Target(p, RATES["J2"], 0.0) for p in positions]
+    ours.start(0, our_targets[0], 0.0)
+    least = floor.Law(KP, KD, SMOOTHING, PERIOD, TURN / COUNTS_PER_TURN, LOWEST, HIGHEST)
+    floor_targets = [floor.Target(p, RATES["J2"], 0.0) for p in positions]
+
+    # Before anything is timed: both are the same law. Ours takes targets in whole 2^-16 counts, up to 24 µV
+    # of the proportional term and 120 µV of the derivative's.
+    ours_volts = [ours.step(c, t) for c, t in zip(counts, our_targets, strict=True)]
+    floor_volts = [least.step(c, t) for c, t in zip(counts, floor_targets, strict=True)]
+    worst = max(abs(a - b) for a, b in zip(ours_volts, floor_volts, strict=True))
+    assert worst < 1e-3, f"ours and the floor differ by {worst} V"
+    assert max(ours_volts) - min(ours_volts) > 1.0, "the law is at its limits all the time"
+
+    def loop_ours():
+        step = ours.step
+        for c, t in zip(counts, our_targets, strict=True):
+            step(c, t)
+
+    def loop_floor():
+        step = least.step
+        for c, t in zip(counts, floor_targets, strict=True):
+            step(c, t)
+
+    def loop_empty():
+        for _c, _t in zip(counts, our_targets, strict=True):
+            pass
+
+    works = {"clutch.Controller.step": loop_ours, "C-API floor": loop_floor, "empty loop": loop_empty}
+    return [Candidate(name, work, rounds) for name, work in works.items()]

@@ -1,0 +1,26 @@
+"""The job done by clutch: one run, and many."""
+
+import clutch
+from job import Figures, toml
+
+METRICS = ["rms_error_rad", "max_error_rad", "stick_slip_cycles_per_s", "measured_s"]
+
+
+def scenario(job: str, **times: float) -> clutch.Scenario:
+    """The job as an object; `times` are `duration` and `settle`, s."""
+    return clutch.Scenario.from_toml(toml(job, **times))
+
+
+def run(job: clutch.Scenario) -> Figures:
+    """One run, of which all samples and events are kept."""
+    m = clutch.simulate(job).metrics
+    return Figures(m.rms_error_rad, m.max_error_rad, round(m.stick_slip_cycles_per_s * m.measured_s))
+
+
+def run_many(job: clutch.Scenario, pairs: list[tuple[float, float]]) -> Figures:
+    """A run for each pair of gains, of which only figures are kept; their mean."""
+    kp, kd = zip(*pairs, strict=True)
+    samples = clutch.samples({"law.pd.kp_v_rad": kp, "law.pd.kd_v_s_rad": kd})
+    table = clutch.sweep(job, samples, metrics=METRICS, progress=False).table
+    sticks = table["stick_slip_cycles_per_s"] * table["measured_s"]
+    return Figures(float(table["rms_error_rad"].mean()), float(table["max_error_rad"].mean()), float(sticks.mean()))

@@ -1,0 +1,200 @@
+"""clutch's Python package against peers, in one run: see README.md.
+
+python benches/python/run.py [--quick] [--json FILE]
+"""
+
+import argparse
+import functools
+import itertools
+import json
+import math
+import os
+import pathlib
+from dataclasses import asdict, dataclass
+
+# Waiting threads must not burn the CPU seconds that are being counted. Before anything starts threads.
+os.environ["OMP_WAIT_POLICY"] = "passive"
+
+import call
+import imports
+import numba_peer
+import ours
+import reference
+import scipy_peer
+from job import DURATION, KD, KP, RATES, Figures, gains
+from timing import Candidate, interleave
+
+MARGIN = 1.25  # how far the cost per run may be above the best
+
+
+@dataclass
+class Row:
+    """A line of the report. `ratio` is how many times as fast clutch is, if the section does not say else."""
+
+    section: str
+    candidate: str
+    cpu_s: float
+    simulated_per_cpu: float | None = None
+    figures: Figures | None = None
+    ratio: float | None = None
+    target: float | None = None
+    at_most: bool = False  # the target is a ceiling
+
+    @property
+    def bound(self) -> str:
+        return "" if self.target is None else f"{'≤' if self.at_most else '≥'} {self.target:g}"
+
+    @property
+    def reached(self) -> bool | None:
+        if self.target is None:
+            return None
+        return self.ratio <= self.target if self.at_most else self.ratio >= self.target
+
+
+def one_run(job: str, quick: bool) -> list[Row]:
+    """One run of the job: solvers that a Python user would take, and ours."""
+    scenario = ours.scenario(job)
+    one = [(KP, KD)]
+    slow, fast = (1, 5) if quick else (2, 7)
+    targets = {"scipy": 4000.0, "numba": 25.0} if job == "J20" else {"scipy": 1500.0, "numba": 5.0}
+    tight = {"rtol": 1e-6, "atol": 1e-9}
+    peers = [
+        (Candidate("SciPy RK45, its defaults", lambda: scipy_peer.run(job), slow), targets["scipy"]),
+        (Candidate("numba RK4, 10 steps a sample", lambda: numba_peer.run(job), fast), targets["numba"]),
+    ]
+    if not quick:
+        path = scenario.path().table()["position_rad"]
+        peers += [
+            (Candidate("SciPy RK45, 1e-6", lambda: scipy_peer.run(job, **tight), slow), targets["scipy"]),
+            (Candidate("reference, DOP853 1e-12", lambda: reference.run(job), 1), None),
+            (Candidate("reference on clutch's targets", lambda: reference.run(job, path), 1), None),
+        ]
+    mine = Candidate("clutch.simulate, samples kept", lambda: ours.run(scenario), fast)
+    bare = Candidate("clutch.sweep of one, figures only", lambda: ours.run_many(scenario, one), fast)
+    interleave([*(c for c, _ in peers), mine, bare])
+
+    section = f"one run, {job}"
+    rows = [Row(section, c.name, c.cpu, DURATION / c.cpu, c.result, c.cpu / mine.cpu, target) for c, target in peers]
+    rows += [Row(section, c.name, c.cpu, DURATION / c.cpu, c.result) for c in (mine, bare)]
+    return rows
+
+
+def many_runs(job: str, quick: bool) -> list[Row]:
+    """Runs with different gains on all cores; CPU seconds are the sum over the cores."""
+    n = 128 if quick else 4096
+    scenario, pairs = ours.scenario(job), gains(n)
+    peer = Candidate("numba RK4, 10 steps a sample, prange", lambda: numba_peer.run_many(job, n), 1)
+    mine = Candidate("clutch.sweep", lambda: ours.run_many(scenario, pairs), 3 if quick else 5)
+    interleave([peer, mine])
+    section, target = f"{n} runs, {job}", 350.0 if job == "J20" else 25.0
+    simulated = n * DURATION
+    return [
+        Row(section, peer.name, peer.cpu, simulated / peer.cpu, peer.result, peer.cpu / mine.cpu, target),
+        Row(section, mine.name, mine.cpu, simulated / mine.cpu, mine.result),
+    ]
+
+
+def scaling(section: str, cells: list[tuple[str, int, float, Candidate]], per_second: bool) -> list[Row]:
+    """Cost per run, or per simulated second of a run, over the lowest of the section."""
+    interleave([c for _, _, _, c in cells])
+    cost = [c.cpu / (n * duration if per_second else n) for _, n, duration, c in cells]
+    return [
+        Row(section, name, c.cpu, n * duration / c.cpu, c.result, own / min(cost), MARGIN, at_most=True)
+        for (name, n, duration, c), own in zip(cells, cost, strict=True)
+    ]
+
+
+def scaling_in_runs(job: str, quick: bool) -> list[Row]:
+    """Short runs: what each costs beside the simulation shows."""
+    scenario = ours.scenario(job, duration=1.0, settle=0.0)
+    cells = []
+    for n in (32, 256) if quick else (32, 1000, 4096, 20000):
+        work = Candidate("", functools.partial(ours.run_many, scenario, gains(n)), 3 if quick else 5)
+        cells.append((f"{n} runs of 1 s", n, 1.0, work))
+    return scaling(f"cost per run, {job}", cells, per_second=False)
+
+
+def scaling_in_time(job: str, quick: bool) -> list[Row]:
+    pairs = gains(16)
+    cells = []
+    for duration in (1.0, 10.0) if quick else (1.0, 10.0, 60.0, 600.0):
+        scenario = ours.scenario(job, duration=duration, settle=0.0)
+        work = Candidate("", functools.partial(ours.run_many, scenario, pairs), 3 if quick else 5)
+        cells.append((f"{len(pairs)} runs of {duration:g} s", len(pairs), duration, work))
+    return scaling(f"cost per simulated second, {job}", cells, per_second=True)
+
+
+def calls(quick: bool) -> list[Row]:
+    """Cost of one step of the law; the loop around it is taken off."""
+    mine, floor, empty = call.candidates(5 if quick else 15)
+    interleave([mine, floor, empty])
+    net = {c.name: (c.cpu - empty.cpu) / call.CALLS for c in (mine, floor)}
+    section = "one call, without the loop around it"
+    ratio = net[mine.name] / net[floor.name]
+    return [
+        Row(section, mine.name, net[mine.name], ratio=ratio, target=1.25, at_most=True),
+        Row(section, floor.name, net[floor.name]),
+    ]
+
+
+def importing(quick: bool) -> list[Row]:
+    seconds = imports.seconds(5 if quick else 15)
+    section = "import, in json's"
+    return [Row(section, f"import {name}", took, ratio=took / seconds["json"]) for name, took in seconds.items()]
+
+
+def number(x: float | None, form: str = "") -> str:
+    """`x` in a form, else to three digits, but whole above 100."""
+    return "" if x is None else format(x, form or (",.0f" if x >= 100.0 else ".3g"))
+
+
+def show(rows: list[Row]) -> str:
+    """The report, a table in Markdown for each section."""
+    lines = []
+    for section, group in itertools.groupby(rows, key=lambda r: r.section):
+        some = list(group)
+        columns = {"candidate": [r.candidate for r in some], "CPU s": [number(r.cpu_s) for r in some]}
+        if some[0].figures:
+            columns["simulated s per CPU s"] = [number(r.simulated_per_cpu) for r in some]
+            columns["rms error °"] = [number(math.degrees(r.figures.rms), ".6f") for r in some]
+            columns["max error °"] = [number(math.degrees(r.figures.max), ".6f") for r in some]
+            columns["sticks"] = [number(r.figures.sticks) for r in some]
+        columns["ratio"] = [number(r.ratio) for r in some]
+        if any(r.target for r in some):
+            columns["target"] = [r.bound for r in some]
+            columns["reached"] = [{None: "", True: "yes", False: "**no**"}[r.reached] for r in some]
+        lines += ["", f"**{section}**", "", f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+        lines += [f"| {' | '.join(cells)} |" for cells in zip(*columns.values(), strict=True)]
+    return "\n".join(lines[1:])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer rounds and runs: below 40 s")
+    parser.add_argument("--json", metavar="FILE", type=pathlib.Path, help="write the rows here too")
+    options = parser.parse_args()
+    quick = options.quick
+
+    numba_peer.compile_all()
+    rows = []
+    for job in RATES:
+        rows += one_run(job, quick)
+    for job in RATES:
+        rows += many_runs(job, quick)
+    rows += calls(quick)
+    rows += importing(quick)
+    for job in RATES:
+        rows += scaling_in_runs(job, quick)
+    for job in RATES:
+        rows += scaling_in_time(job, quick)
+
+    print(show(rows))
+    heavy = imports.brought_along()
+    print(f"\n`import clutch` imports {', '.join(heavy) or 'none'} of {', '.join(imports.HEAVY)}.")
+    if options.json:
+        found = [asdict(r) | {"reached": r.reached} for r in rows]
+        options.json.write_text(json.dumps({"rows": found, "imported": heavy}, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
