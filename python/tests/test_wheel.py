@@ -16,6 +16,8 @@ import clutch as package
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = package.scenarios()
+# The command that comes with the package.
+COMMAND = Path(sys.executable).with_name("clutch")
 # Columns of the command's CSV that the package has, too; PD's term demand_v is its law_demand_v.
 RENAMED = {"demand_v": "law_demand_v"}
 
@@ -384,7 +386,7 @@ def test_version_types_and_build_are_those_of_the_crates(clutch):
     ids=" ".join,
 )
 def test_the_wheels_command_is_the_binary(clutch, arguments):
-    ours = subprocess.run([sys.executable, "-m", "clutch", *arguments], capture_output=True, text=True)
+    ours = subprocess.run([COMMAND, *arguments], capture_output=True, text=True)
     theirs = clutch(*arguments, code=None)
     assert (ours.returncode, ours.stdout, ours.stderr) == (theirs.returncode, theirs.stdout, theirs.stderr)
 
@@ -394,9 +396,7 @@ def test_the_wheels_command_runs_the_loop_and_ends_it_on_ctrl_c(tmp_path):
     import time
 
     log = tmp_path / "loop.mcap"
-    loop = subprocess.Popen(
-        [sys.executable, "-m", "clutch", "loop", "--log", str(log)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    )
+    loop = subprocess.Popen([COMMAND, "loop", "--log", str(log)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     deadline = time.monotonic() + 30
     while not (log.exists() and log.stat().st_size > 20_000) and time.monotonic() < deadline:
         time.sleep(0.05)

@@ -25,6 +25,8 @@ enum Verb {
     /// All tests. Installs what they need: Rust targets, a private virtual environment in .venv,
     /// and on Debian, as root, the package that makes such environments.
     Test,
+    /// Only the tests of the wheel: builds it, installs it outside of this tree, tests it there.
+    Wheel,
     /// What CI runs: check, then test.
     Ci,
     /// Benchmarks (criterion). What follows goes to them: `cargo xtask bench -- law`.
@@ -71,6 +73,7 @@ fn main() -> Result<()> {
     match Cli::parse().verb {
         Verb::Check => check(),
         Verb::Test => test::all(),
+        Verb::Wheel => test::wheel(),
         Verb::Ci => {
             check()?;
             test::all()
@@ -90,7 +93,7 @@ fn main() -> Result<()> {
         Verb::Latency { rest } => {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
-        Verb::Stubs => stubs::generate(false).map(drop),
+        Verb::Stubs => stubs::generate(&python::interpreter()?, false).map(drop),
         Verb::Figures => figures(),
     }
 }

@@ -57,7 +57,7 @@ impl Wheel {
     pub(crate) fn install(tools: &Path) -> Result<Wheel> {
         let (dist, target) = (root().join("target/dist"), root().join("target"));
         let _ = std::fs::remove_dir_all(&dist);
-        program(beside(tools, "maturin")).args(["sdist", "--quiet", "--out"]).arg(&dist).run()?;
+        program(beside(tools, "maturin")).args(["sdist", "--out"]).arg(&dist).run()?;
         let sdist = the_one(&dist, "tar.gz")?;
         let pip = |python: &Path| program(python).args(["-m", "pip", "--disable-pip-version-check"]);
         // Its own build environment would need maturin from the net once more.

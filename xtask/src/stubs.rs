@@ -4,6 +4,7 @@
 use crate::python;
 use crate::run::{program, root};
 use anyhow::{Context, Result, bail};
+use std::path::Path;
 
 const STUB: &str = "python/clutch/_clutch.pyi";
 
@@ -74,10 +75,9 @@ const NAMED: &[(&str, &str)] = &[
 ];
 
 /// Generates the stub; with `check` only compares.
-pub(crate) fn generate(check: bool) -> Result<bool> {
+pub(crate) fn generate(python: &Path, check: bool) -> Result<bool> {
     let out = root().join("target/stubs");
-    let python = python::interpreter()?;
-    program(python::beside(&python, "maturin"))
+    program(python::beside(python, "maturin"))
         .args(["generate-stubs", "--quiet", "--out"])
         .arg(&out)
         .run()?;

@@ -38,6 +38,16 @@ impl Tally {
         }
     }
 
+    /// The line that ends a run of tests; an error if any failed.
+    fn end(self, sound: bool) -> Result<()> {
+        let Tally { passed, failed, skipped } = self;
+        println!("\n{passed} passed, {failed} failed, {skipped} skipped");
+        if failed > 0 || !sound {
+            bail!("tests failed");
+        }
+        Ok(())
+    }
+
     fn check(&mut self, name: &str, holds: bool) {
         println!("{name}: {}", if holds { "ok" } else { "FAILED" });
         if holds { self.passed += 1 } else { self.failed += 1 }
@@ -105,12 +115,14 @@ pub(crate) fn all() -> Result<()> {
 
     sound &= python(&mut tally)?;
 
-    let Tally { passed, failed, skipped } = tally;
-    println!("\n{passed} passed, {failed} failed, {skipped} skipped");
-    if failed > 0 || !sound {
-        bail!("tests failed");
-    }
-    Ok(())
+    tally.end(sound)
+}
+
+/// The Python part alone.
+pub(crate) fn wheel() -> Result<()> {
+    let mut tally = Tally::default();
+    let sound = python(&mut tally)?;
+    tally.end(sound)
 }
 
 /// Adds the embedded targets. Without rustup they are skipped on a user's machine, not in CI.
@@ -132,7 +144,7 @@ fn python(tally: &mut Tally) -> Result<bool> {
     let binary = python::binary()?;
     cargo(["build", "--release", "--package", "clutch-log", "--example", "write_demo"]).run()?;
     let tools = python::interpreter()?;
-    tally.check("the type stub is what the native module gives", stubs::generate(true)?);
+    tally.check("the type stub is what the native module gives", stubs::generate(&tools, true)?);
     let tool = |name: &str, args: &[&str]| program(python::beside(&tools, name)).args(args).quietly();
     let mut quiet = |name: &str, (holds, text): (bool, String)| {
         if !holds {
@@ -145,12 +157,14 @@ fn python(tally: &mut Tally) -> Result<bool> {
         tool("ruff", &["check", "python", "benches/python", "docs"])?,
     );
     let wheel = python::Wheel::install(&tools)?;
-    let strict = ["-m", "mypy", "--strict", "-p", "clutch"];
+    let settings = root().join("pyproject.toml");
+    let settings = settings.to_string_lossy();
+    let strict = ["-m", "mypy", "--strict", "--config-file", &settings, "-p", "clutch"];
     quiet(
         "mypy --strict finds nothing in the installed package",
         wheel.program(&tools)?.args(strict).quietly()?,
     );
-    let stubtest = ["-m", "mypy.stubtest", "clutch._clutch"];
+    let stubtest = ["-m", "mypy.stubtest", "--mypy-config-file", &settings, "clutch._clutch"];
     quiet(
         "the type stub agrees with the module at run time",
         wheel.program(&tools)?.args(stubtest).quietly()?,
