@@ -2,7 +2,8 @@
 The native half of the package `clutch`.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Mapping
 from os import PathLike
 from typing import Any, Final, SupportsFloat, SupportsIndex, final
 
@@ -133,10 +134,10 @@ class Log:
         """
         What the log says of itself, as texts.
         """
-    def replay(self, /, overrides: Mapping[str, object] | None = None) -> tuple[Table, int, tuple[int, str, float, float] | None]:
+    def replay(self, /, scenario: Scenario | None = None) -> tuple[Table, int, tuple[int, str, float, float] | None]:
         """
-        The recorded counts to the recorded law: commands of the replay, ticks, and the first difference (tick,
-        field, logged, replayed).
+        The recorded counts to the recorded law, or to another scenario's: commands of the replay, ticks,
+        and the first difference (tick, field, logged, replayed).
         """
     @property
     def scenario_toml(self, /) -> str:
@@ -247,6 +248,11 @@ class Plant:
         sensor is ideal).
 
         The rig's converter rounds and limits the voltage, its delay and lag come on top.
+        """
+    @property
+    def sticks(self, /) -> int:
+        """
+        How often it has stuck so far.
         """
     @property
     def stuck(self, /) -> bool:
@@ -367,6 +373,11 @@ class Sweep:
         """
         Rows that are done.
         """
+    @property
+    def refused(self, /) -> int | None:
+        """
+        The lowest row so far that the scenario refused.
+        """
     def result(self, /) -> tuple[Table, dict[int, Table], list[tuple[int, ParamError]]]:
         """
         Finished rows: a table (run, each metric, error), traces by row, and for each refused row its error.
@@ -419,7 +430,7 @@ class Table:
         """
         The table as an Arrow C stream: how other libraries read it.
         """
-    def __contains__(self, name: str, /) -> bool: ...
+    def __contains__(self, name: Any, /) -> bool: ...
     def __eq__(self, value: object, /) -> bool: ...
     def __getitem__(self, name: str, /) -> Any:
         """
@@ -505,6 +516,15 @@ class Tick:
     """
     What a law written in Python is given each period.
 
+    Parameters
+    ----------
+    error, error_rate : float
+        Position error, target minus position, rad, and its rate, rad/s.
+    target_velocity, target_acceleration : float
+        Of the path, rad/s and rad/s².
+    time : float
+        Since the start of the run, s.
+
     Examples
     --------
     >>> import clutch
@@ -513,6 +533,7 @@ class Tick:
     >>> clutch.simulate("smc_2", law=law).metrics.max_error_rad < 0.01
     True
     """
+    def __new__(cls, /, error: SupportsFloat | SupportsIndex, error_rate: SupportsFloat | SupportsIndex, target_velocity: SupportsFloat | SupportsIndex = 0.0, target_acceleration: SupportsFloat | SupportsIndex = 0.0, time: SupportsFloat | SupportsIndex = 0.0) -> Tick: ...
     def __repr__(self, /) -> str: ...
     @property
     def error(self, /) -> float:

@@ -191,7 +191,8 @@ def replay(log: Log | str | os.PathLike[str], overrides: Mapping[str, object] | 
     'switching_v'
     """
     opened = log if isinstance(log, Log) else read_log(log)
-    commands, ticks, first = opened._log.replay(dict(overrides) if overrides else None)
+    changed = opened.scenario.override(overrides)._native if overrides else None
+    commands, ticks, first = opened._log.replay(changed)
     difference = None
     if first is not None:
         tick, field, logged, replayed = first

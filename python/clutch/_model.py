@@ -49,12 +49,18 @@ def _slots(cls: type["_Record"]) -> tuple[_Slot, ...]:
     return _SLOTS.setdefault(cls, tuple(slots))
 
 
-def _plain(value: Any) -> Any:
+#: Lists in lists, and dicts in dicts, that a value may have; a list that holds itself has no end.
+_DEEPEST = 32
+
+
+def _plain(value: Any, depth: int = 0) -> Any:
     """NumPy's scalars and arrays as Python's numbers and lists, without importing NumPy."""
+    if depth > _DEEPEST:
+        raise ParamError(f"a value nested more than {_DEEPEST} deep")
     if isinstance(value, Mapping):
-        return {k: _plain(v) for k, v in value.items()}
+        return {k: _plain(v, depth + 1) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
+        return [_plain(v, depth + 1) for v in value]
     return value.tolist() if hasattr(value, "tolist") and not isinstance(value, type) else value
 
 

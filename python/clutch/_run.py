@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from clutch import _clutch
 from clutch._clutch import Table, Tick
@@ -98,6 +98,10 @@ class Result:
         Figures after the settling time.
     engine : str
         ``"exact_flow"`` or ``"dormand_prince"``.
+    samples : Table
+        A row for each sample; SI units and radians, as docs/scenario.md says under CSV.
+    events : Table
+        Sticks and break-aways: time_s, kind (``"stick"``, ``"break_away"``), position_rad, torque_nm.
 
     Examples
     --------
@@ -113,23 +117,13 @@ class Result:
         self.scenario = scenario
         self.metrics = Metrics(**run.metrics)
         self.engine: str = run.engine
-        self._run = run
-        self._samples: Table | None = None
-        self._events: Table | None = None
+        self.samples: Table = run.samples
+        self.events: Table = run.events
+        self._run: _clutch.Run | None = run
 
-    @property
-    def samples(self) -> Table:
-        """A row for each sample; SI units and radians, in docs/scenario.md under CSV."""
-        if self._samples is None:
-            self._samples = self._run.samples
-        return self._samples
-
-    @property
-    def events(self) -> Table:
-        """Sticks and break-aways: time_s, kind (``"stick"``, ``"break_away"``), position_rad, torque_nm."""
-        if self._events is None:
-            self._events = self._run.events
-        return self._events
+    def __getstate__(self) -> dict[str, Any]:
+        # All but the run itself, whose memory is this process's; only `save` needs it.
+        return {**self.__dict__, "_run": None}
 
     @property
     def time(self) -> NDArray[float64]:
@@ -200,7 +194,8 @@ class Result:
         OSError
             The file is there already, or cannot be written.
         RuntimeError
-            The law was written in Python: a log holds the law that ran, for its replay.
+            The law was written in Python: a log holds the law that ran, for its replay. Or the result comes from
+            another process.
 
         Examples
         --------
@@ -211,6 +206,8 @@ class Result:
         ...     clutch.replay(log).identical
         True
         """
+        if self._run is None:
+            raise RuntimeError("the result comes from another process: only there it can be saved")
         self._run.save(os.fspath(path))
 
     def __len__(self) -> int:

@@ -6,14 +6,16 @@ import importlib
 import itertools
 import json
 import math
+import operator
 import sys
 import time
+import uuid
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from clutch import _clutch, executors
+from clutch import _clutch, _model, executors
 from clutch._clutch import Table
 from clutch._errors import ParamError
 from clutch._model import Scenario, _Params
@@ -73,8 +75,27 @@ class Samples:
     rows: tuple[tuple[Any, ...], ...] = field(repr=False)
     axes: tuple[tuple[Any, ...], ...] | None = field(default=None, repr=False)
 
+    def __post_init__(self) -> None:
+        for key in self.keys:
+            above = [other for other in self.keys if key.startswith(f"{other}.")]
+            if above:
+                raise ValueError(f"{key} lies within {above[0]}, which is swept, too; sweep one of them")
+            if self.keys.count(key) > 1:
+                raise ValueError(f"{key} is swept twice")
+        for i, row in enumerate(self.rows):
+            if len(row) != len(self.keys):
+                raise ValueError(f"row {i} has {len(row)} values: expected {len(self.keys)}, one for each key")
+
     def __len__(self) -> int:
         return len(self.rows)
+
+    def _distinct(self, key: str) -> list[dict[str, Any]]:
+        """Each value of a key once, as an override; none if it is not swept."""
+        if key not in self.keys:
+            return []
+        i = self.keys.index(key)
+        values = {json.dumps(row[i], sort_keys=True): row[i] for row in self.rows}
+        return [{key: value} for value in values.values()]
 
     def _crossed(self, key: str, values: tuple[Any, ...]) -> Samples:
         """Each row with each value of one more key."""
@@ -234,7 +255,9 @@ def _scale(key: str, limits: Range) -> Callable[[float], float]:
     if how == "linear":
         return lambda x: low + (high - low) * x
     if how == "int":
-        return lambda x: min(math.floor(low + (high - low + 1) * x), math.floor(high))
+        if low != math.floor(low) or high != math.floor(high):
+            raise ValueError(f"{key}: a range with 'int' must have whole ends, got {low} and {high}")
+        return lambda x: min(int(low) + math.floor((high - low + 1) * x), int(high))
     if how != "log":
         raise ValueError(f"{key}: expected 'log' or 'int' after the range, got {how!r}")
     if low <= 0.0:
@@ -261,9 +284,7 @@ def _plain(key: str, value: Any) -> Any:
         for step in reversed(way):
             table = {step: table}
         return table
-    if isinstance(value, Mapping):
-        return dict(value)
-    return value.tolist() if hasattr(value, "tolist") else value
+    return _model._plain(value)
 
 
 # --- The sweep ---------------------------------------------------------------------------------
@@ -348,7 +369,9 @@ def sweep(
         chosen = parameters
     else:
         chosen = grid(parameters) if isinstance(parameters, Mapping) else samples(parameters)
-    drawn = () if seeds is None else _values("seeds", range(1, seeds + 1) if isinstance(seeds, int) else seeds)
+    drawn = () if seeds is None else _seeds(seeds)
+    if progress is not None and not isinstance(progress, bool) and not callable(progress):
+        raise TypeError(f"progress = {progress!r}: expected True, False, None or a function")
     if drawn:
         chosen = chosen._crossed("run.seed", drawn)
     if errors not in ("raise", "keep"):
@@ -359,10 +382,12 @@ def sweep(
         tables=scenario._tables(),
         keys=chosen.keys,
         metrics=_known_metrics(metrics),
-        traces=_known_traces(traces, scenario, chosen.keys),
+        traces=_known_traces(traces, scenario, chosen),
         every=every,
+        keep=errors == "keep",
+        name=uuid.uuid4().hex,
     )
-    finished = _Finished(scenario, chosen, keep=errors == "keep")
+    finished = _Finished(chosen)
     importlib.import_module("numpy")  # now, and not when Ctrl-C waits for an answer
     interrupted = False
     with _Progress(len(chosen), progress) as show:
@@ -374,15 +399,28 @@ def sweep(
                 _run_here(work, finished, left, threads, show)
         except KeyboardInterrupt:
             interrupted = True
+    if not work.keep and not interrupted:
+        finished.check()
     return SweepResult(
         base=scenario,
         samples=chosen,
         table=finished.table(work.metrics),
         metrics=tuple(work.metrics),
-        traces=dict(sorted(finished.traces.items())),
+        traces=dict(sorted(finished.traces().items())),
         seeds=max(1, len(drawn)),
         interrupted=interrupted,
     )
+
+
+def _seeds(seeds: int | Iterable[int]) -> tuple[int, ...]:
+    """The seeds 1 … n of a number n, or those given."""
+    if isinstance(seeds, bool):
+        raise TypeError(f"seeds = {seeds}: expected a number of seeds, or seeds")
+    try:
+        n = operator.index(seeds)  # type: ignore[arg-type]
+    except TypeError:
+        return _values("seeds", seeds)
+    return _values("seeds", range(1, n + 1))
 
 
 def _known_metrics(metrics: str | Sequence[str] | None) -> list[str]:
@@ -394,13 +432,17 @@ def _known_metrics(metrics: str | Sequence[str] | None) -> list[str]:
     return chosen
 
 
-def _known_traces(traces: bool | Sequence[str] | None, scenario: Scenario, keys: Sequence[str]) -> list[str]:
-    chosen = _TRACES if traces is True else traces or ()
-    wanted = [chosen] if isinstance(chosen, str) else list[str](chosen)
-    if wanted and "law" not in keys:  # each law has columns of its own
+def _known_traces(traces: bool | Sequence[str] | None, scenario: Scenario, chosen: Samples) -> list[str]:
+    names = _TRACES if traces is True else traces or ()
+    wanted = [names] if isinstance(names, str) else list[str](names)
+    if wanted:
         period = 1e-6 * scenario.sampling.period_us
-        one = scenario.override({"run.duration_s": period, "run.settle_s": 0.0})
-        known = _clutch.simulate(one).samples.columns
+        short = {"run.duration_s": period, "run.settle_s": 0.0}
+        # Each law has columns of its own; a run has those that are its law's.
+        laws = chosen._distinct("law") or [{}]
+        known: dict[str, None] = {}
+        for law in laws:
+            known |= dict.fromkeys(_clutch.simulate(scenario.override(short | law)).samples.columns)
         unknown = [name for name in wanted if name not in known]
         if unknown:
             raise ValueError(f"unknown traces {', '.join(unknown)}; there are {', '.join(known)}")
@@ -416,6 +458,10 @@ class _Work:
     metrics: list[str]
     traces: list[str]
     every: int
+    #: Whether refused rows are kept.
+    keep: bool
+    #: Tells this sweep from others.
+    name: str
 
     def job(self, rows: Sequence[Sequence[Any]], threads: int | None) -> _clutch.Sweep:
         keys, values = list(self.keys), [list(row) for row in rows]
@@ -431,49 +477,48 @@ class _Work:
 class _Finished:
     """What has run, in the order in which it came."""
 
-    def __init__(self, scenario: Scenario, chosen: Samples, *, keep: bool) -> None:
-        self.scenario, self.samples, self.keep = scenario, chosen, keep
-        self.runs: list[int] = []
-        self.parts: list[Table] = []
-        self.traces: dict[int, Table] = {}
+    def __init__(self, chosen: Samples) -> None:
+        self.samples = chosen
+        # One list, so that Ctrl-C finds a part wholly in it or not at all.
+        self.parts: list[tuple[Sequence[int], _Result]] = []
 
     def __len__(self) -> int:
-        return len(self.runs)
+        return sum(len(result[0]) for _, result in self.parts)
 
     def add(self, numbers: Sequence[int], result: _Result) -> None:
         """All rows of a job, whose row i is the sweep's row ``numbers[i]``."""
-        table = result[0]
-        self.runs += [numbers[i] for i in table["run"].tolist()]
-        self.parts.append(table)
-        self.look(numbers, result)
+        self.parts.append((numbers, result))
 
-    def look(self, numbers: Sequence[int], result: _Result) -> None:
-        """Take a job's new traces; raise its first refusal, unless refused rows are kept."""
-        _, traces, refused = result
-        self.traces |= {numbers[i]: trace for i, trace in traces.items()}
-        if refused and not self.keep:
-            i, error = refused[0]
-            raise self._named(numbers[i], error)
+    def traces(self) -> dict[int, Table]:
+        return {numbers[i]: trace for numbers, result in self.parts for i, trace in result[1].items()}
 
-    def _named(self, number: int, error: ParamError) -> ParamError:
-        """The error with its row, and the value as the user wrote it."""
-        row = dict(zip(self.samples.keys, self.samples.rows[number], strict=True))
-        value = row.get(error.field, error.value)
-        return ParamError(f"row {number}: {error}", error.field, value)
+    def check(self) -> None:
+        """Raise the refusal of the lowest row, if there is one."""
+        refused = {numbers[i]: error for numbers, result in self.parts for i, error in result[2]}
+        if refused:
+            number = min(refused)
+            error = refused[number]
+            # The value as the user wrote it.
+            value = dict(zip(self.samples.keys, self.samples.rows[number], strict=True)).get(error.field, error.value)
+            raise ParamError(f"row {number}: {error}", error.field, value)
 
     def table(self, metrics: Sequence[str]) -> Table:
         import numpy as np
 
-        order = np.argsort(np.asarray(self.runs, dtype=np.int64), kind="stable")
-        runs = [self.runs[i] for i in order]
-        texts = [text for part in self.parts for text in part["error"]]
-        columns: dict[str, Any] = {"run": np.asarray(runs, dtype=np.int64)}
+        tables = [(numbers, result[0]) for numbers, result in self.parts]
+        numbers = [rows[i] for rows, table in tables for i in table["row"].tolist()]
+        texts = [text for _, table in tables for text in table["error"]]
+        order = np.argsort(np.asarray(numbers, dtype=np.int64), kind="stable")
+        rows = np.asarray(numbers, dtype=np.int64)[order]
+        columns: dict[str, Any] = {"row": rows}
         for i, key in enumerate(self.samples.keys):
-            columns[key] = _column([self.samples.rows[n][i] for n in runs])
+            # Of all rows, so that its type does not depend on which have finished.
+            columns[key] = _column([row[i] for row in self.samples.rows])[rows]
         for name in metrics:
-            parts = [part[name] for part in self.parts]
-            columns[name] = np.concatenate(parts)[order] if parts else np.empty(0)
-        columns["error"] = [texts[i] for i in order]
+            parts = [table[name] for _, table in tables]
+            nothing = np.empty(0, dtype=bool if name == "certified" else float)
+            columns[name] = np.concatenate(parts)[order] if parts else nothing
+        columns["error"] = np.asarray([texts[i] for i in order], dtype=object)
         return Table(columns)
 
 
@@ -481,28 +526,23 @@ def _column(values: list[Any]) -> Any:
     """Values of a key as a column; what is neither number nor text is shown as JSON."""
     import numpy as np
 
-    if all(isinstance(v, bool) for v in values):
+    if values and all(isinstance(v, bool) for v in values):
         return np.asarray(values, dtype=bool)
     if all(isinstance(v, int) and not isinstance(v, bool) for v in values):
         return np.asarray(values, dtype=np.int64)
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         return np.asarray(values, dtype=np.float64)
-    return [v if isinstance(v, str) else json.dumps(v) for v in values]
+    texts = [v if isinstance(v, str) else json.dumps(v) for v in values]
+    return np.asarray(texts, dtype=object)
 
 
 def _run_here(work: _Work, finished: _Finished, numbers: list[int], threads: int | None, show: _Progress) -> None:
     before = len(finished)
     job = work.job([finished.samples.rows[i] for i in numbers], threads)
-    looked = 0
     try:
         job.start()
-        while not job.wait(_POLL_S):
+        while not job.wait(_POLL_S) and (work.keep or job.refused is None):
             show(before + job.finished)
-            # A refused row should end a long sweep early. Looking each time that the finished rows have
-            # doubled costs little more than the look at the end.
-            if not finished.keep and job.finished > 2 * looked:
-                looked = job.finished
-                finished.look(numbers, job.result())
     finally:
         job.cancel()
         finished.add(numbers, job.result())
@@ -520,9 +560,15 @@ def _run_there(work: _Work, finished: _Finished, executor: Any, chunk: int | Non
     def done(chunk: int, result: _Result) -> None:
         finished.add(numbers[chunk], result)
         show(len(finished))
+        if not work.keep:
+            finished.check()
 
     calls = [(work, rows[n.start : n.stop]) for n in numbers]
-    failed = executors._run(executor, _run_chunk, calls, done)
+    try:
+        failed = executors._run(executor, _run_chunk, calls, done)
+    except BaseException:
+        _abandoned.add(work.name)
+        raise
     left = [i for chunk in sorted(failed) for i in numbers[chunk]]
     if failed:
         why = next(iter(failed.values()))
@@ -535,13 +581,21 @@ def _run_there(work: _Work, finished: _Finished, executor: Any, chunk: int | Non
     return left
 
 
+#: Sweeps that were ended: their chunks in threads of this process look here.
+_abandoned: set[str] = set()
+
+
 def _run_chunk(work: _Work, rows: Sequence[Sequence[Any]], attempt: int) -> _Result:
     """Run a chunk on one thread of a worker."""
     job = work.job(rows, 1)
     try:
         job.start()
         while not job.wait(_POLL_S):
-            pass
+            if work.name in _abandoned:
+                break
+    except KeyboardInterrupt:
+        # Of this worker alone, or of all: who asked for the chunk decides what it means.
+        raise RuntimeError("the worker was interrupted") from None
     finally:
         job.cancel()
     return job.result()
@@ -616,7 +670,7 @@ class SweepResult:
     samples
         The rows asked for.
     table
-        A row for each finished run: its number "run", its values of the swept keys, its metrics, and in
+        A row for each finished run: its number "row", its values of the swept keys, its metrics, and in
         "error" why the scenario refused it ("" if it did not). Tables as values are shown as JSON.
     metrics
         Names of the metrics.
@@ -634,7 +688,7 @@ class SweepResult:
     >>> result
     <SweepResult: 4 runs over law.smc.kp_v, run.seed>
     >>> len(result), result.keys, result.table.columns
-    (4, ('law.smc.kp_v', 'run.seed'), ['run', 'law.smc.kp_v', 'run.seed', 'max_error_rad', 'error'])
+    (4, ('law.smc.kp_v', 'run.seed'), ['row', 'law.smc.kp_v', 'run.seed', 'max_error_rad', 'error'])
     """
 
     base: Scenario
@@ -708,7 +762,7 @@ class SweepResult:
         >>> clutch.sweep("smc_2", {"law.smc.kp_v": [3.0, 4.0]}).scenario(1).law.kp_v
         4.0
         """
-        number = self.table["run"].tolist()[i]
+        number = self.table["row"].tolist()[i]
         return self.base.override(dict(zip(self.keys, self.samples.rows[number], strict=True)))
 
     def best(self, metric: str) -> tuple[dict[str, Any], Scenario]:
@@ -743,7 +797,9 @@ class SweepResult:
         """
         if metric not in self.metrics:
             raise ValueError(f"metric {metric!r} was not taken; there are {', '.join(self.metrics)}")
-        runs, texts = self.table["run"].tolist(), self.table["error"]
+        if metric == "certified":
+            raise ValueError("certified is no figure to make small; select by it, and take the best of another")
+        runs, texts = self.table["row"].tolist(), self.table["error"]
         columns = {name: self.table[name].tolist() for name in self.metrics}
         groups: dict[int, list[int]] = {}
         for i, (run, text) in enumerate(zip(runs, texts, strict=True)):
@@ -826,7 +882,7 @@ class SweepResult:
         return self.table.__arrow_c_stream__(requested_schema)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The metrics with labelled dimensions: those of a full grid have the keys' names, else it is "run".
+        """The metrics with labelled dimensions: those of a full grid have the keys' names, else it is "row".
 
         Runs that have not finished are NaN.
 
@@ -840,11 +896,11 @@ class SweepResult:
         import numpy as np
         import xarray
 
-        runs, names = self.table["run"], [*self.metrics, "error"]
+        runs, names = self.table["row"], [*self.metrics, "error"]
         if self.samples.axes is None:
-            coords = {key: ("run", np.asarray(self.table[key])) for key in self.keys}
-            columns = {name: ("run", np.asarray(self.table[name])) for name in names}
-            return xarray.Dataset(columns, coords={"run": runs} | coords)
+            coords = {key: ("row", np.asarray(self.table[key])) for key in self.keys}
+            columns = {name: ("row", np.asarray(self.table[name])) for name in names}
+            return xarray.Dataset(columns, coords={"row": runs} | coords)
         axes = [np.asarray(_column(list(axis))) for axis in self.samples.axes]
         shape = [len(axis) for axis in axes]
         values = {}

@@ -104,6 +104,9 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
         self.error_weight, self.variation_weight = error_weight, variation_weight
         # The last sample is seen and not answered.
         self._steps = len(self.scenario.path()) - 1
+        if self._steps < 1:
+            raise ValueError("a scenario of one sample has no step: make run.duration_s longer")
+        self._tick = self._steps  # no episode has begun
         self._count_rad = math.tau / self.scenario.rig.encoder.counts_per_rev
         self.action_space = gymnasium.spaces.Box(0.0, self.scenario.output.highest_v, (1,), np.float32)
         low = np.array([-np.inf, -np.inf, -np.inf, -np.inf, self.scenario.rig.dac.lowest_v])
@@ -158,6 +161,8 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
         ------
         ValueError
             A voltage that is not a number.
+        gymnasium.error.ResetNeeded
+            No episode has begun, or the last one has ended.
 
         Examples
         --------
@@ -169,6 +174,8 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
         >>> while not env.step([0.0])[2]:
         ...     pass
         """
+        if not self._tick < self._steps:
+            raise gymnasium.error.ResetNeeded("call reset before the first step, and after an episode's last")
         before = self._plant.voltage
         volts = min(max(float(action[0]), 0.0), self.scenario.output.highest_v)
         self._plant.step(volts)
@@ -179,6 +186,7 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
         reward = -self._cost(error) - self.variation_weight * abs(self._plant.voltage - before)
         if terminated:
             reward -= (self._steps - self._tick) * self._cost(limit)
+            self._tick = self._steps
         return observation, reward, terminated, truncated and not terminated, info
 
     def _cost(self, error: float) -> float:
@@ -201,7 +209,7 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
             "counts": plant.counts,
             "time_s": plant.time,
             "stuck": plant.stuck,
-            "sticks": plant.events()["kind"].count("stick"),
+            "sticks": plant.sticks,
             "seed": self._seed,
             "law_voltage_v": law_voltage,
         }

@@ -1,4 +1,4 @@
-"""The README and the pages of docs/python are true: their code runs and prints what they say; no public name is left out."""
+"""README and docs/python are true: their code runs and prints what they say; no public name is left out."""
 
 import contextlib
 import io

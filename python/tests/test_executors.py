@@ -17,7 +17,7 @@ from clutch import executors
 
 #: 48 rows of a few milliseconds each, with traces.
 SAMPLES = clutch.sobol({"law.smc.kp_v": (2, 6), "law.smc.boundary_rad_s": (0.02, 0.5, "log")}, 16)
-OPTIONS = {"seeds": 3, "traces": ["time_s", "error_rad", "voltage_v", "stuck"], "every": 50}
+OPTIONS = {"seeds": 3, "traces": ["time_s", "error_rad", "counts", "code", "stuck"], "every": 50}
 
 
 @pytest.fixture(scope="module")
@@ -272,3 +272,32 @@ def test_a_ray_that_runs_already_is_left_running(ray):
     with executors.RayExecutor() as second:
         assert second.submit(abs, -1).result() == 1
     assert ray.submit(abs, -2).result() == 2
+
+
+def test_a_worker_that_is_interrupted_alone_loses_nothing(base, local):
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        victim = pool.submit(os.getpid).result()
+        timer = threading.Timer(0.2, os.kill, (victim, signal.SIGINT))
+        timer.start()
+        there = clutch.sweep(base, SAMPLES, executor=pool, chunk=1, **OPTIONS)
+        timer.join()
+    assert not there.interrupted
+    same(local, there)
+
+
+def test_an_ended_sweep_leaves_no_chunk_running_in_threads_of_this_process(base):
+    long = base.override({"run.duration_s": 100.0})
+    begun = time.monotonic()
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        first = clutch.sweep(long, {"run.seed": range(1, 3)}, executor=pool, chunk=1, metrics=[])
+        one = time.monotonic() - begun
+        assert len(first) == 2
+        found = _interrupted_after(0.3, long, pool)
+    # 2000 runs would take a thousand times as long as two.
+    assert found.interrupted and time.monotonic() - begun < 100 * max(one, 0.1)
+
+
+def _interrupted_after(seconds, base, pool):
+    timer = threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    return clutch.sweep(base, {"run.seed": range(1, 2001)}, executor=pool, chunk=1000, metrics=[])

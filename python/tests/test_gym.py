@@ -164,3 +164,14 @@ def test_registering_twice_changes_nothing():
         warnings.simplefilter("error")
         clutch.gym.register()
     assert before == {name: gymnasium.spec(name) for name in IDS}
+
+
+def test_a_step_outside_of_an_episode_asks_for_a_reset():
+    env = TrackingEnv("smc_2")
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step([2.0])
+    env.reset(seed=1)
+    while not env.step([0.0])[2]:
+        pass
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step([2.0])

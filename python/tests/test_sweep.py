@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import clutch
-from clutch import _sweep
+from clutch import _clutch, _sweep
 
 FIGURES = [
     "measured_s",
@@ -47,7 +47,7 @@ def alone(base, row):
 
 def assert_rows_are_single_runs(base, result):
     for i in range(len(result)):
-        figures, run = alone(base, dict(zip(result.keys, result.samples.rows[result.table["run"][i]], strict=True)))
+        figures, run = alone(base, dict(zip(result.keys, result.samples.rows[result.table["row"][i]], strict=True)))
         for name in FIGURES:
             np.testing.assert_array_equal(result.table[name][i], figures[name], err_msg=f"row {i}: {name}")
         assert result.table["certified"][i] == bool(run.scenario.certificate())
@@ -76,8 +76,8 @@ def test_a_grid_runs_every_combination_with_the_last_key_fastest(short):
     result = clutch.sweep(short, {"law.smc.kp_v": [3, 4], "run.seed": [7, 5, 6]})
     assert result.table["law.smc.kp_v"].tolist() == [3, 3, 3, 4, 4, 4]
     assert result.table["run.seed"].tolist() == [7, 5, 6, 7, 5, 6]
-    assert result.table["run"].tolist() == [0, 1, 2, 3, 4, 5]
-    assert result.table.columns == ["run", "law.smc.kp_v", "run.seed", *FIGURES, "certified", "error"]
+    assert result.table["row"].tolist() == [0, 1, 2, 3, 4, 5]
+    assert result.table.columns == ["row", "law.smc.kp_v", "run.seed", *FIGURES, "certified", "error"]
     assert result.table["error"] == [""] * 6
     assert result.table["run.seed"].dtype == np.int64 and result.table["certified"].dtype == bool
 
@@ -248,7 +248,7 @@ def test_a_grid_becomes_a_dataset_with_named_dimensions(short):
     one = data["max_error_rad"].sel({"law.smc.kp_v": 4.0, "rig.base": "paper", "run.seed": 3})
     assert float(one) == result.table["max_error_rad"][8]
     points = clutch.sweep(short, clutch.sobol({"law.smc.kp_v": (2, 6)}, 4)).to_xarray()
-    assert dict(points.sizes) == {"run": 4} and "law.smc.kp_v" in points.coords
+    assert dict(points.sizes) == {"row": 4} and "law.smc.kp_v" in points.coords
 
 
 def test_the_table_goes_to_data_frames_and_arrow(short):
@@ -295,7 +295,7 @@ INTERRUPTED = """
     answered = time.perf_counter() - sent[0]
     assert result.interrupted and result.total == 100_000, result
     print(answered, len(result), flush=True)
-    rows = list(result.table["run"])
+    rows = list(result.table["row"])
     assert rows == sorted(rows) and len(set(rows)) == len(rows)
     if rows:
         alone = clutch.simulate(result.scenario(len(rows) - 1)).metrics.rms_error_rad
@@ -391,3 +391,133 @@ def test_a_bar_is_shown_on_a_terminal_only_and_only_for_long_sweeps(short, monke
     assert "3" in shown["long"] and "3" in shown["asked"]
     assert shown["short"] == shown["nobody"] == shown["off"] == ""
     assert ("3 of 3 runs" in shown["long"]) != with_tqdm
+
+
+# --- What must not happen ------------------------------------------------------------------------
+
+
+def outcome(code):
+    """What a process of its own prints."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_system_that_refuses_threads_slows_a_sweep_and_does_not_stop_it():
+    code = """
+import resource, clutch
+short = {"run.duration_s": 0.1, "run.settle_s": 0.0}
+clutch.sweep("smc_2", {"run.seed": [1]})
+resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
+print(len(clutch.sweep(clutch.Scenario.load("smc_2", short), {"run.seed": range(1, 4001)}, threads=4000)))
+"""
+    assert outcome(code) == "4000\n"
+
+
+def test_traces_keep_the_columns_asked_for_and_nothing_else():
+    code = """
+import resource, clutch
+clutch.sweep("smc_2", {"run.seed": [1]}, traces="error_rad")
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+found = clutch.sweep("smc_2", {"run.seed": range(1, 401)}, traces="error_rad", metrics=[])
+grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+print(len(found.traces), grown < 100)  # 16 MB of errors; the runs have 260 MB
+"""
+    assert outcome(code) == "400 True\n"
+
+
+def test_whole_tables_may_be_swept_also_the_one_called_run(short):
+    settings = [short.run.replace(seed=1), short.run.replace(seed=2)]
+    found = clutch.sweep(short, {"run": settings})
+    assert [found.scenario(i).run.seed for i in range(2)] == [1, 2]
+    assert found.best("rms_error_rad")[1].run in settings
+
+
+def test_numpys_scalars_may_stand_in_tables(short):
+    found = clutch.sweep(short, {"law": [{"smc": {"kp_v": np.float32(3)}}]})
+    assert found.scenario(0).law.kp_v == 3.0
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"law.smc.kp_v": [3.0, 6.0], "law": [clutch.Smc(kp_v=4.0)]},
+        {"rig.base": ["bench"], "rig": [{"base": "paper"}]},
+        {"run": [{}], "run.seed": [1]},
+    ],
+)
+def test_a_key_within_another_is_refused(short, parameters):
+    with pytest.raises(ValueError, match="lies within"):
+        clutch.sweep(short, parameters)
+
+
+def test_samples_of_ones_own_are_checked():
+    with pytest.raises(ValueError, match=r"run\.seed is swept twice"):
+        clutch.Samples(("run.seed", "run.seed"), ((1, 2),))
+    with pytest.raises(ValueError, match=r"row 1 has 0 values: expected 1"):
+        clutch.Samples(("run.seed",), ((1,), ()))
+
+
+def test_a_refusal_is_raised_once_and_names_the_lowest_row_that_ran(short):
+    with pytest.raises(clutch.ParamError, match=r"row 0: .*kp_v = -1") as caught:
+        clutch.sweep(short, {"law.smc.kp_v": [-1.0, *np.linspace(2, 4, 200)]}, threads=1)
+    assert caught.value.__context__ is None
+    assert (caught.value.field, caught.value.value) == ("law.smc.kp_v", -1.0)
+
+
+def test_certified_is_no_figure_to_make_small(short):
+    with pytest.raises(ValueError, match="certified is no figure"):
+        clutch.sweep(short, {"law.smc.kp_v": [0.1, 3.0]}).best("certified")
+
+
+def test_traces_that_no_law_has_are_refused_also_where_the_law_is_swept(short):
+    laws = {"law": [clutch.Smc(), clutch.Pd()]}
+    with pytest.raises(ValueError, match="unknown traces nonsense"):
+        clutch.sweep(short, laws, traces=["nonsense"])
+    found = clutch.sweep(short, laws, traces=["time_s", "surface_rad_s"])
+    assert [t.columns for t in found.traces.values()] == [["time_s", "surface_rad_s"], ["time_s"]]
+
+
+def test_a_sweep_without_a_finished_row_still_has_its_forms(short, monkeypatch):
+    native = _clutch.Sweep
+
+    class Job:
+        def __init__(self, *arguments):
+            self._job = native(*arguments)
+
+        def __getattr__(self, name):
+            return getattr(self._job, name)
+
+        def start(self):
+            pass
+
+        def wait(self, seconds):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(_clutch, "Sweep", Job)
+    found = clutch.sweep(short, {"law.smc.kp_v": [3.0, 4.0], "run.engine": ["auto", "exact_flow"]})
+    assert found.interrupted and len(found) == 0
+    assert found.table["error"] == [] and found.table["run.engine"] == []
+    assert found.table["certified"].dtype == bool
+    assert np.isnan(found.to_xarray()["max_error_rad"]).all()
+    assert pickle.loads(pickle.dumps(found.table)) == found.table
+    assert found.to_arrow().num_rows == 0
+
+
+def test_numbers_of_seeds_and_progress_are_what_they_say(short):
+    assert len(clutch.sweep(short, {"law.smc.kp_v": [3.0]}, seeds=np.int64(2))) == 2
+    with pytest.raises(TypeError, match="seeds = True"):
+        clutch.sweep(short, {"law.smc.kp_v": [3.0]}, seeds=True)
+    with pytest.raises(TypeError, match="progress = 5"):
+        clutch.sweep(short, {"law.smc.kp_v": [3.0]}, progress=5)
+    with pytest.raises(ValueError, match="whole ends"):
+        clutch.sobol({"rig.delay_ticks": (1.5, 3.2, "int")}, 4)
+
+
+def test_waiting_takes_times_and_no_other_numbers(short):
+    job = _clutch.Sweep(short._tables(), ["run.seed"], [[1]], ["max_error_rad"])
+    for bad in (float("nan"), -1.0):
+        with pytest.raises(ValueError, match="seconds ="):
+            job.wait(bad)
+    job.start()
+    assert job.wait(float("inf"))

@@ -80,6 +80,16 @@ def test_our_own_law_written_in_python_gives_the_same_run():
 
 
 def test_an_exception_in_a_python_law_ends_the_run_with_it():
+    asked = []
+
+    def broken_at_once(tick):
+        asked.append(tick.time)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        package.simulate("pd_2", law=broken_at_once, overrides={"run.duration_s": 3600})
+    assert asked == [0.0]
+
     def broken(tick):
         if tick.time > 0.5:
             raise LookupError("no such gain")
@@ -181,9 +191,15 @@ def test_a_table_takes_any_array_and_names_what_it_cannot_take():
         ({"x": np.zeros((2, 2))}, r'column "x" has the shape \(2, 2\): expected one dimension'),
         ({"x": np.zeros(2), "y": np.zeros(3)}, r'column "y" has 3 rows: expected 2, as many as column "x"'),
         ({"x": np.zeros(2, dtype=complex)}, r'column "x" has the dtype complex128: expected numbers'),
+        ({"x": np.array([2**64 - 1], dtype=np.uint64)}, r'column "x" has numbers above 2\^63'),
+        ({"x": np.ma.masked_array([1.0, 2.0], mask=[True, False])}, r'column "x" has a mask'),
+        ({"x": [1, "a"]}, r'column "x" mixes texts with other values'),
+        ({"x": np.array([None, 1])}, r'column "x" mixes texts with other values'),
     ):
         with pytest.raises(ValueError, match=match):
             package.Table(bad)
+    assert package.Table({"x": ["a\0", ""]})["x"] == ["a\0", ""]
+    assert 5 not in table and "flag" in table
     with pytest.raises(KeyError, match="nothing: expected one of the columns stride"):
         table["nothing"]
 
@@ -345,6 +361,77 @@ def test_a_snapshot_of_a_law_goes_on_by_itself():
     twin = law.copy()
     after = [law.step(tick // 9, path.at(tick)) for tick in range(100, 200)]
     assert [twin.step(tick // 9, path.at(tick)) for tick in range(100, 200)] == after
+
+
+def test_a_value_that_holds_itself_or_is_nested_without_end_is_refused():
+    cyclic, deep = [], [1.0]
+    cyclic.append(cyclic)
+    for _ in range(100_000):
+        deep = [deep]
+    for bad in (cyclic, deep):
+        with pytest.raises(ValueError, match="nested more than 32 deep"):
+            package.simulate("smc_2", overrides={"law.smc.kp_v": bad})
+        with pytest.raises(ValueError, match="nested more than 32 deep"):
+            package.sweep("smc_2", {"law.smc.kp_v": [bad]})
+    with pytest.raises(package.ParamError, match="more than 32 parts"):
+        package.simulate("smc_2", overrides={".".join(["a"] * 200_000): 1})
+
+
+@pytest.mark.parametrize(
+    ("overrides", "field", "value"),
+    [
+        ({"law": {"smc": {"kp_v": -1.0}}}, "law.smc.kp_v", -1.0),
+        ({"run.duration_s": 0.5}, "run.settle_s", 1.0),
+        ({"law.smc.kp_v": 4, "law": {"smc": {"kp_v": -2}}}, "law.smc.kp_v", -2),
+    ],
+)
+def test_the_value_of_an_error_is_the_one_that_was_refused(overrides, field, value):
+    with pytest.raises(package.ParamError) as caught:
+        package.simulate("smc_2", overrides=overrides)
+    assert (caught.value.field, caught.value.value) == (field, value)
+
+
+def test_a_run_too_long_for_the_memory_is_an_error_and_not_the_end_of_python():
+    code = """
+import resource
+import clutch
+resource.setrlimit(resource.RLIMIT_AS, (600 << 20, 600 << 20))
+try:
+    clutch.simulate("smc_2", overrides={"run.duration_s": 9000})
+except clutch.ParamError as e:
+    print(e.field, "no memory" in str(e))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "run.duration_s True\n", done.stderr
+
+
+def test_a_result_crosses_to_another_process():
+    import concurrent.futures
+    import multiprocessing
+
+    with concurrent.futures.ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        there = next(pool.map(package.simulate, ["smc_2"]))
+    here = package.simulate("smc_2")
+    assert (there.scenario, there.metrics, there.samples, there.events) == (
+        here.scenario,
+        here.metrics,
+        here.samples,
+        here.events,
+    )
+    with pytest.raises(RuntimeError, match="another process"):
+        there.save("nowhere.mcap")
+
+
+def test_a_law_can_be_tried_on_a_tick_of_ones_own():
+    tick = package.Tick(0.01, -0.2, target_velocity=0.5)
+    assert (tick.error, tick.error_rate, tick.velocity, tick.time) == (0.01, -0.2, 0.7, 0.0)
+
+
+def test_a_path_has_no_ticks_before_or_after_its_run():
+    path = package.Scenario.load("smc_2").path()
+    for tick in (-1, len(path)):
+        with pytest.raises(IndexError, match=rf"tick {tick}: expected one of the run's, 0 to {len(path) - 1}"):
+            path.at(tick)
 
 
 # --- The package as a file ------------------------------------------------------------------------

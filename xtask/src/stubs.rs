@@ -13,7 +13,7 @@ const NAMED: &[(&str, &str)] = &[
     // Its imports: `CapsuleType` is in `types` from Python 3.13 on only.
     (
         "from _typeshed import Incomplete, SupportsGetItem\n",
-        "from collections.abc import Callable, Iterator, Mapping, Sequence\n",
+        "from collections.abc import Callable, Iterator, Sequence\n",
     ),
     ("from types import CapsuleType\n", ""),
     (
@@ -49,7 +49,7 @@ const NAMED: &[(&str, &str)] = &[
     ("def table3(self, /) -> Any:", "def table3(self, /) -> list[dict[str, float]]:"),
     ("def certificate(self, /) -> Any:", "def certificate(self, /) -> dict[str, Any]:"),
     ("def __iter__(self, /) -> Any: ...", "def __iter__(self, /) -> Iterator[str]: ..."),
-    ("columns: dict) -> Table", "columns: Mapping[str, ArrayLike]) -> Table"),
+    ("columns: Mapping) -> Table", "columns: Mapping[str, ArrayLike]) -> Table"),
     ("def to_dict(self, /) -> dict:", "def to_dict(self, /) -> dict[str, Any]:"),
     ("def to_pandas(self, /) -> Any:", "def to_pandas(self, /) -> pd.DataFrame:"),
     ("def to_polars(self, /) -> Any:", "def to_polars(self, /) -> pl.DataFrame:"),

@@ -27,7 +27,9 @@ pub(crate) fn param_error(py: Python<'_>, message: &str, field: &str, value: Bou
 pub(crate) fn scenario_error(py: Python<'_>, e: &ScenarioError, tables: Option<&Table>) -> PyErr {
     // An error about a whole table is about no one value.
     let found = tables.and_then(|t| lookup(t, &e.key)).filter(|v| !v.is_table()).map(|v| from_toml(py, v));
-    let value = match found {
+    // A default is in no table, and errors tell it as a file would have it.
+    let told = || format!("x = {}", e.value).parse::<Table>().ok()?.remove("x");
+    let value = match found.or_else(|| told().map(|v| from_toml(py, &v))) {
         Some(Ok(value)) => value,
         Some(Err(e)) => return e,
         None if e.value.is_empty() => py.None().into_bound(py),
@@ -87,6 +89,16 @@ fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
 /// A Python value as TOML's: numbers (also NumPy's), texts, lists, tuples, dicts. `None` has no
 /// counterpart.
 pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    nested_to_toml(value, 0)
+}
+
+/// Lists in lists, and dicts in dicts, that a value may have; a list that holds itself has no end.
+const DEEPEST: usize = 32;
+
+fn nested_to_toml(value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
+    if depth > DEEPEST {
+        return Err(PyValueError::new_err(format!("a value nested more than {DEEPEST} deep")));
+    }
     if let Ok(b) = value.cast::<PyBool>() {
         return Ok(Value::Boolean(b.is_true()));
     }
@@ -97,10 +109,12 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
         return Ok(Value::Float(f.value()));
     }
     if let Ok(d) = value.cast::<PyDict>() {
-        return Ok(Value::Table(to_table(d)?));
+        return Ok(Value::Table(nested_to_table(d, depth + 1)?));
     }
     if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
-        return Ok(Value::Array(value.try_iter()?.map(|v| to_toml(&v?)).collect::<PyResult<_>>()?));
+        return Ok(Value::Array(
+            value.try_iter()?.map(|v| nested_to_toml(&v?, depth + 1)).collect::<PyResult<_>>()?,
+        ));
     }
     if value.is_instance_of::<PyInt>() {
         return value.extract::<i64>().map(Value::Integer).map_err(|_| {
@@ -112,7 +126,7 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
         && !own.is(value)
         && own.get_type().getattr("__module__")?.eq("builtins")?
     {
-        return to_toml(&own);
+        return nested_to_toml(&own, depth + 1);
     }
     let kind = value.get_type().name()?;
     Err(PyTypeError::new_err(format!(
@@ -122,10 +136,14 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
 
 /// A dict as a table; entries that are `None` are left out.
 pub(crate) fn to_table(dict: &Bound<'_, PyDict>) -> PyResult<Table> {
+    nested_to_table(dict, 0)
+}
+
+fn nested_to_table(dict: &Bound<'_, PyDict>, depth: usize) -> PyResult<Table> {
     let mut table = Table::new();
     for (key, value) in dict {
         if !value.is_none() {
-            table.insert(key.extract::<String>()?, to_toml(&value)?);
+            table.insert(key.extract::<String>()?, nested_to_toml(&value, depth + 1)?);
         }
     }
     Ok(table)

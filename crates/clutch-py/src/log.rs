@@ -1,6 +1,7 @@
 //! Logs: their channels as tables, and replay.
 
-use crate::convert::{log_error, overrides, scenario_error};
+use crate::convert::{log_error, scenario_error};
+use crate::scenario::Scenario;
 use crate::table::{Column, Table, pairs};
 use clutch_log::names::{ARRIVALS, CAUSES, COMMAND_SOURCES, EVENT_KINDS, LIMITS, Names, STATES, name_of};
 use clutch_log::{CommandRecord, Limits};
@@ -179,24 +180,24 @@ impl Log {
         self.log.damaged
     }
 
-    /// The recorded counts to the recorded law: commands of the replay, ticks, and the first difference (tick,
-    /// field, logged, replayed).
-    #[pyo3(signature = (overrides=None))]
+    /// The recorded counts to the recorded law, or to another scenario's: commands of the replay, ticks,
+    /// and the first difference (tick, field, logged, replayed).
+    #[pyo3(signature = (scenario=None))]
     #[allow(clippy::type_complexity, reason = "what clutch.replay makes its object of")]
     fn replay(
         &self,
         py: Python<'_>,
-        overrides: Option<&Bound<'_, PyDict>>,
+        scenario: Option<&Scenario>,
     ) -> PyResult<(Table, usize, Option<(u64, String, f64, f64)>)> {
-        let set = self::overrides(overrides)?;
-        let origin = format!("{}: its scenario", self.origin);
-        let text = &self.log.header.scenario_toml;
-        let bad = |e: &clutch_sim::ScenarioError| scenario_error(py, e, None);
-        let table: toml::Table = text
-            .parse()
-            .map_err(|_| PyValueError::new_err(format!("{origin}: this is not TOML: the log is damaged")))?;
-        let scenario = clutch_sim::Scenario::from_table(&origin, table, &set).map_err(|e| bad(&e))?;
-        let replayed = py.detach(|| replay::replay(&self.log, &scenario));
+        let scenario = match scenario {
+            Some(other) => other.clone(),
+            None => {
+                let origin = format!("{}: its scenario", self.origin);
+                let read = clutch_sim::Scenario::parse(&origin, &self.log.header.scenario_toml, &[]);
+                Scenario(Arc::new(read.map_err(|e| scenario_error(py, &e, None))?))
+            }
+        };
+        let replayed = py.detach(|| replay::replay(&self.log, &scenario.0));
         let replayed = replayed.map_err(|e| PyValueError::new_err(format!("{}: {e}", self.origin)))?;
         let first = replayed.first.as_ref().map(|d| (d.tick, d.field.clone(), d.logged, d.replayed));
         let terms = &self.log.header.term_names;

@@ -65,7 +65,9 @@ fn with_python_law(
     let law = PythonLaw::new(callable, output_stage(py, scenario)?, spec.period.seconds());
     let params = spec.servo().map_err(|e| wrong(&e))?;
     let servo = Servo::with_law(&params, law).map_err(|e| wrong(&e))?;
-    let run = py.detach(|| simulate_servo(&spec, &servo, Keep::Trace, &unless_interrupted));
+    let watch =
+        |p: Progress| if servo.law().failed() { ControlFlow::Break(()) } else { unless_interrupted(p) };
+    let run = py.detach(|| simulate_servo(&spec, &servo, Keep::Trace, &watch));
     match servo.law().failure() {
         Some(e) => Err(e),
         None => Ok(run.map_err(|e: RunError| scenario.0.run_error(&e))),

@@ -6,7 +6,7 @@ use crate::convert::{
 use crate::stepping::Path;
 use clutch_core::{BrakeGeometry, Stribeck};
 use clutch_sim::rig::Rig;
-use clutch_sim::scenario::{BUILT_IN, check_section};
+use clutch_sim::scenario::{BUILT_IN, check_section, override_keys};
 use clutch_sim::{ScenarioError, Start};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -124,19 +124,19 @@ fn parse(py: Python<'_>, origin: &str, text: &str, set: &[(String, Value)]) -> P
             Err(e) => return Err(scenario_error(py, &e, None)),
         },
     };
-    match clutch_sim::Scenario::from_table(origin, table.clone(), set) {
-        Ok(s) => Ok(Scenario(Arc::new(s))),
-        Err(e) => {
-            // An overridden value is what the user gave last.
-            match set.iter().find(|(key, _)| *key == e.key) {
-                Some((key, value)) => {
-                    let value = crate::convert::from_toml(py, value)?;
-                    Err(param_error(py, &e.to_string(), key, value))
-                }
-                None => Err(scenario_error(py, &e, Some(&table))),
-            }
-        }
-    }
+    checked(py, origin, table, set)
+}
+
+/// A scenario of a table with keys overridden; errors carry the value as it is then.
+pub(crate) fn checked(
+    py: Python<'_>,
+    origin: &str,
+    mut table: Table,
+    set: &[(String, Value)],
+) -> PyResult<Scenario> {
+    let whole = override_keys(origin, &mut table, set);
+    let made = whole.and_then(|()| clutch_sim::Scenario::from_table(origin, table.clone(), &[]));
+    made.map(|s| Scenario(Arc::new(s))).map_err(|e| scenario_error(py, &e, Some(&table)))
 }
 
 /// Checks one table by itself: `key` as `law.smc`, `name` what errors call it. Gives the table

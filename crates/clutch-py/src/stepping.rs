@@ -8,7 +8,9 @@ use clutch_core::{Counts, Dac, Encoder, FixedCounts, ParamError, Real, Servo, Se
 use clutch_sim::MovingRig;
 use clutch_sim::engine::{Event, EventKind, Motion};
 use clutch_sim::scenario::ScalarKind;
-use pyo3::exceptions::{PyIndexError, PyOverflowError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{
+    PyAttributeError, PyIndexError, PyMemoryError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat};
 use std::sync::Mutex;
@@ -111,20 +113,23 @@ impl Path {
         let spec = scenario.0.spec();
         let encoder = Encoder::new::<f64>(spec.rig.counts_per_rev).map_err(|e| core_error(py, &e))?;
         let begun = spec.prepare().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
-        Ok(Path {
-            targets: (0..scenario.0.ticks()).map(|k| begun.reference.at(k)).collect(),
-            period: spec.period.seconds(),
-            radians_per_count: encoder.radians_per_count(),
-        })
+        let ticks = scenario.0.ticks();
+        let mut targets = Vec::new();
+        let room = usize::try_from(ticks).is_ok_and(|n| targets.try_reserve_exact(n).is_ok());
+        if !room {
+            return Err(PyMemoryError::new_err(format!("no memory for a path of {ticks} targets")));
+        }
+        targets.extend((0..ticks).map(|k| begun.reference.at(k)));
+        Ok(Path { targets, period: spec.period.seconds(), radians_per_count: encoder.radians_per_count() })
     }
 }
 
 #[pymethods]
 impl Path {
     /// The target at a tick of the run, from 0.
-    fn at(&self, tick: usize) -> PyResult<Target> {
+    fn at(&self, tick: i64) -> PyResult<Target> {
         let n = self.targets.len();
-        let target = self.targets.get(tick);
+        let target = usize::try_from(tick).ok().and_then(|tick| self.targets.get(tick));
         target.map(|t| Target(*t)).ok_or_else(|| {
             PyIndexError::new_err(format!("tick {tick}: expected one of the run's, 0 to {}", n - 1))
         })
@@ -385,7 +390,9 @@ impl Controller {
 /// True
 #[pyclass(module = "clutch")]
 pub(crate) struct Plant {
-    moving: Mutex<MovingRig>,
+    moving: MovingRig,
+    /// After a motion that the engine could not follow.
+    broken: bool,
     period: f64,
     tick: u64,
     start_voltage: f64,
@@ -393,14 +400,7 @@ pub(crate) struct Plant {
     whole: bool,
     rounds: bool,
     events: Vec<Event>,
-}
-
-impl Plant {
-    fn with<R>(&self, f: impl FnOnce(&MovingRig) -> R) -> PyResult<R> {
-        let moving =
-            self.moving.lock().map_err(|_| PyRuntimeError::new_err("the plant broke in an earlier step"))?;
-        Ok(f(&moving))
-    }
+    sticks: usize,
 }
 
 #[pymethods]
@@ -413,7 +413,8 @@ impl Plant {
         let mut moving = begun.moving;
         moving.begin_period();
         Ok(Plant {
-            moving: Mutex::new(moving),
+            moving,
+            broken: false,
             period: spec.period.seconds(),
             tick: 0,
             start_voltage: begun.volts,
@@ -421,6 +422,7 @@ impl Plant {
             whole: spec.rig.encoder_quantised,
             rounds: spec.rig.dac_quantised,
             events: Vec::new(),
+            sticks: 0,
         })
     }
 
@@ -432,15 +434,21 @@ impl Plant {
         if !voltage.is_finite() {
             return Err(PyValueError::new_err(format!("voltage = {voltage}: expected a finite voltage, V")));
         }
-        let (period, rounds) = (self.period, self.rounds);
-        let moving = self
-            .moving
-            .get_mut()
-            .map_err(|_| PyRuntimeError::new_err("the plant broke in an earlier step"))?;
+        if self.broken {
+            return Err(PyRuntimeError::new_err("the plant broke in an earlier step; make a new one"));
+        }
+        let (period, moving) = (self.period, &mut self.moving);
         let dac = moving.rig().dac;
-        let volts = if rounds { dac.volts(dac.code(voltage)) } else { voltage };
+        let volts = if self.rounds { dac.volts(dac.code(voltage)) } else { voltage };
         moving.command(volts);
-        let seen = moving.advance(period).map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
+        let seen = match moving.advance(period) {
+            Ok(seen) => seen,
+            Err(e) => {
+                self.broken = true;
+                return Err(PyRuntimeError::new_err(e.to_string()));
+            }
+        };
+        self.sticks += seen.iter().filter(|e| e.kind == EventKind::Stick).count();
         self.events.extend_from_slice(seen);
         self.voltage = volts;
         self.tick += 1;
@@ -453,34 +461,40 @@ impl Plant {
     #[getter]
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         if self.whole {
-            Ok(self.with(|m| m.counts().0)?.into_pyobject(py)?.into_any())
+            Ok(self.moving.counts().0.into_pyobject(py)?.into_any())
         } else {
-            Ok(PyFloat::new(py, self.fine_counts()?).into_any())
+            Ok(PyFloat::new(py, self.fine_counts()).into_any())
         }
     }
 
     /// Position in counts to 2⁻¹⁶ of one: what an ideal sensor shows.
     #[getter]
-    fn fine_counts(&self) -> PyResult<f64> {
-        self.with(|m| fixed_to_counts(m.fine_counts()))
+    fn fine_counts(&self) -> f64 {
+        fixed_to_counts(self.moving.fine_counts())
     }
 
     /// True position, rad.
     #[getter]
-    fn position(&self) -> PyResult<f64> {
-        self.with(|m| m.shaft().position)
+    fn position(&self) -> f64 {
+        self.moving.shaft().position
     }
 
     /// True velocity, rad/s; exactly 0 when stuck.
     #[getter]
-    fn velocity(&self) -> PyResult<f64> {
-        self.with(|m| m.shaft().velocity)
+    fn velocity(&self) -> f64 {
+        self.moving.shaft().velocity
     }
 
     /// Whether friction holds the shaft.
     #[getter]
-    fn stuck(&self) -> PyResult<bool> {
-        self.with(|m| m.shaft().motion == Motion::Stuck)
+    fn stuck(&self) -> bool {
+        self.moving.shaft().motion == Motion::Stuck
+    }
+
+    /// How often it has stuck so far.
+    #[getter]
+    fn sticks(&self) -> usize {
+        self.sticks
     }
 
     /// Time since the start, s.
@@ -527,16 +541,26 @@ pub(crate) fn native(scenario: &Bound<'_, PyAny>) -> PyResult<Scenario> {
     if let Ok(native) = scenario.cast::<Scenario>() {
         return Ok(native.get().clone());
     }
-    let inner = scenario.getattr("_native").map_err(|_| {
-        pyo3::exceptions::PyTypeError::new_err(format!(
-            "scenario is of type {}: expected a clutch.Scenario",
-            scenario.get_type()
-        ))
+    let inner = scenario.getattr("_native").map_err(|e| {
+        if !e.is_instance_of::<PyAttributeError>(scenario.py()) {
+            return e;
+        }
+        let kind = scenario.get_type();
+        PyTypeError::new_err(format!("scenario is of type {kind}: expected a clutch.Scenario"))
     })?;
     Ok(inner.cast::<Scenario>()?.get().clone())
 }
 
 /// What a law written in Python is given each period.
+///
+/// Parameters
+/// ----------
+/// error, error_rate : float
+///     Position error, target minus position, rad, and its rate, rad/s.
+/// target_velocity, target_acceleration : float
+///     Of the path, rad/s and rad/s².
+/// time : float
+///     Since the start of the run, s.
 ///
 /// Examples
 /// --------
@@ -553,6 +577,12 @@ pub(crate) struct Tick {
 
 #[pymethods]
 impl Tick {
+    #[new]
+    #[pyo3(signature = (error, error_rate, target_velocity=0.0, target_acceleration=0.0, time=0.0))]
+    fn new(error: f64, error_rate: f64, target_velocity: f64, target_acceleration: f64, time: f64) -> Tick {
+        Tick { tick: law::Tick { error, error_rate, target_velocity, target_acceleration }, time }
+    }
+
     /// Position error, target minus position, rad.
     #[getter]
     fn error(&self) -> f64 {
@@ -630,18 +660,26 @@ impl PythonLaw {
         self.failure.lock().ok()?.take()
     }
 
+    /// The run is lost: what it still does is of no use.
+    pub(crate) fn failed(&self) -> bool {
+        self.failure.lock().map_or(true, |f| f.is_some())
+    }
+
     fn ask(&self, tick: &law::Tick<f64>, ticks: u64) -> f64 {
         let Ok(mut failure) = self.failure.lock() else { return f64::NAN };
         if failure.is_some() {
-            return f64::NAN; // the run is lost, and ends soon
+            return f64::NAN; // until the run ends, at its next report
         }
         let given = Tick { tick: *tick, time: ticks as f64 * self.period };
         let asked = Python::attach(|py| -> PyResult<f64> {
             let answer = self.callable.bind(py).call1((Bound::new(py, given)?,))?;
-            answer.extract::<f64>().map_err(|_| {
-                pyo3::exceptions::PyTypeError::new_err(format!(
-                    "the law answered {answer} at t = {} s: expected a voltage, V",
-                    ticks as f64 * self.period
+            answer.extract::<f64>().map_err(|e| {
+                if !e.is_instance_of::<PyTypeError>(py) {
+                    return e; // the answer's own: it could not become a number
+                }
+                let time = ticks as f64 * self.period;
+                PyTypeError::new_err(format!(
+                    "the law answered {answer} at t = {time} s: expected a voltage, V"
                 ))
             })
         });

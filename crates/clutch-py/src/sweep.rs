@@ -8,6 +8,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -23,9 +24,23 @@ struct Row {
 struct Shared {
     rows: Mutex<BTreeMap<usize, Row>>,
     finished: AtomicUsize,
+    /// Lowest row that was refused; `usize::MAX` = none.
+    refused: AtomicUsize,
     stop: AtomicBool,
     ended: Mutex<bool>,
     bell: Condvar,
+    /// What a thread said when it panicked.
+    broke: Mutex<Option<String>>,
+}
+
+/// Tells that a sweep has ended, however it did.
+struct AtEnd(Arc<Shared>);
+
+impl Drop for AtEnd {
+    fn drop(&mut self) {
+        *locked(&self.0.ended) = true;
+        self.0.bell.notify_all();
+    }
 }
 
 /// A thread that panicked has left whole rows or none.
@@ -89,9 +104,11 @@ impl Sweep {
             shared: Arc::new(Shared {
                 rows: Mutex::default(),
                 finished: AtomicUsize::new(0),
+                refused: AtomicUsize::new(usize::MAX),
                 stop: AtomicBool::new(false),
                 ended: Mutex::new(false),
                 bell: Condvar::new(),
+                broke: Mutex::default(),
             }),
             started: AtomicBool::new(false),
         })
@@ -107,14 +124,21 @@ impl Sweep {
         let threads = self.threads;
         let keep = if traces.is_empty() { Keep::Figures } else { Keep::Trace };
         let work = move || {
+            let _told = AtEnd(shared.clone());
             let done = |i: usize, outcome: Result<sweep::Row, ScenarioError>| {
                 let row = row(outcome, &metrics, &traces, every);
+                if row.error.is_some() {
+                    shared.refused.fetch_min(i, Ordering::SeqCst);
+                }
                 locked(&shared.rows).insert(i, row);
                 shared.finished.fetch_add(1, Ordering::SeqCst);
             };
-            sweep.run(threads, keep, &shared.stop, &done);
-            *locked(&shared.ended) = true;
-            shared.bell.notify_all();
+            let run = AssertUnwindSafe(|| sweep.run(threads, keep, &shared.stop, &done));
+            if let Err(panic) = catch_unwind(run) {
+                let said = panic.downcast_ref::<String>().cloned();
+                let said = said.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()));
+                *locked(&shared.broke) = Some(said.unwrap_or_default());
+            }
         };
         let spawned = std::thread::Builder::new().name("clutch-sweep".into()).spawn(work);
         spawned.map(drop).map_err(|e| PyRuntimeError::new_err(format!("no thread for the sweep: {e}")))
@@ -126,6 +150,12 @@ impl Sweep {
         self.shared.finished.load(Ordering::SeqCst)
     }
 
+    /// The lowest row so far that the scenario refused.
+    #[getter]
+    fn refused(&self) -> Option<usize> {
+        Some(self.shared.refused.load(Ordering::SeqCst)).filter(|i| *i != usize::MAX)
+    }
+
     /// Rows in all.
     #[getter]
     fn total(&self) -> usize {
@@ -133,13 +163,17 @@ impl Sweep {
     }
 
     /// Waits so many seconds at most; whether the sweep has ended.
-    fn wait(&self, py: Python<'_>, seconds: f64) -> bool {
-        let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::ZERO);
-        py.detach(|| {
+    fn wait(&self, py: Python<'_>, seconds: f64) -> PyResult<bool> {
+        if seconds.is_nan() || seconds < 0.0 {
+            return Err(PyValueError::new_err(format!("seconds = {seconds}: expected at least 0")));
+        }
+        // What is longer than a Duration can tell is for ever.
+        let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+        Ok(py.detach(|| {
             let ended = locked(&self.shared.ended);
             let waited = self.shared.bell.wait_timeout_while(ended, time, |ended| !*ended);
             *waited.unwrap_or_else(PoisonError::into_inner).0
-        })
+        }))
     }
 
     /// Ends the sweep: runs under way stop within milliseconds and leave nothing.
@@ -150,31 +184,39 @@ impl Sweep {
     /// Finished rows: a table (run, each metric, error), traces by row, and for each refused row its error.
     #[allow(clippy::type_complexity, reason = "what clutch.sweep makes its object of")]
     fn result<'py>(&self, py: Python<'py>) -> PyResult<(Table, Bound<'py, PyDict>, Vec<(usize, Py<PyAny>)>)> {
-        let mut rows = locked(&self.shared.rows);
-        let run: Vec<i64> = rows.keys().map(|i| *i as i64).collect();
-        let mut columns = vec![("run".to_owned(), Column::own(run))];
-        for (m, name) in self.metrics.iter().enumerate() {
-            let values = rows.values().map(|r| r.metrics[m]);
-            let column = if name == "certified" {
-                Column::own(values.map(|x| x > 0.0).collect::<Vec<bool>>())
-            } else {
-                Column::own(values.collect::<Vec<f64>>())
-            };
-            columns.push((name.clone(), column));
+        if let Some(said) = locked(&self.shared.broke).clone() {
+            return Err(PyRuntimeError::new_err(format!("a thread of the sweep broke: {said}")));
         }
-        let text = |r: &Row| r.error.as_ref().map_or(String::new(), ToString::to_string);
-        columns.push(("error".to_owned(), Column::text(rows.values().map(text))));
+        let mut columns = Vec::new();
+        let mut kept = Vec::new();
+        let mut refused = Vec::new();
+        {
+            // No Python while the lock is held: its threads wait for this one.
+            let mut rows = locked(&self.shared.rows);
+            let row: Vec<i64> = rows.keys().map(|i| *i as i64).collect();
+            columns.push(("row".to_owned(), Column::own(row)));
+            for (m, name) in self.metrics.iter().enumerate() {
+                let values = rows.values().map(|r| r.metrics[m]);
+                let column = if name == "certified" {
+                    Column::own(values.map(|x| x > 0.0).collect::<Vec<bool>>())
+                } else {
+                    Column::own(values.collect::<Vec<f64>>())
+                };
+                columns.push((name.clone(), column));
+            }
+            let text = |r: &Row| r.error.as_ref().map_or(String::new(), ToString::to_string);
+            columns.push(("error".to_owned(), Column::text(rows.values().map(text))));
+            for (i, row) in rows.iter_mut() {
+                kept.extend(row.trace.take().map(|trace| (*i, trace)));
+                refused.extend(row.error.clone().map(|e| (*i, e)));
+            }
+        }
         let traces = PyDict::new(py);
-        let mut errors = Vec::new();
-        for (i, row) in rows.iter_mut() {
-            if let Some(trace) = row.trace.take() {
-                traces.set_item(i, Bound::new(py, trace)?)?;
-            }
-            if let Some(e) = &row.error {
-                errors.push((*i, scenario_error(py, e, None).into_value(py).into_any()));
-            }
+        for (i, trace) in kept {
+            traces.set_item(i, Bound::new(py, trace)?)?;
         }
-        Ok((Table::of(columns), traces, errors))
+        let error = |(i, e)| (i, scenario_error(py, &e, None).into_value(py).into_any());
+        Ok((Table::of(columns), traces, refused.into_iter().map(error).collect()))
     }
 }
 
@@ -195,7 +237,8 @@ fn row(
             let trace = (!traces.is_empty()).then(|| {
                 let columns = sample_columns(&Arc::new(run));
                 let wanted = columns.into_iter().filter(|(n, _)| traces.contains(n));
-                Table::of(wanted.map(|(n, c)| (n, if every == 1 { c } else { c.every(every) })))
+                // A copy, so that the other columns go.
+                Table::of(wanted.map(|(n, c)| (n, c.every(every))))
             });
             Row { metrics, error: None, trace }
         }

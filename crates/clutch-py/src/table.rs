@@ -5,7 +5,7 @@
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{
     ArrayRef, ArrowPrimitiveType, BooleanArray, PrimitiveArray, RecordBatch, RecordBatchIterator,
-    StringArray, types,
+    RecordBatchOptions, StringArray, types,
 };
 use arrow_buffer::{Buffer, ScalarBuffer};
 use arrow_schema::{ArrowError, Field, Schema};
@@ -13,7 +13,7 @@ use numpy::ndarray::ArrayView1;
 use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict, PyList, PyString};
+use pyo3::types::{PyCapsule, PyDict, PyList, PyMapping, PyString};
 use std::panic::{RefUnwindSafe, UnwindSafe};
 use std::ptr::NonNull;
 use std::sync::Arc;
@@ -147,17 +147,20 @@ impl Column {
     fn read(values: &Bound<'_, PyAny>, name: &str) -> PyResult<Column> {
         let py = values.py();
         let numpy = py.import("numpy")?;
-        if let Ok(list) = values.cast::<PyList>()
-            && list.len() > 0
-            && list.iter().all(|x| x.is_instance_of::<PyString>())
+        if !values.is_instance_of::<PyString>()
+            && values.len().is_ok_and(|n| n > 0)
+            && let Ok(texts) = values.extract::<Vec<String>>()
         {
-            return Ok(Column::text(list.extract::<Vec<String>>()?));
+            return Ok(Column::text(texts));
+        }
+        let bad = |what: &str| Err(PyValueError::new_err(format!("column \"{name}\" {what}")));
+        if values.hasattr("mask")? {
+            return bad("has a mask: expected an array without missing values");
         }
         let array = numpy.call_method1("asarray", (values,))?;
         if array.getattr("ndim")?.extract::<usize>()? != 1 {
             let shape = array.getattr("shape")?;
-            let text = format!("column \"{name}\" has the shape {shape}: expected one dimension");
-            return Err(PyValueError::new_err(text));
+            return bad(&format!("has the shape {shape}: expected one dimension"));
         }
         let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
         let dtype: String = array.getattr("dtype")?.getattr("name")?.extract()?;
@@ -173,15 +176,24 @@ impl Column {
             "i" | "u" if dtype == "uint16" => {
                 Column::own(plain("uint16")?.extract::<PyReadonlyArray1<'_, u16>>()?.as_slice()?.to_vec())
             }
+            "u" if dtype == "uint64"
+                && array.call_method1("__gt__", (i64::MAX,))?.call_method0("any")?.is_truthy()? =>
+            {
+                return bad("has numbers above 2^63 − 1");
+            }
             "i" | "u" => {
                 Column::own(plain("int64")?.extract::<PyReadonlyArray1<'_, i64>>()?.as_slice()?.to_vec())
             }
             "b" => Column::own(plain("bool")?.extract::<PyReadonlyArray1<'_, bool>>()?.as_slice()?.to_vec()),
-            "U" | "O" | "T" => Column::text(array.call_method0("tolist")?.extract::<Vec<String>>()?),
-            _ => {
-                let text = format!("column \"{name}\" has the dtype {dtype}: expected numbers, bool or str");
-                return Err(PyValueError::new_err(text));
+            // Of a list NumPy would make texts of all that stands among texts.
+            "U" | "O" | "T" if values.hasattr("dtype")? => {
+                match array.call_method0("tolist")?.extract::<Vec<String>>() {
+                    Ok(texts) => Column::text(texts),
+                    Err(_) => return bad("mixes texts with other values"),
+                }
             }
+            "U" | "O" | "T" => return bad("mixes texts with other values"),
+            _ => return bad(&format!("has the dtype {dtype}: expected numbers, bool or str")),
         })
     }
 
@@ -279,7 +291,9 @@ impl Table {
         let arrays: Vec<ArrayRef> = self.columns.iter().map(Column::to_arrow).collect();
         let field = |(name, a): (&String, &ArrayRef)| Field::new(name, a.data_type().clone(), false);
         let fields: Vec<Field> = self.names.iter().zip(&arrays).map(field).collect();
-        RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)
+        // The number of rows for a table without columns, which is one, too.
+        let options = RecordBatchOptions::new().with_row_count(Some(self.rows));
+        RecordBatch::try_new_with_options(Arc::new(Schema::new(fields)), arrays, &options)
     }
 }
 
@@ -298,10 +312,10 @@ fn made_elsewhere<'py>(
 #[pymethods]
 impl Table {
     #[new]
-    fn new(columns: &Bound<'_, PyDict>) -> PyResult<Table> {
-        let mut read = Vec::with_capacity(columns.len());
-        for (name, values) in columns {
-            let name: String = name.extract()?;
+    fn new(columns: &Bound<'_, PyMapping>) -> PyResult<Table> {
+        let mut read = Vec::new();
+        for item in columns.items()? {
+            let (name, values): (String, Bound<'_, PyAny>) = item.extract()?;
             let column = Column::read(&values, &name)?;
             read.push((name, column));
         }
@@ -329,8 +343,8 @@ impl Table {
         self.rows
     }
 
-    fn __contains__(&self, name: &str) -> bool {
-        self.names.iter().any(|n| n == name)
+    fn __contains__(&self, name: &Bound<'_, PyAny>) -> bool {
+        name.extract::<&str>().is_ok_and(|name| self.names.iter().any(|n| n == name))
     }
 
     fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -395,7 +409,16 @@ impl Table {
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>,))> {
-        Ok((slf.get_type().into_any(), (Table::to_dict(slf)?,)))
+        let dict = Table::to_dict(slf)?;
+        for (name, column) in slf.get().names.iter().zip(&slf.get().columns) {
+            if let Column::Text(texts) = column {
+                // A list without texts would come back as numbers.
+                let numpy = slf.py().import("numpy")?;
+                let array = numpy.call_method1("array", (PyList::new(slf.py(), texts.iter())?, "object"))?;
+                dict.set_item(name, array)?;
+            }
+        }
+        Ok((slf.get_type().into_any(), (dict,)))
     }
 
     fn __repr__(&self) -> String {

@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 /// A rig in motion.
 pub struct MovingRig {
     rig: Rig,
-    engine: Box<dyn Engine + Send>,
+    engine: Box<dyn Engine + Send + Sync>,
     shaft: Shaft,
     /// Where the motion began, rad.
     origin: f64,

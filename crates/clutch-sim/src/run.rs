@@ -208,6 +208,9 @@ pub enum RunError {
     /// The engine gave up.
     #[error(transparent)]
     Motion(#[from] EngineError),
+    /// There is no room for so many samples.
+    #[error("no memory for {0} samples, of about 130 bytes each; make the run shorter, or keep figures only")]
+    Memory(u64),
     /// Whoever watched the progress ended it.
     #[error("stopped before its end")]
     Stopped,
@@ -290,28 +293,32 @@ pub struct Trace {
 
 impl Trace {
     /// Without samples, and with room for so many: growing copies everything, again and again.
-    fn with_capacity(n: usize) -> Self {
-        let reals = || Vec::with_capacity(n);
-        Trace {
-            time: reals(),
-            target_position: reals(),
-            target_fixed: Vec::with_capacity(n),
-            target_velocity: reals(),
-            target_acceleration: reals(),
-            position: reals(),
-            velocity: reals(),
-            error: reals(),
-            counts: Vec::with_capacity(n),
-            measured_error: reals(),
-            error_rate: reals(),
-            code: Vec::with_capacity(n),
-            voltage: reals(),
-            demand: reals(),
-            limit: Vec::with_capacity(n),
-            start_voltage: 0.0,
-            stuck: Vec::with_capacity(n),
-            terms: [("", reals()), ("", reals()), ("", reals())],
+    fn with_room(n: u64) -> Result<Self, RunError> {
+        fn room<T>(n: u64) -> Result<Vec<T>, RunError> {
+            let mut column = Vec::new();
+            let fits = usize::try_from(n).is_ok_and(|n| column.try_reserve_exact(n).is_ok());
+            if fits { Ok(column) } else { Err(RunError::Memory(n)) }
         }
+        Ok(Trace {
+            time: room(n)?,
+            target_position: room(n)?,
+            target_fixed: room(n)?,
+            target_velocity: room(n)?,
+            target_acceleration: room(n)?,
+            position: room(n)?,
+            velocity: room(n)?,
+            error: room(n)?,
+            counts: room(n)?,
+            measured_error: room(n)?,
+            error_rate: room(n)?,
+            code: room(n)?,
+            voltage: room(n)?,
+            demand: room(n)?,
+            limit: room(n)?,
+            start_voltage: 0.0,
+            stuck: room(n)?,
+            terms: [("", room(n)?), ("", room(n)?), ("", room(n)?)],
+        })
     }
 }
 
@@ -393,8 +400,8 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
     let ticks = p.ticks(spec.period);
     let to_radians = |p: FixedCounts| p.minus::<f64>(FixedCounts(0)) * encoder.radians_per_count::<f64>();
 
-    let kept = if keep == Keep::Trace { usize::try_from(ticks).unwrap_or(0) } else { 0 };
-    let mut trace = Trace { start_voltage: volts, ..Trace::with_capacity(kept) };
+    let kept = if keep == Keep::Trace { ticks } else { 0 };
+    let mut trace = Trace { start_voltage: volts, ..Trace::with_room(kept)? };
     let mut events = Vec::new();
     let mut figures = MetricsBuilder::new(period, p.settle);
     let detector = StickSlip::<f64>::new(&StickSlipParams::default(), encoder, spec.period)?;

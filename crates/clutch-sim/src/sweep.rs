@@ -100,8 +100,11 @@ impl Sweep {
             }
         };
         std::thread::scope(|scope| {
-            for _ in 1..threads.max(1).min(self.rows.len().max(1)) {
-                scope.spawn(work);
+            for _ in 1..threads.min(self.rows.len()) {
+                // The system may refuse more threads: those that there are do the work.
+                if std::thread::Builder::new().spawn_scoped(scope, work).is_err() {
+                    break;
+                }
             }
             work();
         });

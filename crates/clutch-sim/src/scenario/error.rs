@@ -162,12 +162,18 @@ pub(super) fn read_value(origin: &str, key: &str, text: &str) -> Result<Value, S
     }
 }
 
+/// Tables within tables that a key may name; no scenario has more than five.
+const DEEPEST: usize = 32;
+
 /// Puts a value at a dotted key.
 pub(super) fn set(origin: &str, table: &mut Table, key: &str, value: Value) -> Result<(), ScenarioError> {
     let wrong = |message: String| {
         let origin = format!("{origin} with {key} = {}", shown(&value));
         ScenarioError::new(&origin, "", "", message)
     };
+    if key.split('.').count() > DEEPEST {
+        return Err(wrong(format!("a key of more than {DEEPEST} parts")));
+    }
     let mut at = table;
     let mut parts = key.split('.').peekable();
     while let Some(part) = parts.next() {

@@ -155,9 +155,7 @@ impl Scenario {
         mut table: Table,
         set: &[(String, Value)],
     ) -> Result<Scenario, ScenarioError> {
-        for (key, value) in set {
-            error::set(origin, &mut table, key, value.clone())?;
-        }
+        override_keys(origin, &mut table, set)?;
         merge_base(origin, &mut table)?;
         let file: File = error::deserialize(origin, &table)?;
         Scenario::check(origin, &file)
@@ -425,6 +423,7 @@ impl Scenario {
             RunError::Param(e) => self.locator.at("", e),
             RunError::Engine(_) => self.locator.message("run.engine", e.to_string()),
             RunError::Motion(_) => self.locator.message("rig", e.to_string()),
+            RunError::Memory(_) => self.locator.message("run.duration_s", e.to_string()),
             RunError::Stopped => self.locator.message("", e.to_string()),
         }
     }
@@ -464,6 +463,14 @@ impl Scenario {
         check("dynamic friction", d.0, d.1, &bounds.mu_dynamic);
         Ok(lines)
     }
+}
+
+/// Puts values at the dotted keys of a scenario's table, in their order.
+///
+/// # Errors
+/// What is no key, or lies below a value.
+pub fn override_keys(origin: &str, table: &mut Table, set: &[(String, Value)]) -> Result<(), ScenarioError> {
+    set.iter().try_for_each(|(key, value)| error::set(origin, table, key, value.clone()))
 }
 
 fn read_table(origin: &str, text: &str) -> Result<Table, ScenarioError> {
