@@ -905,10 +905,9 @@ class SweepResult:
         shape = [len(axis) for axis in axes]
         values = {}
         for name in names:
-            column = np.asarray(self.table[name])
+            column = np.asarray(self.table[name], dtype=object if name == "error" else float)
             if len(self) < self.total:
-                some = column.astype(object if column.dtype.kind == "U" else float)
-                column = np.full(self.total, "" if name == "error" else math.nan, dtype=some.dtype)
+                some, column = column, np.full(self.total, "" if name == "error" else math.nan, dtype=column.dtype)
                 column[runs] = some
             values[name] = (self.keys, column.reshape(shape))
         return xarray.Dataset(values, coords=dict(zip(self.keys, axes, strict=True)))

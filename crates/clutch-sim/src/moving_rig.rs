@@ -11,6 +11,14 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use std::collections::VecDeque;
 
+/// The whole number at or below `x`; saturates. Every tick waits for it, and `libm`'s floor, which gives a
+/// double, takes three times as long without SSE4.1.
+#[inline]
+fn floor(x: f64) -> i64 {
+    let towards_zero = x as i64;
+    towards_zero.saturating_sub(i64::from(towards_zero as f64 > x))
+}
+
 /// A rig in motion.
 pub struct MovingRig {
     rig: Rig,
@@ -84,7 +92,7 @@ impl MovingRig {
     #[must_use]
     pub fn counts(&self) -> Counts {
         let per_radian: f64 = self.rig.encoder.counts_per_radian();
-        Counts(libm::floor(self.shaft.position * per_radian) as i64 as i32)
+        Counts(floor(self.shaft.position * per_radian) as i32)
     }
 
     /// What an ideal sensor shows.
@@ -142,5 +150,23 @@ impl MovingRig {
     /// Time is told anew, s: a sum of many periods drifts, a product does not.
     pub fn set_time(&mut self, time: f64) {
         self.time = time;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_floored_as_libm_floors() {
+        let special =
+            [0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 1e300, -1e300, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE];
+        let near = (-40_i32..40).flat_map(|n| {
+            let x = f64::from(n) * 0.25;
+            [x, f64::from_bits(x.to_bits() + 1), f64::from_bits(x.to_bits().saturating_sub(1))]
+        });
+        for x in special.into_iter().chain(near) {
+            assert_eq!(floor(x), libm::floor(x) as i64, "{x:?}");
+        }
     }
 }
