@@ -18,7 +18,7 @@ const BESIDE: &str = "name = \"beside\"\n[rig]\nbase = \"paper\"\n[law.smc]\n[re
 
 /// Checks the table at `key` (`law.smc`, `rig.friction`, `reference.ramp`, `run` …) by itself, and
 /// gives it back with every default filled in. What depends on other tables (a path that the
-/// drive is too weak for) is not looked at: [`Scenario::from_table`] does that.
+/// drive is too weak for) is not looked at: [`Scenario::from_table`](super::Scenario::from_table) does that.
 ///
 /// # Errors
 /// As for a file; `origin` is what errors begin with, their key is the whole one.
