@@ -46,7 +46,7 @@ pub(crate) fn core_error(py: Python<'_>, e: &ParamError) -> PyErr {
 /// An error of a scenario's file: of the system, or of what is in it.
 pub(crate) fn load_error(py: Python<'_>, e: &LoadError) -> PyErr {
     match e {
-        LoadError::Io { name, source } => os_error(py, Path::new(name), &e.to_string(), source),
+        LoadError::Io { name, error } => os_error(py, Path::new(name), &e.to_string(), error),
         LoadError::Scenario(e) => scenario_error(py, e, None),
     }
 }

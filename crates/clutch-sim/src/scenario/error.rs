@@ -4,6 +4,7 @@ use super::file::File;
 use clutch_core::ParamError;
 use serde::Serialize;
 use std::fmt;
+use std::sync::OnceLock;
 use toml::{Table, Value};
 
 /// What is wrong with a scenario.
@@ -51,13 +52,14 @@ impl ScenarioError {
 #[derive(Clone, Debug)]
 pub(super) struct Locator {
     origin: String,
-    /// The whole file with every default filled in.
-    table: Table,
+    file: File,
+    /// Made when it is asked for: a sweep has thousands of scenarios, of which few have an error.
+    table: OnceLock<Table>,
 }
 
 impl Locator {
     pub(super) fn new(origin: &str, file: &File) -> Self {
-        Locator { origin: origin.into(), table: to_table(file) }
+        Locator { origin: origin.into(), file: file.clone(), table: OnceLock::new() }
     }
 
     /// The error of a parameter somewhere in the table `section` ("" = the whole file).
@@ -68,9 +70,9 @@ impl Locator {
             field => field,
         };
         let root = if section.is_empty() {
-            Some(&self.table)
+            Some(self.table())
         } else {
-            self.table.get(section).and_then(Value::as_table)
+            self.table().get(section).and_then(Value::as_table)
         };
         let found = root.and_then(|t| find(t, section, stem));
         let (key, value) = match found {
@@ -100,17 +102,17 @@ impl Locator {
             }
         }
         let mut out = Vec::new();
-        walk(&self.table, "", &mut out);
+        walk(self.table(), "", &mut out);
         out
     }
 
     /// The whole file with every default filled in.
     pub(super) fn table(&self) -> &Table {
-        &self.table
+        self.table.get_or_init(|| to_table(&self.file))
     }
 
     pub(super) fn path(&self, message: String) -> ScenarioError {
-        let kind = self.table.get("reference").and_then(Value::as_table).and_then(|t| t.keys().next());
+        let kind = self.table().get("reference").and_then(Value::as_table).and_then(|t| t.keys().next());
         let key = kind.map_or("reference".to_owned(), |k| format!("reference.{k}"));
         ScenarioError::new(&self.origin, &key, "", message)
     }

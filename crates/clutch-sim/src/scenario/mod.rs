@@ -94,12 +94,12 @@ pub struct Scenario {
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The system's answer.
-    #[error("{name}: {}", io_text(source))]
+    #[error("{name}: {}", io_text(error))]
     Io {
         /// The file.
         name: String,
-        /// What the system said.
-        source: std::io::Error,
+        /// What the system said; told in words, so not a source to be told again.
+        error: std::io::Error,
     },
     /// What is in the file.
     #[error(transparent)]
@@ -189,7 +189,7 @@ impl Scenario {
         }
         match std::fs::read_to_string(name) {
             Ok(text) => Ok((origin, text)),
-            Err(source) => Err(LoadError::Io { name: origin, source }),
+            Err(error) => Err(LoadError::Io { name: origin, error }),
         }
     }
 
