@@ -16,13 +16,13 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from clutch import _clutch
+from clutch._certificate import Certificate
 from clutch._clutch import Controller, Path, Plant, Table, Target, Tick, scenarios
 from clutch._errors import ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
 from clutch._model import (
     Bounds,
     BrakeGeometry,
-    Certificate,
     Chirp,
     Ctc,
     Dac,

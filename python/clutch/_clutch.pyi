@@ -323,10 +323,6 @@ class Scenario:
         """
         What `clutch certify --json` prints.
         """
-    def initial(self, /) -> tuple[float, float, float]:
-        """
-        Position and velocity at which a run begins (rad, rad/s), and the brake's voltage then (V).
-        """
     @staticmethod
     def load(name: str | PathLike[str], overrides: Mapping[str, object] | None = None) -> Scenario:
         """

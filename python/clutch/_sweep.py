@@ -15,10 +15,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from clutch import _clutch, _model, executors
+from clutch import _clutch, executors
 from clutch._clutch import Table
 from clutch._errors import ParamError
-from clutch._model import Scenario, _Params
+from clutch._model import Scenario
+from clutch._record import _Params
+from clutch._record import _plain as _python
 from clutch._run import METRICS, ScenarioLike, as_scenario
 
 if TYPE_CHECKING:
@@ -284,7 +286,7 @@ def _plain(key: str, value: Any) -> Any:
         for step in reversed(way):
             table = {step: table}
         return table
-    return _model._plain(value)
+    return _python(value)
 
 
 # --- The sweep ---------------------------------------------------------------------------------

@@ -23,7 +23,8 @@ enum Verb {
     /// Format, lints and documentation, all without a warning.
     Check,
     /// All tests. Installs what they need: Rust targets, a private virtual environment in .venv,
-    /// and on Debian, as root, the package that makes such environments.
+    /// for the wheel a second one in the folder for temporary files, and on Debian, as root, the
+    /// package that makes such environments.
     Test,
     /// Only the tests of the wheel: builds it, installs it outside of this tree, tests it there.
     Wheel,

@@ -5,9 +5,9 @@ use crate::convert::{
 };
 use crate::stepping::Path;
 use clutch_core::{BrakeGeometry, Stribeck};
+use clutch_sim::ScenarioError;
 use clutch_sim::rig::Rig;
 use clutch_sim::scenario::{BUILT_IN, check_section, override_keys};
-use clutch_sim::{ScenarioError, Start};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -105,14 +105,6 @@ impl Scenario {
         let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| core_error(py, &e))?;
         Ok(rig.acceleration(time, position, velocity, voltage))
     }
-
-    /// Position and velocity at which a run begins (rad, rad/s), and the brake's voltage then (V).
-    fn initial(&self, py: Python<'_>) -> PyResult<(f64, f64, f64)> {
-        let spec = self.0.spec();
-        let begun = spec.prepare().map_err(|e| self.error(py, &self.0.run_error(&e)))?;
-        let velocity = if spec.run.start == Start::OnPath { begun.reference.at(0).velocity } else { 0.0 };
-        Ok((begun.moving.shaft().position, velocity, begun.volts))
-    }
 }
 
 fn parse(py: Python<'_>, origin: &str, text: &str, set: &[(String, Value)]) -> PyResult<Scenario> {
@@ -178,6 +170,11 @@ pub(crate) fn rig<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDic
     from_table(py, &table)
 }
 
+/// A number of a table; NaN, which no constructor takes, if it is not there.
+fn number(table: &Bound<'_, PyDict>, key: &str) -> PyResult<f64> {
+    table.get_item(key)?.map_or(Ok(f64::NAN), |v| v.extract())
+}
+
 /// The friction coefficient (2) at velocities, rad/s; signed as the velocity.
 #[pyfunction]
 pub(crate) fn stribeck<'py>(
@@ -185,10 +182,7 @@ pub(crate) fn stribeck<'py>(
     table: &Bound<'py, PyDict>,
     velocity: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let number = |key: &str| -> PyResult<f64> {
-        let value = table.get_item(key)?;
-        value.map_or(Ok(f64::NAN), |v| v.extract())
-    };
+    let number = |key| number(table, key);
     let params = clutch_core::StribeckParams {
         mu_static: number("mu_static")?,
         mu_dynamic: number("mu_dynamic")?,
@@ -203,10 +197,7 @@ pub(crate) fn stribeck<'py>(
 /// `K_COF` (18) of a brake's geometry, N m/V.
 #[pyfunction]
 pub(crate) fn brake_gain(py: Python<'_>, table: &Bound<'_, PyDict>) -> PyResult<f64> {
-    let number = |key: &str| -> PyResult<f64> {
-        let value = table.get_item(key)?;
-        value.map_or(Ok(f64::NAN), |v| v.extract())
-    };
+    let number = |key| number(table, key);
     let geometry = BrakeGeometry {
         inner_radius: number("inner_radius_m")?,
         torque_constant: number("torque_constant_nm_a")?,

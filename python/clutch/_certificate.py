@@ -1,0 +1,256 @@
+"""What is guaranteed of a scenario's gains."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from clutch._record import _Record
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Certificate(_Record):
+    """Whether gains hold every plant within the bounds to the sliding surface, and how far from it at most.
+
+    A certificate is true as a condition: ``if scenario.certificate(): …``. Time is continuous and the sensor
+    exact in it; sampling, encoder steps and delay come on top. docs/theory.md, section 8, derives it.
+
+    Parameters
+    ----------
+    scenario : str
+        Title of the scenario.
+    version : str
+        Version of clutch.
+    law : str
+        The law.
+    certified : bool
+        Whether the gains are certified.
+    reason : str or None
+        What is missing; None if certified.
+    rig_outside_bounds : tuple of str
+        A line for each property of the rig that the bounds do not contain.
+    bounds : Certificate.Bounds
+        What is believed of the plant.
+    demand : Certificate.Demand
+        What path, bounds and start ask for.
+    ahead : Certificate.Ahead
+        The shaft ahead of the path: the brake stops it.
+    behind : Certificate.Behind
+        The shaft behind the path: the brake lets go.
+    layer : Certificate.Layer
+        The layer around the sliding surface, and the bound of the error.
+    paper : Certificate.Paper or None
+        The paper's own conditions, as printed; None for PD and CTC.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> certificate = clutch.Scenario.load("smc_2").certificate()
+    >>> bool(certificate), round(certificate.ahead.kp_required_v, 4)
+    (True, 2.2624)
+    """
+
+    @dataclass(frozen=True, kw_only=True, repr=False)
+    class Bounds(_Record):
+        """What is believed of the plant (23): pairs of lowest and highest value.
+
+        Parameters
+        ----------
+        inertia_kg_m2 : tuple of float
+            `J`, kg m².
+        drive_torque_nm : tuple of float
+            `T_u`, N m.
+        viscous_damping_nm_s_rad : tuple of float
+            `C_d`, N m s/rad.
+        brake_gain_nm_v : tuple of float
+            `K_COF`, N m/V.
+        mu_static : tuple of float
+            `μ_s`, no unit.
+        mu_dynamic : tuple of float
+            `μ_d`, no unit.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> scenario = clutch.Scenario.load("smc_2").override({"bounds.friction_percent": 50})
+        >>> scenario.certificate().bounds.mu_static
+        (0.1, 0.30000000000000004)
+        """
+
+        _key: ClassVar[str] = "bounds"
+
+        inertia_kg_m2: tuple[float, float]
+        drive_torque_nm: tuple[float, float]
+        viscous_damping_nm_s_rad: tuple[float, float]
+        brake_gain_nm_v: tuple[float, float]
+        mu_static: tuple[float, float]
+        mu_dynamic: tuple[float, float]
+
+    @dataclass(frozen=True, kw_only=True, repr=False)
+    class Demand(_Record):
+        """What path, bounds and start ask for.
+
+        Parameters
+        ----------
+        velocity_rad_s : float
+            `v_d`: highest velocity of the path, rad/s.
+        acceleration_rad_s2 : float
+            `a_d`: highest acceleration or deceleration of the path, rad/s².
+        reach_rate_rad_s2 : float
+            `γ` in (15), rad/s².
+        start_error_rate_rad_s : float
+            Error rate at the start, rad/s.
+        velocity_jump_rad_s : float
+            Largest jump of the path's velocity on the way, rad/s.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.Scenario.load("smc_2").certificate().demand.acceleration_rad_s2
+        0.0
+        """
+
+        _key: ClassVar[str] = "demand"
+
+        velocity_rad_s: float
+        acceleration_rad_s2: float
+        reach_rate_rad_s2: float
+        start_error_rate_rad_s: float
+        velocity_jump_rad_s: float
+
+    @dataclass(frozen=True, kw_only=True, repr=False)
+    class Ahead(_Record):
+        """The shaft ahead of the path at its worst corner: strongest drive, weakest brake.
+
+        Parameters
+        ----------
+        torque_nm : float
+            Driving torque of the corner, N m.
+        inertia_kg_m2 : float
+            Inertia of the corner, kg m².
+        brake_nm_v : float
+            Weakest brake `μ K_COF`, N m/V.
+        kp_required_v : float
+            `K_p` required (for PD and CTC: the voltage), V.
+        kp_for_boundary_v : float
+            Part of it for the boundary layer, V.
+        kp_given_v : float
+            `K_p` given (for PD and CTC: the highest voltage), V.
+        kd_required_v_s_rad : float
+            `K_d` required, V s/rad; 0 for PD and CTC.
+        kd_given_v_s_rad : float
+            `K_d` given, V s/rad; 0 for PD and CTC.
+        reach_rate_possible_rad_s2 : float
+            Largest `γ` that the brake allows, rad/s².
+        error_rate_limit_rad_s : float
+            Error rate up to which this side holds, rad/s.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> round(clutch.Scenario.load("smc_2").certificate().ahead.kd_required_v_s_rad, 4)
+        5.6667
+        """
+
+        _key: ClassVar[str] = "ahead"
+
+        torque_nm: float
+        inertia_kg_m2: float
+        brake_nm_v: float
+        kp_required_v: float
+        kp_for_boundary_v: float
+        kp_given_v: float
+        kd_required_v_s_rad: float
+        kd_given_v_s_rad: float
+        reach_rate_possible_rad_s2: float
+        error_rate_limit_rad_s: float
+
+    @dataclass(frozen=True, kw_only=True, repr=False)
+    class Behind(_Record):
+        """The shaft behind the path at its worst corner: weakest drive.
+
+        Parameters
+        ----------
+        torque_nm : float
+            Driving torque of the corner, N m.
+        error_rate_limit_rad_s : float
+            Error rate up to which this side holds, rad/s.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> round(clutch.Scenario.load("smc_2").certificate().behind.error_rate_limit_rad_s, 4)
+        0.3954
+        """
+
+        _key: ClassVar[str] = "behind"
+
+        torque_nm: float
+        error_rate_limit_rad_s: float
+
+    @dataclass(frozen=True, kw_only=True, repr=False)
+    class Layer(_Record):
+        """The layer around the sliding surface in which nothing is claimed, and the bound of the error.
+
+        Parameters
+        ----------
+        slope_1_s : float
+            `f` in (13), 1/s.
+        thickness_rad_s : float
+            Thickness of the layer, rad/s.
+        error_bound_rad : float
+            Below which the error stays if certified, rad.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.Scenario.load("smc_2").certificate().layer.slope_1_s
+        70.0
+        """
+
+        _key: ClassVar[str] = "layer"
+
+        slope_1_s: float
+        thickness_rad_s: float
+        error_bound_rad: float
+
+    @dataclass(frozen=True, kw_only=True, repr=False)
+    class Paper(_Record):
+        """The paper's own conditions, as printed. They are not sound: docs/theory.md, section 9.
+
+        Parameters
+        ----------
+        kp_26_v : float
+            (26): `K_p` above, V.
+        kd_27_v_s_rad : float
+            (27): `K_d` above, V s/rad.
+        gamma_28_rad_s2 : float
+            (28): reaching rate `γ`, rad/s².
+
+        Examples
+        --------
+        >>> import clutch
+        >>> round(clutch.Scenario.load("smc_2").certificate().paper.kp_26_v, 4)
+        -0.9603
+        """
+
+        _key: ClassVar[str] = "paper"
+
+        kp_26_v: float
+        kd_27_v_s_rad: float
+        gamma_28_rad_s2: float
+
+    scenario: str
+    version: str
+    law: str
+    certified: bool
+    reason: str | None
+    rig_outside_bounds: tuple[str, ...]
+    bounds: Bounds
+    demand: Demand
+    ahead: Ahead
+    behind: Behind
+    layer: Layer
+    paper: Paper | None
+
+    def __bool__(self) -> bool:
+        """Whether the gains are certified."""
+        return self.certified
