@@ -322,10 +322,8 @@ impl Loop {
         // Consent was starting this command.
         let mut talk = Talk::new(&mut port, &mut node);
         talk.configure(present)?;
+        // Stopped by now, it is not armed: the run below looks before it asks for consent.
         let clock = talk.clock()?;
-        if stop.load(Ordering::Relaxed) {
-            // Not armed: the run below sees the same flag before it asks for consent.
-        }
         let path = setup::path::<T>(scenario)?;
         let spin_us = self.spin_us;
         let options = LoopOptions {
