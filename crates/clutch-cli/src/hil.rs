@@ -33,7 +33,11 @@ pub(crate) struct Hil {
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
     /// The board's image.
-    #[arg(long, value_name = "FILE", default_value = "target/firmware/qemu-mps2")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "target/firmware/thumbv7em-none-eabihf/release/mps2-controller"
+    )]
     image: PathBuf,
     /// Writes an MCAP log, with the shaft's true motion.
     #[arg(long, value_name = "FILE.mcap")]

@@ -400,11 +400,7 @@ impl LogThread {
     ///
     /// # Errors
     /// The file cannot be created.
-    pub fn start(
-        path: &Path,
-        header: &Header,
-        watch: Arc<Watch>,
-    ) -> Result<(LogThread, Ring), LogError> {
+    pub fn start(path: &Path, header: &Header, watch: Arc<Watch>) -> Result<(LogThread, Ring), LogError> {
         let mut writer = LogWriter::create(path, header)?;
         let (producer, mut consumer) = rtrb::RingBuffer::<Record>::new(RING);
         let thread = std::thread::spawn(move || {
