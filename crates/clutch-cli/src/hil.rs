@@ -2,11 +2,12 @@
 
 use crate::table::quantities;
 use crate::{Outcome, ScenarioArgs, json, key_value, print, sim};
-use clap::Args;
+use clap::{Args, ValueEnum};
+use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
 use clutch_log::{LogWriter, Source};
-use clutch_loop::emulated::emulated;
-use clutch_loop::emulator::Emulator;
+use clutch_loop::emulated::{Lockstep, emulated};
+use clutch_loop::emulator::{Emulator, SerialBoard};
 use clutch_loop::faults::Fault;
 use clutch_loop::replay::PRESENT_CODE;
 use clutch_loop::setup::{self, Setup};
@@ -39,6 +40,9 @@ pub(crate) struct Hil {
         default_value = "target/firmware/thumbv7em-none-eabihf/release/mps2-controller"
     )]
     image: PathBuf,
+    /// How the board is reached.
+    #[arg(long, value_enum, default_value = "memory")]
+    link: Link,
     /// Writes an MCAP log, with the shaft's true motion.
     #[arg(long, value_name = "FILE.mcap")]
     log: Option<PathBuf>,
@@ -59,8 +63,20 @@ pub(crate) struct Hil {
     json: bool,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Link {
+    /// Through the emulator's own files: some 25 000 cycles a second, the same each time.
+    Memory,
+    /// Through the board's two serial lines, interrupts and clock: about as fast as a real one. Late answers
+    /// are not looked at, as this machine decides how late they are.
+    Uart,
+}
+
 impl Hil {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(mut self) -> anyhow::Result<Outcome> {
+        if self.link == Link::Uart {
+            self.set.push(("safety.limits.deadline_us".to_owned(), "1000000".to_owned()));
+        }
         let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone() };
         let scenario = crate::single_precision(&args, args.load()?)?;
         let certified = scenario.plan()?.certificate.certified();
@@ -76,24 +92,16 @@ impl Hil {
         if let Some(log) = &self.log {
             crate::new_log(log)?;
         }
-        let board = Emulator::start(&self.image)?;
         let setup = Setup::<f32>::new(&scenario, 1)?;
-        // The last period is the one in which the run ends.
-        let ticks = setup.ticks + 1;
-        let params = WorldParams {
-            latency_ns: u64::from(self.latency_us) * 1000,
-            faults: self.fault.clone(),
-            stall: None,
-            seed: self.fault_seed,
-            record: self.log.is_some(),
-            duration: scenario.spec().run.duration + 1.0,
-            ticks,
-            settle: scenario.spec().run.settle,
-        };
-        let end = emulated(&scenario, &setup, board, ticks)?;
-        let path = setup::path::<f32>(&scenario)?;
         let started = std::time::Instant::now();
-        let ran = World::new(&scenario, params, end)?.run(&path)?;
+        let ran = match self.link {
+            Link::Memory => self.on(&scenario, &setup, Emulator::start(&self.image)?)?,
+            Link::Uart => {
+                let mut patient = setup.clone();
+                patient.control.silence = Micros(10_000_000);
+                self.on(&scenario, &patient, SerialBoard::start(&self.image)?)?
+            }
+        };
         let took = started.elapsed().as_secs_f64();
         if let Some(file) = &self.log {
             let mut header =
@@ -110,6 +118,24 @@ impl Hil {
         let fault = ran.cause.filter(|c| *c != Cause::Done);
         print(&if self.json { summary(&scenario, &ran, took)? } else { self.text(&scenario, &ran, took) })?;
         Ok(if fault.is_some() { Outcome::Fault } else { Outcome::Done })
+    }
+
+    fn on(&self, scenario: &Scenario, setup: &Setup<f32>, board: impl Lockstep) -> anyhow::Result<Ran> {
+        // The last period is the one in which the run ends.
+        let ticks = setup.ticks + 1;
+        let params = WorldParams {
+            latency_ns: u64::from(self.latency_us) * 1000,
+            faults: self.fault.clone(),
+            stall: None,
+            seed: self.fault_seed,
+            record: self.log.is_some(),
+            duration: scenario.spec().run.duration + 1.0,
+            ticks,
+            settle: scenario.spec().run.settle,
+        };
+        let end = emulated(scenario, setup, board, ticks)?;
+        let path = setup::path::<f32>(scenario)?;
+        Ok(World::new(scenario, params, end)?.run(&path)?)
     }
 
     fn text(&self, scenario: &Scenario, ran: &Ran, took: f64) -> String {

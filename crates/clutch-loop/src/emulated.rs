@@ -1,6 +1,6 @@
 //! A board in the controller role that is asked in lockstep: emulated, or in this process.
 
-use crate::emulator::Emulator;
+use crate::emulator::{Emulator, SerialBoard};
 use crate::end::{End, Tells};
 use crate::setup::{self, Setup, SetupError};
 use clutch_core::law::LawTerms;
@@ -10,7 +10,7 @@ use clutch_node::{
     ControlNode, LinkCounts, Notice, Onboard, OnboardParams, Outbox, Ports, RemoteNode, Settings, Told,
 };
 use clutch_sim::Scenario;
-use clutch_wire::{Refused, StopReason};
+use clutch_wire::{Configure, Refused, StopReason};
 
 /// Who answers in lockstep.
 pub trait Lockstep {
@@ -24,6 +24,12 @@ pub trait Lockstep {
 impl Lockstep for Emulator {
     fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
         Emulator::exchange(self, request).map_err(|e| e.to_string())
+    }
+}
+
+impl Lockstep for SerialBoard {
+    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
+        SerialBoard::exchange(self, request).map_err(|e| e.to_string())
     }
 }
 
@@ -174,7 +180,9 @@ impl<L: Lockstep, P: Fn(u64) -> Target<f32>> End for Emulated<L, P> {
         self.remote.configure(&mut self.to_board);
         let mut refused = None;
         self.turn(&[], out, &mut |n| {
-            if let Notice::Refused(m) = n {
+            if let Notice::Refused(m) = n
+                && m.request == Configure::KIND
+            {
                 refused = Some(m);
             }
         });

@@ -296,6 +296,8 @@ impl Onboard {
     fn set(&mut self, m: &Set, host: &mut Outbox) {
         let refusal = if self.driving() {
             Some((Refusal::State, self.state() as u32))
+        } else if !Settings::knows(m.key) {
+            Some((Refusal::Setting, u32::from(m.key)))
         } else {
             if m.run != self.settings_run {
                 self.settings = Settings::default();
