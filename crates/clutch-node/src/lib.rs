@@ -13,8 +13,12 @@
 
 mod board;
 mod control;
+mod counter;
 mod outbox;
+mod runner;
 
 pub use board::{BoardNode, BoardParams};
 pub use control::{ControlNode, ControlParams, CycleNotice, LinkCounts, Notice};
+pub use counter::WideCounter;
 pub use outbox::Outbox;
+pub use runner::{Acquisition, Hardware, Role, receive, tick};

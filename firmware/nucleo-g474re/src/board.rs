@@ -1,0 +1,178 @@
+//! The board: clocks, encoder, converter, serial line, watchdog. Another board is another such file.
+
+use clutch_core::{Counts, DacCode};
+use clutch_node::{BoardParams, Hardware, WideCounter};
+use cortex_m::peripheral::DWT;
+use embassy_futures::poll_once;
+use embassy_stm32::dac::{DacChannel, Value};
+use embassy_stm32::gpio::Pull;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::pac::timer::vals::FilterValue;
+use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
+use embassy_stm32::rng::Rng;
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::qei::{self, Qei};
+use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{bind_interrupts, interrupt, pac, peripherals, rng, uid};
+use embassy_time::Instant;
+use embedded_io_async::Write;
+use static_cell::ConstStaticCell;
+
+/// OUTPUT WHEN NOBODY CONTROLS: at power-up, after a reset, in a fault handler. It is a property of
+/// the rig that the board is built into. 4.5 V of 10 V holds the paper's weight; where a hand moves
+/// the shaft, 0 (an open brake) may be the safe one. THE PULL AT THE DRIVER'S INPUT MUST GIVE THE
+/// SAME VOLTAGE, since until this program runs the pin floats: docs/firmware.md.
+pub const BOOT_CODE: DacCode = DacCode(1844);
+
+/// Counts per turn of the shaft, four for each line of the encoder.
+const COUNTS_PER_REV: u32 = 20_000;
+
+/// Voltage at the brake for code 0 and for code 4096, mV: 3.3 V with the driver's gain of 3.03.
+/// Measure both at the brake's terminals.
+const DRIVER_MV: (i32, i32) = (0, 10_000);
+
+/// Of the debugger's serial port, which is the host's.
+const BAUD: u32 = 921_600;
+
+/// A program that completes no period for so long is reset, µs. The clock of this watchdog may be
+/// off by several percent; two of the longest periods are far within.
+const WATCHDOG_US: u32 = 10_000;
+
+/// The core's clock, Hz.
+pub const CLOCK_HZ: u32 = 170_000_000;
+
+/// Priority of the control task.
+pub const CONTROL: Priority = Priority::P6;
+
+/// Below it, so a byte never delays a period. The line's own buffer of 8 bytes lasts 87 µs.
+/// Moreover embassy's transmitter may go to sleep with bytes in its buffer if its interrupt comes
+/// while a write looks whether it is empty; this one cannot come then.
+const SERIAL: Priority = Priority::P7;
+
+bind_interrupts!(struct Irqs {
+    LPUART1 => usart::BufferedInterruptHandler<peripherals::LPUART1>;
+    RNG => rng::InterruptHandler<peripherals::RNG>;
+});
+
+/// Bytes from the host.
+pub type Line = BufferedUartRx<'static>;
+
+/// The hardware as the node sees it.
+pub struct Board {
+    encoder: Qei<'static, peripherals::TIM3>,
+    counter: WideCounter,
+    converter: DacChannel<'static, Blocking>,
+    told: DacCode,
+    watchdog: IndependentWatchdog<'static, peripherals::IWDG>,
+    line: BufferedUartTx<'static>,
+    /// What the board is.
+    pub params: BoardParams,
+}
+
+/// Starts the board, its output first.
+pub fn start() -> (Board, Line) {
+    let mut config = embassy_stm32::Config::default();
+    // The crystal, not the internal oscillator: the host measures this clock, and 1 % is no clock.
+    config.rcc.hse = Some(Hse { freq: Hertz(24_000_000), mode: HseMode::Oscillator });
+    config.rcc.pll = Some(Pll {
+        source: PllSource::HSE,
+        prediv: PllPreDiv::DIV6,
+        mul: PllMul::MUL85,
+        divp: None,
+        divq: None,
+        divr: Some(PllRDiv::DIV2),
+    });
+    config.rcc.sys = Sysclk::PLL1_R;
+    config.rcc.boost = true;
+    let p = embassy_stm32::init(config);
+
+    // From enabling to this write the output is at code 0; the converter takes longer to wake up.
+    let mut converter = DacChannel::new_blocking(p.DAC1, p.PA4);
+    converter.set(Value::Bit12Right(BOOT_CODE.0));
+    let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+    watchdog.unleash();
+
+    let pins = qei::Config { ch1_pull: Pull::Up, ch2_pull: Pull::Up, ..qei::Config::default() };
+    let encoder = Qei::new(p.TIM3, p.PA6, p.PA7, pins);
+    // A level counts when it has lasted 64 clocks, 0.38 µs: at 200 000 counts/s one has 5 µs.
+    pac::TIM3.ccmr_input(0).modify(|w| [0, 1].map(|n| w.set_icf(n, FilterValue::FDTS_DIV8_N8)));
+
+    static TO_HOST: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
+    static FROM_HOST: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
+    let mut line = usart::Config::default();
+    line.baudrate = BAUD;
+    interrupt::LPUART1.set_priority(SERIAL);
+    let line =
+        BufferedUart::new(p.LPUART1, p.PA3, p.PA2, TO_HOST.take(), FROM_HOST.take(), Irqs, line).unwrap();
+    let (to_host, from_host) = line.split();
+
+    let mut core = cortex_m::Peripherals::take().unwrap();
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
+
+    let params = BoardParams {
+        board: serial_number(),
+        boot: Rng::new(p.RNG, Irqs).next_u32(),
+        counts_per_rev: COUNTS_PER_REV,
+        dac_bits: 12,
+        dac_lowest_mv: DRIVER_MV.0,
+        dac_highest_mv: DRIVER_MV.1,
+        period_min_us: 500,
+        period_max_us: 5000,
+        watchdog_max_us: 100_000,
+        boot_code: BOOT_CODE.0,
+    };
+    let counter = WideCounter::new(encoder.count());
+    (Board { encoder, counter, converter, told: BOOT_CODE, watchdog, line: to_host, params }, from_host)
+}
+
+/// The chip's 96 bits in 32; 0 and 1 are taken by the simulated boards.
+fn serial_number() -> u32 {
+    let [a, b, c] = [0, 4, 8].map(|at| {
+        let id = uid::uid();
+        u32::from_le_bytes([id[at], id[at + 1], id[at + 2], id[at + 3]])
+    });
+    (a ^ b ^ c).max(2)
+}
+
+impl Hardware for Board {
+    fn now_us(&self) -> u64 {
+        Instant::now().as_micros()
+    }
+
+    fn counts(&mut self) -> Counts {
+        self.counter.read(self.encoder.count())
+    }
+
+    /// The bare pins cannot tell a broken wire from a shaft at rest. A receiver with a fault output
+    /// would be read here.
+    fn encoder_fault(&self) -> bool {
+        false
+    }
+
+    /// Its output register has another code: a converter that was reset or lost its clock. What the
+    /// pin gives is not seen.
+    fn converter_fault(&self) -> bool {
+        self.converter.read() != self.told.0
+    }
+
+    fn put_out(&mut self, code: DacCode) {
+        self.converter.set(Value::Bit12Right(code.0));
+        self.told = code;
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.pet();
+    }
+
+    fn send(&mut self, frames: &[u8]) {
+        // One poll: all of it if there is room now, and nothing otherwise.
+        let _ = poll_once(self.line.write(frames));
+    }
+
+    fn cycles(&self) -> u32 {
+        DWT::cycle_count()
+    }
+}
