@@ -11,7 +11,8 @@
 
 use crate::board::{BoardNode, BoardParams};
 use crate::outbox::Outbox;
-use clutch_core::{Counts, DacCode, ParamError};
+use crate::standalone::Standalone;
+use clutch_core::{Counts, DacCode, Micros, ParamError};
 
 /// What a board's one file gives. Nothing of it may wait.
 pub trait Hardware {
@@ -58,8 +59,8 @@ pub trait Role {
     /// Frames for the host.
     fn outbox(&mut self) -> &mut Outbox;
 
-    /// What the last period took, from its begin to its code, in cycles of the core.
-    fn spent(&mut self, cycles: u32);
+    /// The code of the last sample is out: what that took, in cycles of the core and in time.
+    fn answered(&mut self, cycles: u32, lateness: Micros);
 }
 
 /// One sampling period: sample, code, watchdog, frames.
@@ -71,7 +72,8 @@ pub fn tick(role: &mut impl Role, hardware: &mut impl Hardware) {
     role.sample(now_us, counts, encoder_fault, converter_fault);
     hardware.put_out(role.code());
     hardware.feed_watchdog();
-    role.spent(hardware.cycles().wrapping_sub(begun));
+    let lateness = Micros(hardware.now_us().wrapping_sub(now_us) as u32);
+    role.answered(hardware.cycles().wrapping_sub(begun), lateness);
     send(role, hardware);
 }
 
@@ -129,5 +131,33 @@ impl Role for Acquisition {
     }
 
     /// A sample has no room for it.
-    fn spent(&mut self, _cycles: u32) {}
+    fn answered(&mut self, _cycles: u32, _lateness: Micros) {}
+}
+
+/// The board as controller: it closes the loop by itself.
+impl Role for Standalone {
+    fn receive(&mut self, now_us: u64, bytes: &[u8]) {
+        self.host(now_us, bytes);
+    }
+
+    fn sample(&mut self, now_us: u64, counts: Counts, encoder_fault: bool, converter_fault: bool) {
+        Standalone::sample(self, now_us, counts, encoder_fault, converter_fault);
+    }
+
+    fn code(&self) -> DacCode {
+        Standalone::code(self)
+    }
+
+    fn period_us(&self) -> Option<u32> {
+        Standalone::period_us(self)
+    }
+
+    fn outbox(&mut self) -> &mut Outbox {
+        self.to_host()
+    }
+
+    fn answered(&mut self, cycles: u32, lateness: Micros) {
+        self.spent(cycles);
+        Standalone::answered(self, lateness);
+    }
 }

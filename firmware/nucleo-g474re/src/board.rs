@@ -1,5 +1,6 @@
 //! The board: clocks, encoder, converter, serial line, watchdog. Another board is another such file.
 
+use crate::fault::stop;
 use clutch_core::{Counts, DacCode};
 use clutch_node::{BoardParams, Hardware, WideCounter};
 use cortex_m::peripheral::DWT;
@@ -67,8 +68,10 @@ pub struct Board {
     told: DacCode,
     watchdog: IndependentWatchdog<'static, peripherals::IWDG>,
     line: BufferedUartTx<'static>,
-    /// What the board is.
-    pub params: BoardParams,
+    /// Its serial number.
+    pub board: u32,
+    /// Another number at each power-up.
+    pub boot: u32,
 }
 
 /// Starts the board, its output first.
@@ -104,28 +107,36 @@ pub fn start() -> (Board, Line) {
     let mut line = usart::Config::default();
     line.baudrate = BAUD;
     interrupt::LPUART1.set_priority(SERIAL);
-    let line =
-        BufferedUart::new(p.LPUART1, p.PA3, p.PA2, TO_HOST.take(), FROM_HOST.take(), Irqs, line).unwrap();
+    let line = BufferedUart::new(p.LPUART1, p.PA3, p.PA2, TO_HOST.take(), FROM_HOST.take(), Irqs, line);
+    let (Ok(line), Some(mut core)) = (line, cortex_m::Peripherals::take()) else { stop() };
     let (to_host, from_host) = line.split();
-
-    let mut core = cortex_m::Peripherals::take().unwrap();
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
 
-    let params = BoardParams {
-        board: serial_number(),
-        boot: Rng::new(p.RNG, Irqs).next_u32(),
-        counts_per_rev: COUNTS_PER_REV,
-        dac_bits: 12,
-        dac_lowest_mv: DRIVER_MV.0,
-        dac_highest_mv: DRIVER_MV.1,
-        period_min_us: 500,
-        period_max_us: 5000,
-        watchdog_max_us: 100_000,
-        boot_code: BOOT_CODE.0,
-    };
+    let (board, boot) = (serial_number(), Rng::new(p.RNG, Irqs).next_u32());
     let counter = WideCounter::new(encoder.count());
-    (Board { encoder, counter, converter, told: BOOT_CODE, watchdog, line: to_host, params }, from_host)
+    let board = Board { encoder, counter, converter, told: BOOT_CODE, watchdog, line: to_host, board, boot };
+    (board, from_host)
+}
+
+impl Board {
+    /// What the board is. Constants, not a field: their checks are then done by the compiler, and
+    /// no `f64` of an error's value is left in the image.
+    #[must_use]
+    pub fn params(&self) -> BoardParams {
+        BoardParams {
+            board: self.board,
+            boot: self.boot,
+            counts_per_rev: COUNTS_PER_REV,
+            dac_bits: 12,
+            dac_lowest_mv: DRIVER_MV.0,
+            dac_highest_mv: DRIVER_MV.1,
+            period_min_us: 500,
+            period_max_us: 5000,
+            watchdog_max_us: 100_000,
+            boot_code: BOOT_CODE.0,
+        }
+    }
 }
 
 /// The chip's 96 bits in 32; 0 and 1 are taken by the simulated boards.

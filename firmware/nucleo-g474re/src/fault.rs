@@ -1,5 +1,6 @@
 //! When the program cannot go on: the output of [`BOOT_CODE`], and no word to the watchdog, which
-//! then resets the board into its power-up state. Nothing here trusts what is in memory.
+//! then resets the board into its power-up state. Nothing here trusts what is in memory, and nobody
+//! is told: text for a panic, with its formatting of numbers, would be most of the image.
 
 use crate::board::BOOT_CODE;
 use core::panic::PanicInfo;
@@ -7,7 +8,7 @@ use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
 
 /// Puts the safe output out and waits for the reset.
-fn stop() -> ! {
+pub fn stop() -> ! {
     cortex_m::interrupt::disable();
     pac::DAC1.dhr12r(0).write(|w| w.set_dhr(BOOT_CODE.0));
     loop {

@@ -3,5 +3,5 @@
 #![no_std]
 
 pub mod board;
-mod fault;
+pub mod fault;
 pub mod run;

@@ -2,8 +2,9 @@
 //! come to it one after the other, so nothing is shared and nothing locks.
 
 use crate::board::{self, Board, CONTROL, Line};
+use crate::fault::stop;
 use clutch_node::{Role, receive, tick};
-use embassy_executor::{InterruptExecutor, SendSpawner};
+use embassy_executor::{InterruptExecutor, SpawnError, SpawnToken};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::InterruptExt;
@@ -26,17 +27,19 @@ unsafe fn TIM20_UP() {
 }
 
 /// Starts the board and its control task, and sleeps between interrupts for ever.
-pub fn begin(spawn: impl FnOnce(SendSpawner, Board, Line)) -> ! {
+pub fn begin<S: Send>(control: impl FnOnce(Board, Line) -> Result<SpawnToken<S>, SpawnError>) -> ! {
     let (board, line) = board::start();
     interrupt::TIM20_UP.set_priority(CONTROL);
-    spawn(EXECUTOR.start(interrupt::TIM20_UP), board, line);
+    let Ok(control) = control(board, line) else { stop() };
+    EXECUTOR.start(interrupt::TIM20_UP).spawn(control);
     loop {
         cortex_m::asm::wfi();
     }
 }
 
-/// Runs a role, for ever.
-pub async fn run(mut role: impl Role, mut board: Board, mut line: Line) -> ! {
+/// Runs a role, for ever. One that could not be made stays in the safe output.
+pub async fn run(role: Option<impl Role>, mut board: Board, mut line: Line) -> ! {
+    let Some(mut role) = role else { stop() };
     let mut bytes = [0; CHUNK];
     let mut period_us = BOOT_PERIOD_US;
     let mut beat = every(period_us);

@@ -9,10 +9,10 @@ use cortex_m_rt::entry;
 
 #[embassy_executor::task]
 async fn control(board: Board, line: Line) -> ! {
-    run::run(Acquisition::new(&board.params).unwrap(), board, line).await
+    run::run(Acquisition::new(&board.params()).ok(), board, line).await
 }
 
 #[entry]
 fn main() -> ! {
-    run::begin(|spawner, board, line| spawner.spawn(control(board, line).unwrap()))
+    run::begin(control)
 }
