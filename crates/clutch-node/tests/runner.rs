@@ -2,9 +2,10 @@
 #![allow(missing_docs, reason = "the tests' names say what holds")]
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
-use clutch_core::{Counts, DacCode};
-use clutch_node::{Acquisition, BoardParams, Hardware, Role, WideCounter, receive, tick};
+use clutch_core::{Counts, DacCode, Micros};
+use clutch_node::{Acquisition, BoardParams, Hardware, Outbox, Role, WideCounter, receive, tick};
 use clutch_wire::{Actuate, Arm, Configure, Decoder, Message, SafeKind, Sample, encode};
+use core::mem::take;
 use proptest::prelude::*;
 
 const BOOT_CODE: u16 = 1844;
@@ -44,6 +45,7 @@ enum Done {
 #[derive(Default)]
 struct Desk {
     now_us: u64,
+    cycles: u32,
     counts: i32,
     encoder_fault: bool,
     done: Vec<Done>,
@@ -63,7 +65,10 @@ impl Hardware for Desk {
     fn converter_fault(&self) -> bool {
         false
     }
+    /// Takes 7 µs, 1190 cycles.
     fn put_out(&mut self, code: DacCode) {
+        self.now_us += 7;
+        self.cycles = self.cycles.wrapping_add(1190);
         self.done.push(Done::PutOut(code.0));
     }
     fn feed_watchdog(&mut self) {
@@ -75,19 +80,19 @@ impl Hardware for Desk {
             .push(Done::Sent(frames.iter().filter_map(|b| decoder.push(*b)).map(Result::unwrap).collect()));
     }
     fn cycles(&self) -> u32 {
-        0
+        self.cycles
     }
 }
 
 impl Desk {
     fn hears(&mut self, role: &mut impl Role, message: &Message) -> Vec<Done> {
         receive(role, self, encode(message).as_bytes());
-        std::mem::take(&mut self.done)
+        take(&mut self.done)
     }
 
     fn ticks(&mut self, role: &mut impl Role) -> Vec<Done> {
         tick(role, self);
-        std::mem::take(&mut self.done)
+        take(&mut self.done)
     }
 }
 
@@ -135,6 +140,39 @@ fn a_fault_of_the_hardware_is_answered_with_the_safe_output_within_its_period() 
     let (mut board, mut desk) = driving();
     desk.encoder_fault = true;
     assert_eq!(desk.ticks(&mut board)[1], Done::PutOut(3072));
+}
+
+/// A role that has one code, 100, and keeps what it is told.
+#[derive(Default)]
+struct Clerk {
+    outbox: Outbox,
+    told: Vec<(u32, Micros)>,
+}
+
+impl Role for Clerk {
+    fn receive(&mut self, _: u64, _: &[u8]) {}
+    fn sample(&mut self, _: u64, _: Counts, _: bool, _: bool) {}
+    fn code(&self) -> DacCode {
+        DacCode(100)
+    }
+    fn period_us(&self) -> Option<u32> {
+        None
+    }
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
+    }
+    fn answered(&mut self, cycles: u32, lateness: Micros) {
+        self.told.push((cycles, lateness));
+    }
+}
+
+#[test]
+fn the_role_is_told_what_a_period_took_up_to_its_code_also_when_the_clocks_wrap() {
+    let mut desk = Desk { now_us: u64::from(u32::MAX) - 3, cycles: u32::MAX - 100, ..Desk::default() };
+    let mut clerk = Clerk::default();
+    desk.ticks(&mut clerk);
+    desk.hears(&mut clerk, &Message::Arm(Arm { run: 5, config: 7 }));
+    assert_eq!(clerk.told, [(1190, Micros(7))]);
 }
 
 proptest! {
