@@ -11,12 +11,11 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac::timer::vals::FilterValue;
 use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
-use embassy_stm32::rng::Rng;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::qei::{self, Qei};
 use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{bind_interrupts, interrupt, pac, peripherals, rng, uid};
+use embassy_stm32::{bind_interrupts, interrupt, pac, peripherals, uid};
 use embassy_time::Instant;
 use embedded_io_async::Write;
 use static_cell::ConstStaticCell;
@@ -47,14 +46,12 @@ pub const CLOCK_HZ: u32 = 170_000_000;
 /// Priority of the control task.
 pub const CONTROL: Priority = Priority::P6;
 
-/// Below it, so a byte never delays a period. The line's own buffer of 8 bytes lasts 87 µs.
-/// Moreover embassy's transmitter may go to sleep with bytes in its buffer if its interrupt comes
-/// while a write looks whether it is empty; this one cannot come then.
-const SERIAL: Priority = Priority::P7;
+/// Above it: the line's own buffer of 8 bytes lasts 87 µs, and a period of the controller may take
+/// about as long. Each byte takes its interrupt's time from the period in turn.
+const SERIAL: Priority = Priority::P5;
 
 bind_interrupts!(struct Irqs {
     LPUART1 => usart::BufferedInterruptHandler<peripherals::LPUART1>;
-    RNG => rng::InterruptHandler<peripherals::RNG>;
 });
 
 /// Bytes from the host.
@@ -108,12 +105,13 @@ pub fn start() -> (Board, Line) {
     line.baudrate = BAUD;
     interrupt::LPUART1.set_priority(SERIAL);
     let line = BufferedUart::new(p.LPUART1, p.PA3, p.PA2, TO_HOST.take(), FROM_HOST.take(), Irqs, line);
-    let (Ok(line), Some(mut core)) = (line, cortex_m::Peripherals::take()) else { stop() };
+    let core = cortex_m::Peripherals::take();
+    let (Ok(line), Some(mut core), Some(boot)) = (line, core, random()) else { stop() };
     let (to_host, from_host) = line.split();
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
 
-    let (board, boot) = (serial_number(), Rng::new(p.RNG, Irqs).next_u32());
+    let board = serial_number();
     let counter = WideCounter::new(encoder.count());
     let board = Board { encoder, counter, converter, told: BOOT_CODE, watchdog, line: to_host, board, boot };
     (board, from_host)
@@ -137,6 +135,16 @@ impl Board {
             boot_code: BOOT_CODE.0,
         }
     }
+}
+
+/// A number of the chip's noise source: the second, since its manual wants the first thrown away.
+/// None if there is none within some milliseconds. embassy's driver would try again for ever, on a
+/// stack that ends.
+fn random() -> Option<u32> {
+    pac::RCC.ahb2enr().modify(|w| w.set_rngen(true));
+    pac::RNG.cr().write(|w| w.set_rngen(true));
+    let ready = (0..50_000).filter(|_| pac::RNG.sr().read().drdy());
+    ready.map(|_| pac::RNG.dr().read()).nth(1)
 }
 
 /// The chip's 96 bits in 32; 0 and 1 are taken by the simulated boards.
@@ -179,8 +187,10 @@ impl Hardware for Board {
     }
 
     fn send(&mut self, frames: &[u8]) {
-        // One poll: all of it if there is room now, and nothing otherwise.
-        let _ = poll_once(self.line.write(frames));
+        // One poll: all of it if there is room now, and nothing otherwise. No interrupt in between:
+        // one that sends the last byte while the write looks whether there is any would leave the
+        // transmitter asleep with these.
+        let _ = cortex_m::interrupt::free(|_| poll_once(self.line.write(frames)));
     }
 
     fn cycles(&self) -> u32 {

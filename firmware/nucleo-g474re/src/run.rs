@@ -37,17 +37,16 @@ pub fn begin<S: Send>(control: impl FnOnce(Board, Line) -> Result<SpawnToken<S>,
     }
 }
 
-/// Runs a role, for ever. One that could not be made stays in the safe output.
-pub async fn run(role: Option<impl Role>, mut board: Board, mut line: Line) -> ! {
-    let Some(mut role) = role else { stop() };
+/// Runs a role, for ever.
+pub async fn run(role: &mut impl Role, mut board: Board, mut line: Line) -> ! {
     let mut bytes = [0; CHUNK];
     let mut period_us = BOOT_PERIOD_US;
     let mut beat = every(period_us);
     loop {
         // In this order: a period that is due goes before bytes that wait.
         match select(beat.next(), line.read(&mut bytes)).await {
-            Either::First(()) => tick(&mut role, &mut board),
-            Either::Second(Ok(count)) => receive(&mut role, &mut board, &bytes[..count]),
+            Either::First(()) => tick(role, &mut board),
+            Either::Second(Ok(count)) => receive(role, &mut board, &bytes[..count]),
             Either::Second(Err(_)) => {}
         }
         let wanted_us = role.period_us().unwrap_or(BOOT_PERIOD_US);
