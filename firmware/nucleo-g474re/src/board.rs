@@ -5,7 +5,7 @@ use clutch_core::{Counts, DacCode};
 use clutch_node::{BoardParams, Hardware, WideCounter};
 use cortex_m::peripheral::DWT;
 use embassy_futures::poll_once;
-use embassy_stm32::dac::{DacChannel, Value};
+use embassy_stm32::dac::{self, DacChannel, Value};
 use embassy_stm32::gpio::Pull;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::mode::Blocking;
@@ -29,8 +29,8 @@ pub const BOOT_CODE: DacCode = DacCode(1844);
 /// Counts per turn of the shaft, four for each line of the encoder.
 const COUNTS_PER_REV: u32 = 20_000;
 
-/// Voltage at the brake for code 0 and for code 4096, mV: 3.3 V with the driver's gain of 3.03.
-/// Measure both at the brake's terminals.
+/// Voltage at the brake for code 0 and for code 4096, mV: 3.3 V times the driver's gain of 3.03.
+/// Put in what you measure at the brake's terminals, and the same into the scenario.
 const DRIVER_MV: (i32, i32) = (0, 10_000);
 
 /// Of the debugger's serial port, which is the host's.
@@ -88,8 +88,11 @@ pub fn start() -> (Board, Line) {
     config.rcc.boost = true;
     let p = embassy_stm32::init(config);
 
-    // From enabling to this write the output is at code 0; the converter takes longer to wake up.
+    // Without the chip's output buffer, which reaches neither 0 V nor the top: 0.2 V at the pin would
+    // be 0.6 V at a brake that is to let go. Until the write the code is 0, for some clocks.
     let mut converter = DacChannel::new_blocking(p.DAC1, p.PA4);
+    converter.set_mode(dac::Mode::NormalExternalUnbuffered);
+    converter.enable();
     converter.set(Value::Bit12Right(BOOT_CODE.0));
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();
