@@ -203,7 +203,7 @@ impl Onboard {
             Notice::BoardFault(m) => host.push(&Message::Fault(m)),
             Notice::Ended(_) => ended = true,
             Notice::Hello(m) => hello = Some(m),
-            Notice::Controller(_) | Notice::BadFrame(_) | Notice::Echo => {}
+            Notice::Controller(_) | Notice::Taken(_) | Notice::BadFrame(_) | Notice::Echo => {}
         });
         if let Some(m) = hello {
             self.hello = Some(m);

@@ -1,0 +1,188 @@
+//! The emulated board: a Cortex-M4F in `qemu-system-arm`, asked in lockstep.
+
+use clutch_node::exchange::{Exchange, LONGEST};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{CWD, FileType, Mode, mknodat};
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// The emulator's command.
+pub const PROGRAM: &str = "qemu-system-arm";
+
+/// Longest time for an answer: it takes microseconds, but a machine may stall.
+const PATIENCE_S: u32 = 20;
+
+/// The emulated board could not be started, or ended.
+#[derive(Debug, thiserror::Error)]
+pub enum EmulatorError {
+    /// No emulator.
+    #[error(
+        "{PROGRAM} was not found. Install it (on Debian and Ubuntu: apt-get install qemu-system-arm), or run \
+         `clutch sim`, which needs none"
+    )]
+    NoProgram,
+    /// No image.
+    #[error("{}: no such file. Build the emulated board's image: cargo xtask firmware build", path.display())]
+    NoImage {
+        /// Where it was looked for.
+        path: PathBuf,
+    },
+    /// The system.
+    #[error("the emulated board could not be {what}: {error}")]
+    System {
+        /// What was tried.
+        what: &'static str,
+        /// Why not.
+        error: std::io::Error,
+    },
+    /// It has ended.
+    #[error("the emulated board has ended ({status}): {said}")]
+    Ended {
+        /// How.
+        status: String,
+        /// What the emulator printed.
+        said: String,
+    },
+    /// It does not answer.
+    #[error("the emulated board has not answered for {PATIENCE_S} s")]
+    Silent,
+    /// It answers something else.
+    #[error("the emulated board's answer is none: {0}")]
+    Garbled(&'static str),
+}
+
+fn system(what: &'static str) -> impl Fn(std::io::Error) -> EmulatorError {
+    move |error| EmulatorError::System { what, error }
+}
+
+/// A folder of its own that is gone with it.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> std::io::Result<Folder> {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("clutch-board-{}-{number}", std::process::id()));
+        std::fs::create_dir(&path)?;
+        Ok(Folder(path))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A board that is emulated, in lockstep.
+pub struct Emulator {
+    child: Child,
+    requests: File,
+    answers: File,
+    buffer: Box<[u8; LONGEST]>,
+    _folder: Folder,
+}
+
+impl Emulator {
+    /// Starts a board with an image.
+    ///
+    /// # Errors
+    /// No emulator, no image, no memory.
+    pub fn start(image: &Path) -> Result<Emulator, EmulatorError> {
+        let image = image.canonicalize().map_err(|_| EmulatorError::NoImage { path: image.to_owned() })?;
+        let folder = Folder::new().map_err(system("given a folder"))?;
+        // Both ends of both files are open here: opening waits for nobody.
+        let open = |name: &str| -> std::io::Result<File> {
+            let path = folder.0.join(name);
+            mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)?;
+            OpenOptions::new().read(true).write(true).open(path)
+        };
+        let requests = open("to_fw").map_err(system("given its lines"))?;
+        let answers = open("from_fw").map_err(system("given its lines"))?;
+        let child = Command::new(PROGRAM)
+            .args(["-machine", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "null"])
+            .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+            .arg(image)
+            .current_dir(&folder.0)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|error| match error.kind() {
+                std::io::ErrorKind::NotFound => EmulatorError::NoProgram,
+                _ => EmulatorError::System { what: "started", error },
+            })?;
+        Ok(Emulator { child, requests, answers, buffer: Box::new([0; LONGEST]), _folder: folder })
+    }
+
+    /// A request, and the board's answer.
+    ///
+    /// # Errors
+    /// It has ended, or does not answer.
+    pub fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, EmulatorError> {
+        let length =
+            request.write(&mut *self.buffer).ok_or(EmulatorError::Garbled("the request is too long"))?;
+        self.requests.write_all(&self.buffer[..length]).map_err(system("asked"))?;
+        let mut used = 0;
+        loop {
+            self.wait()?;
+            used += self.answers.read(&mut self.buffer[used..]).map_err(system("heard"))?;
+            match Exchange::length(&self.buffer[..used]) {
+                Some(length) if length > LONGEST => return Err(EmulatorError::Garbled("it is too long")),
+                Some(length) if length <= used => break,
+                _ => {}
+            }
+        }
+        Exchange::read(&self.buffer[..used]).ok_or(EmulatorError::Garbled("it is cut off"))
+    }
+
+    /// Waits for bytes; looks now and then whether the emulator lives.
+    fn wait(&mut self) -> Result<(), EmulatorError> {
+        let second = Timespec { tv_sec: 1, tv_nsec: 0 };
+        for _ in 0..PATIENCE_S {
+            let mut fds = [PollFd::new(&self.answers, PollFlags::IN)];
+            match poll(&mut fds, Some(&second)) {
+                Ok(0) | Err(rustix::io::Errno::INTR) => {}
+                Ok(_) => return Ok(()),
+                Err(error) => return Err(system("heard")(error.into())),
+            }
+            if let Some(status) = self.child.try_wait().map_err(system("looked at"))? {
+                let mut said = String::new();
+                if let Some(mut stderr) = self.child.stderr.take() {
+                    let _ = stderr.read_to_string(&mut said); // the status alone tells, too
+                }
+                return Err(EmulatorError::Ended {
+                    status: status.to_string(),
+                    said: said.trim().to_owned(),
+                });
+            }
+        }
+        Err(EmulatorError::Silent)
+    }
+
+    /// Lets the board's processor fail, as a test of what its last word is: the answer's frames.
+    ///
+    /// # Errors
+    /// As [`Emulator::exchange`].
+    pub fn fail(&mut self) -> Result<Exchange<'_>, EmulatorError> {
+        self.exchange(&Exchange { time_ns: u64::MAX, lateness_us: 0, host: &[], daq: &[] })
+    }
+
+    /// How the emulator ended; waits for it.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn ended(mut self) -> std::io::Result<Option<i32>> {
+        Ok(self.child.wait()?.code())
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
