@@ -56,7 +56,10 @@ fn build() -> Result<PathBuf> {
     program("rustup").args(["target", "add", TARGET]).run().context(
         "the boards' Rust target is missing, and rustup is not there to add it: install thumbv7em-none-eabihf",
     )?;
-    in_firmware(["build", "--release", "--locked"]).run()?;
+    // One by one: together each would get the features that the other wants of the libraries.
+    for board in ["clutch-qemu-mps2", "clutch-nucleo-g474re"] {
+        in_firmware(["build", "--release", "--locked", "--package", board]).run()?;
+    }
     let images = root().join("target/firmware").join(TARGET).join("release");
     println!("\nimages: {}", images.display());
     Ok(images)
