@@ -145,7 +145,7 @@ impl<'a, T: Real> Reference<'a, T> {
         let target = match &self.kind {
             Kind::Profile(p) => p.at(tick),
             Kind::Wave(w) => w.at(tick),
-            Kind::Table(t, scale) => t.at(tick, scale),
+            Kind::Table(t, scale) => t.scaled(tick, scale),
         };
         Target { position: target.position.plus(self.start), ..target }
     }
