@@ -21,7 +21,7 @@ use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Micros};
 use clutch_wire::{
     Armed, BoardState, Configure, Configured, Controller, Decoder, Discover, Ended, Hello, Link, Message,
-    Pong, Refusal, Refused, SCHEMA, Set, StopReason, Stopped, Taken, VERSION,
+    Pong, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION,
 };
 
 /// What a board in the controller role is.
@@ -102,6 +102,22 @@ impl Onboard {
     #[must_use]
     pub fn state(&self) -> State {
         self.run.as_ref().map_or(State::Disconnected, |r| r.control.state().state())
+    }
+
+    /// Whether it drives, or has the consent to.
+    #[must_use]
+    pub fn driving(&self) -> bool {
+        self.run.as_ref().is_some_and(Run::driving)
+    }
+
+    /// What tells encoder and converter to go to the safe state, for a handler that can trust nothing else;
+    /// none while nothing is driven.
+    #[must_use]
+    pub fn last_word(&self) -> Option<Outbox> {
+        let run = self.run.as_ref().filter(|r| r.driving())?;
+        let mut out = Outbox::default();
+        out.push(&Message::Stop(Stop { run: run.number, reason: StopReason::Fault as u8 }));
+        Some(out)
     }
 
     /// Clock cycles that the last tick took, for the telemetry of the next.
@@ -248,10 +264,6 @@ impl Onboard {
         self.run.as_ref().map_or(0, |r| r.number)
     }
 
-    fn driving(&self) -> bool {
-        self.run.as_ref().is_some_and(Run::driving)
-    }
-
     fn discover(&mut self, m: &Discover, out: &mut Ports) {
         let request = Discover::KIND;
         let refusal = if m.version != VERSION {
@@ -338,7 +350,7 @@ impl Onboard {
         Ok(())
     }
 
-    fn stop(&mut self, m: &clutch_wire::Stop, out: &mut Ports) {
+    fn stop(&mut self, m: &Stop, out: &mut Ports) {
         let Some(run) = self.run.as_mut().filter(|r| r.number == m.run) else { return };
         let from = run.control.state().state();
         let reason = if m.reason == StopReason::Done as u8 { StopReason::Done } else { StopReason::Operator };
