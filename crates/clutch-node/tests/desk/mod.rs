@@ -8,7 +8,7 @@
 //! Frames are passed by hand and times are computed.
 #![allow(dead_code, unreachable_pub, reason = "each test takes what it needs")]
 
-use clutch_core::law::{LawParams, LawTerms, PdParams};
+use clutch_core::law::{LawParams, LawTerms, OutputParams, PdParams};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::supervisor::State;
 use clutch_core::{
@@ -59,14 +59,14 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// One count each millisecond, without an end.
+    /// Three counts each millisecond, without an end.
     pub fn new() -> Plan {
         Plan {
             run: 5,
-            servo: ServoParams::paper(LawParams::Pd(PdParams::default())),
+            servo: paper(LawParams::Pd(PdParams::default())),
             limits: SupervisorParams::new(SafeState::Hold { volts: 5.0 }),
             bounds: Bounds::around(&PlantParams::default(), &Tolerances::default()).unwrap(),
-            reference: ReferenceParams::Ramp(18.0_f32.to_radians()),
+            reference: ReferenceParams::Ramp(54.0_f32.to_radians()),
             start: FixedCounts(0),
             watchdog: Micros(3000),
             silence: Micros(3000),
@@ -133,6 +133,12 @@ impl Plan {
     }
 }
 
+/// The paper's, with a start that remembers what the converter had.
+pub fn paper(law: LawParams<f32>) -> ServoParams<f32> {
+    let paper = ServoParams::paper(law);
+    ServoParams { output: OutputParams { bumpless_time: 0.05, ..paper.output }, ..paper }
+}
+
 pub fn drain(out: &mut Outbox) -> Vec<u8> {
     let bytes = out.as_bytes().to_vec();
     out.clear();
@@ -167,7 +173,10 @@ pub struct Desk {
     /// What the host and the twin make of it.
     pub notices: Vec<Told>,
     pub expected: Vec<Told>,
+    /// Counts that the shaft goes in a period.
+    pub speed: i32,
     periods: i32,
+    shaft: i32,
 }
 
 impl Desk {
@@ -186,7 +195,9 @@ impl Desk {
             sent: Vec::new(),
             notices: Vec::new(),
             expected: Vec::new(),
+            speed: 3,
             periods: 0,
+            shaft: 700,
         };
         desk.twin.configure(DacCode(BOARD.boot_code), &mut Outbox::default());
         desk
@@ -272,7 +283,7 @@ impl Desk {
         desk
     }
 
-    /// A sample of a shaft that goes its one count a period, not quite evenly.
+    /// A sample of a shaft that goes at its speed, not quite evenly.
     pub fn samples(&mut self) {
         self.faulty(false, false);
     }
@@ -280,7 +291,9 @@ impl Desk {
     pub fn faulty(&mut self, encoder: bool, converter: bool) {
         self.now_ns += MS;
         self.periods += 1;
-        let counts = Counts(700 + self.periods + [0, 1, 0, -1][self.periods as usize % 4]);
+        self.shaft += self.speed;
+        let uneven = if self.speed == 0 { 0 } else { [0, 1, 0, -1][self.periods as usize % 4] };
+        let counts = Counts(self.shaft + uneven);
         self.board.sample(self.now_us(), counts, encoder, converter, &mut self.up);
     }
 
