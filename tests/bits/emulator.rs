@@ -1,4 +1,4 @@
-//! The image `bits` and the emulator that runs it.
+//! The image `mps2-bits` and the emulator that runs it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -44,13 +44,22 @@ fn built() -> PathBuf {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("../firmware");
     // From within its folder: its flags stand in a file that cargo looks for from there.
     let done = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["build", "--release", "--locked", "--bin", "bits", "--target-dir"])
+        .args([
+            "build",
+            "--release",
+            "--locked",
+            "--package",
+            "clutch-qemu-mps2",
+            "--bin",
+            "mps2-bits",
+            "--target-dir",
+        ])
         .arg(&target)
         .current_dir(firmware)
         .output()
         .expect("cargo starts");
     assert!(done.status.success(), "the image does not build:\n{}", String::from_utf8_lossy(&done.stderr));
-    target.join(TARGET).join("release/bits")
+    target.join(TARGET).join("release/mps2-bits")
 }
 
 impl Board {
