@@ -15,7 +15,7 @@ pub(crate) struct Board {
 
 /// The board; none where it cannot be emulated.
 pub(crate) fn board() -> Option<Board> {
-    firmware::image("bits").map(|image| Board { image })
+    firmware::image("mps2-bits").map(|image| Board { image })
 }
 
 impl Board {
