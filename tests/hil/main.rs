@@ -17,6 +17,19 @@ use clutch_sim::{Keep, Metrics, Run, Scenario};
 use clutch_tests::firmware::image;
 use clutch_wire::{BoardState, Decoder, Message, StopReason};
 use std::path::PathBuf;
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+static MACHINE: RwLock<()> = RwLock::new(());
+
+/// For a test in which time is computed.
+fn beside() -> RwLockReadGuard<'static, ()> {
+    MACHINE.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The machine for this test alone: three programs in real time on two cores need it.
+fn alone() -> RwLockWriteGuard<'static, ()> {
+    MACHINE.write().unwrap_or_else(PoisonError::into_inner)
+}
 
 const LAWS: [&str; 3] = ["pd", "ctc", "smc"];
 
@@ -84,6 +97,7 @@ fn simulate(scenario: &Scenario) -> Run {
 #[test]
 fn ten_seeds_of_the_papers_laws_on_the_board_are_the_simulation_bit_for_bit() {
     let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
     for seed in 1..=10 {
         for law in LAWS {
             let scenario = paper(law, seed);
@@ -96,6 +110,7 @@ fn ten_seeds_of_the_papers_laws_on_the_board_are_the_simulation_bit_for_bit() {
 #[test]
 fn over_its_serial_lines_too_the_board_is_the_simulation() {
     let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
     std::thread::scope(|scope| {
         for law in LAWS {
             let image = &image;
@@ -111,6 +126,7 @@ fn over_its_serial_lines_too_the_board_is_the_simulation() {
 #[test]
 fn every_field_of_every_tick_is_the_one_of_the_same_node_in_this_process() {
     let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
     for law in LAWS {
         let scenario = paper(law, 11);
         let board = on(&scenario, Emulator::start(&image).expect("a board"), 3000);
@@ -125,6 +141,7 @@ fn every_field_of_every_tick_is_the_one_of_the_same_node_in_this_process() {
 #[test]
 fn every_kind_of_path_on_the_board_is_the_simulation() {
     let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
     for (name, path) in [
         ("hold", "[reference.hold]\n"),
         (
@@ -155,6 +172,7 @@ fn every_kind_of_path_on_the_board_is_the_simulation() {
 #[test]
 fn the_boards_log_replays_bit_for_bit_on_this_machine() {
     let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
     for law in LAWS {
         let scenario = paper(law, 3);
         let ran = on(&scenario, Emulator::start(&image).expect("a board"), 3000);
@@ -183,6 +201,7 @@ fn scratch(name: &str) -> PathBuf {
 #[test]
 fn what_breaks_the_boards_line_ends_in_the_safe_state_in_time_and_is_named() {
     let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
     let (mut count, mut wrong) = (0, Vec::new());
     // Seed 3 has the bench, the others the paper's rig.
     for run in runs(2, 2).filter(clutch_loop::campaign::RunId::is_outside) {
@@ -220,6 +239,7 @@ impl Lockstep for &mut Failing {
 #[test]
 fn a_processor_that_fails_sends_encoder_and_converter_to_the_safe_state() {
     let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
     let scenario = paper("smc", 1);
     let setup = Setup::<f32>::new(&scenario, 7).expect("a safe state");
     let mut failing = Failing {
@@ -254,6 +274,7 @@ fn a_processor_that_fails_sends_encoder_and_converter_to_the_safe_state() {
 #[test]
 fn a_processor_that_fails_at_rest_says_nothing() {
     let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
     let mut board = Emulator::start(&image).expect("a board");
     assert!(board.fail().expect("an answer").daq.is_empty());
     assert_eq!(board.ended().expect("it ends"), Some(101));

@@ -1,7 +1,7 @@
 //! `clutch loop --board`: the emulated board in real time, on its serial lines over TCP, with the simulated
 //! board as its encoder and converter.
 
-use crate::scratch;
+use crate::{alone, scratch};
 use clutch_tests::firmware::image;
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
@@ -92,6 +92,8 @@ fn shown(done: &Output) -> String {
 #[test]
 fn a_board_that_closes_the_loop_is_set_up_armed_logged_and_stopped_over_a_line() {
     let Some(image) = image("mps2-controller") else { return };
+    program();
+    let _alone = alone();
     let (_rig, rig) = rig();
     let (_board, address) = board(&image, Some(&rig));
     let log = scratch("serial.mcap");
@@ -130,6 +132,8 @@ fn a_board_that_closes_the_loop_is_set_up_armed_logged_and_stopped_over_a_line()
 #[test]
 fn each_kind_of_board_tells_which_option_is_for_it() {
     let Some(image) = image("mps2-controller") else { return };
+    program();
+    let _alone = alone();
     let (_rig, rig) = rig();
     let done = clutch(&["loop", "board_smc_2", "--board", &format!("tcp://{rig}")]);
     assert_eq!(done.status.code(), Some(1), "{}", shown(&done));
