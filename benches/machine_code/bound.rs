@@ -129,7 +129,7 @@ impl<'a> Bounds<'a> {
             }
         };
         for round in &loops {
-            let most = self.rounds(function, graph, round, length);
+            let most = self.rounds(function, graph, &loops, round, length);
             collapse(&mut ways, round, most);
         }
         let Some(path) = reach(&ways, 0, None).1.remove(&None) else {
@@ -151,7 +151,7 @@ impl<'a> Bounds<'a> {
             let mut cost = Cost::default();
             for (k, i) in block.instructions.iter().enumerate() {
                 let Some(c) = cycles(i) else {
-                    let (address, text) = (i.address, i.text.clone());
+                    let (address, text) = (i.address, format!("{} ({})", i.text, i.name));
                     self.fault(Fault::NoCost { function: function.name.clone(), address, text });
                     continue;
                 };
@@ -207,10 +207,16 @@ impl<'a> Bounds<'a> {
             let stated = self.facts.lengths.iter().find(|f| function.name.contains(&f.function));
             handed_on.or_else(|| constant(before, register)).or(stated.map(|f| f.most))
         });
+        if length_register(&callee.name).is_some() && bytes.is_none() {
+            let (function, callee) = (function.name.clone(), callee.name.clone());
+            return self.fault(Fault::Length { function, address: i.address, callee });
+        }
         let cost = self.function(callee, bytes);
         match cap {
             Some(c) => {
-                capped.insert(target, (cost, c.most));
+                // Calls of different lengths: the dearest of them.
+                let dearest = capped.get(&target).map_or(cost, |(other, _)| other.max(cost));
+                capped.insert(target, (dearest, c.most));
                 Cost::default()
             }
             None => cost,
@@ -218,18 +224,29 @@ impl<'a> Bounds<'a> {
     }
 
     /// How often a loop's head is executed each time that the loop is entered.
-    fn rounds(&mut self, function: &Function, graph: &Graph, round: &Loop, length: Option<u64>) -> u64 {
+    fn rounds(
+        &mut self,
+        function: &Function,
+        graph: &Graph,
+        loops: &[Loop],
+        round: &Loop,
+        length: Option<u64>,
+    ) -> u64 {
         let address = graph.address(round.head);
         let from = self.image.inlined_from(address);
-        let fits = |f: &&facts::LoopFact| {
+        let outer = loops.iter().any(|l| l.head != round.head && round.body.contains(&l.head));
+        let fact = self.facts.loops.iter().find(|f| {
             function.name.contains(&f.function)
+                && f.outer.is_none_or(|o| o == outer)
                 && f.of.as_ref().is_none_or(|of| from.iter().any(|name| name.contains(of)))
-        };
-        let fact = self.facts.loops.iter().find(fits);
-        let most = fact.and_then(|f| f.most.or(Some(length? / f.step? + 1)));
-        if let (Some(most), Some(f)) = (most, fact) {
-            let of = f.of.as_deref().unwrap_or("any");
-            self.told.insert(address, format!("{}: at most {most}, as of {of}: {}", function.name, f.why));
+        });
+        let worked = |f: &facts::LoopFact| Some(length? / f.step? + 1);
+        let stated = fact.and_then(|f| f.most.or_else(|| worked(f)));
+        let each = fact.and_then(|f| f.by.as_ref()).map_or(1, |by| graph.least_each_round(round, by));
+        if let (Some(stated), Some(fact), 1..) = (stated, fact, each) {
+            // In the last round, the head may be executed and none of what is counted.
+            let most = if fact.by.is_some() { stated / each + 1 } else { stated };
+            self.told.insert(address, format!("{}: {most}: {}", function.name, fact.why));
             return most.max(1);
         }
         let from = from.join(" < ");

@@ -15,10 +15,10 @@ pub(super) fn cycles(i: &Instruction) -> Option<u64> {
     let doubles = i.operands.iter().filter(|o| register(o, 'd')).count() as u64;
     Some(match i.name.as_str() {
         "adc" | "add" | "addw" | "adr" | "and" | "asr" | "bfc" | "bfi" | "bic" | "clz" | "cmn" | "cmp"
-        | "eor" | "it" | "lsl" | "lsr" | "mov" | "movs" | "movt" | "movw" | "mul" | "mvn" | "nop" | "orn"
-        | "orr" | "pkhbt" | "pkhtb" | "rbit" | "rev" | "rev16" | "revsh" | "ror" | "rrx" | "rsb" | "sbc"
-        | "sbfx" | "ssat" | "sub" | "subw" | "sxtab" | "sxtah" | "sxtb" | "sxth" | "teq" | "tst" | "ubfx"
-        | "usat" | "uxtab" | "uxtah" | "uxtb" | "uxth" => 1,
+        | "eor" | "hint" | "it" | "lsl" | "lsr" | "mov" | "movs" | "movt" | "movw" | "mul" | "mvn"
+        | "nop" | "orn" | "orr" | "qadd" | "qsub" | "pkhbt" | "pkhtb" | "rbit" | "rev" | "rev16"
+        | "revsh" | "ror" | "rrx" | "rsb" | "sbc" | "sbfx" | "ssat" | "sub" | "subw" | "sxtab" | "sxtah"
+        | "sxtb" | "sxth" | "teq" | "tst" | "ubfx" | "usat" | "uxtab" | "uxtah" | "uxtb" | "uxth" => 1,
         "smlabb" | "smlabt" | "smlatb" | "smlatt" | "smlal" | "smulbb" | "smulbt" | "smultb" | "smultt"
         | "smull" | "smmul" | "smmla" | "umaal" | "umlal" | "umull" => 1,
         "mla" | "mls" => 2,
@@ -29,7 +29,7 @@ pub(super) fn cycles(i: &Instruction) -> Option<u64> {
         "push" | "pop" => 1 + listed(0),
         "ldm" | "ldmdb" | "stm" | "stmdb" => 1 + listed(1),
         "vadd" | "vsub" | "vmul" | "vnmul" | "vcvt" | "vcvtr" | "vabs" | "vneg" | "vcmp" | "vcmpe"
-        | "vmrs" | "vmsr" => 1,
+        | "vmrs" | "vmsr" | "fmstat" | "fconsts" => 1,
         "vmov" if i.operands.len() > 2 => 2,
         "vmov" => 1,
         "vmla" | "vmls" | "vnmla" | "vnmls" | "vfma" | "vfms" | "vfnma" | "vfnms" => 3,

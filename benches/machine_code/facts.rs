@@ -17,7 +17,11 @@ pub struct Facts {
     pub lengths: Vec<LengthFact>,
 }
 
-/// How often a loop goes round.
+/// How often a loop goes round, each time that it is entered from outside.
+///
+/// `most` executions of its head; with `by`, `most` executions of instructions whose names begin
+/// with `by`. The second way holds however often the compiler has unrolled the loop: it is divided
+/// by how many such instructions each way round has at least.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoopFact {
@@ -26,9 +30,13 @@ pub struct LoopFact {
     pub function: String,
     /// Part of the name of a function that the loop's head was inlined from; without it, any loop.
     pub of: Option<String>,
-    /// Executions of the head at most, each time that the loop is entered from outside.
+    /// Whether it has another loop within; without it, either.
+    pub outer: Option<bool>,
+    /// The instruction that is counted, or the beginning of its name; without it, the head.
+    pub by: Option<String>,
+    /// How many at most.
     pub most: Option<u64>,
-    /// For memcpy and its like: bytes that each round does; the head is executed once more.
+    /// For memcpy and its like, instead: bytes that one of them does.
     pub step: Option<u64>,
     /// Why that holds.
     pub why: String,

@@ -57,6 +57,16 @@ pub enum Fault {
         /// The functions that the head was inlined from, innermost first.
         from: String,
     },
+    /// A call of memcpy or its like with a length that the code does not say and nobody states.
+    #[error("{function} at {address:#x}: {callee} of an unknown length")]
+    Length {
+        /// Where.
+        function: String,
+        /// Address of the call.
+        address: u32,
+        /// What is called.
+        callee: String,
+    },
     /// A jump into the middle of a loop.
     #[error("{function} at {address:#x}: a jump into the middle of a loop")]
     Irreducible {

@@ -73,6 +73,10 @@ impl Graph {
         let mut at = start;
         loop {
             let Some(i) = code.get(&at) else {
+                // A call that ends a function does not come back.
+                if block.instructions.last().is_some_and(|i| matches!(i.flow, Flow::Call(_))) {
+                    return Ok((block, vec![]));
+                }
                 return Err(Fault::RunsOff { function: function.name.clone() });
             };
             block.instructions.push(i.clone());
@@ -137,6 +141,26 @@ impl Graph {
         loops.sort_by_key(|l| l.body.len());
         self.without_back_edges_nothing_goes_round(&dominators)?;
         Ok(loops)
+    }
+
+    /// The least number of instructions whose name begins with `name` on any way round a loop.
+    pub(super) fn least_each_round(&self, round: &Loop, name: &str) -> u64 {
+        let count = |b: usize| -> u64 {
+            self.blocks[b].instructions.iter().filter(|i| i.name.starts_with(name)).count() as u64
+        };
+        let mut least: BTreeMap<usize, u64> = BTreeMap::from([(round.head, count(round.head))]);
+        let mut open = vec![round.head];
+        while let Some(b) = open.pop() {
+            for &to in self.blocks[b].next.iter().filter(|t| **t != round.head && round.body.contains(t)) {
+                let total = least[&b] + count(to);
+                if least.get(&to).is_none_or(|l| total < *l) {
+                    least.insert(to, total);
+                    open.push(to);
+                }
+            }
+        }
+        let back = least.iter().filter(|(b, _)| self.blocks[**b].next.contains(&round.head));
+        back.map(|(_, total)| *total).min().unwrap_or(0)
     }
 
     /// The blocks that lead to each.

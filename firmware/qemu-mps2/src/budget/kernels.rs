@@ -82,8 +82,11 @@ pub extern "C" fn servo_tick(axis: &mut Axis, counts: i32) -> u16 {
 #[unsafe(no_mangle)]
 pub extern "C" fn decode_sample(decoder: &mut Decoder, bytes: &Bytes, message: &mut Option<Message>) {
     for byte in bytes.as_slice() {
-        if let Some(Ok(whole)) = decoder.push(*byte) {
-            *message = Some(whole);
+        if let Some(end) = decoder.push(*byte) {
+            if let Ok(whole) = end {
+                *message = Some(whole);
+            }
+            return;
         }
     }
 }
