@@ -1054,7 +1054,7 @@ class Sampling(_Params):
     period_us : int, default 1000
         `T` in (5): sampling period, µs. 1 to 1 000 000.
     scalar : {"f64", "f32"}, default "f64"
-        What the law computes in; a board has ``"f32"``. The shaft is always ``"f64"``.
+        What path and law compute in; a board has ``"f32"``. The shaft is always ``"f64"``.
 
     Raises
     ------

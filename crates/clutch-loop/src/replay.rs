@@ -213,17 +213,14 @@ fn simulated<T: Real>(
             expected: e.expected,
         })
     })?;
-    let start = spec.run.start_position();
-    let path =
-        clutch_core::reference::Reference::<f64>::new(&spec.reference, start, servo.encoder(), spec.period)
-            .map_err(SetupError::from)?;
+    let path = spec.path::<T>().map_err(SetupError::from)?;
     let radians = servo.encoder().radians_per_count::<f64>();
     let Some(first) = samples.first() else { return Ok(Vec::new()) };
-    let mut state = servo.start(Counts(first.counts), &path.at(0).cast(), T::from_f64(volts));
+    let mut state = servo.start(Counts(first.counts), &path.at(0), T::from_f64(volts));
     Ok(samples
         .iter()
         .map(|sample| {
-            let target = path.at(sample.tick).cast();
+            let target = path.at(sample.tick);
             let output = servo.tick(&mut state, Counts(sample.counts), &target);
             let cycle = simulated_cycle(sample.tick, target, output);
             records::command(sample.time_ns, &cycle, servo.dac(), radians)

@@ -1,7 +1,6 @@
 //! From a scenario to what runs: servo, supervisor, path, numbers for the wire and the log.
 
 use clutch_core::law::{Controller, Terms, Tick};
-use clutch_core::reference::Reference;
 use clutch_core::supervisor::Checks;
 use clutch_core::{
     DacCode, FixedCounts, Micros, ParamError, Real, Servo, ServoParams, StickSlip, StickSlipParams,
@@ -112,22 +111,19 @@ impl<T: Real> Setup<T> {
 }
 
 /// The scenario's path from the count on which a run begins: its first point lies within that
-/// count, where the simulation's does.
+/// count, where the simulation's does, and its targets are the simulation's in the same scalar.
 ///
 /// # Errors
 /// None for a checked scenario.
 pub fn path<T: Real>(scenario: &Scenario) -> Result<impl Fn(u64) -> Target<T> + '_, SetupError> {
-    let spec = scenario.spec();
-    let encoder = clutch_core::Encoder::new::<f64>(spec.rig.counts_per_rev)?;
-    let within = spec.run.start_position().0 & ((1 << FixedCounts::FRACTION_BITS) - 1);
-    let reference = Reference::<f64>::new(&spec.reference, FixedCounts(within), encoder, spec.period)?;
-    // Planned in double precision and rounded, as in the simulation: both scalars follow one path.
+    let reference = scenario.spec().path::<T>()?;
+    // Whole counts, so that nothing is rounded anew.
     let first = reference.at(0).position.0 >> FixedCounts::FRACTION_BITS;
     let first = FixedCounts::from_counts(first);
     Ok(move |tick: u64| {
         let target = reference.at(tick);
         let position = FixedCounts(target.position.0.wrapping_sub(first.0));
-        Target { position, ..target }.cast()
+        Target { position, ..target }
     })
 }
 
@@ -220,4 +216,40 @@ pub fn boot_output(scenario: &Scenario, hello: &Hello, plan: &Plan) -> (f64, boo
         None => true,
     });
     (volts, holds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clutch_sim::progress::UNWATCHED;
+    use clutch_sim::run::{Keep, simulate_watched};
+
+    fn same_targets<T: Real>(name: &str) {
+        let scalar = if size_of::<T>() == 4 { "f32" } else { "f64" };
+        for start in ["0.0", "0.625", "-3.25", "123456789.75"] {
+            let set = [("sampling.scalar", scalar), ("run.start_counts", start), ("run.duration_s", "3.0")];
+            let set = set.map(|(key, value)| (key.to_owned(), value.to_owned()));
+            let scenario = Scenario::load(name.as_ref(), &set).unwrap();
+            let trace = simulate_watched::<T>(&scenario.spec(), Keep::Trace, UNWATCHED).unwrap().trace;
+            let path = path::<T>(&scenario).unwrap();
+            // The loop counts from the count on which it begins.
+            let origin = trace.target_fixed[0].0 >> FixedCounts::FRACTION_BITS;
+            let origin = FixedCounts::from_counts(origin);
+            for (k, simulated) in trace.target_fixed.iter().enumerate() {
+                let looped = path(k as u64);
+                let what = format!("{name} in {scalar} from {start}, tick {k}");
+                assert_eq!(looped.position.plus(origin), *simulated, "{what}");
+                assert_eq!(looped.velocity.to_f64(), trace.target_velocity[k], "{what}");
+                assert_eq!(looped.acceleration.to_f64(), trace.target_acceleration[k], "{what}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_loop_asks_for_the_targets_of_the_simulation_bit_for_bit() {
+        for name in ["minimum_jerk", "smc_2"] {
+            same_targets::<f32>(name);
+            same_targets::<f64>(name);
+        }
+    }
 }

@@ -7,8 +7,9 @@ use clutch_core::{
     Counts, DacCode, FixedCounts, Micros, Real, SafeKind, Servo, Supervisor, SupervisorState, Target,
 };
 use clutch_wire::{
-    Actuate, Arm, BoardState, Configure, Decoder, Discover, Fault, FrameError, Hello, Message, Ping, Refused,
-    SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop, StopReason, Stopped, VERSION,
+    Actuate, Arm, BoardState, Configure, Controller as ControllerInfo, Decoder, Discover, Fault, FrameError,
+    Hello, Message, Ping, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop,
+    StopReason, Stopped, VERSION,
 };
 
 /// What a run is, on the wire.
@@ -54,6 +55,8 @@ pub struct CycleNotice<T, Terms> {
     pub superseded: bool,
     /// Time that the answer to the sample before took.
     pub lateness: Micros,
+    /// Clock cycles of the tick before, where a board counts them; else 0.
+    pub cycles: u32,
     /// What it led to.
     pub cycle: Cycle<T, Terms>,
 }
@@ -64,6 +67,8 @@ pub struct CycleNotice<T, Terms> {
 pub enum Notice<T, Terms> {
     /// A board answered.
     Hello(Hello),
+    /// A board in the controller role answered.
+    Controller(ControllerInfo),
     /// The board is configured for this run; samples follow.
     Configured,
     /// The board takes codes.
@@ -158,8 +163,14 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
     /// Tells the board of the run; `present` is the code that its converter has now. The pre-flight has taken place.
     pub fn configure(&mut self, present: DacCode, out: &mut Outbox) {
         self.present = present;
+        out.push(&Message::Configure(self.configuration()));
+    }
+
+    /// What the board is told of the run.
+    #[must_use]
+    pub fn configuration(&self) -> Configure {
         let safe = self.supervisor.safe_codes();
-        out.push(&Message::Configure(Configure {
+        Configure {
             run: self.params.run,
             config: self.params.config,
             period_us: self.servo.period().0,
@@ -174,7 +185,7 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
             release_code: safe.release.0,
             ramp_step: safe.ramp_step,
             hold_periods: safe.hold_periods,
-        }));
+        }
     }
 
     /// Consent.
@@ -275,6 +286,7 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
         let (run, config) = (self.params.run, self.params.config);
         match message {
             Message::Hello(m) => notices(Notice::Hello(*m)),
+            Message::Controller(m) => notices(Notice::Controller(*m)),
             Message::Configured(m) if m.run == run && m.config == config => {
                 self.supervisor.connect(&mut self.state);
                 notices(Notice::Configured);
@@ -296,7 +308,8 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
             | Message::Arm(_)
             | Message::Actuate(_)
             | Message::Stop(_)
-            | Message::Ping(_) => notices(Notice::Echo),
+            | Message::Ping(_)
+            | Message::Set(_) => notices(Notice::Echo),
             // Of another run.
             _ => {}
         }
@@ -354,7 +367,7 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
             }));
         }
         self.count(cycle.arrival);
-        notices(Notice::Cycle(CycleNotice { sample: *sample, superseded, lateness, cycle }));
+        notices(Notice::Cycle(CycleNotice { sample: *sample, superseded, lateness, cycles: 0, cycle }));
         if cycle.from != State::Faulted && cycle.state == State::Faulted {
             self.send_stop(StopReason::Fault, out);
         } else if let Some(reason) = self.stopping {

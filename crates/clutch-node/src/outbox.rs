@@ -40,6 +40,12 @@ impl Outbox {
         self.bytes.get(..self.used).unwrap_or(&[])
     }
 
+    /// Nothing is to be written.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.used == 0
+    }
+
     /// It has been written.
     pub fn clear(&mut self) {
         self.used = 0;

@@ -112,14 +112,23 @@ impl Path {
     pub(crate) fn new(py: Python<'_>, scenario: &Scenario) -> PyResult<Path> {
         let spec = scenario.0.spec();
         let encoder = Encoder::new::<f64>(spec.rig.counts_per_rev).map_err(|e| core_error(py, &e))?;
-        let begun = spec.prepare().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
+        let wrong = |e: ParamError| scenario.error(py, &scenario.0.run_error(&e.into()));
         let ticks = scenario.0.ticks();
         let mut targets = Vec::new();
         let room = usize::try_from(ticks).is_ok_and(|n| targets.try_reserve_exact(n).is_ok());
         if !room {
             return Err(PyMemoryError::new_err(format!("no memory for a path of {ticks} targets")));
         }
-        targets.extend((0..ticks).map(|k| begun.reference.at(k)));
+        match scenario.0.scalar {
+            ScalarKind::F32 => {
+                let path = spec.path::<f32>().map_err(wrong)?;
+                targets.extend((0..ticks).map(|k| path.at(k).cast::<f64>()));
+            }
+            ScalarKind::F64 => {
+                let path = spec.path::<f64>().map_err(wrong)?;
+                targets.extend((0..ticks).map(|k| path.at(k)));
+            }
+        }
         Ok(Path { targets, period: spec.period.seconds(), radians_per_count: encoder.radians_per_count() })
     }
 }
@@ -217,7 +226,7 @@ fn begin<T: Real>(py: Python<'_>, scenario: &Scenario) -> PyResult<Running<T>> {
     let params = spec.servo().map_err(|e| wrong(&e))?.cast::<T>();
     let servo = Servo::<T>::new(&params)
         .map_err(|e| wrong(&ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }))?;
-    let begun = spec.prepare().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
+    let begun = spec.prepare::<T>().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
     Ok(Running { state: begun.servo_state(&servo), servo, last: ServoOutput::default() })
 }
 
@@ -409,16 +418,19 @@ impl Plant {
     fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Plant> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
-        let begun = spec.prepare().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
-        let mut moving = begun.moving;
+        let begun = match scenario.0.scalar {
+            ScalarKind::F32 => spec.prepare::<f32>().map(|p| (p.moving, p.volts)),
+            ScalarKind::F64 => spec.prepare::<f64>().map(|p| (p.moving, p.volts)),
+        };
+        let (mut moving, start_voltage) = begun.map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
         moving.begin_period();
         Ok(Plant {
             moving,
             broken: false,
             period: spec.period.seconds(),
             tick: 0,
-            start_voltage: begun.volts,
-            voltage: begun.volts,
+            start_voltage,
+            voltage: start_voltage,
             whole: spec.rig.encoder_quantised,
             rounds: spec.rig.dac_quantised,
             events: Vec::new(),

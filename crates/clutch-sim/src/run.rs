@@ -153,26 +153,35 @@ impl<'a> RunSpec<'a> {
         }
     }
 
-    /// Rig and path as a run begins.
+    /// The path from where the run begins, planned in the law's scalar: a board that computes in
+    /// single precision has nothing else to plan in.
+    ///
+    /// # Errors
+    /// A parameter out of range.
+    pub fn path<T: Real>(&self) -> Result<Reference<'a, T>, ParamError> {
+        let encoder = Encoder::new::<f64>(self.rig.counts_per_rev)?;
+        let start = self.run.start_position();
+        Reference::new(&self.reference.cast(), start, encoder, self.period).map_err(to_f64)
+    }
+
+    /// Rig and path as a run in the scalar `T` begins.
     ///
     /// # Errors
     /// A parameter out of range; an engine that cannot take the rig.
-    pub fn prepare(&self) -> Result<Prepared<'a>, RunError> {
+    pub fn prepare<T: Real>(&self) -> Result<Prepared<'a, T>, RunError> {
         let p = &self.run;
         let rig = Rig::new(&self.rig, p.seed)?;
         let engine = self.engine(&rig)?;
         p.check(self.period)?;
         let encoder = rig.encoder;
-        // The path is planned in double precision and rounded to the law's scalar at each tick, so
-        // that runs in both scalars follow one path.
-        let reference = Reference::new(&self.reference, p.start_position(), encoder, self.period)?;
+        let reference = self.path::<T>()?;
         let first = reference.at(0);
         let begin = first.position.minus::<f64>(FixedCounts(0)) * encoder.radians_per_count::<f64>();
         if i32::try_from(first.position.0 >> FixedCounts::FRACTION_BITS).is_err() {
             let expected = "a path that begins within ±2³¹ counts, rad";
             return Err(ParamError { field: "points", value: begin, expected }.into());
         }
-        let velocity = if p.start == Start::OnPath { first.velocity } else { 0.0 };
+        let velocity = if p.start == Start::OnPath { first.velocity.to_f64() } else { 0.0 };
         let volts =
             if p.start == Start::Rest { rig.resting_voltage() } else { rig.sliding_voltage(velocity) };
         let moving = MovingRig::new(rig, engine, p.seed, (begin, velocity), volts);
@@ -226,9 +235,9 @@ pub enum Keep {
 }
 
 /// A rig and a path at the start of a run.
-pub struct Prepared<'a> {
+pub struct Prepared<'a, T> {
     /// The path.
-    pub reference: Reference<'a, f64>,
+    pub reference: Reference<'a, T>,
     /// The rig, at the path's beginning.
     pub moving: MovingRig,
     /// Voltage on the brake before the first tick, V.
@@ -237,15 +246,15 @@ pub struct Prepared<'a> {
     pub engine: EngineKind,
 }
 
-impl Prepared<'_> {
+impl<T: Real> Prepared<'_, T> {
     /// The servo's state for the first tick.
     #[must_use]
-    pub fn servo_state<T: Real, C: Controller<T>>(&self, servo: &Servo<T, C>) -> ServoState<T, C::State> {
+    pub fn servo_state<C: Controller<T>>(&self, servo: &Servo<T, C>) -> ServoState<T, C::State> {
         let (first, volts) = (self.reference.at(0), T::from_f64(self.volts));
         if self.moving.rig().params.encoder_quantised {
-            servo.start(self.moving.counts(), &first.cast(), volts)
+            servo.start(self.moving.counts(), &first, volts)
         } else {
-            servo.start_at(self.moving.fine_counts(), &first.cast(), volts)
+            servo.start_at(self.moving.fine_counts(), &first, volts)
         }
     }
 }
@@ -392,7 +401,7 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
         let expected = "a servo with the rig's encoder, counts per revolution";
         return Err(ParamError { field: "counts_per_rev", value, expected }.into());
     }
-    let prepared = spec.prepare()?;
+    let prepared = spec.prepare::<T>()?;
     let mut state = prepared.servo_state(servo);
     let Prepared { reference, mut moving, volts, engine } = prepared;
     let p = &spec.run;
@@ -422,9 +431,9 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
         let shaft = *moving.shaft();
         let counts = moving.counts();
         let out = if spec.rig.encoder_quantised {
-            servo.tick(&mut state, counts, &target.cast())
+            servo.tick(&mut state, counts, &target)
         } else {
-            servo.tick_at(&mut state, moving.fine_counts(), &target.cast())
+            servo.tick_at(&mut state, moving.fine_counts(), &target)
         };
         let commanded = if spec.rig.dac_quantised {
             moving.rig().dac.volts(out.code)
@@ -438,8 +447,8 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
             trace.time.push(time);
             trace.target_position.push(target_position);
             trace.target_fixed.push(target.position);
-            trace.target_velocity.push(target.velocity);
-            trace.target_acceleration.push(target.acceleration);
+            trace.target_velocity.push(target.velocity.to_f64());
+            trace.target_acceleration.push(target.acceleration.to_f64());
             trace.position.push(shaft.position);
             trace.velocity.push(shaft.velocity);
             trace.error.push(error);
@@ -457,7 +466,7 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
             }
         }
 
-        if detector.update(&mut seen_by_encoder, counts, target.velocity) && keep == Keep::Trace {
+        if detector.update(&mut seen_by_encoder, counts, target.velocity.to_f64()) && keep == Keep::Trace {
             detected.ticks.push(k);
         }
         if time < p.settle {

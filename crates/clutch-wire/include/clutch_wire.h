@@ -13,9 +13,9 @@
 #include <string.h>
 
 #define CLUTCH_VERSION 1u
-#define CLUTCH_SCHEMA UINT64_C(0xbaa0a79fbd366494)
-#define CLUTCH_MAX_BODY 64u  /* longest frame before stuffing, bytes */
-#define CLUTCH_MAX_FRAME 66u /* longest frame on the wire, bytes */
+#define CLUTCH_SCHEMA UINT64_C(0xa97bd1b77a40015b)
+#define CLUTCH_MAX_BODY 66u  /* longest frame before stuffing, bytes */
+#define CLUTCH_MAX_FRAME 68u /* longest frame on the wire, bytes */
 
 /* BoardState: What the board is doing. */
 #define CLUTCH_BOARD_STATE_BOOT 0u /* Powered up; never configured since; the output is boot_code. */
@@ -53,12 +53,23 @@
 #define CLUTCH_REFUSAL_LATE 9u /* Came too late. A board of version 1 shows this in Sample.status instead; value is the delay, us. */
 #define CLUTCH_REFUSAL_BUSY 10u /* Cannot be done just now: ask again; value is 0. */
 #define CLUTCH_REFUSAL_CODE 11u /* The code is above the converter's top; value is the code. */
+#define CLUTCH_REFUSAL_SETTING 12u /* A setting that is unknown or missing; value is its key. */
+#define CLUTCH_REFUSAL_UNFIT 13u /* The settings make no run; value is the offending one's value as the bits of a real number. */
+#define CLUTCH_REFUSAL_NO_BOARD 14u /* Nothing answers where the controller's encoder and converter should be; value is 0. */
+#define CLUTCH_REFUSAL_DIFFERS 15u /* Configure does not say what the settings say; value is 0. */
 
 /* Bits of the field status of Sample. */
 #define CLUTCH_STATUS_STATE 0x07u /* The bits that hold the BoardState. */
 #define CLUTCH_STATUS_ENCODER_FAULT 0x08u /* The encoder's reading cannot be trusted. */
 #define CLUTCH_STATUS_DAC_FAULT 0x10u /* The converter did not take the last code. */
 #define CLUTCH_STATUS_LATE 0x20u /* An Actuate since the sample before came too late and was not applied. */
+
+/* Bits of the field flags of Telemetry. */
+#define CLUTCH_TELEMETRY_SUPERSEDED 0x01u /* A newer sample was there already. */
+#define CLUTCH_TELEMETRY_ANSWERED 0x02u /* The sample was answered. */
+#define CLUTCH_TELEMETRY_ASKED 0x04u /* The law was asked: error, rate, terms and demand are set. */
+#define CLUTCH_TELEMETRY_TARGETED 0x08u /* The path was asked for its target. */
+#define CLUTCH_TELEMETRY_LIMIT 0x30u /* Which limit decided the voltage: 0 none, 1 the lowest, 2 the highest, 3 a demand that was not a number. */
 
 /* Integers, little-endian. */
 static inline void clutch_put_u8(uint8_t *at, uint8_t value)
@@ -352,6 +363,37 @@ static inline void clutch_get_ping(const uint8_t *body, clutch_ping_t *m)
 {
     m->run = clutch_get_u16(body + CLUTCH_PING_RUN);
     m->nonce = clutch_get_u32(body + CLUTCH_PING_NONCE);
+}
+
+/* Set: One setting of the run to come. For boards in the controller role: the loop then runs on them. */
+#define CLUTCH_SET_KIND 0x07u
+#define CLUTCH_SET_LENGTH 17u
+#define CLUTCH_SET_RUN 1u
+#define CLUTCH_SET_KEY 3u
+#define CLUTCH_SET_VALUE 5u
+typedef struct {
+    uint16_t run; /* Number of the run to come; the first setting of another run forgets those before. */
+    uint16_t key; /* Which setting. */
+    uint64_t value; /* Its value: a whole number, or the bits of a real one of 32 bits. */
+} clutch_set_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_set(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_set_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_SET_KIND;
+    clutch_put_u16(body + CLUTCH_SET_RUN, m->run);
+    clutch_put_u16(body + CLUTCH_SET_KEY, m->key);
+    clutch_put_u64(body + CLUTCH_SET_VALUE, m->value);
+    return clutch_frame(wire, body, CLUTCH_SET_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_SET_KIND. */
+static inline void clutch_get_set(const uint8_t *body, clutch_set_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_SET_RUN);
+    m->key = clutch_get_u16(body + CLUTCH_SET_KEY);
+    m->value = clutch_get_u64(body + CLUTCH_SET_VALUE);
 }
 
 /* Hello: Who the board is, what it can do, and what it is doing. Answers Discover. */
@@ -666,6 +708,301 @@ static inline void clutch_get_refused(const uint8_t *body, clutch_refused_t *m)
     m->value = clutch_get_u32(body + CLUTCH_REFUSED_VALUE);
 }
 
+/* Controller: A board in the controller role. Answers Discover; the Hello of the board that it drives follows. */
+#define CLUTCH_CONTROLLER_KIND 0x89u
+#define CLUTCH_CONTROLLER_LENGTH 51u
+#define CLUTCH_CONTROLLER_NONCE 1u
+#define CLUTCH_CONTROLLER_VERSION 5u
+#define CLUTCH_CONTROLLER_SCHEMA 6u
+#define CLUTCH_CONTROLLER_SETTINGS 14u
+#define CLUTCH_CONTROLLER_BOARD 22u
+#define CLUTCH_CONTROLLER_BOOT 26u
+#define CLUTCH_CONTROLLER_CLOCK_HZ 30u
+#define CLUTCH_CONTROLLER_KNOTS 34u
+#define CLUTCH_CONTROLLER_STATE 36u
+#define CLUTCH_CONTROLLER_RUN 37u
+#define CLUTCH_CONTROLLER_CONFIG 39u
+typedef struct {
+    uint32_t nonce; /* The nonce of Discover. */
+    uint8_t version; /* The board's version of the protocol. */
+    uint64_t schema; /* The board's schema hash. */
+    uint64_t settings; /* The board's hash of its table of settings. */
+    uint32_t board; /* The board's own serial number; 0 and 1 are emulated boards. */
+    uint32_t boot; /* Another number at each power-up. */
+    uint32_t clock_hz; /* What Telemetry.cycles counts; 0 if it counts nothing. [Hz] */
+    uint16_t knots; /* Points that a path given as a table may have. */
+    uint8_t state; /* Where control stands: the supervisor's state. */
+    uint16_t run; /* The latched run; 0 if none since power-up. */
+    uint64_t config; /* The latched hash; 0 if none since power-up. */
+} clutch_controller_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_controller(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_controller_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_CONTROLLER_KIND;
+    clutch_put_u32(body + CLUTCH_CONTROLLER_NONCE, m->nonce);
+    clutch_put_u8(body + CLUTCH_CONTROLLER_VERSION, m->version);
+    clutch_put_u64(body + CLUTCH_CONTROLLER_SCHEMA, m->schema);
+    clutch_put_u64(body + CLUTCH_CONTROLLER_SETTINGS, m->settings);
+    clutch_put_u32(body + CLUTCH_CONTROLLER_BOARD, m->board);
+    clutch_put_u32(body + CLUTCH_CONTROLLER_BOOT, m->boot);
+    clutch_put_u32(body + CLUTCH_CONTROLLER_CLOCK_HZ, m->clock_hz);
+    clutch_put_u16(body + CLUTCH_CONTROLLER_KNOTS, m->knots);
+    clutch_put_u8(body + CLUTCH_CONTROLLER_STATE, m->state);
+    clutch_put_u16(body + CLUTCH_CONTROLLER_RUN, m->run);
+    clutch_put_u64(body + CLUTCH_CONTROLLER_CONFIG, m->config);
+    return clutch_frame(wire, body, CLUTCH_CONTROLLER_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_CONTROLLER_KIND. */
+static inline void clutch_get_controller(const uint8_t *body, clutch_controller_t *m)
+{
+    m->nonce = clutch_get_u32(body + CLUTCH_CONTROLLER_NONCE);
+    m->version = clutch_get_u8(body + CLUTCH_CONTROLLER_VERSION);
+    m->schema = clutch_get_u64(body + CLUTCH_CONTROLLER_SCHEMA);
+    m->settings = clutch_get_u64(body + CLUTCH_CONTROLLER_SETTINGS);
+    m->board = clutch_get_u32(body + CLUTCH_CONTROLLER_BOARD);
+    m->boot = clutch_get_u32(body + CLUTCH_CONTROLLER_BOOT);
+    m->clock_hz = clutch_get_u32(body + CLUTCH_CONTROLLER_CLOCK_HZ);
+    m->knots = clutch_get_u16(body + CLUTCH_CONTROLLER_KNOTS);
+    m->state = clutch_get_u8(body + CLUTCH_CONTROLLER_STATE);
+    m->run = clutch_get_u16(body + CLUTCH_CONTROLLER_RUN);
+    m->config = clutch_get_u64(body + CLUTCH_CONTROLLER_CONFIG);
+}
+
+/* Taken: The setting is taken. Answers Set. */
+#define CLUTCH_TAKEN_KIND 0x8au
+#define CLUTCH_TAKEN_LENGTH 17u
+#define CLUTCH_TAKEN_RUN 1u
+#define CLUTCH_TAKEN_KEY 3u
+#define CLUTCH_TAKEN_VALUE 5u
+typedef struct {
+    uint16_t run; /* The run. */
+    uint16_t key; /* The setting. */
+    uint64_t value; /* The value, as it was taken. */
+} clutch_taken_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_taken(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_taken_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_TAKEN_KIND;
+    clutch_put_u16(body + CLUTCH_TAKEN_RUN, m->run);
+    clutch_put_u16(body + CLUTCH_TAKEN_KEY, m->key);
+    clutch_put_u64(body + CLUTCH_TAKEN_VALUE, m->value);
+    return clutch_frame(wire, body, CLUTCH_TAKEN_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_TAKEN_KIND. */
+static inline void clutch_get_taken(const uint8_t *body, clutch_taken_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_TAKEN_RUN);
+    m->key = clutch_get_u16(body + CLUTCH_TAKEN_KEY);
+    m->value = clutch_get_u64(body + CLUTCH_TAKEN_VALUE);
+}
+
+/* Telemetry: A sample and what the controller made of it. Real numbers are told as their 32 bits. */
+#define CLUTCH_TELEMETRY_KIND 0x8bu
+#define CLUTCH_TELEMETRY_LENGTH 66u
+#define CLUTCH_TELEMETRY_RUN 1u
+#define CLUTCH_TELEMETRY_NUMBER 3u
+#define CLUTCH_TELEMETRY_TICK 5u
+#define CLUTCH_TELEMETRY_SEQUENCE 9u
+#define CLUTCH_TELEMETRY_TIME_US 11u
+#define CLUTCH_TELEMETRY_COUNTS 15u
+#define CLUTCH_TELEMETRY_STATUS 19u
+#define CLUTCH_TELEMETRY_FLAGS 20u
+#define CLUTCH_TELEMETRY_ARRIVAL 21u
+#define CLUTCH_TELEMETRY_STATES 22u
+#define CLUTCH_TELEMETRY_CAUSE 23u
+#define CLUTCH_TELEMETRY_VALUE 24u
+#define CLUTCH_TELEMETRY_LATENESS_US 28u
+#define CLUTCH_TELEMETRY_ERROR 32u
+#define CLUTCH_TELEMETRY_ERROR_RATE 36u
+#define CLUTCH_TELEMETRY_TERM_0 40u
+#define CLUTCH_TELEMETRY_TERM_1 44u
+#define CLUTCH_TELEMETRY_TERM_2 48u
+#define CLUTCH_TELEMETRY_DEMAND 52u
+#define CLUTCH_TELEMETRY_CODE 56u
+#define CLUTCH_TELEMETRY_CYCLES 58u
+typedef struct {
+    uint16_t run; /* The run. */
+    uint16_t number; /* One more with each frame of this kind; wraps. A gap is telemetry that got lost. */
+    uint32_t tick; /* The run's tick, low half. */
+    uint16_t sequence; /* Of the sample. */
+    uint32_t time_us; /* Of the sample. [us] */
+    int32_t counts; /* Of the sample. [counts] */
+    uint8_t status; /* Of the sample: BoardState and flags. */
+    uint8_t flags; /* What the controller saw: bits. */
+    uint8_t arrival; /* How the sample came: the supervisor's number for it. */
+    uint8_t states; /* The supervisor's state after it (high half) and before it (low half). */
+    uint8_t cause; /* Why control ended, if it has: the supervisor's number for it. */
+    uint32_t value; /* What the check that ended it saw. [bits] */
+    uint32_t lateness_us; /* Time that the answer before took. [us] */
+    uint32_t error; /* The error. [bits, rad] */
+    uint32_t error_rate; /* Its rate. [bits, rad/s] */
+    uint32_t term_0; /* First term of the law. [bits] */
+    uint32_t term_1; /* Second term of the law. [bits] */
+    uint32_t term_2; /* Third term of the law. [bits] */
+    uint32_t demand; /* The law's voltage within its limits. [bits, V] */
+    uint16_t code; /* What the converter was given. [DAC code] */
+    uint32_t cycles; /* Clock cycles of the tick before: see Controller.clock_hz. [clock cycles] */
+} clutch_telemetry_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_telemetry(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_telemetry_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_TELEMETRY_KIND;
+    clutch_put_u16(body + CLUTCH_TELEMETRY_RUN, m->run);
+    clutch_put_u16(body + CLUTCH_TELEMETRY_NUMBER, m->number);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_TICK, m->tick);
+    clutch_put_u16(body + CLUTCH_TELEMETRY_SEQUENCE, m->sequence);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_TIME_US, m->time_us);
+    clutch_put_i32(body + CLUTCH_TELEMETRY_COUNTS, m->counts);
+    clutch_put_u8(body + CLUTCH_TELEMETRY_STATUS, m->status);
+    clutch_put_u8(body + CLUTCH_TELEMETRY_FLAGS, m->flags);
+    clutch_put_u8(body + CLUTCH_TELEMETRY_ARRIVAL, m->arrival);
+    clutch_put_u8(body + CLUTCH_TELEMETRY_STATES, m->states);
+    clutch_put_u8(body + CLUTCH_TELEMETRY_CAUSE, m->cause);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_VALUE, m->value);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_LATENESS_US, m->lateness_us);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_ERROR, m->error);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_ERROR_RATE, m->error_rate);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_TERM_0, m->term_0);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_TERM_1, m->term_1);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_TERM_2, m->term_2);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_DEMAND, m->demand);
+    clutch_put_u16(body + CLUTCH_TELEMETRY_CODE, m->code);
+    clutch_put_u32(body + CLUTCH_TELEMETRY_CYCLES, m->cycles);
+    return clutch_frame(wire, body, CLUTCH_TELEMETRY_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_TELEMETRY_KIND. */
+static inline void clutch_get_telemetry(const uint8_t *body, clutch_telemetry_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_TELEMETRY_RUN);
+    m->number = clutch_get_u16(body + CLUTCH_TELEMETRY_NUMBER);
+    m->tick = clutch_get_u32(body + CLUTCH_TELEMETRY_TICK);
+    m->sequence = clutch_get_u16(body + CLUTCH_TELEMETRY_SEQUENCE);
+    m->time_us = clutch_get_u32(body + CLUTCH_TELEMETRY_TIME_US);
+    m->counts = clutch_get_i32(body + CLUTCH_TELEMETRY_COUNTS);
+    m->status = clutch_get_u8(body + CLUTCH_TELEMETRY_STATUS);
+    m->flags = clutch_get_u8(body + CLUTCH_TELEMETRY_FLAGS);
+    m->arrival = clutch_get_u8(body + CLUTCH_TELEMETRY_ARRIVAL);
+    m->states = clutch_get_u8(body + CLUTCH_TELEMETRY_STATES);
+    m->cause = clutch_get_u8(body + CLUTCH_TELEMETRY_CAUSE);
+    m->value = clutch_get_u32(body + CLUTCH_TELEMETRY_VALUE);
+    m->lateness_us = clutch_get_u32(body + CLUTCH_TELEMETRY_LATENESS_US);
+    m->error = clutch_get_u32(body + CLUTCH_TELEMETRY_ERROR);
+    m->error_rate = clutch_get_u32(body + CLUTCH_TELEMETRY_ERROR_RATE);
+    m->term_0 = clutch_get_u32(body + CLUTCH_TELEMETRY_TERM_0);
+    m->term_1 = clutch_get_u32(body + CLUTCH_TELEMETRY_TERM_1);
+    m->term_2 = clutch_get_u32(body + CLUTCH_TELEMETRY_TERM_2);
+    m->demand = clutch_get_u32(body + CLUTCH_TELEMETRY_DEMAND);
+    m->code = clutch_get_u16(body + CLUTCH_TELEMETRY_CODE);
+    m->cycles = clutch_get_u32(body + CLUTCH_TELEMETRY_CYCLES);
+}
+
+/* Ended: Control has ended, and not by a sample. */
+#define CLUTCH_ENDED_KIND 0x8cu
+#define CLUTCH_ENDED_LENGTH 17u
+#define CLUTCH_ENDED_RUN 1u
+#define CLUTCH_ENDED_TICK 3u
+#define CLUTCH_ENDED_STATES 7u
+#define CLUTCH_ENDED_CAUSE 8u
+#define CLUTCH_ENDED_VALUE 9u
+typedef struct {
+    uint16_t run; /* The run. */
+    uint32_t tick; /* The run's tick, low half. */
+    uint8_t states; /* The supervisor's state after it (high half) and before it (low half). */
+    uint8_t cause; /* Why: the supervisor's number for it. */
+    uint32_t value; /* What the check saw. [bits] */
+} clutch_ended_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_ended(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_ended_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_ENDED_KIND;
+    clutch_put_u16(body + CLUTCH_ENDED_RUN, m->run);
+    clutch_put_u32(body + CLUTCH_ENDED_TICK, m->tick);
+    clutch_put_u8(body + CLUTCH_ENDED_STATES, m->states);
+    clutch_put_u8(body + CLUTCH_ENDED_CAUSE, m->cause);
+    clutch_put_u32(body + CLUTCH_ENDED_VALUE, m->value);
+    return clutch_frame(wire, body, CLUTCH_ENDED_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_ENDED_KIND. */
+static inline void clutch_get_ended(const uint8_t *body, clutch_ended_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_ENDED_RUN);
+    m->tick = clutch_get_u32(body + CLUTCH_ENDED_TICK);
+    m->states = clutch_get_u8(body + CLUTCH_ENDED_STATES);
+    m->cause = clutch_get_u8(body + CLUTCH_ENDED_CAUSE);
+    m->value = clutch_get_u32(body + CLUTCH_ENDED_VALUE);
+}
+
+/* Link: What the controller's own line has carried; each second. */
+#define CLUTCH_LINK_KIND 0x8du
+#define CLUTCH_LINK_LENGTH 43u
+#define CLUTCH_LINK_RUN 1u
+#define CLUTCH_LINK_RECEIVED 3u
+#define CLUTCH_LINK_LOST 7u
+#define CLUTCH_LINK_LATE 11u
+#define CLUTCH_LINK_DUPLICATED 15u
+#define CLUTCH_LINK_REORDERED 19u
+#define CLUTCH_LINK_BAD_FRAMES 23u
+#define CLUTCH_LINK_REJECTED 27u
+#define CLUTCH_LINK_DEADLINE_MISSES 31u
+#define CLUTCH_LINK_DROPPED 35u
+typedef struct {
+    uint16_t run; /* The run. */
+    uint32_t received; /* Samples of the run. */
+    uint32_t lost; /* Samples lost. */
+    uint32_t late; /* Samples that a newer one had overtaken. */
+    uint32_t duplicated; /* Samples that came twice. */
+    uint32_t reordered; /* Samples that came after a newer one. */
+    uint32_t bad_frames; /* Frames that were not whole. */
+    uint32_t rejected; /* Samples that were not believed. */
+    uint32_t deadline_misses; /* Answers later than the deadline. */
+    uint32_t dropped; /* Frames to the host that found no room. */
+} clutch_link_t;
+
+/* The frame for the wire; its length, bytes. */
+static inline size_t clutch_encode_link(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_link_t *m)
+{
+    uint8_t body[CLUTCH_MAX_BODY];
+    body[0] = CLUTCH_LINK_KIND;
+    clutch_put_u16(body + CLUTCH_LINK_RUN, m->run);
+    clutch_put_u32(body + CLUTCH_LINK_RECEIVED, m->received);
+    clutch_put_u32(body + CLUTCH_LINK_LOST, m->lost);
+    clutch_put_u32(body + CLUTCH_LINK_LATE, m->late);
+    clutch_put_u32(body + CLUTCH_LINK_DUPLICATED, m->duplicated);
+    clutch_put_u32(body + CLUTCH_LINK_REORDERED, m->reordered);
+    clutch_put_u32(body + CLUTCH_LINK_BAD_FRAMES, m->bad_frames);
+    clutch_put_u32(body + CLUTCH_LINK_REJECTED, m->rejected);
+    clutch_put_u32(body + CLUTCH_LINK_DEADLINE_MISSES, m->deadline_misses);
+    clutch_put_u32(body + CLUTCH_LINK_DROPPED, m->dropped);
+    return clutch_frame(wire, body, CLUTCH_LINK_LENGTH);
+}
+
+/* From the body that clutch_push accepted as CLUTCH_LINK_KIND. */
+static inline void clutch_get_link(const uint8_t *body, clutch_link_t *m)
+{
+    m->run = clutch_get_u16(body + CLUTCH_LINK_RUN);
+    m->received = clutch_get_u32(body + CLUTCH_LINK_RECEIVED);
+    m->lost = clutch_get_u32(body + CLUTCH_LINK_LOST);
+    m->late = clutch_get_u32(body + CLUTCH_LINK_LATE);
+    m->duplicated = clutch_get_u32(body + CLUTCH_LINK_DUPLICATED);
+    m->reordered = clutch_get_u32(body + CLUTCH_LINK_REORDERED);
+    m->bad_frames = clutch_get_u32(body + CLUTCH_LINK_BAD_FRAMES);
+    m->rejected = clutch_get_u32(body + CLUTCH_LINK_REJECTED);
+    m->deadline_misses = clutch_get_u32(body + CLUTCH_LINK_DEADLINE_MISSES);
+    m->dropped = clutch_get_u32(body + CLUTCH_LINK_DROPPED);
+}
+
 /* Bytes before stuffing of a frame of this kind, CRC included; 0 for a kind that is not known. */
 static inline size_t clutch_length(uint8_t kind)
 {
@@ -676,6 +1013,7 @@ static inline size_t clutch_length(uint8_t kind)
     case CLUTCH_ACTUATE_KIND: return CLUTCH_ACTUATE_LENGTH;
     case CLUTCH_STOP_KIND: return CLUTCH_STOP_LENGTH;
     case CLUTCH_PING_KIND: return CLUTCH_PING_LENGTH;
+    case CLUTCH_SET_KIND: return CLUTCH_SET_LENGTH;
     case CLUTCH_HELLO_KIND: return CLUTCH_HELLO_LENGTH;
     case CLUTCH_CONFIGURED_KIND: return CLUTCH_CONFIGURED_LENGTH;
     case CLUTCH_ARMED_KIND: return CLUTCH_ARMED_LENGTH;
@@ -684,6 +1022,11 @@ static inline size_t clutch_length(uint8_t kind)
     case CLUTCH_STOPPED_KIND: return CLUTCH_STOPPED_LENGTH;
     case CLUTCH_PONG_KIND: return CLUTCH_PONG_LENGTH;
     case CLUTCH_REFUSED_KIND: return CLUTCH_REFUSED_LENGTH;
+    case CLUTCH_CONTROLLER_KIND: return CLUTCH_CONTROLLER_LENGTH;
+    case CLUTCH_TAKEN_KIND: return CLUTCH_TAKEN_LENGTH;
+    case CLUTCH_TELEMETRY_KIND: return CLUTCH_TELEMETRY_LENGTH;
+    case CLUTCH_ENDED_KIND: return CLUTCH_ENDED_LENGTH;
+    case CLUTCH_LINK_KIND: return CLUTCH_LINK_LENGTH;
     default: return 0;
     }
 }

@@ -136,21 +136,47 @@ codes! {
         Busy = 10,
         /// The code is above the converter's top; `value` is the code.
         Code = 11,
+        /// A setting that is unknown or missing; `value` is its key.
+        Setting = 12,
+        /// The settings make no run; `value` is the offending one's value as the bits of a real number.
+        Unfit = 13,
+        /// Nothing answers where the controller's encoder and converter should be; `value` is 0.
+        NoBoard = 14,
+        /// `Configure` does not say what the settings say; `value` is 0.
+        Differs = 15,
     }
 }
 
-/// Bits of `Sample.status`: each a constant, and all of them in [`STATUS`].
-macro_rules! status {
-    ($($(#[doc = $doc:literal])+ $name:ident = $value:literal $short:literal;)+) => {
+/// Bits of a field: each a constant, and all of them in one table.
+macro_rules! bits {
+    ($(#[doc = $all:literal])+ $table:ident
+     $($(#[doc = $doc:literal])+ $name:ident = $value:literal $short:literal;)+) => {
         $($(#[doc = $doc])+ pub const $name: u8 = $value;)+
 
-        /// The bits of `Sample.status`.
-        pub const STATUS: &[CodeValue] =
+        $(#[doc = $all])+
+        pub const $table: &[CodeValue] =
             &[$(CodeValue { name: $short, value: $value, doc: concat!($($doc),+) }),+];
     };
 }
 
-status! {
+bits! {
+    /// The bits of `Telemetry.flags`.
+    TELEMETRY
+    /// A newer sample was there already.
+    TELEMETRY_SUPERSEDED = 0x01 "Superseded";
+    /// The sample was answered.
+    TELEMETRY_ANSWERED = 0x02 "Answered";
+    /// The law was asked: error, rate, terms and demand are set.
+    TELEMETRY_ASKED = 0x04 "Asked";
+    /// The path was asked for its target.
+    TELEMETRY_TARGETED = 0x08 "Targeted";
+    /// Which limit decided the voltage: 0 none, 1 the lowest, 2 the highest, 3 a demand that was not a number.
+    TELEMETRY_LIMIT = 0x30 "Limit";
+}
+
+bits! {
+    /// The bits of `Sample.status`.
+    STATUS
     /// The bits that hold the `BoardState`.
     STATUS_STATE = 0x07 "State";
     /// The encoder's reading cannot be trusted.

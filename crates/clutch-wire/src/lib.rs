@@ -32,12 +32,14 @@ mod message;
 
 pub use codes::{
     BoardFault, BoardState, CODES, CodeInfo, CodeValue, Refusal, STATUS, STATUS_DAC_FAULT,
-    STATUS_ENCODER_FAULT, STATUS_LATE, STATUS_STATE, SafeKind, StopReason,
+    STATUS_ENCODER_FAULT, STATUS_LATE, STATUS_STATE, SafeKind, StopReason, TELEMETRY, TELEMETRY_ANSWERED,
+    TELEMETRY_ASKED, TELEMETRY_LIMIT, TELEMETRY_SUPERSEDED, TELEMETRY_TARGETED,
 };
 pub use frame::{Decoder, Frame, FrameError, MAX_BODY, MAX_FRAME, encode};
 pub use message::{
-    Actuate, Arm, Armed, Configure, Configured, Direction, Discover, Fault, FieldInfo, Hello, Message,
-    MessageInfo, Ping, Pong, Refused, SCHEMA, Sample, Stop, Stopped, TABLE,
+    Actuate, Arm, Armed, Configure, Configured, Controller, Direction, Discover, Ended, Fault, FieldInfo,
+    Hello, Link, Message, MessageInfo, Ping, Pong, Refused, SCHEMA, Sample, Set, Stop, Stopped, TABLE, Taken,
+    Telemetry,
 };
 
 /// Version of the protocol: of the rules, of the codes' meanings and of the framing. A change of

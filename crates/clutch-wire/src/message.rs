@@ -253,6 +253,16 @@ messages! {
         nonce: u32,
     }
 
+    /// One setting of the run to come. For boards in the controller role: the loop then runs on them.
+    0x07 ToBoard Set {
+        /// Number of the run to come; the first setting of another run forgets those before.
+        run: u16,
+        /// Which setting.
+        key: u16,
+        /// Its value: a whole number, or the bits of a real one of 32 bits.
+        value: u64,
+    }
+
     /// Who the board is, what it can do, and what it is doing. Answers `Discover`.
     0x81 ToHost Hello {
         /// The nonce of `Discover`.
@@ -363,6 +373,126 @@ messages! {
         reason: u8,
         /// Detail of the reason.
         value: u32,
+    }
+
+    /// A board in the controller role. Answers `Discover`; the `Hello` of the board that it drives follows.
+    0x89 ToHost Controller {
+        /// The nonce of `Discover`.
+        nonce: u32,
+        /// The board's version of the protocol.
+        version: u8,
+        /// The board's schema hash.
+        schema: u64,
+        /// The board's hash of its table of settings.
+        settings: u64,
+        /// The board's own serial number; 0 and 1 are emulated boards.
+        board: u32,
+        /// Another number at each power-up.
+        boot: u32,
+        /// What `Telemetry.cycles` counts; 0 if it counts nothing.
+        clock_hz: u32 ["Hz"],
+        /// Points that a path given as a table may have.
+        knots: u16,
+        /// Where control stands: the supervisor's state.
+        state: u8,
+        /// The latched run; 0 if none since power-up.
+        run: u16,
+        /// The latched hash; 0 if none since power-up.
+        config: u64,
+    }
+
+    /// The setting is taken. Answers `Set`.
+    0x8A ToHost Taken {
+        /// The run.
+        run: u16,
+        /// The setting.
+        key: u16,
+        /// The value, as it was taken.
+        value: u64,
+    }
+
+    /// A sample and what the controller made of it. Real numbers are told as their 32 bits.
+    0x8B ToHost Telemetry {
+        /// The run.
+        run: u16,
+        /// One more with each frame of this kind; wraps. A gap is telemetry that got lost.
+        number: u16,
+        /// The run's tick, low half.
+        tick: u32,
+        /// Of the sample.
+        sequence: u16,
+        /// Of the sample.
+        time_us: u32 ["µs"],
+        /// Of the sample.
+        counts: i32 ["counts"],
+        /// Of the sample: `BoardState` and flags.
+        status: u8,
+        /// What the controller saw: bits.
+        flags: u8,
+        /// How the sample came: the supervisor's number for it.
+        arrival: u8,
+        /// The supervisor's state after it (high half) and before it (low half).
+        states: u8,
+        /// Why control ended, if it has: the supervisor's number for it.
+        cause: u8,
+        /// What the check that ended it saw.
+        value: u32 ["bits"],
+        /// Time that the answer before took.
+        lateness_us: u32 ["µs"],
+        /// The error.
+        error: u32 ["bits, rad"],
+        /// Its rate.
+        error_rate: u32 ["bits, rad/s"],
+        /// First term of the law.
+        term_0: u32 ["bits"],
+        /// Second term of the law.
+        term_1: u32 ["bits"],
+        /// Third term of the law.
+        term_2: u32 ["bits"],
+        /// The law's voltage within its limits.
+        demand: u32 ["bits, V"],
+        /// What the converter was given.
+        code: u16 ["DAC code"],
+        /// Clock cycles of the tick before: see `Controller.clock_hz`.
+        cycles: u32 ["clock cycles"],
+    }
+
+    /// Control has ended, and not by a sample.
+    0x8C ToHost Ended {
+        /// The run.
+        run: u16,
+        /// The run's tick, low half.
+        tick: u32,
+        /// The supervisor's state after it (high half) and before it (low half).
+        states: u8,
+        /// Why: the supervisor's number for it.
+        cause: u8,
+        /// What the check saw.
+        value: u32 ["bits"],
+    }
+
+    /// What the controller's own line has carried; each second.
+    0x8D ToHost Link {
+        /// The run.
+        run: u16,
+        /// Samples of the run.
+        received: u32,
+        /// Samples lost.
+        lost: u32,
+        /// Samples that a newer one had overtaken.
+        late: u32,
+        /// Samples that came twice.
+        duplicated: u32,
+        /// Samples that came after a newer one.
+        reordered: u32,
+        /// Frames that were not whole.
+        bad_frames: u32,
+        /// Samples that were not believed.
+        rejected: u32,
+        /// Answers later than the deadline.
+        deadline_misses: u32,
+        /// Frames to the host that found no room.
+        dropped: u32,
     }
 }
 

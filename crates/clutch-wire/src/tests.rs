@@ -73,7 +73,7 @@ fn frames_of_the_cycle_take_at_most_twenty_bytes() {
     assert_eq!(Sample::LENGTH + 2, 20);
     assert_eq!(Actuate::LENGTH + 2, 15);
     assert_eq!(encode(&sample(0)).as_bytes().len(), 20);
-    assert_eq!(MAX_FRAME, 66);
+    assert_eq!(MAX_FRAME, 68);
 }
 
 #[test]

@@ -66,6 +66,24 @@ pub enum ReferenceParams<'a, T = f64> {
     Table(Table<'a>),
 }
 
+impl<'a, T: Real> ReferenceParams<'a, T> {
+    /// The same in another scalar, each number rounded to the nearest; a table's points are
+    /// integers and stay as they are.
+    #[must_use]
+    pub fn cast<U: Real>(&self) -> ReferenceParams<'a, U> {
+        match self {
+            ReferenceParams::Hold => ReferenceParams::Hold,
+            ReferenceParams::Ramp(rate) => ReferenceParams::Ramp(U::from_f64(rate.to_f64())),
+            ReferenceParams::Trapezoid(p) => ReferenceParams::Trapezoid(p.cast()),
+            ReferenceParams::JerkLimited(p) => ReferenceParams::JerkLimited(p.cast()),
+            ReferenceParams::MinimumJerk(p) => ReferenceParams::MinimumJerk(p.cast()),
+            ReferenceParams::Sine(p) => ReferenceParams::Sine(p.cast()),
+            ReferenceParams::Chirp(p) => ReferenceParams::Chirp(p.cast()),
+            ReferenceParams::Table(table) => ReferenceParams::Table(*table),
+        }
+    }
+}
+
 /// A checked path.
 ///
 /// ```
@@ -127,7 +145,7 @@ impl<'a, T: Real> Reference<'a, T> {
         let target = match &self.kind {
             Kind::Profile(p) => p.at(tick),
             Kind::Wave(w) => w.at(tick),
-            Kind::Table(t, scale) => t.at(tick, scale),
+            Kind::Table(t, scale) => t.scaled(tick, scale),
         };
         Target { position: target.position.plus(self.start), ..target }
     }

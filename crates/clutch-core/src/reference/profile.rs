@@ -1,7 +1,7 @@
 //! Paths made of polynomial pieces: ramp, trapezoid, jerk-limited, minimum jerk.
 
 use super::{Scale, Target, advance, representable_rate};
-use crate::error::require;
+use crate::error::{cast, require};
 use crate::{FixedCounts, ParamError, Real};
 
 /// Rest to rest with a trapezoidal velocity; a triangle where the distance is too short.
@@ -15,6 +15,8 @@ pub struct Trapezoid<T = f64> {
     /// Acceleration and deceleration, rad/s².
     pub acceleration: T,
 }
+
+cast!(Trapezoid { distance, speed, acceleration });
 
 /// Rest to rest with bounded jerk: seven pieces, fewer where a bound is not reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +32,8 @@ pub struct JerkLimited<T = f64> {
     pub jerk: T,
 }
 
+cast!(JerkLimited { distance, speed, acceleration, jerk });
+
 /// Rest to rest along `10 s³ − 15 s⁴ + 6 s⁵`, `s = t/duration` (Flash and Hogan 1985).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
@@ -39,6 +43,8 @@ pub struct MinimumJerk<T = f64> {
     /// Time, s.
     pub duration: T,
 }
+
+cast!(MinimumJerk { distance, duration });
 
 /// One piece: from its first tick until the next piece's.
 #[derive(Clone, Copy, Debug, PartialEq)]

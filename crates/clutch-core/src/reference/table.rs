@@ -118,7 +118,14 @@ impl Table<'_> {
         }
     }
 
-    pub(super) fn at<T: Real>(&self, tick: u64, scale: &Scale<T>) -> Target<T> {
+    /// The target at a tick, from the first point's zero on. For who keeps the points apart from a
+    /// [`super::Reference`]; it checks nothing, and of points that no reference takes it makes some target.
+    #[must_use]
+    pub fn at<T: Real>(&self, tick: u64, encoder: Encoder, period: Micros) -> Target<T> {
+        self.scaled(tick, &Scale::new(encoder, period))
+    }
+
+    pub(super) fn scaled<T: Real>(&self, tick: u64, scale: &Scale<T>) -> Target<T> {
         let time = tick.saturating_mul(scale.period_us);
         let after = self.knots.partition_point(|k| k.time_us <= time);
         let Some(last) = after.checked_sub(1) else {

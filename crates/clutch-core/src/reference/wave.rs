@@ -1,7 +1,7 @@
 //! Sine and chirp on a ramp. The phase is an integer in 2⁻⁶⁴ turns, so it never drifts.
 
 use super::{Scale, Target, advance, representable_rate};
-use crate::error::require;
+use crate::error::{cast, require};
 use crate::{ParamError, Real, sin_cos_turns};
 
 /// `rate · t + amplitude · [sin(2π f t + phase) − sin(phase)]`.
@@ -20,6 +20,8 @@ pub struct Sine<T = f64> {
     pub phase: T,
 }
 
+cast!(Sine { rate, amplitude, frequency, phase });
+
 /// A [`Sine`] whose frequency goes linearly from one value to another and stays there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
@@ -37,6 +39,8 @@ pub struct Chirp<T = f64> {
     /// Phase at the start, in turns; −0.25 starts at the rate of the ramp.
     pub phase: T,
 }
+
+cast!(Chirp { rate, amplitude, from, to, duration, phase });
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Wave<T> {

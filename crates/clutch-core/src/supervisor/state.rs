@@ -25,6 +25,23 @@ pub enum State {
     Faulted = 6,
 }
 
+impl State {
+    /// The one of this number; none if there is none.
+    #[must_use]
+    pub fn from_u8(number: u8) -> Option<State> {
+        const ALL: [State; 7] = [
+            State::Disconnected,
+            State::Ready,
+            State::Armed,
+            State::Running,
+            State::Holding,
+            State::Released,
+            State::Faulted,
+        ];
+        ALL.get(usize::from(number)).copied()
+    }
+}
+
 /// Why control ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
@@ -86,6 +103,19 @@ impl Cause {
 /// A set of checks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Checks(u16);
+
+impl Cause {
+    /// The one of this number; none if there is none.
+    #[must_use]
+    pub fn from_u8(number: u8) -> Option<Cause> {
+        match number {
+            0 => Some(Cause::None),
+            14 => Some(Cause::Operator),
+            15 => Some(Cause::Done),
+            check => Cause::CHECKS.get(usize::from(check).wrapping_sub(1)).copied(),
+        }
+    }
+}
 
 impl Checks {
     /// All of them.
@@ -161,6 +191,20 @@ pub enum Arrival {
 }
 
 impl Arrival {
+    /// The one of this number; none if there is none.
+    #[must_use]
+    pub fn from_u8(number: u8) -> Option<Arrival> {
+        const ALL: [Arrival; 6] = [
+            Arrival::Fresh,
+            Arrival::Missing,
+            Arrival::Duplicate,
+            Arrival::Reordered,
+            Arrival::Late,
+            Arrival::Implausible,
+        ];
+        ALL.get(usize::from(number)).copied()
+    }
+
     /// Whether a period of the board has passed with it.
     #[must_use]
     pub fn is_fresh(self) -> bool {
@@ -320,5 +364,19 @@ impl<T: Real, S> SupervisorState<T, S> {
     #[must_use]
     pub fn deadline_misses(&self) -> u64 {
         self.deadline_misses
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_of_the_wire_names_what_it_was_made_of() {
+        for n in 0..=u8::MAX {
+            assert_eq!(State::from_u8(n).map(|s| s as u8), (n <= 6).then_some(n));
+            assert_eq!(Cause::from_u8(n).map(|c| c as u8), (n <= 15).then_some(n));
+            assert_eq!(Arrival::from_u8(n).map(|a| a as u8), (n <= 5).then_some(n));
+        }
     }
 }

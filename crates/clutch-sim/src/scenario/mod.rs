@@ -245,6 +245,10 @@ impl Scenario {
         let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| at.at("rig", &e))?;
         spec.engine(&rig).map_err(|e| at.message("run.engine", e.to_string()))?;
         self.path().map_err(|e| at.at("reference", &e))?;
+        if self.scalar == ScalarKind::F32 {
+            // What is in range in f64 can be nothing, or beyond everything, in f32.
+            spec.path::<f32>().map_err(|e| at.at("reference", &e))?;
+        }
         let plan = self.make_plan()?;
         self.safety.as_ref().map_or(Ok(()), |s| self.check_safety(s, &plan))?;
         Ok(plan)

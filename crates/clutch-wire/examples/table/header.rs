@@ -1,6 +1,6 @@
 //! The C header: layouts as offsets, and a codec, for boards written in C or C++.
 
-use clutch_wire::{CODES, MAX_BODY, MAX_FRAME, MessageInfo, SCHEMA, STATUS, TABLE, VERSION};
+use clutch_wire::{CODES, MAX_BODY, MAX_FRAME, MessageInfo, SCHEMA, STATUS, TABLE, TELEMETRY, VERSION};
 use std::fmt::Write as _;
 
 /// `HoldThenRelease` as `hold_then_release`.
@@ -50,9 +50,14 @@ fn write_all(out: &mut String) -> std::fmt::Result {
             writeln!(out, "#define {name} {}u /* {} */", v.value, ascii(v.doc))?;
         }
     }
-    writeln!(out, "\n/* Bits of the field status of Sample. */")?;
-    for v in STATUS {
-        writeln!(out, "#define CLUTCH_STATUS_{} {:#04x}u /* {} */", upper(v.name), v.value, ascii(v.doc))?;
+    for (field, prefix, bits) in
+        [("status of Sample", "STATUS", STATUS), ("flags of Telemetry", "TELEMETRY", TELEMETRY)]
+    {
+        writeln!(out, "\n/* Bits of the field {field}. */")?;
+        for v in bits {
+            let name = format!("CLUTCH_{prefix}_{}", upper(v.name));
+            writeln!(out, "#define {name} {:#04x}u /* {} */", v.value, ascii(v.doc))?;
+        }
     }
     out.push_str(CODEC);
     for m in TABLE {

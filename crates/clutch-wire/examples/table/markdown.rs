@@ -1,6 +1,6 @@
 //! The tables of docs/wire.md.
 
-use clutch_wire::{CODES, Direction, MAX_BODY, MAX_FRAME, SCHEMA, STATUS, TABLE, VERSION};
+use clutch_wire::{CODES, Direction, MAX_BODY, MAX_FRAME, SCHEMA, STATUS, TABLE, TELEMETRY, VERSION};
 use std::fmt::Write as _;
 
 const BEGIN: &str = "<!-- table:begin -->\n";
@@ -43,11 +43,13 @@ fn write_all(out: &mut String) -> std::fmt::Result {
             writeln!(out, "| {} | {} | {} |", v.value, v.name, v.doc.trim())?;
         }
     }
-    writeln!(out, "\n### Bits of `Sample.status`\n")?;
-    writeln!(out, "| bits | name | meaning |")?;
-    writeln!(out, "|---|---|---|")?;
-    for v in STATUS {
-        writeln!(out, "| `{:#04x}` | {} | {} |", v.value, v.name, v.doc.trim())?;
+    for (field, bits) in [("Sample.status", STATUS), ("Telemetry.flags", TELEMETRY)] {
+        writeln!(out, "\n### Bits of `{field}`\n")?;
+        writeln!(out, "| bits | name | meaning |")?;
+        writeln!(out, "|---|---|---|")?;
+        for v in bits {
+            writeln!(out, "| `{:#04x}` | {} | {} |", v.value, v.name, v.doc.trim())?;
+        }
     }
     Ok(())
 }

@@ -1,13 +1,38 @@
-//! The controller on the emulated board.
+//! The controller role on the emulated board, over one of two links:
+//!
+//! | files `to_fw` and `from_fw` in the emulator's directory | link |
+//! |---|---|
+//! | are there | lockstep: time and bytes come through them; what `clutch hil` starts |
+//! | are not | UART0 is the host's line, UART1 that of encoder and converter; real time |
+//!
+//! The first does some ten thousand cycles a second and repeats bit for bit. The second is a board as any
+//! other, and a slow one.
 #![no_std]
 #![no_main]
 
+#[path = "../fault.rs"]
+mod fault;
+#[path = "../files.rs"]
+mod files;
+#[path = "../lockstep.rs"]
+mod lockstep;
 #[path = "../panic.rs"]
 mod panic;
+#[path = "../serial.rs"]
+mod serial;
 
+use clutch_node::{Onboard, OnboardParams};
 use cortex_m_rt::entry;
+
+/// Serial number of the emulated board: one that keeps its own time.
+const BOARD: u32 = 1;
 
 #[entry]
 fn main() -> ! {
-    semihosting::process::exit(0)
+    // No cycle counter: the emulator does not know how long an instruction takes.
+    let node = Onboard::new(OnboardParams { board: BOARD, boot: 1, clock_hz: 0 });
+    match lockstep::Link::open() {
+        Some(link) => lockstep::run(link, node),
+        None => serial::run(node),
+    }
 }

@@ -1,0 +1,410 @@
+//! The controller role: the loop runs on the board, and a host looks on.
+//!
+//! ```text
+//!            Set… Configure Arm Stop Ping            Configure Arm Actuate Stop
+//!   host ────────────────────────────────► Onboard ───────────────────────────► encoder and
+//!        ◄──────────────────────────────── (loop)  ◄─────────────────────────── converter
+//!          Taken Configured Armed Telemetry           Configured Armed Sample
+//! ```
+//!
+//! Towards encoder and converter it is a [`ControlNode`], the one that runs on Linux; they are a
+//! [`crate::BoardNode`] behind another serial line, or on the same chip ([`crate::Standalone`]). Towards
+//! the host it speaks the same protocol as a board, with settings before and telemetry instead of
+//! samples. A host that falls silent ends the run in the safe state.
+
+use crate::control::{ControlNode, ControlParams, Notice};
+use crate::outbox::Outbox;
+use crate::settings::{Built, MAX_KNOTS, Misfit, Path, SETTINGS_HASH, Settings};
+use crate::telemetry::{frame, states};
+use clutch_core::law::LawTerms;
+use clutch_core::supervisor::State;
+use clutch_core::{DacCode, Micros};
+use clutch_wire::{
+    Armed, BoardState, Configure, Configured, Controller, Decoder, Discover, Ended, Hello, Link, Message,
+    Pong, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION,
+};
+
+/// What a board in the controller role is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OnboardParams {
+    /// Its serial number; 0 and 1 are emulated boards.
+    pub board: u32,
+    /// A number that changes at each power-up.
+    pub boot: u32,
+    /// What [`Onboard::spent`] counts, Hz; 0 if it is not called.
+    pub clock_hz: u32,
+}
+
+/// Frames on their way out.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ports {
+    /// To the host.
+    pub host: Outbox,
+    /// To encoder and converter.
+    pub daq: Outbox,
+}
+
+/// How often the host is told what the line has carried.
+const LINK_EVERY_NS: u64 = 1_000_000_000;
+
+/// A run that the host has configured.
+#[derive(Clone, Debug)]
+struct Run {
+    control: ControlNode<f32>,
+    path: Path,
+    number: u16,
+    config: u64,
+    ticks: u64,
+    host_silence_ns: u64,
+    /// Telemetry so far.
+    told: u16,
+}
+
+/// The controller role's state machine. Times are the board's monotonic clock, ns.
+#[derive(Clone, Debug)]
+pub struct Onboard {
+    params: OnboardParams,
+    decoder: Decoder,
+    settings: Settings,
+    /// The run that the settings are for.
+    settings_run: u16,
+    /// Hears encoder and converter before the first run.
+    introduced: Decoder,
+    /// Encoder and converter, once they have answered.
+    hello: Option<Hello>,
+    run: Option<Run>,
+    heard_ns: u64,
+    linked_ns: u64,
+    spent: u32,
+}
+
+type Cycle = Notice<f32, LawTerms<f32>>;
+
+impl Onboard {
+    /// A board at power-up.
+    #[must_use]
+    pub fn new(params: OnboardParams) -> Self {
+        Onboard {
+            params,
+            decoder: Decoder::new(),
+            settings: Settings::default(),
+            settings_run: 0,
+            introduced: Decoder::new(),
+            hello: None,
+            run: None,
+            heard_ns: 0,
+            linked_ns: 0,
+            spent: 0,
+        }
+    }
+
+    /// Where control stands.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.run.as_ref().map_or(State::Disconnected, |r| r.control.state().state())
+    }
+
+    /// Whether it drives, or has the consent to.
+    #[must_use]
+    pub fn driving(&self) -> bool {
+        self.run.as_ref().is_some_and(Run::driving)
+    }
+
+    /// What tells encoder and converter to go to the safe state, for a handler that can trust nothing else;
+    /// none while nothing is driven.
+    #[must_use]
+    pub fn last_word(&self) -> Option<Outbox> {
+        let run = self.run.as_ref().filter(|r| r.driving())?;
+        let mut out = Outbox::default();
+        out.push(&Message::Stop(Stop { run: run.number, reason: StopReason::Fault as u8 }));
+        Some(out)
+    }
+
+    /// Clock cycles that the last tick took, for the telemetry of the next.
+    pub fn spent(&mut self, cycles: u32) {
+        self.spent = cycles;
+    }
+
+    /// The answer to the last sample has been written, and took so long.
+    pub fn answered(&mut self, lateness: Micros) {
+        if let Some(run) = &mut self.run {
+            run.control.answered(lateness);
+        }
+    }
+
+    /// When [`Onboard::poll`] has to be called at the latest, ns; none while nothing is awaited.
+    #[must_use]
+    pub fn poll_at(&self) -> Option<u64> {
+        let run = self.run.as_ref()?;
+        let host = (run.driving() && run.host_silence_ns > 0)
+            .then(|| self.heard_ns.saturating_add(run.host_silence_ns));
+        match (run.control.poll_at(), host) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// Looks at the clock: silence of encoder and converter, silence of the host.
+    pub fn poll(&mut self, now_ns: u64, out: &mut Ports) {
+        let Some(run) = &mut self.run else { return };
+        let (number, from) = (run.number, run.control.state().state());
+        let mut ended = None;
+        run.control.poll(now_ns, &mut out.daq, &mut |n: Cycle| {
+            if let Notice::Ended(cause) = n {
+                ended = Some(cause);
+            }
+        });
+        let silent = now_ns.saturating_sub(self.heard_ns);
+        if run.driving() && run.host_silence_ns > 0 && silent >= run.host_silence_ns {
+            run.control.stop(StopReason::Operator, &mut out.daq);
+            ended = Some(run.control.state().cause());
+        }
+        if ended.is_some() {
+            tell_end(run, number, from, &mut out.host);
+        }
+    }
+
+    /// Bytes from the host.
+    pub fn host(&mut self, now_ns: u64, bytes: &[u8], out: &mut Ports) {
+        for byte in bytes {
+            if let Some(Ok(message)) = self.decoder.push(*byte) {
+                self.heard_ns = now_ns;
+                self.message(now_ns, &message, out);
+            }
+        }
+    }
+
+    /// Bytes from encoder and converter.
+    pub fn daq(&mut self, now_ns: u64, bytes: &[u8], out: &mut Ports) {
+        let spent = core::mem::take(&mut self.spent);
+        let Some(run) = &mut self.run else {
+            self.introduction(bytes, out);
+            return;
+        };
+        let mut from = run.control.state().state();
+        let (number, config, boot) = (run.number, run.config, self.params.boot);
+        let (host, told, path, points) = (&mut out.host, &mut run.told, &run.path, self.settings.points());
+        let (mut ended, mut hello) = (false, None);
+        let at = |tick: u64| path.target(points, tick);
+        run.control.receive(now_ns, bytes, &at, &mut out.daq, &mut |n: Cycle| match n {
+            Notice::Cycle(mut n) => {
+                n.cycles = spent;
+                from = n.cycle.state;
+                *told = told.wrapping_add(1);
+                host.push(&Message::Telemetry(frame(number, *told, &n)));
+            }
+            Notice::Configured => host.push(&Message::Configured(Configured { run: number, config, boot })),
+            Notice::Armed => host.push(&Message::Armed(Armed { run: number, config })),
+            Notice::Refused(m) => host.push(&Message::Refused(m)),
+            Notice::Pong(nonce, time_us) => {
+                host.push(&Message::Pong(Pong { run: number, nonce, time_us }));
+            }
+            Notice::Stopped(m) => host.push(&Message::Stopped(m)),
+            Notice::BoardFault(m) => host.push(&Message::Fault(m)),
+            Notice::Ended(_) => ended = true,
+            Notice::Hello(m) => hello = Some(m),
+            Notice::Controller(_) | Notice::BadFrame(_) | Notice::Echo => {}
+        });
+        if let Some(m) = hello {
+            self.hello = Some(m);
+            host.push(&Message::Hello(m));
+        }
+        if ended {
+            tell_end(run, number, from, &mut out.host);
+        }
+        let state = run.control.state();
+        if state.state() == State::Running && state.tick().saturating_add(1) >= run.ticks {
+            run.control.stop(StopReason::Done, &mut out.daq);
+            tell_end(run, number, State::Running, &mut out.host);
+        }
+        if run.driving() && now_ns.saturating_sub(self.linked_ns) >= LINK_EVERY_NS {
+            self.linked_ns = now_ns;
+            tell_link(run, &mut out.host);
+        }
+    }
+
+    /// Before there is a run: who are encoder and converter?
+    fn introduction(&mut self, bytes: &[u8], out: &mut Ports) {
+        for byte in bytes {
+            if let Some(Ok(Message::Hello(m))) = self.introduced.push(*byte) {
+                self.hello = Some(m);
+                out.host.push(&Message::Hello(m));
+            }
+        }
+    }
+
+    fn message(&mut self, now_ns: u64, message: &Message, out: &mut Ports) {
+        match message {
+            Message::Discover(m) => self.discover(m, out),
+            Message::Set(m) => self.set(m, &mut out.host),
+            Message::Configure(m) => {
+                if let Err((reason, value)) = self.configure(now_ns, m, out) {
+                    let request = Configure::KIND;
+                    out.host.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
+                }
+            }
+            Message::Arm(m) => match &mut self.run {
+                Some(run) if run.number == m.run && run.config == m.config => run.control.arm(&mut out.daq),
+                _ => {
+                    let (reason, value) = (Refusal::Run as u8, self.number().into());
+                    let request = clutch_wire::Arm::KIND;
+                    out.host.push(&Message::Refused(Refused { request, reason, value }));
+                }
+            },
+            Message::Stop(m) => self.stop(m, out),
+            Message::Ping(m) => match &mut self.run {
+                Some(run) if run.number == m.run => run.control.ping(m.nonce, &mut out.daq),
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+
+    fn number(&self) -> u16 {
+        self.run.as_ref().map_or(0, |r| r.number)
+    }
+
+    fn discover(&mut self, m: &Discover, out: &mut Ports) {
+        let request = Discover::KIND;
+        let refusal = if m.version != VERSION {
+            Some((Refusal::Version, u32::from(VERSION)))
+        } else if m.schema != SCHEMA {
+            Some((Refusal::Schema, SCHEMA as u32))
+        } else {
+            None
+        };
+        if let Some((reason, value)) = refusal {
+            out.host.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
+            return;
+        }
+        out.host.push(&Message::Controller(Controller {
+            nonce: m.nonce,
+            version: VERSION,
+            schema: SCHEMA,
+            settings: SETTINGS_HASH,
+            board: self.params.board,
+            boot: self.params.boot,
+            clock_hz: self.params.clock_hz,
+            knots: MAX_KNOTS as u16,
+            state: self.state() as u8,
+            run: self.number(),
+            config: self.run.as_ref().map_or(0, |r| r.config),
+        }));
+        out.daq.push(&Message::Discover(*m));
+    }
+
+    fn set(&mut self, m: &Set, host: &mut Outbox) {
+        let refusal = if self.driving() {
+            Some((Refusal::State, self.state() as u32))
+        } else {
+            if m.run != self.settings_run {
+                self.settings = Settings::default();
+                self.settings_run = m.run;
+            }
+            (!self.settings.set(m.key, m.value)).then_some((Refusal::Setting, u32::from(m.key)))
+        };
+        host.push(&match refusal {
+            None => Message::Taken(Taken { run: m.run, key: m.key, value: m.value }),
+            Some((reason, value)) => {
+                Message::Refused(Refused { request: Set::KIND, reason: reason as u8, value })
+            }
+        });
+    }
+
+    fn configure(&mut self, now_ns: u64, m: &Configure, out: &mut Ports) -> Result<(), (Refusal, u32)> {
+        if self.driving() {
+            return Err((Refusal::State, self.state() as u32));
+        }
+        let Some(hello) = self.hello else { return Err((Refusal::NoBoard, 0)) };
+        if m.run != self.settings_run {
+            return Err((Refusal::Run, self.settings_run.into()));
+        }
+        let built: Built = self.settings.build().map_err(|misfit| match misfit {
+            Misfit::Missing(key) | Misfit::Unknown(key) => (Refusal::Setting, u32::from(key)),
+            Misfit::Param(e) => (Refusal::Unfit, e.value.to_bits()),
+        })?;
+        let n = &self.settings.numbers;
+        let params = ControlParams {
+            run: m.run,
+            config: m.config,
+            watchdog: Micros(n.watchdog_us),
+            valid: Micros(n.valid_us),
+            silence: Micros(n.silence_us),
+        };
+        let mut control = ControlNode::new(params, built.servo, built.supervisor);
+        // What the host asks for and what the settings say is one run, or none.
+        if control.configuration() != *m {
+            return Err((Refusal::Differs, 0));
+        }
+        control.configure(present_code(&hello, built.supervisor.safe_codes().hold), &mut out.daq);
+        self.run = Some(Run {
+            control,
+            path: built.path,
+            number: m.run,
+            config: m.config,
+            ticks: n.ticks,
+            host_silence_ns: u64::from(n.host_silence_us).saturating_mul(1000),
+            told: 0,
+        });
+        self.linked_ns = now_ns;
+        Ok(())
+    }
+
+    fn stop(&mut self, m: &Stop, out: &mut Ports) {
+        let Some(run) = self.run.as_mut().filter(|r| r.number == m.run) else { return };
+        let from = run.control.state().state();
+        let reason = if m.reason == StopReason::Done as u8 { StopReason::Done } else { StopReason::Operator };
+        run.control.stop(reason, &mut out.daq);
+        if run.control.state().state() == from {
+            // It has ended before; the host asks again until it hears so.
+            let code = run.control.state().code().0;
+            out.host.push(&Message::Stopped(Stopped { run: m.run, reason: m.reason, code }));
+        } else {
+            tell_end(run, m.run, from, &mut out.host);
+        }
+    }
+}
+
+impl Run {
+    fn driving(&self) -> bool {
+        matches!(self.control.state().state(), State::Armed | State::Running)
+    }
+}
+
+fn tell_end(run: &Run, number: u16, from: State, host: &mut Outbox) {
+    let state = run.control.state();
+    host.push(&Message::Ended(Ended {
+        run: number,
+        tick: state.tick() as u32,
+        states: states(from, state.state()),
+        cause: state.cause() as u8,
+        value: state.value().to_bits(),
+    }));
+    tell_link(run, host);
+}
+
+fn tell_link(run: &Run, host: &mut Outbox) {
+    let (counts, state) = (run.control.counts(), run.control.state());
+    host.push(&Message::Link(Link {
+        run: run.number,
+        received: counts.received as u32,
+        lost: state.lost() as u32,
+        late: counts.late as u32,
+        duplicated: counts.duplicated as u32,
+        reordered: counts.reordered as u32,
+        bad_frames: counts.bad_frames as u32,
+        rejected: state.rejected() as u32,
+        deadline_misses: state.deadline_misses() as u32,
+        dropped: host.dropped(),
+    }));
+}
+
+/// The code that a converter has before the first answer of a run: that of power-up, or the safe
+/// state's of the run before.
+#[must_use]
+pub fn present_code(hello: &Hello, hold: DacCode) -> DacCode {
+    match BoardState::from_u8(hello.state) {
+        Some(BoardState::Boot) => DacCode(hello.boot_code),
+        _ => hold,
+    }
+}

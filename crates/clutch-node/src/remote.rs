@@ -1,0 +1,328 @@
+//! The host's end of a board in the controller role: it configures, consents, and hears.
+
+use crate::control::{LinkCounts, Notice};
+use crate::outbox::Outbox;
+use crate::settings::Settings;
+use crate::telemetry::{both_states, notice};
+use clutch_core::law::{Law, LawTerms};
+use clutch_core::supervisor::{Cause, State};
+use clutch_core::{FixedCounts, Servo, Target};
+use clutch_wire::{
+    Arm, Configure, Controller, Decoder, Discover, Message, Ping, SCHEMA, Set, Stop, StopReason, Taken,
+    Telemetry, VERSION,
+};
+
+/// Where control stands, as the board told last.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Told {
+    /// The supervisor's state.
+    pub state: State,
+    /// Why control ended.
+    pub cause: Cause,
+    /// What the check that ended it saw.
+    pub value: f32,
+    /// The run's tick.
+    pub tick: u64,
+    /// Samples lost.
+    pub lost: u64,
+    /// Samples that were not believed.
+    pub rejected: u64,
+    /// Answers later than the deadline.
+    pub deadline_misses: u64,
+    /// Telemetry that did not come.
+    pub untold: u64,
+}
+
+/// The host's state machine for a board in the controller role. Times are the host's monotonic
+/// clock, ns.
+#[derive(Clone, Debug)]
+pub struct RemoteNode {
+    servo: Servo<f32>,
+    configure: Configure,
+    decoder: Decoder,
+    told: Told,
+    counts: LinkCounts,
+    controller: Option<Controller>,
+    origin: FixedCounts,
+    /// Number of the last telemetry.
+    number: Option<u16>,
+    heard_ns: Option<u64>,
+    /// A frame that shows that the host lives is due then.
+    due_ns: u64,
+    alive_ns: u64,
+    silent_ns: u64,
+    pings: u32,
+    stopping: Option<StopReason>,
+    /// The setting that was taken last.
+    taken: Option<Taken>,
+}
+
+impl RemoteNode {
+    /// For a run: `servo` as the board builds it, `configure` as a [`crate::ControlNode`] of the same run
+    /// gives it. The board hears from the host each `alive_ns`; if nothing comes from it for `silent_ns`,
+    /// control has ended for the host.
+    #[must_use]
+    pub fn new(servo: Servo<f32>, configure: Configure, alive_ns: u64, silent_ns: u64) -> Self {
+        RemoteNode {
+            servo,
+            configure,
+            decoder: Decoder::new(),
+            told: Told::default(),
+            counts: LinkCounts::default(),
+            controller: None,
+            origin: FixedCounts(0),
+            number: None,
+            heard_ns: None,
+            due_ns: 0,
+            alive_ns,
+            silent_ns,
+            pings: 0,
+            stopping: None,
+            taken: None,
+        }
+    }
+
+    /// Where control stands.
+    #[must_use]
+    pub fn told(&self) -> &Told {
+        &self.told
+    }
+
+    /// What the board's own line has carried.
+    #[must_use]
+    pub fn counts(&self) -> &LinkCounts {
+        &self.counts
+    }
+
+    /// The board, once it has answered.
+    #[must_use]
+    pub fn controller(&self) -> Option<&Controller> {
+        self.controller.as_ref()
+    }
+
+    /// The servo.
+    #[must_use]
+    pub fn servo(&self) -> &Servo<f32> {
+        &self.servo
+    }
+
+    /// Where the path begins.
+    #[must_use]
+    pub fn origin(&self) -> FixedCounts {
+        self.origin
+    }
+
+    /// Asks who is there.
+    pub fn discover(&mut self, nonce: u32, out: &mut Outbox) {
+        out.push(&Message::Discover(Discover { nonce, version: VERSION, schema: SCHEMA }));
+    }
+
+    /// Sends a setting.
+    pub fn set(&mut self, key: u16, value: u64, out: &mut Outbox) {
+        out.push(&Message::Set(Set { run: self.configure.run, key, value }));
+    }
+
+    /// Whether the board has taken this setting, with this value.
+    #[must_use]
+    pub fn has_taken(&self, key: u16, value: u64) -> bool {
+        self.taken == Some(Taken { run: self.configure.run, key, value })
+    }
+
+    /// Sends all settings at once, to a board whose line loses nothing.
+    pub fn set_all(&mut self, settings: &Settings, mut send: impl FnMut(&Outbox)) {
+        let mut out = Outbox::default();
+        settings.each(|key, value| {
+            out.clear();
+            self.set(key, value, &mut out);
+            send(&out);
+        });
+    }
+
+    /// Tells the board of the run, whose settings it has.
+    pub fn configure(&mut self, out: &mut Outbox) {
+        out.push(&Message::Configure(self.configure));
+    }
+
+    /// Consent.
+    pub fn arm(&mut self, out: &mut Outbox) {
+        out.push(&Message::Arm(Arm { run: self.configure.run, config: self.configure.config }));
+    }
+
+    /// Asks for the clock of encoder and converter.
+    pub fn ping(&mut self, nonce: u32, out: &mut Outbox) {
+        out.push(&Message::Ping(Ping { run: self.configure.run, nonce }));
+    }
+
+    /// Asks the board to end control: `Done` or `Operator`.
+    pub fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
+        self.stopping.get_or_insert(reason);
+        out.push(&Message::Stop(Stop { run: self.configure.run, reason: reason as u8 }));
+    }
+
+    /// The line is gone. The board goes on until it misses its host.
+    pub fn disconnect(&mut self) {
+        if matches!(self.told.state, State::Armed | State::Running) {
+            (self.told.state, self.told.cause) = (State::Faulted, Cause::Silence);
+        } else if self.told.state != State::Faulted {
+            self.told.state = State::Disconnected;
+        }
+    }
+
+    fn driving(&self) -> bool {
+        matches!(self.told.state, State::Armed | State::Running)
+    }
+
+    /// When [`RemoteNode::poll`] has to be called at the latest, ns.
+    #[must_use]
+    pub fn poll_at(&self) -> Option<u64> {
+        self.driving()
+            .then(|| self.heard_ns.map_or(self.due_ns, |t| t.saturating_add(self.silent_ns).min(self.due_ns)))
+    }
+
+    /// Looks at the clock: shows that the host lives, and whether the board does.
+    pub fn poll(
+        &mut self,
+        now_ns: u64,
+        out: &mut Outbox,
+        notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
+    ) {
+        if !self.driving() {
+            return;
+        }
+        if now_ns >= self.due_ns {
+            self.due_ns = now_ns.saturating_add(self.alive_ns);
+            self.pings = self.pings.wrapping_add(1);
+            // Not a number that somebody asks the clock with.
+            self.ping(self.pings | 1 << 31, out);
+            if let Some(reason) = self.stopping {
+                self.stop(reason, out);
+            }
+        }
+        if self.heard_ns.is_some_and(|t| now_ns.saturating_sub(t) >= self.silent_ns) {
+            (self.told.state, self.told.cause) = (State::Faulted, Cause::Silence);
+            notices(Notice::Ended(Cause::Silence));
+        }
+    }
+
+    /// Bytes from the board. `path` is the planned path from position 0 on.
+    pub fn receive(
+        &mut self,
+        now_ns: u64,
+        bytes: &[u8],
+        path: &impl Fn(u64) -> Target<f32>,
+        notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
+    ) {
+        for byte in bytes {
+            match self.decoder.push(*byte) {
+                None => {}
+                Some(Ok(message)) => self.message(now_ns, &message, path, notices),
+                Some(Err(error)) => notices(Notice::BadFrame(error)),
+            }
+        }
+    }
+
+    fn message(
+        &mut self,
+        now_ns: u64,
+        message: &Message,
+        path: &impl Fn(u64) -> Target<f32>,
+        notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
+    ) {
+        let (run, config) = (self.configure.run, self.configure.config);
+        match message {
+            Message::Controller(m) => {
+                self.controller = Some(*m);
+                notices(Notice::Controller(*m));
+            }
+            Message::Hello(m) => notices(Notice::Hello(*m)),
+            Message::Taken(m) => self.taken = Some(*m),
+            Message::Configured(m) if m.run == run && m.config == config => {
+                if self.told.state == State::Disconnected {
+                    self.told.state = State::Ready;
+                }
+                notices(Notice::Configured);
+            }
+            Message::Armed(m) if m.run == run && m.config == config => {
+                if self.told.state == State::Ready {
+                    self.told = Told { state: State::Armed, ..Told::default() };
+                    (self.heard_ns, self.due_ns) = (Some(now_ns), now_ns);
+                }
+                notices(Notice::Armed);
+            }
+            Message::Refused(m) => notices(Notice::Refused(*m)),
+            Message::Pong(m) if m.run == run => notices(Notice::Pong(m.nonce, m.time_us)),
+            Message::Stopped(m) if m.run == run => notices(Notice::Stopped(*m)),
+            Message::Fault(m) if m.run == run => notices(Notice::BoardFault(*m)),
+            Message::Telemetry(m) if m.run == run => self.telemetry(now_ns, m, path, notices),
+            Message::Ended(m) if m.run == run => {
+                let Some((_, state)) = both_states(m.states) else { return };
+                // Told again, it is not news.
+                if state == self.told.state || !self.driving() {
+                    return;
+                }
+                self.told.state = state;
+                self.told.cause = Cause::from_u8(m.cause).unwrap_or_default();
+                self.told.value = f32::from_bits(m.value);
+                notices(Notice::Ended(self.told.cause));
+            }
+            Message::Link(m) if m.run == run => {
+                let wide = u64::from;
+                self.counts = LinkCounts {
+                    received: wide(m.received),
+                    bad_frames: wide(m.bad_frames),
+                    foreign: 0,
+                    late: wide(m.late),
+                    duplicated: wide(m.duplicated),
+                    reordered: wide(m.reordered),
+                };
+                self.told.lost = wide(m.lost);
+                self.told.rejected = wide(m.rejected);
+                self.told.deadline_misses = wide(m.deadline_misses);
+            }
+            Message::Discover(_)
+            | Message::Configure(_)
+            | Message::Arm(_)
+            | Message::Actuate(_)
+            | Message::Stop(_)
+            | Message::Ping(_)
+            | Message::Set(_) => notices(Notice::Echo),
+            // Of another run.
+            _ => {}
+        }
+    }
+
+    fn telemetry(
+        &mut self,
+        now_ns: u64,
+        m: &Telemetry,
+        path: &impl Fn(u64) -> Target<f32>,
+        notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
+    ) {
+        self.heard_ns = Some(now_ns);
+        if let Some(last) = self.number {
+            let gap = m.number.wrapping_sub(last).wrapping_sub(1);
+            self.told.untold = self.told.untold.wrapping_add(u64::from(gap));
+        }
+        self.number = Some(m.number);
+        // The tick's high half is ours to know.
+        let ahead = m.tick.wrapping_sub(self.told.tick as u32).cast_signed();
+        let tick = self.told.tick.wrapping_add_signed(i64::from(ahead));
+        if both_states(m.states).is_some_and(|(from, _)| from == State::Armed) {
+            self.origin = FixedCounts::from_counts(i64::from(m.counts));
+        }
+        let target = path(tick);
+        let target = Target { position: target.position.plus(self.origin), ..target };
+        let kind = match self.servo.law() {
+            Law::Pd(_) => LawTerms::Pd(Default::default()),
+            Law::Ctc(_) => LawTerms::Ctc(Default::default()),
+            Law::Smc(_) => LawTerms::Smc(Default::default()),
+        };
+        let Some(notice) = notice(m, &kind, self.servo.dac(), tick, target) else { return };
+        let cycle = &notice.cycle;
+        self.told.tick = tick;
+        self.told.state = cycle.state;
+        self.told.cause = cycle.cause;
+        self.told.value = cycle.value;
+        notices(Notice::Cycle(notice));
+    }
+}

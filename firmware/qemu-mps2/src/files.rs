@@ -1,0 +1,51 @@
+//! Files of the machine that runs the emulator.
+
+use core::ffi::CStr;
+use core::mem::forget;
+use semihosting::fd::{AsFd as _, BorrowedFd, RawFd};
+use semihosting::{fs::File, sys};
+
+/// An open file, which is never closed: the image ends with the emulator.
+#[derive(Clone, Copy)]
+pub struct HostFile(RawFd);
+
+impl HostFile {
+    /// Opens a file to read.
+    pub fn open(path: &CStr) -> Option<HostFile> {
+        HostFile::keep(File::open(path).ok()?)
+    }
+
+    /// Opens a file to write; without creating it that is refused.
+    pub fn create(path: &CStr) -> Option<HostFile> {
+        HostFile::keep(File::create(path).ok()?)
+    }
+
+    fn keep(file: File) -> Option<HostFile> {
+        let fd = file.as_fd().as_raw_fd();
+        forget(file);
+        Some(HostFile(fd))
+    }
+
+    /// Borrowing asserts what is asked here first; so no panic is left.
+    fn fd(&self) -> Option<BorrowedFd<'_>> {
+        // SAFETY: never closed.
+        (self.0 != -1).then(|| unsafe { BorrowedFd::borrow_raw(self.0) })
+    }
+
+    /// Reads some bytes; how many, and none at the end or on an error.
+    pub fn read(&self, buffer: &mut [u8]) -> usize {
+        self.fd().and_then(|fd| sys::read(fd, buffer).ok()).unwrap_or(0)
+    }
+
+    /// Writes all bytes; whether that was possible.
+    pub fn write(&self, mut bytes: &[u8]) -> bool {
+        while !bytes.is_empty() {
+            let written = self.fd().and_then(|fd| sys::write(fd, bytes).ok()).filter(|n| *n > 0);
+            match written.and_then(|n| bytes.get(n..)) {
+                Some(rest) => bytes = rest,
+                None => return false,
+            }
+        }
+        true
+    }
+}

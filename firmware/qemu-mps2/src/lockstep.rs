@@ -1,0 +1,86 @@
+//! Lockstep over two files: each request brings the time and what has arrived, each answer takes back
+//! what is to be sent.
+
+use crate::fault;
+use crate::files::HostFile;
+use clutch_core::Micros;
+use clutch_node::exchange::{Exchange, LONGEST};
+use clutch_node::{Onboard, Ports};
+use semihosting::process;
+
+/// A request at this time is a test's: the processor is to fail.
+const FAIL_AT: u64 = u64::MAX;
+
+/// Both files.
+pub struct Link {
+    requests: HostFile,
+    answers: HostFile,
+}
+
+impl Link {
+    /// The files, if there are any.
+    pub fn open() -> Option<Link> {
+        Some(Link { requests: HostFile::open(c"to_fw")?, answers: HostFile::create(c"from_fw")? })
+    }
+
+    /// Writes an answer whole.
+    fn answer(&self, answer: &Exchange<'_>) -> bool {
+        let mut buffer = [0; LONGEST];
+        let bytes = answer.write(&mut buffer).and_then(|n| buffer.get(..n));
+        bytes.is_some_and(|bytes| self.answers.write(bytes))
+    }
+}
+
+/// Answers until the files are closed.
+pub fn run(link: Link, mut node: Onboard) -> ! {
+    let mut buffer = [0; LONGEST];
+    let mut used = 0;
+    let mut ports = Ports::default();
+    loop {
+        // One read brings one request, as its writer writes it in one piece; but nothing promises that.
+        let whole = Exchange::length(buffer.get(..used).unwrap_or(&[]));
+        if whole.is_none_or(|n| n > used) {
+            let Some(room) = buffer.get_mut(used..).filter(|r| !r.is_empty()) else { process::exit(2) };
+            match link.requests.read(room) {
+                0 => process::exit(0),
+                count => used = used.wrapping_add(count),
+            }
+            continue;
+        }
+        let Some(request) = buffer.get(..used).and_then(Exchange::read) else { process::exit(2) };
+        if request.time_ns == FAIL_AT {
+            fault::fail();
+        }
+        node.answered(Micros(request.lateness_us));
+        cycle(&mut node, &request, &mut ports);
+        let answer = Exchange {
+            time_ns: node.poll_at().unwrap_or(u64::MAX),
+            lateness_us: 0,
+            host: ports.host.as_bytes(),
+            daq: ports.daq.as_bytes(),
+        };
+        if !link.answer(&answer) {
+            process::exit(3);
+        }
+        fault::prepare(node.last_word());
+        ports.host.clear();
+        ports.daq.clear();
+        used = 0;
+    }
+}
+
+/// What has arrived goes in, what is due comes out.
+fn cycle(node: &mut Onboard, request: &Exchange<'_>, ports: &mut Ports) {
+    node.host(request.time_ns, request.host, ports);
+    if !request.daq.is_empty() {
+        node.daq(request.time_ns, request.daq, ports);
+    }
+    node.poll(request.time_ns, ports);
+}
+
+/// The last word of a processor that has failed.
+pub fn last_word(frame: &[u8]) {
+    if let Some(link) = Link::open() {
+        let _ = link.answer(&Exchange { time_ns: u64::MAX, lateness_us: 0, host: &[], daq: frame });
+    }
+}
