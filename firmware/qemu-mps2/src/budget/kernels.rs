@@ -3,8 +3,7 @@
 
 use clutch_core::law::{Controller, Ctc, OutputState, Pd, Smc, Tick};
 use clutch_core::{Counts, Servo, ServoState, Target};
-use clutch_node::{ControlNode, Notice, Outbox};
-use clutch_core::reference::Reference;
+use clutch_node::{Onboard, Ports};
 use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
 
 /// Bytes of one frame, as they come over the line: one delimiter, at their end.
@@ -98,21 +97,18 @@ pub extern "C" fn encode_actuate(answer: &Actuate, frame: &mut Option<Frame>) {
     *frame = Some(encode(&Message::Actuate(*answer)));
 }
 
-/// A controller with its path.
-pub struct Session {
-    pub node: ControlNode<f32>,
-    pub path: Reference<'static, f32>,
-    pub out: Outbox,
-    pub now_ns: u64,
-    /// What the last notice told, so that none of it is left out.
-    pub told: Option<Notice<f32, clutch_core::law::LawTerms<f32>>>,
-}
-
-/// A frame in, the answer's frame out: a period of the controller.
+/// A frame of encoder and converter in, those for them and for the host out: a period of the controller.
 #[inline(never)]
 #[unsafe(no_mangle)]
 pub extern "C" fn whole_tick(session: &mut Session, bytes: &Bytes) {
-    let Session { node, path, out, now_ns, told } = session;
-    out.clear();
-    node.receive(*now_ns, bytes.as_slice(), &|tick| path.at(tick), out, &mut |notice| *told = Some(notice));
+    session.ports.host.clear();
+    session.ports.daq.clear();
+    session.node.daq(session.now_ns, bytes.as_slice(), &mut session.ports);
+}
+
+/// A controller and its lines.
+pub struct Session {
+    pub node: Onboard,
+    pub ports: Ports,
+    pub now_ns: u64,
 }

@@ -6,18 +6,18 @@ use crate::kernels::{
 };
 use crate::meter::{Tally, instructions, line};
 use clutch_core::law::{
-    Controller, Ctc, CtcParams, LawParams, OutputParams, OutputState, Pd, PdParams, Smc, SmcParams, SmcSignParams,
-    Tick,
+    Controller, Ctc, CtcParams, LawParams, OutputParams, OutputState, Pd, PdParams, Smc, SmcParams,
+    SmcSignParams, Tick,
 };
 use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, StribeckParams, Target};
 use clutch_wire::{Actuate, Decoder, Message, Sample};
 
-const PERIOD: Micros = Micros(1000);
+pub const PERIOD: Micros = Micros(1000);
 /// Of ordinary and of wild inputs.
-const OF_EACH: u32 = 1000;
+pub const OF_EACH: u32 = 1000;
 
 /// With a bumpless start: its offset is what a law remembers.
-fn output() -> OutputParams<f32> {
+pub fn output() -> OutputParams<f32> {
     OutputParams { bumpless_time: 0.05, lowest: 0.5, ..OutputParams::default() }
 }
 

@@ -4,15 +4,16 @@ use crate::inputs::Random;
 use crate::kernels::{Bytes, Session, whole_tick};
 use crate::meter::{Tally, instructions};
 use clutch_core::law::{LawParams, SmcParams};
-use clutch_core::reference::{MinimumJerk, Reference, ReferenceParams};
+use clutch_core::reference::{Interpolation, Knot, MinimumJerk, ReferenceParams, Sine, Table};
 use clutch_core::{
-    Bounds, DacCode, Encoder, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams, Supervisor,
-    SupervisorParams, Tolerances,
+    Bounds, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams, Supervisor, SupervisorParams,
+    Tolerances,
 };
-use clutch_node::{ControlNode, ControlParams, Outbox};
+use clutch_node::{ControlNode, ControlParams, Onboard, OnboardParams, Ports, RunParams, Settings};
 use clutch_wire::{
-    Armed, BoardFault, BoardState, Configured, Fault, Hello, Message, Pong, Refused, SCHEMA, STATUS_DAC_FAULT,
-    STATUS_ENCODER_FAULT, STATUS_LATE, Sample, StopReason, Stopped, VERSION,
+    Arm, Armed, BoardFault, BoardState, Configured, Discover, Fault, Hello, Message, Pong, Refused, SCHEMA,
+    STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Set, Stop, StopReason, Stopped, VERSION,
+    encode,
 };
 
 const RUN: u16 = 7;
@@ -20,9 +21,10 @@ const CONFIG: u64 = 0xfeed_f00d;
 const RUNS: u32 = 120;
 const PERIODS: u32 = 60;
 
+/// A controller that has been configured by its host, up to the question to encoder and converter.
 fn session(kind: u32) -> Option<Session> {
     let law = LawParams::Smc(SmcParams::default());
-    let params = ServoParams::<f32>::paper(law);
+    let servo = ServoParams::<f32>::paper(law);
     let bounds = Bounds::around(&PlantParams::default(), &Tolerances::default()).ok()?;
     let on_fault = match kind % 4 {
         0 => SafeState::Hold { volts: 5.0 },
@@ -30,57 +32,91 @@ fn session(kind: u32) -> Option<Session> {
         2 => SafeState::Release,
         _ => SafeState::HoldThenRelease { volts: 5.0, after: 0.01 },
     };
-    let supervisor = Supervisor::new(&SupervisorParams::new(on_fault), &params, &bounds).ok()?;
-    let control = ControlParams {
-        run: RUN,
-        config: CONFIG,
-        watchdog: Micros(3000),
-        valid: Micros(2000),
-        silence: Micros(3000),
-    };
-    let path = match kind % 2 {
+    let knots =
+        [0, 20_000, 40_000, 60_000].map(|us| Knot { time_us: us, position: FixedCounts(us as i64 * 60) });
+    let table = |interpolation| ReferenceParams::Table(Table { knots: &knots, interpolation });
+    let path = match kind % 5 {
         0 => ReferenceParams::Ramp(0.35),
-        _ => ReferenceParams::MinimumJerk(MinimumJerk { distance: 0.02, duration: 0.06 }),
+        1 => ReferenceParams::MinimumJerk(MinimumJerk { distance: 0.02, duration: 0.06 }),
+        2 => ReferenceParams::Sine(Sine { rate: 0.3, amplitude: 0.001, frequency: 5.0, phase: 0.0 }),
+        3 => table(Interpolation::Linear),
+        _ => table(Interpolation::Cubic),
     };
-    Some(Session {
-        node: ControlNode::new(control, Servo::new(&params).ok()?, supervisor),
-        path: Reference::new(&path, FixedCounts(0), Encoder::PAPER, params.period).ok()?,
-        out: Outbox::default(),
-        now_ns: 0,
-        told: None,
+    let (watchdog, valid, silence) = (Micros(3000), Micros(2000), Micros(3000));
+    let supervisor = SupervisorParams::new(on_fault);
+    let settings = Settings::new(&RunParams {
+        servo: &servo,
+        supervisor: &supervisor,
+        bounds: &bounds,
+        reference: &path,
+        start: FixedCounts(0),
+        watchdog,
+        valid,
+        silence,
+        host_silence: Micros(1_000_000),
+        ticks: u64::from(PERIODS) - 5,
     })
+    .ok()?;
+    let mut session = Session {
+        node: Onboard::new(OnboardParams { board: 1, boot: 1, clock_hz: 0 }),
+        ports: Ports::default(),
+        now_ns: 0,
+    };
+    session.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
+    session.node.daq(0, encode(&hello(RUN)).as_bytes(), &mut session.ports);
+    settings.each(|key, value| session.asks(&Message::Set(Set { run: RUN, key, value })));
+    let params = ControlParams { run: RUN, config: CONFIG, watchdog, valid, silence };
+    let supervisor = Supervisor::new(&supervisor, &servo, &bounds).ok()?;
+    let node = ControlNode::new(params, Servo::new(&servo).ok()?, supervisor);
+    session.asks(&Message::Configure(node.configuration()));
+    Some(session)
 }
 
-fn period(tally: &mut Tally, session: &mut Session, bytes: &Bytes) {
+impl Session {
+    /// A frame of the host's, which is not measured.
+    fn asks(&mut self, message: &Message) {
+        self.ports.host.clear();
+        self.ports.daq.clear();
+        self.node.host(self.now_ns, encode(message).as_bytes(), &mut self.ports);
+    }
+}
+
+fn period(tally: &mut Tally, session: &mut Session, bytes: &Bytes) -> u32 {
     session.now_ns = session.now_ns.wrapping_add(1_000_000);
     let arguments = [&raw mut *session as usize, &raw const *bytes as usize, 0];
     let function = whole_tick as extern "C" fn(&mut Session, &Bytes);
     // SAFETY: the arguments are those of the function.
-    tally.add(unsafe { instructions(function as usize, arguments) });
+    let count = unsafe { instructions(function as usize, arguments) };
+    tally.add(count);
+    count
+}
+
+fn hello(run: u16) -> Message {
+    Message::Hello(Hello {
+        nonce: 1,
+        version: VERSION,
+        schema: SCHEMA,
+        board: 1,
+        boot: 1,
+        counts_per_rev: 20_000,
+        dac_bits: 12,
+        dac_lowest_mv: -10_000,
+        dac_highest_mv: 10_000,
+        period_min_us: 100,
+        period_max_us: 10_000,
+        watchdog_max_us: 100_000,
+        boot_code: 2048,
+        state: BoardState::Running as u8,
+        run,
+        config: CONFIG,
+    })
 }
 
 /// Anything but a sample of this run.
 fn other(random: &mut Random) -> Message {
     let run = if random.below(3) == 0 { RUN } else { RUN + 1 };
     match random.below(6) {
-        0 => Message::Hello(Hello {
-            nonce: random.next(),
-            version: VERSION,
-            schema: SCHEMA,
-            board: 1,
-            boot: random.next(),
-            counts_per_rev: 20_000,
-            dac_bits: 12,
-            dac_lowest_mv: -10_000,
-            dac_highest_mv: 10_000,
-            period_min_us: 100,
-            period_max_us: 10_000,
-            watchdog_max_us: 100_000,
-            boot_code: 2048,
-            state: BoardState::Running as u8,
-            run,
-            config: CONFIG,
-        }),
+        0 => hello(run),
         1 => Message::Pong(Pong { run, nonce: 1, time_us: random.next() }),
         2 => Message::Refused(Refused { request: 4, reason: 1, value: random.next() }),
         3 => Message::Stopped(Stopped { run, reason: StopReason::Done as u8, code: 2048 }),
@@ -95,17 +131,25 @@ fn other(random: &mut Random) -> Message {
 /// Measures and prints.
 pub fn measure() -> Option<()> {
     let mut tally = Tally::new("whole_tick");
+    // Of these, samples that came in order, right after the one before.
+    let mut in_order = Tally::new("whole_tick_in_order");
     let mut random = Random::new(5);
     for kind in 0..RUNS {
         let mut session = session(kind)?;
-        session.node.configure(DacCode(2048), &mut session.out);
-        period(&mut tally, &mut session, &Bytes::of(&Message::Configured(Configured { run: RUN, config: CONFIG, boot: 1 })));
+        period(
+            &mut tally,
+            &mut session,
+            &Bytes::of(&Message::Configured(Configured { run: RUN, config: CONFIG, boot: 1 })),
+        );
         if kind % 16 != 15 {
+            session.asks(&Message::Arm(Arm { run: RUN, config: CONFIG }));
             period(&mut tally, &mut session, &Bytes::of(&Message::Armed(Armed { run: RUN, config: CONFIG })));
         }
         // How often something is amiss differs from run to run: a run that ends early tries little.
         let rarity = [4, 12, 40][kind as usize % 3];
         let (mut sequence, mut counts) = (random.next() as u16, random.next() as i32);
+        // The first two samples of a run are not in a row with anything.
+        let mut before = 0;
         for _ in 0..PERIODS {
             sequence = sequence.wrapping_add(1);
             counts = counts.wrapping_add(random.below(3) as i32);
@@ -141,8 +185,9 @@ pub fn measure() -> Option<()> {
                     Bytes::of(&Message::Sample(sample))
                 }
                 5 => {
-                    sample.status = [BoardState::Running as u8 | STATUS_ENCODER_FAULT, STATUS_DAC_FAULT | 3, 1]
-                        [random.below(3) as usize % 3];
+                    sample.status =
+                        [BoardState::Running as u8 | STATUS_ENCODER_FAULT, STATUS_DAC_FAULT | 3, 1]
+                            [random.below(3) as usize % 3];
                     Bytes::of(&Message::Sample(sample))
                 }
                 6 => {
@@ -156,12 +201,17 @@ pub fn measure() -> Option<()> {
                 }
                 _ => Bytes::of(&Message::Sample(sample)),
             };
-            period(&mut tally, &mut session, &bytes);
+            let count = period(&mut tally, &mut session, &bytes);
+            if amiss == 9 && before == 9 {
+                in_order.add(count);
+            }
+            before = amiss;
             if random.below(200) == 0 {
-                session.node.stop(StopReason::Operator, &mut session.out);
+                session.asks(&Message::Stop(Stop { run: RUN, reason: StopReason::Operator as u8 }));
             }
         }
     }
     tally.print();
+    in_order.print();
     Some(())
 }
