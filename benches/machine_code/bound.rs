@@ -2,7 +2,7 @@
 
 use super::cost::{cycles, refill, stall};
 use super::decode::{Flow, Instruction};
-use super::facts::Facts;
+use super::facts::{Facts, means};
 use super::graph::{Graph, Loop};
 use super::image::{Function, Image};
 use super::{Fault, facts};
@@ -21,6 +21,10 @@ pub struct Cost {
 impl Cost {
     fn max(self, o: Cost) -> Cost {
         Cost { instructions: self.instructions.max(o.instructions), cycles: self.cycles.max(o.cycles) }
+    }
+
+    fn min(self, o: Cost) -> Cost {
+        Cost { instructions: self.instructions.min(o.instructions), cycles: self.cycles.min(o.cycles) }
     }
 
     fn cycles(cycles: u64) -> Cost {
@@ -47,7 +51,7 @@ pub struct Bounds<'a> {
     image: &'a Image,
     facts: &'a Facts,
     /// Facts that hold in this case only; they are asked first.
-    case: &'a [facts::CallFact],
+    case: &'a Facts,
     known: BTreeMap<(u32, Option<u64>), Cost>,
     /// Functions being looked at, the outermost first.
     within: Vec<u32>,
@@ -57,13 +61,24 @@ pub struct Bounds<'a> {
     told: BTreeMap<u32, String>,
 }
 
+/// Calls of one function that are few.
+#[derive(Default)]
+struct Capped {
+    /// Of one.
+    cost: Cost,
+    /// How many, each time that the calling function is called.
+    most: u64,
+    /// Where they are.
+    blocks: BTreeSet<usize>,
+}
+
 /// A way from block to block, or out of the function.
 type Ways = BTreeMap<(usize, Option<usize>), Cost>;
 
 impl<'a> Bounds<'a> {
     /// Nothing bounded yet.
     #[must_use]
-    pub fn new(image: &'a Image, facts: &'a Facts, case: &'a [facts::CallFact]) -> Self {
+    pub fn new(image: &'a Image, facts: &'a Facts, case: &'a Facts) -> Self {
         Bounds {
             image,
             facts,
@@ -84,6 +99,15 @@ impl<'a> Bounds<'a> {
         let function = self.image.function(name).map_err(|f| vec![f])?;
         let cost = self.function(function, None);
         if self.found.is_empty() { Ok(cost) } else { Err(std::mem::take(&mut self.found)) }
+    }
+
+    /// The functions that have been looked at, with the bound of each; one that works on memory, for
+    /// each length.
+    pub fn functions(&self) -> impl Iterator<Item = (&Function, Option<u64>, Cost)> {
+        let named = |((address, length), cost): (&(u32, Option<u64>), &Cost)| {
+            Some((self.image.function_at(*address)?, *length, *cost))
+        };
+        self.known.iter().filter_map(named)
     }
 
     /// The loops that were met, by address, and the fact that bounds each.
@@ -130,12 +154,12 @@ impl<'a> Bounds<'a> {
         };
         for round in &loops {
             let most = self.rounds(function, graph, &loops, round, length);
-            collapse(&mut ways, round, most);
+            collapse(&mut ways, round, most, capped.values());
         }
         let Some(path) = reach(&ways, 0, None).1.remove(&None) else {
             return self.fault(Fault::NoReturn { function: function.name.clone() });
         };
-        capped.values().fold(path, |sum, (cost, most)| sum + *cost * *most)
+        capped.values().fold(path, |sum, c| sum + c.cost * c.most)
     }
 
     /// What each way costs: the block that it leaves, and the jump.
@@ -144,7 +168,7 @@ impl<'a> Bounds<'a> {
         function: &Function,
         graph: &Graph,
         length: Option<u64>,
-        capped: &mut BTreeMap<u32, (Cost, u64)>,
+        capped: &mut BTreeMap<u32, Capped>,
     ) -> Ways {
         let mut ways = Ways::new();
         for (n, block) in graph.blocks.iter().enumerate() {
@@ -160,7 +184,7 @@ impl<'a> Bounds<'a> {
                 if let Flow::Call(target) = i.flow {
                     cost = cost + Cost::cycles(refill(i));
                     let so_far = &block.instructions[..k];
-                    cost = cost + self.call(function, i, target, so_far, length, capped);
+                    cost = cost + self.call(function, (n, i), target, so_far, length, capped);
                 }
             }
             let Some((last, so_far)) = block.instructions.split_last() else { continue };
@@ -173,7 +197,7 @@ impl<'a> Bounds<'a> {
                 ways.insert((n, None), cost + Cost::cycles(refill(last)));
             }
             if let Some(target) = block.tail_call {
-                let callee = self.call(function, last, target, so_far, length, capped);
+                let callee = self.call(function, (n, last), target, so_far, length, capped);
                 ways.insert((n, None), cost + Cost::cycles(refill(last)) + callee);
             }
         }
@@ -184,11 +208,11 @@ impl<'a> Bounds<'a> {
     fn call(
         &mut self,
         function: &Function,
-        i: &Instruction,
+        (block, i): (usize, &Instruction),
         target: u32,
         before: &[Instruction],
         length: Option<u64>,
-        capped: &mut BTreeMap<u32, (Cost, u64)>,
+        capped: &mut BTreeMap<u32, Capped>,
     ) -> Cost {
         let Some(callee) = self.image.function_at(target) else {
             let (function, address) = (function.name.clone(), i.address);
@@ -196,15 +220,17 @@ impl<'a> Bounds<'a> {
         };
         let cap = self
             .case
+            .calls
             .iter()
             .chain(&self.facts.calls)
-            .find(|f| function.name.contains(&f.function) && callee.name.contains(&f.of));
+            .find(|f| means(&f.function, &function.name) && means(&f.of, &callee.name));
         if cap.is_some_and(|c| c.most == 0) {
             return Cost::default();
         }
         let bytes = length_register(&callee.name).and_then(|register| {
             let handed_on = length.filter(|_| length_register(&function.name).is_some());
-            let stated = self.facts.lengths.iter().find(|f| function.name.contains(&f.function));
+            let stated =
+                self.facts.lengths.iter().find(|f| means(&f.function, &function.name) && callee.name == f.of);
             handed_on.or_else(|| constant(before, register)).or(stated.map(|f| f.most))
         });
         if length_register(&callee.name).is_some() && bytes.is_none() {
@@ -215,8 +241,10 @@ impl<'a> Bounds<'a> {
         match cap {
             Some(c) => {
                 // Calls of different lengths: the dearest of them.
-                let dearest = capped.get(&target).map_or(cost, |(other, _)| other.max(cost));
-                capped.insert(target, (dearest, c.most));
+                let known = capped.entry(target).or_default();
+                known.cost = known.cost.max(cost);
+                known.most = c.most;
+                known.blocks.insert(block);
                 Cost::default()
             }
             None => cost,
@@ -235,10 +263,10 @@ impl<'a> Bounds<'a> {
         let address = graph.address(round.head);
         let from = self.image.inlined_from(address);
         let outer = loops.iter().any(|l| l.head != round.head && round.body.contains(&l.head));
-        let fact = self.facts.loops.iter().find(|f| {
-            function.name.contains(&f.function)
+        let fact = self.case.loops.iter().chain(&self.facts.loops).find(|f| {
+            means(&f.function, &function.name)
                 && f.outer.is_none_or(|o| o == outer)
-                && f.of.as_ref().is_none_or(|of| from.iter().any(|name| name.contains(of)))
+                && f.of.as_ref().is_none_or(|of| from.iter().any(|name| means(of, name)))
         });
         let worked = |f: &facts::LoopFact| Some(length? / f.step? + 1);
         let stated = fact.and_then(|f| f.most.or_else(|| worked(f)));
@@ -320,10 +348,35 @@ fn reach(
 }
 
 /// Puts a loop into its head: what leads out of the loop costs all rounds, too.
-fn collapse(ways: &mut Ways, round: &Loop, most: u64) {
-    let (order, longest) = reach(ways, round.head, Some(&round.body));
-    let at = |b: usize| longest.get(&Some(b)).copied().unwrap_or_default();
+fn collapse<'c>(ways: &mut Ways, round: &Loop, most: u64, capped: impl Iterator<Item = &'c Capped>) {
+    let (once, out) = rounds_and_ways_out(ways, round, &round.body);
+    let again = most - 1;
+    let mut rounds = once * again;
+    // Rounds that call what is called a few times only are as few.
+    for c in capped.filter(|c| c.most < again && !c.blocks.is_disjoint(&round.body)) {
+        let rest = round.body.difference(&c.blocks).copied().collect();
+        let (without, _) = rounds_and_ways_out(ways, round, &rest);
+        rounds = rounds.min(once * c.most + without * (again - c.most));
+    }
+    ways.retain(|(from, _), _| !round.body.contains(from));
+    for (to, cost) in out {
+        let total = rounds + cost;
+        ways.entry((round.head, to)).and_modify(|c| *c = c.max(total)).or_insert(total);
+    }
+}
+
+/// The longest way round a loop, and the ways out of it, by the blocks of `only`.
+fn rounds_and_ways_out(
+    ways: &Ways,
+    round: &Loop,
+    only: &BTreeSet<usize>,
+) -> (Cost, Vec<(Option<usize>, Cost)>) {
     let (mut once, mut out) = (Cost::default(), Vec::new());
+    if !only.contains(&round.head) {
+        return (once, out);
+    }
+    let (order, longest) = reach(ways, round.head, Some(only));
+    let at = |b: usize| longest.get(&Some(b)).copied().unwrap_or_default();
     for &b in &order {
         for ((_, to), cost) in ways.range((b, None)..=(b, Some(usize::MAX))) {
             match to {
@@ -333,9 +386,5 @@ fn collapse(ways: &mut Ways, round: &Loop, most: u64) {
             }
         }
     }
-    ways.retain(|(from, _), _| !round.body.contains(from));
-    for (to, cost) in out {
-        let total = once * (most - 1) + cost;
-        ways.entry((round.head, to)).and_modify(|c| *c = c.max(total)).or_insert(total);
-    }
+    (once, out)
 }

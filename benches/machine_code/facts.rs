@@ -1,19 +1,17 @@
 //! What the code does not say of itself, and somebody has to vouch for.
+//!
+//! Functions are named by a part of their names; with a `$` at the end, by the end of their names.
 
 use serde::Deserialize;
 
 /// Stated bounds.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default)]
 pub struct Facts {
     /// Of loops.
-    #[serde(default, rename = "loop")]
     pub loops: Vec<LoopFact>,
     /// Of calls.
-    #[serde(default, rename = "call")]
     pub calls: Vec<CallFact>,
     /// Of lengths given to memcpy and its like.
-    #[serde(default, rename = "length")]
     pub lengths: Vec<LengthFact>,
 }
 
@@ -64,8 +62,15 @@ pub struct LengthFact {
     /// Part of the name of the calling function.
     #[serde(rename = "in")]
     pub function: String,
+    /// Name of the called one, whole: those for aligned memory have names of their own.
+    pub of: String,
     /// Bytes at most.
     pub most: u64,
     /// Why that holds.
     pub why: String,
+}
+
+/// Whether `name` is one that `pattern` means.
+pub(super) fn means(pattern: &str, name: &str) -> bool {
+    pattern.strip_suffix('$').map_or_else(|| name.contains(pattern), |end| name.ends_with(end))
 }

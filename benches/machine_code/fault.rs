@@ -27,6 +27,12 @@ pub enum Fault {
         /// Address of the bytes.
         address: u32,
     },
+    /// An address in a trace that is no instruction of the image.
+    #[error("a trace has {address:#x}, which is no instruction of the image")]
+    Untraceable {
+        /// The address.
+        address: u32,
+    },
     /// An instruction without an entry in the table of cycles.
     #[error("{function} at {address:#x}: no cost is known for `{text}`")]
     NoCost {

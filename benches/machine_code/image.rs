@@ -40,6 +40,8 @@ pub struct Image {
     marks: BTreeMap<u32, bool>,
     sections: Vec<Section>,
     symbols: Vec<String>,
+    /// The words of the table of exceptions, but for the stack pointer.
+    vectors: Vec<u32>,
     lines: Option<Loader>,
     decoder: Decoder,
 }
@@ -65,6 +67,10 @@ impl Image {
             let (name, address, size) = (section.name()?, section.address() as u32, section.size() as u32);
             if section.kind() == SectionKind::Text {
                 image.code.push((address, section.data()?.to_vec()));
+            }
+            if name == ".vector_table" {
+                let words = section.data()?.as_chunks::<4>().0.iter().map(|w| u32::from_le_bytes(*w));
+                image.vectors = words.skip(1).collect();
             }
             let loaded = matches!(
                 section.kind(),
@@ -124,6 +130,7 @@ impl Image {
             marks: BTreeMap::new(),
             sections: Vec::new(),
             symbols: Vec::new(),
+            vectors: Vec::new(),
             lines: None,
             decoder: Decoder::new(),
         }
@@ -140,6 +147,11 @@ impl Image {
     /// There is none.
     pub fn function(&self, name: &str) -> Result<&Function, Fault> {
         self.functions.values().find(|f| f.name == name).ok_or_else(|| Fault::NoFunction(name.to_owned()))
+    }
+
+    /// The functions that exceptions and interrupts begin with; the first is that of the reset.
+    pub fn handlers(&self) -> impl Iterator<Item = &Function> {
+        self.vectors.iter().filter_map(|v| self.functions.get(&(v & !1)))
     }
 
     /// The function that begins at an address.

@@ -25,4 +25,4 @@ pub use facts::{CallFact, Facts, LengthFact, LoopFact};
 pub use fault::Fault;
 pub use image::{Function, Image, Section};
 pub use stack::{Stack, Stacks};
-pub use trace::traced_cycles;
+pub use trace::traced;

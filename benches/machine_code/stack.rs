@@ -38,7 +38,11 @@ impl<'a> Stacks<'a> {
         self.function(function)
     }
 
-    fn function(&mut self, function: &Function) -> Result<Stack, Fault> {
+    /// The deepest stack below a function.
+    ///
+    /// # Errors
+    /// As [`Stacks::of`].
+    pub fn function(&mut self, function: &Function) -> Result<Stack, Fault> {
         if let Some(stack) = self.known.get(&function.address) {
             return Ok(stack.clone());
         }

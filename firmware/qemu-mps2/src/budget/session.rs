@@ -18,7 +18,7 @@ use clutch_wire::{
 
 const RUN: u16 = 7;
 const CONFIG: u64 = 0xfeed_f00d;
-const RUNS: u32 = 120;
+const RUNS: u32 = 600;
 const PERIODS: u32 = 60;
 
 /// A controller that has been configured by its host, up to the question to encoder and converter.
@@ -79,16 +79,15 @@ impl Session {
         self.ports.daq.clear();
         self.node.host(self.now_ns, encode(message).as_bytes(), &mut self.ports);
     }
-}
 
-fn period(tally: &mut Tally, session: &mut Session, bytes: &Bytes) -> u32 {
-    session.now_ns = session.now_ns.wrapping_add(1_000_000);
-    let arguments = [&raw mut *session as usize, &raw const *bytes as usize, 0];
-    let function = whole_tick as extern "C" fn(&mut Session, &Bytes);
-    // SAFETY: the arguments are those of the function.
-    let count = unsafe { instructions(function as usize, arguments) };
-    tally.add(count);
-    count
+    /// A period; its instructions.
+    fn period(&mut self, bytes: &Bytes) -> u32 {
+        self.now_ns = self.now_ns.wrapping_add(1_000_000);
+        let arguments = [&raw mut *self as usize, &raw const *bytes as usize, 0];
+        let function = whole_tick as extern "C" fn(&mut Session, &Bytes);
+        // SAFETY: the arguments are those of the function.
+        unsafe { instructions(function as usize, arguments) }
+    }
 }
 
 fn hello(run: u16) -> Message {
@@ -112,106 +111,125 @@ fn hello(run: u16) -> Message {
     })
 }
 
-/// Anything but a sample of this run.
+/// Anything but a sample.
 fn other(random: &mut Random) -> Message {
     let run = if random.below(3) == 0 { RUN } else { RUN + 1 };
-    match random.below(6) {
+    match random.below(5) {
         0 => hello(run),
         1 => Message::Pong(Pong { run, nonce: 1, time_us: random.next() }),
         2 => Message::Refused(Refused { request: 4, reason: 1, value: random.next() }),
         3 => Message::Stopped(Stopped { run, reason: StopReason::Done as u8, code: 2048 }),
-        4 => {
+        _ => {
             let cause = BoardFault::Watchdog as u8;
             Message::Fault(Fault { run, sequence: 3, time_us: random.next(), cause, value: 0 })
         }
-        _ => Message::Sample(Sample { run: RUN + 1, sequence: 0, time_us: 0, counts: 0, status: 3 }),
+    }
+}
+
+/// What is amiss with the frame of a period.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Amiss {
+    Nothing,
+    /// The samples before it are lost: few, or so many that it is silence.
+    Lost,
+    Repeated,
+    Reordered,
+    /// The counts are those of no shaft.
+    Jump,
+    /// What the board says of itself.
+    Status,
+    /// A byte is not as it was sent.
+    Corrupted,
+    /// It is no sample.
+    Other,
+    /// The answer before was late.
+    Late,
+}
+
+const AMISS: [Amiss; 8] = [
+    Amiss::Lost,
+    Amiss::Repeated,
+    Amiss::Reordered,
+    Amiss::Jump,
+    Amiss::Status,
+    Amiss::Corrupted,
+    Amiss::Other,
+    Amiss::Late,
+];
+
+/// The frame of a period; `sample` is that of the period before, and becomes its own.
+fn frame(random: &mut Random, amiss: Amiss, sample: &mut Sample) -> Bytes {
+    let lost = if amiss == Amiss::Lost { 1 + random.below(14) as u16 } else { 0 };
+    sample.sequence = sample.sequence.wrapping_add(1).wrapping_add(lost);
+    sample.counts = sample.counts.wrapping_add(random.below(3) as i32);
+    sample.time_us = random.next();
+    let sent = match amiss {
+        Amiss::Repeated => Sample { sequence: sample.sequence.wrapping_sub(1), ..*sample },
+        Amiss::Reordered => {
+            let run = if random.below(4) == 0 { RUN + 1 } else { RUN };
+            Sample { run, sequence: sample.sequence.wrapping_sub(3), ..*sample }
+        }
+        Amiss::Jump => Sample { counts: random.next() as i32, ..*sample },
+        Amiss::Status => {
+            let flags = [STATUS_LATE, STATUS_ENCODER_FAULT, STATUS_DAC_FAULT, 0];
+            let flag = flags.get(random.below(4) as usize).copied().unwrap_or(0);
+            // Without a flag: a board that does not drive.
+            let state = if flag == 0 { BoardState::Ready } else { BoardState::Running };
+            Sample { status: state as u8 | flag, ..*sample }
+        }
+        _ => *sample,
+    };
+    let whole = Bytes::of(&Message::Sample(sent));
+    match amiss {
+        Amiss::Corrupted => whole.corrupted(random.below(20) as usize, random.next() as u8),
+        Amiss::Other => Bytes::of(&other(random)),
+        _ => whole,
     }
 }
 
 /// Measures and prints.
 pub fn measure() -> Option<()> {
-    let mut tally = Tally::new("whole_tick");
-    // Of these, samples that came in order, right after the one before.
     let mut in_order = Tally::new("whole_tick_in_order");
+    let mut formula = Tally::new("whole_tick_formula");
+    let mut table = Tally::new("whole_tick_table");
+    let mut others = Tally::new("whole_tick_other");
     let mut random = Random::new(5);
     for kind in 0..RUNS {
         let mut session = session(kind)?;
-        period(
-            &mut tally,
-            &mut session,
-            &Bytes::of(&Message::Configured(Configured { run: RUN, config: CONFIG, boot: 1 })),
-        );
+        let configured = Configured { run: RUN, config: CONFIG, boot: 1 };
+        others.add(session.period(&Bytes::of(&Message::Configured(configured))));
         if kind % 16 != 15 {
             session.asks(&Message::Arm(Arm { run: RUN, config: CONFIG }));
-            period(&mut tally, &mut session, &Bytes::of(&Message::Armed(Armed { run: RUN, config: CONFIG })));
+            others.add(session.period(&Bytes::of(&Message::Armed(Armed { run: RUN, config: CONFIG }))));
         }
         // How often something is amiss differs from run to run: a run that ends early tries little.
-        let rarity = [4, 12, 40][kind as usize % 3];
-        let (mut sequence, mut counts) = (random.next() as u16, random.next() as i32);
-        // The first two samples of a run are not in a row with anything.
-        let mut before = 0;
+        let rarity = [4, 12, 40].get(kind as usize % 3).copied()?;
+        let (sequence, counts) = (random.next() as u16, random.next() as i32);
+        let mut sample = Sample { run: RUN, sequence, time_us: 0, counts, status: BoardState::Running as u8 };
+        // The first sample is not in order with anything.
+        let mut before = Amiss::Lost;
         for _ in 0..PERIODS {
-            sequence = sequence.wrapping_add(1);
-            counts = counts.wrapping_add(random.below(3) as i32);
-            let mut sample = Sample {
-                run: RUN,
-                sequence,
-                time_us: random.next(),
-                counts,
-                status: BoardState::Running as u8,
+            let amiss = match random.below(rarity) {
+                0 => AMISS.get(random.below(8) as usize).copied()?,
+                _ => Amiss::Nothing,
             };
-            let amiss = if random.below(rarity) == 0 { random.below(9) } else { 9 };
-            let bytes = match amiss {
-                // Lost ones: few, or so many that it is silence.
-                0 => {
-                    sequence = sequence.wrapping_add(1 + random.below(14) as u16);
-                    sample.sequence = sequence;
-                    Bytes::of(&Message::Sample(sample))
-                }
-                1 => {
-                    sample.sequence = sequence.wrapping_sub(1);
-                    Bytes::of(&Message::Sample(sample))
-                }
-                2 => {
-                    sample.sequence = sequence.wrapping_sub(3);
-                    Bytes::of(&Message::Sample(sample))
-                }
-                3 => {
-                    sample.counts = random.next() as i32;
-                    Bytes::of(&Message::Sample(sample))
-                }
-                4 => {
-                    sample.status |= STATUS_LATE;
-                    Bytes::of(&Message::Sample(sample))
-                }
-                5 => {
-                    sample.status =
-                        [BoardState::Running as u8 | STATUS_ENCODER_FAULT, STATUS_DAC_FAULT | 3, 1]
-                            [random.below(3) as usize % 3];
-                    Bytes::of(&Message::Sample(sample))
-                }
-                6 => {
-                    let whole = Bytes::of(&Message::Sample(sample));
-                    whole.corrupted(random.below(20) as usize, random.next() as u8)
-                }
-                7 => Bytes::of(&other(&mut random)),
-                8 => {
-                    session.node.answered(Micros(random.below(4000)));
-                    Bytes::of(&Message::Sample(sample))
-                }
-                _ => Bytes::of(&Message::Sample(sample)),
-            };
-            let count = period(&mut tally, &mut session, &bytes);
-            if amiss == 9 && before == 9 {
-                in_order.add(count);
+            if amiss == Amiss::Late {
+                session.node.answered(Micros(random.below(4000)));
             }
+            let count = session.period(&frame(&mut random, amiss, &mut sample));
+            let of = match (amiss, before) {
+                (Amiss::Corrupted | Amiss::Other, _) => &mut others,
+                (Amiss::Nothing, Amiss::Nothing) => &mut in_order,
+                _ if kind % 5 < 3 => &mut formula,
+                _ => &mut table,
+            };
+            of.add(count);
             before = amiss;
             if random.below(200) == 0 {
                 session.asks(&Message::Stop(Stop { run: RUN, reason: StopReason::Operator as u8 }));
             }
         }
     }
-    tally.print();
-    in_order.print();
+    [in_order, formula, table, others].iter().for_each(Tally::print);
     Some(())
 }
