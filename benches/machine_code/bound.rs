@@ -191,14 +191,14 @@ impl<'a> Bounds<'a> {
             for &to in &block.next {
                 let first = &graph.blocks[to].instructions[0];
                 let jumped = if first.address == last.address + last.size { 0 } else { refill(last) };
-                ways.insert((n, Some(to)), cost + Cost::cycles(jumped + stall(last, first)));
+                or_longer(&mut ways, (n, Some(to)), cost + Cost::cycles(jumped + stall(last, first)));
             }
             if block.returns {
-                ways.insert((n, None), cost + Cost::cycles(refill(last)));
+                or_longer(&mut ways, (n, None), cost + Cost::cycles(refill(last)));
             }
             if let Some(target) = block.tail_call {
                 let callee = self.call(function, (n, last), target, so_far, length, capped);
-                ways.insert((n, None), cost + Cost::cycles(refill(last)) + callee);
+                or_longer(&mut ways, (n, None), cost + Cost::cycles(refill(last)) + callee);
             }
         }
         ways
@@ -347,6 +347,11 @@ fn reach(
     (order, longest)
 }
 
+/// Adds a way, or makes the one that is there as long.
+fn or_longer(ways: &mut Ways, way: (usize, Option<usize>), cost: Cost) {
+    ways.entry(way).and_modify(|c| *c = c.max(cost)).or_insert(cost);
+}
+
 /// Puts a loop into its head: what leads out of the loop costs all rounds, too.
 fn collapse<'c>(ways: &mut Ways, round: &Loop, most: u64, capped: impl Iterator<Item = &'c Capped>) {
     let (once, out) = rounds_and_ways_out(ways, round, &round.body);
@@ -361,7 +366,7 @@ fn collapse<'c>(ways: &mut Ways, round: &Loop, most: u64, capped: impl Iterator<
     ways.retain(|(from, _), _| !round.body.contains(from));
     for (to, cost) in out {
         let total = rounds + cost;
-        ways.entry((round.head, to)).and_modify(|c| *c = c.max(total)).or_insert(total);
+        or_longer(ways, (round.head, to), total);
     }
 }
 

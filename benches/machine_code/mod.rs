@@ -18,6 +18,8 @@ mod fault;
 mod graph;
 mod image;
 mod stack;
+#[cfg(test)]
+mod tests;
 mod trace;
 
 pub use bound::{Bounds, Cost};
