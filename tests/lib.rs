@@ -1,5 +1,8 @@
 //! What the acceptance tests share.
 
+#[path = "bits/native.rs"]
+pub mod bits;
+
 use clutch_core::{Plant, PlantParams};
 use clutch_sim::drive::Drive;
 use clutch_sim::engine::{DormandPrince, Engine, Event, ExactFlow, Input, Model, Shaft, Volts};

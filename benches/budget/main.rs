@@ -60,7 +60,7 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
             return Ok(Vec::new());
         }
     };
-    let controller = Image::read(&images.join("controller"))?;
+    let controller = Image::read(&images.join("mps2-controller"))?;
     let mut over = Vec::new();
     if part.is_none_or(|p| p == "size") {
         over.extend(memory::size(&controller, &plan.memory));
@@ -73,7 +73,7 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
     }
     let path = images.join("budget");
     let image = Image::read(&path)?;
-    for (name, image) in [("controller", &controller), ("budget", &image)] {
+    for (name, image) in [("mps2-controller", &controller), ("budget", &image)] {
         let found = image.double_precision();
         over.extend(found.iter().map(|s| format!("{name}: double precision: {s}")));
     }

@@ -14,7 +14,7 @@ const EXCEPTION: u64 = 104 + 4;
 pub(crate) fn size(image: &Image, budget: &Memory) -> Vec<String> {
     let (mut flash, mut ram) = (0, 0);
     println!(
-        "\nMemory of the image `controller`, bytes:\n\n| section | address | flash | RAM |\n|---|---|---|---|"
+        "\nMemory of the image `mps2-controller`, bytes:\n\n| section | address | flash | RAM |\n|---|---|---|---|"
     );
     for s in image.sections() {
         let stored = if s.stored { u64::from(s.size) } else { 0 };
@@ -45,7 +45,7 @@ pub(crate) fn stack(image: &Image, budget: &Memory) -> Result<Vec<String>> {
             *deepest = stack;
         }
     }
-    println!("\nStack of the image `controller`, bytes:\n\n| function | bytes |\n|---|---|");
+    println!("\nStack of the image `mps2-controller`, bytes:\n\n| function | bytes |\n|---|---|");
     let mut total = 0;
     for (what, stack, frame) in
         [("thread", &thread, 0), ("interrupt", &interrupt, EXCEPTION), ("failure", &failure, EXCEPTION)]

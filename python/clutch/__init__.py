@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from clutch import _clutch
 from clutch._certificate import Certificate
-from clutch._clutch import Controller, Path, Plant, Table, Target, Tick, scenarios
+from clutch._clutch import Controller, Path, Plant, StickSlip, Table, Target, Tick, scenarios
 from clutch._errors import ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
 from clutch._model import (
@@ -113,6 +113,7 @@ __all__ = [
     "SmcSign",
     "SmoothedDerivative",
     "SpringDrive",
+    "StickSlip",
     "StribeckFriction",
     "SweepResult",
     "Table",

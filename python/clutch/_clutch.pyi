@@ -18,7 +18,7 @@ from typing_extensions import CapsuleType
 from clutch import _model
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "VERSION", "Controller", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "Sweep", "Table", "Target", "Tick", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "scenarios", "simulate", "stribeck"]
+__all__ = ["BUILD", "VERSION", "Controller", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "StickSlip", "Sweep", "Table", "Target", "Tick", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "scenarios", "simulate", "stribeck"]
 
 BUILD: Final[str]
 """
@@ -70,6 +70,11 @@ class Controller:
         A snapshot: goes on from here by itself.
         """
     @property
+    def demand(self, /) -> float:
+        """
+        Voltage that the law asked of the converter at the last step, V.
+        """
+    @property
     def error(self, /) -> float:
         """
         Position error of the last step as the law saw it, rad.
@@ -78,6 +83,12 @@ class Controller:
     def error_rate(self, /) -> float:
         """
         Its rate as the law saw it, rad/s.
+        """
+    @property
+    def limit(self, /) -> int:
+        """
+        What decided the last voltage, as in a run's column `limit`: 0 the law, 1 the lowest voltage,
+        2 the highest, 3 a demand that was not a number.
         """
     @property
     def limited(self, /) -> bool:
@@ -349,6 +360,67 @@ class Scenario:
     def to_toml(self, /) -> str:
         """
         The scenario's file, defaults filled in.
+        """
+
+@final
+class StickSlip:
+    """
+    Stick-slip seen from the encoder's counts, sampled by you.
+
+    The shaft counts as stuck when the encoder is silent while the path moves on by more than a count.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Encoder and sampling period; its scalar, f32 or f64.
+
+    Examples
+    --------
+    Three counts at once each 27 ms, where the path moves evenly:
+
+    >>> import clutch
+    >>> sticks = clutch.StickSlip(clutch.Scenario.load("pd_2"))
+    >>> for tick in range(270):
+    ...     begins = sticks.update(tick // 27 * 3, 0.035)
+    >>> sticks.cycles, sticks.stair
+    (10, 3)
+    """
+    def __new__(cls, /, scenario: _model.Scenario | Scenario) -> StickSlip: ...
+    @property
+    def cycles(self, /) -> int:
+        """
+        Stick-slip cycles so far.
+        """
+    @property
+    def stair(self, /) -> int:
+        """
+        Largest movement between one stick and the next so far, counts.
+        """
+    @property
+    def stuck(self, /) -> bool:
+        """
+        Whether the shaft counts as stuck now.
+        """
+    @property
+    def stuck_ticks(self, /) -> int:
+        """
+        Sampling periods spent stuck so far, with the silence before each detection.
+        """
+    def update(self, /, counts: SupportsFloat | SupportsIndex, velocity_rad_s: SupportsFloat | SupportsIndex) -> bool:
+        """
+        One sampling period: the encoder's counts and the path's velocity, rad/s.
+
+        Parameters
+        ----------
+        counts : int
+            The encoder's counts.
+        velocity_rad_s : float
+            Velocity of the path now, rad/s.
+
+        Returns
+        -------
+        bool
+            Whether a stick is detected at this sample.
         """
 
 @final

@@ -40,7 +40,8 @@ def test_law_and_plant_stepped_by_hand_are_the_simulation_bit_for_bit(name):
     scenario = package.Scenario.load(name).override({"run.duration_s": 2.0, "run.settle_s": 0.5})
     run = package.simulate(scenario)
     law, plant, path = package.Controller(scenario), package.Plant(scenario), scenario.path()
-    seen = {"counts": [], "voltage_v": [], "position_rad": [], "velocity_rad_s": [], "stuck": [], "code": []}
+    columns = ("counts", "voltage_v", "demand_v", "limit", "position_rad", "velocity_rad_s", "stuck", "code")
+    seen = {column: [] for column in columns}
     for tick in range(len(path)):
         seen["counts"].append(plant.counts)
         seen["position_rad"].append(plant.position)
@@ -49,10 +50,27 @@ def test_law_and_plant_stepped_by_hand_are_the_simulation_bit_for_bit(name):
         voltage = law.step(plant.counts, path.at(tick))
         seen["voltage_v"].append(voltage)
         seen["code"].append(law.code)
+        seen["demand_v"].append(law.demand)
+        seen["limit"].append(law.limit)
         plant.step(voltage)
     for column, values in seen.items():
         assert run.samples[column].tolist() == values, f"{name}: {column} differs"
     assert plant.events() == run.events
+
+
+@pytest.mark.parametrize("name", ["pd_2", "bench_smc_2"])
+def test_stick_slip_detected_by_hand_is_that_of_the_simulation(name):
+    scenario = package.Scenario.load(name).override({"run.duration_s": 2.0, "run.settle_s": 0.0})
+    run = package.simulate(scenario)
+    sticks = package.StickSlip(scenario)
+    begun = 0
+    for counts, velocity in zip(run.samples["counts"], run.samples["target_velocity_rad_s"], strict=True):
+        begun += sticks.update(counts, velocity)
+    assert begun == sticks.cycles > 5
+    assert sticks.cycles / 2.0 == pytest.approx(run.metrics.detected_stick_slip_cycles_per_s, rel=1e-12)
+    assert sticks.stuck_ticks / 2000 == pytest.approx(run.metrics.detected_stick_time_fraction, rel=1e-12)
+    with pytest.raises(ValueError, match=r"counts = 0.5: expected a whole number"):
+        sticks.update(0.5, 0.1)
 
 
 @pytest.mark.parametrize("rig", ["paper", "ideal"])

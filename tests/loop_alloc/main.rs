@@ -4,6 +4,7 @@
 use clutch_core::{DacCode, Target};
 use clutch_log::Source;
 use clutch_loop::daq::{self, DaqOptions};
+use clutch_loop::end::Local;
 use clutch_loop::port::{Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{RealtimeOptions, WaitMode};
@@ -98,19 +99,6 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
 
     let mut port = Port::open(&address, &SerialOptions::default()).unwrap().port;
     let setup = Setup::<f64>::new(&scenario, 0).unwrap();
-    let mut node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-    let hello = Talk::new(&mut port, &mut node).discover(Duration::from_secs(5)).unwrap();
-    assert_eq!(hello.board, PATIENT_BOARD);
-    let mut setup = Setup::<f64>::new(&scenario, hello.run.wrapping_add(1).max(1)).unwrap();
-    setup.control.silence = clutch_core::Micros(400_000);
-    let mut node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-    let mut talk = Talk::new(&mut port, &mut node);
-    talk.configure(DacCode(hello.boot_code)).unwrap();
-    let clock = talk.clock().unwrap();
-
-    let watch = Arc::new(Watch::default());
-    let header = setup::header(&scenario, &setup.servo, Source::Loop, &address.to_string(), "test");
-    let (log_thread, ring) = LogThread::start(&log, &header, watch.clone()).unwrap();
     let path = setup::path::<f64>(&scenario).unwrap();
     let path = |tick: u64| -> Target<f64> {
         if Some(tick) == spoilt {
@@ -118,6 +106,21 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
         }
         path(tick)
     };
+    let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
+    let mut end = Local { node, path: &path };
+    let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(5)).unwrap();
+    assert_eq!(hello.board, PATIENT_BOARD);
+    let mut setup = Setup::<f64>::new(&scenario, hello.run.wrapping_add(1).max(1)).unwrap();
+    setup.control.silence = clutch_core::Micros(400_000);
+    let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
+    let mut end = Local { node, path: &path };
+    let mut talk = Talk::new(&mut port, &mut end);
+    talk.configure(DacCode(hello.boot_code)).unwrap();
+    let clock = talk.clock().unwrap();
+
+    let watch = Arc::new(Watch::default());
+    let header = setup::header(&scenario, &setup.servo, Source::Loop, &address.to_string(), "test");
+    let (log_thread, ring) = LogThread::start(&log, &header, watch.clone()).unwrap();
     let options = LoopOptions {
         // The machine's settings are not the subject, and locked memory would stay locked.
         realtime: RealtimeOptions { thread_priority: 0, lock_memory: false, ..RealtimeOptions::default() },
@@ -130,9 +133,9 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     }
     let (ticks, detector) = (setup.ticks, setup.detector);
     let report = std::thread::scope(|scope| {
-        let (node, port, watch, path) = (&mut node, &mut port, &*watch, &path);
+        let (end, port, watch) = (&mut end, &mut port, &*watch);
         let configured =
-            Configured { node, port, path, ring: Some(ring), watch, ticks, clock, detector, patient: true };
+            Configured { end, port, ring: Some(ring), watch, ticks, clock, detector, patient: true };
         scope.spawn(move || run::run(configured, &options)).join().unwrap()
     });
     stop.store(true, Ordering::Relaxed);

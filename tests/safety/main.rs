@@ -3,9 +3,11 @@
 use clutch_core::supervisor::{Arrival, Cause, Checks, State};
 use clutch_log::names;
 use clutch_loop::campaign::{CASES, Expected, RunId, Table, runs};
+use clutch_loop::end::Local;
 use clutch_loop::replay::{PRESENT_CODE, replay};
 use clutch_loop::setup::{self, Setup};
 use clutch_loop::world::{World, WorldParams};
+use clutch_node::ControlNode;
 use clutch_sim::{Keep, Scenario};
 use std::collections::BTreeSet;
 
@@ -151,11 +153,12 @@ fn world<T: clutch_core::Real>(scenario: &Scenario) -> clutch_loop::world::Outco
         record: true,
         duration: 2.999,
         ticks: u64::MAX,
+        settle: 0.0,
     };
     let path = setup::path::<T>(scenario).expect("a path");
-    World::new(scenario, params, setup.control, setup.servo, setup.supervisor)
-        .and_then(|w| w.run(&path))
-        .expect("a run")
+    let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
+    let mut world = World::new(scenario, params, Local { node, path: &path }).expect("a rig");
+    world.run(&path).expect("a run")
 }
 
 #[test]
@@ -212,11 +215,12 @@ fn healthy_runs_of_every_law_and_path_are_never_ended() {
                     record: false,
                     duration: 20.0,
                     ticks: u64::MAX,
+                    settle: 0.0,
                 };
                 let path = setup::path::<f32>(&scenario).expect("a path");
-                let outcome = World::new(&scenario, params, setup.control, setup.servo, setup.supervisor)
-                    .and_then(|w| w.run(&path))
-                    .expect("a run");
+                let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
+                let mut world = World::new(&scenario, params, Local { node, path: &path }).expect("a rig");
+                let outcome = world.run(&path).expect("a run");
                 assert_eq!(outcome.cause, None, "{law} at {rate} °/s on {rig}, seed {seed}: a nuisance trip");
             }
         }

@@ -1,5 +1,6 @@
 //! The developer's verbs: `cargo xtask --help`. CI calls the same ones.
 
+mod firmware;
 mod fuzz;
 mod python;
 mod run;
@@ -34,6 +35,11 @@ enum Verb {
     Bench {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,
+    },
+    /// The boards' images.
+    Firmware {
+        #[command(subcommand)]
+        verb: firmware::Verb,
     },
     /// The API documentation, in target/doc.
     Docs,
@@ -80,6 +86,7 @@ fn main() -> Result<()> {
             test::all()
         }
         Verb::Bench { rest } => cargo(["bench", "--package", "clutch-benches", "--"]).args(rest).run(),
+        Verb::Firmware { verb } => firmware::run(&verb),
         Verb::Docs => docs(),
         Verb::Msrv => {
             check_with("1.89.0", &["--workspace", "--all-targets"])?;

@@ -36,6 +36,10 @@ const NAMED: &[(&str, &str)] = &[
         "def __new__(cls, /, scenario: Any) -> Plant",
         "def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Plant",
     ),
+    (
+        "def __new__(cls, /, scenario: Any) -> StickSlip",
+        "def __new__(cls, /, scenario: _model.Scenario | Scenario) -> StickSlip",
+    ),
     ("def terms(self, /) -> dict:", "def terms(self, /) -> dict[str, float]:"),
     ("def channels(self, /) -> dict:", "def channels(self, /) -> dict[str, Table]:"),
     ("def metadata(self, /) -> dict:", "def metadata(self, /) -> dict[str, str]:"),

@@ -60,13 +60,15 @@ pub(crate) fn all() -> Result<()> {
     let mut sound = true;
     // Tests that need a program skip themselves without it, on a user's machine and not in CI.
     if std::env::var_os("CI").is_some() {
-        for name in ["gcc", "strace"] {
+        for name in ["gcc", "strace", "qemu-system-arm"] {
             if program(name).args(["--version"]).quietly().is_err() {
                 python::install_debian(name)?;
             }
         }
     }
 
+    // Before the tests: some build images for an emulated board.
+    let embedded = targets()?;
     let mut rust = |args: &[&str]| -> Result<()> {
         sound &= cargo(["test"]).args(args).lines(|l| tally.read(l))?;
         Ok(())
@@ -76,7 +78,6 @@ pub(crate) fn all() -> Result<()> {
     // The core as firmware takes it, without the features that the workspace turns on.
     rust(&["--package", "clutch-core", "--lib", "--no-fail-fast"])?;
 
-    let embedded = targets()?;
     for target in embedded {
         for features in ["", "linalg"] {
             let build = [
@@ -143,6 +144,8 @@ fn targets() -> Result<&'static [&'static str]> {
 fn python(tally: &mut Tally) -> Result<bool> {
     let binary = python::binary()?;
     cargo(["build", "--release", "--package", "clutch-log", "--example", "write_demo"]).run()?;
+    let bits = root().join("target/bits");
+    cargo(["run", "--release", "--package", "clutch-tests", "--example", "bits", "--"]).arg(&bits).run()?;
     let tools = python::interpreter()?;
     tally.check("the type stub is what the native module gives", stubs::generate(&tools, true)?);
     let tool = |name: &str, args: &[&str]| program(python::beside(&tools, name)).args(args).quietly();
@@ -174,6 +177,7 @@ fn python(tally: &mut Tally) -> Result<bool> {
         .args(["-m", "pytest", "--color=no", "-q"])
         .arg(root().join("python/tests"))
         .env("CLUTCH_BIN", binary)
+        .env("CLUTCH_BITS", bits)
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .lines(|l| tally.read(l))
 }

@@ -5,6 +5,7 @@
 
 pub mod certify;
 mod daq;
+mod hil;
 mod log;
 mod loop_verb;
 pub mod plot;
@@ -19,6 +20,7 @@ use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
 use clutch_sim::Scenario;
 use clutch_sim::progress::Report;
+use clutch_sim::scenario::ScalarKind;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
@@ -50,6 +52,7 @@ struct Cli {
 enum Verb {
     Loop(loop_verb::Loop),
     Daq(daq::Daq),
+    Hil(hil::Hil),
     Replay(replay::Replay),
     Log(log::Log),
     Sim(sim::Sim),
@@ -80,6 +83,20 @@ impl ScenarioArgs {
     }
 }
 
+/// The scenario as a board takes it that closes the loop itself; says so if that changes it.
+fn single_precision(args: &ScenarioArgs, scenario: Scenario) -> anyhow::Result<Scenario> {
+    if scenario.scalar == ScalarKind::F32 {
+        return Ok(scenario);
+    }
+    let _ = writeln!(
+        std::io::stderr(),
+        "note: such a board calculates in single precision: sampling.scalar = \"f32\""
+    );
+    let mut set = args.set.clone();
+    set.push(("sampling.scalar".to_owned(), "f32".to_owned()));
+    Ok(Scenario::load(&args.scenario, &set)?)
+}
+
 /// How a verb ended, if not with an error.
 enum Outcome {
     /// Exit code 0.
@@ -108,6 +125,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = match cli.verb {
         Verb::Loop(v) => v.run(),
         Verb::Daq(v) => v.run(),
+        Verb::Hil(v) => v.run(),
         Verb::Replay(v) => v.run(),
         Verb::Log(v) => v.run(),
         Verb::Sim(v) => v.run(),

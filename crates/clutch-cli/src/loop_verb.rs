@@ -5,22 +5,25 @@ use crate::table::{number, quantities};
 use crate::{Outcome, ScenarioArgs, key_value, print};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use clutch_core::law::Law;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{DacCode, Real, SafeState};
+use clutch_core::{DacCode, Micros, Real, SafeState, Target};
 use clutch_log::Source;
 use clutch_loop::daq::{self, DaqOptions, DaqReport};
+use clutch_loop::emulated::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE};
+use clutch_loop::end::{End, Local, Remote};
 use clutch_loop::faults::Fault;
 use clutch_loop::port::{Address, DeviceKind, Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode, describe_system};
 use clutch_loop::replay::PRESENT_CODE;
-use clutch_loop::run::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Watch};
+use clutch_loop::run::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Ring, Watch};
 use clutch_loop::setup::{self, Setup};
 use clutch_loop::sim_board::{PATIENT_BOARD, STRICT_BOARD};
-use clutch_node::ControlNode;
+use clutch_node::{ControlNode, RemoteNode, present_code};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::ScalarKind;
-use clutch_wire::{BoardState, Hello};
+use clutch_wire::Hello;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -73,6 +76,9 @@ pub(crate) struct Loop {
     /// The board's port; without it a board is simulated.
     #[arg(long, value_name = "PATH|tcp://HOST:PORT")]
     port: Option<Address>,
+    /// The port of a board that closes the loop itself (docs/firmware.md): it is set up, armed, and looked at.
+    #[arg(long, value_name = "PATH|tcp://HOST:PORT", conflicts_with_all = ["port", "fault", "strict"])]
+    board: Option<Address>,
     /// Line rate of the port, baud; no effect on USB, pseudo-terminals and TCP.
     #[arg(long)]
     baud: Option<u32>,
@@ -173,7 +179,10 @@ impl Loop {
             self.set.push(("safety.limits.overruns".to_owned(), "1".to_owned()));
         }
         let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone() };
-        let scenario = args.load()?;
+        let mut scenario = args.load()?;
+        if self.board.is_some() {
+            scenario = crate::single_precision(&args, scenario)?;
+        }
         if let Some(log) = &self.log
             && log.canonicalize().is_ok_and(|l| self.scenario.canonicalize().is_ok_and(|s| s == l))
         {
@@ -217,7 +226,7 @@ impl Loop {
             .context("signals could not be caught")?;
 
         // The board.
-        let (background, address) = match &self.port {
+        let (background, address) = match self.port.as_ref().or(self.board.as_ref()) {
             Some(address) => (None, address.clone()),
             None => {
                 let options = DaqOptions {
@@ -230,7 +239,12 @@ impl Loop {
                 (Some(board), address)
             }
         };
-        let outcome = self.on_board::<T>(scenario, &address, certified, safety, &plan, &stop);
+        let run =
+            Run { verb: self, scenario, address: &address, certified, safety, plan: &plan, stop: &stop };
+        let outcome = match &self.board {
+            None => run.on_board::<T>(),
+            Some(_) => run.on_controller(),
+        };
         let board = background.map(Background::end).transpose();
         let (report, log_line) = outcome?;
         let board = board?;
@@ -249,128 +263,190 @@ impl Loop {
             _ => Outcome::Done,
         })
     }
+}
 
-    fn on_board<T: Real>(
-        &self,
-        scenario: &Scenario,
-        address: &Address,
-        certified: bool,
-        safety: &clutch_sim::scenario::Safety,
-        plan: &clutch_sim::scenario::Plan,
-        stop: &Arc<AtomicBool>,
-    ) -> anyhow::Result<(LoopReport, String)> {
-        let spec = scenario.spec();
-        let opened = Port::open(address, &SerialOptions { baud: self.baud, low_latency: true })?;
-        let (mut port, mut notes) = (opened.port, opened.notes);
-        // A sample and its answer, each cycle.
-        let period = Duration::from_micros(u64::from(spec.period.0));
+/// A run that has been checked, and where it is to go.
+struct Run<'a> {
+    verb: &'a Loop,
+    scenario: &'a Scenario,
+    address: &'a Address,
+    certified: bool,
+    safety: &'a clutch_sim::scenario::Safety,
+    plan: &'a clutch_sim::scenario::Plan,
+    stop: &'a Arc<AtomicBool>,
+}
+
+impl<'a> Run<'a> {
+    /// Opens the port, whose line carries frames of these lengths each cycle.
+    fn open(&self, frames: (usize, usize)) -> anyhow::Result<(Port, Vec<String>)> {
+        let options = SerialOptions { baud: self.verb.baud, low_latency: true };
+        let opened = Port::open(self.address, &options)?;
+        let (port, mut notes) = (opened.port, opened.notes);
+        let period = Duration::from_micros(u64::from(self.scenario.spec().period.0));
         if port.kind().has_line_rate() {
-            notes.extend(port.check_baud((15, 20), period)?);
+            notes.extend(port.check_baud(frames, period)?);
         }
-        // Who is there?
-        let setup = Setup::<T>::new(scenario, 0)?;
-        let mut node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-        let hello = Talk::new(&mut port, &mut node).discover(Duration::from_secs(2))?;
-        let lines = setup::misfits(scenario, &hello);
-        if !lines.is_empty() {
-            let address = address.to_string();
-            return Err(clutch_loop::preflight::PreflightError::Misfit { address, lines }.into());
-        }
-        let mut setup = Setup::<T>::new(scenario, hello.run.wrapping_add(1).max(1))?;
+        Ok((port, notes))
+    }
+
+    /// Whether encoder and converter are those of the scenario.
+    fn check(&self, hello: &Hello, port: &Port) -> anyhow::Result<()> {
+        let mut lines = setup::misfits(self.scenario, hello);
         let simulated = hello.board == PATIENT_BOARD || hello.board == STRICT_BOARD;
-        if simulated && !matches!(port.kind(), DeviceKind::PseudoTerminal | DeviceKind::Tcp) {
-            let line = format!(
+        let real = !matches!(port.kind(), DeviceKind::PseudoTerminal | DeviceKind::Tcp);
+        if simulated && real && self.verb.board.is_none() {
+            lines.push(format!(
                 "board: its serial number {} is kept for simulated boards; give it another",
                 hello.board
-            );
-            return Err(clutch_loop::preflight::PreflightError::Misfit {
-                address: address.to_string(),
-                lines: vec![line],
-            }
-            .into());
+            ));
         }
+        if lines.is_empty() {
+            return Ok(());
+        }
+        let address = self.address.to_string();
+        Err(clutch_loop::preflight::PreflightError::Misfit { address, lines }.into())
+    }
+
+    /// A new run on a board with this clock: what it waits for when the clock waits.
+    fn setup<T: Real>(&self, hello: &Hello) -> anyhow::Result<Setup<T>> {
+        let mut setup = Setup::<T>::new(self.scenario, hello.run.wrapping_add(1).max(1))?;
         if hello.board == PATIENT_BOARD {
             // Its clock waits when this machine stalls, and so does our patience.
-            setup.control.silence = clutch_core::Micros(5_500_000);
+            setup.control.silence = Micros(5_500_000);
         }
-        let mut node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-        self.say(&self.plan_text(scenario, &hello, address, port.kind(), certified, safety, plan))?;
-        for note in &notes {
-            self.say(&format!("note: {note}\n"))?;
-        }
+        Ok(setup)
+    }
 
-        // The log before the board is armed: what cannot be logged is known before anything moves.
-        let watch = Arc::new(Watch { stop: stop.clone(), ..Watch::default() });
-        let present = match BoardState::from_u8(hello.state) {
-            Some(BoardState::Boot) => DacCode(hello.boot_code),
-            _ => setup.supervisor.safe_codes().hold,
-        };
-        let log = match &self.log {
-            None => None,
-            Some(path) => {
-                let version = crate::BUILD;
-                let mut header =
-                    setup::header(scenario, &setup.servo, Source::Loop, &address.to_string(), version);
-                header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
-                header.extra.push(("board".to_owned(), board_text(&hello)));
-                header.extra.push(("certified".to_owned(), certified.to_string()));
-                Some(LogThread::start(path, &header, watch.clone())?)
-            }
-        };
-        let (log, ring) = log.map_or((None, None), |(thread, ring)| (Some(thread), Some(ring)));
+    fn local<T: Real>(
+        &self,
+        setup: &Setup<T>,
+    ) -> anyhow::Result<Local<T, Law<T>, impl Fn(u64) -> Target<T> + use<'a, T>>> {
+        let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
+        Ok(Local { node, path: setup::path::<T>(self.scenario)? })
+    }
 
+    /// The loop is closed here.
+    fn on_board<T: Real>(&self) -> anyhow::Result<(LoopReport, String)> {
+        // A sample and its answer, each cycle.
+        let (mut port, notes) = self.open((15, 20))?;
+        // Who is there?
+        let mut end = self.local(&Setup::<T>::new(self.scenario, 0)?)?;
+        let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
+        self.check(&hello, &port)?;
+        let setup = self.setup::<T>(&hello)?;
+        let mut end = self.local(&setup)?;
+        self.tell(&hello, &port, &notes)?;
+        let hold = setup.supervisor.safe_codes().hold;
+        let (log, ring, watch) = self.log(&setup, present_code(&hello, hold), &board_text(&hello))?;
         // Consent was starting this command.
-        let mut talk = Talk::new(&mut port, &mut node);
-        talk.configure(present)?;
-        // Stopped by now, it is not armed: the run below looks before it asks for consent.
+        let mut talk = Talk::new(&mut port, &mut end);
+        talk.configure(present_code(&hello, hold))?;
         let clock = talk.clock()?;
-        let path = setup::path::<T>(scenario)?;
-        let spin_us = self.spin_us;
+        let (end, port) = (&mut end, &mut port);
+        let (ticks, detector, patient) = (setup.ticks, setup.detector, hello.board == PATIENT_BOARD);
+        let configured = Configured { end, port, ring, watch: &watch, patient, ticks, clock, detector };
+        self.drive(configured, log)
+    }
+
+    /// The loop is closed on the board.
+    fn on_controller(&self) -> anyhow::Result<(LoopReport, String)> {
+        // Telemetry each cycle; now and then a word to it.
+        let (mut port, notes) = self.open((0, clutch_wire::Telemetry::LENGTH + 2))?;
+        let remote = |setup: &Setup<f32>, patient: bool| -> anyhow::Result<_> {
+            let configure = ControlNode::new(setup.control, setup.servo, setup.supervisor).configuration();
+            let silence = if patient { 5_500_000_000 } else { BOARD_SILENCE_NS };
+            let node = RemoteNode::new(setup.servo, configure, ALIVE_NS, silence);
+            Ok(Remote { node, path: setup::path::<f32>(self.scenario)? })
+        };
+        let mut end = remote(&Setup::<f32>::new(self.scenario, 0)?, false)?;
+        let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
+        let clock_hz = end.node.controller().map_or(0, |c| c.clock_hz);
+        let text = end.node.controller().map_or_else(String::new, controller_text);
+        self.check(&hello, &port)?;
+        let setup = self.setup::<f32>(&hello)?;
+        let patient = hello.board == PATIENT_BOARD;
+        let host_silence = if patient { setup.control.silence } else { HOST_SILENCE };
+        let settings = setup::settings(self.scenario, &setup, host_silence, setup.ticks)?;
+        let mut end = remote(&setup, patient)?;
+        self.tell(&hello, &port, &notes)?;
+        self.verb.say(&format!("the loop is closed on the board: {text}\n"))?;
+        let hold = setup.supervisor.safe_codes().hold;
+        let (log, ring, watch) = self.log(&setup, present_code(&hello, hold), &text)?;
+        let mut talk = Talk::new(&mut port, &mut end);
+        talk.upload(&settings)?;
+        talk.configure(hold)?;
+        let clock = talk.clock()?;
+        let (end, port, detector) = (&mut end, &mut port, setup.detector);
+        let ticks = setup.ticks;
+        let configured = Configured { end, port, ring, watch: &watch, patient, ticks, clock, detector };
+        let (mut report, line) = self.drive(configured, log)?;
+        report.clock_hz = clock_hz;
+        Ok((report, line))
+    }
+
+    /// Says what will be done.
+    fn tell(&self, hello: &Hello, port: &Port, notes: &[String]) -> anyhow::Result<()> {
+        self.verb.say(&self.plan_text(hello, port.kind()))?;
+        for note in notes {
+            self.verb.say(&format!("note: {note}\n"))?;
+        }
+        Ok(())
+    }
+
+    /// The log before the board is armed: what cannot be logged is known before anything moves.
+    fn log<T: Real>(
+        &self,
+        setup: &Setup<T>,
+        present: DacCode,
+        board: &str,
+    ) -> anyhow::Result<(Option<LogThread>, Option<Ring>, Arc<Watch>)> {
+        let watch = Arc::new(Watch { stop: self.stop.clone(), ..Watch::default() });
+        let Some(path) = &self.verb.log else { return Ok((None, None, watch)) };
+        let address = self.address.to_string();
+        let mut header = setup::header(self.scenario, &setup.servo, Source::Loop, &address, crate::BUILD);
+        header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
+        header.extra.push(("board".to_owned(), board.to_owned()));
+        header.extra.push(("certified".to_owned(), self.certified.to_string()));
+        let (thread, ring) = LogThread::start(path, &header, watch.clone())?;
+        Ok((Some(thread), Some(ring), watch))
+    }
+
+    /// Runs it on a thread of its own, and shows where it stands.
+    fn drive<E: End + Send>(
+        &self,
+        configured: Configured<'_, E>,
+        log: Option<LogThread>,
+    ) -> anyhow::Result<(LoopReport, String)> {
+        let (verb, watch, ticks) = (self.verb, configured.watch, configured.ticks);
+        let spec = self.scenario.spec();
+        let spin_us = verb.spin_us;
         let options = LoopOptions {
             realtime: RealtimeOptions {
-                thread_priority: self.thread_priority,
-                lock_memory: self.lock_memory,
-                cpu_affinity: self.cpu_affinity,
-                wait: match self.wait {
+                thread_priority: verb.thread_priority,
+                lock_memory: verb.lock_memory,
+                cpu_affinity: verb.cpu_affinity,
+                wait: match verb.wait {
                     WaitArg::Sleep => WaitMode::Sleep,
                     WaitArg::Spin => WaitMode::SleepSpin { spin_us },
                 },
             },
-            pace: match self.pace {
+            pace: match verb.pace {
                 PaceArg::Sample => Pace::Sample,
                 PaceArg::Clock => Pace::Clock,
             },
             settle: spec.run.settle,
             hooks: (|| (), || ()),
         };
-        let (ticks, detector, patient) = (setup.ticks, setup.detector, hello.board == PATIENT_BOARD);
         let show = std::io::stderr().is_terminal();
         let report = std::thread::scope(|scope| {
-            let (node, port, path, watched) = (&mut node, &mut port, &path, &*watch);
-            let control = std::thread::Builder::new().name("clutch-control".to_owned()).spawn_scoped(
-                scope,
-                move || {
-                    run::run(
-                        Configured {
-                            node,
-                            port,
-                            path,
-                            ring,
-                            watch: watched,
-                            patient,
-                            ticks,
-                            clock,
-                            detector,
-                        },
-                        &options,
-                    )
-                },
-            );
+            let control = std::thread::Builder::new()
+                .name("clutch-control".to_owned())
+                .spawn_scoped(scope, move || run::run(configured, &options));
             let control = control.context("the control thread could not be started")?;
             let mut refused_told = false;
             while !control.is_finished() {
                 if show {
-                    status(&watch, spec.period.0, ticks);
+                    status(watch, spec.period.0, ticks);
                 }
                 if watch.log_ended.load(Ordering::Relaxed) && !refused_told {
                     refused_told = true;
@@ -386,7 +462,7 @@ impl Loop {
         let mut line = match log.map(LogThread::finish) {
             None => String::new(),
             Some(Ok(summary)) => {
-                let path = self.log.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
+                let path = verb.log.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
                 format!("log: {path}, {} records; clutch replay {path}\n", summary.records)
             }
             Some(Err(error)) => format!("log: {error}\n"),
@@ -397,17 +473,8 @@ impl Loop {
         Ok((report, line))
     }
 
-    #[allow(clippy::too_many_arguments, reason = "one text from everything that is known before a run")]
-    fn plan_text(
-        &self,
-        scenario: &Scenario,
-        hello: &Hello,
-        address: &Address,
-        kind: DeviceKind,
-        certified: bool,
-        safety: &clutch_sim::scenario::Safety,
-        plan: &clutch_sim::scenario::Plan,
-    ) -> String {
+    fn plan_text(&self, hello: &Hello, kind: DeviceKind) -> String {
+        let Run { scenario, address, certified, safety, plan, .. } = *self;
         let spec = scenario.spec();
         let board = board_text(hello);
         let safe = match safety.supervisor.on_fault {
@@ -465,6 +532,14 @@ impl Loop {
         }
         text
     }
+}
+
+fn controller_text(c: &clutch_wire::Controller) -> String {
+    let name =
+        if c.board <= STRICT_BOARD { "emulated".to_owned() } else { format!("number {:08x}", c.board) };
+    let clock =
+        if c.clock_hz > 0 { format!(", {} MHz", number(f64::from(c.clock_hz) / 1e6)) } else { String::new() };
+    format!("{name}{clock}")
 }
 
 fn board_text(hello: &Hello) -> String {
@@ -564,6 +639,25 @@ fn summary(
             ("cycle time p50 / p99 / p99.9 / max", latency(&r.interval), "µs"),
         ],
     );
+    if r.clock_hz > 0 {
+        let us = |cycles: u64| number(cycles as f64 * 1e6 / f64::from(r.clock_hz));
+        let c = &r.tick_cycles;
+        text += &format!(
+            "a tick on the board p50 / p99.9 / max: {} / {} / {} clock cycles, {} / {} / {} µs\n",
+            c.p50_ns,
+            c.p99_9_ns,
+            c.max_ns,
+            us(c.p50_ns),
+            us(c.p99_9_ns),
+            us(c.max_ns)
+        );
+    }
+    if r.untold > 0 {
+        text += &format!(
+            "{} cycles of the board did not reach this machine; they are missing in the log\n",
+            r.untold
+        );
+    }
     if r.log_dropped > 0 {
         text += &format!("the log dropped {} records: its thread did not keep up\n", r.log_dropped);
     }
@@ -632,6 +726,11 @@ fn as_json(
         "deadline_misses": r.deadline_misses,
         "response": latency(&r.response),
         "cycle": latency(&r.interval),
+        "tick_clock_cycles": (r.clock_hz > 0).then(|| serde_json::json!({
+            "clock_hz": r.clock_hz, "p50": r.tick_cycles.p50_ns, "p99_9": r.tick_cycles.p99_9_ns,
+            "max": r.tick_cycles.max_ns,
+        })),
+        "untold": r.untold,
         "log_dropped": r.log_dropped,
         "cut_writes": r.cut_writes,
         "board_safe": r.board_safe,

@@ -118,9 +118,26 @@ fn same_file(a: &PathBuf, b: &PathBuf) -> bool {
     a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
+/// The figures of the shaft's true motion: name, value, unit.
+pub(crate) fn figures(m: &Metrics) -> Vec<(&'static str, String, &'static str)> {
+    let deg = |x: f64| number(x.to_degrees());
+    let optional = |x: Option<f64>| x.map_or("–".to_owned(), number);
+    vec![
+        ("max |error|", deg(m.max_error_rad), "°"),
+        ("RMS error", deg(m.rms_error_rad), "°"),
+        ("mean error (target − position)", deg(m.mean_error_rad), "°"),
+        ("integral of |error|", deg(m.iae_rad_s), "° s"),
+        ("stick-slip", number(m.stick_slip_cycles_per_s), "cycles/s"),
+        ("time stuck", number(100.0 * m.stick_time_fraction), "%"),
+        ("stair height", deg(m.stair_height_rad), "°"),
+        ("torque at break-away", optional(m.break_away_torque_nm.map(|t| 1e3 * t)), "mN m"),
+        ("voltage variation", number(m.control_variation_v_s), "V/s"),
+        ("jerk RMS", number(m.jerk_rms_rad_s3), "rad/s³"),
+    ]
+}
+
 fn text(s: &Summary<'_>, run: &Run) -> String {
     let m = &s.metrics;
-    let deg = |x: f64| number(x.to_degrees());
     let scalar = match s.scalar {
         ScalarKind::F32 => "f32",
         ScalarKind::F64 => "f64",
@@ -136,20 +153,9 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         s.seed,
         number(m.measured_s)
     );
-    let optional = |x: Option<f64>| x.map_or("–".to_owned(), number);
-    let mut rows = vec![
-        ("max |error|", deg(m.max_error_rad), "°"),
-        ("RMS error", deg(m.rms_error_rad), "°"),
-        ("mean error (target − position)", deg(m.mean_error_rad), "°"),
-        ("integral of |error|", deg(m.iae_rad_s), "° s"),
-        ("stick-slip", number(m.stick_slip_cycles_per_s), "cycles/s"),
-        ("stick-slip seen by the encoder", number(s.detected.stick_slip_cycles_per_s), "cycles/s"),
-        ("time stuck", number(100.0 * m.stick_time_fraction), "%"),
-        ("stair height", deg(m.stair_height_rad), "°"),
-        ("torque at break-away", optional(m.break_away_torque_nm.map(|t| 1e3 * t)), "mN m"),
-        ("voltage variation", number(m.control_variation_v_s), "V/s"),
-        ("jerk RMS", number(m.jerk_rms_rad_s3), "rad/s³"),
-    ];
+    let mut rows = figures(m);
+    let seen = number(s.detected.stick_slip_cycles_per_s);
+    rows.insert(5, ("stick-slip seen by the encoder", seen, "cycles/s"));
     if let Some(time) = s.reaching.time_s {
         rows.push(("sliding surface reached after", number(time), "s"));
         if let Some(bound) = s.reaching.bound_s {
@@ -167,7 +173,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     if jump > 1e-9 {
         text += &format!(
             "note: the path's velocity jumps by {} °/s, which no brake follows at once; the shaft catches up\n",
-            deg(jump)
+            number(jump.to_degrees())
         );
     }
     text

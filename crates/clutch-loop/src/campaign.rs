@@ -5,13 +5,17 @@
 //! the table of `docs/safety.md`; the tests run it with fewer seeds, and show that it fails when
 //! any one of the supervisor's checks is taken out.
 
+use crate::emulated::{Lockstep, emulated};
+use crate::end::Local;
 use crate::faults::{Direction, Fault, FaultKind, StuckAt};
 use crate::setup::{self, Setup, SetupError};
 use crate::sim_board::SimBoardError;
-use crate::world::{Outcome, Stall, World, WorldParams};
+use crate::world::{Outcome, Stall, World, WorldError, WorldParams};
 use clutch_core::law::{Command, Controller, Law, Tick};
 use clutch_core::supervisor::{Cause, Checks};
 use clutch_core::{Real, Servo, Target};
+use clutch_node::ControlNode;
+use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Scenario, ScenarioError};
 use clutch_wire::BoardState;
 use rand::{RngExt, SeedableRng};
@@ -238,6 +242,9 @@ pub enum CampaignError {
     /// Its board.
     #[error(transparent)]
     Board(#[from] SimBoardError),
+    /// Its controller's end.
+    #[error(transparent)]
+    World(#[from] WorldError),
 }
 
 impl RunId {
@@ -264,10 +271,12 @@ impl RunId {
     /// # Errors
     /// None, unless a row of the tables is wrong.
     pub fn scenario(&self) -> Result<Scenario, ScenarioError> {
-        let mut rng = self.rng();
+        self.scenario_in(if self.rng().random_bool(0.5) { "f32" } else { "f64" })
+    }
+
+    fn scenario_in(&self, scalar: &str) -> Result<Scenario, ScenarioError> {
         let rig = if self.on_bench() { "bench" } else { "paper" };
         let cycles = self.case().watchdog_cycles;
-        let scalar = if rng.random_bool(0.5) { "f32" } else { "f64" };
         let text = format!(
             "name = \"campaign\"\n[rig]\nbase = \"{rig}\"\n[law.{}]\n{}[sampling]\nscalar = \"{scalar}\"\n\
              [run]\nduration_s = 5.0\nstart = \"rest\"\nseed = {}\n\
@@ -306,20 +315,35 @@ impl RunId {
     pub fn run(&self, checks: Checks, record: bool) -> Result<Outcome, CampaignError> {
         let scenario = self.scenario()?;
         match scenario.scalar {
-            clutch_sim::scenario::ScalarKind::F32 => self.run_in::<f32>(&scenario, checks, record),
-            clutch_sim::scenario::ScalarKind::F64 => self.run_in::<f64>(&scenario, checks, record),
+            ScalarKind::F32 => self.run_in::<f32>(&scenario, checks, record),
+            ScalarKind::F64 => self.run_in::<f64>(&scenario, checks, record),
         }
     }
 
-    fn run_in<T: Real>(
-        &self,
-        scenario: &Scenario,
-        checks: Checks,
-        record: bool,
-    ) -> Result<Outcome, CampaignError> {
+    /// Whether a board that closes the loop can be broken so from outside: its law and its path cannot.
+    #[must_use]
+    pub fn is_outside(&self) -> bool {
+        let broken = self.case().broken;
+        !matches!(broken, Broken::LawNotFinite | Broken::TargetNotFinite | Broken::TargetHuge)
+    }
+
+    /// Runs it against a board that closes the loop.
+    ///
+    /// # Errors
+    /// The board failed.
+    pub fn run_on(&self, link: impl Lockstep) -> Result<Outcome, CampaignError> {
+        let scenario = self.scenario_in("f32")?;
+        let setup = Setup::<f32>::new(&scenario, 7)?;
+        let params = self.world(setup.servo.period().seconds(), false);
+        let end = emulated(&scenario, &setup, link, u64::MAX)?;
+        let path = setup::path::<f32>(&scenario)?;
+        let outcome = World::new(&scenario, params, end)?.run(&path)?;
+        Ok(self.with_onset(outcome, self.onset()))
+    }
+
+    /// What is broken in the world around the controller.
+    fn world(&self, period: f64, record: bool) -> WorldParams {
         let onset = self.onset();
-        let setup = Setup::<T>::with_checks(scenario, 7, checks)?;
-        let period: f64 = setup.servo.period().seconds();
         let mut params = WorldParams {
             latency_ns: 50_000,
             faults: Vec::new(),
@@ -328,8 +352,8 @@ impl RunId {
             record,
             duration: onset + 1.6,
             ticks: u64::MAX,
+            settle: 0.0,
         };
-        let onset_tick = (onset / period) as u64;
         let fault = |kind, direction| Fault { direction, ..Fault::new(kind, onset) };
         match self.case().broken {
             Broken::Fault(kind, way) => params.faults.push(fault(kind, way)),
@@ -341,7 +365,7 @@ impl RunId {
             }
             Broken::Periodic(kind, way, every) => {
                 // At the middle between two samples, so that one frame each is hit.
-                let begin = (onset_tick as f64 + 0.5) * period;
+                let begin = ((onset / period).floor() + 0.5) * period;
                 params.faults.extend((0..60).map(|i| Fault {
                     at: begin + f64::from(i * every) * period,
                     lasting: period,
@@ -356,6 +380,27 @@ impl RunId {
             }
             Broken::LawNotFinite | Broken::TargetNotFinite | Broken::TargetHuge => {}
         }
+        params
+    }
+
+    /// A fault that the line does not show showed at its onset.
+    fn with_onset(&self, mut outcome: Outcome, onset: f64) -> Outcome {
+        if outcome.hit.is_none() && !matches!(self.case().expected, Expected::Tolerated) {
+            outcome.hit = Some(onset);
+        }
+        outcome
+    }
+
+    fn run_in<T: Real>(
+        &self,
+        scenario: &Scenario,
+        checks: Checks,
+        record: bool,
+    ) -> Result<Outcome, CampaignError> {
+        let setup = Setup::<T>::with_checks(scenario, 7, checks)?;
+        let period: f64 = setup.servo.period().seconds();
+        let params = self.world(period, record);
+        let onset_tick = (self.onset() / period) as u64;
         let path = setup::path::<T>(scenario)?;
         let nan = T::from_f64(f64::NAN);
         let broken = self.case().broken;
@@ -370,7 +415,7 @@ impl RunId {
                 _ => target,
             }
         };
-        let mut outcome = if broken == Broken::LawNotFinite {
+        let outcome = if broken == Broken::LawNotFinite {
             let law = BrokenLaw { law: *setup.servo.law(), from: onset_tick };
             let servo = Servo::with_law(&setup.params, law).map_err(|e| {
                 SetupError::Param(clutch_core::ParamError {
@@ -379,19 +424,14 @@ impl RunId {
                     expected: e.expected,
                 })
             })?;
-            World::new(scenario, params, setup.control, servo, setup.supervisor)?.run(&path)?
+            let node = ControlNode::new(setup.control, servo, setup.supervisor);
+            World::new(scenario, params, Local { node, path: &path })?.run(&path)?
         } else {
-            World::new(scenario, params, setup.control, setup.servo, setup.supervisor)?.run(&path)?
+            let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
+            World::new(scenario, params, Local { node, path: &path })?.run(&path)?
         };
-        if outcome.hit.is_none() && !matches!(self.case().expected, Expected::Tolerated) {
-            outcome.hit = Some(match broken {
-                Broken::LawNotFinite | Broken::TargetNotFinite | Broken::TargetHuge => {
-                    onset_tick as f64 * period
-                }
-                _ => onset,
-            });
-        }
-        Ok(outcome)
+        let onset = if self.is_outside() { self.onset() } else { onset_tick as f64 * period };
+        Ok(self.with_onset(outcome, onset))
     }
 
     /// Whether the outcome is what must come of it; what is wrong if not.

@@ -2,6 +2,9 @@
 
 pub mod campaign;
 pub mod daq;
+pub mod emulated;
+pub mod emulator;
+pub mod end;
 pub mod faults;
 pub mod line;
 pub mod port;

@@ -1,11 +1,10 @@
 //! Before a run: who is on the line, and does it fit.
 
+use crate::end::{End, Remote, Tells};
 use crate::port::{Port, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
 use crate::setup::SetupError;
-use clutch_core::law::Law;
-use clutch_core::{Real, Target};
-use clutch_node::{ControlNode, Notice, Outbox};
+use clutch_node::{Notice, Outbox, SETTINGS, Settings};
 use clutch_wire::{Hello, Refusal, Refused};
 use rustix::fd::AsFd;
 use std::time::Duration;
@@ -90,6 +89,41 @@ pub enum PreflightError {
         /// Why.
         why: String,
     },
+    /// The board closes the loop itself, and was to be a mere board.
+    #[error(
+        "{address}: this board is a controller, it closes the loop itself; use --board instead of --port"
+    )]
+    IsController {
+        /// The port.
+        address: String,
+    },
+    /// The board is a mere board, and was to close the loop itself.
+    #[error("{address}: this board does not close the loop itself; use --port instead of --board")]
+    IsNoController {
+        /// The port.
+        address: String,
+    },
+    /// A controller without encoder and converter.
+    #[error(
+        "{address}: the controller answers, but finds no encoder and converter. Is the board on its other line \
+         powered and connected?"
+    )]
+    NoBoard {
+        /// The port.
+        address: String,
+    },
+    /// A controller whose settings mean something else.
+    #[error(
+        "{address}: the controller's table of settings differs (its hash is {board:016x}, this program's {:016x}). \
+         Flash a firmware of this release, or use the release that fits the board",
+        clutch_node::SETTINGS_HASH
+    )]
+    Settings {
+        /// The port.
+        address: String,
+        /// The board's hash.
+        board: u64,
+    },
     /// The board stopped answering.
     #[error(
         "{address}: the board answered at first and then no more, when it was to be {what}. Unplugged, or reset?"
@@ -115,14 +149,21 @@ pub fn why(m: &Refused) -> String {
         Some(Refusal::Watchdog) => format!("its watchdog cannot be set to {} µs", m.value),
         Some(Refusal::Safe) => "it does not know the safe state, or its converter has no such code".into(),
         Some(Refusal::Busy) => "it is busy".into(),
+        Some(Refusal::Setting) => match SETTINGS.iter().find(|s| u32::from(s.key) == m.value) {
+            Some(setting) => format!("the setting {} is missing, or of a kind that it does not know", setting.name),
+            None => format!("the setting {:#06x} is missing or unknown", m.value),
+        },
+        Some(Refusal::Unfit) => format!("it cannot run with {} in its settings", f32::from_bits(m.value)),
+        Some(Refusal::NoBoard) => "it finds no encoder and converter".into(),
+        Some(Refusal::Differs) => "its settings say something else than the run; start again".into(),
         _ => format!("reason {}, value {}", m.reason, m.value),
     }
 }
 
 /// A line with a controller's state machine at its end, spoken to step by step.
-pub struct Talk<'a, T: Real> {
+pub struct Talk<'a, E> {
     port: &'a mut Port,
-    node: &'a mut ControlNode<T, Law<T>>,
+    end: &'a mut E,
     out: Outbox,
     bytes: u64,
     echo: bool,
@@ -137,10 +178,10 @@ pub struct ClockOffset {
     pub round_trip_us: u64,
 }
 
-impl<'a, T: Real> Talk<'a, T> {
+impl<'a, E: End> Talk<'a, E> {
     /// On an open port.
-    pub fn new(port: &'a mut Port, node: &'a mut ControlNode<T, Law<T>>) -> Self {
-        Talk { port, node, out: Outbox::default(), bytes: 0, echo: false }
+    pub fn new(port: &'a mut Port, end: &'a mut E) -> Self {
+        Talk { port, end, out: Outbox::default(), bytes: 0, echo: false }
     }
 
     fn address(&self) -> String {
@@ -151,39 +192,34 @@ impl<'a, T: Real> Talk<'a, T> {
     fn exchange<R>(
         &mut self,
         patience: Duration,
-        ask: impl Fn(&mut ControlNode<T, Law<T>>, &mut Outbox),
-        mut answer: impl FnMut(&Notice<T, clutch_core::law::LawTerms<T>>) -> Option<R>,
+        ask: impl Fn(&mut E, &mut Outbox),
+        mut answer: impl FnMut(&Tells<E>) -> Option<R>,
     ) -> Result<Option<R>, PreflightError> {
-        let rest = |_: u64| Target {
-            position: clutch_core::FixedCounts(0),
-            velocity: T::ZERO,
-            acceleration: T::ZERO,
-        };
-        let end = monotonic_ns() + patience.as_nanos() as u64;
+        let until = monotonic_ns() + patience.as_nanos() as u64;
         let mut again = 0;
         let mut buffer = [0; 1024];
         let mut found = None;
         loop {
             let now = monotonic_ns();
-            if now >= end {
+            if now >= until {
                 return Ok(None);
             }
             if now >= again {
                 again = now + 100_000_000;
-                ask(self.node, &mut self.out);
+                ask(self.end, &mut self.out);
             }
             if !self.out.as_bytes().is_empty() {
                 self.port.write(self.out.as_bytes()).map_err(|e| self.port.explain(&e))?;
                 self.out.clear();
             }
-            if wait_readable(self.port.as_fd(), again.min(end), WaitMode::Sleep) == Readiness::Timeout {
+            if wait_readable(self.port.as_fd(), again.min(until), WaitMode::Sleep) == Readiness::Timeout {
                 continue;
             }
             let count = self.port.read(&mut buffer).map_err(|e| self.port.explain(&e))?;
             self.bytes += count as u64;
             let echo = &mut self.echo;
             let bytes = buffer.get(..count).unwrap_or(&[]);
-            self.node.receive(monotonic_ns(), bytes, &rest, &mut self.out, &mut |n| {
+            self.end.receive(monotonic_ns(), bytes, &mut self.out, &mut |n| {
                 *echo |= matches!(n, Notice::Echo);
                 if found.is_none() {
                     found = answer(&n);
@@ -204,11 +240,16 @@ impl<'a, T: Real> Talk<'a, T> {
             Hello(Box<Hello>),
             No(Refused),
         }
+        let mut controller = None;
         let nonce = (monotonic_ns() / 1000) as u32;
         let said = self.exchange(
             patience,
-            |node, out| node.discover(nonce, out),
+            |end, out| end.discover(nonce, out),
             |n| match n {
+                Notice::Controller(m) if m.nonce == nonce => {
+                    controller = Some(*m);
+                    None
+                }
                 Notice::Hello(m) if m.nonce == nonce => Some(Said::Hello(Box::new(*m))),
                 Notice::Refused(m) if m.request == clutch_wire::Discover::KIND => Some(Said::No(*m)),
                 _ => None,
@@ -223,7 +264,14 @@ impl<'a, T: Real> Talk<'a, T> {
             Some(Said::Hello(hello)) if hello.schema != clutch_wire::SCHEMA => {
                 Err(PreflightError::Schema { address, board: hello.schema as u32 })
             }
-            Some(Said::Hello(hello)) => Ok(*hello),
+            Some(Said::Hello(hello)) => match (controller, E::IS_CONTROLLER) {
+                (Some(_), false) => Err(PreflightError::IsController { address }),
+                (None, true) => Err(PreflightError::IsNoController { address }),
+                (Some(m), true) if m.settings != clutch_node::SETTINGS_HASH => {
+                    Err(PreflightError::Settings { address, board: m.settings })
+                }
+                _ => Ok(*hello),
+            },
             Some(Said::No(m)) if m.reason == Refusal::Version as u8 => {
                 Err(PreflightError::Version { address, board: m.value })
             }
@@ -231,6 +279,7 @@ impl<'a, T: Real> Talk<'a, T> {
                 Err(PreflightError::Schema { address, board: m.value })
             }
             Some(Said::No(m)) => Err(PreflightError::Refused { address, what: "known", why: why(&m) }),
+            None if controller.is_some() => Err(PreflightError::NoBoard { address }),
             None if self.echo => Err(PreflightError::Echo { address }),
             None if self.bytes > 0 => Err(PreflightError::Foreign { address, bytes: self.bytes }),
             None => Err(PreflightError::Silent { address }),
@@ -244,7 +293,7 @@ impl<'a, T: Real> Talk<'a, T> {
     pub fn configure(&mut self, present: clutch_core::DacCode) -> Result<(), PreflightError> {
         let said = self.exchange(
             Duration::from_secs(1),
-            |node, out| node.configure(present, out),
+            |end, out| end.configure(present, out),
             |n| match n {
                 Notice::Configured => Some(None),
                 Notice::Refused(m) if m.request == clutch_wire::Configure::KIND => Some(Some(*m)),
@@ -273,7 +322,7 @@ impl<'a, T: Real> Talk<'a, T> {
             let sent = monotonic_ns();
             let answer = self.exchange(
                 Duration::from_millis(90),
-                |node, out| node.ping(nonce, out),
+                |end, out| end.ping(nonce, out),
                 |n| match n {
                     Notice::Pong(n, time_us) if *n == nonce => Some((*time_us, monotonic_ns())),
                     _ => None,
@@ -286,6 +335,30 @@ impl<'a, T: Real> Talk<'a, T> {
             }
         }
         best.ok_or_else(|| PreflightError::Lost { address: self.address(), what: "asked for its time" })
+    }
+}
+
+impl<P: Fn(u64) -> clutch_core::Target<f32>> Talk<'_, Remote<P>> {
+    /// Sends a run's settings, each until the board has said that it has it.
+    ///
+    /// # Errors
+    /// The board refuses one, or is silent.
+    pub fn upload(&mut self, settings: &Settings) -> Result<(), PreflightError> {
+        let mut all = Vec::new();
+        settings.each(|key, value| all.push((key, value)));
+        for (key, value) in all {
+            let said = self.exchange(
+                Duration::from_secs(1),
+                |end, out| end.node.set(key, value, out),
+                |n| match n {
+                    Notice::Taken(m) if (m.key, m.value) == (key, value) => Some(None),
+                    Notice::Refused(m) if m.request == clutch_wire::Set::KIND => Some(Some(*m)),
+                    _ => None,
+                },
+            )?;
+            self.verdict(said, "set up")?;
+        }
+        Ok(())
     }
 }
 

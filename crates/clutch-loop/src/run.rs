@@ -11,6 +11,7 @@
 //! Between its first and its last cycle the control thread allocates nothing, takes no lock, and
 //! makes no system call but the wait for the next sample, the read and the write.
 
+use crate::end::{End, Tells};
 use crate::port::{Port, PortError};
 use crate::preflight::ClockOffset;
 use crate::realtime::{
@@ -18,11 +19,10 @@ use crate::realtime::{
     wait_readable,
 };
 use crate::records;
-use clutch_core::law::{Law, LawTerms};
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{Micros, Real, StickSlip, StickSlipState, Target};
+use clutch_core::{Micros, Real, StickSlip, StickSlipState};
 use clutch_log::{EventKind, EventRecord, Header, LogError, LogWriter, Record};
-use clutch_node::{ControlNode, CycleNotice, LinkCounts, Notice, Outbox};
+use clutch_node::{CycleNotice, LinkCounts, Notice, Outbox};
 use clutch_sim::Metrics;
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
 use clutch_wire::{Refused, StopReason};
@@ -103,6 +103,12 @@ pub struct LoopReport {
     pub response: CycleSummary,
     /// Time between two answers, ns.
     pub interval: CycleSummary,
+    /// What the board's clock cycles count, Hz; 0 if it counts none.
+    pub clock_hz: u32,
+    /// Clock cycles of a tick, where the board counts them.
+    pub tick_cycles: CycleSummary,
+    /// Telemetry of the board that did not come.
+    pub untold: u64,
     /// What the system refused.
     pub notes: Vec<String>,
     /// Records that did not fit into the ring.
@@ -117,7 +123,10 @@ pub struct LoopReport {
     pub port_error: Option<String>,
 }
 
-/// Frames of a log that wait for their thread.
+/// The way of records to their thread.
+pub type Ring = rtrb::Producer<Record>;
+
+/// Records of a log that wait for their thread.
 const RING: usize = 1 << 15;
 /// How often a chunk of the log goes to the file. With the ring's 20 ms this leaves a busy machine
 /// 20 ms of the 100 ms that a crash may cost.
@@ -125,17 +134,16 @@ const LOG_FLUSH: Duration = Duration::from_millis(60);
 /// How long the control thread waits for the board to say that it is safe.
 const FAREWELL: Duration = Duration::from_millis(300);
 
-struct Control<'a, T: Real, P> {
-    node: &'a mut ControlNode<T, Law<T>>,
+struct Control<'a, E: End> {
+    end: &'a mut E,
     port: &'a mut Port,
-    path: &'a P,
-    ring: Option<rtrb::Producer<Record>>,
+    ring: Option<Ring>,
     watch: &'a Watch,
     out: Outbox,
     ticks: u64,
     start_ns: u64,
     radians: f64,
-    dac: clutch_core::Dac<T>,
+    dac: clutch_core::Dac<E::Scalar>,
     period: f64,
     settle: f64,
     clock: ClockOffset,
@@ -151,6 +159,8 @@ struct Control<'a, T: Real, P> {
     interval: CycleStats,
     last_answer_ns: Option<u64>,
     last_arrival_ns: Option<u64>,
+    last_sample_us: Option<u32>,
+    tick_cycles: CycleStats,
     period_ns: u64,
     patient: bool,
     dropped: u64,
@@ -162,8 +172,8 @@ struct Control<'a, T: Real, P> {
 
 /// What one call of the node brought, gathered for use after it.
 #[derive(Clone, Copy)]
-struct Batch<T: Real> {
-    cycles: [Option<CycleNotice<T, LawTerms<T>>>; 32],
+struct Batch<T, X> {
+    cycles: [Option<CycleNotice<T, X>>; 32],
     used: usize,
     ended: Option<Cause>,
     pong: Option<(u32, u32)>,
@@ -171,7 +181,7 @@ struct Batch<T: Real> {
     refused: Option<Refused>,
 }
 
-impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
+impl<E: End> Control<'_, E> {
     fn push(&mut self, records: &[Record]) {
         let Some(ring) = &mut self.ring else { return };
         // A sample and its command together or not at all; after a gap its event comes first.
@@ -201,9 +211,20 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
     /// One wake-up: read, decide, write. Whether the line is still there.
     fn cycle(&mut self, arrived_ns: u64, buffer: &mut [u8]) -> Result<(), std::io::Error> {
         let count = self.port.read(buffer)?;
+        let bytes = buffer.get(..count).unwrap_or(&[]);
+        if !E::IS_CONTROLLER {
+            return self.hear(arrived_ns, bytes);
+        }
+        for frame in bytes.split_inclusive(|byte| *byte == 0) {
+            self.hear(arrived_ns, frame)?;
+        }
+        if bytes.is_empty() { self.hear(arrived_ns, bytes) } else { Ok(()) }
+    }
+
+    fn hear(&mut self, arrived_ns: u64, bytes: &[u8]) -> Result<(), std::io::Error> {
         let now = monotonic_ns();
-        let from = self.node.state().state();
-        let mut batch = Batch::<T> {
+        let from = self.end.told().state;
+        let mut batch = Batch::<E::Scalar, E::Terms> {
             cycles: [const { None }; 32],
             used: 0,
             ended: None,
@@ -213,7 +234,7 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
         };
         let mut lost_records = 0;
         {
-            let mut notices = |n: Notice<T, LawTerms<T>>| match n {
+            let mut notices = |n: Tells<E>| match n {
                 Notice::Cycle(n) => match batch.cycles.get_mut(batch.used) {
                     Some(slot) => {
                         *slot = Some(n);
@@ -228,12 +249,11 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
                 Notice::Refused(m) => batch.refused = Some(m),
                 _ => {}
             };
-            let bytes = buffer.get(..count).unwrap_or(&[]);
-            self.node.receive(now, bytes, self.path, &mut self.out, &mut notices);
-            self.node.poll(now, &mut self.out, &mut notices);
+            self.end.receive(now, bytes, &mut self.out, &mut notices);
+            self.end.poll(now, &mut self.out, &mut notices);
         }
         self.dropped += if self.ring.is_some() { lost_records } else { 0 };
-        if !self.out.as_bytes().is_empty() {
+        if !self.out.is_empty() {
             self.send()?;
             let done = monotonic_ns();
             let took = done.saturating_sub(arrived_ns);
@@ -241,8 +261,9 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
             // clock of a patient board waits for a stalled machine, so that it says nothing of that.
             let due = self.last_arrival_ns.filter(|_| !self.patient).map(|t| t + self.period_ns);
             let late = done.saturating_sub(due.unwrap_or(arrived_ns).min(arrived_ns));
-            self.node.answered(Micros(u32::try_from(late / 1000).unwrap_or(u32::MAX)));
-            if batch.cycles.iter().take(batch.used).flatten().any(|n| n.cycle.answer.is_some()) {
+            self.end.answered(Micros(u32::try_from(late / 1000).unwrap_or(u32::MAX)));
+            let answered = batch.cycles.iter().take(batch.used).flatten().any(|n| n.cycle.answer.is_some());
+            if answered && !E::IS_CONTROLLER {
                 self.response.record(took);
                 if let Some(last) = self.last_answer_ns {
                     self.interval.record(done.saturating_sub(last));
@@ -268,11 +289,11 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
     }
 
     /// What need not be done before the answer is on its way: log, figures, watcher.
-    fn after(&mut self, now: u64, from: State, batch: &Batch<T>) {
+    fn after(&mut self, now: u64, from: State, batch: &Batch<E::Scalar, E::Terms>) {
         let time_ns = now.saturating_sub(self.start_ns);
         self.refused = self.refused.or(batch.refused);
         // What came before consent is not of the run.
-        let of_run = |n: &&CycleNotice<T, LawTerms<T>>| n.cycle.from != State::Ready;
+        let of_run = |n: &&CycleNotice<E::Scalar, E::Terms>| n.cycle.from != State::Ready;
         for n in batch.cycles.iter().take(batch.used).flatten().filter(of_run) {
             let age = self.clock.age_us(n.sample.time_us, now);
             let mut records = [Record::Sample(records::sample(time_ns, age, n)); 3];
@@ -286,6 +307,9 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
             };
             self.push(&records[..used]);
             self.board_safe |= matches!(n.sample.status & 0x07, 4 | 5);
+            if E::IS_CONTROLLER {
+                self.on_the_board(n);
+            }
             if let Some(out) = &n.cycle.output {
                 let time = n.cycle.tick as f64 * self.period;
                 let error = out.tick.error.to_f64();
@@ -303,10 +327,10 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
             }
         }
         self.board_safe |= batch.stopped;
-        let state = self.node.state();
+        let state = self.end.told();
         if let Some(cause) = batch.ended {
-            let value = state.value().to_f64();
-            let record = records::ended(time_ns, state.tick(), from, state.state(), cause, value);
+            let value = state.value.to_f64();
+            let record = records::ended(time_ns, state.tick, from, state.state, cause, value);
             self.push(&[record]);
         }
         if let (Some((nonce, time_us)), Some((sent, sent_ns))) = (batch.pong, self.ping_sent)
@@ -319,31 +343,48 @@ impl<T: Real, P: Fn(u64) -> Target<T>> Control<'_, T, P> {
             }
             self.ping_sent = None;
         }
-        let state = self.node.state();
+        let state = self.end.told();
         let w = self.watch;
-        w.state.store(state.state() as u8, Ordering::Relaxed);
-        w.tick.store(state.tick(), Ordering::Relaxed);
-        w.lost.store(state.lost(), Ordering::Relaxed);
-        w.late_answers.store(state.deadline_misses(), Ordering::Relaxed);
+        w.state.store(state.state as u8, Ordering::Relaxed);
+        w.tick.store(state.tick, Ordering::Relaxed);
+        w.lost.store(state.lost, Ordering::Relaxed);
+        w.late_answers.store(state.deadline_misses, Ordering::Relaxed);
+    }
+
+    /// What the board tells of its own times: those of its answers, its samples, its ticks.
+    fn on_the_board(&mut self, n: &CycleNotice<E::Scalar, E::Terms>) {
+        if n.cycle.answer.is_none() {
+            return;
+        }
+        self.response.record(u64::from(n.lateness.0) * 1000);
+        if let Some(last) = self.last_sample_us.replace(n.sample.time_us) {
+            self.interval.record(u64::from(n.sample.time_us.wrapping_sub(last)) * 1000);
+        }
+        if n.cycles > 0 {
+            self.tick_cycles.record(n.cycles.into());
+        }
     }
 
     /// Once a second: the link's counters, the board's clock.
     fn housekeeping(&mut self, now: u64) {
-        let state = self.node.state();
-        let others = (state.lost(), state.rejected(), state.deadline_misses(), self.dropped);
-        let link = records::link(now.saturating_sub(self.start_ns), state.tick(), self.node.counts(), others);
+        let state = self.end.told();
+        let others = (state.lost, state.rejected, state.deadline_misses, self.dropped);
+        let link = records::link(now.saturating_sub(self.start_ns), state.tick, self.end.counts(), others);
         self.push(&[Record::Link(link)]);
         self.pings = self.pings.wrapping_add(1);
-        self.node.ping(self.pings, &mut self.out);
+        self.end.ping(self.pings, &mut self.out);
         self.ping_sent = Some((self.pings, now));
     }
 
-    fn end(&mut self, reason: StopReason) {
-        let from = self.node.state().state();
-        self.node.stop(reason, &mut self.out);
-        let state = self.node.state();
+    fn stop(&mut self, reason: StopReason) {
+        let from = self.end.told().state;
+        self.end.stop(reason, &mut self.out);
+        if E::IS_CONTROLLER {
+            return; // the board says when it has ended
+        }
+        let state = self.end.told();
         let now = monotonic_ns().saturating_sub(self.start_ns);
-        let record = records::ended(now, state.tick(), from, state.state(), state.cause(), 0.0);
+        let record = records::ended(now, state.tick, from, state.state, state.cause, 0.0);
         self.push(&[record]);
     }
 }
@@ -359,11 +400,7 @@ impl LogThread {
     ///
     /// # Errors
     /// The file cannot be created.
-    pub fn start(
-        path: &Path,
-        header: &Header,
-        watch: Arc<Watch>,
-    ) -> Result<(LogThread, rtrb::Producer<Record>), LogError> {
+    pub fn start(path: &Path, header: &Header, watch: Arc<Watch>) -> Result<(LogThread, Ring), LogError> {
         let mut writer = LogWriter::create(path, header)?;
         let (producer, mut consumer) = rtrb::RingBuffer::<Record>::new(RING);
         let thread = std::thread::spawn(move || {
@@ -412,18 +449,16 @@ impl LogThread {
 }
 
 /// Everything that a run needs, after the pre-flight: the board is configured.
-pub struct Configured<'a, T: Real, P> {
-    /// The controller.
-    pub node: &'a mut ControlNode<T, Law<T>>,
+pub struct Configured<'a, E> {
+    /// The controller's end.
+    pub end: &'a mut E,
     /// The open port.
     pub port: &'a mut Port,
-    /// The path.
-    pub path: &'a P,
     /// Where records go, if anywhere.
-    pub ring: Option<rtrb::Producer<Record>>,
+    pub ring: Option<Ring>,
     /// What a watcher sees.
     pub watch: &'a Watch,
-    /// Ticks of the run.
+    /// Ticks of the run; a board that is the controller has been told, and ends it by itself.
     pub ticks: u64,
     /// The board's clock.
     pub clock: ClockOffset,
@@ -434,19 +469,14 @@ pub struct Configured<'a, T: Real, P> {
 }
 
 /// Gives consent and runs the cycles until the path's end, a stop, or a fault, on the calling thread.
-pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
-    configured: Configured<'_, T, P>,
-    options: &LoopOptions,
-) -> LoopReport {
-    let servo = configured.node.servo();
-    let (encoder, period) = (servo.encoder(), servo.period());
-    let dac = *servo.dac();
+pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> LoopReport {
+    let (encoder, period) = (configured.end.encoder(), configured.end.period());
+    let dac = *configured.end.dac();
     let seconds: f64 = period.seconds();
     let period_ns = u64::from(period.0) * 1000;
     let mut buffer = [0_u8; 2048];
     let notes = enter(&options.realtime);
     let mut c = Control {
-        path: configured.path,
         ring: configured.ring,
         watch: configured.watch,
         out: Outbox::default(),
@@ -468,6 +498,8 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
         interval: CycleStats::new(),
         last_answer_ns: None,
         last_arrival_ns: None,
+        last_sample_us: None,
+        tick_cycles: CycleStats::new(),
         period_ns,
         patient: configured.patient,
         dropped: 0,
@@ -475,7 +507,7 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
         board_safe: false,
         refused: None,
         cut: 0,
-        node: configured.node,
+        end: configured.end,
         port: configured.port,
     };
     (options.hooks.0)();
@@ -489,14 +521,14 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
     loop {
         // Wait.
         let arrived = match options.pace {
-            _ if c.node.state().state() == State::Ready => {
+            _ if c.end.told().state == State::Ready => {
                 let now = monotonic_ns();
                 if c.refused.is_some() || now >= give_up || c.watch.stop.load(Ordering::Relaxed) {
                     break;
                 }
                 if now >= ask_again {
                     ask_again = now + 100_000_000;
-                    c.node.arm(&mut c.out);
+                    c.end.arm(&mut c.out);
                     if let Err(error) = c.send() {
                         port_error = Some(error);
                         break;
@@ -506,7 +538,7 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
                 monotonic_ns()
             }
             Pace::Sample => {
-                let until = c.node.poll_at().unwrap_or_else(|| monotonic_ns() + 20_000_000);
+                let until = c.end.poll_at().unwrap_or_else(|| monotonic_ns() + 20_000_000);
                 // Spinning is for the moment at which the sample is due; one that is overdue is slept for.
                 let (until, mode) = match (mode, c.last_answer_ns) {
                     (WaitMode::SleepSpin { spin_us }, Some(last)) => {
@@ -546,13 +578,16 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
         }
         // Ends.
         let now = monotonic_ns();
-        match c.node.state().state() {
+        match c.end.told().state {
             State::Ready => {}
             State::Running | State::Armed => {
                 if c.watch.stop.load(Ordering::Relaxed) {
-                    c.end(StopReason::Operator);
-                } else if c.node.state().state() == State::Running && c.node.state().tick() + 1 >= c.ticks {
-                    c.end(StopReason::Done);
+                    c.stop(StopReason::Operator);
+                } else if !E::IS_CONTROLLER
+                    && c.end.told().state == State::Running
+                    && c.end.told().tick + 1 >= c.ticks
+                {
+                    c.stop(StopReason::Done);
                 } else if now >= next_second {
                     next_second += 1_000_000_000;
                     c.housekeeping(now);
@@ -572,17 +607,17 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
     }
     (options.hooks.1)();
     let port_error = port_error.map(|e| {
-        let from = c.node.state().state();
-        c.node.disconnect();
-        let state = c.node.state();
+        let from = c.end.told().state;
+        c.end.disconnect();
+        let state = c.end.told();
         let now = monotonic_ns().saturating_sub(c.start_ns);
         let record = EventRecord {
-            tick: state.tick(),
+            tick: state.tick,
             time_ns: now,
             kind: EventKind::PortLost as u8,
             from: from as u8,
-            to: state.state() as u8,
-            cause: state.cause() as u8,
+            to: state.state as u8,
+            cause: state.cause as u8,
             value: 0.0,
         };
         c.push(&[Record::Event(record)]);
@@ -592,7 +627,7 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
     let now = monotonic_ns();
     c.housekeeping(now);
     c.out.clear();
-    let state = c.node.state();
+    let state = c.end.told();
     let mut metrics = c.figures.finish();
     let measured = metrics.measured_s.max(seconds);
     // On hardware the encoder's silence is all that is seen of sticking.
@@ -601,17 +636,20 @@ pub fn run<T: Real, P: Fn(u64) -> Target<T>>(
     metrics.stair_height_rad = f64::from(c.sticks.stair()) * c.radians;
     let _ = c.watch.log_dropped.fetch_max(c.dropped, Ordering::Relaxed);
     LoopReport {
-        state: state.state(),
-        cause: state.cause(),
-        value: state.value().to_f64(),
+        state: state.state,
+        cause: state.cause,
+        value: state.value.to_f64(),
         ticks: c.answers,
         metrics,
-        link: *c.node.counts(),
-        lost: state.lost(),
-        implausible: state.rejected(),
-        deadline_misses: state.deadline_misses(),
+        link: *c.end.counts(),
+        lost: state.lost,
+        implausible: state.rejected,
+        deadline_misses: state.deadline_misses,
         response: c.response.summary(),
         interval: c.interval.summary(),
+        clock_hz: 0,
+        tick_cycles: c.tick_cycles.summary(),
+        untold: state.untold,
         notes,
         log_dropped: c.dropped,
         cut_writes: c.cut,

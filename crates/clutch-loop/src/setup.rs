@@ -7,7 +7,7 @@ use clutch_core::{
     Supervisor, SupervisorParams, Target,
 };
 use clutch_log::{Header, Source};
-use clutch_node::ControlParams;
+use clutch_node::{ControlParams, RunParams, Settings, Unsupported};
 use clutch_sim::scenario::{Plan, ScalarKind};
 use clutch_sim::{Scenario, ScenarioError};
 use clutch_wire::Hello;
@@ -48,6 +48,12 @@ pub enum SetupError {
     /// A parameter.
     #[error(transparent)]
     Param(#[from] ParamError),
+    /// A board cannot close such a loop.
+    #[error("{0}")]
+    Unsupported(#[from] Unsupported),
+    /// A board that closes the loop calculates in single precision.
+    #[error("sampling.scalar = \"f64\": expected \"f32\", the scalar of a board that closes the loop itself")]
+    Scalar,
 }
 
 pub(crate) fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
@@ -108,6 +114,35 @@ impl<T: Real> Setup<T> {
             ticks: scenario.ticks(),
         })
     }
+}
+
+/// What a board needs to close the loop by itself; the run ends there after so many ticks.
+///
+/// # Errors
+/// The scenario is not one in single precision, or asks for what boards do not have.
+pub fn settings(
+    scenario: &Scenario,
+    setup: &Setup<f32>,
+    host_silence: Micros,
+    ticks: u64,
+) -> Result<Settings, SetupError> {
+    if scenario.scalar != ScalarKind::F32 {
+        return Err(SetupError::Scalar);
+    }
+    let spec = scenario.spec();
+    let within = spec.run.start_position().0 & ((1 << FixedCounts::FRACTION_BITS) - 1);
+    Ok(Settings::new(&RunParams {
+        servo: &setup.params,
+        supervisor: &scenario.safety()?.supervisor.cast(),
+        bounds: &scenario.plan()?.bounds.cast(),
+        reference: &spec.reference.cast(),
+        start: FixedCounts(within),
+        watchdog: setup.control.watchdog,
+        valid: setup.control.valid,
+        silence: setup.control.silence,
+        host_silence,
+        ticks,
+    })?)
 }
 
 /// The scenario's path from the count on which a run begins: its first point lies within that

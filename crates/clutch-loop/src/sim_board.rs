@@ -4,7 +4,7 @@
 use crate::faults::{Fault, FaultKind, StuckAt};
 use clutch_core::{Counts, Dac, DacCode, FixedCounts, ParamError, SafeCodes};
 use clutch_node::{BoardNode, BoardParams, Outbox};
-use clutch_sim::engine::{EngineError, Motion};
+use clutch_sim::engine::{EngineError, Event, Motion};
 use clutch_sim::rig::Rig;
 use clutch_sim::{MovingRig, RunError, Scenario, ScenarioError};
 use clutch_wire::BoardState;
@@ -52,7 +52,11 @@ pub struct SimBoard {
     stuck_at: Option<f64>,
     reset_done: bool,
     first_hit_ns: Option<u64>,
+    events: Vec<Event>,
 }
+
+/// Events that wait to be asked for.
+const MAX_EVENTS: usize = 1 << 12;
 
 /// The converter in whole millivolts, as the wire tells it.
 fn millivolts(volts: f64) -> i32 {
@@ -117,7 +121,13 @@ impl SimBoard {
             stuck_at: None,
             reset_done: false,
             first_hit_ns: None,
+            events: Vec::new(),
         })
+    }
+
+    /// What has happened to the shaft since the last call: it stuck, it broke away.
+    pub fn take_events(&mut self) -> Vec<Event> {
+        std::mem::take(&mut self.events)
     }
 
     /// The board's state machine.
@@ -265,7 +275,11 @@ impl SimBoard {
         if let Some(since) = self.moved_ns
             && now_ns > since
         {
-            self.rig.advance((now_ns - since) as f64 / 1e9)?;
+            let events = self.rig.advance((now_ns - since) as f64 / 1e9)?;
+            // Nobody may ask for them: what waits is bounded.
+            if self.events.len() < MAX_EVENTS {
+                self.events.extend_from_slice(events);
+            }
             self.moved_ns = Some(now_ns);
         }
         Ok(())

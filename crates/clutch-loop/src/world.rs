@@ -3,16 +3,18 @@
 //! The same state machines, frames and rig as in real time; only the clock is computed. A run of
 //! one second takes some milliseconds and repeats bit for bit.
 
+use crate::end::{End, Tells};
 use crate::faults::{Direction, Fault};
 use crate::line::Line;
 use crate::records;
 use crate::sim_board::{SimBoard, SimBoardError};
-use clutch_core::law::Controller;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{Micros, Real, Servo, Supervisor, Target};
+use clutch_core::{Micros, Real, Target};
 use clutch_log::Record;
-use clutch_node::{ControlNode, ControlParams, Notice, Outbox};
-use clutch_sim::Scenario;
+use clutch_node::{Notice, Outbox};
+use clutch_sim::engine::{Event, Motion, Shaft};
+use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
+use clutch_sim::{Metrics, Scenario};
 use clutch_wire::{BoardState, StopReason};
 
 /// Time that a controller takes for an answer, over a part of a run.
@@ -41,8 +43,10 @@ pub struct WorldParams {
     pub record: bool,
     /// Time after arming at which the run ends, s; the safe state is watched until then.
     pub duration: f64,
-    /// Whether an end that nothing forced is followed by an orderly stop.
+    /// Ticks after which the run is over and an orderly stop follows.
     pub ticks: u64,
+    /// Time left out of the figures, s.
+    pub settle: f64,
 }
 
 /// What became of a run.
@@ -74,34 +78,51 @@ pub struct Outcome {
     pub errors: Vec<f64>,
     /// The board's state at the end.
     pub board: Option<BoardState>,
+    /// Figures of the shaft's true motion under control, as a simulation has them; the last period of the
+    /// run, in which it ends, is not among them.
+    pub metrics: Metrics,
+}
+
+/// A run in virtual time could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum WorldError {
+    /// The board or its rig.
+    #[error(transparent)]
+    Board(#[from] SimBoardError),
+    /// The controller's end.
+    #[error("{0}")]
+    Controller(String),
+}
+
+/// A sample of the shaft that waits for its answer.
+struct Sampled {
+    shaft: Shaft,
+    /// When, by the rig's clock, s.
+    rig_time: f64,
+    /// The run's tick, once the controller has told.
+    tick: Option<u64>,
 }
 
 /// Controller, line and board.
-pub struct World<T: Real, C: Controller<T>> {
+pub struct World<E> {
     board: SimBoard,
-    node: ControlNode<T, C>,
+    end: E,
     up: Line,
     down: Line,
     params: WorldParams,
     now_ns: u64,
 }
 
-impl<T: Real, C: Controller<T>> World<T, C> {
-    /// A controller around a servo, and the scenario's rig on a board.
+impl<E: End> World<E> {
+    /// A controller's end, and the scenario's rig on a board.
     ///
     /// # Errors
     /// As [`SimBoard::new`].
-    pub fn new(
-        scenario: &Scenario,
-        params: WorldParams,
-        control: ControlParams,
-        servo: Servo<T, C>,
-        supervisor: Supervisor<T>,
-    ) -> Result<Self, SimBoardError> {
+    pub fn new(scenario: &Scenario, params: WorldParams, end: E) -> Result<Self, SimBoardError> {
         let line = |way| Line::new(way, params.latency_ns, &params.faults, params.seed);
         Ok(World {
             board: SimBoard::new(scenario, &params.faults, 1, false)?,
-            node: ControlNode::new(control, servo, supervisor),
+            end,
             up: line(Direction::Up),
             down: line(Direction::Down),
             params,
@@ -109,32 +130,34 @@ impl<T: Real, C: Controller<T>> World<T, C> {
         })
     }
 
-    /// Discovers, configures, arms, and runs to the end.
+    /// Discovers, configures, arms, and runs to the end; `path` is the one that the controller follows.
     ///
     /// # Errors
-    /// The engine gave up.
-    pub fn run(mut self, path: &impl Fn(u64) -> Target<T>) -> Result<Outcome, SimBoardError> {
+    /// The engine gave up, or the controller's end.
+    pub fn run(&mut self, path: &impl Fn(u64) -> Target<E::Scalar>) -> Result<Outcome, WorldError> {
         let mut outcome = Outcome { volts: (f64::INFINITY, f64::NEG_INFINITY), ..Outcome::default() };
         let (mut out, mut up) = (Outbox::default(), Outbox::default());
-        let radians = self.node.servo().encoder().radians_per_count::<f64>();
-        let dac = *self.node.servo().dac();
-        let period_ns = u64::from(self.node.servo().period().0) * 1000;
-        let (mut configured, mut armed, mut ready_samples) = (false, false, 0);
+        let radians = self.end.encoder().radians_per_count::<f64>();
+        let dac = *self.end.dac();
+        let period_ns = u64::from(self.end.period().0) * 1000;
+        let period = self.end.period().seconds::<f64>();
+        let mut figures = MetricsBuilder::new(period, self.params.settle);
+        let mut waiting: Option<Sampled> = None;
+        let (mut hello, mut configured, mut armed, mut ready_samples) = (false, false, false, 0);
         let mut origin_ns = 0;
         let mut safe_at: Option<u64> = None;
         let mut busy_until = 0;
         let (mut sampled, mut first_sample) = (0, None);
-        self.node.discover(1, &mut out);
+        self.end.discover(1, &mut out);
         let present = self.board.code();
         outcome.present = present.0;
-        self.node.configure(present, &mut out);
         self.down.send(0, None, out.as_bytes());
         out.clear();
         let mut end_ns = u64::MAX;
         loop {
             // What comes next.
             let host = self.up.next_ns().map(|t| t.max(busy_until));
-            let poll = self.node.poll_at().map(|t| t.max(busy_until));
+            let poll = self.end.poll_at().map(|t| t.max(busy_until));
             let times = [self.board.next_ns(), host, self.down.next_ns(), poll];
             let Some(next) = times.into_iter().flatten().min() else { break };
             self.now_ns = next.max(self.now_ns);
@@ -165,6 +188,21 @@ impl<T: Real, C: Controller<T>> World<T, C> {
             up.clear();
             if self.board.samples() != sampled {
                 sampled = self.board.samples();
+                let events = self.board.take_events();
+                if let Some(Sampled { shaft, rig_time, tick: Some(tick) }) = waiting.take()
+                    && tick + 1 < self.params.ticks
+                {
+                    let time = tick as f64 * period;
+                    let error = self.target(path, tick) - shaft.position;
+                    let voltage = self.board.volts();
+                    figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage });
+                    // The rig's clock began before the run's.
+                    let of_run = |e: &Event| Event { time: e.time - rig_time + time, ..*e };
+                    let events: Vec<Event> = events.iter().map(of_run).collect();
+                    figures.period(time, shaft.motion == Motion::Stuck, &events);
+                }
+                let rig = self.board.rig();
+                waiting = Some(Sampled { shaft: *rig.shaft(), rig_time: rig.time(), tick: None });
                 if let Some(first) = first_sample
                     && safe_at.is_none()
                 {
@@ -189,60 +227,66 @@ impl<T: Real, C: Controller<T>> World<T, C> {
             let mut records = Vec::new();
             let mut cycles = 0_u64;
             let time_ns = now.saturating_sub(origin_ns);
-            let from = self.node.state().state();
+            let from = self.end.told().state;
             let mut ended = None;
+            let mut greeted = false;
             {
-                let armed_now = &mut armed;
-                let mut notices = |n: Notice<T, C::Terms>| match n {
+                let (armed_now, rig) = (&mut armed, self.board.rig());
+                let mut notices = |n: Tells<E>| match n {
+                    Notice::Hello(_) => greeted = true,
                     Notice::Configured => configured = true,
                     Notice::Armed => *armed_now = true,
                     Notice::Cycle(n) => {
                         cycles += 1;
                         if *armed_now {
+                            if let Some(waiting) = waiting.as_mut().filter(|_| n.cycle.answer.is_some()) {
+                                waiting.tick = Some(n.cycle.tick);
+                            }
                             outcome.answers += u64::from(n.cycle.answer.is_some());
                             let volts = dac.volts(n.cycle.code).to_f64();
                             outcome.volts = (outcome.volts.0.min(volts), outcome.volts.1.max(volts));
                             records.push(Record::Sample(records::sample(time_ns, 0, &n)));
                             records.push(Record::Command(records::command(time_ns, &n.cycle, &dac, radians)));
                             records.extend(records::change(time_ns, &n.cycle));
+                            records.push(Record::Truth(records::truth(time_ns, n.cycle.tick, rig)));
                         }
                     }
                     Notice::Ended(cause) => ended = Some(cause),
                     _ => {}
                 };
                 while let Some(bytes) = self.up.arrived(now) {
-                    self.node.receive(now, &bytes, path, &mut out, &mut notices);
+                    self.end.receive(now, &bytes, &mut out, &mut notices);
                 }
-                self.node.poll(now, &mut out, &mut notices);
+                self.end.poll(now, &mut out, &mut notices);
+            }
+            if greeted && !hello {
+                hello = true;
+                self.end.configure(present, &mut out);
+            }
+            if let Some(why) = self.end.failure() {
+                return Err(WorldError::Controller(why));
             }
             if configured && !armed {
                 ready_samples += cycles;
                 if cycles > 0 && ready_samples == 3 {
-                    self.node.arm(&mut out);
+                    self.end.arm(&mut out);
                 }
             }
-            let state = self.node.state().state();
-            let tick = self.node.state().tick();
+            let told = self.end.told();
+            let (state, tick) = (told.state, told.tick);
             if state == State::Running && first_sample.is_none() {
                 first_sample = Some(sampled);
             }
             if let Some(cause) = ended {
-                records.push(records::ended(
-                    time_ns,
-                    tick,
-                    from,
-                    state,
-                    cause,
-                    self.node.state().value().to_f64(),
-                ));
+                records.push(records::ended(time_ns, tick, from, state, cause, told.value.to_f64()));
             }
             if state == State::Faulted && outcome.tripped.is_none() {
                 outcome.tripped = armed_for;
-                outcome.cause = Some(self.node.state().cause());
+                outcome.cause = Some(told.cause);
             }
-            if state == State::Running && tick + 1 >= self.params.ticks {
-                self.node.stop(StopReason::Done, &mut out);
-                let to = self.node.state().state();
+            if !E::IS_CONTROLLER && state == State::Running && tick + 1 >= self.params.ticks {
+                self.end.stop(StopReason::Done, &mut out);
+                let to = self.end.told().state;
                 records.push(records::ended(time_ns, tick, state, to, Cause::Done, 0.0));
             }
             if self.params.record {
@@ -253,7 +297,7 @@ impl<T: Real, C: Controller<T>> World<T, C> {
                     self.params.stall.filter(|s| armed_for.is_some_and(|t| t >= s.at && t < s.until));
                 let takes = answer.map_or(0, |s| (s.answer * 1e9) as u64);
                 busy_until = now.saturating_add(takes);
-                self.node.answered(Micros((takes / 1000) as u32));
+                self.end.answered(Micros((takes / 1000) as u32));
                 self.down.send(busy_until, armed_for, out.as_bytes());
                 out.clear();
             }
@@ -262,7 +306,7 @@ impl<T: Real, C: Controller<T>> World<T, C> {
                 break;
             }
         }
-        outcome.lost = self.node.state().lost();
+        outcome.lost = self.end.told().lost;
         outcome.board = Some(self.board.node().state());
         outcome.hit = [self.up.hits().1, self.down.hits().1, self.board.first_hit_ns()]
             .into_iter()
@@ -270,21 +314,28 @@ impl<T: Real, C: Controller<T>> World<T, C> {
             .min()
             .map(|t| t.saturating_sub(origin_ns) as f64 / 1e9);
         let at_end = self.board.rig().shaft().position;
+        outcome.metrics = figures.finish();
         outcome.overrun =
             outcome.overrun.max(self.beyond(at_end, path, safe_at.unwrap_or(self.now_ns), origin_ns));
         Ok(outcome)
     }
 
     /// How far a position lies beyond the path's at a time.
-    fn beyond(&self, position: f64, path: &impl Fn(u64) -> Target<T>, at_ns: u64, origin_ns: u64) -> f64 {
-        let period_ns = u64::from(self.node.servo().period().0) * 1000;
+    fn beyond(
+        &self,
+        position: f64,
+        path: &impl Fn(u64) -> Target<E::Scalar>,
+        at_ns: u64,
+        origin_ns: u64,
+    ) -> f64 {
+        let period_ns = u64::from(self.end.period().0) * 1000;
         let tick = at_ns.saturating_sub(origin_ns) / period_ns;
         position - self.target(path, tick)
     }
 
-    fn target(&self, path: &impl Fn(u64) -> Target<T>, tick: u64) -> f64 {
-        let radians = self.node.servo().encoder().radians_per_count::<f64>();
-        let position = path(tick).position.plus(self.node.origin());
+    fn target(&self, path: &impl Fn(u64) -> Target<E::Scalar>, tick: u64) -> f64 {
+        let radians = self.end.encoder().radians_per_count::<f64>();
+        let position = path(tick).position.plus(self.end.origin());
         position.minus::<f64>(clutch_core::FixedCounts(0)) * radians
     }
 }

@@ -9,7 +9,7 @@ use clutch_core::{
 use clutch_wire::{
     Actuate, Arm, BoardState, Configure, Controller as ControllerInfo, Decoder, Discover, Fault, FrameError,
     Hello, Message, Ping, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop,
-    StopReason, Stopped, VERSION,
+    StopReason, Stopped, Taken, VERSION,
 };
 
 /// What a run is, on the wire.
@@ -69,6 +69,8 @@ pub enum Notice<T, Terms> {
     Hello(Hello),
     /// A board in the controller role answered.
     Controller(ControllerInfo),
+    /// The board took a setting.
+    Taken(Taken),
     /// The board is configured for this run; samples follow.
     Configured,
     /// The board takes codes.

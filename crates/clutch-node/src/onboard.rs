@@ -203,7 +203,7 @@ impl Onboard {
             Notice::BoardFault(m) => host.push(&Message::Fault(m)),
             Notice::Ended(_) => ended = true,
             Notice::Hello(m) => hello = Some(m),
-            Notice::Controller(_) | Notice::BadFrame(_) | Notice::Echo => {}
+            Notice::Controller(_) | Notice::Taken(_) | Notice::BadFrame(_) | Notice::Echo => {}
         });
         if let Some(m) = hello {
             self.hello = Some(m);
@@ -296,6 +296,8 @@ impl Onboard {
     fn set(&mut self, m: &Set, host: &mut Outbox) {
         let refusal = if self.driving() {
             Some((Refusal::State, self.state() as u32))
+        } else if !Settings::knows(m.key) {
+            Some((Refusal::Setting, u32::from(m.key)))
         } else {
             if m.run != self.settings_run {
                 self.settings = Settings::default();

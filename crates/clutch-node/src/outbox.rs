@@ -22,8 +22,11 @@ impl Default for Outbox {
 impl Outbox {
     /// Adds a frame.
     pub fn push(&mut self, message: &Message) {
-        let frame = encode(message);
-        let frame = frame.as_bytes();
+        self.append(encode(message).as_bytes());
+    }
+
+    /// Adds whole frames that have been made before.
+    pub fn append(&mut self, frame: &[u8]) {
         let end = self.used.saturating_add(frame.len());
         match self.bytes.get_mut(self.used..end) {
             Some(free) => {

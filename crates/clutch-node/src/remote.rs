@@ -2,25 +2,24 @@
 
 use crate::control::{LinkCounts, Notice};
 use crate::outbox::Outbox;
-use crate::settings::Settings;
 use crate::telemetry::{both_states, notice};
 use clutch_core::law::{Law, LawTerms};
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{FixedCounts, Servo, Target};
 use clutch_wire::{
-    Arm, Configure, Controller, Decoder, Discover, Message, Ping, SCHEMA, Set, Stop, StopReason, Taken,
-    Telemetry, VERSION,
+    Arm, Configure, Controller, Decoder, Discover, Message, Ping, SCHEMA, Set, Stop, StopReason, Telemetry,
+    VERSION,
 };
 
 /// Where control stands, as the board told last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Told {
+pub struct Told<T> {
     /// The supervisor's state.
     pub state: State,
     /// Why control ended.
     pub cause: Cause,
     /// What the check that ended it saw.
-    pub value: f32,
+    pub value: T,
     /// The run's tick.
     pub tick: u64,
     /// Samples lost.
@@ -40,7 +39,7 @@ pub struct RemoteNode {
     servo: Servo<f32>,
     configure: Configure,
     decoder: Decoder,
-    told: Told,
+    told: Told<f32>,
     counts: LinkCounts,
     controller: Option<Controller>,
     origin: FixedCounts,
@@ -53,8 +52,6 @@ pub struct RemoteNode {
     silent_ns: u64,
     pings: u32,
     stopping: Option<StopReason>,
-    /// The setting that was taken last.
-    taken: Option<Taken>,
 }
 
 impl RemoteNode {
@@ -78,13 +75,12 @@ impl RemoteNode {
             silent_ns,
             pings: 0,
             stopping: None,
-            taken: None,
         }
     }
 
     /// Where control stands.
     #[must_use]
-    pub fn told(&self) -> &Told {
+    pub fn told(&self) -> &Told<f32> {
         &self.told
     }
 
@@ -122,22 +118,6 @@ impl RemoteNode {
         out.push(&Message::Set(Set { run: self.configure.run, key, value }));
     }
 
-    /// Whether the board has taken this setting, with this value.
-    #[must_use]
-    pub fn has_taken(&self, key: u16, value: u64) -> bool {
-        self.taken == Some(Taken { run: self.configure.run, key, value })
-    }
-
-    /// Sends all settings at once, to a board whose line loses nothing.
-    pub fn set_all(&mut self, settings: &Settings, mut send: impl FnMut(&Outbox)) {
-        let mut out = Outbox::default();
-        settings.each(|key, value| {
-            out.clear();
-            self.set(key, value, &mut out);
-            send(&out);
-        });
-    }
-
     /// Tells the board of the run, whose settings it has.
     pub fn configure(&mut self, out: &mut Outbox) {
         out.push(&Message::Configure(self.configure));
@@ -153,9 +133,15 @@ impl RemoteNode {
         out.push(&Message::Ping(Ping { run: self.configure.run, nonce }));
     }
 
-    /// Asks the board to end control: `Done` or `Operator`.
+    /// Asks the board to end control, `Done` or `Operator`; again and again, until it says that it has.
     pub fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
-        self.stopping.get_or_insert(reason);
+        if self.stopping.is_none() {
+            self.stopping = Some(reason);
+            self.send_stop(reason, out);
+        }
+    }
+
+    fn send_stop(&self, reason: StopReason, out: &mut Outbox) {
         out.push(&Message::Stop(Stop { run: self.configure.run, reason: reason as u8 }));
     }
 
@@ -195,7 +181,7 @@ impl RemoteNode {
             // Not a number that somebody asks the clock with.
             self.ping(self.pings | 1 << 31, out);
             if let Some(reason) = self.stopping {
-                self.stop(reason, out);
+                self.send_stop(reason, out);
             }
         }
         if self.heard_ns.is_some_and(|t| now_ns.saturating_sub(t) >= self.silent_ns) {
@@ -235,7 +221,7 @@ impl RemoteNode {
                 notices(Notice::Controller(*m));
             }
             Message::Hello(m) => notices(Notice::Hello(*m)),
-            Message::Taken(m) => self.taken = Some(*m),
+            Message::Taken(m) if m.run == run => notices(Notice::Taken(*m)),
             Message::Configured(m) if m.run == run && m.config == config => {
                 if self.told.state == State::Disconnected {
                     self.told.state = State::Ready;

@@ -522,6 +522,13 @@ impl Settings {
         }
     }
 
+    /// Whether there is a setting of this key.
+    #[must_use]
+    pub fn knows(key: u16) -> bool {
+        let knot = key.checked_sub(FIRST_KNOT).is_some_and(|n| usize::from(n / 2) < MAX_KNOTS);
+        knot || usize::from(key) < SETTINGS.len()
+    }
+
     /// Takes a setting; whether there is such a one and the value fits its type.
     pub fn set(&mut self, key: u16, value: u64) -> bool {
         if let Some(number) = key.checked_sub(FIRST_KNOT) {

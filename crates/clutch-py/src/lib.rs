@@ -33,7 +33,7 @@ mod _clutch {
     #[pymodule_export]
     use super::scenario::{Scenario, brake_gain, check, rig, scenarios, stribeck};
     #[pymodule_export]
-    use super::stepping::{Controller, Path, Plant, Target, Tick};
+    use super::stepping::{Controller, Path, Plant, StickSlip, Target, Tick};
     #[pymodule_export]
     use super::sweep::Sweep;
     #[pymodule_export]

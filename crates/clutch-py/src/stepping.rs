@@ -4,7 +4,10 @@ use crate::convert::core_error;
 use crate::scenario::Scenario;
 use crate::table::{Column, Table};
 use clutch_core::law::{Command, Law, LawTerms, Limit, Output, OutputState, Terms};
-use clutch_core::{Counts, Dac, Encoder, FixedCounts, ParamError, Real, Servo, ServoOutput, ServoState, law};
+use clutch_core::{
+    Counts, Dac, Encoder, FixedCounts, ParamError, Real, Servo, ServoOutput, ServoState, StickSlipParams,
+    StickSlipState, law,
+};
 use clutch_sim::MovingRig;
 use clutch_sim::engine::{Event, EventKind, Motion};
 use clutch_sim::scenario::ScalarKind;
@@ -220,12 +223,15 @@ pub(crate) struct Controller {
     dac: Dac<f64>,
 }
 
+fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
+    ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }
+}
+
 fn begin<T: Real>(py: Python<'_>, scenario: &Scenario) -> PyResult<Running<T>> {
     let spec = scenario.0.spec();
     let wrong = |e: &ParamError| core_error(py, e);
     let params = spec.servo().map_err(|e| wrong(&e))?.cast::<T>();
-    let servo = Servo::<T>::new(&params)
-        .map_err(|e| wrong(&ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }))?;
+    let servo = Servo::<T>::new(&params).map_err(|e| wrong(&to_f64(e)))?;
     let begun = spec.prepare::<T>().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
     Ok(Running { state: begun.servo_state(&servo), servo, last: ServoOutput::default() })
 }
@@ -351,10 +357,23 @@ impl Controller {
         either!(&self.running, r => r.last.tick.error_rate.to_f64())
     }
 
+    /// Voltage that the law asked of the converter at the last step, V.
+    #[getter]
+    fn demand(&self) -> f64 {
+        either!(&self.running, r => r.last.command.voltage.to_f64())
+    }
+
     /// Whether a limit of the output decided the last voltage.
     #[getter]
     fn limited(&self) -> bool {
         either!(&self.running, r => r.last.command.limit != Limit::None)
+    }
+
+    /// What decided the last voltage, as in a run's column `limit`: 0 the law, 1 the lowest voltage,
+    /// 2 the highest, 3 a demand that was not a number.
+    #[getter]
+    fn limit(&self) -> u8 {
+        either!(&self.running, r => r.last.command.limit as u8)
     }
 
     /// The law's intermediate terms at the last step, by name with unit.
@@ -374,6 +393,112 @@ impl Controller {
 
     fn __copy__(&self) -> Controller {
         self.clone()
+    }
+}
+
+#[derive(Clone)]
+enum Sticks {
+    F32(clutch_core::StickSlip<f32>, StickSlipState<f32>),
+    F64(clutch_core::StickSlip<f64>, StickSlipState<f64>),
+}
+
+/// Stick-slip seen from the encoder's counts, sampled by you.
+///
+/// The shaft counts as stuck when the encoder is silent while the path moves on by more than a count.
+///
+/// Parameters
+/// ----------
+/// scenario : Scenario
+///     Encoder and sampling period; its scalar, f32 or f64.
+///
+/// Examples
+/// --------
+/// Three counts at once each 27 ms, where the path moves evenly:
+///
+/// >>> import clutch
+/// >>> sticks = clutch.StickSlip(clutch.Scenario.load("pd_2"))
+/// >>> for tick in range(270):
+/// ...     begins = sticks.update(tick // 27 * 3, 0.035)
+/// >>> sticks.cycles, sticks.stair
+/// (10, 3)
+#[pyclass(module = "clutch")]
+#[derive(Clone)]
+pub(crate) struct StickSlip(Sticks);
+
+macro_rules! seen {
+    ($of:expr, $state:ident => $body:expr) => {
+        match &$of.0 {
+            Sticks::F32(_, $state) => $body,
+            Sticks::F64(_, $state) => $body,
+        }
+    };
+}
+
+#[pymethods]
+impl StickSlip {
+    #[new]
+    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<StickSlip> {
+        let scenario = native(scenario)?;
+        let spec = scenario.0.spec();
+        let wrong = |e: ParamError| core_error(py, &e);
+        let (encoder, period) = (Encoder::new(spec.rig.counts_per_rev).map_err(wrong)?, spec.period);
+        let single = StickSlipParams::default();
+        let double = StickSlipParams::default();
+        Ok(StickSlip(match scenario.0.scalar {
+            ScalarKind::F32 => Sticks::F32(
+                clutch_core::StickSlip::new(&single, encoder, period).map_err(|e| wrong(to_f64(e)))?,
+                StickSlipState::default(),
+            ),
+            ScalarKind::F64 => Sticks::F64(
+                clutch_core::StickSlip::new(&double, encoder, period).map_err(wrong)?,
+                StickSlipState::default(),
+            ),
+        }))
+    }
+
+    /// One sampling period: the encoder's counts and the path's velocity, rad/s.
+    ///
+    /// Parameters
+    /// ----------
+    /// counts : int
+    ///     The encoder's counts.
+    /// velocity_rad_s : float
+    ///     Velocity of the path now, rad/s.
+    ///
+    /// Returns
+    /// -------
+    /// bool
+    ///     Whether a stick is detected at this sample.
+    fn update(&mut self, counts: f64, velocity_rad_s: f64) -> PyResult<bool> {
+        let counts = Counts(checked_counts(counts, true)? as i64 as i32);
+        Ok(match &mut self.0 {
+            Sticks::F32(detector, state) => detector.update(state, counts, f32::from_f64(velocity_rad_s)),
+            Sticks::F64(detector, state) => detector.update(state, counts, velocity_rad_s),
+        })
+    }
+
+    /// Whether the shaft counts as stuck now.
+    #[getter]
+    fn stuck(&self) -> bool {
+        seen!(self, state => state.stuck())
+    }
+
+    /// Stick-slip cycles so far.
+    #[getter]
+    fn cycles(&self) -> u64 {
+        seen!(self, state => state.cycles())
+    }
+
+    /// Sampling periods spent stuck so far, with the silence before each detection.
+    #[getter]
+    fn stuck_ticks(&self) -> u64 {
+        seen!(self, state => state.stuck_ticks())
+    }
+
+    /// Largest movement between one stick and the next so far, counts.
+    #[getter]
+    fn stair(&self) -> u32 {
+        seen!(self, state => state.stair())
     }
 }
 

@@ -142,7 +142,7 @@ impl MetricsBuilder {
     }
 
     /// An event between samples.
-    pub fn event(&mut self, e: &Event) {
+    fn event(&mut self, e: &Event) {
         if e.time < self.settle {
             return;
         }
@@ -161,11 +161,23 @@ impl MetricsBuilder {
         }
     }
 
-    /// Time spent stuck within the interval that began at `t`, s.
-    pub fn stuck(&mut self, t: f64, time: f64) {
-        if t >= self.settle {
-            self.stuck_time += time;
+    /// The period that began at `begin` (s), with the shaft stuck or not, and what happened in it.
+    pub fn period(&mut self, begin: f64, mut stuck: bool, events: &[Event]) {
+        let (mut since, mut sum) = (begin, 0.0);
+        for e in events {
+            if stuck && e.kind == EventKind::BreakAway {
+                sum += e.time - since;
+            }
+            stuck = e.kind == EventKind::Stick;
+            since = e.time;
         }
+        if stuck {
+            sum += begin + self.period - since;
+        }
+        if begin >= self.settle {
+            self.stuck_time += sum;
+        }
+        events.iter().for_each(|e| self.event(e));
     }
 
     /// The figures so far.

@@ -1,6 +1,6 @@
 //! One run: rig, servo and path in closed loop.
 
-use crate::engine::{EngineError, EngineKind, Event, EventKind, ExactFlow, Motion};
+use crate::engine::{EngineError, EngineKind, Event, ExactFlow, Motion};
 use crate::metrics::{Metrics, MetricsBuilder, MetricsSample};
 use crate::moving_rig::MovingRig;
 use crate::progress::{Progress, Report, UNWATCHED};
@@ -473,10 +473,8 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
             before_settling = (seen_by_encoder.cycles(), seen_by_encoder.stuck_ticks());
         }
         moving.command(commanded);
-        let was_stuck = shaft.motion == Motion::Stuck;
         let seen = moving.advance(period)?;
-        figures.stuck(time, stuck_time(was_stuck, time, period, seen));
-        seen.iter().for_each(|e| figures.event(e));
+        figures.period(time, shaft.motion == Motion::Stuck, seen);
         if keep == Keep::Trace {
             events.extend_from_slice(seen);
         }
@@ -487,19 +485,6 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
     detected.stick_time_fraction =
         (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured;
     Ok(Run { trace, events, metrics, detected, engine })
-}
-
-/// Time spent stuck within one interval.
-fn stuck_time(mut stuck: bool, begin: f64, period: f64, events: &[Event]) -> f64 {
-    let (mut since, mut sum) = (begin, 0.0);
-    for e in events {
-        if stuck && e.kind == EventKind::BreakAway {
-            sum += e.time - since;
-        }
-        stuck = e.kind == EventKind::Stick;
-        since = e.time;
-    }
-    if stuck { sum + (begin + period - since) } else { sum }
 }
 
 fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {

@@ -154,8 +154,12 @@ impl Clock {
                 break before.wrapping_mul(1000).wrapping_add(within);
             }
         };
-        self.wide = self.wide.wrapping_add(u64::from(narrow.wrapping_sub(self.seen)));
-        self.seen = narrow;
+        // The counter has begun anew and its interrupt has not been taken yet: time stands still for so long.
+        let passed = narrow.wrapping_sub(self.seen);
+        if passed.cast_signed() > 0 {
+            self.wide = self.wide.wrapping_add(u64::from(passed));
+            self.seen = narrow;
+        }
         self.wide
     }
 }

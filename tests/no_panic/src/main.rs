@@ -41,7 +41,10 @@ use clutch_core::{
     StickSlipParams, StickSlipState, Stribeck, StribeckParams, Supervisor, SupervisorParams, Target,
     Tolerances, VelocityParams, VelocitySource, check_path, sin_cos_turns,
 };
-use clutch_node::{BoardNode, BoardParams, ControlNode, ControlParams, Outbox};
+use clutch_node::{
+    Acquisition, BoardNode, BoardParams, ControlNode, ControlParams, Hardware, Outbox, WideCounter, receive,
+    tick,
+};
 use clutch_wire::{BoardState, Decoder, StopReason, encode};
 use core::hint::black_box;
 
@@ -610,6 +613,7 @@ fn board() {
         watchdog_max_us: word() as u32,
         boot_code: word() as u16,
     };
+    runner(&params);
     let Some(mut node) = made(BoardNode::new(&params)) else { return };
     let mut out = opaque(Outbox::default());
     loop {
@@ -621,6 +625,48 @@ fn board() {
         sink((node.code(), node.state() == BoardState::Running, node.period_us(), node.watchdog_at()));
         sink(node.is_answered());
         drain(&mut out);
+        if flag() {
+            return;
+        }
+    }
+}
+
+/// A board's hardware of which nothing is known.
+struct Unknown(WideCounter);
+
+impl Hardware for Unknown {
+    fn now_us(&self) -> u64 {
+        word()
+    }
+    fn counts(&mut self) -> Counts {
+        self.0.read(word() as u16)
+    }
+    fn encoder_fault(&self) -> bool {
+        flag()
+    }
+    fn converter_fault(&self) -> bool {
+        flag()
+    }
+    fn put_out(&mut self, code: DacCode) {
+        sink(code);
+    }
+    fn feed_watchdog(&mut self) {}
+    fn send(&mut self, frames: &[u8]) {
+        black_box(frames);
+    }
+    fn cycles(&self) -> u32 {
+        word() as u32
+    }
+}
+
+fn runner(params: &BoardParams) {
+    let Some(mut role) = made(Acquisition::new(params)) else { return };
+    let mut hardware = Unknown(WideCounter::new(word() as u16));
+    loop {
+        tick(&mut role, &mut hardware);
+        role = opaque(role);
+        receive(&mut role, &mut hardware, bytes(&any_bytes()));
+        role = opaque(role);
         if flag() {
             return;
         }

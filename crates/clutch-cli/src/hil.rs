@@ -1,0 +1,174 @@
+//! `clutch hil`.
+
+use crate::table::quantities;
+use crate::{Outcome, ScenarioArgs, json, key_value, print, sim};
+use clap::{Args, ValueEnum};
+use clutch_core::Micros;
+use clutch_core::supervisor::Cause;
+use clutch_log::{LogWriter, Source};
+use clutch_loop::emulated::{Lockstep, emulated};
+use clutch_loop::emulator::{Emulator, SerialBoard};
+use clutch_loop::faults::Fault;
+use clutch_loop::replay::PRESENT_CODE;
+use clutch_loop::setup::{self, Setup};
+use clutch_loop::world::{Outcome as Ran, World, WorldParams};
+use clutch_sim::Scenario;
+use std::path::PathBuf;
+
+/// Runs the loop on an emulated Cortex-M4F board, with the simulated rig as its encoder and converter.
+///
+/// Hardware in the loop, without the hardware: the board's own image runs in qemu-system-arm, takes a step,
+/// and waits for the simulation to take one. Time is computed, so that a run takes as long as it takes, and is
+/// the same each time, bit for bit; the figures are those of `clutch sim` in single precision.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  cargo xtask firmware build && clutch hil\n  clutch hil board_smc_2 --log run.mcap && \
+    clutch replay run.mcap\n  clutch hil --fault silence:at=2\n\n\
+    Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run. docs/firmware.md is the guide."
+)]
+pub(crate) struct Hil {
+    /// Scenario file, or the name of a built-in scenario; board_smc_2 if none is given.
+    #[arg(value_name = "SCENARIO.toml", default_value = "board_smc_2")]
+    scenario: PathBuf,
+    /// Overrides a key of the scenario; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    set: Vec<(String, String)>,
+    /// The board's image.
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "target/firmware/thumbv7em-none-eabihf/release/mps2-controller"
+    )]
+    image: PathBuf,
+    /// How the board is reached.
+    #[arg(long, value_enum, default_value = "memory")]
+    link: Link,
+    /// Writes an MCAP log, with the shaft's true motion.
+    #[arg(long, value_name = "FILE.mcap")]
+    log: Option<PathBuf>,
+    /// Runs a law that is not certified for the scenario's bounds.
+    #[arg(long)]
+    uncertified: bool,
+    /// Breaks something on line or rig; see `clutch daq --help`.
+    #[arg(long, value_name = "KIND:KEY=VALUE,…")]
+    fault: Vec<Fault>,
+    /// Seed of the faults that hit at random.
+    #[arg(long, default_value_t = 1)]
+    fault_seed: u64,
+    /// How long a frame takes between board and rig, µs.
+    #[arg(long, default_value_t = 0, value_name = "US", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    latency_us: u32,
+    /// Prints the summary as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Link {
+    /// Through the emulator's own files: some 25 000 cycles a second, the same each time.
+    Memory,
+    /// Through the board's two serial lines, interrupts and clock: about as fast as a real one. Late answers
+    /// are not looked at, as this machine decides how late they are.
+    Uart,
+}
+
+impl Hil {
+    pub(crate) fn run(mut self) -> anyhow::Result<Outcome> {
+        if self.link == Link::Uart {
+            self.set.push(("safety.limits.deadline_us".to_owned(), "1000000".to_owned()));
+        }
+        let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone() };
+        let scenario = crate::single_precision(&args, args.load()?)?;
+        let certified = scenario.plan()?.certificate.certified();
+        if !certified && !self.uncertified {
+            print(&format!(
+                "{}: the gains are not certified for these bounds and this path, so nothing was started.\n\
+                 `clutch certify {}` says why; --uncertified runs it all the same.\n",
+                scenario.name,
+                self.scenario.display()
+            ))?;
+            return Ok(Outcome::NotCertified);
+        }
+        if let Some(log) = &self.log {
+            crate::new_log(log)?;
+        }
+        let setup = Setup::<f32>::new(&scenario, 1)?;
+        let started = std::time::Instant::now();
+        let ran = match self.link {
+            Link::Memory => self.on(&scenario, &setup, Emulator::start(&self.image)?)?,
+            Link::Uart => {
+                let mut patient = setup.clone();
+                patient.control.silence = Micros(10_000_000);
+                self.on(&scenario, &patient, SerialBoard::start(&self.image)?)?
+            }
+        };
+        let took = started.elapsed().as_secs_f64();
+        if let Some(file) = &self.log {
+            let mut header =
+                setup::header(&scenario, &setup.servo, Source::Loop, "emulated board", crate::BUILD);
+            header.extra.push((PRESENT_CODE.to_owned(), ran.present.to_string()));
+            header.extra.push(("board".to_owned(), "emulated".to_owned()));
+            header.extra.push(("certified".to_owned(), certified.to_string()));
+            let mut log = LogWriter::create(file, &header)?;
+            for record in &ran.records {
+                log.write(record)?;
+            }
+            log.finish()?;
+        }
+        let fault = ran.cause.filter(|c| *c != Cause::Done);
+        print(&if self.json { summary(&scenario, &ran, took)? } else { self.text(&scenario, &ran, took) })?;
+        Ok(if fault.is_some() { Outcome::Fault } else { Outcome::Done })
+    }
+
+    fn on(&self, scenario: &Scenario, setup: &Setup<f32>, board: impl Lockstep) -> anyhow::Result<Ran> {
+        // The last period is the one in which the run ends.
+        let ticks = setup.ticks + 1;
+        let params = WorldParams {
+            latency_ns: u64::from(self.latency_us) * 1000,
+            faults: self.fault.clone(),
+            stall: None,
+            seed: self.fault_seed,
+            record: self.log.is_some(),
+            duration: scenario.spec().run.duration + 1.0,
+            ticks,
+            settle: scenario.spec().run.settle,
+        };
+        let end = emulated(scenario, setup, board, ticks)?;
+        let path = setup::path::<f32>(scenario)?;
+        Ok(World::new(scenario, params, end)?.run(&path)?)
+    }
+
+    fn text(&self, scenario: &Scenario, ran: &Ran, took: f64) -> String {
+        let title = format!(
+            "{}\n{} ticks on the emulated board in {took:.1} s, seed {}; figures over {} s after settling",
+            scenario.name,
+            ran.answers,
+            scenario.spec().run.seed,
+            crate::table::number(ran.metrics.measured_s)
+        );
+        let mut text = quantities(&title, &sim::figures(&ran.metrics));
+        if let Some(file) = &self.log {
+            text += &format!("log: {0}; clutch replay {0}\n", file.display());
+        }
+        let board = ran.board.map_or("gone".to_owned(), |s| format!("{s:?}").to_lowercase());
+        text += &match ran.cause {
+            None => format!("the path is done; encoder and converter are {board}\n"),
+            Some(cause) => format!("FAULT: {cause:?}; encoder and converter are {board}\n"),
+        };
+        text
+    }
+}
+
+fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> anyhow::Result<String> {
+    json(&serde_json::json!({
+        "scenario": scenario.name,
+        "version": env!("CARGO_PKG_VERSION"),
+        "seed": scenario.spec().run.seed,
+        "ticks": ran.answers,
+        "took_s": took,
+        "metrics": ran.metrics,
+        "cause": ran.cause.map(|c| format!("{c:?}")),
+        "board": ran.board.map(|s| format!("{s:?}")),
+        "lost": ran.lost,
+    }))
+}

@@ -1,0 +1,253 @@
+//! A board in the controller role that is asked in lockstep: emulated, or in this process.
+
+use crate::emulator::{Emulator, SerialBoard};
+use crate::end::{End, Tells};
+use crate::setup::{self, Setup, SetupError};
+use clutch_core::law::LawTerms;
+use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Target};
+use clutch_node::exchange::Exchange;
+use clutch_node::{
+    ControlNode, LinkCounts, Notice, Onboard, OnboardParams, Outbox, Ports, RemoteNode, Settings, Told,
+};
+use clutch_sim::Scenario;
+use clutch_wire::{Configure, Refused, StopReason};
+
+/// Who answers in lockstep.
+pub trait Lockstep {
+    /// A request, and the answer; or why there is none.
+    ///
+    /// # Errors
+    /// In words.
+    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String>;
+}
+
+impl Lockstep for Emulator {
+    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
+        Emulator::exchange(self, request).map_err(|e| e.to_string())
+    }
+}
+
+impl Lockstep for SerialBoard {
+    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
+        SerialBoard::exchange(self, request).map_err(|e| e.to_string())
+    }
+}
+
+/// The board's state machine in this process: what an image runs, compiled for this machine.
+pub struct InProcess {
+    node: Onboard,
+    ports: Ports,
+}
+
+impl Default for InProcess {
+    fn default() -> Self {
+        let node = Onboard::new(OnboardParams { board: 1, boot: 1, clock_hz: 0 });
+        InProcess { node, ports: Ports::default() }
+    }
+}
+
+impl Lockstep for InProcess {
+    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
+        self.ports.host.clear();
+        self.ports.daq.clear();
+        if request.lateness_us > 0 {
+            self.node.answered(Micros(request.lateness_us));
+        }
+        self.node.host(request.time_ns, request.host, &mut self.ports);
+        if !request.daq.is_empty() {
+            self.node.daq(request.time_ns, request.daq, &mut self.ports);
+        }
+        self.node.poll(request.time_ns, &mut self.ports);
+        Ok(Exchange {
+            time_ns: self.node.poll_at().unwrap_or(u64::MAX),
+            lateness_us: 0,
+            host: self.ports.host.as_bytes(),
+            daq: self.ports.daq.as_bytes(),
+        })
+    }
+}
+
+/// How often the host shows that it lives, and after which silence the board ends a run.
+pub const ALIVE_NS: u64 = 100_000_000;
+/// See [`ALIVE_NS`].
+pub const HOST_SILENCE: Micros = Micros(1_000_000);
+/// After so long without a word of the board, control has ended for the host.
+pub const BOARD_SILENCE_NS: u64 = 1_000_000_000;
+
+/// A board in the controller role, and the host beside it.
+pub struct Emulated<L, P> {
+    remote: RemoteNode,
+    link: L,
+    settings: Settings,
+    path: P,
+    to_board: Outbox,
+    now_ns: u64,
+    lateness: Micros,
+    poll_at: Option<u64>,
+    failure: Option<String>,
+}
+
+/// For a scenario in single precision, whose run takes so many ticks.
+///
+/// # Errors
+/// The scenario has no safe state, or asks for what boards do not have.
+pub fn emulated<'a, L: Lockstep>(
+    scenario: &'a Scenario,
+    setup: &Setup<f32>,
+    link: L,
+    ticks: u64,
+) -> Result<Emulated<L, impl Fn(u64) -> Target<f32> + 'a>, SetupError> {
+    let configure = ControlNode::new(setup.control, setup.servo, setup.supervisor).configuration();
+    Ok(Emulated {
+        remote: RemoteNode::new(setup.servo, configure, ALIVE_NS, BOARD_SILENCE_NS),
+        link,
+        settings: setup::settings(scenario, setup, HOST_SILENCE, ticks)?,
+        path: setup::path::<f32>(scenario)?,
+        to_board: Outbox::default(),
+        now_ns: 0,
+        lateness: Micros(0),
+        poll_at: None,
+        failure: None,
+    })
+}
+
+impl<L: Lockstep, P: Fn(u64) -> Target<f32>> Emulated<L, P> {
+    /// The link.
+    pub fn link(&mut self) -> &mut L {
+        &mut self.link
+    }
+
+    /// The link alone.
+    #[must_use]
+    pub fn into_link(self) -> L {
+        self.link
+    }
+
+    /// What the host has to say and these bytes go to the board; what it has to say comes back.
+    fn turn(&mut self, daq: &[u8], out: &mut Outbox, notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>)) {
+        if self.failure.is_some() {
+            return;
+        }
+        let request = Exchange {
+            time_ns: self.now_ns,
+            lateness_us: std::mem::take(&mut self.lateness).0,
+            host: self.to_board.as_bytes(),
+            daq,
+        };
+        match self.link.exchange(&request) {
+            Ok(answer) => {
+                self.poll_at = (answer.time_ns != u64::MAX).then_some(answer.time_ns);
+                out.append(answer.daq);
+                self.remote.receive(self.now_ns, answer.host, &self.path, notices);
+            }
+            Err(why) => self.failure = Some(why),
+        }
+        self.to_board.clear();
+    }
+
+    /// The settings, one by one: the board's answer to each is waited for.
+    fn upload(&mut self, out: &mut Outbox) {
+        let mut all = Vec::new();
+        self.settings.each(|key, value| all.push((key, value)));
+        for (key, value) in all {
+            self.remote.set(key, value, &mut self.to_board);
+            let (mut taken, mut refused) = (false, None);
+            self.turn(&[], out, &mut |n| match n {
+                Notice::Taken(m) => taken |= (m.key, m.value) == (key, value),
+                Notice::Refused(m) => refused = Some(m),
+                _ => {}
+            });
+            if !taken && self.failure.is_none() {
+                let why = |m: &Refused| crate::preflight::why(m);
+                let why = refused.as_ref().map_or("it did not answer".to_owned(), why);
+                self.failure = Some(format!("the board did not take the setting {key:#06x}: {why}"));
+            }
+        }
+    }
+}
+
+impl<L: Lockstep, P: Fn(u64) -> Target<f32>> End for Emulated<L, P> {
+    type Scalar = f32;
+    type Terms = LawTerms<f32>;
+    const IS_CONTROLLER: bool = true;
+
+    fn discover(&mut self, nonce: u32, out: &mut Outbox) {
+        self.remote.discover(nonce, &mut self.to_board);
+        self.turn(&[], out, &mut |_| ());
+    }
+    fn configure(&mut self, _: DacCode, out: &mut Outbox) {
+        self.upload(out);
+        self.remote.configure(&mut self.to_board);
+        let mut refused = None;
+        self.turn(&[], out, &mut |n| {
+            if let Notice::Refused(m) = n
+                && m.request == Configure::KIND
+            {
+                refused = Some(m);
+            }
+        });
+        if let Some(m) = refused {
+            let why = crate::preflight::why(&m);
+            self.failure = Some(format!("the board refused to be configured: {why}"));
+        }
+    }
+    fn arm(&mut self, out: &mut Outbox) {
+        self.remote.arm(&mut self.to_board);
+        self.turn(&[], out, &mut |_| ());
+    }
+    fn ping(&mut self, nonce: u32, out: &mut Outbox) {
+        self.remote.ping(nonce, &mut self.to_board);
+        self.turn(&[], out, &mut |_| ());
+    }
+    fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
+        self.remote.stop(reason, &mut self.to_board);
+        self.turn(&[], out, &mut |_| ());
+    }
+    fn disconnect(&mut self) {
+        self.remote.disconnect();
+    }
+    fn answered(&mut self, lateness: Micros) {
+        self.lateness = lateness;
+    }
+    fn poll_at(&self) -> Option<u64> {
+        [self.remote.poll_at(), self.poll_at].into_iter().flatten().min()
+    }
+    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Tells<Self>)) {
+        self.now_ns = now_ns;
+        self.remote.poll(now_ns, &mut self.to_board, notices);
+        if !self.to_board.is_empty() || self.poll_at.is_some_and(|t| now_ns >= t) {
+            self.turn(&[], out, notices);
+        }
+    }
+    fn receive(
+        &mut self,
+        now_ns: u64,
+        bytes: &[u8],
+        out: &mut Outbox,
+        notices: &mut impl FnMut(Tells<Self>),
+    ) {
+        self.now_ns = now_ns;
+        self.turn(bytes, out, notices);
+    }
+    fn told(&self) -> Told<f32> {
+        *self.remote.told()
+    }
+    fn counts(&self) -> &LinkCounts {
+        self.remote.counts()
+    }
+    fn origin(&self) -> FixedCounts {
+        self.remote.origin()
+    }
+    fn encoder(&self) -> Encoder {
+        self.remote.servo().encoder()
+    }
+    fn dac(&self) -> &Dac<f32> {
+        self.remote.servo().dac()
+    }
+    fn period(&self) -> Micros {
+        self.remote.servo().period()
+    }
+    fn failure(&self) -> Option<String> {
+        self.failure.clone()
+    }
+}

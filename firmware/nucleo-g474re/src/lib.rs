@@ -1,0 +1,7 @@
+//! clutch on a NUCLEO-G474RE. The board is `board`; the rest is the same on any board that embassy
+//! knows. Wiring, power-up and flashing: docs/firmware.md. Not yet run on hardware.
+#![no_std]
+
+pub mod board;
+pub mod fault;
+pub mod run;

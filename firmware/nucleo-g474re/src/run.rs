@@ -1,0 +1,62 @@
+//! The control task: one task, in an interrupt of its own, owns node and hardware. Periods and bytes
+//! come to it one after the other, so nothing is shared and nothing locks.
+
+use crate::board::{self, Board, CONTROL, Line};
+use crate::fault::stop;
+use clutch_node::{Role, receive, tick};
+use embassy_executor::{InterruptExecutor, SpawnError, SpawnToken};
+use embassy_futures::select::{Either, select};
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::InterruptExt;
+use embassy_time::{Duration, Ticker};
+use embedded_io_async::Read;
+
+/// Bytes that are looked at in one go: what a period may have to wait for.
+const CHUNK: usize = 32;
+
+/// Period until a host has configured one, µs.
+const BOOT_PERIOD_US: u32 = 1000;
+
+static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+
+// No hardware is behind this interrupt; the executor raises it.
+#[interrupt]
+unsafe fn TIM20_UP() {
+    // SAFETY: called here only, and not before `begin` has started the executor: that enables it.
+    unsafe { EXECUTOR.on_interrupt() }
+}
+
+/// Starts the board and its control task, and sleeps between interrupts for ever.
+pub fn begin<S: Send>(control: impl FnOnce(Board, Line) -> Result<SpawnToken<S>, SpawnError>) -> ! {
+    let (board, line) = board::start();
+    interrupt::TIM20_UP.set_priority(CONTROL);
+    let Ok(control) = control(board, line) else { stop() };
+    EXECUTOR.start(interrupt::TIM20_UP).spawn(control);
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+/// Runs a role, for ever.
+pub async fn run(role: &mut impl Role, mut board: Board, mut line: Line) -> ! {
+    let mut bytes = [0; CHUNK];
+    let mut period_us = BOOT_PERIOD_US;
+    let mut beat = every(period_us);
+    loop {
+        // In this order: a period that is due goes before bytes that wait.
+        match select(beat.next(), line.read(&mut bytes)).await {
+            Either::First(()) => tick(role, &mut board),
+            Either::Second(Ok(count)) => receive(role, &mut board, &bytes[..count]),
+            Either::Second(Err(_)) => {}
+        }
+        let wanted_us = role.period_us().unwrap_or(BOOT_PERIOD_US);
+        if wanted_us != period_us {
+            period_us = wanted_us;
+            beat = every(period_us);
+        }
+    }
+}
+
+fn every(period_us: u32) -> Ticker {
+    Ticker::every(Duration::from_micros(period_us.into()))
+}

@@ -1,0 +1,11 @@
+//! What the test of equal bits runs on every machine: a servo in `f32` along a path, its counts
+//! given, every output of every tick as bytes, and a running hash of them.
+#![no_std]
+
+mod job;
+mod record;
+mod workload;
+
+pub use job::{HEADER, Job, SETTING, setting_from_bytes, setting_to_bytes};
+pub use record::{FIELDS, Field, Kind, RECORD, hash};
+pub use workload::Workload;

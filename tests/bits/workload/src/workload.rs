@@ -1,0 +1,63 @@
+//! A run, tick by tick.
+
+use crate::record::{RECORD, record};
+use clutch_core::law::OutputState;
+use clutch_core::{
+    Counts, FixedCounts, Servo, ServoState, StickSlip, StickSlipParams, StickSlipState, Target,
+};
+use clutch_node::{Misfit, Path, Settings};
+
+/// A servo, its path and the stick-slip detector, in `f32`.
+pub struct Workload<'a> {
+    settings: &'a Settings,
+    servo: Servo<f32>,
+    path: Path,
+    detector: StickSlip<f32>,
+    state: ServoState<f32, OutputState<f32>>,
+    sticks: StickSlipState<f32>,
+    origin: FixedCounts,
+    tick: u64,
+}
+
+impl<'a> Workload<'a> {
+    /// A run that begins at `counts` with `volts` on the brake; its path begins on the count `origin`.
+    ///
+    /// # Errors
+    /// Settings that make no run.
+    pub fn new(
+        settings: &'a Settings,
+        origin: FixedCounts,
+        counts: Counts,
+        volts: f32,
+    ) -> Result<Self, Misfit> {
+        let built = settings.build()?;
+        let servo = built.servo;
+        let detector = StickSlip::new(&StickSlipParams::default(), servo.encoder(), servo.period())?;
+        let mut workload = Workload {
+            settings,
+            servo,
+            path: built.path,
+            detector,
+            state: ServoState::default(),
+            sticks: StickSlipState::default(),
+            origin,
+            tick: 0,
+        };
+        workload.state = servo.start(counts, &workload.target(), volts);
+        Ok(workload)
+    }
+
+    fn target(&self) -> Target<f32> {
+        let target = self.path.target(self.settings.points(), self.tick);
+        Target { position: target.position.plus(self.origin), ..target }
+    }
+
+    /// One period: counts in, every output out.
+    pub fn tick(&mut self, counts: Counts) -> [u8; RECORD] {
+        let target = self.target();
+        let output = self.servo.tick(&mut self.state, counts, &target);
+        self.detector.update(&mut self.sticks, counts, target.velocity);
+        self.tick = self.tick.wrapping_add(1);
+        record(&target, &output, &self.sticks)
+    }
+}

@@ -1,0 +1,82 @@
+//! Images of the boards: built, flashed, measured.
+
+use crate::run::{Program, cargo, program, root};
+use anyhow::{Context, Result, bail};
+use clap::{Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// What the boards run.
+pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
+const CHIP: &str = "STM32G474RETx";
+
+#[derive(Subcommand)]
+pub(crate) enum Verb {
+    /// Builds the images of all boards, in target/firmware; adds the Rust target.
+    Build,
+    /// Builds the NUCLEO-G474RE's image and flashes it, with probe-rs.
+    Flash {
+        /// What the board is to be.
+        #[arg(long, value_enum)]
+        role: Role,
+    },
+    /// How much flash and memory the images take.
+    Size,
+    /// The longest way through each law, the codec and the whole tick, in instructions and cycles, against
+    /// what the emulator counts (docs/timing.md).
+    Budget,
+    /// The deepest stack.
+    Stack,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum Role {
+    /// It closes the loop itself: clutch loop --board.
+    Controller,
+    /// It samples and obeys: clutch loop --port.
+    Daq,
+}
+
+pub(crate) fn run(verb: &Verb) -> Result<()> {
+    match verb {
+        Verb::Build => build().map(drop),
+        Verb::Flash { role } => flash(*role),
+        Verb::Size => report("size"),
+        Verb::Budget => report("budget"),
+        Verb::Stack => report("stack"),
+    }
+}
+
+/// A cargo in the folder of the images, whose flags stand in a file there.
+pub(crate) fn in_firmware<const N: usize>(args: [&str; N]) -> Program {
+    cargo(args).within(&root().join("firmware")).env("CARGO_TARGET_DIR", root().join("target/firmware"))
+}
+
+/// All images; where they lie.
+fn build() -> Result<PathBuf> {
+    program("rustup").args(["target", "add", TARGET]).run().context(
+        "the boards' Rust target is missing, and rustup is not there to add it: install thumbv7em-none-eabihf",
+    )?;
+    // One by one: together each would get the features that the other wants of the libraries.
+    for board in ["clutch-qemu-mps2", "clutch-nucleo-g474re"] {
+        in_firmware(["build", "--release", "--locked", "--package", board]).run()?;
+    }
+    let images = root().join("target/firmware").join(TARGET).join("release");
+    println!("\nimages: {}", images.display());
+    Ok(images)
+}
+
+fn flash(role: Role) -> Result<()> {
+    if program("probe-rs").args(["--version"]).quietly().is_err() {
+        bail!("probe-rs is not installed: `cargo install probe-rs-tools --locked`, or see https://probe.rs");
+    }
+    let image = build()?.join(match role {
+        Role::Controller => "nucleo-controller",
+        Role::Daq => "nucleo-daq",
+    });
+    program("probe-rs").args(["download", "--chip", CHIP, "--verify"]).arg(&image).run()?;
+    program("probe-rs").args(["reset", "--chip", CHIP]).run()
+}
+
+fn report(what: &str) -> Result<()> {
+    cargo(["bench", "--package", "clutch-benches", "--bench", "budget", "--", what]).run()
+}
