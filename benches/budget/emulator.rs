@@ -48,8 +48,8 @@ pub(crate) fn no_emulator() -> Option<String> {
 
 /// Builds the images; the folder that they are in.
 pub(crate) fn build(firmware: &Path, peer: bool) -> Result<PathBuf> {
-    let target =
-        std::env::var_os("CLUTCH_FIRMWARE_TARGET_DIR").map_or(firmware.join("target"), PathBuf::from);
+    let target = std::env::var_os("CLUTCH_FIRMWARE_TARGET_DIR")
+        .map_or(firmware.join("../target/firmware"), PathBuf::from);
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
     command.current_dir(firmware).args([

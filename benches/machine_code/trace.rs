@@ -26,7 +26,7 @@ pub fn traced(
     let mut open: Option<(u32, Cost, u64)> = None;
     let mut last: Option<&Instruction> = None;
     for address in trace {
-        let i = code.get(&address).ok_or_else(|| Fault::Untraceable { address })?;
+        let i = code.get(&address).ok_or(Fault::Untraceable { address })?;
         if let (Some((entry, cost, depth)), Some(before)) = (&mut open, last) {
             let jumped = before.address + before.size != address;
             let left = before.flow == Flow::Return || before.flow == Flow::MayReturn && jumped;
