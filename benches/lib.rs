@@ -1,1 +1,3 @@
-//! Benchmarks only: `cargo xtask bench`.
+//! Benchmarks, and what they need: `cargo xtask bench`.
+
+pub mod machine_code;

@@ -2,6 +2,7 @@
 
 #[path = "bits/native.rs"]
 pub mod bits;
+pub mod firmware;
 
 use clutch_core::{Plant, PlantParams};
 use clutch_sim::drive::Drive;

@@ -1,11 +1,10 @@
 //! The image `bits` and the emulator that runs it.
 
+use clutch_tests::firmware;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-const TARGET: &str = "thumbv7em-none-eabihf";
 /// A run that takes longer than this hangs: it takes seconds.
 const PATIENCE: Duration = Duration::from_secs(300);
 
@@ -14,43 +13,9 @@ pub(crate) struct Board {
     image: PathBuf,
 }
 
-/// The board with its image built; none, with a message, where emulator or target are missing. CI has
-/// both.
+/// The board; none where it cannot be emulated.
 pub(crate) fn board() -> Option<Board> {
-    static IMAGE: LazyLock<Result<PathBuf, &str>> = LazyLock::new(|| {
-        if !Command::new("qemu-system-arm").arg("--version").output().is_ok_and(|o| o.status.success()) {
-            return Err("qemu-system-arm is not installed (Debian and Ubuntu: qemu-system-arm)");
-        }
-        let libraries =
-            Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().ok();
-        let libraries = libraries.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_default();
-        if !Path::new(libraries.trim()).is_dir() {
-            return Err("the target is not installed (rustup target add thumbv7em-none-eabihf)");
-        }
-        Ok(built())
-    });
-    match &*IMAGE {
-        Ok(image) => Some(Board { image: image.clone() }),
-        Err(why) => {
-            assert!(std::env::var_os("CI").is_none(), "{why}: CI must not skip this test");
-            println!("skipped: {why}");
-            None
-        }
-    }
-}
-
-fn built() -> PathBuf {
-    let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware");
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("../firmware");
-    // From within its folder: its flags stand in a file that cargo looks for from there.
-    let done = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["build", "--release", "--locked", "--bin", "bits", "--target-dir"])
-        .arg(&target)
-        .current_dir(firmware)
-        .output()
-        .expect("cargo starts");
-    assert!(done.status.success(), "the image does not build:\n{}", String::from_utf8_lossy(&done.stderr));
-    target.join(TARGET).join("release/bits")
+    firmware::image("mps2-bits").map(|image| Board { image })
 }
 
 impl Board {

@@ -2,8 +2,9 @@
 //! workload makes of these counts on this machine.
 
 use clutch_bits::{FIELDS, Job, Kind, RECORD, Workload, hash, setting_to_bytes};
-use clutch_core::{Bounds, Counts, FixedCounts, Micros, SafeState, SupervisorParams};
-use clutch_node::{RunParams, Settings};
+use clutch_core::{Counts, FixedCounts, Micros};
+use clutch_loop::setup::{self, Setup};
+use clutch_node::Settings;
 use clutch_sim::run::{Keep, Trace, simulate_watched};
 use clutch_sim::{Scenario, progress::UNWATCHED};
 use std::fmt;
@@ -56,23 +57,8 @@ impl Run {
     /// A scenario that is none, or not one for a board.
     pub fn new(name: &'static str, toml: &'static str) -> Result<Run, Wrong> {
         let scenario = Scenario::parse(name, toml, &[])?;
-        let (spec, plan) = (scenario.spec(), scenario.plan()?);
-        let trace = simulate_watched::<f32>(&spec, Keep::Trace, UNWATCHED)?.trace;
-        let bounds: Bounds<f32> = plan.bounds.cast();
-        // Nothing of it is used here, but a board's settings are one thing.
-        let supervisor = SupervisorParams::<f32>::new(SafeState::Release);
-        let settings = Settings::new(&RunParams {
-            servo: &spec.servo()?.cast(),
-            supervisor: &supervisor,
-            bounds: &bounds,
-            reference: &spec.reference.cast(),
-            start: spec.run.start_position(),
-            watchdog: Micros(0),
-            valid: Micros(0),
-            silence: Micros(0),
-            host_silence: Micros(0),
-            ticks: scenario.ticks(),
-        })?;
+        let trace = simulate_watched::<f32>(&scenario.spec(), Keep::Trace, UNWATCHED)?.trace;
+        let settings = setup::settings(&scenario, &Setup::new(&scenario, 0)?, Micros(0), scenario.ticks())?;
         let mut sent = 0;
         settings.each(|_, _| sent += 1);
         let first = trace.target_fixed.first().ok_or("a run without a tick")?.0;
@@ -86,7 +72,7 @@ impl Run {
         };
         let counts = trace.counts.clone();
         let (records, hash) = records(&settings, &job, &counts)?;
-        Ok(Run { name, toml, title: scenario.name.clone(), settings, job, counts, trace, records, hash })
+        Ok(Run { name, toml, title: scenario.name, settings, job, counts, trace, records, hash })
     }
 
     /// All of them.
@@ -107,7 +93,7 @@ impl Run {
         last.and_then(|record| value(record, "cycles")).map_or(0, |cycles| cycles as u64)
     }
 
-    /// What the image `bits` reads, with another header.
+    /// What the image `mps2-bits` reads, with another header.
     #[must_use]
     pub fn input(&self, job: Job) -> Vec<u8> {
         let mut bytes = job.to_bytes().to_vec();

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use clutch_core::law::Law;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{DacCode, Micros, Real, SafeState, Target};
+use clutch_core::{DacCode, Micros, Real, SafeState};
 use clutch_log::Source;
 use clutch_loop::daq::{self, DaqOptions, DaqReport};
 use clutch_loop::emulated::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE};
@@ -276,7 +276,7 @@ struct Run<'a> {
     stop: &'a Arc<AtomicBool>,
 }
 
-impl<'a> Run<'a> {
+impl Run<'_> {
     /// Opens the port, whose line carries frames of these lengths each cycle.
     fn open(&self, frames: (usize, usize)) -> anyhow::Result<(Port, Vec<String>)> {
         let options = SerialOptions { baud: self.verb.baud, low_latency: true };
@@ -317,24 +317,16 @@ impl<'a> Run<'a> {
         Ok(setup)
     }
 
-    fn local<T: Real>(
-        &self,
-        setup: &Setup<T>,
-    ) -> anyhow::Result<Local<T, Law<T>, impl Fn(u64) -> Target<T> + use<'a, T>>> {
-        let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-        Ok(Local { node, path: setup::path::<T>(self.scenario)? })
-    }
-
     /// The loop is closed here.
     fn on_board<T: Real>(&self) -> anyhow::Result<(LoopReport, String)> {
         // A sample and its answer, each cycle.
         let (mut port, notes) = self.open((15, 20))?;
         // Who is there?
-        let mut end = self.local(&Setup::<T>::new(self.scenario, 0)?)?;
+        let mut end = local(&Setup::<T>::new(self.scenario, 0)?, setup::path(self.scenario)?);
         let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
         self.check(&hello, &port)?;
         let setup = self.setup::<T>(&hello)?;
-        let mut end = self.local(&setup)?;
+        let mut end = local(&setup, setup::path(self.scenario)?);
         self.tell(&hello, &port, &notes)?;
         let hold = setup.supervisor.safe_codes().hold;
         let (log, ring, watch) = self.log(&setup, present_code(&hello, hold), &board_text(&hello))?;
@@ -532,6 +524,10 @@ impl<'a> Run<'a> {
         }
         text
     }
+}
+
+fn local<T: Real, P>(setup: &Setup<T>, path: P) -> Local<T, Law<T>, P> {
+    Local { node: ControlNode::new(setup.control, setup.servo, setup.supervisor), path }
 }
 
 fn controller_text(c: &clutch_wire::Controller) -> String {

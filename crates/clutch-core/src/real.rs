@@ -97,12 +97,11 @@ pub trait Real:
     /// `sat(self)` of (30): the identity between −1 and 1, the sign outside; 0 for NaN.
     #[inline]
     fn sat(self) -> Self {
-        if self >= Self::ONE {
-            Self::ONE
+        // Between the ends, where a law spends its time, two comparisons decide; NaN fails all.
+        if self > -Self::ONE {
+            if self < Self::ONE { self } else { Self::ONE }
         } else if self <= -Self::ONE {
             -Self::ONE
-        } else if self.is_finite() {
-            self
         } else {
             Self::ZERO
         }

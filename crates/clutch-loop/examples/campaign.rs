@@ -1,17 +1,24 @@
-//! The fault campaign, with as many seeds as you like; prints the table of `docs/safety.md`.
+//! The fault campaign, with as many seeds as you like; prints the table of `docs/safety.md`. With an image of the
+//! emulated board the controller is that board, and what breaks the controller from within is left out.
 //!
-//! `cargo run --release -p clutch-loop --example campaign -- [SEEDS [FIRST]]`
+//! `cargo run --release -p clutch-loop --example campaign -- [SEEDS [FIRST [IMAGE]]]`
 
 use clutch_core::supervisor::Checks;
 use clutch_loop::campaign::{Table, runs};
+use clutch_loop::emulator::Emulator;
+use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut args = std::env::args().skip(1);
     let seeds = args.next().map_or(Ok(12), |s| s.parse())?;
     let first = args.next().map_or(Ok(1), |s| s.parse())?;
+    let image = args.next().map(PathBuf::from);
     let (mut table, mut count, mut failures) = (Table::default(), 0, 0);
-    for run in runs(first, seeds) {
-        let outcome = run.run(Checks::ALL, false)?;
+    for run in runs(first, seeds).filter(|run| image.is_none() || run.is_outside()) {
+        let outcome = match &image {
+            None => run.run(Checks::ALL, false)?,
+            Some(image) => run.run_on(Emulator::start(image)?)?,
+        };
         table.add(&run, &outcome);
         count += 1;
         if let Some(what) = run.judge(&outcome) {

@@ -1,7 +1,7 @@
 //! The emulated board: a Cortex-M4F in `qemu-system-arm`, asked in lockstep.
 
 use clutch_node::exchange::{Exchange, LONGEST};
-use clutch_wire::{Decoder, Message, Set, encode};
+use clutch_wire::{BoardState, Decoder, Message, STATUS_STATE, Set, encode};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{CWD, FileType, Mode, mknodat};
 use std::fs::{File, OpenOptions};
@@ -265,7 +265,8 @@ impl SerialBoard {
     pub fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, EmulatorError> {
         self.said_to_host.clear();
         self.said_to_daq.clear();
-        // Each frame of encoder and converter makes it say one of these to the host.
+        // Each frame of encoder and converter makes it say one of these to the host, but for samples before
+        // consent.
         let said = |m: &Message| {
             matches!(
                 m,
@@ -279,7 +280,9 @@ impl SerialBoard {
             )
         };
         let decoder = &mut self.from_rig;
-        let frames = request.daq.iter().filter(|b| matches!(decoder.push(**b), Some(Ok(_)))).count();
+        let ready = BoardState::Ready as u8;
+        let heard = |m: &Message| !matches!(m, Message::Sample(s) if s.status & STATUS_STATE == ready);
+        let frames = request.daq.iter().filter_map(|b| decoder.push(*b)?.ok()).filter(heard).count();
         write(&mut self.daq, request.daq)?;
         self.hear(frames, said)?;
         if !request.host.is_empty() {

@@ -517,7 +517,9 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
     let mut farewell: Option<u64> = None;
     let mode = options.realtime.wait;
     // Consent, once this thread is what it is going to be: the board's watchdog starts with it.
-    let (mut ask_again, give_up) = (0, monotonic_ns() + 1_000_000_000);
+    // A simulated board on a busy machine may be behind with its samples.
+    let patience = if c.patient { 10_000_000_000 } else { 1_000_000_000 };
+    let (mut ask_again, give_up) = (0, monotonic_ns() + patience);
     loop {
         // Wait.
         let arrived = match options.pace {

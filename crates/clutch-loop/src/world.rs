@@ -143,7 +143,7 @@ impl<E: End> World<E> {
         let period = self.end.period().seconds::<f64>();
         let mut figures = MetricsBuilder::new(period, self.params.settle);
         let mut waiting: Option<Sampled> = None;
-        let (mut hello, mut configured, mut armed, mut ready_samples) = (false, false, false, 0);
+        let (mut hello, mut configured, mut asked, mut armed) = (false, false, false, false);
         let mut origin_ns = 0;
         let mut safe_at: Option<u64> = None;
         let mut busy_until = 0;
@@ -225,7 +225,6 @@ impl<E: End> World<E> {
                 continue;
             }
             let mut records = Vec::new();
-            let mut cycles = 0_u64;
             let time_ns = now.saturating_sub(origin_ns);
             let from = self.end.told().state;
             let mut ended = None;
@@ -236,20 +235,17 @@ impl<E: End> World<E> {
                     Notice::Hello(_) => greeted = true,
                     Notice::Configured => configured = true,
                     Notice::Armed => *armed_now = true,
-                    Notice::Cycle(n) => {
-                        cycles += 1;
-                        if *armed_now {
-                            if let Some(waiting) = waiting.as_mut().filter(|_| n.cycle.answer.is_some()) {
-                                waiting.tick = Some(n.cycle.tick);
-                            }
-                            outcome.answers += u64::from(n.cycle.answer.is_some());
-                            let volts = dac.volts(n.cycle.code).to_f64();
-                            outcome.volts = (outcome.volts.0.min(volts), outcome.volts.1.max(volts));
-                            records.push(Record::Sample(records::sample(time_ns, 0, &n)));
-                            records.push(Record::Command(records::command(time_ns, &n.cycle, &dac, radians)));
-                            records.extend(records::change(time_ns, &n.cycle));
-                            records.push(Record::Truth(records::truth(time_ns, n.cycle.tick, rig)));
+                    Notice::Cycle(n) if *armed_now => {
+                        if let Some(waiting) = waiting.as_mut().filter(|_| n.cycle.answer.is_some()) {
+                            waiting.tick = Some(n.cycle.tick);
                         }
+                        outcome.answers += u64::from(n.cycle.answer.is_some());
+                        let volts = dac.volts(n.cycle.code).to_f64();
+                        outcome.volts = (outcome.volts.0.min(volts), outcome.volts.1.max(volts));
+                        records.push(Record::Sample(records::sample(time_ns, 0, &n)));
+                        records.push(Record::Command(records::command(time_ns, &n.cycle, &dac, radians)));
+                        records.extend(records::change(time_ns, &n.cycle));
+                        records.push(Record::Truth(records::truth(time_ns, n.cycle.tick, rig)));
                     }
                     Notice::Ended(cause) => ended = Some(cause),
                     _ => {}
@@ -266,11 +262,9 @@ impl<E: End> World<E> {
             if let Some(why) = self.end.failure() {
                 return Err(WorldError::Controller(why));
             }
-            if configured && !armed {
-                ready_samples += cycles;
-                if cycles > 0 && ready_samples == 3 {
-                    self.end.arm(&mut out);
-                }
+            if configured && !asked && self.board.samples() >= 3 {
+                asked = true;
+                self.end.arm(&mut out);
             }
             let told = self.end.told();
             let (state, tick) = (told.state, told.tick);

@@ -279,6 +279,8 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
         }
     }
 
+    // A function of its own in machine code, too: the timing analysis is told how often it is called.
+    #[inline(never)]
     fn message(
         &mut self,
         message: &Message,
@@ -317,6 +319,8 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
         }
     }
 
+    // A function of its own in machine code, too: the timing analysis is told how often it is called.
+    #[inline(never)]
     fn sample(
         &mut self,
         now_ns: u64,

@@ -802,7 +802,7 @@ static inline void clutch_get_taken(const uint8_t *body, clutch_taken_t *m)
     m->value = clutch_get_u64(body + CLUTCH_TAKEN_VALUE);
 }
 
-/* Telemetry: A sample and what the controller made of it. Real numbers are told as their 32 bits. */
+/* Telemetry: A sample after consent, and what the controller made of it. Real numbers are told as their 32 bits. */
 #define CLUTCH_TELEMETRY_KIND 0x8bu
 #define CLUTCH_TELEMETRY_LENGTH 66u
 #define CLUTCH_TELEMETRY_RUN 1u

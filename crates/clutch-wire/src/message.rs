@@ -411,7 +411,7 @@ messages! {
         value: u64,
     }
 
-    /// A sample and what the controller made of it. Real numbers are told as their 32 bits.
+    /// A sample after consent, and what the controller made of it. Real numbers are told as their 32 bits.
     0x8B ToHost Telemetry {
         /// The run.
         run: u16,

@@ -229,7 +229,9 @@ pub fn run(mut node: Onboard) -> ! {
     }
 }
 
-/// The last word of a processor that has failed.
+/// The last word of a processor that has failed; over a line that is open.
 pub fn last_word(frame: &[u8]) {
-    DAQ.send(frame);
+    if DAQ.read(CTRL) & ENABLE_TX != 0 {
+        DAQ.send(frame);
+    }
 }

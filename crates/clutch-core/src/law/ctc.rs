@@ -111,11 +111,12 @@ impl<T: Real> Ctc<T> {
     fn terms(&self, tick: &Tick<T>) -> (T, CtcTerms<T>) {
         let (p, m) = (&self.params, self.model.params());
         let velocity = tick.velocity();
+        // First: what is computed before the call of exp has to be kept across it.
+        let mu = self.model.friction().magnitude(velocity);
         let accel_demand = -(p.outer_gain * (p.kp * tick.error + p.kd * tick.error_rate));
         let friction_torque = m.drive_torque
             - m.inertia * (tick.target_acceleration - accel_demand)
             - m.viscous_damping * velocity;
-        let mu = self.model.friction().magnitude(velocity);
         (friction_torque / (mu * m.brake_gain), CtcTerms { accel_demand, friction_torque, mu })
     }
 }

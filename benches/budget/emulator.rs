@@ -1,0 +1,133 @@
+//! The images are built and run.
+
+use anyhow::{Context, Result, bail};
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+const QEMU: &str = "qemu-system-arm";
+const BOARD: [&str; 9] = [
+    "-machine",
+    "mps2-an386",
+    "-display",
+    "none",
+    "-monitor",
+    "none",
+    "-serial",
+    "null",
+    "-semihosting-config",
+];
+
+/// What the image printed of one function.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Counts {
+    pub(crate) calls: usize,
+    pub(crate) least: u64,
+    pub(crate) mean: u64,
+    pub(crate) most: u64,
+}
+
+/// All that it printed.
+pub(crate) struct Measured {
+    /// In the order of the measurements.
+    pub(crate) names: Vec<String>,
+    pub(crate) counts: BTreeMap<String, Counts>,
+}
+
+/// Why there is nothing to look at; not an error on a machine that lacks the tools.
+pub(crate) fn missing(program: &str, option: &str) -> Option<String> {
+    let runs = Command::new(program).arg(option).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    (!runs.is_ok_and(|s| s.success())).then(|| format!("{program} is not there"))
+}
+
+/// Whether the emulator is there.
+pub(crate) fn no_emulator() -> Option<String> {
+    missing(QEMU, "--version")
+}
+
+/// Builds the images; the folder that they are in.
+pub(crate) fn build(firmware: &Path, peer: bool) -> Result<PathBuf> {
+    let target = std::env::var_os("CLUTCH_FIRMWARE_TARGET_DIR")
+        .map_or(firmware.join("../target/firmware"), PathBuf::from);
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command.current_dir(firmware).args([
+        "build",
+        "--release",
+        "--package",
+        "clutch-qemu-mps2",
+        "--target-dir",
+    ]);
+    command.arg(&target).args(if peer { &["--features", "peer"][..] } else { &[] });
+    // Flags and targets that were meant for the host.
+    for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET"] {
+        command.env_remove(name);
+    }
+    if !command.status().context("cargo cannot be started")?.success() {
+        bail!("the images cannot be built");
+    }
+    Ok(target.join("thumbv7em-none-eabihf/release"))
+}
+
+fn qemu(image: &Path) -> Command {
+    let mut command = Command::new(QEMU);
+    command.args(BOARD).args(["enable=on,target=native", "-kernel"]).arg(image);
+    command
+}
+
+/// Runs the image so that it counts instructions.
+pub(crate) fn measure(image: &Path) -> Result<Measured> {
+    let run = qemu(image).args(["-icount", "shift=7,align=off,sleep=off"]).output()?;
+    // The console of the emulated board.
+    let text = String::from_utf8(run.stderr)?;
+    if !run.status.success() {
+        bail!("the image ended with {}: {text}", run.status);
+    }
+    let mut measured = Measured { names: Vec::new(), counts: BTreeMap::new() };
+    for line in text.lines() {
+        let words: Vec<&str> = line.split(' ').collect();
+        match &words[..] {
+            // Three instructions: the frame is made and unmade.
+            ["nothing", "1" | "3"] => {}
+            ["nothing", n] => bail!("an empty function is counted as {n} instructions"),
+            ["differs", "0"] => {}
+            ["differs", n] => bail!("the law in C answers {n} times otherwise than ours"),
+            [name, calls, least, mean, most] => {
+                let number = |w: &str| w.parse::<u64>().with_context(|| line.to_owned());
+                let counts = Counts {
+                    calls: number(calls)? as usize,
+                    least: number(least)?,
+                    mean: number(mean)?,
+                    most: number(most)?,
+                };
+                measured.names.push((*name).to_owned());
+                measured.counts.insert((*name).to_owned(), counts);
+            }
+            _ => bail!("the image printed: {line}"),
+        }
+    }
+    Ok(measured)
+}
+
+/// Runs the image one instruction at a time; the addresses executed within the given ranges.
+pub(crate) fn trace(image: &Path, ranges: &[(u32, u32)]) -> Result<Vec<u32>> {
+    let log = image.with_extension("trace");
+    let filter: Vec<String> = ranges.iter().map(|(a, n)| format!("{a:#x}+{n:#x}")).collect();
+    let run = qemu(image)
+        .args(["-singlestep", "-d", "exec,nochain", "-dfilter", &filter.join(","), "-D"])
+        .arg(&log)
+        .output()?;
+    if !run.status.success() {
+        bail!("the traced image ended with {}: {}", run.status, String::from_utf8_lossy(&run.stderr));
+    }
+    let mut addresses = Vec::new();
+    for line in BufReader::new(std::fs::File::open(&log)?).lines() {
+        // Trace 0: 0x7f… [00400000/00007da0/00000b01/ff000200] step_pd
+        let line = line?;
+        let address = line.split('/').nth(1).and_then(|a| u32::from_str_radix(a, 16).ok());
+        addresses.push(address.with_context(|| format!("not a line of a trace: {line}"))?);
+    }
+    std::fs::remove_file(&log)?;
+    Ok(addresses)
+}

@@ -1,0 +1,251 @@
+//! What a control period costs at most on a Cortex-M4F: bounds from the machine code of the linked
+//! image, the most that was measured in the emulator, and the budgets of firmware/budget.toml.
+//! docs/timing.md says what the figures mean.
+//!
+//! `cargo bench --bench budget`, with `-- size` or `-- stack` only that part, and with
+//! `-- loops` all functions and loops that the bounds are made of. It fails
+//! when a measured value exceeds its bound, or a bound its budget.
+
+mod emulator;
+mod memory;
+mod plan;
+
+use anyhow::{Context, Result, bail};
+use clutch_benches::machine_code::{Bounds, Cost, Fault, Image, traced};
+use emulator::Measured;
+use plan::{Item, Plan};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let part = arguments.iter().find(|a| ["size", "stack", "loops"].contains(&a.as_str()));
+    // A filter that means other benchmarks: `cargo bench -- law`.
+    if matches!(&arguments[..], [filter] if part.is_none() && !filter.starts_with('-') && !"budget".contains(filter.as_str()))
+    {
+        return ExitCode::SUCCESS;
+    }
+    match run(part.map(String::as_str)) {
+        Ok(over) if over.is_empty() => ExitCode::SUCCESS,
+        Ok(over) => {
+            over.iter().for_each(|o| println!("over budget: {o}"));
+            ExitCode::FAILURE
+        }
+        Err(error) => {
+            println!("{error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// On a machine of CI all has to be there; elsewhere it is said what is not.
+fn skipped(why: &str) -> Result<()> {
+    if std::env::var_os("CI").is_some() {
+        bail!("{why}");
+    }
+    println!("skipped: {why}");
+    Ok(())
+}
+
+fn run(part: Option<&str>) -> Result<Vec<String>> {
+    let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware");
+    let plan = Plan::read(&firmware.join("budget.toml"))?;
+    let no_gcc = emulator::missing("arm-none-eabi-gcc", "--version");
+    let images = match emulator::build(&firmware, no_gcc.is_none()) {
+        Ok(images) => images,
+        Err(error) => {
+            let add = "`rustup target add thumbv7em-none-eabihf`";
+            skipped(&format!("{error:#}; does {add} help?"))?;
+            return Ok(Vec::new());
+        }
+    };
+    let controller = Image::read(&images.join("mps2-controller"))?;
+    let mut over = Vec::new();
+    if part.is_none_or(|p| p == "size") {
+        over.extend(memory::size(&controller, &plan.memory));
+    }
+    if part.is_none_or(|p| p == "stack") {
+        over.extend(memory::stack(&controller, &plan.memory)?);
+    }
+    if part.is_some_and(|p| p != "loops") {
+        return Ok(over);
+    }
+    let path = images.join("budget");
+    let image = Image::read(&path)?;
+    for (name, image) in [("mps2-controller", &controller), ("budget", &image)] {
+        let found = image.double_precision();
+        over.extend(found.iter().map(|s| format!("{name}: double precision: {s}")));
+    }
+    let bounds = all_bounds(&image, &plan, part == Some("loops"))?;
+    if part == Some("loops") {
+        return Ok(over);
+    }
+    let measured = match emulator::no_emulator() {
+        Some(why) => skipped(&why).map(|()| None)?,
+        None => Some(emulator::measure(&path)?),
+    };
+    if let Some(why) = no_gcc {
+        skipped(&format!("{why}: the laws in C are not compared"))?;
+    }
+    let cycles = match &measured {
+        Some(m) => gone(&path, &image, &plan, m)?,
+        None => BTreeMap::new(),
+    };
+    over.extend(table(&plan, &bounds, measured.as_ref(), &cycles));
+    peers(&plan, &image, &bounds, measured.as_ref(), &cycles)?;
+    Ok(over)
+}
+
+fn told(faults: Vec<Fault>) -> anyhow::Error {
+    let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    anyhow::anyhow!("no bound:\n{}", lines.join("\n"))
+}
+
+/// The bound of each item.
+fn all_bounds(image: &Image, plan: &Plan, loops: bool) -> Result<Vec<Cost>> {
+    let facts = plan.facts();
+    let mut all = Vec::new();
+    for item in &plan.items {
+        let case = item.case();
+        let mut bounds = Bounds::new(image, &facts, &case);
+        all.push(bounds.of(&item.symbol).map_err(told).with_context(|| item.name.clone())?);
+        if loops {
+            println!("\n{}:", item.name);
+            for (f, length, cost) in bounds.functions() {
+                let of = length.map_or(String::new(), |n| format!(" of {n} bytes"));
+                println!("{}{of}: {} instructions, {} cycles", f.name, cost.instructions, cost.cycles);
+            }
+            bounds.loops().for_each(|(address, what)| println!("{address:#x} {what}"));
+        }
+    }
+    Ok(all)
+}
+
+/// The dearest path that was gone, of what is traced: cycles by the table of the bound.
+fn gone(path: &Path, image: &Image, plan: &Plan, measured: &Measured) -> Result<BTreeMap<String, Cost>> {
+    let facts = plan.facts();
+    let (mut ranges, mut entries) = (BTreeMap::new(), BTreeMap::new());
+    let ours = plan.items.iter().filter(|i| i.traced).map(|i| (i.measured.as_str(), i.symbol.as_str()));
+    let theirs = plan.peers.iter().map(|p| (p.symbol.as_str(), p.symbol.as_str()));
+    for (name, symbol) in ours.chain(theirs) {
+        let Ok(function) = image.function(symbol) else { continue };
+        let none = Default::default();
+        let mut bounds = Bounds::new(image, &facts, &none);
+        bounds.of(symbol).map_err(told)?;
+        ranges.extend(bounds.functions().map(|(f, ..)| (f.address, f.size)));
+        entries.insert(name, function.address);
+    }
+    let ranges: Vec<(u32, u32)> = ranges.into_iter().collect();
+    let addresses: Vec<u32> = entries.values().copied().collect();
+    let mut calls = traced(image, &addresses, emulator::trace(path, &ranges)?.into_iter())?;
+    let mut most = BTreeMap::new();
+    // One function may have been measured under several names, one after the other.
+    for name in &measured.names {
+        let Some(of) = entries.get(name.as_str()).and_then(|a| calls.get_mut(a)) else { continue };
+        let counts = measured.counts[name];
+        let took =
+            of.get(..counts.calls).with_context(|| format!("{name}: calls are missing in the trace"))?;
+        let top = took.iter().fold(Cost::default(), |a, b| Cost {
+            instructions: a.instructions.max(b.instructions),
+            cycles: a.cycles.max(b.cycles),
+        });
+        if top.instructions != counts.most {
+            bail!("{name}: {} instructions by the trace, {} by the timer", top.instructions, counts.most);
+        }
+        most.insert(name.clone(), top);
+        of.drain(..counts.calls);
+    }
+    Ok(most)
+}
+
+/// Prints the table; what is over.
+fn table(
+    plan: &Plan,
+    bounds: &[Cost],
+    measured: Option<&Measured>,
+    cycles: &BTreeMap<String, Cost>,
+) -> Vec<String> {
+    let mut over = Vec::new();
+    println!(
+        "\nBounds of the machine code, Cortex-M4F without wait states, and the most that was measured:\n"
+    );
+    println!(
+        "| function | instructions: bound | budget | measured least / mean / most | cycles: bound | budget | measured | share of {} ms at {} MHz |",
+        plan.core.period_us as f64 / 1000.0,
+        plan.core.clock_hz / 1_000_000
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    let exceeds = |item: &Item, what: &str, is: u64, may: u64| {
+        (is > may).then(|| format!("{}: {what}: {is}, at most {may}", item.name))
+    };
+    for (item, bound) in plan.items.iter().zip(bounds) {
+        let counts = measured.and_then(|m| m.counts.get(&item.measured));
+        let along = cycles.get(&item.measured).map(|c| c.cycles);
+        println!(
+            "| {} | {} | {} | {} | {} | {} | {} | {:.2} % |",
+            item.name,
+            bound.instructions,
+            item.budget.instructions,
+            counts.map_or("–".to_owned(), |c| format!("{} / {} / {}", c.least, c.mean, c.most)),
+            bound.cycles,
+            item.budget.cycles,
+            along.map_or("–".to_owned(), |c| c.to_string()),
+            plan.share(bound.cycles),
+        );
+        over.extend(exceeds(item, "bound, instructions", bound.instructions, item.budget.instructions));
+        over.extend(exceeds(item, "bound, cycles", bound.cycles, item.budget.cycles));
+        over.extend(exceeds(item, "measured instructions", counts.map_or(0, |c| c.most), bound.instructions));
+        over.extend(exceeds(item, "measured cycles", along.unwrap_or(0), bound.cycles));
+        if measured.is_some() && counts.is_none() {
+            over.push(format!("{}: the image did not measure it", item.name));
+        }
+    }
+    over
+}
+
+/// Prints how the laws compare with those in C.
+fn peers(
+    plan: &Plan,
+    image: &Image,
+    bounds: &[Cost],
+    measured: Option<&Measured>,
+    cycles: &BTreeMap<String, Cost>,
+) -> Result<()> {
+    let Some(measured) = measured.filter(|m| plan.peers.iter().any(|p| m.counts.contains_key(&p.symbol)))
+    else {
+        return Ok(());
+    };
+    println!(
+        "\nThe laws against C (`benches/peer_c`, gcc -O2), most executed instructions and bound in cycles:\n"
+    );
+    println!(
+        "| law | ours | C | ratio | earlier C | ratio | bound: ours | C | earlier C | measured: ours | C |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    let facts = plan.facts();
+    let none = Default::default();
+    for peer in &plan.peers {
+        let Some((item, ours)) = plan.items.iter().zip(bounds).find(|(i, _)| i.name == peer.name) else {
+            bail!("{}: a law in C without one of ours", peer.name);
+        };
+        let theirs = Bounds::new(image, &facts, &none).of(&peer.symbol).map_err(told)?;
+        let (a, b) = (measured.counts[&item.measured].most, measured.counts[&peer.symbol].most);
+        let ratio = |n: u64| format!("{:.2}", a as f64 / n as f64);
+        let along = |name: &String| cycles.get(name).map_or("–".to_owned(), |c| c.cycles.to_string());
+        let old = |f: &dyn Fn(plan::Limit) -> String| peer.historic.map_or("–".to_owned(), f);
+        println!(
+            "| {} | {a} | {b} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            peer.name,
+            ratio(b),
+            old(&|h| h.instructions.to_string()),
+            old(&|h| ratio(h.instructions)),
+            ours.cycles,
+            theirs.cycles,
+            old(&|h| h.cycles.to_string()),
+            along(&item.measured),
+            along(&peer.symbol),
+        );
+    }
+    Ok(())
+}

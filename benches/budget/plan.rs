@@ -1,0 +1,105 @@
+//! firmware/budget.toml.
+
+use anyhow::{Context, Result};
+use clutch_benches::machine_code::{CallFact, Facts, LengthFact, LoopFact};
+use serde::Deserialize;
+use std::path::Path;
+
+/// The file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Plan {
+    pub(crate) core: Core,
+    #[serde(rename = "item")]
+    pub(crate) items: Vec<Item>,
+    #[serde(rename = "peer")]
+    pub(crate) peers: Vec<Peer>,
+    pub(crate) memory: Memory,
+    #[serde(rename = "loop")]
+    loops: Vec<LoopFact>,
+    #[serde(rename = "call")]
+    calls: Vec<CallFact>,
+    #[serde(rename = "length")]
+    lengths: Vec<LengthFact>,
+}
+
+/// The core for which cycles become a share of a period.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Core {
+    pub(crate) clock_hz: u64,
+    pub(crate) period_us: u64,
+}
+
+/// A function with a budget.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Item {
+    pub(crate) name: String,
+    /// Its name in the image.
+    pub(crate) symbol: String,
+    /// The name under which the image prints its counts.
+    pub(crate) measured: String,
+    /// Whether its cycles along the paths gone are added up, too.
+    #[serde(default)]
+    pub(crate) traced: bool,
+    pub(crate) budget: Limit,
+    #[serde(default, rename = "loop")]
+    loops: Vec<LoopFact>,
+    #[serde(default, rename = "call")]
+    calls: Vec<CallFact>,
+}
+
+/// A law in C.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Peer {
+    /// That of the item it is compared with.
+    pub(crate) name: String,
+    /// Its name in the image, and in what the image prints.
+    pub(crate) symbol: String,
+    /// What an earlier version in C executed at most, and its bound.
+    pub(crate) historic: Option<Limit>,
+}
+
+/// Instructions and cycles.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Limit {
+    pub(crate) instructions: u64,
+    pub(crate) cycles: u64,
+}
+
+/// Budgets of the controller's image, bytes.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Memory {
+    pub(crate) flash: u64,
+    pub(crate) ram: u64,
+    pub(crate) stack: u64,
+}
+
+impl Plan {
+    pub(crate) fn read(path: &Path) -> Result<Plan> {
+        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        toml::from_str(&text).with_context(|| path.display().to_string())
+    }
+
+    /// What holds in every case.
+    pub(crate) fn facts(&self) -> Facts {
+        Facts { loops: self.loops.clone(), calls: self.calls.clone(), lengths: self.lengths.clone() }
+    }
+
+    /// Cycles as a share of a period, %.
+    pub(crate) fn share(&self, cycles: u64) -> f64 {
+        let period = self.core.clock_hz * self.core.period_us / 1_000_000;
+        100.0 * cycles as f64 / period as f64
+    }
+}
+
+impl Item {
+    /// What holds in this case.
+    pub(crate) fn case(&self) -> Facts {
+        Facts { loops: self.loops.clone(), calls: self.calls.clone(), lengths: Vec::new() }
+    }
+}

@@ -1,0 +1,395 @@
+//! The longest way through a function.
+
+use super::cost::{cycles, refill, stall};
+use super::decode::{Flow, Instruction};
+use super::facts::{Facts, means};
+use super::graph::{Graph, Loop};
+use super::image::{Function, Image};
+use super::{Fault, facts};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::{Add, Mul};
+
+/// Instructions and cycles, each by itself: the longest way in one is not always that in the other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Executed instructions; those that a condition switches off count.
+    pub instructions: u64,
+    /// Cycles of the core.
+    pub cycles: u64,
+}
+
+impl Cost {
+    fn max(self, o: Cost) -> Cost {
+        Cost { instructions: self.instructions.max(o.instructions), cycles: self.cycles.max(o.cycles) }
+    }
+
+    fn min(self, o: Cost) -> Cost {
+        Cost { instructions: self.instructions.min(o.instructions), cycles: self.cycles.min(o.cycles) }
+    }
+
+    fn cycles(cycles: u64) -> Cost {
+        Cost { instructions: 0, cycles }
+    }
+}
+
+impl Add for Cost {
+    type Output = Cost;
+    fn add(self, o: Cost) -> Cost {
+        Cost { instructions: self.instructions + o.instructions, cycles: self.cycles + o.cycles }
+    }
+}
+
+impl Mul<u64> for Cost {
+    type Output = Cost;
+    fn mul(self, n: u64) -> Cost {
+        Cost { instructions: self.instructions * n, cycles: self.cycles * n }
+    }
+}
+
+/// Bounds of the functions of one image under one set of facts.
+pub struct Bounds<'a> {
+    image: &'a Image,
+    facts: &'a Facts,
+    /// Facts that hold in this case only; they are asked first.
+    case: &'a Facts,
+    known: BTreeMap<(u32, Option<u64>), Cost>,
+    /// Functions being looked at, the outermost first.
+    within: Vec<u32>,
+    faults: BTreeSet<String>,
+    found: Vec<Fault>,
+    /// Loops and what they were taken for.
+    told: BTreeMap<u32, String>,
+}
+
+/// Calls of one function that are few.
+#[derive(Default)]
+struct Capped {
+    /// Of one.
+    cost: Cost,
+    /// How many, each time that the calling function is called.
+    most: u64,
+    /// Where they are.
+    blocks: BTreeSet<usize>,
+}
+
+/// A way from block to block, or out of the function.
+type Ways = BTreeMap<(usize, Option<usize>), Cost>;
+
+impl<'a> Bounds<'a> {
+    /// Nothing bounded yet.
+    #[must_use]
+    pub fn new(image: &'a Image, facts: &'a Facts, case: &'a Facts) -> Self {
+        Bounds {
+            image,
+            facts,
+            case,
+            known: BTreeMap::new(),
+            within: Vec::new(),
+            faults: BTreeSet::new(),
+            found: Vec::new(),
+            told: BTreeMap::new(),
+        }
+    }
+
+    /// The bound of the function of this name, from its first instruction to its return.
+    ///
+    /// # Errors
+    /// All that stands in the way.
+    pub fn of(&mut self, name: &str) -> Result<Cost, Vec<Fault>> {
+        let function = self.image.function(name).map_err(|f| vec![f])?;
+        let cost = self.function(function, None);
+        if self.found.is_empty() { Ok(cost) } else { Err(std::mem::take(&mut self.found)) }
+    }
+
+    /// The functions that have been looked at, with the bound of each; one that works on memory, for
+    /// each length.
+    pub fn functions(&self) -> impl Iterator<Item = (&Function, Option<u64>, Cost)> {
+        let named = |((address, length), cost): (&(u32, Option<u64>), &Cost)| {
+            Some((self.image.function_at(*address)?, *length, *cost))
+        };
+        self.known.iter().filter_map(named)
+    }
+
+    /// The loops that were met, by address, and the fact that bounds each.
+    pub fn loops(&self) -> impl Iterator<Item = (u32, &str)> {
+        self.told.iter().map(|(a, t)| (*a, t.as_str()))
+    }
+
+    fn fault(&mut self, fault: Fault) -> Cost {
+        if self.faults.insert(fault.to_string()) {
+            self.found.push(fault);
+        }
+        Cost::default()
+    }
+
+    /// `length`: bytes, for a function that works on memory.
+    fn function(&mut self, function: &Function, length: Option<u64>) -> Cost {
+        if let Some(cost) = self.known.get(&(function.address, length)) {
+            return *cost;
+        }
+        if self.within.contains(&function.address) {
+            let name = |a: &u32| self.image.function_at(*a).map_or("?", |f| f.name.as_str());
+            let chain: Vec<&str> = self.within.iter().map(name).chain([function.name.as_str()]).collect();
+            return self.fault(Fault::Recursion(chain.join(" → ")));
+        }
+        self.within.push(function.address);
+        let cost = match Graph::new(self.image, function) {
+            Ok(graph) => self.longest(function, &graph, length),
+            Err(fault) => self.fault(fault),
+        };
+        self.within.pop();
+        self.known.insert((function.address, length), cost);
+        cost
+    }
+
+    fn longest(&mut self, function: &Function, graph: &Graph, length: Option<u64>) -> Cost {
+        let mut capped = BTreeMap::new();
+        let mut ways = self.ways(function, graph, length, &mut capped);
+        let loops = match graph.loops() {
+            Ok(loops) => loops,
+            Err(block) => {
+                let (function, address) = (function.name.clone(), graph.address(block));
+                return self.fault(Fault::Irreducible { function, address });
+            }
+        };
+        for round in &loops {
+            let most = self.rounds(function, graph, &loops, round, length);
+            collapse(&mut ways, round, most, capped.values());
+        }
+        let Some(path) = reach(&ways, 0, None).1.remove(&None) else {
+            return self.fault(Fault::NoReturn { function: function.name.clone() });
+        };
+        capped.values().fold(path, |sum, c| sum + c.cost * c.most)
+    }
+
+    /// What each way costs: the block that it leaves, and the jump.
+    fn ways(
+        &mut self,
+        function: &Function,
+        graph: &Graph,
+        length: Option<u64>,
+        capped: &mut BTreeMap<u32, Capped>,
+    ) -> Ways {
+        let mut ways = Ways::new();
+        for (n, block) in graph.blocks.iter().enumerate() {
+            let mut cost = Cost::default();
+            for (k, i) in block.instructions.iter().enumerate() {
+                let Some(c) = cycles(i) else {
+                    let (address, text) = (i.address, format!("{} ({})", i.text, i.name));
+                    self.fault(Fault::NoCost { function: function.name.clone(), address, text });
+                    continue;
+                };
+                let stalled = block.instructions.get(k + 1).map_or(0, |next| stall(i, next));
+                cost = cost + Cost { instructions: 1, cycles: c + stalled };
+                if let Flow::Call(target) = i.flow {
+                    cost = cost + Cost::cycles(refill(i));
+                    let so_far = &block.instructions[..k];
+                    cost = cost + self.call(function, (n, i), target, so_far, length, capped);
+                }
+            }
+            let Some((last, so_far)) = block.instructions.split_last() else { continue };
+            for &to in &block.next {
+                let first = &graph.blocks[to].instructions[0];
+                let jumped = if first.address == last.address + last.size { 0 } else { refill(last) };
+                or_longer(&mut ways, (n, Some(to)), cost + Cost::cycles(jumped + stall(last, first)));
+            }
+            if block.returns {
+                or_longer(&mut ways, (n, None), cost + Cost::cycles(refill(last)));
+            }
+            if let Some(target) = block.tail_call {
+                let callee = self.call(function, (n, last), target, so_far, length, capped);
+                or_longer(&mut ways, (n, None), cost + Cost::cycles(refill(last)) + callee);
+            }
+        }
+        ways
+    }
+
+    /// What a call adds where it stands. What calls of a capped number add is kept apart.
+    fn call(
+        &mut self,
+        function: &Function,
+        (block, i): (usize, &Instruction),
+        target: u32,
+        before: &[Instruction],
+        length: Option<u64>,
+        capped: &mut BTreeMap<u32, Capped>,
+    ) -> Cost {
+        let Some(callee) = self.image.function_at(target) else {
+            let (function, address) = (function.name.clone(), i.address);
+            return self.fault(Fault::NoTarget { function, address, target });
+        };
+        let cap = self
+            .case
+            .calls
+            .iter()
+            .chain(&self.facts.calls)
+            .find(|f| means(&f.function, &function.name) && means(&f.of, &callee.name));
+        if cap.is_some_and(|c| c.most == 0) {
+            return Cost::default();
+        }
+        let bytes = length_register(&callee.name).and_then(|register| {
+            let handed_on = length.filter(|_| length_register(&function.name).is_some());
+            let stated =
+                self.facts.lengths.iter().find(|f| means(&f.function, &function.name) && callee.name == f.of);
+            handed_on.or_else(|| constant(before, register)).or(stated.map(|f| f.most))
+        });
+        if length_register(&callee.name).is_some() && bytes.is_none() {
+            let (function, callee) = (function.name.clone(), callee.name.clone());
+            return self.fault(Fault::Length { function, address: i.address, callee });
+        }
+        let cost = self.function(callee, bytes);
+        match cap {
+            Some(c) => {
+                // Calls of different lengths: the dearest of them.
+                let known = capped.entry(target).or_default();
+                known.cost = known.cost.max(cost);
+                known.most = c.most;
+                known.blocks.insert(block);
+                Cost::default()
+            }
+            None => cost,
+        }
+    }
+
+    /// How often a loop's head is executed each time that the loop is entered.
+    fn rounds(
+        &mut self,
+        function: &Function,
+        graph: &Graph,
+        loops: &[Loop],
+        round: &Loop,
+        length: Option<u64>,
+    ) -> u64 {
+        let address = graph.address(round.head);
+        let from = self.image.inlined_from(address);
+        let outer = loops.iter().any(|l| l.head != round.head && round.body.contains(&l.head));
+        let fact = self.case.loops.iter().chain(&self.facts.loops).find(|f| {
+            means(&f.function, &function.name)
+                && f.outer.is_none_or(|o| o == outer)
+                && f.of.as_ref().is_none_or(|of| from.iter().any(|name| means(of, name)))
+        });
+        let worked = |f: &facts::LoopFact| Some(length? / f.step? + 1);
+        let stated = fact.and_then(|f| f.most.or_else(|| worked(f)));
+        let each = fact.and_then(|f| f.by.as_ref()).map_or(1, |by| graph.least_each_round(round, by));
+        if let (Some(stated), Some(fact), 1..) = (stated, fact, each) {
+            // In the last round, the head may be executed and none of what is counted.
+            let most = if fact.by.is_some() { stated / each + 1 } else { stated };
+            self.told.insert(address, format!("{}: {most}: {}", function.name, fact.why));
+            return most.max(1);
+        }
+        let from = from.join(" < ");
+        self.fault(Fault::Unbounded { function: function.name.clone(), address, from });
+        1
+    }
+}
+
+/// The register in which a function on memory gets its number of bytes.
+fn length_register(name: &str) -> Option<&'static str> {
+    let name = name.rsplit("::").next().unwrap_or(name);
+    let name = name.strip_prefix("__aeabi_").map_or((name, false), |n| (n, true));
+    match name {
+        (n, true) if n.starts_with("memset") || n.starts_with("memclr") => Some("r1"),
+        (n, _) if ["memcpy", "memmove", "memset"].iter().any(|m| n.starts_with(m)) => Some("r2"),
+        _ => None,
+    }
+}
+
+/// The constant that a register has been given last.
+fn constant(before: &[Instruction], register: &str) -> Option<u64> {
+    let last = before
+        .iter()
+        .rev()
+        .find(|i| matches!(i.flow, Flow::Call(_)) || i.operands.first().is_some_and(|o| o == register))?;
+    let [_, value] = &last.operands[..] else { return None };
+    if !last.name.starts_with("mov") || last.name == "movt" {
+        return None;
+    }
+    let digits = value.strip_prefix('#')?;
+    digits.strip_prefix("0x").map_or_else(|| digits.parse().ok(), |h| u64::from_str_radix(h, 16).ok())
+}
+
+/// The longest ways from a block within `only`, to each block and out of the function; the ways that
+/// leave `only` or lead back to the block are not gone.
+fn reach(
+    ways: &Ways,
+    from: usize,
+    only: Option<&BTreeSet<usize>>,
+) -> (Vec<usize>, BTreeMap<Option<usize>, Cost>) {
+    let inside = |b: usize| only.is_none_or(|o| o.contains(&b));
+    let next = |b: usize| ways.range((b, None)..=(b, Some(usize::MAX)));
+    // In an order in which each block comes after all that lead to it.
+    let (mut order, mut seen, mut open) = (Vec::new(), BTreeSet::new(), vec![(from, false)]);
+    while let Some((b, done)) = open.pop() {
+        if done {
+            order.push(b);
+        } else if seen.insert(b) {
+            open.push((b, true));
+            open.extend(
+                next(b)
+                    .filter_map(|((_, to), _)| *to)
+                    .filter(|&t| t != from && inside(t))
+                    .map(|t| (t, false)),
+            );
+        }
+    }
+    order.reverse();
+    let mut longest: BTreeMap<Option<usize>, Cost> = BTreeMap::from([(Some(from), Cost::default())]);
+    for &b in &order {
+        let so_far = longest.get(&Some(b)).copied().unwrap_or_default();
+        for ((_, to), cost) in next(b) {
+            if to.is_some_and(|t| t == from || !inside(t)) {
+                continue;
+            }
+            let total = so_far + *cost;
+            longest.entry(*to).and_modify(|c| *c = c.max(total)).or_insert(total);
+        }
+    }
+    (order, longest)
+}
+
+/// Adds a way, or makes the one that is there as long.
+fn or_longer(ways: &mut Ways, way: (usize, Option<usize>), cost: Cost) {
+    ways.entry(way).and_modify(|c| *c = c.max(cost)).or_insert(cost);
+}
+
+/// Puts a loop into its head: what leads out of the loop costs all rounds, too.
+fn collapse<'c>(ways: &mut Ways, round: &Loop, most: u64, capped: impl Iterator<Item = &'c Capped>) {
+    let (once, out) = rounds_and_ways_out(ways, round, &round.body);
+    let again = most - 1;
+    let mut rounds = once * again;
+    // Rounds that call what is called a few times only are as few.
+    for c in capped.filter(|c| c.most < again && !c.blocks.is_disjoint(&round.body)) {
+        let rest = round.body.difference(&c.blocks).copied().collect();
+        let (without, _) = rounds_and_ways_out(ways, round, &rest);
+        rounds = rounds.min(once * c.most + without * (again - c.most));
+    }
+    ways.retain(|(from, _), _| !round.body.contains(from));
+    for (to, cost) in out {
+        let total = rounds + cost;
+        or_longer(ways, (round.head, to), total);
+    }
+}
+
+/// The longest way round a loop, and the ways out of it, by the blocks of `only`.
+fn rounds_and_ways_out(
+    ways: &Ways,
+    round: &Loop,
+    only: &BTreeSet<usize>,
+) -> (Cost, Vec<(Option<usize>, Cost)>) {
+    let (mut once, mut out) = (Cost::default(), Vec::new());
+    if !only.contains(&round.head) {
+        return (once, out);
+    }
+    let (order, longest) = reach(ways, round.head, Some(only));
+    let at = |b: usize| longest.get(&Some(b)).copied().unwrap_or_default();
+    for &b in &order {
+        for ((_, to), cost) in ways.range((b, None)..=(b, Some(usize::MAX))) {
+            match to {
+                Some(t) if *t == round.head => once = once.max(at(b) + *cost),
+                Some(t) if round.body.contains(t) => {}
+                _ => out.push((*to, at(b) + *cost)),
+            }
+        }
+    }
+    (once, out)
+}

@@ -1,0 +1,101 @@
+//! Cycles of each instruction on a Cortex-M4F whose memory has no wait states.
+//!
+//! From the tables of the Cortex-M4 Technical Reference Manual (also printed as tables 3-25 and 3-27
+//! of TI's SWCU192). Where a table gives a range, its upper end; what depends on a condition is
+//! charged as if it took place. Not in the tables and not charged: savings by back-to-back loads.
+
+use super::decode::{Flow, Instruction};
+
+/// Cycles to fill the pipeline anew: 1 to 3.
+pub(super) const REFILL: u64 = 3;
+
+/// Cycles of an instruction, without the filling of the pipeline where it jumps; none if unknown.
+pub(super) fn cycles(i: &Instruction) -> Option<u64> {
+    let listed = |from: usize| i.operands.len().saturating_sub(from) as u64;
+    let doubles = i.operands.iter().filter(|o| register(o, 'd')).count() as u64;
+    Some(match i.name.as_str() {
+        "adc" | "add" | "addw" | "adr" | "and" | "asr" | "bfc" | "bfi" | "bic" | "clz" | "cmn" | "cmp"
+        | "eor" | "hint" | "it" | "lsl" | "lsr" | "mov" | "movs" | "movt" | "movw" | "mul" | "mvn"
+        | "nop" | "orn" | "orr" | "qadd" | "qsub" | "pkhbt" | "pkhtb" | "rbit" | "rev" | "rev16"
+        | "revsh" | "ror" | "rrx" | "rsb" | "sbc" | "sbfx" | "ssat" | "sub" | "subw" | "sxtab" | "sxtah"
+        | "sxtb" | "sxth" | "teq" | "tst" | "ubfx" | "usat" | "uxtab" | "uxtah" | "uxtb" | "uxth" => 1,
+        "smlabb" | "smlabt" | "smlatb" | "smlatt" | "smlal" | "smulbb" | "smulbt" | "smultb" | "smultt"
+        | "smull" | "smmul" | "smmla" | "umaal" | "umlal" | "umull" => 1,
+        "mla" | "mls" => 2,
+        "sdiv" | "udiv" => 12,
+        "b" | "bl" | "bx" | "cbz" | "cbnz" => 1,
+        "ldr" | "ldrb" | "ldrh" | "ldrsb" | "ldrsh" | "str" | "strb" | "strh" => 2,
+        "ldrd" | "strd" => 3,
+        "push" | "pop" => 1 + listed(0),
+        "ldm" | "ldmdb" | "stm" | "stmdb" => 1 + listed(1),
+        "vadd" | "vsub" | "vmul" | "vnmul" | "vcvt" | "vcvtr" | "vabs" | "vneg" | "vcmp" | "vcmpe"
+        | "vmrs" | "vmsr" | "fmstat" | "fconsts" => 1,
+        "vmov" if i.operands.len() > 2 => 2,
+        "vmov" => 1,
+        "vmla" | "vmls" | "vnmla" | "vnmls" | "vfma" | "vfms" | "vfnma" | "vfnms" => 3,
+        "vdiv" | "vsqrt" => 14,
+        "vldr" | "vstr" => 2 + doubles,
+        "vpush" | "vpop" => 1 + listed(0) + doubles,
+        "vldmia" | "vldmdb" | "vstmia" | "vstmdb" => 1 + listed(1) + doubles,
+        _ => return None,
+    })
+}
+
+/// Cycles for going on at an address other than the next.
+pub(super) fn refill(i: &Instruction) -> u64 {
+    if matches!(i.flow, Flow::Next | Flow::Trap) { 0 } else { REFILL }
+}
+
+/// One cycle more if `next` needs what `i` has just computed in the floating-point unit.
+pub(super) fn stall(i: &Instruction, next: &Instruction) -> u64 {
+    let computes = matches!(
+        i.name.as_str(),
+        "vadd"
+            | "vsub"
+            | "vmul"
+            | "vnmul"
+            | "vcvt"
+            | "vcvtr"
+            | "vmla"
+            | "vmls"
+            | "vnmla"
+            | "vnmls"
+            | "vfma"
+            | "vfms"
+            | "vfnma"
+            | "vfnms"
+            | "vdiv"
+            | "vsqrt"
+    );
+    let Some(result) = i.operands.first().filter(|_| computes) else { return 0 };
+    // The first operand is only written, but for stores, comparisons and accumulation.
+    let writes_first = !matches!(
+        next.name.as_str(),
+        "vstr"
+            | "vpush"
+            | "vstmia"
+            | "vstmdb"
+            | "vcmp"
+            | "vcmpe"
+            | "vmla"
+            | "vmls"
+            | "vnmla"
+            | "vnmls"
+            | "vfma"
+            | "vfms"
+            | "vfnma"
+            | "vfnms"
+    );
+    let read = next.operands.get(usize::from(writes_first)..).unwrap_or_default();
+    u64::from(read.iter().any(|o| o == result || pair(o).is_some_and(|p| p.contains(result))))
+}
+
+/// The two single registers of a double one.
+fn pair(operand: &str) -> Option<[String; 2]> {
+    let n: u32 = operand.strip_prefix('d')?.parse().ok()?;
+    Some([format!("s{}", 2 * n), format!("s{}", 2 * n + 1)])
+}
+
+fn register(operand: &str, kind: char) -> bool {
+    operand.strip_prefix(kind).is_some_and(|n| n.parse::<u32>().is_ok())
+}

@@ -1,0 +1,114 @@
+//! The functions that have a budget, each by itself and under its name: what firmware calls that
+//! uses the crates.
+
+use clutch_core::law::{Controller, Ctc, OutputState, Pd, Smc, Tick};
+use clutch_core::{Counts, Servo, ServoState, Target};
+use clutch_node::{Onboard, Ports};
+use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
+
+/// Bytes of one frame, as they come over the line: one delimiter, at their end.
+#[derive(Clone, Copy)]
+pub struct Bytes {
+    bytes: [u8; MAX_FRAME],
+    length: usize,
+}
+
+impl Bytes {
+    /// Of a message.
+    pub fn of(message: &Message) -> Bytes {
+        let mut bytes = [0; MAX_FRAME];
+        let frame = encode(message);
+        bytes.iter_mut().zip(frame.as_bytes()).for_each(|(to, from)| *to = *from);
+        Bytes { bytes, length: frame.as_bytes().len() }
+    }
+
+    /// The same with one byte flipped, but not into another delimiter.
+    pub fn corrupted(mut self, place: usize, flip: u8) -> Bytes {
+        let body = self.bytes.get_mut(..self.length.saturating_sub(1)).unwrap_or_default();
+        if let Some(byte) = body.get_mut(place) {
+            *byte = if *byte == flip { flip } else { *byte ^ flip };
+        }
+        self
+    }
+
+    fn as_slice(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+}
+
+/// A call and a return, to see that the meter counts right.
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn nothing() {}
+
+/// The law (4).
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn step_pd(law: &Pd<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
+    law.update(state, tick).voltage
+}
+
+/// The law (11).
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn step_ctc(law: &Ctc<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
+    law.update(state, tick).voltage
+}
+
+/// The laws (29) and (31).
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn step_smc(law: &Smc<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
+    law.update(state, tick).voltage
+}
+
+/// A servo, what it remembers, and where it shall be.
+pub struct Axis {
+    pub servo: Servo<f32>,
+    pub state: ServoState<f32, OutputState<f32>>,
+    pub target: Target<f32>,
+}
+
+/// Counts in, the converter's code out.
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn servo_tick(axis: &mut Axis, counts: i32) -> u16 {
+    axis.servo.tick(&mut axis.state, Counts(counts), &axis.target).code.0
+}
+
+/// The bytes of one frame in, its message out.
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn decode_sample(decoder: &mut Decoder, bytes: &Bytes, message: &mut Option<Message>) {
+    for byte in bytes.as_slice() {
+        if let Some(end) = decoder.push(*byte) {
+            if let Ok(whole) = end {
+                *message = Some(whole);
+            }
+            return;
+        }
+    }
+}
+
+/// A code in, the bytes of its frame out.
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn encode_actuate(answer: &Actuate, frame: &mut Option<Frame>) {
+    *frame = Some(encode(&Message::Actuate(*answer)));
+}
+
+/// A frame of encoder and converter in, those for them and for the host out: a period of the controller.
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn whole_tick(session: &mut Session, bytes: &Bytes) {
+    session.ports.host.clear();
+    session.ports.daq.clear();
+    session.node.daq(session.now_ns, bytes.as_slice(), &mut session.ports);
+}
+
+/// A controller and its lines.
+pub struct Session {
+    pub node: Onboard,
+    pub ports: Ports,
+    pub now_ns: u64,
+}

@@ -1,0 +1,122 @@
+//! The laws, the servo and the codec over their sets.
+
+use crate::inputs::{CORNERS, Random, ticks};
+use crate::kernels::{
+    Axis, Bytes, decode_sample, encode_actuate, nothing, servo_tick, step_ctc, step_pd, step_smc,
+};
+use crate::meter::{Tally, instructions, line};
+use clutch_core::law::{
+    Controller, Ctc, CtcParams, LawParams, OutputParams, OutputState, Pd, PdParams, Smc, SmcParams,
+    SmcSignParams, Tick,
+};
+use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, StribeckParams, Target};
+use clutch_wire::{Actuate, Decoder, Message, Sample};
+
+pub const PERIOD: Micros = Micros(1000);
+/// Of ordinary and of wild inputs.
+pub const OF_EACH: u32 = 1000;
+
+/// With a bumpless start: its offset is what a law remembers.
+pub fn output() -> OutputParams<f32> {
+    OutputParams { bumpless_time: 0.05, lowest: 0.5, ..OutputParams::default() }
+}
+
+fn law<L: Controller<f32, State = OutputState<f32>>>(
+    name: &'static str,
+    step: extern "C" fn(&L, &mut OutputState<f32>, &Tick<f32>) -> f32,
+    law: &L,
+) {
+    let mut tally = Tally::new(name);
+    let mut random = Random::new(1);
+    let mut state = OutputState::default();
+    ticks(&mut Random::new(2), OF_EACH, |tick, _| {
+        if random.below(8) == 0 {
+            state = law.start(&tick, random.around(10.0));
+        }
+        let arguments = [&raw const *law as usize, &raw mut state as usize, &raw const tick as usize];
+        // SAFETY: the arguments are those of the function.
+        tally.add(unsafe { instructions(step as usize, arguments) });
+    });
+    tally.print();
+}
+
+/// Measures and prints.
+pub fn measure() -> Option<()> {
+    // SAFETY: a function without arguments.
+    line("nothing", unsafe { instructions(nothing as extern "C" fn() as usize, [0; 3]) });
+
+    let (plant, output) = (PlantParams::default(), output());
+    law("step_pd", step_pd, &Pd::new(&PdParams::default(), &output, PERIOD).ok()?);
+    law("step_ctc", step_ctc, &Ctc::new(&CtcParams::default(), &plant, &output, PERIOD).ok()?);
+    let friction = StribeckParams { stribeck_exponent: 2.0, ..plant.friction };
+    let curved = PlantParams { friction, ..plant };
+    law("step_ctc_powf", step_ctc, &Ctc::new(&CtcParams::default(), &curved, &output, PERIOD).ok()?);
+    law("step_smc", step_smc, &Smc::new(&SmcParams::default(), &output, PERIOD).ok()?);
+    law("step_smc_sign", step_smc, &Smc::with_sign(&SmcSignParams::default(), &output, PERIOD).ok()?);
+
+    servo()?;
+    codec();
+    Some(())
+}
+
+fn servo() -> Option<()> {
+    let mut tally = Tally::new("servo_tick");
+    let mut random = Random::new(3);
+    let target = Target::<f32>::default();
+    let servo = Servo::<f32>::new(&ServoParams::paper(LawParams::Smc(SmcParams::default()))).ok()?;
+    let mut axis = Axis { servo, state: servo.start(Counts(0), &target, 0.0), target };
+    for call in 0..4 * OF_EACH {
+        // Near the target, and anywhere; a target that is no number, now and then.
+        let near = call % 4 != 0;
+        let any = FixedCounts((u64::from(random.next()) << 32 | u64::from(random.next())) as i64);
+        axis.target = Target {
+            position: if near { FixedCounts::from_counts(i64::from(random.below(40))) } else { any },
+            velocity: if near { 0.35 } else { CORNERS.get(call as usize % CORNERS.len()).copied()? },
+            acceleration: random.around(10.0),
+        };
+        let counts = if near { random.below(40) } else { random.next() };
+        let arguments = [&raw mut axis as usize, counts as usize, 0];
+        let function = servo_tick as extern "C" fn(&mut Axis, i32) -> u16;
+        // SAFETY: the arguments are those of the function.
+        tally.add(unsafe { instructions(function as usize, arguments) });
+    }
+    tally.print();
+    Some(())
+}
+
+fn codec() {
+    let mut random = Random::new(4);
+    let mut decoding = Tally::new("decode_sample");
+    let mut decoder = Decoder::new();
+    let mut message: Option<Message> = None;
+    for call in 0..2 * OF_EACH {
+        let bytes = Bytes::of(&Message::Sample(Sample {
+            run: random.next() as u16,
+            sequence: call as u16,
+            time_us: random.next(),
+            counts: if call % 16 == 0 { 0 } else { random.next() as i32 },
+            status: random.below(8) as u8,
+        }));
+        let bytes = match call % 4 {
+            0 => bytes.corrupted(random.below(20) as usize, random.next() as u8),
+            _ => bytes,
+        };
+        let arguments = [&raw mut decoder as usize, &raw const bytes as usize, &raw mut message as usize];
+        let function = decode_sample as extern "C" fn(&mut Decoder, &Bytes, &mut Option<Message>);
+        // SAFETY: the arguments are those of the function.
+        decoding.add(unsafe { instructions(function as usize, arguments) });
+    }
+    decoding.print();
+
+    let mut encoding = Tally::new("encode_actuate");
+    let mut frame: Option<clutch_wire::Frame> = None;
+    for _ in 0..2 * OF_EACH {
+        let mut any = || if random.below(4) == 0 { 0 } else { random.next() as u16 };
+        let answer = Actuate { run: any(), sequence: any(), code: any(), valid_us: any() };
+        let arguments = [&raw const answer as usize, &raw mut frame as usize, 0];
+        let function = encode_actuate as extern "C" fn(&Actuate, &mut Option<clutch_wire::Frame>);
+        // SAFETY: the arguments are those of the function.
+        encoding.add(unsafe { instructions(function as usize, arguments) });
+    }
+    encoding.print();
+}

@@ -1,0 +1,94 @@
+//! The laws in C (`benches/peer_c`), over the same inputs as ours.
+
+use crate::inputs::{Random, ticks};
+use crate::laws::{OF_EACH, PERIOD, output};
+use crate::meter::{Tally, instructions, line};
+use clutch_core::PlantParams;
+use clutch_core::law::{
+    Controller, Ctc, CtcParams, OutputState, Pd, PdParams, Smc, SmcParams, SmcSignParams,
+};
+
+/// `peer_tick`
+#[repr(C)]
+struct PeerTick([f32; 4]);
+
+/// `peer_output`: lowest, highest, on_invalid, decay.
+#[repr(C)]
+struct PeerOutput([f32; 4]);
+
+/// `peer_pd_law`, `peer_ctc_law`, `peer_smc_law`: gains, then the output.
+#[repr(C)]
+struct PeerLaw<const N: usize> {
+    gains: [f32; N],
+    output: PeerOutput,
+}
+
+type Step<const N: usize> = unsafe extern "C" fn(*const PeerLaw<N>, *mut f32, *const PeerTick) -> f32;
+
+unsafe extern "C" {
+    fn peer_pd(law: *const PeerLaw<2>, offset: *mut f32, tick: *const PeerTick) -> f32;
+    fn peer_ctc(law: *const PeerLaw<10>, offset: *mut f32, tick: *const PeerTick) -> f32;
+    fn peer_smc(law: *const PeerLaw<4>, offset: *mut f32, tick: *const PeerTick) -> f32;
+    fn peer_smc_sign(law: *const PeerLaw<4>, offset: *mut f32, tick: *const PeerTick) -> f32;
+}
+
+/// Counts the C version, and how often its answer to an ordinary input is more than a millivolt
+/// from ours: it may fuse a product and a sum.
+fn law<const N: usize, L: Controller<f32, State = OutputState<f32>>>(
+    name: &'static str,
+    step: Step<N>,
+    gains: [f32; N],
+    ours: &L,
+) {
+    let o = output();
+    let law = PeerLaw { gains, output: PeerOutput([o.lowest, o.highest, o.on_invalid, 0.98]) };
+    let mut tally = Tally::new(name);
+    let mut random = Random::new(1);
+    let (mut offset, mut differs) = (0.0, 0);
+    ticks(&mut Random::new(2), OF_EACH, |t, ordinary| {
+        if random.below(8) == 0 {
+            offset = random.around(10.0);
+        }
+        let tick = PeerTick([t.error, t.error_rate, t.target_velocity, t.target_acceleration]);
+        let arguments = [&raw const law as usize, &raw mut offset as usize, &raw const tick as usize];
+        // SAFETY: the arguments are those of the function.
+        tally.add(unsafe { instructions(step as usize, arguments) });
+        let mut state = OutputState::default();
+        let mut none = 0.0;
+        // SAFETY: the arguments are those of the function.
+        let theirs = unsafe { step(&law, &mut none, &tick) };
+        let apart = ours.update(&mut state, &t).voltage - theirs;
+        if ordinary && !(-0.001..=0.001).contains(&apart) {
+            differs += 1;
+        }
+    });
+    tally.print();
+    line("differs", differs);
+}
+
+/// Measures and prints.
+pub fn measure() -> Option<()> {
+    let (plant, output) = (PlantParams::<f32>::default(), output());
+    let p = PdParams::<f32>::default();
+    law("peer_pd", peer_pd, [p.kp, p.kd], &Pd::new(&p, &output, PERIOD).ok()?);
+    let (p, f) = (CtcParams::<f32>::default(), &plant.friction);
+    let gains = [
+        p.outer_gain,
+        p.kp,
+        p.kd,
+        plant.inertia,
+        plant.drive_torque,
+        plant.viscous_damping,
+        plant.brake_gain,
+        f.mu_static,
+        f.mu_dynamic,
+        1.0 / f.stribeck_velocity,
+    ];
+    law("peer_ctc", peer_ctc, gains, &Ctc::new(&p, &plant, &output, PERIOD).ok()?);
+    let p = SmcParams::<f32>::default();
+    let gains = [p.kp, p.kd, p.slope, 1.0 / p.boundary];
+    law("peer_smc", peer_smc, gains, &Smc::new(&p, &output, PERIOD).ok()?);
+    let p = SmcSignParams::<f32>::default();
+    law("peer_smc_sign", peer_smc_sign, gains, &Smc::with_sign(&p, &output, PERIOD).ok()?);
+    Some(())
+}

@@ -1,0 +1,235 @@
+//! Whole periods of a controller: runs in which the line and the board do what they can.
+
+use crate::inputs::Random;
+use crate::kernels::{Bytes, Session, whole_tick};
+use crate::meter::{Tally, instructions};
+use clutch_core::law::{LawParams, SmcParams};
+use clutch_core::reference::{Interpolation, Knot, MinimumJerk, ReferenceParams, Sine, Table};
+use clutch_core::{
+    Bounds, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams, Supervisor, SupervisorParams,
+    Tolerances,
+};
+use clutch_node::{ControlNode, ControlParams, Onboard, OnboardParams, Ports, RunParams, Settings};
+use clutch_wire::{
+    Arm, Armed, BoardFault, BoardState, Configured, Discover, Fault, Hello, Message, Pong, Refused, SCHEMA,
+    STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Set, Stop, StopReason, Stopped, VERSION,
+    encode,
+};
+
+const RUN: u16 = 7;
+const CONFIG: u64 = 0xfeed_f00d;
+const RUNS: u32 = 600;
+const PERIODS: u32 = 60;
+
+/// A controller that has been configured by its host, up to the question to encoder and converter.
+fn session(kind: u32) -> Option<Session> {
+    let law = LawParams::Smc(SmcParams::default());
+    let servo = ServoParams::<f32>::paper(law);
+    let bounds = Bounds::around(&PlantParams::default(), &Tolerances::default()).ok()?;
+    let on_fault = match kind % 4 {
+        0 => SafeState::Hold { volts: 5.0 },
+        1 => SafeState::Ramp { volts_per_s: 1000.0, volts: 5.0 },
+        2 => SafeState::Release,
+        _ => SafeState::HoldThenRelease { volts: 5.0, after: 0.01 },
+    };
+    let knots =
+        [0, 20_000, 40_000, 60_000].map(|us| Knot { time_us: us, position: FixedCounts(us as i64 * 60) });
+    let table = |interpolation| ReferenceParams::Table(Table { knots: &knots, interpolation });
+    let path = match kind % 5 {
+        0 => ReferenceParams::Ramp(0.35),
+        1 => ReferenceParams::MinimumJerk(MinimumJerk { distance: 0.02, duration: 0.06 }),
+        2 => ReferenceParams::Sine(Sine { rate: 0.3, amplitude: 0.001, frequency: 5.0, phase: 0.0 }),
+        3 => table(Interpolation::Linear),
+        _ => table(Interpolation::Cubic),
+    };
+    let (watchdog, valid, silence) = (Micros(3000), Micros(2000), Micros(3000));
+    let supervisor = SupervisorParams::new(on_fault);
+    let settings = Settings::new(&RunParams {
+        servo: &servo,
+        supervisor: &supervisor,
+        bounds: &bounds,
+        reference: &path,
+        start: FixedCounts(0),
+        watchdog,
+        valid,
+        silence,
+        host_silence: Micros(1_000_000),
+        ticks: u64::from(PERIODS) - 5,
+    })
+    .ok()?;
+    let mut session = Session {
+        node: Onboard::new(OnboardParams { board: 1, boot: 1, clock_hz: 0 }),
+        ports: Ports::default(),
+        now_ns: 0,
+    };
+    session.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
+    session.node.daq(0, encode(&hello(RUN)).as_bytes(), &mut session.ports);
+    settings.each(|key, value| session.asks(&Message::Set(Set { run: RUN, key, value })));
+    let params = ControlParams { run: RUN, config: CONFIG, watchdog, valid, silence };
+    let supervisor = Supervisor::new(&supervisor, &servo, &bounds).ok()?;
+    let node = ControlNode::new(params, Servo::new(&servo).ok()?, supervisor);
+    session.asks(&Message::Configure(node.configuration()));
+    Some(session)
+}
+
+impl Session {
+    /// A frame of the host's, which is not measured.
+    fn asks(&mut self, message: &Message) {
+        self.ports.host.clear();
+        self.ports.daq.clear();
+        self.node.host(self.now_ns, encode(message).as_bytes(), &mut self.ports);
+    }
+
+    /// A period; its instructions.
+    fn period(&mut self, bytes: &Bytes) -> u32 {
+        self.now_ns = self.now_ns.wrapping_add(1_000_000);
+        let arguments = [&raw mut *self as usize, &raw const *bytes as usize, 0];
+        let function = whole_tick as extern "C" fn(&mut Session, &Bytes);
+        // SAFETY: the arguments are those of the function.
+        unsafe { instructions(function as usize, arguments) }
+    }
+}
+
+fn hello(run: u16) -> Message {
+    Message::Hello(Hello {
+        nonce: 1,
+        version: VERSION,
+        schema: SCHEMA,
+        board: 1,
+        boot: 1,
+        counts_per_rev: 20_000,
+        dac_bits: 12,
+        dac_lowest_mv: -10_000,
+        dac_highest_mv: 10_000,
+        period_min_us: 100,
+        period_max_us: 10_000,
+        watchdog_max_us: 100_000,
+        boot_code: 2048,
+        state: BoardState::Running as u8,
+        run,
+        config: CONFIG,
+    })
+}
+
+/// Anything but a sample.
+fn other(random: &mut Random) -> Message {
+    let run = if random.below(3) == 0 { RUN } else { RUN + 1 };
+    match random.below(5) {
+        0 => hello(run),
+        1 => Message::Pong(Pong { run, nonce: 1, time_us: random.next() }),
+        2 => Message::Refused(Refused { request: 4, reason: 1, value: random.next() }),
+        3 => Message::Stopped(Stopped { run, reason: StopReason::Done as u8, code: 2048 }),
+        _ => {
+            let cause = BoardFault::Watchdog as u8;
+            Message::Fault(Fault { run, sequence: 3, time_us: random.next(), cause, value: 0 })
+        }
+    }
+}
+
+/// What is amiss with the frame of a period.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Amiss {
+    Nothing,
+    /// The samples before it are lost: few, or so many that it is silence.
+    Lost,
+    Repeated,
+    Reordered,
+    /// The counts are those of no shaft.
+    Jump,
+    /// What the board says of itself.
+    Status,
+    /// A byte is not as it was sent.
+    Corrupted,
+    /// It is no sample.
+    Other,
+    /// The answer before was late.
+    Late,
+}
+
+const AMISS: [Amiss; 8] = [
+    Amiss::Lost,
+    Amiss::Repeated,
+    Amiss::Reordered,
+    Amiss::Jump,
+    Amiss::Status,
+    Amiss::Corrupted,
+    Amiss::Other,
+    Amiss::Late,
+];
+
+/// The frame of a period; `sample` is that of the period before, and becomes its own.
+fn frame(random: &mut Random, amiss: Amiss, sample: &mut Sample) -> Bytes {
+    let lost = if amiss == Amiss::Lost { 1 + random.below(14) as u16 } else { 0 };
+    sample.sequence = sample.sequence.wrapping_add(1).wrapping_add(lost);
+    sample.counts = sample.counts.wrapping_add(random.below(3) as i32);
+    sample.time_us = random.next();
+    let sent = match amiss {
+        Amiss::Repeated => Sample { sequence: sample.sequence.wrapping_sub(1), ..*sample },
+        Amiss::Reordered => {
+            let run = if random.below(4) == 0 { RUN + 1 } else { RUN };
+            Sample { run, sequence: sample.sequence.wrapping_sub(3), ..*sample }
+        }
+        Amiss::Jump => Sample { counts: random.next() as i32, ..*sample },
+        Amiss::Status => {
+            let flags = [STATUS_LATE, STATUS_ENCODER_FAULT, STATUS_DAC_FAULT, 0];
+            let flag = flags.get(random.below(4) as usize).copied().unwrap_or(0);
+            // Without a flag: a board that does not drive.
+            let state = if flag == 0 { BoardState::Ready } else { BoardState::Running };
+            Sample { status: state as u8 | flag, ..*sample }
+        }
+        _ => *sample,
+    };
+    let whole = Bytes::of(&Message::Sample(sent));
+    match amiss {
+        Amiss::Corrupted => whole.corrupted(random.below(20) as usize, random.next() as u8),
+        Amiss::Other => Bytes::of(&other(random)),
+        _ => whole,
+    }
+}
+
+/// Measures and prints.
+pub fn measure() -> Option<()> {
+    let mut in_order = Tally::new("whole_tick_in_order");
+    let mut formula = Tally::new("whole_tick_formula");
+    let mut table = Tally::new("whole_tick_table");
+    let mut others = Tally::new("whole_tick_other");
+    let mut random = Random::new(5);
+    for kind in 0..RUNS {
+        let mut session = session(kind)?;
+        let configured = Configured { run: RUN, config: CONFIG, boot: 1 };
+        others.add(session.period(&Bytes::of(&Message::Configured(configured))));
+        if kind % 16 != 15 {
+            session.asks(&Message::Arm(Arm { run: RUN, config: CONFIG }));
+            others.add(session.period(&Bytes::of(&Message::Armed(Armed { run: RUN, config: CONFIG }))));
+        }
+        // How often something is amiss differs from run to run: a run that ends early tries little.
+        let rarity = [4, 12, 40].get(kind as usize % 3).copied()?;
+        let (sequence, counts) = (random.next() as u16, random.next() as i32);
+        let mut sample = Sample { run: RUN, sequence, time_us: 0, counts, status: BoardState::Running as u8 };
+        // The first sample is not in order with anything.
+        let mut before = Amiss::Lost;
+        for _ in 0..PERIODS {
+            let amiss = match random.below(rarity) {
+                0 => AMISS.get(random.below(8) as usize).copied()?,
+                _ => Amiss::Nothing,
+            };
+            if amiss == Amiss::Late {
+                session.node.answered(Micros(random.below(4000)));
+            }
+            let count = session.period(&frame(&mut random, amiss, &mut sample));
+            let of = match (amiss, before) {
+                (Amiss::Corrupted | Amiss::Other, _) => &mut others,
+                (Amiss::Nothing, Amiss::Nothing) => &mut in_order,
+                _ if kind % 5 < 3 => &mut formula,
+                _ => &mut table,
+            };
+            of.add(count);
+            before = amiss;
+            if random.below(200) == 0 {
+                session.asks(&Message::Stop(Stop { run: RUN, reason: StopReason::Operator as u8 }));
+            }
+        }
+    }
+    [in_order, formula, table, others].iter().for_each(Tally::print);
+    Some(())
+}

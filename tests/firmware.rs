@@ -1,0 +1,48 @@
+//! Images of the emulated board for tests.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::LazyLock;
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// Why there can be no emulated board here, if so; else the folder of its images, built once.
+static IMAGES: LazyLock<Result<PathBuf, &str>> = LazyLock::new(|| {
+    if !Command::new("qemu-system-arm").arg("--version").output().is_ok_and(|o| o.status.success()) {
+        return Err("qemu-system-arm is not installed (Debian and Ubuntu: qemu-system-arm)");
+    }
+    let libraries =
+        Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().ok();
+    let libraries = libraries.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_default();
+    if !Path::new(libraries.trim()).is_dir() {
+        return Err("the target is not installed (rustup target add thumbv7em-none-eabihf)");
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let target = root.join("target/firmware");
+    // From within its folder: its flags stand in a file that cargo looks for from there.
+    let done = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .args(["build", "--release", "--locked", "--package", "clutch-qemu-mps2", "--target-dir"])
+        .arg(&target)
+        .current_dir(root.join("firmware"))
+        .output()
+        .expect("cargo starts");
+    assert!(done.status.success(), "the images do not build:\n{}", String::from_utf8_lossy(&done.stderr));
+    Ok(target.join(TARGET).join("release"))
+});
+
+/// An image of the emulated board; none, with a message, where emulator or target are missing. CI has
+/// both.
+///
+/// # Panics
+/// The image does not build; or in CI, where there is none.
+#[must_use]
+pub fn image(name: &str) -> Option<PathBuf> {
+    match &*IMAGES {
+        Ok(folder) => Some(folder.join(name)),
+        Err(why) => {
+            assert!(std::env::var_os("CI").is_none(), "{why}: CI must not skip this test");
+            println!("skipped: {why}");
+            None
+        }
+    }
+}
