@@ -188,7 +188,7 @@ impl Onboard {
         let at = |tick: u64| path.target(points, tick);
         run.control.receive(now_ns, bytes, &at, &mut out.daq, &mut |n: Cycle| match n {
             // Before consent nothing is driven, and the line stays free.
-            Notice::Cycle(n) if n.cycle.from == State::Ready => {}
+            Notice::Cycle(n) if n.cycle.state == State::Ready => {}
             Notice::Cycle(mut n) => {
                 n.cycles = spent;
                 from = n.cycle.state;

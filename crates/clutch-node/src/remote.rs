@@ -44,8 +44,8 @@ pub struct RemoteNode {
     controller: Option<Controller>,
     /// Where the path begins; none before it is known.
     origin: Option<FixedCounts>,
-    /// Number of the last telemetry.
-    number: Option<u16>,
+    /// Number of the last telemetry; they begin with 1 at each Configure.
+    number: u16,
     heard_ns: Option<u64>,
     /// A frame that shows that the host lives is due then.
     due_ns: u64,
@@ -69,7 +69,7 @@ impl RemoteNode {
             counts: LinkCounts::default(),
             controller: None,
             origin: None,
-            number: None,
+            number: 0,
             heard_ns: None,
             due_ns: 0,
             alive_ns,
@@ -227,6 +227,7 @@ impl RemoteNode {
                 if self.told.state == State::Disconnected {
                     self.told.state = State::Ready;
                 }
+                self.number = 0;
                 notices(Notice::Configured);
             }
             Message::Armed(m) if m.run == run && m.config == config => {
@@ -299,11 +300,9 @@ impl RemoteNode {
         notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
     ) {
         self.heard_ns = Some(now_ns);
-        if let Some(last) = self.number {
-            let gap = m.number.wrapping_sub(last).wrapping_sub(1);
-            self.told.untold = self.told.untold.wrapping_add(u64::from(gap));
-        }
-        self.number = Some(m.number);
+        let gap = m.number.wrapping_sub(self.number).wrapping_sub(1);
+        self.told.untold = self.told.untold.wrapping_add(u64::from(gap));
+        self.number = m.number;
         // The tick's high half is ours to know.
         let ahead = m.tick.wrapping_sub(self.told.tick as u32).cast_signed();
         let tick = self.told.tick.wrapping_add_signed(i64::from(ahead));

@@ -329,11 +329,12 @@ impl Desk {
         (self.notices, self.expected, self.sent) = (Vec::new(), Vec::new(), Vec::new());
     }
 
-    /// The samples of which the host and the twin heard since the last look.
+    /// The samples of which the host and the twin heard since the last look; of those before consent the
+    /// host does not hear.
     pub fn cycles(&mut self) -> (Vec<Told>, Vec<Told>) {
-        let cycles = |notices: &mut Vec<Told>| {
-            take(notices).into_iter().filter(|n| matches!(n, Notice::Cycle(_))).collect()
-        };
+        let told = |n: &Told| matches!(n, Notice::Cycle(c) if c.cycle.state != State::Ready);
+        let cycles = |notices: &mut Vec<Told>| take(notices).into_iter().filter(told).collect();
+        assert!(!self.notices.iter().any(|n| matches!(n, Notice::Cycle(_)) && !told(n)));
         (cycles(&mut self.notices), cycles(&mut self.expected))
     }
 
