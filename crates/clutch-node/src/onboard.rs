@@ -181,14 +181,14 @@ impl Onboard {
             self.introduction(bytes, out);
             return;
         };
-        let mut from = run.control.state().state();
+        let (mut from, drove) = (run.control.state().state(), run.driving());
         let (number, config, boot) = (run.number, run.config, self.params.boot);
         let (host, told, path, points) = (&mut out.host, &mut run.told, &run.path, self.settings.points());
-        let (mut ended, mut hello) = (false, None);
+        let (mut ended, mut armed, mut hello) = (false, false, None);
         let at = |tick: u64| path.target(points, tick);
         run.control.receive(now_ns, bytes, &at, &mut out.daq, &mut |n: Cycle| match n {
             // Before consent nothing is driven, and the line stays free.
-            Notice::Cycle(n) if n.cycle.from == State::Ready => {}
+            Notice::Cycle(n) if n.cycle.state == State::Ready => {}
             Notice::Cycle(mut n) => {
                 n.cycles = spent;
                 from = n.cycle.state;
@@ -196,7 +196,10 @@ impl Onboard {
                 host.push(&Message::Telemetry(frame(number, *told, &n)));
             }
             Notice::Configured => host.push(&Message::Configured(Configured { run: number, config, boot })),
-            Notice::Armed => host.push(&Message::Armed(Armed { run: number, config })),
+            Notice::Armed => {
+                armed = true;
+                host.push(&Message::Armed(Armed { run: number, config }));
+            }
             Notice::Refused(m) => host.push(&Message::Refused(m)),
             Notice::Pong(nonce, time_us) => {
                 host.push(&Message::Pong(Pong { run: number, nonce, time_us }));
@@ -211,8 +214,14 @@ impl Onboard {
             self.hello = Some(m);
             host.push(&Message::Hello(m));
         }
+        if armed && let Some(hello) = &mut self.hello {
+            // From now on the converter has not the code of power-up any more.
+            hello.state = BoardState::Armed as u8;
+        }
         if ended {
             tell_end(run, number, from, &mut out.host);
+        } else if drove && !run.driving() {
+            tell_link(run, &mut out.host); // the sample's telemetry has told the end
         }
         let state = run.control.state();
         if state.state() == State::Running && state.tick().saturating_add(1) >= run.ticks {
@@ -304,6 +313,11 @@ impl Onboard {
             if m.run != self.settings_run {
                 self.settings = Settings::default();
                 self.settings_run = m.run;
+            }
+            // Consent is to what was configured: a setting behind it takes it back. Were a consent
+            // on its way already, the watchdog of encoder and converter would end it.
+            if matches!(self.state(), State::Disconnected | State::Ready) {
+                self.run = None;
             }
             (!self.settings.set(m.key, m.value)).then_some((Refusal::Setting, u32::from(m.key)))
         };

@@ -7,8 +7,8 @@ use clutch_core::law::{Law, LawTerms};
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{FixedCounts, Servo, Target};
 use clutch_wire::{
-    Arm, Configure, Controller, Decoder, Discover, Message, Ping, SCHEMA, Set, Stop, StopReason, Telemetry,
-    VERSION,
+    Arm, Configure, Controller, Decoder, Discover, Message, Ping, SCHEMA, Set, Stop, StopReason,
+    TELEMETRY_ASKED, Telemetry, VERSION,
 };
 
 /// Where control stands, as the board told last.
@@ -42,9 +42,10 @@ pub struct RemoteNode {
     told: Told<f32>,
     counts: LinkCounts,
     controller: Option<Controller>,
-    origin: FixedCounts,
-    /// Number of the last telemetry.
-    number: Option<u16>,
+    /// Where the path begins; none before it is known.
+    origin: Option<FixedCounts>,
+    /// Number of the last telemetry; they begin with 1 at each Configure.
+    number: u16,
     heard_ns: Option<u64>,
     /// A frame that shows that the host lives is due then.
     due_ns: u64,
@@ -67,8 +68,8 @@ impl RemoteNode {
             told: Told::default(),
             counts: LinkCounts::default(),
             controller: None,
-            origin: FixedCounts(0),
-            number: None,
+            origin: None,
+            number: 0,
             heard_ns: None,
             due_ns: 0,
             alive_ns,
@@ -105,7 +106,7 @@ impl RemoteNode {
     /// Where the path begins.
     #[must_use]
     pub fn origin(&self) -> FixedCounts {
-        self.origin
+        self.origin.unwrap_or_default()
     }
 
     /// Asks who is there.
@@ -226,11 +227,13 @@ impl RemoteNode {
                 if self.told.state == State::Disconnected {
                     self.told.state = State::Ready;
                 }
+                self.number = 0;
                 notices(Notice::Configured);
             }
             Message::Armed(m) if m.run == run && m.config == config => {
                 if self.told.state == State::Ready {
                     self.told = Told { state: State::Armed, ..Told::default() };
+                    self.origin = None;
                     (self.heard_ns, self.due_ns) = (Some(now_ns), now_ns);
                 }
                 notices(Notice::Armed);
@@ -277,6 +280,18 @@ impl RemoteNode {
         }
     }
 
+    /// Where the path begins, when the telemetry that says so got lost: a whole number of counts, from
+    /// where the path and the shaft are and what lies between.
+    fn origin_from(&self, m: &Telemetry, position: FixedCounts) -> FixedCounts {
+        const HALF: i64 = 1 << (FixedCounts::FRACTION_BITS - 1);
+        let encoder = self.servo.encoder();
+        let error = FixedCounts::from_real(f32::from_bits(m.error) * encoder.counts_per_radian::<f32>());
+        let target = FixedCounts::from_counts(i64::from(m.counts)).plus(error);
+        let origin = target.0.wrapping_sub(position.0).wrapping_add(HALF) >> FixedCounts::FRACTION_BITS;
+        // It was a count of the encoder's, which wraps.
+        FixedCounts::from_counts(i64::from(origin as i32))
+    }
+
     fn telemetry(
         &mut self,
         now_ns: u64,
@@ -285,19 +300,20 @@ impl RemoteNode {
         notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
     ) {
         self.heard_ns = Some(now_ns);
-        if let Some(last) = self.number {
-            let gap = m.number.wrapping_sub(last).wrapping_sub(1);
-            self.told.untold = self.told.untold.wrapping_add(u64::from(gap));
-        }
-        self.number = Some(m.number);
+        let gap = m.number.wrapping_sub(self.number).wrapping_sub(1);
+        self.told.untold = self.told.untold.wrapping_add(u64::from(gap));
+        self.number = m.number;
         // The tick's high half is ours to know.
         let ahead = m.tick.wrapping_sub(self.told.tick as u32).cast_signed();
         let tick = self.told.tick.wrapping_add_signed(i64::from(ahead));
         if both_states(m.states).is_some_and(|(from, _)| from == State::Armed) {
-            self.origin = FixedCounts::from_counts(i64::from(m.counts));
+            self.origin = Some(FixedCounts::from_counts(i64::from(m.counts)));
         }
         let target = path(tick);
-        let target = Target { position: target.position.plus(self.origin), ..target };
+        if self.origin.is_none() && m.flags & TELEMETRY_ASKED != 0 {
+            self.origin = Some(self.origin_from(m, target.position));
+        }
+        let target = Target { position: target.position.plus(self.origin()), ..target };
         let kind = match self.servo.law() {
             Law::Pd(_) => LawTerms::Pd(Default::default()),
             Law::Ctc(_) => LawTerms::Ctc(Default::default()),

@@ -337,6 +337,7 @@ pub struct Settings {
     knots: [Knot; MAX_KNOTS],
     /// Which numbers have been set, a bit each.
     seen: u128,
+    /// How many numbers of points have been set in their order, two each.
     seen_knots: u32,
 }
 
@@ -507,7 +508,7 @@ impl Settings {
             knots: points.len() as u32,
         };
         settings.seen = (1 << SETTINGS.len()) - 1;
-        settings.seen_knots = settings.numbers.knots;
+        settings.seen_knots = settings.numbers.knots.wrapping_mul(2);
         Ok(settings)
     }
 
@@ -537,10 +538,10 @@ impl Settings {
                 knot.time_us = value;
             } else {
                 knot.position = FixedCounts(value.cast_signed());
-                // They come in order; one that is left out stays missing.
-                if u32::from(number / 2) == self.seen_knots {
-                    self.seen_knots = self.seen_knots.wrapping_add(1);
-                }
+            }
+            // They come in order; one that is left out stays missing.
+            if u32::from(number) == self.seen_knots {
+                self.seen_knots = self.seen_knots.wrapping_add(1);
             }
             return true;
         }
@@ -567,8 +568,8 @@ impl Settings {
             return Err(Misfit::Missing(missing as u16));
         }
         let n = &self.numbers;
-        if self.seen_knots < n.knots || n.knots as usize > MAX_KNOTS {
-            return Err(Misfit::Missing(FIRST_KNOT.wrapping_add((self.seen_knots as u16).wrapping_mul(2))));
+        if self.seen_knots / 2 < n.knots {
+            return Err(Misfit::Missing(FIRST_KNOT.wrapping_add(self.seen_knots as u16)));
         }
         let servo = ServoParams {
             period: Micros(n.period_us),

@@ -77,10 +77,12 @@ pub(crate) fn notice(
     let (from, state) = both_states(m.states)?;
     let real = f32::from_bits;
     let [a, b, c] = [real(m.term_0), real(m.term_1), real(m.term_2)];
+    // What the law asked for; the frame's code is what the converter has, which may be another.
+    let given = dac.code(real(m.demand));
     let target = if m.flags & TELEMETRY_TARGETED != 0 { target } else { Target::default() };
     let output = (m.flags & TELEMETRY_ASKED != 0).then(|| ServoOutput {
-        code: DacCode(m.code),
-        voltage: dac.volts(DacCode(m.code)),
+        code: given,
+        voltage: dac.volts(given),
         tick: Tick {
             error: real(m.error),
             error_rate: real(m.error_rate),

@@ -1,0 +1,348 @@
+//! A host, a board in the controller role, and encoder and converter, on one desk.
+//!
+//! ```text
+//!  RemoteNode ◄──► Onboard ◄──► BoardNode
+//!                     └ what it reads from there a ControlNode reads too: the twin
+//! ```
+//!
+//! Frames are passed by hand and times are computed.
+#![allow(dead_code, unreachable_pub, reason = "each test takes what it needs")]
+
+use clutch_core::law::{LawParams, LawTerms, OutputParams, PdParams};
+use clutch_core::reference::{Reference, ReferenceParams};
+use clutch_core::supervisor::State;
+use clutch_core::{
+    Bounds, Counts, DacCode, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams, Supervisor,
+    SupervisorParams, Target, Tolerances,
+};
+use clutch_node::{
+    BoardNode, BoardParams, ControlNode, ControlParams, Notice, Onboard, OnboardParams, Outbox, Ports,
+    RemoteNode, RunParams, Settings,
+};
+use clutch_wire::{Decoder, Message, encode};
+use core::mem::take;
+
+pub type Told = Notice<f32, LawTerms<f32>>;
+
+pub const CONFIG: u64 = 0x0123_4567_89ab_cdef;
+pub const BOARD: BoardParams = BoardParams {
+    board: 42,
+    boot: 9,
+    counts_per_rev: 20_000,
+    dac_bits: 12,
+    dac_lowest_mv: -10_000,
+    dac_highest_mv: 10_000,
+    period_min_us: 500,
+    period_max_us: 10_000,
+    watchdog_max_us: 30_000,
+    boot_code: 2867,
+};
+pub const ONBOARD: OnboardParams = OnboardParams { board: 77, boot: 3, clock_hz: 25_000_000 };
+pub const MS: u64 = 1_000_000;
+/// The host pings so often, and believes in the board for so long.
+pub const ALIVE_NS: u64 = 20 * MS;
+pub const BOARD_SILENCE_NS: u64 = 200 * MS;
+
+/// A run as a host plans it.
+#[derive(Clone, Copy)]
+pub struct Plan {
+    pub run: u16,
+    pub servo: ServoParams<f32>,
+    pub limits: SupervisorParams<f32>,
+    pub bounds: Bounds<f32>,
+    pub reference: ReferenceParams<'static, f32>,
+    pub start: FixedCounts,
+    pub watchdog: Micros,
+    pub silence: Micros,
+    pub host_silence: Micros,
+    pub ticks: u64,
+}
+
+impl Plan {
+    /// Three counts each millisecond, without an end.
+    pub fn new() -> Plan {
+        Plan {
+            run: 5,
+            servo: paper(LawParams::Pd(PdParams::default())),
+            limits: SupervisorParams::new(SafeState::Hold { volts: 5.0 }),
+            bounds: Bounds::around(&PlantParams::default(), &Tolerances::default()).unwrap(),
+            reference: ReferenceParams::Ramp(54.0_f32.to_radians()),
+            start: FixedCounts(0),
+            watchdog: Micros(3000),
+            silence: Micros(3000),
+            host_silence: Micros(0),
+            ticks: u64::MAX,
+        }
+    }
+
+    pub fn run_params(&self) -> RunParams<'_> {
+        RunParams {
+            servo: &self.servo,
+            supervisor: &self.limits,
+            bounds: &self.bounds,
+            reference: &self.reference,
+            start: self.start,
+            watchdog: self.watchdog,
+            valid: Micros(2000),
+            silence: self.silence,
+            host_silence: self.host_silence,
+            ticks: self.ticks,
+        }
+    }
+
+    pub fn settings(&self) -> Settings {
+        Settings::new(&self.run_params()).unwrap()
+    }
+
+    /// Every setting as it goes over the wire.
+    pub fn pairs(&self) -> Vec<(u16, u64)> {
+        let mut pairs = Vec::new();
+        self.settings().each(|key, value| pairs.push((key, value)));
+        pairs
+    }
+
+    pub fn supervisor(&self) -> Supervisor<f32> {
+        Supervisor::new(&self.limits, &self.servo, &self.bounds).unwrap()
+    }
+
+    pub fn control(&self) -> ControlNode<f32> {
+        let params = ControlParams {
+            run: self.run,
+            config: CONFIG,
+            watchdog: self.watchdog,
+            valid: Micros(2000),
+            silence: self.silence,
+        };
+        ControlNode::new(params, Servo::new(&self.servo).unwrap(), self.supervisor())
+    }
+
+    pub fn remote(&self) -> RemoteNode {
+        let configure = self.control().configuration();
+        RemoteNode::new(Servo::new(&self.servo).unwrap(), configure, ALIVE_NS, BOARD_SILENCE_NS)
+    }
+
+    /// The planned path from the count on which it begins.
+    pub fn path(&self) -> impl Fn(u64) -> Target<f32> + use<> {
+        let servo = &self.servo;
+        let path = Reference::new(&self.reference, self.start, servo.encoder, servo.period).unwrap();
+        let first = path.at(0).position.0 >> FixedCounts::FRACTION_BITS << FixedCounts::FRACTION_BITS;
+        move |tick| {
+            let target = path.at(tick);
+            Target { position: FixedCounts(target.position.0 - first), ..target }
+        }
+    }
+}
+
+/// The paper's, with a start that remembers what the converter had.
+pub fn paper(law: LawParams<f32>) -> ServoParams<f32> {
+    let paper = ServoParams::paper(law);
+    ServoParams { output: OutputParams { bumpless_time: 0.05, ..paper.output }, ..paper }
+}
+
+pub fn drain(out: &mut Outbox) -> Vec<u8> {
+    let bytes = out.as_bytes().to_vec();
+    out.clear();
+    bytes
+}
+
+/// The frames in bytes, all of which are whole.
+pub fn frames(bytes: &[u8]) -> Vec<Message> {
+    let mut decoder = Decoder::new();
+    bytes.iter().filter_map(|b| decoder.push(*b)).map(Result::unwrap).collect()
+}
+
+/// Two notices are the same in every field and bit, but for the bits of what is not a number.
+pub fn words(notices: &[Told]) -> Vec<String> {
+    notices.iter().map(|n| format!("{n:?}")).collect()
+}
+
+pub struct Desk {
+    pub plan: Plan,
+    pub remote: RemoteNode,
+    pub onboard: Onboard,
+    pub board: BoardNode,
+    pub twin: ControlNode<f32>,
+    pub now_ns: u64,
+    pub to_onboard: Outbox,
+    pub ports: Ports,
+    pub up: Outbox,
+    /// Whether the host looks at the clock.
+    pub host_alive: bool,
+    /// What the host has been sent: bytes, and with what each read of it came.
+    pub sent: Vec<u8>,
+    /// What the host and the twin make of it.
+    pub notices: Vec<Told>,
+    pub expected: Vec<Told>,
+    /// Counts that the shaft goes in a period.
+    pub speed: i32,
+    periods: i32,
+    shaft: i32,
+}
+
+impl Desk {
+    pub fn new(plan: Plan) -> Desk {
+        let mut desk = Desk {
+            plan,
+            remote: plan.remote(),
+            onboard: Onboard::new(ONBOARD),
+            board: BoardNode::new(&BOARD).unwrap(),
+            twin: plan.control(),
+            now_ns: 1000 * MS,
+            to_onboard: Outbox::default(),
+            ports: Ports::default(),
+            up: Outbox::default(),
+            host_alive: true,
+            sent: Vec::new(),
+            notices: Vec::new(),
+            expected: Vec::new(),
+            speed: 3,
+            periods: 0,
+            shaft: 700,
+        };
+        desk.twin.configure(DacCode(BOARD.boot_code), &mut Outbox::default());
+        desk
+    }
+
+    pub fn now_us(&self) -> u32 {
+        (self.now_ns / 1000) as u32
+    }
+
+    /// Frames to and fro until nobody has more to say; what the host heard.
+    pub fn settle(&mut self) -> Vec<Message> {
+        let mut heard = Vec::new();
+        for _ in 0..10 {
+            let up = drain(&mut self.up);
+            let down = drain(&mut self.to_onboard);
+            if up.is_empty() && down.is_empty() && self.ports.daq.is_empty() && self.ports.host.is_empty() {
+                return heard;
+            }
+            self.onboard.host(self.now_ns, &down, &mut self.ports);
+            if !up.is_empty() {
+                self.onboard.daq(self.now_ns, &up, &mut self.ports);
+                let (path, expected) = (self.plan.path(), &mut self.expected);
+                self.twin.receive(self.now_ns, &up, &path, &mut Outbox::default(), &mut |n| expected.push(n));
+            }
+            let daq = drain(&mut self.ports.daq);
+            self.board.receive(self.now_us(), &daq, &mut self.up);
+            let host = drain(&mut self.ports.host);
+            heard.extend(frames(&host));
+            self.sent.extend_from_slice(&host);
+            let notices = &mut self.notices;
+            self.remote.receive(self.now_ns, &host, &self.plan.path(), &mut |n| notices.push(n));
+        }
+        panic!("they never come to an end: {heard:?}");
+    }
+
+    /// A frame from the host, whether the host's own state machine would send it or not.
+    pub fn says(&mut self, message: Message) -> Vec<Message> {
+        self.to_onboard.append(encode(&message).as_bytes());
+        self.settle()
+    }
+
+    pub fn asks(&mut self, f: impl FnOnce(&mut RemoteNode, &mut Outbox)) -> Vec<Message> {
+        f(&mut self.remote, &mut self.to_onboard);
+        self.settle()
+    }
+
+    pub fn uploads(&mut self, pairs: &[(u16, u64)]) {
+        for (key, value) in pairs {
+            let heard = self.asks(|remote, out| remote.set(*key, *value, out));
+            let taken = clutch_wire::Taken { run: self.plan.run, key: *key, value: *value };
+            assert_eq!(heard, [Message::Taken(taken)]);
+        }
+    }
+
+    /// With the settings and the board's answer to Configure.
+    pub fn configures(&mut self) {
+        self.uploads(&self.plan.pairs());
+        let heard = self.asks(|remote, out| remote.configure(out));
+        assert!(matches!(heard[..], [Message::Configured(_)]), "{heard:?}");
+        assert_eq!((self.onboard.state(), self.remote.told().state), (State::Ready, State::Ready));
+    }
+
+    pub fn arms(&mut self) {
+        let heard = self.asks(|remote, out| remote.arm(out));
+        assert!(matches!(heard[..], [Message::Armed(_)]), "{heard:?}");
+        assert_eq!((self.onboard.state(), self.remote.told().state), (State::Armed, State::Armed));
+    }
+
+    pub fn ready(plan: Plan) -> Desk {
+        let mut desk = Desk::new(plan);
+        let heard = desk.asks(|remote, out| remote.discover(7, out));
+        assert_eq!(heard.len(), 2, "the controller and its board: {heard:?}");
+        desk.configures();
+        desk
+    }
+
+    pub fn running(plan: Plan) -> Desk {
+        let mut desk = Desk::ready(plan);
+        desk.follows(3);
+        desk.arms();
+        desk.follows(5);
+        assert_eq!((desk.onboard.state(), desk.remote.told().state), (State::Running, State::Running));
+        desk
+    }
+
+    /// A sample of a shaft that goes at its speed, not quite evenly.
+    pub fn samples(&mut self) {
+        self.faulty(false, false);
+    }
+
+    pub fn faulty(&mut self, encoder: bool, converter: bool) {
+        self.now_ns += MS;
+        self.periods += 1;
+        self.shaft += self.speed;
+        let uneven = if self.speed == 0 { 0 } else { [0, 1, 0, -1][self.periods as usize % 4] };
+        let counts = Counts(self.shaft + uneven);
+        self.board.sample(self.now_us(), counts, encoder, converter, &mut self.up);
+    }
+
+    /// Both ends look at the clock.
+    pub fn polls(&mut self) -> Vec<Message> {
+        self.onboard.poll(self.now_ns, &mut self.ports);
+        if self.host_alive {
+            let notices = &mut self.notices;
+            self.remote.poll(self.now_ns, &mut self.to_onboard, &mut |n| notices.push(n));
+        }
+        self.settle()
+    }
+
+    /// So many periods in which all goes well.
+    pub fn follows(&mut self, periods: u32) {
+        for _ in 0..periods {
+            self.samples();
+            self.settle();
+            self.polls();
+        }
+    }
+
+    /// Time without a sample.
+    pub fn passes(&mut self, ns: u64) -> Vec<Message> {
+        self.now_ns += ns;
+        self.polls()
+    }
+
+    /// Another run with the same boards.
+    pub fn next(&mut self, plan: Plan) {
+        (self.plan, self.remote, self.twin) = (plan, plan.remote(), plan.control());
+        self.twin.configure(plan.supervisor().safe_codes().hold, &mut Outbox::default());
+        (self.notices, self.expected, self.sent) = (Vec::new(), Vec::new(), Vec::new());
+    }
+
+    /// The samples of which the host and the twin heard since the last look; of those before consent the
+    /// host does not hear.
+    pub fn cycles(&mut self) -> (Vec<Told>, Vec<Told>) {
+        let told = |n: &Told| matches!(n, Notice::Cycle(c) if c.cycle.state != State::Ready);
+        let cycles = |notices: &mut Vec<Told>| take(notices).into_iter().filter(told).collect();
+        assert!(!self.notices.iter().any(|n| matches!(n, Notice::Cycle(_)) && !told(n)));
+        (cycles(&mut self.notices), cycles(&mut self.expected))
+    }
+
+    /// Why control ended, as often as the host was told.
+    pub fn ends(&self) -> Vec<clutch_core::supervisor::Cause> {
+        self.notices
+            .iter()
+            .filter_map(|n| if let Notice::Ended(cause) = n { Some(*cause) } else { None })
+            .collect()
+    }
+}
