@@ -10,6 +10,10 @@ use std::process::{Command, Stdio};
 #[path = "../../crates/clutch-wire/examples/table/main.rs"]
 mod table;
 
+#[allow(dead_code, reason = "likewise")]
+#[path = "../../crates/clutch-node/examples/settings.rs"]
+mod settings;
+
 const VECTORS: &str = include_str!("vectors.csv");
 const HEADER: &str = include_str!("../../crates/clutch-wire/include/clutch_wire.h");
 const DOCUMENT: &str = include_str!("../../docs/wire.md");
@@ -76,6 +80,16 @@ fn committed_files_are_what_the_table_gives_now() {
     assert!(VECTORS == table::vectors::text(), "{}", stale("vectors.csv"));
     let document = table::markdown::replaced(DOCUMENT).expect("docs/wire.md has its markers");
     assert!(DOCUMENT == document, "{}", stale("docs/wire.md"));
+    let block = DOCUMENT
+        .split("<!-- settings:begin -->")
+        .nth(1)
+        .and_then(|p| p.split("<!-- settings:end -->").next());
+    let block = block.expect("the markers of the settings in docs/wire.md").trim();
+    assert_eq!(
+        block,
+        settings::text().trim(),
+        "`cargo run -p clutch-node --example settings` prints the table"
+    );
 }
 
 #[test]

@@ -3,10 +3,13 @@
 use crate::run::{Program, cargo, program, root};
 use anyhow::{Context, Result, bail};
 use clap::{Subcommand, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What the boards run.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
+/// Packages of the boards. One by one: together each would get the features that the other wants of the
+/// libraries.
+pub(crate) const BOARDS: [&str; 2] = ["clutch-qemu-mps2", "clutch-nucleo-g474re"];
 const CHIP: &str = "STM32G474RETx";
 
 #[derive(Subcommand)]
@@ -46,6 +49,17 @@ pub(crate) fn run(verb: &Verb) -> Result<()> {
     }
 }
 
+/// Whether the boards' Rust target is installed.
+pub(crate) fn has_target() -> bool {
+    let libraries = program("rustc").args(["--print", "target-libdir", "--target", TARGET]).quietly();
+    libraries.is_ok_and(|(known, text)| known && Path::new(text.trim()).is_dir())
+}
+
+/// Builds a board's images.
+pub(crate) fn image(board: &str) -> Program {
+    in_firmware(["build", "--release", "--locked", "--package", board])
+}
+
 /// A cargo in the folder of the images, whose flags stand in a file there.
 pub(crate) fn in_firmware<const N: usize>(args: [&str; N]) -> Program {
     cargo(args).within(&root().join("firmware")).env("CARGO_TARGET_DIR", root().join("target/firmware"))
@@ -56,9 +70,8 @@ fn build() -> Result<PathBuf> {
     program("rustup").args(["target", "add", TARGET]).run().context(
         "the boards' Rust target is missing, and rustup is not there to add it: install thumbv7em-none-eabihf",
     )?;
-    // One by one: together each would get the features that the other wants of the libraries.
-    for board in ["clutch-qemu-mps2", "clutch-nucleo-g474re"] {
-        in_firmware(["build", "--release", "--locked", "--package", board]).run()?;
+    for board in BOARDS {
+        image(board).run()?;
     }
     let images = root().join("target/firmware").join(TARGET).join("release");
     println!("\nimages: {}", images.display());

@@ -82,6 +82,7 @@ fn main() -> Result<()> {
         Verb::Test => test::all(),
         Verb::Wheel => test::wheel(),
         Verb::Ci => {
+            test::targets()?; // the lints of the images need theirs
             check()?;
             test::all()
         }
@@ -113,6 +114,23 @@ fn check() -> Result<()> {
     for features in ["", "linalg", "serde"] {
         cargo(["clippy", "--package", "clutch-core", "--features", features, "--", "-D", "warnings"])
             .run()?;
+    }
+    // The images, where their target is; tests build them in any case.
+    firmware::in_firmware(["fmt", "--all", "--check"]).run()?;
+    if firmware::has_target() {
+        for board in firmware::BOARDS {
+            firmware::in_firmware([
+                "clippy",
+                "--release",
+                "--locked",
+                "--package",
+                board,
+                "--",
+                "-D",
+                "warnings",
+            ])
+            .run()?;
+        }
     }
     docs()
 }

@@ -1,5 +1,6 @@
 //! All tests, and their number at the end.
 
+use crate::firmware;
 use crate::fuzz;
 use crate::python;
 use crate::run::{cargo, program, root};
@@ -60,9 +61,15 @@ pub(crate) fn all() -> Result<()> {
     let mut sound = true;
     // Tests that need a program skip themselves without it, on a user's machine and not in CI.
     if std::env::var_os("CI").is_some() {
-        for name in ["gcc", "strace", "qemu-system-arm"] {
+        // The program, and the Debian package that has it.
+        for (name, package) in [
+            ("gcc", "gcc"),
+            ("strace", "strace"),
+            ("qemu-system-arm", "qemu-system-arm"),
+            ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ] {
             if program(name).args(["--version"]).quietly().is_err() {
-                python::install_debian(name)?;
+                python::install_debian(package)?;
             }
         }
     }
@@ -98,8 +105,18 @@ pub(crate) fn all() -> Result<()> {
             tally.check(&format!("clutch-core builds for {target} with {with}"), built);
         }
     }
-    if embedded.contains(&"thumbv7em-none-eabihf") {
+    if embedded.contains(&firmware::TARGET) {
         no_panic(&mut tally)?;
+        for board in firmware::BOARDS {
+            let (built, text) = firmware::image(board).quietly()?;
+            if !built {
+                println!("{text}");
+            }
+            tally.check(&format!("the images of {board} build"), built);
+        }
+        // As a test, not as a benchmark: the figures are the machine code's, not this machine's.
+        let budget = cargo(["test", "--package", "clutch-benches", "--bench", "budget"]);
+        tally.check("bounds, measurements, memory and stack keep their budgets", budget.lines(|_| ())?);
     }
 
     if std::env::var_os("CI").is_some() {
@@ -127,7 +144,7 @@ pub(crate) fn wheel() -> Result<()> {
 }
 
 /// Adds the embedded targets. Without rustup they are skipped on a user's machine, not in CI.
-fn targets() -> Result<&'static [&'static str]> {
+pub(crate) fn targets() -> Result<&'static [&'static str]> {
     match program("rustup").args(["target", "add"]).args(TARGETS).quietly() {
         Ok((true, _)) => Ok(&TARGETS),
         other if std::env::var_os("CI").is_none() => {
