@@ -33,7 +33,7 @@ use clutch_core::law::{
 use clutch_core::reference::{
     Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, Reference, ReferenceParams, Sine, Table, Trapezoid,
 };
-use clutch_core::supervisor::{BoardMode, Cause, Checks, Sample, SupervisorState};
+use clutch_core::supervisor::{Arrival, BoardMode, Cause, Checks, Sample, State, SupervisorState};
 use clutch_core::{
     Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams, Daq, DerivativeState, Encoder, FixedCounts,
     Interval, Micros, Observer, ObserverGains, ObserverParams, Plant, PlantParams, Real, SafeCodes, SafeKind,
@@ -41,11 +41,13 @@ use clutch_core::{
     StickSlipParams, StickSlipState, Stribeck, StribeckParams, Supervisor, SupervisorParams, Target,
     Tolerances, VelocityParams, VelocitySource, check_path, sin_cos_turns,
 };
+use clutch_node::exchange::Exchange;
 use clutch_node::{
-    Acquisition, BoardNode, BoardParams, ControlNode, ControlParams, Hardware, Outbox, WideCounter, receive,
-    tick,
+    Acquisition, BoardNode, BoardParams, ControlNode, ControlParams, Hardware, Onboard, OnboardParams,
+    Outbox, Path, Ports, RemoteNode, Role, RunParams, Settings, Standalone, WideCounter, present_code,
+    receive, tick,
 };
-use clutch_wire::{BoardState, Decoder, StopReason, encode};
+use clutch_wire::{BoardState, Configure, Decoder, Hello, StopReason, encode};
 use core::hint::black_box;
 
 #[panic_handler]
@@ -105,6 +107,7 @@ extern "C" fn _start() -> ! {
     all::<f64, f32>();
     wire();
     board();
+    controller_role();
     #[cfg(feature = "control")]
     control();
     loop {
@@ -660,7 +663,18 @@ impl Hardware for Unknown {
 }
 
 fn runner(params: &BoardParams) {
-    let Some(mut role) = made(Acquisition::new(params)) else { return };
+    if let Some(role) = made(Acquisition::new(params)) {
+        periods(role);
+    }
+    if let Some(mut chip) = made(Standalone::new(onboard_params(), params)) {
+        // What the runner does not call.
+        chip.poll(word());
+        sink((chip.state() == BoardState::Running, chip.code()));
+        periods(opaque(chip));
+    }
+}
+
+fn periods(mut role: impl Role) {
     let mut hardware = Unknown(WideCounter::new(word() as u16));
     loop {
         tick(&mut role, &mut hardware);
@@ -706,4 +720,146 @@ fn control_node<T: Real>() {
         }
         node = opaque(node);
     }
+}
+
+fn onboard_params() -> OnboardParams {
+    OnboardParams { board: word() as u32, boot: word() as u32, clock_hz: word() as u32 }
+}
+
+/// The controller role: the board's end, the host's end, and what goes between them.
+fn controller_role() {
+    numbers();
+    sent();
+    onboard();
+    exchange();
+}
+
+fn numbers() {
+    sink((State::from_u8(word() as u8), Cause::from_u8(word() as u8), Arrival::from_u8(word() as u8)));
+    let hello = Hello {
+        nonce: word() as u32,
+        version: word() as u8,
+        schema: word(),
+        board: word() as u32,
+        boot: word() as u32,
+        counts_per_rev: word() as u32,
+        dac_bits: word() as u8,
+        dac_lowest_mv: word() as i32,
+        dac_highest_mv: word() as i32,
+        period_min_us: word() as u32,
+        period_max_us: word() as u32,
+        watchdog_max_us: word() as u32,
+        boot_code: word() as u16,
+        state: word() as u8,
+        run: word() as u16,
+        config: word(),
+    };
+    sink(present_code(&hello, DacCode(word() as u16)));
+}
+
+/// Settings as a host makes them, on their way, and as a board builds from them.
+fn sent() {
+    let knots = opaque([Knot { time_us: word(), position: fixed() }; 400]);
+    let knots = knots.get(..word() as usize).unwrap_or(&knots);
+    let table = Table { knots, interpolation: Interpolation::Cubic };
+    sink(table.at::<f32>(word(), encoder::<f32>(), micros()));
+    let Some(bounds) = bounds::<f32>() else { return };
+    let run = RunParams {
+        servo: &servo_params(),
+        supervisor: &supervisor_params(),
+        bounds: &bounds,
+        reference: &reference_params(knots),
+        start: fixed(),
+        watchdog: micros(),
+        valid: micros(),
+        silence: micros(),
+        host_silence: micros(),
+        ticks: word(),
+    };
+    if let Some(settings) = made(Settings::new(&run)) {
+        settings.each(|key, value| sink((key, value)));
+    }
+    let mut settings = opaque(Settings::default());
+    sink((settings.set(word() as u16, word()), Settings::knows(word() as u16)));
+    let settings = opaque(settings);
+    settings.each(|key, value| sink((key, value)));
+    if let Some(built) = made(settings.build()) {
+        target_of(&built.path, settings.points());
+        target_of(&built.path, knots);
+        remote_node(&built.path, knots);
+    }
+}
+
+fn target_of(path: &Path, knots: &[Knot]) {
+    sink(path.target(knots, word()));
+}
+
+fn onboard() {
+    let mut node = opaque(Onboard::new(onboard_params()));
+    let mut out = opaque(Ports::default());
+    loop {
+        node.host(word(), bytes(&any_bytes()), &mut out);
+        node = opaque(node);
+        node.daq(word(), bytes(&any_bytes()), &mut out);
+        node = opaque(node);
+        node.poll(word(), &mut out);
+        node.spent(word() as u32);
+        node.answered(micros());
+        sink((node.state(), node.driving(), node.poll_at(), node.last_word()));
+        drain(&mut out.host);
+        drain(&mut out.daq);
+        out = opaque(out);
+        if flag() {
+            return;
+        }
+    }
+}
+
+fn remote_node(path: &Path, knots: &[Knot]) {
+    let Some(servo) = made(Servo::new(&servo_params())) else { return };
+    let configure = Configure {
+        run: word() as u16,
+        config: word(),
+        period_us: word() as u32,
+        watchdog_us: word() as u32,
+        safe_kind: word() as u8,
+        hold_code: word() as u16,
+        release_code: word() as u16,
+        ramp_step: word() as u32,
+        hold_periods: word() as u32,
+    };
+    let mut node = opaque(RemoteNode::new(servo, configure, word(), word()));
+    let mut out = opaque(Outbox::default());
+    let path = |tick| path.target(knots, tick);
+    loop {
+        node.discover(word() as u32, &mut out);
+        node.set(word() as u16, word(), &mut out);
+        node.configure(&mut out);
+        node.arm(&mut out);
+        node.ping(word() as u32, &mut out);
+        node.receive(word(), bytes(&any_bytes()), &path, &mut |notice| sink(notice));
+        node = opaque(node);
+        node.poll(word(), &mut out, &mut |notice| sink(notice));
+        sink((node.poll_at(), node.origin(), *node.counts(), *node.told(), node.controller().copied()));
+        sink(node.servo().period());
+        drain(&mut out);
+        match word() {
+            0 => node.stop(StopReason::Done, &mut out),
+            1 => node.stop(StopReason::Operator, &mut out),
+            2 => node.disconnect(),
+            3 => return,
+            _ => {}
+        }
+        node = opaque(node);
+    }
+}
+
+fn exchange() {
+    let (host, daq) = (any_bytes(), any_bytes());
+    let exchange =
+        Exchange { time_ns: word(), lateness_us: word() as u32, host: bytes(&host), daq: bytes(&daq) };
+    let mut buffer = any_bytes();
+    sink(exchange.write(&mut buffer));
+    let buffer = opaque(buffer);
+    sink((Exchange::length(bytes(&buffer)), Exchange::read(bytes(&buffer))));
 }
