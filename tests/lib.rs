@@ -2,7 +2,10 @@
 
 #[path = "bits/native.rs"]
 pub mod bits;
+mod command;
 pub mod firmware;
+
+pub use command::command;
 
 use clutch_core::{Plant, PlantParams};
 use clutch_sim::drive::Drive;

@@ -19,6 +19,7 @@ LAYOUTS = {
     0x04: ("Actuate", "run:H sequence:H code:H valid_us:H"),
     0x05: ("Stop", "run:H reason:B"),
     0x06: ("Ping", "run:H nonce:I"),
+    0x07: ("Set", "run:H key:H value:Q"),
     0x81: (
         "Hello",
         "nonce:I version:B schema:Q board:I boot:I counts_per_rev:I dac_bits:B dac_lowest_mv:i"
@@ -32,6 +33,21 @@ LAYOUTS = {
     0x86: ("Stopped", "run:H reason:B code:H"),
     0x87: ("Pong", "run:H nonce:I time_us:I"),
     0x88: ("Refused", "request:B reason:B value:I"),
+    0x89: (
+        "Controller",
+        "nonce:I version:B schema:Q settings:Q board:I boot:I clock_hz:I knots:H state:B run:H config:Q",
+    ),
+    0x8A: ("Taken", "run:H key:H value:Q"),
+    0x8B: (
+        "Telemetry",
+        "run:H number:H tick:I sequence:H time_us:I counts:i status:B flags:B arrival:B states:B cause:B value:I"
+        " lateness_us:I error:I error_rate:I term_0:I term_1:I term_2:I demand:I code:H cycles:I",
+    ),
+    0x8C: ("Ended", "run:H tick:I states:B cause:B value:I"),
+    0x8D: (
+        "Link",
+        "run:H received:I lost:I late:I duplicated:I reordered:I bad_frames:I rejected:I deadline_misses:I dropped:I",
+    ),
 }
 
 

@@ -49,16 +49,9 @@ fn on(scenario: &Scenario, board: impl Lockstep, patience_us: u32) -> Outcome {
     let mut setup = Setup::<f32>::new(scenario, 7).expect("a safe state");
     setup.control.silence = clutch_core::Micros(patience_us);
     let ticks = setup.ticks + 1;
-    let params = WorldParams {
-        latency_ns: 0,
-        faults: Vec::new(),
-        stall: None,
-        seed: 1,
-        record: true,
-        duration: scenario.spec().run.duration + 1.0,
-        ticks,
-        settle: scenario.spec().run.settle,
-    };
+    let run = &scenario.spec().run;
+    let (duration, settle) = (run.duration + 1.0, run.settle);
+    let params = WorldParams { record: true, duration, ticks, settle, ..WorldParams::default() };
     let end = emulated(scenario, &setup, board, ticks).expect("a board can run it");
     let path = setup::path::<f32>(scenario).expect("a path");
     World::new(scenario, params, end).expect("a rig").run(&path).expect("the board answers")
@@ -251,16 +244,7 @@ fn a_processor_that_fails_sends_encoder_and_converter_to_the_safe_state() {
     let end: Emulated<_, _> =
         emulated(&scenario, &setup, &mut failing, u64::MAX).expect("a board can run it");
     let path = setup::path::<f32>(&scenario).expect("a path");
-    let params = WorldParams {
-        latency_ns: 0,
-        faults: Vec::new(),
-        stall: None,
-        seed: 1,
-        record: false,
-        duration: 5.0,
-        ticks: u64::MAX,
-        settle: 0.0,
-    };
+    let params = WorldParams { duration: 5.0, ..WorldParams::default() };
     let ended = World::new(&scenario, params, end).expect("a rig").run(&path).expect_err("it fails");
     assert!(ended.to_string().contains("as it was to"), "{ended}");
     let mut decoder = Decoder::new();

@@ -2,35 +2,13 @@
 //! board as its encoder and converter.
 
 use crate::{alone, scratch};
+use clutch_tests::command;
 use clutch_tests::firmware::image;
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::OnceLock;
-
-/// The command under test: `CLUTCH_BIN`, or what cargo builds from this tree.
-fn program() -> &'static PathBuf {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        if let Some(path) = std::env::var_os("CLUTCH_BIN") {
-            return path.into();
-        }
-        let output = Command::new(env!("CARGO"))
-            .args(["build", "--package", "clutch-cli", "--message-format=json-render-diagnostics"])
-            .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
-            .output()
-            .expect("cargo starts");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8_lossy(&output.stdout)
-            .lines()
-            .filter_map(|line| serde_json::from_str::<Value>(line).ok())
-            .filter(|message| message["target"]["name"] == "clutch")
-            .find_map(|message| message["executable"].as_str().map(PathBuf::from))
-            .expect("cargo says where the command is")
-    })
-}
 
 /// A process that ends with the test.
 struct Beside(Child);
@@ -43,12 +21,12 @@ impl Drop for Beside {
 }
 
 fn clutch(args: &[&str]) -> Output {
-    Command::new(program()).args(args).stdin(Stdio::null()).output().expect("the command starts")
+    Command::new(command()).args(args).stdin(Stdio::null()).output().expect("the command starts")
 }
 
 /// The simulated board on a TCP address.
 fn rig() -> (Beside, String) {
-    let mut child = Command::new(program())
+    let mut child = Command::new(command())
         .args(["daq", "board_smc_2", "--patient", "--listen", "tcp://127.0.0.1:0"])
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -92,7 +70,7 @@ fn shown(done: &Output) -> String {
 #[test]
 fn a_board_that_closes_the_loop_is_set_up_armed_logged_and_stopped_over_a_line() {
     let Some(image) = image("mps2-controller") else { return };
-    program();
+    command();
     let _alone = alone();
     let (_rig, rig) = rig();
     let (_board, address) = board(&image, Some(&rig));
@@ -132,7 +110,7 @@ fn a_board_that_closes_the_loop_is_set_up_armed_logged_and_stopped_over_a_line()
 #[test]
 fn each_kind_of_board_tells_which_option_is_for_it() {
     let Some(image) = image("mps2-controller") else { return };
-    program();
+    command();
     let _alone = alone();
     let (_rig, rig) = rig();
     let done = clutch(&["loop", "board_smc_2", "--board", &format!("tcp://{rig}")]);

@@ -1,5 +1,7 @@
 //! Starting `clutch`, and listening to it.
 
+pub(crate) use clutch_tests::command as program;
+
 use clutch_loop::port::{Endpoint, PseudoTerminal};
 use clutch_loop::realtime::{WaitMode, monotonic_ns};
 use rustix::process::{Pid, Signal, kill_process};
@@ -11,31 +13,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-
-/// The command under test: `CLUTCH_BIN`, or what cargo builds from this tree.
-pub(crate) fn program() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        if let Some(path) = std::env::var_os("CLUTCH_BIN") {
-            return path.into();
-        }
-        let mut cargo = Command::new(env!("CARGO"));
-        cargo.args(["build", "--package", "clutch-cli", "--message-format=json-render-diagnostics"]);
-        if !cfg!(debug_assertions) {
-            cargo.arg("--release");
-        }
-        let output =
-            cargo.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).output().expect("cargo starts");
-        let stderr = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "clutch does not build:\n{stderr}");
-        String::from_utf8_lossy(&output.stdout)
-            .lines()
-            .filter_map(|line| serde_json::from_str::<Value>(line).ok())
-            .filter(|message| message["target"]["name"] == "clutch")
-            .find_map(|message| message["executable"].as_str().map(PathBuf::from))
-            .expect("cargo says where the command is")
-    })
-}
 
 static MACHINE: RwLock<()> = RwLock::new(());
 

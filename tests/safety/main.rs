@@ -145,16 +145,7 @@ fn equal(scenario: &Scenario, what: &str) {
 
 fn world<T: clutch_core::Real>(scenario: &Scenario) -> clutch_loop::world::Outcome {
     let setup = Setup::<T>::new(scenario, 7).expect("a safe state");
-    let params = WorldParams {
-        latency_ns: 0,
-        faults: Vec::new(),
-        stall: None,
-        seed: 1,
-        record: true,
-        duration: 2.999,
-        ticks: u64::MAX,
-        settle: 0.0,
-    };
+    let params = WorldParams { record: true, duration: 2.999, ..WorldParams::default() };
     let path = setup::path::<T>(scenario).expect("a path");
     let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
     let mut world = World::new(scenario, params, Local { node, path: &path }).expect("a rig");
@@ -207,16 +198,8 @@ fn healthy_runs_of_every_law_and_path_are_never_ended() {
                 );
                 let scenario = Scenario::parse("healthy", &text, &[]).expect("a scenario");
                 let setup = Setup::<f32>::new(&scenario, 7).expect("a safe state");
-                let params = WorldParams {
-                    latency_ns: 80_000,
-                    faults: Vec::new(),
-                    stall: None,
-                    seed,
-                    record: false,
-                    duration: 20.0,
-                    ticks: u64::MAX,
-                    settle: 0.0,
-                };
+                let params =
+                    WorldParams { latency_ns: 80_000, seed, duration: 20.0, ..WorldParams::default() };
                 let path = setup::path::<f32>(&scenario).expect("a path");
                 let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
                 let mut world = World::new(&scenario, params, Local { node, path: &path }).expect("a rig");

@@ -81,12 +81,7 @@ impl Hil {
         let scenario = crate::single_precision(&args, args.load()?)?;
         let certified = scenario.plan()?.certificate.certified();
         if !certified && !self.uncertified {
-            print(&format!(
-                "{}: the gains are not certified for these bounds and this path, so nothing was started.\n\
-                 `clutch certify {}` says why; --uncertified runs it all the same.\n",
-                scenario.name,
-                self.scenario.display()
-            ))?;
+            print(&crate::not_certified(&scenario, &self.scenario))?;
             return Ok(Outcome::NotCertified);
         }
         if let Some(log) = &self.log {

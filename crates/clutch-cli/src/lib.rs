@@ -97,6 +97,16 @@ fn single_precision(args: &ScenarioArgs, scenario: Scenario) -> anyhow::Result<S
     Ok(Scenario::load(&args.scenario, &set)?)
 }
 
+/// Why nothing was started, and what to do.
+fn not_certified(scenario: &Scenario, file: &Path) -> String {
+    format!(
+        "{}: the gains are not certified for these bounds and this path, so nothing was started.\n\
+         `clutch certify {}` says why; --uncertified runs it all the same.\n",
+        scenario.name,
+        file.display()
+    )
+}
+
 /// How a verb ended, if not with an error.
 enum Outcome {
     /// Exit code 0.

@@ -208,12 +208,7 @@ impl Loop {
         let plan = scenario.plan()?;
         let certified = plan.certificate.certified();
         if !certified && !self.uncertified {
-            self.say(&format!(
-                "{}: the gains are not certified for these bounds and this path, so nothing was started.\n\
-                 `clutch certify {}` says why; --uncertified runs it all the same.\n",
-                scenario.name,
-                self.scenario.display()
-            ))?;
+            self.say(&crate::not_certified(scenario, &self.scenario))?;
             return Ok(Outcome::NotCertified);
         }
         if let Some(log) = &self.log {

@@ -346,13 +346,10 @@ impl RunId {
         let onset = self.onset();
         let mut params = WorldParams {
             latency_ns: 50_000,
-            faults: Vec::new(),
-            stall: None,
             seed: self.seed,
             record,
             duration: onset + 1.6,
-            ticks: u64::MAX,
-            settle: 0.0,
+            ..WorldParams::default()
         };
         let fault = |kind, direction| Fault { direction, ..Fault::new(kind, onset) };
         match self.case().broken {

@@ -5,7 +5,7 @@ use crate::end::{End, Tells};
 use crate::setup::{self, Setup, SetupError};
 use clutch_core::law::LawTerms;
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Target};
-use clutch_node::exchange::Exchange;
+use clutch_node::exchange::{Exchange, answer};
 use clutch_node::{
     ControlNode, LinkCounts, Notice, Onboard, OnboardParams, Outbox, Ports, RemoteNode, Settings, Told,
 };
@@ -48,22 +48,7 @@ impl Default for InProcess {
 
 impl Lockstep for InProcess {
     fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
-        self.ports.host.clear();
-        self.ports.daq.clear();
-        if request.lateness_us > 0 {
-            self.node.answered(Micros(request.lateness_us));
-        }
-        self.node.host(request.time_ns, request.host, &mut self.ports);
-        if !request.daq.is_empty() {
-            self.node.daq(request.time_ns, request.daq, &mut self.ports);
-        }
-        self.node.poll(request.time_ns, &mut self.ports);
-        Ok(Exchange {
-            time_ns: self.node.poll_at().unwrap_or(u64::MAX),
-            lateness_us: 0,
-            host: self.ports.host.as_bytes(),
-            daq: self.ports.daq.as_bytes(),
-        })
+        Ok(answer(&mut self.node, request, &mut self.ports))
     }
 }
 

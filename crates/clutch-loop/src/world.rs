@@ -49,6 +49,23 @@ pub struct WorldParams {
     pub settle: f64,
 }
 
+/// A line that loses nothing and takes no time, a controller that never stalls, and no end but that of the
+/// duration, which has to be given.
+impl Default for WorldParams {
+    fn default() -> Self {
+        WorldParams {
+            latency_ns: 0,
+            faults: Vec::new(),
+            stall: None,
+            seed: 1,
+            record: false,
+            duration: 0.0,
+            ticks: u64::MAX,
+            settle: 0.0,
+        }
+    }
+}
+
 /// What became of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {

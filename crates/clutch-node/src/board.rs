@@ -269,16 +269,8 @@ impl BoardNode {
     }
 
     fn discover(&self, m: &Discover, out: &mut Outbox) {
-        let request = Discover::KIND;
-        let refusal = if m.version != VERSION {
-            Some((Refusal::Version, u32::from(VERSION)))
-        } else if m.schema != SCHEMA {
-            Some((Refusal::Schema, SCHEMA as u32))
-        } else {
-            None
-        };
-        if let Some((reason, value)) = refusal {
-            out.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
+        if let Some(refused) = misunderstood(m) {
+            out.push(&Message::Refused(refused));
             return;
         }
         let p = &self.params;
@@ -408,4 +400,16 @@ impl BoardNode {
             _ => self.late = true,
         }
     }
+}
+
+/// The refusal of a host that speaks another version or has another table; none for one that does not.
+pub(crate) fn misunderstood(m: &Discover) -> Option<Refused> {
+    let (reason, value) = if m.version != VERSION {
+        (Refusal::Version, u32::from(VERSION))
+    } else if m.schema != SCHEMA {
+        (Refusal::Schema, SCHEMA as u32)
+    } else {
+        return None;
+    };
+    Some(Refused { request: Discover::KIND, reason: reason as u8, value })
 }

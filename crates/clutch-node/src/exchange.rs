@@ -8,6 +8,9 @@
 //! All little-endian. Whoever sends a request decides how long it is until the next, so that a run is
 //! the same however fast the machine is.
 
+use crate::onboard::{Onboard, Ports};
+use clutch_core::Micros;
+
 /// Bytes before those that are carried.
 pub const HEAD: usize = 16;
 /// The longest request or answer.
@@ -65,5 +68,25 @@ impl<'a> Exchange<'a> {
             host,
             daq: rest.get(..daq)?,
         })
+    }
+}
+
+/// A controller's answer: what has arrived goes in, what is due comes out.
+pub fn answer<'p>(node: &mut Onboard, request: &Exchange<'_>, ports: &'p mut Ports) -> Exchange<'p> {
+    ports.host.clear();
+    ports.daq.clear();
+    if request.lateness_us > 0 {
+        node.answered(Micros(request.lateness_us));
+    }
+    node.host(request.time_ns, request.host, ports);
+    if !request.daq.is_empty() {
+        node.daq(request.time_ns, request.daq, ports);
+    }
+    node.poll(request.time_ns, ports);
+    Exchange {
+        time_ns: node.poll_at().unwrap_or(u64::MAX),
+        lateness_us: 0,
+        host: ports.host.as_bytes(),
+        daq: ports.daq.as_bytes(),
     }
 }

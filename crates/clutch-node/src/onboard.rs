@@ -12,6 +12,7 @@
 //! the host it speaks the same protocol as a board, with settings before and telemetry instead of
 //! samples. A host that falls silent ends the run in the safe state.
 
+use crate::board::misunderstood;
 use crate::control::{ControlNode, ControlParams, Notice};
 use crate::outbox::Outbox;
 use crate::settings::{Built, MAX_KNOTS, Misfit, Path, SETTINGS_HASH, Settings};
@@ -276,16 +277,8 @@ impl Onboard {
     }
 
     fn discover(&mut self, m: &Discover, out: &mut Ports) {
-        let request = Discover::KIND;
-        let refusal = if m.version != VERSION {
-            Some((Refusal::Version, u32::from(VERSION)))
-        } else if m.schema != SCHEMA {
-            Some((Refusal::Schema, SCHEMA as u32))
-        } else {
-            None
-        };
-        if let Some((reason, value)) = refusal {
-            out.host.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
+        if let Some(refused) = misunderstood(m) {
+            out.host.push(&Message::Refused(refused));
             return;
         }
         out.host.push(&Message::Controller(Controller {

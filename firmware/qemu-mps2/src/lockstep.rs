@@ -3,8 +3,7 @@
 
 use crate::fault;
 use crate::files::HostFile;
-use clutch_core::Micros;
-use clutch_node::exchange::{Exchange, LONGEST};
+use clutch_node::exchange::{Exchange, LONGEST, answer};
 use clutch_node::{Onboard, Ports};
 use semihosting::process;
 
@@ -51,33 +50,12 @@ pub fn run(link: Link, mut node: Onboard) -> ! {
         if request.time_ns == FAIL_AT {
             fault::fail();
         }
-        if request.lateness_us > 0 {
-            node.answered(Micros(request.lateness_us));
-        }
-        cycle(&mut node, &request, &mut ports);
-        let answer = Exchange {
-            time_ns: node.poll_at().unwrap_or(u64::MAX),
-            lateness_us: 0,
-            host: ports.host.as_bytes(),
-            daq: ports.daq.as_bytes(),
-        };
-        if !link.answer(&answer) {
+        if !link.answer(&answer(&mut node, &request, &mut ports)) {
             process::exit(3);
         }
         fault::prepare(node.last_word());
-        ports.host.clear();
-        ports.daq.clear();
         used = 0;
     }
-}
-
-/// What has arrived goes in, what is due comes out.
-fn cycle(node: &mut Onboard, request: &Exchange<'_>, ports: &mut Ports) {
-    node.host(request.time_ns, request.host, ports);
-    if !request.daq.is_empty() {
-        node.daq(request.time_ns, request.daq, ports);
-    }
-    node.poll(request.time_ns, ports);
 }
 
 /// The last word of a processor that has failed.
