@@ -301,8 +301,11 @@ impl RemoteNode {
     ) {
         self.heard_ns = Some(now_ns);
         let gap = m.number.wrapping_sub(self.number).wrapping_sub(1);
-        self.told.untold = self.told.untold.wrapping_add(u64::from(gap));
-        self.number = m.number;
+        // Half the range back is a frame that came twice.
+        if gap < 0x8000 {
+            self.told.untold = self.told.untold.wrapping_add(u64::from(gap));
+            self.number = m.number;
+        }
         // The tick's high half is ours to know.
         let ahead = m.tick.wrapping_sub(self.told.tick as u32).cast_signed();
         let tick = self.told.tick.wrapping_add_signed(i64::from(ahead));

@@ -149,7 +149,21 @@ impl<T: Real> Limits<T> {
         let deadline = T::from_u64(u64::from(p.deadline.0));
         require("deadline", deadline, p.deadline.0 >= 1, "at least 1 µs")?;
         let inertia = bounds.inertia.high;
+        above_0("inertia", inertia, "bounds on the inertia that end at a finite number above 0 kg m²")?;
+        let drive = bounds.drive_torque.low;
+        require(
+            "drive_torque",
+            drive,
+            true,
+            "bounds on the driving torque that begin at a finite number, N m",
+        )?;
+        let drag = bounds.viscous_damping.high;
+        let expected = "bounds on the viscous damping that end at a finite number of at least 0 N m s/rad";
+        require("viscous_damping", drag, drag >= T::ZERO, expected)?;
         let strongest = bounds.mu_static.high.max(bounds.mu_dynamic.high) * bounds.brake_gain.high;
+        let expected =
+            "bounds on friction and brake gain whose ends give a finite number of at least 0 N m/V";
+        require("brake_gain", strongest, strongest >= T::ZERO, expected)?;
         Ok(Limits {
             period,
             radians_per_count: servo.encoder.radians_per_count(),
@@ -169,9 +183,9 @@ impl<T: Real> Limits<T> {
             still: T::from_f64(1e-6),
             speed_limit: p.speed_limit,
             speed_counts: p.speed_limit * per_radian * period + T::ONE,
-            drive: bounds.drive_torque.low / inertia,
+            drive: drive / inertia,
             brake: strongest * p.friction_margin / inertia,
-            drag: bounds.viscous_damping.high / inertia,
+            drag: drag / inertia,
         })
     }
 

@@ -1002,6 +1002,16 @@ in_both_scalars! {
         }
         let slow = ServoParams { period: Micros(0), ..paper() };
         assert_eq!(Supervisor::new(&d, &slow, &bounds()).unwrap_err().field, "period");
+        let (b, not) = (bounds::<T>(), |low| crate::Interval { low, high: nan });
+        for (bad, field) in [
+            (Bounds { inertia: not(f(0.001)), ..b }, "inertia"),
+            (Bounds { inertia: crate::Interval { low: f(0.0), high: f(0.0) }, ..b }, "inertia"),
+            (Bounds { drive_torque: not(nan), ..b }, "drive_torque"),
+            (Bounds { viscous_damping: not(f(0.0)), ..b }, "viscous_damping"),
+            (Bounds { brake_gain: not(f(0.1)), ..b }, "brake_gain"),
+        ] {
+            assert_eq!(Supervisor::new(&d, &paper(), &bad).unwrap_err().field, field, "{bad:?}");
+        }
         let at_the_limits = SupervisorParams {
             jumps: 128, lost: 128, late: 1, disorder: 1, overruns: 128, silence_cycles: 1000, good_samples: 999,
             jump: count * f(1.01), stand_still: f(1.0), friction_margin: f(1.0), following_time: f(0.0),
