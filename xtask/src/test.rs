@@ -16,12 +16,20 @@ struct Tally {
     passed: u64,
     failed: u64,
     skipped: u64,
+    /// What failed, by name.
+    failures: Vec<String>,
 }
 
 impl Tally {
     /// Reads the closing lines of libtest (`test result: ok. 3 passed; 0 failed; …`) and of
-    /// pytest (`3 passed, 1 skipped in 2.1s`).
+    /// pytest (`3 passed, 1 skipped in 2.1s`), and the names of what failed (`test NAME ... FAILED`,
+    /// `FAILED NAME - why`).
     fn read(&mut self, line: &str) {
+        if let Some(name) = line.strip_prefix("test ").and_then(|l| l.strip_suffix(" ... FAILED")) {
+            self.failures.push(name.to_owned());
+        } else if line.starts_with("FAILED ") || line.starts_with("ERROR ") {
+            self.failures.push(line.to_owned());
+        }
         let closing = line.starts_with("test result:") || (line.contains(" in ") && line.contains("passed"));
         if !closing {
             return;
@@ -41,17 +49,27 @@ impl Tally {
 
     /// The line that ends a run of tests; an error if any failed.
     fn end(self, sound: bool) -> Result<()> {
-        let Tally { passed, failed, skipped } = self;
-        println!("\n{passed} passed, {failed} failed, {skipped} skipped");
-        if failed > 0 || !sound {
-            bail!("tests failed");
+        let Tally { passed, failed, skipped, failures } = self;
+        let sound = sound && failed == 0;
+        println!();
+        for name in failures {
+            println!("failed: {name}");
         }
-        Ok(())
+        if !sound {
+            println!("tests failed; what they said is above");
+        }
+        println!("{passed} passed, {failed} failed, {skipped} skipped");
+        if sound { Ok(()) } else { std::process::exit(1) }
     }
 
     fn check(&mut self, name: &str, holds: bool) {
         println!("{name}: {}", if holds { "ok" } else { "FAILED" });
-        if holds { self.passed += 1 } else { self.failed += 1 }
+        if holds {
+            self.passed += 1;
+        } else {
+            self.failed += 1;
+            self.failures.push(name.to_owned());
+        }
     }
 }
 

@@ -110,9 +110,12 @@ impl Hil {
             }
             log.finish()?;
         }
-        let fault = ran.cause.filter(|c| *c != Cause::Done);
         print(&if self.json { summary(&scenario, &ran, took)? } else { self.text(&scenario, &ran, took) })?;
-        Ok(if fault.is_some() { Outcome::Fault } else { Outcome::Done })
+        Ok(match ran.end {
+            (_, Cause::Done) => Outcome::Done,
+            (_, Cause::None) => Outcome::Failed,
+            _ => Outcome::Fault,
+        })
     }
 
     fn on(&self, scenario: &Scenario, setup: &Setup<f32>, board: impl Lockstep) -> anyhow::Result<Ran> {
@@ -146,9 +149,12 @@ impl Hil {
             text += &format!("log: {0}; clutch replay {0}\n", file.display());
         }
         let board = ran.board.map_or("gone".to_owned(), |s| format!("{s:?}").to_lowercase());
-        text += &match ran.cause {
-            None => format!("the path is done; encoder and converter are {board}\n"),
-            Some(cause) => format!("FAULT: {cause:?}; encoder and converter are {board}\n"),
+        text += &match ran.end {
+            (_, Cause::Done) => format!("the path is done; encoder and converter are {board}\n"),
+            (state, Cause::None) => {
+                format!("control did not end: the board is {state:?}, encoder and converter are {board}\n")
+            }
+            (_, cause) => format!("FAULT: {cause:?}; encoder and converter are {board}\n"),
         };
         text
     }
@@ -162,7 +168,8 @@ fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> anyhow::Result<String> 
         "ticks": ran.answers,
         "took_s": took,
         "metrics": ran.metrics,
-        "cause": ran.cause.map(|c| format!("{c:?}")),
+        "state": format!("{:?}", ran.end.0),
+        "cause": format!("{:?}", ran.end.1),
         "board": ran.board.map(|s| format!("{s:?}")),
         "lost": ran.lost,
     }))

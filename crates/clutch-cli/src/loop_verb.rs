@@ -245,17 +245,21 @@ impl Loop {
         let board = board?;
         let stopped = stop.load(Ordering::Relaxed);
         let text = if self.json {
-            crate::json(&as_json(scenario, &report, certified, board.as_ref()))?
+            crate::json(&as_json(scenario, &report, certified, board.as_ref(), stopped))?
         } else {
             summary(scenario, &report, &log_line, board.as_ref(), (stopped, self.fault.len()))
         };
         print(&text)?;
-        Ok(match (report.state, report.port_error.is_some(), stopped) {
-            (State::Faulted, _, _) | (_, true, _) => Outcome::Fault,
-            (State::Ready, _, true) => Outcome::Stopped,
-            (State::Ready, _, _) => Outcome::Failed,
-            (_, _, true) => Outcome::Stopped,
-            _ => Outcome::Done,
+        Ok(if report.state == State::Faulted || report.port_error.is_some() {
+            Outcome::Fault
+        } else if stopped {
+            Outcome::Stopped
+        } else if !report.begun {
+            Outcome::Failed
+        } else if report.cause == Cause::Operator {
+            Outcome::Fault // nobody here has stopped it: the board has missed this machine
+        } else {
+            Outcome::Done
         })
     }
 }
@@ -557,10 +561,13 @@ fn status(watch: &Watch, period_us: u32, ticks: u64) {
 }
 
 /// What ended control, in words.
-fn cause_text(report: &LoopReport) -> String {
+fn cause_text(report: &LoopReport, stopped: bool) -> String {
     let v = report.value;
     match report.cause {
         Cause::Done => "the path is done".into(),
+        Cause::Operator if report.on_the_board && !stopped => {
+            "the board has not heard this machine for too long, and has ended the run".into()
+        }
         Cause::Operator => "stopped by the operator".into(),
         Cause::Lost => format!("{v} samples lost within 128 cycles"),
         Cause::Late => "too many samples or answers came late".into(),
@@ -575,6 +582,10 @@ fn cause_text(report: &LoopReport) -> String {
         Cause::Saturation => "the brake's voltage was at its limit for too long".into(),
         Cause::NotFinite => "the law's demand was not a number".into(),
         Cause::Deadline => format!("answers came too late, the last after {v} µs"),
+        // The board's own supervisor tells for how many periods.
+        Cause::Silence if report.on_the_board && v > 0.0 => {
+            "the board's encoder and converter fell silent".into()
+        }
         Cause::Silence => "the board fell silent".into(),
         Cause::Board => match v as u8 {
             1 => "the board's watchdog went off: it got no valid answer in time".into(),
@@ -673,17 +684,27 @@ fn summary(
     let safe = match (r.state, r.board_safe) {
         (State::Released, true) => "the brake is released",
         (_, true) => "the board is in its safe state",
+        (_, false) if r.on_the_board => {
+            "the board did not confirm its safe state; it goes there by itself when it misses this machine"
+        }
         (_, false) => "the board did not confirm its safe state; its watchdog takes it there",
     };
-    if r.cause == Cause::None {
-        let why = r.refused.as_ref().map_or("it did not answer".to_owned(), clutch_loop::preflight::why);
-        if stopped {
+    if !r.begun && r.state != State::Faulted {
+        if r.cause == Cause::None && stopped {
             return text + "stopped before the board was armed; its output is as it was\n";
         }
-        return text + &format!("the board was not armed: {why}\n");
+        if stopped {
+            return text + &format!("stopped before the board said that it was armed; {safe}\n");
+        }
+        return text
+            + &match &r.refused {
+                Some(m) => format!("the board was not armed: {}\n", clutch_loop::preflight::why(m)),
+                None => format!("the board did not say that it was armed; {safe}\n"),
+            };
     }
-    let fault = if r.state == State::Faulted { "FAULT: " } else { "" };
-    text += &format!("{fault}{}; {safe}\n", cause_text(r));
+    let missed = r.cause == Cause::Operator && !stopped;
+    let fault = if r.state == State::Faulted || missed { "FAULT: " } else { "" };
+    text += &format!("{fault}{}; {safe}\n", cause_text(r, stopped));
     text
 }
 
@@ -692,6 +713,7 @@ fn as_json(
     r: &LoopReport,
     certified: bool,
     board: Option<&DaqReport>,
+    stopped: bool,
 ) -> serde_json::Value {
     let latency = |s: &CycleSummary| {
         serde_json::json!({
@@ -704,7 +726,7 @@ fn as_json(
         "version": env!("CARGO_PKG_VERSION"),
         "state": format!("{:?}", r.state),
         "cause": format!("{:?}", r.cause),
-        "cause_text": cause_text(r),
+        "cause_text": cause_text(r, stopped),
         "value": r.value,
         "certified": certified,
         "ticks": r.ticks,

@@ -10,7 +10,7 @@ use clutch_node::{
     ControlNode, LinkCounts, Notice, Onboard, OnboardParams, Outbox, Ports, RemoteNode, Settings, Told,
 };
 use clutch_sim::Scenario;
-use clutch_wire::{Configure, Refused, StopReason};
+use clutch_wire::{Arm, Configure, Refused, StopReason};
 
 /// Who answers in lockstep.
 pub trait Lockstep {
@@ -86,7 +86,8 @@ pub fn emulated<'a, L: Lockstep>(
     Ok(Emulated {
         remote: RemoteNode::new(setup.servo, configure, ALIVE_NS, BOARD_SILENCE_NS),
         link,
-        settings: setup::settings(scenario, setup, HOST_SILENCE, ticks)?,
+        // A board that keeps its own time waits as long for the host as for encoder and converter.
+        settings: setup::settings(scenario, setup, HOST_SILENCE.max(setup.control.silence), ticks)?,
         path: setup::path::<f32>(scenario)?,
         to_board: Outbox::default(),
         now_ns: 0,
@@ -130,6 +131,21 @@ impl<L: Lockstep, P: Fn(u64) -> Target<f32>> Emulated<L, P> {
         self.to_board.clear();
     }
 
+    /// Sends a request that the board itself may refuse.
+    fn request(&mut self, kind: u8, what: &str, out: &mut Outbox) {
+        let mut refused = None;
+        self.turn(&[], out, &mut |n| {
+            if let Notice::Refused(m) = n
+                && m.request == kind
+            {
+                refused = Some(m);
+            }
+        });
+        if let Some(m) = refused {
+            self.failure = Some(format!("the board refused to {what}: {}", crate::preflight::why(&m)));
+        }
+    }
+
     /// The settings, one by one: the board's answer to each is waited for.
     fn upload(&mut self, out: &mut Outbox) {
         let mut all = Vec::new();
@@ -163,22 +179,11 @@ impl<L: Lockstep, P: Fn(u64) -> Target<f32>> End for Emulated<L, P> {
     fn configure(&mut self, _: DacCode, out: &mut Outbox) {
         self.upload(out);
         self.remote.configure(&mut self.to_board);
-        let mut refused = None;
-        self.turn(&[], out, &mut |n| {
-            if let Notice::Refused(m) = n
-                && m.request == Configure::KIND
-            {
-                refused = Some(m);
-            }
-        });
-        if let Some(m) = refused {
-            let why = crate::preflight::why(&m);
-            self.failure = Some(format!("the board refused to be configured: {why}"));
-        }
+        self.request(Configure::KIND, "be configured", out);
     }
     fn arm(&mut self, out: &mut Outbox) {
         self.remote.arm(&mut self.to_board);
-        self.turn(&[], out, &mut |_| ());
+        self.request(Arm::KIND, "be armed", out);
     }
     fn ping(&mut self, nonce: u32, out: &mut Outbox) {
         self.remote.ping(nonce, &mut self.to_board);

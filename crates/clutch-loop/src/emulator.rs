@@ -267,17 +267,16 @@ impl SerialBoard {
         self.said_to_daq.clear();
         // Each frame of encoder and converter makes it say one of these to the host, but for samples before
         // consent.
-        let said = |m: &Message| {
-            matches!(
-                m,
-                Message::Telemetry(_)
-                    | Message::Hello(_)
-                    | Message::Configured(_)
-                    | Message::Armed(_)
-                    | Message::Pong(_)
-                    | Message::Stopped(_)
-                    | Message::Fault(_)
-            )
+        let said = |m: &Message| match m {
+            Message::Telemetry(_)
+            | Message::Hello(_)
+            | Message::Configured(_)
+            | Message::Armed(_)
+            | Message::Pong(_)
+            | Message::Stopped(_)
+            | Message::Fault(_) => true,
+            Message::Refused(m) => m.request != Set::KIND,
+            _ => false,
         };
         let decoder = &mut self.from_rig;
         let ready = BoardState::Ready as u8;

@@ -318,17 +318,21 @@ impl<'a, E: End> Talk<'a, E> {
     /// The board is silent.
     pub fn clock(&mut self) -> Result<ClockOffset, PreflightError> {
         let mut best: Option<ClockOffset> = None;
+        let mut sent = [0; 8];
         for nonce in 0..8 {
-            let sent = monotonic_ns();
+            sent[nonce as usize] = monotonic_ns();
             let answer = self.exchange(
                 Duration::from_millis(90),
                 |end, out| end.ping(nonce, out),
                 |n| match n {
-                    Notice::Pong(n, time_us) if *n == nonce => Some((*time_us, monotonic_ns())),
+                    // On a slow line the answer to an earlier one.
+                    Notice::Pong(n, time_us) => {
+                        Some((*sent.get(*n as usize).filter(|_| *n <= nonce)?, *time_us, monotonic_ns()))
+                    }
                     _ => None,
                 },
             )?;
-            let Some((time_us, received)) = answer else { continue };
+            let Some((sent, time_us, received)) = answer else { continue };
             let offset = ClockOffset::new(sent, received, time_us);
             if best.is_none_or(|b| offset.round_trip_us < b.round_trip_us) {
                 best = Some(offset);

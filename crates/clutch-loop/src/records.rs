@@ -3,13 +3,13 @@
 use crate::replay::START_VOLTAGE;
 use crate::setup::{self, SetupError};
 use clutch_core::law::{Limit, Terms};
-use clutch_core::supervisor::{Cause, Cycle, State};
+use clutch_core::supervisor::{Cycle, State};
 use clutch_core::{Dac, FixedCounts, Real, Servo};
 use clutch_log::{
     CommandRecord, CommandSource, EventKind, EventRecord, LinkRecord, LogError, LogWriter, Record,
     SampleRecord, Source, TruthRecord,
 };
-use clutch_node::{CycleNotice, LinkCounts};
+use clutch_node::{CycleNotice, Ending, LinkCounts};
 use clutch_sim::engine::Motion;
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{MovingRig, Scenario};
@@ -100,10 +100,16 @@ pub fn change<T: Real, X>(time_ns: u64, cycle: &Cycle<T, X>) -> Option<Record> {
 
 /// An end that no sample brought: silence, the board's own report, an operator, the path's end.
 #[must_use]
-pub fn ended(time_ns: u64, tick: u64, from: State, to: State, cause: Cause, value: f64) -> Record {
-    let kind = EventKind::Ended as u8;
-    let (from, to, cause) = (from as u8, to as u8, cause as u8);
-    Record::Event(EventRecord { tick, time_ns, kind, from, to, cause, value })
+pub fn ended<T: Real>(time_ns: u64, e: &Ending<T>) -> Record {
+    Record::Event(EventRecord {
+        tick: e.tick,
+        time_ns,
+        kind: EventKind::Ended as u8,
+        from: e.from as u8,
+        to: e.state as u8,
+        cause: e.cause as u8,
+        value: e.value.to_f64(),
+    })
 }
 
 /// Of a simulation: every sample with its command and the shaft's true state.

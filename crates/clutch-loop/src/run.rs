@@ -22,7 +22,7 @@ use crate::records;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Micros, Real, StickSlip, StickSlipState};
 use clutch_log::{EventKind, EventRecord, Header, LogError, LogWriter, Record};
-use clutch_node::{CycleNotice, LinkCounts, Notice, Outbox};
+use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Told};
 use clutch_sim::Metrics;
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
 use clutch_wire::{Refused, StopReason};
@@ -115,6 +115,10 @@ pub struct LoopReport {
     pub log_dropped: u64,
     /// Writes that the line took only in part: its buffer was full.
     pub cut_writes: u64,
+    /// Whether control began.
+    pub begun: bool,
+    /// Whether the board is the controller, and ends control by itself when it misses this machine.
+    pub on_the_board: bool,
     /// Whether the board said that it is in its safe state.
     pub board_safe: bool,
     /// Why the board did not take consent, if it did not.
@@ -165,6 +169,8 @@ struct Control<'a, E: End> {
     patient: bool,
     dropped: u64,
     dropped_told: u64,
+    untold: u64,
+    begun: bool,
     board_safe: bool,
     refused: Option<Refused>,
     cut: u64,
@@ -175,7 +181,7 @@ struct Control<'a, E: End> {
 struct Batch<T, X> {
     cycles: [Option<CycleNotice<T, X>>; 32],
     used: usize,
-    ended: Option<Cause>,
+    ended: Option<Ending<T>>,
     pong: Option<(u32, u32)>,
     stopped: bool,
     refused: Option<Refused>,
@@ -223,7 +229,6 @@ impl<E: End> Control<'_, E> {
 
     fn hear(&mut self, arrived_ns: u64, bytes: &[u8]) -> Result<(), std::io::Error> {
         let now = monotonic_ns();
-        let from = self.end.told().state;
         let mut batch = Batch::<E::Scalar, E::Terms> {
             cycles: [const { None }; 32],
             used: 0,
@@ -243,7 +248,7 @@ impl<E: End> Control<'_, E> {
                     // What came before consent is not logged.
                     None => lost_records += if n.cycle.from == State::Ready { 0 } else { 2 },
                 },
-                Notice::Ended(cause) => batch.ended = Some(cause),
+                Notice::Ended(ending) => batch.ended = Some(ending),
                 Notice::Pong(nonce, time_us) => batch.pong = Some((nonce, time_us)),
                 Notice::Stopped(_) => batch.stopped = true,
                 Notice::Refused(m) => batch.refused = Some(m),
@@ -252,6 +257,10 @@ impl<E: End> Control<'_, E> {
             self.end.receive(now, bytes, &mut self.out, &mut notices);
             self.end.poll(now, &mut self.out, &mut notices);
         }
+        // A cycle that the board did not tell of is missing like one that the log did not take.
+        let untold = self.end.told().untold;
+        lost_records += 2 * untold.saturating_sub(self.untold);
+        self.untold = untold;
         self.dropped += if self.ring.is_some() { lost_records } else { 0 };
         if !self.out.is_empty() {
             self.send()?;
@@ -272,7 +281,7 @@ impl<E: End> Control<'_, E> {
                 self.last_arrival_ns = Some(arrived_ns);
             }
         }
-        self.after(now, from, &batch);
+        self.after(now, &batch);
         Ok(())
     }
 
@@ -289,7 +298,7 @@ impl<E: End> Control<'_, E> {
     }
 
     /// What need not be done before the answer is on its way: log, figures, watcher.
-    fn after(&mut self, now: u64, from: State, batch: &Batch<E::Scalar, E::Terms>) {
+    fn after(&mut self, now: u64, batch: &Batch<E::Scalar, E::Terms>) {
         let time_ns = now.saturating_sub(self.start_ns);
         self.refused = self.refused.or(batch.refused);
         // What came before consent is not of the run.
@@ -327,11 +336,8 @@ impl<E: End> Control<'_, E> {
             }
         }
         self.board_safe |= batch.stopped;
-        let state = self.end.told();
-        if let Some(cause) = batch.ended {
-            let value = state.value.to_f64();
-            let record = records::ended(time_ns, state.tick, from, state.state, cause, value);
-            self.push(&[record]);
+        if let Some(ending) = batch.ended.filter(|e| e.from != State::Ready) {
+            self.push(&[records::ended(time_ns, &ending)]);
         }
         if let (Some((nonce, time_us)), Some((sent, sent_ns))) = (batch.pong, self.ping_sent)
             && nonce == sent
@@ -382,10 +388,11 @@ impl<E: End> Control<'_, E> {
         if E::IS_CONTROLLER {
             return; // the board says when it has ended
         }
-        let state = self.end.told();
-        let now = monotonic_ns().saturating_sub(self.start_ns);
-        let record = records::ended(now, state.tick, from, state.state, state.cause, 0.0);
-        self.push(&[record]);
+        let Told { state, cause, value, tick, .. } = self.end.told();
+        if from != State::Ready {
+            let now = monotonic_ns().saturating_sub(self.start_ns);
+            self.push(&[records::ended(now, &Ending { from, state, cause, value, tick })]);
+        }
     }
 }
 
@@ -504,6 +511,8 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
         patient: configured.patient,
         dropped: 0,
         dropped_told: 0,
+        untold: 0,
+        begun: false,
         board_safe: false,
         refused: None,
         cut: 0,
@@ -525,16 +534,24 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
         let arrived = match options.pace {
             _ if c.end.told().state == State::Ready => {
                 let now = monotonic_ns();
-                if c.refused.is_some() || now >= give_up || c.watch.stop.load(Ordering::Relaxed) {
+                let unasked = ask_again == 0;
+                let leave = now >= give_up || c.watch.stop.load(Ordering::Relaxed);
+                if c.refused.is_some() || leave && unasked {
                     break;
                 }
-                if now >= ask_again {
-                    ask_again = now + 100_000_000;
-                    c.end.arm(&mut c.out);
-                    if let Err(error) = c.send() {
-                        port_error = Some(error);
+                if leave {
+                    // Consent may have come through, and the word of it not.
+                    c.stop(StopReason::Operator);
+                    if now >= *farewell.get_or_insert(now + FAREWELL.as_nanos() as u64) || c.board_safe {
                         break;
                     }
+                } else if now >= ask_again {
+                    ask_again = now + 100_000_000;
+                    c.end.arm(&mut c.out);
+                }
+                if let Err(error) = c.send() {
+                    port_error = Some(error);
+                    break;
                 }
                 let _ = wait_readable(c.port.as_fd(), now + 10_000_000, WaitMode::Sleep);
                 monotonic_ns()
@@ -583,6 +600,7 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
         match c.end.told().state {
             State::Ready => {}
             State::Running | State::Armed => {
+                c.begun = true;
                 if c.watch.stop.load(Ordering::Relaxed) {
                     c.stop(StopReason::Operator);
                 } else if !E::IS_CONTROLLER
@@ -653,8 +671,10 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
         tick_cycles: c.tick_cycles.summary(),
         untold: state.untold,
         notes,
-        log_dropped: c.dropped,
+        log_dropped: c.dropped.saturating_sub(2 * c.untold),
         cut_writes: c.cut,
+        begun: c.begun,
+        on_the_board: E::IS_CONTROLLER,
         board_safe: c.board_safe,
         refused: c.refused,
         port_error,

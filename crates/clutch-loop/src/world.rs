@@ -6,12 +6,13 @@
 use crate::end::{End, Tells};
 use crate::faults::{Direction, Fault};
 use crate::line::Line;
+use crate::preflight;
 use crate::records;
 use crate::sim_board::{SimBoard, SimBoardError};
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Micros, Real, Target};
 use clutch_log::Record;
-use clutch_node::{Notice, Outbox};
+use clutch_node::{Ending, Notice, Outbox, Told};
 use clutch_sim::engine::{Event, Motion, Shaft};
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
 use clutch_sim::{Metrics, Scenario};
@@ -69,8 +70,10 @@ impl Default for WorldParams {
 /// What became of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Why the controller ended control.
+    /// Why the controller ended control, if by a fault.
     pub cause: Option<Cause>,
+    /// Where the controller stood last, and why.
+    pub end: (State, Cause),
     /// When the fault first showed, s after arming.
     pub hit: Option<f64>,
     /// When the controller faulted, s after arming.
@@ -109,6 +112,9 @@ pub enum WorldError {
     /// The controller's end.
     #[error("{0}")]
     Controller(String),
+    /// Encoder and converter, or the controller, before control began.
+    #[error("the board did not take the run: {0}")]
+    Refused(String),
 }
 
 /// A sample of the shaft that waits for its answer.
@@ -166,6 +172,7 @@ impl<E: End> World<E> {
         let mut busy_until = 0;
         let (mut sampled, mut first_sample) = (0, None);
         self.end.discover(1, &mut out);
+        self.sound()?;
         let present = self.board.code();
         outcome.present = present.0;
         self.down.send(0, None, out.as_bytes());
@@ -243,8 +250,7 @@ impl<E: End> World<E> {
             }
             let mut records = Vec::new();
             let time_ns = now.saturating_sub(origin_ns);
-            let from = self.end.told().state;
-            let mut ended = None;
+            let (mut ended, mut refused) = (None, None);
             let mut greeted = false;
             {
                 let (armed_now, rig) = (&mut armed, self.board.rig());
@@ -264,7 +270,8 @@ impl<E: End> World<E> {
                         records.extend(records::change(time_ns, &n.cycle));
                         records.push(Record::Truth(records::truth(time_ns, n.cycle.tick, rig)));
                     }
-                    Notice::Ended(cause) => ended = Some(cause),
+                    Notice::Ended(ending) => ended = Some(ending),
+                    Notice::Refused(m) if !*armed_now => refused = Some(m),
                     _ => {}
                 };
                 while let Some(bytes) = self.up.arrived(now) {
@@ -276,8 +283,9 @@ impl<E: End> World<E> {
                 hello = true;
                 self.end.configure(present, &mut out);
             }
-            if let Some(why) = self.end.failure() {
-                return Err(WorldError::Controller(why));
+            self.sound()?;
+            if let Some(m) = refused {
+                return Err(WorldError::Refused(preflight::why(&m)));
             }
             if configured && !asked && self.board.samples() >= 3 {
                 asked = true;
@@ -288,8 +296,8 @@ impl<E: End> World<E> {
             if state == State::Running && first_sample.is_none() {
                 first_sample = Some(sampled);
             }
-            if let Some(cause) = ended {
-                records.push(records::ended(time_ns, tick, from, state, cause, told.value.to_f64()));
+            if let Some(ending) = ended {
+                records.push(records::ended(time_ns, &ending));
             }
             if state == State::Faulted && outcome.tripped.is_none() {
                 outcome.tripped = armed_for;
@@ -297,8 +305,8 @@ impl<E: End> World<E> {
             }
             if !E::IS_CONTROLLER && state == State::Running && tick + 1 >= self.params.ticks {
                 self.end.stop(StopReason::Done, &mut out);
-                let to = self.end.told().state;
-                records.push(records::ended(time_ns, tick, state, to, Cause::Done, 0.0));
+                let Told { state: to, cause, value, .. } = self.end.told();
+                records.push(records::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }));
             }
             if self.params.record {
                 outcome.records.append(&mut records);
@@ -317,7 +325,9 @@ impl<E: End> World<E> {
                 break;
             }
         }
-        outcome.lost = self.end.told().lost;
+        self.sound()?;
+        let told = self.end.told();
+        (outcome.end, outcome.lost) = ((told.state, told.cause), told.lost);
         outcome.board = Some(self.board.node().state());
         outcome.hit = [self.up.hits().1, self.down.hits().1, self.board.first_hit_ns()]
             .into_iter()
@@ -329,6 +339,11 @@ impl<E: End> World<E> {
         outcome.overrun =
             outcome.overrun.max(self.beyond(at_end, path, safe_at.unwrap_or(self.now_ns), origin_ns));
         Ok(outcome)
+    }
+
+    /// An error if the controller's end cannot go on.
+    fn sound(&self) -> Result<(), WorldError> {
+        self.end.failure().map_or(Ok(()), |why| Err(WorldError::Controller(why)))
     }
 
     /// How far a position lies beyond the path's at a time.

@@ -90,7 +90,22 @@ pub enum Notice<T, Terms> {
     /// A sample of this run.
     Cycle(CycleNotice<T, Terms>),
     /// The supervisor ended control without a sample.
-    Ended(Cause),
+    Ended(Ending<T>),
+}
+
+/// An end of control that no sample brought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ending<T> {
+    /// The supervisor's state before it.
+    pub from: State,
+    /// And after it.
+    pub state: State,
+    /// Why.
+    pub cause: Cause,
+    /// What the check saw.
+    pub value: T,
+    /// The run's tick.
+    pub tick: u64,
 }
 
 /// The controller's state machine. Times are the host's monotonic clock, ns.
@@ -233,8 +248,9 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
     pub fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
         if self.poll_at().is_some_and(|at| now_ns >= at) {
             self.silence_told = true;
+            let from = self.state.state();
             self.supervisor.silence(&mut self.state, u32::MAX);
-            self.after_fault(out, notices);
+            self.after_fault(from, out, notices);
         }
     }
 
@@ -304,8 +320,9 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
             Message::Stopped(m) if m.run == run => notices(Notice::Stopped(*m)),
             Message::Fault(m) if m.run == run => {
                 notices(Notice::BoardFault(*m));
+                let from = self.state.state();
                 self.supervisor.board_fault(&mut self.state, T::from_i32(i32::from(m.cause)));
-                self.after_fault(out, notices);
+                self.after_fault(from, out, notices);
             }
             Message::Discover(_)
             | Message::Configure(_)
@@ -395,11 +412,17 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
         *counter = counter.wrapping_add(1);
     }
 
-    fn after_fault(&mut self, out: &mut Outbox, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
+    fn after_fault(&mut self, from: State, out: &mut Outbox, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
         if self.state.state() == State::Faulted && self.stopping.is_none() {
-            notices(Notice::Ended(self.state.cause()));
+            notices(Notice::Ended(self.ending(from)));
             self.send_stop(StopReason::Fault, out);
         }
+    }
+
+    /// How control has ended; `from` is the state before.
+    pub(crate) fn ending(&self, from: State) -> Ending<T> {
+        let s = &self.state;
+        Ending { from, state: s.state(), cause: s.cause(), value: s.value(), tick: s.tick() }
     }
 
     fn send_stop(&mut self, reason: StopReason, out: &mut Outbox) {

@@ -30,7 +30,7 @@ mod standalone;
 mod telemetry;
 
 pub use board::{BoardNode, BoardParams};
-pub use control::{ControlNode, ControlParams, CycleNotice, LinkCounts, Notice};
+pub use control::{ControlNode, ControlParams, CycleNotice, Ending, LinkCounts, Notice};
 pub use counter::WideCounter;
 pub use onboard::{Onboard, OnboardParams, Ports, present_code};
 pub use outbox::Outbox;

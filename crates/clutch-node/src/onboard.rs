@@ -13,7 +13,7 @@
 //! samples. A host that falls silent ends the run in the safe state.
 
 use crate::board::misunderstood;
-use crate::control::{ControlNode, ControlParams, Notice};
+use crate::control::{ControlNode, ControlParams, Ending, Notice};
 use crate::outbox::Outbox;
 use crate::settings::{Built, MAX_KNOTS, Misfit, Path, SETTINGS_HASH, Settings};
 use crate::telemetry::{frame, states};
@@ -22,7 +22,7 @@ use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Micros};
 use clutch_wire::{
     Armed, BoardState, Configure, Configured, Controller, Decoder, Discover, Ended, Hello, Link, Message,
-    Pong, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION,
+    Pong, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Taken, VERSION,
 };
 
 /// What a board in the controller role is.
@@ -69,7 +69,7 @@ pub struct Onboard {
     settings: Settings,
     /// The run that the settings are for.
     settings_run: u16,
-    /// Hears encoder and converter before the first run.
+    /// Hears encoder and converter while there is no run.
     introduced: Decoder,
     /// Encoder and converter, once they have answered.
     hello: Option<Hello>,
@@ -148,20 +148,20 @@ impl Onboard {
     /// Looks at the clock: silence of encoder and converter, silence of the host.
     pub fn poll(&mut self, now_ns: u64, out: &mut Ports) {
         let Some(run) = &mut self.run else { return };
-        let (number, from) = (run.number, run.control.state().state());
-        let mut ended = None;
+        let (number, mut ends) = (run.number, false);
+        let host = &mut out.host;
         run.control.poll(now_ns, &mut out.daq, &mut |n: Cycle| {
-            if let Notice::Ended(cause) = n {
-                ended = Some(cause);
+            if let Notice::Ended(ending) = n {
+                host.push(&ended(number, &ending));
+                ends = true;
             }
         });
+        if ends {
+            tell_link(run, &mut out.host);
+        }
         let silent = now_ns.saturating_sub(self.heard_ns);
         if run.driving() && run.host_silence_ns > 0 && silent >= run.host_silence_ns {
-            run.control.stop(StopReason::Operator, &mut out.daq);
-            ended = Some(run.control.state().cause());
-        }
-        if ended.is_some() {
-            tell_end(run, number, from, &mut out.host);
+            run.end(StopReason::Operator, out);
         }
     }
 
@@ -169,7 +169,6 @@ impl Onboard {
     pub fn host(&mut self, now_ns: u64, bytes: &[u8], out: &mut Ports) {
         for byte in bytes {
             if let Some(Ok(message)) = self.decoder.push(*byte) {
-                self.heard_ns = now_ns;
                 self.message(now_ns, &message, out);
             }
         }
@@ -177,22 +176,20 @@ impl Onboard {
 
     /// Bytes from encoder and converter.
     pub fn daq(&mut self, now_ns: u64, bytes: &[u8], out: &mut Ports) {
-        let spent = core::mem::take(&mut self.spent);
         let Some(run) = &mut self.run else {
             self.introduction(bytes, out);
             return;
         };
-        let (mut from, drove) = (run.control.state().state(), run.driving());
+        let drove = run.driving();
         let (number, config, boot) = (run.number, run.config, self.params.boot);
         let (host, told, path, points) = (&mut out.host, &mut run.told, &run.path, self.settings.points());
-        let (mut ended, mut armed, mut hello) = (false, false, None);
+        let (spent, mut armed, mut hello, mut ends) = (&mut self.spent, false, None, false);
         let at = |tick: u64| path.target(points, tick);
         run.control.receive(now_ns, bytes, &at, &mut out.daq, &mut |n: Cycle| match n {
             // Before consent nothing is driven, and the line stays free.
             Notice::Cycle(n) if n.cycle.state == State::Ready => {}
             Notice::Cycle(mut n) => {
-                n.cycles = spent;
-                from = n.cycle.state;
+                n.cycles = core::mem::take(spent);
                 *told = told.wrapping_add(1);
                 host.push(&Message::Telemetry(frame(number, *told, &n)));
             }
@@ -207,7 +204,11 @@ impl Onboard {
             }
             Notice::Stopped(m) => host.push(&Message::Stopped(m)),
             Notice::BoardFault(m) => host.push(&Message::Fault(m)),
-            Notice::Ended(_) => ended = true,
+            // Before the telemetry of the sample that shows it.
+            Notice::Ended(ending) => {
+                ends = true;
+                host.push(&ended(number, &ending));
+            }
             Notice::Hello(m) => hello = Some(m),
             Notice::Controller(_) | Notice::Taken(_) | Notice::BadFrame(_) | Notice::Echo => {}
         });
@@ -219,15 +220,12 @@ impl Onboard {
             // From now on the converter has not the code of power-up any more.
             hello.state = BoardState::Armed as u8;
         }
-        if ended {
-            tell_end(run, number, from, &mut out.host);
-        } else if drove && !run.driving() {
-            tell_link(run, &mut out.host); // the sample's telemetry has told the end
+        if ends || (drove && !run.driving()) {
+            tell_link(run, &mut out.host);
         }
         let state = run.control.state();
         if state.state() == State::Running && state.tick().saturating_add(1) >= run.ticks {
-            run.control.stop(StopReason::Done, &mut out.daq);
-            tell_end(run, number, State::Running, &mut out.host);
+            run.end(StopReason::Done, out);
         }
         if run.driving() && now_ns.saturating_sub(self.linked_ns) >= LINK_EVERY_NS {
             self.linked_ns = now_ns;
@@ -238,14 +236,28 @@ impl Onboard {
     /// Before there is a run: who are encoder and converter?
     fn introduction(&mut self, bytes: &[u8], out: &mut Ports) {
         for byte in bytes {
-            if let Some(Ok(Message::Hello(m))) = self.introduced.push(*byte) {
-                self.hello = Some(m);
-                out.host.push(&Message::Hello(m));
+            match self.introduced.push(*byte) {
+                Some(Ok(Message::Hello(m))) => {
+                    self.hello = Some(m);
+                    out.host.push(&Message::Hello(m));
+                }
+                Some(Ok(Message::Refused(m))) => out.host.push(&Message::Refused(m)),
+                _ => {}
             }
         }
     }
 
     fn message(&mut self, now_ns: u64, message: &Message, out: &mut Ports) {
+        match message {
+            // What only a host says shows that it lives; an echo of this board's own words does not.
+            Message::Discover(_)
+            | Message::Set(_)
+            | Message::Configure(_)
+            | Message::Arm(_)
+            | Message::Stop(_)
+            | Message::Ping(_) => self.heard_ns = now_ns,
+            _ => return,
+        }
         match message {
             Message::Discover(m) => self.discover(m, out),
             Message::Set(m) => self.set(m, &mut out.host),
@@ -255,14 +267,22 @@ impl Onboard {
                     out.host.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
                 }
             }
-            Message::Arm(m) => match &mut self.run {
-                Some(run) if run.number == m.run && run.config == m.config => run.control.arm(&mut out.daq),
-                _ => {
-                    let (reason, value) = (Refusal::Run as u8, self.number().into());
-                    let request = clutch_wire::Arm::KIND;
-                    out.host.push(&Message::Refused(Refused { request, reason, value }));
-                }
-            },
+            Message::Arm(m) => {
+                let state = self.state();
+                let refusal = match &mut self.run {
+                    Some(run) if run.number == m.run && run.config == m.config => match state {
+                        State::Ready | State::Armed | State::Running => {
+                            run.control.arm(&mut out.daq);
+                            return;
+                        }
+                        _ => (Refusal::State, state as u32),
+                    },
+                    _ => (Refusal::Run, u32::from(self.number())),
+                };
+                let (reason, value) = (refusal.0 as u8, refusal.1);
+                let request = clutch_wire::Arm::KIND;
+                out.host.push(&Message::Refused(Refused { request, reason, value }));
+            }
             Message::Stop(m) => self.stop(m, out),
             Message::Ping(m) => match &mut self.run {
                 Some(run) if run.number == m.run => run.control.ping(m.nonce, &mut out.daq),
@@ -363,15 +383,10 @@ impl Onboard {
 
     fn stop(&mut self, m: &Stop, out: &mut Ports) {
         let Some(run) = self.run.as_mut().filter(|r| r.number == m.run) else { return };
-        let from = run.control.state().state();
         let reason = if m.reason == StopReason::Done as u8 { StopReason::Done } else { StopReason::Operator };
-        run.control.stop(reason, &mut out.daq);
-        if run.control.state().state() == from {
-            // It has ended before; the host asks again until it hears so.
-            let code = run.control.state().code().0;
-            out.host.push(&Message::Stopped(Stopped { run: m.run, reason: m.reason, code }));
-        } else {
-            tell_end(run, m.run, from, &mut out.host);
+        if !run.end(reason, out) {
+            // It has ended before. Encoder and converter are told again, and say where they are.
+            out.daq.push(&Message::Stop(*m));
         }
     }
 }
@@ -380,18 +395,28 @@ impl Run {
     fn driving(&self) -> bool {
         matches!(self.control.state().state(), State::Armed | State::Running)
     }
+
+    /// Ends control as wanted and tells the host; whether there was anything to end.
+    fn end(&mut self, reason: StopReason, out: &mut Ports) -> bool {
+        let from = self.control.state().state();
+        self.control.stop(reason, &mut out.daq);
+        let ends = self.control.state().state() != from;
+        if ends {
+            out.host.push(&ended(self.number, &self.control.ending(from)));
+            tell_link(self, &mut out.host);
+        }
+        ends
+    }
 }
 
-fn tell_end(run: &Run, number: u16, from: State, host: &mut Outbox) {
-    let state = run.control.state();
-    host.push(&Message::Ended(Ended {
-        run: number,
-        tick: state.tick() as u32,
-        states: states(from, state.state()),
-        cause: state.cause() as u8,
-        value: state.value().to_bits(),
-    }));
-    tell_link(run, host);
+fn ended(run: u16, ending: &Ending<f32>) -> Message {
+    Message::Ended(Ended {
+        run,
+        tick: ending.tick as u32,
+        states: states(ending.from, ending.state),
+        cause: ending.cause as u8,
+        value: ending.value.to_bits(),
+    })
 }
 
 fn tell_link(run: &Run, host: &mut Outbox) {

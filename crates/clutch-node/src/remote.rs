@@ -1,6 +1,6 @@
 //! The host's end of a board in the controller role: it configures, consents, and hears.
 
-use crate::control::{LinkCounts, Notice};
+use crate::control::{Ending, LinkCounts, Notice};
 use crate::outbox::Outbox;
 use crate::telemetry::{both_states, notice};
 use clutch_core::law::{Law, LawTerms};
@@ -53,6 +53,10 @@ pub struct RemoteNode {
     silent_ns: u64,
     pings: u32,
     stopping: Option<StopReason>,
+    /// The board's converter has said that it is in its safe output.
+    stopped: bool,
+    /// It has been silent for too long: what it tells later does not bring the run back.
+    given_up: bool,
 }
 
 impl RemoteNode {
@@ -76,6 +80,8 @@ impl RemoteNode {
             silent_ns,
             pings: 0,
             stopping: None,
+            stopped: false,
+            given_up: false,
         }
     }
 
@@ -162,6 +168,9 @@ impl RemoteNode {
     /// When [`RemoteNode::poll`] has to be called at the latest, ns.
     #[must_use]
     pub fn poll_at(&self) -> Option<u64> {
+        if self.asks_to_stop() {
+            return Some(self.due_ns);
+        }
         self.driving()
             .then(|| self.heard_ns.map_or(self.due_ns, |t| t.saturating_add(self.silent_ns).min(self.due_ns)))
     }
@@ -173,8 +182,15 @@ impl RemoteNode {
         out: &mut Outbox,
         notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
     ) {
-        if !self.driving() {
+        if !self.driving() && !self.asks_to_stop() {
             return;
+        }
+        if self.driving() && self.heard_ns.is_some_and(|t| now_ns.saturating_sub(t) >= self.silent_ns) {
+            // It may hear all the same, and still drive.
+            self.given_up = true;
+            self.end(State::Faulted, Cause::Silence, 0.0, notices);
+            self.stopping.get_or_insert(StopReason::Operator);
+            self.due_ns = now_ns;
         }
         if now_ns >= self.due_ns {
             self.due_ns = now_ns.saturating_add(self.alive_ns);
@@ -185,10 +201,23 @@ impl RemoteNode {
                 self.send_stop(reason, out);
             }
         }
-        if self.heard_ns.is_some_and(|t| now_ns.saturating_sub(t) >= self.silent_ns) {
-            (self.told.state, self.told.cause) = (State::Faulted, Cause::Silence);
-            notices(Notice::Ended(Cause::Silence));
-        }
+    }
+
+    /// The board has been asked to stop, and has not said that it has.
+    fn asks_to_stop(&self) -> bool {
+        self.stopping.is_some() && !self.stopped
+    }
+
+    fn end(
+        &mut self,
+        state: State,
+        cause: Cause,
+        value: f32,
+        notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
+    ) {
+        let from = self.told.state;
+        (self.told.state, self.told.cause, self.told.value) = (state, cause, value);
+        notices(Notice::Ended(Ending { from, state, cause, value, tick: self.told.tick }));
     }
 
     /// Bytes from the board. `path` is the planned path from position 0 on.
@@ -226,8 +255,8 @@ impl RemoteNode {
             Message::Configured(m) if m.run == run && m.config == config => {
                 if self.told.state == State::Disconnected {
                     self.told.state = State::Ready;
+                    self.number = 0;
                 }
-                self.number = 0;
                 notices(Notice::Configured);
             }
             Message::Armed(m) if m.run == run && m.config == config => {
@@ -240,19 +269,20 @@ impl RemoteNode {
             }
             Message::Refused(m) => notices(Notice::Refused(*m)),
             Message::Pong(m) if m.run == run => notices(Notice::Pong(m.nonce, m.time_us)),
-            Message::Stopped(m) if m.run == run => notices(Notice::Stopped(*m)),
+            Message::Stopped(m) if m.run == run => {
+                self.stopped = true;
+                notices(Notice::Stopped(*m));
+            }
             Message::Fault(m) if m.run == run => notices(Notice::BoardFault(*m)),
             Message::Telemetry(m) if m.run == run => self.telemetry(now_ns, m, path, notices),
             Message::Ended(m) if m.run == run => {
                 let Some((_, state)) = both_states(m.states) else { return };
+                let runs = self.driving() || self.told.state == State::Ready;
                 // Told again, it is not news.
-                if state == self.told.state || !self.driving() {
-                    return;
+                if state != self.told.state && runs {
+                    let cause = Cause::from_u8(m.cause).unwrap_or_default();
+                    self.end(state, cause, f32::from_bits(m.value), notices);
                 }
-                self.told.state = state;
-                self.told.cause = Cause::from_u8(m.cause).unwrap_or_default();
-                self.told.value = f32::from_bits(m.value);
-                notices(Notice::Ended(self.told.cause));
             }
             Message::Link(m) if m.run == run => {
                 let wide = u64::from;
@@ -299,6 +329,9 @@ impl RemoteNode {
         path: &impl Fn(u64) -> Target<f32>,
         notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
     ) {
+        if self.given_up {
+            return;
+        }
         self.heard_ns = Some(now_ns);
         let gap = m.number.wrapping_sub(self.number).wrapping_sub(1);
         // Half the range back is a frame that came twice.
@@ -324,6 +357,11 @@ impl RemoteNode {
         };
         let Some(notice) = notice(m, &kind, self.servo.dac(), tick, target) else { return };
         let cycle = &notice.cycle;
+        // The word of the end got lost.
+        let ended = !matches!(cycle.from, State::Ready | State::Armed | State::Running);
+        if self.driving() && ended {
+            self.end(cycle.from, cycle.cause, cycle.value, notices);
+        }
         self.told.tick = tick;
         self.told.state = cycle.state;
         self.told.cause = cycle.cause;

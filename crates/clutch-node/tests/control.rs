@@ -8,7 +8,7 @@ use clutch_core::{
     Bounds, Counts, DacCode, Encoder, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams,
     Supervisor, SupervisorParams, Target, Tolerances,
 };
-use clutch_node::{BoardNode, BoardParams, ControlNode, ControlParams, LinkCounts, Notice, Outbox};
+use clutch_node::{BoardNode, BoardParams, ControlNode, ControlParams, Ending, LinkCounts, Notice, Outbox};
 use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, FrameError,
     Hello, Message, Ping, Pong, Refused, SCHEMA, STATUS_ENCODER_FAULT, STATUS_LATE, SafeKind, Sample, Stop,
@@ -337,7 +337,11 @@ fn silence_is_noticed_in_its_nanosecond_and_told_once() {
     assert_eq!(desk.state(), State::Running);
     desk.now = last + 3_000_000;
     assert_eq!(desk.polls(), stop(StopReason::Fault));
-    assert!(matches!(desk.notices[..], [Notice::Ended(Cause::Silence)]), "{:?}", desk.notices);
+    assert!(
+        matches!(desk.notices[..], [Notice::Ended(Ending { cause: Cause::Silence, .. })]),
+        "{:?}",
+        desk.notices
+    );
     assert_eq!((desk.state(), desk.node.state().code()), (State::Faulted, DacCode(SAFE)));
     for _ in 0..3 {
         desk.now += 3_000_000;
@@ -366,7 +370,8 @@ fn a_board_that_went_safe_by_itself_ends_control() {
     let mut desk = Desk::running();
     let fault = Fault { run: RUN, sequence: 4, time_us: 7, cause: BoardFault::Watchdog as u8, value: 3000 };
     assert_eq!(desk.reads(&[Message::Fault(fault)]), stop(StopReason::Fault));
-    let [Notice::BoardFault(told), Notice::Ended(Cause::Board)] = desk.notices[..] else {
+    let [Notice::BoardFault(told), Notice::Ended(Ending { cause: Cause::Board, .. })] = desk.notices[..]
+    else {
         panic!("{:?}", desk.notices)
     };
     assert_eq!(told, fault);

@@ -7,7 +7,7 @@ mod desk;
 use clutch_core::law::{CtcParams, LawParams, Limit, SmcParams, SmcSignParams};
 use clutch_core::supervisor::{Arrival, Cause, State};
 use clutch_core::{FixedCounts, Micros, SafeState, SupervisorParams};
-use clutch_node::{MAX_KNOTS, Notice, Onboard, Outbox, Ports, SETTINGS, SETTINGS_HASH};
+use clutch_node::{Ending, MAX_KNOTS, Notice, Onboard, Outbox, Ports, SETTINGS, SETTINGS_HASH};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configure, Configured, Controller, Discover, Message, Ping, Refusal,
     Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION, encode,
@@ -489,12 +489,31 @@ fn for_the_host_a_board_that_says_nothing_more_has_ended() {
     let mut desk = Desk::running(Plan::new());
     let told = desk.now_ns;
     let mut ended = Vec::new();
-    for _ in 0..BOARD_SILENCE_NS / MS + 5 {
-        desk.now_ns = desk.remote.poll_at().unwrap_or(desk.now_ns + MS);
-        desk.remote.poll(desk.now_ns, &mut Outbox::default(), &mut |n| ended.push((desk.now_ns - told, n)));
+    let mut out = Outbox::default();
+    while ended.is_empty() {
+        desk.now_ns = desk.remote.poll_at().unwrap();
+        out.clear();
+        desk.remote.poll(desk.now_ns, &mut out, &mut |n| ended.push((desk.now_ns - told, n)));
     }
-    assert!(matches!(ended[..], [(BOARD_SILENCE_NS, Notice::Ended(Cause::Silence))]), "{ended:?}");
-    assert_eq!((desk.remote.told().state, desk.remote.poll_at()), (State::Faulted, None));
+    assert!(
+        matches!(ended[..], [(BOARD_SILENCE_NS, Notice::Ended(Ending { cause: Cause::Silence, .. }))]),
+        "{ended:?}"
+    );
+    assert_eq!(desk.remote.told().state, State::Faulted);
+    // It may hear all the same: it is asked to stop, until it says that it has.
+    for _ in 0..3 {
+        let asked = frames(out.as_bytes());
+        let stop = Message::Stop(Stop { run: 5, reason: StopReason::Operator as u8 });
+        assert!(asked.contains(&stop), "{asked:?}");
+        desk.now_ns = desk.remote.poll_at().unwrap();
+        out.clear();
+        desk.remote.poll(desk.now_ns, &mut out, &mut |n| ended.push((desk.now_ns - told, n)));
+    }
+    assert_eq!(ended.len(), 1, "told once: {ended:?}");
+    let stopped = Message::Stopped(Stopped { run: 5, reason: 2, code: 3072 });
+    let path = |_| clutch_core::Target::default();
+    desk.remote.receive(desk.now_ns, encode(&stopped).as_bytes(), &path, &mut |_| ());
+    assert_eq!(desk.remote.poll_at(), None);
 }
 
 #[test]
@@ -666,7 +685,7 @@ fn a_second_run_is_like_the_first_after_whichever_end() {
         }
         desk.follows(3);
         let heard = desk.asks(|remote, out| remote.arm(out));
-        let state = if fault { BoardState::Faulted } else { BoardState::Stopped };
+        let state = if fault { State::Faulted } else { State::Holding };
         assert_eq!(heard, refused(Arm::KIND, Refusal::State, state as u32), "a run is over once");
         let servo = paper(LawParams::Smc(SmcParams::default()));
         desk.next(Plan { run: 6, servo, ticks: 100, ..Plan::new() });

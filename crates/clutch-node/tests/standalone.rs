@@ -198,7 +198,8 @@ fn a_sample_that_comes_late_finds_the_watchdogs_safe_output() {
         let heard = bench.hears();
         let bitten = |m: &Message| matches!(m, Message::Fault(f) if f.cause == BoardFault::Watchdog as u8);
         assert_eq!(heard.iter().any(bitten), bites);
-        let ends = bench.notices.iter().filter(|n| matches!(n, Notice::Ended(Cause::Board))).count();
+        let ends =
+            bench.notices.iter().filter(|n| matches!(n, Notice::Ended(e) if e.cause == Cause::Board)).count();
         assert_eq!(ends, usize::from(bites));
         let code = bench.chip.sample(bench.now_us, bench.shaft.counts(), false, false);
         assert_eq!(code == safe, bites, "and stays there");

@@ -120,7 +120,7 @@ codes! {
         Run = 3,
         /// The configuration hash is not the configured one; `value` is the low 32 bits of the board's.
         Config = 4,
-        /// Not in this state; `value` is the state.
+        /// Not in this state; `value` is the `BoardState`, and of a controller its own state of control.
         State = 5,
         /// The period is out of the board's range; `value` is the period asked for, µs.
         Period = 6,

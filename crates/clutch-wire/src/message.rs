@@ -471,7 +471,7 @@ messages! {
         value: u32 ["bits"],
     }
 
-    /// What the controller's own line has carried; each second.
+    /// What the controller's own line has carried; each second, and at each end.
     0x8D ToHost Link {
         /// The run.
         run: u16,

@@ -133,7 +133,7 @@ impl Board {
             dac_lowest_mv: DRIVER_MV.0,
             dac_highest_mv: DRIVER_MV.1,
             period_min_us: 500,
-            period_max_us: 5000,
+            period_max_us: 4000,
             watchdog_max_us: 100_000,
             boot_code: BOOT_CODE.0,
         }

@@ -211,15 +211,16 @@ pub fn run(mut node: Onboard) -> ! {
         if daq_bytes > 0 {
             node.daq(now_ns, daq.get(..daq_bytes).unwrap_or(&[]), &mut ports);
         }
-        node.host(now_ns, host.get(..host_bytes).unwrap_or(&[]), &mut ports);
-        node.poll(now_ns, &mut ports);
-        // The answer before anything else.
+        // The answer before anything else; what the host has to say to encoder and converter is none.
         let ticked = !ports.daq.is_empty();
         DAQ.flush(&mut ports.daq);
         if ticked {
             let late = clock.now_us().wrapping_sub(arrived);
             node.answered(Micros(u32::try_from(late).unwrap_or(u32::MAX)));
         }
+        node.host(now_ns, host.get(..host_bytes).unwrap_or(&[]), &mut ports);
+        node.poll(now_ns, &mut ports);
+        DAQ.flush(&mut ports.daq);
         // While it drives a shaft, only a completed tick shows that the board works.
         if ticked || !node.driving() {
             watchdog.feed();

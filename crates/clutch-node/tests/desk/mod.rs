@@ -342,7 +342,7 @@ impl Desk {
     pub fn ends(&self) -> Vec<clutch_core::supervisor::Cause> {
         self.notices
             .iter()
-            .filter_map(|n| if let Notice::Ended(cause) = n { Some(*cause) } else { None })
+            .filter_map(|n| if let Notice::Ended(ending) = n { Some(ending.cause) } else { None })
             .collect()
     }
 }
