@@ -2,6 +2,7 @@
 //! what breaks its line ends in the safe state.
 
 mod serial;
+mod verb;
 
 use clutch_core::supervisor::State;
 use clutch_log::{Limits, LogWriter, Record, Source};

@@ -1,5 +1,6 @@
 //! `clutch hil`.
 
+use crate::loop_verb::cause_text;
 use crate::table::quantities;
 use crate::{Outcome, ScenarioArgs, json, key_value, print, sim};
 use clap::{Args, ValueEnum};
@@ -111,9 +112,9 @@ impl Hil {
             log.finish()?;
         }
         print(&if self.json { summary(&scenario, &ran, took)? } else { self.text(&scenario, &ran, took) })?;
-        Ok(match ran.end {
-            (_, Cause::Done) => Outcome::Done,
-            (_, Cause::None) => Outcome::Failed,
+        Ok(match ran.end.cause {
+            Cause::Done => Outcome::Done,
+            Cause::None => Outcome::Failed,
             _ => Outcome::Fault,
         })
     }
@@ -149,12 +150,17 @@ impl Hil {
             text += &format!("log: {0}; clutch replay {0}\n", file.display());
         }
         let board = ran.board.map_or("gone".to_owned(), |s| format!("{s:?}").to_lowercase());
-        text += &match ran.end {
-            (_, Cause::Done) => format!("the path is done; encoder and converter are {board}\n"),
-            (state, Cause::None) => {
-                format!("control did not end: the board is {state:?}, encoder and converter are {board}\n")
+        let end = &ran.end;
+        text += &match end.cause {
+            Cause::None => {
+                let state = format!("{:?}", end.state).to_lowercase();
+                format!("control did not end: the board is {state}, encoder and converter are {board}\n")
             }
-            (_, cause) => format!("FAULT: {cause:?}; encoder and converter are {board}\n"),
+            cause => {
+                let fault = if cause == Cause::Done { "" } else { "FAULT: " };
+                let what = cause_text(cause, end.value, true, false);
+                format!("{fault}{what}; encoder and converter are {board}\n")
+            }
         };
         text
     }
@@ -168,9 +174,11 @@ fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> anyhow::Result<String> 
         "ticks": ran.answers,
         "took_s": took,
         "metrics": ran.metrics,
-        "state": format!("{:?}", ran.end.0),
-        "cause": format!("{:?}", ran.end.1),
+        "state": format!("{:?}", ran.end.state),
+        "cause": format!("{:?}", ran.end.cause),
+        "cause_text": cause_text(ran.end.cause, ran.end.value, true, false),
+        "value": ran.end.value,
         "board": ran.board.map(|s| format!("{s:?}")),
-        "lost": ran.lost,
+        "lost": ran.end.lost,
     }))
 }

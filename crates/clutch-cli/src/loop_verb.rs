@@ -560,12 +560,11 @@ fn status(watch: &Watch, period_us: u32, ticks: u64) {
     let _ = std::io::stderr().write_all(line.as_bytes()); // a terminal that has gone away
 }
 
-/// What ended control, in words.
-fn cause_text(report: &LoopReport, stopped: bool) -> String {
-    let v = report.value;
-    match report.cause {
+/// What ended control, in words; `v` is what the check saw, `stopped` whether somebody here has stopped it.
+pub(crate) fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> String {
+    match cause {
         Cause::Done => "the path is done".into(),
-        Cause::Operator if report.on_the_board && !stopped => {
+        Cause::Operator if on_the_board && !stopped => {
             "the board has not heard this machine for too long, and has ended the run".into()
         }
         Cause::Operator => "stopped by the operator".into(),
@@ -583,9 +582,7 @@ fn cause_text(report: &LoopReport, stopped: bool) -> String {
         Cause::NotFinite => "the law's demand was not a number".into(),
         Cause::Deadline => format!("answers came too late, the last after {v} µs"),
         // The board's own supervisor tells for how many periods.
-        Cause::Silence if report.on_the_board && v > 0.0 => {
-            "the board's encoder and converter fell silent".into()
-        }
+        Cause::Silence if on_the_board && v > 0.0 => "the board's encoder and converter fell silent".into(),
         Cause::Silence => "the board fell silent".into(),
         Cause::Board => match v as u8 {
             1 => "the board's watchdog went off: it got no valid answer in time".into(),
@@ -704,7 +701,7 @@ fn summary(
     }
     let missed = r.cause == Cause::Operator && !stopped;
     let fault = if r.state == State::Faulted || missed { "FAULT: " } else { "" };
-    text += &format!("{fault}{}; {safe}\n", cause_text(r, stopped));
+    text += &format!("{fault}{}; {safe}\n", cause_text(r.cause, r.value, r.on_the_board, stopped));
     text
 }
 
@@ -726,7 +723,7 @@ fn as_json(
         "version": env!("CARGO_PKG_VERSION"),
         "state": format!("{:?}", r.state),
         "cause": format!("{:?}", r.cause),
-        "cause_text": cause_text(r, stopped),
+        "cause_text": cause_text(r.cause, r.value, r.on_the_board, stopped),
         "value": r.value,
         "certified": certified,
         "ticks": r.ticks,

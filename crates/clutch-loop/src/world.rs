@@ -73,7 +73,7 @@ pub struct Outcome {
     /// Why the controller ended control, if by a fault.
     pub cause: Option<Cause>,
     /// Where the controller stood last, and why.
-    pub end: (State, Cause),
+    pub end: Told<f64>,
     /// When the fault first showed, s after arming.
     pub hit: Option<f64>,
     /// When the controller faulted, s after arming.
@@ -88,8 +88,6 @@ pub struct Outcome {
     pub volts: (f64, f64),
     /// Ticks in which the law answered.
     pub answers: u64,
-    /// Samples lost on the line.
-    pub lost: u64,
     /// What a log would hold.
     pub records: Vec<Record>,
     /// The code that the converter had when the controller was armed.
@@ -327,7 +325,7 @@ impl<E: End> World<E> {
         }
         self.sound()?;
         let told = self.end.told();
-        (outcome.end, outcome.lost) = ((told.state, told.cause), told.lost);
+        outcome.end = told.map(Real::to_f64);
         outcome.board = Some(self.board.node().state());
         outcome.hit = [self.up.hits().1, self.down.hits().1, self.board.first_hit_ns()]
             .into_iter()

@@ -32,6 +32,14 @@ pub struct Told<T> {
     pub untold: u64,
 }
 
+impl<T> Told<T> {
+    /// The same with another scalar.
+    pub fn map<U>(self, f: impl FnOnce(T) -> U) -> Told<U> {
+        let Told { state, cause, value, tick, lost, rejected, deadline_misses, untold } = self;
+        Told { state, cause, value: f(value), tick, lost, rejected, deadline_misses, untold }
+    }
+}
+
 /// The host's state machine for a board in the controller role. Times are the host's monotonic
 /// clock, ns.
 #[derive(Clone, Debug)]

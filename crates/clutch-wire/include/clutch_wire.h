@@ -46,7 +46,7 @@
 #define CLUTCH_REFUSAL_SCHEMA 2u /* Another table of messages; value is the low 32 bits of the board's schema hash. */
 #define CLUTCH_REFUSAL_RUN 3u /* The run number is not a new one (Configure) or not the configured one; value is the board's. */
 #define CLUTCH_REFUSAL_CONFIG 4u /* The configuration hash is not the configured one; value is the low 32 bits of the board's. */
-#define CLUTCH_REFUSAL_STATE 5u /* Not in this state; value is the state. */
+#define CLUTCH_REFUSAL_STATE 5u /* Not in this state; value is the BoardState, and of a controller its own state of control. */
 #define CLUTCH_REFUSAL_PERIOD 6u /* The period is out of the board's range; value is the period asked for, us. */
 #define CLUTCH_REFUSAL_WATCHDOG 7u /* The watchdog time is below two periods or above the board's limit; value is the time asked for, us. */
 #define CLUTCH_REFUSAL_SAFE 8u /* No such safe output: unknown kind, or a code above the converter's top; value is the kind. */
@@ -944,7 +944,7 @@ static inline void clutch_get_ended(const uint8_t *body, clutch_ended_t *m)
     m->value = clutch_get_u32(body + CLUTCH_ENDED_VALUE);
 }
 
-/* Link: What the controller's own line has carried; each second. */
+/* Link: What the controller's own line has carried; each second, and at each end. */
 #define CLUTCH_LINK_KIND 0x8du
 #define CLUTCH_LINK_LENGTH 43u
 #define CLUTCH_LINK_RUN 1u
