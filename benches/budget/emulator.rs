@@ -6,6 +6,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+const TARGET: &str = "thumbv7em-none-eabihf";
 const QEMU: &str = "qemu-system-arm";
 const BOARD: [&str; 9] = [
     "-machine",
@@ -46,6 +47,13 @@ pub(crate) fn no_emulator() -> Option<String> {
     missing(QEMU, "--version")
 }
 
+/// Whether images can be built.
+pub(crate) fn no_target() -> Option<String> {
+    let asked = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().ok()?;
+    let folder = PathBuf::from(String::from_utf8_lossy(&asked.stdout).trim());
+    (!folder.is_dir()).then(|| format!("the target is not there: rustup target add {TARGET}"))
+}
+
 /// Builds the images; the folder that they are in.
 pub(crate) fn build(firmware: &Path, peer: bool) -> Result<PathBuf> {
     let target = std::env::var_os("CLUTCH_FIRMWARE_TARGET_DIR")
@@ -55,6 +63,7 @@ pub(crate) fn build(firmware: &Path, peer: bool) -> Result<PathBuf> {
     command.current_dir(firmware).args([
         "build",
         "--release",
+        "--locked",
         "--package",
         "clutch-qemu-mps2",
         "--target-dir",
@@ -67,7 +76,14 @@ pub(crate) fn build(firmware: &Path, peer: bool) -> Result<PathBuf> {
     if !command.status().context("cargo cannot be started")?.success() {
         bail!("the images cannot be built");
     }
-    Ok(target.join("thumbv7em-none-eabihf/release"))
+    Ok(target.join(TARGET).join("release"))
+}
+
+/// The option that makes the emulator stop after each instruction; it has changed its name.
+fn one_instruction_at_a_time() -> Result<&'static [&'static str]> {
+    let help = Command::new(QEMU).arg("-help").output()?;
+    let old = String::from_utf8_lossy(&help.stdout).contains("-singlestep");
+    Ok(if old { &["-singlestep"] } else { &["-accel", "tcg,one-insn-per-tb=on"] })
 }
 
 fn qemu(image: &Path) -> Command {
@@ -115,7 +131,8 @@ pub(crate) fn trace(image: &Path, ranges: &[(u32, u32)]) -> Result<Vec<u32>> {
     let log = image.with_extension("trace");
     let filter: Vec<String> = ranges.iter().map(|(a, n)| format!("{a:#x}+{n:#x}")).collect();
     let run = qemu(image)
-        .args(["-singlestep", "-d", "exec,nochain", "-dfilter", &filter.join(","), "-D"])
+        .args(one_instruction_at_a_time()?)
+        .args(["-d", "exec,nochain", "-dfilter", &filter.join(","), "-D"])
         .arg(&log)
         .output()?;
     if !run.status.success() {

@@ -14,7 +14,7 @@ use anyhow::{Context, Result, bail};
 use clutch_benches::machine_code::{Bounds, Cost, Fault, Image, traced};
 use emulator::Measured;
 use plan::{Item, Plan};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -52,14 +52,11 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
     let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware");
     let plan = Plan::read(&firmware.join("budget.toml"))?;
     let no_gcc = emulator::missing("arm-none-eabi-gcc", "--version");
-    let images = match emulator::build(&firmware, no_gcc.is_none()) {
-        Ok(images) => images,
-        Err(error) => {
-            let add = "`rustup target add thumbv7em-none-eabihf`";
-            skipped(&format!("{error:#}; does {add} help?"))?;
-            return Ok(Vec::new());
-        }
-    };
+    if let Some(why) = emulator::no_target() {
+        skipped(&why)?;
+        return Ok(Vec::new());
+    }
+    let images = emulator::build(&firmware, no_gcc.is_none())?;
     let controller = Image::read(&images.join("mps2-controller"))?;
     let mut over = Vec::new();
     if part.is_none_or(|p| p == "size") {
@@ -106,10 +103,15 @@ fn told(faults: Vec<Fault>) -> anyhow::Error {
 fn all_bounds(image: &Image, plan: &Plan, loops: bool) -> Result<Vec<Cost>> {
     let facts = plan.facts();
     let mut all = Vec::new();
+    let mut unused: BTreeSet<String> = facts.names().collect();
     for item in &plan.items {
         let case = item.case();
         let mut bounds = Bounds::new(image, &facts, &case);
         all.push(bounds.of(&item.symbol).map_err(told).with_context(|| item.name.clone())?);
+        unused.retain(|name| !bounds.used(false).any(|used| used == name));
+        if let Some(fact) = case.names().find(|name| !bounds.used(true).any(|used| used == name)) {
+            bail!("{}: no code is meant by: {fact}", item.name);
+        }
         if loops {
             println!("\n{}:", item.name);
             for (f, length, cost) in bounds.functions() {
@@ -118,6 +120,10 @@ fn all_bounds(image: &Image, plan: &Plan, loops: bool) -> Result<Vec<Cost>> {
             }
             bounds.loops().for_each(|(address, what)| println!("{address:#x} {what}"));
         }
+    }
+    // One that means nothing here may mean something wrong tomorrow.
+    if !unused.is_empty() {
+        bail!("firmware/budget.toml: no code is meant by:\n{}", Vec::from_iter(unused).join("\n"));
     }
     Ok(all)
 }

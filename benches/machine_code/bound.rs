@@ -59,6 +59,8 @@ pub struct Bounds<'a> {
     found: Vec<Fault>,
     /// Loops and what they were taken for.
     told: BTreeMap<u32, String>,
+    /// The facts that were asked, of the case and of all.
+    used: BTreeSet<(bool, String)>,
 }
 
 /// Calls of one function that are few.
@@ -88,6 +90,7 @@ impl<'a> Bounds<'a> {
             faults: BTreeSet::new(),
             found: Vec::new(),
             told: BTreeMap::new(),
+            used: BTreeSet::new(),
         }
     }
 
@@ -113,6 +116,11 @@ impl<'a> Bounds<'a> {
     /// The loops that were met, by address, and the fact that bounds each.
     pub fn loops(&self) -> impl Iterator<Item = (u32, &str)> {
         self.told.iter().map(|(a, t)| (*a, t.as_str()))
+    }
+
+    /// The facts that the bounds rest on, by name: those of the case, or those of all cases.
+    pub fn used(&self, of_the_case: bool) -> impl Iterator<Item = &str> {
+        self.used.iter().filter(move |(case, _)| *case == of_the_case).map(|(_, name)| name.as_str())
     }
 
     fn fault(&mut self, fault: Fault) -> Cost {
@@ -218,12 +226,10 @@ impl<'a> Bounds<'a> {
             let (function, address) = (function.name.clone(), i.address);
             return self.fault(Fault::NoTarget { function, address, target });
         };
-        let cap = self
-            .case
-            .calls
-            .iter()
-            .chain(&self.facts.calls)
-            .find(|f| means(&f.function, &function.name) && means(&f.of, &callee.name));
+        let cap = both(&self.case.calls, &self.facts.calls)
+            .find(|(_, f)| means(&f.function, &function.name) && means(&f.of, &callee.name));
+        self.used.extend(cap.map(|(case, f)| (case, f.name())));
+        let cap = cap.map(|(_, f)| f);
         if cap.is_some_and(|c| c.most == 0) {
             return Cost::default();
         }
@@ -231,7 +237,10 @@ impl<'a> Bounds<'a> {
             let handed_on = length.filter(|_| length_register(&function.name).is_some());
             let stated =
                 self.facts.lengths.iter().find(|f| means(&f.function, &function.name) && callee.name == f.of);
-            handed_on.or_else(|| constant(before, register)).or(stated.map(|f| f.most))
+            handed_on.or_else(|| constant(before, register)).or_else(|| {
+                self.used.extend(stated.map(|f| (false, f.name())));
+                stated.map(|f| f.most)
+            })
         });
         if length_register(&callee.name).is_some() && bytes.is_none() {
             let (function, callee) = (function.name.clone(), callee.name.clone());
@@ -263,17 +272,19 @@ impl<'a> Bounds<'a> {
         let address = graph.address(round.head);
         let from = self.image.inlined_from(address);
         let outer = loops.iter().any(|l| l.head != round.head && round.body.contains(&l.head));
-        let fact = self.case.loops.iter().chain(&self.facts.loops).find(|f| {
+        let fact = both(&self.case.loops, &self.facts.loops).find(|(_, f)| {
             means(&f.function, &function.name)
                 && f.outer.is_none_or(|o| o == outer)
                 && f.of.as_ref().is_none_or(|of| from.iter().any(|name| means(of, name)))
         });
+        self.used.extend(fact.map(|(case, f)| (case, f.name())));
+        let fact = fact.map(|(_, f)| f);
         let worked = |f: &facts::LoopFact| Some(length? / f.step? + 1);
         let stated = fact.and_then(|f| f.most.or_else(|| worked(f)));
-        let each = fact.and_then(|f| f.by.as_ref()).map_or(1, |by| graph.least_each_round(round, by));
+        let each = fact.filter(|f| !f.by.is_empty()).map_or(1, |f| graph.least_each_round(round, &f.by));
         if let (Some(stated), Some(fact), 1..) = (stated, fact, each) {
             // In the last round, the head may be executed and none of what is counted.
-            let most = if fact.by.is_some() { stated / each + 1 } else { stated };
+            let most = if !fact.by.is_empty() { stated / each + 1 } else { stated };
             self.told.insert(address, format!("{}: {most}: {}", function.name, fact.why));
             return most.max(1);
         }
@@ -281,6 +292,11 @@ impl<'a> Bounds<'a> {
         self.fault(Fault::Unbounded { function: function.name.clone(), address, from });
         1
     }
+}
+
+/// The facts of a case, and then those of all cases.
+fn both<'f, F>(case: &'f [F], all: &'f [F]) -> impl Iterator<Item = (bool, &'f F)> {
+    case.iter().map(|f| (true, f)).chain(all.iter().map(|f| (false, f)))
 }
 
 /// The register in which a function on memory gets its number of bytes.
@@ -294,14 +310,19 @@ fn length_register(name: &str) -> Option<&'static str> {
     }
 }
 
-/// The constant that a register has been given last.
+/// The constant that a register has been given last, whatever was the case.
 fn constant(before: &[Instruction], register: &str) -> Option<u64> {
-    let last = before
-        .iter()
-        .rev()
-        .find(|i| matches!(i.flow, Flow::Call(_)) || i.operands.first().is_some_and(|o| o == register))?;
-    let [_, value] = &last.operands[..] else { return None };
-    if !last.name.starts_with("mov") || last.name == "movt" {
+    // What only reads its operands, none of which it names twice.
+    let reads = |i: &Instruction| {
+        ["str", "strb", "strh", "strd", "cmp", "cmn", "tst", "teq", "push"].contains(&i.name.as_str())
+            && !i.text.contains('!')
+            && !i.text.contains("], #")
+    };
+    let names =
+        |i: &Instruction| i.operands.iter().any(|o| o.trim_matches(['[', ']', '^']) == register) && !reads(i);
+    let last = before.iter().rev().find(|i| matches!(i.flow, Flow::Call(_)) || names(i))?;
+    let [to, value] = &last.operands[..] else { return None };
+    if !["mov", "movs", "movw"].contains(&last.name.as_str()) || last.conditional || to != register {
         return None;
     }
     let digits = value.strip_prefix('#')?;

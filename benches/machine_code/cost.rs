@@ -24,7 +24,10 @@ pub(super) fn cycles(i: &Instruction) -> Option<u64> {
         "mla" | "mls" => 2,
         "sdiv" | "udiv" => 12,
         "b" | "bl" | "bx" | "cbz" | "cbnz" => 1,
-        "ldr" | "ldrb" | "ldrh" | "ldrsb" | "ldrsh" | "str" | "strb" | "strh" => 2,
+        "ldrb" | "ldrsb" | "strb" => 2,
+        // Away from a multiple of their size, a word is moved in up to three pieces, a half-word in two.
+        "ldr" | "str" => 2 + if aligned(i) { 0 } else { 2 },
+        "ldrh" | "ldrsh" | "strh" => 2 + if aligned(i) { 0 } else { 1 },
         "ldrd" | "strd" => 3,
         "push" | "pop" => 1 + listed(0),
         "ldm" | "ldmdb" | "stm" | "stmdb" => 1 + listed(1),
@@ -39,6 +42,17 @@ pub(super) fn cycles(i: &Instruction) -> Option<u64> {
         "vldmia" | "vldmdb" | "vstmia" | "vstmdb" => 1 + listed(1) + doubles,
         _ => return None,
     })
+}
+
+/// Whether the code says that an address is a multiple of four: on the stack, or a constant beside the code.
+/// The other instructions that move words must not be given any other address.
+fn aligned(i: &Instruction) -> bool {
+    let Some((_, address)) = i.text.split_once('[') else { return false };
+    let Some(offset) = address.strip_prefix("sp").or(address.strip_prefix("pc")) else { return false };
+    let digits = offset.trim_start_matches([',', ' ', '#']).trim_end_matches(['!', ']']);
+    let number =
+        digits.strip_prefix("0x").map_or_else(|| digits.parse().ok(), |h| u32::from_str_radix(h, 16).ok());
+    digits.is_empty() || number.is_some_and(|n: u32| n.is_multiple_of(4))
 }
 
 /// Cycles for going on at an address other than the next.

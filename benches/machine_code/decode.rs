@@ -37,6 +37,8 @@ pub(super) struct Instruction {
     /// Operands in order, those of a list one by one.
     pub operands: Vec<String>,
     pub flow: Flow,
+    /// A condition may switch it off.
+    pub conditional: bool,
 }
 
 /// Decodes Thumb-2 with the floating-point extension of a Cortex-M4F.
@@ -69,7 +71,15 @@ impl Decoder {
             .collect();
         let text = format!("{} {op_str}", i.mnemonic().unwrap_or_default());
         let flow = flow(&name, &operands, op_str, conditional);
-        Some(Instruction { address: i.address() as u32, size: i.len() as u32, name, text, operands, flow })
+        Some(Instruction {
+            address: i.address() as u32,
+            size: i.len() as u32,
+            name,
+            text,
+            operands,
+            flow,
+            conditional,
+        })
     }
 }
 

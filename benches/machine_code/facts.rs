@@ -15,10 +15,38 @@ pub struct Facts {
     pub lengths: Vec<LengthFact>,
 }
 
+impl Facts {
+    /// Their names.
+    pub fn names(&self) -> impl Iterator<Item = String> {
+        let loops = self.loops.iter().map(LoopFact::name);
+        loops.chain(self.calls.iter().map(CallFact::name)).chain(self.lengths.iter().map(LengthFact::name))
+    }
+}
+
+impl LoopFact {
+    pub(super) fn name(&self) -> String {
+        let part =
+            |word: &str, of: &Option<String>| of.as_ref().map_or(String::new(), |o| format!(" {word} {o}"));
+        let by = (!self.by.is_empty()).then(|| self.by.join("/"));
+        format!("loop in {}{}{}", self.function, part("of", &self.of), part("by", &by))
+    }
+}
+
+impl CallFact {
+    pub(super) fn name(&self) -> String {
+        format!("calls in {} of {}", self.function, self.of)
+    }
+}
+
+impl LengthFact {
+    pub(super) fn name(&self) -> String {
+        format!("length in {} of {}", self.function, self.of)
+    }
+}
+
 /// How often a loop goes round, each time that it is entered from outside.
 ///
-/// `most` executions of its head; with `by`, `most` executions of instructions whose names begin
-/// with `by`. The second way holds however often the compiler has unrolled the loop: it is divided
+/// `most` executions of its head; with `by`, `most` executions of instructions of these names. The second way holds however often the compiler has unrolled the loop: it is divided
 /// by how many such instructions each way round has at least.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -30,8 +58,9 @@ pub struct LoopFact {
     pub of: Option<String>,
     /// Whether it has another loop within; without it, either.
     pub outer: Option<bool>,
-    /// The instruction that is counted, or the beginning of its name; without it, the head.
-    pub by: Option<String>,
+    /// The instructions that are counted; without them, the head.
+    #[serde(default)]
+    pub by: Vec<String>,
     /// How many at most.
     pub most: Option<u64>,
     /// For memcpy and its like, instead: bytes that one of them does.

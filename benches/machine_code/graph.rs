@@ -143,10 +143,13 @@ impl Graph {
         Ok(loops)
     }
 
-    /// The least number of instructions whose name begins with `name` on any way round a loop.
-    pub(super) fn least_each_round(&self, round: &Loop, name: &str) -> u64 {
+    /// The least number of instructions of these names on any way round a loop; those that a condition may
+    /// switch off and those on the stack, where a function keeps what has no register, do not count.
+    pub(super) fn least_each_round(&self, round: &Loop, names: &[String]) -> u64 {
         let count = |b: usize| -> u64 {
-            self.blocks[b].instructions.iter().filter(|i| i.name.starts_with(name)).count() as u64
+            let counts =
+                |i: &&Instruction| names.contains(&i.name) && !i.conditional && !i.text.contains("[sp");
+            self.blocks[b].instructions.iter().filter(counts).count() as u64
         };
         let mut least: BTreeMap<usize, u64> = BTreeMap::from([(round.head, count(round.head))]);
         let mut open = vec![round.head];

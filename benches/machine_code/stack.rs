@@ -123,9 +123,6 @@ fn moved(i: &Instruction, depth: i64) -> Option<i64> {
         "ldm" | "vldmia" if first == "sp" && writes_back => depth - words(1),
         "sub" | "subw" if first == "sp" => depth + number(i.operands.last())?,
         "add" | "addw" if first == "sp" => depth - number(i.operands.last())?,
-        // From the frame pointer, or from where an over-aligned frame has kept it: only at the end,
-        // where the stack gets shallower.
-        "mov" if first == "sp" => depth,
         "str" | "strd" if writes_back => {
             depth - number(i.operands.last().map(|o| o.trim_end_matches(']').to_owned()).as_ref())?
         }

@@ -14,7 +14,7 @@ fn image(functions: &[(&str, &[u16])]) -> Image {
 
 fn round(most: u64, by: Option<&str>) -> Facts {
     let why = "counted by hand".to_owned();
-    let (function, by) = ("f".to_owned(), by.map(str::to_owned));
+    let (function, by) = ("f".to_owned(), by.map(str::to_owned).into_iter().collect());
     let fact = LoopFact { function, of: None, outer: None, by, most: Some(most), step: None, why };
     Facts { loops: vec![fact], ..Facts::default() }
 }
@@ -158,4 +158,50 @@ fn a_way_that_was_gone_costs_what_it_costs_by_hand() {
     let calls = traced(&image, &[0x1000], trace.into_iter()).unwrap();
     assert_eq!(calls[&0x1000], [cost(3, 9), cost(4, 7)]);
     assert_eq!(traced(&image, &[0x1000], [0x2000].into_iter()), Err(Fault::Untraceable { address: 0x2000 }));
+}
+
+#[test]
+fn a_word_that_may_lie_across_two_costs_more() {
+    // ldr r0, [r1]; bx lr   and   ldr r0, [sp, #4]; bx lr   and   ldrh r0, [r1]; bx lr
+    assert_eq!(bound(&image(&[("f", &[0x6808, BX_LR])])), Ok(cost(2, 4 + 4)));
+    assert_eq!(bound(&image(&[("f", &[0x9801, BX_LR])])), Ok(cost(2, 2 + 4)));
+    assert_eq!(bound(&image(&[("f", &[0x8808, BX_LR])])), Ok(cost(2, 3 + 4)));
+}
+
+#[test]
+fn what_only_looks_like_what_is_counted_does_not_bound_a_loop() {
+    // 1: strb r2, [r0]; subs r1, #1; bne 1b; bx lr   and   str r2, [sp] in its place
+    for store in [0x7002, 0x9200] {
+        let image = image(&[("f", &[store, COUNT, 0xd1fc, BX_LR])]);
+        let faults = bound_with(&image, &round(6, Some("str"))).unwrap_err();
+        assert!(matches!(&faults[..], [Fault::Unbounded { .. }]));
+    }
+}
+
+#[test]
+fn a_length_that_depends_on_a_condition_is_not_known() {
+    // f: push {lr}; …; movs r2, #4; bl memcpy; pop {pc}   with cmp r0, #0; it eq before the length, or two nops
+    let f = |before: [u16; 2]| [0xb500, before[0], before[1], 0x2204, 0xf000, 0xf801, 0xbd00];
+    let (always, sometimes) = (f([0xbf00, 0xbf00]), f([0x2800, 0xbf08]));
+    assert!(bound(&image(&[("f", &always), ("memcpy", &[BX_LR])])).is_ok());
+    let faults = bound(&image(&[("f", &sometimes), ("memcpy", &[BX_LR])])).unwrap_err();
+    assert!(matches!(&faults[..], [Fault::Length { .. }]));
+}
+
+#[test]
+fn a_fact_tells_whether_it_was_needed() {
+    let image = image(&[("f", &[0x2105, COUNT, 0xd1fd, BX_LR])]);
+    let (facts, none) = (round(5, None), Facts::default());
+    let mut bounds = Bounds::new(&image, &facts, &none);
+    assert_eq!(bounds.used(false).count(), 0);
+    bounds.of("f").unwrap();
+    assert!(bounds.used(false).eq(facts.names()));
+    assert_eq!(bounds.used(true).count(), 0);
+}
+
+#[test]
+fn a_stack_pointer_from_a_register_is_an_error() {
+    // mov sp, r7; bx lr
+    let image = image(&[("f", &[0x46bd, BX_LR])]);
+    assert!(matches!(Stacks::new(&image).of("f"), Err(Fault::StackPointer { .. })));
 }
