@@ -1,10 +1,10 @@
-"""The wheel, built for any x86-64, against a build for this machine's own processor.
+"""The wheel, which chooses its code by the processor, against a build for this machine's own processor.
 
     python -m venv generic && generic/bin/pip install .
     python -m venv native && RUSTFLAGS="-C target-cpu=native" native/bin/pip install .
     python benches/python/native.py generic/bin/python native/bin/python
 
-Says whether there is anything to gain from choosing code by the processor at run time. Processes take turns; each gives
+Says whether more could be gained from choosing code by the processor at run time. Processes take turns; each gives
 the CPU seconds of 40 runs on one thread, and the least of its turns counts.
 """
 

@@ -15,6 +15,10 @@ import importlib
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+# Before the native module: it chooses which.
+from clutch import _processor  # noqa: F401
+
+# isort: split
 from clutch import _clutch
 from clutch._certificate import Certificate
 from clutch._clutch import Controller, Path, Plant, StickSlip, Table, Target, Tick, scenarios
