@@ -46,9 +46,11 @@ def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
 
 def wants_both() -> bool:
     """Whether the build is for any x86-64, here: not for another machine, and not for one processor."""
-    flags = os.environ.get("RUSTFLAGS", "") + os.environ.get("CARGO_ENCODED_RUSTFLAGS", "")
-    here = sys.platform == "linux" and platform.machine() == "x86_64"
-    return here and "CARGO_BUILD_TARGET" not in os.environ and "target-cpu" not in flags
+    if sys.platform != "linux" or platform.machine() != "x86_64":
+        return False
+    # The second goes before RUSTFLAGS, in which the level is asked for below.
+    elsewhere = {"CARGO_BUILD_TARGET", "CARGO_ENCODED_RUSTFLAGS"} & os.environ.keys()
+    return not elsewhere and "target-cpu" not in os.environ.get("RUSTFLAGS", "")
 
 
 def build_wheel(wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None) -> str:

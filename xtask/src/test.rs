@@ -139,7 +139,8 @@ pub(crate) fn all() -> Result<()> {
             tally.check(&format!("the images of {board} build"), built);
         }
         // As a test, not as a benchmark: the figures are the machine code's, not this machine's.
-        let budget = cargo(["test", "--package", "clutch-benches", "--bench", "budget"]);
+        // With the packages of the tests above: what is compiled for them serves here, too.
+        let budget = cargo(["test", "--workspace", "--exclude", "clutch-py", "--bench", "budget"]);
         tally.check("bounds, measurements, memory and stack keep their budgets", budget.lines(|_| ())?);
     }
 
@@ -183,9 +184,9 @@ pub(crate) fn targets() -> Result<&'static [&'static str]> {
 /// The wheel: built from its source distribution, installed outside of this tree, tested there.
 fn python(tally: &mut Tally) -> Result<bool> {
     let binary = python::binary()?;
-    cargo(["build", "--release", "--package", "clutch-log", "--example", "write_demo"]).run()?;
+    cargo(["build", "--package", "clutch-log", "--example", "write_demo"]).run()?;
     let bits = root().join("target/bits");
-    cargo(["run", "--release", "--package", "clutch-tests", "--example", "bits", "--"]).arg(&bits).run()?;
+    cargo(["run", "--package", "clutch-tests", "--example", "bits", "--"]).arg(&bits).run()?;
     let tools = python::interpreter()?;
     tally.check("the type stub is what the native module gives", stubs::generate(&tools, true)?);
     let tool = |name: &str, args: &[&str]| program(python::beside(&tools, name)).args(args).quietly();
@@ -217,6 +218,7 @@ fn python(tally: &mut Tally) -> Result<bool> {
         .args(["-m", "pytest", "--color=no", "-q"])
         .arg(root().join("python/tests"))
         .env("CLUTCH_BIN", binary)
+        .env("CLUTCH_LOG_DEMO", root().join("target/debug/examples/write_demo"))
         .env("CLUTCH_BITS", bits)
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .lines(|l| tally.read(l))
