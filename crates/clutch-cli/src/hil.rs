@@ -66,10 +66,10 @@ pub(crate) struct Hil {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Link {
-    /// Through the emulator's own files: some 25 000 cycles a second, the same each time.
+    /// Through the emulator's own files: some 20 000 cycles a second, the same each time.
     Memory,
-    /// Through the board's two serial lines, interrupts and clock: about as fast as a real one. Late answers
-    /// are not looked at, as this machine decides how late they are.
+    /// Through the board's two serial lines, interrupts and clock: some 500 to 2000 cycles a second. Late
+    /// answers are not looked at, as this machine decides how late they are.
     Uart,
 }
 
