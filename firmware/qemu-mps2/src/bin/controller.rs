@@ -5,7 +5,7 @@
 //! | are there | lockstep: time and bytes come through them; what `clutch hil` starts |
 //! | are not | UART0 is the host's line, UART1 that of encoder and converter; real time |
 //!
-//! The first does some ten thousand cycles a second and repeats bit for bit. The second is a board as any
+//! The first does some 20 000 cycles a second and repeats bit for bit. The second is a board as any
 //! other, and a slow one.
 #![no_std]
 #![no_main]
