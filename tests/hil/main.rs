@@ -15,9 +15,11 @@ use clutch_loop::world::{Outcome, World, WorldParams};
 use clutch_node::exchange::Exchange;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::{Keep, Metrics, Run, Scenario};
+use clutch_tests::command;
 use clutch_tests::firmware::image;
 use clutch_wire::{BoardState, Decoder, Message, StopReason};
 use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 static MACHINE: RwLock<()> = RwLock::new(());
@@ -182,6 +184,16 @@ fn the_boards_log_replays_bit_for_bit_on_this_machine() {
         assert_eq!(replayed.first, None, "{law}");
         assert!(replayed.commands.len() > 10_000, "{law}: {} ticks", replayed.commands.len());
     }
+}
+
+/// Runs the command.
+fn clutch(args: &[&str]) -> Output {
+    Command::new(command()).args(args).stdin(Stdio::null()).output().expect("the command starts")
+}
+
+/// What it printed.
+fn shown(done: &Output) -> String {
+    String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr)
 }
 
 fn scratch(name: &str) -> PathBuf {

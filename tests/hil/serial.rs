@@ -1,14 +1,14 @@
 //! `clutch loop --board`: the emulated board in real time, on its serial lines over TCP, with the simulated
 //! board as its encoder and converter.
 
-use crate::{alone, scratch};
+use crate::{alone, clutch, scratch, shown};
 use clutch_tests::command;
 use clutch_tests::firmware::image;
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 
 /// A process that ends with the test.
 struct Beside(Child);
@@ -18,10 +18,6 @@ impl Drop for Beside {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
-}
-
-fn clutch(args: &[&str]) -> Output {
-    Command::new(command()).args(args).stdin(Stdio::null()).output().expect("the command starts")
 }
 
 /// The simulated board on a TCP address.
@@ -61,10 +57,6 @@ fn board(image: &PathBuf, rig: Option<&str>) -> (Beside, String) {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     (Beside(child), format!("tcp://{address}"))
-}
-
-fn shown(done: &Output) -> String {
-    String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr)
 }
 
 #[test]

@@ -1,21 +1,10 @@
 //! `clutch hil`: its exit codes, and that a log of what went wrong replays.
 
-use crate::{beside, scratch};
+use crate::{beside, clutch, scratch, shown};
 use clutch_sim::scenario::BUILT_IN;
 use clutch_tests::command;
 use clutch_tests::firmware::image;
 use serde_json::Value;
-use std::process::{Command, Output, Stdio};
-
-fn hil(image: &std::path::Path, args: &[&str]) -> Output {
-    let mut command = Command::new(command());
-    command.arg("hil").arg("--image").arg(image).args(args);
-    command.stdin(Stdio::null()).output().expect("the command starts")
-}
-
-fn shown(done: &Output) -> String {
-    String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr)
-}
 
 #[test]
 fn however_a_run_on_the_board_ends_its_exit_code_says_so_and_its_log_replays() {
@@ -40,16 +29,15 @@ fn however_a_run_on_the_board_ends_its_exit_code_says_so_and_its_log_replays() {
     ] {
         let file = scratch(&format!("ends {name}.mcap"));
         let log = file.to_str().expect("a path");
-        let mut run = vec![scenario, "--set", "run.duration_s=3", "--log", log, "--json"];
+        let mut run = vec!["hil", scenario, "--image", image.to_str().expect("a path")];
+        run.extend(["--set", "run.duration_s=3", "--log", log, "--json"]);
         run.extend(fault.iter().flat_map(|f| ["--fault", f]));
-        let done = hil(&image, &run);
+        let done = clutch(&run);
         let (code, state) = if fault.is_some() { (3, "Faulted") } else { (0, "Holding") };
         assert_eq!(done.status.code(), Some(code), "{name}: {}", shown(&done));
         let report: Value = serde_json::from_slice(&done.stdout).expect("JSON");
         assert_eq!((&report["state"], &report["cause"]), (&state.into(), &cause.into()), "{name}: {report}");
-        let mut replay = Command::new(command());
-        let replayed =
-            replay.args(["replay", log]).stdin(Stdio::null()).output().expect("the command starts");
+        let replayed = clutch(&["replay", log]);
         assert_eq!(replayed.status.code(), Some(0), "{name}: {}", shown(&replayed));
         assert!(shown(&replayed).contains("identical"), "{name}: {}", shown(&replayed));
     }

@@ -85,26 +85,22 @@ pub fn limit(limit: Limit) -> u8 {
 /// A change of the supervisor's state, if this was one.
 #[must_use]
 pub fn change<T: Real, X>(time_ns: u64, cycle: &Cycle<T, X>) -> Option<Record> {
-    (cycle.from != cycle.state).then(|| {
-        Record::Event(EventRecord {
-            tick: cycle.tick,
-            time_ns,
-            kind: EventKind::StateChange as u8,
-            from: cycle.from as u8,
-            to: cycle.state as u8,
-            cause: cycle.cause as u8,
-            value: cycle.value.to_f64(),
-        })
-    })
+    let Cycle { from, state, cause, value, tick, .. } = *cycle;
+    (from != state)
+        .then(|| event(EventKind::StateChange, time_ns, &Ending { from, state, cause, value, tick }))
 }
 
 /// An end that no sample brought: silence, the board's own report, an operator, the path's end.
 #[must_use]
-pub fn ended<T: Real>(time_ns: u64, e: &Ending<T>) -> Record {
+pub fn ended<T: Real>(time_ns: u64, ending: &Ending<T>) -> Record {
+    event(EventKind::Ended, time_ns, ending)
+}
+
+fn event<T: Real>(kind: EventKind, time_ns: u64, e: &Ending<T>) -> Record {
     Record::Event(EventRecord {
         tick: e.tick,
         time_ns,
-        kind: EventKind::Ended as u8,
+        kind: kind as u8,
         from: e.from as u8,
         to: e.state as u8,
         cause: e.cause as u8,

@@ -234,9 +234,12 @@ pub(super) fn permission_advice(path: &Path, groups: &Path) -> String {
 
 /// Who holds the lock on the file.
 pub(super) fn lock_holder(path: &Path) -> Option<Holder> {
+    /// The list is read in pieces; a lock given up elsewhere between two of them shifts the rest,
+    /// and a line is missed.
+    const READINGS: usize = 10;
     let meta = std::fs::metadata(path).ok()?;
-    let text = std::fs::read_to_string("/proc/locks").ok()?;
-    let pid = holder_in(&text, meta.dev(), meta.ino())?;
+    let pid = (0..READINGS)
+        .find_map(|_| holder_in(&std::fs::read_to_string("/proc/locks").ok()?, meta.dev(), meta.ino()))?;
     let name = crate::realtime::line(Path::new(&format!("/proc/{pid}/comm")));
     Some(Holder { pid, name })
 }
