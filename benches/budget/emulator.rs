@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
+use std::fmt::{Display, Formatter};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -27,6 +28,12 @@ pub(crate) struct Counts {
     pub(crate) least: u64,
     pub(crate) mean: u64,
     pub(crate) most: u64,
+}
+
+impl Display for Counts {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} / {} / {}", self.least, self.mean, self.most)
+    }
 }
 
 /// All that it printed.

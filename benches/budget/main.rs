@@ -193,7 +193,7 @@ fn table(
             item.name,
             bound.instructions,
             item.budget.instructions,
-            counts.map_or("–".to_owned(), |c| format!("{} / {} / {}", c.least, c.mean, c.most)),
+            counts.map_or("–".to_owned(), ToString::to_string),
             bound.cycles,
             item.budget.cycles,
             along.map_or("–".to_owned(), |c| c.to_string()),
@@ -223,10 +223,11 @@ fn peers(
         return Ok(());
     };
     println!(
-        "\nThe laws against C (`benches/peer_c`, gcc -O2), most executed instructions and bound in cycles:\n"
+        "\nThe laws against C (`benches/peer_c`, gcc -O2), executed instructions (least / mean / most; ratios of mean \
+         and most) and cycles:\n"
     );
     println!(
-        "| law | ours | C | ratio | earlier C | ratio | bound: ours | C | earlier C | measured: ours | C |"
+        "| law | ours | C | ratios | earlier C | ratios | bound: ours | C | earlier C | measured: ours | C |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     let facts = plan.facts();
@@ -236,16 +237,18 @@ fn peers(
             bail!("{}: a law in C without one of ours", peer.name);
         };
         let theirs = Bounds::new(image, &facts, &none).of(&peer.symbol).map_err(told)?;
-        let (a, b) = (measured.counts[&item.measured].most, measured.counts[&peer.symbol].most);
-        let ratio = |n: u64| format!("{:.2}", a as f64 / n as f64);
+        let (a, b) = (&measured.counts[&item.measured], &measured.counts[&peer.symbol]);
+        let ratios = |mean: u64, most: u64| {
+            format!("{:.2}, {:.2}", a.mean as f64 / mean as f64, a.most as f64 / most as f64)
+        };
         let along = |name: &String| cycles.get(name).map_or("–".to_owned(), |c| c.cycles.to_string());
         let old = |f: &dyn Fn(plan::Limit) -> String| peer.historic.map_or("–".to_owned(), f);
         println!(
             "| {} | {a} | {b} | {} | {} | {} | {} | {} | {} | {} | {} |",
             peer.name,
-            ratio(b),
+            ratios(b.mean, b.most),
             old(&|h| h.instructions.to_string()),
-            old(&|h| ratio(h.instructions)),
+            old(&|h| ratios(h.instructions, h.instructions)),
             ours.cycles,
             theirs.cycles,
             old(&|h| h.cycles.to_string()),

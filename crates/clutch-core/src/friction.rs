@@ -57,6 +57,10 @@ pub struct Stribeck<T> {
     params: StribeckParams<T>,
     inverse_velocity: T,
     exponent_is_one: bool,
+    /// `μ_s − μ_d`.
+    drop: T,
+    /// From this exponent on, the exponential changes no bit of `μ`, or is no normal number.
+    vanishes_at: T,
 }
 
 impl<T: Real> Stribeck<T> {
@@ -82,7 +86,17 @@ impl<T: Real> Stribeck<T> {
             p.stribeck_exponent > T::ZERO,
             "a finite number above 0",
         )?;
-        Ok(Stribeck { params: *p, inverse_velocity, exponent_is_one: p.stribeck_exponent == T::ONE })
+        // Where the exponential's part is ε μ_d / 8: the next number to μ_d is at least ε μ_d / 2 away,
+        // and half of that decides how a sum is rounded.
+        let drop = p.mu_static - p.mu_dynamic;
+        let vanishes_at = (T::from_i32(8) * drop.abs() / (T::EPSILON * p.mu_dynamic)).ln();
+        Ok(Stribeck {
+            params: *p,
+            inverse_velocity,
+            exponent_is_one: p.stribeck_exponent == T::ONE,
+            drop,
+            vanishes_at: vanishes_at.min(T::EXP_NEG_MAX),
+        })
     }
 
     /// The parameters it was built from.
@@ -95,11 +109,26 @@ impl<T: Real> Stribeck<T> {
     #[inline]
     #[must_use]
     pub fn magnitude(&self, velocity: T) -> T {
-        let p = &self.params;
-        let ratio = velocity.abs() * self.inverse_velocity;
-        // powf costs three times exp on a board; most pairs have δ = 1.
-        let ratio = if self.exponent_is_one { ratio } else { ratio.powf(p.stribeck_exponent) };
-        p.mu_dynamic + (p.mu_static - p.mu_dynamic) * (-ratio).exp()
+        self.magnitude_without_power(velocity).unwrap_or_else(|| {
+            self.falling((velocity.abs() * self.inverse_velocity).powf(self.params.stribeck_exponent))
+        })
+    }
+
+    /// [`Stribeck::magnitude`] where `δ = 1`, as for most pairs; `None` elsewhere. A power takes
+    /// five times as long as the rest.
+    #[inline]
+    pub(crate) fn magnitude_without_power(&self, velocity: T) -> Option<T> {
+        self.exponent_is_one.then(|| self.falling(velocity.abs() * self.inverse_velocity))
+    }
+
+    #[inline]
+    fn falling(&self, exponent: T) -> T {
+        // In steady motion it mostly has vanished, and then costs nothing.
+        if exponent >= self.vanishes_at {
+            self.params.mu_dynamic
+        } else {
+            self.params.mu_dynamic + self.drop * exponent.exp_neg()
+        }
     }
 
     /// `μ(θ̇)` of (2), with its sign; 0 at rest.
@@ -198,6 +227,13 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_velocity_that_is_no_number_gives_no_coefficient() {
+        let s = Stribeck::<f32>::new(&StribeckParams::<f64>::default().cast()).unwrap();
+        assert!(s.magnitude(f32::NAN).is_nan());
+        assert_eq!(s.magnitude(f32::INFINITY), 0.15);
+    }
+
     proptest! {
         #[test]
         fn friction_opposes_motion_and_lies_between_its_two_coefficients(
@@ -210,6 +246,24 @@ mod tests {
             prop_assert!(mu * v >= 0.0);
             prop_assert!(s.magnitude(v) >= mu_s.min(mu_d) - 1e-15 && s.magnitude(v) <= mu_s.max(mu_d) + 1e-15);
             prop_assert_eq!(s.coefficient(-v), -mu);
+        }
+
+        #[test]
+        fn leaving_out_an_exponential_that_has_vanished_changes_no_bit(
+            mu_s in 0.0_f64..2.0, mu_d in prop_oneof![Just(0.125), 1e-9_f64..2.0], far in 0.9_f64..1.2
+        ) {
+            fn same<T: Real>(p: &StribeckParams<T>, far: T) -> bool {
+                let s = Stribeck::new(p).unwrap();
+                let v = s.vanishes_at.max(T::ZERO) * far;
+                let all = p.mu_dynamic + (p.mu_static - p.mu_dynamic) * (-v).exp();
+                // An exponential of which a sum shows bits differs in them from another routine's.
+                v < s.vanishes_at || s.magnitude(v) == all
+            }
+            let p = StribeckParams {
+                mu_static: mu_s, mu_dynamic: mu_d, stribeck_velocity: 1.0, stribeck_exponent: 1.0,
+            };
+            prop_assert!(same(&p, far));
+            prop_assert!(same(&p.cast::<f32>(), far as f32));
         }
     }
 }

@@ -108,16 +108,31 @@ impl<T: Real> Ctc<T> {
     }
 
     #[inline]
-    fn terms(&self, tick: &Tick<T>) -> (T, CtcTerms<T>) {
+    fn terms(&self, tick: &Tick<T>, mu: T) -> (T, CtcTerms<T>) {
         let (p, m) = (&self.params, self.model.params());
-        let velocity = tick.velocity();
-        // First: what is computed before the call of exp has to be kept across it.
-        let mu = self.model.friction().magnitude(velocity);
         let accel_demand = -(p.outer_gain * (p.kp * tick.error + p.kd * tick.error_rate));
         let friction_torque = m.drive_torque
             - m.inertia * (tick.target_acceleration - accel_demand)
-            - m.viscous_damping * velocity;
+            - m.viscous_damping * tick.velocity();
         (friction_torque / (mu * m.brake_gain), CtcTerms { accel_demand, friction_torque, mu })
+    }
+
+    #[inline]
+    fn command(&self, state: &mut OutputState<T>, tick: &Tick<T>, mu: T) -> Command<T, CtcTerms<T>> {
+        let (demand, terms) = self.terms(tick, mu);
+        let (voltage, limit) = self.output.apply(state, demand);
+        Command { voltage, limit, terms }
+    }
+
+    /// Apart: a call of the power among what a tick computes makes the others slower, too.
+    #[cold]
+    #[inline(never)]
+    fn command_for_any_exponent(
+        &self,
+        state: &mut OutputState<T>,
+        tick: &Tick<T>,
+    ) -> Command<T, CtcTerms<T>> {
+        self.command(state, tick, self.model.friction().magnitude(tick.velocity()))
     }
 }
 
@@ -126,13 +141,15 @@ impl<T: Real> Controller<T> for Ctc<T> {
     type Terms = CtcTerms<T>;
 
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
-        self.output.start(self.terms(tick).0, applied)
+        self.output.start(self.terms(tick, self.model.friction().magnitude(tick.velocity())).0, applied)
     }
 
-    #[inline]
+    // Always: as a function of its own it would keep the registers of the call below for each tick.
+    #[inline(always)]
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
-        let (demand, terms) = self.terms(tick);
-        let (voltage, limit) = self.output.apply(state, demand);
-        Command { voltage, limit, terms }
+        match self.model.friction().magnitude_without_power(tick.velocity()) {
+            Some(mu) => self.command(state, tick, mu),
+            None => self.command_for_any_exponent(state, tick),
+        }
     }
 }
