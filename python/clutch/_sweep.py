@@ -464,6 +464,11 @@ class _Work:
     keep: bool
     #: Tells this sweep from others.
     name: str
+    #: Whether this is the sweep's own process; no longer so once it has travelled.
+    here: bool = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "here": False}
 
     def job(self, rows: Sequence[Sequence[Any]], threads: int | None) -> _clutch.Sweep:
         keys, values = list(self.keys), [list(row) for row in rows]
@@ -596,6 +601,8 @@ def _run_chunk(work: _Work, rows: Sequence[Sequence[Any]], attempt: int) -> _Res
             if work.name in _abandoned:
                 break
     except KeyboardInterrupt:
+        if work.here:  # an executor that runs what it gets at once: it is the sweep that is to end
+            raise
         # Of this worker alone, or of all: who asked for the chunk decides what it means.
         raise RuntimeError("the worker was interrupted") from None
     finally:

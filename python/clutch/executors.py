@@ -204,24 +204,30 @@ def _run(
         except Exception as e:  # the executor itself is broken or shut down
             failed[number] = e
 
+    def take(number: int) -> None:
+        future, attempt = pending.pop(number)
+        try:
+            result = future.result()
+        except Exception as e:
+            if attempt < _ATTEMPTS:
+                submit(number, attempt + 1)
+            else:
+                failed[number] = e
+        else:
+            done(number, result)
+
     try:
         for number in range(len(chunks)):
             submit(number, 1)
+            # An executor that runs a chunk at once: its progress is to be seen, and kept after Ctrl-C.
+            if number in pending and pending[number][0].done():
+                take(number)
         wait = 1e-3
         while pending:
             ended = [number for number, (future, _) in pending.items() if future.done()]
             wait = min(2.0 * wait, _LONGEST_WAIT_S) if not ended else 1e-3
             for number in ended:
-                future, attempt = pending.pop(number)
-                try:
-                    result = future.result()
-                except Exception as e:
-                    if attempt < _ATTEMPTS:
-                        submit(number, attempt + 1)
-                    else:
-                        failed[number] = e
-                else:
-                    done(number, result)
+                take(number)
             if not ended:
                 time.sleep(wait)
     finally:

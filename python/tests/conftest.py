@@ -6,6 +6,7 @@ Run with ``pytest python/tests``. The binary is ``CLUTCH_BIN``, else ``target/re
 import itertools
 import json
 import os
+import signal
 import subprocess
 from pathlib import Path
 
@@ -13,6 +14,10 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+
+# A shell that starts the tests in the background tells them to ignore Ctrl-C; some wait for one.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def toml(table, prefix=""):

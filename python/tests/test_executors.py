@@ -154,19 +154,38 @@ def test_a_refused_row_is_not_tried_again(base):
     assert kept.table == clutch.sweep(base, {"law.smc.kp_v": [3.0, -1.0]}, errors="keep").table
 
 
+def interrupt_in(seconds):
+    threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+
 def test_ctrl_c_cancels_what_has_not_begun(base):
     class Stuck(Counting):
         def submit(self, function, *arguments):
             if not self.chunks:
                 return super().submit(function, *arguments)
             self.chunks.append(concurrent.futures.Future())
+            if len(self.chunks) == 3:
+                interrupt_in(0.2)
             return self.chunks[-1]
 
     executor = Stuck()
-    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     result = clutch.sweep(base, {"run.seed": range(1, 31)}, executor=executor, chunk=10)
     assert result.interrupted and len(result) == 10
     assert all(future.cancelled() for future in executor.chunks[1:])
+
+
+def test_ctrl_c_ends_a_sweep_whose_executor_runs_chunks_at_once_and_here(base):
+    class Here(Counting):
+        def submit(self, function, *arguments):
+            if self.chunks:
+                interrupt_in(0.2)
+            return super().submit(function, *arguments)
+
+    executor = Here()
+    lengths = {"run.duration_s": [1.5, 3600.0, 3600.0]}
+    result = clutch.sweep(base, lengths, executor=executor, chunk=1)
+    assert result.interrupted and len(result) == 1
+    assert executor.chunks == [1, 1]
 
 
 # --- Workers that are killed -------------------------------------------------------------------
@@ -286,9 +305,12 @@ def test_a_worker_that_is_interrupted_alone_loses_nothing(base, local):
 
 
 def test_an_ended_sweep_leaves_no_chunk_running_in_threads_of_this_process(base, monkeypatch):
-    rows_of_chunks = []
+    begun, rows_of_chunks = [], []
 
     def watched(*arguments):
+        begun.append(None)
+        if len(begun) == 2:
+            interrupt_in(0.2)
         result = _sweep_chunk(*arguments)
         rows_of_chunks.append(len(result[0]))
         return result
@@ -297,7 +319,6 @@ def test_an_ended_sweep_leaves_no_chunk_running_in_threads_of_this_process(base,
     monkeypatch.setattr(_sweep, "_run_chunk", watched)
     long = base.override({"run.duration_s": 100.0})
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
         found = clutch.sweep(long, {"run.seed": range(1, 2001)}, executor=pool, chunk=1000, metrics=[])
     # The pool has waited for the two chunks that had begun.
     assert found.interrupted

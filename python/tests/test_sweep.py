@@ -285,13 +285,14 @@ INTERRUPTED = """
     base = clutch.Scenario.load("smc_2", {"run.duration_s": %s})
     executor = None
     %s
-    sent = []
+    sent, runs = [], threading.Event()
     def interrupt():
-        time.sleep(%s)
+        %s
         sent.append(time.perf_counter())
         os.kill(os.getpid(), signal.SIGINT)
     threading.Thread(target=interrupt).start()
-    result = clutch.sweep(base, {"run.seed": range(1, 100_001)}, executor=executor, chunk=20)
+    told = lambda finished, _: finished and runs.set()
+    result = clutch.sweep(base, {"run.seed": range(1, 100_001)}, executor=executor, chunk=20, progress=told)
     answered = time.perf_counter() - sent[0]
     assert result.interrupted and result.total == 100_000, result
     print(answered, len(result), flush=True)
@@ -305,11 +306,11 @@ INTERRUPTED = """
 """
 
 
-def interrupted(duration, setup="", after=0.5):
+def interrupted(duration, setup="", when="runs.wait(30); time.sleep(0.2)"):
     """Seconds from Ctrl-C to the answer, and finished runs; the median of three processes."""
     found = []
     for _ in range(3):
-        script = textwrap.dedent(INTERRUPTED) % (duration, setup, after)
+        script = textwrap.dedent(INTERRUPTED) % (duration, setup, when)
         done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
         assert done.returncode == 0, done.stderr
         seconds, runs = done.stdout.split()
@@ -323,13 +324,13 @@ def test_ctrl_c_gives_the_finished_part_within_a_fifth_of_a_second():
 
 
 def test_ctrl_c_ends_also_a_single_long_run():
-    seconds, runs = interrupted(9_000.0)
+    seconds, runs = interrupted(9_000.0, when="time.sleep(0.5)")
     assert runs == 0 and seconds < 0.2
 
 
 def test_ctrl_c_gives_the_chunks_that_threads_have_finished():
     setup = "from concurrent.futures import ThreadPoolExecutor; executor = ThreadPoolExecutor(2)"
-    seconds, runs = interrupted(0.5 + 1, setup, after=1.0)
+    seconds, runs = interrupted(1.5, setup)
     assert runs > 0 and runs % 20 == 0 and seconds < 0.5
 
 
