@@ -3,6 +3,7 @@
 import concurrent.futures
 import importlib
 import importlib.util
+import itertools
 import multiprocessing
 import os
 import signal
@@ -305,11 +306,10 @@ def test_a_worker_that_is_interrupted_alone_loses_nothing(base, local):
 
 
 def test_an_ended_sweep_leaves_no_chunk_running_in_threads_of_this_process(base, monkeypatch):
-    begun, rows_of_chunks = [], []
+    begun, rows_of_chunks = itertools.count(1), []
 
     def watched(*arguments):
-        begun.append(None)
-        if len(begun) == 2:
+        if next(begun) == 2:
             interrupt_in(0.2)
         result = _sweep_chunk(*arguments)
         rows_of_chunks.append(len(result[0]))
