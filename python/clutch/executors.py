@@ -179,7 +179,7 @@ def _run(
     function: Callable[..., Any],
     chunks: list[tuple[Any, ...]],
     done: Callable[[int, Any], None],
-) -> dict[int, Exception]:
+) -> dict[int, BaseException]:
     """Call ``function(*chunk, attempt)`` for each chunk, and ``done(number, result)`` for each that ended.
 
     A chunk that fails is submitted again, up to four times in all: whatever its worker died of, another may
@@ -193,7 +193,7 @@ def _run(
     # A future of dask's own wakes nobody up while its event loop is busy; those of its executor do.
     if hasattr(executor, "get_executor"):
         executor = executor.get_executor()
-    failed: dict[int, Exception] = {}
+    failed: dict[int, BaseException] = {}
     pending: dict[int, tuple[Future, int]] = {}
 
     def submit(number: int, attempt: int) -> None:
@@ -208,7 +208,10 @@ def _run(
         future, attempt = pending.pop(number)
         try:
             result = future.result()
-        except Exception as e:
+        except (Exception, KeyboardInterrupt) as e:
+            # A worker's KeyboardInterrupt comes with the worker's traceback as its cause; Ctrl-C here has none.
+            if isinstance(e, KeyboardInterrupt) and e.__cause__ is None:
+                raise
             if attempt < _ATTEMPTS:
                 submit(number, attempt + 1)
             else:

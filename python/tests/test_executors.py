@@ -305,6 +305,28 @@ def test_a_worker_that_is_interrupted_alone_loses_nothing(base, local):
     same(local, there)
 
 
+class Interrupted(Counting):
+    """Its worker is interrupted before it has begun what it got, the first time."""
+
+    def submit(self, function, *arguments):
+        if self.chunks:
+            return super().submit(function, *arguments)
+        self.chunks.append(0)
+        error = KeyboardInterrupt()
+        error.__cause__ = RuntimeError("as a pool of processes hands over the traceback there")
+        future = concurrent.futures.Future()
+        future.set_exception(error)
+        return future
+
+
+def test_a_worker_that_is_interrupted_between_two_chunks_loses_nothing(base, local):
+    same(local, clutch.sweep(base, SAMPLES, executor=Interrupted(), chunk=7, **OPTIONS))
+    # The pool of processes does so.
+    with concurrent.futures.ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        error = pool.submit(signal.raise_signal, signal.SIGINT).exception()
+    assert isinstance(error, KeyboardInterrupt) and error.__cause__ is not None
+
+
 def test_an_ended_sweep_leaves_no_chunk_running_in_threads_of_this_process(base, monkeypatch):
     begun, rows_of_chunks = itertools.count(1), []
 
