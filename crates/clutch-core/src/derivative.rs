@@ -7,24 +7,15 @@
 //! It is a first-order low-pass on the backward difference; nothing is estimated. The
 //! difference is taken in integers, so it stays exact however far the shaft has turned.
 
-use crate::error::{cast, require};
+use crate::params::{Range, Table};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 
-/// Parameters of (5); `Default` = 0.2, the value that reproduces the paper's figures.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct SmoothedDerivativeParams<T = f64> {
-    /// `K_Kal` in (5): share of the newest difference, above 0 and at most 1 (no smoothing).
-    /// The paper gives 0.2 to 1.
-    #[doc(alias = "K_Kal")]
-    pub smoothing: T,
-}
-
-cast!(SmoothedDerivativeParams { smoothing });
-
-impl<T: Real> Default for SmoothedDerivativeParams<T> {
-    fn default() -> Self {
-        SmoothedDerivativeParams { smoothing: T::from_f64(0.2) }
+crate::params! {
+    /// The difference (5): a first-order low-pass on the backward difference of the error.
+    pub struct SmoothedDerivativeParams<T>: Default {
+        /// Share of the newest difference; 1 smooths nothing. The paper gives 0.2 to 1, and 0.2 reproduces its
+        /// figures.
+        smoothing: T = 0.2, "smoothing" "K_Kal" NONE, Range::above(0.0).up_to(1.0);
     }
 }
 
@@ -61,12 +52,7 @@ impl<T: Real> SmoothedDerivative<T> {
         encoder: Encoder,
         period: Micros,
     ) -> Result<Self, ParamError<T>> {
-        require(
-            "smoothing",
-            p.smoothing,
-            p.smoothing > T::ZERO && p.smoothing <= T::ONE,
-            "a number above 0 and at most 1",
-        )?;
+        p.check_rows()?;
         let period = period.period::<T>()?;
         Ok(SmoothedDerivative {
             keep: T::ONE - p.smoothing,
@@ -129,7 +115,7 @@ mod tests {
                 Encoder::PAPER,
                 Micros(1000),
             );
-            assert_eq!(e.unwrap_err().field, "smoothing");
+            assert_eq!(e.unwrap_err().field(), "smoothing");
         }
     }
 }

@@ -40,10 +40,10 @@
 mod params;
 mod state;
 
-pub use params::SupervisorParams;
+pub use params::{LimitParams, SpeedLimit, SupervisorParams};
 pub use state::{Arrival, BoardMode, Cause, Checks, Cycle, Sample, State, SupervisorState};
 
-use crate::law::{Controller, Limit, Terms};
+use crate::law::{ControlLaw, Limit, Terms};
 use crate::safe_state::{SafeCodes, SafeRun};
 use crate::{Bounds, Dac, DacCode, ParamError, Real, Servo, ServoOutput, ServoParams, Target};
 use params::Limits;
@@ -154,7 +154,7 @@ impl<T: Real> Supervisor<T> {
     /// One sample: judged, and if it may pass, given to the servo. `target` is the path.
     ///
     /// The answer, if there is one, belongs on the wire at once.
-    pub fn sample<C: Controller<T>>(
+    pub fn sample<C: ControlLaw<T>>(
         &self,
         servo: &Servo<T, C>,
         s: &mut SupervisorState<T, C::State>,
@@ -179,7 +179,7 @@ impl<T: Real> Supervisor<T> {
         cycle
     }
 
-    fn judge<C: Controller<T>>(
+    fn judge<C: ControlLaw<T>>(
         &self,
         servo: &Servo<T, C>,
         s: &mut SupervisorState<T, C::State>,
@@ -429,10 +429,10 @@ impl<T: Real> Supervisor<T> {
 }
 
 fn finite<T: Real, X: Terms<T>>(out: &ServoOutput<T, X>) -> bool {
-    let [a, b, c] = out.command.terms.columns();
     let t = &out.tick;
-    let all = [a.1, b.1, c.1, t.error, t.error_rate, out.command.voltage, out.voltage];
-    out.command.limit != Limit::Invalid && all.iter().all(|x| x.is_finite())
+    let rest = [t.error, t.error_rate, out.command.voltage, out.voltage];
+    let terms = out.command.terms.values();
+    out.command.limit != Limit::Invalid && terms.iter().chain(&rest).all(|x| x.is_finite())
 }
 
 #[cfg(test)]
