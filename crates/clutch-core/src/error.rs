@@ -1,13 +1,10 @@
 //! The error of a parameter that a constructor cannot take.
 
 use crate::Real;
-use crate::params::{Kind, RelationInfo, Row, TableInfo};
+use crate::params::{Kind, RelationInfo, Row, TableInfo, TableRef};
 use core::fmt;
 
 /// A parameter outside its range, or one that does not fit the others.
-///
-/// It holds numbers only, so that a board can report it without text; [`ParamError::row`] and
-/// [`ParamError::relation`] find what the tables of this crate say of it, and `Display` uses them.
 ///
 /// ```
 /// use clutch_core::{Micros, law::{PdParams, Pd}};
@@ -16,10 +13,12 @@ use core::fmt;
 /// assert_eq!(error.field(), "kp");
 /// assert_eq!(error.to_string(), "kp = NaN: expected a finite number of at least 0 V/rad");
 /// ```
+///
+/// A board has numbers only, and its text says so.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParamError<T = f64> {
-    /// [`TableInfo::id`] of its table.
-    pub table: u32,
+    /// Its table.
+    pub table: TableRef,
     /// Its place in [`TableInfo::rows`].
     pub row: u8,
     /// Place in [`TableInfo::relations`] of the condition that does not hold, from 1; 0 for its own range.
@@ -29,19 +28,19 @@ pub struct ParamError<T = f64> {
 }
 
 impl<T: Real> ParamError<T> {
-    /// Its table, if it is one of this crate's.
+    /// What is known of its table; nothing on a board.
     #[must_use]
     pub fn table(&self) -> Option<&'static TableInfo> {
-        crate::TABLES.iter().find_map(|info| info.find(self.table))
+        self.table.info()
     }
 
-    /// Its row, if it is one of this crate's.
+    /// Its row; nothing on a board.
     #[must_use]
     pub fn row(&self) -> Option<&'static Row> {
         self.table()?.rows.get(usize::from(self.row))
     }
 
-    /// The condition that does not hold, if it is one between parameters.
+    /// The condition that does not hold, if it is one between parameters; nothing on a board.
     #[must_use]
     pub fn relation(&self) -> Option<&'static RelationInfo> {
         self.table()?.relations.get(usize::from(self.relation).checked_sub(1)?)
@@ -65,7 +64,7 @@ impl<T: Real> fmt::Display for ParamError<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(row) = self.row() else {
             let ParamError { table, row, value, .. } = self;
-            return write!(f, "row {row} of table {table:#010x} = {value}: out of range");
+            return write!(f, "row {row} of {table:?} = {value}: out of range");
         };
         write!(f, "{} = {}: expected ", row.field, self.value)?;
         match self.relation() {

@@ -75,28 +75,3 @@ pub use servo::{Servo, ServoOutput, ServoParams, ServoState};
 pub use stick_slip::{StickSlip, StickSlipParams, StickSlipState};
 pub use supervisor::{LimitParams, SpeedLimit, Supervisor, SupervisorParams, SupervisorState};
 pub use velocity::{VelocityParams, VelocitySource, VelocityState};
-
-/// Every table of this crate, at or below these: where an error finds its words.
-const TABLES: &[&params::Info] = {
-    use params::Params;
-    &[
-        &<law::LawParams as Params<f64>>::INFO,
-        &<law::OutputParams as Params<f64>>::INFO,
-        &<PlantParams as Params<f64>>::INFO,
-        &<BrakeGeometry as Params<f64>>::INFO,
-        &<VelocityParams as Params<f64>>::INFO,
-        &<reference::ReferenceParams<'static> as Params<f64>>::INFO,
-        &<SafeState as Params<f64>>::INFO,
-        &<LimitParams as Params<f64>>::INFO,
-        &<SpeedLimit as Params<f64>>::INFO,
-        &<Tolerances as Params<f64>>::INFO,
-        &<Bounds as Params<f64>>::INFO,
-        &<certificate::Demand as Params<f64>>::INFO,
-        &<StickSlipParams as Params<f64>>::INFO,
-        &<SamplingParams as Params<f64>>::INFO,
-        &<EncoderParams as Params<f64>>::INFO,
-        &<DacParams as Params<f64>>::INFO,
-        #[cfg(feature = "linalg")]
-        &<ObserverGains as Params<f64>>::INFO,
-    ]
-};

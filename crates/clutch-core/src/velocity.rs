@@ -7,18 +7,12 @@ use crate::{Encoder, FixedCounts, Micros, ParamError, Plant, Real, Target};
 
 crate::choice! {
     /// Source of the velocity that laws are given.
-    pub enum VelocityParams<T> {
+    pub enum VelocityParams<T>: Default {
         /// The smoothed backward difference of the error (5).
         SmoothedDerivative(SmoothedDerivativeParams<T>) = "smoothed_derivative",
         /// A Kalman observer of position, velocity and disturbance torque.
         #[cfg(feature = "linalg")]
         Observer(ObserverParams<T>) = "observer",
-    }
-}
-
-impl<T: Real> Default for VelocityParams<T> {
-    fn default() -> Self {
-        VelocityParams::SmoothedDerivative(SmoothedDerivativeParams::default())
     }
 }
 

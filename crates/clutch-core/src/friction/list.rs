@@ -9,7 +9,7 @@ macro_rules! frictions {
 
         crate::choice! {
             /// Friction model, and its parameters.
-            pub enum FrictionParams<T> {
+            pub enum FrictionParams<T>: Default {
                 $(#[doc = $doc] $model($params<T>) = stringify!($module),)+
             }
         }
@@ -27,13 +27,6 @@ macro_rules! frictions {
                 }
             }
         )+
-
-        impl<T: Real> Default for FrictionParams<T> {
-            /// The first model of the list, with its defaults.
-            fn default() -> Self {
-                <Self as crate::params::Params<T>>::blank()
-            }
-        }
 
         impl<T: Arithmetic> FrictionModel<T> for Friction<T> {
             type Params = FrictionParams<T>;

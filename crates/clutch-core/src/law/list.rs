@@ -128,14 +128,6 @@ macro_rules! laws {
                 }
             }
 
-            /// Names of the terms of the law that was chosen, with units.
-            #[must_use]
-            pub fn term_names(&self) -> &'static [&'static str] {
-                match self {
-                    $(Law::$law(_) => <$law<T> as ControlLaw<T>>::TERMS,)+
-                }
-            }
-
             /// Terms of this law from their values; what is missing is 0, what is too much is left out.
             #[must_use]
             pub fn terms_of(&self, values: &[T]) -> LawTerms<T> {
@@ -154,8 +146,14 @@ macro_rules! laws {
         impl<T: Arithmetic> ControlLaw<T> for Law<T> {
             type State = LawState<T>;
             type Terms = LawTerms<T>;
-            /// Those of the law that was chosen: [`Law::term_names`].
+            /// None: which law was chosen is not known here.
             const TERMS: &'static [&'static str] = &[];
+
+            fn term_names(&self) -> &'static [&'static str] {
+                match self {
+                    $(Law::$law(_) => <$law<T> as ControlLaw<T>>::TERMS,)+
+                }
+            }
 
             fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
                 match self {

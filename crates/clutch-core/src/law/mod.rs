@@ -84,6 +84,11 @@ pub trait ControlLaw<T: Arithmetic> {
     /// Names of the terms, with units; at most [`MAX_TERMS`].
     const TERMS: &'static [&'static str];
 
+    /// Names of the terms of this law: [`ControlLaw::TERMS`], unless it stands for one of several.
+    fn term_names(&self) -> &'static [&'static str] {
+        Self::TERMS
+    }
+
     /// The state for a start at `tick` while the brake is at `applied` volts.
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State;
 

@@ -1,6 +1,6 @@
 //! The macros that declare choices: between tables, and between words.
 
-/// Declares a choice between tables.
+/// Declares a choice between tables; with `: Default` the first option is taken where nothing is said.
 ///
 /// ```
 /// use clutch_core::params::{Choice, Params, Range};
@@ -25,21 +25,23 @@
 /// ```
 #[macro_export]
 macro_rules! choice {
-    ($(#[doc = $doc:literal])+ $vis:vis enum $name:ident<T> { $($body:tt)* }) => {
+    ($(#[doc = $doc:literal])+ $vis:vis enum $name:ident<T> $(: $default:ident)? { $($body:tt)* }) => {
+        $crate::__default! { $name [T: $crate::Real] [T] T $($default)? }
         $crate::__choice! {
-            [$($doc)+] [#[derive(Copy)]] [$vis] $name [T = f64] [T: $crate::Real] [T] T { $($body)* }
+            [$($doc)+] [$($default)?] [#[derive(Copy)]] [$vis] $name [T = f64] [T: $crate::Real] [T] T { $($body)* }
         }
         $crate::__cast_choice! { $name [] { $($body)* } }
     };
     ($(#[doc = $doc:literal])+ $vis:vis enum $name:ident<$life:lifetime, T> { $($body:tt)* }) => {
         $crate::__choice! {
-            [$($doc)+] [#[derive(Copy)]] [$vis] $name
+            [$($doc)+] [] [#[derive(Copy)]] [$vis] $name
             [$life, T = f64] [$life, T: $crate::Real] [$life, T] T { $($body)* }
         }
         $crate::__cast_choice! { $name [$life,] { $($body)* } }
     };
-    ($(#[doc = $doc:literal])+ $vis:vis enum $name:ident<f64> { $($body:tt)* }) => {
-        $crate::__choice! { [$($doc)+] [] [$vis] $name [] [] [] f64 { $($body)* } }
+    ($(#[doc = $doc:literal])+ $vis:vis enum $name:ident<f64> $(: $default:ident)? { $($body:tt)* }) => {
+        $crate::__default! { $name [] [] f64 $($default)? }
+        $crate::__choice! { [$($doc)+] [$($default)?] [] [$vis] $name [] [] [] f64 { $($body)* } }
     };
 }
 
@@ -81,7 +83,7 @@ macro_rules! __with {
 #[macro_export]
 macro_rules! __choice {
     (
-        [$($doc:literal)+] [$($meta:tt)*] [$vis:vis] $name:ident
+        [$($doc:literal)+] [$($default:ident)?] [$($meta:tt)*] [$vis:vis] $name:ident
         [$($decl:tt)*] [$($bound:tt)*] [$($arg:tt)*] $t:ident
         {$($(#[doc = $option_doc:literal])+ $(#[cfg($cfg:meta)])? $option:ident $(($table:ty))? = $key:expr,)+}
     ) => {
@@ -96,6 +98,7 @@ macro_rules! __choice {
             const CHOICE: $crate::params::ChoiceInfo = $crate::params::ChoiceInfo {
                 name: stringify!($name),
                 doc: concat!($($doc, "\n"),+).trim_ascii(),
+                has_default: !concat!($(stringify!($default))?).is_empty(),
                 options: &[$($(#[cfg($cfg)])? $crate::params::OptionInfo {
                     key: $key,
                     doc: concat!($($option_doc, "\n"),+).trim_ascii(),

@@ -111,6 +111,8 @@ pub struct ChoiceInfo {
     pub name: &'static str,
     /// Its meaning.
     pub doc: &'static str,
+    /// `true` if the first option is taken where a scenario says nothing.
+    pub has_default: bool,
     /// What can be chosen.
     pub options: &'static [OptionInfo],
 }

@@ -11,12 +11,14 @@ mod info;
 mod leaf;
 mod range;
 mod table;
+mod table_ref;
 mod unit;
 
 pub use info::{ChoiceInfo, Info, Kind, Nested, OptionInfo, RelationInfo, Row, TableInfo, Word};
 pub use leaf::Leaf;
 pub use range::{Range, Words};
 pub use table::Relation;
+pub use table_ref::TableRef;
 pub use unit::*;
 
 use crate::{ParamError, Real};

@@ -98,7 +98,10 @@ impl fmt::Display for Words {
             Kind::Whole => "whole number",
             Kind::Switch => return f.write_str("true or false"),
             Kind::Text => return f.write_str("a text in quotes"),
-            Kind::Points => return write!(f, "a list of points [[{text}], …]"),
+            Kind::Points => {
+                let from = if has_low { " from 0 s on" } else { "" };
+                return write!(f, "a list of pairs [{text}] of finite numbers, with times that rise{from}");
+            }
             Kind::Word(words) => {
                 f.write_str("one of: ")?;
                 for (i, word) in words.iter().enumerate() {

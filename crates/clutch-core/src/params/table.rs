@@ -1,13 +1,14 @@
 //! The macros that declare parameters.
 
+use super::TableRef;
 use crate::{ParamError, Real};
 
 /// A condition that a parameter fulfils together with others: declared with the table, asked for where all
 /// the others are known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Relation {
-    /// Number of the table.
-    pub table: u32,
+    /// The table.
+    pub table: TableRef,
     /// The parameter that errors name.
     pub row: u8,
     /// Its number in the table, from 1.
@@ -53,7 +54,7 @@ impl Relation {
 /// }
 /// let pull = PullParams { speed: 1.5_f32, low: 2.0, high: 1.0 };
 /// let error = pull.check_rows().unwrap_err();
-/// assert_eq!((error.table, error.row, error.value), (PullParams::<f32>::TABLE.id, 2, 1.0));
+/// assert_eq!(error.to_string(), "high = 1: expected a voltage above low_v");
 /// ```
 ///
 /// `struct Name<T>` is for any scalar, `struct Name<f64>` for double precision, `struct Name<>` has no real
@@ -238,7 +239,7 @@ macro_rules! __params {
                 $(
                     if let Some(value) = $crate::params::Leaf::<$t>::outside(&self.$field, &{ $range }, &$crate::params::$unit) {
                         return Err($crate::ParamError {
-                            table: const { $crate::params::TableInfo::id_of(stringify!($name)) },
+                            table: const { $crate::params::TableRef::of::<$t, Self>() },
                             row: const {
                                 $crate::params::TableInfo::row_of(
                                     <Self as $crate::params::Table<$t>>::ROWS,
@@ -336,7 +337,7 @@ macro_rules! __relations {
             $(
                 $(#[doc = $doc])+
                 pub const $rel: $crate::params::Relation = $crate::params::Relation {
-                    table: $crate::params::TableInfo::id_of(stringify!($name)),
+                    table: $crate::params::TableRef::of::<f64, Self>(),
                     row: $crate::params::TableInfo::row_of(
                         <Self as $crate::params::Table<f64>>::ROWS,
                         stringify!($field),

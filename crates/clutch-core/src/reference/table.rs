@@ -28,7 +28,7 @@ crate::params! {
     /// Points in time. Before the first point the path rests there, after the last too.
     pub struct Table<'a> {
         /// Points with rising times, from the start.
-        knots: &'a [Knot], "points_s_deg" "" S_DEG, Range::ANY;
+        knots: &'a [Knot], "points_s_deg" "" S_DEG, Range::at_least(0.0).below(1e12);
         /// How to go from point to point.
         interpolation: Interpolation = "cubic", "interpolation" "" NONE, Range::ANY;
     }
