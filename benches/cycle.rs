@@ -4,8 +4,8 @@
 use clutch_core::supervisor::{BoardMode, Sample, State};
 use clutch_core::{Counts, DacCode, FixedCounts, Real, SupervisorState, Target};
 use clutch_log::Record;
-use clutch_loop::records;
-use clutch_loop::setup::{self, Setup};
+use clutch_loop::from_scenario::{self, Setup};
+use clutch_loop::to_log;
 use clutch_node::{ControlNode, Notice, Outbox};
 use clutch_sim::Scenario;
 use clutch_wire::{Armed, BoardState, Configured, Message, Sample as SampleFrame, encode};
@@ -24,7 +24,7 @@ fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
     let set = [("sampling.scalar".to_owned(), scalar.to_owned())];
     let scenario = Scenario::parse("bench", SCENARIO, &set).expect("a scenario");
     let setup = Setup::<T>::new(&scenario, 7).expect("a safe state");
-    let path = setup::path::<T>(&scenario).expect("a path");
+    let path = from_scenario::path::<T>(&scenario).expect("a path");
     let mut group = c.benchmark_group(format!("cycle, SMC, {scalar}"));
 
     let (servo, supervisor) = (setup.servo, setup.supervisor);
@@ -110,9 +110,8 @@ fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
             let bytes = frame(tick);
             controller.receive(tick * 1_000_000, bytes.as_bytes(), &path, &mut out, &mut |n| {
                 if let Notice::Cycle(n) = n {
-                    let _ = ring.push(Record::Sample(records::sample(tick, 0, &n)));
-                    let _ =
-                        ring.push(Record::Command(records::command(tick, &n.cycle, servo.dac(), radians)));
+                    let _ = ring.push(Record::Sample(to_log::sample(tick, 0, &n)));
+                    let _ = ring.push(Record::Command(to_log::command(tick, &n.cycle, servo.dac(), radians)));
                 }
             });
             tick += 1;

@@ -7,12 +7,12 @@ mod verb;
 use clutch_core::supervisor::State;
 use clutch_log::{Limits, LogWriter, Record, Source};
 use clutch_loop::campaign::runs;
-use clutch_loop::emulated::{Emulated, InProcess, Lockstep, emulated};
-use clutch_loop::emulator::{Emulator, SerialBoard};
+use clutch_loop::from_scenario::{self, Setup};
+use clutch_loop::lockstep_host::{Emulated, InProcess, Lockstep, emulated};
+use clutch_loop::qemu_board::{Emulator, SerialBoard};
 use clutch_loop::replay::{PRESENT_CODE, replay};
-use clutch_loop::setup::{self, Setup};
-use clutch_loop::world::{Outcome, World, WorldParams};
-use clutch_node::exchange::Exchange;
+use clutch_loop::virtual_time::{Outcome, World, WorldParams};
+use clutch_node::lockstep::Exchange;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::{Keep, Metrics, Run, Scenario};
 use clutch_tests::command;
@@ -56,7 +56,7 @@ fn on(scenario: &Scenario, board: impl Lockstep, patience_us: u32) -> Outcome {
     let (duration, settle) = (run.duration + 1.0, run.settle);
     let params = WorldParams { record: true, duration, ticks, settle, ..WorldParams::default() };
     let end = emulated(scenario, &setup, board, ticks).expect("a board can run it");
-    let path = setup::path::<f32>(scenario).expect("a path");
+    let path = from_scenario::path::<f32>(scenario).expect("a path");
     World::new(scenario, params, end).expect("a rig").run(&path).expect("the board answers")
 }
 
@@ -174,7 +174,7 @@ fn the_boards_log_replays_bit_for_bit_on_this_machine() {
         let ran = on(&scenario, Emulator::start(&image).expect("a board"), 3000);
         let file = scratch(&format!("{law}.mcap"));
         let setup = Setup::<f32>::new(&scenario, 7).expect("a safe state");
-        let mut header = setup::header(&scenario, &setup.servo, Source::Loop, "emulated", "test");
+        let mut header = from_scenario::header(&scenario, &setup.servo, Source::Loop, "emulated", "test");
         header.extra.push((PRESENT_CODE.to_owned(), ran.present.to_string()));
         let mut log = LogWriter::create(&file, &header).expect("a file");
         ran.records.iter().for_each(|r| log.write(r).expect("room for it"));
@@ -256,7 +256,7 @@ fn a_processor_that_fails_sends_encoder_and_converter_to_the_safe_state() {
     };
     let end: Emulated<_, _> =
         emulated(&scenario, &setup, &mut failing, u64::MAX).expect("a board can run it");
-    let path = setup::path::<f32>(&scenario).expect("a path");
+    let path = from_scenario::path::<f32>(&scenario).expect("a path");
     let params = WorldParams { duration: 5.0, ..WorldParams::default() };
     let ended = World::new(&scenario, params, end).expect("a rig").run(&path).expect_err("it fails");
     assert!(ended.to_string().contains("as it was to"), "{ended}");

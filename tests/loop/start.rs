@@ -2,7 +2,7 @@
 
 use clutch_core::Target;
 use clutch_core::supervisor::State;
-use clutch_loop::setup::{self, Setup};
+use clutch_loop::from_scenario::{self, Setup};
 use clutch_node::{ControlNode, Outbox};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::BUILT_IN;
@@ -15,7 +15,7 @@ fn samples_that_pile_up_before_consent_do_not_end_the_run() {
     let setup = Setup::<f64>::new(&scenario, 1).unwrap();
     let (run, config) = (1, setup.control.config);
     let mut node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-    let path = setup::path::<f64>(&scenario).unwrap();
+    let path = from_scenario::path::<f64>(&scenario).unwrap();
     let path = |tick: u64| -> Target<f64> { path(tick) };
     let mut out = Outbox::default();
     let mut hear = |node: &mut ControlNode<f64>, now_ns: u64, messages: &[Message]| {

@@ -3,14 +3,14 @@
 
 use clutch_core::{DacCode, Target};
 use clutch_log::Source;
-use clutch_loop::daq::{self, DaqOptions};
-use clutch_loop::end::Local;
+use clutch_loop::control_loop::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Watch};
+use clutch_loop::from_scenario::{self, Setup};
 use clutch_loop::port::{Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{RealtimeOptions, WaitMode};
-use clutch_loop::run::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Watch};
-use clutch_loop::setup::{self, Setup};
 use clutch_loop::sim_board::PATIENT_BOARD;
+use clutch_loop::sim_board_server::{self, DaqOptions};
+use clutch_loop::station::Local;
 use clutch_node::ControlNode;
 use clutch_sim::Scenario;
 use clutch_sim::scenario::BUILT_IN;
@@ -95,11 +95,12 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let stop = Arc::new(AtomicBool::new(false));
     let (flag, rig) = (stop.clone(), scenario.clone());
     let options = DaqOptions { faults: Vec::new(), seed: 1, patient: true, wait: WaitMode::Sleep };
-    let board = std::thread::spawn(move || daq::run(&rig, &options, &mut terminal, &flag, |_| ()));
+    let board =
+        std::thread::spawn(move || sim_board_server::run(&rig, &options, &mut terminal, &flag, |_| ()));
 
     let mut port = Port::open(&address, &SerialOptions::default()).unwrap().port;
     let setup = Setup::<f64>::new(&scenario, 0).unwrap();
-    let path = setup::path::<f64>(&scenario).unwrap();
+    let path = from_scenario::path::<f64>(&scenario).unwrap();
     let path = |tick: u64| -> Target<f64> {
         if Some(tick) == spoilt {
             drop(black_box(Box::new(tick)));
@@ -119,7 +120,7 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let clock = talk.clock().unwrap();
 
     let watch = Arc::new(Watch::default());
-    let header = setup::header(&scenario, &setup.servo, Source::Loop, &address.to_string(), "test");
+    let header = from_scenario::header(&scenario, &setup.servo, Source::Loop, &address.to_string(), "test");
     let (log_thread, ring) = LogThread::start(&log, &header, watch.clone()).unwrap();
     let options = LoopOptions {
         // The machine's settings are not the subject, and locked memory would stay locked.
@@ -136,7 +137,7 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
         let (end, port, watch) = (&mut end, &mut port, &*watch);
         let configured =
             Configured { end, port, ring: Some(ring), watch, ticks, clock, detector, patient: true };
-        scope.spawn(move || run::run(configured, &options)).join().unwrap()
+        scope.spawn(move || control_loop::run(configured, &options)).join().unwrap()
     });
     stop.store(true, Ordering::Relaxed);
     let _ = board.join().unwrap().unwrap();

@@ -3,10 +3,10 @@
 use clutch_core::supervisor::{Arrival, Cause, Checks, State};
 use clutch_log::names;
 use clutch_loop::campaign::{CASES, Expected, RunId, Table, runs};
-use clutch_loop::end::Local;
+use clutch_loop::from_scenario::{self, Setup};
 use clutch_loop::replay::{PRESENT_CODE, replay};
-use clutch_loop::setup::{self, Setup};
-use clutch_loop::world::{World, WorldParams};
+use clutch_loop::station::Local;
+use clutch_loop::virtual_time::{World, WorldParams};
 use clutch_node::ControlNode;
 use clutch_sim::{Keep, Scenario};
 use std::collections::BTreeSet;
@@ -73,7 +73,8 @@ fn each_run_leaves_a_log_that_replays_bit_for_bit() {
         let outcome = run.run(Checks::ALL, true).expect("the tables are right");
         let scenario = run.scenario().expect("the tables are right");
         let setup = Setup::<f64>::new(&scenario, 7).expect("the scenario has a safe state");
-        let mut header = setup::header(&scenario, &setup.servo, clutch_log::Source::Loop, "virtual", "test");
+        let mut header =
+            from_scenario::header(&scenario, &setup.servo, clutch_log::Source::Loop, "virtual", "test");
         header.extra.push((PRESENT_CODE.to_owned(), outcome.present.to_string()));
         let mut log = clutch_log::LogWriter::create(&path, &header).expect("a temporary file");
         for record in &outcome.records {
@@ -143,10 +144,10 @@ fn equal(scenario: &Scenario, what: &str) {
     }
 }
 
-fn world<T: clutch_core::Real>(scenario: &Scenario) -> clutch_loop::world::Outcome {
+fn world<T: clutch_core::Real>(scenario: &Scenario) -> clutch_loop::virtual_time::Outcome {
     let setup = Setup::<T>::new(scenario, 7).expect("a safe state");
     let params = WorldParams { record: true, duration: 2.999, ..WorldParams::default() };
-    let path = setup::path::<T>(scenario).expect("a path");
+    let path = from_scenario::path::<T>(scenario).expect("a path");
     let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
     let mut world = World::new(scenario, params, Local { node, path: &path }).expect("a rig");
     world.run(&path).expect("a run")
@@ -200,7 +201,7 @@ fn healthy_runs_of_every_law_and_path_are_never_ended() {
                 let setup = Setup::<f32>::new(&scenario, 7).expect("a safe state");
                 let params =
                     WorldParams { latency_ns: 80_000, seed, duration: 20.0, ..WorldParams::default() };
-                let path = setup::path::<f32>(&scenario).expect("a path");
+                let path = from_scenario::path::<f32>(&scenario).expect("a path");
                 let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
                 let mut world = World::new(&scenario, params, Local { node, path: &path }).expect("a rig");
                 let outcome = world.run(&path).expect("a run");

@@ -3,10 +3,10 @@
 use crate::{Outcome, ScenarioArgs, print};
 use anyhow::Context;
 use clap::Args;
-use clutch_loop::daq::{self, DaqNotice, DaqOptions};
 use clutch_loop::faults::Fault;
 use clutch_loop::port::{Address, ClientEvent, Endpoint, Listener, PseudoTerminal};
 use clutch_loop::realtime::WaitMode;
+use clutch_loop::sim_board_server::{self, DaqNotice, DaqOptions};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -73,7 +73,7 @@ impl Daq {
             patient: self.patient,
             wait: WaitMode::Sleep,
         };
-        let report = daq::run(&scenario, &options, endpoint.as_mut(), &stop, |notice| {
+        let report = sim_board_server::run(&scenario, &options, endpoint.as_mut(), &stop, |notice| {
             // A terminal that has gone away does not stop a board.
             let _ = print(&match notice {
                 DaqNotice::Client(ClientEvent::Connected) => "client connected\n".to_owned(),

@@ -7,12 +7,12 @@ use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
 use clutch_log::{LogWriter, Source};
-use clutch_loop::emulated::{Lockstep, emulated};
-use clutch_loop::emulator::{Emulator, SerialBoard};
 use clutch_loop::faults::Fault;
+use clutch_loop::from_scenario::{self, Setup};
+use clutch_loop::lockstep_host::{Lockstep, emulated};
+use clutch_loop::qemu_board::{Emulator, SerialBoard};
 use clutch_loop::replay::PRESENT_CODE;
-use clutch_loop::setup::{self, Setup};
-use clutch_loop::world::{Outcome as Ran, World, WorldParams};
+use clutch_loop::virtual_time::{Outcome as Ran, World, WorldParams};
 use clutch_sim::Scenario;
 use std::path::PathBuf;
 
@@ -101,7 +101,7 @@ impl Hil {
         let took = started.elapsed().as_secs_f64();
         if let Some(file) = &self.log {
             let mut header =
-                setup::header(&scenario, &setup.servo, Source::Loop, "emulated board", crate::BUILD);
+                from_scenario::header(&scenario, &setup.servo, Source::Loop, "emulated board", crate::BUILD);
             header.extra.push((PRESENT_CODE.to_owned(), ran.present.to_string()));
             header.extra.push(("board".to_owned(), "emulated".to_owned()));
             header.extra.push(("certified".to_owned(), certified.to_string()));
@@ -133,7 +133,7 @@ impl Hil {
             settle: scenario.spec().run.settle,
         };
         let end = emulated(scenario, setup, board, ticks)?;
-        let path = setup::path::<f32>(scenario)?;
+        let path = from_scenario::path::<f32>(scenario)?;
         Ok(World::new(scenario, params, end)?.run(&path)?)
     }
 

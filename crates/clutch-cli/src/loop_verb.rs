@@ -9,17 +9,17 @@ use clutch_core::law::Law;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{DacCode, Micros, Real, SafeState};
 use clutch_log::Source;
-use clutch_loop::daq::{self, DaqOptions, DaqReport};
-use clutch_loop::emulated::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE};
-use clutch_loop::end::{End, Local, Remote};
+use clutch_loop::control_loop::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Ring, Watch};
 use clutch_loop::faults::Fault;
+use clutch_loop::from_scenario::{self, Setup};
+use clutch_loop::lockstep_host::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE};
 use clutch_loop::port::{Address, DeviceKind, Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode, describe_system};
 use clutch_loop::replay::PRESENT_CODE;
-use clutch_loop::run::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Ring, Watch};
-use clutch_loop::setup::{self, Setup};
 use clutch_loop::sim_board::{PATIENT_BOARD, STRICT_BOARD};
+use clutch_loop::sim_board_server::{self, DaqOptions, DaqReport};
+use clutch_loop::station::{End, Local, Remote};
 use clutch_node::{ControlNode, RemoteNode, present_code};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::ScalarKind;
@@ -133,7 +133,7 @@ pub(crate) struct Loop {
 /// The simulated board, beside the loop.
 struct Background {
     stop: Arc<AtomicBool>,
-    thread: std::thread::JoinHandle<Result<DaqReport, daq::DaqError>>,
+    thread: std::thread::JoinHandle<Result<DaqReport, sim_board_server::DaqError>>,
 }
 
 impl Background {
@@ -144,7 +144,7 @@ impl Background {
         let (scenario, flag) = (scenario.clone(), stop.clone());
         let thread = std::thread::Builder::new()
             .name("clutch-board".to_owned())
-            .spawn(move || daq::run(&scenario, &options, &mut terminal, &flag, |_| ()))
+            .spawn(move || sim_board_server::run(&scenario, &options, &mut terminal, &flag, |_| ()))
             .context("the simulated board could not be started")?;
         Ok((Background { stop, thread }, address))
     }
@@ -290,7 +290,7 @@ impl Run<'_> {
 
     /// Whether encoder and converter are those of the scenario.
     fn check(&self, hello: &Hello, port: &Port) -> anyhow::Result<()> {
-        let mut lines = setup::misfits(self.scenario, hello);
+        let mut lines = from_scenario::misfits(self.scenario, hello);
         let simulated = hello.board == PATIENT_BOARD || hello.board == STRICT_BOARD;
         let real = !matches!(port.kind(), DeviceKind::PseudoTerminal | DeviceKind::Tcp);
         if simulated && real && self.verb.board.is_none() {
@@ -321,11 +321,11 @@ impl Run<'_> {
         // A sample and its answer, each cycle.
         let (mut port, notes) = self.open((15, 20))?;
         // Who is there?
-        let mut end = local(&Setup::<T>::new(self.scenario, 0)?, setup::path(self.scenario)?);
+        let mut end = local(&Setup::<T>::new(self.scenario, 0)?, from_scenario::path(self.scenario)?);
         let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
         self.check(&hello, &port)?;
         let setup = self.setup::<T>(&hello)?;
-        let mut end = local(&setup, setup::path(self.scenario)?);
+        let mut end = local(&setup, from_scenario::path(self.scenario)?);
         self.tell(&hello, &port, &notes)?;
         let hold = setup.supervisor.safe_codes().hold;
         let (log, ring, watch) = self.log(&setup, present_code(&hello, hold), &board_text(&hello))?;
@@ -347,7 +347,7 @@ impl Run<'_> {
             let configure = ControlNode::new(setup.control, setup.servo, setup.supervisor).configuration();
             let silence = if patient { 5_500_000_000 } else { BOARD_SILENCE_NS };
             let node = RemoteNode::new(setup.servo, configure, ALIVE_NS, silence);
-            Ok(Remote { node, path: setup::path::<f32>(self.scenario)? })
+            Ok(Remote { node, path: from_scenario::path::<f32>(self.scenario)? })
         };
         let mut end = remote(&Setup::<f32>::new(self.scenario, 0)?, false)?;
         let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
@@ -357,7 +357,7 @@ impl Run<'_> {
         let setup = self.setup::<f32>(&hello)?;
         let patient = hello.board == PATIENT_BOARD;
         let host_silence = if patient { setup.control.silence } else { HOST_SILENCE };
-        let settings = setup::settings(self.scenario, &setup, host_silence, setup.ticks)?;
+        let settings = from_scenario::settings(self.scenario, &setup, host_silence, setup.ticks)?;
         let mut end = remote(&setup, patient)?;
         self.tell(&hello, &port, &notes)?;
         self.verb.say(&format!("the loop is closed on the board: {text}\n"))?;
@@ -394,7 +394,8 @@ impl Run<'_> {
         let watch = Arc::new(Watch { stop: self.stop.clone(), ..Watch::default() });
         let Some(path) = &self.verb.log else { return Ok((None, None, watch)) };
         let address = self.address.to_string();
-        let mut header = setup::header(self.scenario, &setup.servo, Source::Loop, &address, crate::BUILD);
+        let mut header =
+            from_scenario::header(self.scenario, &setup.servo, Source::Loop, &address, crate::BUILD);
         header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
         header.extra.push(("board".to_owned(), board.to_owned()));
         header.extra.push(("certified".to_owned(), self.certified.to_string()));
@@ -432,7 +433,7 @@ impl Run<'_> {
         let report = std::thread::scope(|scope| {
             let control = std::thread::Builder::new()
                 .name("clutch-control".to_owned())
-                .spawn_scoped(scope, move || run::run(configured, &options));
+                .spawn_scoped(scope, move || control_loop::run(configured, &options));
             let control = control.context("the control thread could not be started")?;
             let mut refused_told = false;
             while !control.is_finished() {
@@ -478,7 +479,7 @@ impl Run<'_> {
                 format!("hold with {} V for {} s, then release", number(volts), number(after))
             }
         };
-        let (boot, holds) = setup::boot_output(scenario, hello, plan);
+        let (boot, holds) = from_scenario::boot_output(scenario, hello, plan);
         let system = describe_system();
         let mut text = format!("{}\n", scenario.name);
         let mut row = |name: &str, value: String| text += &format!("  {name:<12}{value}\n");

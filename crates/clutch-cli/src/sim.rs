@@ -5,7 +5,7 @@ use crate::table::{number, quantities};
 use crate::{Outcome, ScenarioArgs, json, print};
 use anyhow::Context;
 use clap::Args;
-use clutch_loop::records;
+use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::Reaching;
 use clutch_sim::run::Detected;
@@ -84,7 +84,7 @@ impl Sim {
             csv(&run, file)?;
         }
         if let Some(file) = &self.log {
-            records::save_simulation(file, &scenario, &run, crate::BUILD)?;
+            to_log::save_simulation(file, &scenario, &run, crate::BUILD)?;
         }
         if let Some(file) = &self.plot {
             figure(&scenario, &run).save(file)?;

@@ -5,7 +5,7 @@
 
 use clutch_core::supervisor::Checks;
 use clutch_loop::campaign::{Table, runs};
-use clutch_loop::emulator::Emulator;
+use clutch_loop::qemu_board::Emulator;
 use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -5,12 +5,12 @@
 //! the table of `docs/safety.md`; the tests run it with fewer seeds, and show that it fails when
 //! any one of the supervisor's checks is taken out.
 
-use crate::emulated::{Lockstep, emulated};
-use crate::end::Local;
 use crate::faults::{Direction, Fault, FaultKind, StuckAt};
-use crate::setup::{self, Setup, SetupError};
+use crate::from_scenario::{self, Setup, SetupError};
+use crate::lockstep_host::{Lockstep, emulated};
 use crate::sim_board::SimBoardError;
-use crate::world::{Outcome, Stall, World, WorldError, WorldParams};
+use crate::station::Local;
+use crate::virtual_time::{Outcome, Stall, World, WorldError, WorldParams};
 use clutch_core::law::{Command, Controller, Law, Tick};
 use clutch_core::supervisor::{Cause, Checks};
 use clutch_core::{Real, Servo, Target};
@@ -336,7 +336,7 @@ impl RunId {
         let setup = Setup::<f32>::new(&scenario, 7)?;
         let params = self.world(setup.servo.period().seconds(), false);
         let end = emulated(&scenario, &setup, link, u64::MAX)?;
-        let path = setup::path::<f32>(&scenario)?;
+        let path = from_scenario::path::<f32>(&scenario)?;
         let outcome = World::new(&scenario, params, end)?.run(&path)?;
         Ok(self.with_onset(outcome, self.onset()))
     }
@@ -398,7 +398,7 @@ impl RunId {
         let period: f64 = setup.servo.period().seconds();
         let params = self.world(period, record);
         let onset_tick = (self.onset() / period) as u64;
-        let path = setup::path::<T>(scenario)?;
+        let path = from_scenario::path::<T>(scenario)?;
         let nan = T::from_f64(f64::NAN);
         let broken = self.case().broken;
         let path = move |tick: u64| {

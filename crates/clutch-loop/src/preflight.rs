@@ -1,9 +1,9 @@
 //! Before a run: who is on the line, and does it fit.
 
-use crate::end::{End, Remote, Tells};
+use crate::from_scenario::SetupError;
 use crate::port::{Port, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
-use crate::setup::SetupError;
+use crate::station::{End, Remote, Tells};
 use clutch_node::{Notice, Outbox, SETTINGS, Settings};
 use clutch_wire::{Hello, Refusal, Refused};
 use rustix::fd::AsFd;

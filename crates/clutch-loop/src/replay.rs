@@ -1,7 +1,7 @@
 //! Replay: the recorded counts to the recorded law, every output compared bit for bit.
 
-use crate::records;
-use crate::setup::{self, Setup, SetupError};
+use crate::from_scenario::{self, Setup, SetupError};
+use crate::to_log;
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Cycle, Sample, State};
 use clutch_core::{Counts, DacCode, FixedCounts, Micros, Real, SupervisorState, Target};
 use clutch_log::{CommandRecord, EventKind, EventRecord, Log, SampleRecord, Source};
@@ -156,7 +156,7 @@ fn looped<T: Real>(
     let present = present.ok_or(ReplayError::Lacks("the code at arming"))?;
     let setup = Setup::<T>::new(scenario, 0)?;
     let (servo, supervisor) = (&setup.servo, &setup.supervisor);
-    let path = setup::path::<T>(scenario)?;
+    let path = from_scenario::path::<T>(scenario)?;
     let radians = servo.encoder().radians_per_count::<f64>();
     let mut state = SupervisorState::default();
     supervisor.connect(&mut state);
@@ -189,7 +189,7 @@ fn looped<T: Real>(
             Target { position: target.position.plus(origin), ..target }
         };
         let cycle = supervisor.sample(servo, &mut state, &seen(sample), target);
-        commands.push(records::command(sample.time_ns, &cycle, servo.dac(), radians));
+        commands.push(to_log::command(sample.time_ns, &cycle, servo.dac(), radians));
     }
     Ok(commands)
 }
@@ -223,7 +223,7 @@ fn simulated<T: Real>(
             let target = path.at(sample.tick);
             let output = servo.tick(&mut state, Counts(sample.counts), &target);
             let cycle = simulated_cycle(sample.tick, target, output);
-            records::command(sample.time_ns, &cycle, servo.dac(), radians)
+            to_log::command(sample.time_ns, &cycle, servo.dac(), radians)
         })
         .collect())
 }

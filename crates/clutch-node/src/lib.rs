@@ -18,26 +18,26 @@
 #![no_std]
 
 mod board;
-mod control;
-mod counter;
-pub mod exchange;
-mod onboard;
+mod board_controller;
+mod controller;
+mod hardware;
+mod host;
+pub mod lockstep;
+mod one_chip;
 mod outbox;
-mod remote;
-mod runner;
 mod settings;
-mod standalone;
 mod telemetry;
+mod wide_counter;
 
 pub use board::{BoardNode, BoardParams};
-pub use control::{ControlNode, ControlParams, CycleNotice, Ending, LinkCounts, Notice};
-pub use counter::WideCounter;
-pub use onboard::{Onboard, OnboardParams, Ports, present_code};
+pub use board_controller::{Onboard, OnboardParams, Ports, present_code};
+pub use controller::{ControlNode, ControlParams, CycleNotice, Ending, LinkCounts, Notice};
+pub use hardware::{Acquisition, Hardware, Role, receive, tick};
+pub use host::{RemoteNode, Told};
+pub use one_chip::Standalone;
 pub use outbox::Outbox;
-pub use remote::{RemoteNode, Told};
-pub use runner::{Acquisition, Hardware, Role, receive, tick};
 pub use settings::{
     Built, MAX_KNOTS, Misfit, Numbers, Path, RunParams, SETTINGS, SETTINGS_HASH, SettingInfo, Settings,
     Unsupported,
 };
-pub use standalone::Standalone;
+pub use wide_counter::WideCounter;

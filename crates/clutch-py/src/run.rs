@@ -6,7 +6,7 @@ use crate::stepping::{PythonLaw, event_table, native, output_stage};
 use crate::table::{Column, Table};
 use clutch_core::law::Limit;
 use clutch_core::{ParamError, Servo};
-use clutch_loop::records::{SaveError, save_simulation};
+use clutch_loop::to_log::{SaveError, save_simulation};
 use clutch_sim::engine::EngineKind;
 use clutch_sim::progress::Progress;
 use clutch_sim::{Keep, Metrics, RunError, ScenarioError, simulate_servo};

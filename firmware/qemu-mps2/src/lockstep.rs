@@ -3,7 +3,7 @@
 
 use crate::fault;
 use crate::files::HostFile;
-use clutch_node::exchange::{Exchange, LONGEST, answer};
+use clutch_node::lockstep::{Exchange, LONGEST, answer};
 use clutch_node::{Onboard, Ports};
 use semihosting::process;
 

@@ -41,7 +41,7 @@ use clutch_core::{
     StickSlipParams, StickSlipState, Stribeck, StribeckParams, Supervisor, SupervisorParams, Target,
     Tolerances, VelocityParams, VelocitySource, check_path, sin_cos_turns,
 };
-use clutch_node::exchange::Exchange;
+use clutch_node::lockstep::Exchange;
 use clutch_node::{
     Acquisition, BoardNode, BoardParams, ControlNode, ControlParams, Hardware, Onboard, OnboardParams,
     Outbox, Path, Ports, RemoteNode, Role, RunParams, Settings, Standalone, WideCounter, present_code,

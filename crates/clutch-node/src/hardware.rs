@@ -10,8 +10,8 @@
 //! from one place, so that neither interrupts the other: nothing here locks.
 
 use crate::board::{BoardNode, BoardParams};
+use crate::one_chip::Standalone;
 use crate::outbox::Outbox;
-use crate::standalone::Standalone;
 use clutch_core::{Counts, DacCode, Micros, ParamError};
 
 /// What a board's one file gives. Nothing of it may wait.

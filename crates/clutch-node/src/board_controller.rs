@@ -13,7 +13,7 @@
 //! samples. A host that falls silent ends the run in the safe state.
 
 use crate::board::misunderstood;
-use crate::control::{ControlNode, ControlParams, Ending, Notice};
+use crate::controller::{ControlNode, ControlParams, Ending, Notice};
 use crate::outbox::Outbox;
 use crate::settings::{Built, MAX_KNOTS, Misfit, Path, SETTINGS_HASH, Settings};
 use crate::telemetry::{frame, states};

@@ -8,7 +8,7 @@
 //! All little-endian. Whoever sends a request decides how long it is until the next, so that a run is
 //! the same however fast the machine is.
 
-use crate::onboard::{Onboard, Ports};
+use crate::board_controller::{Onboard, Ports};
 use clutch_core::Micros;
 
 /// Bytes before those that are carried.

@@ -3,12 +3,12 @@
 //! The same state machines, frames and rig as in real time; only the clock is computed. A run of
 //! one second takes some milliseconds and repeats bit for bit.
 
-use crate::end::{End, Tells};
 use crate::faults::{Direction, Fault};
-use crate::line::Line;
+use crate::faulty_line::Line;
 use crate::preflight;
-use crate::records;
 use crate::sim_board::{SimBoard, SimBoardError};
+use crate::station::{End, Tells};
+use crate::to_log;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Micros, Real, Target};
 use clutch_log::Record;
@@ -263,10 +263,10 @@ impl<E: End> World<E> {
                         outcome.answers += u64::from(n.cycle.answer.is_some());
                         let volts = dac.volts(n.cycle.code).to_f64();
                         outcome.volts = (outcome.volts.0.min(volts), outcome.volts.1.max(volts));
-                        records.push(Record::Sample(records::sample(time_ns, 0, &n)));
-                        records.push(Record::Command(records::command(time_ns, &n.cycle, &dac, radians)));
-                        records.extend(records::change(time_ns, &n.cycle));
-                        records.push(Record::Truth(records::truth(time_ns, n.cycle.tick, rig)));
+                        records.push(Record::Sample(to_log::sample(time_ns, 0, &n)));
+                        records.push(Record::Command(to_log::command(time_ns, &n.cycle, &dac, radians)));
+                        records.extend(to_log::change(time_ns, &n.cycle));
+                        records.push(Record::Truth(to_log::truth(time_ns, n.cycle.tick, rig)));
                     }
                     Notice::Ended(ending) => ended = Some(ending),
                     Notice::Refused(m) if !*armed_now => refused = Some(m),
@@ -295,7 +295,7 @@ impl<E: End> World<E> {
                 first_sample = Some(sampled);
             }
             if let Some(ending) = ended {
-                records.push(records::ended(time_ns, &ending));
+                records.push(to_log::ended(time_ns, &ending));
             }
             if state == State::Faulted && outcome.tripped.is_none() {
                 outcome.tripped = armed_for;
@@ -304,7 +304,7 @@ impl<E: End> World<E> {
             if !E::IS_CONTROLLER && state == State::Running && tick + 1 >= self.params.ticks {
                 self.end.stop(StopReason::Done, &mut out);
                 let Told { state: to, cause, value, .. } = self.end.told();
-                records.push(records::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }));
+                records.push(to_log::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }));
             }
             if self.params.record {
                 outcome.records.append(&mut records);

@@ -7,7 +7,7 @@
 //! then goes on as if the machine had not stalled. How often and how long is counted.
 
 use crate::faults::{Direction, Fault};
-use crate::line::Line;
+use crate::faulty_line::Line;
 use crate::port::{ClientEvent, Endpoint};
 use crate::realtime::{WaitMode, monotonic_ns};
 use crate::sim_board::{SimBoard, SimBoardError};

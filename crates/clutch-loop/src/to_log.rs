@@ -1,7 +1,7 @@
 //! What a log gets of each sample, of the link and of the shaft.
 
+use crate::from_scenario::{self, SetupError};
 use crate::replay::START_VOLTAGE;
-use crate::setup::{self, SetupError};
 use clutch_core::law::{Limit, Terms};
 use clutch_core::supervisor::{Cycle, State};
 use clutch_core::{Dac, FixedCounts, Real, Servo};
@@ -195,8 +195,8 @@ fn save_in<T: Real>(
 ) -> Result<(), SaveError> {
     let spec = scenario.spec();
     let params = spec.servo().map_err(SetupError::from)?;
-    let servo = Servo::<T>::new(&params.cast()).map_err(|e| SetupError::from(setup::to_f64(e)))?;
-    let mut header = setup::header(scenario, &servo, Source::Simulation, "", version);
+    let servo = Servo::<T>::new(&params.cast()).map_err(|e| SetupError::from(from_scenario::to_f64(e)))?;
+    let mut header = from_scenario::header(scenario, &servo, Source::Simulation, "", version);
     let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
     header.extra.push((START_VOLTAGE.to_owned(), bits));
     let mut log = LogWriter::create(path, &header)?;

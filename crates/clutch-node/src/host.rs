@@ -1,6 +1,6 @@
 //! The host's end of a board in the controller role: it configures, consents, and hears.
 
-use crate::control::{Ending, LinkCounts, Notice};
+use crate::controller::{Ending, LinkCounts, Notice};
 use crate::outbox::Outbox;
 use crate::telemetry::{both_states, notice};
 use clutch_core::law::{Law, LawTerms};

@@ -11,14 +11,14 @@
 //! Between its first and its last cycle the control thread allocates nothing, takes no lock, and
 //! makes no system call but the wait for the next sample, the read and the write.
 
-use crate::end::{End, Tells};
 use crate::port::{Port, PortError};
 use crate::preflight::ClockOffset;
 use crate::realtime::{
     CycleStats, CycleSummary, Readiness, RealtimeOptions, WaitMode, enter, monotonic_ns, sleep_until,
     wait_readable,
 };
-use crate::records;
+use crate::station::{End, Tells};
+use crate::to_log;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Micros, Real, StickSlip, StickSlipState};
 use clutch_log::{EventKind, EventRecord, Header, LogError, LogWriter, Record};
@@ -305,9 +305,9 @@ impl<E: End> Control<'_, E> {
         let of_run = |n: &&CycleNotice<E::Scalar, E::Terms>| n.cycle.from != State::Ready;
         for n in batch.cycles.iter().take(batch.used).flatten().filter(of_run) {
             let age = self.clock.age_us(n.sample.time_us, now);
-            let mut records = [Record::Sample(records::sample(time_ns, age, n)); 3];
-            records[1] = Record::Command(records::command(time_ns, &n.cycle, &self.dac, self.radians));
-            let change = records::change(time_ns, &n.cycle);
+            let mut records = [Record::Sample(to_log::sample(time_ns, age, n)); 3];
+            records[1] = Record::Command(to_log::command(time_ns, &n.cycle, &self.dac, self.radians));
+            let change = to_log::change(time_ns, &n.cycle);
             let used = if let Some(change) = change {
                 records[2] = change;
                 3
@@ -337,7 +337,7 @@ impl<E: End> Control<'_, E> {
         }
         self.board_safe |= batch.stopped;
         if let Some(ending) = batch.ended.filter(|e| e.from != State::Ready) {
-            self.push(&[records::ended(time_ns, &ending)]);
+            self.push(&[to_log::ended(time_ns, &ending)]);
         }
         if let (Some((nonce, time_us)), Some((sent, sent_ns))) = (batch.pong, self.ping_sent)
             && nonce == sent
@@ -375,7 +375,7 @@ impl<E: End> Control<'_, E> {
     fn housekeeping(&mut self, now: u64) {
         let state = self.end.told();
         let others = (state.lost, state.rejected, state.deadline_misses, self.dropped);
-        let link = records::link(now.saturating_sub(self.start_ns), state.tick, self.end.counts(), others);
+        let link = to_log::link(now.saturating_sub(self.start_ns), state.tick, self.end.counts(), others);
         self.push(&[Record::Link(link)]);
         self.pings = self.pings.wrapping_add(1);
         self.end.ping(self.pings, &mut self.out);
@@ -391,7 +391,7 @@ impl<E: End> Control<'_, E> {
         let Told { state, cause, value, tick, .. } = self.end.told();
         if from != State::Ready {
             let now = monotonic_ns().saturating_sub(self.start_ns);
-            self.push(&[records::ended(now, &Ending { from, state, cause, value, tick })]);
+            self.push(&[to_log::ended(now, &Ending { from, state, cause, value, tick })]);
         }
     }
 }

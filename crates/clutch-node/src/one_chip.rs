@@ -1,7 +1,7 @@
 //! Controller, encoder and converter on one chip.
 
 use crate::board::{BoardNode, BoardParams};
-use crate::onboard::{Onboard, OnboardParams, Ports};
+use crate::board_controller::{Onboard, OnboardParams, Ports};
 use crate::outbox::Outbox;
 use clutch_core::{Counts, DacCode, Micros, ParamError};
 use clutch_wire::BoardState;

@@ -1,11 +1,11 @@
 //! A board in the controller role that is asked in lockstep: emulated, or in this process.
 
-use crate::emulator::{Emulator, SerialBoard};
-use crate::end::{End, Tells};
-use crate::setup::{self, Setup, SetupError};
+use crate::from_scenario::{self, Setup, SetupError};
+use crate::qemu_board::{Emulator, SerialBoard};
+use crate::station::{End, Tells};
 use clutch_core::law::LawTerms;
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Target};
-use clutch_node::exchange::{Exchange, answer};
+use clutch_node::lockstep::{Exchange, answer};
 use clutch_node::{
     ControlNode, LinkCounts, Notice, Onboard, OnboardParams, Outbox, Ports, RemoteNode, Settings, Told,
 };
@@ -87,8 +87,8 @@ pub fn emulated<'a, L: Lockstep>(
         remote: RemoteNode::new(setup.servo, configure, ALIVE_NS, BOARD_SILENCE_NS),
         link,
         // A board that keeps its own time waits as long for the host as for encoder and converter.
-        settings: setup::settings(scenario, setup, HOST_SILENCE.max(setup.control.silence), ticks)?,
-        path: setup::path::<f32>(scenario)?,
+        settings: from_scenario::settings(scenario, setup, HOST_SILENCE.max(setup.control.silence), ticks)?,
+        path: from_scenario::path::<f32>(scenario)?,
         to_board: Outbox::default(),
         now_ns: 0,
         lateness: Micros(0),
