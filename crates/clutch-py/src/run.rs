@@ -181,7 +181,7 @@ impl Run {
         let written = py.detach(|| save_simulation(&path, &self.scenario.0, &self.run, clutch_cli::BUILD));
         written.map_err(|e| match e {
             SaveError::Log(e) => crate::convert::log_error(py, &e),
-            SaveError::Setup(e) => {
+            SaveError::Build(e) => {
                 let source = std::io::Error::other(e.to_string());
                 os_error(py, &path, &e.to_string(), &source)
             }
