@@ -189,7 +189,7 @@ fn a_file_cut_at_any_byte_gives_every_whole_chunk() {
                 assert!(
                     matches!(log.tail, Tail::Cut { at, .. } if at <= cut as u64),
                     "cut at {cut}: {}",
-                    log.end
+                    log.tail
                 );
                 let Tail::Cut { at, .. } = log.tail else { unreachable!() };
                 assert_eq!(log.left_out_bytes, cut as u64 - at, "cut at {cut}");
@@ -456,7 +456,7 @@ fn a_record_of_two_to_the_64_bytes_is_the_end_of_the_log() {
         assert_eq!(log.records(), ends[3].1);
         assert!(log.records() < records.len() && !log.complete);
         assert!(matches!(log.tail, Tail::Broken { at, .. } if at == end as u64), "{}", log.tail);
-        assert!(log.end.to_string().contains(&length.to_string()), "{}", log.tail);
+        assert!(log.tail.to_string().contains(&length.to_string()), "{}", log.tail);
     }
 }
 

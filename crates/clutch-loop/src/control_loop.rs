@@ -218,7 +218,7 @@ impl<S: Station> Control<'_, S> {
     fn cycle(&mut self, arrived_ns: u64, buffer: &mut [u8]) -> Result<(), std::io::Error> {
         let count = self.port.read(buffer)?;
         let bytes = buffer.get(..count).unwrap_or(&[]);
-        if !S::IS_HOST {
+        if !S::LOOKS_ON {
             return self.hear(arrived_ns, bytes);
         }
         for frame in bytes.split_inclusive(|byte| *byte == 0) {
@@ -272,7 +272,7 @@ impl<S: Station> Control<'_, S> {
             let late = done.saturating_sub(due.unwrap_or(arrived_ns).min(arrived_ns));
             self.station.answered(Micros(u32::try_from(late / 1000).unwrap_or(u32::MAX)));
             let answered = batch.cycles.iter().take(batch.used).flatten().any(|n| n.cycle.answer.is_some());
-            if answered && !S::IS_HOST {
+            if answered && !S::LOOKS_ON {
                 self.response.record(took);
                 if let Some(last) = self.last_answer_ns {
                     self.interval.record(done.saturating_sub(last));
@@ -316,7 +316,7 @@ impl<S: Station> Control<'_, S> {
             };
             self.push(&records[..used]);
             self.board_safe |= matches!(n.sample.status & 0x07, 4 | 5);
-            if S::IS_HOST {
+            if S::LOOKS_ON {
                 self.on_the_board(n);
             }
             if let Some(out) = &n.cycle.output {
@@ -385,7 +385,7 @@ impl<S: Station> Control<'_, S> {
     fn stop(&mut self, reason: StopReason) {
         let from = self.station.standing().state;
         self.station.stop(reason, &mut self.out);
-        if S::IS_HOST {
+        if S::LOOKS_ON {
             return; // the board says when it has ended
         }
         let Standing { state, cause, value, tick, .. } = self.station.standing();
@@ -603,7 +603,7 @@ pub fn run<S: Station>(configured: ConfiguredRun<'_, S>, options: &LoopOptions) 
                 c.begun = true;
                 if c.watch.stop.load(Ordering::Relaxed) {
                     c.stop(StopReason::Operator);
-                } else if !S::IS_HOST
+                } else if !S::LOOKS_ON
                     && c.station.standing().state == State::Running
                     && c.station.standing().tick + 1 >= c.ticks
                 {
@@ -674,7 +674,7 @@ pub fn run<S: Station>(configured: ConfiguredRun<'_, S>, options: &LoopOptions) 
         log_dropped: c.dropped.saturating_sub(2 * c.untold),
         cut_writes: c.cut,
         begun: c.begun,
-        on_the_board: S::IS_HOST,
+        on_the_board: S::LOOKS_ON,
         board_safe: c.board_safe,
         refused: c.refused,
         port_error,

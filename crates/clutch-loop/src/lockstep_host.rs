@@ -126,7 +126,7 @@ impl<L: LockstepBoard, P: Fn(u64) -> Target<f32>> LockstepHost<L, P> {
 impl<L: LockstepBoard, P: Fn(u64) -> Target<f32>> Station for LockstepHost<L, P> {
     type Scalar = f32;
     type Terms = LawTerms<f32>;
-    const IS_HOST: bool = true;
+    const LOOKS_ON: bool = true;
 
     fn discover(&mut self, nonce: u32, out: &mut Outbox) {
         self.host.discover(nonce, &mut self.to_board);

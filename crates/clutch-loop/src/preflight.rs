@@ -264,7 +264,7 @@ impl<'a, S: Station> Talk<'a, S> {
             Some(Said::Hello(hello)) if hello.schema != clutch_wire::SCHEMA => {
                 Err(PreflightError::Schema { address, board: hello.schema as u32 })
             }
-            Some(Said::Hello(hello)) => match (controller, S::IS_HOST) {
+            Some(Said::Hello(hello)) => match (controller, S::LOOKS_ON) {
                 (Some(_), false) => Err(PreflightError::IsController { address }),
                 (None, true) => Err(PreflightError::IsNoController { address }),
                 (Some(m), true) if m.settings != clutch_node::SETTINGS_HASH => {

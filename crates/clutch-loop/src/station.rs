@@ -24,9 +24,9 @@ pub trait Station {
     type Scalar: Real;
     /// The terms of its law.
     type Terms: Terms<Self::Scalar>;
-    /// Whether it is the host of a board that closes the loop. Then what comes over the line are reports, each with a time of its
+    /// Whether a board closes the loop, and this machine looks on. Then what comes over the line are reports, each with a time of its
     /// own, and the board ends the run by itself; samples are heard together, as the newest of them counts.
-    const IS_HOST: bool;
+    const LOOKS_ON: bool;
 
     /// Asks who is there.
     fn discover(&mut self, nonce: u32, out: &mut Outbox);
@@ -84,7 +84,7 @@ pub struct ControllerStation<T: Real, C: Controller<T>, P> {
 impl<T: Real, C: Controller<T>, P: Fn(u64) -> Target<T>> Station for ControllerStation<T, C, P> {
     type Scalar = T;
     type Terms = C::Terms;
-    const IS_HOST: bool = false;
+    const LOOKS_ON: bool = false;
 
     fn discover(&mut self, nonce: u32, out: &mut Outbox) {
         self.node.discover(nonce, out);
@@ -163,7 +163,7 @@ pub struct HostStation<P> {
 impl<P: Fn(u64) -> Target<f32>> Station for HostStation<P> {
     type Scalar = f32;
     type Terms = LawTerms<f32>;
-    const IS_HOST: bool = true;
+    const LOOKS_ON: bool = true;
 
     fn discover(&mut self, nonce: u32, out: &mut Outbox) {
         self.node.discover(nonce, out);

@@ -302,7 +302,7 @@ impl<S: Station> VirtualLoop<S> {
                 report.tripped = armed_for;
                 report.cause = Some(standing.cause);
             }
-            if !S::IS_HOST && state == State::Running && tick + 1 >= self.params.ticks {
+            if !S::LOOKS_ON && state == State::Running && tick + 1 >= self.params.ticks {
                 self.station.stop(StopReason::Done, &mut out);
                 let Standing { state: to, cause, value, .. } = self.station.standing();
                 records.push(to_log::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }));

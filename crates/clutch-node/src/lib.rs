@@ -1,4 +1,4 @@
-//! Both ends of the serial line, as state machines without I/O and without a clock.
+//! What stands at a serial line, as state machines without I/O and without a clock: the nodes.
 //!
 //! ```text
 //!  encoder ─► BoardNode ──Sample──► ControllerNode ─► supervisor ─► servo
