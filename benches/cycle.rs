@@ -4,9 +4,9 @@
 use clutch_core::supervisor::{BoardMode, Sample, State};
 use clutch_core::{Counts, DacCode, FixedCounts, Real, SupervisorState, Target};
 use clutch_log::Record;
-use clutch_loop::records;
-use clutch_loop::setup::{self, Setup};
-use clutch_node::{ControlNode, Notice, Outbox};
+use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::to_log;
+use clutch_node::{ControllerNode, Notice, Outbox};
 use clutch_sim::Scenario;
 use clutch_wire::{Armed, BoardState, Configured, Message, Sample as SampleFrame, encode};
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -23,11 +23,11 @@ fn counts(tick: u64) -> i32 {
 fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
     let set = [("sampling.scalar".to_owned(), scalar.to_owned())];
     let scenario = Scenario::parse("bench", SCENARIO, &set).expect("a scenario");
-    let setup = Setup::<T>::new(&scenario, 7).expect("a safe state");
-    let path = setup::path::<T>(&scenario).expect("a path");
+    let built = BuiltRun::<T>::new(&scenario, 7).expect("a safe state");
+    let path = from_scenario::path::<T>(&scenario).expect("a path");
     let mut group = c.benchmark_group(format!("cycle, SMC, {scalar}"));
 
-    let (servo, supervisor) = (setup.servo, setup.supervisor);
+    let (servo, supervisor) = (built.servo, built.supervisor);
     let mut state = servo.start(Counts(0), &path(0), T::ZERO);
     let mut tick = 0;
     group.bench_function("path", |b| {
@@ -73,12 +73,12 @@ fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
         }))
     };
     let node = || {
-        let mut node = ControlNode::new(setup.control, servo, supervisor);
+        let mut node = ControllerNode::new(built.controller, servo, supervisor);
         let mut out = Outbox::default();
         let path = |_| Target { position: FixedCounts(0), velocity: T::ZERO, acceleration: T::ZERO };
         for message in [
-            Message::Configured(Configured { run: 7, config: setup.control.config, boot: 1 }),
-            Message::Armed(Armed { run: 7, config: setup.control.config }),
+            Message::Configured(Configured { run: 7, config: built.controller.config, boot: 1 }),
+            Message::Armed(Armed { run: 7, config: built.controller.config }),
         ] {
             node.receive(0, encode(&message).as_bytes(), &path, &mut out, &mut |_| ());
         }
@@ -110,9 +110,8 @@ fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
             let bytes = frame(tick);
             controller.receive(tick * 1_000_000, bytes.as_bytes(), &path, &mut out, &mut |n| {
                 if let Notice::Cycle(n) = n {
-                    let _ = ring.push(Record::Sample(records::sample(tick, 0, &n)));
-                    let _ =
-                        ring.push(Record::Command(records::command(tick, &n.cycle, servo.dac(), radians)));
+                    let _ = ring.push(Record::Sample(to_log::sample(tick, 0, &n)));
+                    let _ = ring.push(Record::Command(to_log::command(tick, &n.cycle, servo.dac(), radians)));
                 }
             });
             tick += 1;

@@ -21,7 +21,7 @@ from clutch import _processor  # noqa: F401
 # isort: split
 from clutch import _clutch
 from clutch._certificate import Certificate
-from clutch._clutch import Controller, Path, Plant, StickSlip, Table, Target, Tick, scenarios
+from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
 from clutch._errors import ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
 from clutch._model import (
@@ -76,7 +76,6 @@ __all__ = [
     "BrakeGeometry",
     "Certificate",
     "Chirp",
-    "Controller",
     "Ctc",
     "Dac",
     "Difference",
@@ -112,6 +111,7 @@ __all__ = [
     "Samples",
     "Sampling",
     "Scenario",
+    "Servo",
     "Sine",
     "Smc",
     "SmcSign",

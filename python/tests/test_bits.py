@@ -30,7 +30,7 @@ def bits():
 
 def stepped(scenario, counts, record):
     """What law and detector make of the counts: a record each."""
-    law, sticks, path = package.Controller(scenario), package.StickSlip(scenario), scenario.path()
+    law, sticks, path = package.Servo(scenario), package.StickSlip(scenario), scenario.path()
     assert len(path) == len(counts)
     rows = []
     for tick, count in enumerate(counts.tolist()):

@@ -34,7 +34,7 @@ LAYOUTS = {
     0x87: ("Pong", "run:H nonce:I time_us:I"),
     0x88: ("Refused", "request:B reason:B value:I"),
     0x89: (
-        "Controller",
+        "ControllerHello",
         "nonce:I version:B schema:Q settings:Q board:I boot:I clock_hz:I knots:H state:B run:H config:Q",
     ),
     0x8A: ("Taken", "run:H key:H value:Q"),

@@ -3,7 +3,7 @@
 
 use clutch_bits::{FIELDS, Job, Kind, RECORD, Workload, hash, setting_to_bytes};
 use clutch_core::{Counts, FixedCounts, Micros};
-use clutch_loop::setup::{self, Setup};
+use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_node::Settings;
 use clutch_sim::run::{Keep, Trace, simulate_watched};
 use clutch_sim::{Scenario, progress::UNWATCHED};
@@ -58,7 +58,8 @@ impl Run {
     pub fn new(name: &'static str, toml: &'static str) -> Result<Run, Wrong> {
         let scenario = Scenario::parse(name, toml, &[])?;
         let trace = simulate_watched::<f32>(&scenario.spec(), Keep::Trace, UNWATCHED)?.trace;
-        let settings = setup::settings(&scenario, &Setup::new(&scenario, 0)?, Micros(0), scenario.ticks())?;
+        let settings =
+            from_scenario::settings(&scenario, &BuiltRun::new(&scenario, 0)?, Micros(0), scenario.ticks())?;
         let mut sent = 0;
         settings.each(|_, _| sent += 1);
         let first = trace.target_fixed.first().ok_or("a run without a tick")?.0;

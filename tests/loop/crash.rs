@@ -2,7 +2,7 @@
 
 use crate::harness::{Board, Done, Random, alone, clutch, folder, read_log, run, start, unless_held_up};
 use clutch_log::{Header, Record, SampleRecord};
-use clutch_loop::run::LogThread;
+use clutch_loop::control_loop::LogThread;
 use rustix::process::Signal;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -81,7 +81,7 @@ fn after_kill_9_at_twenty_random_instants_the_board_is_safe_and_the_log_is_recov
             let _ = std::fs::remove_file(&saved);
             let told = run(&["log", "recover", log.to_str().unwrap(), saved.to_str().unwrap()]).expect(0);
             let recovered = read_log(&saved);
-            assert!(recovered.complete, "{what}: {:?} {}", recovered.end, told.out);
+            assert!(recovered.complete, "{what}: {:?} {}", recovered.tail, told.out);
             assert_eq!(recovered.samples, cut.samples, "{what}");
             assert_eq!(recovered.commands, cut.commands, "{what}");
             run(&["log", "info", saved.to_str().unwrap()]).expect(0).prints(&["recovered: original"]);

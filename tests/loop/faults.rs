@@ -50,7 +50,7 @@ fn ends_with(name: &str, fault: &str, causes: &[(&str, &str)], latest: u64) {
     assert!(report["ticks"].as_u64().unwrap() <= latest, "{fault}: {report:#}");
 
     let read = read_log(&log);
-    assert!(read.complete, "{:?}", read.end);
+    assert!(read.complete, "{:?}", read.tail);
     let number = clutch_log::names::CAUSES.iter().find(|(_, name)| *name == cause).unwrap().0;
     assert!(read.events.iter().any(|event| event.cause == number), "{:?}", read.events);
     // No command leaves the converter's range.

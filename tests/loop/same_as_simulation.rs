@@ -38,7 +38,7 @@ const SMOOTHED: &str = "velocity.smoothed_derivative.smoothing=0.5";
 /// RMS and largest error as the law saw it, °, after the settling time of a second.
 fn errors(log: &Path) -> [f64; 2] {
     let read = read_log(log);
-    assert!(read.complete, "{:?}", read.end);
+    assert!(read.complete, "{:?}", read.tail);
     let law = CommandSource::Law as u8;
     let settled = read.commands.iter().filter(|c| c.source == law && (1000..10_000).contains(&c.tick));
     let errors: Vec<f64> = settled.map(|c| c.error.to_degrees()).collect();

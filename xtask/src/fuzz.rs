@@ -4,7 +4,7 @@ use crate::run::program;
 use anyhow::{Result, bail};
 
 /// Targets in `fuzz/fuzz_targets`.
-pub(crate) const TARGETS: [&str; 3] = ["decoder", "log", "onboard"];
+pub(crate) const TARGETS: [&str; 3] = ["decoder", "log", "board_controller"];
 
 /// Fuzzes every target for so many seconds.
 pub(crate) fn all(seconds: u32) -> Result<()> {

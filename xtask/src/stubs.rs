@@ -29,8 +29,8 @@ const NAMED: &[(&str, &str)] = &[
         "-> tuple[Table, dict[int, Table], list[tuple[int, ParamError]]]",
     ),
     (
-        "def __new__(cls, /, scenario: Any) -> Controller",
-        "def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Controller",
+        "def __new__(cls, /, scenario: Any) -> Servo",
+        "def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Servo",
     ),
     (
         "def __new__(cls, /, scenario: Any) -> Plant",

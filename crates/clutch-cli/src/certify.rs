@@ -1,7 +1,7 @@
 //! `clutch certify`.
 
 use crate::table::{number, quantities};
-use crate::{Outcome, ScenarioArgs, json, print};
+use crate::{Exit, ScenarioArgs, json, print};
 use clap::Args;
 use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
 use clutch_core::law::LawParams;
@@ -25,14 +25,14 @@ pub(crate) struct Certify {
 }
 
 impl Certify {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;
         let shown =
             if self.json { json(&certificate(&scenario)?)? } else { text(&scenario, &plan, &outside) };
         print(&shown)?;
-        Ok(if plan.certificate.certified() { Outcome::Done } else { Outcome::NotCertified })
+        Ok(if plan.certificate.certified() { Exit::Done } else { Exit::NotCertified })
     }
 }
 

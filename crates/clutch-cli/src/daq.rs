@@ -1,12 +1,12 @@
 //! `clutch daq`.
 
-use crate::{Outcome, ScenarioArgs, print};
+use crate::{Exit, ScenarioArgs, print};
 use anyhow::Context;
 use clap::Args;
-use clutch_loop::daq::{self, DaqNotice, DaqOptions};
 use clutch_loop::faults::Fault;
 use clutch_loop::port::{Address, ClientEvent, Endpoint, Listener, PseudoTerminal};
 use clutch_loop::realtime::WaitMode;
+use clutch_loop::sim_board_server::{self, ServeNotice, ServeOptions};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -39,7 +39,7 @@ pub(crate) struct Daq {
 }
 
 impl Daq {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let scenario = self.scenario.load()?;
         scenario.safety()?;
         if self.patient && self.fault.iter().any(|f| f.kind.silences()) {
@@ -67,19 +67,19 @@ impl Daq {
             text += &format!("fault: {fault} (seconds after arming; seed {})\n", self.fault_seed);
         }
         print(&text)?;
-        let options = DaqOptions {
+        let options = ServeOptions {
             faults: self.fault,
             seed: self.fault_seed,
             patient: self.patient,
             wait: WaitMode::Sleep,
         };
-        let report = daq::run(&scenario, &options, endpoint.as_mut(), &stop, |notice| {
+        let report = sim_board_server::serve(&scenario, &options, endpoint.as_mut(), &stop, |notice| {
             // A terminal that has gone away does not stop a board.
             let _ = print(&match notice {
-                DaqNotice::Client(ClientEvent::Connected) => "client connected\n".to_owned(),
-                DaqNotice::Client(ClientEvent::Left) => "client left\n".to_owned(),
-                DaqNotice::State(state, time) => format!("{time:10.6} s  {state:?}\n"),
-                DaqNotice::Faulted(silent) => {
+                ServeNotice::Client(ClientEvent::Connected) => "client connected\n".to_owned(),
+                ServeNotice::Client(ClientEvent::Left) => "client left\n".to_owned(),
+                ServeNotice::State(state, time) => format!("{time:10.6} s  {state:?}\n"),
+                ServeNotice::Faulted(silent) => {
                     format!("              {:.3} ms after the last code that was applied\n", silent * 1e3)
                 }
             });
@@ -92,7 +92,7 @@ impl Daq {
             );
         }
         print(&(text + "\n"))?;
-        Ok(Outcome::Done)
+        Ok(Exit::Done)
     }
 }
 

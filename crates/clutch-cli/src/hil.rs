@@ -2,17 +2,18 @@
 
 use crate::loop_verb::cause_text;
 use crate::table::quantities;
-use crate::{Outcome, ScenarioArgs, json, key_value, print, sim};
+use crate::{Exit, ScenarioArgs, json, key_value, print, sim};
 use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
 use clutch_log::{LogWriter, Source};
-use clutch_loop::emulated::{Lockstep, emulated};
-use clutch_loop::emulator::{Emulator, SerialBoard};
 use clutch_loop::faults::Fault;
-use clutch_loop::replay::PRESENT_CODE;
-use clutch_loop::setup::{self, Setup};
-use clutch_loop::world::{Outcome as Ran, World, WorldParams};
+use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::lockstep_board::LockstepBoard;
+use clutch_loop::lockstep_host::lockstep_host;
+use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
+use clutch_loop::to_log::PRESENT_CODE;
+use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions, VirtualReport as Ran};
 use clutch_sim::Scenario;
 use std::path::PathBuf;
 
@@ -74,7 +75,7 @@ enum Link {
 }
 
 impl Hil {
-    pub(crate) fn run(mut self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
         if self.link == Link::Uart {
             self.set.push(("safety.limits.deadline_us".to_owned(), "1000000".to_owned()));
         }
@@ -83,25 +84,25 @@ impl Hil {
         let certified = scenario.plan()?.certificate.certified();
         if !certified && !self.uncertified {
             print(&crate::not_certified(&scenario, &self.scenario))?;
-            return Ok(Outcome::NotCertified);
+            return Ok(Exit::NotCertified);
         }
         if let Some(log) = &self.log {
             crate::new_log(log)?;
         }
-        let mut setup = Setup::<f32>::new(&scenario, 1)?;
+        let mut built = BuiltRun::<f32>::new(&scenario, 1)?;
         if self.link == Link::Uart {
             // The board's own clock runs on while this machine computes.
-            setup.control.silence = Micros(10_000_000);
+            built.controller.silence = Micros(10_000_000);
         }
         let started = std::time::Instant::now();
         let ran = match self.link {
-            Link::Memory => self.on(&scenario, &setup, Emulator::start(&self.image)?)?,
-            Link::Uart => self.on(&scenario, &setup, SerialBoard::start(&self.image)?)?,
+            Link::Memory => self.on(&scenario, &built, QemuBoard::start(&self.image)?)?,
+            Link::Uart => self.on(&scenario, &built, QemuSerialBoard::start(&self.image)?)?,
         };
         let took = started.elapsed().as_secs_f64();
         if let Some(file) = &self.log {
             let mut header =
-                setup::header(&scenario, &setup.servo, Source::Loop, "emulated board", crate::BUILD);
+                from_scenario::header(&scenario, &built.servo, Source::Loop, "emulated board", crate::BUILD);
             header.extra.push((PRESENT_CODE.to_owned(), ran.present.to_string()));
             header.extra.push(("board".to_owned(), "emulated".to_owned()));
             header.extra.push(("certified".to_owned(), certified.to_string()));
@@ -112,17 +113,22 @@ impl Hil {
             log.finish()?;
         }
         print(&if self.json { summary(&scenario, &ran, took)? } else { self.text(&scenario, &ran, took) })?;
-        Ok(match ran.end.cause {
-            Cause::Done => Outcome::Done,
-            Cause::None => Outcome::Failed,
-            _ => Outcome::Fault,
+        Ok(match ran.standing.cause {
+            Cause::Done => Exit::Done,
+            Cause::None => Exit::Failed,
+            _ => Exit::Fault,
         })
     }
 
-    fn on(&self, scenario: &Scenario, setup: &Setup<f32>, board: impl Lockstep) -> anyhow::Result<Ran> {
+    fn on(
+        &self,
+        scenario: &Scenario,
+        built: &BuiltRun<f32>,
+        board: impl LockstepBoard,
+    ) -> anyhow::Result<Ran> {
         // The last period is the one in which the run ends.
-        let ticks = setup.ticks + 1;
-        let params = WorldParams {
+        let ticks = built.ticks + 1;
+        let params = VirtualOptions {
             latency_ns: u64::from(self.latency_us) * 1000,
             faults: self.fault.clone(),
             stall: None,
@@ -132,9 +138,9 @@ impl Hil {
             ticks,
             settle: scenario.spec().run.settle,
         };
-        let end = emulated(scenario, setup, board, ticks)?;
-        let path = setup::path::<f32>(scenario)?;
-        Ok(World::new(scenario, params, end)?.run(&path)?)
+        let station = lockstep_host(scenario, built, board, ticks)?;
+        let path = from_scenario::path::<f32>(scenario)?;
+        Ok(VirtualLoop::new(scenario, params, station)?.run(&path)?)
     }
 
     fn text(&self, scenario: &Scenario, ran: &Ran, took: f64) -> String {
@@ -150,15 +156,15 @@ impl Hil {
             text += &format!("log: {0}; clutch replay {0}\n", file.display());
         }
         let board = ran.board.map_or("gone".to_owned(), |s| format!("{s:?}").to_lowercase());
-        let end = &ran.end;
-        text += &match end.cause {
+        let standing = &ran.standing;
+        text += &match standing.cause {
             Cause::None => {
-                let state = format!("{:?}", end.state).to_lowercase();
+                let state = format!("{:?}", standing.state).to_lowercase();
                 format!("control did not end: the board is {state}, encoder and converter are {board}\n")
             }
             cause => {
                 let fault = if cause == Cause::Done { "" } else { "FAULT: " };
-                let what = cause_text(cause, end.value, true, false);
+                let what = cause_text(cause, standing.value, true, false);
                 format!("{fault}{what}; encoder and converter are {board}\n")
             }
         };
@@ -174,11 +180,11 @@ fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> anyhow::Result<String> 
         "ticks": ran.answers,
         "took_s": took,
         "metrics": ran.metrics,
-        "state": format!("{:?}", ran.end.state),
-        "cause": format!("{:?}", ran.end.cause),
-        "cause_text": cause_text(ran.end.cause, ran.end.value, true, false),
-        "value": ran.end.value,
+        "state": format!("{:?}", ran.standing.state),
+        "cause": format!("{:?}", ran.standing.cause),
+        "cause_text": cause_text(ran.standing.cause, ran.standing.value, true, false),
+        "value": ran.standing.value,
         "board": ran.board.map(|s| format!("{s:?}")),
-        "lost": ran.end.lost,
+        "lost": ran.standing.lost,
     }))
 }

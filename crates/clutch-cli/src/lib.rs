@@ -108,7 +108,7 @@ fn not_certified(scenario: &Scenario, file: &Path) -> String {
 }
 
 /// How a verb ended, if not with an error.
-enum Outcome {
+enum Exit {
     /// Exit code 0.
     Done,
     /// Exit code 2.
@@ -144,11 +144,11 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Reproduce(v) => v.run(),
     };
     match outcome {
-        Ok(Outcome::Done) => 0,
-        Ok(Outcome::Failed) => 1,
-        Ok(Outcome::NotCertified) => 2,
-        Ok(Outcome::Fault) => 3,
-        Ok(Outcome::Stopped) => 4,
+        Ok(Exit::Done) => 0,
+        Ok(Exit::Failed) => 1,
+        Ok(Exit::NotCertified) => 2,
+        Ok(Exit::Fault) => 3,
+        Ok(Exit::Stopped) => 4,
         Err(e) => {
             // Some errors tell their source themselves.
             let mut text = e.to_string();

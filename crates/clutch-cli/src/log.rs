@@ -1,6 +1,6 @@
 //! `clutch log`.
 
-use crate::{Outcome, print};
+use crate::{Exit, print};
 use clap::{Args, Subcommand};
 use clutch_log::Limits;
 use std::path::PathBuf;
@@ -34,7 +34,7 @@ enum Verb {
 }
 
 impl Log {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let text = match self.verb {
             Verb::Info { log } => clutch_log::info(&log, &Limits::default())?.to_string(),
             Verb::Recover { from, to } => {
@@ -45,6 +45,6 @@ impl Log {
             }
         };
         print(&(text.trim_end().to_owned() + "\n"))?;
-        Ok(Outcome::Done)
+        Ok(Exit::Done)
     }
 }

@@ -2,25 +2,25 @@
 
 use crate::daq::stop_flag;
 use crate::table::{number, quantities};
-use crate::{Outcome, ScenarioArgs, key_value, print};
+use crate::{Exit, ScenarioArgs, key_value, print};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use clutch_core::law::Law;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{DacCode, Micros, Real, SafeState};
 use clutch_log::Source;
-use clutch_loop::daq::{self, DaqOptions, DaqReport};
-use clutch_loop::emulated::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE};
-use clutch_loop::end::{End, Local, Remote};
+use clutch_loop::control_loop::{self, ConfiguredRun, LogThread, LoopOptions, LoopReport, Pace, Ring, Watch};
 use clutch_loop::faults::Fault;
+use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_loop::port::{Address, DeviceKind, Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode, describe_system};
-use clutch_loop::replay::PRESENT_CODE;
-use clutch_loop::run::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Ring, Watch};
-use clutch_loop::setup::{self, Setup};
 use clutch_loop::sim_board::{PATIENT_BOARD, STRICT_BOARD};
-use clutch_node::{ControlNode, RemoteNode, present_code};
+use clutch_loop::sim_board_server::{self, ServeOptions, ServeReport};
+use clutch_loop::station::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE};
+use clutch_loop::station::{ControllerStation, HostStation, Station};
+use clutch_loop::to_log::PRESENT_CODE;
+use clutch_node::{ControllerNode, HostNode, present_code};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::ScalarKind;
 use clutch_wire::Hello;
@@ -133,23 +133,23 @@ pub(crate) struct Loop {
 /// The simulated board, beside the loop.
 struct Background {
     stop: Arc<AtomicBool>,
-    thread: std::thread::JoinHandle<Result<DaqReport, daq::DaqError>>,
+    thread: std::thread::JoinHandle<Result<ServeReport, sim_board_server::ServeError>>,
 }
 
 impl Background {
-    fn start(scenario: &Scenario, options: DaqOptions) -> anyhow::Result<(Background, Address)> {
+    fn start(scenario: &Scenario, options: ServeOptions) -> anyhow::Result<(Background, Address)> {
         let (mut terminal, _) = PseudoTerminal::open().context("a pseudo-terminal could not be opened")?;
         let address = terminal.address();
         let stop = Arc::new(AtomicBool::new(false));
         let (scenario, flag) = (scenario.clone(), stop.clone());
         let thread = std::thread::Builder::new()
             .name("clutch-board".to_owned())
-            .spawn(move || daq::run(&scenario, &options, &mut terminal, &flag, |_| ()))
+            .spawn(move || sim_board_server::serve(&scenario, &options, &mut terminal, &flag, |_| ()))
             .context("the simulated board could not be started")?;
         Ok((Background { stop, thread }, address))
     }
 
-    fn end(self) -> anyhow::Result<DaqReport> {
+    fn end(self) -> anyhow::Result<ServeReport> {
         self.stop.store(true, Ordering::Relaxed);
         match self.thread.join() {
             Ok(report) => Ok(report?),
@@ -159,7 +159,7 @@ impl Background {
 }
 
 impl Loop {
-    pub(crate) fn run(mut self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
         if let Some(duration) = self.duration {
             self.set.push(("run.duration_s".to_owned(), format!("{duration:?}")));
         }
@@ -203,13 +203,13 @@ impl Loop {
         print(text)
     }
 
-    fn run_in<T: Real>(&self, scenario: &Scenario) -> anyhow::Result<Outcome> {
+    fn run_in<T: Real>(&self, scenario: &Scenario) -> anyhow::Result<Exit> {
         let safety = scenario.safety()?;
         let plan = scenario.plan()?;
         let certified = plan.certificate.certified();
         if !certified && !self.uncertified {
             self.say(&crate::not_certified(scenario, &self.scenario))?;
-            return Ok(Outcome::NotCertified);
+            return Ok(Exit::NotCertified);
         }
         if let Some(log) = &self.log {
             crate::new_log(log)?;
@@ -224,7 +224,7 @@ impl Loop {
         let (background, address) = match self.port.as_ref().or(self.board.as_ref()) {
             Some(address) => (None, address.clone()),
             None => {
-                let options = DaqOptions {
+                let options = ServeOptions {
                     faults: self.fault.clone(),
                     seed: self.fault_seed,
                     patient: !self.strict && !self.fault.iter().any(|f| f.kind.silences()),
@@ -251,15 +251,15 @@ impl Loop {
         };
         print(&text)?;
         Ok(if report.state == State::Faulted || report.port_error.is_some() {
-            Outcome::Fault
+            Exit::Fault
         } else if stopped {
-            Outcome::Stopped
+            Exit::Stopped
         } else if !report.begun {
-            Outcome::Failed
+            Exit::Failed
         } else if report.cause == Cause::Operator {
-            Outcome::Fault // nobody here has stopped it: the board has missed this machine
+            Exit::Fault // nobody here has stopped it: the board has missed this machine
         } else {
-            Outcome::Done
+            Exit::Done
         })
     }
 }
@@ -290,7 +290,7 @@ impl Run<'_> {
 
     /// Whether encoder and converter are those of the scenario.
     fn check(&self, hello: &Hello, port: &Port) -> anyhow::Result<()> {
-        let mut lines = setup::misfits(self.scenario, hello);
+        let mut lines = from_scenario::misfits(self.scenario, hello);
         let simulated = hello.board == PATIENT_BOARD || hello.board == STRICT_BOARD;
         let real = !matches!(port.kind(), DeviceKind::PseudoTerminal | DeviceKind::Tcp);
         if simulated && real && self.verb.board.is_none() {
@@ -307,13 +307,13 @@ impl Run<'_> {
     }
 
     /// A new run on a board with this clock: what it waits for when the clock waits.
-    fn setup<T: Real>(&self, hello: &Hello) -> anyhow::Result<Setup<T>> {
-        let mut setup = Setup::<T>::new(self.scenario, hello.run.wrapping_add(1).max(1))?;
+    fn built<T: Real>(&self, hello: &Hello) -> anyhow::Result<BuiltRun<T>> {
+        let mut built = BuiltRun::<T>::new(self.scenario, hello.run.wrapping_add(1).max(1))?;
         if hello.board == PATIENT_BOARD {
             // Its clock waits when this machine stalls, and so does our patience.
-            setup.control.silence = Micros(5_500_000);
+            built.controller.silence = Micros(5_500_000);
         }
-        Ok(setup)
+        Ok(built)
     }
 
     /// The loop is closed here.
@@ -321,21 +321,22 @@ impl Run<'_> {
         // A sample and its answer, each cycle.
         let (mut port, notes) = self.open((15, 20))?;
         // Who is there?
-        let mut end = local(&Setup::<T>::new(self.scenario, 0)?, setup::path(self.scenario)?);
+        let mut end = local(&BuiltRun::<T>::new(self.scenario, 0)?, from_scenario::path(self.scenario)?);
         let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
         self.check(&hello, &port)?;
-        let setup = self.setup::<T>(&hello)?;
-        let mut end = local(&setup, setup::path(self.scenario)?);
+        let built = self.built::<T>(&hello)?;
+        let mut end = local(&built, from_scenario::path(self.scenario)?);
         self.tell(&hello, &port, &notes)?;
-        let hold = setup.supervisor.safe_codes().hold;
-        let (log, ring, watch) = self.log(&setup, present_code(&hello, hold), &board_text(&hello))?;
+        let hold = built.supervisor.safe_codes().hold;
+        let (log, ring, watch) = self.log(&built, present_code(&hello, hold), &board_text(&hello))?;
         // Consent was starting this command.
         let mut talk = Talk::new(&mut port, &mut end);
         talk.configure(present_code(&hello, hold))?;
         let clock = talk.clock()?;
         let (end, port) = (&mut end, &mut port);
-        let (ticks, detector, patient) = (setup.ticks, setup.detector, hello.board == PATIENT_BOARD);
-        let configured = Configured { end, port, ring, watch: &watch, patient, ticks, clock, detector };
+        let (ticks, detector, patient) = (built.ticks, built.detector, hello.board == PATIENT_BOARD);
+        let configured =
+            ConfiguredRun { station: end, port, ring, watch: &watch, patient, ticks, clock, detector };
         self.drive(configured, log)
     }
 
@@ -343,33 +344,35 @@ impl Run<'_> {
     fn on_controller(&self) -> anyhow::Result<(LoopReport, String)> {
         // Telemetry each cycle; now and then a word to it.
         let (mut port, notes) = self.open((0, clutch_wire::Telemetry::LENGTH + 2))?;
-        let remote = |setup: &Setup<f32>, patient: bool| -> anyhow::Result<_> {
-            let configure = ControlNode::new(setup.control, setup.servo, setup.supervisor).configuration();
+        let remote = |built: &BuiltRun<f32>, patient: bool| -> anyhow::Result<_> {
+            let configure =
+                ControllerNode::new(built.controller, built.servo, built.supervisor).configuration();
             let silence = if patient { 5_500_000_000 } else { BOARD_SILENCE_NS };
-            let node = RemoteNode::new(setup.servo, configure, ALIVE_NS, silence);
-            Ok(Remote { node, path: setup::path::<f32>(self.scenario)? })
+            let node = HostNode::new(built.servo, configure, ALIVE_NS, silence);
+            Ok(HostStation { node, path: from_scenario::path::<f32>(self.scenario)? })
         };
-        let mut end = remote(&Setup::<f32>::new(self.scenario, 0)?, false)?;
+        let mut end = remote(&BuiltRun::<f32>::new(self.scenario, 0)?, false)?;
         let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
         let clock_hz = end.node.controller().map_or(0, |c| c.clock_hz);
         let text = end.node.controller().map_or_else(String::new, controller_text);
         self.check(&hello, &port)?;
-        let setup = self.setup::<f32>(&hello)?;
+        let built = self.built::<f32>(&hello)?;
         let patient = hello.board == PATIENT_BOARD;
-        let host_silence = if patient { setup.control.silence } else { HOST_SILENCE };
-        let settings = setup::settings(self.scenario, &setup, host_silence, setup.ticks)?;
-        let mut end = remote(&setup, patient)?;
+        let host_silence = if patient { built.controller.silence } else { HOST_SILENCE };
+        let settings = from_scenario::settings(self.scenario, &built, host_silence, built.ticks)?;
+        let mut end = remote(&built, patient)?;
         self.tell(&hello, &port, &notes)?;
         self.verb.say(&format!("the loop is closed on the board: {text}\n"))?;
-        let hold = setup.supervisor.safe_codes().hold;
-        let (log, ring, watch) = self.log(&setup, present_code(&hello, hold), &text)?;
+        let hold = built.supervisor.safe_codes().hold;
+        let (log, ring, watch) = self.log(&built, present_code(&hello, hold), &text)?;
         let mut talk = Talk::new(&mut port, &mut end);
         talk.upload(&settings)?;
         talk.configure(hold)?;
         let clock = talk.clock()?;
-        let (end, port, detector) = (&mut end, &mut port, setup.detector);
-        let ticks = setup.ticks;
-        let configured = Configured { end, port, ring, watch: &watch, patient, ticks, clock, detector };
+        let (end, port, detector) = (&mut end, &mut port, built.detector);
+        let ticks = built.ticks;
+        let configured =
+            ConfiguredRun { station: end, port, ring, watch: &watch, patient, ticks, clock, detector };
         let (mut report, line) = self.drive(configured, log)?;
         report.clock_hz = clock_hz;
         Ok((report, line))
@@ -387,14 +390,15 @@ impl Run<'_> {
     /// The log before the board is armed: what cannot be logged is known before anything moves.
     fn log<T: Real>(
         &self,
-        setup: &Setup<T>,
+        built: &BuiltRun<T>,
         present: DacCode,
         board: &str,
     ) -> anyhow::Result<(Option<LogThread>, Option<Ring>, Arc<Watch>)> {
         let watch = Arc::new(Watch { stop: self.stop.clone(), ..Watch::default() });
         let Some(path) = &self.verb.log else { return Ok((None, None, watch)) };
         let address = self.address.to_string();
-        let mut header = setup::header(self.scenario, &setup.servo, Source::Loop, &address, crate::BUILD);
+        let mut header =
+            from_scenario::header(self.scenario, &built.servo, Source::Loop, &address, crate::BUILD);
         header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
         header.extra.push(("board".to_owned(), board.to_owned()));
         header.extra.push(("certified".to_owned(), self.certified.to_string()));
@@ -403,9 +407,9 @@ impl Run<'_> {
     }
 
     /// Runs it on a thread of its own, and shows where it stands.
-    fn drive<E: End + Send>(
+    fn drive<S: Station + Send>(
         &self,
-        configured: Configured<'_, E>,
+        configured: ConfiguredRun<'_, S>,
         log: Option<LogThread>,
     ) -> anyhow::Result<(LoopReport, String)> {
         let (verb, watch, ticks) = (self.verb, configured.watch, configured.ticks);
@@ -432,7 +436,7 @@ impl Run<'_> {
         let report = std::thread::scope(|scope| {
             let control = std::thread::Builder::new()
                 .name("clutch-control".to_owned())
-                .spawn_scoped(scope, move || run::run(configured, &options));
+                .spawn_scoped(scope, move || control_loop::run(configured, &options));
             let control = control.context("the control thread could not be started")?;
             let mut refused_told = false;
             while !control.is_finished() {
@@ -478,7 +482,7 @@ impl Run<'_> {
                 format!("hold with {} V for {} s, then release", number(volts), number(after))
             }
         };
-        let (boot, holds) = setup::boot_output(scenario, hello, plan);
+        let (boot, holds) = from_scenario::boot_output(scenario, hello, plan);
         let system = describe_system();
         let mut text = format!("{}\n", scenario.name);
         let mut row = |name: &str, value: String| text += &format!("  {name:<12}{value}\n");
@@ -525,11 +529,11 @@ impl Run<'_> {
     }
 }
 
-fn local<T: Real, P>(setup: &Setup<T>, path: P) -> Local<T, Law<T>, P> {
-    Local { node: ControlNode::new(setup.control, setup.servo, setup.supervisor), path }
+fn local<T: Real, P>(built: &BuiltRun<T>, path: P) -> ControllerStation<T, Law<T>, P> {
+    ControllerStation { node: ControllerNode::new(built.controller, built.servo, built.supervisor), path }
 }
 
-fn controller_text(c: &clutch_wire::Controller) -> String {
+fn controller_text(c: &clutch_wire::ControllerHello) -> String {
     let name =
         if c.board <= STRICT_BOARD { "emulated".to_owned() } else { format!("number {:08x}", c.board) };
     let clock =
@@ -601,7 +605,7 @@ fn summary(
     scenario: &Scenario,
     r: &LoopReport,
     log_line: &str,
-    board: Option<&DaqReport>,
+    board: Option<&ServeReport>,
     (stopped, faults): (bool, usize),
 ) -> String {
     let m = &r.metrics;
@@ -709,7 +713,7 @@ fn as_json(
     scenario: &Scenario,
     r: &LoopReport,
     certified: bool,
-    board: Option<&DaqReport>,
+    board: Option<&ServeReport>,
     stopped: bool,
 ) -> serde_json::Value {
     let latency = |s: &CycleSummary| {

@@ -127,9 +127,9 @@ impl Figure {
     /// Another ending, as [`svg`](Self::svg) and [`png`](Self::png), or the file cannot be written; the
     /// file is named.
     pub fn save(&self, path: &Path) -> anyhow::Result<()> {
-        let bytes = match check_ending(path)? {
-            Ending::Svg => self.svg()?.into_bytes(),
-            Ending::Png => self.png()?,
+        let bytes = match figure_format(path)? {
+            FigureFormat::Svg => self.svg()?.into_bytes(),
+            FigureFormat::Png => self.png()?,
         };
         std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
     }
@@ -137,7 +137,7 @@ impl Figure {
 
 /// How a figure is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
+pub enum FigureFormat {
     /// `.svg`
     Svg,
     /// `.png`
@@ -148,11 +148,11 @@ pub enum Ending {
 ///
 /// # Errors
 /// An ending other than `.svg` and `.png`; the file is named.
-pub fn check_ending(path: &Path) -> anyhow::Result<Ending> {
+pub fn figure_format(path: &Path) -> anyhow::Result<FigureFormat> {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     match ending.as_deref() {
-        Some("svg") => Ok(Ending::Svg),
-        Some("png") => Ok(Ending::Png),
+        Some("svg") => Ok(FigureFormat::Svg),
+        Some("png") => Ok(FigureFormat::Png),
         _ => bail!("cannot draw {}: the name of a figure must end in .svg or .png", path.display()),
     }
 }

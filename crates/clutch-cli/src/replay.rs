@@ -2,7 +2,7 @@
 
 use crate::plot::{self, Figure, Panel, Series};
 use crate::table::{number, quantities};
-use crate::{Outcome, key_value, print};
+use crate::{Exit, key_value, print};
 use clap::Args;
 use clutch_log::{CommandRecord, Limits, Log};
 use clutch_loop::replay::replay;
@@ -32,9 +32,9 @@ pub(crate) struct Replay {
 }
 
 impl Replay {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         if let Some(file) = &self.plot {
-            plot::check_ending(file)?;
+            plot::figure_format(file)?;
         }
         let log = clutch_log::read(&self.log, &Limits::default())?;
         let origin = format!("{}: its scenario", self.log.display());
@@ -57,12 +57,12 @@ impl Replay {
         if !self.set.is_empty() {
             text += &compare(&log.commands, &replayed.commands);
             print(&text)?;
-            return Ok(Outcome::Done);
+            return Ok(Exit::Done);
         }
         let outcome = match &replayed.first {
             None => {
                 text += &format!("identical over {n} ticks\n");
-                Outcome::Done
+                Exit::Done
             }
             Some(d) => {
                 text += &format!(
@@ -76,7 +76,7 @@ impl Replay {
                         crate::BUILD
                     );
                 }
-                Outcome::Fault
+                Exit::Fault
             }
         };
         print(&text)?;

@@ -3,7 +3,7 @@
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{ReportFigure, claims_table, html};
 use crate::table::number;
-use crate::{Outcome, json, print, with_progress, write};
+use crate::{Exit, json, print, with_progress, write};
 use anyhow::Context;
 use clap::Args;
 use clutch_sim::paper::{self, FigureData, SEEDS, Table3Row};
@@ -22,7 +22,7 @@ pub(crate) struct Reproduce {
 }
 
 impl Reproduce {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let dir = &self.out;
         std::fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
         let outcome = with_progress("runs", paper::reproduce)?;
@@ -71,7 +71,7 @@ impl Reproduce {
             claims_table(&outcome.claims),
             dir.display()
         ))?;
-        Ok(if unexpected.is_empty() { Outcome::Done } else { Outcome::Failed })
+        Ok(if unexpected.is_empty() { Exit::Done } else { Exit::Failed })
     }
 }
 

@@ -1,6 +1,6 @@
 //! `clutch scenario`.
 
-use crate::{Outcome, print};
+use crate::{Exit, print};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use clutch_sim::scenario::{BUILT_IN, BuiltIn};
@@ -47,7 +47,7 @@ fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
 }
 
 impl ScenarioVerb {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         match self.verb {
             Verb::List => {
                 let lines: Vec<String> = BUILT_IN
@@ -70,6 +70,6 @@ impl ScenarioVerb {
                 print(&format!("wrote {shown}; run it with: clutch sim {shown}\n"))?;
             }
         }
-        Ok(Outcome::Done)
+        Ok(Exit::Done)
     }
 }

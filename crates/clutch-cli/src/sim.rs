@@ -2,12 +2,12 @@
 
 use crate::plot::{self, Figure, Panel, Series};
 use crate::table::{number, quantities};
-use crate::{Outcome, ScenarioArgs, json, print};
+use crate::{Exit, ScenarioArgs, json, print};
 use anyhow::Context;
 use clap::Args;
-use clutch_loop::records;
+use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
-use clutch_sim::metrics::Reaching;
+use clutch_sim::reaching::Reaching;
 use clutch_sim::run::Detected;
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Keep, Metrics, Run, Scenario};
@@ -60,9 +60,9 @@ struct Path {
 }
 
 impl Sim {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         if let Some(file) = &self.plot {
-            plot::check_ending(file)?; // before a long run, not after
+            plot::figure_format(file)?; // before a long run, not after
         }
         let files = [Some(&self.scenario.scenario), self.csv.as_ref(), self.plot.as_ref(), self.log.as_ref()];
         let files: Vec<&PathBuf> = files.into_iter().flatten().collect();
@@ -84,7 +84,7 @@ impl Sim {
             csv(&run, file)?;
         }
         if let Some(file) = &self.log {
-            records::save_simulation(file, &scenario, &run, crate::BUILD)?;
+            to_log::save_simulation(file, &scenario, &run, crate::BUILD)?;
         }
         if let Some(file) = &self.plot {
             figure(&scenario, &run).save(file)?;
@@ -109,7 +109,7 @@ impl Sim {
             rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
         };
         print(&if self.json { json(&summary)? } else { text(&summary, &run) })?;
-        Ok(Outcome::Done)
+        Ok(Exit::Done)
     }
 }
 

@@ -55,7 +55,7 @@ impl Info {
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (s, h) = (&self.scanned, &self.scanned.header);
-        writeln!(f, "{}: {}", self.path.display(), s.end)?;
+        writeln!(f, "{}: {}", self.path.display(), s.tail)?;
         writeln!(f, "  {} of {} by clutch {}", h.source, Quoted(&h.scenario_name), h.version)?;
         writeln!(
             f,

@@ -2,7 +2,7 @@
 
 use crate::error::LogError;
 use crate::record::{CommandRecord, EventRecord, Header, LinkRecord, Record, SampleRecord, TruthRecord};
-use crate::scan::{Damage, Each, End, Limits, Scanned, scan_bytes, scan_file};
+use crate::scan::{Damage, Each, Limits, Scanned, Tail, scan_bytes, scan_file};
 use std::path::Path;
 
 /// A log, each channel in the order of the file.
@@ -23,7 +23,7 @@ pub struct Log {
     /// Finished by its writer and without damage. If not, see `end` and `damage`.
     pub complete: bool,
     /// How the file ends.
-    pub end: End,
+    pub tail: Tail,
     /// The first damaged place that was skipped.
     pub damage: Option<Damage>,
     /// How many damaged places were skipped.
@@ -84,7 +84,7 @@ fn collect(
         Ok(())
     })?;
     let complete = seen.complete();
-    let Scanned { header, end, damage, damaged, file_bytes, left_out_bytes, .. } = seen;
+    let Scanned { header, tail, damage, damaged, file_bytes, left_out_bytes, .. } = seen;
     Ok(Log {
         header,
         samples,
@@ -93,7 +93,7 @@ fn collect(
         links,
         truths,
         complete,
-        end,
+        tail,
         damage,
         damaged,
         file_bytes,

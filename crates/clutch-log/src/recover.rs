@@ -29,7 +29,7 @@ impl fmt::Display for Recovered {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let until = self.until_ns as f64 * 1e-9;
         let (s, to) = (&self.scanned, self.summary.path.display());
-        write!(f, "{to}: {} records, up to {until:.3} s; the original is {}", self.records, s.end)?;
+        write!(f, "{to}: {} records, up to {until:.3} s; the original is {}", self.records, s.tail)?;
         write!(f, ", {} of its {} bytes left out", self.left_out_bytes, s.file_bytes)?;
         if let Some(damage) = &s.damage {
             write!(f, "; {} damaged places, the first: {damage}", s.damaged)?;
@@ -60,7 +60,7 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>, limits: &Limits) ->
         RECOVERED.into(),
         format!(
             "original {}; {} of {} bytes left out",
-            scanned.end, scanned.left_out_bytes, scanned.file_bytes
+            scanned.tail, scanned.left_out_bytes, scanned.file_bytes
         ),
     ));
     let mut log = LogWriter::create(to, &header)?;

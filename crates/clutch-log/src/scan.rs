@@ -55,7 +55,7 @@ impl Default for Limits {
 
 /// How a log ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum Tail {
     /// Finished by its writer.
     Finished,
     /// Cut, by a crash or a full disk: the file is whole up to byte `at`, where a record starts
@@ -75,12 +75,12 @@ pub enum End {
     },
 }
 
-impl fmt::Display for End {
+impl fmt::Display for Tail {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            End::Finished => write!(f, "complete"),
-            End::Cut { at, inside } => write!(f, "cut at byte {at}, inside {inside}"),
-            End::Broken { at, what } => write!(f, "broken at byte {at}: {what}"),
+            Tail::Finished => write!(f, "complete"),
+            Tail::Cut { at, inside } => write!(f, "cut at byte {at}, inside {inside}"),
+            Tail::Broken { at, what } => write!(f, "broken at byte {at}: {what}"),
         }
     }
 }
@@ -106,7 +106,7 @@ pub struct Scanned {
     /// What the log says of itself.
     pub header: Header,
     /// How it ends.
-    pub end: End,
+    pub tail: Tail,
     /// The first damage that was skipped.
     pub damage: Option<Damage>,
     /// How many damaged places were skipped.
@@ -131,7 +131,7 @@ impl Scanned {
     /// Finished by its writer and without damage.
     #[must_use]
     pub fn complete(&self) -> bool {
-        self.end == End::Finished && self.damaged == 0
+        self.tail == Tail::Finished && self.damaged == 0
     }
 }
 
@@ -232,7 +232,7 @@ impl<'a, R: Read> Scan<'a, R> {
             unpack: None,
             seen: Scanned {
                 header: Header::default(),
-                end: End::Finished,
+                tail: Tail::Finished,
                 damage: None,
                 damaged: 0,
                 file_bytes: size,
@@ -267,16 +267,16 @@ impl<'a, R: Read> Scan<'a, R> {
             self.fill(&mut head, 9)?;
             let mut fields = Bytes(&head);
             let (Some(opcode), Some(length)) = (fields.u8(), fields.u64()) else {
-                break End::Cut { at: self.at, inside: "the head of a record" };
+                break Tail::Cut { at: self.at, inside: "the head of a record" };
             };
             let left = self.size.saturating_sub(self.at).saturating_sub(9);
             if length > left {
                 break if length > self.limits.max_record_bytes {
                     let what =
                         format!("a record of {length} bytes: expected at most the {left} left in the file");
-                    End::Broken { at: self.at, what }
+                    Tail::Broken { at: self.at, what }
                 } else {
-                    End::Cut { at: self.at, inside: name_of_record(opcode) }
+                    Tail::Cut { at: self.at, inside: name_of_record(opcode) }
                 };
             }
             if length > self.limits.max_record_bytes {
@@ -292,7 +292,7 @@ impl<'a, R: Read> Scan<'a, R> {
             self.fill(&mut body, length)?;
             if body.len() as u64 != length {
                 // The file became shorter meanwhile.
-                break End::Cut { at: self.at, inside: name_of_record(opcode) };
+                break Tail::Cut { at: self.at, inside: name_of_record(opcode) };
             }
             let next = self.record(opcode, &head, &body, each)?;
             self.at += 9 + length;
@@ -302,16 +302,16 @@ impl<'a, R: Read> Scan<'a, R> {
         };
         if !(self.named && self.attached) {
             return Err(match end {
-                End::Finished => {
+                Tail::Finished => {
                     self.foreign("no record of it is ours".into(), "a metadata record \"clutch\"")
                 }
                 _ => LogError::NoHeader { path: self.path.into(), at: self.at },
             });
         }
-        if end != End::Finished {
+        if end != Tail::Finished {
             self.seen.left_out_bytes += self.size.saturating_sub(self.at);
         }
-        self.seen.end = end;
+        self.seen.tail = end;
         Ok(self.seen)
     }
 
@@ -586,17 +586,17 @@ impl<'a, R: Read> Scan<'a, R> {
     }
 
     /// After the footer.
-    fn last_magic(&mut self) -> Result<End, LogError> {
+    fn last_magic(&mut self) -> Result<Tail, LogError> {
         let left = self.size.saturating_sub(self.at);
         let mut magic = Vec::new();
         self.fill(&mut magic, left.min(9))?; // one more than expected shows that there is more
         let at = self.at;
         Ok(if magic == mcap::MAGIC {
-            End::Finished
+            Tail::Finished
         } else if mcap::MAGIC.starts_with(&magic) {
-            End::Cut { at, inside: "the last magic" }
+            Tail::Cut { at, inside: "the last magic" }
         } else {
-            End::Broken { at, what: "something after the footer: expected the magic and the end".into() }
+            Tail::Broken { at, what: "something after the footer: expected the magic and the end".into() }
         })
     }
 

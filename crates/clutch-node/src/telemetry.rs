@@ -1,6 +1,6 @@
 //! A cycle of the controller as a frame for the host, and back.
 
-use crate::control::CycleNotice;
+use crate::notice::CycleNotice;
 use clutch_core::law::{Command, CtcTerms, LawTerms, Limit, PdTerms, SmcTerms, Tick};
 use clutch_core::supervisor::{Arrival, Cause, Cycle, State};
 use clutch_core::{Dac, DacCode, Micros, ServoOutput, Target};

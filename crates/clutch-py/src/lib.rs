@@ -5,6 +5,7 @@
 mod convert;
 mod log;
 mod paper;
+mod path;
 mod run;
 mod scenario;
 mod stepping;
@@ -29,11 +30,13 @@ mod _clutch {
     #[pymodule_export]
     use super::paper::{Paper, reproduce};
     #[pymodule_export]
+    use super::path::{Path, Target};
+    #[pymodule_export]
     use super::run::{Run, simulate};
     #[pymodule_export]
     use super::scenario::{Scenario, brake_gain, check, rig, scenarios, stribeck};
     #[pymodule_export]
-    use super::stepping::{Controller, Path, Plant, StickSlip, Target, Tick};
+    use super::stepping::{Plant, Servo, StickSlip, Tick};
     #[pymodule_export]
     use super::sweep::Sweep;
     #[pymodule_export]

@@ -6,7 +6,7 @@ use crate::stepping::{PythonLaw, event_table, native, output_stage};
 use crate::table::{Column, Table};
 use clutch_core::law::Limit;
 use clutch_core::{ParamError, Servo};
-use clutch_loop::records::{SaveError, save_simulation};
+use clutch_loop::to_log::{SaveError, save_simulation};
 use clutch_sim::engine::EngineKind;
 use clutch_sim::progress::Progress;
 use clutch_sim::{Keep, Metrics, RunError, ScenarioError, simulate_servo};
@@ -181,7 +181,7 @@ impl Run {
         let written = py.detach(|| save_simulation(&path, &self.scenario.0, &self.run, clutch_cli::BUILD));
         written.map_err(|e| match e {
             SaveError::Log(e) => crate::convert::log_error(py, &e),
-            SaveError::Setup(e) => {
+            SaveError::Build(e) => {
                 let source = std::io::Error::other(e.to_string());
                 os_error(py, &path, &e.to_string(), &source)
             }

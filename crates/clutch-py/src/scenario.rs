@@ -3,7 +3,7 @@
 use crate::convert::{
     core_error, from_json, from_table, load_error, overrides, param_error, scenario_error, to_table,
 };
-use crate::stepping::Path;
+use crate::path::Path;
 use clutch_core::{BrakeGeometry, Stribeck};
 use clutch_sim::ScenarioError;
 use clutch_sim::rig::Rig;
@@ -82,7 +82,7 @@ impl Scenario {
 
     /// The path, sampled.
     fn path(&self, py: Python<'_>) -> PyResult<Path> {
-        Path::new(py, self)
+        Path::new(py, &self.0, |e| self.error(py, &self.0.run_error(&e.into())))
     }
 
     /// The number of ticks in a run.

@@ -1,179 +1,28 @@
 //! Law and plant stepped by the user, and laws written in Python.
 
 use crate::convert::core_error;
+use crate::path::{Target, fixed_to_counts};
 use crate::scenario::Scenario;
 use crate::table::{Column, Table};
 use clutch_core::law::{Command, Law, LawTerms, Limit, Output, OutputState, Terms};
 use clutch_core::{
-    Counts, Dac, Encoder, FixedCounts, ParamError, Real, Servo, ServoOutput, ServoState, StickSlipParams,
+    Counts, Dac, Encoder, FixedCounts, ParamError, Real, ServoOutput, ServoState, StickSlipParams,
     StickSlipState, law,
 };
 use clutch_sim::MovingRig;
 use clutch_sim::engine::{Event, EventKind, Motion};
 use clutch_sim::scenario::ScalarKind;
-use pyo3::exceptions::{
-    PyAttributeError, PyIndexError, PyMemoryError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError,
-};
+use pyo3::exceptions::{PyAttributeError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat};
 use std::sync::Mutex;
 
 type State<T> = ServoState<T, OutputState<T>>;
 
-fn fixed_to_counts(position: FixedCounts) -> f64 {
-    position.minus::<f64>(FixedCounts(0))
-}
-
-/// A point of a path: what the law is asked to follow at one tick.
-///
-/// Parameters
-/// ----------
-/// position_counts : float
-///     Target position, encoder counts from the encoder's zero; kept to 2⁻¹⁶ counts.
-/// velocity_rad_s : float
-///     Target velocity, rad/s.
-/// acceleration_rad_s2 : float
-///     Target acceleration, rad/s².
-///
-/// Examples
-/// --------
-/// >>> import clutch
-/// >>> clutch.Target(12.5, 0.035)
-/// Target(12.5, 0.035, 0.0)
-#[pyclass(frozen, module = "clutch", eq)]
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) struct Target(clutch_core::Target<f64>);
-
-#[pymethods]
-impl Target {
-    #[new]
-    #[pyo3(signature = (position_counts, velocity_rad_s=0.0, acceleration_rad_s2=0.0))]
-    fn new(position_counts: f64, velocity_rad_s: f64, acceleration_rad_s2: f64) -> PyResult<Target> {
-        let named = [
-            ("position_counts", position_counts),
-            ("velocity_rad_s", velocity_rad_s),
-            ("acceleration_rad_s2", acceleration_rad_s2),
-        ];
-        if let Some((name, value)) = named.iter().find(|(_, x)| !x.is_finite() || x.abs() >= 1e12) {
-            return Err(PyValueError::new_err(format!(
-                "{name} = {value}: expected a finite number below 1e12"
-            )));
-        }
-        Ok(Target(clutch_core::Target {
-            position: FixedCounts::from_real(position_counts),
-            velocity: velocity_rad_s,
-            acceleration: acceleration_rad_s2,
-        }))
-    }
-
-    /// Target position, counts.
-    #[getter]
-    fn position_counts(&self) -> f64 {
-        fixed_to_counts(self.0.position)
-    }
-
-    /// Target velocity, rad/s.
-    #[getter]
-    fn velocity_rad_s(&self) -> f64 {
-        self.0.velocity
-    }
-
-    /// Target acceleration, rad/s².
-    #[getter]
-    fn acceleration_rad_s2(&self) -> f64 {
-        self.0.acceleration
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (f64, f64, f64)) {
-        let t = slf.get();
-        (slf.get_type().into_any(), (t.position_counts(), t.0.velocity, t.0.acceleration))
-    }
-
-    fn __repr__(&self) -> String {
-        format!("Target({:?}, {:?}, {:?})", self.position_counts(), self.0.velocity, self.0.acceleration)
-    }
-}
-
-/// A scenario's path, sampled at its period.
-///
-/// Examples
-/// --------
-/// >>> import clutch
-/// >>> path = clutch.Scenario.load("minimum_jerk").path()
-/// >>> path.at(0).velocity_rad_s
-/// 0.0
-/// >>> len(path) == len(path.table())
-/// True
-#[pyclass(frozen, module = "clutch")]
-pub(crate) struct Path {
-    targets: Vec<clutch_core::Target<f64>>,
-    period: f64,
-    radians_per_count: f64,
-}
-
-impl Path {
-    pub(crate) fn new(py: Python<'_>, scenario: &Scenario) -> PyResult<Path> {
-        let spec = scenario.0.spec();
-        let encoder = Encoder::new::<f64>(spec.rig.counts_per_rev).map_err(|e| core_error(py, &e))?;
-        let wrong = |e: ParamError| scenario.error(py, &scenario.0.run_error(&e.into()));
-        let ticks = scenario.0.ticks();
-        let mut targets = Vec::new();
-        let room = usize::try_from(ticks).is_ok_and(|n| targets.try_reserve_exact(n).is_ok());
-        if !room {
-            return Err(PyMemoryError::new_err(format!("no memory for a path of {ticks} targets")));
-        }
-        match scenario.0.scalar {
-            ScalarKind::F32 => {
-                let path = spec.path::<f32>().map_err(wrong)?;
-                targets.extend((0..ticks).map(|k| path.at(k).cast::<f64>()));
-            }
-            ScalarKind::F64 => {
-                let path = spec.path::<f64>().map_err(wrong)?;
-                targets.extend((0..ticks).map(|k| path.at(k)));
-            }
-        }
-        Ok(Path { targets, period: spec.period.seconds(), radians_per_count: encoder.radians_per_count() })
-    }
-}
-
-#[pymethods]
-impl Path {
-    /// The target at a tick of the run, from 0.
-    fn at(&self, tick: i64) -> PyResult<Target> {
-        let n = self.targets.len();
-        let target = usize::try_from(tick).ok().and_then(|tick| self.targets.get(tick));
-        target.map(|t| Target(*t)).ok_or_else(|| {
-            PyIndexError::new_err(format!("tick {tick}: expected one of the run's, 0 to {}", n - 1))
-        })
-    }
-
-    fn __len__(&self) -> usize {
-        self.targets.len()
-    }
-
-    /// Columns time_s, position_rad, velocity_rad_s, acceleration_rad_s2.
-    fn table(&self) -> Table {
-        let of = |f: &dyn Fn(&clutch_core::Target<f64>) -> f64| {
-            Column::own(self.targets.iter().map(f).collect::<Vec<f64>>())
-        };
-        let time: Vec<f64> = (0..self.targets.len()).map(|k| k as f64 * self.period).collect();
-        Table::of([
-            ("time_s", Column::own(time)),
-            ("position_rad", of(&|t| fixed_to_counts(t.position) * self.radians_per_count)),
-            ("velocity_rad_s", of(&|t| t.velocity)),
-            ("acceleration_rad_s2", of(&|t| t.acceleration)),
-        ])
-    }
-
-    fn __repr__(&self) -> String {
-        format!("Path({} ticks of {} s)", self.targets.len(), self.period)
-    }
-}
-
 /// A servo in one scalar, with its state.
 #[derive(Clone)]
 struct Running<T: Real> {
-    servo: Servo<T>,
+    servo: clutch_core::Servo<T>,
     state: State<T>,
     last: ServoOutput<T, LawTerms<T>>,
 }
@@ -181,7 +30,7 @@ struct Running<T: Real> {
 #[derive(Clone)]
 #[allow(
     clippy::large_enum_variant,
-    reason = "one lives in each controller; a box would cost each step a cache line"
+    reason = "one lives in each servo; a box would cost each step a cache line"
 )]
 enum Scalar {
     F32(Running<f32>),
@@ -205,16 +54,16 @@ enum Scalar {
 ///
 /// >>> import clutch
 /// >>> scenario = clutch.Scenario.load("smc_2").override({"run.duration_s": 2.0})
-/// >>> law, plant, path = clutch.Controller(scenario), clutch.Plant(scenario), scenario.path()
+/// >>> servo, plant, path = clutch.Servo(scenario), clutch.Plant(scenario), scenario.path()
 /// >>> volts = []
 /// >>> for tick in range(len(path)):
-/// ...     volts.append(law.step(plant.counts, path.at(tick)))
+/// ...     volts.append(servo.step(plant.counts, path.at(tick)))
 /// ...     counts = plant.step(volts[-1])
 /// >>> volts == clutch.simulate(scenario).samples["voltage_v"].tolist()
 /// True
 #[pyclass(module = "clutch")]
 #[derive(Clone)]
-pub(crate) struct Controller {
+pub(crate) struct Servo {
     running: Scalar,
     /// Counts are fractions where the rig's sensor is ideal.
     whole: bool,
@@ -231,7 +80,7 @@ fn begin<T: Real>(py: Python<'_>, scenario: &Scenario) -> PyResult<Running<T>> {
     let spec = scenario.0.spec();
     let wrong = |e: &ParamError| core_error(py, e);
     let params = spec.servo().map_err(|e| wrong(&e))?.cast::<T>();
-    let servo = Servo::<T>::new(&params).map_err(|e| wrong(&to_f64(e)))?;
+    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| wrong(&to_f64(e)))?;
     let begun = spec.prepare::<T>().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
     Ok(Running { state: begun.servo_state(&servo), servo, last: ServoOutput::default() })
 }
@@ -291,12 +140,12 @@ fn checked_counts(counts: f64, whole: bool) -> PyResult<f64> {
 }
 
 #[pymethods]
-impl Controller {
+impl Servo {
     #[new]
-    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Controller> {
+    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Servo> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
-        Ok(Controller {
+        Ok(Servo {
             running: match scenario.0.scalar {
                 ScalarKind::F32 => Scalar::F32(begin(py, &scenario)?),
                 ScalarKind::F64 => Scalar::F64(begin(py, &scenario)?),
@@ -387,11 +236,11 @@ impl Controller {
     }
 
     /// A snapshot: goes on from here by itself.
-    fn copy(&self) -> Controller {
+    fn copy(&self) -> Servo {
         self.clone()
     }
 
-    fn __copy__(&self) -> Controller {
+    fn __copy__(&self) -> Servo {
         self.clone()
     }
 }

@@ -1,8 +1,8 @@
 //! Finds the `bench` rig: the stand-in for the paper's experiment.
 //!
 //! An evolution strategy over the parameters in which a real bench differs from the paper's own
-//! simulation. It is fitted to Table 3, to the PD controller's smooth motion and error at 20 and
-//! 100 °/s, its error and its stick-slip at 2 to 10 °/s, and to the computed-torque controller's
+//! simulation. It is fitted to Table 3, to PD's smooth motion and error at 20 and
+//! 100 °/s, its error and its stick-slip at 2 to 10 °/s, and to computed torque's
 //! stick-slip just below 20 °/s; every other statement of section 4 stays out of the fit. Same arguments, same result.
 //!
 //! `cargo xtask calibrate [--generations N] [--seed S]`

@@ -6,6 +6,7 @@ pub mod metrics;
 pub mod moving_rig;
 pub mod paper;
 pub mod progress;
+pub mod reaching;
 pub mod rig;
 pub mod run;
 pub mod scenario;

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #define CLUTCH_VERSION 1u
-#define CLUTCH_SCHEMA UINT64_C(0xa97bd1b77a40015b)
+#define CLUTCH_SCHEMA UINT64_C(0xab8778f18f682fb3)
 #define CLUTCH_MAX_BODY 66u  /* longest frame before stuffing, bytes */
 #define CLUTCH_MAX_FRAME 68u /* longest frame on the wire, bytes */
 
@@ -708,20 +708,20 @@ static inline void clutch_get_refused(const uint8_t *body, clutch_refused_t *m)
     m->value = clutch_get_u32(body + CLUTCH_REFUSED_VALUE);
 }
 
-/* Controller: A board in the controller role. Answers Discover; the Hello of the board that it drives follows. */
-#define CLUTCH_CONTROLLER_KIND 0x89u
-#define CLUTCH_CONTROLLER_LENGTH 51u
-#define CLUTCH_CONTROLLER_NONCE 1u
-#define CLUTCH_CONTROLLER_VERSION 5u
-#define CLUTCH_CONTROLLER_SCHEMA 6u
-#define CLUTCH_CONTROLLER_SETTINGS 14u
-#define CLUTCH_CONTROLLER_BOARD 22u
-#define CLUTCH_CONTROLLER_BOOT 26u
-#define CLUTCH_CONTROLLER_CLOCK_HZ 30u
-#define CLUTCH_CONTROLLER_KNOTS 34u
-#define CLUTCH_CONTROLLER_STATE 36u
-#define CLUTCH_CONTROLLER_RUN 37u
-#define CLUTCH_CONTROLLER_CONFIG 39u
+/* ControllerHello: A board in the controller role. Answers Discover; the Hello of the board that it drives follows. */
+#define CLUTCH_CONTROLLER_HELLO_KIND 0x89u
+#define CLUTCH_CONTROLLER_HELLO_LENGTH 51u
+#define CLUTCH_CONTROLLER_HELLO_NONCE 1u
+#define CLUTCH_CONTROLLER_HELLO_VERSION 5u
+#define CLUTCH_CONTROLLER_HELLO_SCHEMA 6u
+#define CLUTCH_CONTROLLER_HELLO_SETTINGS 14u
+#define CLUTCH_CONTROLLER_HELLO_BOARD 22u
+#define CLUTCH_CONTROLLER_HELLO_BOOT 26u
+#define CLUTCH_CONTROLLER_HELLO_CLOCK_HZ 30u
+#define CLUTCH_CONTROLLER_HELLO_KNOTS 34u
+#define CLUTCH_CONTROLLER_HELLO_STATE 36u
+#define CLUTCH_CONTROLLER_HELLO_RUN 37u
+#define CLUTCH_CONTROLLER_HELLO_CONFIG 39u
 typedef struct {
     uint32_t nonce; /* The nonce of Discover. */
     uint8_t version; /* The board's version of the protocol. */
@@ -734,41 +734,41 @@ typedef struct {
     uint8_t state; /* Where control stands: the supervisor's state. */
     uint16_t run; /* The latched run; 0 if none since power-up. */
     uint64_t config; /* The latched hash; 0 if none since power-up. */
-} clutch_controller_t;
+} clutch_controller_hello_t;
 
 /* The frame for the wire; its length, bytes. */
-static inline size_t clutch_encode_controller(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_controller_t *m)
+static inline size_t clutch_encode_controller_hello(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_controller_hello_t *m)
 {
     uint8_t body[CLUTCH_MAX_BODY];
-    body[0] = CLUTCH_CONTROLLER_KIND;
-    clutch_put_u32(body + CLUTCH_CONTROLLER_NONCE, m->nonce);
-    clutch_put_u8(body + CLUTCH_CONTROLLER_VERSION, m->version);
-    clutch_put_u64(body + CLUTCH_CONTROLLER_SCHEMA, m->schema);
-    clutch_put_u64(body + CLUTCH_CONTROLLER_SETTINGS, m->settings);
-    clutch_put_u32(body + CLUTCH_CONTROLLER_BOARD, m->board);
-    clutch_put_u32(body + CLUTCH_CONTROLLER_BOOT, m->boot);
-    clutch_put_u32(body + CLUTCH_CONTROLLER_CLOCK_HZ, m->clock_hz);
-    clutch_put_u16(body + CLUTCH_CONTROLLER_KNOTS, m->knots);
-    clutch_put_u8(body + CLUTCH_CONTROLLER_STATE, m->state);
-    clutch_put_u16(body + CLUTCH_CONTROLLER_RUN, m->run);
-    clutch_put_u64(body + CLUTCH_CONTROLLER_CONFIG, m->config);
-    return clutch_frame(wire, body, CLUTCH_CONTROLLER_LENGTH);
+    body[0] = CLUTCH_CONTROLLER_HELLO_KIND;
+    clutch_put_u32(body + CLUTCH_CONTROLLER_HELLO_NONCE, m->nonce);
+    clutch_put_u8(body + CLUTCH_CONTROLLER_HELLO_VERSION, m->version);
+    clutch_put_u64(body + CLUTCH_CONTROLLER_HELLO_SCHEMA, m->schema);
+    clutch_put_u64(body + CLUTCH_CONTROLLER_HELLO_SETTINGS, m->settings);
+    clutch_put_u32(body + CLUTCH_CONTROLLER_HELLO_BOARD, m->board);
+    clutch_put_u32(body + CLUTCH_CONTROLLER_HELLO_BOOT, m->boot);
+    clutch_put_u32(body + CLUTCH_CONTROLLER_HELLO_CLOCK_HZ, m->clock_hz);
+    clutch_put_u16(body + CLUTCH_CONTROLLER_HELLO_KNOTS, m->knots);
+    clutch_put_u8(body + CLUTCH_CONTROLLER_HELLO_STATE, m->state);
+    clutch_put_u16(body + CLUTCH_CONTROLLER_HELLO_RUN, m->run);
+    clutch_put_u64(body + CLUTCH_CONTROLLER_HELLO_CONFIG, m->config);
+    return clutch_frame(wire, body, CLUTCH_CONTROLLER_HELLO_LENGTH);
 }
 
-/* From the body that clutch_push accepted as CLUTCH_CONTROLLER_KIND. */
-static inline void clutch_get_controller(const uint8_t *body, clutch_controller_t *m)
+/* From the body that clutch_push accepted as CLUTCH_CONTROLLER_HELLO_KIND. */
+static inline void clutch_get_controller_hello(const uint8_t *body, clutch_controller_hello_t *m)
 {
-    m->nonce = clutch_get_u32(body + CLUTCH_CONTROLLER_NONCE);
-    m->version = clutch_get_u8(body + CLUTCH_CONTROLLER_VERSION);
-    m->schema = clutch_get_u64(body + CLUTCH_CONTROLLER_SCHEMA);
-    m->settings = clutch_get_u64(body + CLUTCH_CONTROLLER_SETTINGS);
-    m->board = clutch_get_u32(body + CLUTCH_CONTROLLER_BOARD);
-    m->boot = clutch_get_u32(body + CLUTCH_CONTROLLER_BOOT);
-    m->clock_hz = clutch_get_u32(body + CLUTCH_CONTROLLER_CLOCK_HZ);
-    m->knots = clutch_get_u16(body + CLUTCH_CONTROLLER_KNOTS);
-    m->state = clutch_get_u8(body + CLUTCH_CONTROLLER_STATE);
-    m->run = clutch_get_u16(body + CLUTCH_CONTROLLER_RUN);
-    m->config = clutch_get_u64(body + CLUTCH_CONTROLLER_CONFIG);
+    m->nonce = clutch_get_u32(body + CLUTCH_CONTROLLER_HELLO_NONCE);
+    m->version = clutch_get_u8(body + CLUTCH_CONTROLLER_HELLO_VERSION);
+    m->schema = clutch_get_u64(body + CLUTCH_CONTROLLER_HELLO_SCHEMA);
+    m->settings = clutch_get_u64(body + CLUTCH_CONTROLLER_HELLO_SETTINGS);
+    m->board = clutch_get_u32(body + CLUTCH_CONTROLLER_HELLO_BOARD);
+    m->boot = clutch_get_u32(body + CLUTCH_CONTROLLER_HELLO_BOOT);
+    m->clock_hz = clutch_get_u32(body + CLUTCH_CONTROLLER_HELLO_CLOCK_HZ);
+    m->knots = clutch_get_u16(body + CLUTCH_CONTROLLER_HELLO_KNOTS);
+    m->state = clutch_get_u8(body + CLUTCH_CONTROLLER_HELLO_STATE);
+    m->run = clutch_get_u16(body + CLUTCH_CONTROLLER_HELLO_RUN);
+    m->config = clutch_get_u64(body + CLUTCH_CONTROLLER_HELLO_CONFIG);
 }
 
 /* Taken: The setting is taken. Answers Set. */
@@ -847,7 +847,7 @@ typedef struct {
     uint32_t term_2; /* Third term of the law. [bits] */
     uint32_t demand; /* The law's voltage within its limits. [bits, V] */
     uint16_t code; /* What the converter was given. [DAC code] */
-    uint32_t cycles; /* Clock cycles of the tick before: see Controller.clock_hz. [clock cycles] */
+    uint32_t cycles; /* Clock cycles of the tick before: see ControllerHello.clock_hz. [clock cycles] */
 } clutch_telemetry_t;
 
 /* The frame for the wire; its length, bytes. */
@@ -1022,7 +1022,7 @@ static inline size_t clutch_length(uint8_t kind)
     case CLUTCH_STOPPED_KIND: return CLUTCH_STOPPED_LENGTH;
     case CLUTCH_PONG_KIND: return CLUTCH_PONG_LENGTH;
     case CLUTCH_REFUSED_KIND: return CLUTCH_REFUSED_LENGTH;
-    case CLUTCH_CONTROLLER_KIND: return CLUTCH_CONTROLLER_LENGTH;
+    case CLUTCH_CONTROLLER_HELLO_KIND: return CLUTCH_CONTROLLER_HELLO_LENGTH;
     case CLUTCH_TAKEN_KIND: return CLUTCH_TAKEN_LENGTH;
     case CLUTCH_TELEMETRY_KIND: return CLUTCH_TELEMETRY_LENGTH;
     case CLUTCH_ENDED_KIND: return CLUTCH_ENDED_LENGTH;

@@ -37,9 +37,9 @@ pub use codes::{
 };
 pub use frame::{Decoder, Frame, FrameError, MAX_BODY, MAX_FRAME, encode};
 pub use message::{
-    Actuate, Arm, Armed, Configure, Configured, Controller, Direction, Discover, Ended, Fault, FieldInfo,
-    Hello, Link, Message, MessageInfo, Ping, Pong, Refused, SCHEMA, Sample, Set, Stop, Stopped, TABLE, Taken,
-    Telemetry,
+    Actuate, Arm, Armed, Configure, Configured, ControllerHello, Direction, Discover, Ended, Fault,
+    FieldInfo, Hello, Link, Message, MessageInfo, Ping, Pong, Refused, SCHEMA, Sample, Set, Stop, Stopped,
+    TABLE, Taken, Telemetry,
 };
 
 /// Version of the protocol: of the rules, of the codes' meanings and of the framing. A change of

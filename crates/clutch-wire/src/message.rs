@@ -376,7 +376,7 @@ messages! {
     }
 
     /// A board in the controller role. Answers `Discover`; the `Hello` of the board that it drives follows.
-    0x89 ToHost Controller {
+    0x89 ToHost ControllerHello {
         /// The nonce of `Discover`.
         nonce: u32,
         /// The board's version of the protocol.
@@ -453,7 +453,7 @@ messages! {
         demand: u32 ["bits, V"],
         /// What the converter was given.
         code: u16 ["DAC code"],
-        /// Clock cycles of the tick before: see `Controller.clock_hz`.
+        /// Clock cycles of the tick before: see `ControllerHello.clock_hz`.
         cycles: u32 ["clock cycles"],
     }
 

@@ -1,6 +1,5 @@
 //! The board: clocks, encoder, converter, serial line, watchdog. Another board is another such file.
 
-use crate::fault::stop;
 use clutch_core::{Counts, DacCode};
 use clutch_node::{BoardParams, Hardware, WideCounter};
 use cortex_m::peripheral::DWT;
@@ -69,6 +68,16 @@ pub struct Board {
     pub board: u32,
     /// Another number at each power-up.
     pub boot: u32,
+}
+
+/// When the program cannot go on: puts the safe output out and waits for the reset. Trusts nothing that is in
+/// memory.
+pub fn stop() -> ! {
+    cortex_m::interrupt::disable();
+    pac::DAC1.dhr12r(0).write(|w| w.set_dhr(BOOT_CODE.0));
+    loop {
+        cortex_m::asm::nop();
+    }
 }
 
 /// Starts the board, its output first.

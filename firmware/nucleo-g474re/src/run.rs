@@ -1,8 +1,7 @@
 //! The control task: one task, in an interrupt of its own, owns node and hardware. Periods and bytes
 //! come to it one after the other, so nothing is shared and nothing locks.
 
-use crate::board::{self, Board, CONTROL, Line};
-use crate::fault::stop;
+use crate::board::{self, Board, CONTROL, Line, stop};
 use clutch_node::{Role, receive, tick};
 use embassy_executor::{InterruptExecutor, SpawnError, SpawnToken};
 use embassy_futures::select::{Either, select};

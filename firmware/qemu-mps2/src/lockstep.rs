@@ -1,10 +1,10 @@
 //! Lockstep over two files: each request brings the time and what has arrived, each answer takes back
 //! what is to be sent.
 
-use crate::fault;
 use crate::files::HostFile;
-use clutch_node::exchange::{Exchange, LONGEST, answer};
-use clutch_node::{Onboard, Ports};
+use crate::last_word;
+use clutch_node::lockstep::{Exchange, LONGEST, answer};
+use clutch_node::{BoardController, Outboxes};
 use semihosting::process;
 
 /// A request at this time is a test's: the processor is to fail.
@@ -31,10 +31,10 @@ impl Link {
 }
 
 /// Answers until the files are closed.
-pub fn run(link: Link, mut node: Onboard) -> ! {
+pub fn run(link: Link, mut node: BoardController) -> ! {
     let mut buffer = [0; LONGEST];
     let mut used = 0;
-    let mut ports = Ports::default();
+    let mut outboxes = Outboxes::default();
     loop {
         // One read brings one request, as its writer writes it in one piece; but nothing promises that.
         let whole = Exchange::length(buffer.get(..used).unwrap_or(&[]));
@@ -48,12 +48,12 @@ pub fn run(link: Link, mut node: Onboard) -> ! {
         }
         let Some(request) = buffer.get(..used).and_then(Exchange::read) else { process::exit(2) };
         if request.time_ns == FAIL_AT {
-            fault::fail();
+            cortex_m::asm::udf(); // an instruction that is none
         }
-        if !link.answer(&answer(&mut node, &request, &mut ports)) {
+        if !link.answer(&answer(&mut node, &request, &mut outboxes)) {
             process::exit(3);
         }
-        fault::prepare(node.last_word());
+        last_word::prepare(node.last_word());
         used = 0;
     }
 }

@@ -1,8 +1,8 @@
 //! Two UARTs and a clock: the board as any other.
 
-use crate::fault;
+use crate::last_word;
 use clutch_core::Micros;
-use clutch_node::{Onboard, Outbox, Ports};
+use clutch_node::{BoardController, Outbox, Outboxes};
 use core::ptr::{read_volatile, write_volatile};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::interrupt::InterruptNumber;
@@ -191,12 +191,12 @@ impl Watchdog {
 }
 
 /// The board's loop.
-pub fn run(mut node: Onboard) -> ! {
+pub fn run(mut node: BoardController) -> ! {
     let mut clock = Clock::start();
     let mut watchdog = Watchdog::start();
     HOST.enable();
     DAQ.enable();
-    let (mut ports, mut host, mut daq) = (Ports::default(), [0; 64], [0; 64]);
+    let (mut outboxes, mut host, mut daq) = (Outboxes::default(), [0; 64], [0; 64]);
     loop {
         let (host_bytes, daq_bytes) = cortex_m::interrupt::free(|cs| {
             let (a, b) = (FROM_HOST.drain(cs, &mut host), FROM_DAQ.drain(cs, &mut daq));
@@ -209,24 +209,24 @@ pub fn run(mut node: Onboard) -> ! {
         let arrived = clock.now_us();
         let now_ns = arrived.saturating_mul(1000);
         if daq_bytes > 0 {
-            node.daq(now_ns, daq.get(..daq_bytes).unwrap_or(&[]), &mut ports);
+            node.daq(now_ns, daq.get(..daq_bytes).unwrap_or(&[]), &mut outboxes);
         }
         // The answer before anything else; what the host has to say to encoder and converter is none.
-        let ticked = !ports.daq.is_empty();
-        DAQ.flush(&mut ports.daq);
+        let ticked = !outboxes.daq.is_empty();
+        DAQ.flush(&mut outboxes.daq);
         if ticked {
             let late = clock.now_us().wrapping_sub(arrived);
             node.answered(Micros(u32::try_from(late).unwrap_or(u32::MAX)));
         }
-        node.host(now_ns, host.get(..host_bytes).unwrap_or(&[]), &mut ports);
-        node.poll(now_ns, &mut ports);
-        DAQ.flush(&mut ports.daq);
+        node.host(now_ns, host.get(..host_bytes).unwrap_or(&[]), &mut outboxes);
+        node.poll(now_ns, &mut outboxes);
+        DAQ.flush(&mut outboxes.daq);
         // While it drives a shaft, only a completed tick shows that the board works.
         if ticked || !node.driving() {
             watchdog.feed();
         }
-        HOST.flush(&mut ports.host);
-        fault::prepare(node.last_word());
+        HOST.flush(&mut outboxes.host);
+        last_word::prepare(node.last_word());
     }
 }
 

@@ -41,11 +41,11 @@ use clutch_core::{
     StickSlipParams, StickSlipState, Stribeck, StribeckParams, Supervisor, SupervisorParams, Target,
     Tolerances, VelocityParams, VelocitySource, check_path, sin_cos_turns,
 };
-use clutch_node::exchange::Exchange;
+use clutch_node::lockstep::Exchange;
 use clutch_node::{
-    Acquisition, BoardNode, BoardParams, ControlNode, ControlParams, Hardware, Onboard, OnboardParams,
-    Outbox, Path, Ports, RemoteNode, Role, RunParams, Settings, Standalone, WideCounter, present_code,
-    receive, tick,
+    BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
+    DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Path, Role, RunParams, Settings, WideCounter,
+    present_code, receive, tick,
 };
 use clutch_wire::{BoardState, Configure, Decoder, Hello, StopReason, encode};
 use core::hint::black_box;
@@ -663,10 +663,10 @@ impl Hardware for Unknown {
 }
 
 fn runner(params: &BoardParams) {
-    if let Some(role) = made(Acquisition::new(params)) {
+    if let Some(role) = made(DaqBoard::new(params)) {
         periods(role);
     }
-    if let Some(mut chip) = made(Standalone::new(onboard_params(), params)) {
+    if let Some(mut chip) = made(OneChip::new(board_controller_params(), params)) {
         // What the runner does not call.
         chip.poll(word());
         sink((chip.state() == BoardState::Running, chip.code()));
@@ -689,14 +689,14 @@ fn periods(mut role: impl Role) {
 
 fn control_node<T: Real>() {
     let Some((servo, supervisor)) = checked_supervisor::<T>() else { return };
-    let params = ControlParams {
+    let params = ControllerParams {
         run: word() as u16,
         config: word(),
         watchdog: micros(),
         valid: micros(),
         silence: micros(),
     };
-    let mut node = opaque(ControlNode::new(params, servo, supervisor));
+    let mut node = opaque(ControllerNode::new(params, servo, supervisor));
     let mut out = opaque(Outbox::default());
     let path = |_| target();
     loop {
@@ -722,15 +722,15 @@ fn control_node<T: Real>() {
     }
 }
 
-fn onboard_params() -> OnboardParams {
-    OnboardParams { board: word() as u32, boot: word() as u32, clock_hz: word() as u32 }
+fn board_controller_params() -> BoardControllerParams {
+    BoardControllerParams { board: word() as u32, boot: word() as u32, clock_hz: word() as u32 }
 }
 
 /// The controller role: the board's end, the host's end, and what goes between them.
 fn controller_role() {
     numbers();
     sent();
-    onboard();
+    board_controller();
     exchange();
 }
 
@@ -786,7 +786,7 @@ fn sent() {
     if let Some(built) = made(settings.build()) {
         target_of(&built.path, settings.points());
         target_of(&built.path, knots);
-        remote_node(&built.path, knots);
+        host_node(&built.path, knots);
     }
 }
 
@@ -794,9 +794,9 @@ fn target_of(path: &Path, knots: &[Knot]) {
     sink(path.target(knots, word()));
 }
 
-fn onboard() {
-    let mut node = opaque(Onboard::new(onboard_params()));
-    let mut out = opaque(Ports::default());
+fn board_controller() {
+    let mut node = opaque(BoardController::new(board_controller_params()));
+    let mut out = opaque(Outboxes::default());
     loop {
         node.host(word(), bytes(&any_bytes()), &mut out);
         node = opaque(node);
@@ -815,7 +815,7 @@ fn onboard() {
     }
 }
 
-fn remote_node(path: &Path, knots: &[Knot]) {
+fn host_node(path: &Path, knots: &[Knot]) {
     let Some(servo) = made(Servo::new(&servo_params())) else { return };
     let configure = Configure {
         run: word() as u16,
@@ -828,7 +828,7 @@ fn remote_node(path: &Path, knots: &[Knot]) {
         ramp_step: word() as u32,
         hold_periods: word() as u32,
     };
-    let mut node = opaque(RemoteNode::new(servo, configure, word(), word()));
+    let mut node = opaque(HostNode::new(servo, configure, word(), word()));
     let mut out = opaque(Outbox::default());
     let path = |tick| path.target(knots, tick);
     loop {
@@ -840,7 +840,7 @@ fn remote_node(path: &Path, knots: &[Knot]) {
         node.receive(word(), bytes(&any_bytes()), &path, &mut |notice| sink(notice));
         node = opaque(node);
         node.poll(word(), &mut out, &mut |notice| sink(notice));
-        sink((node.poll_at(), node.origin(), *node.counts(), *node.told(), node.controller().copied()));
+        sink((node.poll_at(), node.origin(), *node.counts(), *node.standing(), node.controller().copied()));
         sink(node.servo().period());
         drain(&mut out);
         match word() {

@@ -14,6 +14,8 @@
 mod fault;
 #[path = "../files.rs"]
 mod files;
+#[path = "../last_word.rs"]
+mod last_word;
 #[path = "../lockstep.rs"]
 mod lockstep;
 #[path = "../panic.rs"]
@@ -21,7 +23,7 @@ mod panic;
 #[path = "../serial.rs"]
 mod serial;
 
-use clutch_node::{Onboard, OnboardParams};
+use clutch_node::{BoardController, BoardControllerParams};
 use cortex_m_rt::entry;
 
 /// Serial number of the emulated board: one that keeps its own time.
@@ -30,7 +32,7 @@ const BOARD: u32 = 1;
 #[entry]
 fn main() -> ! {
     // No cycle counter: the emulator does not know how long an instruction takes.
-    let node = Onboard::new(OnboardParams { board: BOARD, boot: 1, clock_hz: 0 });
+    let node = BoardController::new(BoardControllerParams { board: BOARD, boot: 1, clock_hz: 0 });
     match lockstep::Link::open() {
         Some(link) => lockstep::run(link, node),
         None => serial::run(node),

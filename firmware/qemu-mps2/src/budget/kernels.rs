@@ -3,7 +3,7 @@
 
 use clutch_core::law::{Controller, Ctc, OutputState, Pd, Smc, Tick};
 use clutch_core::{Counts, Servo, ServoState, Target};
-use clutch_node::{Onboard, Ports};
+use clutch_node::{BoardController, Outboxes};
 use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
 
 /// Bytes of one frame, as they come over the line: one delimiter, at their end.
@@ -101,14 +101,14 @@ pub extern "C" fn encode_actuate(answer: &Actuate, frame: &mut Option<Frame>) {
 #[inline(never)]
 #[unsafe(no_mangle)]
 pub extern "C" fn whole_tick(session: &mut Session, bytes: &Bytes) {
-    session.ports.host.clear();
-    session.ports.daq.clear();
-    session.node.daq(session.now_ns, bytes.as_slice(), &mut session.ports);
+    session.outboxes.host.clear();
+    session.outboxes.daq.clear();
+    session.node.daq(session.now_ns, bytes.as_slice(), &mut session.outboxes);
 }
 
 /// A controller and its lines.
 pub struct Session {
-    pub node: Onboard,
-    pub ports: Ports,
+    pub node: BoardController,
+    pub outboxes: Outboxes,
     pub now_ns: u64,
 }

@@ -9,7 +9,9 @@ use clutch_core::{
     Bounds, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams, Supervisor, SupervisorParams,
     Tolerances,
 };
-use clutch_node::{ControlNode, ControlParams, Onboard, OnboardParams, Ports, RunParams, Settings};
+use clutch_node::{
+    BoardController, BoardControllerParams, ControllerNode, ControllerParams, Outboxes, RunParams, Settings,
+};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configured, Discover, Fault, Hello, Message, Pong, Refused, SCHEMA,
     STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Set, Stop, StopReason, Stopped, VERSION,
@@ -58,16 +60,16 @@ fn session(kind: u32) -> Option<Session> {
     })
     .ok()?;
     let mut session = Session {
-        node: Onboard::new(OnboardParams { board: 1, boot: 1, clock_hz: 0 }),
-        ports: Ports::default(),
+        node: BoardController::new(BoardControllerParams { board: 1, boot: 1, clock_hz: 0 }),
+        outboxes: Outboxes::default(),
         now_ns: 0,
     };
     session.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
-    session.node.daq(0, encode(&hello(RUN)).as_bytes(), &mut session.ports);
+    session.node.daq(0, encode(&hello(RUN)).as_bytes(), &mut session.outboxes);
     settings.each(|key, value| session.asks(&Message::Set(Set { run: RUN, key, value })));
-    let params = ControlParams { run: RUN, config: CONFIG, watchdog, valid, silence };
+    let params = ControllerParams { run: RUN, config: CONFIG, watchdog, valid, silence };
     let supervisor = Supervisor::new(&supervisor, &servo, &bounds).ok()?;
-    let node = ControlNode::new(params, Servo::new(&servo).ok()?, supervisor);
+    let node = ControllerNode::new(params, Servo::new(&servo).ok()?, supervisor);
     session.asks(&Message::Configure(node.configuration()));
     Some(session)
 }
@@ -75,9 +77,9 @@ fn session(kind: u32) -> Option<Session> {
 impl Session {
     /// A frame of the host's, which is not measured.
     fn asks(&mut self, message: &Message) {
-        self.ports.host.clear();
-        self.ports.daq.clear();
-        self.node.host(self.now_ns, encode(message).as_bytes(), &mut self.ports);
+        self.outboxes.host.clear();
+        self.outboxes.daq.clear();
+        self.node.host(self.now_ns, encode(message).as_bytes(), &mut self.outboxes);
     }
 
     /// A period; its instructions.

@@ -7,12 +7,12 @@ mod desk;
 use clutch_core::law::{CtcParams, LawParams, SmcParams};
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Counts, Dac, DacCode, Encoder, Micros, Plant, PlantParams};
-use clutch_node::{BoardParams, Notice, Outbox, RemoteNode, Standalone};
+use clutch_node::{BoardParams, HostNode, Notice, OneChip, Outbox};
 use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configured, Message, Sample, StopReason, TELEMETRY_ANSWERED,
     Telemetry, encode,
 };
-use desk::{BOARD, CONFIG, ONBOARD, Plan, drain, frames, paper};
+use desk::{BOARD, BOARD_CONTROLLER, CONFIG, Plan, drain, frames, paper};
 
 /// A shaft of the paper's, a tenth of a period at a time.
 struct Shaft {
@@ -44,33 +44,33 @@ impl Shaft {
 /// A chip that drives a shaft, and its host.
 struct Bench {
     plan: Plan,
-    chip: Standalone,
-    remote: RemoteNode,
+    chip: OneChip,
+    host: HostNode,
     shaft: Shaft,
     now_us: u64,
-    notices: Vec<desk::Told>,
+    notices: Vec<desk::Heard>,
 }
 
 impl Bench {
     fn new(plan: Plan) -> Bench {
-        let chip = Standalone::new(ONBOARD, &BOARD).unwrap();
-        let remote = plan.remote();
+        let chip = OneChip::new(BOARD_CONTROLLER, &BOARD).unwrap();
+        let host = plan.host();
         // The board's clock of 32 bits wraps on the way.
         let now_us = (1 << 32) - 500_000;
-        Bench { plan, chip, remote, shaft: Shaft::new(), now_us, notices: Vec::new() }
+        Bench { plan, chip, host, shaft: Shaft::new(), now_us, notices: Vec::new() }
     }
 
     fn hears(&mut self) -> Vec<Message> {
         assert_eq!(self.chip.to_host().dropped(), 0);
         let bytes = drain(self.chip.to_host());
         let notices = &mut self.notices;
-        self.remote.receive(self.now_us * 1000, &bytes, &self.plan.path(), &mut |n| notices.push(n));
+        self.host.receive(self.now_us * 1000, &bytes, &self.plan.path(), &mut |n| notices.push(n));
         frames(&bytes)
     }
 
-    fn asks(&mut self, f: impl FnOnce(&mut RemoteNode, &mut Outbox)) -> Vec<Message> {
+    fn asks(&mut self, f: impl FnOnce(&mut HostNode, &mut Outbox)) -> Vec<Message> {
         let mut out = Outbox::default();
-        f(&mut self.remote, &mut out);
+        f(&mut self.host, &mut out);
         self.chip.host(self.now_us, out.as_bytes());
         self.hears()
     }
@@ -78,14 +78,14 @@ impl Bench {
     fn ready(plan: Plan) -> Bench {
         let mut bench = Bench::new(plan);
         assert_eq!((bench.chip.state(), bench.chip.period_us()), (BoardState::Boot, None));
-        let heard = bench.asks(|remote, out| remote.discover(7, out));
-        assert!(matches!(heard[..], [Message::Controller(_), Message::Hello(_)]), "{heard:?}");
+        let heard = bench.asks(|host, out| host.discover(7, out));
+        assert!(matches!(heard[..], [Message::ControllerHello(_), Message::Hello(_)]), "{heard:?}");
         for (key, value) in plan.pairs() {
-            let heard = bench.asks(|remote, out| remote.set(key, value, out));
+            let heard = bench.asks(|host, out| host.set(key, value, out));
             assert!(matches!(heard[..], [Message::Taken(_)]), "{heard:?}");
         }
-        let heard = bench.asks(|remote, out| remote.configure(out));
-        let configured = Configured { run: plan.run, config: CONFIG, boot: ONBOARD.boot };
+        let heard = bench.asks(|host, out| host.configure(out));
+        let configured = Configured { run: plan.run, config: CONFIG, boot: BOARD_CONTROLLER.boot };
         assert_eq!(heard, [Message::Configured(configured)]);
         assert_eq!(bench.chip.period_us(), Some(plan.servo.period.0));
         bench
@@ -93,7 +93,7 @@ impl Bench {
 
     fn armed(plan: Plan) -> Bench {
         let mut bench = Bench::ready(plan);
-        let heard = bench.asks(|remote, out| remote.arm(out));
+        let heard = bench.asks(|host, out| host.arm(out));
         assert_eq!(heard, [Message::Armed(Armed { run: plan.run, config: CONFIG })]);
         bench
     }
@@ -143,7 +143,7 @@ fn each_law_follows_the_path_on_one_chip() {
         }
         assert_eq!(begun, 5000, "the watchdog never bites");
         assert!(largest > 0.0 && largest < 0.1_f32.to_radians(), "{law:?}: {largest} rad");
-        assert_eq!((bench.remote.told().state, bench.remote.told().tick), (State::Running, 4999));
+        assert_eq!((bench.host.standing().state, bench.host.standing().tick), (State::Running, 4999));
     }
 }
 
@@ -213,7 +213,7 @@ fn silence_of_the_encoder_ends_in_a_fault_also_before_the_watchdog_bites() {
     bench.chip.poll(bench.now_us);
     bench.hears();
     assert_eq!(bench.chip.state(), BoardState::Faulted);
-    assert_eq!((bench.remote.told().state, bench.remote.told().cause), (State::Faulted, Cause::Silence));
+    assert_eq!((bench.host.standing().state, bench.host.standing().cause), (State::Faulted, Cause::Silence));
 }
 
 #[test]
@@ -226,7 +226,10 @@ fn a_fault_of_the_hardware_is_answered_with_the_safe_output_in_the_same_sample()
             (bench.plan.supervisor().safe_codes().hold, BoardState::Faulted)
         );
         assert!(matches!(heard[0], Message::Fault(_)), "{heard:?}");
-        assert_eq!((bench.remote.told().state, bench.remote.told().cause), (State::Faulted, Cause::Board));
+        assert_eq!(
+            (bench.host.standing().state, bench.host.standing().cause),
+            (State::Faulted, Cause::Board)
+        );
     }
 }
 
@@ -236,21 +239,21 @@ fn a_run_on_one_chip_ends_by_itself_and_another_may_follow() {
     for _ in 0..50 {
         bench.period();
     }
-    assert_eq!((bench.remote.told().state, bench.remote.told().cause), (State::Holding, Cause::Done));
+    assert_eq!((bench.host.standing().state, bench.host.standing().cause), (State::Holding, Cause::Done));
     assert_eq!(bench.chip.state(), BoardState::Stopped);
     assert_eq!(bench.chip.code(), bench.plan.supervisor().safe_codes().hold);
-    let heard = bench.asks(|remote, out| remote.arm(out));
+    let heard = bench.asks(|host, out| host.arm(out));
     assert!(matches!(heard[..], [Message::Refused(m)] if m.request == Arm::KIND), "{heard:?}");
     bench.plan = Plan { run: 6, ..Plan::new() };
-    bench.remote = bench.plan.remote();
+    bench.host = bench.plan.host();
     for (key, value) in bench.plan.pairs() {
-        bench.asks(|remote, out| remote.set(key, value, out));
+        bench.asks(|host, out| host.set(key, value, out));
     }
-    bench.asks(|remote, out| remote.configure(out));
-    bench.asks(|remote, out| remote.arm(out));
+    bench.asks(|host, out| host.configure(out));
+    bench.asks(|host, out| host.arm(out));
     bench.period();
-    assert_eq!((bench.chip.state(), bench.remote.told().state), (BoardState::Running, State::Running));
-    let heard = bench.asks(|remote, out| remote.stop(StopReason::Operator, out));
+    assert_eq!((bench.chip.state(), bench.host.standing().state), (BoardState::Running, State::Running));
+    let heard = bench.asks(|host, out| host.stop(StopReason::Operator, out));
     assert!(heard.iter().any(|m| matches!(m, Message::Stopped(_))), "{heard:?}");
     assert_eq!(bench.chip.state(), BoardState::Stopped);
 }
@@ -264,7 +267,7 @@ fn without_its_host_the_chip_goes_to_the_safe_state() {
     assert_eq!(bench.chip.state(), BoardState::Running);
     bench.period();
     assert_eq!(bench.chip.state(), BoardState::Stopped);
-    assert_eq!((bench.remote.told().state, bench.remote.told().cause), (State::Holding, Cause::Operator));
+    assert_eq!((bench.host.standing().state, bench.host.standing().cause), (State::Holding, Cause::Operator));
 }
 
 #[test]
@@ -281,5 +284,5 @@ fn how_long_a_period_took_is_told_with_the_next() {
 #[test]
 fn a_chip_that_cannot_be_is_named() {
     let bad = BoardParams { dac_bits: 17, ..BOARD };
-    assert_eq!(Standalone::new(ONBOARD, &bad).unwrap_err().field, "dac_bits");
+    assert_eq!(OneChip::new(BOARD_CONTROLLER, &bad).unwrap_err().field, "dac_bits");
 }

@@ -1,6 +1,6 @@
 //! The emulated board: a Cortex-M4F in `qemu-system-arm`, asked in lockstep.
 
-use clutch_node::exchange::{Exchange, LONGEST};
+use clutch_node::lockstep::{Exchange, LONGEST};
 use clutch_wire::{BoardState, Decoder, Message, STATUS_STATE, Set, encode};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{CWD, FileType, Mode, mknodat};
@@ -19,7 +19,7 @@ const PATIENCE_S: u32 = 20;
 
 /// The emulated board could not be started, or ended.
 #[derive(Debug, thiserror::Error)]
-pub enum EmulatorError {
+pub enum QemuError {
     /// No emulator.
     #[error(
         "{PROGRAM} was not found. Install it (on Debian and Ubuntu: apt-get install qemu-system-arm), or run \
@@ -56,8 +56,8 @@ pub enum EmulatorError {
     Garbled(&'static str),
 }
 
-fn system(what: &'static str) -> impl Fn(std::io::Error) -> EmulatorError {
-    move |error| EmulatorError::System { what, error }
+fn system(what: &'static str) -> impl Fn(std::io::Error) -> QemuError {
+    move |error| QemuError::System { what, error }
 }
 
 /// A folder of its own that is gone with it.
@@ -79,11 +79,11 @@ impl Drop for Folder {
     }
 }
 
-fn found(image: &Path) -> Result<PathBuf, EmulatorError> {
-    image.canonicalize().map_err(|_| EmulatorError::NoImage { path: image.to_owned() })
+fn found(image: &Path) -> Result<PathBuf, QemuError> {
+    image.canonicalize().map_err(|_| QemuError::NoImage { path: image.to_owned() })
 }
 
-fn started(image: &Path, folder: &Folder, serial: &[&str]) -> Result<Child, EmulatorError> {
+fn started(image: &Path, folder: &Folder, serial: &[&str]) -> Result<Child, QemuError> {
     Command::new(PROGRAM)
         .args(["-machine", "mps2-an386", "-display", "none", "-monitor", "none"])
         .args(serial)
@@ -95,23 +95,23 @@ fn started(image: &Path, folder: &Folder, serial: &[&str]) -> Result<Child, Emul
         .stderr(Stdio::piped())
         .spawn()
         .map_err(|error| match error.kind() {
-            std::io::ErrorKind::NotFound => EmulatorError::NoProgram,
-            _ => EmulatorError::System { what: "started", error },
+            std::io::ErrorKind::NotFound => QemuError::NoProgram,
+            _ => QemuError::System { what: "started", error },
         })
 }
 
 /// An error if it has ended.
-fn alive(child: &mut Child) -> Result<(), EmulatorError> {
+fn alive(child: &mut Child) -> Result<(), QemuError> {
     let Some(status) = child.try_wait().map_err(system("looked at"))? else { return Ok(()) };
     let mut said = String::new();
     if let Some(mut stderr) = child.stderr.take() {
         let _ = stderr.read_to_string(&mut said); // the status alone tells, too
     }
-    Err(EmulatorError::Ended { status: status.to_string(), said: said.trim().to_owned() })
+    Err(QemuError::Ended { status: status.to_string(), said: said.trim().to_owned() })
 }
 
 /// A board that is emulated, in lockstep.
-pub struct Emulator {
+pub struct QemuBoard {
     child: Child,
     requests: File,
     answers: File,
@@ -119,13 +119,13 @@ pub struct Emulator {
     _folder: Folder,
 }
 
-impl Emulator {
+impl QemuBoard {
     /// Starts a board with an image.
     ///
     /// # Errors
     /// No emulator, no image, no memory.
-    pub fn start(image: &Path) -> Result<Emulator, EmulatorError> {
-        let image = image.canonicalize().map_err(|_| EmulatorError::NoImage { path: image.to_owned() })?;
+    pub fn start(image: &Path) -> Result<QemuBoard, QemuError> {
+        let image = image.canonicalize().map_err(|_| QemuError::NoImage { path: image.to_owned() })?;
         let folder = Folder::new().map_err(system("given a folder"))?;
         // Both ends of both files are open here: opening waits for nobody.
         let open = |name: &str| -> std::io::Result<File> {
@@ -136,32 +136,31 @@ impl Emulator {
         let requests = open("to_fw").map_err(system("given its lines"))?;
         let answers = open("from_fw").map_err(system("given its lines"))?;
         let child = started(&image, &folder, &["-serial", "null"])?;
-        Ok(Emulator { child, requests, answers, buffer: Box::new([0; LONGEST]), _folder: folder })
+        Ok(QemuBoard { child, requests, answers, buffer: Box::new([0; LONGEST]), _folder: folder })
     }
 
     /// A request, and the board's answer.
     ///
     /// # Errors
     /// It has ended, or does not answer.
-    pub fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, EmulatorError> {
-        let length =
-            request.write(&mut *self.buffer).ok_or(EmulatorError::Garbled("the request is too long"))?;
+    pub fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, QemuError> {
+        let length = request.write(&mut *self.buffer).ok_or(QemuError::Garbled("the request is too long"))?;
         self.requests.write_all(&self.buffer[..length]).map_err(system("asked"))?;
         let mut used = 0;
         loop {
             self.wait()?;
             used += self.answers.read(&mut self.buffer[used..]).map_err(system("heard"))?;
             match Exchange::length(&self.buffer[..used]) {
-                Some(length) if length > LONGEST => return Err(EmulatorError::Garbled("it is too long")),
+                Some(length) if length > LONGEST => return Err(QemuError::Garbled("it is too long")),
                 Some(length) if length <= used => break,
                 _ => {}
             }
         }
-        Exchange::read(&self.buffer[..used]).ok_or(EmulatorError::Garbled("it is cut off"))
+        Exchange::read(&self.buffer[..used]).ok_or(QemuError::Garbled("it is cut off"))
     }
 
     /// Waits for bytes; looks now and then whether the emulator lives.
-    fn wait(&mut self) -> Result<(), EmulatorError> {
+    fn wait(&mut self) -> Result<(), QemuError> {
         let second = Timespec { tv_sec: 1, tv_nsec: 0 };
         for _ in 0..PATIENCE_S {
             let mut fds = [PollFd::new(&self.answers, PollFlags::IN)];
@@ -172,14 +171,14 @@ impl Emulator {
             }
             alive(&mut self.child)?;
         }
-        Err(EmulatorError::Silent)
+        Err(QemuError::Silent)
     }
 
     /// Lets the board's processor fail, as a test of what its last word is: the answer's frames.
     ///
     /// # Errors
-    /// As [`Emulator::exchange`].
-    pub fn fail(&mut self) -> Result<Exchange<'_>, EmulatorError> {
+    /// As [`QemuBoard::exchange`].
+    pub fn fail(&mut self) -> Result<Exchange<'_>, QemuError> {
         self.exchange(&Exchange { time_ns: u64::MAX, lateness_us: 0, host: &[], daq: &[] })
     }
 
@@ -192,7 +191,7 @@ impl Emulator {
     }
 }
 
-impl Drop for Emulator {
+impl Drop for QemuBoard {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -201,7 +200,7 @@ impl Drop for Emulator {
 
 /// A board that is emulated, on its two serial lines. It keeps its own time; in lockstep it is waited for
 /// until it has said what it has to say.
-pub struct SerialBoard {
+pub struct QemuSerialBoard {
     child: Child,
     host: UnixStream,
     daq: UnixStream,
@@ -215,12 +214,12 @@ pub struct SerialBoard {
 /// A setting that no board has: its refusal shows that what came before has been heard.
 const BARRIER: Message = Message::Set(Set { run: 0, key: u16::MAX, value: 0 });
 
-impl SerialBoard {
+impl QemuSerialBoard {
     /// Starts a board with an image.
     ///
     /// # Errors
     /// No emulator, no image, no memory.
-    pub fn start(image: &Path) -> Result<SerialBoard, EmulatorError> {
+    pub fn start(image: &Path) -> Result<QemuSerialBoard, QemuError> {
         let image = found(image)?;
         let folder = Folder::new().map_err(system("given a folder"))?;
         let listen = |name: &str| UnixListener::bind(folder.0.join(name));
@@ -230,7 +229,7 @@ impl SerialBoard {
         let (h, d) = (line("host"), line("daq"));
         let serial = ["-chardev", &h, "-serial", "chardev:host", "-chardev", &d, "-serial", "chardev:daq"];
         let mut child = started(&image, &folder, &serial)?;
-        let mut accept = |listener: &UnixListener| -> Result<UnixStream, EmulatorError> {
+        let mut accept = |listener: &UnixListener| -> Result<UnixStream, QemuError> {
             listener.set_nonblocking(true).map_err(system("reached"))?;
             for _ in 0..PATIENCE_S * 100 {
                 match listener.accept() {
@@ -239,14 +238,14 @@ impl SerialBoard {
                         return Ok(stream);
                     }
                     Err(e) if e.kind() == std::io::ErrorKind::WouldBlock => alive(&mut child)?,
-                    Err(error) => return Err(EmulatorError::System { what: "reached", error }),
+                    Err(error) => return Err(QemuError::System { what: "reached", error }),
                 }
                 std::thread::sleep(std::time::Duration::from_millis(10));
             }
-            Err(EmulatorError::Silent)
+            Err(QemuError::Silent)
         };
         let (host, daq) = (accept(&host)?, accept(&daq)?);
-        Ok(SerialBoard {
+        Ok(QemuSerialBoard {
             child,
             host,
             daq,
@@ -262,7 +261,7 @@ impl SerialBoard {
     ///
     /// # Errors
     /// It has ended, or does not answer.
-    pub fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, EmulatorError> {
+    pub fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, QemuError> {
         self.said_to_host.clear();
         self.said_to_daq.clear();
         // Each frame of encoder and converter makes it say one of these to the host, but for samples before
@@ -296,7 +295,7 @@ impl SerialBoard {
     }
 
     /// Hears the board's words to the host until so many are of a kind.
-    fn hear(&mut self, mut count: usize, counts: impl Fn(&Message) -> bool) -> Result<(), EmulatorError> {
+    fn hear(&mut self, mut count: usize, counts: impl Fn(&Message) -> bool) -> Result<(), QemuError> {
         let mut silent = 0;
         while count > 0 {
             let second = Timespec { tv_sec: 1, tv_nsec: 0 };
@@ -306,7 +305,7 @@ impl SerialBoard {
                 alive(&mut self.child)?;
                 silent += 1;
                 if silent >= PATIENCE_S {
-                    return Err(EmulatorError::Silent);
+                    return Err(QemuError::Silent);
                 }
             }
             let before = self.said_to_host.len();
@@ -322,30 +321,30 @@ impl SerialBoard {
 }
 
 /// What is there.
-fn read(stream: &mut UnixStream, into: &mut Vec<u8>) -> Result<(), EmulatorError> {
+fn read(stream: &mut UnixStream, into: &mut Vec<u8>) -> Result<(), QemuError> {
     let mut buffer = [0; 1024];
     loop {
         match stream.read(&mut buffer) {
-            Ok(0) => return Err(EmulatorError::Garbled("a line was closed")),
+            Ok(0) => return Err(QemuError::Garbled("a line was closed")),
             Ok(count) => into.extend_from_slice(&buffer[..count]),
             Err(e) if e.kind() == std::io::ErrorKind::WouldBlock => return Ok(()),
-            Err(error) => return Err(EmulatorError::System { what: "heard", error }),
+            Err(error) => return Err(QemuError::System { what: "heard", error }),
         }
     }
 }
 
-fn write(stream: &mut UnixStream, mut bytes: &[u8]) -> Result<(), EmulatorError> {
+fn write(stream: &mut UnixStream, mut bytes: &[u8]) -> Result<(), QemuError> {
     while !bytes.is_empty() {
         match stream.write(bytes) {
             Ok(count) => bytes = &bytes[count..],
             Err(e) if e.kind() == std::io::ErrorKind::WouldBlock => std::thread::yield_now(),
-            Err(error) => return Err(EmulatorError::System { what: "asked", error }),
+            Err(error) => return Err(QemuError::System { what: "asked", error }),
         }
     }
     Ok(())
 }
 
-impl Drop for SerialBoard {
+impl Drop for QemuSerialBoard {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();

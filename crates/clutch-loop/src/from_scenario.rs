@@ -7,7 +7,7 @@ use clutch_core::{
     Supervisor, SupervisorParams, Target,
 };
 use clutch_log::{Header, Source};
-use clutch_node::{ControlParams, RunParams, Settings, Unsupported};
+use clutch_node::{ControllerParams, RunParams, Settings, Unsupported};
 use clutch_sim::scenario::{Plan, ScalarKind};
 use clutch_sim::{Scenario, ScenarioError};
 use clutch_wire::Hello;
@@ -41,7 +41,7 @@ pub fn law_hash(scenario: &Scenario) -> u64 {
 
 /// A run could not be set up.
 #[derive(Clone, Debug, thiserror::Error)]
-pub enum SetupError {
+pub enum BuildError {
     /// The scenario.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
@@ -62,7 +62,7 @@ pub(crate) fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
 
 /// What a run on a board is made of, in the scalar `T`.
 #[derive(Clone, Debug)]
-pub struct Setup<T: Real> {
+pub struct BuiltRun<T: Real> {
     /// The servo's parameters, for one built around another law.
     pub params: ServoParams<T>,
     /// The servo.
@@ -70,28 +70,28 @@ pub struct Setup<T: Real> {
     /// The supervisor.
     pub supervisor: Supervisor<T>,
     /// Numbers for the wire.
-    pub control: ControlParams,
+    pub controller: ControllerParams,
     /// What sees stick-slip in the counts.
     pub detector: StickSlip<f64>,
     /// Ticks of the run.
     pub ticks: u64,
 }
 
-impl<T: Real> Setup<T> {
+impl<T: Real> BuiltRun<T> {
     /// Of a scenario; `run` is the run's number on the wire.
     ///
     /// # Errors
     /// The scenario has no safe state.
-    pub fn new(scenario: &Scenario, run: u16) -> Result<Self, SetupError> {
-        Setup::with_checks(scenario, run, Checks::ALL)
+    pub fn new(scenario: &Scenario, run: u16) -> Result<Self, BuildError> {
+        BuiltRun::with_checks(scenario, run, Checks::ALL)
     }
 
     /// The same with fewer of the supervisor's checks: for the campaign that shows that each is
     /// needed.
     ///
     /// # Errors
-    /// As [`Setup::new`].
-    pub fn with_checks(scenario: &Scenario, run: u16, checks: Checks) -> Result<Self, SetupError> {
+    /// As [`BuiltRun::new`].
+    pub fn with_checks(scenario: &Scenario, run: u16, checks: Checks) -> Result<Self, BuildError> {
         let spec = scenario.spec();
         let safety = scenario.safety()?;
         let plan = scenario.plan()?;
@@ -99,11 +99,11 @@ impl<T: Real> Setup<T> {
         let limits: SupervisorParams<T> = safety.supervisor.cast();
         let bounds = plan.bounds.cast::<T>();
         let cycles = |n: u32| Micros(spec.period.0.saturating_mul(n));
-        Ok(Setup {
+        Ok(BuiltRun {
             params: servo_params,
             servo: Servo::new(&servo_params).map_err(to_f64)?,
             supervisor: Supervisor::new(&limits, &servo_params, &bounds).map_err(to_f64)?.with_checks(checks),
-            control: ControlParams {
+            controller: ControllerParams {
                 run,
                 config: config_hash(scenario),
                 watchdog: cycles(safety.watchdog_cycles),
@@ -122,24 +122,24 @@ impl<T: Real> Setup<T> {
 /// The scenario is not one in single precision, or asks for what boards do not have.
 pub fn settings(
     scenario: &Scenario,
-    setup: &Setup<f32>,
+    built: &BuiltRun<f32>,
     host_silence: Micros,
     ticks: u64,
-) -> Result<Settings, SetupError> {
+) -> Result<Settings, BuildError> {
     if scenario.scalar != ScalarKind::F32 {
-        return Err(SetupError::Scalar);
+        return Err(BuildError::Scalar);
     }
     let spec = scenario.spec();
     let within = spec.run.start_position().0 & ((1 << FixedCounts::FRACTION_BITS) - 1);
     Ok(Settings::new(&RunParams {
-        servo: &setup.params,
+        servo: &built.params,
         supervisor: &scenario.safety()?.supervisor.cast(),
         bounds: &scenario.plan()?.bounds.cast(),
         reference: &spec.reference.cast(),
         start: FixedCounts(within),
-        watchdog: setup.control.watchdog,
-        valid: setup.control.valid,
-        silence: setup.control.silence,
+        watchdog: built.controller.watchdog,
+        valid: built.controller.valid,
+        silence: built.controller.silence,
         host_silence,
         ticks,
     })?)
@@ -150,7 +150,7 @@ pub fn settings(
 ///
 /// # Errors
 /// None for a checked scenario.
-pub fn path<T: Real>(scenario: &Scenario) -> Result<impl Fn(u64) -> Target<T> + '_, SetupError> {
+pub fn path<T: Real>(scenario: &Scenario) -> Result<impl Fn(u64) -> Target<T> + '_, BuildError> {
     let reference = scenario.spec().path::<T>()?;
     // Whole counts, so that nothing is rounded anew.
     let first = reference.at(0).position.0 >> FixedCounts::FRACTION_BITS;

@@ -10,8 +10,8 @@
 //! from one place, so that neither interrupts the other: nothing here locks.
 
 use crate::board::{BoardNode, BoardParams};
+use crate::one_chip::OneChip;
 use crate::outbox::Outbox;
-use crate::standalone::Standalone;
 use clutch_core::{Counts, DacCode, Micros, ParamError};
 
 /// What a board's one file gives. Nothing of it may wait.
@@ -94,22 +94,22 @@ fn send(role: &mut impl Role, hardware: &mut impl Hardware) {
 
 /// The board as a host's data acquisition: the host closes the loop.
 #[derive(Clone, Debug)]
-pub struct Acquisition {
+pub struct DaqBoard {
     node: BoardNode,
     outbox: Outbox,
 }
 
-impl Acquisition {
+impl DaqBoard {
     /// At power-up.
     ///
     /// # Errors
     /// Those of [`BoardNode::new`].
     pub fn new(params: &BoardParams) -> Result<Self, ParamError<f64>> {
-        Ok(Acquisition { node: BoardNode::new(params)?, outbox: Outbox::default() })
+        Ok(DaqBoard { node: BoardNode::new(params)?, outbox: Outbox::default() })
     }
 }
 
-impl Role for Acquisition {
+impl Role for DaqBoard {
     fn receive(&mut self, now_us: u64, bytes: &[u8]) {
         self.node.receive(now_us as u32, bytes, &mut self.outbox);
     }
@@ -135,21 +135,21 @@ impl Role for Acquisition {
 }
 
 /// The board as controller: it closes the loop by itself.
-impl Role for Standalone {
+impl Role for OneChip {
     fn receive(&mut self, now_us: u64, bytes: &[u8]) {
         self.host(now_us, bytes);
     }
 
     fn sample(&mut self, now_us: u64, counts: Counts, encoder_fault: bool, converter_fault: bool) {
-        Standalone::sample(self, now_us, counts, encoder_fault, converter_fault);
+        OneChip::sample(self, now_us, counts, encoder_fault, converter_fault);
     }
 
     fn code(&self) -> DacCode {
-        Standalone::code(self)
+        OneChip::code(self)
     }
 
     fn period_us(&self) -> Option<u32> {
-        Standalone::period_us(self)
+        OneChip::period_us(self)
     }
 
     fn outbox(&mut self) -> &mut Outbox {
@@ -158,6 +158,6 @@ impl Role for Standalone {
 
     fn answered(&mut self, cycles: u32, lateness: Micros) {
         self.spent(cycles);
-        Standalone::answered(self, lateness);
+        OneChip::answered(self, lateness);
     }
 }

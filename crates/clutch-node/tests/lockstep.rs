@@ -2,7 +2,7 @@
 #![allow(missing_docs, reason = "the tests' names say what holds")]
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
-use clutch_node::exchange::{Exchange, HEAD, LONGEST};
+use clutch_node::lockstep::{Exchange, HEAD, LONGEST};
 use proptest::prelude::*;
 
 proptest! {

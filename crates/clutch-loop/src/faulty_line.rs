@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 /// Frames under way. Times are ns.
 #[derive(Debug)]
-pub struct Line {
+pub struct FaultyLine {
     latency_ns: u64,
     faults: Vec<Fault>,
     rng: Pcg64,
@@ -21,11 +21,11 @@ pub struct Line {
     first_hit_ns: Option<u64>,
 }
 
-impl Line {
+impl FaultyLine {
     /// A line with a fixed latency; the seed decides what faults hit.
     #[must_use]
     pub fn new(way: Direction, latency_ns: u64, faults: &[Fault], seed: u64) -> Self {
-        Line {
+        FaultyLine {
             latency_ns,
             faults: faults.iter().filter(|f| f.covers(way)).copied().collect(),
             rng: Pcg64::seed_from_u64(seed ^ (0x6c69_6e65 + way as u64)),

@@ -1,25 +1,32 @@
-//! The controller's end of a run: a controller in this process, or a board that is one.
+//! What this machine is at its line: the controller itself, or the host of a board that is the controller.
 //!
-//! Both are asked and told the same, so that pre-flight, loop and virtual time need not know which
-//! of the two it is.
+//! Both are asked the same, and report the same, so that pre-flight, loop and virtual time need not know
+//! which of the two it is.
 
 use clutch_core::law::{Controller, LawTerms, Terms};
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Real, Target};
-use clutch_node::{ControlNode, LinkCounts, Notice, Outbox, RemoteNode, Told};
+use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
 use clutch_wire::StopReason;
 
-/// What an end tells.
-pub type Tells<E> = Notice<<E as End>::Scalar, <E as End>::Terms>;
+/// How often the host shows that it lives, and after which silence the board ends a run.
+pub const ALIVE_NS: u64 = 100_000_000;
+/// See [`ALIVE_NS`].
+pub const HOST_SILENCE: Micros = Micros(1_000_000);
+/// After so long without a word of the board, control has ended for the host.
+pub const BOARD_SILENCE_NS: u64 = 1_000_000_000;
 
-/// The controller's end. Times are this machine's monotonic clock, or a computed one, ns.
-pub trait End {
+/// What a station reports.
+pub type StationNotice<S> = Notice<<S as Station>::Scalar, <S as Station>::Terms>;
+
+/// A controller, or the host of one, at a line. Times are this machine's monotonic clock, or a computed one, ns.
+pub trait Station {
     /// The scalar of its law.
     type Scalar: Real;
     /// The terms of its law.
     type Terms: Terms<Self::Scalar>;
-    /// Whether a board closes the loop. Then what comes over the line are reports, each with a time of its
+    /// Whether a board closes the loop, and this machine looks on. Then what comes over the line are reports, each with a time of its
     /// own, and the board ends the run by itself; samples are heard together, as the newest of them counts.
-    const IS_CONTROLLER: bool;
+    const LOOKS_ON: bool;
 
     /// Asks who is there.
     fn discover(&mut self, nonce: u32, out: &mut Outbox);
@@ -35,15 +42,21 @@ pub trait End {
     fn disconnect(&mut self);
     /// The answer to the last sample has been written, and took so long.
     fn answered(&mut self, lateness: Micros);
-    /// When [`End::poll`] has to be called at the latest, ns.
+    /// When [`Station::poll`] has to be called at the latest, ns.
     fn poll_at(&self) -> Option<u64>;
     /// Looks at the clock.
-    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Tells<Self>));
+    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(StationNotice<Self>));
     /// Bytes from the line.
-    fn receive(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outbox, notices: &mut impl FnMut(Tells<Self>));
+    fn receive(
+        &mut self,
+        now_ns: u64,
+        bytes: &[u8],
+        out: &mut Outbox,
+        notices: &mut impl FnMut(StationNotice<Self>),
+    );
 
     /// Where control stands.
-    fn told(&self) -> Told<Self::Scalar>;
+    fn standing(&self) -> Standing<Self::Scalar>;
     /// What the line to encoder and converter has carried.
     fn counts(&self) -> &LinkCounts;
     /// Where the path begins.
@@ -61,17 +74,17 @@ pub trait End {
 }
 
 /// A controller in this process, with its path.
-pub struct Local<T: Real, C: Controller<T>, P> {
+pub struct ControllerStation<T: Real, C: Controller<T>, P> {
     /// The controller.
-    pub node: ControlNode<T, C>,
+    pub node: ControllerNode<T, C>,
     /// The path, from position 0 on.
     pub path: P,
 }
 
-impl<T: Real, C: Controller<T>, P: Fn(u64) -> Target<T>> End for Local<T, C, P> {
+impl<T: Real, C: Controller<T>, P: Fn(u64) -> Target<T>> Station for ControllerStation<T, C, P> {
     type Scalar = T;
     type Terms = C::Terms;
-    const IS_CONTROLLER: bool = false;
+    const LOOKS_ON: bool = false;
 
     fn discover(&mut self, nonce: u32, out: &mut Outbox) {
         self.node.discover(nonce, out);
@@ -97,7 +110,7 @@ impl<T: Real, C: Controller<T>, P: Fn(u64) -> Target<T>> End for Local<T, C, P> 
     fn poll_at(&self) -> Option<u64> {
         self.node.poll_at()
     }
-    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Tells<Self>)) {
+    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(StationNotice<Self>)) {
         self.node.poll(now_ns, out, notices);
     }
     fn receive(
@@ -105,13 +118,13 @@ impl<T: Real, C: Controller<T>, P: Fn(u64) -> Target<T>> End for Local<T, C, P> 
         now_ns: u64,
         bytes: &[u8],
         out: &mut Outbox,
-        notices: &mut impl FnMut(Tells<Self>),
+        notices: &mut impl FnMut(StationNotice<Self>),
     ) {
         self.node.receive(now_ns, bytes, &self.path, out, notices);
     }
-    fn told(&self) -> Told<T> {
+    fn standing(&self) -> Standing<T> {
         let s = self.node.state();
-        Told {
+        Standing {
             state: s.state(),
             cause: s.cause(),
             value: s.value(),
@@ -139,18 +152,18 @@ impl<T: Real, C: Controller<T>, P: Fn(u64) -> Target<T>> End for Local<T, C, P> 
     }
 }
 
-/// A board in the controller role, with the path that it follows.
-pub struct Remote<P> {
-    /// What hears the board.
-    pub node: RemoteNode,
+/// The host of a board controller, with the path that the board follows.
+pub struct HostStation<P> {
+    /// The host.
+    pub node: HostNode,
     /// The path, from position 0 on.
     pub path: P,
 }
 
-impl<P: Fn(u64) -> Target<f32>> End for Remote<P> {
+impl<P: Fn(u64) -> Target<f32>> Station for HostStation<P> {
     type Scalar = f32;
     type Terms = LawTerms<f32>;
-    const IS_CONTROLLER: bool = true;
+    const LOOKS_ON: bool = true;
 
     fn discover(&mut self, nonce: u32, out: &mut Outbox) {
         self.node.discover(nonce, out);
@@ -174,14 +187,20 @@ impl<P: Fn(u64) -> Target<f32>> End for Remote<P> {
     fn poll_at(&self) -> Option<u64> {
         self.node.poll_at()
     }
-    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Tells<Self>)) {
+    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(StationNotice<Self>)) {
         self.node.poll(now_ns, out, notices);
     }
-    fn receive(&mut self, now_ns: u64, bytes: &[u8], _: &mut Outbox, notices: &mut impl FnMut(Tells<Self>)) {
+    fn receive(
+        &mut self,
+        now_ns: u64,
+        bytes: &[u8],
+        _: &mut Outbox,
+        notices: &mut impl FnMut(StationNotice<Self>),
+    ) {
         self.node.receive(now_ns, bytes, &self.path, notices);
     }
-    fn told(&self) -> Told<f32> {
-        *self.node.told()
+    fn standing(&self) -> Standing<f32> {
+        *self.node.standing()
     }
     fn counts(&self) -> &LinkCounts {
         self.node.counts()

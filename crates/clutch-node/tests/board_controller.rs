@@ -7,12 +7,14 @@ mod desk;
 use clutch_core::law::{CtcParams, LawParams, Limit, SmcParams, SmcSignParams};
 use clutch_core::supervisor::{Arrival, Cause, State};
 use clutch_core::{FixedCounts, Micros, SafeState, SupervisorParams};
-use clutch_node::{Ending, MAX_KNOTS, Notice, Onboard, Outbox, Ports, SETTINGS, SETTINGS_HASH};
+use clutch_node::{BoardController, Ending, MAX_KNOTS, Notice, Outbox, Outboxes, SETTINGS, SETTINGS_HASH};
 use clutch_wire::{
-    Arm, Armed, BoardFault, BoardState, Configure, Configured, Controller, Discover, Message, Ping, Refusal,
-    Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION, encode,
+    Arm, Armed, BoardFault, BoardState, Configure, Configured, ControllerHello, Discover, Message, Ping,
+    Refusal, Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION, encode,
 };
-use desk::{ALIVE_NS, BOARD, BOARD_SILENCE_NS, CONFIG, Desk, MS, ONBOARD, Plan, frames, paper, words};
+use desk::{
+    ALIVE_NS, BOARD, BOARD_CONTROLLER, BOARD_SILENCE_NS, CONFIG, Desk, MS, Plan, frames, paper, words,
+};
 use proptest::prelude::*;
 
 fn refused(request: u8, reason: Refusal, value: u32) -> [Message; 1] {
@@ -37,15 +39,17 @@ fn configure(plan: &Plan) -> Configure {
 fn discover_is_answered_by_the_controller_and_then_by_its_board() {
     let mut desk = Desk::new(Plan::new());
     let heard = desk.says(discover());
-    let [Message::Controller(controller), Message::Hello(hello)] = heard[..] else { panic!("{heard:?}") };
-    let expected = Controller {
+    let [Message::ControllerHello(controller), Message::Hello(hello)] = heard[..] else {
+        panic!("{heard:?}")
+    };
+    let expected = ControllerHello {
         nonce: 11,
         version: VERSION,
         schema: SCHEMA,
         settings: SETTINGS_HASH,
-        board: ONBOARD.board,
-        boot: ONBOARD.boot,
-        clock_hz: ONBOARD.clock_hz,
+        board: BOARD_CONTROLLER.board,
+        boot: BOARD_CONTROLLER.boot,
+        clock_hz: BOARD_CONTROLLER.clock_hz,
         knots: MAX_KNOTS as u16,
         state: State::Disconnected as u8,
         run: 0,
@@ -53,16 +57,18 @@ fn discover_is_answered_by_the_controller_and_then_by_its_board() {
     };
     assert_eq!(controller, expected);
     assert_eq!((hello.nonce, hello.board, hello.boot_code), (11, BOARD.board, BOARD.boot_code));
-    assert!(matches!(desk.notices[..], [Notice::Controller(_), Notice::Hello(_)]), "{:?}", desk.notices);
-    assert_eq!(desk.remote.controller(), Some(&expected));
+    assert!(matches!(desk.notices[..], [Notice::ControllerHello(_), Notice::Hello(_)]), "{:?}", desk.notices);
+    assert_eq!(desk.host.controller(), Some(&expected));
     // Also in the middle of a run, which goes on.
     let mut desk = Desk::running(Plan::new());
     let heard = desk.says(discover());
-    let [Message::Controller(controller), Message::Hello(hello)] = heard[..] else { panic!("{heard:?}") };
+    let [Message::ControllerHello(controller), Message::Hello(hello)] = heard[..] else {
+        panic!("{heard:?}")
+    };
     assert_eq!((controller.state, controller.run, controller.config), (State::Running as u8, 5, CONFIG));
     assert_eq!((hello.state, hello.run), (BoardState::Running as u8, 5));
     desk.follows(5);
-    assert_eq!(desk.onboard.state(), State::Running);
+    assert_eq!(desk.board_controller.state(), State::Running);
 }
 
 #[test]
@@ -84,7 +90,7 @@ fn answer_to(plan: &Plan, pairs: &[(u16, u64)]) -> Vec<Message> {
     let mut desk = Desk::new(*plan);
     desk.says(discover());
     desk.uploads(pairs);
-    let heard = desk.asks(|remote, out| remote.configure(out));
+    let heard = desk.asks(|host, out| host.configure(out));
     let taken = matches!(heard[..], [Message::Configured(_)]);
     assert_eq!(desk.board.state() == BoardState::Boot, !taken, "the board hears of it only if it is a run");
     heard
@@ -99,7 +105,7 @@ fn changed(plan: &Plan, name: &str, value: u64) -> Vec<(u16, u64)> {
 #[test]
 fn settings_that_make_no_run_are_refused_with_the_reason() {
     let plan = Plan::new();
-    let configured = Configured { run: 5, config: CONFIG, boot: ONBOARD.boot };
+    let configured = Configured { run: 5, config: CONFIG, boot: BOARD_CONTROLLER.boot };
     assert_eq!(answer_to(&plan, &plan.pairs()), [Message::Configured(configured)]);
     let request = Configure::KIND;
     for missing in [0, 30, plan.pairs().len() - 1] {
@@ -139,10 +145,10 @@ fn without_encoder_and_converter_nothing_is_configured() {
     let plan = Plan::new();
     let mut desk = Desk::new(plan);
     desk.uploads(&plan.pairs());
-    let heard = desk.asks(|remote, out| remote.configure(out));
+    let heard = desk.asks(|host, out| host.configure(out));
     assert_eq!(heard, refused(Configure::KIND, Refusal::NoBoard, 0));
     desk.says(discover());
-    assert!(matches!(desk.asks(|remote, out| remote.configure(out))[..], [Message::Configured(_)]));
+    assert!(matches!(desk.asks(|host, out| host.configure(out))[..], [Message::Configured(_)]));
 }
 
 #[test]
@@ -152,9 +158,12 @@ fn what_the_board_cannot_do_the_host_hears_from_the_board() {
     let mut desk = Desk::new(plan);
     desk.says(discover());
     desk.uploads(&plan.pairs());
-    let heard = desk.asks(|remote, out| remote.configure(out));
+    let heard = desk.asks(|host, out| host.configure(out));
     assert_eq!(heard, refused(Configure::KIND, Refusal::Watchdog, watchdog.0));
-    assert_eq!((desk.onboard.state(), desk.remote.told().state), (State::Disconnected, State::Disconnected));
+    assert_eq!(
+        (desk.board_controller.state(), desk.host.standing().state),
+        (State::Disconnected, State::Disconnected)
+    );
 }
 
 #[test]
@@ -173,7 +182,7 @@ fn a_setting_that_is_not_known_or_does_not_fit_is_refused_and_changes_nothing() 
     let (key, value) = (key("period_us"), 1 << 32);
     let heard = desk.says(Message::Set(Set { run: 5, key, value }));
     assert_eq!(heard, refused(Set::KIND, Refusal::Setting, key.into()));
-    assert!(matches!(desk.asks(|remote, out| remote.configure(out))[..], [Message::Configured(_)]));
+    assert!(matches!(desk.asks(|host, out| host.configure(out))[..], [Message::Configured(_)]));
 }
 
 #[test]
@@ -197,7 +206,7 @@ fn while_it_drives_neither_settings_nor_configure_are_taken() {
         let mut desk = Desk::ready(Plan::new());
         desk.arms();
         desk.follows(periods);
-        let state = desk.onboard.state();
+        let state = desk.board_controller.state();
         let reason = (Refusal::State, state as u32);
         for run in [5, 6] {
             let heard = desk.says(Message::Set(Set { run, key: 0, value: 1000 }));
@@ -206,7 +215,7 @@ fn while_it_drives_neither_settings_nor_configure_are_taken() {
         let heard = desk.says(Message::Configure(configure(&desk.plan)));
         assert_eq!(heard, refused(Configure::KIND, reason.0, reason.1));
         desk.follows(5);
-        assert_eq!(desk.onboard.state(), State::Running, "{:?}", desk.remote.told());
+        assert_eq!(desk.board_controller.state(), State::Running, "{:?}", desk.host.standing());
     }
 }
 
@@ -217,8 +226,8 @@ fn a_setting_behind_configure_takes_the_configuration_back() {
     let (key, value) = desk.plan.pairs()[0];
     // Consent was to what was configured.
     desk.uploads(&[(key, value)]);
-    assert_eq!(desk.onboard.state(), State::Disconnected);
-    let heard = desk.asks(|remote, out| remote.arm(out));
+    assert_eq!(desk.board_controller.state(), State::Disconnected);
+    let heard = desk.asks(|host, out| host.arm(out));
     assert_eq!(heard, refused(Arm::KIND, Refusal::Run, 0));
     assert_eq!(desk.board.state(), BoardState::Ready);
 }
@@ -226,8 +235,8 @@ fn a_setting_behind_configure_takes_the_configuration_back() {
 #[test]
 fn a_setting_while_consent_is_on_its_way_lets_the_boards_watchdog_bite() {
     let mut desk = Desk::ready(Plan::new());
-    let mut arm = Ports::default();
-    desk.onboard.host(
+    let mut arm = Outboxes::default();
+    desk.board_controller.host(
         desk.now_ns,
         encode(&Message::Arm(Arm { run: 5, config: CONFIG })).as_bytes(),
         &mut arm,
@@ -267,10 +276,10 @@ fn told_the_same(desk: &mut Desk) -> usize {
         assert_eq!(told, expected);
     }
     assert_eq!(told.len(), expected.len());
-    let (told, state) = (desk.remote.told(), desk.twin.state());
+    let (told, state) = (desk.host.standing(), desk.twin.state());
     assert_eq!((told.state, told.cause, told.tick), (state.state(), state.cause(), state.tick()));
     assert_eq!(told.value.to_bits(), state.value().to_bits());
-    assert_eq!((desk.remote.origin(), told.untold), (desk.twin.origin(), 0));
+    assert_eq!((desk.host.origin(), told.untold), (desk.twin.origin(), 0));
     expected.len()
 }
 
@@ -290,7 +299,7 @@ fn the_host_is_told_of_each_sample_all_that_a_controller_of_its_own_would_know()
         assert_eq!(told_the_same(&mut desk), 0, "before consent nothing is told");
         for k in 0..200 {
             let lateness = Micros(100 + k % 7);
-            desk.onboard.answered(lateness);
+            desk.board_controller.answered(lateness);
             desk.twin.answered(lateness);
             desk.follows(1);
         }
@@ -310,13 +319,13 @@ fn the_host_is_told_of_each_sample_all_that_a_controller_of_its_own_would_know()
         desk.up.clear();
         desk.follows(3);
         assert_eq!(told_the_same(&mut desk), 5);
-        assert_eq!(desk.onboard.state(), State::Running);
+        assert_eq!(desk.board_controller.state(), State::Running);
         // And one that ends it.
         desk.faulty(true, false);
         desk.settle();
         desk.follows(3);
         assert_eq!(told_the_same(&mut desk), 4);
-        assert_eq!(desk.remote.told().state, State::Faulted);
+        assert_eq!(desk.host.standing().state, State::Faulted);
     }
 }
 
@@ -338,14 +347,15 @@ fn each_check_that_ends_control_is_told_with_what_it_saw() {
             Cause::Jump => 1000,
             _ => 5,
         };
-        while desk.onboard.driving() {
+        while desk.board_controller.driving() {
             desk.follows(1);
         }
         let samples = told_the_same(&mut desk);
-        assert!(samples > 10, "{cause:?} after {samples} samples: {:?}", desk.remote.told());
-        let (told, counts, rejected) = (desk.remote.told(), desk.twin.counts(), desk.twin.state().rejected());
+        assert!(samples > 10, "{cause:?} after {samples} samples: {:?}", desk.host.standing());
+        let (told, counts, rejected) =
+            (desk.host.standing(), desk.twin.counts(), desk.twin.state().rejected());
         assert_eq!((told.state, told.cause), (State::Faulted, cause));
-        assert_eq!((told.rejected, desk.remote.counts()), (rejected, counts), "the line's counts come too");
+        assert_eq!((told.rejected, desk.host.counts()), (rejected, counts), "the line's counts come too");
         assert_ne!(told.value, 0.0);
     }
 }
@@ -357,21 +367,21 @@ fn a_fault_before_consent_is_told_with_its_sample() {
     desk.faulty(true, false);
     desk.settle();
     assert_eq!(told_the_same(&mut desk), 1);
-    assert_eq!((desk.remote.told().state, desk.remote.told().cause), (State::Faulted, Cause::Board));
+    assert_eq!((desk.host.standing().state, desk.host.standing().cause), (State::Faulted, Cause::Board));
 }
 
 #[test]
 fn the_path_begins_at_the_count_on_which_the_run_begins() {
     let desk = Desk::running(Plan::new());
-    assert_eq!(desk.remote.origin(), desk.twin.origin());
-    assert_ne!(desk.remote.origin(), FixedCounts(0));
+    assert_eq!(desk.host.origin(), desk.twin.origin());
+    assert_ne!(desk.host.origin(), FixedCounts(0));
 }
 
 #[test]
 fn clock_cycles_are_told_with_the_sample_after_and_only_with_it() {
     let mut desk = Desk::running(Plan::new());
     desk.cycles();
-    desk.onboard.spent(4321);
+    desk.board_controller.spent(4321);
     desk.follows(2);
     let cycles: Vec<u32> =
         desk.cycles().0.iter().map(|n| if let Notice::Cycle(c) = n { c.cycles } else { 0 }).collect();
@@ -384,18 +394,18 @@ fn a_run_ends_by_itself_after_its_ticks_and_the_host_is_told_once() {
         let mut desk = Desk::ready(Plan { ticks, ..Plan::new() });
         desk.arms();
         desk.follows(ticks as u32 - 1);
-        assert!(desk.onboard.driving() && desk.board.state() != BoardState::Stopped);
+        assert!(desk.board_controller.driving() && desk.board.state() != BoardState::Stopped);
         assert!(desk.ends().is_empty());
         desk.follows(1);
-        let told = *desk.remote.told();
-        assert_eq!((desk.onboard.state(), told.state), (State::Holding, State::Holding));
+        let told = *desk.host.standing();
+        assert_eq!((desk.board_controller.state(), told.state), (State::Holding, State::Holding));
         assert_eq!((told.cause, told.tick), (Cause::Done, ticks - 1));
         assert_eq!(desk.board.state(), BoardState::Stopped);
         desk.follows(20);
         assert_eq!(desk.ends(), [Cause::Done]);
         assert_eq!(desk.board.code(), desk.plan.supervisor().safe_codes().hold);
-        assert_eq!(desk.remote.counts().received, ticks, "the counts of the line came with the end");
-        assert_eq!(desk.onboard.poll_at(), None, "nothing is awaited");
+        assert_eq!(desk.host.counts().received, ticks, "the counts of the line came with the end");
+        assert_eq!(desk.board_controller.poll_at(), None, "nothing is awaited");
     }
 }
 
@@ -403,9 +413,9 @@ fn a_run_ends_by_itself_after_its_ticks_and_the_host_is_told_once() {
 fn the_host_may_stop_it_and_is_told_as_often_as_it_asks() {
     for (reason, cause) in [(StopReason::Done, Cause::Done), (StopReason::Operator, Cause::Operator)] {
         let mut desk = Desk::running(Plan::new());
-        let heard = desk.asks(|remote, out| remote.stop(reason, out));
+        let heard = desk.asks(|host, out| host.stop(reason, out));
         assert!(matches!(heard[..], [Message::Ended(_), Message::Link(_), Message::Stopped(_)]), "{heard:?}");
-        assert_eq!((desk.remote.told().state, desk.remote.told().cause), (State::Holding, cause));
+        assert_eq!((desk.host.standing().state, desk.host.standing().cause), (State::Holding, cause));
         assert_eq!((desk.board.state(), desk.ends()), (BoardState::Stopped, vec![cause]));
         let heard = desk.says(Message::Stop(Stop { run: 5, reason: reason as u8 }));
         let code = desk.plan.supervisor().safe_codes().hold.0;
@@ -418,22 +428,22 @@ fn the_host_may_stop_it_and_is_told_as_often_as_it_asks() {
 #[test]
 fn the_host_asks_for_the_end_until_it_hears_of_it() {
     let mut desk = Desk::running(Plan::new());
-    desk.remote.stop(StopReason::Operator, &mut Outbox::default()); // lost on the way
+    desk.host.stop(StopReason::Operator, &mut Outbox::default()); // lost on the way
     desk.follows((ALIVE_NS / MS) as u32 + 1);
-    assert_eq!((desk.onboard.state(), desk.ends()), (State::Holding, vec![Cause::Operator]));
+    assert_eq!((desk.board_controller.state(), desk.ends()), (State::Holding, vec![Cause::Operator]));
 }
 
 #[test]
 fn a_board_that_falls_silent_ends_in_a_fault_of_which_the_host_hears() {
     let mut desk = Desk::running(Plan::new());
-    let at = desk.onboard.poll_at().unwrap();
+    let at = desk.board_controller.poll_at().unwrap();
     assert_eq!(at, desk.now_ns + 3 * MS);
     desk.passes(at - desk.now_ns - 1);
-    assert_eq!(desk.onboard.state(), State::Running);
+    assert_eq!(desk.board_controller.state(), State::Running);
     let heard = desk.passes(1);
     assert!(matches!(heard[..2], [Message::Ended(_), Message::Link(_)]), "{heard:?}");
-    assert_eq!((desk.onboard.state(), desk.remote.told().state), (State::Faulted, State::Faulted));
-    assert_eq!((desk.remote.told().cause, desk.ends()), (Cause::Silence, vec![Cause::Silence]));
+    assert_eq!((desk.board_controller.state(), desk.host.standing().state), (State::Faulted, State::Faulted));
+    assert_eq!((desk.host.standing().cause, desk.ends()), (Cause::Silence, vec![Cause::Silence]));
     desk.passes(1000 * MS);
     assert_eq!(desk.ends(), [Cause::Silence], "told once");
 }
@@ -445,7 +455,7 @@ fn a_board_whose_watchdog_bit_ends_in_a_fault_of_which_the_host_hears() {
     desk.board.poll(desk.now_us(), &mut desk.up);
     let heard = desk.settle();
     assert!(matches!(heard[0], Message::Fault(m) if m.cause == BoardFault::Watchdog as u8), "{heard:?}");
-    assert_eq!((desk.remote.told().state, desk.remote.told().cause), (State::Faulted, Cause::Board));
+    assert_eq!((desk.host.standing().state, desk.host.standing().cause), (State::Faulted, Cause::Board));
     assert_eq!(desk.ends(), [Cause::Board]);
 }
 
@@ -455,14 +465,14 @@ fn a_host_that_falls_silent_ends_the_run_in_the_safe_state() {
     let mut desk = Desk::running(plan);
     // The host's pings keep it going.
     desk.follows(500);
-    assert_eq!(desk.onboard.state(), State::Running);
+    assert_eq!(desk.board_controller.state(), State::Running);
     desk.host_alive = false;
     desk.says(Message::Ping(Ping { run: 5, nonce: 1 }));
     desk.follows(49);
-    assert_eq!(desk.onboard.state(), State::Running);
+    assert_eq!(desk.board_controller.state(), State::Running);
     desk.follows(1);
-    assert_eq!((desk.onboard.state(), desk.board.state()), (State::Holding, BoardState::Stopped));
-    assert_eq!((desk.remote.told().cause, desk.ends()), (Cause::Operator, vec![Cause::Operator]));
+    assert_eq!((desk.board_controller.state(), desk.board.state()), (State::Holding, BoardState::Stopped));
+    assert_eq!((desk.host.standing().cause, desk.ends()), (Cause::Operator, vec![Cause::Operator]));
 }
 
 #[test]
@@ -470,7 +480,7 @@ fn a_run_that_does_not_need_its_host_goes_on_without() {
     let mut desk = Desk::running(Plan::new());
     desk.host_alive = false;
     desk.follows(5000);
-    assert_eq!((desk.onboard.state(), desk.board.state()), (State::Running, BoardState::Running));
+    assert_eq!((desk.board_controller.state(), desk.board.state()), (State::Running, BoardState::Running));
 }
 
 #[test]
@@ -478,10 +488,10 @@ fn bytes_that_are_no_frame_are_no_sign_of_a_host() {
     let mut desk = Desk::running(Plan { host_silence: Micros(50_000), ..Plan::new() });
     desk.host_alive = false;
     for _ in 0..60 {
-        desk.to_onboard.append(&[0, 3, 7, 7, 0]);
+        desk.to_board.append(&[0, 3, 7, 7, 0]);
         desk.follows(1);
     }
-    assert_eq!(desk.onboard.state(), State::Holding);
+    assert_eq!(desk.board_controller.state(), State::Holding);
 }
 
 #[test]
@@ -491,29 +501,29 @@ fn for_the_host_a_board_that_says_nothing_more_has_ended() {
     let mut ended = Vec::new();
     let mut out = Outbox::default();
     while ended.is_empty() {
-        desk.now_ns = desk.remote.poll_at().unwrap();
+        desk.now_ns = desk.host.poll_at().unwrap();
         out.clear();
-        desk.remote.poll(desk.now_ns, &mut out, &mut |n| ended.push((desk.now_ns - told, n)));
+        desk.host.poll(desk.now_ns, &mut out, &mut |n| ended.push((desk.now_ns - told, n)));
     }
     assert!(
         matches!(ended[..], [(BOARD_SILENCE_NS, Notice::Ended(Ending { cause: Cause::Silence, .. }))]),
         "{ended:?}"
     );
-    assert_eq!(desk.remote.told().state, State::Faulted);
+    assert_eq!(desk.host.standing().state, State::Faulted);
     // It may hear all the same: it is asked to stop, until it says that it has.
     for _ in 0..3 {
         let asked = frames(out.as_bytes());
         let stop = Message::Stop(Stop { run: 5, reason: StopReason::Operator as u8 });
         assert!(asked.contains(&stop), "{asked:?}");
-        desk.now_ns = desk.remote.poll_at().unwrap();
+        desk.now_ns = desk.host.poll_at().unwrap();
         out.clear();
-        desk.remote.poll(desk.now_ns, &mut out, &mut |n| ended.push((desk.now_ns - told, n)));
+        desk.host.poll(desk.now_ns, &mut out, &mut |n| ended.push((desk.now_ns - told, n)));
     }
     assert_eq!(ended.len(), 1, "told once: {ended:?}");
     let stopped = Message::Stopped(Stopped { run: 5, reason: 2, code: 3072 });
     let path = |_| clutch_core::Target::default();
-    desk.remote.receive(desk.now_ns, encode(&stopped).as_bytes(), &path, &mut |_| ());
-    assert_eq!(desk.remote.poll_at(), None);
+    desk.host.receive(desk.now_ns, encode(&stopped).as_bytes(), &path, &mut |_| ());
+    assert_eq!(desk.host.poll_at(), None);
 }
 
 #[test]
@@ -526,18 +536,21 @@ fn frames_of_another_run_are_ignored() {
         assert_eq!(desk.says(message), []);
     }
     desk.follows(5);
-    assert_eq!(desk.onboard.state(), State::Running);
+    assert_eq!(desk.board_controller.state(), State::Running);
     // And by a host that waits for another run.
-    let (mut other, mut notices) = (Plan { run: 6, ..desk.plan }.remote(), Vec::new());
+    let (mut other, mut notices) = (Plan { run: 6, ..desk.plan }.host(), Vec::new());
     other.receive(desk.now_ns, &desk.sent, &desk.plan.path(), &mut |n| notices.push(n));
-    assert!(notices.iter().all(|n| matches!(n, Notice::Controller(_) | Notice::Hello(_))), "{notices:?}");
-    assert_eq!(other.told().state, State::Disconnected);
+    assert!(
+        notices.iter().all(|n| matches!(n, Notice::ControllerHello(_) | Notice::Hello(_))),
+        "{notices:?}"
+    );
+    assert_eq!(other.standing().state, State::Disconnected);
 }
 
 #[test]
 fn a_ping_is_answered_with_the_boards_clock() {
     let mut desk = Desk::running(Plan::new());
-    desk.asks(|remote, out| remote.ping(99, out));
+    desk.asks(|host, out| host.ping(99, out));
     let at = desk.now_us();
     assert!(matches!(desk.notices.last(), Some(Notice::Pong(99, time)) if *time == at));
 }
@@ -553,10 +566,10 @@ fn how_it_ended_and_what_the_line_has_carried_is_told_whichever_end_it_was() {
             desk.faulty(true, false);
             desk.settle();
         } else {
-            desk.asks(|remote, out| remote.stop(StopReason::Operator, out));
+            desk.asks(|host, out| host.stop(StopReason::Operator, out));
         }
-        let (told, counts) = (desk.remote.told(), desk.twin.counts());
-        assert_eq!((told.lost, desk.remote.counts().received), (1, counts.received), "{encoder_fault}");
+        let (told, counts) = (desk.host.standing(), desk.twin.counts());
+        assert_eq!((told.lost, desk.host.counts().received), (1, counts.received), "{encoder_fault}");
     }
 }
 
@@ -566,19 +579,19 @@ fn what_the_line_has_carried_is_told_each_second() {
     desk.samples();
     desk.up.clear();
     desk.follows(985);
-    assert_eq!((desk.remote.told().lost, desk.remote.counts().received), (0, 0));
+    assert_eq!((desk.host.standing().lost, desk.host.counts().received), (0, 0));
     desk.follows(15);
-    assert_eq!(desk.remote.told().lost, 1);
-    assert!(desk.remote.counts().received.abs_diff(1000) < 8, "{:?}", desk.remote.counts());
+    assert_eq!(desk.host.standing().lost, 1);
+    assert!(desk.host.counts().received.abs_diff(1000) < 8, "{:?}", desk.host.counts());
 }
 
 // What gets lost on the way to the host.
 
 /// What a host makes of frames: how often it was told of a sample, and where it thinks control stands.
-fn replay(desk: &Desk, bytes: &[u8]) -> (Vec<desk::Told>, clutch_node::RemoteNode) {
-    let (mut remote, mut notices) = (desk.plan.remote(), Vec::new());
-    remote.receive(0, bytes, &desk.plan.path(), &mut |n| notices.push(n));
-    (notices, remote)
+fn replay(desk: &Desk, bytes: &[u8]) -> (Vec<desk::Heard>, clutch_node::HostNode) {
+    let (mut host, mut notices) = (desk.plan.host(), Vec::new());
+    host.receive(0, bytes, &desk.plan.path(), &mut |n| notices.push(n));
+    (notices, host)
 }
 
 fn bytes(frames: &[Message]) -> Vec<u8> {
@@ -604,13 +617,13 @@ proptest! {
             telemetry += usize::from(matches!(m, Message::Telemetry(_)));
             !(matches!(m, Message::Telemetry(_)) && lost.contains(&telemetry))
         });
-        let (some, remote) = replay(&desk, &bytes(&kept));
-        prop_assert_eq!(remote.told().untold, lost.len() as u64);
+        let (some, host) = replay(&desk, &bytes(&kept));
+        prop_assert_eq!(host.standing().untold, lost.len() as u64);
         prop_assert_eq!(some.len() + lost.len(), all.len());
         // What did come is what it was.
         let (some, all) = (words(&some), words(&all));
         prop_assert!(some.iter().all(|n| all.contains(n)));
-        prop_assert_eq!(remote.told().tick, desk.twin.state().tick());
+        prop_assert_eq!(host.standing().tick, desk.twin.state().tick());
     }
 
     #[test]
@@ -638,10 +651,10 @@ proptest! {
         let place = place % line.len();
         let lost = if line[place] == 0 { 2 } else { 1 };
         line[place] ^= bits;
-        let (mut onboard, mut ports, mut taken) = (Onboard::new(ONBOARD), Ports::default(), Vec::new());
+        let (mut board_controller, mut outboxes, mut taken) = (BoardController::new(BOARD_CONTROLLER), Outboxes::default(), Vec::new());
         for byte in line {
-            onboard.host(0, &[byte], &mut ports);
-            taken.extend(frames(&desk::drain(&mut ports.host)));
+            board_controller.host(0, &[byte], &mut outboxes);
+            taken.extend(frames(&desk::drain(&mut outboxes.host)));
         }
         prop_assert!(taken.len() + lost >= sets.len());
         for m in taken {
@@ -662,8 +675,8 @@ fn a_host_that_missed_the_first_answered_sample_knows_where_the_path_began_all_t
         .into_iter()
         .filter(|m| !matches!(m, Message::Telemetry(t) if t.states & 0x0f == State::Armed as u8))
         .collect();
-    let (some, remote) = replay(&desk, &bytes(&kept));
-    assert_eq!((remote.origin(), remote.told().untold), (desk.twin.origin(), 1));
+    let (some, host) = replay(&desk, &bytes(&kept));
+    assert_eq!((host.origin(), host.standing().untold), (desk.twin.origin(), 1));
     assert_eq!(
         words(&some),
         words(&all).into_iter().filter(|w| !w.contains("from: Armed")).collect::<Vec<_>>()
@@ -679,12 +692,12 @@ fn a_second_run_is_like_the_first_after_whichever_end() {
         if fault {
             desk.faulty(false, true);
             desk.settle();
-            assert_eq!(desk.onboard.state(), State::Faulted);
+            assert_eq!(desk.board_controller.state(), State::Faulted);
         } else {
-            desk.asks(|remote, out| remote.stop(StopReason::Operator, out));
+            desk.asks(|host, out| host.stop(StopReason::Operator, out));
         }
         desk.follows(3);
-        let heard = desk.asks(|remote, out| remote.arm(out));
+        let heard = desk.asks(|host, out| host.arm(out));
         let state = if fault { State::Faulted } else { State::Holding };
         assert_eq!(heard, refused(Arm::KIND, Refusal::State, state as u32), "a run is over once");
         let servo = paper(LawParams::Smc(SmcParams::default()));
@@ -698,15 +711,15 @@ fn a_second_run_is_like_the_first_after_whichever_end() {
         desk.follows(99);
         assert_eq!(told_the_same(&mut desk), 99, "after a fault: {fault}, asked: {asked_again}");
         desk.follows(1);
-        assert_eq!((desk.remote.told().state, desk.remote.told().cause), (State::Holding, Cause::Done));
+        assert_eq!((desk.host.standing().state, desk.host.standing().cause), (State::Holding, Cause::Done));
     }
 }
 
 #[test]
 fn the_same_run_is_not_run_twice() {
     let mut desk = Desk::running(Plan::new());
-    desk.asks(|remote, out| remote.stop(StopReason::Operator, out));
-    let heard = desk.asks(|remote, out| remote.configure(out));
+    desk.asks(|host, out| host.stop(StopReason::Operator, out));
+    let heard = desk.asks(|host, out| host.configure(out));
     assert_eq!(heard, refused(Configure::KIND, Refusal::Run, 5));
     assert_eq!(desk.board.state(), BoardState::Stopped);
 }
@@ -717,23 +730,23 @@ fn the_same_run_is_not_run_twice() {
 fn there_is_a_last_word_exactly_while_it_drives_and_it_makes_the_board_safe() {
     let on_fault = SafeState::Hold { volts: 6.0 };
     let plan = Plan { limits: SupervisorParams::new(on_fault), ..Plan::new() };
-    assert!(Desk::new(plan).onboard.last_word().is_none());
+    assert!(Desk::new(plan).board_controller.last_word().is_none());
     let mut desk = Desk::ready(plan);
-    assert!(desk.onboard.last_word().is_none());
+    assert!(desk.board_controller.last_word().is_none());
     desk.arms();
     for periods in [0, 1, 5] {
         desk.follows(periods);
-        assert!(desk.onboard.driving());
-        let (word, mut board) = (desk.onboard.last_word().unwrap(), desk.board.clone());
+        assert!(desk.board_controller.driving());
+        let (word, mut board) = (desk.board_controller.last_word().unwrap(), desk.board.clone());
         board.receive(desk.now_us(), word.as_bytes(), &mut Outbox::default());
         assert_eq!((board.state(), board.code()), (BoardState::Faulted, plan.supervisor().safe_codes().hold));
     }
-    desk.asks(|remote, out| remote.stop(StopReason::Operator, out));
-    assert!(desk.onboard.last_word().is_none());
+    desk.asks(|host, out| host.stop(StopReason::Operator, out));
+    assert!(desk.board_controller.last_word().is_none());
     let mut desk = Desk::running(plan);
     desk.faulty(true, false);
     desk.settle();
-    assert!(desk.onboard.last_word().is_none());
+    assert!(desk.board_controller.last_word().is_none());
 }
 
 #[test]
@@ -747,6 +760,6 @@ fn a_sample_that_was_overtaken_is_told_with_what_the_law_made_of_it() {
     let [Notice::Cycle(first), Notice::Cycle(_)] = &told[..] else { panic!("{told:?}") };
     assert_eq!((first.cycle.arrival, first.superseded, first.cycle.answer), (Arrival::Late, true, None));
     let output = first.cycle.output.unwrap();
-    assert_eq!(output.code, desk.remote.servo().dac().code(output.command.voltage));
+    assert_eq!(output.code, desk.host.servo().dac().code(output.command.voltage));
     assert_ne!((output.code, output.command.limit), (first.cycle.code, Limit::Invalid));
 }

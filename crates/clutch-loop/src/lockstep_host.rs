@@ -1,67 +1,18 @@
-//! A board in the controller role that is asked in lockstep: emulated, or in this process.
+//! The host of a board controller that is asked in lockstep.
 
-use crate::emulator::{Emulator, SerialBoard};
-use crate::end::{End, Tells};
-use crate::setup::{self, Setup, SetupError};
+use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::lockstep_board::LockstepBoard;
+use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE, Station, StationNotice};
 use clutch_core::law::LawTerms;
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Target};
-use clutch_node::exchange::{Exchange, answer};
-use clutch_node::{
-    ControlNode, LinkCounts, Notice, Onboard, OnboardParams, Outbox, Ports, RemoteNode, Settings, Told,
-};
+use clutch_node::lockstep::Exchange;
+use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Settings, Standing};
 use clutch_sim::Scenario;
 use clutch_wire::{Arm, Configure, Refused, StopReason};
 
-/// Who answers in lockstep.
-pub trait Lockstep {
-    /// A request, and the answer; or why there is none.
-    ///
-    /// # Errors
-    /// In words.
-    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String>;
-}
-
-impl Lockstep for Emulator {
-    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
-        Emulator::exchange(self, request).map_err(|e| e.to_string())
-    }
-}
-
-impl Lockstep for SerialBoard {
-    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
-        SerialBoard::exchange(self, request).map_err(|e| e.to_string())
-    }
-}
-
-/// The board's state machine in this process: what an image runs, compiled for this machine.
-pub struct InProcess {
-    node: Onboard,
-    ports: Ports,
-}
-
-impl Default for InProcess {
-    fn default() -> Self {
-        let node = Onboard::new(OnboardParams { board: 1, boot: 1, clock_hz: 0 });
-        InProcess { node, ports: Ports::default() }
-    }
-}
-
-impl Lockstep for InProcess {
-    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
-        Ok(answer(&mut self.node, request, &mut self.ports))
-    }
-}
-
-/// How often the host shows that it lives, and after which silence the board ends a run.
-pub const ALIVE_NS: u64 = 100_000_000;
-/// See [`ALIVE_NS`].
-pub const HOST_SILENCE: Micros = Micros(1_000_000);
-/// After so long without a word of the board, control has ended for the host.
-pub const BOARD_SILENCE_NS: u64 = 1_000_000_000;
-
-/// A board in the controller role, and the host beside it.
-pub struct Emulated<L, P> {
-    remote: RemoteNode,
+/// A board controller that is asked in lockstep, and its host.
+pub struct LockstepHost<L, P> {
+    host: HostNode,
     link: L,
     settings: Settings,
     path: P,
@@ -76,19 +27,24 @@ pub struct Emulated<L, P> {
 ///
 /// # Errors
 /// The scenario has no safe state, or asks for what boards do not have.
-pub fn emulated<'a, L: Lockstep>(
+pub fn lockstep_host<'a, L: LockstepBoard>(
     scenario: &'a Scenario,
-    setup: &Setup<f32>,
+    built: &BuiltRun<f32>,
     link: L,
     ticks: u64,
-) -> Result<Emulated<L, impl Fn(u64) -> Target<f32> + 'a>, SetupError> {
-    let configure = ControlNode::new(setup.control, setup.servo, setup.supervisor).configuration();
-    Ok(Emulated {
-        remote: RemoteNode::new(setup.servo, configure, ALIVE_NS, BOARD_SILENCE_NS),
+) -> Result<LockstepHost<L, impl Fn(u64) -> Target<f32> + 'a>, BuildError> {
+    let configure = ControllerNode::new(built.controller, built.servo, built.supervisor).configuration();
+    Ok(LockstepHost {
+        host: HostNode::new(built.servo, configure, ALIVE_NS, BOARD_SILENCE_NS),
         link,
         // A board that keeps its own time waits as long for the host as for encoder and converter.
-        settings: setup::settings(scenario, setup, HOST_SILENCE.max(setup.control.silence), ticks)?,
-        path: setup::path::<f32>(scenario)?,
+        settings: from_scenario::settings(
+            scenario,
+            built,
+            HOST_SILENCE.max(built.controller.silence),
+            ticks,
+        )?,
+        path: from_scenario::path::<f32>(scenario)?,
         to_board: Outbox::default(),
         now_ns: 0,
         lateness: Micros(0),
@@ -97,7 +53,7 @@ pub fn emulated<'a, L: Lockstep>(
     })
 }
 
-impl<L: Lockstep, P: Fn(u64) -> Target<f32>> Emulated<L, P> {
+impl<L: LockstepBoard, P: Fn(u64) -> Target<f32>> LockstepHost<L, P> {
     /// The link.
     pub fn link(&mut self) -> &mut L {
         &mut self.link
@@ -124,7 +80,7 @@ impl<L: Lockstep, P: Fn(u64) -> Target<f32>> Emulated<L, P> {
             Ok(answer) => {
                 self.poll_at = (answer.time_ns != u64::MAX).then_some(answer.time_ns);
                 out.append(answer.daq);
-                self.remote.receive(self.now_ns, answer.host, &self.path, notices);
+                self.host.receive(self.now_ns, answer.host, &self.path, notices);
             }
             Err(why) => self.failure = Some(why),
         }
@@ -151,7 +107,7 @@ impl<L: Lockstep, P: Fn(u64) -> Target<f32>> Emulated<L, P> {
         let mut all = Vec::new();
         self.settings.each(|key, value| all.push((key, value)));
         for (key, value) in all {
-            self.remote.set(key, value, &mut self.to_board);
+            self.host.set(key, value, &mut self.to_board);
             let (mut taken, mut refused) = (false, None);
             self.turn(&[], out, &mut |n| match n {
                 Notice::Taken(m) => taken |= (m.key, m.value) == (key, value),
@@ -167,44 +123,44 @@ impl<L: Lockstep, P: Fn(u64) -> Target<f32>> Emulated<L, P> {
     }
 }
 
-impl<L: Lockstep, P: Fn(u64) -> Target<f32>> End for Emulated<L, P> {
+impl<L: LockstepBoard, P: Fn(u64) -> Target<f32>> Station for LockstepHost<L, P> {
     type Scalar = f32;
     type Terms = LawTerms<f32>;
-    const IS_CONTROLLER: bool = true;
+    const LOOKS_ON: bool = true;
 
     fn discover(&mut self, nonce: u32, out: &mut Outbox) {
-        self.remote.discover(nonce, &mut self.to_board);
+        self.host.discover(nonce, &mut self.to_board);
         self.turn(&[], out, &mut |_| ());
     }
     fn configure(&mut self, _: DacCode, out: &mut Outbox) {
         self.upload(out);
-        self.remote.configure(&mut self.to_board);
+        self.host.configure(&mut self.to_board);
         self.request(Configure::KIND, "be configured", out);
     }
     fn arm(&mut self, out: &mut Outbox) {
-        self.remote.arm(&mut self.to_board);
+        self.host.arm(&mut self.to_board);
         self.request(Arm::KIND, "be armed", out);
     }
     fn ping(&mut self, nonce: u32, out: &mut Outbox) {
-        self.remote.ping(nonce, &mut self.to_board);
+        self.host.ping(nonce, &mut self.to_board);
         self.turn(&[], out, &mut |_| ());
     }
     fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
-        self.remote.stop(reason, &mut self.to_board);
+        self.host.stop(reason, &mut self.to_board);
         self.turn(&[], out, &mut |_| ());
     }
     fn disconnect(&mut self) {
-        self.remote.disconnect();
+        self.host.disconnect();
     }
     fn answered(&mut self, lateness: Micros) {
         self.lateness = lateness;
     }
     fn poll_at(&self) -> Option<u64> {
-        [self.remote.poll_at(), self.poll_at].into_iter().flatten().min()
+        [self.host.poll_at(), self.poll_at].into_iter().flatten().min()
     }
-    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Tells<Self>)) {
+    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(StationNotice<Self>)) {
         self.now_ns = now_ns;
-        self.remote.poll(now_ns, &mut self.to_board, notices);
+        self.host.poll(now_ns, &mut self.to_board, notices);
         if !self.to_board.is_empty() || self.poll_at.is_some_and(|t| now_ns >= t) {
             self.turn(&[], out, notices);
         }
@@ -214,28 +170,28 @@ impl<L: Lockstep, P: Fn(u64) -> Target<f32>> End for Emulated<L, P> {
         now_ns: u64,
         bytes: &[u8],
         out: &mut Outbox,
-        notices: &mut impl FnMut(Tells<Self>),
+        notices: &mut impl FnMut(StationNotice<Self>),
     ) {
         self.now_ns = now_ns;
         self.turn(bytes, out, notices);
     }
-    fn told(&self) -> Told<f32> {
-        *self.remote.told()
+    fn standing(&self) -> Standing<f32> {
+        *self.host.standing()
     }
     fn counts(&self) -> &LinkCounts {
-        self.remote.counts()
+        self.host.counts()
     }
     fn origin(&self) -> FixedCounts {
-        self.remote.origin()
+        self.host.origin()
     }
     fn encoder(&self) -> Encoder {
-        self.remote.servo().encoder()
+        self.host.servo().encoder()
     }
     fn dac(&self) -> &Dac<f32> {
-        self.remote.servo().dac()
+        self.host.servo().dac()
     }
     fn period(&self) -> Micros {
-        self.remote.servo().period()
+        self.host.servo().period()
     }
     fn failure(&self) -> Option<String> {
         self.failure.clone()

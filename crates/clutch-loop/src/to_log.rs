@@ -1,7 +1,6 @@
 //! What a log gets of each sample, of the link and of the shaft.
 
-use crate::replay::START_VOLTAGE;
-use crate::setup::{self, SetupError};
+use crate::from_scenario::{self, BuildError};
 use clutch_core::law::{Limit, Terms};
 use clutch_core::supervisor::{Cycle, State};
 use clutch_core::{Dac, FixedCounts, Real, Servo};
@@ -14,6 +13,11 @@ use clutch_sim::engine::Motion;
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{MovingRig, Scenario};
 use std::path::Path;
+
+/// Key of the header under which the code at arming stands.
+pub const PRESENT_CODE: &str = "present_code";
+/// Key of the header under which a simulation's voltage at the start stands: its bits, in hex.
+pub const START_VOLTAGE: &str = "start_voltage_bits";
 
 /// Of a sample: as it came.
 #[must_use]
@@ -184,7 +188,7 @@ pub enum SaveError {
     Log(#[from] LogError),
     /// The scenario.
     #[error(transparent)]
-    Setup(#[from] SetupError),
+    Build(#[from] BuildError),
 }
 
 fn save_in<T: Real>(
@@ -194,9 +198,9 @@ fn save_in<T: Real>(
     version: &str,
 ) -> Result<(), SaveError> {
     let spec = scenario.spec();
-    let params = spec.servo().map_err(SetupError::from)?;
-    let servo = Servo::<T>::new(&params.cast()).map_err(|e| SetupError::from(setup::to_f64(e)))?;
-    let mut header = setup::header(scenario, &servo, Source::Simulation, "", version);
+    let params = spec.servo().map_err(BuildError::from)?;
+    let servo = Servo::<T>::new(&params.cast()).map_err(|e| BuildError::from(from_scenario::to_f64(e)))?;
+    let mut header = from_scenario::header(scenario, &servo, Source::Simulation, "", version);
     let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
     header.extra.push((START_VOLTAGE.to_owned(), bits));
     let mut log = LogWriter::create(path, &header)?;

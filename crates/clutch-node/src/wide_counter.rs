@@ -2,7 +2,7 @@
 
 use clutch_core::Counts;
 
-/// Encoder counts from a timer of 16 bits, as those of small controllers are. It is right as long
+/// Encoder counts from a timer of 16 bits, as those of small microcontrollers are. It is right as long
 /// as the shaft turns by less than 2¹⁵ counts from reading to reading.
 #[derive(Clone, Copy, Debug)]
 pub struct WideCounter {

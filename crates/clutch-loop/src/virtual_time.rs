@@ -3,16 +3,16 @@
 //! The same state machines, frames and rig as in real time; only the clock is computed. A run of
 //! one second takes some milliseconds and repeats bit for bit.
 
-use crate::end::{End, Tells};
 use crate::faults::{Direction, Fault};
-use crate::line::Line;
+use crate::faulty_line::FaultyLine;
 use crate::preflight;
-use crate::records;
 use crate::sim_board::{SimBoard, SimBoardError};
+use crate::station::{Station, StationNotice};
+use crate::to_log;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Micros, Real, Target};
 use clutch_log::Record;
-use clutch_node::{Ending, Notice, Outbox, Told};
+use clutch_node::{Ending, Notice, Outbox, Standing};
 use clutch_sim::engine::{Event, Motion, Shaft};
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
 use clutch_sim::{Metrics, Scenario};
@@ -31,7 +31,7 @@ pub struct Stall {
 
 /// How a run in virtual time is made.
 #[derive(Clone, Debug)]
-pub struct WorldParams {
+pub struct VirtualOptions {
     /// One way, ns.
     pub latency_ns: u64,
     /// What goes wrong on line and board.
@@ -52,9 +52,9 @@ pub struct WorldParams {
 
 /// A line that loses nothing and takes no time, a controller that never stalls, and no end but that of the
 /// duration, which has to be given.
-impl Default for WorldParams {
+impl Default for VirtualOptions {
     fn default() -> Self {
-        WorldParams {
+        VirtualOptions {
             latency_ns: 0,
             faults: Vec::new(),
             stall: None,
@@ -69,11 +69,11 @@ impl Default for WorldParams {
 
 /// What became of a run.
 #[derive(Clone, Debug, Default)]
-pub struct Outcome {
+pub struct VirtualReport {
     /// Why the controller ended control, if by a fault.
     pub cause: Option<Cause>,
     /// Where the controller stood last, and why.
-    pub end: Told<f64>,
+    pub standing: Standing<f64>,
     /// When the fault first showed, s after arming.
     pub hit: Option<f64>,
     /// When the controller faulted, s after arming.
@@ -103,13 +103,13 @@ pub struct Outcome {
 
 /// A run in virtual time could not be made.
 #[derive(Debug, thiserror::Error)]
-pub enum WorldError {
+pub enum VirtualError {
     /// The board or its rig.
     #[error(transparent)]
     Board(#[from] SimBoardError),
-    /// The controller's end.
+    /// The station.
     #[error("{0}")]
-    Controller(String),
+    Station(String),
     /// Encoder and converter, or the controller, before control began.
     #[error("the board did not take the run: {0}")]
     Refused(String),
@@ -125,25 +125,25 @@ struct Sampled {
 }
 
 /// Controller, line and board.
-pub struct World<E> {
+pub struct VirtualLoop<S> {
     board: SimBoard,
-    end: E,
-    up: Line,
-    down: Line,
-    params: WorldParams,
+    station: S,
+    up: FaultyLine,
+    down: FaultyLine,
+    params: VirtualOptions,
     now_ns: u64,
 }
 
-impl<E: End> World<E> {
-    /// A controller's end, and the scenario's rig on a board.
+impl<S: Station> VirtualLoop<S> {
+    /// A station, and the scenario's rig on a board.
     ///
     /// # Errors
     /// As [`SimBoard::new`].
-    pub fn new(scenario: &Scenario, params: WorldParams, end: E) -> Result<Self, SimBoardError> {
-        let line = |way| Line::new(way, params.latency_ns, &params.faults, params.seed);
-        Ok(World {
+    pub fn new(scenario: &Scenario, params: VirtualOptions, station: S) -> Result<Self, SimBoardError> {
+        let line = |way| FaultyLine::new(way, params.latency_ns, &params.faults, params.seed);
+        Ok(VirtualLoop {
             board: SimBoard::new(scenario, &params.faults, 1, false)?,
-            end,
+            station,
             up: line(Direction::Up),
             down: line(Direction::Down),
             params,
@@ -154,14 +154,15 @@ impl<E: End> World<E> {
     /// Discovers, configures, arms, and runs to the end; `path` is the one that the controller follows.
     ///
     /// # Errors
-    /// The engine gave up, or the controller's end.
-    pub fn run(&mut self, path: &impl Fn(u64) -> Target<E::Scalar>) -> Result<Outcome, WorldError> {
-        let mut outcome = Outcome { volts: (f64::INFINITY, f64::NEG_INFINITY), ..Outcome::default() };
+    /// The engine gave up, or the station.
+    pub fn run(&mut self, path: &impl Fn(u64) -> Target<S::Scalar>) -> Result<VirtualReport, VirtualError> {
+        let mut report =
+            VirtualReport { volts: (f64::INFINITY, f64::NEG_INFINITY), ..VirtualReport::default() };
         let (mut out, mut up) = (Outbox::default(), Outbox::default());
-        let radians = self.end.encoder().radians_per_count::<f64>();
-        let dac = *self.end.dac();
-        let period_ns = u64::from(self.end.period().0) * 1000;
-        let period = self.end.period().seconds::<f64>();
+        let radians = self.station.encoder().radians_per_count::<f64>();
+        let dac = *self.station.dac();
+        let period_ns = u64::from(self.station.period().0) * 1000;
+        let period = self.station.period().seconds::<f64>();
         let mut figures = MetricsBuilder::new(period, self.params.settle);
         let mut waiting: Option<Sampled> = None;
         let (mut hello, mut configured, mut asked, mut armed) = (false, false, false, false);
@@ -169,17 +170,17 @@ impl<E: End> World<E> {
         let mut safe_at: Option<u64> = None;
         let mut busy_until = 0;
         let (mut sampled, mut first_sample) = (0, None);
-        self.end.discover(1, &mut out);
+        self.station.discover(1, &mut out);
         self.sound()?;
         let present = self.board.code();
-        outcome.present = present.0;
+        report.present = present.0;
         self.down.send(0, None, out.as_bytes());
         out.clear();
         let mut end_ns = u64::MAX;
         loop {
             // What comes next.
             let host = self.up.next_ns().map(|t| t.max(busy_until));
-            let poll = self.end.poll_at().map(|t| t.max(busy_until));
+            let poll = self.station.poll_at().map(|t| t.max(busy_until));
             let times = [self.board.next_ns(), host, self.down.next_ns(), poll];
             let Some(next) = times.into_iter().flatten().min() else { break };
             self.now_ns = next.max(self.now_ns);
@@ -229,8 +230,8 @@ impl<E: End> World<E> {
                     && safe_at.is_none()
                 {
                     let error = self.target(path, sampled - first) - self.board.rig().shaft().position;
-                    outcome.largest_error = outcome.largest_error.max(error.abs());
-                    outcome.errors.push(error);
+                    report.largest_error = report.largest_error.max(error.abs());
+                    report.errors.push(error);
                 }
             }
             let safe_now = matches!(
@@ -239,7 +240,7 @@ impl<E: End> World<E> {
             );
             if armed_for.is_some() && safe_now && safe_at.is_none() {
                 safe_at = Some(now);
-                outcome.safe = armed_for;
+                report.safe = armed_for;
             }
 
             // The controller.
@@ -252,7 +253,7 @@ impl<E: End> World<E> {
             let mut greeted = false;
             {
                 let (armed_now, rig) = (&mut armed, self.board.rig());
-                let mut notices = |n: Tells<E>| match n {
+                let mut notices = |n: StationNotice<S>| match n {
                     Notice::Hello(_) => greeted = true,
                     Notice::Configured => configured = true,
                     Notice::Armed => *armed_now = true,
@@ -260,61 +261,61 @@ impl<E: End> World<E> {
                         if let Some(waiting) = waiting.as_mut().filter(|_| n.cycle.answer.is_some()) {
                             waiting.tick = Some(n.cycle.tick);
                         }
-                        outcome.answers += u64::from(n.cycle.answer.is_some());
+                        report.answers += u64::from(n.cycle.answer.is_some());
                         let volts = dac.volts(n.cycle.code).to_f64();
-                        outcome.volts = (outcome.volts.0.min(volts), outcome.volts.1.max(volts));
-                        records.push(Record::Sample(records::sample(time_ns, 0, &n)));
-                        records.push(Record::Command(records::command(time_ns, &n.cycle, &dac, radians)));
-                        records.extend(records::change(time_ns, &n.cycle));
-                        records.push(Record::Truth(records::truth(time_ns, n.cycle.tick, rig)));
+                        report.volts = (report.volts.0.min(volts), report.volts.1.max(volts));
+                        records.push(Record::Sample(to_log::sample(time_ns, 0, &n)));
+                        records.push(Record::Command(to_log::command(time_ns, &n.cycle, &dac, radians)));
+                        records.extend(to_log::change(time_ns, &n.cycle));
+                        records.push(Record::Truth(to_log::truth(time_ns, n.cycle.tick, rig)));
                     }
                     Notice::Ended(ending) => ended = Some(ending),
                     Notice::Refused(m) if !*armed_now => refused = Some(m),
                     _ => {}
                 };
                 while let Some(bytes) = self.up.arrived(now) {
-                    self.end.receive(now, &bytes, &mut out, &mut notices);
+                    self.station.receive(now, &bytes, &mut out, &mut notices);
                 }
-                self.end.poll(now, &mut out, &mut notices);
+                self.station.poll(now, &mut out, &mut notices);
             }
             if greeted && !hello {
                 hello = true;
-                self.end.configure(present, &mut out);
+                self.station.configure(present, &mut out);
             }
             self.sound()?;
             if let Some(m) = refused {
-                return Err(WorldError::Refused(preflight::why(&m)));
+                return Err(VirtualError::Refused(preflight::why(&m)));
             }
             if configured && !asked && self.board.samples() >= 3 {
                 asked = true;
-                self.end.arm(&mut out);
+                self.station.arm(&mut out);
             }
-            let told = self.end.told();
-            let (state, tick) = (told.state, told.tick);
+            let standing = self.station.standing();
+            let (state, tick) = (standing.state, standing.tick);
             if state == State::Running && first_sample.is_none() {
                 first_sample = Some(sampled);
             }
             if let Some(ending) = ended {
-                records.push(records::ended(time_ns, &ending));
+                records.push(to_log::ended(time_ns, &ending));
             }
-            if state == State::Faulted && outcome.tripped.is_none() {
-                outcome.tripped = armed_for;
-                outcome.cause = Some(told.cause);
+            if state == State::Faulted && report.tripped.is_none() {
+                report.tripped = armed_for;
+                report.cause = Some(standing.cause);
             }
-            if !E::IS_CONTROLLER && state == State::Running && tick + 1 >= self.params.ticks {
-                self.end.stop(StopReason::Done, &mut out);
-                let Told { state: to, cause, value, .. } = self.end.told();
-                records.push(records::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }));
+            if !S::LOOKS_ON && state == State::Running && tick + 1 >= self.params.ticks {
+                self.station.stop(StopReason::Done, &mut out);
+                let Standing { state: to, cause, value, .. } = self.station.standing();
+                records.push(to_log::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }));
             }
             if self.params.record {
-                outcome.records.append(&mut records);
+                report.records.append(&mut records);
             }
             if !out.as_bytes().is_empty() {
                 let answer =
                     self.params.stall.filter(|s| armed_for.is_some_and(|t| t >= s.at && t < s.until));
                 let takes = answer.map_or(0, |s| (s.answer * 1e9) as u64);
                 busy_until = now.saturating_add(takes);
-                self.end.answered(Micros((takes / 1000) as u32));
+                self.station.answered(Micros((takes / 1000) as u32));
                 self.down.send(busy_until, armed_for, out.as_bytes());
                 out.clear();
             }
@@ -324,42 +325,42 @@ impl<E: End> World<E> {
             }
         }
         self.sound()?;
-        let told = self.end.told();
-        outcome.end = told.map(Real::to_f64);
-        outcome.board = Some(self.board.node().state());
-        outcome.hit = [self.up.hits().1, self.down.hits().1, self.board.first_hit_ns()]
+        let standing = self.station.standing();
+        report.standing = standing.map(Real::to_f64);
+        report.board = Some(self.board.node().state());
+        report.hit = [self.up.hits().1, self.down.hits().1, self.board.first_hit_ns()]
             .into_iter()
             .flatten()
             .min()
             .map(|t| t.saturating_sub(origin_ns) as f64 / 1e9);
         let at_end = self.board.rig().shaft().position;
-        outcome.metrics = figures.finish();
-        outcome.overrun =
-            outcome.overrun.max(self.beyond(at_end, path, safe_at.unwrap_or(self.now_ns), origin_ns));
-        Ok(outcome)
+        report.metrics = figures.finish();
+        report.overrun =
+            report.overrun.max(self.beyond(at_end, path, safe_at.unwrap_or(self.now_ns), origin_ns));
+        Ok(report)
     }
 
-    /// An error if the controller's end cannot go on.
-    fn sound(&self) -> Result<(), WorldError> {
-        self.end.failure().map_or(Ok(()), |why| Err(WorldError::Controller(why)))
+    /// An error if the station cannot go on.
+    fn sound(&self) -> Result<(), VirtualError> {
+        self.station.failure().map_or(Ok(()), |why| Err(VirtualError::Station(why)))
     }
 
     /// How far a position lies beyond the path's at a time.
     fn beyond(
         &self,
         position: f64,
-        path: &impl Fn(u64) -> Target<E::Scalar>,
+        path: &impl Fn(u64) -> Target<S::Scalar>,
         at_ns: u64,
         origin_ns: u64,
     ) -> f64 {
-        let period_ns = u64::from(self.end.period().0) * 1000;
+        let period_ns = u64::from(self.station.period().0) * 1000;
         let tick = at_ns.saturating_sub(origin_ns) / period_ns;
         position - self.target(path, tick)
     }
 
-    fn target(&self, path: &impl Fn(u64) -> Target<E::Scalar>, tick: u64) -> f64 {
-        let radians = self.end.encoder().radians_per_count::<f64>();
-        let position = path(tick).position.plus(self.end.origin());
+    fn target(&self, path: &impl Fn(u64) -> Target<S::Scalar>, tick: u64) -> f64 {
+        let radians = self.station.encoder().radians_per_count::<f64>();
+        let position = path(tick).position.plus(self.station.origin());
         position.minus::<f64>(clutch_core::FixedCounts(0)) * radians
     }
 }

@@ -1,20 +1,20 @@
-//! The controller's end: handshake, cycle, stop.
+//! The controller: handshake, cycle, stop. On a PC, and within [`crate::BoardController`].
 
+use crate::notice::{CycleNotice, Ending, LinkCounts, Notice};
 use crate::outbox::Outbox;
 use clutch_core::law::{Controller, Law};
-use clutch_core::supervisor::{BoardMode, Cause, Cycle, Sample as Seen, State};
+use clutch_core::supervisor::{BoardMode, Cause, Sample as Seen, State};
 use clutch_core::{
     Counts, DacCode, FixedCounts, Micros, Real, SafeKind, Servo, Supervisor, SupervisorState, Target,
 };
 use clutch_wire::{
-    Actuate, Arm, BoardState, Configure, Controller as ControllerInfo, Decoder, Discover, Fault, FrameError,
-    Hello, Message, Ping, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop,
-    StopReason, Stopped, Taken, VERSION,
+    Actuate, Arm, BoardState, Configure, Decoder, Discover, Message, Ping, SCHEMA, STATUS_DAC_FAULT,
+    STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop, StopReason, VERSION,
 };
 
 /// What a run is, on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ControlParams {
+pub struct ControllerParams {
     /// Number of the run; another for each run on a board.
     pub run: u16,
     /// Hash of the scenario.
@@ -29,89 +29,10 @@ pub struct ControlParams {
     pub silence: Micros,
 }
 
-/// What the line has carried.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LinkCounts {
-    /// Samples of this run.
-    pub received: u64,
-    /// Frames that were not whole.
-    pub bad_frames: u64,
-    /// Samples of another run.
-    pub foreign: u64,
-    /// Samples that a newer one had overtaken.
-    pub late: u64,
-    /// Samples that came twice.
-    pub duplicated: u64,
-    /// Samples that came after a newer one.
-    pub reordered: u64,
-}
-
-/// A sample and what it led to.
-#[derive(Clone, Copy, Debug)]
-pub struct CycleNotice<T, Terms> {
-    /// The sample as it came.
-    pub sample: Sample,
-    /// Whether a newer one was there already.
-    pub superseded: bool,
-    /// Time that the answer to the sample before took.
-    pub lateness: Micros,
-    /// Clock cycles of the tick before, where a board counts them; else 0.
-    pub cycles: u32,
-    /// What it led to.
-    pub cycle: Cycle<T, Terms>,
-}
-
-/// What the controller has to tell its environment.
-#[derive(Clone, Copy, Debug)]
-#[allow(clippy::large_enum_variant, reason = "lives on the stack for one call; nothing allocates here")]
-pub enum Notice<T, Terms> {
-    /// A board answered.
-    Hello(Hello),
-    /// A board in the controller role answered.
-    Controller(ControllerInfo),
-    /// The board took a setting.
-    Taken(Taken),
-    /// The board is configured for this run; samples follow.
-    Configured,
-    /// The board takes codes.
-    Armed,
-    /// The board refused a request.
-    Refused(Refused),
-    /// The board's clock: the nonce of the request, µs.
-    Pong(u32, u32),
-    /// The board has stopped.
-    Stopped(Stopped),
-    /// The board went to its safe state by itself.
-    BoardFault(Fault),
-    /// A frame that was not whole.
-    BadFrame(FrameError),
-    /// A controller's own kind of frame: the line echoes, or another controller is on it.
-    Echo,
-    /// A sample of this run.
-    Cycle(CycleNotice<T, Terms>),
-    /// The supervisor ended control without a sample.
-    Ended(Ending<T>),
-}
-
-/// An end of control that no sample brought.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ending<T> {
-    /// The supervisor's state before it.
-    pub from: State,
-    /// And after it.
-    pub state: State,
-    /// Why.
-    pub cause: Cause,
-    /// What the check saw.
-    pub value: T,
-    /// The run's tick.
-    pub tick: u64,
-}
-
 /// The controller's state machine. Times are the host's monotonic clock, ns.
 #[derive(Clone, Debug)]
-pub struct ControlNode<T: Real, C: Controller<T> = Law<T>> {
-    params: ControlParams,
+pub struct ControllerNode<T: Real, C: Controller<T> = Law<T>> {
+    params: ControllerParams,
     servo: Servo<T, C>,
     supervisor: Supervisor<T>,
     state: SupervisorState<T, C::State>,
@@ -128,11 +49,11 @@ pub struct ControlNode<T: Real, C: Controller<T> = Law<T>> {
     stopping: Option<StopReason>,
 }
 
-impl<T: Real, C: Controller<T>> ControlNode<T, C> {
+impl<T: Real, C: Controller<T>> ControllerNode<T, C> {
     /// A controller that has not spoken yet.
     #[must_use]
-    pub fn new(params: ControlParams, servo: Servo<T, C>, supervisor: Supervisor<T>) -> Self {
-        ControlNode {
+    pub fn new(params: ControllerParams, servo: Servo<T, C>, supervisor: Supervisor<T>) -> Self {
+        ControllerNode {
             params,
             servo,
             supervisor,
@@ -235,7 +156,7 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
         self.lateness = lateness;
     }
 
-    /// When [`ControlNode::poll`] has to be called at the latest, ns; none while nothing is
+    /// When [`ControllerNode::poll`] has to be called at the latest, ns; none while nothing is
     /// awaited.
     #[must_use]
     pub fn poll_at(&self) -> Option<u64> {
@@ -306,7 +227,7 @@ impl<T: Real, C: Controller<T>> ControlNode<T, C> {
         let (run, config) = (self.params.run, self.params.config);
         match message {
             Message::Hello(m) => notices(Notice::Hello(*m)),
-            Message::Controller(m) => notices(Notice::Controller(*m)),
+            Message::ControllerHello(m) => notices(Notice::ControllerHello(*m)),
             Message::Configured(m) if m.run == run && m.config == config => {
                 self.supervisor.connect(&mut self.state);
                 notices(Notice::Configured);

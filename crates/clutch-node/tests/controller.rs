@@ -1,4 +1,4 @@
-//! The controller's end: handshake, one answer per batch, stop until the board has heard.
+//! The controller: handshake, one answer per batch, stop until the board has heard.
 #![allow(missing_docs, reason = "the tests' names say what holds")]
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
@@ -8,7 +8,9 @@ use clutch_core::{
     Bounds, Counts, DacCode, Encoder, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams,
     Supervisor, SupervisorParams, Target, Tolerances,
 };
-use clutch_node::{BoardNode, BoardParams, ControlNode, ControlParams, Ending, LinkCounts, Notice, Outbox};
+use clutch_node::{
+    BoardNode, BoardParams, ControllerNode, ControllerParams, Ending, LinkCounts, Notice, Outbox,
+};
 use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, FrameError,
     Hello, Message, Ping, Pong, Refused, SCHEMA, STATUS_ENCODER_FAULT, STATUS_LATE, SafeKind, Sample, Stop,
@@ -18,7 +20,7 @@ use proptest::prelude::*;
 
 const RUN: u16 = 5;
 const CONFIG: u64 = 0xfeed;
-const PARAMS: ControlParams = ControlParams {
+const PARAMS: ControllerParams = ControllerParams {
     run: RUN,
     config: CONFIG,
     watchdog: Micros(3000),
@@ -36,7 +38,7 @@ fn path(tick: u64) -> Target<f64> {
 
 /// A controller on a desk; frames in, frames and notices out.
 struct Desk {
-    node: ControlNode<f64>,
+    node: ControllerNode<f64>,
     /// ns
     now: u64,
     /// Of the next sample, and the counts of the first one.
@@ -53,11 +55,11 @@ fn heard(out: &mut Outbox) -> Vec<Message> {
 }
 
 impl Desk {
-    fn with(params: ControlParams, on_fault: SafeState) -> Desk {
+    fn with(params: ControllerParams, on_fault: SafeState) -> Desk {
         let servo = ServoParams::paper(LawParams::Pd(PdParams::default()));
         let bounds = Bounds::around(&PlantParams::default(), &Tolerances::default()).unwrap();
         let supervisor = Supervisor::new(&SupervisorParams::new(on_fault), &servo, &bounds).unwrap();
-        let node = ControlNode::new(params, Servo::new(&servo).unwrap(), supervisor);
+        let node = ControllerNode::new(params, Servo::new(&servo).unwrap(), supervisor);
         Desk { node, now: 1_000_000_000, sequence: 0, origin: 700, notices: Vec::new() }
     }
 
@@ -88,7 +90,7 @@ impl Desk {
         desk
     }
 
-    fn asks(&mut self, f: impl FnOnce(&mut ControlNode<f64>, &mut Outbox)) -> Vec<Message> {
+    fn asks(&mut self, f: impl FnOnce(&mut ControllerNode<f64>, &mut Outbox)) -> Vec<Message> {
         let mut out = Outbox::default();
         f(&mut self.node, &mut out);
         heard(&mut out)
@@ -478,7 +480,7 @@ fn hello() -> Message {
 
 #[test]
 fn a_validity_that_the_wire_cannot_carry_is_the_longest_that_it_can() {
-    let mut desk = Desk::with(ControlParams { valid: Micros(70_000), ..PARAMS }, SafeState::Release);
+    let mut desk = Desk::with(ControllerParams { valid: Micros(70_000), ..PARAMS }, SafeState::Release);
     desk.reads(&[CONFIGURED, ARMED]);
     let sample = desk.fresh(BoardState::Armed);
     let sent = desk.reads(&[Message::Sample(sample)]);

@@ -7,7 +7,7 @@
 //! then goes on as if the machine had not stalled. How often and how long is counted.
 
 use crate::faults::{Direction, Fault};
-use crate::line::Line;
+use crate::faulty_line::FaultyLine;
 use crate::port::{ClientEvent, Endpoint};
 use crate::realtime::{WaitMode, monotonic_ns};
 use crate::sim_board::{SimBoard, SimBoardError};
@@ -28,7 +28,7 @@ const SLIP_NS: u64 = 500_000;
 
 /// How the simulated board runs.
 #[derive(Clone, Debug)]
-pub struct DaqOptions {
+pub struct ServeOptions {
     /// What goes wrong.
     pub faults: Vec<Fault>,
     /// Seed of what goes wrong at random.
@@ -41,7 +41,7 @@ pub struct DaqOptions {
 
 /// What the board tells while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum DaqNotice {
+pub enum ServeNotice {
     /// A client came or left.
     Client(ClientEvent),
     /// The board's state changed, at a time of its own clock, s.
@@ -53,7 +53,7 @@ pub enum DaqNotice {
 
 /// How it went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DaqReport {
+pub struct ServeReport {
     /// Samples taken since the last configuration.
     pub samples: u64,
     /// Times that the board's clock waited.
@@ -66,7 +66,7 @@ pub struct DaqReport {
 
 /// The board could not go on.
 #[derive(Debug, thiserror::Error)]
-pub enum DaqError {
+pub enum ServeError {
     /// The board or its rig.
     #[error(transparent)]
     Board(#[from] SimBoardError),
@@ -79,19 +79,19 @@ pub enum DaqError {
 ///
 /// # Errors
 /// The scenario has no safe state, the rig cannot be simulated, the line fails.
-pub fn run(
+pub fn serve(
     scenario: &Scenario,
-    options: &DaqOptions,
+    options: &ServeOptions,
     endpoint: &mut dyn Endpoint,
     stop: &AtomicBool,
-    mut notice: impl FnMut(DaqNotice),
-) -> Result<DaqReport, DaqError> {
+    mut notice: impl FnMut(ServeNotice),
+) -> Result<ServeReport, ServeError> {
     let patient = options.patient && !options.faults.iter().any(|f| f.kind.silences());
     let boot = (monotonic_ns() / 1000) as u32;
     let mut board = SimBoard::new(scenario, &options.faults, boot, patient)?;
-    let mut up = Line::new(Direction::Up, 0, &options.faults, options.seed);
-    let mut down = Line::new(Direction::Down, 0, &options.faults, options.seed);
-    let mut report = DaqReport::default();
+    let mut up = FaultyLine::new(Direction::Up, 0, &options.faults, options.seed);
+    let mut down = FaultyLine::new(Direction::Down, 0, &options.faults, options.seed);
+    let mut report = ServeReport::default();
     let start = monotonic_ns();
     // By how much the board's clock is behind the machine's, ns.
     let mut slipped = start;
@@ -105,7 +105,7 @@ pub fn run(
     while !stop.load(Ordering::Relaxed) {
         while let Some(event) = endpoint.service()? {
             present = event == ClientEvent::Connected;
-            notice(DaqNotice::Client(event));
+            notice(ServeNotice::Client(event));
             if event == ClientEvent::Left {
                 waiting_since = None;
             }
@@ -146,10 +146,10 @@ pub fn run(
         }
         if board.node().state() != state {
             state = board.node().state();
-            notice(DaqNotice::State(state, now as f64 / 1e9));
+            notice(ServeNotice::State(state, now as f64 / 1e9));
             if state == BoardState::Faulted {
                 let silent = ((now / 1000) as u32).wrapping_sub(board.node().fed_us());
-                notice(DaqNotice::Faulted(f64::from(silent) / 1e6));
+                notice(ServeNotice::Faulted(f64::from(silent) / 1e6));
             }
         }
         if !out.as_bytes().is_empty() {

@@ -1,55 +1,26 @@
-//! The host's end of a board in the controller role: it configures, consents, and hears.
+//! The host of a board controller: it configures, consents, and hears.
 
-use crate::control::{Ending, LinkCounts, Notice};
+use crate::notice::{Ending, LinkCounts, Notice, Standing};
 use crate::outbox::Outbox;
 use crate::telemetry::{both_states, notice};
 use clutch_core::law::{Law, LawTerms};
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{FixedCounts, Servo, Target};
 use clutch_wire::{
-    Arm, Configure, Controller, Decoder, Discover, Message, Ping, SCHEMA, Set, Stop, StopReason,
+    Arm, Configure, ControllerHello, Decoder, Discover, Message, Ping, SCHEMA, Set, Stop, StopReason,
     TELEMETRY_ASKED, Telemetry, VERSION,
 };
 
-/// Where control stands, as the board told last.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Told<T> {
-    /// The supervisor's state.
-    pub state: State,
-    /// Why control ended.
-    pub cause: Cause,
-    /// What the check that ended it saw.
-    pub value: T,
-    /// The run's tick.
-    pub tick: u64,
-    /// Samples lost.
-    pub lost: u64,
-    /// Samples that were not believed.
-    pub rejected: u64,
-    /// Answers later than the deadline.
-    pub deadline_misses: u64,
-    /// Telemetry that did not come.
-    pub untold: u64,
-}
-
-impl<T> Told<T> {
-    /// The same with another scalar.
-    pub fn map<U>(self, f: impl FnOnce(T) -> U) -> Told<U> {
-        let Told { state, cause, value, tick, lost, rejected, deadline_misses, untold } = self;
-        Told { state, cause, value: f(value), tick, lost, rejected, deadline_misses, untold }
-    }
-}
-
-/// The host's state machine for a board in the controller role. Times are the host's monotonic
+/// The state machine of the host of a board controller. Times are the host's monotonic
 /// clock, ns.
 #[derive(Clone, Debug)]
-pub struct RemoteNode {
+pub struct HostNode {
     servo: Servo<f32>,
     configure: Configure,
     decoder: Decoder,
-    told: Told<f32>,
+    standing: Standing<f32>,
     counts: LinkCounts,
-    controller: Option<Controller>,
+    controller: Option<ControllerHello>,
     /// Where the path begins; none before it is known.
     origin: Option<FixedCounts>,
     /// Number of the last telemetry; they begin with 1 at each Configure.
@@ -67,17 +38,17 @@ pub struct RemoteNode {
     given_up: bool,
 }
 
-impl RemoteNode {
-    /// For a run: `servo` as the board builds it, `configure` as a [`crate::ControlNode`] of the same run
+impl HostNode {
+    /// For a run: `servo` as the board builds it, `configure` as a [`crate::ControllerNode`] of the same run
     /// gives it. The board hears from the host each `alive_ns`; if nothing comes from it for `silent_ns`,
     /// control has ended for the host.
     #[must_use]
     pub fn new(servo: Servo<f32>, configure: Configure, alive_ns: u64, silent_ns: u64) -> Self {
-        RemoteNode {
+        HostNode {
             servo,
             configure,
             decoder: Decoder::new(),
-            told: Told::default(),
+            standing: Standing::default(),
             counts: LinkCounts::default(),
             controller: None,
             origin: None,
@@ -95,8 +66,8 @@ impl RemoteNode {
 
     /// Where control stands.
     #[must_use]
-    pub fn told(&self) -> &Told<f32> {
-        &self.told
+    pub fn standing(&self) -> &Standing<f32> {
+        &self.standing
     }
 
     /// What the board's own line has carried.
@@ -107,7 +78,7 @@ impl RemoteNode {
 
     /// The board, once it has answered.
     #[must_use]
-    pub fn controller(&self) -> Option<&Controller> {
+    pub fn controller(&self) -> Option<&ControllerHello> {
         self.controller.as_ref()
     }
 
@@ -162,18 +133,18 @@ impl RemoteNode {
 
     /// The line is gone. The board goes on until it misses its host.
     pub fn disconnect(&mut self) {
-        if matches!(self.told.state, State::Armed | State::Running) {
-            (self.told.state, self.told.cause) = (State::Faulted, Cause::Silence);
-        } else if self.told.state != State::Faulted {
-            self.told.state = State::Disconnected;
+        if matches!(self.standing.state, State::Armed | State::Running) {
+            (self.standing.state, self.standing.cause) = (State::Faulted, Cause::Silence);
+        } else if self.standing.state != State::Faulted {
+            self.standing.state = State::Disconnected;
         }
     }
 
     fn driving(&self) -> bool {
-        matches!(self.told.state, State::Armed | State::Running)
+        matches!(self.standing.state, State::Armed | State::Running)
     }
 
-    /// When [`RemoteNode::poll`] has to be called at the latest, ns.
+    /// When [`HostNode::poll`] has to be called at the latest, ns.
     #[must_use]
     pub fn poll_at(&self) -> Option<u64> {
         if self.asks_to_stop() {
@@ -223,9 +194,9 @@ impl RemoteNode {
         value: f32,
         notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
     ) {
-        let from = self.told.state;
-        (self.told.state, self.told.cause, self.told.value) = (state, cause, value);
-        notices(Notice::Ended(Ending { from, state, cause, value, tick: self.told.tick }));
+        let from = self.standing.state;
+        (self.standing.state, self.standing.cause, self.standing.value) = (state, cause, value);
+        notices(Notice::Ended(Ending { from, state, cause, value, tick: self.standing.tick }));
     }
 
     /// Bytes from the board. `path` is the planned path from position 0 on.
@@ -254,22 +225,22 @@ impl RemoteNode {
     ) {
         let (run, config) = (self.configure.run, self.configure.config);
         match message {
-            Message::Controller(m) => {
+            Message::ControllerHello(m) => {
                 self.controller = Some(*m);
-                notices(Notice::Controller(*m));
+                notices(Notice::ControllerHello(*m));
             }
             Message::Hello(m) => notices(Notice::Hello(*m)),
             Message::Taken(m) if m.run == run => notices(Notice::Taken(*m)),
             Message::Configured(m) if m.run == run && m.config == config => {
-                if self.told.state == State::Disconnected {
-                    self.told.state = State::Ready;
+                if self.standing.state == State::Disconnected {
+                    self.standing.state = State::Ready;
                     self.number = 0;
                 }
                 notices(Notice::Configured);
             }
             Message::Armed(m) if m.run == run && m.config == config => {
-                if self.told.state == State::Ready {
-                    self.told = Told { state: State::Armed, ..Told::default() };
+                if self.standing.state == State::Ready {
+                    self.standing = Standing { state: State::Armed, ..Standing::default() };
                     self.origin = None;
                     (self.heard_ns, self.due_ns) = (Some(now_ns), now_ns);
                 }
@@ -285,9 +256,9 @@ impl RemoteNode {
             Message::Telemetry(m) if m.run == run => self.telemetry(now_ns, m, path, notices),
             Message::Ended(m) if m.run == run => {
                 let Some((_, state)) = both_states(m.states) else { return };
-                let runs = self.driving() || self.told.state == State::Ready;
-                // Told again, it is not news.
-                if state != self.told.state && runs {
+                let runs = self.driving() || self.standing.state == State::Ready;
+                // Standing again, it is not news.
+                if state != self.standing.state && runs {
                     let cause = Cause::from_u8(m.cause).unwrap_or_default();
                     self.end(state, cause, f32::from_bits(m.value), notices);
                 }
@@ -302,9 +273,9 @@ impl RemoteNode {
                     duplicated: wide(m.duplicated),
                     reordered: wide(m.reordered),
                 };
-                self.told.lost = wide(m.lost);
-                self.told.rejected = wide(m.rejected);
-                self.told.deadline_misses = wide(m.deadline_misses);
+                self.standing.lost = wide(m.lost);
+                self.standing.rejected = wide(m.rejected);
+                self.standing.deadline_misses = wide(m.deadline_misses);
             }
             Message::Discover(_)
             | Message::Configure(_)
@@ -344,12 +315,12 @@ impl RemoteNode {
         let gap = m.number.wrapping_sub(self.number).wrapping_sub(1);
         // Half the range back is a frame that came twice.
         if gap < 0x8000 {
-            self.told.untold = self.told.untold.wrapping_add(u64::from(gap));
+            self.standing.untold = self.standing.untold.wrapping_add(u64::from(gap));
             self.number = m.number;
         }
         // The tick's high half is ours to know.
-        let ahead = m.tick.wrapping_sub(self.told.tick as u32).cast_signed();
-        let tick = self.told.tick.wrapping_add_signed(i64::from(ahead));
+        let ahead = m.tick.wrapping_sub(self.standing.tick as u32).cast_signed();
+        let tick = self.standing.tick.wrapping_add_signed(i64::from(ahead));
         if both_states(m.states).is_some_and(|(from, _)| from == State::Armed) {
             self.origin = Some(FixedCounts::from_counts(i64::from(m.counts)));
         }
@@ -370,10 +341,10 @@ impl RemoteNode {
         if self.driving() && ended {
             self.end(cycle.from, cycle.cause, cycle.value, notices);
         }
-        self.told.tick = tick;
-        self.told.state = cycle.state;
-        self.told.cause = cycle.cause;
-        self.told.value = cycle.value;
+        self.standing.tick = tick;
+        self.standing.state = cycle.state;
+        self.standing.cause = cycle.cause;
+        self.standing.value = cycle.value;
         notices(Notice::Cycle(notice));
     }
 }

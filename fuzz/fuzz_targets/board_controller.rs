@@ -14,8 +14,8 @@ use clutch_core::{
     Bounds, Counts, FixedCounts, Micros, PlantParams, SafeState, ServoParams, SupervisorParams, Tolerances,
 };
 use clutch_node::{
-    BoardNode, BoardParams, Built, ControlNode, ControlParams, Onboard, OnboardParams, Outbox, Ports,
-    RemoteNode, RunParams, SETTINGS, Settings, Standalone,
+    BoardController, BoardControllerParams, BoardNode, BoardParams, Built, ControllerNode, ControllerParams,
+    HostNode, OneChip, Outbox, Outboxes, RunParams, SETTINGS, Settings,
 };
 use clutch_wire::{Decoder, Message, StopReason, TABLE};
 use libfuzzer_sys::fuzz_target;
@@ -152,13 +152,13 @@ fn frames(out: &mut Outbox) -> (Vec<u8>, Vec<Message>) {
 struct Bench {
     settings: Settings,
     built: Built,
-    remote: RemoteNode,
-    onboard: Onboard,
-    ports: Ports,
+    host: HostNode,
+    board_controller: BoardController,
+    outboxes: Outboxes,
     board: BoardNode,
     up: Outbox,
-    chip: Standalone,
-    chip_remote: RemoteNode,
+    chip: OneChip,
+    chip_host: HostNode,
     now_us: u64,
     counts: i32,
     /// The highest code of the run's converter.
@@ -168,27 +168,27 @@ struct Bench {
 impl Bench {
     fn new((settings, built): (Settings, Built)) -> Bench {
         let n = &settings.numbers;
-        let params = ControlParams {
+        let params = ControllerParams {
             run: 5,
             config: 7,
             watchdog: Micros(n.watchdog_us),
             valid: Micros(n.valid_us),
             silence: Micros(n.silence_us),
         };
-        let configure = ControlNode::new(params, built.servo, built.supervisor).configuration();
-        let remote = RemoteNode::new(built.servo, configure, 20_000_000, 200_000_000);
-        let this = OnboardParams { board: 1, boot: 1, clock_hz: 1 };
+        let configure = ControllerNode::new(params, built.servo, built.supervisor).configuration();
+        let host = HostNode::new(built.servo, configure, 20_000_000, 200_000_000);
+        let this = BoardControllerParams { board: 1, boot: 1, clock_hz: 1 };
         Bench {
             top: ((1_u32 << n.dac_bits) - 1) as u16,
             settings,
             built,
-            chip_remote: remote.clone(),
-            remote,
-            onboard: Onboard::new(this),
-            ports: Ports::default(),
+            chip_host: host.clone(),
+            host,
+            board_controller: BoardController::new(this),
+            outboxes: Outboxes::default(),
             board: BoardNode::new(&BOARD).expect("a board"),
             up: Outbox::default(),
-            chip: Standalone::new(this, &BOARD).expect("a board"),
+            chip: OneChip::new(this, &BOARD).expect("a board"),
             now_us: 1 << 31,
             counts: 700,
         }
@@ -200,19 +200,19 @@ impl Bench {
 
     /// Bytes from the host, to both.
     fn host(&mut self, bytes: &[u8]) {
-        self.onboard.host(self.now_ns(), bytes, &mut self.ports);
+        self.board_controller.host(self.now_ns(), bytes, &mut self.outboxes);
         self.chip.host(self.now_us, bytes);
         self.settle();
     }
 
-    fn asks(&mut self, f: impl Fn(&mut RemoteNode, &mut Outbox)) {
+    fn asks(&mut self, f: impl Fn(&mut HostNode, &mut Outbox)) {
         for chip in [false, true] {
             let mut out = Outbox::default();
-            f(if chip { &mut self.chip_remote } else { &mut self.remote }, &mut out);
+            f(if chip { &mut self.chip_host } else { &mut self.host }, &mut out);
             if chip {
                 self.chip.host(self.now_us, out.as_bytes());
             } else {
-                self.onboard.host(self.now_ns(), out.as_bytes(), &mut self.ports);
+                self.board_controller.host(self.now_ns(), out.as_bytes(), &mut self.outboxes);
             }
         }
         self.settle();
@@ -224,7 +224,7 @@ impl Bench {
         let (path, points) = (&self.built.path, self.settings.points());
         let at = |tick| path.target(points, tick);
         for _ in 0..4 {
-            let (bytes, messages) = frames(&mut self.ports.daq);
+            let (bytes, messages) = frames(&mut self.outboxes.daq);
             for message in messages {
                 if let Message::Actuate(m) = message {
                     // A run of other settings may have another converter.
@@ -234,29 +234,29 @@ impl Bench {
             self.board.receive(self.now_us as u32, &bytes, &mut self.up);
             let (bytes, _) = frames(&mut self.up);
             if !bytes.is_empty() {
-                self.onboard.daq(now_ns, &bytes, &mut self.ports);
+                self.board_controller.daq(now_ns, &bytes, &mut self.outboxes);
             }
-            let (bytes, _) = frames(&mut self.ports.host);
-            self.remote.receive(now_ns, &bytes, &at, &mut |_| ());
+            let (bytes, _) = frames(&mut self.outboxes.host);
+            self.host.receive(now_ns, &bytes, &at, &mut |_| ());
             let (bytes, _) = frames(self.chip.to_host());
-            self.chip_remote.receive(now_ns, &bytes, &at, &mut |_| ());
-            if self.ports.daq.is_empty() {
+            self.chip_host.receive(now_ns, &bytes, &at, &mut |_| ());
+            if self.outboxes.daq.is_empty() {
                 break;
             }
         }
         for code in [self.board.code(), self.chip.code()] {
             assert!(code.0 < 1 << BOARD.dac_bits, "{code:?}");
         }
-        let word = self.onboard.last_word().map(|mut word| frames(&mut word).1.len());
-        assert_eq!(word, self.onboard.driving().then_some(1));
+        let word = self.board_controller.last_word().map(|mut word| frames(&mut word).1.len());
+        assert_eq!(word, self.board_controller.driving().then_some(1));
     }
 
     fn passes(&mut self, us: u64) {
         self.boards_pass(us);
         let now_ns = self.now_ns();
-        self.asks(|remote, out| {
-            remote.poll(now_ns, out, &mut |_| ());
-            assert!(remote.poll_at().is_none_or(|at| at > now_ns || now_ns > u64::MAX - 20_000_000));
+        self.asks(|host, out| {
+            host.poll(now_ns, out, &mut |_| ());
+            assert!(host.poll_at().is_none_or(|at| at > now_ns || now_ns > u64::MAX - 20_000_000));
         });
     }
 
@@ -264,9 +264,9 @@ impl Bench {
     fn boards_pass(&mut self, us: u64) {
         self.now_us = self.now_us.saturating_add(us);
         let now_ns = self.now_ns();
-        self.onboard.poll(now_ns, &mut self.ports);
+        self.board_controller.poll(now_ns, &mut self.outboxes);
         // At the end of all times there is no later.
-        assert!(self.onboard.poll_at().is_none_or(|at| at > now_ns || now_ns == u64::MAX));
+        assert!(self.board_controller.poll_at().is_none_or(|at| at > now_ns || now_ns == u64::MAX));
         self.board.poll(self.now_us as u32, &mut self.up);
         self.chip.poll(self.now_us);
         self.settle();
@@ -285,26 +285,24 @@ impl Bench {
             self.settle(); // else it waits for the next
         }
         let took = Micros(u32::from(faults) * 10);
-        self.onboard.spent(u32::from(faults));
-        self.onboard.answered(took);
+        self.board_controller.spent(u32::from(faults));
+        self.board_controller.answered(took);
         self.chip.answered(took);
     }
 
     fn acts(&mut self, input: &mut Input<'_>) {
         match input.byte() % 16 {
-            0 => self.asks(|remote, out| remote.discover(1, out)),
+            0 => self.asks(|host, out| host.discover(1, out)),
             1 => {
                 let mut all = Vec::new();
                 self.settings.each(|key, value| all.push((key, value)));
                 // The answers to so many have room.
                 for some in all.chunks(20) {
-                    self.asks(|remote, out| {
-                        some.iter().for_each(|(key, value)| remote.set(*key, *value, out))
-                    });
+                    self.asks(|host, out| some.iter().for_each(|(key, value)| host.set(*key, *value, out)));
                 }
             }
-            2 => self.asks(|remote, out| remote.configure(out)),
-            3 => self.asks(|remote, out| remote.arm(out)),
+            2 => self.asks(|host, out| host.configure(out)),
+            3 => self.asks(|host, out| host.arm(out)),
             4 => {
                 for _ in 0..input.byte() % 64 {
                     self.passes(1000);
@@ -331,7 +329,7 @@ impl Bench {
             10 => {
                 let done = input.byte() & 1 == 0;
                 let reason = if done { StopReason::Done } else { StopReason::Operator };
-                self.asks(|remote, out| remote.stop(reason, out));
+                self.asks(|host, out| host.stop(reason, out));
             }
             11 => {
                 let frame = input.frame();
@@ -339,25 +337,25 @@ impl Bench {
             }
             12 => {
                 let frame = input.frame();
-                self.onboard.daq(self.now_ns(), &frame, &mut self.ports);
+                self.board_controller.daq(self.now_ns(), &frame, &mut self.outboxes);
                 self.settle();
             }
             13 => {
                 let frame = input.frame();
                 let (path, points) = (&self.built.path, self.settings.points());
                 let at = |tick| path.target(points, tick);
-                self.remote.receive(self.now_us.saturating_mul(1000), &frame, &at, &mut |_| ());
+                self.host.receive(self.now_us.saturating_mul(1000), &frame, &at, &mut |_| ());
             }
             14 => {
                 let length = usize::from(input.byte());
                 let bytes = input.some(length);
                 self.host(&bytes);
-                self.onboard.daq(self.now_ns(), &bytes, &mut self.ports);
+                self.board_controller.daq(self.now_ns(), &bytes, &mut self.outboxes);
                 self.settle();
             }
             _ => {
                 let setting = (u16::from_le_bytes(input.take()), u64::from_le_bytes(input.take()));
-                self.asks(|remote, out| remote.set(setting.0, setting.1, out));
+                self.asks(|host, out| host.set(setting.0, setting.1, out));
             }
         }
     }

@@ -2,18 +2,19 @@
 //!
 //! ```text
 //!            Set… Configure Arm Stop Ping            Configure Arm Actuate Stop
-//!   host ────────────────────────────────► Onboard ───────────────────────────► encoder and
+//!   host ────────────────────────────────► BoardController ───────────────────────────► encoder and
 //!        ◄──────────────────────────────── (loop)  ◄─────────────────────────── converter
 //!          Taken Configured Armed Telemetry           Configured Armed Sample
 //! ```
 //!
-//! Towards encoder and converter it is a [`ControlNode`], the one that runs on Linux; they are a
-//! [`crate::BoardNode`] behind another serial line, or on the same chip ([`crate::Standalone`]). Towards
+//! Towards encoder and converter it is a [`ControllerNode`], the one that runs on Linux; they are a
+//! [`crate::BoardNode`] behind another serial line, or on the same chip ([`crate::OneChip`]). Towards
 //! the host it speaks the same protocol as a board, with settings before and telemetry instead of
 //! samples. A host that falls silent ends the run in the safe state.
 
 use crate::board::misunderstood;
-use crate::control::{ControlNode, ControlParams, Ending, Notice};
+use crate::controller::{ControllerNode, ControllerParams};
+use crate::notice::{Ending, Notice};
 use crate::outbox::Outbox;
 use crate::settings::{Built, MAX_KNOTS, Misfit, Path, SETTINGS_HASH, Settings};
 use crate::telemetry::{frame, states};
@@ -21,24 +22,24 @@ use clutch_core::law::LawTerms;
 use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Micros};
 use clutch_wire::{
-    Armed, BoardState, Configure, Configured, Controller, Decoder, Discover, Ended, Hello, Link, Message,
-    Pong, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Taken, VERSION,
+    Armed, BoardState, Configure, Configured, ControllerHello, Decoder, Discover, Ended, Hello, Link,
+    Message, Pong, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Taken, VERSION,
 };
 
 /// What a board in the controller role is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OnboardParams {
+pub struct BoardControllerParams {
     /// Its serial number; 0 and 1 are emulated boards.
     pub board: u32,
     /// A number that changes at each power-up.
     pub boot: u32,
-    /// What [`Onboard::spent`] counts, Hz; 0 if it is not called.
+    /// What [`BoardController::spent`] counts, Hz; 0 if it is not called.
     pub clock_hz: u32,
 }
 
 /// Frames on their way out.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Ports {
+pub struct Outboxes {
     /// To the host.
     pub host: Outbox,
     /// To encoder and converter.
@@ -51,7 +52,7 @@ const LINK_EVERY_NS: u64 = 1_000_000_000;
 /// A run that the host has configured.
 #[derive(Clone, Debug)]
 struct Run {
-    control: ControlNode<f32>,
+    control: ControllerNode<f32>,
     path: Path,
     number: u16,
     config: u64,
@@ -63,8 +64,8 @@ struct Run {
 
 /// The controller role's state machine. Times are the board's monotonic clock, ns.
 #[derive(Clone, Debug)]
-pub struct Onboard {
-    params: OnboardParams,
+pub struct BoardController {
+    params: BoardControllerParams,
     decoder: Decoder,
     settings: Settings,
     /// The run that the settings are for.
@@ -81,11 +82,11 @@ pub struct Onboard {
 
 type Cycle = Notice<f32, LawTerms<f32>>;
 
-impl Onboard {
+impl BoardController {
     /// A board at power-up.
     #[must_use]
-    pub fn new(params: OnboardParams) -> Self {
-        Onboard {
+    pub fn new(params: BoardControllerParams) -> Self {
+        BoardController {
             params,
             decoder: Decoder::new(),
             settings: Settings::default(),
@@ -133,7 +134,7 @@ impl Onboard {
         }
     }
 
-    /// When [`Onboard::poll`] has to be called at the latest, ns; none while nothing is awaited.
+    /// When [`BoardController::poll`] has to be called at the latest, ns; none while nothing is awaited.
     #[must_use]
     pub fn poll_at(&self) -> Option<u64> {
         let run = self.run.as_ref()?;
@@ -146,7 +147,7 @@ impl Onboard {
     }
 
     /// Looks at the clock: silence of encoder and converter, silence of the host.
-    pub fn poll(&mut self, now_ns: u64, out: &mut Ports) {
+    pub fn poll(&mut self, now_ns: u64, out: &mut Outboxes) {
         let Some(run) = &mut self.run else { return };
         let (number, mut ends) = (run.number, false);
         let host = &mut out.host;
@@ -166,7 +167,7 @@ impl Onboard {
     }
 
     /// Bytes from the host.
-    pub fn host(&mut self, now_ns: u64, bytes: &[u8], out: &mut Ports) {
+    pub fn host(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outboxes) {
         for byte in bytes {
             if let Some(Ok(message)) = self.decoder.push(*byte) {
                 self.message(now_ns, &message, out);
@@ -175,7 +176,7 @@ impl Onboard {
     }
 
     /// Bytes from encoder and converter.
-    pub fn daq(&mut self, now_ns: u64, bytes: &[u8], out: &mut Ports) {
+    pub fn daq(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outboxes) {
         let Some(run) = &mut self.run else {
             self.introduction(bytes, out);
             return;
@@ -210,7 +211,7 @@ impl Onboard {
                 host.push(&ended(number, &ending));
             }
             Notice::Hello(m) => hello = Some(m),
-            Notice::Controller(_) | Notice::Taken(_) | Notice::BadFrame(_) | Notice::Echo => {}
+            Notice::ControllerHello(_) | Notice::Taken(_) | Notice::BadFrame(_) | Notice::Echo => {}
         });
         if let Some(m) = hello {
             self.hello = Some(m);
@@ -234,7 +235,7 @@ impl Onboard {
     }
 
     /// Before there is a run: who are encoder and converter?
-    fn introduction(&mut self, bytes: &[u8], out: &mut Ports) {
+    fn introduction(&mut self, bytes: &[u8], out: &mut Outboxes) {
         for byte in bytes {
             match self.introduced.push(*byte) {
                 Some(Ok(Message::Hello(m))) => {
@@ -247,7 +248,7 @@ impl Onboard {
         }
     }
 
-    fn message(&mut self, now_ns: u64, message: &Message, out: &mut Ports) {
+    fn message(&mut self, now_ns: u64, message: &Message, out: &mut Outboxes) {
         match message {
             // What only a host says shows that it lives; an echo of this board's own words does not.
             Message::Discover(_)
@@ -296,12 +297,12 @@ impl Onboard {
         self.run.as_ref().map_or(0, |r| r.number)
     }
 
-    fn discover(&mut self, m: &Discover, out: &mut Ports) {
+    fn discover(&mut self, m: &Discover, out: &mut Outboxes) {
         if let Some(refused) = misunderstood(m) {
             out.host.push(&Message::Refused(refused));
             return;
         }
-        out.host.push(&Message::Controller(Controller {
+        out.host.push(&Message::ControllerHello(ControllerHello {
             nonce: m.nonce,
             version: VERSION,
             schema: SCHEMA,
@@ -342,7 +343,7 @@ impl Onboard {
         });
     }
 
-    fn configure(&mut self, now_ns: u64, m: &Configure, out: &mut Ports) -> Result<(), (Refusal, u32)> {
+    fn configure(&mut self, now_ns: u64, m: &Configure, out: &mut Outboxes) -> Result<(), (Refusal, u32)> {
         if self.driving() {
             return Err((Refusal::State, self.state() as u32));
         }
@@ -355,14 +356,14 @@ impl Onboard {
             Misfit::Param(e) => (Refusal::Unfit, e.value.to_bits()),
         })?;
         let n = &self.settings.numbers;
-        let params = ControlParams {
+        let params = ControllerParams {
             run: m.run,
             config: m.config,
             watchdog: Micros(n.watchdog_us),
             valid: Micros(n.valid_us),
             silence: Micros(n.silence_us),
         };
-        let mut control = ControlNode::new(params, built.servo, built.supervisor);
+        let mut control = ControllerNode::new(params, built.servo, built.supervisor);
         // What the host asks for and what the settings say is one run, or none.
         if control.configuration() != *m {
             return Err((Refusal::Differs, 0));
@@ -381,7 +382,7 @@ impl Onboard {
         Ok(())
     }
 
-    fn stop(&mut self, m: &Stop, out: &mut Ports) {
+    fn stop(&mut self, m: &Stop, out: &mut Outboxes) {
         let Some(run) = self.run.as_mut().filter(|r| r.number == m.run) else { return };
         let reason = if m.reason == StopReason::Done as u8 { StopReason::Done } else { StopReason::Operator };
         if !run.end(reason, out) {
@@ -397,7 +398,7 @@ impl Run {
     }
 
     /// Ends control as wanted and tells the host; whether there was anything to end.
-    fn end(&mut self, reason: StopReason, out: &mut Ports) -> bool {
+    fn end(&mut self, reason: StopReason, out: &mut Outboxes) -> bool {
         let from = self.control.state().state();
         self.control.stop(reason, &mut out.daq);
         let ends = self.control.state().state() != from;

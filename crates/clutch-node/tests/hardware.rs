@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
 use clutch_core::{Counts, DacCode, Micros};
-use clutch_node::{Acquisition, BoardParams, Hardware, Outbox, Role, WideCounter, receive, tick};
+use clutch_node::{BoardParams, DaqBoard, Hardware, Outbox, Role, WideCounter, receive, tick};
 use clutch_wire::{Actuate, Arm, Configure, Decoder, Message, SafeKind, Sample, encode};
 use core::mem::take;
 use proptest::prelude::*;
@@ -96,8 +96,8 @@ impl Desk {
     }
 }
 
-fn driving() -> (Acquisition, Desk) {
-    let (mut board, mut desk) = (Acquisition::new(&PARAMS).unwrap(), Desk::default());
+fn driving() -> (DaqBoard, Desk) {
+    let (mut board, mut desk) = (DaqBoard::new(&PARAMS).unwrap(), Desk::default());
     desk.hears(&mut board, &Message::Configure(CONFIGURE));
     desk.hears(&mut board, &Message::Arm(Arm { run: 5, config: 7 }));
     (board, desk)
@@ -121,7 +121,7 @@ fn a_period_puts_its_code_out_before_it_feeds_the_watchdog_and_that_before_it_se
 
 #[test]
 fn before_a_host_has_come_a_period_holds_the_power_up_output_feeds_the_watchdog_and_says_nothing() {
-    let (mut board, mut desk) = (Acquisition::new(&PARAMS).unwrap(), Desk::default());
+    let (mut board, mut desk) = (DaqBoard::new(&PARAMS).unwrap(), Desk::default());
     assert_eq!(board.period_us(), None);
     assert_eq!(desk.ticks(&mut board), [Done::Sampled, Done::PutOut(BOOT_CODE), Done::FedWatchdog]);
 }

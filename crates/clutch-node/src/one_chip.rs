@@ -1,7 +1,7 @@
 //! Controller, encoder and converter on one chip.
 
 use crate::board::{BoardNode, BoardParams};
-use crate::onboard::{Onboard, OnboardParams, Ports};
+use crate::board_controller::{BoardController, BoardControllerParams, Outboxes};
 use crate::outbox::Outbox;
 use clutch_core::{Counts, DacCode, Micros, ParamError};
 use clutch_wire::BoardState;
@@ -10,26 +10,26 @@ use clutch_wire::BoardState;
 /// quarrel, and waits for the next call.
 const ROUNDS: u32 = 4;
 
-/// An [`Onboard`] that drives a [`BoardNode`] in the same memory. Both speak as over a line, so that
+/// An [`BoardController`] that drives a [`BoardNode`] in the same memory. Both speak as over a line, so that
 /// what was shown for one is shown for the other. Times are the chip's clock since power-up, µs.
 #[derive(Clone, Debug)]
-pub struct Standalone {
-    controller: Onboard,
+pub struct OneChip {
+    controller: BoardController,
     board: BoardNode,
-    ports: Ports,
+    outboxes: Outboxes,
     up: Outbox,
 }
 
-impl Standalone {
+impl OneChip {
     /// A chip at power-up.
     ///
     /// # Errors
     /// As [`BoardNode::new`].
-    pub fn new(controller: OnboardParams, board: &BoardParams) -> Result<Self, ParamError<f64>> {
-        Ok(Standalone {
-            controller: Onboard::new(controller),
+    pub fn new(controller: BoardControllerParams, board: &BoardParams) -> Result<Self, ParamError<f64>> {
+        Ok(OneChip {
+            controller: BoardController::new(controller),
             board: BoardNode::new(board)?,
-            ports: Ports::default(),
+            outboxes: Outboxes::default(),
             up: Outbox::default(),
         })
     }
@@ -51,13 +51,13 @@ impl Standalone {
 
     /// Bytes from the host.
     pub fn host(&mut self, now_us: u64, bytes: &[u8]) {
-        self.controller.host(now_us.saturating_mul(1000), bytes, &mut self.ports);
+        self.controller.host(now_us.saturating_mul(1000), bytes, &mut self.outboxes);
         self.settle(now_us);
     }
 
     /// Looks at the clock.
     pub fn poll(&mut self, now_us: u64) {
-        self.controller.poll(now_us.saturating_mul(1000), &mut self.ports);
+        self.controller.poll(now_us.saturating_mul(1000), &mut self.outboxes);
         self.board.poll(now_us as u32, &mut self.up);
         self.settle(now_us);
     }
@@ -65,13 +65,13 @@ impl Standalone {
     /// Frames between the two, until neither has more to say.
     fn settle(&mut self, now_us: u64) {
         for _ in 0..ROUNDS {
-            if self.up.is_empty() && self.ports.daq.is_empty() {
+            if self.up.is_empty() && self.outboxes.daq.is_empty() {
                 return;
             }
-            self.controller.daq(now_us.saturating_mul(1000), self.up.as_bytes(), &mut self.ports);
+            self.controller.daq(now_us.saturating_mul(1000), self.up.as_bytes(), &mut self.outboxes);
             self.up.clear();
-            self.board.receive(now_us as u32, self.ports.daq.as_bytes(), &mut self.up);
-            self.ports.daq.clear();
+            self.board.receive(now_us as u32, self.outboxes.daq.as_bytes(), &mut self.up);
+            self.outboxes.daq.clear();
         }
     }
 
@@ -95,7 +95,7 @@ impl Standalone {
 
     /// Frames for the host.
     pub fn to_host(&mut self) -> &mut Outbox {
-        &mut self.ports.host
+        &mut self.outboxes.host
     }
 
     /// Clock cycles that the last tick took.

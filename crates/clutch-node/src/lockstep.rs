@@ -8,7 +8,7 @@
 //! All little-endian. Whoever sends a request decides how long it is until the next, so that a run is
 //! the same however fast the machine is.
 
-use crate::onboard::{Onboard, Ports};
+use crate::board_controller::{BoardController, Outboxes};
 use clutch_core::Micros;
 
 /// Bytes before those that are carried.
@@ -72,21 +72,25 @@ impl<'a> Exchange<'a> {
 }
 
 /// A controller's answer: what has arrived goes in, what is due comes out.
-pub fn answer<'p>(node: &mut Onboard, request: &Exchange<'_>, ports: &'p mut Ports) -> Exchange<'p> {
-    ports.host.clear();
-    ports.daq.clear();
+pub fn answer<'p>(
+    node: &mut BoardController,
+    request: &Exchange<'_>,
+    outboxes: &'p mut Outboxes,
+) -> Exchange<'p> {
+    outboxes.host.clear();
+    outboxes.daq.clear();
     if request.lateness_us > 0 {
         node.answered(Micros(request.lateness_us));
     }
-    node.host(request.time_ns, request.host, ports);
+    node.host(request.time_ns, request.host, outboxes);
     if !request.daq.is_empty() {
-        node.daq(request.time_ns, request.daq, ports);
+        node.daq(request.time_ns, request.daq, outboxes);
     }
-    node.poll(request.time_ns, ports);
+    node.poll(request.time_ns, outboxes);
     Exchange {
         time_ns: node.poll_at().unwrap_or(u64::MAX),
         lateness_us: 0,
-        host: ports.host.as_bytes(),
-        daq: ports.daq.as_bytes(),
+        host: outboxes.host.as_bytes(),
+        daq: outboxes.daq.as_bytes(),
     }
 }

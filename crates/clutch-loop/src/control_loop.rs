@@ -11,18 +11,18 @@
 //! Between its first and its last cycle the control thread allocates nothing, takes no lock, and
 //! makes no system call but the wait for the next sample, the read and the write.
 
-use crate::end::{End, Tells};
 use crate::port::{Port, PortError};
 use crate::preflight::ClockOffset;
 use crate::realtime::{
     CycleStats, CycleSummary, Readiness, RealtimeOptions, WaitMode, enter, monotonic_ns, sleep_until,
     wait_readable,
 };
-use crate::records;
+use crate::station::{Station, StationNotice};
+use crate::to_log;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Micros, Real, StickSlip, StickSlipState};
 use clutch_log::{EventKind, EventRecord, Header, LogError, LogWriter, Record};
-use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Told};
+use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Standing};
 use clutch_sim::Metrics;
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
 use clutch_wire::{Refused, StopReason};
@@ -138,8 +138,8 @@ const LOG_FLUSH: Duration = Duration::from_millis(60);
 /// How long the control thread waits for the board to say that it is safe.
 const FAREWELL: Duration = Duration::from_millis(300);
 
-struct Control<'a, E: End> {
-    end: &'a mut E,
+struct Control<'a, S: Station> {
+    station: &'a mut S,
     port: &'a mut Port,
     ring: Option<Ring>,
     watch: &'a Watch,
@@ -147,7 +147,7 @@ struct Control<'a, E: End> {
     ticks: u64,
     start_ns: u64,
     radians: f64,
-    dac: clutch_core::Dac<E::Scalar>,
+    dac: clutch_core::Dac<S::Scalar>,
     period: f64,
     settle: f64,
     clock: ClockOffset,
@@ -187,7 +187,7 @@ struct Batch<T, X> {
     refused: Option<Refused>,
 }
 
-impl<E: End> Control<'_, E> {
+impl<S: Station> Control<'_, S> {
     fn push(&mut self, records: &[Record]) {
         let Some(ring) = &mut self.ring else { return };
         // A sample and its command together or not at all; after a gap its event comes first.
@@ -218,7 +218,7 @@ impl<E: End> Control<'_, E> {
     fn cycle(&mut self, arrived_ns: u64, buffer: &mut [u8]) -> Result<(), std::io::Error> {
         let count = self.port.read(buffer)?;
         let bytes = buffer.get(..count).unwrap_or(&[]);
-        if !E::IS_CONTROLLER {
+        if !S::LOOKS_ON {
             return self.hear(arrived_ns, bytes);
         }
         for frame in bytes.split_inclusive(|byte| *byte == 0) {
@@ -229,7 +229,7 @@ impl<E: End> Control<'_, E> {
 
     fn hear(&mut self, arrived_ns: u64, bytes: &[u8]) -> Result<(), std::io::Error> {
         let now = monotonic_ns();
-        let mut batch = Batch::<E::Scalar, E::Terms> {
+        let mut batch = Batch::<S::Scalar, S::Terms> {
             cycles: [const { None }; 32],
             used: 0,
             ended: None,
@@ -239,7 +239,7 @@ impl<E: End> Control<'_, E> {
         };
         let mut lost_records = 0;
         {
-            let mut notices = |n: Tells<E>| match n {
+            let mut notices = |n: StationNotice<S>| match n {
                 Notice::Cycle(n) => match batch.cycles.get_mut(batch.used) {
                     Some(slot) => {
                         *slot = Some(n);
@@ -254,11 +254,11 @@ impl<E: End> Control<'_, E> {
                 Notice::Refused(m) => batch.refused = Some(m),
                 _ => {}
             };
-            self.end.receive(now, bytes, &mut self.out, &mut notices);
-            self.end.poll(now, &mut self.out, &mut notices);
+            self.station.receive(now, bytes, &mut self.out, &mut notices);
+            self.station.poll(now, &mut self.out, &mut notices);
         }
         // A cycle that the board did not tell of is missing like one that the log did not take.
-        let untold = self.end.told().untold;
+        let untold = self.station.standing().untold;
         lost_records += 2 * untold.saturating_sub(self.untold);
         self.untold = untold;
         self.dropped += if self.ring.is_some() { lost_records } else { 0 };
@@ -270,9 +270,9 @@ impl<E: End> Control<'_, E> {
             // clock of a patient board waits for a stalled machine, so that it says nothing of that.
             let due = self.last_arrival_ns.filter(|_| !self.patient).map(|t| t + self.period_ns);
             let late = done.saturating_sub(due.unwrap_or(arrived_ns).min(arrived_ns));
-            self.end.answered(Micros(u32::try_from(late / 1000).unwrap_or(u32::MAX)));
+            self.station.answered(Micros(u32::try_from(late / 1000).unwrap_or(u32::MAX)));
             let answered = batch.cycles.iter().take(batch.used).flatten().any(|n| n.cycle.answer.is_some());
-            if answered && !E::IS_CONTROLLER {
+            if answered && !S::LOOKS_ON {
                 self.response.record(took);
                 if let Some(last) = self.last_answer_ns {
                     self.interval.record(done.saturating_sub(last));
@@ -298,16 +298,16 @@ impl<E: End> Control<'_, E> {
     }
 
     /// What need not be done before the answer is on its way: log, figures, watcher.
-    fn after(&mut self, now: u64, batch: &Batch<E::Scalar, E::Terms>) {
+    fn after(&mut self, now: u64, batch: &Batch<S::Scalar, S::Terms>) {
         let time_ns = now.saturating_sub(self.start_ns);
         self.refused = self.refused.or(batch.refused);
         // What came before consent is not of the run.
-        let of_run = |n: &&CycleNotice<E::Scalar, E::Terms>| n.cycle.from != State::Ready;
+        let of_run = |n: &&CycleNotice<S::Scalar, S::Terms>| n.cycle.from != State::Ready;
         for n in batch.cycles.iter().take(batch.used).flatten().filter(of_run) {
             let age = self.clock.age_us(n.sample.time_us, now);
-            let mut records = [Record::Sample(records::sample(time_ns, age, n)); 3];
-            records[1] = Record::Command(records::command(time_ns, &n.cycle, &self.dac, self.radians));
-            let change = records::change(time_ns, &n.cycle);
+            let mut records = [Record::Sample(to_log::sample(time_ns, age, n)); 3];
+            records[1] = Record::Command(to_log::command(time_ns, &n.cycle, &self.dac, self.radians));
+            let change = to_log::change(time_ns, &n.cycle);
             let used = if let Some(change) = change {
                 records[2] = change;
                 3
@@ -316,7 +316,7 @@ impl<E: End> Control<'_, E> {
             };
             self.push(&records[..used]);
             self.board_safe |= matches!(n.sample.status & 0x07, 4 | 5);
-            if E::IS_CONTROLLER {
+            if S::LOOKS_ON {
                 self.on_the_board(n);
             }
             if let Some(out) = &n.cycle.output {
@@ -337,7 +337,7 @@ impl<E: End> Control<'_, E> {
         }
         self.board_safe |= batch.stopped;
         if let Some(ending) = batch.ended.filter(|e| e.from != State::Ready) {
-            self.push(&[records::ended(time_ns, &ending)]);
+            self.push(&[to_log::ended(time_ns, &ending)]);
         }
         if let (Some((nonce, time_us)), Some((sent, sent_ns))) = (batch.pong, self.ping_sent)
             && nonce == sent
@@ -349,7 +349,7 @@ impl<E: End> Control<'_, E> {
             }
             self.ping_sent = None;
         }
-        let state = self.end.told();
+        let state = self.station.standing();
         let w = self.watch;
         w.state.store(state.state as u8, Ordering::Relaxed);
         w.tick.store(state.tick, Ordering::Relaxed);
@@ -358,7 +358,7 @@ impl<E: End> Control<'_, E> {
     }
 
     /// What the board tells of its own times: those of its answers, its samples, its ticks.
-    fn on_the_board(&mut self, n: &CycleNotice<E::Scalar, E::Terms>) {
+    fn on_the_board(&mut self, n: &CycleNotice<S::Scalar, S::Terms>) {
         if n.cycle.answer.is_none() {
             return;
         }
@@ -373,25 +373,25 @@ impl<E: End> Control<'_, E> {
 
     /// Once a second: the link's counters, the board's clock.
     fn housekeeping(&mut self, now: u64) {
-        let state = self.end.told();
+        let state = self.station.standing();
         let others = (state.lost, state.rejected, state.deadline_misses, self.dropped);
-        let link = records::link(now.saturating_sub(self.start_ns), state.tick, self.end.counts(), others);
+        let link = to_log::link(now.saturating_sub(self.start_ns), state.tick, self.station.counts(), others);
         self.push(&[Record::Link(link)]);
         self.pings = self.pings.wrapping_add(1);
-        self.end.ping(self.pings, &mut self.out);
+        self.station.ping(self.pings, &mut self.out);
         self.ping_sent = Some((self.pings, now));
     }
 
     fn stop(&mut self, reason: StopReason) {
-        let from = self.end.told().state;
-        self.end.stop(reason, &mut self.out);
-        if E::IS_CONTROLLER {
+        let from = self.station.standing().state;
+        self.station.stop(reason, &mut self.out);
+        if S::LOOKS_ON {
             return; // the board says when it has ended
         }
-        let Told { state, cause, value, tick, .. } = self.end.told();
+        let Standing { state, cause, value, tick, .. } = self.station.standing();
         if from != State::Ready {
             let now = monotonic_ns().saturating_sub(self.start_ns);
-            self.push(&[records::ended(now, &Ending { from, state, cause, value, tick })]);
+            self.push(&[to_log::ended(now, &Ending { from, state, cause, value, tick })]);
         }
     }
 }
@@ -456,9 +456,9 @@ impl LogThread {
 }
 
 /// Everything that a run needs, after the pre-flight: the board is configured.
-pub struct Configured<'a, E> {
-    /// The controller's end.
-    pub end: &'a mut E,
+pub struct ConfiguredRun<'a, S> {
+    /// This machine's station.
+    pub station: &'a mut S,
     /// The open port.
     pub port: &'a mut Port,
     /// Where records go, if anywhere.
@@ -476,9 +476,9 @@ pub struct Configured<'a, E> {
 }
 
 /// Gives consent and runs the cycles until the path's end, a stop, or a fault, on the calling thread.
-pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> LoopReport {
-    let (encoder, period) = (configured.end.encoder(), configured.end.period());
-    let dac = *configured.end.dac();
+pub fn run<S: Station>(configured: ConfiguredRun<'_, S>, options: &LoopOptions) -> LoopReport {
+    let (encoder, period) = (configured.station.encoder(), configured.station.period());
+    let dac = *configured.station.dac();
     let seconds: f64 = period.seconds();
     let period_ns = u64::from(period.0) * 1000;
     let mut buffer = [0_u8; 2048];
@@ -516,7 +516,7 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
         board_safe: false,
         refused: None,
         cut: 0,
-        end: configured.end,
+        station: configured.station,
         port: configured.port,
     };
     (options.hooks.0)();
@@ -532,7 +532,7 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
     loop {
         // Wait.
         let arrived = match options.pace {
-            _ if c.end.told().state == State::Ready => {
+            _ if c.station.standing().state == State::Ready => {
                 let now = monotonic_ns();
                 let unasked = ask_again == 0;
                 let leave = now >= give_up || c.watch.stop.load(Ordering::Relaxed);
@@ -547,7 +547,7 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
                     }
                 } else if now >= ask_again {
                     ask_again = now + 100_000_000;
-                    c.end.arm(&mut c.out);
+                    c.station.arm(&mut c.out);
                 }
                 if let Err(error) = c.send() {
                     port_error = Some(error);
@@ -557,7 +557,7 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
                 monotonic_ns()
             }
             Pace::Sample => {
-                let until = c.end.poll_at().unwrap_or_else(|| monotonic_ns() + 20_000_000);
+                let until = c.station.poll_at().unwrap_or_else(|| monotonic_ns() + 20_000_000);
                 // Spinning is for the moment at which the sample is due; one that is overdue is slept for.
                 let (until, mode) = match (mode, c.last_answer_ns) {
                     (WaitMode::SleepSpin { spin_us }, Some(last)) => {
@@ -597,15 +597,15 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
         }
         // Ends.
         let now = monotonic_ns();
-        match c.end.told().state {
+        match c.station.standing().state {
             State::Ready => {}
             State::Running | State::Armed => {
                 c.begun = true;
                 if c.watch.stop.load(Ordering::Relaxed) {
                     c.stop(StopReason::Operator);
-                } else if !E::IS_CONTROLLER
-                    && c.end.told().state == State::Running
-                    && c.end.told().tick + 1 >= c.ticks
+                } else if !S::LOOKS_ON
+                    && c.station.standing().state == State::Running
+                    && c.station.standing().tick + 1 >= c.ticks
                 {
                     c.stop(StopReason::Done);
                 } else if now >= next_second {
@@ -627,9 +627,9 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
     }
     (options.hooks.1)();
     let port_error = port_error.map(|e| {
-        let from = c.end.told().state;
-        c.end.disconnect();
-        let state = c.end.told();
+        let from = c.station.standing().state;
+        c.station.disconnect();
+        let state = c.station.standing();
         let now = monotonic_ns().saturating_sub(c.start_ns);
         let record = EventRecord {
             tick: state.tick,
@@ -647,7 +647,7 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
     let now = monotonic_ns();
     c.housekeeping(now);
     c.out.clear();
-    let state = c.end.told();
+    let state = c.station.standing();
     let mut metrics = c.figures.finish();
     let measured = metrics.measured_s.max(seconds);
     // On hardware the encoder's silence is all that is seen of sticking.
@@ -661,7 +661,7 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
         value: state.value.to_f64(),
         ticks: c.answers,
         metrics,
-        link: *c.end.counts(),
+        link: *c.station.counts(),
         lost: state.lost,
         implausible: state.rejected,
         deadline_misses: state.deadline_misses,
@@ -674,7 +674,7 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
         log_dropped: c.dropped.saturating_sub(2 * c.untold),
         cut_writes: c.cut,
         begun: c.begun,
-        on_the_board: E::IS_CONTROLLER,
+        on_the_board: S::LOOKS_ON,
         board_safe: c.board_safe,
         refused: c.refused,
         port_error,
