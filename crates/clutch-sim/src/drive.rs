@@ -119,10 +119,13 @@ impl Drive {
             DriveParams::Spring(SpringDrive { stiffness, rest }) => {
                 Ok(Drive::Spring { stiffness: *stiffness, rest: *rest })
             }
-            DriveParams::Table(TableDrive { points: Points(points) }) => {
-                Ok(Drive::Table(points.clone()))
-            }
-            DriveParams::Hand(HandDrive { mean, rms, lowest_frequency: lowest, highest_frequency: highest }) => {
+            DriveParams::Table(TableDrive { points: Points(points) }) => Ok(Drive::Table(points.clone())),
+            DriveParams::Hand(HandDrive {
+                mean,
+                rms,
+                lowest_frequency: lowest,
+                highest_frequency: highest,
+            }) => {
                 let mut rng = Pcg64::seed_from_u64(seed ^ 0x6861_6e64); // a stream apart from the noise
                 let amplitude = rms * libm::sqrt(2.0 / f64::from(HAND_SINES));
                 let width = (highest - lowest) / f64::from(HAND_SINES);
@@ -198,7 +201,9 @@ mod tests {
 
     #[test]
     fn a_table_is_straight_between_its_points_and_constant_outside() {
-        let d = Drive::new(&DriveParams::Table(TableDrive { points: Points(vec![(1.0, 0.1), (2.0, 0.3)]) }), 0).unwrap();
+        let d =
+            Drive::new(&DriveParams::Table(TableDrive { points: Points(vec![(1.0, 0.1), (2.0, 0.3)]) }), 0)
+                .unwrap();
         assert_eq!(d.torque(0.0, 0.0), 0.1);
         assert!((d.torque(1.25, 0.0) - 0.15).abs() < 1e-15);
         assert_eq!(d.torque(9.0, 0.0), 0.3);

@@ -9,9 +9,9 @@ use crate::metrics::Metrics;
 use crate::progress::{Progress, Report};
 use crate::rig::RigParams;
 use crate::run::{RunError, RunSpec, simulate};
+use clutch_core::PlantParams;
 use clutch_core::law::{CtcParams, LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;
-use clutch_core::{PlantParams, StribeckParams};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -160,7 +160,7 @@ fn spec(column: Column, law: PaperLaw, rate_deg_s: f64, seed: u64) -> RunSpec<'s
         Column::Experiment => bench.clone(),
         Column::KnownFriction => RigParams { ripple: None, delay_ticks: 0, ..bench.clone() },
     };
-    let mut spec = RunSpec::new(rig, law.params(), ReferenceParams::Ramp(rate_deg_s.to_radians()));
+    let mut spec = RunSpec::new(rig, law.params(), ReferenceParams::ramp(rate_deg_s.to_radians()));
     if column == Column::KnownFriction {
         spec.model = known_model(&bench);
     }
@@ -170,13 +170,13 @@ fn spec(column: Column, law: PaperLaw, rate_deg_s: f64, seed: u64) -> RunSpec<'s
 
 /// The bench's plant as a law would know it after a perfect measurement.
 fn known_model(bench: &RigParams) -> PlantParams {
-    let friction: StribeckParams = bench.friction;
+    let friction = bench.friction;
     let drive = crate::drive::Drive::new(&bench.drive, 0).map_or(0.0, |d| d.torque(0.0, 0.0));
     PlantParams {
         inertia: bench.inertia,
         drive_torque: drive,
         viscous_damping: bench.viscous_damping,
-        brake_gain: bench.brake_gain,
+        brake_gain: bench.gain().unwrap_or(f64::NAN),
         friction,
     }
 }
@@ -370,7 +370,7 @@ fn claims(m: &Measured) -> Vec<Claim> {
     let none = at_most(0.0);
 
     let sampled = RigParams::paper();
-    let one_count = 360.0 / f64::from(sampled.counts_per_rev);
+    let one_count = 360.0 / f64::from(sampled.encoder.sensor.counts_per_rev);
     let torque = PlantParams::<f64>::default().drive_torque;
     let slow = [10.0, 6.0, 2.0];
 
@@ -402,7 +402,7 @@ fn claims(m: &Measured) -> Vec<Claim> {
         claim(
             "s4-converter",
             "The output goes through a 12-bit converter",
-            f64::from(sampled.dac.bits),
+            f64::from(sampled.dac.converter.bits),
             "bits",
             around(12.0, 0.0),
             "both rigs; over ±10 V, which the paper does not print",

@@ -5,8 +5,8 @@ use crate::metrics::{Metrics, MetricsBuilder, MetricsSample};
 use crate::moving_rig::MovingRig;
 use crate::progress::{Progress, Report, UNWATCHED};
 use crate::rig::{Rig, RigParams};
-use clutch_core::params::{Range, Table};
 use clutch_core::law::{ControlLaw, LawParams, Limit, OutputParams, Terms};
+use clutch_core::params::{Range, Table};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
     Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, ServoState, StickSlip,
@@ -293,11 +293,6 @@ pub struct Trace {
 impl Trace {
     /// Without samples, and with room for so many: growing copies everything, again and again.
     fn with_room(n: u64) -> Result<Self, RunError> {
-        fn room<T>(n: u64) -> Result<Vec<T>, RunError> {
-            let mut column = Vec::new();
-            let fits = usize::try_from(n).is_ok_and(|n| column.try_reserve_exact(n).is_ok());
-            if fits { Ok(column) } else { Err(RunError::Memory(n)) }
-        }
         Ok(Trace {
             time: room(n)?,
             target_position: room(n)?,
@@ -319,6 +314,13 @@ impl Trace {
             terms: Vec::new(),
         })
     }
+}
+
+/// A column with room for so many samples.
+fn room<T>(n: u64) -> Result<Vec<T>, RunError> {
+    let mut column = Vec::new();
+    let fits = usize::try_from(n).is_ok_and(|n| column.try_reserve_exact(n).is_ok());
+    if fits { Ok(column) } else { Err(RunError::Memory(n)) }
 }
 
 /// A run's outcome.
@@ -470,4 +472,3 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
         (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured;
     Ok(Run { trace, events, metrics, detected, engine })
 }
-

@@ -6,8 +6,8 @@
 //! J. R. Dormand, P. J. Prince, A family of embedded Runge–Kutta formulae, J. Comp. Appl. Math.
 //! 6 (1980) 19–26.
 
-use clutch_core::friction::FrictionModel;
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, break_away};
+use clutch_core::friction::FrictionModel;
 
 /// Error allowed per step: relative, and absolute in rad and rad/s.
 const TOLERANCE: f64 = 1e-11;

@@ -16,8 +16,8 @@
 //!    that end at fixed multiples of `v_s`, where the curve bends.
 //! 3. stuck: nothing to integrate; break-away is a comparison.
 
-use clutch_core::friction::FrictionModel;
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, Volts, break_away};
+use clutch_core::friction::FrictionModel;
 
 /// Speed, in Stribeck velocities, above which the exponential is lost in rounding.
 const LINEAR_ABOVE: f64 = 37.0;

@@ -10,7 +10,12 @@ use toml::{Table, Value};
 ///
 /// # Errors
 /// The first thing that is wrong, with its whole key.
-pub(crate) fn complete(origin: &str, path: &str, info: &'static Info, table: &mut Table) -> Result<(), ScenarioError> {
+pub(crate) fn complete(
+    origin: &str,
+    path: &str,
+    info: &'static Info,
+    table: &mut Table,
+) -> Result<(), ScenarioError> {
     match info {
         Info::Table(info) => complete_table(origin, path, info, table),
         Info::Choice(info) => complete_choice(origin, path, info, table),
@@ -75,7 +80,9 @@ pub(crate) fn complete_table(
                 (Some(other), _) => {
                     let expected = match info {
                         Info::Table(_) => "a table".to_owned(),
-                        Info::Choice(c) => format!("a table that names a choice, as [{at}.{}]", c.options[0].key),
+                        Info::Choice(c) => {
+                            format!("a table that names a choice, as [{at}.{}]", c.options[0].key)
+                        }
                     };
                     return Err(ScenarioError::value(origin, &at, &shown(&other), &expected));
                 }
@@ -159,11 +166,11 @@ fn unknown_key(
     path: &str,
     unknown: &str,
     value: Option<&Value>,
-    keys: &[(&'static str, Entry)],
+    known: &[(&'static str, Entry)],
 ) -> ScenarioError {
-    let names: Vec<String> = keys.iter().map(|(key, _)| (*key).to_owned()).collect();
+    let names: Vec<String> = known.iter().map(|(key, _)| (*key).to_owned()).collect();
     // The key may have moved into a choice below.
-    let moved = keys.iter().find_map(|(key, entry)| match entry {
+    let moved = known.iter().find_map(|(key, entry)| match entry {
         Entry::Below(Info::Choice(choice), _) => choice.options.iter().find_map(|option| {
             let there = keys(option.table).iter().any(|(k, _)| *k == unknown);
             there.then(|| format!(": did you mean {}.{}.{unknown}?", join(path, key), option.key))
@@ -187,7 +194,8 @@ fn in_kind(kind: Kind, value: Value) -> Value {
 /// The value, if it is of the row's kind and in its range.
 pub(crate) fn checked(origin: &str, at: &str, row: &Row, value: Value) -> Result<Value, ScenarioError> {
     let expected = || row.range.words(row.kind, &row.unit, false).to_string();
-    let wrong = |value: &Value, expected: &str| Err(ScenarioError::value(origin, at, &shown(value), expected));
+    let wrong =
+        |value: &Value, expected: &str| Err(ScenarioError::value(origin, at, &shown(value), expected));
     let number = |x: f64| row.range.holds(&clutch_core::params::NONE, x);
     let value = in_kind(row.kind, value);
     match (row.kind, &value) {
@@ -220,7 +228,7 @@ pub(crate) fn checked(origin: &str, at: &str, row: &Row, value: Value) -> Result
 }
 
 /// Two numbers.
-pub(super) fn pair(value: &Value) -> Option<(f64, f64)> {
+pub(crate) fn pair(value: &Value) -> Option<(f64, f64)> {
     let number = |v: &Value| v.as_float().or(v.as_integer().map(|i| i as f64));
     match value.as_array()?.as_slice() {
         [a, b] => Some((number(a)?, number(b)?)),

@@ -1,7 +1,7 @@
 //! Parameters that allocate: lists of points, and texts.
 
-use clutch_core::params::{Editor, Kind, Leaf, Range, Table, Unit};
 use clutch_core::Real;
+use clutch_core::params::{Editor, Kind, Leaf, Range, Table, Unit};
 
 /// Pairs of numbers, in the units of their key.
 #[derive(Clone, Debug, Default, PartialEq)]

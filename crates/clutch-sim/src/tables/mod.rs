@@ -11,8 +11,7 @@ mod set;
 mod suggest;
 
 pub(crate) use check::check;
-use complete::pair;
-pub(crate) use complete::{checked, complete, complete_table, find, lookup, shown};
+pub(crate) use complete::{checked, complete, complete_table, find, lookup, pair, shown};
 pub use leaves::{Points, Text};
 pub(crate) use read::{read, read_known};
 pub(crate) use set::{row_at, set};
