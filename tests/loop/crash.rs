@@ -2,7 +2,7 @@
 
 use crate::harness::{Board, Done, Random, alone, clutch, folder, read_log, run, start, unless_held_up};
 use clutch_log::{Header, Record, SampleRecord};
-use clutch_loop::control_loop::LogThread;
+use clutch_loop::log_thread::LogThread;
 use rustix::process::Signal;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

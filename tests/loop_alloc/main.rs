@@ -3,14 +3,16 @@
 
 use clutch_core::{DacCode, Target};
 use clutch_log::Source;
-use clutch_loop::control_loop::{self, ConfiguredRun, LogThread, LoopOptions, LoopReport, Pace, Watch};
+use clutch_loop::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, Pace};
 use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::log_thread::LogThread;
 use clutch_loop::port::{Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{RealtimeOptions, WaitMode};
 use clutch_loop::sim_board::PATIENT_BOARD;
 use clutch_loop::sim_board_server::{self, ServeOptions};
 use clutch_loop::station::ControllerStation;
+use clutch_loop::watch::Watch;
 use clutch_node::ControllerNode;
 use clutch_sim::Scenario;
 use clutch_sim::scenario::BUILT_IN;
