@@ -1,20 +1,4 @@
-//! Both ends of the serial line, as state machines without I/O and without a clock.
-//!
-//! ```text
-//!  encoder ─► BoardNode ──Sample──► ControlNode ─► supervisor ─► servo
-//!  pad     ◄─ watchdog  ◄─Actuate──             ◄─────────────────┘
-//! ```
-//!
-//! The loop may run on a board itself; then a host looks on:
-//!
-//! ```text
-//!  host: RemoteNode ◄──settings, telemetry──► Onboard (a ControlNode) ◄──as above──► BoardNode
-//! ```
-//!
-//! [`BoardNode`] is what a data-acquisition board does: it samples, applies codes, and goes to the
-//! safe state by itself when the controller falls silent. [`ControlNode`] is what drives it. Bytes
-//! and times go in, bytes and notices come out; the Linux loop, the simulated board, the tests in
-//! virtual time and firmware run the same two. No allocation, no `unsafe`, no reachable panic.
+#![doc = include_str!("../README.md")]
 #![no_std]
 
 mod board;
