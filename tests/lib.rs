@@ -7,6 +7,11 @@ pub mod firmware;
 
 pub use command::command;
 
+/// The README's example runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}
+
 use clutch_core::{Plant, PlantParams};
 use clutch_sim::drive::Drive;
 use clutch_sim::engine::{DormandPrince, Engine, Event, ExactFlow, Input, Model, Shaft, Volts};

@@ -3,11 +3,17 @@
 use crate::harness::{
     alone, beside_others, clutch, folder, program, read_log, replays_identically, run, start,
 };
-use clutch_log::{LogWriter, Record};
+use clutch_log::{LogWriter, Record, channel_table};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::BUILT_IN;
 use std::path::Path;
 use std::process::Command;
+
+#[test]
+fn the_docs_have_the_channel_table_of_the_code() {
+    let docs = include_str!("../../docs/log.md");
+    assert!(docs.contains(&channel_table()), "docs/log.md lacks:\n{}", channel_table());
+}
 
 #[test]
 fn the_log_of_every_simulation_with_an_encoder_replays_identically() {

@@ -3,8 +3,7 @@
 mod common;
 
 use clutch_log::{
-    CHUNK_NS, Header, Limits, LogError, LogWriter, Record, SampleRecord, Tail, channel_table, info, read,
-    read_bytes, recover, scan,
+    CHUNK_NS, Header, Limits, LogError, LogWriter, Record, SampleRecord, Tail, info, read, read_bytes, recover, scan,
 };
 use common::{Folder, Numbers, bits, header, record, small_log};
 use mcap::records::{ChunkHeader, op};
@@ -637,10 +636,4 @@ fn info_counts_without_reading_into_memory() {
     ] {
         assert!(shown.contains(part), "no \"{part}\" in\n{shown}");
     }
-}
-
-#[test]
-fn the_docs_have_the_channel_table_of_the_code() {
-    let docs = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/log.md")).unwrap();
-    assert!(docs.contains(&channel_table()), "docs/log.md lacks:\n{}", channel_table());
 }
