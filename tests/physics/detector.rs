@@ -36,7 +36,7 @@ fn measure(rig: &RigParams, law: LawParams, rate: f64) -> (f64, f64, f64, f64) {
     let (mut hits, mut calls, mut found, mut wanted) = (0, 0, 0, 0);
     let (mut seen, mut truth) = (0.0, 0.0);
     for seed in 1..=10 {
-        let mut spec = RunSpec::new(rig.clone(), law, ReferenceParams::Ramp(rate.to_radians()));
+        let mut spec = RunSpec::new(rig.clone(), law, ReferenceParams::ramp(rate.to_radians()));
         spec.run.seed = seed;
         let run = simulate::<f64>(&spec).unwrap();
         let true_sticks = sticks(&run);

@@ -10,7 +10,7 @@
 
 use super::{Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Tick};
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
     /// PID control with feed-forward, a filtered derivative, and an integral that does not wind up at a limit.
@@ -85,6 +85,29 @@ impl<T: Real> Pid<T> {
 }
 
 impl<T: Arithmetic> Pid<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Pid<L> {
+        let p = |get: fn(&PidParams<T>) -> T| each(&|law| get(&law.params));
+        let params = PidParams {
+            kp: p(|p| p.kp),
+            ki: p(|p| p.ki),
+            kd: p(|p| p.kd),
+            derivative_time: p(|p| p.derivative_time),
+            tracking_time: p(|p| p.tracking_time),
+            bias: p(|p| p.bias),
+            velocity: p(|p| p.velocity),
+            acceleration: p(|p| p.acceleration),
+        };
+        Pid {
+            params,
+            integral_step: each(&|law| law.integral_step),
+            newest: each(&|law| law.newest),
+            tracking: each(&|law| law.tracking),
+            output: Output::in_lanes(&|get| each(&|law| get(&law.output))),
+        }
+    }
+
     /// Proportional, derivative and feed-forward part, V.
     #[inline]
     fn parts(&self, tick: &Tick<T>, rate: T) -> (T, T, T) {

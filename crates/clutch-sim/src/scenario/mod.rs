@@ -626,6 +626,9 @@ fn merge_base(origin: &str, table: &mut Table) -> Result<(), ScenarioError> {
             merged.remove(choice);
         }
     }
+    if own.contains_key("brake_geometry") {
+        merged.remove("brake_gain_nm_v");
+    }
     overlay(&mut merged, std::mem::take(own));
     *own = merged;
     Ok(())
