@@ -203,8 +203,8 @@ fn python(tally: &mut Tally) -> Result<bool> {
         tally.check(name, holds);
     };
     quiet(
-        "ruff finds nothing in python, benches/python and docs",
-        tool("ruff", &["check", "python", "benches/python", "docs"])?,
+        "ruff finds nothing in the Python sources",
+        tool("ruff", &[&["check"], &python::SOURCES[..]].concat())?,
     );
     let wheel = python::Wheel::install(&tools)?;
     let settings = root().join("pyproject.toml");
