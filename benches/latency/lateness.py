@@ -114,7 +114,7 @@ def main() -> None:
             whole = percentile(pooled[name], percent) / max(percentile(pooled["cyclictest"], percent), 1)
             each = sorted(
                 percentile(mine, percent) / max(percentile(theirs, percent), 1)
-                for mine, theirs in zip(rounds[name], rounds["cyclictest"])
+                for mine, theirs in zip(rounds[name], rounds["cyclictest"], strict=True)
             )
             row += f"{whole:10.3f} /{each[len(each) // 2]:7.3f}"
         print(f"{name:12}{row}")

@@ -1,17 +1,30 @@
 //! Python: a private environment for tools, and the wheel in one of its own.
 
-use crate::run::{cargo, program, root};
+use crate::run::{Program, cargo, program, root};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 
+/// Python of this tree that is formatted and linted.
+pub(crate) const SOURCES: [&str; 5] = ["python", "benches/latency", "benches/python", "crates", "docs"];
+
 /// The interpreter of the environment with everything but the wheel, made and filled if need be.
 pub(crate) fn interpreter() -> Result<PathBuf> {
+    environment("python/tests/requirements.txt")
+}
+
+/// The programs that check texts and manifests, by name. Installs only these: a check shall not wait for all that
+/// tests need.
+pub(crate) fn checkers() -> Result<impl Fn(&str) -> Program> {
+    let python = environment("xtask/requirements.txt")?;
+    Ok(move |name: &str| program(beside(&python, name)))
+}
+
+fn environment(requirements: &str) -> Result<PathBuf> {
     let venv = root().join(".venv");
     let python = venv.join("bin/python");
     if !python.exists() {
         make_environment("python3".as_ref(), &venv, &[])?;
     }
-    let requirements = "python/tests/requirements.txt";
     program(&python)
         .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", requirements])
         .run()?;
@@ -91,7 +104,7 @@ impl Wheel {
     }
 
     /// A program of the environment, to be run outside of the tree.
-    pub(crate) fn program(&self, tools: &Path) -> Result<crate::run::Program> {
+    pub(crate) fn program(&self, tools: &Path) -> Result<Program> {
         Ok(program(&self.python).within(&self.folder).env("PATH", {
             let mut path = self.folder.join("bin").into_os_string();
             path.push(":");

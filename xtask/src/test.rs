@@ -11,8 +11,8 @@ use anyhow::{Result, bail};
 /// RISC-V.
 const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
 
-/// Checks that need the targets: two builds each, the two link tests, two boards, the budgets.
-const SKIPPED_WITHOUT_TARGETS: u64 = 2 * TARGETS.len() as u64 + 5;
+/// Checks that need the targets: two builds each, the two link tests, the example, two boards, the budgets.
+const SKIPPED_WITHOUT_TARGETS: u64 = 2 * TARGETS.len() as u64 + 6;
 
 #[derive(Default)]
 struct Tally {
@@ -131,6 +131,12 @@ pub(crate) fn all() -> Result<()> {
     }
     if embedded.contains(&firmware::TARGET) {
         no_panic(&mut tally)?;
+        let example = ["build", "--release", "--package", "clutch-core", "--example", "own_friction"];
+        let (built, text) = cargo(example).args(["--target", firmware::TARGET]).quietly()?;
+        if !built {
+            println!("{text}");
+        }
+        tally.check("the example with friction numbers of one's own builds for a Cortex-M4F", built);
         for board in firmware::BOARDS {
             let (built, text) = firmware::image(board).quietly()?;
             if !built {
@@ -197,8 +203,8 @@ fn python(tally: &mut Tally) -> Result<bool> {
         tally.check(name, holds);
     };
     quiet(
-        "ruff finds nothing in python, benches/python and docs",
-        tool("ruff", &["check", "python", "benches/python", "docs"])?,
+        "ruff finds nothing in the Python sources",
+        tool("ruff", &[&["check"], &python::SOURCES[..]].concat())?,
     );
     let wheel = python::Wheel::install(&tools)?;
     let settings = root().join("pyproject.toml");
