@@ -20,11 +20,11 @@ crate::params! {
     /// `K_a = J/(μ K_COF)`.
     pub struct PidParams<T>: Default {
         /// Proportional gain.
-        kp: T = 5000.0, "kp_v_rad" "K_p" V_RAD, Range::at_least(0.0);
+        kp: T = 1000.0, "kp_v_rad" "K_p" V_RAD, Range::at_least(0.0);
         /// Integral gain.
-        ki: T = 20000.0, "ki_v_rad_s" "K_i" V_RAD_S, Range::at_least(0.0);
+        ki: T = 10000.0, "ki_v_rad_s" "K_i" V_RAD_S, Range::at_least(0.0);
         /// Derivative gain.
-        kd: T = 50.0, "kd_v_s_rad" "K_d" V_S_RAD, Range::at_least(0.0);
+        kd: T = 20.0, "kd_v_s_rad" "K_d" V_S_RAD, Range::at_least(0.0);
         /// Time constant of the derivative's filter; 0 takes the error rate as it is.
         derivative_time: T = 0.0, "derivative_time_s" "τ" S, Range::at_least(0.0);
         /// Time in which the integral follows a limit of the output.

@@ -100,7 +100,10 @@ impl fmt::Display for Words {
             Kind::Text => return f.write_str("a text in quotes"),
             Kind::Points => {
                 let from = if has_low { " from 0 s on" } else { "" };
-                return write!(f, "a list of pairs [{text}] of finite numbers, with times that rise{from}");
+                return write!(
+                    f,
+                    "a list of at least one pair [{text}] of finite numbers, with times that rise{from}"
+                );
             }
             Kind::Word(words) => {
                 f.write_str("one of: ")?;

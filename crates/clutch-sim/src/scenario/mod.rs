@@ -51,6 +51,7 @@ built_in!(
     "pd_2",
     "ctc_2",
     "smc_2",
+    "pid_2",
     "bench_pd_2",
     "bench_smc_2",
     "observer_smc_2",

@@ -216,6 +216,9 @@ pub(crate) fn checked(origin: &str, at: &str, row: &Row, value: Value) -> Result
                 return wrong(&value, &expected());
             };
             let pairs = Points(pairs);
+            if pairs.0.is_empty() {
+                return wrong(&value, &expected());
+            }
             if let Some(i) = pairs.wrong(&row.range, &row.unit) {
                 return Err(ScenarioError::value(origin, at, &format!("(point {i})"), &expected()));
             }
