@@ -6,7 +6,7 @@
 
 #define RECENT 8u /* samples that an Actuate may answer */
 
-/* What the board keeps. */
+/* State that the board keeps. */
 static struct {
     board_params_t params;
     clutch_decoder_t decoder;
