@@ -807,7 +807,7 @@ class SweepResult:
         if metric not in self.metrics:
             raise ValueError(f"metric {metric!r} was not taken; there are {', '.join(self.metrics)}")
         if metric == "certified":
-            raise ValueError("certified is no figure to make small; select by it, and take the best of another")
+            raise ValueError("certified cannot be minimised; filter by it and rank by another metric")
         runs, texts = self.table["row"].tolist(), self.table["error"]
         columns = {name: self.table[name].tolist() for name in self.metrics}
         groups: dict[int, list[int]] = {}

@@ -540,7 +540,7 @@ pub fn run<E: End>(configured: Configured<'_, E>, options: &LoopOptions) -> Loop
                     break;
                 }
                 if leave {
-                    // Consent may have come through, and the word of it not.
+                    // The board may have received `Arm` although its reply was lost.
                     c.stop(StopReason::Operator);
                     if now >= *farewell.get_or_insert(now + FAREWELL.as_nanos() as u64) || c.board_safe {
                         break;

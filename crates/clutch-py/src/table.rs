@@ -185,7 +185,7 @@ impl Column {
                 Column::own(plain("int64")?.extract::<PyReadonlyArray1<'_, i64>>()?.as_slice()?.to_vec())
             }
             "b" => Column::own(plain("bool")?.extract::<PyReadonlyArray1<'_, bool>>()?.as_slice()?.to_vec()),
-            // Of a list NumPy would make texts of all that stands among texts.
+            // NumPy turns every element of a mixed list into a string.
             "U" | "O" | "T" if values.hasattr("dtype")? => {
                 match array.call_method0("tolist")?.extract::<Vec<String>>() {
                     Ok(texts) => Column::text(texts),

@@ -21,9 +21,9 @@ use embedded_io_async::Write;
 use static_cell::ConstStaticCell;
 
 /// OUTPUT WHEN NOBODY CONTROLS: at power-up, after a reset, in a fault handler. It is a property of
-/// the rig that the board is built into. 4.5 V of 10 V holds the paper's weight; where a hand moves
-/// the shaft, 0 (an open brake) may be the safe one. THE PULL AT THE DRIVER'S INPUT MUST GIVE THE
-/// SAME VOLTAGE, since until this program runs the pin floats: docs/firmware.md.
+/// the rig that the board is built into. 4.5 V of 10 V holds the paper's weight; if a person moves the shaft
+/// and an open brake is safe, set it to 0. THE PULL AT THE DRIVER'S INPUT MUST GIVE THE SAME VOLTAGE, since
+/// until this program runs the pin floats: docs/firmware.md.
 pub const BOOT_CODE: DacCode = DacCode(1844);
 
 /// Counts per turn of the shaft, four for each line of the encoder.

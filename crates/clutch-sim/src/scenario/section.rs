@@ -63,8 +63,8 @@ fn a_safety() -> Table {
     ])
 }
 
-/// What a table is checked beside: a long time, a small angle or a high voltage is fine with some
-/// periods, encoders and converters and not with others, which stand in tables of their own.
+/// Stand-ins for the other tables while one table is checked alone: a long time, a small angle or a high
+/// voltage is fine with some periods, encoders and converters, and not with others.
 struct Beside {
     period: Micros,
     encoder: Encoder,
