@@ -1,8 +1,8 @@
 //! The serial DAQ protocol: one table of messages, and the frames that carry them.
 //!
-//! A board reads an encoder and writes a converter; a host closes the loop. This crate is what
-//! both say to each other, as bytes. It does no I/O, keeps no time and allocates nothing.
-//! docs/wire.md specifies the same for those who write a board in another language.
+//! A board reads an encoder and writes a converter; a host closes the loop. This crate has the
+//! messages between the two, as bytes. It does no I/O, keeps no time and allocates nothing.
+//! If you write a board in another language, docs/wire.md specifies the same.
 //!
 //! ```text
 //! frame = COBS( kind u8 · fields, little-endian · CRC-32 u32 ) · 0x00
