@@ -5,7 +5,7 @@
 //! ```
 //!
 //! [`Record`] is `Copy` and holds no heap: it goes through a ring from the control thread to the
-//! thread that owns the [`LogWriter`]. Schemas stand in the file, so that Foxglove, PlotJuggler
+//! thread that owns the [`LogWriter`]. The file contains the schemas, so that Foxglove, PlotJuggler
 //! and Python show names and units without a plugin. Reals are doubles, always written, so that
 //! a replay compares bit for bit, −0 and the payload of a NaN included.
 //!

@@ -10,7 +10,7 @@ use prost_types::{
 };
 use std::fmt::Write as _;
 
-/// A field of a message: what viewers show.
+/// A field of a message, as viewers show it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Its number on the wire; never used for anything else later.
@@ -19,7 +19,7 @@ pub struct Field {
     pub name: &'static str,
     /// Its protobuf type.
     pub kind: Kind,
-    /// What it means.
+    /// Its meaning.
     pub meaning: &'static str,
 }
 
@@ -68,7 +68,7 @@ pub struct Channel {
     pub topic: &'static str,
     /// Protobuf message: `clutch.Sample`.
     pub message: &'static str,
-    /// What is in it, and how often.
+    /// Its content, and its rate.
     pub meaning: &'static str,
     /// Its fields.
     pub fields: &'static [Field],
