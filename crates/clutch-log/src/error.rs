@@ -94,7 +94,7 @@ pub enum LogError {
     Corrupt {
         /// The file.
         path: PathBuf,
-        /// Where the record starts, bytes.
+        /// Start of the record, bytes.
         offset: u64,
         /// The fault, and the expectation.
         what: String,

@@ -1,4 +1,5 @@
-//! The board: clocks, encoder, converter, serial line, watchdog. Another board is another such file.
+//! The board: clocks, encoder, converter, serial line, watchdog. For another board, write another
+//! such file.
 
 use crate::fault::stop;
 use clutch_core::{Counts, DacCode};
@@ -30,14 +31,14 @@ pub const BOOT_CODE: DacCode = DacCode(1844);
 const COUNTS_PER_REV: u32 = 20_000;
 
 /// Voltage at the brake for code 0 and for code 4096, mV: 3.3 V times the driver's gain of 3.03.
-/// Put in what you measure at the brake's terminals, and the same into the scenario.
+/// Enter the values that you measure at the brake's terminals, here and in the scenario.
 const DRIVER_MV: (i32, i32) = (0, 10_000);
 
-/// Of the debugger's serial port, which is the host's.
+/// Baud rate of the debugger's serial port, which is the host's.
 const BAUD: u32 = 921_600;
 
-/// A program that completes no period for so long is reset, µs. The clock of this watchdog may be
-/// off by several percent; two of the longest periods are far within.
+/// Time without a completed period after which the program is reset, µs. The clock of this watchdog
+/// may be off by several percent; two of the longest periods are far within.
 const WATCHDOG_US: u32 = 10_000;
 
 /// The core's clock, Hz.
@@ -67,14 +68,15 @@ pub struct Board {
     line: BufferedUartTx<'static>,
     /// Its serial number.
     pub board: u32,
-    /// Another number at each power-up.
+    /// A different number at each power-up.
     pub boot: u32,
 }
 
 /// Starts the board, its output first.
 pub fn start() -> (Board, Line) {
     let mut config = embassy_stm32::Config::default();
-    // The crystal, not the internal oscillator: the host measures this clock, and 1 % is no clock.
+    // The crystal, not the internal oscillator: the host measures this clock, and an error of 1 %
+    // is too much.
     config.rcc.hse = Some(Hse { freq: Hertz(24_000_000), mode: HseMode::Oscillator });
     config.rcc.pll = Some(Pll {
         source: PllSource::HSE,
@@ -121,8 +123,8 @@ pub fn start() -> (Board, Line) {
 }
 
 impl Board {
-    /// What the board is. Constants, not a field: their checks are then done by the compiler, and
-    /// no `f64` of an error's value is left in the image.
+    /// The board's parameters. They are constants, not a field: the compiler then does their
+    /// checks, and no `f64` of an error's value is left in the image.
     #[must_use]
     pub fn params(&self) -> BoardParams {
         BoardParams {
@@ -140,9 +142,9 @@ impl Board {
     }
 }
 
-/// A number of the chip's noise source: the second, since its manual wants the first thrown away.
-/// None if there is none within some milliseconds. embassy's driver would try again for ever, on a
-/// stack that ends.
+/// A number of the chip's noise source: the second, since its manual wants the first discarded.
+/// None if none comes within some milliseconds. embassy's driver would try again for ever, on a
+/// finite stack.
 fn random() -> Option<u32> {
     pac::RCC.ahb2enr().modify(|w| w.set_rngen(true));
     pac::RNG.cr().write(|w| w.set_rngen(true));
@@ -174,8 +176,8 @@ impl Hardware for Board {
         false
     }
 
-    /// Its output register has another code: a converter that was reset or lost its clock. What the
-    /// pin gives is not seen.
+    /// Its output register has another code: a converter that was reset or lost its clock. The
+    /// pin's voltage is not seen.
     fn converter_fault(&self) -> bool {
         self.converter.read() != self.told.0
     }
@@ -191,8 +193,8 @@ impl Hardware for Board {
 
     fn send(&mut self, frames: &[u8]) {
         // One poll: all of it if there is room now, and nothing otherwise. No interrupt in between:
-        // one that sends the last byte while the write looks whether there is any would leave the
-        // transmitter asleep with these.
+        // one that sends the last byte while the write checks for any would leave the transmitter
+        // asleep with these.
         let _ = cortex_m::interrupt::free(|_| poll_once(self.line.write(frames)));
     }
 

@@ -1,6 +1,7 @@
-//! When the program cannot go on: the output of [`BOOT_CODE`], and no word to the watchdog, which
-//! then resets the board into its power-up state. Nothing here trusts what is in memory, and nobody
-//! is told: text for a panic, with its formatting of numbers, would be most of the image.
+//! For a program that cannot continue: puts out [`BOOT_CODE`] and stops feeding the watchdog, which
+//! then resets the board into its power-up state. Nothing here trusts the contents of memory, and
+//! nothing is reported: text for a panic, with its formatting of numbers, would be most of the
+//! image.
 
 use crate::board::BOOT_CODE;
 use core::panic::PanicInfo;
@@ -33,7 +34,7 @@ unsafe fn NonMaskableInt() -> ! {
     stop()
 }
 
-// An interrupt that nobody has asked for.
+// An unexpected interrupt.
 #[exception]
 unsafe fn DefaultHandler(_: i16) -> ! {
     stop()

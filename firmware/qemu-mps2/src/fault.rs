@@ -1,4 +1,4 @@
-//! What is done when the processor fails: encoder and converter are told to go to the safe state.
+//! The reaction to a failing processor: encoder and converter are ordered into the safe state.
 //!
 //! The frame is ready before it is needed, so that a handler that can trust nothing has only to send it.
 
@@ -34,12 +34,12 @@ pub fn prepare(frame: Option<Outbox>) {
     }
 }
 
-/// An instruction that is none.
+/// An invalid instruction.
 pub fn fail() -> ! {
     cortex_m::asm::udf()
 }
 
-/// Sends the last word, and leaves with a code that is nobody else's.
+/// Sends the last frame, and exits with a code that nothing else uses.
 #[exception]
 unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     let length = LAST_WORD.length.load(Ordering::Acquire);
