@@ -10,7 +10,7 @@ const RAM: u32 = 0x2000_0000;
 /// word to align them.
 const EXCEPTION: u64 = 104 + 4;
 
-/// Sections with their sizes; what exceeds its budget.
+/// Prints the sections with their sizes; gives the values over budget.
 pub(crate) fn size(image: &Image, budget: &Memory) -> Vec<String> {
     let (mut flash, mut ram) = (0, 0);
     println!(
