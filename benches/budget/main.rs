@@ -123,7 +123,10 @@ fn all_bounds(image: &Image, plan: &Plan, loops: bool) -> Result<Vec<Cost>> {
     }
     // A statement that applies to nothing here may apply wrongly tomorrow.
     if !unused.is_empty() {
-        bail!("firmware/budget.toml: these statements apply to no code:\n{}", Vec::from_iter(unused).join("\n"));
+        bail!(
+            "firmware/budget.toml: these statements apply to no code:\n{}",
+            Vec::from_iter(unused).join("\n")
+        );
     }
     Ok(all)
 }
