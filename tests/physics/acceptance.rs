@@ -1,4 +1,4 @@
-//! Cases whose answer is known without any code of ours.
+//! Cases whose answer is known independently of this code.
 
 use clutch_core::law::{LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;

@@ -46,8 +46,8 @@ fn stick_slip_at_20_degrees_per_second_is_the_same_motion_in_both_engines() {
     let sticks = runs[0].events.iter().filter(|e| e.kind == EventKind::Stick).count();
     assert!(sticks >= 5, "{sticks} sticks are no stick-slip");
     let apart = furthest_apart(&runs);
-    // The loop is unstable here and blows up what the two servos see apart, which is at least
-    // the ideal sensor's step of 6e-12 rad. Without the loop: the next test.
+    // The loop is unstable here and amplifies the difference that the two servos see, which is at
+    // least the ideal sensor's step of 6e-12 rad. Without the loop: the next test.
     assert!(apart <= 1e-9, "{apart:e} rad apart after {sticks} sticks");
 }
 

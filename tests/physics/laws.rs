@@ -1,4 +1,4 @@
-//! What every law of the core must do, whatever its gains.
+//! The duties of every law of the core, with any gains.
 
 use clutch_core::law::{
     Controller, CtcParams, Law, LawParams, Limit, OutputParams, OutputState, PdParams, SmcParams,
