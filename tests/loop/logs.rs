@@ -107,7 +107,7 @@ fn one_changed_count_is_found_with_its_tick_and_field() {
 fn cut_short(out: &str, err: &str) {
     assert!(out.contains("the path is done"), "{out}\n{err}");
     assert!(out.contains("no space for the log"), "{out}\n{err}");
-    assert!(err.contains("the log has ended early; the loop goes on"), "{out}\n{err}");
+    assert!(err.contains("the log has ended early; the loop continues"), "{out}\n{err}");
 }
 
 #[test]
