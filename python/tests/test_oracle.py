@@ -17,7 +17,7 @@ from oracle import PERIOD, TURN, Brake, Ctc, Dac, Encoder, Loop, Pd, Plant, Smc,
 
 ENGINES = ("dormand_prince", "exact_flow")
 IDEAL_COUNTS = 2**24
-# What the simulator's ideal sensor resolves: 2^-16 of its counts, 5.7e-12 rad.
+# Resolution of the simulator's ideal sensor: 2^-16 of its counts, 5.7e-12 rad.
 IDEAL_SENSOR = Encoder(IDEAL_COUNTS * 2**16)
 PAPER = {"encoder": Encoder(), "dac": Dac()}
 
@@ -37,7 +37,7 @@ class Case:
 
     @property
     def step(self):
-        """What the simulator's paths resolve: 2^-16 of the rig's counts, rad."""
+        """Resolution of the simulator's paths: 2^-16 of the rig's counts, rad."""
         counts = 20_000 if self.scenario["rig"]["base"] == "paper" else IDEAL_COUNTS
         return TURN / counts / 2**16
 
