@@ -4,7 +4,7 @@
 //! ```text
 //! ELF ─► functions ─► instructions ─► blocks ─► longest path ─► bound
 //!                                       ▲             ▲
-//!                          loop bounds, told      costs of instructions
+//!                          loop bounds, stated     costs of instructions
 //! ```
 //!
 //! Everything that cannot be followed is a [`Fault`]: a loop without a stated bound, a jump into

@@ -193,7 +193,7 @@ def test_a_perfect_loop_moves_as_equations_1_2_and_its_law_say(case, engine):
     sticks = len(r.times("stick"))
     assert sticks >= case.sticks, f"the oracle sticks {sticks} times: no test of stick-slip"
     differing = np.flatnonzero(d["stuck"] != r["stuck"])
-    assert differing.size == 0, f"stuck and slipping are told apart otherwise at ticks {differing[:10]}"
+    assert differing.size == 0, f"stuck and slipping differ at ticks {differing[:10]}"
     apart = largest(d["position_rad"], r["position"])
     assert apart <= tolerance, f"(1), (2): positions {apart:.1e} rad apart after {sticks} sticks"
     # A difference in position changes the voltage and with it the velocity of the next period.

@@ -115,7 +115,7 @@ fn child_writes_until_the_disk_is_full() {
     assert!(!back.complete);
     // The last chunk may be whole without its index.
     let read = back.samples.len() as u64;
-    assert!(read >= written && read <= tick, "{written} told, {read} read, {tick} accepted");
+    assert!(read >= written && read <= tick, "{written} reported, {read} read, {tick} accepted");
     assert!(back.samples.iter().zip(0..).all(|(s, tick)| s.tick == tick));
     println!("full: {e}; {read} read back");
 }
