@@ -3,8 +3,7 @@
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use clutch_core::law::{
-    ControlLaw, CtcParams, Law, LawParams, OutputParams, PdParams, SmcParams, SmcSignParams,
-    Tick,
+    ControlLaw, CtcParams, Law, LawParams, OutputParams, PdParams, SmcParams, SmcSignParams, Tick,
 };
 use clutch_core::{
     Counts, FixedCounts, Micros, ObserverParams, PlantParams, Real, Servo, ServoParams,

@@ -24,11 +24,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// The system's allocator, and a count of what a watched thread asks of it.
+/// The system's allocator, and counts of a watched thread's requests.
 struct Watching;
 
 thread_local! {
-    /// Whether this thread is between its first and its last cycle.
+    /// True if this thread is between its first and its last cycle.
     static INSIDE: Cell<bool> = const { Cell::new(false) };
 }
 static TAKEN: AtomicU64 = AtomicU64::new(0);
@@ -37,7 +37,7 @@ static GIVEN_BACK: AtomicU64 = AtomicU64::new(0);
 static SIZE: AtomicU64 = AtomicU64::new(0);
 
 fn note(counter: &AtomicU64, size: usize) {
-    // A thread that ends has no flag any more, and is no control thread.
+    // A thread that ends has lost its flag, and is not a control thread.
     if INSIDE.try_with(Cell::get).unwrap_or(false) {
         counter.fetch_add(1, Ordering::Relaxed);
         SIZE.store(size as u64, Ordering::Relaxed);

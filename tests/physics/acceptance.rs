@@ -1,4 +1,4 @@
-//! Cases whose answer is known without any code of ours.
+//! Cases whose answer is known independently of this code.
 
 use clutch_core::law::{LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;
@@ -33,7 +33,8 @@ fn a1_holding_voltages_and_free_motion_of_the_papers_shaft() {
 fn a2_a_constant_brake_stops_the_shaft_at_the_analytic_instant() {
     let flat = StribeckParams { mu_static: 0.15, mu_dynamic: 0.15, ..StribeckParams::default() };
     for (damping, instant, angle_deg) in [(0.001, 0.0504770714, Some(2.5113638)), (0.0, 0.0512339, None)] {
-        let params = PlantParams { friction: flat.into(), viscous_damping: damping, ..PlantParams::default() };
+        let params =
+            PlantParams { friction: flat.into(), viscous_damping: damping, ..PlantParams::default() };
         // Without damping: t = J ω0 / (μ K v − T), exactly.
         let exact = 0.0017 * 100.0_f64.to_radians() / (0.15 * 0.14 * 5.0 - params.drive_torque);
         for (name, mut engine) in engines() {

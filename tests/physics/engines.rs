@@ -47,8 +47,8 @@ fn stick_slip_at_20_degrees_per_second_is_the_same_motion_in_both_engines() {
     let sticks = runs[0].events.iter().filter(|e| e.kind == EventKind::Stick).count();
     assert!(sticks >= 5, "{sticks} sticks are no stick-slip");
     let apart = furthest_apart(&runs);
-    // The loop is unstable here and blows up what the two servos see apart, which is at least
-    // the ideal sensor's step of 6e-12 rad. Without the loop: the next test.
+    // The loop is unstable here and amplifies the difference that the two servos see, which is at
+    // least the ideal sensor's step of 6e-12 rad. Without the loop: the next test.
     assert!(apart <= 1e-9, "{apart:e} rad apart after {sticks} sticks");
 }
 
@@ -114,7 +114,13 @@ fn the_exact_flow_says_which_rigs_it_cannot_take() {
             "exponent",
         ),
         (RigParams { ripple, ..paper() }, "along the disc"),
-        (RigParams { drive: DriveParams::Table(TableDrive { points: Points(vec![(0.0, 0.05)]) }), ..paper() }, "constant"),
+        (
+            RigParams {
+                drive: DriveParams::Table(TableDrive { points: Points(vec![(0.0, 0.05)]) }),
+                ..paper()
+            },
+            "constant",
+        ),
         (RigParams { actuator_time_constant: Some(1e-3), ..paper() }, "lag"),
     ] {
         let error = simulate::<f64>(&spec(rig.clone())).unwrap_err();

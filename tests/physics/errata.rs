@@ -1,8 +1,6 @@
-//! What the paper prints and what is true: each erratum with the run that shows it.
+//! The paper's statements and the truth: each erratum with the run that shows it.
 
-use clutch_core::law::{
-    Command, ControlLaw, LawParams, Limit, PdParams, SmcParams, SmcSignParams, Tick,
-};
+use clutch_core::law::{Command, ControlLaw, LawParams, Limit, PdParams, SmcParams, SmcSignParams, Tick};
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Servo, StribeckParams};
 use clutch_sim::progress::UNWATCHED;
@@ -91,9 +89,11 @@ fn the_boundary_layer_weakens_the_damping_term_where_the_certificate_says_so() {
 #[test]
 fn the_stribeck_velocity_read_in_degrees_per_second_sticks_at_2_degrees_per_second_too() {
     let mut rig = RigParams::paper();
-    rig.friction = StribeckParams { stribeck_velocity: 0.001_f64.to_radians(), ..StribeckParams::default() }.into();
+    rig.friction =
+        StribeckParams { stribeck_velocity: 0.001_f64.to_radians(), ..StribeckParams::default() }.into();
     let run = simulate::<f64>(&ramp(rig, LawParams::Pd(PdParams::default()))).unwrap();
-    // The unit is not printed. Both readings stick at 2 °/s; the figures are not told apart by it.
+    // The unit is not printed. Both readings stick at 2 °/s, so the figures cannot decide between
+    // them.
     assert!(run.metrics.stick_slip_cycles_per_s > 10.0, "{}", run.metrics.stick_slip_cycles_per_s);
 }
 

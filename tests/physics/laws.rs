@@ -1,8 +1,7 @@
-//! What every law of the core must do, whatever its gains.
+//! The duties of every law of the core, with any gains.
 
 use clutch_core::law::{
-    ControlLaw, CtcParams, Law, LawParams, Limit, OutputParams, PdParams, SmcParams,
-    SmcSignParams, Tick,
+    ControlLaw, CtcParams, Law, LawParams, Limit, OutputParams, PdParams, SmcParams, SmcSignParams, Tick,
 };
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, Target};

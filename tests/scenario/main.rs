@@ -1,4 +1,4 @@
-//! Scenario files: what they say, and what is said of bad ones.
+//! Scenario files: their contents, and the errors of bad ones.
 
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::BUILT_IN;
@@ -291,7 +291,7 @@ proptest! {
         let value = if integer { whole.to_string() } else { format!("{value:?}") };
         let mut set = vec![("rig.base".to_owned(), base.to_owned()), (key.to_owned(), value)];
         if !key.starts_with("run.") {
-            // What is taken must run: a tenth of a second is enough to meet it.
+            // An accepted scenario must run: a tenth of a second is enough.
             set.extend([("run.duration_s".into(), "0.1".into()), ("run.settle_s".into(), "0".into())]);
         }
         match Scenario::parse("my.toml", GOOD, &set) {

@@ -503,7 +503,7 @@ impl<'a, S: Station> Control<'a, S> {
             return Ok(None);
         }
         if leave {
-            // Consent may have come through, and the word of it not.
+            // The board may have received `Arm` although its reply was lost.
             self.stop(StopReason::Operator);
             if due.farewell_over(now) || self.board_safe {
                 return Ok(None);

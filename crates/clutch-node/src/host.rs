@@ -336,7 +336,7 @@ impl HostNode {
         };
         let Some(notice) = notice(m, &kind, self.servo.dac(), tick, target) else { return };
         let cycle = &notice.cycle;
-        // The word of the end got lost.
+        // The `Ended` frame was lost.
         let ended = !matches!(cycle.from, State::Ready | State::Armed | State::Running);
         if self.driving() && ended {
             self.end(cycle.from, cycle.cause, cycle.value, notices);

@@ -225,7 +225,7 @@ settings! {
     watchdog_us: u32,
     /// How long after its sample a code is valid, µs.
     valid_us: u32,
-    /// Time without a sample after which silence is looked at, µs.
+    /// Time without a sample after which the silence check runs, µs.
     silence_us: u32,
     /// Time without a frame of the host after which the run ends in the safe state, µs; 0 goes on.
     host_silence_us: u32,
@@ -321,7 +321,7 @@ pub struct RunParams<'a> {
     pub watchdog: Micros,
     /// How long after its sample a code is valid.
     pub valid: Micros,
-    /// Time without a sample after which silence is looked at.
+    /// Time without a sample after which the silence check runs.
     pub silence: Micros,
     /// Time without a frame of the host after which the run ends; 0 goes on.
     pub host_silence: Micros,

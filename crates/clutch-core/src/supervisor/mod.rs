@@ -23,7 +23,7 @@
 //! |---|---|
 //! | [`Cause::Lost`] | samples are missing more often than allowed in a window |
 //! | [`Cause::Late`] | samples or answers come too late, more often than allowed |
-//! | [`Cause::Duplicated`], [`Cause::Reordered`] | so |
+//! | [`Cause::Duplicated`], [`Cause::Reordered`] | samples repeat, or arrive out of order, more often than allowed |
 //! | [`Cause::Jump`] | counts depart from dead reckoning by more than a shaft can, more often than allowed |
 //! | [`Cause::StandStill`] | the brake is open, the drive must have moved the shaft, and no count came |
 //! | [`Cause::FollowingError`] | the error exceeds its limit, which grows with the speed |

@@ -33,7 +33,7 @@ fn write_all(out: &mut String) -> std::fmt::Result {
             let unit = if f.unit.is_empty() { "–" } else { f.unit };
             writeln!(out, "| {} | `{}` | `{}` | {unit} | {} |", f.offset, f.name, f.ty, f.doc.trim())?;
         }
-        writeln!(out, "| {} | CRC | `u32` | – | Of all bytes before it. |", m.length - 4)?;
+        writeln!(out, "| {} | CRC | `u32` | – | Checksum of all bytes before it. |", m.length - 4)?;
     }
     for set in CODES {
         writeln!(out, "\n### {}\n\n{}\n", set.name, set.doc.trim())?;
