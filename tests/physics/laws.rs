@@ -1,7 +1,8 @@
 //! The duties of every law of the core, with any gains.
 
 use clutch_core::law::{
-    ControlLaw, CtcParams, Law, LawParams, Limit, OutputParams, PdParams, SmcParams, SmcSignParams, Tick,
+    ControlLaw, CtcParams, Law, LawParams, Limit, OutputParams, PdParams, PidParams, SmcParams,
+    SmcSignParams, Tick,
 };
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, Target};
@@ -17,11 +18,20 @@ fn laws() -> impl Strategy<Value = LawParams> {
             .prop_map(|(outer_gain, kp, kd)| LawParams::Ctc(CtcParams { outer_gain, kp, kd })),
         (gain.clone(), gain.clone(), 1.0..500.0_f64, 1e-3..10.0_f64)
             .prop_map(|(kp, kd, slope, boundary)| LawParams::Smc(SmcParams { kp, kd, slope, boundary })),
-        (gain.clone(), gain, 1.0..500.0_f64).prop_map(|(kp, kd, slope)| LawParams::SmcSign(SmcSignParams {
-            kp,
-            kd,
-            slope
-        })),
+        (gain.clone(), gain.clone(), 1.0..500.0_f64)
+            .prop_map(|(kp, kd, slope)| LawParams::SmcSign(SmcSignParams { kp, kd, slope })),
+        (gain.clone(), gain.clone(), gain, 0.0..1.0_f64, 0.001..1.0_f64).prop_map(
+            |(kp, ki, kd, derivative_time, tracking_time)| {
+                LawParams::Pid(PidParams {
+                    kp,
+                    ki,
+                    kd,
+                    derivative_time,
+                    tracking_time,
+                    ..PidParams::default()
+                })
+            }
+        ),
     ]
 }
 
@@ -49,12 +59,7 @@ fn small_tick() -> impl Strategy<Value = Tick<f64>> {
 
 #[test]
 fn every_law_follows_with_either_velocity_source_in_either_scalar() {
-    for law in [
-        LawParams::Pd(PdParams::default()),
-        LawParams::Ctc(CtcParams::default()),
-        LawParams::Smc(SmcParams::default()),
-        LawParams::SmcSign(SmcSignParams::default()),
-    ] {
+    for law in LawParams::all() {
         for velocity in [
             VelocityParams::SmoothedDerivative(SmoothedDerivativeParams::default()),
             VelocityParams::Observer(ObserverParams::default()),

@@ -23,7 +23,8 @@ fn an_integral_takes_away_the_mean_error_that_pd_keeps() {
     // A model that is wrong by a fifth leaves PD behind or ahead; here the drive is.
     let drive = ("rig.drive.weight.mass_kg", "0.24".to_owned());
     let pid = metrics(&[drive.clone()]).mean_error_rad.abs();
-    let pd = metrics(&[drive, ("law.pid.ki_v_rad_s", "0.0".to_owned()), ("law.pid.bias_v", "2.24".to_owned())]);
+    let pd =
+        metrics(&[drive, ("law.pid.ki_v_rad_s", "0.0".to_owned()), ("law.pid.bias_v", "2.24".to_owned())]);
     assert!(pid.to_degrees() < 0.015, "{}°", pid.to_degrees());
     assert!(pd.mean_error_rad.abs() > 3.0 * pid, "{}°", pd.mean_error_rad.to_degrees());
 }
