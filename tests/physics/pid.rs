@@ -43,7 +43,8 @@ fn a_long_time_at_a_limit_winds_nothing_up() {
         let m = Scenario::parse("x", &text, &set).unwrap().run(Keep::Figures, UNWATCHED).unwrap().metrics;
         m.max_error_rad.to_degrees()
     };
-    let (tracks, winds_up) = (error("0.05"), error("1e6"));
-    assert!(tracks < 0.3, "{tracks}°");
-    assert!(winds_up > 2.0 * tracks, "{winds_up}° without tracking, {tracks}° with it");
+    // With tracking, and by the limit of the integral alone.
+    for tracking in ["0.05", "1e6"] {
+        assert!(error(tracking) < 0.3, "{}° with a tracking time of {tracking} s", error(tracking));
+    }
 }
