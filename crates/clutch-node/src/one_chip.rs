@@ -1,9 +1,9 @@
 //! Controller, encoder and converter on one chip.
 
-use crate::board::{BoardNode, BoardParams};
+use crate::board::{BoardMisfit, BoardNode, BoardParams};
 use crate::board_controller::{BoardController, BoardControllerParams, Outboxes};
 use crate::outbox::Outbox;
-use clutch_core::{Counts, DacCode, Micros, ParamError};
+use clutch_core::{Counts, DacCode, Micros};
 use clutch_wire::BoardState;
 
 /// Rounds of frames to and fro within one call. A handshake takes two; more rounds would mean a livelock; the
@@ -25,7 +25,7 @@ impl OneChip {
     ///
     /// # Errors
     /// As [`BoardNode::new`].
-    pub fn new(controller: BoardControllerParams, board: &BoardParams) -> Result<Self, ParamError<f64>> {
+    pub fn new(controller: BoardControllerParams, board: &BoardParams) -> Result<Self, BoardMisfit> {
         Ok(OneChip {
             controller: BoardController::new(controller),
             board: BoardNode::new(board)?,

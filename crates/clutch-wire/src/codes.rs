@@ -136,9 +136,10 @@ codes! {
         Busy = 10,
         /// The code is above the converter's top; `value` is the code.
         Code = 11,
-        /// A setting that is unknown or missing; `value` is its key.
+        /// A setting that is missing, or whose value is of a kind that is not known; `value` is its key.
         Setting = 12,
-        /// The settings make no run; `value` is the offending one's value as the bits of a real number.
+        /// The settings make no run; `value` is the key of the offending one, and above its 16 bits the number of
+        /// the condition between several that does not hold, or 0.
         Unfit = 13,
         /// Nothing answers where the controller's encoder and converter should be; `value` is 0.
         NoBoard = 14,

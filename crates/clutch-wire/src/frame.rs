@@ -87,7 +87,7 @@ pub enum FrameError {
     Length {
         /// Kind of the frame.
         kind: u8,
-        /// Length of that kind, bytes.
+        /// Length of that kind, bytes, with as many numbers as its list claims; 255 stands for more, too.
         expected: u8,
         /// Length of the frame, bytes.
         got: u8,
@@ -213,12 +213,13 @@ fn parse(body: &[u8]) -> Result<Message, FrameError> {
     if expected != computed {
         return Err(FrameError::Crc { expected, computed });
     }
-    let Some(length) = Message::length(kind) else {
+    let Some(length) = Message::length(kind, fields) else {
         return Err(FrameError::UnknownKind(kind));
     };
     if length != body.len() {
-        // Both are below 254, see MAX_FRAME.
-        return Err(FrameError::Length { kind, expected: length as u8, got: body.len() as u8 });
+        // A list may claim more than any frame has; what came is below 254, see MAX_FRAME.
+        let expected = u8::try_from(length).unwrap_or(u8::MAX);
+        return Err(FrameError::Length { kind, expected, got: body.len() as u8 });
     }
     Message::take(kind, fields).ok_or(FrameError::UnknownKind(kind))
 }

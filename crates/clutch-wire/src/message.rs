@@ -1,5 +1,8 @@
 //! The one table of messages: structs, lengths, coding, description and schema hash come from it.
 
+use crate::list::List;
+use clutch_core::{FNV_64, fnv1a_64};
+
 /// The sender of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
@@ -18,8 +21,10 @@ pub struct MessageInfo {
     pub kind: u8,
     /// Its sender.
     pub direction: Direction,
-    /// Bytes before stuffing: kind, fields and CRC. On the wire two more.
+    /// Bytes before stuffing: kind, fields and CRC, without the numbers of a list. On the wire two more.
     pub length: u8,
+    /// Most numbers of the list that ends it, four bytes each; 0 if it has none.
+    pub list: u8,
     /// Its meaning.
     pub doc: &'static str,
     /// Its fields in order.
@@ -31,7 +36,8 @@ pub struct MessageInfo {
 pub struct FieldInfo {
     /// Name, as the struct's.
     pub name: &'static str,
-    /// `u8`, `u16`, `u32`, `u64` or `i32`; little-endian.
+    /// `u8`, `u16`, `u32`, `u64` or `i32`; little-endian. `[u32;8]`: up to eight, and in front of them their number
+    /// in a byte.
     pub ty: &'static str,
     /// Its place, bytes from the start of the frame before stuffing (the kind is at 0).
     pub offset: u8,
@@ -66,7 +72,7 @@ impl<'a> Put<'a> {
 
 /// The next `N` bytes.
 #[inline]
-fn next<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+pub(crate) fn next<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, tail) = rest.split_first_chunk::<N>()?;
     *rest = tail;
     Some(*head)
@@ -78,6 +84,7 @@ macro_rules! messages {
         $kind:literal $direction:ident $name:ident {
             $($(#[doc = $field_doc:literal])+ $field:ident: $ty:ident $([$unit:literal])?,)+
         }
+        $(then $(#[doc = $list_doc:literal])+ $list:ident [$list_unit:literal])?
     )+) => {
         $(
             $(#[doc = $doc])+
@@ -88,23 +95,35 @@ macro_rules! messages {
                     $(#[doc = concat!("\n\nUnit: ", $unit, ".")])?
                     pub $field: $ty,
                 )+
+                $(
+                    $(#[doc = $list_doc])+
+                    #[doc = concat!("\n\nUnit: ", $list_unit, ".")]
+                    pub $list: List,
+                )?
             }
 
             impl $name {
                 /// First byte of the frame.
                 pub const KIND: u8 = $kind;
-                /// Bytes before stuffing: kind, fields and CRC.
-                pub const LENGTH: usize = AROUND $(+ size_of::<$ty>())+;
+                /// Bytes before stuffing: kind, fields and CRC, without the numbers of a list.
+                pub const LENGTH: usize = AROUND $(+ size_of::<$ty>())+ $(+ listed!($list 1))?;
+                /// The same of the longest.
+                const LONGEST: usize = $name::LENGTH $(+ listed!($list 4 * List::MOST))?;
 
                 #[inline]
-                fn put(&self, out: &mut Put<'_>) {
+                fn put(&self, out: &mut Put<'_>) -> usize {
                     out.bytes([$kind]);
                     $(out.bytes(self.$field.to_le_bytes());)+
+                    $(self.$list.put(out);)?
+                    ($name::LENGTH - 4) $(.wrapping_add(self.$list.size()))?
                 }
 
                 #[inline]
                 fn take(mut rest: &[u8]) -> Option<Self> {
-                    Some($name { $($field: <$ty>::from_le_bytes(next(&mut rest)?),)+ })
+                    Some($name {
+                        $($field: <$ty>::from_le_bytes(next(&mut rest)?),)+
+                        $($list: List::take(&mut rest)?,)?
+                    })
                 }
             }
         )+
@@ -120,18 +139,19 @@ macro_rules! messages {
             #[inline]
             pub(crate) fn put(&self, out: &mut Put<'_>) -> usize {
                 match self {
-                    $(Message::$name(message) => {
-                        message.put(out);
-                        $name::LENGTH.wrapping_sub(4)
-                    })+
+                    $(Message::$name(message) => message.put(out),)+
                 }
             }
 
-            /// Bytes before stuffing of a frame of this kind; nothing for a kind that is not in the table.
+            /// Bytes before stuffing of a frame of this kind with these fields; nothing for a kind that is not in
+            /// the table.
             #[inline]
-            pub(crate) fn length(kind: u8) -> Option<usize> {
+            pub(crate) fn length(kind: u8, fields: &[u8]) -> Option<usize> {
+                let _ = fields; // most have no list
                 match kind {
-                    $($kind => Some($name::LENGTH),)+
+                    $($kind => Some(
+                        $name::LENGTH $(.wrapping_add(listed!($list List::claimed(fields, $name::LENGTH - AROUND - 1))))?
+                    ),)+
                     _ => None,
                 }
             }
@@ -152,6 +172,7 @@ macro_rules! messages {
             kind: $kind,
             direction: Direction::$direction,
             length: $name::LENGTH as u8,
+            list: 0 $(+ listed!($list List::MOST as u8))?,
             doc: concat!($($doc),+),
             fields: {
                 #[allow(unused_assignments, reason = "the last field's end starts no other field")]
@@ -167,7 +188,13 @@ macro_rules! messages {
                             unit: concat!("" $(, $unit)?),
                             doc: concat!($($field_doc),+),
                         }
-                    }),+]
+                    },)+ $(FieldInfo {
+                        name: stringify!($list),
+                        ty: "[u32;8]",
+                        offset: end,
+                        unit: $list_unit,
+                        doc: concat!($($list_doc),+),
+                    })?]
                 };
                 FIELDS
             },
@@ -176,11 +203,18 @@ macro_rules! messages {
         /// The longest frame before stuffing, bytes.
         pub(crate) const LONGEST: usize = {
             let mut longest = 0;
-            $(if $name::LENGTH > longest {
-                longest = $name::LENGTH;
+            $(if $name::LONGEST > longest {
+                longest = $name::LONGEST;
             })+
             longest
         };
+    };
+}
+
+/// What a message with a list has more.
+macro_rules! listed {
+    ($list:ident $($what:tt)+) => {
+        $($what)+
     };
 }
 
@@ -443,12 +477,6 @@ messages! {
         error: u32 ["bits, rad"],
         /// Its rate.
         error_rate: u32 ["bits, rad/s"],
-        /// First term of the law.
-        term_0: u32 ["bits"],
-        /// Second term of the law.
-        term_1: u32 ["bits"],
-        /// Third term of the law.
-        term_2: u32 ["bits"],
         /// The law's voltage within its limits.
         demand: u32 ["bits, V"],
         /// Code given to the converter.
@@ -456,6 +484,9 @@ messages! {
         /// Clock cycles of the tick before: see `ControllerHello.clock_hz`.
         cycles: u32 ["clock cycles"],
     }
+    then
+        /// The law's terms: how many, and each.
+        terms ["bits"]
 
     /// Control has ended, but not by a sample.
     0x8C ToHost Ended {
@@ -496,15 +527,6 @@ messages! {
     }
 }
 
-/// FNV-1a, 64 bit, one piece of text after the other.
-const fn fnv(mut hash: u64, mut text: &[u8]) -> u64 {
-    while let [byte, rest @ ..] = text {
-        hash = (hash ^ *byte as u64).wrapping_mul(0x0000_0100_0000_01b3);
-        text = rest;
-    }
-    hash
-}
-
 /// A hexadecimal digit, lower case.
 const fn digit(value: u8) -> u8 {
     if value < 10 { b'0'.wrapping_add(value) } else { b'a'.wrapping_add(value.wrapping_sub(10)) }
@@ -517,20 +539,20 @@ const fn digit(value: u8) -> u8 {
 /// The line of `Ping`, for one: `06 Ping run:u16 nonce:u32`. Two ends with the same hash agree on
 /// every byte of every frame.
 pub const SCHEMA: u64 = {
-    let mut hash = 0xcbf2_9ce4_8422_2325;
+    let mut hash = FNV_64;
     let mut table = TABLE;
     while let [message, others @ ..] = table {
-        hash = fnv(hash, &[digit(message.kind >> 4), digit(message.kind & 15), b' ']);
-        hash = fnv(hash, message.name.as_bytes());
+        hash = fnv1a_64(hash, &[digit(message.kind >> 4), digit(message.kind & 15), b' ']);
+        hash = fnv1a_64(hash, message.name.as_bytes());
         let mut fields = message.fields;
         while let [field, rest @ ..] = fields {
-            hash = fnv(hash, b" ");
-            hash = fnv(hash, field.name.as_bytes());
-            hash = fnv(hash, b":");
-            hash = fnv(hash, field.ty.as_bytes());
+            hash = fnv1a_64(hash, b" ");
+            hash = fnv1a_64(hash, field.name.as_bytes());
+            hash = fnv1a_64(hash, b":");
+            hash = fnv1a_64(hash, field.ty.as_bytes());
             fields = rest;
         }
-        hash = fnv(hash, b"\n");
+        hash = fnv1a_64(hash, b"\n");
         table = others;
     }
     hash

@@ -10,7 +10,8 @@ use clutch_core::{
     Tolerances,
 };
 use clutch_node::{
-    BoardController, BoardControllerParams, ControllerNode, ControllerParams, Outboxes, RunParams, Settings,
+    BoardController, BoardControllerParams, ControllerNode, ControllerParams, Outboxes, RunParams, RunTimes,
+    Settings,
 };
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configured, Discover, Fault, Hello, Message, Pong, Refused, SCHEMA,
@@ -29,16 +30,16 @@ fn session(kind: u32) -> Option<Session> {
     let servo = ServoParams::<f32>::paper(law);
     let bounds = Bounds::around(&PlantParams::default(), &Tolerances::default()).ok()?;
     let on_fault = match kind % 4 {
-        0 => SafeState::Hold { volts: 5.0 },
-        1 => SafeState::Ramp { volts_per_s: 1000.0, volts: 5.0 },
+        0 => SafeState::hold(5.0),
+        1 => SafeState::ramp(1000.0, 5.0),
         2 => SafeState::Release,
-        _ => SafeState::HoldThenRelease { volts: 5.0, after: 0.01 },
+        _ => SafeState::hold_then_release(5.0, 0.01),
     };
     let knots =
         [0, 20_000, 40_000, 60_000].map(|us| Knot { time_us: us, position: FixedCounts(us as i64 * 60) });
     let table = |interpolation| ReferenceParams::Table(Table { knots: &knots, interpolation });
     let path = match kind % 5 {
-        0 => ReferenceParams::Ramp(0.35),
+        0 => ReferenceParams::ramp(0.35),
         1 => ReferenceParams::MinimumJerk(MinimumJerk { distance: 0.02, duration: 0.06 }),
         2 => ReferenceParams::Sine(Sine { rate: 0.3, amplitude: 0.001, frequency: 5.0, phase: 0.0 }),
         3 => table(Interpolation::Linear),
@@ -52,10 +53,7 @@ fn session(kind: u32) -> Option<Session> {
         bounds: &bounds,
         reference: &path,
         start: FixedCounts(0),
-        watchdog,
-        valid,
-        silence,
-        host_silence: Micros(1_000_000),
+        times: RunTimes { watchdog, valid, silence, host_silence: Micros(1_000_000) },
         ticks: u64::from(PERIODS) - 5,
     })
     .ok()?;

@@ -60,9 +60,6 @@ pub const FIELDS: &[Field] = &[
     Field { name: "target_acceleration", kind: Kind::F32 },
     Field { name: "error", kind: Kind::F32 },
     Field { name: "error_rate", kind: Kind::F32 },
-    Field { name: "term_0", kind: Kind::F32 },
-    Field { name: "term_1", kind: Kind::F32 },
-    Field { name: "term_2", kind: Kind::F32 },
     Field { name: "demand", kind: Kind::F32 },
     Field { name: "voltage", kind: Kind::F32 },
     Field { name: "code", kind: Kind::U16 },
@@ -71,6 +68,15 @@ pub const FIELDS: &[Field] = &[
     Field { name: "cycles", kind: Kind::U32 },
     Field { name: "stuck_ticks", kind: Kind::U32 },
     Field { name: "stair", kind: Kind::U32 },
+    // The law's terms; 0 beyond those that it has.
+    Field { name: "term_0", kind: Kind::F32 },
+    Field { name: "term_1", kind: Kind::F32 },
+    Field { name: "term_2", kind: Kind::F32 },
+    Field { name: "term_3", kind: Kind::F32 },
+    Field { name: "term_4", kind: Kind::F32 },
+    Field { name: "term_5", kind: Kind::F32 },
+    Field { name: "term_6", kind: Kind::F32 },
+    Field { name: "term_7", kind: Kind::F32 },
 ];
 
 /// Bytes of a record.
@@ -113,16 +119,12 @@ pub(crate) fn record(
     output: &ServoOutput<f32, LawTerms<f32>>,
     sticks: &StickSlipState<f32>,
 ) -> [u8; RECORD] {
-    let [(_, term_0), (_, term_1), (_, term_2)] = output.command.terms.columns();
-    Writer { bytes: [0; RECORD], at: 0 }
+    let writer = Writer { bytes: [0; RECORD], at: 0 }
         .put(target.position.0.to_le_bytes())
         .put(target.velocity.to_le_bytes())
         .put(target.acceleration.to_le_bytes())
         .put(output.tick.error.to_le_bytes())
         .put(output.tick.error_rate.to_le_bytes())
-        .put(term_0.to_le_bytes())
-        .put(term_1.to_le_bytes())
-        .put(term_2.to_le_bytes())
         .put(output.command.voltage.to_le_bytes())
         .put(output.voltage.to_le_bytes())
         .put(output.code.0.to_le_bytes())
@@ -131,6 +133,7 @@ pub(crate) fn record(
         // A run has fewer ticks than 32 bits count.
         .put((sticks.cycles() as u32).to_le_bytes())
         .put((sticks.stuck_ticks() as u32).to_le_bytes())
-        .put(sticks.stair().to_le_bytes())
-        .bytes
+        .put(sticks.stair().to_le_bytes());
+    let terms = output.command.terms.values();
+    terms.iter().fold(writer, |writer, term| writer.put(term.to_le_bytes())).bytes
 }
