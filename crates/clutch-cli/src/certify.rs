@@ -81,7 +81,7 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
     let deg = |x: f64| number(x.to_degrees());
     let law = scenario.spec().law;
     let is_smc = plan.paper.is_some();
-    let mut out = format!("{}\n{}\n\n", scenario.name, law_name(&law));
+    let mut out = format!("{}\n{}\n\n", scenario.name(), law_name(&law));
     out += &quantities(
         "Bounds",
         &[
@@ -180,7 +180,7 @@ pub fn certificate(scenario: &Scenario) -> Result<Value, ScenarioError> {
     let paper =
         |p: &PaperConditions| value!({"kp_26_v": p.kp, "kd_27_v_s_rad": p.kd, "gamma_28_rad_s2": p.gamma});
     Ok(value!({
-        "scenario": scenario.name,
+        "scenario": scenario.name(),
         "version": env!("CARGO_PKG_VERSION"),
         "law": law_name(&scenario.spec().law),
         "certified": c.certified(),

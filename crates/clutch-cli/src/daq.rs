@@ -61,7 +61,7 @@ impl Daq {
         };
         let mut text = format!(
             "{path}\n{}: simulated board; connect with: clutch loop {} --port {path}\n",
-            scenario.name,
+            scenario.name(),
             self.scenario.scenario.display()
         );
         for fault in &self.fault {

@@ -147,7 +147,7 @@ impl Hil {
     fn text(&self, scenario: &Scenario, ran: &Ran, took: f64) -> String {
         let title = format!(
             "{}\n{} ticks on the emulated board in {took:.1} s, seed {}; figures over {} s after settling",
-            scenario.name,
+            scenario.name(),
             ran.answers,
             scenario.spec().run.seed,
             crate::table::number(ran.metrics.measured_s)
@@ -175,7 +175,7 @@ impl Hil {
 
 fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> anyhow::Result<String> {
     json(&serde_json::json!({
-        "scenario": scenario.name,
+        "scenario": scenario.name(),
         "version": env!("CARGO_PKG_VERSION"),
         "seed": scenario.spec().run.seed,
         "ticks": ran.answers,

@@ -85,7 +85,7 @@ impl ScenarioArgs {
 /// The scenario in the form for a board that closes the loop itself; prints a note if that changes
 /// it.
 fn single_precision(args: &ScenarioArgs, scenario: Scenario) -> anyhow::Result<Scenario> {
-    if scenario.scalar == ScalarKind::F32 {
+    if scenario.scalar() == ScalarKind::F32 {
         return Ok(scenario);
     }
     let _ = writeln!(
@@ -102,7 +102,7 @@ fn not_certified(scenario: &Scenario, file: &Path) -> String {
     format!(
         "{}: the gains are not certified for these bounds and this path, so nothing was started.\n\
          `clutch certify {}` gives the reason; --uncertified runs it anyway.\n",
-        scenario.name,
+        scenario.name(),
         file.display()
     )
 }

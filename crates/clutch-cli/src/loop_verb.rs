@@ -191,7 +191,7 @@ impl Loop {
         {
             bail!("{}: is the scenario; name another file for the log", log.display());
         }
-        match scenario.scalar {
+        match scenario.scalar() {
             ScalarKind::F32 => self.run_in::<f32>(&scenario),
             ScalarKind::F64 => self.run_in::<f64>(&scenario),
         }
@@ -475,8 +475,8 @@ impl Run<'_> {
         let Run { scenario, address, certified, safety, plan, .. } = *self;
         let spec = scenario.spec();
         let board = board_text(hello);
-        let safe = match safety.supervisor.on_fault {
-            SafeState::Hold { volts } => format!("hold with {} V", number(volts)),
+        let safe = match safety.on_fault {
+            SafeState::hold(volts) => format!("hold with {} V", number(volts)),
             SafeState::Ramp { volts_per_s, volts } => {
                 format!("ramp by {} V/s to {} V, and hold", number(volts_per_s), number(volts))
             }
@@ -487,7 +487,7 @@ impl Run<'_> {
         };
         let (boot, holds) = from_scenario::boot_output(scenario, hello, plan);
         let system = describe_system();
-        let mut text = format!("{}\n", scenario.name);
+        let mut text = format!("{}\n", scenario.name());
         let mut row = |name: &str, value: String| text += &format!("  {name:<12}{value}\n");
         row("port", format!("{address}, {}", kind.describe()));
         row(
@@ -499,7 +499,7 @@ impl Run<'_> {
                 number(boot)
             ),
         );
-        row("loop", format!("{} µs, answers due within {} µs", spec.period.0, safety.supervisor.deadline.0));
+        row("loop", format!("{} µs, answers due within {} µs", spec.period.0, safety.limits.supervisor.deadline.0));
         row(
             "path",
             format!(
@@ -517,7 +517,7 @@ impl Run<'_> {
             },
         );
         row("safe state", format!("{safe}: {}", safety.reason));
-        row("watchdog", format!("{} cycles on the board", safety.watchdog_cycles));
+        row("watchdog", format!("{} cycles on the board", safety.limits.watchdog_cycles));
         if let Some(first) = system.first() {
             row("system", first.clone());
         }
@@ -619,7 +619,7 @@ fn summary(
     };
     let title = format!(
         "{}\n{} ticks; figures over {} s after settling, from the encoder",
-        scenario.name,
+        scenario.name(),
         r.ticks,
         number(m.measured_s)
     );
@@ -726,7 +726,7 @@ fn as_json(
         })
     };
     serde_json::json!({
-        "scenario": scenario.name,
+        "scenario": scenario.name(),
         "version": env!("CARGO_PKG_VERSION"),
         "state": format!("{:?}", r.state),
         "cause": format!("{:?}", r.cause),

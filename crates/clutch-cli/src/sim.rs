@@ -90,10 +90,10 @@ impl Sim {
             figure(&scenario, &run).save(file)?;
         }
         let summary = Summary {
-            scenario: &scenario.name,
+            scenario: &scenario.name(),
             version: env!("CARGO_PKG_VERSION"),
             engine: run.engine,
-            scalar: scenario.scalar,
+            scalar: scenario.scalar(),
             seed: scenario.spec().run.seed,
             metrics: run.metrics,
             detected: &run.detected,
@@ -138,7 +138,7 @@ pub(crate) fn figures(m: &Metrics) -> Vec<(&'static str, String, &'static str)> 
 
 fn text(s: &Summary<'_>, run: &Run) -> String {
     let m = &s.metrics;
-    let scalar = match s.scalar {
+    let scalar = match s.scalar() {
         ScalarKind::F32 => "f32",
         ScalarKind::F64 => "f64",
     };
@@ -237,7 +237,7 @@ fn figure(scenario: &Scenario, run: &Run) -> Figure {
         lines: Vec::new(),
     };
     Figure {
-        title: scenario.name.clone(),
+        title: scenario.name().clone(),
         columns: 1,
         panels: vec![
             panel("Position error", "error (°)", vec![over_time("error", &t.error, degrees)], false),

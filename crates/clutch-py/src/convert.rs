@@ -40,7 +40,7 @@ pub(crate) fn scenario_error(py: Python<'_>, e: &ScenarioError, tables: Option<&
 
 /// A refused parameter of the core.
 pub(crate) fn core_error(py: Python<'_>, e: &ParamError) -> PyErr {
-    param_error(py, &e.to_string(), e.field, PyFloat::new(py, e.value).into_any())
+    param_error(py, &e.to_string(), e.field(), PyFloat::new(py, e.value).into_any())
 }
 
 /// An error of a scenario's file: of the system, or of its contents.
