@@ -22,8 +22,9 @@ from clutch import _processor  # noqa: F401
 from clutch import _clutch
 from clutch._certificate import Certificate
 from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
-from clutch._errors import ParamError
+from clutch._errors import LoopError, ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
+from clutch._loop import LoopResult, loop
 from clutch._model import (
     Bounds,
     BrakeGeometry,
@@ -87,6 +88,8 @@ __all__ = [
     "JerkLimited",
     "Limits",
     "Log",
+    "LoopError",
+    "LoopResult",
     "Metrics",
     "MinimumJerk",
     "Model",
@@ -133,6 +136,7 @@ __all__ = [
     "grid",
     "gym",
     "latin_hypercube",
+    "loop",
     "plot",
     "read_log",
     "replay",

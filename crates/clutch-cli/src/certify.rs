@@ -1,7 +1,8 @@
 //! `clutch certify`.
 
+use crate::args::ScenarioArgs;
+use crate::output::{Exit, json, print};
 use crate::table::{number, quantities};
-use crate::{Exit, ScenarioArgs, json, print};
 use clap::Args;
 use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
 use clutch_core::law::LawParams;

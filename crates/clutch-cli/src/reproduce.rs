@@ -1,9 +1,9 @@
 //! `clutch reproduce`.
 
+use crate::output::{Exit, json, print, with_progress, write};
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{ReportFigure, claims_table, html};
 use crate::table::number;
-use crate::{Exit, json, print, with_progress, write};
 use anyhow::Context;
 use clap::Args;
 use clutch_sim::paper::{self, FigureData, SEEDS, Table3Row};

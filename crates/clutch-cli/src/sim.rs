@@ -1,8 +1,9 @@
 //! `clutch sim`.
 
+use crate::args::ScenarioArgs;
+use crate::output::{BUILD, Exit, json, new_log, print, with_progress};
 use crate::plot::{self, Figure, Panel, Series};
 use crate::table::{number, quantities};
-use crate::{Exit, ScenarioArgs, json, print};
 use anyhow::Context;
 use clap::Args;
 use clutch_loop::to_log;
@@ -75,16 +76,16 @@ impl Sim {
             }
         }
         if let Some(log) = &self.log {
-            crate::new_log(log)?;
+            new_log(log)?;
         }
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
-        let run = crate::with_progress("samples", |progress| scenario.run(Keep::Trace, progress))?;
+        let run = with_progress("samples", |progress| scenario.run(Keep::Trace, progress))?;
         if let Some(file) = &self.csv {
             csv(&run, file)?;
         }
         if let Some(file) = &self.log {
-            to_log::save_simulation(file, &scenario, &run, crate::BUILD)?;
+            to_log::save_simulation(file, &scenario, &run, BUILD)?;
         }
         if let Some(file) = &self.plot {
             figure(&scenario, &run).save(file)?;

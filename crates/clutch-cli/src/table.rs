@@ -1,5 +1,6 @@
 //! Plain tables for a terminal.
 
+pub(crate) use clutch_loop::summary::number;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
 
 /// Rows of name, value and unit, under a title.
@@ -21,14 +22,4 @@ pub(crate) fn quantities(title: &str, rows: &[(&str, String, &str)]) -> String {
         text.push('\n');
     }
     text
-}
-
-/// A number with about five significant digits.
-pub(crate) fn number(x: f64) -> String {
-    if x == 0.0 {
-        return "0".into();
-    }
-    let digits = (4.0 - x.abs().log10().floor()).clamp(0.0, 12.0) as usize;
-    let text = format!("{x:.digits$}");
-    if digits == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
 }

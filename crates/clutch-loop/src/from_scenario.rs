@@ -143,6 +143,21 @@ pub fn settings(
     })?)
 }
 
+/// What [`in_single_precision`] says when it changes something.
+pub const SINGLE_PRECISION: &str = "such a board calculates in single precision: sampling.scalar = \"f32\"";
+
+/// The scenario as a board takes it that closes the loop itself; none if it is one already.
+///
+/// # Errors
+/// The scenario does not go with single precision.
+pub fn in_single_precision(scenario: &Scenario) -> Result<Option<Scenario>, ScenarioError> {
+    if scenario.scalar == ScalarKind::F32 {
+        return Ok(None);
+    }
+    let set = [("sampling.scalar".to_owned(), "f32".to_owned())];
+    Scenario::parse(&scenario.name, &scenario.canonical(), &set).map(Some)
+}
+
 /// The scenario's path from the count on which a run begins: its first point lies within that
 /// count, where the simulation's does, and its targets are the simulation's in the same scalar.
 ///

@@ -23,6 +23,18 @@ pub(crate) fn param_error(py: Python<'_>, message: &str, field: &str, value: Bou
     }
 }
 
+/// A `clutch.LoopError`.
+pub(crate) fn loop_error(py: Python<'_>, message: &str) -> PyErr {
+    let made = py
+        .import("clutch._errors")
+        .and_then(|m| m.getattr("LoopError"))
+        .and_then(|class| class.call1((message,)));
+    match made {
+        Ok(error) => PyErr::from_value(error),
+        Err(e) => e,
+    }
+}
+
 /// A scenario's error; its value is looked up in the tables it came from.
 pub(crate) fn scenario_error(py: Python<'_>, e: &ScenarioError, tables: Option<&Table>) -> PyErr {
     // An error about a whole table is about no one value.
