@@ -10,7 +10,6 @@ use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
 use clutch_sim::reaching::Reaching;
 use clutch_sim::run::Detected;
-use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Keep, Metrics, Run, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -40,8 +39,8 @@ pub(crate) struct Sim {
 struct Summary<'a> {
     scenario: &'a str,
     version: &'static str,
-    engine: EngineKind,
-    scalar: ScalarKind,
+    engine: &'static str,
+    scalar: &'static str,
     seed: u64,
     metrics: Metrics,
     detected: &'a Detected,
@@ -91,10 +90,10 @@ impl Sim {
             figure(&scenario, &run).save(file)?;
         }
         let summary = Summary {
-            scenario: &scenario.name(),
+            scenario: scenario.name(),
             version: env!("CARGO_PKG_VERSION"),
-            engine: run.engine,
-            scalar: scenario.scalar(),
+            engine: run.engine.name(),
+            scalar: scenario.scalar().name(),
             seed: scenario.spec().run.seed,
             metrics: run.metrics,
             detected: &run.detected,
@@ -139,16 +138,12 @@ pub(crate) fn figures(m: &Metrics) -> Vec<(&'static str, String, &'static str)> 
 
 fn text(s: &Summary<'_>, run: &Run) -> String {
     let m = &s.metrics;
-    let scalar = match s.scalar() {
-        ScalarKind::F32 => "f32",
-        ScalarKind::F64 => "f64",
-    };
-    let engine = match s.engine {
+    let engine = match run.engine {
         EngineKind::ExactFlow => "exact flow",
         EngineKind::DormandPrince | EngineKind::Auto => "Dormand–Prince",
     };
     let title = format!(
-        "{}\n{} ticks, seed {}, servo in {scalar}, engine {engine}; figures over {} s after settling",
+        "{}\n{} ticks, seed {}, servo in {}, engine {engine}; figures over {} s after settling",
         s.scenario,
         run.trace.time.len(),
         s.seed,
@@ -238,7 +233,7 @@ fn figure(scenario: &Scenario, run: &Run) -> Figure {
         lines: Vec::new(),
     };
     Figure {
-        title: scenario.name().clone(),
+        title: scenario.name().to_owned(),
         columns: 1,
         panels: vec![
             panel("Position error", "error (°)", vec![over_time("error", &t.error, degrees)], false),

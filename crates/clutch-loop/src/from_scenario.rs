@@ -151,11 +151,11 @@ pub const SINGLE_PRECISION: &str = "such a board calculates in single precision:
 /// # Errors
 /// The scenario does not go with single precision.
 pub fn in_single_precision(scenario: &Scenario) -> Result<Option<Scenario>, ScenarioError> {
-    if scenario.scalar == ScalarKind::F32 {
+    if scenario.scalar() == ScalarKind::F32 {
         return Ok(None);
     }
     let set = [("sampling.scalar".to_owned(), "f32".to_owned())];
-    Scenario::parse(&scenario.name, &scenario.canonical(), &set).map(Some)
+    Scenario::parse(&scenario.name(), &scenario.canonical(), &set).map(Some)
 }
 
 /// The scenario's path from the count on which a run begins: its first point lies within that

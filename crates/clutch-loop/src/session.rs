@@ -18,7 +18,7 @@ use crate::summary::{LogSummary, Summary, number};
 use crate::to_log::PRESENT_CODE;
 use crate::watch::Watch;
 use clutch_core::law::Law;
-use clutch_core::{DacCode, Micros, Real, SafeState};
+use clutch_core::{DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState};
 use clutch_log::{LogError, Source};
 use clutch_node::{ControllerNode, HostNode, present_code};
 use clutch_sim::scenario::{Plan, ScalarKind};
@@ -153,7 +153,7 @@ pub fn check(scenario: &Scenario, uncertified: bool, log: Option<&Path>) -> Resu
     scenario.safety()?;
     let plan = scenario.plan()?;
     if !plan.certificate.certified() && !uncertified {
-        return Err(SessionError::NotCertified { scenario: scenario.name.clone() });
+        return Err(SessionError::NotCertified { scenario: scenario.name().to_owned() });
     }
     match log {
         Some(path) if path.exists() => Err(SessionError::LogExists { path: path.to_owned() }),
@@ -266,7 +266,7 @@ impl Session {
             }
         };
         let mut course = Course { session: self, address: &address, stop, event };
-        let ran = match (&self.options.board, self.scenario.scalar) {
+        let ran = match (&self.options.board, self.scenario.scalar()) {
             (Board::Controller(_), _) => course.on_controller(),
             (_, ScalarKind::F32) => course.on_daq::<f32>(),
             (_, ScalarKind::F64) => course.on_daq::<f64>(),
@@ -274,7 +274,7 @@ impl Session {
         let board = simulated.map(SimulatedBoard::stop).transpose();
         let (report, log) = ran?;
         Ok(Summary {
-            scenario: self.scenario.name.clone(),
+            scenario: self.scenario.name().to_owned(),
             version: self.options.version.clone(),
             certified: self.certified(),
             stopped: stop.load(Ordering::Relaxed),
@@ -454,13 +454,13 @@ impl Course<'_> {
     fn announcement(&self, hello: &Hello, kind: DeviceKind) -> Result<Announcement, SessionError> {
         let Session { scenario, plan, .. } = self.session;
         let (spec, safety) = (scenario.spec(), scenario.safety()?);
-        let safe = match safety.supervisor.on_fault {
-            SafeState::Hold { volts } => format!("hold with {} V", number(volts)),
-            SafeState::Ramp { volts_per_s, volts } => {
-                format!("ramp by {} V/s to {} V, and hold", number(volts_per_s), number(volts))
+        let safe = match safety.on_fault {
+            SafeState::Hold(SafeHold { volts }) => format!("hold with {} V", number(volts)),
+            SafeState::Ramp(SafeRamp { rate, volts }) => {
+                format!("ramp by {} V/s to {} V, and hold", number(rate), number(volts))
             }
             SafeState::Release => "release".to_owned(),
-            SafeState::HoldThenRelease { volts, after } => {
+            SafeState::HoldThenRelease(SafeHoldThenRelease { volts, after }) => {
                 format!("hold with {} V for {} s, then release", number(volts), number(after))
             }
         };
@@ -481,11 +481,11 @@ impl Course<'_> {
         let mut rows = vec![
             ("port", format!("{}, {}", self.address, kind.describe())),
             ("board", board),
-            ("loop", format!("{} µs, answers due within {} µs", spec.period.0, safety.supervisor.deadline.0)),
+            ("loop", format!("{} µs, answers due within {} µs", spec.period.0, safety.limits.supervisor.deadline.0)),
             ("path", format!("{} s, up to {fastest} °/s", number(spec.run.duration))),
             ("gains", gains.to_owned()),
-            ("safe state", format!("{safe}: {}", safety.reason)),
-            ("watchdog", format!("{} cycles on the board", safety.watchdog_cycles)),
+            ("safe state", format!("{safe}: {}", safety.reason.0)),
+            ("watchdog", format!("{} cycles on the board", safety.limits.watchdog_cycles)),
         ];
         rows.extend(describe_system().first().map(|system| ("system", system.clone())));
         let mut remarks = Vec::new();
@@ -498,7 +498,7 @@ impl Course<'_> {
                     .to_owned(),
             );
         }
-        Ok(Announcement { title: scenario.name.clone(), rows, remarks })
+        Ok(Announcement { title: scenario.name().to_owned(), rows, remarks })
     }
 
     /// Begins the log.

@@ -171,7 +171,7 @@ impl Summary {
                 "stopped before the board was armed; its output is as it was".into()
             }
             _ if self.stopped => format!("stopped before the board said that it was armed; {safe}"),
-            Some(m) => format!("the board was not armed: {}", preflight::why(m)),
+            Some(m) => format!("the board was not armed: {}", preflight::why(m, None)),
             None => format!("the board did not say that it was armed; {safe}"),
         }
     }
