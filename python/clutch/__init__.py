@@ -24,6 +24,7 @@ from clutch._certificate import Certificate
 from clutch._clutch import Controller, Path, Plant, StickSlip, Table, Target, Tick, scenarios
 from clutch._errors import ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
+from clutch._metrics import Metrics
 from clutch._model import (
     Bounds,
     BrakeGeometry,
@@ -63,7 +64,7 @@ from clutch._model import (
     WeightDrive,
 )
 from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
-from clutch._run import Metrics, Result, simulate
+from clutch._run import Result, simulate
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
 
 if TYPE_CHECKING:

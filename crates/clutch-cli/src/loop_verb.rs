@@ -1,7 +1,7 @@
 //! `clutch loop`.
 
 use crate::daq::stop_flag;
-use crate::table::{number, quantities};
+use crate::table::{number, quantities, row};
 use crate::{Outcome, ScenarioArgs, key_value, print};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
@@ -21,8 +21,9 @@ use clutch_loop::run::{self, Configured, LogThread, LoopOptions, LoopReport, Pac
 use clutch_loop::setup::{self, Setup};
 use clutch_loop::sim_board::{PATIENT_BOARD, STRICT_BOARD};
 use clutch_node::{ControlNode, RemoteNode, present_code};
-use clutch_sim::Scenario;
+use clutch_sim::metrics::Detected;
 use clutch_sim::scenario::ScalarKind;
+use clutch_sim::{Metrics, Scenario};
 use clutch_wire::Hello;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
@@ -605,7 +606,6 @@ fn summary(
     (stopped, faults): (bool, usize),
 ) -> String {
     let m = &r.metrics;
-    let deg = |x: f64| number(x.to_degrees());
     let us = |ns: u64| number(ns as f64 / 1e3);
     let latency = |s: &CycleSummary| {
         format!("{} / {} / {} / {}", us(s.p50_ns), us(s.p99_ns), us(s.p99_9_ns), us(s.max_ns))
@@ -619,11 +619,11 @@ fn summary(
     let mut text = quantities(
         &title,
         &[
-            ("max |error|", deg(m.max_error_rad), "°"),
-            ("RMS error", deg(m.rms_error_rad), "°"),
-            ("mean error (target − position)", deg(m.mean_error_rad), "°"),
-            ("stick-slip seen by the encoder", number(m.stick_slip_cycles_per_s), "cycles/s"),
-            ("voltage variation", number(m.control_variation_v_s), "V/s"),
+            row(&Metrics::MAX_ERROR, m),
+            row(&Metrics::RMS_ERROR, m),
+            row(&Metrics::MEAN_ERROR, m),
+            (Detected::STICK_SLIP.label, number(m.stick_slip_cycles_per_s), Detected::STICK_SLIP.shown_unit),
+            row(&Metrics::VARIATION, m),
             ("samples received", r.link.received.to_string(), ""),
             ("samples lost", r.lost.to_string(), ""),
             (
