@@ -83,8 +83,14 @@ impl Program {
     }
 
     /// Runs it unseen; whether it succeeded, and what it printed on either stream.
-    pub(crate) fn quietly(mut self) -> Result<(bool, String)> {
-        let shown = self.announce();
+    pub(crate) fn quietly(self) -> Result<(bool, String)> {
+        self.announce();
+        self.silently()
+    }
+
+    /// The same, and nothing is said of it either.
+    pub(crate) fn silently(mut self) -> Result<(bool, String)> {
+        let shown = self.shown();
         let output = self.0.output().with_context(|| format!("cannot start: {shown}"))?;
         let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         Ok((output.status.success(), text.into_owned()))
