@@ -25,6 +25,7 @@ from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, s
 from clutch._errors import LoopError, ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
 from clutch._loop import LoopResult, loop
+from clutch._metrics import Metrics
 from clutch._model import (
     Bounds,
     BrakeGeometry,
@@ -64,7 +65,7 @@ from clutch._model import (
     WeightDrive,
 )
 from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
-from clutch._run import Metrics, Result, simulate
+from clutch._run import Result, simulate
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 use crate::args::{ScenarioArgs, key_value};
 use crate::output::{BUILD, Exit, json, not_certified, print};
 use crate::signals::stop_flag;
-use crate::table::{number, quantities};
+use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use clutch_loop::control_loop::Pace;
@@ -252,7 +252,6 @@ fn status(p: &Progress) {
 pub fn summary(s: &Summary) -> String {
     let r = &s.report;
     let m = &r.metrics;
-    let deg = |x: f64| number(x.to_degrees());
     let us = |ns: u64| number(ns as f64 / 1e3);
     let latency = |s: &CycleSummary| {
         format!("{} / {} / {} / {}", us(s.p50_ns), us(s.p99_ns), us(s.p99_9_ns), us(s.max_ns))
@@ -266,11 +265,11 @@ pub fn summary(s: &Summary) -> String {
     let mut text = quantities(
         &title,
         &[
-            ("max |error|", deg(m.max_error_rad), "°"),
-            ("RMS error", deg(m.rms_error_rad), "°"),
-            ("mean error (target − position)", deg(m.mean_error_rad), "°"),
-            ("stick-slip seen by the encoder", number(m.stick_slip_cycles_per_s), "cycles/s"),
-            ("voltage variation", number(m.control_variation_v_s), "V/s"),
+            row(&Metrics::MAX_ERROR, m),
+            row(&Metrics::RMS_ERROR, m),
+            row(&Metrics::MEAN_ERROR, m),
+            (Detected::STICK_SLIP.label, number(m.stick_slip_cycles_per_s), Detected::STICK_SLIP.shown_unit),
+            row(&Metrics::VARIATION, m),
             ("samples received", r.link.received.to_string(), ""),
             ("samples lost", r.lost.to_string(), ""),
             (

@@ -3,13 +3,12 @@
 use crate::args::ScenarioArgs;
 use crate::output::{BUILD, Exit, json, new_log, print, with_progress};
 use crate::plot::{self, Figure, Panel, Series};
-use crate::table::{number, quantities};
+use crate::table::{number, quantities, row};
 use anyhow::Context;
 use clap::Args;
 use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
-use clutch_sim::reaching::Reaching;
-use clutch_sim::run::Detected;
+use clutch_sim::metrics::{Detected, Reaching};
 use clutch_sim::{Keep, Metrics, Run, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -118,22 +117,9 @@ fn same_file(a: &PathBuf, b: &PathBuf) -> bool {
     a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// The figures of the shaft's true motion: name, value, unit.
+/// The figures of the shaft's true motion, but for the time over which they were taken.
 pub(crate) fn figures(m: &Metrics) -> Vec<(&'static str, String, &'static str)> {
-    let deg = |x: f64| number(x.to_degrees());
-    let optional = |x: Option<f64>| x.map_or("–".to_owned(), number);
-    vec![
-        ("max |error|", deg(m.max_error_rad), "°"),
-        ("RMS error", deg(m.rms_error_rad), "°"),
-        ("mean error (target − position)", deg(m.mean_error_rad), "°"),
-        ("integral of |error|", deg(m.iae_rad_s), "° s"),
-        ("stick-slip", number(m.stick_slip_cycles_per_s), "cycles/s"),
-        ("time stuck", number(100.0 * m.stick_time_fraction), "%"),
-        ("stair height", deg(m.stair_height_rad), "°"),
-        ("torque at break-away", optional(m.break_away_torque_nm.map(|t| 1e3 * t)), "mN m"),
-        ("voltage variation", number(m.control_variation_v_s), "V/s"),
-        ("jerk RMS", number(m.jerk_rms_rad_s3), "rad/s³"),
-    ]
+    Metrics::FIGURES.iter().filter(|f| f.name != Metrics::MEASURED.name).map(|f| row(f, m)).collect()
 }
 
 fn text(s: &Summary<'_>, run: &Run) -> String {
@@ -150,8 +136,9 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         number(m.measured_s)
     );
     let mut rows = figures(m);
-    let seen = number(s.detected.stick_slip_cycles_per_s);
-    rows.insert(5, ("stick-slip seen by the encoder", seen, "cycles/s"));
+    // Beside what it was in truth.
+    let truth = rows.iter().position(|(label, ..)| *label == Metrics::STICK_SLIP.label);
+    rows.insert(truth.map_or(0, |i| i + 1), row(&Detected::STICK_SLIP, s.detected));
     if let Some(time) = s.reaching.time_s {
         rows.push(("sliding surface reached after", number(time), "s"));
         if let Some(bound) = s.reaching.bound_s {

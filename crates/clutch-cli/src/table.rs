@@ -1,6 +1,7 @@
 //! Plain tables for a terminal.
 
 pub(crate) use clutch_loop::summary::number;
+use clutch_sim::metrics::Figure;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
 
 /// Rows of name, value and unit, under a title.
@@ -22,4 +23,9 @@ pub(crate) fn quantities(title: &str, rows: &[(&str, String, &str)]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// A figure as a row of [`quantities`]: in words, its value, its unit.
+pub(crate) fn row<M>(figure: &Figure<M>, m: &M) -> (&'static str, String, &'static str) {
+    (figure.label, figure.shown(m).map_or("–".to_owned(), number), figure.shown_unit)
 }
