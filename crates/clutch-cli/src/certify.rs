@@ -60,7 +60,7 @@ fn reason(s: Shortfall) -> &'static str {
         Shortfall::Surface => {
             "the law has no sliding surface, of which the certificate speaks: PD and CTC have one if K_p and K_d are above \
              0, PID has none"
-        },
+        }
         _ => "not certified",
     }
 }

@@ -12,6 +12,8 @@ use clutch_loop::port::Address;
 use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode};
 use clutch_loop::session::{Board, Event, Progress, Session, SessionError, SessionOptions};
 use clutch_loop::summary::{Summary, Verdict};
+use clutch_sim::Metrics;
+use clutch_sim::metrics::Detected;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;

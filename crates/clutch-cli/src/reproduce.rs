@@ -6,6 +6,7 @@ use crate::report::{ReportFigure, claims_table, html};
 use crate::table::number;
 use anyhow::Context;
 use clap::Args;
+use clutch_core::FrictionParams;
 use clutch_sim::paper::{self, FigureData, SEEDS, Table3Row};
 use std::path::PathBuf;
 

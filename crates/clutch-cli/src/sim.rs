@@ -8,7 +8,8 @@ use anyhow::Context;
 use clap::Args;
 use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
-use clutch_sim::metrics::{Detected, Reaching};
+use clutch_sim::metrics::Detected;
+use clutch_sim::reaching::Reaching;
 use clutch_sim::{Keep, Metrics, Run, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -133,6 +134,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         s.scenario,
         run.trace.time.len(),
         s.seed,
+        s.scalar,
         number(m.measured_s)
     );
     let mut rows = figures(m);

@@ -448,12 +448,10 @@ pub(crate) fn decode(channel: usize, time_ns: u64, data: &[u8]) -> Result<Record
                 target_acceleration: real(m.target_acceleration_rad_s2),
                 error: real(m.error_rad),
                 error_rate: real(m.error_rate_rad_s),
-                terms: [
-                    m.term_0, m.term_1, m.term_2, m.term_3, m.term_4, m.term_5, m.term_6, m.term_7,
-                ]
-                .into_iter()
-                .map_while(|term| term)
-                .collect(),
+                terms: [m.term_0, m.term_1, m.term_2, m.term_3, m.term_4, m.term_5, m.term_6, m.term_7]
+                    .into_iter()
+                    .map_while(|term| term)
+                    .collect(),
             })
         }
         2 => {

@@ -98,7 +98,9 @@ impl<T: Real> BuiltRun<T> {
         Ok(BuiltRun {
             params: servo_params,
             servo: Servo::new(&servo_params).map_err(|e| e.cast())?,
-            supervisor: Supervisor::new(&limits, &servo_params, &bounds).map_err(|e| e.cast())?.with_checks(checks),
+            supervisor: Supervisor::new(&limits, &servo_params, &bounds)
+                .map_err(|e| e.cast())?
+                .with_checks(checks),
             controller: ControllerParams {
                 run,
                 config: config_hash(scenario),
@@ -230,7 +232,12 @@ pub fn misfits(scenario: &Scenario, hello: &Hello) -> Vec<String> {
     let volts = |mv: i32| format!("{:.3} V", f64::from(mv) / 1000.0);
     let ours = |v: f64| format!("{v:.3} V");
     differ("converter", volts(hello.dac_lowest_mv), "rig.dac.lowest_v", ours(spec.rig.dac.converter.lowest));
-    differ("converter", volts(hello.dac_highest_mv), "rig.dac.highest_v", ours(spec.rig.dac.converter.highest));
+    differ(
+        "converter",
+        volts(hello.dac_highest_mv),
+        "rig.dac.highest_v",
+        ours(spec.rig.dac.converter.highest),
+    );
     let period = spec.period.0;
     if period < hello.period_min_us || period > hello.period_max_us {
         lines.push(format!(
@@ -254,7 +261,8 @@ pub fn misfits(scenario: &Scenario, hello: &Hello) -> Vec<String> {
 #[must_use]
 pub fn boot_output(scenario: &Scenario, hello: &Hello, plan: &Plan) -> (f64, bool) {
     let spec = scenario.spec();
-    let volts = clutch_core::Dac::new(&spec.rig.dac.converter).map_or(0.0, |d| d.volts(DacCode(hello.boot_code)));
+    let volts =
+        clutch_core::Dac::new(&spec.rig.dac.converter).map_or(0.0, |d| d.volts(DacCode(hello.boot_code)));
     let holds = scenario.safety().is_ok_and(|s| match s.on_fault.holding_voltage() {
         Some(_) => volts + 1e-9 >= plan.envelope.holding_voltage,
         None => true,

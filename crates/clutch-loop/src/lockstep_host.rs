@@ -98,7 +98,10 @@ impl<L: LockstepBoard, P: Fn(u64) -> Target<f32>> LockstepHost<L, P> {
             }
         });
         if let Some(m) = refused {
-            self.failure = Some(format!("the board refused to {what}: {}", crate::preflight::why(&m, Some(&self.settings))));
+            self.failure = Some(format!(
+                "the board refused to {what}: {}",
+                crate::preflight::why(&m, Some(&self.settings))
+            ));
         }
     }
 

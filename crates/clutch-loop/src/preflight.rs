@@ -310,7 +310,9 @@ impl<'a, S: Station> Talk<'a, S> {
         let address = self.address();
         match said {
             Some(None) => Ok(()),
-            Some(Some(m)) => Err(PreflightError::Refused { address, what, why: why(&m, self.settings.as_ref()) }),
+            Some(Some(m)) => {
+                Err(PreflightError::Refused { address, what, why: why(&m, self.settings.as_ref()) })
+            }
             None => Err(PreflightError::Lost { address, what }),
         }
     }

@@ -200,9 +200,7 @@ fn simulated<T: Real>(
     let volts = extra(log, START_VOLTAGE).and_then(|v| u64::from_str_radix(v, 16).ok());
     let volts = f64::from_bits(volts.ok_or(ReplayError::Lacks("the voltage at the start"))?);
     let params = spec.servo().map_err(BuildError::from)?.cast::<T>();
-    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| {
-        BuildError::from(e.cast::<f64>())
-    })?;
+    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| BuildError::from(e.cast::<f64>()))?;
     let path = spec.path::<T>().map_err(BuildError::from)?;
     let radians = servo.encoder().radians_per_count::<f64>();
     let Some(first) = samples.first() else { return Ok(Vec::new()) };

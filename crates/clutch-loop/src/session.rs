@@ -481,7 +481,13 @@ impl Course<'_> {
         let mut rows = vec![
             ("port", format!("{}, {}", self.address, kind.describe())),
             ("board", board),
-            ("loop", format!("{} µs, answers due within {} µs", spec.period.0, safety.limits.supervisor.deadline.0)),
+            (
+                "loop",
+                format!(
+                    "{} µs, answers due within {} µs",
+                    spec.period.0, safety.limits.supervisor.deadline.0
+                ),
+            ),
             ("path", format!("{} s, up to {fastest} °/s", number(spec.run.duration))),
             ("gains", gains.to_owned()),
             ("safe state", format!("{safe}: {}", safety.reason.0)),

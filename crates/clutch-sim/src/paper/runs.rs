@@ -48,7 +48,7 @@ impl Case {
             Source::Experiment => bench.clone(),
             Source::KnownFriction => RigParams { ripple: None, delay_ticks: 0, ..bench.clone() },
         };
-        let path = ReferenceParams::Ramp(self.rate_deg_s().to_radians());
+        let path = ReferenceParams::ramp(self.rate_deg_s().to_radians());
         let mut spec = RunSpec::new(rig, self.law.params(), path);
         if self.source == Source::KnownFriction {
             spec.model = known_model(&bench);
@@ -65,7 +65,7 @@ fn known_model(bench: &RigParams) -> PlantParams {
         inertia: bench.inertia,
         drive_torque: drive,
         viscous_damping: bench.viscous_damping,
-        brake_gain: bench.brake_gain,
+        brake_gain: bench.gain().unwrap_or(f64::NAN),
         friction: bench.friction,
     }
 }
