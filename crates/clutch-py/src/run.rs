@@ -101,14 +101,12 @@ pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)
         ("limit".into(), limit),
         ("stuck".into(), Column::part(run, |r| &r.trace.stuck)),
     ];
-    for i in 0..3 {
+    for i in 0..run.trace.terms.len() {
         let name = run.trace.terms[i].0;
-        // A law may call a term like a column: PD's demand_v is its sum before the output stage.
+        // A law may call a term like a column.
         let name =
             if columns.iter().any(|(n, _)| n == name) { format!("law_{name}") } else { name.to_owned() };
-        if !run.trace.terms[i].0.is_empty() {
-            columns.push((name, Column::part(run, |r| r.trace.terms[i].1.as_slice())));
-        }
+        columns.push((name, Column::part(run, |r| r.trace.terms[i].1.as_slice())));
     }
     columns
 }

@@ -4,7 +4,7 @@ use crate::convert::{
     core_error, from_json, from_table, load_error, overrides, param_error, scenario_error, to_table,
 };
 use crate::path::Path;
-use clutch_core::{BrakeGeometry, Stribeck};
+use clutch_core::{BrakeGeometry, FrictionModel, Stribeck};
 use clutch_sim::ScenarioError;
 use clutch_sim::rig::Rig;
 use clutch_sim::scenario::{BUILT_IN, check_section, override_keys};

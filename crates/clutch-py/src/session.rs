@@ -137,6 +137,6 @@ pub(crate) fn run_loop<'py>(
     }
     let summary = ran.map_err(|e| error(py, &scenario, &e))?;
     let ran_as = session.scenario();
-    let changed = (ran_as.scalar != scenario.0.scalar()).then(|| ran_as.canonical());
+    let changed = (ran_as.scalar() != scenario.0.scalar()).then(|| ran_as.canonical());
     Ok((from_json(py, &summary.to_json())?, clutch_cli::summary(&summary), announced, changed))
 }
