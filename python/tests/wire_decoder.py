@@ -57,7 +57,7 @@ MOST = 8
 
 @dataclass(frozen=True)
 class Layout:
-    """How one kind of body is laid out."""
+    """The layout of one kind of body."""
 
     kind: int
     name: str
@@ -151,7 +151,7 @@ def parse(data):
 
 
 def receive(stream):
-    """What a receiver that has just started says to a stream: messages and errors in order."""
+    """The results of a receiver that has just started, for a stream: messages and errors in order."""
     said, kept, dropping = [], bytearray(), False
     for byte in stream:
         if byte != 0:

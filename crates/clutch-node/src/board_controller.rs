@@ -127,7 +127,7 @@ impl BoardController {
         self.spent = cycles;
     }
 
-    /// The answer to the last sample has been written, and took so long.
+    /// Reports how long the last answer took, from sample to write.
     pub fn answered(&mut self, lateness: Micros) {
         if let Some(run) = &mut self.run {
             run.control.answered(lateness);

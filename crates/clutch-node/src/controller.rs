@@ -151,7 +151,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         self.supervisor.disconnect(&mut self.state);
     }
 
-    /// The answer to the last sample has been written, and took so long.
+    /// Reports how long the last answer took, from sample to write.
     pub fn answered(&mut self, lateness: Micros) {
         self.lateness = lateness;
     }

@@ -331,7 +331,7 @@ impl HostNode {
         let target = Target { position: target.position.plus(self.origin()), ..target };
         let Some(notice) = notice(m, &self.servo, tick, target) else { return };
         let cycle = &notice.cycle;
-        // The word of the end got lost.
+        // The `Ended` frame was lost.
         let ended = !matches!(cycle.from, State::Ready | State::Armed | State::Running);
         if self.driving() && ended {
             self.end(cycle.from, cycle.cause, cycle.value, notices);

@@ -267,7 +267,7 @@ proptest! {
     ) {
         let mut decoder = Decoder::new();
         for &byte in &bytes {
-            // What is accepted is what would have been sent.
+            // A decoder accepts only what an encoder would have sent.
             if let Some(Ok(found)) = decoder.push(byte) {
                 prop_assert_eq!(heard(encode(&found).as_bytes()), [Ok(found)]);
             }

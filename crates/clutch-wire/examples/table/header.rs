@@ -147,9 +147,9 @@ fn message(out: &mut String, m: &MessageInfo) -> std::fmt::Result {
 
 const HEAD: &str = r"/* The serial DAQ protocol, for boards in C99 or C++11. Generated from the table of clutch-wire:
  *     cargo run -p clutch-wire --example table -- header
- * Do not edit. What the fields mean and what a board must do: docs/wire.md.
+ * Do not edit. docs/wire.md has the meaning of the fields and the duties of a board.
  *
- * Works with any byte order and alignment: nothing is cast, bytes are put together one by one.
+ * Works with any byte order and alignment: nothing is cast, bytes are assembled one by one.
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
 #ifndef CLUTCH_WIRE_H
@@ -275,10 +275,10 @@ static inline size_t clutch_frame(uint8_t *wire, uint8_t *body, size_t length)
 ";
 
 const DECODER: &str = r"
-/* What clutch_push says besides a kind. */
+/* Results of clutch_push besides a kind. */
 #define CLUTCH_NOTHING 0        /* no frame ends here */
 #define CLUTCH_BAD_COBS (-1)    /* a code points past the end */
-#define CLUTCH_TOO_LONG (-2)    /* more bytes than the longest frame; said once */
+#define CLUTCH_TOO_LONG (-2)    /* more bytes than the longest frame; reported once */
 #define CLUTCH_TOO_SHORT (-3)   /* shorter than a kind and a CRC */
 #define CLUTCH_BAD_CRC (-4)     /* the checksum does not hold */
 #define CLUTCH_UNKNOWN_KIND (-5)

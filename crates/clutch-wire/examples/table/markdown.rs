@@ -35,7 +35,7 @@ fn write_all(out: &mut String) -> std::fmt::Result {
             writeln!(out, "| {} | `{}` | `{}` | {unit} | {} |", f.offset, f.name, f.ty, f.doc.trim())?;
         }
         let n = if m.list > 0 { " + 4 n" } else { "" };
-        writeln!(out, "| {}{n} | CRC | `u32` | – | Of all bytes before it. |", m.length - 4)?;
+        writeln!(out, "| {}{n} | CRC | `u32` | – | Checksum of all bytes before it. |", m.length - 4)?;
     }
     for set in CODES {
         writeln!(out, "\n### {}\n\n{}\n", set.name, set.doc.trim())?;

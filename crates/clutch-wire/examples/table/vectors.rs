@@ -50,7 +50,7 @@ fn content(mut wire: &[u8]) -> Vec<u8> {
     body
 }
 
-/// All that a decoder says to these bytes.
+/// All results of a decoder for these bytes.
 pub(crate) fn heard(bytes: &[u8]) -> Vec<Result<Message, FrameError>> {
     let mut decoder = Decoder::new();
     bytes.iter().filter_map(|byte| decoder.push(*byte)).collect()

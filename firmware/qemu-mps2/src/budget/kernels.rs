@@ -1,4 +1,4 @@
-//! The functions that have a budget, each by itself and under its name: what firmware calls that
+//! The functions that have a budget, each by itself and under its name: the calls of firmware that
 //! uses the crates.
 
 use clutch_core::law::{ControlLaw, Ctc, LawState, OutputState, Pd, Pid, Smc, SmcSign, Tick};
@@ -14,7 +14,7 @@ pub struct Bytes {
 }
 
 impl Bytes {
-    /// Of a message.
+    /// Makes the bytes of a message.
     pub fn of(message: &Message) -> Bytes {
         let mut bytes = [0; MAX_FRAME];
         let frame = encode(message);
@@ -80,7 +80,7 @@ pub extern "C" fn step_pid(
     law.update(state, tick).voltage
 }
 
-/// A servo, what it remembers, and where it shall be.
+/// A servo, its state, and its target.
 pub struct Axis {
     pub servo: Servo<f32>,
     pub state: ServoState<f32, LawState<f32>>,

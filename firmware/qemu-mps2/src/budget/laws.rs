@@ -14,10 +14,10 @@ use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, 
 use clutch_wire::{Actuate, Decoder, Message, Sample};
 
 pub const PERIOD: Micros = Micros(1000);
-/// Of ordinary and of wild inputs.
+/// Number of ordinary and of wild inputs.
 pub const OF_EACH: u32 = 1000;
 
-/// With a bumpless start: its offset is what a law remembers.
+/// With a bumpless start: its offset is the state of a law.
 pub fn output() -> OutputParams<f32> {
     OutputParams { bumpless_time: 0.05, lowest: 0.5, ..OutputParams::default() }
 }
@@ -73,7 +73,7 @@ fn servo() -> Option<()> {
     let servo = Servo::<f32>::new(&ServoParams::paper(LawParams::Smc(SmcParams::default()))).ok()?;
     let mut axis = Axis { servo, state: servo.start(Counts(0), &target, 0.0), target };
     for call in 0..4 * OF_EACH {
-        // Near the target, and anywhere; a target that is no number, now and then.
+        // Near the target, and anywhere; a target that is not a number, now and then.
         let near = call % 4 != 0;
         let any = FixedCounts((u64::from(random.next()) << 32 | u64::from(random.next())) as i64);
         axis.target = Target {

@@ -32,8 +32,8 @@ unsafe extern "C" {
     fn peer_smc_sign(law: *const PeerLaw<4>, offset: *mut f32, tick: *const PeerTick) -> f32;
 }
 
-/// Counts the C version, and how often its answer to an ordinary input is more than a millivolt
-/// from ours: it may fuse a product and a sum.
+/// Counts the C version, and the number of ordinary inputs for which its answer is more than a
+/// millivolt from ours: it may fuse a product and a sum.
 fn law<const N: usize, L: ControlLaw<f32, State = OutputState<f32>>>(
     name: &'static str,
     step: Step<N>,

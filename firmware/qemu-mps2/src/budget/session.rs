@@ -1,4 +1,4 @@
-//! Whole periods of a controller: runs in which the line and the board do what they can.
+//! Whole periods of a controller: runs in which the line and the board do everything they can.
 
 use crate::inputs::Random;
 use crate::kernels::{Bytes, Session, whole_tick};
@@ -126,7 +126,7 @@ fn other(random: &mut Random) -> Message {
     }
 }
 
-/// What is amiss with the frame of a period.
+/// The fault in the frame of a period.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Amiss {
     Nothing,
@@ -136,11 +136,11 @@ enum Amiss {
     Reordered,
     /// The counts are those of no shaft.
     Jump,
-    /// What the board says of itself.
+    /// The board's report about itself.
     Status,
     /// A byte is not as it was sent.
     Corrupted,
-    /// It is no sample.
+    /// It is not a sample.
     Other,
     /// The answer before was late.
     Late,
@@ -202,7 +202,7 @@ pub fn measure() -> Option<()> {
             session.asks(&Message::Arm(Arm { run: RUN, config: CONFIG }));
             others.add(session.period(&Bytes::of(&Message::Armed(Armed { run: RUN, config: CONFIG }))));
         }
-        // How often something is amiss differs from run to run: a run that ends early tries little.
+        // The frequency of faults differs from run to run: a run that ends early tries little.
         let rarity = [4, 12, 40].get(kind as usize % 3).copied()?;
         let (sequence, counts) = (random.next() as u16, random.next() as i32);
         let mut sample = Sample { run: RUN, sequence, time_us: 0, counts, status: BoardState::Running as u8 };

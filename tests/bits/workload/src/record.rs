@@ -4,7 +4,7 @@ use clutch_core::law::{LawTerms, Terms};
 use clutch_core::{ServoOutput, StickSlipState, Target};
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 
-/// How a field's bytes are to be read; all are little-endian.
+/// The type of a field's bytes; all are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Unsigned, 8 bit.
@@ -97,7 +97,7 @@ pub fn hash() -> Digest<'static, u32> {
     CRC.digest()
 }
 
-/// Fills a record from its begin.
+/// Fills a record from its beginning.
 struct Writer {
     bytes: [u8; RECORD],
     at: usize,
@@ -113,7 +113,7 @@ impl Writer {
     }
 }
 
-/// What a tick gave, in the order of [`FIELDS`].
+/// The outputs of a tick, in the order of [`FIELDS`].
 pub(crate) fn record(
     target: &Target<f32>,
     output: &ServoOutput<f32, LawTerms<f32>>,
