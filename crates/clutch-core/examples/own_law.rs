@@ -68,7 +68,7 @@ impl Shaft {
 }
 
 /// Ten seconds at 2 °/s; the root mean square of the error in degrees, and how often the shaft stuck, after one second.
-fn run<C: Controller<f64>>(servo: &Servo<f64, C>) -> Result<(f64, u32), ParamError> {
+fn run<C: ControlLaw<f64>>(servo: &Servo<f64, C>) -> Result<(f64, u32), ParamError> {
     let encoder = servo.encoder();
     let path = ReferenceParams::ramp(2.0_f64.to_radians());
     let path = Reference::new(&path, FixedCounts(0), encoder, servo.period())?;
