@@ -22,8 +22,10 @@ from clutch import _processor  # noqa: F401
 from clutch import _clutch
 from clutch._certificate import Certificate
 from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
-from clutch._errors import ParamError
+from clutch._errors import LoopError, ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
+from clutch._loop import LoopResult, loop
+from clutch._metrics import Metrics
 from clutch._model import (
     Bounds,
     BrakeGeometry,
@@ -63,7 +65,7 @@ from clutch._model import (
     WeightDrive,
 )
 from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
-from clutch._run import Metrics, Result, simulate
+from clutch._run import Result, simulate
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
 
 if TYPE_CHECKING:
@@ -87,6 +89,8 @@ __all__ = [
     "JerkLimited",
     "Limits",
     "Log",
+    "LoopError",
+    "LoopResult",
     "Metrics",
     "MinimumJerk",
     "Model",
@@ -133,6 +137,7 @@ __all__ = [
     "grid",
     "gym",
     "latin_hypercube",
+    "loop",
     "plot",
     "read_log",
     "replay",

@@ -22,6 +22,8 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
+from clutch._metrics import FIGURES
+
 if TYPE_CHECKING:
     import numpy as np
     from matplotlib.axes import Axes
@@ -185,9 +187,7 @@ def _figure(ax: Axes) -> Figure:
 
 
 def _split(name: str) -> tuple[str, str]:
-    """A key or metric without its unit's suffix, and the unit."""
-    if name == "iae_rad_s":  # an integral over time: the one name in which "_s" multiplies
-        return "iae", "rad s"
+    """A key without its unit's suffix, and the unit."""
     parts = name.split("_")
     for i in range(1, len(parts)):
         unit = _UNITS.get("_".join(parts[i:]))
@@ -203,14 +203,12 @@ def _label(key: str) -> str:
 
 
 def _metric(name: str) -> tuple[str, float]:
-    """Label of a metric, angles in degrees, and the factor that takes it there."""
-    if "." in name:
+    """Label of a column of a sweep, and the factor that takes it into the label's unit."""
+    figure = FIGURES.get(name)
+    if figure is None:
         return _label(name), 1.0
-    quantity, unit = _split(name)
-    words = quantity.replace("_", " ").replace("stick slip", "stick-slip")
-    degrees = unit.replace("rad", "°")
-    factor = 57.29577951308232 if degrees != unit else 1.0
-    return (f"{words} ({degrees})" if unit else words), factor
+    unit = f" ({figure.shown_unit})" if figure.shown_unit else ""
+    return figure.label + unit, figure.factor
 
 
 def _thin(x: NDArray[Any], y: NDArray[Any], columns: int) -> NDArray[np.intp]:
@@ -633,7 +631,7 @@ def sweep_map(
     x, y : str
         Swept keys of the scenario, as ``"law.smc.kp_v"``.
     value : str
-        The metric to draw, as ``"max_error_rad"``. Angles are drawn in degrees.
+        The metric to draw, as ``"max_error_rad"``, in words and in the unit of ``clutch sim``: errors in degrees.
     contours : str, optional
         The metric of the lines; None for none. The default is left out where the sweep does not have it.
     ax : matplotlib.axes.Axes, optional

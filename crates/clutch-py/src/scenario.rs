@@ -208,6 +208,6 @@ pub(crate) fn brake_gain(py: Python<'_>, table: &Bound<'_, PyDict>) -> PyResult<
     };
     geometry.brake_gain().map_err(|e| {
         let value = PyString::new(py, &e.value.to_string()).into_any();
-        param_error(py, &e.to_string(), e.field, value)
+        param_error(py, &e.to_string(), e.field(), value)
     })
 }

@@ -72,7 +72,7 @@ pub(crate) struct Servo {
 }
 
 fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
-    ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }
+    ParamError { field: e.field(), value: e.value.to_f64(), expected: e.expected }
 }
 
 fn begin<T: Real>(py: Python<'_>, scenario: &Scenario) -> PyResult<Running<T>> {
@@ -145,13 +145,13 @@ impl Servo {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         Ok(Servo {
-            running: match scenario.0.scalar {
+            running: match scenario.0.scalar() {
                 ScalarKind::F32 => Scalar::F32(begin(py, &scenario)?),
                 ScalarKind::F64 => Scalar::F64(begin(py, &scenario)?),
             },
-            whole: spec.rig.encoder_quantised,
-            rounds: spec.rig.dac_quantised,
-            dac: Dac::new(&spec.rig.dac).map_err(|e| core_error(py, &e))?,
+            whole: spec.rig.encoder.quantised,
+            rounds: spec.rig.dac.quantised,
+            dac: Dac::new(&spec.rig.dac.converter).map_err(|e| core_error(py, &e))?,
         })
     }
 
@@ -289,10 +289,10 @@ impl StickSlip {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         let wrong = |e: ParamError| core_error(py, &e);
-        let (encoder, period) = (Encoder::new(spec.rig.counts_per_rev).map_err(wrong)?, spec.period);
+        let (encoder, period) = (Encoder::new(spec.rig.encoder.sensor.counts_per_rev).map_err(wrong)?, spec.period);
         let single = StickSlipParams::default();
         let double = StickSlipParams::default();
-        Ok(StickSlip(match scenario.0.scalar {
+        Ok(StickSlip(match scenario.0.scalar() {
             ScalarKind::F32 => Sticks::F32(
                 clutch_core::StickSlip::new(&single, encoder, period).map_err(|e| wrong(to_f64(e)))?,
                 StickSlipState::default(),
@@ -391,7 +391,7 @@ impl Plant {
     fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Plant> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
-        let begun = match scenario.0.scalar {
+        let begun = match scenario.0.scalar() {
             ScalarKind::F32 => spec.prepare::<f32>().map(|p| (p.moving, p.volts)),
             ScalarKind::F64 => spec.prepare::<f64>().map(|p| (p.moving, p.volts)),
         };
@@ -404,8 +404,8 @@ impl Plant {
             tick: 0,
             start_voltage,
             voltage: start_voltage,
-            whole: spec.rig.encoder_quantised,
-            rounds: spec.rig.dac_quantised,
+            whole: spec.rig.encoder.quantised,
+            rounds: spec.rig.dac.quantised,
             events: Vec::new(),
             sticks: 0,
         })
@@ -675,7 +675,7 @@ impl PythonLaw {
     }
 }
 
-impl law::Controller<f64> for PythonLaw {
+impl law::ControlLaw<f64> for PythonLaw {
     type State = PythonState;
     type Terms = PythonTerms;
 
