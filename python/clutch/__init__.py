@@ -19,52 +19,16 @@ from typing import TYPE_CHECKING
 from clutch import _processor  # noqa: F401
 
 # isort: split
-from clutch import _clutch
+from clutch import _clutch, _tables
 from clutch._certificate import Certificate
 from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
 from clutch._errors import ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
-from clutch._model import (
-    Bounds,
-    BrakeGeometry,
-    Chirp,
-    Ctc,
-    Dac,
-    Encoder,
-    HandDrive,
-    Hold,
-    HoldThenRelease,
-    HoldVoltage,
-    JerkLimited,
-    Limits,
-    MinimumJerk,
-    Model,
-    Observer,
-    Output,
-    Pd,
-    Ramp,
-    RampVoltage,
-    Release,
-    Rig,
-    Ripple,
-    RunSettings,
-    Safety,
-    Sampling,
-    Scenario,
-    Sine,
-    Smc,
-    SmcSign,
-    SmoothedDerivative,
-    SpringDrive,
-    StribeckFriction,
-    TableDrive,
-    TablePath,
-    Trapezoid,
-    WeightDrive,
-)
+from clutch._model import Scenario
 from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
 from clutch._run import Metrics, Result, simulate
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
+from clutch._tables import *  # noqa: F403
 
 if TYPE_CHECKING:
     from clutch import dynamics, executors, gym, plot
@@ -72,61 +36,26 @@ if TYPE_CHECKING:
 __version__ = _clutch.VERSION
 
 __all__ = [
-    "Bounds",
-    "BrakeGeometry",
     "Certificate",
-    "Chirp",
-    "Ctc",
-    "Dac",
     "Difference",
-    "Encoder",
-    "HandDrive",
-    "Hold",
-    "HoldThenRelease",
-    "HoldVoltage",
-    "JerkLimited",
-    "Limits",
     "Log",
     "Metrics",
-    "MinimumJerk",
-    "Model",
-    "Observer",
-    "Output",
     "PaperFigure",
     "PaperPanel",
     "ParamError",
     "Path",
-    "Pd",
     "Plant",
-    "Ramp",
-    "RampVoltage",
-    "Release",
     "Replay",
     "Reproduction",
     "Result",
-    "Rig",
-    "Ripple",
-    "RunSettings",
-    "Safety",
     "Samples",
-    "Sampling",
     "Scenario",
     "Servo",
-    "Sine",
-    "Smc",
-    "SmcSign",
-    "SmoothedDerivative",
-    "SpringDrive",
     "StickSlip",
-    "StribeckFriction",
     "SweepResult",
     "Table",
-    "TableDrive",
-    "TablePath",
     "Target",
     "Tick",
-    "Trapezoid",
-    "WeightDrive",
     "__version__",
     "dynamics",
     "executors",
@@ -143,6 +72,7 @@ __all__ = [
     "sobol",
     "sweep",
 ]
+__all__ += _tables.__all__
 
 # Each brings a large library along: imported when it is asked for.
 _LATER = {"dynamics", "executors", "gym", "plot"}

@@ -72,6 +72,13 @@ enum Verb {
     },
     /// Generates the type stub of the Python package's native module anew.
     Stubs,
+    /// Writes what follows from the declarations of parameters: Python's classes, tables of the documentation, the
+    /// schema of scenario files.
+    Generate {
+        /// Only compares.
+        #[arg(long)]
+        check: bool,
+    },
     /// Draws the README's figures again, with `clutch reproduce`.
     Figures,
 }
@@ -103,8 +110,13 @@ fn main() -> Result<()> {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
         Verb::Stubs => stubs::generate(&python::interpreter()?, false).map(drop),
+        Verb::Generate { check } => generate(if check { &["--check"] } else { &[] }),
         Verb::Figures => figures(),
     }
+}
+
+fn generate(args: &[&str]) -> Result<()> {
+    cargo(["run", "--package", "clutch-sim", "--example", "generate", "--"]).args(args).run()
 }
 
 fn check() -> Result<()> {
@@ -115,6 +127,7 @@ fn check() -> Result<()> {
         cargo(["clippy", "--package", "clutch-core", "--features", features, "--", "-D", "warnings"])
             .run()?;
     }
+    generate(&["--check"])?;
     // The images, where their target is; tests build them in any case.
     firmware::in_firmware(["fmt", "--all", "--check"]).run()?;
     if firmware::has_target() {
