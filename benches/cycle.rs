@@ -1,5 +1,5 @@
 //! A control cycle, part by part: the servo alone, under its supervisor, with the frames around it,
-//! and what a log adds to it.
+//! and with the share of a log.
 
 use clutch_core::supervisor::{BoardMode, Sample, State};
 use clutch_core::{Counts, DacCode, FixedCounts, Real, SupervisorState, Target};

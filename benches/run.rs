@@ -8,7 +8,7 @@ use clutch_sim::{RigParams, RunSpec, simulate};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 fn ten_seconds(rig: RigParams, law: LawParams, rate_deg_s: f64) -> RunSpec<'static> {
-    let mut spec = RunSpec::new(rig, law, ReferenceParams::Ramp(rate_deg_s.to_radians()));
+    let mut spec = RunSpec::new(rig, law, ReferenceParams::ramp(rate_deg_s.to_radians()));
     spec.run.duration = 10.0;
     spec
 }

@@ -1,4 +1,4 @@
-//! What the acceptance tests share.
+//! Helpers that the acceptance tests share.
 
 #[path = "bits/native.rs"]
 pub mod bits;
@@ -6,6 +6,11 @@ mod command;
 pub mod firmware;
 
 pub use command::command;
+
+/// The README's example runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}
 
 use clutch_core::{Plant, PlantParams};
 use clutch_sim::drive::Drive;

@@ -1,4 +1,4 @@
-"""How late a thread wakes at 1 kHz: cyclictest, and this project's two wait modes, in turn.
+"""Lateness of a thread that wakes at 1 kHz: cyclictest, and this project's two wait modes, in turn.
 
     python3 benches/latency/lateness.py [--rounds 10] [--cycles 3000] [--cpu 1] [--priority 80]
 
@@ -114,7 +114,7 @@ def main() -> None:
             whole = percentile(pooled[name], percent) / max(percentile(pooled["cyclictest"], percent), 1)
             each = sorted(
                 percentile(mine, percent) / max(percentile(theirs, percent), 1)
-                for mine, theirs in zip(rounds[name], rounds["cyclictest"])
+                for mine, theirs in zip(rounds[name], rounds["cyclictest"], strict=True)
             )
             row += f"{whole:10.3f} /{each[len(each) // 2]:7.3f}"
         print(f"{name:12}{row}")

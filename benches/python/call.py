@@ -1,4 +1,4 @@
-"""A law's step called from Python, against the least that CPython's C API lets such a call cost."""
+"""A law's step called from Python, against the least possible cost of such a call through CPython's C API."""
 
 import importlib.util
 import pathlib
@@ -29,7 +29,7 @@ def build_floor() -> ModuleType:
 
 
 def candidates(rounds: int) -> list[Candidate]:
-    """Ours, the floor, and the loop around both, which is taken off."""
+    """Ours, the floor, and the loop around both, which is subtracted."""
     floor = build_floor()
     per_tick = RATES["J2"] * PERIOD * COUNTS_PER_TURN / TURN
     ticks = range(CALLS)

@@ -1,6 +1,6 @@
-//! A board in the controller role, its host, and encoder and converter, whatever anybody sends.
-//! Nothing panics or overflows; whatever goes out is whole frames; a code fits the converter; and
-//! a clock that has just been looked at is not asked for again at once.
+//! A board in the controller role, its host, and encoder and converter, with any frames between
+//! them. Nothing panics or overflows; all output is whole frames; a code fits the converter; and a
+//! clock that has just been read is not requested again at once.
 //!
 //! The input plans a run (law, safe state, path, a few numbers changed) and then acts: orderly
 //! steps, so that a run is reached, between bytes and well-formed frames of any content.
@@ -72,7 +72,7 @@ impl Input<'_> {
     }
 }
 
-/// The settings of a run, and what they build.
+/// The settings of a run, and the run that they build.
 fn plan(input: &mut Input<'_>) -> Option<(Settings, Built)> {
     let [kinds, path, host_silence] = input.take();
     let law = match kinds & 3 {
@@ -139,7 +139,7 @@ fn plan(input: &mut Input<'_>) -> Option<(Settings, Built)> {
     Some((settings, built))
 }
 
-/// Empties what goes out, which must be whole frames.
+/// Empties the output, which must be whole frames.
 fn frames(out: &mut Outbox) -> (Vec<u8>, Vec<Message>) {
     let bytes = out.as_bytes().to_vec();
     out.clear();
@@ -218,7 +218,7 @@ impl Bench {
         self.settle();
     }
 
-    /// What both have to say goes where it belongs.
+    /// The output of both goes to its addressee.
     fn settle(&mut self) {
         let now_ns = self.now_ns();
         let (path, points) = (&self.built.path, self.settings.points());

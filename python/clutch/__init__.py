@@ -1,8 +1,8 @@
 """Slow, smooth motion of shafts restrained by friction.
 
-A brake can only resist: a weight, a spring or a hand drives a shaft, and a computer decides each millisecond how hard
-a pad presses on a disc. This package scripts experiments with it: simulate, certify, sweep, read logs, replay, plot.
-The physics, the laws and the checks are the Rust crates that drive the hardware; nothing of them is written again
+A brake can only resist: a weight, a spring or a hand drives a shaft, and each millisecond a computer sets how hard a
+pad presses on a disc. This package scripts experiments with it: simulate, certify, sweep, read logs, replay, plot.
+The physics, the laws and the checks are in the Rust crates that drive the hardware; nothing of them is written again
 here.
 
 >>> import clutch
@@ -15,7 +15,7 @@ import importlib
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-# Before the native module: it chooses which.
+# Before the native module, which it chooses.
 from clutch import _processor  # noqa: F401
 
 # isort: split
@@ -74,7 +74,7 @@ __all__ = [
 ]
 __all__ += _tables.__all__
 
-# Each brings a large library along: imported when it is asked for.
+# Each imports a large library, so it is imported on request.
 _LATER = {"dynamics", "executors", "gym", "plot"}
 
 

@@ -1,4 +1,4 @@
-"""Tables in the forms of other libraries, each imported only when asked for."""
+"""Tables in the forms of other libraries, each imported only on request."""
 
 from __future__ import annotations
 

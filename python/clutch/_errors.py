@@ -7,7 +7,7 @@ class ParamError(ValueError):
     Parameters
     ----------
     message : str
-        What is wrong, where, and what is expected.
+        The fault, its place, and the expectation.
     field : str, default ""
         The parameter: within an object its name, as ``kp_v``; within a scenario its dotted key, as
         ``law.smc.kp_v``. Empty if it is about the whole.

@@ -36,7 +36,7 @@ def as_scenario(scenario: ScenarioLike, overrides: Mapping[str, object] | None =
 
 @dataclass(frozen=True, kw_only=True)
 class Metrics:
-    """How well a run went. All figures are taken after the settling time, with the true position.
+    """The quality of a run. All figures are taken after the settling time, with the true position.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Metrics:
     jerk_rms_rad_s3 : float
         Root mean square of the sampled jerk, rad/s³.
     detected_stick_slip_cycles_per_s, detected_stick_time_fraction : float
-        The same as the encoder shows it: what a loop on hardware would count.
+        The same as the encoder shows it, and as a loop on hardware would count it.
 
     Examples
     --------
@@ -88,12 +88,12 @@ METRICS: tuple[str, ...] = tuple(f.name for f in fields(Metrics))
 
 
 class Result:
-    """A finished run: what :func:`clutch.simulate` returns.
+    """A finished run, as :func:`clutch.simulate` returns it.
 
     Attributes
     ----------
     scenario : Scenario
-        What ran.
+        The scenario that ran.
     metrics : Metrics
         Figures after the settling time.
     engine : str
@@ -172,7 +172,7 @@ class Result:
         return data
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
-        """Give the samples as an Arrow C stream: how other libraries read them."""
+        """Give the samples as an Arrow C stream, which other libraries read."""
         return self.samples.__arrow_c_stream__(requested_schema)
 
     def plot(self) -> Figure:
@@ -187,7 +187,7 @@ class Result:
         Parameters
         ----------
         path : str or path
-            A new file; a log is never written over.
+            A new file; a log is never overwritten.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class Result:
         True
         """
         if self._run is None:
-            raise RuntimeError("the result comes from another process: only there it can be saved")
+            raise RuntimeError("the result comes from another process, and can only be saved there")
         self._run.save(os.fspath(path))
 
     def __len__(self) -> int:
@@ -242,8 +242,8 @@ def simulate(
         A scenario, the name of a built-in one, or a TOML file.
     law : callable, optional
         A law of your own in place of the scenario's: called with a :class:`clutch.Tick` each period, it answers the
-        brake's voltage, V. It stands behind the scenario's output stage (limits, bumpless start) and runs in double
-        precision. What it remembers is its own affair.
+        brake's voltage, V. The scenario's output stage (limits, bumpless start) follows it, and it runs in double
+        precision. It keeps its own state.
     overrides : mapping, optional
         Values for dotted keys of the scenario, as ``{"law.smc.kp_v": 4}``.
 

@@ -214,8 +214,8 @@ class TableDrive(_Params):
     Parameters
     ----------
     points_s_nm : sequence of (float, float)
-        Points of time and torque; times rise. A list of pairs [s, N m] of finite numbers, with times that
-        rise; at least one point.
+        Points of time and torque; times rise. A list of at least one pair [s, N m] of finite numbers, with
+        times that rise; at least one point.
 
     Raises
     ------
@@ -284,7 +284,7 @@ class Encoder(_Params):
     ----------
     counts_per_rev : int, default 20000
         Counts per revolution, after quadrature. The paper's resolution is 0.018°. `N`: a whole number from 4
-        to 16777216 counts per revolution.
+        to 16 777 216 counts per revolution.
     quantised : bool, default True
         `true` if it gives whole counts, rounded down; else it resolves 2⁻¹⁶ counts.
 
@@ -450,8 +450,8 @@ class Rig(_mixins.Rig):
     viscous_damping_nm_s_rad : float, default 0.001
         Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
     brake_gain_nm_v : float or BrakeGeometry, default 0.14
-        Brake torque per volt and unit of μ, (18): given by itself, or by the geometry of the brake. `K_COF`:
-        a finite number above 0 N m/V; either brake_gain_nm_v or a table brake_geometry, not both.
+        Brake torque per volt and unit of μ, (18), 0.14 in each base: a number, or what the geometry of the
+        brake gives. `K_COF`: a finite number above 0 N m/V.
     torque_noise_nm : float, default 0.0
         Root mean square of a random torque, normally distributed, held from sample to sample. A finite number
         of at least 0 N m.
@@ -689,11 +689,11 @@ class Pid(_Params):
 
     Parameters
     ----------
-    kp_v_rad : float, default 5000.0
+    kp_v_rad : float, default 1000.0
         Proportional gain. `K_p`: a finite number of at least 0 V/rad.
-    ki_v_rad_s : float, default 20000.0
+    ki_v_rad_s : float, default 10000.0
         Integral gain. `K_i`: a finite number of at least 0 V/(rad s).
-    kd_v_s_rad : float, default 50.0
+    kd_v_s_rad : float, default 20.0
         Derivative gain. `K_d`: a finite number of at least 0 V s/rad.
     derivative_time_s : float, default 0.0
         Time constant of the derivative's filter; 0 takes the error rate as it is. `τ`: a finite number of at
@@ -717,14 +717,14 @@ class Pid(_Params):
     --------
     >>> import clutch
     >>> clutch.Pid().kp_v_rad
-    5000.0
+    1000.0
     """
 
     _key: ClassVar[str] = "law.pid"
 
-    kp_v_rad: float = 5000.0
-    ki_v_rad_s: float = 20000.0
-    kd_v_s_rad: float = 50.0
+    kp_v_rad: float = 1000.0
+    ki_v_rad_s: float = 10000.0
+    kd_v_s_rad: float = 20.0
     derivative_time_s: float = 0.0
     tracking_time_s: float = 0.05
     bias_v: float = 0.0
@@ -964,8 +964,8 @@ class MinimumJerk(_Params):
         Distance. Either sign; a brake follows only the sign of its drive. A finite number, °; a finite
         distance below 1e12 counts of rig.encoder.counts_per_rev, °.
     duration_s : float
-        Time of the path. A number above 0 and at most 1000000 s; a time of at least sampling.period_us, s; a
-        time in which the highest speed stays below 4e6 counts of rig.encoder.counts_per_rev per
+        Time of the path. A number above 0 and at most 1 000 000 s; a time of at least sampling.period_us, s;
+        a time in which the highest speed stays below 4e6 counts of rig.encoder.counts_per_rev per
         sampling.period_us, s.
 
     Raises
@@ -1082,8 +1082,9 @@ class TablePath(_Params):
     ----------
     points_s_deg : sequence of (float, float)
         Points of time and angle, from the start; times rise. A brake follows only angles that do not fall. A
-        list of pairs [s, °] of finite numbers, with times that rise from 0 s on; at least one point; times of
-        at least 0 s that rise from point to point; positions below 7e13 counts of rig.encoder.counts_per_rev.
+        list of at least one pair [s, °] of finite numbers, with times that rise from 0 s on; at least one
+        point; times of at least 0 s that rise from point to point; positions below 7e13 counts of
+        rig.encoder.counts_per_rev.
     interpolation : {"linear", "cubic"}, default "cubic"
         How to go from point to point. `linear`: Straight lines: the velocity jumps at each point. `cubic`:
         Monotone cubics (Fritsch and Butland 1984): the velocity is continuous and a rising table never runs
@@ -1117,7 +1118,7 @@ class Sampling(_Params):
     Parameters
     ----------
     period_us : int, default 1000
-        Time from sample to sample, in (5). `T`: a whole number from 1 to 1000000 µs.
+        Time from sample to sample, in (5). `T`: a whole number from 1 to 1 000 000 µs.
     scalar : {"f32", "f64"}, default "f64"
         Scalar that path and servo compute in; a board has `f32`. The shaft is always in `f64`. `f32`: Single
         precision, as on a board. `f64`: Double precision.
@@ -1202,7 +1203,8 @@ class RunSettings(_Params):
     start_counts : float or None, default None
         Position at which shaft and path begin; absent: somewhere within the first count, drawn from the seed.
         Where the path lies between the encoder's edges decides how often a slow shaft sticks, and nobody
-        mounts an encoder to a fraction of a count. A number above -1000000000 and below 1000000000 counts.
+        mounts an encoder to a fraction of a count. A number above -1 000 000 000 and below 1 000 000 000
+        counts.
     seed : int, default 1
         Seed of everything random: start, ripple phases, noise, a hand. A whole number from 0 to
         9223372036854776000.

@@ -28,7 +28,7 @@ _IDS = {
 
 
 class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
-    """An agent in the place of the law: each sampling period it sees what a law sees and says a voltage.
+    """An agent in the place of the law: each sampling period it sees what a law sees and answers with a voltage.
 
     Action: the brake's voltage in V, from 0 to ``output.highest_v``; the converter rounds it.
 
@@ -45,13 +45,13 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
     generator.
 
     Info: ``error_rad`` (true), ``position_rad``, ``velocity_rad_s``, ``counts``, ``time_s``, ``stuck``,
-    ``sticks`` (so far), ``seed``, and ``law_voltage_v``, what the scenario's own law would say now.
+    ``sticks`` (so far), ``seed``, and ``law_voltage_v``, the present answer of the scenario's own law.
 
     Parameters
     ----------
     scenario
-        Scenario, name of a built-in one, or file. Its velocity must be the smoothed derivative: an observer
-        would be told the law's voltages instead of the agent's.
+        Scenario, name of a built-in one, or file. Its velocity must be the smoothed derivative: an observer would be
+        given the law's voltages instead of the agent's.
     overrides
         Dotted keys of the scenario with other values.
     max_error_deg

@@ -29,7 +29,7 @@ def bits():
 
 
 def stepped(scenario, counts, record):
-    """What law and detector make of the counts: a record each."""
+    """The outputs of law and detector for the counts: a record each."""
     law, sticks, path = package.Servo(scenario), package.StickSlip(scenario), scenario.path()
     assert len(path) == len(counts)
     rows = []

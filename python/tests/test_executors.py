@@ -265,7 +265,7 @@ def test_ray_gives_the_same_bits(base, local, ray):
 
 
 def test_a_killed_worker_of_ray_loses_no_row(long, long_local, ray):
-    # Two tasks at once, so that both workers tell their numbers; eval is a function they surely have.
+    # Two tasks at once, so that both workers report their numbers; eval is a function they surely have.
     busy = "[__import__('os').getpid(), __import__('time').sleep(0.3)][0]"
     pids = {future.result() for future in [ray.submit(eval, busy) for _ in range(4)]}
     progress, killed = killing(lambda: pids)

@@ -17,7 +17,7 @@ from oracle import PERIOD, TURN, Brake, Ctc, Dac, Encoder, Loop, Pd, Plant, Smc,
 
 ENGINES = ("dormand_prince", "exact_flow")
 IDEAL_COUNTS = 2**24
-# What the simulator's ideal sensor resolves: 2^-16 of its counts, 5.7e-12 rad.
+# Resolution of the simulator's ideal sensor: 2^-16 of its counts, 5.7e-12 rad.
 IDEAL_SENSOR = Encoder(IDEAL_COUNTS * 2**16)
 PAPER = {"encoder": Encoder(), "dac": Dac()}
 
@@ -37,7 +37,7 @@ class Case:
 
     @property
     def step(self):
-        """What the simulator's paths resolve: 2^-16 of the rig's counts, rad."""
+        """Resolution of the simulator's paths: 2^-16 of the rig's counts, rad."""
         counts = 20_000 if self.scenario["rig"]["base"] == "paper" else IDEAL_COUNTS
         return TURN / counts / 2**16
 
@@ -193,7 +193,7 @@ def test_a_perfect_loop_moves_as_equations_1_2_and_its_law_say(case, engine):
     sticks = len(r.times("stick"))
     assert sticks >= case.sticks, f"the oracle sticks {sticks} times: no test of stick-slip"
     differing = np.flatnonzero(d["stuck"] != r["stuck"])
-    assert differing.size == 0, f"stuck and slipping are told apart otherwise at ticks {differing[:10]}"
+    assert differing.size == 0, f"stuck and slipping differ at ticks {differing[:10]}"
     apart = largest(d["position_rad"], r["position"])
     assert apart <= tolerance, f"(1), (2): positions {apart:.1e} rad apart after {sticks} sticks"
     # A difference in position changes the voltage and with it the velocity of the next period.

@@ -419,7 +419,7 @@ def test_a_metrics_label_is_words_and_its_angles_are_degrees(name, label, factor
 
 
 def region(ax, kp, kd):
-    """Whether a point lies in the shaded region."""
+    """True if a point lies in the shaded region."""
     return any(path.contains_point((kp, kd)) for one in ax.collections[:1] for path in one.get_paths())
 
 

@@ -398,7 +398,7 @@ def test_a_bar_is_shown_on_a_terminal_only_and_only_for_long_sweeps(short, monke
 
 
 def outcome(code):
-    """What a process of its own prints."""
+    """The output of a separate process."""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     return done.stdout

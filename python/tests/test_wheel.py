@@ -282,7 +282,7 @@ def test_the_columns_of_a_log_are_those_that_any_mcap_reader_finds(clutch, tmp_p
 def test_a_log_is_never_written_over(tmp_path):
     run = package.simulate("smc_2")
     run.save(tmp_path / "run.mcap")
-    with pytest.raises(FileExistsError, match="never written over"):
+    with pytest.raises(FileExistsError, match="never overwritten"):
         run.save(tmp_path / "run.mcap")
     with pytest.raises(OSError, match=r"nowhere"):
         run.save(tmp_path / "nowhere" / "run.mcap")

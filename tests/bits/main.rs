@@ -109,7 +109,7 @@ fn lowest_bit(name: &str) -> u32 {
     before.map(|field| 8 * field.kind.size() as u32).sum()
 }
 
-/// Runs once more with every record written, and tells the first that differs.
+/// Runs once more with every record written, and reports the first that differs.
 fn told(board: &emulator::Board, run: &Run, job: Job) -> String {
     let (_, theirs) = board.run("told", &run.input(Job { dump: true, ..job }));
     match first_difference(&run.records, &theirs) {

@@ -1,5 +1,5 @@
-//! The runs of the test of equal bits: scenarios, the counts that their simulations gave, and what the
-//! workload makes of these counts on this machine.
+//! The runs of the test of equal bits: scenarios, the counts that their simulations gave, and the
+//! workload's results for these counts on this machine.
 
 use clutch_bits::{FIELDS, Job, Kind, RECORD, Workload, hash, setting_to_bytes};
 use clutch_core::{Counts, FixedCounts, Micros};
@@ -25,16 +25,16 @@ pub const RUNS: [(&str, &str); 11] = [
     ("sign_trapezoid", include_str!("runs/sign_trapezoid.toml")),
 ];
 
-/// What went wrong.
+/// The reason of a failure.
 pub type Wrong = Box<dyn std::error::Error + Send + Sync>;
 
-/// A run with everything that a machine needs to repeat it, and what came of it here.
+/// A run with everything that a machine needs to repeat it, and its result here.
 pub struct Run {
     /// Its name.
     pub name: &'static str,
     /// Its scenario as a file.
     pub toml: &'static str,
-    /// What the scenario calls itself.
+    /// The scenario's own name.
     pub title: String,
     /// The settings, as a board gets them.
     pub settings: Settings,
@@ -54,7 +54,7 @@ impl Run {
     /// Simulates a scenario, and gives its counts to the workload.
     ///
     /// # Errors
-    /// A scenario that is none, or not one for a board.
+    /// An invalid scenario, or one that is not for a board.
     pub fn new(name: &'static str, toml: &'static str) -> Result<Run, Wrong> {
         let scenario = Scenario::parse(name, toml, &[])?;
         let trace = simulate_watched::<f32>(&scenario.spec(), Keep::Trace, UNWATCHED)?.trace;
@@ -94,7 +94,7 @@ impl Run {
         last.and_then(|record| value(record, "cycles")).map_or(0, |cycles| cycles as u64)
     }
 
-    /// What the image `mps2-bits` reads, with another header.
+    /// The input of the image `mps2-bits`, with another header.
     #[must_use]
     pub fn input(&self, job: Job) -> Vec<u8> {
         let mut bytes = job.to_bytes().to_vec();
@@ -195,9 +195,9 @@ pub fn table(runs: &[Run]) -> String {
     text
 }
 
-/// Writes what a machine other than the emulator needs to repeat the runs and to compare itself:
-/// scenarios, counts, records, the fields of a record (name and NumPy's type), and a list of the runs
-/// (name, ticks, hash).
+/// Writes the files that a machine other than the emulator needs to repeat the runs and to compare
+/// itself: scenarios, counts, records, the fields of a record (name and NumPy's type), and a list
+/// of the runs (name, ticks, hash).
 ///
 /// # Errors
 /// A file that cannot be written.

@@ -1,5 +1,5 @@
-//! The emulated Cortex-M4F board in the controller role: it does what the simulation does, bit for bit, and
-//! what breaks its line ends in the safe state.
+//! The emulated Cortex-M4F board in the controller role: it behaves like the simulation, bit for
+//! bit, and faults of its line end in the safe state.
 
 mod serial;
 mod verb;
@@ -38,7 +38,8 @@ fn alone() -> RwLockWriteGuard<'static, ()> {
 
 const LAWS: [&str; 3] = ["pd", "ctc", "smc"];
 
-/// The paper's laws at 2 °/s for 10 s, in single precision. Lateness is this machine's and not looked at.
+/// The paper's laws at 2 °/s for 10 s, in single precision. Lateness belongs to this machine and is
+/// not checked.
 fn paper(law: &str, seed: u64) -> Scenario {
     let text = format!(
         "name = \"{law} at 2 °/s\"\n[rig]\nbase = \"paper\"\n[law.{law}]\n[reference.ramp]\nrate_deg_s = 2.0\n\
@@ -193,7 +194,7 @@ fn clutch(args: &[&str]) -> Output {
     Command::new(command()).args(args).stdin(Stdio::null()).output().expect("the command starts")
 }
 
-/// What it printed.
+/// Its output.
 fn shown(done: &Output) -> String {
     String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr)
 }
@@ -222,7 +223,8 @@ fn what_breaks_the_boards_line_ends_in_the_safe_state_in_time_and_is_named() {
     assert!(wrong.is_empty(), "{} of {count} runs:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// What a processor that fails after so many exchanges of a run still says, and how the emulator ends.
+/// The last frames of a processor that fails after a number of exchanges of a run, and the end of
+/// the emulator.
 struct Failing {
     board: Option<QemuBoard>,
     left: u32,
@@ -240,7 +242,7 @@ impl LockstepBoard for &mut Failing {
         let mut board = self.board.take().ok_or("it has ended")?;
         self.last = board.fail().map_err(|e| e.to_string())?.daq.to_vec();
         self.code = board.ended().map_err(|e| e.to_string())?;
-        Err("its processor has failed, as it was to".to_owned())
+        Err("its processor has failed, as ordered".to_owned())
     }
 }
 
@@ -267,7 +269,7 @@ fn a_processor_that_fails_sends_encoder_and_converter_to_the_safe_state() {
     let said: Vec<Message> =
         failing.last.iter().filter_map(|b| decoder.push(*b)).collect::<Result<_, _>>().expect("whole frames");
     let stop = clutch_wire::Stop { run: 7, reason: StopReason::Fault as u8 };
-    assert_eq!(said, [Message::Stop(stop)], "the last word of a processor that fails while it drives");
+    assert_eq!(said, [Message::Stop(stop)], "the last frame of a processor that fails while it drives");
     assert_eq!(failing.code, Some(101), "the emulator's exit code after a hard fault");
 }
 

@@ -1,6 +1,6 @@
 //! Broken boards and lines, over a real pseudo-terminal: the loop ends in the safe state and names
-//! the cause. The campaign in virtual time has the numbers; this shows that the real line is no
-//! other.
+//! the cause. The campaign in virtual time has the numbers; this shows that the real line behaves
+//! the same.
 
 use crate::harness::{Board, alone, folder, read_log, replays_identically, run, unless_held_up};
 

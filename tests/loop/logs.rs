@@ -3,11 +3,17 @@
 use crate::harness::{
     alone, beside_others, clutch, folder, program, read_log, replays_identically, run, start,
 };
-use clutch_log::{LogWriter, Record};
+use clutch_log::{LogWriter, Record, channel_table};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::BUILT_IN;
 use std::path::Path;
 use std::process::Command;
+
+#[test]
+fn the_docs_have_the_channel_table_of_the_code() {
+    let docs = include_str!("../../docs/log.md");
+    assert!(docs.contains(&channel_table()), "docs/log.md lacks:\n{}", channel_table());
+}
 
 #[test]
 fn the_log_of_every_simulation_with_an_encoder_replays_identically() {
@@ -102,12 +108,12 @@ fn one_changed_count_is_found_with_its_tick_and_field() {
     );
 }
 
-/// What every run with a log that was cut short has to show.
+/// The checks of every run with a log that was cut short.
 #[track_caller]
 fn cut_short(out: &str, err: &str) {
     assert!(out.contains("the path is done"), "{out}\n{err}");
     assert!(out.contains("no space for the log"), "{out}\n{err}");
-    assert!(err.contains("the log has ended early; the loop goes on"), "{out}\n{err}");
+    assert!(err.contains("the log has ended early; the loop continues"), "{out}\n{err}");
 }
 
 #[test]
@@ -133,7 +139,7 @@ fn a_log_that_may_not_grow_ends_and_the_loop_goes_on() {
 fn a_full_disk_ends_the_log_and_the_loop_goes_on() {
     let _alone = alone();
     let folder = folder("disk-full");
-    // A disk of its own, that nobody but these processes sees.
+    // A separate disk, visible only to these processes.
     let mount = "mount -t tmpfs -o size=64k none \"$1\"";
     let may = Command::new("unshare").args(["-m", "sh", "-c", mount, "sh"]).arg(&folder).output();
     if !may.is_ok_and(|done| done.status.success()) {

@@ -31,7 +31,7 @@ fn samples_that_pile_up_before_consent_do_not_end_the_run() {
 
     hear(&mut node, 0, &[Message::Configured(Configured { run, config, boot: 1 })]);
     assert_eq!(node.state().state(), State::Ready);
-    // What waits in the line after a thread was set up for a fifth of a second.
+    // Samples that wait in the line after a thread was set up for a fifth of a second.
     let waiting: Vec<Message> = (0..200).map(|i| sample(i, BoardState::Ready)).collect();
     hear(&mut node, 200_000_000, &waiting);
     assert_eq!(node.state().state(), State::Ready, "{:?}", node.state().cause());

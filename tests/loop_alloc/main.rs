@@ -3,14 +3,16 @@
 
 use clutch_core::{DacCode, Target};
 use clutch_log::Source;
-use clutch_loop::control_loop::{self, ConfiguredRun, LogThread, LoopOptions, LoopReport, Pace, Watch};
+use clutch_loop::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, Pace};
 use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::log_thread::LogThread;
 use clutch_loop::port::{Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{RealtimeOptions, WaitMode};
 use clutch_loop::sim_board::PATIENT_BOARD;
 use clutch_loop::sim_board_server::{self, ServeOptions};
 use clutch_loop::station::ControllerStation;
+use clutch_loop::watch::Watch;
 use clutch_node::ControllerNode;
 use clutch_sim::Scenario;
 use clutch_sim::scenario::BUILT_IN;
@@ -22,11 +24,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// The system's allocator, and a count of what a watched thread asks of it.
+/// The system's allocator, and counts of a watched thread's requests.
 struct Watching;
 
 thread_local! {
-    /// Whether this thread is between its first and its last cycle.
+    /// True if this thread is between its first and its last cycle.
     static INSIDE: Cell<bool> = const { Cell::new(false) };
 }
 static TAKEN: AtomicU64 = AtomicU64::new(0);
@@ -35,7 +37,7 @@ static GIVEN_BACK: AtomicU64 = AtomicU64::new(0);
 static SIZE: AtomicU64 = AtomicU64::new(0);
 
 fn note(counter: &AtomicU64, size: usize) {
-    // A thread that ends has no flag any more, and is no control thread.
+    // A thread that ends has lost its flag, and is not a control thread.
     if INSIDE.try_with(Cell::get).unwrap_or(false) {
         counter.fetch_add(1, Ordering::Relaxed);
         SIZE.store(size as u64, Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! The fault campaign in virtual time, the supervisor's sensitivity, and what its logs hold.
+//! The fault campaign in virtual time, the supervisor's sensitivity, and the contents of its logs.
 
 use clutch_core::supervisor::{Arrival, Cause, Checks, State};
 use clutch_log::names;
@@ -64,7 +64,7 @@ fn each_run_leaves_a_log_that_replays_bit_for_bit() {
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let path = folder.join("run.mcap");
     for run in runs(SEEDS.0, SEEDS.1) {
-        // A law or a path that a test breaks is not in the log; what it led to is.
+        // A law or a path that a test breaks is not in the log; its effect is.
         let broken_inside = matches!(
             run.case().broken,
             clutch_loop::campaign::Broken::LawNotFinite

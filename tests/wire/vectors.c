@@ -1,4 +1,4 @@
-/* Reads lines of hexadecimal bytes, and prints what the C codec says of each: the fields of a
+/* Reads lines of hexadecimal bytes, and prints the C codec's result for each: the fields of a
  * Sample or an Actuate, other messages encoded again, errors by name. */
 #include <stdio.h>
 

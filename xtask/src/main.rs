@@ -3,6 +3,7 @@
 mod firmware;
 mod fuzz;
 mod python;
+mod release;
 mod run;
 mod stubs;
 mod test;
@@ -21,43 +22,49 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Format, lints and documentation, all without a warning.
+    /// Checks format, lints and documentation, all without a warning; spelling; licences, duplicates and sources of the
+    /// dependencies. Installs the tools for it in .venv.
     Check,
-    /// All tests. Installs what they need: Rust targets, a private virtual environment in .venv,
+    /// Runs all tests. Installs their needs: Rust targets, a private virtual environment in .venv,
     /// for the wheel a second one in the folder for temporary files, and on Debian, as root, the
     /// package that makes such environments.
     Test,
-    /// Only the tests of the wheel: builds it, installs it outside of this tree, tests it there.
+    /// Runs only the tests of the wheel: builds it, installs it outside this tree, tests it there.
     Wheel,
-    /// What CI runs: check, then test.
+    /// Runs the steps of CI: check, package, msrv, semver, then test.
     Ci,
-    /// Benchmarks (criterion). What follows goes to them: `cargo xtask bench -- law`.
+    /// Runs the benchmarks (criterion) with the arguments that follow: `cargo xtask bench -- law`.
     Bench {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,
     },
-    /// The boards' images.
+    /// Builds, flashes and measures the boards' images.
     Firmware {
         #[command(subcommand)]
         verb: firmware::Verb,
     },
-    /// The API documentation, in target/doc.
+    /// Builds the API documentation, in target/doc.
     Docs,
-    /// Builds with the oldest Rust that the manifests name; installs it.
+    /// Packs the libraries that others build on, and builds them from what was packed.
+    Package,
+    /// Checks what users build with the oldest Rust that the manifests name; installs it.
     Msrv,
+    /// Holds the packages' interfaces against those of the last tag v*. Once there is one, installs
+    /// cargo-semver-checks: some minutes.
+    Semver,
     /// Finds the rig `bench` anew (docs/bench-rig.md): some minutes on two cores.
     Calibrate {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,
     },
-    /// Fuzzes what reads bytes from outside, for so many seconds each; installs cargo-fuzz and a
+    /// Fuzzes each reader of bytes from outside for a number of seconds; installs cargo-fuzz and a
     /// nightly compiler.
     Fuzz {
         /// Seconds for each target.
         #[arg(default_value_t = 60)]
         seconds: u32,
     },
-    /// Runs the fault campaign. With the default seeds it writes the table of docs/safety.md anew.
+    /// Runs the fault campaign. With the default seeds it rewrites the table of docs/safety.md.
     Campaign {
         /// Seeds; each gives about 180 runs.
         seeds: Option<u64>,
@@ -65,12 +72,12 @@ enum Verb {
         #[arg(default_value_t = 1)]
         first: u64,
     },
-    /// How late a thread wakes here, against cyclictest (benches/latency).
+    /// Measures the lateness of a waking thread here, against cyclictest (benches/latency).
     Latency {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,
     },
-    /// Generates the type stub of the Python package's native module anew.
+    /// Regenerates the type stub of the Python package's native module.
     Stubs,
     /// Writes what follows from the declarations of parameters: Python's classes, tables of the documentation, the
     /// schema of scenario files.
@@ -91,15 +98,17 @@ fn main() -> Result<()> {
         Verb::Ci => {
             test::targets()?; // the lints of the images need theirs
             check()?;
+            release::package()?;
+            release::msrv()?;
+            release::semver()?;
             test::all()
         }
         Verb::Bench { rest } => cargo(["bench", "--package", "clutch-benches", "--"]).args(rest).run(),
         Verb::Firmware { verb } => firmware::run(&verb),
         Verb::Docs => docs(),
-        Verb::Msrv => {
-            check_with("1.89.0", &["--workspace", "--all-targets"])?;
-            check_with("1.85.0", &["--package", "clutch-core", "--features", "serde"])
-        }
+        Verb::Package => release::package(),
+        Verb::Msrv => release::msrv(),
+        Verb::Semver => release::semver(),
         Verb::Calibrate { rest } => {
             let example = ["run", "--release", "--package", "clutch-sim", "--example", "calibrate", "--"];
             cargo(example).args(rest).run()
@@ -121,6 +130,26 @@ fn generate(args: &[&str]) -> Result<()> {
 
 fn check() -> Result<()> {
     cargo(["fmt", "--all", "--check"]).run()?;
+    // The images: a workspace of their own.
+    firmware::in_firmware(["fmt", "--all", "--check"]).run()?;
+    let tool = python::checkers()?;
+    tool("ruff").args(["format", "--check"]).args(python::SOURCES).run()?;
+    tool("typos").run()?;
+    for manifest in ["Cargo.toml", "firmware/Cargo.toml"] {
+        // A permission that nothing needs any more is an error, too.
+        let deny = [
+            "--locked",
+            "--manifest-path",
+            manifest,
+            "check",
+            "-D",
+            "warnings",
+            "licenses",
+            "bans",
+            "sources",
+        ];
+        tool("cargo-deny").args(deny).run()?;
+    }
     cargo(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]).run()?;
     // Each set of features of the core by itself: the workspace turns them all on.
     for features in ["", "linalg", "serde"] {
@@ -129,7 +158,6 @@ fn check() -> Result<()> {
     }
     generate(&["--check"])?;
     // The images, where their target is; tests build them in any case.
-    firmware::in_firmware(["fmt", "--all", "--check"]).run()?;
     if firmware::has_target() {
         for board in firmware::BOARDS {
             firmware::in_firmware([
@@ -146,15 +174,6 @@ fn check() -> Result<()> {
         }
     }
     docs()
-}
-
-/// `rustup run` and not `cargo +version`, which a cargo started by cargo does not take.
-fn check_with(version: &str, args: &[&str]) -> Result<()> {
-    run::program("rustup").args(["toolchain", "install", version, "--profile", "minimal"]).run()?;
-    run::program("rustup")
-        .args(["run", version, "cargo", "check", "--target-dir", "target/msrv"])
-        .args(args)
-        .run()
 }
 
 fn docs() -> Result<()> {

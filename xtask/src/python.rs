@@ -1,17 +1,30 @@
 //! Python: a private environment for tools, and the wheel in one of its own.
 
-use crate::run::{cargo, program, root};
+use crate::run::{Program, cargo, program, root};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 
+/// Python of this tree that is formatted and linted.
+pub(crate) const SOURCES: [&str; 5] = ["python", "benches/latency", "benches/python", "crates", "docs"];
+
 /// The interpreter of the environment with everything but the wheel, made and filled if need be.
 pub(crate) fn interpreter() -> Result<PathBuf> {
+    environment("python/tests/requirements.txt")
+}
+
+/// The programs that check texts and manifests, by name. Installs only these: a check shall not wait for all that
+/// tests need.
+pub(crate) fn checkers() -> Result<impl Fn(&str) -> Program> {
+    let python = environment("xtask/requirements.txt")?;
+    Ok(move |name: &str| program(beside(&python, name)))
+}
+
+fn environment(requirements: &str) -> Result<PathBuf> {
     let venv = root().join(".venv");
     let python = venv.join("bin/python");
     if !python.exists() {
         make_environment("python3".as_ref(), &venv, &[])?;
     }
-    let requirements = "python/tests/requirements.txt";
     program(&python)
         .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", requirements])
         .run()?;
@@ -52,15 +65,15 @@ impl Drop for Wheel {
 }
 
 impl Wheel {
-    /// Builds the source distribution, from it the wheel, and installs that. What the wheel is tested
-    /// with is seen through from `tools`, the environment of [`interpreter`].
+    /// Builds the source distribution, from it the wheel, and installs that. The test tools are
+    /// visible from `tools`, the environment of [`interpreter`].
     pub(crate) fn install(tools: &Path) -> Result<Wheel> {
         let (dist, target) = (root().join("target/dist"), root().join("target"));
         let _ = std::fs::remove_dir_all(&dist);
         program(beside(tools, "maturin")).args(["sdist", "--out"]).arg(&dist).run()?;
         let sdist = the_one(&dist, "tar.gz")?;
         let pip = |python: &Path| program(python).args(["-m", "pip", "--disable-pip-version-check"]);
-        // Its own build environment would need maturin from the net once more.
+        // A separate build environment would download maturin once more.
         pip(tools)
             .args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"])
             .arg(&dist)
@@ -84,14 +97,14 @@ impl Wheel {
             .args(["-c", "import sysconfig; print(sysconfig.get_path('purelib'))"])
             .quietly()?;
         if !found {
-            bail!("{} does not tell its packages: {site}", tools.display());
+            bail!("{} does not report its packages: {site}", tools.display());
         }
         std::fs::write(Path::new(own.trim()).join("tools.pth"), site)?;
         Ok(wheel)
     }
 
     /// A program of the environment, to be run outside of the tree.
-    pub(crate) fn program(&self, tools: &Path) -> Result<crate::run::Program> {
+    pub(crate) fn program(&self, tools: &Path) -> Result<Program> {
         Ok(program(&self.python).within(&self.folder).env("PATH", {
             let mut path = self.folder.join("bin").into_os_string();
             path.push(":");

@@ -1,4 +1,4 @@
-//! Running programs, with what they print passed on.
+//! Runs programs, and passes their output on.
 
 use anyhow::{Context, Result, bail};
 use std::ffi::OsStr;
@@ -67,7 +67,7 @@ impl Program {
         Ok(())
     }
 
-    /// Runs it, hands each line of its output to `line`, and says whether it succeeded.
+    /// Runs it, hands each line of its output to `line`; true if it succeeded.
     pub(crate) fn lines(mut self, mut line: impl FnMut(&str)) -> Result<bool> {
         let shown = self.announce();
         let mut child =
@@ -82,7 +82,7 @@ impl Program {
         Ok(child.wait()?.success())
     }
 
-    /// Runs it unseen; whether it succeeded, and what it printed on either stream.
+    /// Runs it unseen; gives its success, and its output on both streams.
     pub(crate) fn quietly(mut self) -> Result<(bool, String)> {
         let shown = self.announce();
         let output = self.0.output().with_context(|| format!("cannot start: {shown}"))?;

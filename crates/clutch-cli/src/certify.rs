@@ -15,7 +15,7 @@ use serde_json::{Value, json as value};
 /// Exit code 0: certified; 2: not certified.
 #[derive(Args)]
 #[command(after_help = "Example:\n  clutch certify smc_2 --set bounds.friction_percent=20\n\n\
-    docs/theory.md derives the conditions and says what they do not cover.")]
+    docs/theory.md derives the conditions and gives their limits.")]
 pub(crate) struct Certify {
     #[command(flatten)]
     scenario: ScenarioArgs,
@@ -42,7 +42,7 @@ fn reason(s: Shortfall) -> &'static str {
             "K_p is too small for the worst corner: the weakest brake against the strongest drive, at the path's \
              acceleration and the reaching rate wanted"
         }
-        Shortfall::Kd => "K_d is too small: it does not pay for f |ė|",
+        Shortfall::Kd => "K_d is too small: it does not cover f |ė|",
         Shortfall::Voltage => "output.highest_v is too small for the brake to stop the strongest drive",
         Shortfall::Drive => "the drive is too weak for the path: a released shaft does not catch up",
         Shortfall::Start => {
@@ -159,7 +159,7 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
         Some(s) => format!("\nNOT certified: {}\n", reason(s)),
     };
     if !outside.is_empty() {
-        out += "\nThe scenario's rig lies outside these bounds; the certificate does not speak of it:\n";
+        out += "\nThe scenario's rig lies outside these bounds; the certificate does not cover it:\n";
         for line in outside {
             out += &format!("  {line}\n");
         }

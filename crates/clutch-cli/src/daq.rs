@@ -12,7 +12,7 @@ use std::sync::atomic::AtomicBool;
 
 /// Simulates a board in real time: a pseudo-terminal or a TCP address to drive with `clutch loop`.
 ///
-/// Prints the path to connect to, then tells of clients and of its state until it is interrupted.
+/// Prints the path to connect to, then reports clients and its state until it is interrupted.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  clutch daq board_smc_2\n  clutch daq board_smc_2 --listen tcp://127.0.0.1:5000\n  \
@@ -26,14 +26,15 @@ pub(crate) struct Daq {
     /// Listens on a TCP address of this machine instead of a pseudo-terminal.
     #[arg(long, value_name = "tcp://HOST:PORT")]
     listen: Option<Address>,
-    /// Breaks something; may be given several times.
+    /// Injects a fault; may be given several times.
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
-    /// Seed of the faults that hit at random.
+    /// Seed of the random faults.
     #[arg(long, default_value_t = 1)]
     fault_seed: u64,
-    /// Lets the board's clock wait, up to five seconds, for a controller that a busy machine holds up. Without it a
-    /// controller that is silent for the watchdog's time meets the safe state, as on hardware.
+    /// Lets the board's clock wait, up to five seconds, for a controller that a busy machine holds
+    /// up. Without it, the board goes to its safe state when the controller is silent for the
+    /// watchdog's time, as on hardware.
     #[arg(long)]
     patient: bool,
 }

@@ -19,9 +19,10 @@ use std::path::PathBuf;
 
 /// Runs the loop on an emulated Cortex-M4F board, with the simulated rig as its encoder and converter.
 ///
-/// Hardware in the loop, without the hardware: the board's own image runs in qemu-system-arm, takes a step,
-/// and waits for the simulation to take one. Time is computed, so that a run takes as long as it takes, and is
-/// the same each time, bit for bit; the figures are those of `clutch sim` in single precision.
+/// This is hardware in the loop, without the hardware: the board's own image runs in
+/// qemu-system-arm, takes a step, and waits for the simulation to take one. Time is computed, so
+/// that a run is the same each time, bit for bit, however long it takes; the figures are those of
+/// `clutch sim` in single precision.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask firmware build && clutch hil\n  clutch hil board_smc_2 --log run.mcap && \
@@ -42,7 +43,7 @@ pub(crate) struct Hil {
         default_value = "target/firmware/thumbv7em-none-eabihf/release/mps2-controller"
     )]
     image: PathBuf,
-    /// How the board is reached.
+    /// Link to the board.
     #[arg(long, value_enum, default_value = "memory")]
     link: Link,
     /// Writes an MCAP log, with the shaft's true motion.
@@ -51,13 +52,13 @@ pub(crate) struct Hil {
     /// Runs a law that is not certified for the scenario's bounds.
     #[arg(long)]
     uncertified: bool,
-    /// Breaks something on line or rig; see `clutch daq --help`.
+    /// Injects a fault on line or rig; see `clutch daq --help`.
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
-    /// Seed of the faults that hit at random.
+    /// Seed of the random faults.
     #[arg(long, default_value_t = 1)]
     fault_seed: u64,
-    /// How long a frame takes between board and rig, µs.
+    /// Time that a frame takes between board and rig, µs.
     #[arg(long, default_value_t = 0, value_name = "US", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     latency_us: u32,
     /// Prints the summary as JSON, and nothing else, on standard output.
@@ -69,8 +70,8 @@ pub(crate) struct Hil {
 enum Link {
     /// Through the emulator's own files: some 20 000 cycles a second, the same each time.
     Memory,
-    /// Through the board's two serial lines, interrupts and clock: some 500 to 2000 cycles a second. Late
-    /// answers are not looked at, as this machine decides how late they are.
+    /// Through the board's two serial lines, interrupts and clock: some 500 to 2000 cycles a
+    /// second. Late answers are not checked, since this machine decides the lateness.
     Uart,
 }
 
@@ -91,7 +92,7 @@ impl Hil {
         }
         let mut built = BuiltRun::<f32>::new(&scenario, 1)?;
         if self.link == Link::Uart {
-            // The board's own clock runs on while this machine computes.
+            // The board's own clock continues while this machine computes.
             built.controller.silence = Micros(10_000_000);
         }
         let started = std::time::Instant::now();

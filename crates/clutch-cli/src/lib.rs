@@ -1,7 +1,6 @@
-//! What the `clutch` command is made of: the verbs, drawing, reports.
+//! The parts of the `clutch` command: the verbs, drawing, reports.
 //!
-//! The verbs hold no control or friction of their own: they call `clutch-sim` and show what it
-//! says.
+//! The verbs hold no control or friction of their own: they call `clutch-sim` and show its results.
 
 pub mod certify;
 mod daq;
@@ -30,7 +29,7 @@ use std::path::{Path, PathBuf};
 /// Slow, smooth motion of shafts restrained by friction.
 ///
 /// Simulates a shaft that a weight drives and a computer brakes, certifies the gains of its
-/// control law, and reproduces the paper that this is built on.
+/// control law, and reproduces the paper behind it.
 ///
 /// Drives a shaft over a serial line to a data-acquisition board, or to a simulated one; logs,
 /// and replays its logs.
@@ -61,7 +60,7 @@ enum Verb {
     Reproduce(reproduce::Reproduce),
 }
 
-/// A scenario and what to change in it.
+/// A scenario, and the changes to it.
 #[derive(Args)]
 struct ScenarioArgs {
     /// Scenario file, or the name of a built-in scenario (`clutch scenario list`).
@@ -83,7 +82,8 @@ impl ScenarioArgs {
     }
 }
 
-/// The scenario as a board takes it that closes the loop itself; says so if that changes it.
+/// The scenario in the form for a board that closes the loop itself; prints a note if that changes
+/// it.
 fn single_precision(args: &ScenarioArgs, scenario: Scenario) -> anyhow::Result<Scenario> {
     if scenario.scalar == ScalarKind::F32 {
         return Ok(scenario);
@@ -97,17 +97,17 @@ fn single_precision(args: &ScenarioArgs, scenario: Scenario) -> anyhow::Result<S
     Ok(Scenario::load(&args.scenario, &set)?)
 }
 
-/// Why nothing was started, and what to do.
+/// The reason why nothing was started, and the remedy.
 fn not_certified(scenario: &Scenario, file: &Path) -> String {
     format!(
         "{}: the gains are not certified for these bounds and this path, so nothing was started.\n\
-         `clutch certify {}` says why; --uncertified runs it all the same.\n",
+         `clutch certify {}` gives the reason; --uncertified runs it anyway.\n",
         scenario.name,
         file.display()
     )
 }
 
-/// How a verb ended, if not with an error.
+/// The end of a verb, if not an error.
 enum Exit {
     /// Exit code 0.
     Done,
@@ -121,14 +121,14 @@ enum Exit {
     Stopped,
 }
 
-/// Runs the command with its arguments, the program's name first; its exit code.
+/// Runs the command with its arguments, the program's name first; gives its exit code.
 #[must_use]
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,
         Err(e) => {
             let asked_for = !e.use_stderr(); // --help, --version
-            let _ = e.print(); // nobody is left to be told
+            let _ = e.print(); // nobody is left to receive it
             return if asked_for { 0 } else { 64 };
         }
     };
@@ -150,7 +150,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Exit::Fault) => 3,
         Ok(Exit::Stopped) => 4,
         Err(e) => {
-            // Some errors tell their source themselves.
+            // Some errors contain their source themselves.
             let mut text = e.to_string();
             for source in e.chain().skip(1).map(ToString::to_string) {
                 if !text.contains(&source) {
@@ -187,10 +187,10 @@ fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Version and commit, as logs tell it.
+/// Version and commit, as logs record it.
 pub const BUILD: &str = env!("CLUTCH_BUILD");
 
-/// A log is never written over: it may be the only record of a run.
+/// A log is never overwritten: it may be the only record of a run.
 fn new_log(path: &Path) -> anyhow::Result<()> {
     if path.exists() {
         anyhow::bail!("{}: exists already; name a new file for the log", path.display());

@@ -5,7 +5,7 @@ use clap::{Args, Subcommand};
 use clutch_log::Limits;
 use std::path::PathBuf;
 
-/// Looks into logs, and saves those that were cut.
+/// Inspects logs, and recovers those that were cut.
 #[derive(Args)]
 pub(crate) struct Log {
     #[command(subcommand)]
@@ -14,7 +14,7 @@ pub(crate) struct Log {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Says what a log holds: channels, time, scenario, and whether it was finished.
+    /// Reports the contents of a log: channels, time, scenario, and its completeness.
     #[command(after_help = "Example:\n  clutch log info run.mcap")]
     Info {
         /// The log.

@@ -9,9 +9,10 @@ use clutch_core::law::Law;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{DacCode, Micros, Real, SafeState};
 use clutch_log::Source;
-use clutch_loop::control_loop::{self, ConfiguredRun, LogThread, LoopOptions, LoopReport, Pace, Ring, Watch};
+use clutch_loop::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, Pace};
 use clutch_loop::faults::Fault;
 use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::log_thread::{LogThread, Ring};
 use clutch_loop::port::{Address, DeviceKind, Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode, describe_system};
@@ -20,6 +21,7 @@ use clutch_loop::sim_board_server::{self, ServeOptions, ServeReport};
 use clutch_loop::station::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE};
 use clutch_loop::station::{ControllerStation, HostStation, Station};
 use clutch_loop::to_log::PRESENT_CODE;
+use clutch_loop::watch::Watch;
 use clutch_node::{ControllerNode, HostNode, present_code};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::ScalarKind;
@@ -57,14 +59,14 @@ enum WaitArg {
 /// Closes the loop on a board over a serial line, or on a simulated one.
 ///
 /// Without --port it starts the simulated board in the background and runs over a real
-/// pseudo-terminal. It checks board, path and gains, says what it will do, arms, and runs to the
-/// path's end; Ctrl-C ends in the safe state.
+/// pseudo-terminal. It checks board, path and gains, prints its plan, arms, and runs to the path's
+/// end; Ctrl-C ends in the safe state.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  clutch loop\n  clutch loop mine.toml --port /dev/ttyACM0 --log run.mcap\n  \
     clutch loop --fault freeze:at=2 --strict\n\n\
     Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run, and the brake is in the \
-    safe state; 4 stopped by Ctrl-C or SIGTERM, likewise. docs/loop.md is the guide, docs/safety.md says what is watched."
+    safe state; 4 stopped by Ctrl-C or SIGTERM, likewise. docs/loop.md is the guide, docs/safety.md lists the checks."
 )]
 pub(crate) struct Loop {
     /// Scenario file, or the name of a built-in scenario; board_smc_2 if none is given.
@@ -76,7 +78,8 @@ pub(crate) struct Loop {
     /// The board's port; without it a board is simulated.
     #[arg(long, value_name = "PATH|tcp://HOST:PORT")]
     port: Option<Address>,
-    /// The port of a board that closes the loop itself (docs/firmware.md): it is set up, armed, and looked at.
+    /// The port of a board that closes the loop itself (docs/firmware.md): it is set up, armed, and
+    /// watched.
     #[arg(long, value_name = "PATH|tcp://HOST:PORT", conflicts_with_all = ["port", "fault", "strict"])]
     board: Option<Address>,
     /// Line rate of the port, baud; no effect on USB, pseudo-terminals and TCP.
@@ -104,25 +107,25 @@ pub(crate) struct Loop {
     #[arg(long, alias = "thread_priority", default_value_t = clutch_loop::realtime::DEFAULT_PRIORITY,
         value_parser = clap::value_parser!(u8).range(0..=99))]
     thread_priority: u8,
-    /// What a late answer does.
+    /// Effect of a late answer.
     #[arg(long, value_enum, default_value = "manage")]
     overruns: OverrunsArg,
-    /// What starts a cycle.
+    /// Start of a cycle.
     #[arg(long, value_enum, default_value = "sample")]
     pace: PaceArg,
-    /// How the loop waits.
+    /// Wait mode of the loop.
     #[arg(long, value_enum, default_value = "sleep")]
     wait: WaitArg,
-    /// How long before a sample spinning begins, with --wait spin, µs.
+    /// Time before a sample at which spinning begins, with --wait spin, µs.
     #[arg(long, default_value_t = 150, value_name = "US")]
     spin_us: u32,
-    /// Breaks something on the simulated board; see `clutch daq --help`.
+    /// Injects a fault on the simulated board; see `clutch daq --help`.
     #[arg(long, value_name = "KIND:KEY=VALUE,…", conflicts_with = "port")]
     fault: Vec<Fault>,
-    /// Seed of the faults that hit at random.
+    /// Seed of the random faults.
     #[arg(long, default_value_t = 1)]
     fault_seed: u64,
-    /// Keeps the simulated board's clock from waiting when this machine stalls: as on hardware.
+    /// Keeps the simulated board's clock running when this machine stalls, as on hardware.
     #[arg(long, conflicts_with = "port")]
     strict: bool,
     /// Prints the summary as JSON, and nothing else, on standard output.
@@ -153,7 +156,7 @@ impl Background {
         self.stop.store(true, Ordering::Relaxed);
         match self.thread.join() {
             Ok(report) => Ok(report?),
-            Err(_) => bail!("the simulated board came to a bad end; please report this as a defect"),
+            Err(_) => bail!("the simulated board failed; please report this as a defect"),
         }
     }
 }
@@ -257,14 +260,14 @@ impl Loop {
         } else if !report.begun {
             Exit::Failed
         } else if report.cause == Cause::Operator {
-            Exit::Fault // nobody here has stopped it: the board has missed this machine
+            Exit::Fault // it was not stopped from here: the board has missed this machine
         } else {
             Exit::Done
         })
     }
 }
 
-/// A run that has been checked, and where it is to go.
+/// A run that has been checked, and its destination.
 struct Run<'a> {
     verb: &'a Loop,
     scenario: &'a Scenario,
@@ -288,7 +291,7 @@ impl Run<'_> {
         Ok((port, notes))
     }
 
-    /// Whether encoder and converter are those of the scenario.
+    /// An error unless encoder and converter are those of the scenario.
     fn check(&self, hello: &Hello, port: &Port) -> anyhow::Result<()> {
         let mut lines = from_scenario::misfits(self.scenario, hello);
         let simulated = hello.board == PATIENT_BOARD || hello.board == STRICT_BOARD;
@@ -306,7 +309,7 @@ impl Run<'_> {
         Err(clutch_loop::preflight::PreflightError::Misfit { address, lines }.into())
     }
 
-    /// A new run on a board with this clock: what it waits for when the clock waits.
+    /// A new run on a board with this clock: its patience when the clock waits.
     fn built<T: Real>(&self, hello: &Hello) -> anyhow::Result<BuiltRun<T>> {
         let mut built = BuiltRun::<T>::new(self.scenario, hello.run.wrapping_add(1).max(1))?;
         if hello.board == PATIENT_BOARD {
@@ -316,11 +319,11 @@ impl Run<'_> {
         Ok(built)
     }
 
-    /// The loop is closed here.
+    /// Closes the loop here.
     fn on_board<T: Real>(&self) -> anyhow::Result<(LoopReport, String)> {
         // A sample and its answer, each cycle.
         let (mut port, notes) = self.open((15, 20))?;
-        // Who is there?
+        // Ask for the board's identity.
         let mut end = local(&BuiltRun::<T>::new(self.scenario, 0)?, from_scenario::path(self.scenario)?);
         let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
         self.check(&hello, &port)?;
@@ -329,7 +332,7 @@ impl Run<'_> {
         self.tell(&hello, &port, &notes)?;
         let hold = built.supervisor.safe_codes().hold;
         let (log, ring, watch) = self.log(&built, present_code(&hello, hold), &board_text(&hello))?;
-        // Consent was starting this command.
+        // The start of this command was the consent.
         let mut talk = Talk::new(&mut port, &mut end);
         talk.configure(present_code(&hello, hold))?;
         let clock = talk.clock()?;
@@ -340,9 +343,9 @@ impl Run<'_> {
         self.drive(configured, log)
     }
 
-    /// The loop is closed on the board.
+    /// Closes the loop on the board.
     fn on_controller(&self) -> anyhow::Result<(LoopReport, String)> {
-        // Telemetry each cycle; now and then a word to it.
+        // Telemetry each cycle; now and then a frame to the board.
         let (mut port, notes) = self.open((0, clutch_wire::Telemetry::LENGTH + 2))?;
         let remote = |built: &BuiltRun<f32>, patient: bool| -> anyhow::Result<_> {
             let configure =
@@ -378,7 +381,7 @@ impl Run<'_> {
         Ok((report, line))
     }
 
-    /// Says what will be done.
+    /// Prints the plan.
     fn tell(&self, hello: &Hello, port: &Port, notes: &[String]) -> anyhow::Result<()> {
         self.verb.say(&self.plan_text(hello, port.kind()))?;
         for note in notes {
@@ -387,7 +390,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// The log before the board is armed: what cannot be logged is known before anything moves.
+    /// Opens the log before the board is armed: an error of the log appears before anything moves.
     fn log<T: Real>(
         &self,
         built: &BuiltRun<T>,
@@ -406,7 +409,7 @@ impl Run<'_> {
         Ok((Some(thread), Some(ring), watch))
     }
 
-    /// Runs it on a thread of its own, and shows where it stands.
+    /// Runs it on a thread of its own, and shows its progress.
     fn drive<S: Station + Send>(
         &self,
         configured: ConfiguredRun<'_, S>,
@@ -445,14 +448,14 @@ impl Run<'_> {
                 }
                 if watch.log_ended.load(Ordering::Relaxed) && !refused_told {
                     refused_told = true;
-                    let _ = writeln!(std::io::stderr(), "\nthe log has ended early; the loop goes on");
+                    let _ = writeln!(std::io::stderr(), "\nthe log has ended early; the loop continues");
                 }
                 std::thread::sleep(Duration::from_millis(50));
             }
             if show {
                 let _ = write!(std::io::stderr(), "\r\x1b[K");
             }
-            control.join().map_err(|_| anyhow::anyhow!("the control thread came to a bad end; the board's watchdog has put the brake into the safe state. Please report this as a defect"))
+            control.join().map_err(|_| anyhow::anyhow!("the control thread failed; the board's watchdog has put the brake into the safe state. Please report this as a defect"))
         })?;
         let mut line = match log.map(LogThread::finish) {
             None => String::new(),
@@ -510,7 +513,7 @@ impl Run<'_> {
             if certified {
                 "certified for the bounds given".into()
             } else {
-                "NOT certified; run all the same, as asked".into()
+                "NOT certified; run anyway, as requested".into()
             },
         );
         row("safe state", format!("{safe}: {}", safety.reason));
@@ -522,8 +525,7 @@ impl Run<'_> {
             text += "note: the board powers up at a voltage that does not hold the shaft; set its power-up output to the safe state's\n";
         }
         if hello.board != PATIENT_BOARD && hello.board != STRICT_BOARD {
-            text +=
-                "note: a brake that a motor presses lets go when its power fails; no software changes that\n";
+            text += "note: a brake that a motor presses lets go when its power fails; software cannot change that\n";
         }
         text
     }
@@ -564,7 +566,8 @@ fn status(watch: &Watch, period_us: u32, ticks: u64) {
     let _ = std::io::stderr().write_all(line.as_bytes()); // a terminal that has gone away
 }
 
-/// What ended control, in words; `v` is what the check saw, `stopped` whether somebody here has stopped it.
+/// The cause of the end of control, in words; `v` is the value that the check saw, `stopped` is
+/// true if it was stopped from here.
 pub(crate) fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> String {
     match cause {
         Cause::Done => "the path is done".into(),
@@ -585,7 +588,7 @@ pub(crate) fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool
         Cause::Saturation => "the brake's voltage was at its limit for too long".into(),
         Cause::NotFinite => "the law's demand was not a number".into(),
         Cause::Deadline => format!("answers came too late, the last after {v} µs"),
-        // The board's own supervisor tells for how many periods.
+        // The board's own supervisor reports the number of periods.
         Cause::Silence if on_the_board && v > 0.0 => "the board's encoder and converter fell silent".into(),
         Cause::Silence => "the board fell silent".into(),
         Cause::Board => match v as u8 {
@@ -676,7 +679,7 @@ fn summary(
         );
     }
     if board.is_some_and(|b| b.hits == 0) && faults > 0 {
-        text += "the fault that was asked for had not begun\n";
+        text += "the requested fault had not begun\n";
     }
     text += log_line;
     if let Some(error) = &r.port_error {

@@ -11,8 +11,8 @@ use std::path::PathBuf;
 
 /// Feeds a log's encoder counts to its law again and compares every output bit for bit.
 ///
-/// With --set the law gets other parameters: an open-loop replay, which answers what those would
-/// have commanded on the same counts, not how the shaft would have moved.
+/// With --set the law gets other parameters: an open-loop replay, which gives the commands that
+/// those would have caused on the same counts, and does not predict the motion of the shaft.
 ///
 /// Exit code 0: identical, or replayed with --set; 3: the outputs differ.
 #[derive(Args)]
@@ -46,11 +46,11 @@ impl Replay {
         let n = replayed.commands.len();
         let mut text = String::new();
         if !log.complete {
-            text += "the log was cut; what is readable is replayed\n";
+            text += "the log was cut; its readable part is replayed\n";
         }
         if replayed.dropped > 0 {
             text += &format!(
-                "the log dropped {} records; a difference after the first gap says nothing of the law\n",
+                "the log dropped {} records; a difference after the first gap proves nothing about the law\n",
                 replayed.dropped
             );
         }

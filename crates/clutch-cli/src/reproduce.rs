@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[command(after_help = "Example:\n  clutch reproduce --out reproduce\n\n\
     Then open reproduce/report.html in a browser.")]
 pub(crate) struct Reproduce {
-    /// Folder for figures, table and report; made if it is not there.
+    /// Folder for figures, table and report; created if missing.
     #[arg(long, value_name = "DIR", default_value = "reproduce")]
     out: PathBuf,
 }

@@ -7,7 +7,7 @@ use clutch_sim::scenario::{BUILT_IN, BuiltIn, schema};
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Hands out the built-in scenarios, and the schema with which editors complete a file.
+/// Lists, prints and copies the built-in scenarios; prints the schema with which editors complete a file.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml\n  clutch scenario schema > scenario.schema.json"
@@ -19,16 +19,16 @@ pub(crate) struct ScenarioVerb {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Lists their names and titles.
+    /// Lists the names and titles of the built-in scenarios.
     #[command(after_help = "Example:\n  clutch scenario list")]
     List,
-    /// Prints one.
+    /// Prints a built-in scenario.
     #[command(after_help = "Example:\n  clutch scenario show smc_2 > mine.toml")]
     Show {
         /// Its name.
         name: String,
     },
-    /// Writes one to a new file, as a beginning of your own.
+    /// Writes a built-in scenario to a new file, as the start of your own.
     #[command(after_help = "Example:\n  clutch scenario new mine.toml --from bench_pd_2")]
     New {
         /// The file, which must not exist yet.
@@ -67,7 +67,7 @@ impl ScenarioVerb {
             Verb::New { file, from } => {
                 let text = find(&from)?.toml;
                 let shown = file.display();
-                // Never over a file that is there.
+                // An existing file is never overwritten.
                 let mut out = std::fs::File::create_new(&file)
                     .with_context(|| format!("{shown}: cannot be created"))?;
                 out.write_all(text.as_bytes()).with_context(|| format!("{shown}: cannot be written"))?;

@@ -14,7 +14,7 @@ use clutch_sim::{Keep, Metrics, Run, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Simulates a scenario and prints how well the shaft followed its path.
+/// Simulates a scenario and prints figures of the shaft's motion along its path.
 #[derive(Args)]
 #[command(after_help = "Example:\n  clutch sim smc_2 --set law.smc.kp_v=4 --csv run.csv --plot run.svg\n\n\
     Columns of the CSV are in SI units and radians; docs/scenario.md explains them.")]
@@ -113,7 +113,7 @@ impl Sim {
     }
 }
 
-/// The same place, also by another way of writing it.
+/// True for the same place, even if it is written differently.
 fn same_file(a: &PathBuf, b: &PathBuf) -> bool {
     a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

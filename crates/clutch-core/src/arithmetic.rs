@@ -75,3 +75,6 @@ pub trait Arithmetic:
         Self::select((-Self::ONE).less(self), inner, outer)
     }
 }
+
+/// Makes a vector of what something of each lane has: `each(&|law| law.kp)` is the `kp` of the law of each lane.
+pub type Each<'a, S, T, L> = &'a dyn Fn(&dyn Fn(&S) -> T) -> L;

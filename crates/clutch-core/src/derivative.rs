@@ -8,7 +8,7 @@
 //! difference is taken in integers, so it stays exact however far the shaft has turned.
 
 use crate::params::{Range, Table};
-use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
+use crate::{Arithmetic, Encoder, FixedCounts, Micros, ParamError, Real};
 
 crate::params! {
     /// The smoothed difference (5), which the paper calls a Kalman filter: a first-order low-pass on the backward
@@ -68,8 +68,17 @@ impl<T: Real> SmoothedDerivative<T> {
     pub fn update(&self, state: &mut DerivativeState<T>, error: FixedCounts) -> T {
         let difference: T = error.minus(state.previous);
         state.previous = error;
-        state.rate = self.keep * state.rate + self.scale * difference;
+        state.rate = self.smooth(state.rate, difference);
         state.rate
+    }
+}
+
+impl<T: Arithmetic> SmoothedDerivative<T> {
+    /// The next rate from the last one, rad/s, and the difference of the error, counts.
+    #[inline]
+    #[must_use]
+    pub fn smooth(&self, rate: T, difference: T) -> T {
+        self.keep * rate + self.scale * difference
     }
 }
 

@@ -1,4 +1,4 @@
-#![doc = include_str!("../../../README.md")]
+#![doc = include_str!("../README.md")]
 //!
 //! # The crate
 //!
@@ -55,7 +55,7 @@ mod stick_slip;
 pub mod supervisor;
 mod velocity;
 
-pub use arithmetic::Arithmetic;
+pub use arithmetic::{Arithmetic, Each};
 pub use bounds::{Bounds, Interval, Tolerances};
 pub use codes::{
     Counts, Dac, DacCode, DacParams, Encoder, EncoderParams, FixedCounts, Micros, SamplingParams,

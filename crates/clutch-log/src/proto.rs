@@ -10,7 +10,7 @@ use prost_types::{
 };
 use std::fmt::Write as _;
 
-/// A field of a message: what viewers show.
+/// A field of a message, as viewers show it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Its number on the wire; never used for anything else later.
@@ -19,7 +19,7 @@ pub struct Field {
     pub name: &'static str,
     /// Its protobuf type.
     pub kind: Kind,
-    /// What it means.
+    /// Its meaning.
     pub meaning: &'static str,
 }
 
@@ -68,7 +68,7 @@ pub struct Channel {
     pub topic: &'static str,
     /// Protobuf message: `clutch.Sample`.
     pub message: &'static str,
-    /// What is in it, and how often.
+    /// Its content, and its rate.
     pub meaning: &'static str,
     /// Its fields.
     pub fields: &'static [Field],
@@ -90,12 +90,12 @@ macro_rules! message {
 // come back as +0.0. The schema says plain `double`; a zero on the wire is valid there.
 message!(Sample, SAMPLE {
     1 tick: u64, (uint64), Kind::Uint64, "tick of the run, from 0";
-    2 arrival: u32, (uint32), Kind::Enum("Arrival", names::ARRIVALS), "how the sample came in";
+    2 arrival: u32, (uint32), Kind::Enum("Arrival", names::ARRIVALS), "arrival of the sample";
     3 sequence: u32, (uint32), Kind::Uint32, "the board's sequence number, wraps at 2^16";
     4 board_time_us: u32, (uint32), Kind::Uint32, "the board's clock at the measurement, µs, wraps at 2^32";
     5 counts: i32, (sint32), Kind::Sint32, "encoder counts, wrap at 2^32";
     6 status: u32, (uint32), Kind::Uint32, "the board's status bits";
-    7 age_us: u32, (uint32), Kind::Uint32, "how old the sample was when it was used, µs";
+    7 age_us: u32, (uint32), Kind::Uint32, "age of the sample when it was used, µs";
     8 lateness_us: u32, (uint32), Kind::Uint32, "time that the answer to the sample before took, µs";
     9 superseded: bool, (bool), Kind::Bool, "a newer sample had come with it; not answered";
 });
@@ -103,8 +103,8 @@ message!(Sample, SAMPLE {
 message!(Command, COMMAND {
     1 tick: u64, (uint64), Kind::Uint64, "tick of the run, from 0";
     2 state: u32, (uint32), Kind::Enum("State", names::STATES), "state of the supervisor";
-    3 source: u32, (uint32), Kind::Enum("Source", names::COMMAND_SOURCES), "who chose the code";
-    4 limit: u32, (uint32), Kind::Enum("Limit", names::LIMITS), "what the output stage did to the demand";
+    3 source: u32, (uint32), Kind::Enum("Source", names::COMMAND_SOURCES), "origin of the code";
+    4 limit: u32, (uint32), Kind::Enum("Limit", names::LIMITS), "effect of the output stage on the demand";
     5 code: u32, (uint32), Kind::Uint32, "code for the converter";
     6 voltage_v: Option<f64>, (double, optional), Kind::Double, "voltage of the code, V";
     7 demand_v: Option<f64>, (double, optional), Kind::Double, "the law's output before limits, V";
@@ -121,11 +121,11 @@ message!(Command, COMMAND {
 
 message!(Event, EVENT {
     1 tick: u64, (uint64), Kind::Uint64, "tick of the run, from 0";
-    2 kind: u32, (uint32), Kind::Enum("Kind", names::EVENT_KINDS), "what happened";
+    2 kind: u32, (uint32), Kind::Enum("Kind", names::EVENT_KINDS), "kind of event";
     3 from_state: u32, (uint32), Kind::Enum("State", names::STATES), "state before";
     4 to_state: u32, (uint32), Kind::Enum("State", names::STATES), "state after";
     5 cause: u32, (uint32), Kind::Enum("Cause", names::CAUSES), "why";
-    6 value: Option<f64>, (double, optional), Kind::Double, "what the check saw, in the check's unit";
+    6 value: Option<f64>, (double, optional), Kind::Double, "value that the check saw, in the check's unit";
 });
 
 message!(Link, LINK {
@@ -158,7 +158,7 @@ pub const CHANNELS: [Channel; 6] = [
     Channel {
         topic: "/sample",
         message: "clutch.Sample",
-        meaning: "The measurement of a tick, or that none came.",
+        meaning: "The measurement of a tick, or its absence.",
         fields: SAMPLE,
     },
     Channel {
@@ -170,7 +170,7 @@ pub const CHANNELS: [Channel; 6] = [
     Channel {
         topic: "/event",
         message: "clutch.Event",
-        meaning: "What the supervisor, the gate, the log or the port had to tell.",
+        meaning: "A report of the supervisor, the gate, the log or the port.",
         fields: EVENT,
     },
     Channel {

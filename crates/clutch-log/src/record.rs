@@ -1,15 +1,15 @@
-//! The records, and what a log says of itself.
+//! The records, and a log's description of itself.
 
 use std::fmt;
 
-/// One record, without heap: what goes through the ring from the control thread.
+/// One record, without heap: it goes through the ring from the control thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Record {
-    /// A measurement, or that none came.
+    /// A measurement, or its absence.
     Sample(SampleRecord),
     /// A command, with every term of the law.
     Command(CommandRecord),
-    /// What the supervisor, the gate, the log or the port had to tell.
+    /// A report of the supervisor, the gate, the log or the port.
     Event(EventRecord),
     /// Counters of the link, since the start of the run.
     Link(LinkRecord),
@@ -50,7 +50,7 @@ pub struct SampleRecord {
     pub tick: u64,
     /// Time since the start of the run, ns.
     pub time_ns: u64,
-    /// How it came in: [`Arrival`](crate::Arrival) as a number.
+    /// Its arrival: [`Arrival`](crate::Arrival) as a number.
     pub arrival: u8,
     /// The board's sequence number; wraps.
     pub sequence: u16,
@@ -60,7 +60,7 @@ pub struct SampleRecord {
     pub counts: i32,
     /// The board's status bits.
     pub status: u8,
-    /// How old the sample was when it was used, µs.
+    /// Age of the sample when it was used, µs.
     pub age_us: u32,
     /// Time that the answer to the sample before took, µs.
     pub lateness_us: u32,
@@ -68,7 +68,7 @@ pub struct SampleRecord {
     pub superseded: bool,
 }
 
-/// A command and how the law came to it.
+/// A command, with the values that led the law to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CommandRecord {
     /// Tick of the run, from 0.
@@ -77,9 +77,9 @@ pub struct CommandRecord {
     pub time_ns: u64,
     /// The supervisor's state: see [`STATES`](crate::names::STATES).
     pub state: u8,
-    /// Who chose the code: [`CommandSource`](crate::CommandSource) as a number.
+    /// Origin of the code: [`CommandSource`](crate::CommandSource) as a number.
     pub source: u8,
-    /// What the output stage did to the demand: see [`LIMITS`](crate::names::LIMITS).
+    /// Effect of the output stage on the demand: see [`LIMITS`](crate::names::LIMITS).
     pub limit: u8,
     /// Code for the converter.
     pub code: u16,
@@ -110,15 +110,15 @@ pub struct EventRecord {
     pub tick: u64,
     /// Time since the start of the run, ns.
     pub time_ns: u64,
-    /// What: [`EventKind`](crate::EventKind) as a number.
+    /// Its kind: [`EventKind`](crate::EventKind) as a number.
     pub kind: u8,
     /// State before: see [`STATES`](crate::names::STATES).
     pub from: u8,
     /// State after.
     pub to: u8,
-    /// Why: see [`CAUSES`](crate::names::CAUSES).
+    /// Its cause: see [`CAUSES`](crate::names::CAUSES).
     pub cause: u8,
-    /// The number that goes with it: what the check saw, in the check's unit.
+    /// The number that goes with it: the value that the check saw, in the check's unit.
     pub value: f64,
 }
 
@@ -164,7 +164,7 @@ pub struct TruthRecord {
     pub stuck: bool,
 }
 
-/// Where the records of a log come from.
+/// The source of a log's records.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Source {
     /// `clutch sim`.
@@ -203,7 +203,7 @@ impl fmt::Display for Source {
     }
 }
 
-/// What a log says of itself; written before the first record.
+/// A log's description of itself; written before the first record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// Name of the scenario.
@@ -218,7 +218,7 @@ pub struct Header {
     pub law_hash: u64,
     /// The port: a path, an address, or nothing.
     pub port: String,
-    /// Where the records come from.
+    /// Source of the records.
     pub source: Source,
     /// Scalar of the law: `f32` or `f64`.
     pub scalar: String,

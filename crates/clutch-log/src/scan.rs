@@ -2,10 +2,10 @@
 //!
 //! The file's records (opcode, length, body) are walked here and not by the `mcap` crate: its
 //! readers abort on a length of 2⁶⁴ − 1 and on an attachment shorter than its own fields, give
-//! nothing of a chunk that is cut, and decompress whatever a chunk claims to hold. Here a length
-//! is compared with what is left of the file before anything is allocated, a chunk is
-//! decompressed into a buffer of at most [`Limits::max_chunk_bytes`], and its checksum is
-//! verified before the first record of it is believed.
+//! nothing of a chunk that is cut, and decompress everything that a chunk claims to hold. Here a
+//! length is compared with what is left of the file before anything is allocated, a chunk is
+//! decompressed into a buffer of at most [`Limits::max_chunk_bytes`], and its checksum is verified
+//! before the first record of it is believed.
 
 use crate::error::{LogError, require_file};
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
-/// What a reader accepts. The defaults hold for hours of logging at 1 kHz. They let a hostile file
+/// The bounds of a reader. The defaults hold for hours of logging at 1 kHz. They let a hostile file
 /// take 2.3 GB at most for records (20 million of 112 bytes) and five minutes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
@@ -53,7 +53,7 @@ impl Default for Limits {
     }
 }
 
-/// How a log ends.
+/// The end of a log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Tail {
     /// Finished by its writer.
@@ -63,14 +63,14 @@ pub enum Tail {
     Cut {
         /// Offset, bytes.
         at: u64,
-        /// What was cut.
+        /// The part that was cut.
         inside: &'static str,
     },
     /// From byte `at` on the file makes no sense.
     Broken {
         /// Offset, bytes.
         at: u64,
-        /// What stands there, and what was expected.
+        /// The content at that place, and the expectation.
         what: String,
     },
 }
@@ -90,7 +90,7 @@ impl fmt::Display for Tail {
 pub struct Damage {
     /// Offset of the record of the file, bytes.
     pub at: u64,
-    /// What is wrong, and what was expected.
+    /// The fault, and the expectation.
     pub what: String,
 }
 
@@ -100,16 +100,16 @@ impl fmt::Display for Damage {
     }
 }
 
-/// What a walk through a log saw.
+/// The findings of a walk through a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scanned {
-    /// What the log says of itself.
+    /// The log's description of itself.
     pub header: Header,
-    /// How it ends.
+    /// Its end.
     pub tail: Tail,
     /// The first damage that was skipped.
     pub damage: Option<Damage>,
-    /// How many damaged places were skipped.
+    /// Number of damaged places that were skipped.
     pub damaged: u64,
     /// Size of the file, bytes.
     pub file_bytes: u64,
@@ -150,7 +150,7 @@ pub fn scan(
 
 pub(crate) type Each<'a> = &'a mut dyn FnMut(&Header, Record) -> Result<(), LogError>;
 
-/// `lenient`: what is over a limit is skipped as damage, and is no error.
+/// With `lenient`, a part over a limit is skipped as damage instead of an error.
 pub(crate) fn scan_file(
     path: &Path,
     limits: &Limits,
@@ -175,7 +175,7 @@ pub(crate) fn scan_bytes(
     Scan::new(bytes, bytes.len() as u64, path, limits, false).run(each)
 }
 
-/// What a channel of the file holds.
+/// The content of a channel of the file.
 #[derive(Clone, Copy)]
 enum Held {
     /// The channel in this row of [`CHANNELS`].
@@ -193,7 +193,7 @@ struct Scan<'a, R> {
     lenient: bool,
     started: Instant,
     time: Duration,
-    /// Of the data section, then of the summary.
+    /// Checksum of the data section, then of the summary.
     crc: crc::Digest<'static, u32, Table<16>>,
     named: bool,
     attached: bool,
@@ -205,7 +205,7 @@ struct Scan<'a, R> {
     seen: Scanned,
 }
 
-/// What to do after a record of the file.
+/// The next step after a record of the file.
 enum Next {
     More,
     End,
@@ -369,7 +369,7 @@ impl<'a, R: Read> Scan<'a, R> {
         let mut fields = Bytes(body);
         let name = fields.text().unwrap_or_default();
         match name {
-            // Only the first counts: what follows cannot take the log's name from it.
+            // Only the first counts: a later one cannot take the log's name from it.
             METADATA if !self.named => match fields.map() {
                 Some(map) => {
                     self.header(map)?;
@@ -500,8 +500,8 @@ impl<'a, R: Read> Scan<'a, R> {
         match compression {
             "" => chunk.extend_from_slice(packed),
             "zstd" => {
-                // Exactly as much room as the chunk claims, and that is within the limit: zstd
-                // stops there. The room is not touched before something is written to it.
+                // The room is exactly the chunk's claim, which is within the limit: zstd stops
+                // there. The room is not touched before something is written to it.
                 chunk.reserve_exact(size as usize);
                 let unpack = match &mut self.unpack {
                     Some(unpack) => unpack,
@@ -665,7 +665,7 @@ fn name_of_record(opcode: u8) -> &'static str {
     }
 }
 
-/// What is left of a record's body. Little-endian, as MCAP is; `None` if it is too short.
+/// The rest of a record's body. Little-endian, as MCAP is; `None` if it is too short.
 struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {

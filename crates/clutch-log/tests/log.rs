@@ -3,8 +3,8 @@
 mod common;
 
 use clutch_log::{
-    CHUNK_NS, Header, Limits, LogError, LogWriter, Record, SampleRecord, Tail, channel_table, info, read,
-    read_bytes, recover, scan,
+    CHUNK_NS, Header, Limits, LogError, LogWriter, Record, SampleRecord, Tail, info, read, read_bytes,
+    recover, scan,
 };
 use common::{Folder, Numbers, bits, header, record, small_log};
 use mcap::records::{ChunkHeader, op};
@@ -469,7 +469,7 @@ fn a_bomb_costs_neither_memory_nor_time() {
     let made = started.elapsed();
     assert!(bomb.len() < 1 << 20);
 
-    // It says what it is: refused unread.
+    // It declares its size: refused unread.
     let mut bytes = head.clone();
     bytes.extend(chunk_record(4 << 30, 0, &bomb));
     let path = folder.file("honest.mcap");
@@ -484,7 +484,7 @@ fn a_bomb_costs_neither_memory_nor_time() {
     let recovered = recover(&path, folder.file("to.mcap"), &Limits::default()).unwrap();
     assert_eq!((recovered.scanned.damaged, recovered.scanned.chunks), (1, 2));
 
-    // It says that it is small: unpacked so far and no further.
+    // It declares a small size: unpacked to that size and no further.
     let mut bytes = head.clone();
     bytes.extend(chunk_record(1 << 20, 0, &bomb));
     let log = read_bytes(&bytes, &Limits::default()).unwrap();
@@ -586,7 +586,7 @@ fn what_is_no_log_is_named() {
             "{e}"
         );
     }
-    // Of a clutch to come.
+    // A log of a future clutch.
     let (_, mut bytes) = small_log(&path, 3);
     let at = bytes.windows(6).position(|w| w == b"format").unwrap() + 6 + 4;
     bytes[at] = b'2';
@@ -637,10 +637,4 @@ fn info_counts_without_reading_into_memory() {
     ] {
         assert!(shown.contains(part), "no \"{part}\" in\n{shown}");
     }
-}
-
-#[test]
-fn the_docs_have_the_channel_table_of_the_code() {
-    let docs = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/log.md")).unwrap();
-    assert!(docs.contains(&channel_table()), "docs/log.md lacks:\n{}", channel_table());
 }

@@ -11,7 +11,8 @@
 //! Between its first and its last cycle the control thread allocates nothing, takes no lock, and
 //! makes no system call but the wait for the next sample, the read and the write.
 
-use crate::port::{Port, PortError};
+use crate::log_thread::Ring;
+use crate::port::Port;
 use crate::preflight::ClockOffset;
 use crate::realtime::{
     CycleStats, CycleSummary, Readiness, RealtimeOptions, WaitMode, enter, monotonic_ns, sleep_until,
@@ -19,18 +20,17 @@ use crate::realtime::{
 };
 use crate::station::{Station, StationNotice};
 use crate::to_log;
+use crate::watch::Watch;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Micros, Real, StickSlip, StickSlipState};
-use clutch_log::{EventKind, EventRecord, Header, LogError, LogWriter, Record};
+use clutch_log::{EventKind, EventRecord, Record};
 use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Standing};
 use clutch_sim::Metrics;
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
 use clutch_wire::{Refused, StopReason};
 use rustix::fd::AsFd;
-use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 /// What starts a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,29 +53,6 @@ pub struct LoopOptions {
     pub settle: f64,
     /// Called on the control thread when its cycles begin and when they have ended.
     pub hooks: (fn(), fn()),
-}
-
-/// What a watcher sees while the loop runs.
-#[derive(Debug, Default)]
-pub struct Watch {
-    /// Set to end the run in the safe state.
-    pub stop: Arc<AtomicBool>,
-    /// [`State`] as a number.
-    pub state: AtomicU8,
-    /// Ticks so far.
-    pub tick: AtomicU64,
-    /// Error, 1e-9 rad.
-    pub error_nrad: AtomicI64,
-    /// Brake voltage, mV.
-    pub millivolts: AtomicI64,
-    /// Samples lost.
-    pub lost: AtomicU64,
-    /// Answers later than the deadline.
-    pub late_answers: AtomicU64,
-    /// Records that did not fit into the ring.
-    pub log_dropped: AtomicU64,
-    /// Set by the log thread when it could not go on.
-    pub log_ended: AtomicBool,
 }
 
 /// How it went.
@@ -127,16 +104,73 @@ pub struct LoopReport {
     pub port_error: Option<String>,
 }
 
-/// The way of records to their thread.
-pub type Ring = rtrb::Producer<Record>;
-
-/// Records of a log that wait for their thread.
-const RING: usize = 1 << 15;
-/// How often a chunk of the log goes to the file. With the ring's 20 ms this leaves a busy machine
-/// 20 ms of the 100 ms that a crash may cost.
-const LOG_FLUSH: Duration = Duration::from_millis(60);
 /// How long the control thread waits for the board to say that it is safe.
 const FAREWELL: Duration = Duration::from_millis(300);
+
+/// Everything that a run needs, after the pre-flight: the board is configured.
+pub struct ConfiguredRun<'a, S> {
+    /// This machine's station.
+    pub station: &'a mut S,
+    /// The open port.
+    pub port: &'a mut Port,
+    /// Where records go, if anywhere.
+    pub ring: Option<Ring>,
+    /// What a watcher sees.
+    pub watch: &'a Watch,
+    /// Ticks of the run; a board that is the controller has been told, and ends it by itself.
+    pub ticks: u64,
+    /// The board's clock.
+    pub clock: ClockOffset,
+    /// What sees stick-slip in the counts.
+    pub detector: StickSlip<f64>,
+    /// The board is simulated and its clock waits for this machine: a stall is then no late answer.
+    pub patient: bool,
+}
+
+/// Gives consent and runs the cycles until the path's end, a stop, or a fault, on the calling thread.
+pub fn run<S: Station>(configured: ConfiguredRun<'_, S>, options: &LoopOptions) -> LoopReport {
+    let notes = enter(&options.realtime);
+    let mut control = Control::new(configured, options);
+    (options.hooks.0)();
+    let lost = control.cycles(options).err();
+    (options.hooks.1)();
+    let port_error = lost.map(|error| control.port_lost(&error));
+    control.report(notes, port_error)
+}
+
+/// When what is due that no sample brings, by this machine's clock, ns.
+struct Due {
+    /// The next cycle, if this machine's clock starts them.
+    cycle: u64,
+    /// The next look at link and clock.
+    second: u64,
+    /// Consent is asked for again; 0 if it never was.
+    consent: u64,
+    /// Consent that has not come until then is given up.
+    give_up: u64,
+    /// Until then the board may say that it is safe; none before the end.
+    farewell: Option<u64>,
+}
+
+impl Due {
+    fn new(period_ns: u64, patient: bool) -> Due {
+        let now = monotonic_ns();
+        // A simulated board on a busy machine may be behind with its samples.
+        let patience = if patient { 10_000_000_000 } else { 1_000_000_000 };
+        Due {
+            cycle: now + period_ns,
+            second: now + 1_000_000_000,
+            consent: 0,
+            give_up: now + patience,
+            farewell: None,
+        }
+    }
+
+    /// Whether the board has had its time to say that it is safe.
+    fn farewell_over(&mut self, now: u64) -> bool {
+        now >= *self.farewell.get_or_insert(now + FAREWELL.as_nanos() as u64)
+    }
+}
 
 struct Control<'a, S: Station> {
     station: &'a mut S,
@@ -187,7 +221,48 @@ struct Batch<T, X> {
     refused: Option<Refused>,
 }
 
-impl<S: Station> Control<'_, S> {
+impl<'a, S: Station> Control<'a, S> {
+    fn new(configured: ConfiguredRun<'a, S>, options: &LoopOptions) -> Self {
+        let (encoder, period) = (configured.station.encoder(), configured.station.period());
+        let seconds: f64 = period.seconds();
+        Control {
+            ring: configured.ring,
+            watch: configured.watch,
+            out: Outbox::default(),
+            ticks: configured.ticks,
+            start_ns: monotonic_ns(),
+            radians: encoder.radians_per_count(),
+            dac: *configured.station.dac(),
+            period: seconds,
+            settle: options.settle,
+            clock: configured.clock,
+            ping_sent: None,
+            pings: 0,
+            figures: MetricsBuilder::new(seconds, options.settle),
+            detector: configured.detector,
+            sticks: StickSlipState::default(),
+            sticks_before: (0, 0),
+            answers: 0,
+            response: CycleStats::new(),
+            interval: CycleStats::new(),
+            last_answer_ns: None,
+            last_arrival_ns: None,
+            last_sample_us: None,
+            tick_cycles: CycleStats::new(),
+            period_ns: u64::from(period.0) * 1000,
+            patient: configured.patient,
+            dropped: 0,
+            dropped_told: 0,
+            untold: 0,
+            begun: false,
+            board_safe: false,
+            refused: None,
+            cut: 0,
+            station: configured.station,
+            port: configured.port,
+        }
+    }
+
     fn push(&mut self, records: &[Record]) {
         let Some(ring) = &mut self.ring else { return };
         // A sample and its command together or not at all; after a gap its event comes first.
@@ -394,289 +469,158 @@ impl<S: Station> Control<'_, S> {
             self.push(&[to_log::ended(now, &Ending { from, state, cause, value, tick })]);
         }
     }
-}
 
-/// A log that is written beside the loop.
-pub struct LogThread {
-    path: std::path::PathBuf,
-    thread: std::thread::JoinHandle<Result<clutch_log::Summary, LogError>>,
-}
-
-impl LogThread {
-    /// Starts a thread that writes what comes through the ring.
+    /// Consent, once this thread is what it is going to be: the board's watchdog starts with it. Then cycles until
+    /// control has ended.
     ///
     /// # Errors
-    /// The file cannot be created.
-    pub fn start(path: &Path, header: &Header, watch: Arc<Watch>) -> Result<(LogThread, Ring), LogError> {
-        let mut writer = LogWriter::create(path, header)?;
-        let (producer, mut consumer) = rtrb::RingBuffer::<Record>::new(RING);
-        let thread = std::thread::spawn(move || {
-            let mut failed = None;
-            let mut flushed = Instant::now();
-            loop {
-                // Asked before the ring is emptied: what was pushed before the end is seen.
-                let last = consumer.is_abandoned();
-                while let Ok(record) = consumer.pop() {
-                    if failed.is_none()
-                        && let Err(error) = writer.write(&record)
-                    {
-                        watch.log_ended.store(true, Ordering::Relaxed);
-                        failed = Some(error);
-                    }
-                }
-                if last {
-                    break;
-                }
-                // Sooner than the writer would: what waits in the ring is lost with the chunk.
-                if failed.is_none() && flushed.elapsed() >= LOG_FLUSH {
-                    flushed = Instant::now();
-                    if let Err(error) = writer.flush() {
-                        watch.log_ended.store(true, Ordering::Relaxed);
-                        failed = Some(error);
-                    }
-                }
-                std::thread::sleep(Duration::from_millis(20));
+    /// The line is gone.
+    fn cycles(&mut self, options: &LoopOptions) -> Result<(), std::io::Error> {
+        let mut buffer = [0_u8; 2048];
+        let mut due = Due::new(self.period_ns, self.patient);
+        loop {
+            let arrived = match options.pace {
+                _ if self.station.standing().state == State::Ready => match self.ask_for_consent(&mut due)? {
+                    Some(arrived) => arrived,
+                    None => return Ok(()),
+                },
+                Pace::Sample => self.wait_for_sample(options.realtime.wait)?,
+                Pace::Clock => self.wait_for_clock(&mut due, options.realtime.wait),
+            };
+            self.cycle(arrived, &mut buffer)?;
+            if self.is_over(&mut due) {
+                return Ok(());
             }
-            match failed {
-                Some(error) => Err(error),
-                None => writer.finish(),
-            }
-        });
-        Ok((LogThread { path: path.to_owned(), thread }, producer))
-    }
-
-    /// Waits until everything is in the file.
-    ///
-    /// # Errors
-    /// The file could not be written to its end.
-    pub fn finish(self) -> Result<clutch_log::Summary, LogError> {
-        let LogThread { path, thread } = self;
-        thread.join().unwrap_or(Err(LogError::Closed { path, written: 0 }))
-    }
-}
-
-/// Everything that a run needs, after the pre-flight: the board is configured.
-pub struct ConfiguredRun<'a, S> {
-    /// This machine's station.
-    pub station: &'a mut S,
-    /// The open port.
-    pub port: &'a mut Port,
-    /// Where records go, if anywhere.
-    pub ring: Option<Ring>,
-    /// What a watcher sees.
-    pub watch: &'a Watch,
-    /// Ticks of the run; a board that is the controller has been told, and ends it by itself.
-    pub ticks: u64,
-    /// The board's clock.
-    pub clock: ClockOffset,
-    /// What sees stick-slip in the counts.
-    pub detector: StickSlip<f64>,
-    /// The board is simulated and its clock waits for this machine: a stall is then no late answer.
-    pub patient: bool,
-}
-
-/// Gives consent and runs the cycles until the path's end, a stop, or a fault, on the calling thread.
-pub fn run<S: Station>(configured: ConfiguredRun<'_, S>, options: &LoopOptions) -> LoopReport {
-    let (encoder, period) = (configured.station.encoder(), configured.station.period());
-    let dac = *configured.station.dac();
-    let seconds: f64 = period.seconds();
-    let period_ns = u64::from(period.0) * 1000;
-    let mut buffer = [0_u8; 2048];
-    let notes = enter(&options.realtime);
-    let mut c = Control {
-        ring: configured.ring,
-        watch: configured.watch,
-        out: Outbox::default(),
-        ticks: configured.ticks,
-        start_ns: monotonic_ns(),
-        radians: encoder.radians_per_count(),
-        dac,
-        period: seconds,
-        settle: options.settle,
-        clock: configured.clock,
-        ping_sent: None,
-        pings: 0,
-        figures: MetricsBuilder::new(seconds, options.settle),
-        detector: configured.detector,
-        sticks: StickSlipState::default(),
-        sticks_before: (0, 0),
-        answers: 0,
-        response: CycleStats::new(),
-        interval: CycleStats::new(),
-        last_answer_ns: None,
-        last_arrival_ns: None,
-        last_sample_us: None,
-        tick_cycles: CycleStats::new(),
-        period_ns,
-        patient: configured.patient,
-        dropped: 0,
-        dropped_told: 0,
-        untold: 0,
-        begun: false,
-        board_safe: false,
-        refused: None,
-        cut: 0,
-        station: configured.station,
-        port: configured.port,
-    };
-    (options.hooks.0)();
-    let mut port_error = None;
-    let mut next_clock = monotonic_ns() + period_ns;
-    let mut next_second = monotonic_ns() + 1_000_000_000;
-    let mut farewell: Option<u64> = None;
-    let mode = options.realtime.wait;
-    // Consent, once this thread is what it is going to be: the board's watchdog starts with it.
-    // A simulated board on a busy machine may be behind with its samples.
-    let patience = if c.patient { 10_000_000_000 } else { 1_000_000_000 };
-    let (mut ask_again, give_up) = (0, monotonic_ns() + patience);
-    loop {
-        // Wait.
-        let arrived = match options.pace {
-            _ if c.station.standing().state == State::Ready => {
-                let now = monotonic_ns();
-                let unasked = ask_again == 0;
-                let leave = now >= give_up || c.watch.stop.load(Ordering::Relaxed);
-                if c.refused.is_some() || leave && unasked {
-                    break;
-                }
-                if leave {
-                    // Consent may have come through, and the word of it not.
-                    c.stop(StopReason::Operator);
-                    if now >= *farewell.get_or_insert(now + FAREWELL.as_nanos() as u64) || c.board_safe {
-                        break;
-                    }
-                } else if now >= ask_again {
-                    ask_again = now + 100_000_000;
-                    c.station.arm(&mut c.out);
-                }
-                if let Err(error) = c.send() {
-                    port_error = Some(error);
-                    break;
-                }
-                let _ = wait_readable(c.port.as_fd(), now + 10_000_000, WaitMode::Sleep);
-                monotonic_ns()
-            }
-            Pace::Sample => {
-                let until = c.station.poll_at().unwrap_or_else(|| monotonic_ns() + 20_000_000);
-                // Spinning is for the moment at which the sample is due; one that is overdue is slept for.
-                let (until, mode) = match (mode, c.last_answer_ns) {
-                    (WaitMode::SleepSpin { spin_us }, Some(last)) => {
-                        let window = last + period_ns + u64::from(spin_us) * 500;
-                        if monotonic_ns() < window {
-                            (until.min(window), mode)
-                        } else {
-                            (until, WaitMode::Sleep)
-                        }
-                    }
-                    _ => (until, WaitMode::Sleep),
-                };
-                match wait_readable(c.port.as_fd(), until, mode) {
-                    Readiness::HungUp => {
-                        port_error = Some(std::io::Error::from(std::io::ErrorKind::BrokenPipe));
-                        break;
-                    }
-                    Readiness::Readable | Readiness::Timeout => {}
-                }
-                monotonic_ns()
-            }
-            Pace::Clock => {
-                sleep_until(next_clock, mode);
-                let woke = monotonic_ns();
-                let due = next_clock;
-                // Cycles that were missed stay missed.
-                while next_clock <= woke {
-                    next_clock += period_ns;
-                }
-                if c.patient { woke } else { due }
-            }
-        };
-        // Read, decide, write.
-        if let Err(error) = c.cycle(arrived, &mut buffer) {
-            port_error = Some(error);
-            break;
+            self.send()?;
         }
-        // Ends.
+    }
+
+    /// Before consent: asks for it, again each 100 ms. When there was something to hear; none if there will be no run.
+    fn ask_for_consent(&mut self, due: &mut Due) -> Result<Option<u64>, std::io::Error> {
         let now = monotonic_ns();
-        match c.station.standing().state {
+        let leave = now >= due.give_up || self.watch.stop.load(Ordering::Relaxed);
+        if self.refused.is_some() || leave && due.consent == 0 {
+            return Ok(None);
+        }
+        if leave {
+            // The board may have received `Arm` although its reply was lost.
+            self.stop(StopReason::Operator);
+            if due.farewell_over(now) || self.board_safe {
+                return Ok(None);
+            }
+        } else if now >= due.consent {
+            due.consent = now + 100_000_000;
+            self.station.arm(&mut self.out);
+        }
+        self.send()?;
+        let _ = wait_readable(self.port.as_fd(), now + 10_000_000, WaitMode::Sleep);
+        Ok(Some(monotonic_ns()))
+    }
+
+    /// Waits for the board's next sample, or until the station has to look at the clock.
+    fn wait_for_sample(&self, mode: WaitMode) -> Result<u64, std::io::Error> {
+        let until = self.station.poll_at().unwrap_or_else(|| monotonic_ns() + 20_000_000);
+        // Spinning is for the moment at which the sample is due; one that is overdue is slept for.
+        let (until, mode) = match (mode, self.last_answer_ns) {
+            (WaitMode::SleepSpin { spin_us }, Some(last)) => {
+                let window = last + self.period_ns + u64::from(spin_us) * 500;
+                if monotonic_ns() < window { (until.min(window), mode) } else { (until, WaitMode::Sleep) }
+            }
+            _ => (until, WaitMode::Sleep),
+        };
+        match wait_readable(self.port.as_fd(), until, mode) {
+            Readiness::HungUp => Err(std::io::Error::from(std::io::ErrorKind::BrokenPipe)),
+            Readiness::Readable | Readiness::Timeout => Ok(monotonic_ns()),
+        }
+    }
+
+    /// Waits for this machine's next cycle. Cycles that were missed stay missed.
+    fn wait_for_clock(&self, due: &mut Due, mode: WaitMode) -> u64 {
+        sleep_until(due.cycle, mode);
+        let (woke, meant) = (monotonic_ns(), due.cycle);
+        while due.cycle <= woke {
+            due.cycle += self.period_ns;
+        }
+        if self.patient { woke } else { meant }
+    }
+
+    /// After a cycle: ends control that is to end, and looks after the link. Whether all is over.
+    fn is_over(&mut self, due: &mut Due) -> bool {
+        let now = monotonic_ns();
+        let standing = self.station.standing();
+        match standing.state {
             State::Ready => {}
             State::Running | State::Armed => {
-                c.begun = true;
-                if c.watch.stop.load(Ordering::Relaxed) {
-                    c.stop(StopReason::Operator);
-                } else if !S::LOOKS_ON
-                    && c.station.standing().state == State::Running
-                    && c.station.standing().tick + 1 >= c.ticks
-                {
-                    c.stop(StopReason::Done);
-                } else if now >= next_second {
-                    next_second += 1_000_000_000;
-                    c.housekeeping(now);
+                self.begun = true;
+                let last = standing.state == State::Running && standing.tick + 1 >= self.ticks;
+                if self.watch.stop.load(Ordering::Relaxed) {
+                    self.stop(StopReason::Operator);
+                } else if !S::LOOKS_ON && last {
+                    self.stop(StopReason::Done);
+                } else if now >= due.second {
+                    due.second += 1_000_000_000;
+                    self.housekeeping(now);
                 }
             }
-            _ => {
-                let until = *farewell.get_or_insert(now + FAREWELL.as_nanos() as u64);
-                if c.board_safe || now >= until {
-                    break;
-                }
-            }
+            _ => return due.farewell_over(now) || self.board_safe,
         }
-        if let Err(error) = c.send() {
-            port_error = Some(error);
-            break;
-        }
+        false
     }
-    (options.hooks.1)();
-    let port_error = port_error.map(|e| {
-        let from = c.station.standing().state;
-        c.station.disconnect();
-        let state = c.station.standing();
-        let now = monotonic_ns().saturating_sub(c.start_ns);
+
+    /// The line is gone: the station and the log are told. Why, in words.
+    fn port_lost(&mut self, error: &std::io::Error) -> String {
+        let from = self.station.standing().state;
+        self.station.disconnect();
+        let standing = self.station.standing();
         let record = EventRecord {
-            tick: state.tick,
-            time_ns: now,
+            tick: standing.tick,
+            time_ns: monotonic_ns().saturating_sub(self.start_ns),
             kind: EventKind::PortLost as u8,
             from: from as u8,
-            to: state.state as u8,
-            cause: state.cause as u8,
+            to: standing.state as u8,
+            cause: standing.cause as u8,
             value: 0.0,
         };
-        c.push(&[Record::Event(record)]);
-        let explained: PortError = c.port.explain(&e);
-        explained.to_string()
-    });
-    let now = monotonic_ns();
-    c.housekeeping(now);
-    c.out.clear();
-    let state = c.station.standing();
-    let mut metrics = c.figures.finish();
-    let measured = metrics.measured_s.max(seconds);
-    // On hardware the encoder's silence is all that is seen of sticking.
-    metrics.stick_slip_cycles_per_s = (c.sticks.cycles() - c.sticks_before.0) as f64 / measured;
-    metrics.stick_time_fraction = (c.sticks.stuck_ticks() - c.sticks_before.1) as f64 * seconds / measured;
-    metrics.stair_height_rad = f64::from(c.sticks.stair()) * c.radians;
-    let _ = c.watch.log_dropped.fetch_max(c.dropped, Ordering::Relaxed);
-    LoopReport {
-        state: state.state,
-        cause: state.cause,
-        value: state.value.to_f64(),
-        ticks: c.answers,
-        metrics,
-        link: *c.station.counts(),
-        lost: state.lost,
-        implausible: state.rejected,
-        deadline_misses: state.deadline_misses,
-        response: c.response.summary(),
-        interval: c.interval.summary(),
-        clock_hz: 0,
-        tick_cycles: c.tick_cycles.summary(),
-        untold: state.untold,
-        notes,
-        log_dropped: c.dropped.saturating_sub(2 * c.untold),
-        cut_writes: c.cut,
-        begun: c.begun,
-        on_the_board: S::LOOKS_ON,
-        board_safe: c.board_safe,
-        refused: c.refused,
-        port_error,
+        self.push(&[Record::Event(record)]);
+        self.port.explain(error).to_string()
+    }
+
+    /// How it went.
+    fn report(mut self, notes: Vec<String>, port_error: Option<String>) -> LoopReport {
+        self.housekeeping(monotonic_ns());
+        let standing = self.station.standing();
+        let mut metrics = self.figures.finish();
+        let measured = metrics.measured_s.max(self.period);
+        // On hardware the encoder's silence is all that is seen of sticking.
+        let (cycles, ticks) =
+            (self.sticks.cycles() - self.sticks_before.0, self.sticks.stuck_ticks() - self.sticks_before.1);
+        metrics.stick_slip_cycles_per_s = cycles as f64 / measured;
+        metrics.stick_time_fraction = ticks as f64 * self.period / measured;
+        metrics.stair_height_rad = f64::from(self.sticks.stair()) * self.radians;
+        let _ = self.watch.log_dropped.fetch_max(self.dropped, Ordering::Relaxed);
+        LoopReport {
+            state: standing.state,
+            cause: standing.cause,
+            value: standing.value.to_f64(),
+            ticks: self.answers,
+            metrics,
+            link: *self.station.counts(),
+            lost: standing.lost,
+            implausible: standing.rejected,
+            deadline_misses: standing.deadline_misses,
+            response: self.response.summary(),
+            interval: self.interval.summary(),
+            clock_hz: 0,
+            tick_cycles: self.tick_cycles.summary(),
+            untold: standing.untold,
+            notes,
+            log_dropped: self.dropped.saturating_sub(2 * self.untold),
+            cut_writes: self.cut,
+            begun: self.begun,
+            on_the_board: S::LOOKS_ON,
+            board_safe: self.board_safe,
+            refused: self.refused,
+            port_error,
+        }
     }
 }

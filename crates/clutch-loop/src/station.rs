@@ -40,7 +40,7 @@ pub trait Station {
     fn stop(&mut self, reason: StopReason, out: &mut Outbox);
     /// The line is gone.
     fn disconnect(&mut self);
-    /// The answer to the last sample has been written, and took so long.
+    /// Reports how long the last answer took, from sample to write.
     fn answered(&mut self, lateness: Micros);
     /// When [`Station::poll`] has to be called at the latest, ns.
     fn poll_at(&self) -> Option<u64>;

@@ -10,13 +10,13 @@ use crate::sim_board::{SimBoard, SimBoardError};
 use crate::station::{Station, StationNotice};
 use crate::to_log;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{Micros, Real, Target};
+use clutch_core::{DacCode, Micros, Real, Target};
 use clutch_log::Record;
 use clutch_node::{Ending, Notice, Outbox, Standing};
 use clutch_sim::engine::{Event, Motion, Shaft};
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
 use clutch_sim::{Metrics, Scenario};
-use clutch_wire::{BoardState, StopReason};
+use clutch_wire::{BoardState, Refused, StopReason};
 
 /// Time that a controller takes for an answer, over a part of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -156,211 +156,307 @@ impl<S: Station> VirtualLoop<S> {
     /// # Errors
     /// The engine gave up, or the station.
     pub fn run(&mut self, path: &impl Fn(u64) -> Target<S::Scalar>) -> Result<VirtualReport, VirtualError> {
-        let mut report =
-            VirtualReport { volts: (f64::INFINITY, f64::NEG_INFINITY), ..VirtualReport::default() };
-        let (mut out, mut up) = (Outbox::default(), Outbox::default());
-        let radians = self.station.encoder().radians_per_count::<f64>();
-        let dac = *self.station.dac();
-        let period_ns = u64::from(self.station.period().0) * 1000;
-        let period = self.station.period().seconds::<f64>();
-        let mut figures = MetricsBuilder::new(period, self.params.settle);
-        let mut waiting: Option<Sampled> = None;
-        let (mut hello, mut configured, mut asked, mut armed) = (false, false, false, false);
-        let mut origin_ns = 0;
-        let mut safe_at: Option<u64> = None;
-        let mut busy_until = 0;
-        let (mut sampled, mut first_sample) = (0, None);
-        self.station.discover(1, &mut out);
-        self.sound()?;
-        let present = self.board.code();
-        report.present = present.0;
-        self.down.send(0, None, out.as_bytes());
-        out.clear();
-        let mut end_ns = u64::MAX;
-        loop {
-            // What comes next.
-            let host = self.up.next_ns().map(|t| t.max(busy_until));
-            let poll = self.station.poll_at().map(|t| t.max(busy_until));
-            let times = [self.board.next_ns(), host, self.down.next_ns(), poll];
-            let Some(next) = times.into_iter().flatten().min() else { break };
-            self.now_ns = next.max(self.now_ns);
-            if self.now_ns >= end_ns {
-                self.now_ns = end_ns;
-                self.board.step(end_ns, &mut up)?;
+        let mut course = Course::new(self, path);
+        course.discover()?;
+        while let Some(now) = course.next_event() {
+            if now >= course.end_ns {
+                course.stop_the_clock()?;
                 break;
             }
-            let now = self.now_ns;
-            let before = self.board.armed_for(now);
-
-            // The board: its clock first, then what has arrived.
-            if self.board.next_ns().is_some_and(|t| t <= now) {
-                self.board.step(now, &mut up)?;
-            }
-            while let Some(bytes) = self.down.arrived(now) {
-                self.board.receive(now, &bytes, &mut up)?;
-                if self.board.next_ns().is_some_and(|t| t <= now) {
-                    self.board.step(now, &mut up)?;
-                }
-            }
-            if before.is_none() && self.board.armed_for(now).is_some() {
-                origin_ns = now;
-                end_ns = now + (self.params.duration * 1e9) as u64;
-            }
-            let armed_for = self.board.armed_for(now);
-            self.up.send(now, armed_for, up.as_bytes());
-            up.clear();
-            if self.board.samples() != sampled {
-                sampled = self.board.samples();
-                let events = self.board.take_events();
-                if let Some(Sampled { shaft, rig_time, tick: Some(tick) }) = waiting.take()
-                    && tick + 1 < self.params.ticks
-                {
-                    let time = tick as f64 * period;
-                    let error = self.target(path, tick) - shaft.position;
-                    let voltage = self.board.volts();
-                    figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage });
-                    // The rig's clock began before the run's.
-                    let of_run = |e: &Event| Event { time: e.time - rig_time + time, ..*e };
-                    let events: Vec<Event> = events.iter().map(of_run).collect();
-                    figures.period(time, shaft.motion == Motion::Stuck, &events);
-                }
-                let rig = self.board.rig();
-                waiting = Some(Sampled { shaft: *rig.shaft(), rig_time: rig.time(), tick: None });
-                if let Some(first) = first_sample
-                    && safe_at.is_none()
-                {
-                    let error = self.target(path, sampled - first) - self.board.rig().shaft().position;
-                    report.largest_error = report.largest_error.max(error.abs());
-                    report.errors.push(error);
-                }
-            }
-            let safe_now = matches!(
-                self.board.node().state(),
-                BoardState::Stopped | BoardState::Faulted | BoardState::Boot
-            );
-            if armed_for.is_some() && safe_now && safe_at.is_none() {
-                safe_at = Some(now);
-                report.safe = armed_for;
-            }
-
-            // The controller.
-            if now < busy_until {
+            let armed_for = course.board_turn(now)?;
+            if now < course.busy_until {
                 continue;
             }
-            let mut records = Vec::new();
-            let time_ns = now.saturating_sub(origin_ns);
-            let (mut ended, mut refused) = (None, None);
-            let mut greeted = false;
-            {
-                let (armed_now, rig) = (&mut armed, self.board.rig());
-                let mut notices = |n: StationNotice<S>| match n {
-                    Notice::Hello(_) => greeted = true,
-                    Notice::Configured => configured = true,
-                    Notice::Armed => *armed_now = true,
-                    Notice::Cycle(n) if *armed_now => {
-                        if let Some(waiting) = waiting.as_mut().filter(|_| n.cycle.answer.is_some()) {
-                            waiting.tick = Some(n.cycle.tick);
-                        }
-                        report.answers += u64::from(n.cycle.answer.is_some());
-                        let volts = dac.volts(n.cycle.code).to_f64();
-                        report.volts = (report.volts.0.min(volts), report.volts.1.max(volts));
-                        records.push(Record::Sample(to_log::sample(time_ns, 0, &n)));
-                        records.push(Record::Command(to_log::command(time_ns, &n.cycle, &dac, radians)));
-                        records.extend(to_log::change(time_ns, &n.cycle));
-                        records.push(Record::Truth(to_log::truth(time_ns, n.cycle.tick, rig)));
-                    }
-                    Notice::Ended(ending) => ended = Some(ending),
-                    Notice::Refused(m) if !*armed_now => refused = Some(m),
-                    _ => {}
-                };
-                while let Some(bytes) = self.up.arrived(now) {
-                    self.station.receive(now, &bytes, &mut out, &mut notices);
-                }
-                self.station.poll(now, &mut out, &mut notices);
-            }
-            if greeted && !hello {
-                hello = true;
-                self.station.configure(present, &mut out);
-            }
-            self.sound()?;
-            if let Some(m) = refused {
-                return Err(VirtualError::Refused(preflight::why(&m)));
-            }
-            if configured && !asked && self.board.samples() >= 3 {
-                asked = true;
-                self.station.arm(&mut out);
-            }
-            let standing = self.station.standing();
-            let (state, tick) = (standing.state, standing.tick);
-            if state == State::Running && first_sample.is_none() {
-                first_sample = Some(sampled);
-            }
-            if let Some(ending) = ended {
-                records.push(to_log::ended(time_ns, &ending));
-            }
-            if state == State::Faulted && report.tripped.is_none() {
-                report.tripped = armed_for;
-                report.cause = Some(standing.cause);
-            }
-            if !S::LOOKS_ON && state == State::Running && tick + 1 >= self.params.ticks {
-                self.station.stop(StopReason::Done, &mut out);
-                let Standing { state: to, cause, value, .. } = self.station.standing();
-                records.push(to_log::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }));
-            }
-            if self.params.record {
-                report.records.append(&mut records);
-            }
-            if !out.as_bytes().is_empty() {
-                let answer =
-                    self.params.stall.filter(|s| armed_for.is_some_and(|t| t >= s.at && t < s.until));
-                let takes = answer.map_or(0, |s| (s.answer * 1e9) as u64);
-                busy_until = now.saturating_add(takes);
-                self.station.answered(Micros((takes / 1000) as u32));
-                self.down.send(busy_until, armed_for, out.as_bytes());
-                out.clear();
-            }
+            course.station_turn(now, armed_for)?;
             // Nothing to come: a board that has started anew, and a controller that has given up.
-            if end_ns == u64::MAX && now > 1_000 * period_ns {
+            if course.end_ns == u64::MAX && now > 1_000 * course.period_ns {
                 break;
             }
         }
-        self.sound()?;
-        let standing = self.station.standing();
-        report.standing = standing.map(Real::to_f64);
-        report.board = Some(self.board.node().state());
-        report.hit = [self.up.hits().1, self.down.hits().1, self.board.first_hit_ns()]
-            .into_iter()
-            .flatten()
-            .min()
-            .map(|t| t.saturating_sub(origin_ns) as f64 / 1e9);
-        let at_end = self.board.rig().shaft().position;
-        report.metrics = figures.finish();
-        report.overrun =
-            report.overrun.max(self.beyond(at_end, path, safe_at.unwrap_or(self.now_ns), origin_ns));
-        Ok(report)
+        course.report()
     }
 
     /// An error if the station cannot go on.
     fn sound(&self) -> Result<(), VirtualError> {
         self.station.failure().map_or(Ok(()), |why| Err(VirtualError::Station(why)))
     }
+}
 
-    /// How far a position lies beyond the path's at a time.
-    fn beyond(
-        &self,
-        position: f64,
-        path: &impl Fn(u64) -> Target<S::Scalar>,
-        at_ns: u64,
-        origin_ns: u64,
-    ) -> f64 {
-        let period_ns = u64::from(self.station.period().0) * 1000;
-        let tick = at_ns.saturating_sub(origin_ns) / period_ns;
-        position - self.target(path, tick)
+/// How far station and board are with each other.
+#[derive(Clone, Copy, Default)]
+struct Handshake {
+    greeted: bool,
+    configured: bool,
+    asked: bool,
+    armed: bool,
+}
+
+/// What a turn of the station brought.
+struct Heard<T> {
+    records: Vec<Record>,
+    ended: Option<Ending<T>>,
+    refused: Option<Refused>,
+}
+
+/// A run on its way.
+struct Course<'a, S: Station, P> {
+    on: &'a mut VirtualLoop<S>,
+    path: &'a P,
+    report: VirtualReport,
+    figures: MetricsBuilder,
+    period: f64,
+    period_ns: u64,
+    /// Frames of the station.
+    out: Outbox,
+    /// Frames of the board.
+    up: Outbox,
+    hands: Handshake,
+    /// The code that the converter had at the start.
+    present: DacCode,
+    /// When the board was armed.
+    origin_ns: u64,
+    /// When the run is over; not before the board is armed.
+    end_ns: u64,
+    safe_at: Option<u64>,
+    /// The station makes an answer until then.
+    busy_until: u64,
+    waiting: Option<Sampled>,
+    /// Samples that the board has taken.
+    sampled: u64,
+    /// How many it had taken when control began.
+    first_sample: Option<u64>,
+}
+
+impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
+    fn new(on: &'a mut VirtualLoop<S>, path: &'a P) -> Self {
+        let (period, present) = (on.station.period(), on.board.code());
+        Course {
+            report: VirtualReport {
+                volts: (f64::INFINITY, f64::NEG_INFINITY),
+                present: present.0,
+                ..VirtualReport::default()
+            },
+            figures: MetricsBuilder::new(period.seconds(), on.params.settle),
+            period: period.seconds(),
+            period_ns: u64::from(period.0) * 1000,
+            out: Outbox::default(),
+            up: Outbox::default(),
+            hands: Handshake::default(),
+            present,
+            origin_ns: 0,
+            end_ns: u64::MAX,
+            safe_at: None,
+            busy_until: 0,
+            waiting: None,
+            sampled: 0,
+            first_sample: None,
+            on,
+            path,
+        }
     }
 
-    fn target(&self, path: &impl Fn(u64) -> Target<S::Scalar>, tick: u64) -> f64 {
-        let radians = self.station.encoder().radians_per_count::<f64>();
-        let position = path(tick).position.plus(self.station.origin());
+    /// Asks who is there.
+    fn discover(&mut self) -> Result<(), VirtualError> {
+        self.on.station.discover(1, &mut self.out);
+        self.on.sound()?;
+        self.on.down.send(0, None, self.out.as_bytes());
+        self.out.clear();
+        Ok(())
+    }
+
+    /// When something falls due next, on the board, on the line, or for the station.
+    fn next_event(&mut self) -> Option<u64> {
+        let v = &mut *self.on;
+        let heard = v.up.next_ns().map(|t| t.max(self.busy_until));
+        let poll = v.station.poll_at().map(|t| t.max(self.busy_until));
+        let next = [v.board.next_ns(), heard, v.down.next_ns(), poll].into_iter().flatten().min()?;
+        v.now_ns = next.max(v.now_ns);
+        Some(v.now_ns)
+    }
+
+    /// The run is over: the rig moves to its end, and no further.
+    fn stop_the_clock(&mut self) -> Result<(), VirtualError> {
+        self.on.now_ns = self.end_ns;
+        Ok(self.on.board.step(self.end_ns, &mut self.up)?)
+    }
+
+    /// The board: its clock first, then what has arrived. Time since it was armed, s.
+    fn board_turn(&mut self, now: u64) -> Result<Option<f64>, VirtualError> {
+        let v = &mut *self.on;
+        let before = v.board.armed_for(now);
+        if v.board.next_ns().is_some_and(|t| t <= now) {
+            v.board.step(now, &mut self.up)?;
+        }
+        while let Some(bytes) = v.down.arrived(now) {
+            v.board.receive(now, &bytes, &mut self.up)?;
+            if v.board.next_ns().is_some_and(|t| t <= now) {
+                v.board.step(now, &mut self.up)?;
+            }
+        }
+        let armed_for = v.board.armed_for(now);
+        if before.is_none() && armed_for.is_some() {
+            self.origin_ns = now;
+            self.end_ns = now + (v.params.duration * 1e9) as u64;
+        }
+        v.up.send(now, armed_for, self.up.as_bytes());
+        self.up.clear();
+        if v.board.samples() != self.sampled {
+            self.sampled = v.board.samples();
+            self.sample_taken();
+        }
+        let state = self.on.board.node().state();
+        let safe = matches!(state, BoardState::Stopped | BoardState::Faulted | BoardState::Boot);
+        if armed_for.is_some() && safe && self.safe_at.is_none() {
+            self.safe_at = Some(now);
+            self.report.safe = armed_for;
+        }
+        Ok(armed_for)
+    }
+
+    /// The board has taken a sample: the period before it goes into the figures.
+    fn sample_taken(&mut self) {
+        let events = self.on.board.take_events();
+        if let Some(Sampled { shaft, rig_time, tick: Some(tick) }) = self.waiting.take()
+            && tick + 1 < self.on.params.ticks
+        {
+            let time = tick as f64 * self.period;
+            let error = self.target(tick) - shaft.position;
+            let voltage = self.on.board.volts();
+            self.figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage });
+            // The rig's clock began before the run's.
+            let of_run = |e: &Event| Event { time: e.time - rig_time + time, ..*e };
+            let events: Vec<Event> = events.iter().map(of_run).collect();
+            self.figures.period(time, shaft.motion == Motion::Stuck, &events);
+        }
+        let rig = self.on.board.rig();
+        let (shaft, rig_time) = (*rig.shaft(), rig.time());
+        self.waiting = Some(Sampled { shaft, rig_time, tick: None });
+        if let Some(first) = self.first_sample
+            && self.safe_at.is_none()
+        {
+            let error = self.target(self.sampled - first) - shaft.position;
+            self.report.largest_error = self.report.largest_error.max(error.abs());
+            self.report.errors.push(error);
+        }
+    }
+
+    /// The station: what it hears, what follows from that, and what it sends.
+    fn station_turn(&mut self, now: u64, armed_for: Option<f64>) -> Result<(), VirtualError> {
+        let time_ns = now.saturating_sub(self.origin_ns);
+        let mut heard = self.hear(now, time_ns);
+        self.on.sound()?;
+        if let Some(m) = heard.refused {
+            return Err(VirtualError::Refused(preflight::why(&m)));
+        }
+        if self.hands.configured && !self.hands.asked && self.on.board.samples() >= 3 {
+            self.hands.asked = true;
+            self.on.station.arm(&mut self.out);
+        }
+        heard.records.extend(heard.ended.map(|ending| to_log::ended(time_ns, &ending)));
+        heard.records.extend(self.follow(time_ns, armed_for));
+        if self.on.params.record {
+            self.report.records.append(&mut heard.records);
+        }
+        self.answer(now, armed_for);
+        Ok(())
+    }
+
+    /// What has come over the line, and what the clock says.
+    fn hear(&mut self, now: u64, time_ns: u64) -> Heard<S::Scalar> {
+        let VirtualLoop { board, station, up, .. } = &mut *self.on;
+        let (hands, waiting, report) = (&mut self.hands, &mut self.waiting, &mut self.report);
+        let (dac, radians) = (*station.dac(), station.encoder().radians_per_count::<f64>());
+        let mut heard = Heard { records: Vec::new(), ended: None, refused: None };
+        let mut greeted = false;
+        let mut notices = |n: StationNotice<S>| match n {
+            Notice::Hello(_) => greeted = true,
+            Notice::Configured => hands.configured = true,
+            Notice::Armed => hands.armed = true,
+            Notice::Cycle(n) if hands.armed => {
+                if let Some(waiting) = waiting.as_mut().filter(|_| n.cycle.answer.is_some()) {
+                    waiting.tick = Some(n.cycle.tick);
+                }
+                report.answers += u64::from(n.cycle.answer.is_some());
+                let volts = dac.volts(n.cycle.code).to_f64();
+                report.volts = (report.volts.0.min(volts), report.volts.1.max(volts));
+                let records = &mut heard.records;
+                records.push(Record::Sample(to_log::sample(time_ns, 0, &n)));
+                records.push(Record::Command(to_log::command(time_ns, &n.cycle, &dac, radians)));
+                records.extend(to_log::change(time_ns, &n.cycle));
+                records.push(Record::Truth(to_log::truth(time_ns, n.cycle.tick, board.rig())));
+            }
+            Notice::Ended(ending) => heard.ended = Some(ending),
+            Notice::Refused(m) if !hands.armed => heard.refused = Some(m),
+            _ => {}
+        };
+        while let Some(bytes) = up.arrived(now) {
+            station.receive(now, &bytes, &mut self.out, &mut notices);
+        }
+        station.poll(now, &mut self.out, &mut notices);
+        if greeted && !self.hands.greeted {
+            self.hands.greeted = true;
+            station.configure(self.present, &mut self.out);
+        }
+        heard
+    }
+
+    /// Where control stands now: its beginning and a fault are noted, and the path's end stops it.
+    fn follow(&mut self, time_ns: u64, armed_for: Option<f64>) -> Option<Record> {
+        let Standing { state, cause, tick, .. } = self.on.station.standing();
+        if state == State::Running && self.first_sample.is_none() {
+            self.first_sample = Some(self.sampled);
+        }
+        if state == State::Faulted && self.report.tripped.is_none() {
+            self.report.tripped = armed_for;
+            self.report.cause = Some(cause);
+        }
+        if S::LOOKS_ON || state != State::Running || tick + 1 < self.on.params.ticks {
+            return None;
+        }
+        self.on.station.stop(StopReason::Done, &mut self.out);
+        let Standing { state: to, cause, value, .. } = self.on.station.standing();
+        Some(to_log::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }))
+    }
+
+    /// Sends what there is to send, as late as the stall that was asked for makes it.
+    fn answer(&mut self, now: u64, armed_for: Option<f64>) {
+        if self.out.as_bytes().is_empty() {
+            return;
+        }
+        let v = &mut *self.on;
+        let stall = v.params.stall.filter(|s| armed_for.is_some_and(|t| t >= s.at && t < s.until));
+        let takes = stall.map_or(0, |s| (s.answer * 1e9) as u64);
+        self.busy_until = now.saturating_add(takes);
+        v.station.answered(Micros((takes / 1000) as u32));
+        v.down.send(self.busy_until, armed_for, self.out.as_bytes());
+        self.out.clear();
+    }
+
+    /// What became of it.
+    fn report(mut self) -> Result<VirtualReport, VirtualError> {
+        self.on.sound()?;
+        let now_ns = self.on.now_ns;
+        let overrun = self.on.board.rig().shaft().position - self.path_at(self.safe_at.unwrap_or(now_ns));
+        let v = &self.on;
+        self.report.standing = v.station.standing().map(Real::to_f64);
+        self.report.board = Some(v.board.node().state());
+        let hits = [v.up.hits().1, v.down.hits().1, v.board.first_hit_ns()];
+        let first = hits.into_iter().flatten().min();
+        self.report.hit = first.map(|t| t.saturating_sub(self.origin_ns) as f64 / 1e9);
+        self.report.metrics = self.figures.finish();
+        self.report.overrun = self.report.overrun.max(overrun);
+        Ok(self.report)
+    }
+
+    /// The path's position at a time, rad.
+    fn path_at(&self, at_ns: u64) -> f64 {
+        self.target(at_ns.saturating_sub(self.origin_ns) / self.period_ns)
+    }
+
+    /// The path's position at a tick, rad.
+    fn target(&self, tick: u64) -> f64 {
+        let radians = self.on.station.encoder().radians_per_count::<f64>();
+        let position = (self.path)(tick).position.plus(self.on.station.origin());
         position.minus::<f64>(clutch_core::FixedCounts(0)) * radians
     }
 }

@@ -13,7 +13,7 @@
 //! board and the firmware run.
 
 use crate::outbox::Outbox;
-use clutch_core::{Counts, DacCode, ParamError, SafeCodes, SafeKind, SafeRun};
+use clutch_core::{Counts, DacCode, SafeCodes, SafeKind, SafeRun};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, Hello, Message,
     Pong, Refusal, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, StopReason,
@@ -44,6 +44,41 @@ pub struct BoardParams {
     /// Output at power-up: the safe output of the rig that the board is built into.
     pub boot_code: u16,
 }
+
+/// Why a board cannot be as its parameters say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BoardMisfit {
+    /// [`BoardParams::dac_bits`] is outside 1…16.
+    DacBits(u8),
+    /// [`BoardParams::dac_highest_mv`] is not above the lowest voltage.
+    DacHighest(i32),
+    /// [`BoardParams::boot_code`] is above the converter's top.
+    BootCode(u16),
+    /// [`BoardParams::period_min_us`] is 0, or above the longest period.
+    PeriodMin(u32),
+    /// [`BoardParams::watchdog_max_us`] is below two of the shortest periods.
+    WatchdogMax(u32),
+}
+
+impl core::fmt::Display for BoardMisfit {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            BoardMisfit::DacBits(n) => write!(f, "dac_bits = {n}: expected 1 to 16 bits"),
+            BoardMisfit::DacHighest(n) => {
+                write!(f, "dac_highest_mv = {n}: expected a voltage above the lowest, mV")
+            }
+            BoardMisfit::BootCode(n) => write!(f, "boot_code = {n}: expected a code that the converter has"),
+            BoardMisfit::PeriodMin(n) => {
+                write!(f, "period_min_us = {n}: expected a time above 0 µs and not above the longest period")
+            }
+            BoardMisfit::WatchdogMax(n) => {
+                write!(f, "watchdog_max_us = {n}: expected at least two of the shortest periods, µs")
+            }
+        }
+    }
+}
+
+impl core::error::Error for BoardMisfit {}
 
 /// Samples that an Actuate may answer.
 const RECENT: usize = 8;
@@ -80,17 +115,14 @@ impl BoardNode {
     /// A board at power-up.
     ///
     /// # Errors
-    /// `dac_bits` outside 1…16, `dac_highest` not above `dac_lowest`, `boot_code` above the
-    /// converter's top, periods of 0 or out of order, a watchdog shorter than two periods.
-    pub fn new(p: &BoardParams) -> Result<Self, ParamError<f64>> {
-        let check = |field, value: f64, holds: bool, expected| {
-            if holds { Ok(()) } else { Err(ParamError { field, value, expected }) }
-        };
-        let bits = f64::from(p.dac_bits);
-        check("dac_bits", bits, (1..=16).contains(&p.dac_bits), "1 to 16 bits")?;
-        let highest = f64::from(p.dac_highest_mv);
-        let expected = "a voltage above the lowest, mV";
-        check("dac_highest", highest, p.dac_highest_mv > p.dac_lowest_mv, expected)?;
+    /// The first parameter that no board can have.
+    pub fn new(p: &BoardParams) -> Result<Self, BoardMisfit> {
+        if !(1..=16).contains(&p.dac_bits) {
+            return Err(BoardMisfit::DacBits(p.dac_bits));
+        }
+        if p.dac_highest_mv <= p.dac_lowest_mv {
+            return Err(BoardMisfit::DacHighest(p.dac_highest_mv));
+        }
         let board = BoardNode {
             params: *p,
             decoder: Decoder::new(),
@@ -111,14 +143,15 @@ impl BoardNode {
             safe_under_way: false,
             armed_at: 0,
         };
-        let code = f64::from(p.boot_code);
-        check("boot_code", code, p.boot_code <= board.top(), "a code that the converter has")?;
-        let shortest = f64::from(p.period_min_us);
-        let ordered = p.period_min_us > 0 && p.period_min_us <= p.period_max_us;
-        check("period_min", shortest, ordered, "above 0 µs and not above the longest period")?;
-        let watchdog = f64::from(p.watchdog_max_us);
-        let holds = p.watchdog_max_us / 2 >= p.period_min_us;
-        check("watchdog_max", watchdog, holds, "at least two of the shortest periods, µs")?;
+        if p.boot_code > board.top() {
+            return Err(BoardMisfit::BootCode(p.boot_code));
+        }
+        if p.period_min_us == 0 || p.period_min_us > p.period_max_us {
+            return Err(BoardMisfit::PeriodMin(p.period_min_us));
+        }
+        if p.watchdog_max_us / 2 < p.period_min_us {
+            return Err(BoardMisfit::WatchdogMax(p.watchdog_max_us));
+        }
         Ok(board)
     }
 

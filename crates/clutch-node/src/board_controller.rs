@@ -127,7 +127,7 @@ impl BoardController {
         self.spent = cycles;
     }
 
-    /// The answer to the last sample has been written, and took so long.
+    /// Reports how long the last answer took, from sample to write.
     pub fn answered(&mut self, lateness: Micros) {
         if let Some(run) = &mut self.run {
             run.control.answered(lateness);
@@ -183,9 +183,9 @@ impl BoardController {
         };
         let drove = run.driving();
         let (number, config, boot) = (run.number, run.config, self.params.boot);
-        let (host, told, path, points) = (&mut out.host, &mut run.told, &run.path, self.settings.points());
+        let (host, told, path, knots) = (&mut out.host, &mut run.told, &run.path, self.settings.knots());
         let (spent, mut armed, mut hello, mut ends) = (&mut self.spent, false, None, false);
-        let at = |tick: u64| path.target(points, tick);
+        let at = |tick: u64| path.target(knots, tick);
         run.control.receive(now_ns, bytes, &at, &mut out.daq, &mut |n: Cycle| match n {
             // Before consent nothing is driven, and the line stays free.
             Notice::Cycle(n) if n.cycle.state == State::Ready => {}
@@ -352,16 +352,16 @@ impl BoardController {
             return Err((Refusal::Run, self.settings_run.into()));
         }
         let built: Built = self.settings.build().map_err(|misfit| match misfit {
-            Misfit::Missing(key) | Misfit::Unknown(key) => (Refusal::Setting, u32::from(key)),
-            Misfit::Param(e) => (Refusal::Unfit, e.value.to_bits()),
+            Misfit::Missing(_) | Misfit::Unknown(_) => (Refusal::Setting, misfit.bits()),
+            Misfit::Unfit { .. } => (Refusal::Unfit, misfit.bits()),
         })?;
-        let n = &self.settings.numbers;
+        let times = &built.times;
         let params = ControllerParams {
             run: m.run,
             config: m.config,
-            watchdog: Micros(n.watchdog_us),
-            valid: Micros(n.valid_us),
-            silence: Micros(n.silence_us),
+            watchdog: times.watchdog,
+            valid: times.valid,
+            silence: times.silence,
         };
         let mut control = ControllerNode::new(params, built.servo, built.supervisor);
         // What the host asks for and what the settings say is one run, or none.
@@ -374,8 +374,8 @@ impl BoardController {
             path: built.path,
             number: m.run,
             config: m.config,
-            ticks: n.ticks,
-            host_silence_ns: u64::from(n.host_silence_us).saturating_mul(1000),
+            ticks: built.ticks,
+            host_silence_ns: u64::from(times.host_silence.0).saturating_mul(1000),
             told: 0,
         });
         self.linked_ns = now_ns;

@@ -2,7 +2,7 @@
 
 use crate::notice::{CycleNotice, Ending, LinkCounts, Notice};
 use crate::outbox::Outbox;
-use clutch_core::law::{Controller, Law};
+use clutch_core::law::{ControlLaw, Law};
 use clutch_core::supervisor::{BoardMode, Cause, Sample as Seen, State};
 use clutch_core::{
     Counts, DacCode, FixedCounts, Micros, Real, SafeKind, Servo, Supervisor, SupervisorState, Target,
@@ -31,7 +31,7 @@ pub struct ControllerParams {
 
 /// The controller's state machine. Times are the host's monotonic clock, ns.
 #[derive(Clone, Debug)]
-pub struct ControllerNode<T: Real, C: Controller<T> = Law<T>> {
+pub struct ControllerNode<T: Real, C: ControlLaw<T> = Law<T>> {
     params: ControllerParams,
     servo: Servo<T, C>,
     supervisor: Supervisor<T>,
@@ -49,7 +49,7 @@ pub struct ControllerNode<T: Real, C: Controller<T> = Law<T>> {
     stopping: Option<StopReason>,
 }
 
-impl<T: Real, C: Controller<T>> ControllerNode<T, C> {
+impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
     /// A controller that has not spoken yet.
     #[must_use]
     pub fn new(params: ControllerParams, servo: Servo<T, C>, supervisor: Supervisor<T>) -> Self {
@@ -151,7 +151,7 @@ impl<T: Real, C: Controller<T>> ControllerNode<T, C> {
         self.supervisor.disconnect(&mut self.state);
     }
 
-    /// The answer to the last sample has been written, and took so long.
+    /// Reports how long the last answer took, from sample to write.
     pub fn answered(&mut self, lateness: Micros) {
         self.lateness = lateness;
     }

@@ -9,10 +9,10 @@
 //! A board gives a [`Hardware`]; the role is a node of this crate. Both functions must be called
 //! from one place, so that neither interrupts the other: nothing here locks.
 
-use crate::board::{BoardNode, BoardParams};
+use crate::board::{BoardMisfit, BoardNode, BoardParams};
 use crate::one_chip::OneChip;
 use crate::outbox::Outbox;
-use clutch_core::{Counts, DacCode, Micros, ParamError};
+use clutch_core::{Counts, DacCode, Micros};
 
 /// What a board's one file gives. Nothing of it may wait.
 pub trait Hardware {
@@ -104,7 +104,7 @@ impl DaqBoard {
     ///
     /// # Errors
     /// Those of [`BoardNode::new`].
-    pub fn new(params: &BoardParams) -> Result<Self, ParamError<f64>> {
+    pub fn new(params: &BoardParams) -> Result<Self, BoardMisfit> {
         Ok(DaqBoard { node: BoardNode::new(params)?, outbox: Outbox::default() })
     }
 }

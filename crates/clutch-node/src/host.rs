@@ -3,7 +3,7 @@
 use crate::notice::{Ending, LinkCounts, Notice, Standing};
 use crate::outbox::Outbox;
 use crate::telemetry::{both_states, notice};
-use clutch_core::law::{Law, LawTerms};
+use clutch_core::law::LawTerms;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{FixedCounts, Servo, Target};
 use clutch_wire::{
@@ -329,14 +329,9 @@ impl HostNode {
             self.origin = Some(self.origin_from(m, target.position));
         }
         let target = Target { position: target.position.plus(self.origin()), ..target };
-        let kind = match self.servo.law() {
-            Law::Pd(_) => LawTerms::Pd(Default::default()),
-            Law::Ctc(_) => LawTerms::Ctc(Default::default()),
-            Law::Smc(_) => LawTerms::Smc(Default::default()),
-        };
-        let Some(notice) = notice(m, &kind, self.servo.dac(), tick, target) else { return };
+        let Some(notice) = notice(m, &self.servo, tick, target) else { return };
         let cycle = &notice.cycle;
-        // The word of the end got lost.
+        // The `Ended` frame was lost.
         let ended = !matches!(cycle.from, State::Ready | State::Armed | State::Running);
         if self.driving() && ended {
             self.end(cycle.from, cycle.cause, cycle.value, notices);

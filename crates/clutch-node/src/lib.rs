@@ -43,7 +43,7 @@ mod settings;
 mod telemetry;
 mod wide_counter;
 
-pub use board::{BoardNode, BoardParams};
+pub use board::{BoardMisfit, BoardNode, BoardParams};
 pub use board_controller::{BoardController, BoardControllerParams, Outboxes, present_code};
 pub use controller::{ControllerNode, ControllerParams};
 pub use hardware::{DaqBoard, Hardware, Role, receive, tick};
@@ -52,7 +52,7 @@ pub use notice::{CycleNotice, Ending, LinkCounts, Notice, Standing};
 pub use one_chip::OneChip;
 pub use outbox::Outbox;
 pub use settings::{
-    Built, MAX_KNOTS, Misfit, Numbers, Path, RunParams, SETTINGS, SETTINGS_HASH, SettingInfo, Settings,
-    Unsupported,
+    Built, Declared, MAX_KNOTS, Misfit, Name, Path, Refusing, RunParams, RunSettings, RunTimes, SETTINGS,
+    SETTINGS_HASH, Setting, Settings, Unsupported,
 };
 pub use wide_counter::WideCounter;

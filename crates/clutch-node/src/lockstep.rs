@@ -19,7 +19,7 @@ pub const LONGEST: usize = HEAD + 2 * 1024;
 /// A request or an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Exchange<'a> {
-    /// Of a request the time, ns; of an answer when the controller wants to be asked at the latest.
+    /// In a request: current time, ns. In an answer: latest time for the next request, ns.
     pub time_ns: u64,
     /// Of a request: how long the answer before took until it was on its way, µs.
     pub lateness_us: u32,

@@ -1,7 +1,7 @@
 //! What a controller, or the host of one, reports to its environment.
 
-use clutch_core::Micros;
 use clutch_core::supervisor::{Cause, Cycle, State};
+use clutch_core::{Arithmetic, Micros};
 use clutch_wire::{ControllerHello, Fault, FrameError, Hello, Refused, Sample, Stopped, Taken};
 
 /// What the line has carried.
@@ -23,7 +23,7 @@ pub struct LinkCounts {
 
 /// A sample and what it led to.
 #[derive(Clone, Copy, Debug)]
-pub struct CycleNotice<T, Terms> {
+pub struct CycleNotice<T: Arithmetic, Terms> {
     /// The sample as it came.
     pub sample: Sample,
     /// Whether a newer one was there already.
@@ -39,7 +39,7 @@ pub struct CycleNotice<T, Terms> {
 /// What a controller, or the host of one, reports.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::large_enum_variant, reason = "lives on the stack for one call; nothing allocates here")]
-pub enum Notice<T, Terms> {
+pub enum Notice<T: Arithmetic, Terms> {
     /// A board answered.
     Hello(Hello),
     /// A board controller answered.

@@ -1,13 +1,13 @@
 //! Controller, encoder and converter on one chip.
 
-use crate::board::{BoardNode, BoardParams};
+use crate::board::{BoardMisfit, BoardNode, BoardParams};
 use crate::board_controller::{BoardController, BoardControllerParams, Outboxes};
 use crate::outbox::Outbox;
-use clutch_core::{Counts, DacCode, Micros, ParamError};
+use clutch_core::{Counts, DacCode, Micros};
 use clutch_wire::BoardState;
 
-/// How often frames may go to and fro within one call. A handshake takes two; the rest would be a
-/// quarrel, and waits for the next call.
+/// Rounds of frames to and fro within one call. A handshake takes two; more rounds would mean a livelock; the
+/// remainder waits for the next call.
 const ROUNDS: u32 = 4;
 
 /// An [`BoardController`] that drives a [`BoardNode`] in the same memory. Both speak as over a line, so that
@@ -25,7 +25,7 @@ impl OneChip {
     ///
     /// # Errors
     /// As [`BoardNode::new`].
-    pub fn new(controller: BoardControllerParams, board: &BoardParams) -> Result<Self, ParamError<f64>> {
+    pub fn new(controller: BoardControllerParams, board: &BoardParams) -> Result<Self, BoardMisfit> {
         Ok(OneChip {
             controller: BoardController::new(controller),
             board: BoardNode::new(board)?,
@@ -103,7 +103,7 @@ impl OneChip {
         self.controller.spent(cycles);
     }
 
-    /// The code of the last sample has been given to the converter, and that took so long.
+    /// Reports how long the last answer took, from sample to converter.
     pub fn answered(&mut self, lateness: Micros) {
         self.controller.answered(lateness);
     }

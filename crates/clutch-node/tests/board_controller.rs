@@ -4,16 +4,17 @@
 
 mod desk;
 
-use clutch_core::law::{CtcParams, LawParams, Limit, SmcParams, SmcSignParams};
+use clutch_core::law::{LawParams, Limit, SmcParams};
+use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
 use clutch_core::supervisor::{Arrival, Cause, State};
-use clutch_core::{FixedCounts, Micros, SafeState, SupervisorParams};
+use clutch_core::{FixedCounts, LimitParams, Micros, SafeState, SupervisorParams};
 use clutch_node::{BoardController, Ending, MAX_KNOTS, Notice, Outbox, Outboxes, SETTINGS, SETTINGS_HASH};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configure, Configured, ControllerHello, Discover, Message, Ping,
     Refusal, Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION, encode,
 };
 use desk::{
-    ALIVE_NS, BOARD, BOARD_CONTROLLER, BOARD_SILENCE_NS, CONFIG, Desk, MS, Plan, frames, paper, words,
+    ALIVE_NS, BOARD, BOARD_CONTROLLER, BOARD_SILENCE_NS, CONFIG, Desk, MS, Plan, frames, key, paper, words,
 };
 use proptest::prelude::*;
 
@@ -21,8 +22,8 @@ fn refused(request: u8, reason: Refusal, value: u32) -> [Message; 1] {
     [Message::Refused(Refused { request, reason: reason as u8, value })]
 }
 
-fn key(name: &str) -> u16 {
-    SETTINGS.iter().find(|s| s.name == name).unwrap().key
+const fn knot(time_us: u64, counts: i64) -> Knot {
+    Knot { time_us, position: FixedCounts(counts << 16) }
 }
 
 fn discover() -> Message {
@@ -113,30 +114,36 @@ fn settings_that_make_no_run_are_refused_with_the_reason() {
         let (key, _) = pairs.remove(missing);
         assert_eq!(answer_to(&plan, &pairs), refused(request, Refusal::Setting, key.into()));
     }
-    for (name, kind) in [("law", 4), ("safe", 4), ("path", 9)] {
+    for (name, kind) in [("law", 5), ("safety.on_fault", 4), ("reference", 8)] {
         let heard = answer_to(&plan, &changed(&plan, name, kind));
         assert_eq!(heard, refused(request, Refusal::Setting, key(name).into()));
     }
-    let heard = answer_to(&plan, &changed(&plan, "knots", 2));
-    assert_eq!(heard, refused(request, Refusal::Setting, 0x1000));
-    let value = (-2.5_f32).to_bits();
-    let heard = answer_to(&plan, &changed(&plan, "inertia", value.into()));
-    assert_eq!(heard, refused(request, Refusal::Unfit, value));
-    let heard = answer_to(&plan, &changed(&plan, "path_0", f32::INFINITY.to_bits().into()));
-    assert_eq!(heard, refused(request, Refusal::Unfit, f32::INFINITY.to_bits()));
+    let knots: [Knot; 2] = [knot(0, 0), knot(1_000_000, 16)];
+    let reference =
+        ReferenceParams::Table(Table { knots: knots.to_vec().leak(), interpolation: Interpolation::Cubic });
+    let with_table = Plan { reference, ..plan };
+    let heard = answer_to(&with_table, &changed(&with_table, "reference.table.points_s_deg", 3));
+    assert_eq!(heard, refused(request, Refusal::Setting, 0x1004));
+    for (name, value) in [("model.inertia_kg_m2", -2.5_f32), ("reference.ramp.rate_deg_s", f32::INFINITY)] {
+        let heard = answer_to(&plan, &changed(&plan, name, value.to_bits().into()));
+        assert_eq!(heard, refused(request, Refusal::Unfit, u32::from(key(name))), "{name}");
+    }
+    // Of a condition between several its number.
+    let heard = answer_to(&plan, &changed(&plan, "output.on_invalid_v", 10.5_f32.to_bits().into()));
+    assert_eq!(heard, refused(request, Refusal::Unfit, 2 << 16 | u32::from(key("output.on_invalid_v"))));
 }
 
 #[test]
 fn configure_has_to_say_what_the_settings_say() {
     let plan = Plan::new();
-    for (name, value) in [("period_us", 2000), ("watchdog_us", 4000), ("safe", 2)] {
+    for (name, value) in [("sampling.period_us", 2000), ("times.watchdog_us", 4000), ("safety.on_fault", 2)] {
         let heard = answer_to(&plan, &changed(&plan, name, value));
         assert_eq!(heard, refused(Configure::KIND, Refusal::Differs, 0), "{name}");
     }
-    let heard = answer_to(&plan, &changed(&plan, "safe_volts", 6.0_f32.to_bits().into()));
+    let heard = answer_to(&plan, &changed(&plan, "safety.on_fault.hold.volts_v", 6.0_f32.to_bits().into()));
     assert_eq!(heard, refused(Configure::KIND, Refusal::Differs, 0));
     // What encoder and converter need not know cannot differ.
-    let heard = answer_to(&plan, &changed(&plan, "gain_0", 1.0_f32.to_bits().into()));
+    let heard = answer_to(&plan, &changed(&plan, "law.pd.kp_v_rad", 1.0_f32.to_bits().into()));
     assert!(matches!(heard[..], [Message::Configured(_)]), "{heard:?}");
 }
 
@@ -167,22 +174,33 @@ fn what_the_board_cannot_do_the_host_hears_from_the_board() {
 }
 
 #[test]
-fn a_setting_that_is_not_known_or_does_not_fit_is_refused_and_changes_nothing() {
+fn a_setting_that_is_not_known_is_refused_and_changes_nothing() {
     let plan = Plan::new();
     let mut desk = Desk::new(plan);
     desk.says(discover());
     desk.uploads(&plan.pairs());
     // Whichever run it is said to be for.
     for run in [5, 6] {
-        for key in [SETTINGS.len() as u16, 0x0fff, 0x1000 + 2 * MAX_KNOTS as u16, u16::MAX] {
+        for key in [SETTINGS as u16, 0x0fff, 0x1000 + 2 * MAX_KNOTS as u16, u16::MAX] {
             let heard = desk.says(Message::Set(Set { run, key, value: 1 }));
             assert_eq!(heard, refused(Set::KIND, Refusal::Setting, key.into()));
         }
     }
-    let (key, value) = (key("period_us"), 1 << 32);
-    let heard = desk.says(Message::Set(Set { run: 5, key, value }));
-    assert_eq!(heard, refused(Set::KIND, Refusal::Setting, key.into()));
     assert!(matches!(desk.asks(|host, out| host.configure(out))[..], [Message::Configured(_)]));
+}
+
+#[test]
+fn a_number_that_the_parameters_type_does_not_hold_makes_no_run() {
+    let plan = Plan::new();
+    let real = u64::from(1.5_f32.to_bits());
+    for (name, value) in [
+        ("sampling.period_us", (1 << 32) + 1000),
+        ("rig.dac.bits", 256 + 12),
+        ("law.pd.kp_v_rad", 1 << 32 | real),
+    ] {
+        let heard = answer_to(&plan, &changed(&plan, name, value));
+        assert_eq!(heard, refused(Configure::KIND, Refusal::Setting, key(name).into()), "{name}");
+    }
 }
 
 #[test]
@@ -285,12 +303,7 @@ fn told_the_same(desk: &mut Desk) -> usize {
 
 #[test]
 fn the_host_is_told_of_each_sample_all_that_a_controller_of_its_own_would_know() {
-    for law in [
-        Plan::new().servo.law,
-        LawParams::Ctc(CtcParams::default()),
-        LawParams::Smc(SmcParams::default()),
-        LawParams::SmcSign(SmcSignParams::default()),
-    ] {
+    for law in LawParams::<f32>::all() {
         let start = FixedCounts((1000 << 16) + 777);
         let plan = Plan { servo: paper(law), start, ..Plan::new() };
         let mut desk = Desk::ready(plan);
@@ -333,8 +346,17 @@ fn the_host_is_told_of_each_sample_all_that_a_controller_of_its_own_would_know()
 fn each_check_that_ends_control_is_told_with_what_it_saw() {
     let new = Plan::new().limits;
     for (cause, limits) in [
-        (Cause::FollowingError, SupervisorParams { following_error: 0.002, following_time: 0.0, ..new }),
-        (Cause::Saturation, SupervisorParams { saturation_time: 0.01, ..new }),
+        (
+            Cause::FollowingError,
+            SupervisorParams {
+                limits: LimitParams { following_error: 0.002, following_time: 0.0, ..new.limits },
+                ..new
+            },
+        ),
+        (
+            Cause::Saturation,
+            SupervisorParams { limits: LimitParams { saturation_time: 0.01, ..new.limits }, ..new },
+        ),
         (Cause::StandStill, new),
         (Cause::Jump, new),
     ] {
@@ -728,7 +750,7 @@ fn the_same_run_is_not_run_twice() {
 
 #[test]
 fn there_is_a_last_word_exactly_while_it_drives_and_it_makes_the_board_safe() {
-    let on_fault = SafeState::Hold { volts: 6.0 };
+    let on_fault = SafeState::hold(6.0);
     let plan = Plan { limits: SupervisorParams::new(on_fault), ..Plan::new() };
     assert!(Desk::new(plan).board_controller.last_word().is_none());
     let mut desk = Desk::ready(plan);

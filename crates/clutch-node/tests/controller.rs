@@ -64,7 +64,7 @@ impl Desk {
     }
 
     fn new() -> Desk {
-        Desk::with(PARAMS, SafeState::Hold { volts: 5.0 })
+        Desk::with(PARAMS, SafeState::hold(5.0))
     }
 
     fn ready() -> Desk {
@@ -191,10 +191,10 @@ fn the_handshake_leads_from_discover_to_the_first_answer() {
 #[test]
 fn each_safe_state_is_told_to_the_board_in_codes() {
     for (state, kind, hold, ramp_step, hold_periods) in [
-        (SafeState::Hold { volts: 5.0 }, SafeKind::Hold, SAFE, 0, 0),
-        (SafeState::Ramp { volts_per_s: 1000.0, volts: 5.0 }, SafeKind::Ramp, SAFE, 13_421_772, 0),
+        (SafeState::hold(5.0), SafeKind::Hold, SAFE, 0, 0),
+        (SafeState::ramp(1000.0, 5.0), SafeKind::Ramp, SAFE, 13_421_772, 0),
         (SafeState::Release, SafeKind::Release, 2048, 0, 0),
-        (SafeState::HoldThenRelease { volts: 5.0, after: 2.0 }, SafeKind::HoldThenRelease, SAFE, 0, 2000),
+        (SafeState::hold_then_release(5.0, 2.0), SafeKind::HoldThenRelease, SAFE, 0, 2000),
     ] {
         let sent = Desk::with(PARAMS, state).asks(|node, out| node.configure(DacCode(0), out));
         let [Message::Configure(m)] = sent[..] else { panic!("{sent:?}") };

@@ -4,10 +4,10 @@
 
 mod desk;
 
-use clutch_core::law::{CtcParams, LawParams, SmcParams};
+use clutch_core::law::LawParams;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{Counts, Dac, DacCode, Encoder, Micros, Plant, PlantParams};
-use clutch_node::{BoardParams, HostNode, Notice, OneChip, Outbox};
+use clutch_core::{Counts, Dac, DacCode, Encoder, LimitParams, Micros, Plant, PlantParams, SupervisorParams};
+use clutch_node::{BoardMisfit, BoardParams, HostNode, Notice, OneChip, Outbox};
 use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configured, Message, Sample, StopReason, TELEMETRY_ANSWERED,
     Telemetry, encode,
@@ -128,10 +128,11 @@ fn telemetry(heard: &[Message]) -> Telemetry {
 
 #[test]
 fn each_law_follows_the_path_on_one_chip() {
-    for law in
-        [Plan::new().servo.law, LawParams::Ctc(CtcParams::default()), LawParams::Smc(SmcParams::default())]
-    {
-        let mut bench = Bench::armed(Plan { servo: paper(law), ..Plan::new() });
+    let new = Plan::new().limits;
+    // A law that only switches is always at a limit.
+    let limits = SupervisorParams { limits: LimitParams { saturation_time: 10.0, ..new.limits }, ..new };
+    for law in LawParams::<f32>::all() {
+        let mut bench = Bench::armed(Plan { servo: paper(law), limits, ..Plan::new() });
         let (mut largest, mut begun) = (0.0_f32, 0);
         for period in 0..5000 {
             let (_, heard) = bench.period();
@@ -141,8 +142,8 @@ fn each_law_follows_the_path_on_one_chip() {
             }
             begun += usize::from(bench.chip.state() == BoardState::Running);
         }
-        assert_eq!(begun, 5000, "the watchdog never bites");
-        assert!(largest > 0.0 && largest < 0.1_f32.to_radians(), "{law:?}: {largest} rad");
+        assert_eq!(begun, 5000, "{law:?}: {:?}", bench.host.standing());
+        assert!(largest > 0.0 && largest < 0.2_f32.to_radians(), "{law:?}: {largest} rad");
         assert_eq!((bench.host.standing().state, bench.host.standing().tick), (State::Running, 4999));
     }
 }
@@ -284,5 +285,5 @@ fn how_long_a_period_took_is_told_with_the_next() {
 #[test]
 fn a_chip_that_cannot_be_is_named() {
     let bad = BoardParams { dac_bits: 17, ..BOARD };
-    assert_eq!(OneChip::new(BOARD_CONTROLLER, &bad).unwrap_err().field, "dac_bits");
+    assert_eq!(OneChip::new(BOARD_CONTROLLER, &bad).unwrap_err(), BoardMisfit::DacBits(17));
 }

@@ -1,6 +1,6 @@
-//! The native module `clutch._clutch`: wrappers around the Rust crates, and nothing of its own.
+//! The native module `clutch._clutch`: wrappers around the Rust crates, without logic of its own.
 //!
-//! `python/clutch` is the public package; what it shows of this module it names `clutch.…`.
+//! `python/clutch` is the public package; it exports parts of this module as `clutch.…`.
 
 mod convert;
 mod log;
@@ -14,7 +14,7 @@ mod table;
 
 use pyo3::prelude::*;
 
-/// The `clutch` command with these arguments, the program's name first; its exit code.
+/// Runs the `clutch` command with these arguments, the program's name first; gives its exit code.
 #[pyfunction]
 fn main(py: Python<'_>, args: Vec<std::ffi::OsString>) -> u8 {
     py.detach(|| clutch_cli::main(args))
@@ -44,7 +44,7 @@ mod _clutch {
     /// Version of the package.
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
-    /// Version and commit of the build, as logs tell it.
+    /// Version and commit of the build, as logs record it.
     #[pymodule_export]
     const BUILD: &str = clutch_cli::BUILD;
 }

@@ -11,7 +11,7 @@ pub(crate) fn fixed_to_counts(position: FixedCounts) -> f64 {
     position.minus::<f64>(FixedCounts(0))
 }
 
-/// A point of a path: what the law is asked to follow at one tick.
+/// A point of a path: the law's target at one tick.
 ///
 /// Parameters
 /// ----------

@@ -158,7 +158,7 @@ impl Run {
         Ok(dict)
     }
 
-    /// Which engine ran.
+    /// Name of the engine that ran.
     #[getter]
     fn engine(&self) -> &'static str {
         match self.run.engine {
@@ -175,7 +175,7 @@ impl Run {
             ));
         }
         if path.exists() {
-            let text = format!("{}: exists already; a log is never written over", path.display());
+            let text = format!("{}: exists already; a log is never overwritten", path.display());
             return Err(PyFileExistsError::new_err(text));
         }
         let written = py.detach(|| save_simulation(&path, &self.scenario.0, &self.run, clutch_cli::BUILD));

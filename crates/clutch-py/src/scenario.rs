@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyString};
 use std::sync::Arc;
 use toml::{Table, Value};
 
-/// A checked scenario, as the simulator takes it; `clutch.Scenario` is its public face.
+/// A checked scenario, as the simulator takes it; `clutch.Scenario` is its public form.
 #[pyclass(frozen, module = "clutch._clutch")]
 #[derive(Clone)]
 pub(crate) struct Scenario(pub(crate) Arc<clutch_sim::Scenario>);
@@ -74,7 +74,7 @@ impl Scenario {
         self.0.canonical()
     }
 
-    /// What `clutch certify --json` prints.
+    /// The object that `clutch certify --json` prints.
     fn certificate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = py.detach(|| clutch_cli::certify::certificate(&self.0));
         from_json(py, &found.map_err(|e| self.error(py, &e))?)
@@ -131,7 +131,7 @@ pub(crate) fn checked(
     made.map(|s| Scenario(Arc::new(s))).map_err(|e| scenario_error(py, &e, Some(&table)))
 }
 
-/// Checks one table by itself: `key` as `law.smc`, `name` what errors call it. Gives the table
+/// Checks one table by itself: `key` as `law.smc`, `name` its name in errors. Gives the table
 /// back with its defaults filled in.
 #[pyfunction]
 pub(crate) fn check<'py>(

@@ -37,8 +37,7 @@ enum Scalar {
     F64(Running<f64>),
 }
 
-/// The law of a scenario with all that it remembers, sampled by you: counts and target in,
-/// volts out.
+/// The law of a scenario with its state, sampled by you: counts and target in, volts out.
 ///
 /// It is the servo that the simulator, the loop and the boards run, bit for bit. It begins as
 /// `clutch.simulate` does.
@@ -206,20 +205,20 @@ impl Servo {
         either!(&self.running, r => r.last.tick.error_rate.to_f64())
     }
 
-    /// Voltage that the law asked of the converter at the last step, V.
+    /// Voltage that the law demanded of the converter at the last step, V.
     #[getter]
     fn demand(&self) -> f64 {
         either!(&self.running, r => r.last.command.voltage.to_f64())
     }
 
-    /// Whether a limit of the output decided the last voltage.
+    /// True if a limit of the output decided the last voltage.
     #[getter]
     fn limited(&self) -> bool {
         either!(&self.running, r => r.last.command.limit != Limit::None)
     }
 
-    /// What decided the last voltage, as in a run's column `limit`: 0 the law, 1 the lowest voltage,
-    /// 2 the highest, 3 a demand that was not a number.
+    /// The limit that decided the last voltage, as in a run's column `limit`: 0 the law, 1 the
+    /// lowest voltage, 2 the highest, 3 a demand that was not a number.
     #[getter]
     fn limit(&self) -> u8 {
         either!(&self.running, r => r.last.command.limit as u8)
@@ -235,7 +234,7 @@ impl Servo {
         Ok(dict)
     }
 
-    /// A snapshot: goes on from here by itself.
+    /// A snapshot: continues from here by itself.
     fn copy(&self) -> Servo {
         self.clone()
     }
@@ -253,7 +252,7 @@ enum Sticks {
 
 /// Stick-slip seen from the encoder's counts, sampled by you.
 ///
-/// The shaft counts as stuck when the encoder is silent while the path moves on by more than a count.
+/// The shaft counts as stuck when the encoder is silent while the path moves by more than a count.
 ///
 /// Parameters
 /// ----------
@@ -317,7 +316,7 @@ impl StickSlip {
     /// Returns
     /// -------
     /// bool
-    ///     Whether a stick is detected at this sample.
+    ///     True if a stick is detected at this sample.
     fn update(&mut self, counts: f64, velocity_rad_s: f64) -> PyResult<bool> {
         let counts = Counts(checked_counts(counts, true)? as i64 as i32);
         Ok(match &mut self.0 {
@@ -326,7 +325,7 @@ impl StickSlip {
         })
     }
 
-    /// Whether the shaft counts as stuck now.
+    /// True if the shaft counts as stuck now.
     #[getter]
     fn stuck(&self) -> bool {
         seen!(self, state => state.stuck())
@@ -443,7 +442,7 @@ impl Plant {
         self.counts(py)
     }
 
-    /// What the encoder shows: whole counts; a fraction if the scenario's sensor is ideal.
+    /// The encoder's output: whole counts; a fraction if the scenario's sensor is ideal.
     #[getter]
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         if self.whole {
@@ -453,7 +452,7 @@ impl Plant {
         }
     }
 
-    /// Position in counts to 2⁻¹⁶ of one: what an ideal sensor shows.
+    /// Position in counts to 2⁻¹⁶ of one, as an ideal sensor shows it.
     #[getter]
     fn fine_counts(&self) -> f64 {
         fixed_to_counts(self.moving.fine_counts())
@@ -471,13 +470,13 @@ impl Plant {
         self.moving.shaft().velocity
     }
 
-    /// Whether friction holds the shaft.
+    /// True if friction holds the shaft.
     #[getter]
     fn stuck(&self) -> bool {
         self.moving.shaft().motion == Motion::Stuck
     }
 
-    /// How often it has stuck so far.
+    /// Number of sticks so far.
     #[getter]
     fn sticks(&self) -> usize {
         self.sticks
@@ -537,16 +536,16 @@ pub(crate) fn native(scenario: &Bound<'_, PyAny>) -> PyResult<Scenario> {
     Ok(inner.cast::<Scenario>()?.get().clone())
 }
 
-/// What a law written in Python is given each period.
+/// The input of a law written in Python, each period.
 ///
 /// Parameters
 /// ----------
 /// error, error_rate : float
 ///     Position error, target minus position, rad, and its rate, rad/s.
 /// target_velocity, target_acceleration : float
-///     Of the path, rad/s and rad/s².
+///     Velocity and acceleration of the path, rad/s and rad/s².
 /// time : float
-///     Since the start of the run, s.
+///     Time since the start of the run, s.
 ///
 /// Examples
 /// --------
@@ -619,7 +618,7 @@ pub(crate) struct PythonLaw {
     failure: Mutex<Option<PyErr>>,
 }
 
-/// What it has: the callable remembers for itself.
+/// Its state: the callable keeps its own.
 #[derive(Clone, Default)]
 pub(crate) struct PythonState {
     output: OutputState<f64>,
@@ -646,7 +645,7 @@ impl PythonLaw {
         self.failure.lock().ok()?.take()
     }
 
-    /// The run is lost: what it still does is of no use.
+    /// The run is lost: its remaining results are of no use.
     pub(crate) fn failed(&self) -> bool {
         self.failure.lock().map_or(true, |f| f.is_some())
     }

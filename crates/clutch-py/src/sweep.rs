@@ -13,14 +13,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// What a row leaves behind.
+/// The result of a row.
 struct Row {
     metrics: Vec<f64>,
     error: Option<ScenarioError>,
     trace: Option<Table>,
 }
 
-/// What the threads of a sweep and Python share.
+/// The state that the threads of a sweep share with Python.
 struct Shared {
     rows: Mutex<BTreeMap<usize, Row>>,
     finished: AtomicUsize,
@@ -29,11 +29,11 @@ struct Shared {
     stop: AtomicBool,
     ended: Mutex<bool>,
     bell: Condvar,
-    /// What a thread said when it panicked.
+    /// The message of a thread that panicked.
     broke: Mutex<Option<String>>,
 }
 
-/// Tells that a sweep has ended, however it did.
+/// Reports the end of a sweep, however it came.
 struct AtEnd(Arc<Shared>);
 
 impl Drop for AtEnd {
@@ -48,7 +48,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A sweep that runs in threads of its own; `clutch.sweep` is its public face.
+/// A sweep that runs in threads of its own; `clutch.sweep` is its public form.
 #[pyclass(frozen, module = "clutch._clutch")]
 pub(crate) struct Sweep {
     sweep: Arc<sweep::Sweep>,
@@ -162,12 +162,12 @@ impl Sweep {
         self.sweep.len()
     }
 
-    /// Waits so many seconds at most; whether the sweep has ended.
+    /// Waits at most `seconds`; true if the sweep has ended.
     fn wait(&self, py: Python<'_>, seconds: f64) -> PyResult<bool> {
         if seconds.is_nan() || seconds < 0.0 {
             return Err(PyValueError::new_err(format!("seconds = {seconds}: expected at least 0")));
         }
-        // What is longer than a Duration can tell is for ever.
+        // A time beyond the range of Duration is for ever.
         let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
         Ok(py.detach(|| {
             let ended = locked(&self.shared.ended);
@@ -182,7 +182,7 @@ impl Sweep {
     }
 
     /// Finished rows: a table (run, each metric, error), traces by row, and for each refused row its error.
-    #[allow(clippy::type_complexity, reason = "what clutch.sweep makes its object of")]
+    #[allow(clippy::type_complexity, reason = "the parts of clutch.sweep's object")]
     fn result<'py>(&self, py: Python<'py>) -> PyResult<(Table, Bound<'py, PyDict>, Vec<(usize, Py<PyAny>)>)> {
         if let Some(said) = locked(&self.shared.broke).clone() {
             return Err(PyRuntimeError::new_err(format!("a thread of the sweep broke: {said}")));

@@ -1,4 +1,4 @@
-//! Event-exact simulation of a brake-restrained shaft under a sampled control law.
+#![doc = include_str!("../README.md")]
 
 pub mod drive;
 pub mod engine;

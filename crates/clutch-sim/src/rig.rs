@@ -145,15 +145,15 @@ params! {
     ///
     /// `J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇` (1). What law and certificate believe of it is another thing:
     /// the model.
-    pub struct RigParams<f64>: Default {
+    pub struct RigParams<f64> {
         /// Rig whose values stand where the scenario has none.
         base: RigBase, "base" "" NONE, Range::ANY;
         /// Total moment of inertia, in (1).
         inertia: f64 = 0.0017, "inertia_kg_m2" "J" KG_M2, Range::divisor();
         /// Viscous damping, in (1).
         viscous_damping: f64 = 0.001, "viscous_damping_nm_s_rad" "C_d" NM_S_RAD, Range::at_least(0.0);
-        /// Brake torque per volt and unit of μ, (18): given by itself, or by the geometry of the brake.
-        brake_gain: Option<f64> = 0.14, "brake_gain_nm_v" "K_COF" NM_V, Range::above(0.0);
+        /// Brake torque per volt and unit of μ, (18), 0.14 in each base: a number, or what the geometry of the brake gives.
+        brake_gain: Option<f64>, "brake_gain_nm_v" "K_COF" NM_V, Range::above(0.0);
         /// Root mean square of a random torque, normally distributed, held from sample to sample.
         torque_noise: f64 = 0.0, "torque_noise_nm" "" NM, Range::at_least(0.0);
         /// Whole sampling periods from sample to voltage.
@@ -189,10 +189,10 @@ params! {
     }
 }
 
-/// Rigs as they differ from the paper's.
+/// Rigs as they differ from the defaults of their rows.
 const BASES: [(RigBase, &str); 3] = [
     (RigBase::Ideal, include_str!("../rigs/ideal.toml")),
-    (RigBase::Paper, ""),
+    (RigBase::Paper, include_str!("../rigs/paper.toml")),
     (RigBase::Bench, include_str!("../rigs/bench.toml")),
 ];
 
@@ -240,6 +240,13 @@ impl RigParams {
             (None, Some(gain)) => Ok(gain),
             (_, gain) => Err(RigParams::ONE_GAIN.error(gain.unwrap_or(f64::NAN))),
         }
+    }
+}
+
+impl Default for RigParams {
+    /// The paper's.
+    fn default() -> Self {
+        RigParams::paper()
     }
 }
 

@@ -1,6 +1,6 @@
-//! What ends in [`stop`], the safe output and no word to the watchdog, which then resets the board into its
-//! power-up state. Nothing here trusts what is in memory, and nobody is told: text for a panic, with its
-//! formatting of numbers, would be most of the image.
+//! For a program that cannot continue: [`stop`], the safe output and no more feeding of the watchdog, which then
+//! resets the board into its power-up state. Nothing here trusts the contents of memory, and nothing is reported:
+//! text for a panic, with its formatting of numbers, would be most of the image.
 
 use crate::board::stop;
 use core::panic::PanicInfo;
@@ -23,7 +23,7 @@ unsafe fn NonMaskableInt() -> ! {
     stop()
 }
 
-// An interrupt that nobody has asked for.
+// An unexpected interrupt.
 #[exception]
 unsafe fn DefaultHandler(_: i16) -> ! {
     stop()

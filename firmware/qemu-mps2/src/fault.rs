@@ -1,11 +1,11 @@
-//! What is done when the processor fails: encoder and converter are told to go to the safe state.
+//! The reaction to a failing processor: encoder and converter are ordered into the safe state.
 //!
 //! The frame is ready before it is needed, so that a handler that can trust nothing has only to send it.
 
 use crate::{last_word, lockstep, serial};
 use cortex_m_rt::{ExceptionFrame, exception};
 
-/// Sends the last word, and leaves with a code that is nobody else's.
+/// Sends the last frame, and exits with a code that nothing else uses.
 #[exception]
 unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     // SAFETY: what the handler interrupted does not go on.

@@ -1,5 +1,5 @@
-//! Lockstep over two files: each request brings the time and what has arrived, each answer takes back
-//! what is to be sent.
+//! Lockstep over two files: each request brings the time and the bytes that have arrived, each
+//! answer takes back the bytes to be sent.
 
 use crate::files::HostFile;
 use crate::last_word;
@@ -7,7 +7,7 @@ use clutch_node::lockstep::{Exchange, LONGEST, answer};
 use clutch_node::{BoardController, Outboxes};
 use semihosting::process;
 
-/// A request at this time is a test's: the processor is to fail.
+/// A request at this time comes from a test: the processor must fail.
 const FAIL_AT: u64 = u64::MAX;
 
 /// Both files.
@@ -36,7 +36,8 @@ pub fn run(link: Link, mut node: BoardController) -> ! {
     let mut used = 0;
     let mut outboxes = Outboxes::default();
     loop {
-        // One read brings one request, as its writer writes it in one piece; but nothing promises that.
+        // One read brings one request, as its writer writes it in one piece; but nothing guarantees
+        // that.
         let whole = Exchange::length(buffer.get(..used).unwrap_or(&[]));
         if whole.is_none_or(|n| n > used) {
             let Some(room) = buffer.get_mut(used..).filter(|r| !r.is_empty()) else { process::exit(2) };
@@ -58,7 +59,7 @@ pub fn run(link: Link, mut node: BoardController) -> ! {
     }
 }
 
-/// The last word of a processor that has failed.
+/// The last frame of a processor that has failed.
 pub fn last_word(frame: &[u8]) {
     if let Some(link) = Link::open() {
         let _ = link.answer(&Exchange { time_ns: u64::MAX, lateness_us: 0, host: &[], daq: frame });

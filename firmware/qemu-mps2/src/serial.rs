@@ -1,4 +1,4 @@
-//! Two UARTs and a clock: the board as any other.
+//! Two UARTs and a clock: a board like any other.
 
 use crate::last_word;
 use clutch_core::Micros;
@@ -89,7 +89,7 @@ static FROM_DAQ: Received = Received(core::cell::UnsafeCell::new(Queue::new()));
 static MILLIS: AtomicU32 = AtomicU32::new(0);
 
 impl Received {
-    /// In the handler. What finds no room is lost; its frame fails its check.
+    /// Called in the handler. A byte without room is lost; its frame fails its check.
     fn take(&self, uart: Uart) {
         uart.write(INTCLR, CLEAR_RX);
         if uart.read(STATE) & RX_FULL != 0 {
@@ -99,7 +99,7 @@ impl Received {
         }
     }
 
-    /// In the loop, with interrupts off.
+    /// Called in the loop, with interrupts off.
     fn drain(&self, _: &cortex_m::interrupt::CriticalSection, bytes: &mut [u8; 64]) -> usize {
         // SAFETY: interrupts are off.
         let queue = unsafe { &mut *self.0.get() };
@@ -154,7 +154,8 @@ impl Clock {
                 break before.wrapping_mul(1000).wrapping_add(within);
             }
         };
-        // The counter has begun anew and its interrupt has not been taken yet: time stands still for so long.
+        // The counter has begun anew and its interrupt has not been taken yet: until then, time
+        // stands still.
         let passed = narrow.wrapping_sub(self.seen);
         if passed.cast_signed() > 0 {
             self.wide = self.wide.wrapping_add(u64::from(passed));
@@ -179,7 +180,7 @@ impl Watchdog {
     }
 
     fn start() -> Watchdog {
-        // The first time that it runs out is an interrupt, the second a reset.
+        // Its first timeout is an interrupt, the second a reset.
         Self::register(Self::LOAD, CLOCK_HZ / 2);
         Self::register(Self::CTRL, 3);
         Watchdog
@@ -201,7 +202,8 @@ pub fn run(mut node: BoardController) -> ! {
         let (host_bytes, daq_bytes) = cortex_m::interrupt::free(|cs| {
             let (a, b) = (FROM_HOST.drain(cs, &mut host), FROM_DAQ.drain(cs, &mut daq));
             if a == 0 && b == 0 {
-                // Wakes for a masked interrupt, too: none is missed between looking and sleeping.
+                // Wakes for a masked interrupt, too: none is missed between the check and the
+                // sleep.
                 cortex_m::asm::wfi();
             }
             (a, b)
@@ -211,7 +213,8 @@ pub fn run(mut node: BoardController) -> ! {
         if daq_bytes > 0 {
             node.daq(now_ns, daq.get(..daq_bytes).unwrap_or(&[]), &mut outboxes);
         }
-        // The answer before anything else; what the host has to say to encoder and converter is none.
+        // The answer comes before anything else; a frame from the host to encoder and converter is
+        // not an answer.
         let ticked = !outboxes.daq.is_empty();
         DAQ.flush(&mut outboxes.daq);
         if ticked {
@@ -230,7 +233,7 @@ pub fn run(mut node: BoardController) -> ! {
     }
 }
 
-/// The last word of a processor that has failed; over a line that is open.
+/// The last frame of a processor that has failed, over a line that is open.
 pub fn last_word(frame: &[u8]) {
     if DAQ.read(CTRL) & ENABLE_TX != 0 {
         DAQ.send(frame);

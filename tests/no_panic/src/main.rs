@@ -2,8 +2,8 @@
 //!
 //! The panic handler calls a symbol that does not exist. If the optimiser leaves one path to a
 //! panic, the link fails; if the image links, there is none, and no sum in them overflows
-//! either. Everything that goes in is opaque, and what a constructor has checked is made opaque
-//! again before it is used, so a tick is proven for any bits in its coefficients.
+//! either. All input is opaque, and a value that a constructor has checked is made opaque again
+//! before it is used, so a tick is proven for any bits in its coefficients.
 //!
 //! ```text
 //! cargo build --release --manifest-path tests/no_panic/Cargo.toml --target thumbv7em-none-eabihf
@@ -13,7 +13,7 @@
 //! links at the levels 2, 3 and s, also for thumbv6m and riscv32imac; at z nalgebra's products,
 //! no longer inlined, keep two checks of their lengths.
 //!
-//! To find a surviving path, link it all the same and look for the callers of `core::panicking`:
+//! To find a surviving path, link anyway and look for the callers of `core::panicking`:
 //!
 //! ```text
 //! RUSTFLAGS="-C link-arg=--defsym=__panic_path_survived=0" cargo build …
@@ -59,7 +59,7 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     unsafe { __panic_path_survived() }
 }
 
-/// Whatever the optimiser must not know.
+/// A value that the optimiser must not know.
 static mut INPUT: u64 = 0;
 
 fn word() -> u64 {
@@ -80,7 +80,7 @@ fn micros() -> Micros {
     Micros(word() as u32)
 }
 
-/// The same value, of which the optimiser knows nothing any more.
+/// The same value, about which the optimiser no longer knows anything.
 fn opaque<X>(x: X) -> X {
     black_box(x)
 }
@@ -90,7 +90,7 @@ fn sink<X>(x: X) {
     black_box(&x);
 }
 
-/// Takes either outcome of a constructor; gives back what it made, opaque.
+/// Takes either outcome of a constructor; gives its result back, opaque.
 fn made<X, E>(result: Result<X, E>) -> Option<X> {
     match opaque(result) {
         Ok(x) => Some(x),
@@ -547,7 +547,7 @@ fn supervisor<T: Real, U: Real>() {
     let mut state = SupervisorState::default();
     v.connect(&mut state);
     sink(v.arm(&mut state, DacCode(word() as u16)));
-    // Whatever it has seen: no field is known any more.
+    // After any input: no field is known any more.
     let mut state = opaque(state);
     let sample = Sample {
         sequence: word() as u16,
@@ -589,7 +589,7 @@ fn wire() {
     let mut decoder = opaque(Decoder::new());
     for byte in bytes(&any_bytes()) {
         let heard = decoder.push(*byte);
-        // What the decoder gives, the encoder takes: any kind, any fields.
+        // The encoder takes any message that the decoder gives: any kind, any fields.
         if let Some(Ok(message)) = opaque(heard) {
             black_box(encode(&message).as_bytes());
         }
@@ -667,7 +667,7 @@ fn runner(params: &BoardParams) {
         periods(role);
     }
     if let Some(mut chip) = made(OneChip::new(board_controller_params(), params)) {
-        // What the runner does not call.
+        // The functions that the runner does not call.
         chip.poll(word());
         sink((chip.state() == BoardState::Running, chip.code()));
         periods(opaque(chip));
@@ -726,7 +726,7 @@ fn board_controller_params() -> BoardControllerParams {
     BoardControllerParams { board: word() as u32, boot: word() as u32, clock_hz: word() as u32 }
 }
 
-/// The controller role: the board's end, the host's end, and what goes between them.
+/// The controller role: the board's end, the host's end, and the frames between them.
 fn controller_role() {
     numbers();
     sent();

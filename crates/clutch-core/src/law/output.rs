@@ -1,7 +1,7 @@
 //! The end that all laws share: bumpless start, limits, and what a non-number becomes.
 
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
     /// Output stage of a law. The defaults are the paper's 0 to 10 V without bumpless start, and full braking on
@@ -93,6 +93,17 @@ impl<T: Real> Output<T> {
 }
 
 impl<T: Arithmetic> Output<T> {
+    /// The output stages of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Output<L> {
+        Output {
+            lowest: each(&|o| o.lowest),
+            highest: each(&|o| o.highest),
+            on_invalid: each(&|o| o.on_invalid),
+            decay: each(&|o| o.decay),
+        }
+    }
+
     /// Lowest voltage, V.
     #[must_use]
     pub fn lowest(&self) -> T {

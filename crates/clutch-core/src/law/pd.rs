@@ -9,7 +9,7 @@
 
 use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
     /// Proportional–derivative control (4): `u = −(K_p e + K_d ė)`. The gains' defaults are Table 2's.
@@ -40,6 +40,13 @@ impl<T: Real> Pd<T> {
 }
 
 impl<T: Arithmetic> Pd<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Pd<L> {
+        let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
+        Pd { params: PdParams { kp: each(&|law| law.params.kp), kd: each(&|law| law.params.kd) }, output }
+    }
+
     #[inline]
     fn terms(&self, tick: &Tick<T>) -> (T, [T; 2]) {
         let proportional = -(self.params.kp * tick.error);

@@ -10,7 +10,7 @@
 
 use super::{Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Tick};
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
     /// PID control with feed-forward, a filtered derivative, and an integral that does not wind up at a limit.
@@ -20,11 +20,11 @@ crate::params! {
     /// `K_a = J/(μ K_COF)`.
     pub struct PidParams<T>: Default {
         /// Proportional gain.
-        kp: T = 5000.0, "kp_v_rad" "K_p" V_RAD, Range::at_least(0.0);
+        kp: T = 1000.0, "kp_v_rad" "K_p" V_RAD, Range::at_least(0.0);
         /// Integral gain.
-        ki: T = 20000.0, "ki_v_rad_s" "K_i" V_RAD_S, Range::at_least(0.0);
+        ki: T = 10000.0, "ki_v_rad_s" "K_i" V_RAD_S, Range::at_least(0.0);
         /// Derivative gain.
-        kd: T = 50.0, "kd_v_s_rad" "K_d" V_S_RAD, Range::at_least(0.0);
+        kd: T = 20.0, "kd_v_s_rad" "K_d" V_S_RAD, Range::at_least(0.0);
         /// Time constant of the derivative's filter; 0 takes the error rate as it is.
         derivative_time: T = 0.0, "derivative_time_s" "τ" S, Range::at_least(0.0);
         /// Time in which the integral follows a limit of the output.
@@ -52,6 +52,8 @@ pub struct Pid<T> {
     newest: T,
     /// Share of what a limit cuts off that the integral takes back in a period.
     tracking: T,
+    /// Filtered rate at which the derivative part alone spans the output, rad/s.
+    fastest: T,
     output: Output<T>,
 }
 
@@ -74,17 +76,43 @@ impl<T: Real> Pid<T> {
         p.check_rows()?;
         let seconds = period.period::<T>()?;
         PidParams::SLOWER_THAN_A_PERIOD.require(p.tracking_time, p.tracking_time >= seconds)?;
+        let span = output.highest - output.lowest;
         Ok(Pid {
             params: *p,
             integral_step: p.ki * seconds,
             newest: seconds / (p.derivative_time + seconds),
             tracking: seconds / p.tracking_time,
+            fastest: if p.kd > T::ZERO { span / p.kd } else { T::ZERO },
             output: Output::new(output, period)?,
         })
     }
 }
 
 impl<T: Arithmetic> Pid<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Pid<L> {
+        let p = |get: fn(&PidParams<T>) -> T| each(&|law| get(&law.params));
+        let params = PidParams {
+            kp: p(|p| p.kp),
+            ki: p(|p| p.ki),
+            kd: p(|p| p.kd),
+            derivative_time: p(|p| p.derivative_time),
+            tracking_time: p(|p| p.tracking_time),
+            bias: p(|p| p.bias),
+            velocity: p(|p| p.velocity),
+            acceleration: p(|p| p.acceleration),
+        };
+        Pid {
+            params,
+            integral_step: each(&|law| law.integral_step),
+            newest: each(&|law| law.newest),
+            tracking: each(&|law| law.tracking),
+            fastest: each(&|law| law.fastest),
+            output: Output::in_lanes(&|get| each(&|law| get(&law.output))),
+        }
+    }
+
     /// Proportional, derivative and feed-forward part, V.
     #[inline]
     fn parts(&self, tick: &Tick<T>, rate: T) -> (T, T, T) {
@@ -122,9 +150,12 @@ impl<T: Arithmetic> ControlLaw<T> for Pid<T> {
         let limited = voltage.less_or_equal(self.output.lowest()) | self.output.highest().less_or_equal(voltage);
         let cut_off = T::select(limited, voltage - demand, T::ZERO);
         let next = integral + self.tracking * cut_off;
-        // One measurement that is no number spoils one tick, not the run.
-        state.integral = T::select(next.is_finite(), next, state.integral);
-        state.rate = T::select(state.rate.is_finite(), state.rate, T::ZERO);
+        // One measurement that is no number, or beyond measure, spoils one tick and not the run: what is remembered
+        // stays within what the output can answer.
+        let (low, high) = (self.output.lowest() - forward, self.output.highest() - forward);
+        state.integral = T::select(next.is_finite(), next.max(low).min(high), state.integral);
+        let rate = state.rate.max(-self.fastest).min(self.fastest);
+        state.rate = T::select(state.rate.is_finite(), rate, T::ZERO);
         Command { voltage, limit, terms: [proportional, integral, derivative, forward, cut_off] }
     }
 }
@@ -178,9 +209,9 @@ mod tests {
         for _ in 0..1000 {
             assert_eq!(law.update(&mut state, &behind(-1.0)).voltage, 10.0);
         }
-        // At rest the cut-off is what the tracking lets the error add: 1000 V/s · 0.02 s.
-        let cut_off = law.update(&mut state, &behind(-1.0)).terms[4];
-        assert!((cut_off + 20.0).abs() < 1.0, "{cut_off}");
+        // The proportional part alone is 90 V too much: the tracking has emptied the integral.
+        let [.., integral, _, _, cut_off] = law.update(&mut state, &behind(-1.0)).terms;
+        assert!(integral < 1.1 && cut_off < -90.0, "{integral} V, {cut_off} V");
         let ticks = (0..).take_while(|_| law.update(&mut state, &behind(0.02)).voltage >= 10.0).count();
         assert!(ticks <= 1, "{ticks} ms at the limit after the error has turned");
     }

@@ -9,7 +9,7 @@
 
 use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
     /// Sliding-mode control with a boundary layer (31). The gains' defaults are Table 2's.
@@ -62,6 +62,19 @@ pub(super) fn switched<T: Arithmetic>(
 }
 
 impl<T: Arithmetic> Smc<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Smc<L> {
+        let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
+        let params = SmcParams {
+            kp: each(&|law| law.params.kp),
+            kd: each(&|law| law.params.kd),
+            slope: each(&|law| law.params.slope),
+            boundary: each(&|law| law.params.boundary),
+        };
+        Smc { params, inverse_boundary: each(&|law| law.inverse_boundary), output }
+    }
+
     #[inline]
     fn terms(&self, tick: &Tick<T>) -> (T, [T; 3]) {
         let SmcParams { kp, kd, slope, .. } = self.params;

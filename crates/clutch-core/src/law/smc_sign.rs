@@ -7,7 +7,7 @@
 use super::smc::switched;
 use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
     /// Sliding-mode control with the sign function (29), without a boundary layer: it chatters. The gains' defaults are Table 2's.
@@ -42,6 +42,18 @@ impl<T: Real> SmcSign<T> {
 }
 
 impl<T: Arithmetic> SmcSign<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> SmcSign<L> {
+        let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
+        let params = SmcSignParams {
+            kp: each(&|law| law.params.kp),
+            kd: each(&|law| law.params.kd),
+            slope: each(&|law| law.params.slope),
+        };
+        SmcSign { params, output }
+    }
+
     #[inline]
     fn terms(&self, tick: &Tick<T>) -> (T, [T; 3]) {
         let SmcSignParams { kp, kd, slope } = self.params;

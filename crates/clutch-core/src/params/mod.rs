@@ -64,6 +64,11 @@ pub trait Choice<T: Real>: Params<T> {
 
     /// The place of what is chosen among [`ChoiceInfo::options`].
     fn chosen(&self) -> usize;
+
+    /// Key of what is chosen.
+    fn name(&self) -> &'static str {
+        Self::CHOICE.options.get(self.chosen()).map_or("", |option| option.key)
+    }
 }
 
 /// Something that walks over parameters: reads them, sets them, checks them, counts them.

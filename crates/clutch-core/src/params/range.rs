@@ -100,7 +100,10 @@ impl fmt::Display for Words {
             Kind::Text => return f.write_str("a text in quotes"),
             Kind::Points => {
                 let from = if has_low { " from 0 s on" } else { "" };
-                return write!(f, "a list of pairs [{text}] of finite numbers, with times that rise{from}");
+                return write!(
+                    f,
+                    "a list of at least one pair [{text}] of finite numbers, with times that rise{from}"
+                );
             }
             Kind::Word(words) => {
                 f.write_str("one of: ")?;
@@ -115,14 +118,18 @@ impl fmt::Display for Words {
         let finite = if whole || (has_low && has_high) { "" } else { "finite " };
         write!(f, "a {finite}{what}")?;
         match (has_low, has_high) {
-            (true, true) if range.low_in && range.high_in => write!(f, " from {low} to {high}")?,
+            (true, true) if range.low_in && range.high_in => {
+                write!(f, " from {} to {}", Grouped(low), Grouped(high))?;
+            }
             _ => {
                 if has_low {
-                    write!(f, "{} {low}", if range.low_in { " of at least" } else { " above" })?;
+                    let from = if range.low_in { " of at least" } else { " above" };
+                    write!(f, "{from} {}", Grouped(low))?;
                 }
                 if has_high {
                     let and = if has_low { " and" } else { "" };
-                    write!(f, "{and}{} {high}", if range.high_in { " at most" } else { " below" })?;
+                    let to = if range.high_in { " at most" } else { " below" };
+                    write!(f, "{and}{to} {}", Grouped(high))?;
                 }
             }
         }
@@ -132,5 +139,58 @@ impl fmt::Display for Words {
             (false, false) => write!(f, ", {text}")?,
         }
         if range.divides { f.write_str(" whose inverse is finite, too") } else { Ok(()) }
+    }
+}
+
+/// A number whose digits are told apart in threes, if it is a long whole one.
+struct Grouped(f64);
+
+impl fmt::Display for Grouped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let n = self.0.abs();
+        if !(1e4..1e15).contains(&n) || n % 1.0 > 0.0 {
+            return self.0.fmt(f);
+        }
+        if self.0 < 0.0 {
+            f.write_str("-")?;
+        }
+        let (n, mut unit) = (n as u64, 1_000_000_000_000_u64);
+        let mut begun = false;
+        while unit > 0 {
+            let group = n / unit % 1000;
+            match (begun, group) {
+                (false, 0) => {}
+                (false, _) => write!(f, "{group}")?,
+                (true, _) => write!(f, " {group:03}")?,
+            }
+            begun |= group > 0;
+            unit /= 1000;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::{CYCLES, DEG, NONE, V, V_RAD};
+    use std::string::ToString;
+
+    #[test]
+    fn a_range_in_words_has_its_ends_and_its_unit() {
+        let real = |range: Range, unit: &Unit| range.words(Kind::Real, unit, false).to_string();
+        assert_eq!(real(Range::ANY, &V), "a finite number, V");
+        assert_eq!(real(Range::at_least(0.0), &V_RAD), "a finite number of at least 0 V/rad");
+        assert_eq!(real(Range::above(0.0).up_to(1.0), &NONE), "a number above 0 and at most 1");
+        assert_eq!(real(Range::divisor(), &V), "a finite number above 0 V whose inverse is finite, too");
+        let whole = Range::within(2.0, 16_777_216.0).words(Kind::Whole, &CYCLES, false);
+        assert_eq!(whole.to_string(), "a whole number from 2 to 16 777 216 periods");
+    }
+
+    #[test]
+    fn ends_are_in_the_unit_of_the_key() {
+        let range = Range::within(-90.0, 90.0);
+        assert!(range.holds(&DEG, 1.5_f64) && !range.holds(&DEG, 1.6_f64));
+        assert!(!range.holds(&DEG, f64::NAN) && !Range::ANY.holds(&DEG, f64::INFINITY));
     }
 }

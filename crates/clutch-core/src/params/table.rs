@@ -58,7 +58,7 @@ impl Relation {
 /// ```
 ///
 /// `struct Name<T>` is for any scalar, `struct Name<f64>` for double precision, `struct Name<>` has no real
-/// number, `struct Name<'a>` borrows a list; `: Default` says that each row has a default. A row without one must be given. `nested`,
+/// number, `struct Name<'a>` borrows a list, `struct Name<'a, f32>` likewise in one scalar; `: Default` says that each row has a default. A row without one must be given. `nested`,
 /// `optional` and `flat` tables follow the rows; those of a `flat` one stand among the outer table's own. A
 /// relation without a condition is one that constructors ask for, where all that it relates is known.
 #[macro_export]
@@ -92,6 +92,15 @@ macro_rules! params {
             { $($body)* } $($rest)*
         }
         $crate::__default! { $name [] [] f64 $($default)? }
+    };
+    (
+        $(#[doc = $doc:literal])+
+        $vis:vis struct $name:ident<$life:lifetime, $t:ident> { $($body:tt)* } $($rest:tt)*
+    ) => {
+        $crate::__params! {
+            [$($doc)+] [#[derive(Copy)]] [$vis] $name [$life] [$life] [$life] [$life] [$life] $t
+            { $($body)* } $($rest)*
+        }
     };
     (
         $(#[doc = $doc:literal])+

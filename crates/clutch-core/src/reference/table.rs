@@ -34,7 +34,7 @@ crate::params! {
     }
     relations(p) {
         /// There is a path.
-        NOT_EMPTY: knots, "at least one point" => !p.knots.is_empty();
+        NOT_EMPTY: knots, "at least one point";
         /// Time goes on.
         RISING: knots, "times of at least 0 s that rise from point to point";
         /// Counts hold the points.
@@ -111,7 +111,7 @@ impl<'a> Table<'a> {
 
     /// Checks the points; the value of an error is the number (from 0) of the point.
     pub(super) fn check_points<T: Real>(&self) -> Result<(), ParamError<T>> {
-        params::Table::<T>::check_rows(self)?;
+        Table::NOT_EMPTY.require(T::ZERO, !self.knots.is_empty())?;
         let rising = |w: &[Knot]| matches!(w, [a, b] if a.time_us < b.time_us);
         if let Some(i) = self.knots.windows(2).position(|w| !rising(w)) {
             return Err(Table::RISING.error(T::from_u64(i as u64 + 1)));

@@ -1,4 +1,4 @@
-//! What the tests of this crate share.
+//! Helpers that the tests of this crate share.
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses its own part")]
 
 use clutch_log::{

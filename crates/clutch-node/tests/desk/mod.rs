@@ -17,7 +17,7 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
-    HostNode, Notice, Outbox, Outboxes, RunParams, Settings,
+    HostNode, Notice, Outbox, Outboxes, RunParams, RunTimes, Setting, Settings,
 };
 use clutch_wire::{Decoder, Message, encode};
 use core::mem::take;
@@ -65,9 +65,9 @@ impl Plan {
         Plan {
             run: 5,
             servo: paper(LawParams::Pd(PdParams::default())),
-            limits: SupervisorParams::new(SafeState::Hold { volts: 5.0 }),
+            limits: SupervisorParams::new(SafeState::hold(5.0)),
             bounds: Bounds::around(&PlantParams::default(), &Tolerances::default()).unwrap(),
-            reference: ReferenceParams::Ramp(54.0_f32.to_radians()),
+            reference: ReferenceParams::ramp(54.0_f32.to_radians()),
             start: FixedCounts(0),
             watchdog: Micros(3000),
             silence: Micros(3000),
@@ -83,10 +83,12 @@ impl Plan {
             bounds: &self.bounds,
             reference: &self.reference,
             start: self.start,
-            watchdog: self.watchdog,
-            valid: Micros(2000),
-            silence: self.silence,
-            host_silence: self.host_silence,
+            times: RunTimes {
+                watchdog: self.watchdog,
+                valid: Micros(2000),
+                silence: self.silence,
+                host_silence: self.host_silence,
+            },
             ticks: self.ticks,
         }
     }
@@ -138,6 +140,11 @@ impl Plan {
 pub fn paper(law: LawParams<f32>) -> ServoParams<f32> {
     let paper = ServoParams::paper(law);
     ServoParams { output: OutputParams { bumpless_time: 0.05, ..paper.output }, ..paper }
+}
+
+/// The key of a setting.
+pub fn key(name: &str) -> u16 {
+    Setting::all().find(|s| s.name.to_string() == name).unwrap_or_else(|| panic!("{name}")).key
 }
 
 pub fn drain(out: &mut Outbox) -> Vec<u8> {

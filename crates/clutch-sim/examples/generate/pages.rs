@@ -4,7 +4,7 @@
 //! of which another marker of the page names a longer key; `.` is the file itself.
 
 use crate::classes::Class;
-use crate::places::{Place, join};
+use crate::places::{Place, default_at, join};
 use clutch_core::params::{Info, Kind, Nested, Row};
 use clutch_sim::scenario::describe::{
     Entry, default_option, entries, expected, meaning, paragraphs, row_is_required, table_is_required,
@@ -146,10 +146,10 @@ fn keys_of(keys: &[&str], place: &Place) -> String {
         if let Entry::Row(row, table) = entry {
             let symbol = code(row.symbol);
             let range = cell(&expected(row, table));
+            let default = default(&join(&place.key, row.key), row);
             rows.push(format!(
-                "| `{}` | {symbol} | {} | {range} | {} |",
+                "| `{}` | {symbol} | {default} | {range} | {} |",
                 row.key,
-                default(row),
                 cell(&meaning(row))
             ));
         }
@@ -162,9 +162,9 @@ fn keys_of(keys: &[&str], place: &Place) -> String {
     format!("{text}{gap}{head}\n{}", rows.join("\n"))
 }
 
-/// A row's default as a page shows it.
-fn default(row: &Row) -> String {
-    match (row.default, row.kind) {
+/// A parameter's default as a page shows it.
+fn default(key: &str, row: &Row) -> String {
+    match (default_at(key, row).as_str(), row.kind) {
         ("", _) if row.optional => "none".to_owned(),
         ("", _) => "–".to_owned(),
         (text, Kind::Real) => match text.parse::<f64>() {

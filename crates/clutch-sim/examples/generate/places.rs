@@ -1,8 +1,9 @@
 //! Where the tables of a scenario stand.
 
-use clutch_core::params::{ChoiceInfo, Info, OptionInfo, Params, TableInfo};
-use clutch_sim::scenario::ScenarioParams;
+use clutch_core::params::{ChoiceInfo, Info, OptionInfo, Params, Row, TableInfo};
 use clutch_sim::scenario::describe::{Entry, entries};
+use clutch_sim::scenario::{ScenarioParams, check_section};
+use toml::{Table, Value};
 
 /// A table and the key at which a file has it; the whole file is at "".
 pub(crate) struct Place {
@@ -40,6 +41,20 @@ fn table_at(place: Place, all: &mut Vec<Place>) {
         if let Entry::Below(nested) = entry {
             walk(nested.info, join(&key, nested.key), all);
         }
+    }
+}
+
+/// What a file that says nothing of a parameter has: the row's default or, in a rig, what the paper's has; empty if it
+/// has none.
+pub(crate) fn default_at(key: &str, row: &Row) -> String {
+    let rig = || {
+        let base = Table::from_iter([("base".to_owned(), Value::from("paper"))]);
+        let rig = check_section("rig", "rig", base).ok()?;
+        Some(rig.get(key.strip_prefix("rig.")?)?.to_string())
+    };
+    match row.default {
+        "" if row.optional => rig().unwrap_or_default(),
+        default => default.to_owned(),
     }
 }
 

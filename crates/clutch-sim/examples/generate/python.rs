@@ -1,10 +1,10 @@
 //! Python's classes: `python/clutch/_tables.py`.
 
 use crate::classes::{Class, name, union};
-use crate::places::Place;
+use crate::places::{Place, default_at, join};
 use clutch_core::params::{ChoiceInfo, Info, Kind, Nested, Row, TableInfo, UNITS};
 use clutch_sim::scenario::describe::{
-    Entry, capital, default_option, description, entries, paragraphs, row_is_required, table_is_required,
+    Entry, capital, default_option, description, entries, paragraphs, table_is_required,
 };
 
 /// Columns of a line.
@@ -139,12 +139,14 @@ fn field(entry: Entry, place: &Place, classes: &[Class<'_>]) -> Option<Field> {
         Entry::Row(row, _) if (table, row.key) == HIDDEN => None,
         Entry::Below(nested) if (table, nested.key) == (EITHER.0, EITHER.2) => None,
         Entry::Row(row, of) => {
-            let mut field = row_field(row, of);
+            let mut field = row_field(row, of, &default_at(&join(&place.key, row.key), row));
             if (table, row.key) == (EITHER.0, EITHER.1) {
                 let other = place.table.nested.iter().find(|nested| nested.key == EITHER.2)?;
                 let other = &parts(other, classes).first()?.name;
                 field.kind = format!("float | {other}");
-                field.told = format!("float or {other}, default {}", number(row));
+                field.told = field.told.replacen("float", &format!("float or {other}"), 1);
+                // That a file has one of the two is no concern of an object's.
+                field.text = description(row, &TableInfo { relations: &[], ..*of });
             } else if (table, row.key) == (MADE_UP.0, MADE_UP.1) {
                 field.default = Some(MADE_UP.2.to_owned());
                 field.text += MADE_UP.3;
@@ -155,7 +157,7 @@ fn field(entry: Entry, place: &Place, classes: &[Class<'_>]) -> Option<Field> {
     }
 }
 
-fn row_field(row: &'static Row, of: &TableInfo) -> Field {
+fn row_field(row: &'static Row, of: &TableInfo, default: &str) -> Field {
     let (kind, told) = match row.kind {
         Kind::Real => ("float".to_owned(), "float".to_owned()),
         Kind::Whole => ("int".to_owned(), "int".to_owned()),
@@ -168,10 +170,10 @@ fn row_field(row: &'static Row, of: &TableInfo) -> Field {
             (format!("Literal[{words}]"), format!("{{{words}}}"))
         }
     };
-    let default = match row_is_required(row) {
-        true => None,
-        false if row.default.is_empty() => Some("None".to_owned()),
-        false => Some(number(row)),
+    let default = match default {
+        "" if row.optional => Some("None".to_owned()),
+        "" => None,
+        default => Some(literal(row, default)),
     };
     let optional = default.as_deref() == Some("None");
     let told = if optional { format!("{told} or None") } else { told };
@@ -180,12 +182,12 @@ fn row_field(row: &'static Row, of: &TableInfo) -> Field {
     Field { name: row.key, kind, default, told, text: description(row, of) }
 }
 
-/// A row's default as code.
-fn number(row: &Row) -> String {
+/// A default as code.
+fn literal(row: &Row, default: &str) -> String {
     match row.kind {
-        Kind::Real => row.default.parse::<f64>().map_or(row.default.to_owned(), |x| format!("{x:?}")),
-        Kind::Switch => capital(row.default),
-        _ => row.default.to_owned(),
+        Kind::Real => default.parse::<f64>().map_or(default.to_owned(), |x| format!("{x:?}")),
+        Kind::Switch => capital(default),
+        _ => default.to_owned(),
     }
 }
 

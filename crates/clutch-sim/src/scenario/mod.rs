@@ -54,6 +54,7 @@ built_in!(
     "pd_2",
     "ctc_2",
     "smc_2",
+    "pid_2",
     "bench_pd_2",
     "bench_smc_2",
     "observer_smc_2",
@@ -628,6 +629,9 @@ fn merge_base(origin: &str, table: &mut Table) -> Result<(), ScenarioError> {
         {
             merged.remove(choice);
         }
+    }
+    if own.contains_key("brake_geometry") {
+        merged.remove("brake_gain_nm_v");
     }
     overlay(&mut merged, std::mem::take(own));
     *own = merged;

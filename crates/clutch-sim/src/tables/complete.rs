@@ -216,9 +216,11 @@ pub(crate) fn checked(origin: &str, at: &str, row: &Row, value: Value) -> Result
                 return wrong(&value, &expected());
             };
             let pairs = Points(pairs);
+            if pairs.0.is_empty() {
+                return wrong(&value, &expected());
+            }
             if let Some(i) = pairs.wrong(&row.range, &row.unit) {
-                let value = format!("(point {i}: {})", shown(&points[i]));
-                return Err(ScenarioError::value(origin, at, &value, &expected()));
+                return Err(ScenarioError::value(origin, at, &format!("(point {i})"), &expected()));
             }
             let array = |(a, b)| Value::Array(vec![Value::Float(a), Value::Float(b)]);
             Ok(Value::Array(pairs.0.into_iter().map(array).collect()))

@@ -1,4 +1,4 @@
-//! The board as controller: it closes the loop, and a host looks on: `clutch loop --board`.
+//! The board as controller: it closes the loop, and a host watches: `clutch loop --board`.
 #![no_std]
 #![no_main]
 
@@ -11,7 +11,7 @@ use static_cell::StaticCell;
 #[embassy_executor::task]
 async fn control(board: Board, line: Line) -> ! {
     let params = BoardControllerParams { board: board.board, boot: board.boot, clock_hz: CLOCK_HZ };
-    // In memory of its own: a task keeps what it is given once more for each call on the way.
+    // In a memory cell of its own: a task keeps a copy of each argument for every call on the way.
     static ROLE: StaticCell<OneChip> = StaticCell::new();
     let role = ROLE.init_with(|| OneChip::new(params, &board.params()).unwrap_or_else(|_| stop()));
     run::run(role, board, line).await

@@ -10,7 +10,7 @@ use static_cell::StaticCell;
 
 #[embassy_executor::task]
 async fn control(board: Board, line: Line) -> ! {
-    // In memory of its own: a task keeps what it is given once more for each call on the way.
+    // In a memory cell of its own: a task keeps a copy of each argument for every call on the way.
     static ROLE: StaticCell<DaqBoard> = StaticCell::new();
     let role = ROLE.init_with(|| DaqBoard::new(&board.params()).unwrap_or_else(|_| stop()));
     run::run(role, board, line).await

@@ -1,7 +1,7 @@
-//! The functions that have a budget, each by itself and under its name: what firmware calls that
+//! The functions that have a budget, each by itself and under its name: the calls of firmware that
 //! uses the crates.
 
-use clutch_core::law::{Controller, Ctc, OutputState, Pd, Smc, Tick};
+use clutch_core::law::{ControlLaw, Ctc, LawState, OutputState, Pd, Pid, Smc, SmcSign, Tick};
 use clutch_core::{Counts, Servo, ServoState, Target};
 use clutch_node::{BoardController, Outboxes};
 use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
@@ -14,7 +14,7 @@ pub struct Bytes {
 }
 
 impl Bytes {
-    /// Of a message.
+    /// Makes the bytes of a message.
     pub fn of(message: &Message) -> Bytes {
         let mut bytes = [0; MAX_FRAME];
         let frame = encode(message);
@@ -55,17 +55,35 @@ pub extern "C" fn step_ctc(law: &Ctc<f32>, state: &mut OutputState<f32>, tick: &
     law.update(state, tick).voltage
 }
 
-/// The laws (29) and (31).
+/// The law (31).
 #[inline(never)]
 #[unsafe(no_mangle)]
 pub extern "C" fn step_smc(law: &Smc<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
     law.update(state, tick).voltage
 }
 
-/// A servo, what it remembers, and where it shall be.
+/// The law (29).
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn step_smc_sign(law: &SmcSign<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
+    law.update(state, tick).voltage
+}
+
+/// PID.
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn step_pid(
+    law: &Pid<f32>,
+    state: &mut <Pid<f32> as ControlLaw<f32>>::State,
+    tick: &Tick<f32>,
+) -> f32 {
+    law.update(state, tick).voltage
+}
+
+/// A servo, its state, and its target.
 pub struct Axis {
     pub servo: Servo<f32>,
-    pub state: ServoState<f32, OutputState<f32>>,
+    pub state: ServoState<f32, LawState<f32>>,
     pub target: Target<f32>,
 }
 

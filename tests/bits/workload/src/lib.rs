@@ -1,5 +1,5 @@
-//! What the test of equal bits runs on every machine: a servo in `f32` along a path, its counts
-//! given, every output of every tick as bytes, and a running hash of them.
+//! The workload of the test of equal bits on every machine: a servo in `f32` along a path, its
+//! counts given, every output of every tick as bytes, and a running hash of them.
 #![no_std]
 
 mod job;

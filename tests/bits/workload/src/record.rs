@@ -4,7 +4,7 @@ use clutch_core::law::{LawTerms, Terms};
 use clutch_core::{ServoOutput, StickSlipState, Target};
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 
-/// How a field's bytes are to be read; all are little-endian.
+/// The type of a field's bytes; all are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Unsigned, 8 bit.
@@ -60,9 +60,6 @@ pub const FIELDS: &[Field] = &[
     Field { name: "target_acceleration", kind: Kind::F32 },
     Field { name: "error", kind: Kind::F32 },
     Field { name: "error_rate", kind: Kind::F32 },
-    Field { name: "term_0", kind: Kind::F32 },
-    Field { name: "term_1", kind: Kind::F32 },
-    Field { name: "term_2", kind: Kind::F32 },
     Field { name: "demand", kind: Kind::F32 },
     Field { name: "voltage", kind: Kind::F32 },
     Field { name: "code", kind: Kind::U16 },
@@ -71,6 +68,15 @@ pub const FIELDS: &[Field] = &[
     Field { name: "cycles", kind: Kind::U32 },
     Field { name: "stuck_ticks", kind: Kind::U32 },
     Field { name: "stair", kind: Kind::U32 },
+    // The law's terms; 0 beyond those that it has.
+    Field { name: "term_0", kind: Kind::F32 },
+    Field { name: "term_1", kind: Kind::F32 },
+    Field { name: "term_2", kind: Kind::F32 },
+    Field { name: "term_3", kind: Kind::F32 },
+    Field { name: "term_4", kind: Kind::F32 },
+    Field { name: "term_5", kind: Kind::F32 },
+    Field { name: "term_6", kind: Kind::F32 },
+    Field { name: "term_7", kind: Kind::F32 },
 ];
 
 /// Bytes of a record.
@@ -91,7 +97,7 @@ pub fn hash() -> Digest<'static, u32> {
     CRC.digest()
 }
 
-/// Fills a record from its begin.
+/// Fills a record from its beginning.
 struct Writer {
     bytes: [u8; RECORD],
     at: usize,
@@ -107,22 +113,18 @@ impl Writer {
     }
 }
 
-/// What a tick gave, in the order of [`FIELDS`].
+/// The outputs of a tick, in the order of [`FIELDS`].
 pub(crate) fn record(
     target: &Target<f32>,
     output: &ServoOutput<f32, LawTerms<f32>>,
     sticks: &StickSlipState<f32>,
 ) -> [u8; RECORD] {
-    let [(_, term_0), (_, term_1), (_, term_2)] = output.command.terms.columns();
-    Writer { bytes: [0; RECORD], at: 0 }
+    let writer = Writer { bytes: [0; RECORD], at: 0 }
         .put(target.position.0.to_le_bytes())
         .put(target.velocity.to_le_bytes())
         .put(target.acceleration.to_le_bytes())
         .put(output.tick.error.to_le_bytes())
         .put(output.tick.error_rate.to_le_bytes())
-        .put(term_0.to_le_bytes())
-        .put(term_1.to_le_bytes())
-        .put(term_2.to_le_bytes())
         .put(output.command.voltage.to_le_bytes())
         .put(output.voltage.to_le_bytes())
         .put(output.code.0.to_le_bytes())
@@ -131,6 +133,7 @@ pub(crate) fn record(
         // A run has fewer ticks than 32 bits count.
         .put((sticks.cycles() as u32).to_le_bytes())
         .put((sticks.stuck_ticks() as u32).to_le_bytes())
-        .put(sticks.stair().to_le_bytes())
-        .bytes
+        .put(sticks.stair().to_le_bytes());
+    let terms = output.command.terms.values();
+    terms.iter().fold(writer, |writer, term| writer.put(term.to_le_bytes())).bytes
 }

@@ -1,7 +1,7 @@
 //! A run, tick by tick.
 
 use crate::record::{RECORD, record};
-use clutch_core::law::OutputState;
+use clutch_core::law::LawState;
 use clutch_core::{
     Counts, FixedCounts, Servo, ServoState, StickSlip, StickSlipParams, StickSlipState, Target,
 };
@@ -13,7 +13,7 @@ pub struct Workload<'a> {
     servo: Servo<f32>,
     path: Path,
     detector: StickSlip<f32>,
-    state: ServoState<f32, OutputState<f32>>,
+    state: ServoState<f32, LawState<f32>>,
     sticks: StickSlipState<f32>,
     origin: FixedCounts,
     tick: u64,
@@ -32,7 +32,9 @@ impl<'a> Workload<'a> {
     ) -> Result<Self, Misfit> {
         let built = settings.build()?;
         let servo = built.servo;
-        let detector = StickSlip::new(&StickSlipParams::default(), servo.encoder(), servo.period())?;
+        let detector = StickSlip::new(&StickSlipParams::default(), servo.encoder(), servo.period());
+        // Its parameters are no settings.
+        let detector = detector.map_err(|error| Misfit::Unfit { key: u16::MAX, error })?;
         let mut workload = Workload {
             settings,
             servo,
@@ -48,7 +50,7 @@ impl<'a> Workload<'a> {
     }
 
     fn target(&self) -> Target<f32> {
-        let target = self.path.target(self.settings.points(), self.tick);
+        let target = self.path.target(self.settings.knots(), self.tick);
         Target { position: target.position.plus(self.origin), ..target }
     }
 
