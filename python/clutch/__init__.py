@@ -19,54 +19,18 @@ from typing import TYPE_CHECKING
 from clutch import _processor  # noqa: F401
 
 # isort: split
-from clutch import _clutch
+from clutch import _clutch, _tables
 from clutch._certificate import Certificate
 from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
 from clutch._errors import LoopError, ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
 from clutch._loop import LoopResult, loop
 from clutch._metrics import Metrics
-from clutch._model import (
-    Bounds,
-    BrakeGeometry,
-    Chirp,
-    Ctc,
-    Dac,
-    Encoder,
-    HandDrive,
-    Hold,
-    HoldThenRelease,
-    HoldVoltage,
-    JerkLimited,
-    Limits,
-    MinimumJerk,
-    Model,
-    Observer,
-    Output,
-    Pd,
-    Ramp,
-    RampVoltage,
-    Release,
-    Rig,
-    Ripple,
-    RunSettings,
-    Safety,
-    Sampling,
-    Scenario,
-    Sine,
-    Smc,
-    SmcSign,
-    SmoothedDerivative,
-    SpringDrive,
-    StribeckFriction,
-    TableDrive,
-    TablePath,
-    Trapezoid,
-    WeightDrive,
-)
+from clutch._model import Scenario
 from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
 from clutch._run import Result, simulate
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
+from clutch._tables import *  # noqa: F403
 
 if TYPE_CHECKING:
     from clutch import dynamics, executors, gym, plot
@@ -74,63 +38,28 @@ if TYPE_CHECKING:
 __version__ = _clutch.VERSION
 
 __all__ = [
-    "Bounds",
-    "BrakeGeometry",
     "Certificate",
-    "Chirp",
-    "Ctc",
-    "Dac",
     "Difference",
-    "Encoder",
-    "HandDrive",
-    "Hold",
-    "HoldThenRelease",
-    "HoldVoltage",
-    "JerkLimited",
-    "Limits",
     "Log",
     "LoopError",
     "LoopResult",
     "Metrics",
-    "MinimumJerk",
-    "Model",
-    "Observer",
-    "Output",
     "PaperFigure",
     "PaperPanel",
     "ParamError",
     "Path",
-    "Pd",
     "Plant",
-    "Ramp",
-    "RampVoltage",
-    "Release",
     "Replay",
     "Reproduction",
     "Result",
-    "Rig",
-    "Ripple",
-    "RunSettings",
-    "Safety",
     "Samples",
-    "Sampling",
     "Scenario",
     "Servo",
-    "Sine",
-    "Smc",
-    "SmcSign",
-    "SmoothedDerivative",
-    "SpringDrive",
     "StickSlip",
-    "StribeckFriction",
     "SweepResult",
     "Table",
-    "TableDrive",
-    "TablePath",
     "Target",
     "Tick",
-    "Trapezoid",
-    "WeightDrive",
     "__version__",
     "dynamics",
     "executors",
@@ -148,6 +77,7 @@ __all__ = [
     "sobol",
     "sweep",
 ]
+__all__ += _tables.__all__
 
 # Each imports a large library, so it is imported on request.
 _LATER = {"dynamics", "executors", "gym", "plot"}

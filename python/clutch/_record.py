@@ -88,9 +88,10 @@ class _Record:
     _key: ClassVar[str] = ""
 
     @classmethod
-    def _way(cls, part: type["_Record"]) -> list[str]:
-        """The tables from this one to a part: ``["drive", "weight"]`` from Rig to WeightDrive."""
-        return part._key.removeprefix(cls._key).removeprefix(".").split(".")
+    def _way(cls, name: str) -> list[str]:
+        """The tables from one with a field of that name to this: ``["drive", "weight"]`` for WeightDrive."""
+        *_, outer, last = ["", *cls._key.split(".")]
+        return [outer, last] if outer == name else [last]
 
     @classmethod
     def _build(cls, table: _Tree) -> Self:
@@ -100,7 +101,7 @@ class _Record:
             value = table.get(slot.name)
             for part in slot.classes:
                 inner: Any = table
-                for step in cls._way(part):
+                for step in part._way(slot.name):
                     inner = inner.get(step) if isinstance(inner, dict) else None
                 if inner is not None:
                     value = part._build(inner)
@@ -170,7 +171,7 @@ class _Params(_Record):
         for slot in _slots(type(self)):
             value = getattr(self, slot.name)
             if isinstance(value, _Params) and isinstance(value, slot.classes):
-                *way, last = self._way(type(value))
+                *way, last = value._way(slot.name)
                 inner = table
                 for step in way:
                     inner = inner.setdefault(step, {})

@@ -23,6 +23,7 @@ from clutch._model import Scenario
 from clutch._record import _Params
 from clutch._record import _plain as _python
 from clutch._run import ScenarioLike, as_scenario
+from clutch._units import attributes
 
 if TYPE_CHECKING:
     import pandas
@@ -281,8 +282,9 @@ def _plain(key: str, value: Any) -> Any:
     """A key's value as a file could hold it: Python numbers, lists and dicts."""
     if isinstance(value, _Params):
         table = value._tables()
-        way = value._key.removeprefix(key).split(".")[1:]
-        if value._key != ".".join([key, *way]):
+        *_, name = key.split(".")
+        first, *way = value._way(name)
+        if first != name:
             raise TypeError(f"{key}: a {type(value).__name__} stands at {value._key}")
         for step in reversed(way):
             table = {step: table}
@@ -895,7 +897,7 @@ class SweepResult:
         """The metrics with labelled dimensions: those of a full grid have the keys' names, else it is "row".
 
         Runs that have not finished are NaN. Each metric has its unit and its name in words as attributes, which
-        xarray's plots show.
+        xarray's plots show; each dimension has its unit.
 
         Examples
         --------
@@ -913,7 +915,7 @@ class SweepResult:
 
         runs, names = self.table["row"], [*self.metrics, "error"]
         if self.samples.axes is None:
-            coords = {key: ("row", np.asarray(self.table[key])) for key in self.keys}
+            coords = {key: ("row", np.asarray(self.table[key]), attributes(key)) for key in self.keys}
             columns = {name: ("row", np.asarray(self.table[name]), described(name)) for name in names}
             return xarray.Dataset(columns, coords={"row": runs} | coords)
         axes = [np.asarray(_column(list(axis))) for axis in self.samples.axes]
@@ -925,4 +927,5 @@ class SweepResult:
                 some, column = column, np.full(self.total, "" if name == "error" else math.nan, dtype=column.dtype)
                 column[runs] = some
             values[name] = (self.keys, column.reshape(shape), described(name))
-        return xarray.Dataset(values, coords=dict(zip(self.keys, axes, strict=True)))
+        coords = {key: (key, axis, attributes(key)) for key, axis in zip(self.keys, axes, strict=True)}
+        return xarray.Dataset(values, coords=coords)

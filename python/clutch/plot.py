@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
 from clutch._metrics import FIGURES
+from clutch._units import split
 
 if TYPE_CHECKING:
     import numpy as np
@@ -91,44 +92,6 @@ STYLE: dict[RcKeyType, Any] = {
     "pdf.fonttype": 42,
 }
 
-_UNITS = {
-    "v": "V",
-    "v_s": "V/s",
-    "v_rad": "V/rad",
-    "v_s_rad": "V s/rad",
-    "s": "s",
-    "us": "µs",
-    "1_s": "1/s",
-    "1_s2": "1/s²",
-    "hz": "Hz",
-    "rad": "rad",
-    "rad_s": "rad/s",
-    "rad_s2": "rad/s²",
-    "rad_s3": "rad/s³",
-    "deg": "°",
-    "deg_s": "°/s",
-    "deg_s2": "°/s²",
-    "deg_s3": "°/s³",
-    "turns": "turns",
-    "counts": "counts",
-    "ticks": "ticks",
-    "cycles": "cycles",
-    "cycles_per_s": "cycles/s",
-    "m": "m",
-    "m2": "m²",
-    "m_s2": "m/s²",
-    "kg": "kg",
-    "kg_m2": "kg m²",
-    "nm": "N m",
-    "nm_v": "N m/V",
-    "nm_a": "N m/A",
-    "nm_rad": "N m/rad",
-    "nm_s_rad": "N m s/rad",
-    "nm_rt_s": "N m/√s",
-    "ohm": "Ω",
-    "percent": "%",
-}
-
 _LONG = 20_000
 _COLUMNS_PER_INCH = 600
 _MM = 1 / 25.4
@@ -186,19 +149,9 @@ def _figure(ax: Axes) -> Figure:
     return ax.figure.canvas.figure  # the whole one, also where the axes is in a subfigure
 
 
-def _split(name: str) -> tuple[str, str]:
-    """A key without its unit's suffix, and the unit."""
-    parts = name.split("_")
-    for i in range(1, len(parts)):
-        unit = _UNITS.get("_".join(parts[i:]))
-        if unit:
-            return "_".join(parts[:i]), unit
-    return name, ""
-
-
 def _label(key: str) -> str:
     """Axis label of a key of the scenario: ``law.smc.kp (V)``."""
-    quantity, unit = _split(key)
+    quantity, unit = split(key)
     return f"{quantity} ({unit})" if unit else quantity
 
 
@@ -797,7 +750,7 @@ def certificate_region(
         ax.contourf(*gains, region, levels=[0.5, 1.5], colors=[_PALE])
         if not region.all():
             ax.contour(*gains, region, levels=[0.5], colors=[_BLUE], linewidths=0.7)
-    named = ", ".join(f"{gain:g} {_split(key)[1]}" for gain, key in zip(own, keys, strict=True))
+    named = ", ".join(f"{gain:g} {split(key)[1]}" for gain, key in zip(own, keys, strict=True))
     good = scenario.certificate().certified
     (dot,) = ax.plot(
         *([gain] for gain in own),

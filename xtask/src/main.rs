@@ -98,6 +98,13 @@ enum Verb {
         #[arg(value_name = "REV", default_value = "HEAD")]
         revisions: Vec<String>,
     },
+    /// Writes what follows from the declarations of parameters: Python's classes, tables of the documentation, the
+    /// schema of scenario files.
+    Generate {
+        /// Only compares.
+        #[arg(long)]
+        check: bool,
+    },
     /// Draws the README's figures again, with `clutch reproduce`.
     Figures,
 }
@@ -133,8 +140,14 @@ fn main() -> Result<()> {
         Verb::Stubs => stubs::generate(&python::interpreter()?, false).map(drop),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),
         Verb::Size { revisions } => size::print(&revisions),
+    },
+        Verb::Generate { check } => generate(if check { &["--check"] } else { &[] }),
         Verb::Figures => figures(),
     }
+}
+
+fn generate(args: &[&str]) -> Result<()> {
+    cargo(["run", "--package", "clutch-sim", "--example", "generate", "--"]).args(args).run()
 }
 
 fn check() -> Result<()> {
@@ -165,6 +178,7 @@ fn check() -> Result<()> {
         cargo(["clippy", "--package", "clutch-core", "--features", features, "--", "-D", "warnings"])
             .run()?;
     }
+    generate(&["--check"])?;
     // The images, where their target is; tests build them in any case.
     if firmware::has_target() {
         for board in firmware::BOARDS {

@@ -1,16 +1,16 @@
 //! `clutch scenario`.
 
-use crate::output::{Exit, print};
+use crate::output::{Exit, json, print};
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use clutch_sim::scenario::{BUILT_IN, BuiltIn};
+use clutch_sim::scenario::{BUILT_IN, BuiltIn, schema};
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Lists, prints and copies the built-in scenarios.
+/// Lists, prints and copies the built-in scenarios; prints the schema with which editors complete a file.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml"
+    after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml\n  clutch scenario schema > scenario.schema.json"
 )]
 pub(crate) struct ScenarioVerb {
     #[command(subcommand)]
@@ -37,6 +37,9 @@ enum Verb {
         #[arg(long, value_name = "NAME", default_value = "smc_2")]
         from: String,
     },
+    /// Prints the JSON Schema of scenario files, with which editors complete and check them.
+    #[command(after_help = "Example:\n  clutch scenario schema > scenario.schema.json")]
+    Schema,
 }
 
 fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
@@ -59,6 +62,7 @@ impl ScenarioVerb {
                     .collect();
                 print(&(lines.join("\n") + "\n"))?;
             }
+            Verb::Schema => print(&json(&schema())?)?,
             Verb::Show { name } => print(find(&name)?.toml)?,
             Verb::New { file, from } => {
                 let text = find(&from)?.toml;

@@ -38,15 +38,15 @@ crate::params! {
     /// How well each parameter of the model is known, as a share of its value: 20 % stands for ±20 %. The
     /// defaults say exactly.
     pub struct Tolerances<T>: Default {
-        /// Of the inertia.
+        /// ± on the inertia `J`, (23a).
         inertia: T = 0.0, "inertia_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
-        /// Of the driving torque.
+        /// ± on the driving torque `T_u`, (23b).
         drive_torque: T = 0.0, "drive_torque_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
-        /// Of the viscous damping.
+        /// ± on the viscous damping `C_d`, (23c).
         viscous_damping: T = 0.0, "viscous_damping_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
-        /// Of the brake gain `K_COF`.
+        /// ± on the brake gain `K_COF`, (23h).
         brake_gain: T = 0.0, "brake_gain_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
-        /// Of the friction, at rest and in motion.
+        /// ± on the friction, in motion (23d) and at rest (23e).
         friction: T = 0.0, "friction_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
     }
 }

@@ -88,7 +88,7 @@ impl Micros {
 crate::params! {
     /// When a servo is asked.
     pub struct SamplingParams<>: Default {
-        /// Time from sample to sample.
+        /// Time from sample to sample, in (5).
         period: Micros = 1000, "period_us" "T" US, Range::within(1.0, 1e6);
     }
 }
@@ -148,7 +148,7 @@ crate::params! {
         bits: u8 = 12, "bits" "" BITS, Range::within(1.0, 16.0);
         /// Voltage of code 0.
         lowest: T = -10.0, "lowest_v" "" V, Range::ANY;
-        /// Voltage one step above that of the highest code.
+        /// Voltage one step above that of the highest code, which so is 9.9951 V by default.
         highest: T = 10.0, "highest_v" "" V, Range::ANY;
     }
     relations(p) {

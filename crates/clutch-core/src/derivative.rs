@@ -11,9 +11,12 @@ use crate::params::{Range, Table};
 use crate::{Arithmetic, Encoder, FixedCounts, Micros, ParamError, Real};
 
 crate::params! {
-    /// The difference (5): a first-order low-pass on the backward difference of the error.
+    /// The smoothed difference (5), which the paper calls a Kalman filter: a first-order low-pass on the backward
+    /// difference of the error.
+    ///
+    /// `ė_k = (1 − K_Kal) ė_{k−1} + K_Kal (e_k − e_{k−1})/T`.
     pub struct SmoothedDerivativeParams<T>: Default {
-        /// Share of the newest difference; 1 smooths nothing. The paper gives 0.2 to 1, and 0.2 reproduces its
+        /// Share of the newest difference in (5); 1 smooths nothing. The paper gives 0.2 to 1, and 0.2 reproduces its
         /// figures.
         smoothing: T = 0.2, "smoothing" "K_Kal" NONE, Range::above(0.0).up_to(1.0);
     }

@@ -32,7 +32,8 @@ use crate::{Encoder, FixedCounts, Micros, ParamError, Plant, Real};
 use nalgebra::{Matrix3, Vector3};
 
 crate::params! {
-    /// A Kalman observer of position, velocity and the torque that nobody measures.
+    /// A stationary Kalman filter for position, velocity and the torque that nobody measures. It predicts with the
+    /// model.
     pub struct ObserverParams<T>: Default {
         /// How fast the disturbance torque wanders: by this much (standard deviation) in one second, and with
         /// the root of the time. Larger follows friction faster and lets more of the encoder's steps through.

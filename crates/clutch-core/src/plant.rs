@@ -14,15 +14,16 @@ use crate::{ParamError, Real};
 pub const GRAVITY: f64 = 9.81;
 
 crate::params! {
-    /// The shaft (1) as laws, observers and certificates believe it to be; the defaults are Table 1's.
+    /// The shaft (1) as laws, observers and certificates believe it to be; the defaults are Table 1's, whatever the
+    /// rig is.
     pub struct PlantParams<T>: Default {
-        /// Total moment of inertia.
+        /// Total moment of inertia, in (1).
         inertia: T = 0.0017, "inertia_kg_m2" "J" KG_M2, Range::divisor();
-        /// Driving torque `T_u = M g R_p`. Either sign.
+        /// Driving torque `T_u = M g R_p` in (1). Either sign for a plant alone.
         drive_torque: T = 0.047088000000000005, "drive_torque_nm" "T_u" NM, Range::ANY;
-        /// Viscous damping.
+        /// Viscous damping, in (1).
         viscous_damping: T = 0.001, "viscous_damping_nm_s_rad" "C_d" NM_S_RAD, Range::at_least(0.0);
-        /// Brake torque per volt and unit of μ.
+        /// Brake torque per volt and unit of μ, (18).
         brake_gain: T = 0.14, "brake_gain_nm_v" "K_COF" NM_V, Range::above(0.0);
     }
     nested {

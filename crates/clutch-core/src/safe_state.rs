@@ -16,9 +16,9 @@ use crate::params::{Params, Range, Relation};
 use crate::{Dac, DacCode, Micros, ParamError, Real};
 
 crate::params! {
-    /// Holds the shaft with a voltage.
+    /// Holds the shaft with a voltage, at once.
     pub struct SafeHold<T> {
-        /// Brake voltage.
+        /// Voltage, enough to stop the strongest drive with the weakest brake of the bounds.
         volts: T, "volts_v" "" V, Range::above(0.0);
     }
     relations(p) {
@@ -30,9 +30,9 @@ crate::params! {
 crate::params! {
     /// Brakes with a rising (or falling) voltage, then holds.
     pub struct SafeRamp<T> {
-        /// Rate of the voltage.
+        /// Rate at which the voltage goes up or down from the present one.
         rate: T, "rate_v_s" "" V_S, Range::above(0.0);
-        /// Brake voltage at the end.
+        /// Voltage at the end, enough to stop the strongest drive with the weakest brake of the bounds.
         volts: T, "volts_v" "" V, Range::above(0.0);
     }
     relations(p) {
@@ -44,11 +44,11 @@ crate::params! {
 }
 
 crate::params! {
-    /// Holds for a time, then lets go.
+    /// Holds the shaft with a voltage, at once, and after a time lets go.
     pub struct SafeHoldThenRelease<T> {
-        /// Brake voltage.
+        /// Voltage, enough to stop the strongest drive with the weakest brake of the bounds.
         volts: T, "volts_v" "" V, Range::above(0.0);
-        /// Time of holding.
+        /// Time of holding, after which it lets go.
         after: T, "after_s" "" S, Range::above(0.0);
     }
     relations(p) {
@@ -62,13 +62,13 @@ crate::params! {
 crate::choice! {
     /// Safe state: what the brake does when control has ended.
     pub enum SafeState<T> {
-        /// Holds the shaft with a voltage.
+        /// Holds the shaft with a voltage, at once.
         Hold(SafeHold<T>) = "hold",
         /// Brakes with a rising (or falling) voltage, then holds.
         Ramp(SafeRamp<T>) = "ramp",
-        /// Lets go.
+        /// Lets go: 0 V, or the converter's lowest voltage above it.
         Release = "release",
-        /// Holds for a time, then lets go.
+        /// Holds the shaft with a voltage, at once, and after a time lets go.
         HoldThenRelease(SafeHoldThenRelease<T>) = "hold_then_release",
     }
 }

@@ -10,11 +10,11 @@ params! {
     /// A weight on a pulley, as in the paper: the torque is `T_u = M g R_p` in (1).
     #[derive(Copy)]
     pub struct WeightDrive<f64>: Default {
-        /// Mass.
+        /// Mass, in (1).
         mass: f64 = 0.2, "mass_kg" "M" KG, Range::above(0.0);
-        /// Acceleration of gravity, as the paper rounds it.
+        /// Acceleration of gravity in (1), as the paper rounds it.
         gravity: f64 = 9.81, "gravity_m_s2" "g" M_S2, Range::above(0.0);
-        /// Radius of the pulley.
+        /// Radius of the pulley, in (1).
         pulley_radius: f64 = 0.024, "pulley_radius_m" "R_p" M, Range::above(0.0);
     }
 }
@@ -33,7 +33,7 @@ params! {
 params! {
     /// A torque over time: straight lines between points, constant outside. It needs the engine `dormand_prince`.
     pub struct TableDrive<f64> {
-        /// Points of time and torque. At least one; times rise, all are finite.
+        /// Points of time and torque; times rise.
         points: Points, "points_s_nm" "" S_NM, Range::ANY;
     }
     relations(p) {

@@ -148,13 +148,13 @@ params! {
     pub struct RigParams<f64> {
         /// Rig whose values stand where the scenario has none.
         base: RigBase, "base" "" NONE, Range::ANY;
-        /// Total moment of inertia.
+        /// Total moment of inertia, in (1).
         inertia: f64 = 0.0017, "inertia_kg_m2" "J" KG_M2, Range::divisor();
-        /// Viscous damping.
+        /// Viscous damping, in (1).
         viscous_damping: f64 = 0.001, "viscous_damping_nm_s_rad" "C_d" NM_S_RAD, Range::at_least(0.0);
-        /// Brake torque per volt and unit of μ, 0.14 in each base; absent if `brake_geometry` gives it.
+        /// Brake torque per volt and unit of μ, (18), 0.14 in each base: a number, or what the geometry of the brake gives.
         brake_gain: Option<f64>, "brake_gain_nm_v" "K_COF" NM_V, Range::above(0.0);
-        /// Torque noise, held from sample to sample: root mean square.
+        /// Root mean square of a random torque, normally distributed, held from sample to sample.
         torque_noise: f64 = 0.0, "torque_noise_nm" "" NM, Range::at_least(0.0);
         /// Whole sampling periods from sample to voltage.
         delay_ticks: u32 = 0, "delay_ticks" "" TICKS, Range::within(0.0, 1000.0);

@@ -14,20 +14,20 @@ crate::params! {
     /// `μ(θ̇) = [μ_d + (μ_s − μ_d) exp(−|θ̇/θ̇_s|^δ)] sgn(θ̇)`. A static coefficient below the dynamic one is
     /// taken: such a pair never sticks and slips.
     pub struct StribeckParams<T>: Default {
-        /// Coefficient of friction at rest.
+        /// Coefficient of friction at rest, in (2).
         mu_static: T = 0.2, "mu_static" "μ_s" NONE, Range::at_least(0.0);
-        /// Coefficient of friction of a fast shaft.
+        /// Coefficient of friction of a fast shaft, in (2).
         mu_dynamic: T = 0.15, "mu_dynamic" "μ_d" NONE, Range::at_least(0.0);
-        /// Stribeck velocity, at which all but 1/e of the drop from `μ_s` to `μ_d` is done.
+        /// Stribeck velocity in (2), at which all but 1/e of the drop from `μ_s` to `μ_d` is done.
         stribeck_velocity: T = 0.001, "stribeck_velocity_rad_s" "θ̇_s" RAD_S, Range::divisor();
-        /// Stribeck exponent. Other than 1 needs the engine `dormand_prince`.
+        /// Stribeck exponent in (2). Other than 1 needs the engine `dormand_prince`.
         stribeck_exponent: T = 1.0, "stribeck_exponent" "δ" NONE, Range::above(0.0);
     }
     relations(p) {
         /// Something divides by the friction at rest.
-        STATIC_DIVIDES: mu_static, "a number above 0: computed torque and bounds divide by it";
+        STATIC_DIVIDES: mu_static, "a number above 0 where it is the model's: computed torque and bounds divide by it";
         /// Something divides by the friction of a fast shaft.
-        DYNAMIC_DIVIDES: mu_dynamic, "a number above 0: computed torque and bounds divide by it";
+        DYNAMIC_DIVIDES: mu_dynamic, "a number above 0 where it is the model's: computed torque and bounds divide by it";
     }
 }
 

@@ -9,12 +9,12 @@ crate::params! {
     pub struct OutputParams<T>: Default {
         /// Lowest voltage: a pad can only push. Above 0 the pad never lifts.
         lowest: T = 0.0, "lowest_v" "" V, Range::at_least(0.0);
-        /// Highest voltage.
+        /// Highest voltage. Lower `on_invalid_v` together with it.
         highest: T = 10.0, "highest_v" "" V, Range::ANY;
-        /// Voltage applied when the demand is not a number.
+        /// Voltage for a demand that is not a number.
         on_invalid: T = 10.0, "on_invalid_v" "" V, Range::ANY;
-        /// Time constant with which the difference between the voltage found at start and the law's first demand
-        /// decays; 0 starts with the law's own demand.
+        /// Time constant of a bumpless start, with which the difference between the voltage found at start and the
+        /// law's first demand decays; 0 starts with the law's own demand.
         bumpless_time: T = 0.0, "bumpless_time_s" "" S, Range::at_least(0.0);
     }
     relations(p) {

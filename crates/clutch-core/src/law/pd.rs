@@ -14,9 +14,9 @@ use crate::{Arithmetic, Each, Micros, ParamError, Real};
 crate::params! {
     /// Proportional–derivative control (4): `u = −(K_p e + K_d ė)`. The gains' defaults are Table 2's.
     pub struct PdParams<T>: Default {
-        /// Proportional gain.
+        /// Proportional gain of (4).
         kp: T = 5000.0, "kp_v_rad" "K_p" V_RAD, Range::at_least(0.0);
-        /// Derivative gain.
+        /// Derivative gain of (4).
         kd: T = 50.0, "kd_v_s_rad" "K_d" V_S_RAD, Range::at_least(0.0);
     }
 }

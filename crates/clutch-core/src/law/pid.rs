@@ -29,7 +29,7 @@ crate::params! {
         derivative_time: T = 0.0, "derivative_time_s" "τ" S, Range::at_least(0.0);
         /// Time in which the integral follows a limit of the output.
         tracking_time: T = 0.05, "tracking_time_s" "T_t" S, Range::above(0.0);
-        /// Voltage without error.
+        /// Voltage without error, at rest.
         bias: T = 0.0, "bias_v" "u_0" V, Range::ANY;
         /// Feed-forward of the path's velocity.
         velocity: T = 0.0, "velocity_v_s_rad" "K_v" V_S_RAD, Range::ANY;

@@ -16,13 +16,13 @@ crate::params! {
     ///
     /// `u = −{K_p sat(σ/ε) + K_d sat(σ ė/ε) ė}` with `σ = f e + ė`.
     pub struct SmcParams<T>: Default {
-        /// Switching gain.
+        /// Switching gain of (31).
         kp: T = 3.0, "kp_v" "K_p" V, Range::at_least(0.0);
-        /// Damping gain.
+        /// Damping gain of (31).
         kd: T = 400.0, "kd_v_s_rad" "K_d" V_S_RAD, Range::at_least(0.0);
-        /// Slope of the sliding surface.
+        /// Slope of the sliding surface (13).
         slope: T = 70.0, "slope_1_s" "f" PER_S, Range::above(0.0);
-        /// Thickness of the boundary layer.
+        /// Thickness of the boundary layer (30).
         boundary: T = 0.1, "boundary_rad_s" "ε" RAD_S, Range::divisor();
     }
 }

@@ -10,15 +10,15 @@ use crate::params::{Range, Table};
 use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
-    /// Sliding-mode control with the sign function (29), which chatters. The gains' defaults are Table 2's.
+    /// Sliding-mode control with the sign function (29), without a boundary layer: it chatters. The gains' defaults are Table 2's.
     ///
     /// `u = −{K_p sgn(σ) + K_d sgn(σ ė) ė}` with `σ = f e + ė`.
     pub struct SmcSignParams<T>: Default {
-        /// Switching gain.
+        /// Switching gain of (29).
         kp: T = 3.0, "kp_v" "K_p" V, Range::at_least(0.0);
-        /// Damping gain.
+        /// Damping gain of (29).
         kd: T = 400.0, "kd_v_s_rad" "K_d" V_S_RAD, Range::at_least(0.0);
-        /// Slope of the sliding surface.
+        /// Slope of the sliding surface (13).
         slope: T = 70.0, "slope_1_s" "f" PER_S, Range::above(0.0);
     }
 }

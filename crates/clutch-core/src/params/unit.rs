@@ -113,6 +113,7 @@ units! {
     COUNTS "counts" "counts" "counts" None "" 1.0;
     COUNTS_PER_REV "counts_per_rev" "counts per revolution" "counts per revolution" None "" 1.0;
     WAVES_PER_TURN "waves_per_turn" "waves per turn" "waves per turn" None "" 1.0;
+    CYCLES_PER_S "cycles_per_s" "cycles/s" "cycles/s" None "" 1.0;
     CYCLES "cycles" "periods" "periods" None "" 1.0;
     TICKS "ticks" "periods" "periods" None "" 1.0;
     BITS "bits" "bits" "bits" None "" 1.0;

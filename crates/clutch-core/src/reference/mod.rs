@@ -54,7 +54,7 @@ impl<T: Real> Target<T> {
 crate::params! {
     /// Constant rate from the first tick: the paper's path.
     pub struct Ramp<T> {
-        /// Rate. The velocity jumps to it at the start.
+        /// Rate, to which the velocity jumps at the start. A brake follows only the sign of its drive.
         rate: T, "rate_deg_s" "" DEG_S, Range::ANY;
     }
     relations(p) {

@@ -27,7 +27,7 @@ crate::words! {
 crate::params! {
     /// Points in time. Before the first point the path rests there, after the last too.
     pub struct Table<'a> {
-        /// Points with rising times, from the start.
+        /// Points of time and angle, from the start; times rise. A brake follows only angles that do not fall.
         knots: &'a [Knot], "points_s_deg" "" S_DEG, Range::at_least(0.0).below(1e12);
         /// How to go from point to point.
         interpolation: Interpolation = "cubic", "interpolation" "" NONE, Range::ANY;

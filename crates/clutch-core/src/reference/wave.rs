@@ -9,9 +9,9 @@ crate::params! {
     ///
     /// A brake follows it only while the velocity keeps its sign: `2π f · amplitude ≤ rate`.
     pub struct Sine<T> {
-        /// Rate of the ramp below.
+        /// Rate of the ramp below the sine.
         rate: T, "rate_deg_s" "" DEG_S, Range::ANY;
-        /// Amplitude.
+        /// Amplitude of the sine.
         amplitude: T, "amplitude_deg" "" DEG, Range::ANY;
         /// Frequency.
         frequency: T, "frequency_hz" "f" HZ, Range::at_least(0.0);
@@ -30,10 +30,12 @@ crate::params! {
 
 crate::params! {
     /// A sine on a ramp, whose frequency goes linearly from one value to another and stays there.
+    ///
+    /// A brake follows it only while the velocity keeps its sign: `2π f · amplitude ≤ rate` for either frequency `f`.
     pub struct Chirp<T> {
-        /// Rate of the ramp below.
+        /// Rate of the ramp below the sine.
         rate: T, "rate_deg_s" "" DEG_S, Range::ANY;
-        /// Amplitude.
+        /// Amplitude of the sine.
         amplitude: T, "amplitude_deg" "" DEG, Range::ANY;
         /// Frequency at the start.
         from: T, "from_hz" "" HZ, Range::at_least(0.0);

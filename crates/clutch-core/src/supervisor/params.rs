@@ -7,17 +7,17 @@ use crate::{Bounds, Interval, Micros, ParamError, Real, ServoParams, Target};
 crate::params! {
     /// What the supervisor watches. The defaults are for the paper's shaft at 1 kHz.
     pub struct LimitParams<T>: Default {
-        /// Largest departure of a sample from dead reckoning that a shaft can make in a period.
+        /// Largest departure of a sample from where the last ones lead that a shaft can make in a period.
         jump: T = 0.15, "jump_deg" "" DEG, Range::above(0.0);
-        /// Samples beyond that, within 128 periods, that end control. One glitch is tolerated.
+        /// Samples beyond `jump_deg`, within 128 periods, that end control. One glitch is tolerated.
         jumps: u32 = 3, "jumps" "" IN_128, Range::within(1.0, 128.0);
         /// Samples in a row that have to pass after one was refused before the law answers again.
         good_samples: u32 = 1, "good_samples" "" NONE, Range::at_least(1.0);
-        /// Limit of the error at rest.
+        /// Error at rest that ends control.
         following_error: T = 1.0, "following_error_deg" "" DEG, Range::above(0.0);
-        /// How much that limit grows with the target's speed.
+        /// How much `following_error_deg` grows with the target's speed.
         following_time: T = 0.02, "following_time_s" "" S, Range::at_least(0.0);
-        /// Time at a limit of the output that ends control.
+        /// Time at a limit of the voltage that ends control.
         saturation_time: T = 0.2, "saturation_time_s" "" S, Range::above(0.0);
         /// Distance that the shaft must have gone without a count.
         stand_still: T = 1.1, "stand_still_counts" "" COUNTS, Range::at_least(1.0);
@@ -26,7 +26,7 @@ crate::params! {
         friction_margin: T = 1.8, "friction_margin" "" NONE, Range::at_least(1.0);
         /// Lost samples within 128 periods that end control.
         lost: u32 = 26, "lost" "" IN_128, Range::within(1.0, 128.0);
-        /// Late samples and late answers within 128 periods that end control.
+        /// Late samples, and codes that the board refuses as late, within 128 periods that end control.
         late: u32 = 26, "late" "" IN_128, Range::within(1.0, 128.0);
         /// Duplicated, or reordered, samples within 128 periods that end control.
         disorder: u32 = 2, "disorder" "" IN_128, Range::within(1.0, 128.0);
@@ -34,7 +34,7 @@ crate::params! {
         silence_cycles: u32 = 3, "silence_cycles" "" CYCLES, Range::within(2.0, 1000.0);
         /// Longest time from a sample's arrival to its answer.
         deadline: Micros = 500, "deadline_us" "" US, Range::at_least(1.0);
-        /// Answers later than that within 128 periods that end control.
+        /// Answers later than `deadline_us`, within 128 periods, that end control.
         overruns: u32 = 26, "overruns" "" IN_128, Range::within(1.0, 128.0);
     }
     relations(p) {
@@ -64,7 +64,8 @@ pub struct SupervisorParams<T = f64> {
 crate::params! {
     /// The speed that a path may ask for.
     pub struct SpeedLimit<T>: Default {
-        /// Highest speed that a path may ask for.
+        /// Highest speed that a path may ask for: a guard against a slip of units. On a board a target that moves
+        /// faster ends control.
         speed_limit: T = 360.0, "speed_limit_deg_s" "" DEG_S, Range::above(0.0);
     }
 }

@@ -3,12 +3,15 @@
 //! The rig begins as a copy of the one that `rig.base` names; every key in the file overrides
 //! its value. Unknown keys are errors. `docs/scenario.md` lists all keys.
 
+pub mod describe;
 mod error;
 mod params;
+mod schema;
 mod section;
 
 pub use error::ScenarioError;
 pub use params::{Safety, ScalarKind, ScenarioBounds, ScenarioLimits, ScenarioParams, ScenarioSampling};
+pub use schema::schema;
 pub use section::check_section;
 
 use crate::progress::Report;

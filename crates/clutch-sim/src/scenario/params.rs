@@ -22,7 +22,7 @@ params! {
     /// When the servo is asked, and the scalar that it computes in.
     #[derive(Copy)]
     pub struct ScenarioSampling<f64>: Default {
-        /// Scalar that the servo runs in.
+        /// Scalar that path and servo compute in; a board has `f32`. The shaft is always in `f64`.
         scalar: ScalarKind = "f64", "scalar" "" NONE, Range::ANY;
     }
     flat {
@@ -32,10 +32,12 @@ params! {
 }
 
 params! {
-    /// How well the believed plant is known, and the reaching rate that the certificate shall give.
+    /// How well the believed plant is known, (23), and the reaching rate that the certificate shall give: for the
+    /// certificate and the check of the path.
     #[derive(Copy)]
     pub struct ScenarioBounds<f64>: Default {
-        /// Reaching rate that the certificate shall give (15).
+        /// Rate of reaching the sliding surface that the certificate shall give, in (15); above 0 the reaching time gets
+        /// a bound.
         reach_rate: f64 = 0.0, "reach_rate_rad_s2" "γ" RAD_S2, Range::at_least(0.0);
     }
     flat {
@@ -45,12 +47,14 @@ params! {
 }
 
 params! {
-    /// What ends a run on a board: limits of the supervisor, and how long board and codes wait.
+    /// What ends a run on a board: limits of the supervisor, and how long board and codes wait. docs/safety.md says why
+    /// each default is what it is.
     #[derive(Copy)]
     pub struct ScenarioLimits<f64>: Default {
-        /// Periods without a valid code after which the board goes to the safe state by itself.
+        /// Periods without a valid code after which the board goes to its safe state by itself. Keep it equal to
+        /// `silence_cycles`.
         watchdog_cycles: u32 = 3, "watchdog_cycles" "" CYCLES, Range::within(2.0, 1000.0);
-        /// Periods after its sample during which a code is valid.
+        /// Periods after its sample during which a code is valid; at most 65.535 ms.
         valid_cycles: u32 = 2, "valid_cycles" "" CYCLES, Range::within(1.0, 1000.0);
     }
     flat {
@@ -60,9 +64,9 @@ params! {
 }
 
 params! {
-    /// How a run on a board ends, and what ends it. Only what drives a board needs it.
+    /// How a run on a board ends, and what ends it. Only what drives a board needs it; there is no default safe state.
     pub struct Safety<f64> {
-        /// Why this safe state is the right one for this rig, in the operator's words.
+        /// Why this safe state is the right one for this rig, in the operator's words; printed before each run.
         reason: Text, "reason" "" NONE, Range::ANY;
     }
     nested {
@@ -81,7 +85,7 @@ params! {
 params! {
     /// A scenario: rig, believed plant, law, path, sampling, bounds, run, safety.
     pub struct ScenarioParams<f64> {
-        /// Its title.
+        /// Title of the output, any text.
         name: Text, "name" "" NONE, Range::ANY;
     }
     nested {
@@ -93,11 +97,11 @@ params! {
         law: LawParams, "law";
         /// Source of the velocity that the law is given.
         velocity: VelocityParams, "velocity";
-        /// Output stage.
+        /// Limits of the voltage, bumpless start.
         output: OutputParams, "output";
         /// The path.
         reference: ReferenceParams<'static>, "reference";
-        /// Sampling.
+        /// Sampling period, scalar.
         sampling: ScenarioSampling, "sampling";
         /// How well the believed plant is known.
         bounds: ScenarioBounds, "bounds";
@@ -105,7 +109,7 @@ params! {
         run: RunParams, "run";
     }
     optional {
-        /// How a run on a board ends.
+        /// How a run on a board ends, and what ends it: `clutch loop` and `clutch daq` need it.
         safety: Safety, "safety";
     }
 }

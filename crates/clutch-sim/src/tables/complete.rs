@@ -103,7 +103,7 @@ pub(crate) fn complete_table(
 
 /// A table without a word of the user's, if every parameter has a default. The first option of a choice is its
 /// default, if all of that has one.
-fn default_of(info: &'static Info) -> Option<Table> {
+pub(crate) fn default_of(info: &'static Info) -> Option<Table> {
     fn whole(info: &'static TableInfo) -> bool {
         info.rows.iter().all(|row| row.optional || !row.default.is_empty())
             && info.nested.iter().all(|below| below.optional || default_of(below.info).is_some())
