@@ -3,8 +3,8 @@
 
 use clutch_core::law::{LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;
-use clutch_sim::rig::RigBase;
 use clutch_sim::engine::EngineKind;
+use clutch_sim::rig::RigBase;
 use clutch_sim::{RigParams, RunSpec, simulate};
 use criterion::{Criterion, criterion_group, criterion_main};
 

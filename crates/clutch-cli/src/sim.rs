@@ -134,7 +134,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         s.scenario,
         run.trace.time.len(),
         s.seed,
-        s.scalar(),
+        s.scalar,
         number(m.measured_s)
     );
     let mut rows = figures(m);
