@@ -2,9 +2,8 @@
 //! `f64`.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
-use clutch_core::law::{
-    ControlLaw, CtcParams, Law, LawParams, OutputParams, PdParams, SmcParams, SmcSignParams, Tick,
-};
+use clutch_core::law::{ControlLaw, Law, LawParams, OutputParams, Tick};
+use clutch_core::params::Choice;
 use clutch_core::{
     Counts, FixedCounts, Micros, ObserverParams, PlantParams, Real, Servo, ServoParams,
     SmoothedDerivativeParams, Target, VelocityParams,

@@ -140,7 +140,6 @@ fn main() -> Result<()> {
         Verb::Stubs => stubs::generate(&python::interpreter()?, false).map(drop),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),
         Verb::Size { revisions } => size::print(&revisions),
-    },
         Verb::Generate { check } => generate(if check { &["--check"] } else { &[] }),
         Verb::Figures => figures(),
     }
