@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Callable
+from concurrent.futures import CancelledError
 from typing import Any, Protocol
 
 __all__ = ["Executor", "Future", "RayExecutor"]
@@ -37,11 +38,11 @@ class Future(Protocol):
         ...
 
     def result(self) -> Any:
-        """The function's result, or its exception."""
+        """The function's result, or its exception; ``concurrent.futures.CancelledError`` if it was cancelled."""
         ...
 
     def cancel(self) -> Any:
-        """Ask it not to begin."""
+        """Ask it not to begin. A true answer says that it is cancelled."""
         ...
 
 
@@ -66,17 +67,32 @@ class Executor(Protocol):
 class _RayFuture:
     def __init__(self, ray: Any, reference: Any) -> None:
         self._ray, self._reference = ray, reference
+        # Kept here: what Ray answers for a cancelled task depends on whether it had begun, and how far it came.
+        self._cancelled = False
 
     def done(self) -> bool:
+        if self._cancelled:
+            return True
         ready, _ = self._ray.wait([self._reference], timeout=0)
         return bool(ready)
 
     def result(self) -> Any:
-        return self._ray.get(self._reference)
+        try:
+            result = None if self._cancelled else self._ray.get(self._reference)
+        except Exception as e:
+            # By another thread meanwhile, or by somebody who has the reference.
+            if self._cancelled or isinstance(e, self._ray.exceptions.TaskCancelledError):
+                raise CancelledError from e
+            raise
+        if self._cancelled:
+            raise CancelledError
+        return result
 
     def cancel(self) -> bool:
-        self._ray.cancel(self._reference)
-        return True
+        if not self.done():
+            self._ray.cancel(self._reference)
+            self._cancelled = True
+        return self._cancelled
 
 
 class RayExecutor:
@@ -133,7 +149,8 @@ class RayExecutor:
         Returns
         -------
         Future
-            With ``done()``, ``result()`` and ``cancel()``.
+            With ``done()``, ``result()`` and ``cancel()``. Cancelling also stops a call that has begun: its worker
+            is interrupted, as by Ctrl-C. ``cancel()`` is false, and changes nothing, once the call has ended.
 
         Examples
         --------
