@@ -106,7 +106,8 @@ impl Path {
         wrong: impl Fn(ParamError) -> PyErr,
     ) -> PyResult<Path> {
         let spec = scenario.spec();
-        let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev).map_err(|e| core_error(py, &e))?;
+        let encoder =
+            Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev).map_err(|e| core_error(py, &e))?;
         let ticks = scenario.ticks();
         let mut targets = Vec::new();
         let room = usize::try_from(ticks).is_ok_and(|n| targets.try_reserve_exact(n).is_ok());

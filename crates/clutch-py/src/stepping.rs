@@ -289,7 +289,8 @@ impl StickSlip {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         let wrong = |e: ParamError| core_error(py, &e);
-        let (encoder, period) = (Encoder::new(spec.rig.encoder.sensor.counts_per_rev).map_err(wrong)?, spec.period);
+        let (encoder, period) =
+            (Encoder::new(spec.rig.encoder.sensor.counts_per_rev).map_err(wrong)?, spec.period);
         let single = StickSlipParams::default();
         let double = StickSlipParams::default();
         Ok(StickSlip(match scenario.0.scalar() {
