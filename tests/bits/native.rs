@@ -2,6 +2,8 @@
 //! workload's results for these counts on this machine.
 
 use clutch_bits::{FIELDS, Job, Kind, RECORD, Workload, hash, setting_to_bytes};
+use clutch_core::law::LawParams;
+use clutch_core::params::Choice;
 use clutch_core::{Counts, FixedCounts, Micros};
 use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_node::Settings;
@@ -11,7 +13,7 @@ use std::fmt;
 use std::path::Path;
 
 /// Names and scenarios.
-pub const RUNS: [(&str, &str); 11] = [
+pub const RUNS: [(&str, &str); 13] = [
     ("pd_ramp", include_str!("runs/pd_ramp.toml")),
     ("pd_sine_bench", include_str!("runs/pd_sine_bench.toml")),
     ("pd_table_cubic", include_str!("runs/pd_table_cubic.toml")),
@@ -23,6 +25,8 @@ pub const RUNS: [(&str, &str); 11] = [
     ("smc_table_linear", include_str!("runs/smc_table_linear.toml")),
     ("sign_ramp_bench", include_str!("runs/sign_ramp_bench.toml")),
     ("sign_trapezoid", include_str!("runs/sign_trapezoid.toml")),
+    ("pid_ramp_bench", include_str!("runs/pid_ramp_bench.toml")),
+    ("pid_sine", include_str!("runs/pid_sine.toml")),
 ];
 
 /// The reason of a failure.
@@ -44,6 +48,12 @@ pub struct Run {
     pub counts: Vec<i32>,
     /// The simulation that gave them.
     pub trace: Trace,
+    /// The law.
+    pub law: LawParams,
+    /// The path's place among the kinds of paths.
+    pub path: usize,
+    /// Bytes of a record that the hash covers.
+    pub hashed: usize,
     /// The records of this machine.
     pub records: Vec<u8>,
     /// Their hash.
@@ -72,8 +82,10 @@ impl Run {
             spoil: None,
         };
         let counts = trace.counts.clone();
-        let (records, hash) = records(&settings, &job, &counts)?;
-        Ok(Run { name, toml, title: scenario.name().to_owned(), settings, job, counts, trace, records, hash })
+        let (records, hash, hashed) = records(&settings, &job, &counts)?;
+        let (law, path) = (scenario.spec().law, Choice::<f64>::chosen(&scenario.spec().reference));
+        let title = scenario.name().to_owned();
+        Ok(Run { name, toml, title, settings, job, counts, trace, law, path, hashed, records, hash })
     }
 
     /// All of them.
@@ -104,17 +116,18 @@ impl Run {
     }
 }
 
-fn records(settings: &Settings, job: &Job, counts: &[i32]) -> Result<(Vec<u8>, u32), Wrong> {
+fn records(settings: &Settings, job: &Job, counts: &[i32]) -> Result<(Vec<u8>, u32, usize), Wrong> {
     let first = Counts(*counts.first().ok_or("a run without a tick")?);
     let workload = Workload::new(settings, job.origin, first, job.volts);
     let mut workload = workload.map_err(|misfit| format!("{misfit:?}"))?;
+    let hashed = workload.hashed();
     let (mut records, mut hash) = (Vec::with_capacity(counts.len() * RECORD), hash());
     for counts in counts {
         let record = workload.tick(Counts(*counts));
-        hash.update(&record);
+        hash.update(&record[..hashed]);
         records.extend(record);
     }
-    Ok((records, hash.finalize()))
+    Ok((records, hash.finalize(), hashed))
 }
 
 /// The fields of a record with their bytes.
@@ -204,12 +217,12 @@ pub fn table(runs: &[Run]) -> String {
 pub fn write(runs: &[Run], folder: &Path) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
     let mut list = String::new();
-    for Run { name, toml, job, counts, records, hash, .. } in runs {
+    for Run { name, toml, job, counts, records, hash, hashed, .. } in runs {
         let counts: Vec<u8> = counts.iter().flat_map(|counts| counts.to_le_bytes()).collect();
         std::fs::write(folder.join(format!("{name}.toml")), toml)?;
         std::fs::write(folder.join(format!("{name}.counts")), counts)?;
         std::fs::write(folder.join(format!("{name}.records")), records)?;
-        list += &format!("{name} {} {hash:08x}\n", job.ticks);
+        list += &format!("{name} {} {hash:08x} {hashed}\n", job.ticks);
     }
     let fields: String = FIELDS.iter().map(|f| format!("{} {}\n", f.name, f.kind.numpy())).collect();
     std::fs::write(folder.join("fields.txt"), fields)?;

@@ -77,7 +77,7 @@ fn run(job: &Job, input: &mut Input, records: &HostFile) -> Result<u32, Failed> 
         {
             *byte ^= 1 << (bit % 8);
         }
-        hash.update(&record);
+        hash.update(record.get(..workload.hashed()).unwrap_or_default());
         if job.dump && !records.write(&record) {
             return Err(Failed::Files);
         }

@@ -7,5 +7,5 @@ mod record;
 mod workload;
 
 pub use job::{HEADER, Job, SETTING, setting_from_bytes, setting_to_bytes};
-pub use record::{FIELDS, Field, Kind, RECORD, hash};
+pub use record::{FIELDS, Field, Kind, RECORD, hash, hashed};
 pub use workload::Workload;

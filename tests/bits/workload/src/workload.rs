@@ -1,7 +1,7 @@
 //! A run, tick by tick.
 
-use crate::record::{RECORD, record};
-use clutch_core::law::LawState;
+use crate::record::{RECORD, hashed, record};
+use clutch_core::law::{ControlLaw, LawState};
 use clutch_core::{
     Counts, FixedCounts, ParamError, Servo, ServoState, StickSlip, StickSlipParams, StickSlipState, Target,
 };
@@ -54,6 +54,12 @@ impl<'a> Workload<'a> {
     fn target(&self) -> Target<f32> {
         let target = self.path.target(self.settings.knots(), self.tick);
         Target { position: target.position.plus(self.origin), ..target }
+    }
+
+    /// Bytes of a record that the hash of the run covers.
+    #[must_use]
+    pub fn hashed(&self) -> usize {
+        hashed(self.servo.law().term_names().len())
     }
 
     /// One period: counts in, every output out.
