@@ -44,7 +44,7 @@ fn what_can_be_refused_without_a_board_is_refused_before_one_is_looked_for() {
     let refused = |scenario, options| Session::new(scenario, options).unwrap_err();
     let weak = scenario("board_smc_2", &[("law.smc.kp_v", "0.1")]);
     let refusal = refused(weak.clone(), options.clone());
-    assert!(matches!(&refusal, SessionError::NotCertified { scenario } if *scenario == weak.name));
+    assert!(matches!(&refusal, SessionError::NotCertified { scenario } if *scenario == weak.name()));
     let asked_for = Session::new(weak, SessionOptions { uncertified: true, ..options.clone() }).unwrap();
     assert!(!asked_for.certified());
 
@@ -68,11 +68,11 @@ fn what_can_be_refused_without_a_board_is_refused_before_one_is_looked_for() {
 #[test]
 fn a_board_that_closes_the_loop_gets_a_scenario_in_single_precision() {
     let double = scenario("board_smc_2", &[]);
-    assert_eq!(double.scalar, ScalarKind::F64);
+    assert_eq!(double.scalar(), ScalarKind::F64);
     let address = "/dev/ttyNOTHERE7".parse::<Address>().unwrap();
     let options = SessionOptions { board: Board::Controller(address), ..options() };
     let session = Session::new(double.clone(), options).unwrap();
-    assert_eq!(session.scenario().scalar, ScalarKind::F32);
+    assert_eq!(session.scenario().scalar(), ScalarKind::F32);
     let set = [("sampling.scalar", "f32")];
     assert_eq!(session.scenario().canonical(), scenario("board_smc_2", &set).canonical());
     let session = Session::new(double.clone(), self::options()).unwrap();
@@ -84,7 +84,7 @@ fn the_path_is_announced_run_to_its_end_and_done() {
     let session = Session::new(scenario("board_smc_2", &[("run.duration_s", "1.2")]), options()).unwrap();
     let (summary, events) = run(&session, &Arc::default(), f64::INFINITY);
     let [Event::Announced(announcement)] = &events[..] else { panic!("{events:?}") };
-    assert_eq!(announcement.title, session.scenario().name);
+    assert_eq!(announcement.title, session.scenario().name());
     let gains = announcement.rows.iter().find(|(name, _)| *name == "gains").unwrap();
     assert_eq!(gains.1, "certified for the bounds given");
     assert_eq!(
