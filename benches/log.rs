@@ -48,7 +48,7 @@ fn records() -> Vec<Record> {
                 target_velocity: 0.035,
                 error,
                 error_rate: rate,
-                terms: [rate + 5.0 * error, 4.0 + error, demand - 4.0],
+                terms: [rate + 5.0 * error, 4.0 + error, demand - 4.0].into_iter().collect(),
                 ..CommandRecord::default()
             };
             [Record::Sample(sample), Record::Command(command)]

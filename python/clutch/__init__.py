@@ -22,11 +22,13 @@ from clutch import _processor  # noqa: F401
 from clutch import _clutch, _tables
 from clutch._certificate import Certificate
 from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
-from clutch._errors import ParamError
+from clutch._errors import LoopError, ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
+from clutch._loop import LoopResult, loop
+from clutch._metrics import Metrics
 from clutch._model import Scenario
 from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
-from clutch._run import Metrics, Result, simulate
+from clutch._run import Result, simulate
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
 from clutch._tables import *  # noqa: F403
 
@@ -39,6 +41,8 @@ __all__ = [
     "Certificate",
     "Difference",
     "Log",
+    "LoopError",
+    "LoopResult",
     "Metrics",
     "PaperFigure",
     "PaperPanel",
@@ -62,6 +66,7 @@ __all__ = [
     "grid",
     "gym",
     "latin_hypercube",
+    "loop",
     "plot",
     "read_log",
     "replay",

@@ -18,107 +18,22 @@ from typing_extensions import CapsuleType
 from clutch import _model
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "VERSION", "Controller", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "StickSlip", "Sweep", "Table", "Target", "Tick", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "scenarios", "simulate", "stribeck"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "run_loop", "scenarios", "simulate", "stribeck"]
 
 BUILD: Final[str]
 """
 Version and commit of the build, as logs record it.
 """
 
+DEFAULT_PRIORITY: Final[int]
+"""
+Priority of the loop's control thread unless another is given.
+"""
+
 VERSION: Final[str]
 """
 Version of the package.
 """
-
-@final
-class Controller:
-    """
-    The law of a scenario with its state, sampled by you: counts and target in, volts out.
-
-    It is the servo that the simulator, the loop and the boards run, bit for bit. It begins as
-    `clutch.simulate` does.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Law, gains, sampling, encoder, converter; its scalar, f32 or f64.
-
-    Examples
-    --------
-    The loop of `clutch.simulate`, by hand:
-
-    >>> import clutch
-    >>> scenario = clutch.Scenario.load("smc_2").override({"run.duration_s": 2.0})
-    >>> law, plant, path = clutch.Controller(scenario), clutch.Plant(scenario), scenario.path()
-    >>> volts = []
-    >>> for tick in range(len(path)):
-    ...     volts.append(law.step(plant.counts, path.at(tick)))
-    ...     counts = plant.step(volts[-1])
-    >>> volts == clutch.simulate(scenario).samples["voltage_v"].tolist()
-    True
-    """
-    def __copy__(self, /) -> Controller: ...
-    def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Controller: ...
-    @property
-    def code(self, /) -> int:
-        """
-        Code for the converter at the last step.
-        """
-    def copy(self, /) -> Controller:
-        """
-        A snapshot: continues from here by itself.
-        """
-    @property
-    def demand(self, /) -> float:
-        """
-        Voltage that the law demanded of the converter at the last step, V.
-        """
-    @property
-    def error(self, /) -> float:
-        """
-        Position error of the last step as the law saw it, rad.
-        """
-    @property
-    def error_rate(self, /) -> float:
-        """
-        Its rate as the law saw it, rad/s.
-        """
-    @property
-    def limit(self, /) -> int:
-        """
-        The limit that decided the last voltage, as in a run's column `limit`: 0 the law, 1 the
-        lowest voltage, 2 the highest, 3 a demand that was not a number.
-        """
-    @property
-    def limited(self, /) -> bool:
-        """
-        True if a limit of the output decided the last voltage.
-        """
-    def start(self, /, counts: SupportsFloat | SupportsIndex, target: Target, voltage: SupportsFloat | SupportsIndex) -> None:
-        """
-        Begins anew: the shaft at `counts` moves with the target, the brake has been at `voltage`.
-        """
-    def step(self, /, counts: SupportsFloat | SupportsIndex, target: Target) -> float:
-        """
-        One sampling period: the encoder's counts and the target in, the brake's voltage out, V.
-
-        Parameters
-        ----------
-        counts : int
-            The encoder's counts; a fraction if the scenario's sensor is ideal.
-        target : Target
-            The path now.
-
-        Returns
-        -------
-        float
-            The voltage to command, V, as the converter gives it.
-        """
-    @property
-    def terms(self, /) -> dict[str, float]:
-        """
-        The law's intermediate terms at the last step, by name with unit.
-        """
 
 @final
 class Log:
@@ -359,6 +274,97 @@ class Scenario:
     def to_toml(self, /) -> str:
         """
         The scenario's file, defaults filled in.
+        """
+
+@final
+class Servo:
+    """
+    The law of a scenario with all that it remembers, sampled by you: counts and target in,
+    volts out.
+
+    It is the servo that the simulator, the loop and the boards run, bit for bit. It begins as
+    `clutch.simulate` does.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Law, gains, sampling, encoder, converter; its scalar, f32 or f64.
+
+    Examples
+    --------
+    The loop of `clutch.simulate`, by hand:
+
+    >>> import clutch
+    >>> scenario = clutch.Scenario.load("smc_2").override({"run.duration_s": 2.0})
+    >>> servo, plant, path = clutch.Servo(scenario), clutch.Plant(scenario), scenario.path()
+    >>> volts = []
+    >>> for tick in range(len(path)):
+    ...     volts.append(servo.step(plant.counts, path.at(tick)))
+    ...     counts = plant.step(volts[-1])
+    >>> volts == clutch.simulate(scenario).samples["voltage_v"].tolist()
+    True
+    """
+    def __copy__(self, /) -> Servo: ...
+    def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Servo: ...
+    @property
+    def code(self, /) -> int:
+        """
+        Code for the converter at the last step.
+        """
+    def copy(self, /) -> Servo:
+        """
+        A snapshot: goes on from here by itself.
+        """
+    @property
+    def demand(self, /) -> float:
+        """
+        Voltage that the law asked of the converter at the last step, V.
+        """
+    @property
+    def error(self, /) -> float:
+        """
+        Position error of the last step as the law saw it, rad.
+        """
+    @property
+    def error_rate(self, /) -> float:
+        """
+        Its rate as the law saw it, rad/s.
+        """
+    @property
+    def limit(self, /) -> int:
+        """
+        What decided the last voltage, as in a run's column `limit`: 0 the law, 1 the lowest voltage,
+        2 the highest, 3 a demand that was not a number.
+        """
+    @property
+    def limited(self, /) -> bool:
+        """
+        Whether a limit of the output decided the last voltage.
+        """
+    def start(self, /, counts: SupportsFloat | SupportsIndex, target: Target, voltage: SupportsFloat | SupportsIndex) -> None:
+        """
+        Begins anew: the shaft at `counts` moves with the target, the brake has been at `voltage`.
+        """
+    def step(self, /, counts: SupportsFloat | SupportsIndex, target: Target) -> float:
+        """
+        One sampling period: the encoder's counts and the target in, the brake's voltage out, V.
+
+        Parameters
+        ----------
+        counts : int
+            The encoder's counts; a fraction if the scenario's sensor is ideal.
+        target : Target
+            The path now.
+
+        Returns
+        -------
+        float
+            The voltage to command, V, as the converter gives it.
+        """
+    @property
+    def terms(self, /) -> dict[str, float]:
+        """
+        The law's intermediate terms at the last step, by name with unit.
         """
 
 @final
@@ -662,6 +668,12 @@ def reproduce(progress: Callable[[int, int], object] | None = None) -> Paper:
 def rig(name: str) -> dict[str, Any]:
     """
     The table of a built-in rig: `ideal`, `paper`, `bench`.
+    """
+
+def run_loop(scenario: _model.Scenario | Scenario, *, port: str | None, board: str | None, baud: SupportsIndex | None, log: str | PathLike[str] | None, uncertified: bool, faults: Sequence[str], fault_seed: SupportsIndex, strict: bool, pace: str, wait: str, spin_us: SupportsIndex, thread_priority: SupportsIndex, lock_memory: bool, cpu_affinity: SupportsIndex | None) -> tuple[dict[str, Any], str, str, str | None]:
+    """
+    Runs a session; its summary, the same in words, what it had said it would do, and the scenario's text if that was
+    changed for the board's sake.
     """
 
 def scenarios() -> list[str]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
 from html import escape
 from typing import TYPE_CHECKING, Any
 
 from clutch import _clutch
 from clutch._clutch import Table, Tick
+from clutch._metrics import FIGURES, Metrics
 from clutch._model import Scenario
 
 if TYPE_CHECKING:
@@ -32,59 +32,6 @@ def as_scenario(scenario: ScenarioLike, overrides: Mapping[str, object] | None =
         return Scenario.load(scenario, overrides or {})
     kind = type(scenario).__name__
     raise TypeError(f"scenario is of type {kind}: expected a clutch.Scenario, a built-in name or a path")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Metrics:
-    """The quality of a run. All figures are taken after the settling time, with the true position.
-
-    Attributes
-    ----------
-    measured_s : float
-        Time over which the figures were taken, s.
-    max_error_rad, rms_error_rad, mean_error_rad : float
-        Largest magnitude, root mean square and mean of the error `e = θ_d − θ`, rad.
-    iae_rad_s : float
-        Integral of the error's magnitude, rad s.
-    stick_slip_cycles_per_s : float
-        Stick-slip cycles (entries into the stuck state) per second.
-    stick_time_fraction : float
-        Share of the time that the shaft was stuck.
-    stair_height_rad : float
-        Largest movement between one stick and the next, rad; 0 with fewer than two.
-    break_away_torque_nm : float or None
-        Mean driving torque at break-away, N m; None if the shaft never broke away.
-    control_variation_v_s : float
-        Total variation of the voltage per second, V/s.
-    jerk_rms_rad_s3 : float
-        Root mean square of the sampled jerk, rad/s³.
-    detected_stick_slip_cycles_per_s, detected_stick_time_fraction : float
-        The same as the encoder shows it, and as a loop on hardware would count it.
-
-    Examples
-    --------
-    >>> import clutch
-    >>> metrics = clutch.simulate("smc_2").metrics
-    >>> metrics.max_error_rad < 0.003
-    True
-    """
-
-    measured_s: float
-    max_error_rad: float
-    rms_error_rad: float
-    mean_error_rad: float
-    iae_rad_s: float
-    stick_slip_cycles_per_s: float
-    stick_time_fraction: float
-    stair_height_rad: float
-    break_away_torque_nm: float | None
-    control_variation_v_s: float
-    jerk_rms_rad_s3: float
-    detected_stick_slip_cycles_per_s: float
-    detected_stick_time_fraction: float
-
-
-METRICS: tuple[str, ...] = tuple(f.name for f in fields(Metrics))
 
 
 class Result:
@@ -166,7 +113,7 @@ class Result:
     def to_xarray(self) -> xr.Dataset:
         """Return the samples as an ``xarray.Dataset`` over ``time_s``; figures are its attributes."""
         data = self.samples.to_xarray("time_s")
-        numbers = {name: getattr(self.metrics, name) for name in METRICS}
+        numbers = {name: getattr(self.metrics, name) for name in FIGURES}
         data.attrs = {"scenario": self.scenario.name, "engine": self.engine}
         data.attrs.update({name: value for name, value in numbers.items() if value is not None})
         return data
@@ -223,7 +170,7 @@ class Result:
     def _repr_html_(self) -> str:
         rows = "".join(
             f"<tr><td>{name}</td><td>{'–' if value is None else format(value, '.6g')}</td></tr>"
-            for name, value in ((name, getattr(self.metrics, name)) for name in METRICS)
+            for name, value in ((name, getattr(self.metrics, name)) for name in FIGURES)
         )
         return f"<table><caption>{escape(self.scenario.name)}</caption>{rows}</table>"
 

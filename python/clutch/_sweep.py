@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Any, Literal
 from clutch import _clutch, executors
 from clutch._clutch import Table
 from clutch._errors import ParamError
+from clutch._metrics import FIGURES
 from clutch._model import Scenario
 from clutch._record import _Params
 from clutch._record import _plain as _python
-from clutch._run import METRICS, ScenarioLike, as_scenario
+from clutch._run import ScenarioLike, as_scenario
 from clutch._units import attributes
 
 if TYPE_CHECKING:
@@ -428,7 +429,7 @@ def _seeds(seeds: int | Iterable[int]) -> tuple[int, ...]:
 
 
 def _known_metrics(metrics: str | Sequence[str] | None) -> list[str]:
-    known = [*METRICS, "certified"]
+    known = [*FIGURES, "certified"]
     chosen = [metrics] if isinstance(metrics, str) else known if metrics is None else list(metrics)
     unknown = [m for m in chosen if m not in known]
     if unknown:
@@ -895,7 +896,8 @@ class SweepResult:
     def to_xarray(self) -> xarray.Dataset:
         """The metrics with labelled dimensions: those of a full grid have the keys' names, else it is "row".
 
-        Runs that have not finished are NaN. Each metric and each dimension has its unit, as an attribute.
+        Runs that have not finished are NaN. Each metric has its unit and its name in words as attributes, which
+        xarray's plots show; each dimension has its unit.
 
         Examples
         --------
@@ -907,10 +909,14 @@ class SweepResult:
         import numpy as np
         import xarray
 
+        def described(name: str) -> dict[str, str]:
+            figure = FIGURES.get(name)
+            return {"long_name": figure.label, "units": figure.unit} if figure else {}
+
         runs, names = self.table["row"], [*self.metrics, "error"]
         if self.samples.axes is None:
             coords = {key: ("row", np.asarray(self.table[key]), attributes(key)) for key in self.keys}
-            columns = {name: ("row", np.asarray(self.table[name]), attributes(name)) for name in names}
+            columns = {name: ("row", np.asarray(self.table[name]), described(name)) for name in names}
             return xarray.Dataset(columns, coords={"row": runs} | coords)
         axes = [np.asarray(_column(list(axis))) for axis in self.samples.axes]
         shape = [len(axis) for axis in axes]
@@ -920,6 +926,6 @@ class SweepResult:
             if len(self) < self.total:
                 some, column = column, np.full(self.total, "" if name == "error" else math.nan, dtype=column.dtype)
                 column[runs] = some
-            values[name] = (self.keys, column.reshape(shape), attributes(name))
+            values[name] = (self.keys, column.reshape(shape), described(name))
         coords = {key: (key, axis, attributes(key)) for key, axis in zip(self.keys, axes, strict=True)}
         return xarray.Dataset(values, coords=coords)

@@ -22,6 +22,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
+from clutch._metrics import FIGURES
 from clutch._units import split
 
 if TYPE_CHECKING:
@@ -155,14 +156,12 @@ def _label(key: str) -> str:
 
 
 def _metric(name: str) -> tuple[str, float]:
-    """Label of a metric, angles in degrees, and the factor that takes it there."""
-    if "." in name:
+    """Label of a column of a sweep, and the factor that takes it into the label's unit."""
+    figure = FIGURES.get(name)
+    if figure is None:
         return _label(name), 1.0
-    quantity, unit = split(name)
-    words = quantity.replace("_", " ").replace("stick slip", "stick-slip")
-    degrees = unit.replace("rad", "°")
-    factor = 57.29577951308232 if degrees != unit else 1.0
-    return (f"{words} ({degrees})" if unit else words), factor
+    unit = f" ({figure.shown_unit})" if figure.shown_unit else ""
+    return figure.label + unit, figure.factor
 
 
 def _thin(x: NDArray[Any], y: NDArray[Any], columns: int) -> NDArray[np.intp]:
@@ -585,7 +584,7 @@ def sweep_map(
     x, y : str
         Swept keys of the scenario, as ``"law.smc.kp_v"``.
     value : str
-        The metric to draw, as ``"max_error_rad"``. Angles are drawn in degrees.
+        The metric to draw, as ``"max_error_rad"``, in words and in the unit of ``clutch sim``: errors in degrees.
     contours : str, optional
         The metric of the lines; None for none. The default is left out where the sweep does not have it.
     ax : matplotlib.axes.Axes, optional

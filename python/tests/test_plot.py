@@ -292,7 +292,7 @@ def test_a_map_has_the_means_over_the_seeds_in_the_cells_of_their_keys(gains, tm
     ax = plot.sweep_map(gains, "law.smc.kp_v", "law.smc.boundary_rad_s", "max_error_rad")
     drawn(ax, tmp_path, "map")
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("law.smc.kp (V)", "law.smc.boundary (rad/s)")
-    assert ax.figure.axes[1].get_ylabel() == "max error (°)"
+    assert ax.figure.axes[1].get_ylabel() == "max |error| (°)"
     assert names(ax) == ["lines: stick-slip (cycles/s)"]
     values = mesh(ax).get_array()
     assert values.shape == (2, 3)
@@ -321,7 +321,7 @@ def test_missing_cells_are_empty_before_a_hatched_ground(tmp_path):
     assert np.array_equal(np.ma.getmaskarray(mesh(ax).get_array()), mask)
     assert ax.patch.get_hatch() == "////"
     assert ax.get_xlabel() == "law.pd.kp (V/rad)" and ax.get_ylabel() == "run.seed"
-    assert ax.figure.axes[1].get_ylabel() == "jerk rms (°/s³)"
+    assert ax.figure.axes[1].get_ylabel() == "jerk RMS (rad/s³)"
 
 
 def test_values_spaced_by_factors_get_a_logarithmic_axis_with_plain_numbers():
@@ -402,16 +402,19 @@ def test_a_keys_label_has_the_unit_that_its_name_ends_with(key, label):
 @pytest.mark.parametrize(
     ("name", "label", "factor"),
     [
-        ("max_error_rad", "max error (°)", 180 / np.pi),
-        ("iae_rad_s", "iae (° s)", 180 / np.pi),
-        ("jerk_rms_rad_s3", "jerk rms (°/s³)", 180 / np.pi),
+        ("max_error_rad", "max |error| (°)", 180 / np.pi),
+        ("iae_rad_s", "integral of |error| (° s)", 180 / np.pi),
+        ("jerk_rms_rad_s3", "jerk RMS (rad/s³)", 1.0),
         ("stick_slip_cycles_per_s", "stick-slip (cycles/s)", 1.0),
-        ("stick_time_fraction", "stick time fraction", 1.0),
-        ("break_away_torque_nm", "break away torque (N m)", 1.0),
-        ("control_variation_v_s", "control variation (V/s)", 1.0),
+        ("stick_time_fraction", "time stuck (%)", 100.0),
+        ("break_away_torque_nm", "torque at break-away (mN m)", 1000.0),
+        ("control_variation_v_s", "voltage variation (V/s)", 1.0),
+        ("detected_stick_slip_cycles_per_s", "stick-slip seen by the encoder (cycles/s)", 1.0),
+        ("certified", "certified", 1.0),
+        ("law.smc.kp_v", "law.smc.kp (V)", 1.0),
     ],
 )
-def test_a_metrics_label_is_words_and_its_angles_are_degrees(name, label, factor):
+def test_a_metric_is_drawn_in_the_words_and_the_unit_of_the_command(name, label, factor):
     assert plot._metric(name) == (label, pytest.approx(factor))
 
 

@@ -73,7 +73,7 @@ impl Run {
         };
         let counts = trace.counts.clone();
         let (records, hash) = records(&settings, &job, &counts)?;
-        Ok(Run { name, toml, title: scenario.name, settings, job, counts, trace, records, hash })
+        Ok(Run { name, toml, title: scenario.name().to_owned(), settings, job, counts, trace, records, hash })
     }
 
     /// All of them.

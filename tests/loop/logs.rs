@@ -27,7 +27,7 @@ fn the_log_of_every_simulation_with_an_encoder_replays_identically() {
         let _ = run(&["sim", built_in.name, "--log", path]).expect(0);
         let read = read_log(&log);
         assert!(read.complete && read.commands.len() as u64 == scenario.ticks(), "{}", built_in.name);
-        if scenario.spec().rig.encoder_quantised {
+        if scenario.spec().rig.encoder.quantised {
             replays_identically(&log);
             replayed += 1;
         } else {

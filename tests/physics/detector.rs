@@ -42,7 +42,7 @@ fn measure(rig: &RigParams, law: LawParams, rate: f64) -> (f64, f64, f64, f64) {
         let run = simulate::<f64>(&spec).unwrap();
         let true_sticks = sticks(&run);
         let called: Vec<f64> =
-            run.detected.ticks.iter().map(|k| *k as f64 * 1e-3).filter(|t| *t >= 1.0).collect();
+            run.detections.iter().map(|k| *k as f64 * 1e-3).filter(|t| *t >= 1.0).collect();
         calls += called.len();
         // A call is right if the shaft was stuck at some time in the silence that led to it.
         let window = visible(rate) + 2e-3;

@@ -121,7 +121,7 @@ fn without_latency_the_loop_is_the_simulation_bit_for_bit() {
 
 fn equal(scenario: &Scenario, what: &str) {
     let run = scenario.run(Keep::Trace, clutch_sim::progress::UNWATCHED).expect("a simulation");
-    let report = match scenario.scalar {
+    let report = match scenario.scalar() {
         clutch_sim::scenario::ScalarKind::F32 => world::<f32>(scenario),
         clutch_sim::scenario::ScalarKind::F64 => world::<f64>(scenario),
     };

@@ -1,5 +1,7 @@
 //! Scenario files: their contents, and the errors of bad ones.
 
+mod metrics;
+
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::BUILT_IN;
 use clutch_sim::{Keep, Scenario};

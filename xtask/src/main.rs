@@ -2,11 +2,14 @@
 
 mod firmware;
 mod fuzz;
+mod product;
 mod python;
 mod release;
 mod run;
+mod size;
 mod stubs;
 mod test;
+mod touch;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
@@ -79,6 +82,22 @@ enum Verb {
     },
     /// Regenerates the type stub of the Python package's native module.
     Stubs,
+    /// Counts the files and places in which a fact of each kind is written: a law, a metric, … Two revisions
+    /// stand side by side.
+    Touch {
+        /// Revisions of git.
+        #[arg(value_name = "REV", default_value = "HEAD")]
+        revisions: Vec<String>,
+        /// Lists each file below the table.
+        #[arg(long)]
+        list: bool,
+    },
+    /// Counts the lines of product code by crate. Two revisions stand side by side.
+    Size {
+        /// Revisions of git.
+        #[arg(value_name = "REV", default_value = "HEAD")]
+        revisions: Vec<String>,
+    },
     /// Writes what follows from the declarations of parameters: Python's classes, tables of the documentation, the
     /// schema of scenario files.
     Generate {
@@ -119,6 +138,9 @@ fn main() -> Result<()> {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
         Verb::Stubs => stubs::generate(&python::interpreter()?, false).map(drop),
+        Verb::Touch { revisions, list } => touch::print(&revisions, list),
+        Verb::Size { revisions } => size::print(&revisions),
+    },
         Verb::Generate { check } => generate(if check { &["--check"] } else { &[] }),
         Verb::Figures => figures(),
     }

@@ -83,8 +83,14 @@ impl Program {
     }
 
     /// Runs it unseen; gives its success, and its output on both streams.
-    pub(crate) fn quietly(mut self) -> Result<(bool, String)> {
-        let shown = self.announce();
+    pub(crate) fn quietly(self) -> Result<(bool, String)> {
+        self.announce();
+        self.silently()
+    }
+
+    /// The same, without a word of it.
+    pub(crate) fn silently(mut self) -> Result<(bool, String)> {
+        let shown = self.shown();
         let output = self.0.output().with_context(|| format!("cannot start: {shown}"))?;
         let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         Ok((output.status.success(), text.into_owned()))

@@ -72,6 +72,8 @@ const NAMED: &[(&str, &str)] = &[
         "def simulate(scenario: Any, law: Any | None = None)",
         "def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] | None = None)",
     ),
+    ("def run_loop(scenario: Any,", "def run_loop(scenario: _model.Scenario | Scenario,"),
+    ("-> tuple[Any, str, str, str | None]:", "-> tuple[dict[str, Any], str, str, str | None]:"),
     ("velocity: Incomplete) -> Incomplete", "velocity: NDArray[np.float64]) -> NDArray[np.float64]"),
     ("table: dict", "table: dict[str, Any]"),
     ("tables: dict,", "tables: dict[str, Any],"),

@@ -1,14 +1,14 @@
 //! `clutch daq`.
 
-use crate::{Exit, ScenarioArgs, print};
+use crate::args::ScenarioArgs;
+use crate::output::{Exit, print};
+use crate::signals::stop_flag;
 use anyhow::Context;
 use clap::Args;
 use clutch_loop::faults::Fault;
 use clutch_loop::port::{Address, ClientEvent, Endpoint, Listener, PseudoTerminal};
 use clutch_loop::realtime::WaitMode;
 use clutch_loop::sim_board_server::{self, ServeNotice, ServeOptions};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// Simulates a board in real time: a pseudo-terminal or a TCP address to drive with `clutch loop`.
 ///
@@ -61,7 +61,7 @@ impl Daq {
         };
         let mut text = format!(
             "{path}\n{}: simulated board; connect with: clutch loop {} --port {path}\n",
-            scenario.name,
+            scenario.name(),
             self.scenario.scenario.display()
         );
         for fault in &self.fault {
@@ -95,13 +95,4 @@ impl Daq {
         print(&(text + "\n"))?;
         Ok(Exit::Done)
     }
-}
-
-/// Set by Ctrl-C and SIGTERM.
-pub(crate) fn stop_flag() -> anyhow::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP] {
-        signal_hook::flag::register(signal, stop.clone()).context("signals could not be caught")?;
-    }
-    Ok(stop)
 }

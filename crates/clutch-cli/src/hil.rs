@@ -1,20 +1,20 @@
 //! `clutch hil`.
 
-use crate::loop_verb::cause_text;
-use crate::table::quantities;
-use crate::{Exit, ScenarioArgs, json, key_value, print, sim};
+use crate::args::{ScenarioArgs, key_value};
+use crate::output::{BUILD, Exit, json, not_certified, print};
+use crate::sim;
+use crate::table::{number, quantities};
 use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
-use clutch_log::{LogWriter, Source};
 use clutch_loop::faults::Fault;
-use clutch_loop::from_scenario::{self, BuiltRun};
-use clutch_loop::lockstep_board::LockstepBoard;
-use clutch_loop::lockstep_host::lockstep_host;
+use clutch_loop::lockstep_session::{LockstepOptions, LockstepSession};
 use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
-use clutch_loop::to_log::PRESENT_CODE;
-use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions, VirtualReport as Ran};
+use clutch_loop::session::SessionError;
+use clutch_loop::summary::cause_text;
+use clutch_loop::virtual_time::VirtualReport as Ran;
 use clutch_sim::Scenario;
+use std::io::Write;
 use std::path::PathBuf;
 
 /// Runs the loop on an emulated Cortex-M4F board, with the simulated rig as its encoder and converter.
@@ -81,39 +81,25 @@ impl Hil {
             self.set.push(("safety.limits.deadline_us".to_owned(), "1000000".to_owned()));
         }
         let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone() };
-        let scenario = crate::single_precision(&args, args.load()?)?;
-        let certified = scenario.plan()?.certificate.certified();
-        if !certified && !self.uncertified {
-            print(&crate::not_certified(&scenario, &self.scenario))?;
-            return Ok(Exit::NotCertified);
-        }
-        if let Some(log) = &self.log {
-            crate::new_log(log)?;
-        }
-        let mut built = BuiltRun::<f32>::new(&scenario, 1)?;
-        if self.link == Link::Uart {
-            // The board's own clock continues while this machine computes.
-            built.controller.silence = Micros(10_000_000);
+        let session = match LockstepSession::new(args.load()?, self.options()) {
+            Ok(session) => session,
+            Err(refusal @ SessionError::NotCertified { .. }) => {
+                print(&not_certified(&refusal, &self.scenario))?;
+                return Ok(Exit::NotCertified);
+            }
+            Err(refusal) => return Err(refusal.into()),
+        };
+        if let Some(note) = session.note() {
+            let _ = writeln!(std::io::stderr(), "note: {note}"); // a terminal that has gone away
         }
         let started = std::time::Instant::now();
         let ran = match self.link {
-            Link::Memory => self.on(&scenario, &built, QemuBoard::start(&self.image)?)?,
-            Link::Uart => self.on(&scenario, &built, QemuSerialBoard::start(&self.image)?)?,
+            Link::Memory => session.run(|| QemuBoard::start(&self.image))?,
+            Link::Uart => session.run(|| QemuSerialBoard::start(&self.image))?,
         };
         let took = started.elapsed().as_secs_f64();
-        if let Some(file) = &self.log {
-            let mut header =
-                from_scenario::header(&scenario, &built.servo, Source::Loop, "emulated board", crate::BUILD);
-            header.extra.push((PRESENT_CODE.to_owned(), ran.present.to_string()));
-            header.extra.push(("board".to_owned(), "emulated".to_owned()));
-            header.extra.push(("certified".to_owned(), certified.to_string()));
-            let mut log = LogWriter::create(file, &header)?;
-            for record in &ran.records {
-                log.write(record)?;
-            }
-            log.finish()?;
-        }
-        print(&if self.json { summary(&scenario, &ran, took)? } else { self.text(&scenario, &ran, took) })?;
+        let scenario = session.scenario();
+        print(&if self.json { summary(scenario, &ran, took)? } else { self.text(scenario, &ran, took) })?;
         Ok(match ran.standing.cause {
             Cause::Done => Exit::Done,
             Cause::None => Exit::Failed,
@@ -121,36 +107,26 @@ impl Hil {
         })
     }
 
-    fn on(
-        &self,
-        scenario: &Scenario,
-        built: &BuiltRun<f32>,
-        board: impl LockstepBoard,
-    ) -> anyhow::Result<Ran> {
-        // The last period is the one in which the run ends.
-        let ticks = built.ticks + 1;
-        let params = VirtualOptions {
-            latency_ns: u64::from(self.latency_us) * 1000,
+    fn options(&self) -> LockstepOptions {
+        LockstepOptions {
+            log: self.log.clone(),
+            uncertified: self.uncertified,
             faults: self.fault.clone(),
-            stall: None,
             seed: self.fault_seed,
-            record: self.log.is_some(),
-            duration: scenario.spec().run.duration + 1.0,
-            ticks,
-            settle: scenario.spec().run.settle,
-        };
-        let station = lockstep_host(scenario, built, board, ticks)?;
-        let path = from_scenario::path::<f32>(scenario)?;
-        Ok(VirtualLoop::new(scenario, params, station)?.run(&path)?)
+            latency_ns: u64::from(self.latency_us) * 1000,
+            // The board's own clock runs on while this machine computes.
+            silence: (self.link == Link::Uart).then_some(Micros(10_000_000)),
+            version: BUILD.to_owned(),
+        }
     }
 
     fn text(&self, scenario: &Scenario, ran: &Ran, took: f64) -> String {
         let title = format!(
             "{}\n{} ticks on the emulated board in {took:.1} s, seed {}; figures over {} s after settling",
-            scenario.name,
+            scenario.name(),
             ran.answers,
             scenario.spec().run.seed,
-            crate::table::number(ran.metrics.measured_s)
+            number(ran.metrics.measured_s)
         );
         let mut text = quantities(&title, &sim::figures(&ran.metrics));
         if let Some(file) = &self.log {
@@ -175,7 +151,7 @@ impl Hil {
 
 fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> anyhow::Result<String> {
     json(&serde_json::json!({
-        "scenario": scenario.name,
+        "scenario": scenario.name(),
         "version": env!("CARGO_PKG_VERSION"),
         "seed": scenario.spec().run.seed,
         "ticks": ran.answers,

@@ -1,6 +1,6 @@
 //! `clutch log`.
 
-use crate::{Exit, print};
+use crate::output::{Exit, print};
 use clap::{Args, Subcommand};
 use clutch_log::Limits;
 use std::path::PathBuf;

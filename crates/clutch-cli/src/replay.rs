@@ -1,8 +1,9 @@
 //! `clutch replay`.
 
+use crate::args::key_value;
+use crate::output::{BUILD, Exit, print};
 use crate::plot::{self, Figure, Panel, Series};
 use crate::table::{number, quantities};
-use crate::{Exit, key_value, print};
 use clap::Args;
 use clutch_log::{CommandRecord, Limits, Log};
 use clutch_loop::replay::replay;
@@ -69,11 +70,10 @@ impl Replay {
                     "differs: tick {}, {}: logged {:?}, replayed {:?}\n",
                     d.tick, d.field, d.logged, d.replayed
                 );
-                if log.header.version != crate::BUILD {
+                if log.header.version != BUILD {
                     text += &format!(
                         "the log was written by version {}, this is {}\n",
-                        log.header.version,
-                        crate::BUILD
+                        log.header.version, BUILD
                     );
                 }
                 Exit::Fault

@@ -1,11 +1,12 @@
 //! `clutch reproduce`.
 
+use crate::output::{Exit, json, print, with_progress, write};
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{ReportFigure, claims_table, html};
 use crate::table::number;
-use crate::{Exit, json, print, with_progress, write};
 use anyhow::Context;
 use clap::Args;
+use clutch_core::FrictionParams;
 use clutch_sim::paper::{self, FigureData, SEEDS, Table3Row};
 use std::path::PathBuf;
 
@@ -130,7 +131,6 @@ fn intro() -> Vec<String> {
 fn settings() -> Vec<(String, String)> {
     let row = |a: &str, b: String| (a.to_owned(), b);
     let bench = clutch_sim::RigParams::bench();
-    let f = bench.friction;
     vec![
         row("Version", env!("CARGO_PKG_VERSION").to_owned()),
         row(
@@ -142,12 +142,14 @@ fn settings() -> Vec<(String, String)> {
         row("Seeds", format!("{SEEDS:?}")),
         row(
             "Bench: friction",
-            format!(
-                "mu_s {}, mu_d {}, Stribeck velocity {} rad/s",
-                number(f.mu_static),
-                number(f.mu_dynamic),
-                number(f.stribeck_velocity)
-            ),
+            match bench.friction {
+                FrictionParams::Stribeck(f) => format!(
+                    "mu_s {}, mu_d {}, Stribeck velocity {} rad/s",
+                    number(f.mu_static),
+                    number(f.mu_dynamic),
+                    number(f.stribeck_velocity)
+                ),
+            },
         ),
         row(
             "Bench: along the disc",

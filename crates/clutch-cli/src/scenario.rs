@@ -1,6 +1,6 @@
 //! `clutch scenario`.
 
-use crate::{Exit, json, print};
+use crate::output::{Exit, json, print};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use clutch_sim::scenario::{BUILT_IN, BuiltIn, schema};

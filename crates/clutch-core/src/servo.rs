@@ -132,8 +132,10 @@ impl<T: Real> Servo<T> {
     /// The first parameter out of range, by name; also output limits (`lowest`, `highest`) beyond
     /// the converter's range, at which it would clip unseen.
     pub fn new(p: &ServoParams<T>) -> Result<Self, ParamError<T>> {
+        let servo = Servo::with_law(p, Law::new(&p.law, &p.model, &p.output, p.period)?)?;
+        // Of numbers that output and converter have taken by themselves.
         p.check_output()?;
-        Servo::with_law(p, Law::new(&p.law, &p.model, &p.output, p.period)?)
+        Ok(servo)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The channel table: topics, protobuf messages, their fields, and the way to records and back.
 
 use crate::names::{self, Names};
-use crate::record::{CommandRecord, EventRecord, LinkRecord, Record, SampleRecord, TruthRecord};
+use crate::record::{CommandRecord, EventRecord, LinkRecord, MAX_TERMS, Record, SampleRecord, TruthRecord};
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{
@@ -114,9 +114,14 @@ message!(Command, COMMAND {
     11 target_acceleration_rad_s2: Option<f64>, (double, optional), Kind::Double, "target acceleration, rad/s²";
     12 error_rad: Option<f64>, (double, optional), Kind::Double, "position error as the law saw it, rad";
     13 error_rate_rad_s: Option<f64>, (double, optional), Kind::Double, "its rate as the law saw it, rad/s";
-    14 term_0: Option<f64>, (double, optional), Kind::Double, "the law's first term; the file has the law's name for it";
+    14 term_0: Option<f64>, (double, optional), Kind::Double, "the law's first term; the file has the law's name for it, and as many terms as the law";
     15 term_1: Option<f64>, (double, optional), Kind::Double, "the law's second term, likewise";
     16 term_2: Option<f64>, (double, optional), Kind::Double, "the law's third term, likewise";
+    17 term_3: Option<f64>, (double, optional), Kind::Double, "the law's fourth term, likewise";
+    18 term_4: Option<f64>, (double, optional), Kind::Double, "the law's fifth term, likewise";
+    19 term_5: Option<f64>, (double, optional), Kind::Double, "the law's sixth term, likewise";
+    20 term_6: Option<f64>, (double, optional), Kind::Double, "the law's seventh term, likewise";
+    21 term_7: Option<f64>, (double, optional), Kind::Double, "the law's eighth term, likewise";
 });
 
 message!(Event, EVENT {
@@ -236,13 +241,13 @@ pub fn channel_table() -> String {
     text
 }
 
-/// The schema of a channel: a `FileDescriptorSet`. `terms` name the last three fields of
-/// `/command`.
-pub(crate) fn schema(channel: &Channel, terms: &[String; 3]) -> Vec<u8> {
+/// The schema of a channel: a `FileDescriptorSet`. `terms` name the last fields of `/command`, which has as many.
+pub(crate) fn schema(channel: &Channel, terms: &[String]) -> Vec<u8> {
     let short = channel.message.trim_start_matches("clutch.");
     let mut names: Vec<String> = channel.fields.iter().map(|f| f.name.to_owned()).collect();
     if channel.fields == COMMAND {
-        let first = names.len() - terms.len();
+        let first = names.len() - MAX_TERMS;
+        names.truncate(first + terms.len());
         for (i, term) in terms.iter().enumerate() {
             let mut name = field_name(term, i);
             // Two fields of one name would make the whole schema invalid.
@@ -324,7 +329,7 @@ fn field_name(term: &str, index: usize) -> String {
 /// Appends the record's message, as it stands in the log without the envelope (tick and time
 /// are in the envelope's `sequence` and `log_time`, too).
 pub fn encode(record: &Record, out: &mut Vec<u8>) {
-    out.reserve(192); // the longest message has 16 fields: no second allocation
+    out.reserve(240); // the longest message has 21 fields: no second allocation
     let done = match record {
         Record::Sample(r) => Sample {
             tick: r.tick,
@@ -339,7 +344,8 @@ pub fn encode(record: &Record, out: &mut Vec<u8>) {
         }
         .encode(out),
         Record::Command(r) => {
-            let [term_0, term_1, term_2] = r.terms.map(Some);
+            let [term_0, term_1, term_2, term_3, term_4, term_5, term_6, term_7] =
+                std::array::from_fn(|i| r.terms.get(i).copied());
             Command {
                 tick: r.tick,
                 state: r.state.into(),
@@ -357,6 +363,11 @@ pub fn encode(record: &Record, out: &mut Vec<u8>) {
                 term_0,
                 term_1,
                 term_2,
+                term_3,
+                term_4,
+                term_5,
+                term_6,
+                term_7,
             }
             .encode(out)
         }
@@ -437,7 +448,10 @@ pub(crate) fn decode(channel: usize, time_ns: u64, data: &[u8]) -> Result<Record
                 target_acceleration: real(m.target_acceleration_rad_s2),
                 error: real(m.error_rad),
                 error_rate: real(m.error_rate_rad_s),
-                terms: [m.term_0, m.term_1, m.term_2].map(real),
+                terms: [m.term_0, m.term_1, m.term_2, m.term_3, m.term_4, m.term_5, m.term_6, m.term_7]
+                    .into_iter()
+                    .map_while(|term| term)
+                    .collect(),
             })
         }
         2 => {
@@ -519,19 +533,21 @@ mod tests {
 
     #[test]
     fn a_terms_name_becomes_a_valid_field_that_no_other_field_has() {
-        let named = |terms: [&str; 3]| {
-            let set = schema(&CHANNELS[COMMAND_CHANNEL], &terms.map(String::from));
+        let named = |terms: &[&str]| {
+            let names: Vec<String> = terms.iter().map(|&term| term.into()).collect();
+            let set = schema(&CHANNELS[COMMAND_CHANNEL], &names);
             let set = FileDescriptorSet::decode(&set[..]).expect("a descriptor");
             let fields = &set.file[0].message_type[0].field;
             let mut all: Vec<_> = fields.iter().map(|f| f.name().to_owned()).collect();
             let terms = all[13..].to_vec();
             all.sort_unstable();
             all.dedup();
-            assert_eq!(all.len(), 16, "{terms:?}");
+            assert_eq!(all.len(), 13 + terms.len(), "{terms:?}");
             terms
         };
-        assert_eq!(named(["surface_rad_s", "Ff Torque/N·m", "x"]), ["surface_rad_s", "ff_torque_n_m", "x"]);
-        assert_eq!(named(["", "·", "3rd"]), ["term_0", "term_1", "term_3rd"]);
-        assert_eq!(named(["error_rad", "same", "same"])[0], "error_rad_0");
+        assert_eq!(named(&["surface_rad_s", "Ff Torque/N·m", "x"]), ["surface_rad_s", "ff_torque_n_m", "x"]);
+        assert_eq!(named(&["", "·", "3rd"]), ["term_0", "term_1", "term_3rd"]);
+        assert_eq!(named(&["error_rad", "same", "same"])[0], "error_rad_0");
+        assert_eq!(named(&["a", "b", "c", "d", "e", "f", "g", "h"]).len(), MAX_TERMS);
     }
 }

@@ -68,6 +68,35 @@ pub struct SampleRecord {
     pub superseded: bool,
 }
 
+/// The most terms that a law has in a log.
+pub const MAX_TERMS: usize = 8;
+
+/// Terms of a law: up to [`MAX_TERMS`], without an allocation. What is beyond is left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Terms {
+    values: [f64; MAX_TERMS],
+    count: u8,
+}
+
+impl FromIterator<f64> for Terms {
+    fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Terms {
+        let mut all = Terms::default();
+        for (to, term) in all.values.iter_mut().zip(terms) {
+            *to = term;
+            all.count += 1;
+        }
+        all
+    }
+}
+
+impl std::ops::Deref for Terms {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.values[..usize::from(self.count)]
+    }
+}
+
 /// A command, with the values that led the law to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CommandRecord {
@@ -99,8 +128,8 @@ pub struct CommandRecord {
     pub error: f64,
     /// Its rate as the law saw it, rad/s.
     pub error_rate: f64,
-    /// The law's own three terms; [`Header::term_names`] names them.
-    pub terms: [f64; 3],
+    /// The law's own terms; [`Header::term_names`] names them.
+    pub terms: Terms,
 }
 
 /// Something that happened once.
@@ -225,7 +254,7 @@ pub struct Header {
     /// Sampling period, µs.
     pub period_us: u32,
     /// Names of [`CommandRecord::terms`], with units: `surface_rad_s`.
-    pub term_names: [String; 3],
+    pub term_names: Vec<String>,
     /// Start of the run, ns since 1970-01-01 UTC.
     pub started_unix_ns: u64,
     /// Anything else. Each key once; read back sorted by key.
@@ -244,7 +273,7 @@ impl Default for Header {
             source: Source::default(),
             scalar: "f64".into(),
             period_us: 1000,
-            term_names: ["term_0".into(), "term_1".into(), "term_2".into()],
+            term_names: Vec::new(),
             started_unix_ns: 0,
             extra: Vec::new(),
         }

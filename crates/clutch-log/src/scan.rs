@@ -419,7 +419,7 @@ impl<'a, R: Read> Scan<'a, R> {
         h.version = text("version");
         h.port = text("port");
         h.scalar = text("scalar");
-        h.term_names = ["term_0", "term_1", "term_2"].map(text);
+        h.term_names = (0..crate::MAX_TERMS).map_while(|i| map.remove(&format!("term_{i}"))).collect();
         Ok(())
     }
 

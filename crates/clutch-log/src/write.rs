@@ -2,7 +2,7 @@
 
 use crate::error::{LogError, require_file};
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
-use crate::record::{Header, Record};
+use crate::record::{Header, MAX_TERMS, Record};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use prost::Message;
@@ -359,6 +359,10 @@ fn metadata(path: &Path, h: &Header) -> Result<(Metadata, Metadata), LogError> {
         .chain(h.extra.iter().chain(&h.parameters).flat_map(|(k, v)| [k, v]))
         .map(|text| text.len() as u64)
         .sum();
+    if h.term_names.len() > MAX_TERMS {
+        let (path, what, value) = (path.into(), "terms of a law", h.term_names.len() as u64);
+        return Err(LogError::Limit { path, what, value, limit: MAX_TERMS as u64 });
+    }
     if value > HEADER_BYTES {
         let (path, what) = (path.into(), "bytes of text in the header");
         return Err(LogError::Limit { path, what, value, limit: HEADER_BYTES });

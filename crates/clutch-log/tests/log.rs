@@ -94,9 +94,10 @@ proptest::proptest! {
         law_hash: u64, period_us: u32, started_unix_ns: u64,
     ) {
         let [scenario_name, scenario_toml, version, port, scalar, a, b, c] = texts;
+        let term_names = vec![a, b, c];
         let header = Header {
             scenario_name, scenario_toml, parameters, version, law_hash, port,
-            source: clutch_log::Source::Replay, scalar, period_us, term_names: [a, b, c], started_unix_ns,
+            source: clutch_log::Source::Replay, scalar, period_us, term_names, started_unix_ns,
             extra: extra.into_iter().collect(),
         };
         let folder = Folder::new("any-header");

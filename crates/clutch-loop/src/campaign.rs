@@ -12,7 +12,7 @@ use crate::lockstep_host::lockstep_host;
 use crate::sim_board::SimBoardError;
 use crate::station::ControllerStation;
 use crate::virtual_time::{Stall, VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
-use clutch_core::law::{Command, Controller, Law, Tick};
+use clutch_core::law::{Command, ControlLaw, Law, Tick};
 use clutch_core::supervisor::{Cause, Checks};
 use clutch_core::{Real, Servo, Target};
 use clutch_node::ControllerNode;
@@ -315,7 +315,7 @@ impl RunId {
     /// None, unless a row of the tables is wrong.
     pub fn run(&self, checks: Checks, record: bool) -> Result<VirtualReport, CampaignError> {
         let scenario = self.scenario()?;
-        match scenario.scalar {
+        match scenario.scalar() {
             ScalarKind::F32 => self.run_in::<f32>(&scenario, checks, record),
             ScalarKind::F64 => self.run_in::<f64>(&scenario, checks, record),
         }
@@ -415,13 +415,7 @@ impl RunId {
         };
         let report = if broken == Broken::LawNotFinite {
             let law = BrokenLaw { law: *built.servo.law(), from: onset_tick };
-            let servo = Servo::with_law(&built.params, law).map_err(|e| {
-                BuildError::Param(clutch_core::ParamError {
-                    field: e.field,
-                    value: e.value.to_f64(),
-                    expected: e.expected,
-                })
-            })?;
+            let servo = Servo::with_law(&built.params, law).map_err(|e| BuildError::Param(e.cast()))?;
             let node = ControllerNode::new(built.controller, servo, built.supervisor);
             VirtualLoop::new(scenario, params, ControllerStation { node, path: &path })?.run(&path)?
         } else {
@@ -489,9 +483,10 @@ struct BrokenLaw<T> {
     from: u64,
 }
 
-impl<T: Real> Controller<T> for BrokenLaw<T> {
-    type State = (<Law<T> as Controller<T>>::State, u64);
-    type Terms = <Law<T> as Controller<T>>::Terms;
+impl<T: Real> ControlLaw<T> for BrokenLaw<T> {
+    type State = (<Law<T> as ControlLaw<T>>::State, u64);
+    type Terms = <Law<T> as ControlLaw<T>>::Terms;
+    const TERMS: &'static [&'static str] = &[];
 
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
         (self.law.start(tick, applied), 0)

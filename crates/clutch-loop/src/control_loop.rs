@@ -22,7 +22,7 @@ use crate::station::{Station, StationNotice};
 use crate::to_log;
 use crate::watch::Watch;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{Micros, Real, StickSlip, StickSlipState};
+use clutch_core::{Arithmetic, Micros, Real, StickSlip, StickSlipState};
 use clutch_log::{EventKind, EventRecord, Record};
 use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Standing};
 use clutch_sim::Metrics;
@@ -212,7 +212,7 @@ struct Control<'a, S: Station> {
 
 /// What one call of the node brought, gathered for use after it.
 #[derive(Clone, Copy)]
-struct Batch<T, X> {
+struct Batch<T: Arithmetic, X> {
     cycles: [Option<CycleNotice<T, X>>; 32],
     used: usize,
     ended: Option<Ending<T>>,

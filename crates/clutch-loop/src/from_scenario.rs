@@ -1,13 +1,13 @@
 //! From a scenario to what runs: servo, supervisor, path, numbers for the wire and the log.
 
-use clutch_core::law::{Controller, Terms, Tick};
+use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::Checks;
 use clutch_core::{
     DacCode, FixedCounts, Micros, ParamError, Real, Servo, ServoParams, StickSlip, StickSlipParams,
-    Supervisor, SupervisorParams, Target,
+    Supervisor, Target,
 };
 use clutch_log::{Header, Source};
-use clutch_node::{ControllerParams, RunParams, Settings, Unsupported};
+use clutch_node::{ControllerParams, RunParams, RunTimes, Settings, Unsupported};
 use clutch_sim::scenario::{Plan, ScalarKind};
 use clutch_sim::{Scenario, ScenarioError};
 use clutch_wire::Hello;
@@ -56,10 +56,6 @@ pub enum BuildError {
     Scalar,
 }
 
-pub(crate) fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
-    ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }
-}
-
 /// What a run on a board is made of, in the scalar `T`.
 #[derive(Clone, Debug)]
 pub struct BuiltRun<T: Real> {
@@ -96,19 +92,21 @@ impl<T: Real> BuiltRun<T> {
         let safety = scenario.safety()?;
         let plan = scenario.plan()?;
         let servo_params = spec.servo()?.cast::<T>();
-        let limits: SupervisorParams<T> = safety.supervisor.cast();
+        let limits = scenario.supervisor(safety).cast::<T>();
         let bounds = plan.bounds.cast::<T>();
         let cycles = |n: u32| Micros(spec.period.0.saturating_mul(n));
         Ok(BuiltRun {
             params: servo_params,
-            servo: Servo::new(&servo_params).map_err(to_f64)?,
-            supervisor: Supervisor::new(&limits, &servo_params, &bounds).map_err(to_f64)?.with_checks(checks),
+            servo: Servo::new(&servo_params).map_err(|e| e.cast())?,
+            supervisor: Supervisor::new(&limits, &servo_params, &bounds)
+                .map_err(|e| e.cast())?
+                .with_checks(checks),
             controller: ControllerParams {
                 run,
                 config: config_hash(scenario),
-                watchdog: cycles(safety.watchdog_cycles),
-                valid: cycles(safety.valid_cycles),
-                silence: cycles(safety.supervisor.silence_cycles),
+                watchdog: cycles(safety.limits.watchdog_cycles),
+                valid: cycles(safety.limits.valid_cycles),
+                silence: cycles(safety.limits.supervisor.silence_cycles),
             },
             detector: StickSlip::new(&StickSlipParams::default(), servo_params.encoder, spec.period)?,
             ticks: scenario.ticks(),
@@ -126,23 +124,40 @@ pub fn settings(
     host_silence: Micros,
     ticks: u64,
 ) -> Result<Settings, BuildError> {
-    if scenario.scalar != ScalarKind::F32 {
+    if scenario.scalar() != ScalarKind::F32 {
         return Err(BuildError::Scalar);
     }
     let spec = scenario.spec();
     let within = spec.run.start_position().0 & ((1 << FixedCounts::FRACTION_BITS) - 1);
     Ok(Settings::new(&RunParams {
         servo: &built.params,
-        supervisor: &scenario.safety()?.supervisor.cast(),
+        supervisor: &scenario.supervisor(scenario.safety()?).cast(),
         bounds: &scenario.plan()?.bounds.cast(),
         reference: &spec.reference.cast(),
         start: FixedCounts(within),
-        watchdog: built.controller.watchdog,
-        valid: built.controller.valid,
-        silence: built.controller.silence,
-        host_silence,
+        times: RunTimes {
+            watchdog: built.controller.watchdog,
+            valid: built.controller.valid,
+            silence: built.controller.silence,
+            host_silence,
+        },
         ticks,
     })?)
+}
+
+/// What [`in_single_precision`] says when it changes something.
+pub const SINGLE_PRECISION: &str = "such a board calculates in single precision: sampling.scalar = \"f32\"";
+
+/// The scenario as a board takes it that closes the loop itself; none if it is one already.
+///
+/// # Errors
+/// The scenario does not go with single precision.
+pub fn in_single_precision(scenario: &Scenario) -> Result<Option<Scenario>, ScenarioError> {
+    if scenario.scalar() == ScalarKind::F32 {
+        return Ok(None);
+    }
+    let set = [("sampling.scalar".to_owned(), "f32".to_owned())];
+    Scenario::parse(&scenario.name(), &scenario.canonical(), &set).map(Some)
 }
 
 /// The scenario's path from the count on which a run begins: its first point lies within that
@@ -180,22 +195,18 @@ pub fn header<T: Real>(
     port: &str,
     version: &str,
 ) -> Header {
-    // The names depend on the law and not on what it is asked.
-    let (law, tick) = (servo.law(), Tick::default());
-    let terms = law.update(&mut law.start(&tick, T::ZERO), &tick).terms;
-    let names = terms.columns().map(|(name, _)| name.to_owned());
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     Header {
-        scenario_name: scenario.name.clone(),
+        scenario_name: scenario.name().to_owned(),
         scenario_toml: scenario.canonical(),
         parameters: scenario.parameters(),
         version: version.to_owned(),
         law_hash: law_hash(scenario),
         port: port.to_owned(),
         source,
-        scalar: scalar_name(scenario.scalar).to_owned(),
+        scalar: scalar_name(scenario.scalar()).to_owned(),
         period_us: scenario.spec().period.0,
-        term_names: names,
+        term_names: servo.law().term_names().iter().map(|&name| name.to_owned()).collect(),
         started_unix_ns: now.map_or(0, |t| u64::try_from(t.as_nanos()).unwrap_or(u64::MAX)),
         ..Header::default()
     }
@@ -215,13 +226,18 @@ pub fn misfits(scenario: &Scenario, hello: &Hello) -> Vec<String> {
         "encoder",
         hello.counts_per_rev.to_string(),
         "rig.encoder.counts_per_rev",
-        spec.rig.counts_per_rev.to_string(),
+        spec.rig.encoder.sensor.counts_per_rev.to_string(),
     );
-    differ("converter", hello.dac_bits.to_string(), "rig.dac.bits", spec.rig.dac.bits.to_string());
+    differ("converter", hello.dac_bits.to_string(), "rig.dac.bits", spec.rig.dac.converter.bits.to_string());
     let volts = |mv: i32| format!("{:.3} V", f64::from(mv) / 1000.0);
     let ours = |v: f64| format!("{v:.3} V");
-    differ("converter", volts(hello.dac_lowest_mv), "rig.dac.lowest_v", ours(spec.rig.dac.lowest));
-    differ("converter", volts(hello.dac_highest_mv), "rig.dac.highest_v", ours(spec.rig.dac.highest));
+    differ("converter", volts(hello.dac_lowest_mv), "rig.dac.lowest_v", ours(spec.rig.dac.converter.lowest));
+    differ(
+        "converter",
+        volts(hello.dac_highest_mv),
+        "rig.dac.highest_v",
+        ours(spec.rig.dac.converter.highest),
+    );
     let period = spec.period.0;
     if period < hello.period_min_us || period > hello.period_max_us {
         lines.push(format!(
@@ -230,7 +246,7 @@ pub fn misfits(scenario: &Scenario, hello: &Hello) -> Vec<String> {
         ));
     }
     if let Ok(safety) = scenario.safety() {
-        let watchdog = u64::from(safety.watchdog_cycles) * u64::from(period);
+        let watchdog = u64::from(safety.limits.watchdog_cycles) * u64::from(period);
         if watchdog > u64::from(hello.watchdog_max_us) {
             lines.push(format!(
                 "watchdog: the board's reaches {} µs, the scenario asks for {watchdog} µs",
@@ -245,8 +261,9 @@ pub fn misfits(scenario: &Scenario, hello: &Hello) -> Vec<String> {
 #[must_use]
 pub fn boot_output(scenario: &Scenario, hello: &Hello, plan: &Plan) -> (f64, bool) {
     let spec = scenario.spec();
-    let volts = clutch_core::Dac::new(&spec.rig.dac).map_or(0.0, |d| d.volts(DacCode(hello.boot_code)));
-    let holds = scenario.safety().is_ok_and(|s| match s.supervisor.on_fault.holding_voltage() {
+    let volts =
+        clutch_core::Dac::new(&spec.rig.dac.converter).map_or(0.0, |d| d.volts(DacCode(hello.boot_code)));
+    let holds = scenario.safety().is_ok_and(|s| match s.on_fault.holding_voltage() {
         Some(_) => volts + 1e-9 >= plan.envelope.holding_voltage,
         None => true,
     });

@@ -6,11 +6,13 @@
 //! | `station` | this machine at its line: the controller, or the host of a board controller |
 //! | `port`, `realtime` | the line's device; the machine's clock, priorities and memory |
 //! | `preflight` | what station and board say to each other before consent |
-//! | `control_loop` | the run: control thread, log thread, and what they report |
+//! | `session`, `summary` | a scenario and options in; refusals, events and a summary out |
+//! | `control_loop` | the run on its control thread |
+//! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
 //! | `virtual_time` | the same run with a computed clock |
 //! | `sim_board`, `sim_board_server` | a board on a rig, both simulated; the same in real time behind a port |
 //! | `faults`, `faulty_line`, `campaign` | what breaks, a line on which it breaks, and the campaign over all of it |
-//! | `lockstep_board`, `lockstep_host` | a board controller that is asked instead of keeping time, and its host |
+//! | `lockstep_board`, `lockstep_host`, `lockstep_session` | a board controller that is asked instead of keeping time, its host, and a session with it |
 //! | `qemu_board` | such a board, emulated |
 //! | `to_log`, `replay` | what a log gets; a log's counts to the law again |
 
@@ -21,15 +23,18 @@ pub mod faulty_line;
 pub mod from_scenario;
 pub mod lockstep_board;
 pub mod lockstep_host;
+pub mod lockstep_session;
 pub mod log_thread;
 pub mod port;
 pub mod preflight;
 pub mod qemu_board;
 pub mod realtime;
 pub mod replay;
+pub mod session;
 pub mod sim_board;
 pub mod sim_board_server;
 pub mod station;
+pub mod summary;
 pub mod to_log;
 pub mod virtual_time;
 pub mod watch;

@@ -4,7 +4,7 @@ use crate::from_scenario::BuildError;
 use crate::port::{Port, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
 use crate::station::{HostStation, Station, StationNotice};
-use clutch_node::{Notice, Outbox, SETTINGS, Settings};
+use clutch_node::{Notice, Outbox, Refusing, Settings};
 use clutch_wire::{Hello, Refusal, Refused};
 use rustix::fd::AsFd;
 use std::time::Duration;
@@ -136,9 +136,9 @@ pub enum PreflightError {
     },
 }
 
-/// The board's reason in words.
+/// The board's reason in words; `settings` are those that it was sent, if any.
 #[must_use]
-pub fn why(m: &Refused) -> String {
+pub fn why(m: &Refused, settings: Option<&Settings>) -> String {
     match Refusal::from_u8(m.reason) {
         Some(Refusal::State) => {
             "another controller drives it now; stop that one first (a board whose controller has died is free after its watchdog's time)".into()
@@ -149,11 +149,12 @@ pub fn why(m: &Refused) -> String {
         Some(Refusal::Watchdog) => format!("its watchdog cannot be set to {} µs", m.value),
         Some(Refusal::Safe) => "it does not know the safe state, or its converter has no such code".into(),
         Some(Refusal::Busy) => "it is busy".into(),
-        Some(Refusal::Setting) => match SETTINGS.iter().find(|s| u32::from(s.key) == m.value) {
-            Some(setting) => format!("the setting {} is missing, or of a kind that it does not know", setting.name),
-            None => format!("the setting {:#06x} is missing or unknown", m.value),
+        Some(reason @ (Refusal::Setting | Refusal::Unfit)) => match settings {
+            Some(settings) => {
+                Refusing { settings, bits: m.value, lacks: reason == Refusal::Setting }.to_string()
+            }
+            None => format!("it refuses the setting {:#06x}", m.value & 0xffff),
         },
-        Some(Refusal::Unfit) => format!("it cannot run with {} in its settings", f32::from_bits(m.value)),
         Some(Refusal::NoBoard) => "it finds no encoder and converter".into(),
         Some(Refusal::Differs) => "its settings say something else than the run; start again".into(),
         _ => format!("reason {}, value {}", m.reason, m.value),
@@ -167,6 +168,8 @@ pub struct Talk<'a, S> {
     out: Outbox,
     bytes: u64,
     echo: bool,
+    /// Those that were sent, for words of what the board refuses.
+    settings: Option<Settings>,
 }
 
 /// A board's clock against ours.
@@ -181,7 +184,7 @@ pub struct ClockOffset {
 impl<'a, S: Station> Talk<'a, S> {
     /// On an open port.
     pub fn new(port: &'a mut Port, station: &'a mut S) -> Self {
-        Talk { port, station, out: Outbox::default(), bytes: 0, echo: false }
+        Talk { port, station, out: Outbox::default(), bytes: 0, echo: false, settings: None }
     }
 
     fn address(&self) -> String {
@@ -278,7 +281,7 @@ impl<'a, S: Station> Talk<'a, S> {
             Some(Said::No(m)) if m.reason == Refusal::Schema as u8 => {
                 Err(PreflightError::Schema { address, board: m.value })
             }
-            Some(Said::No(m)) => Err(PreflightError::Refused { address, what: "known", why: why(&m) }),
+            Some(Said::No(m)) => Err(PreflightError::Refused { address, what: "known", why: why(&m, None) }),
             None if controller.is_some() => Err(PreflightError::NoBoard { address }),
             None if self.echo => Err(PreflightError::Echo { address }),
             None if self.bytes > 0 => Err(PreflightError::Foreign { address, bytes: self.bytes }),
@@ -307,7 +310,9 @@ impl<'a, S: Station> Talk<'a, S> {
         let address = self.address();
         match said {
             Some(None) => Ok(()),
-            Some(Some(m)) => Err(PreflightError::Refused { address, what, why: why(&m) }),
+            Some(Some(m)) => {
+                Err(PreflightError::Refused { address, what, why: why(&m, self.settings.as_ref()) })
+            }
             None => Err(PreflightError::Lost { address, what }),
         }
     }
@@ -350,6 +355,7 @@ impl<P: Fn(u64) -> clutch_core::Target<f32>> Talk<'_, HostStation<P>> {
     pub fn upload(&mut self, settings: &Settings) -> Result<(), PreflightError> {
         let mut all = Vec::new();
         settings.each(|key, value| all.push((key, value)));
+        self.settings = Some(settings.clone());
         for (key, value) in all {
             let said = self.exchange(
                 Duration::from_secs(1),

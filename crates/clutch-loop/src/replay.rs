@@ -60,10 +60,10 @@ pub struct Replay {
 }
 
 /// Fields of a command that have to agree; times do not.
-fn fields<'a>(c: &CommandRecord, terms: &'a [String; 3]) -> [(&'a str, u64, f64); 16] {
+fn fields<'a>(c: &CommandRecord, terms: &'a [String]) -> Vec<(&'a str, u64, f64)> {
     let real = |name: &'a str, x: f64| (name, x.to_bits(), x);
     let whole = |name: &'a str, x: u64| (name, x, x as f64);
-    [
+    let mut fields = vec![
         whole("tick", c.tick),
         whole("state", c.state.into()),
         whole("source", c.source.into()),
@@ -77,10 +77,9 @@ fn fields<'a>(c: &CommandRecord, terms: &'a [String; 3]) -> [(&'a str, u64, f64)
         real("target_acceleration_rad_s2", c.target_acceleration),
         real("error_rad", c.error),
         real("error_rate_rad_s", c.error_rate),
-        real(&terms[0], c.terms[0]),
-        real(&terms[1], c.terms[1]),
-        real(&terms[2], c.terms[2]),
-    ]
+    ];
+    fields.extend(terms.iter().zip(c.terms.iter()).map(|(name, value)| real(name, *value)));
+    fields
 }
 
 /// Replays a log under a scenario: its own, or one with other parameters.
@@ -88,7 +87,7 @@ fn fields<'a>(c: &CommandRecord, terms: &'a [String; 3]) -> [(&'a str, u64, f64)
 /// # Errors
 /// The scenario is not one for a run like the log's.
 pub fn replay(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayError> {
-    match scenario.scalar {
+    match scenario.scalar() {
         ScalarKind::F32 => replay_in::<f32>(log, scenario),
         ScalarKind::F64 => replay_in::<f64>(log, scenario),
     }
@@ -195,19 +194,13 @@ fn simulated<T: Real>(
     scenario: &Scenario,
 ) -> Result<Vec<CommandRecord>, ReplayError> {
     let spec = scenario.spec();
-    if !spec.rig.encoder_quantised {
+    if !spec.rig.encoder.quantised {
         return Err(ReplayError::Ideal);
     }
     let volts = extra(log, START_VOLTAGE).and_then(|v| u64::from_str_radix(v, 16).ok());
     let volts = f64::from_bits(volts.ok_or(ReplayError::Lacks("the voltage at the start"))?);
     let params = spec.servo().map_err(BuildError::from)?.cast::<T>();
-    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| {
-        BuildError::from(clutch_core::ParamError {
-            field: e.field,
-            value: e.value.to_f64(),
-            expected: e.expected,
-        })
-    })?;
+    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| BuildError::from(e.cast::<f64>()))?;
     let path = spec.path::<T>().map_err(BuildError::from)?;
     let radians = servo.encoder().radians_per_count::<f64>();
     let Some(first) = samples.first() else { return Ok(Vec::new()) };

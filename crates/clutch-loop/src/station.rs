@@ -3,7 +3,7 @@
 //! Both are asked the same, and report the same, so that pre-flight, loop and virtual time need not know
 //! which of the two it is.
 
-use clutch_core::law::{Controller, LawTerms, Terms};
+use clutch_core::law::{ControlLaw, LawTerms, Terms};
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Real, Target};
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
 use clutch_wire::StopReason;
@@ -74,14 +74,14 @@ pub trait Station {
 }
 
 /// A controller in this process, with its path.
-pub struct ControllerStation<T: Real, C: Controller<T>, P> {
+pub struct ControllerStation<T: Real, C: ControlLaw<T>, P> {
     /// The controller.
     pub node: ControllerNode<T, C>,
     /// The path, from position 0 on.
     pub path: P,
 }
 
-impl<T: Real, C: Controller<T>, P: Fn(u64) -> Target<T>> Station for ControllerStation<T, C, P> {
+impl<T: Real, C: ControlLaw<T>, P: Fn(u64) -> Target<T>> Station for ControllerStation<T, C, P> {
     type Scalar = T;
     type Terms = C::Terms;
     const LOOKS_ON: bool = false;

@@ -1,7 +1,7 @@
 //! What a log gets of each sample, of the link and of the shaft.
 
 use crate::from_scenario::{self, BuildError};
-use clutch_core::law::{Limit, Terms};
+use clutch_core::law::Terms;
 use clutch_core::supervisor::{Cycle, State};
 use clutch_core::{Dac, FixedCounts, Real, Servo};
 use clutch_log::{
@@ -66,24 +66,13 @@ pub fn command<T: Real, X: Terms<T>>(
         ..CommandRecord::default()
     };
     if let Some(out) = &cycle.output {
-        record.limit = limit(out.command.limit);
+        record.limit = out.command.limit as u8;
         record.demand = out.command.voltage.to_f64();
         record.error = out.tick.error.to_f64();
         record.error_rate = out.tick.error_rate.to_f64();
-        record.terms = out.command.terms.columns().map(|(_, value)| value.to_f64());
+        record.terms = out.command.terms.values().iter().map(|value| value.to_f64()).collect();
     }
     record
-}
-
-/// A limit's number in a log.
-#[must_use]
-pub fn limit(limit: Limit) -> u8 {
-    match limit {
-        Limit::None => 0,
-        Limit::Lowest => 1,
-        Limit::Highest => 2,
-        Limit::Invalid => 3,
-    }
 }
 
 /// A change of the supervisor's state, if this was one.
@@ -140,7 +129,7 @@ fn of_simulation<T: Real>(
                 time_ns,
                 state: State::Running as u8,
                 source: CommandSource::Law as u8,
-                limit: limit(t.limit[i]),
+                limit: t.limit[i] as u8,
                 code: t.code[i],
                 voltage: dac.volts(clutch_core::DacCode(t.code[i])).to_f64(),
                 demand: t.demand[i],
@@ -150,7 +139,7 @@ fn of_simulation<T: Real>(
                 target_acceleration: cast(t.target_acceleration[i]),
                 error: t.measured_error[i],
                 error_rate: t.error_rate[i],
-                terms: [t.terms[0].1[i], t.terms[1].1[i], t.terms[2].1[i]],
+                terms: t.terms.iter().map(|(_, values)| values[i]).collect(),
             }),
             Record::Truth(TruthRecord {
                 tick,
@@ -174,7 +163,7 @@ pub fn save_simulation(
     run: &clutch_sim::Run,
     version: &str,
 ) -> Result<(), SaveError> {
-    match scenario.scalar {
+    match scenario.scalar() {
         ScalarKind::F32 => save_in::<f32>(path, scenario, run, version),
         ScalarKind::F64 => save_in::<f64>(path, scenario, run, version),
     }
@@ -199,7 +188,7 @@ fn save_in<T: Real>(
 ) -> Result<(), SaveError> {
     let spec = scenario.spec();
     let params = spec.servo().map_err(BuildError::from)?;
-    let servo = Servo::<T>::new(&params.cast()).map_err(|e| BuildError::from(from_scenario::to_f64(e)))?;
+    let servo = Servo::<T>::new(&params.cast()).map_err(|e| BuildError::from(e.cast::<f64>()))?;
     let mut header = from_scenario::header(scenario, &servo, Source::Simulation, "", version);
     let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
     header.extra.push((START_VOLTAGE.to_owned(), bits));

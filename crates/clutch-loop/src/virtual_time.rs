@@ -1,4 +1,4 @@
-//! Controller, line and simulated board in virtual time: what the fault campaign runs.
+//! ControlLaw, line and simulated board in virtual time: what the fault campaign runs.
 //!
 //! The same state machines, frames and rig as in real time; only the clock is computed. A run of
 //! one second takes some milliseconds and repeats bit for bit.
@@ -124,7 +124,7 @@ struct Sampled {
     tick: Option<u64>,
 }
 
-/// Controller, line and board.
+/// ControlLaw, line and board.
 pub struct VirtualLoop<S> {
     board: SimBoard,
     station: S,
@@ -346,7 +346,7 @@ impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
         let mut heard = self.hear(now, time_ns);
         self.on.sound()?;
         if let Some(m) = heard.refused {
-            return Err(VirtualError::Refused(preflight::why(&m)));
+            return Err(VirtualError::Refused(preflight::why(&m, None)));
         }
         if self.hands.configured && !self.hands.asked && self.on.board.samples() >= 3 {
             self.hands.asked = true;

@@ -23,6 +23,18 @@ pub(crate) fn param_error(py: Python<'_>, message: &str, field: &str, value: Bou
     }
 }
 
+/// A `clutch.LoopError`.
+pub(crate) fn loop_error(py: Python<'_>, message: &str) -> PyErr {
+    let made = py
+        .import("clutch._errors")
+        .and_then(|m| m.getattr("LoopError"))
+        .and_then(|class| class.call1((message,)));
+    match made {
+        Ok(error) => PyErr::from_value(error),
+        Err(e) => e,
+    }
+}
+
 /// A scenario's error; its value is looked up in the tables it came from.
 pub(crate) fn scenario_error(py: Python<'_>, e: &ScenarioError, tables: Option<&Table>) -> PyErr {
     // An error about a whole table is about no one value.
@@ -40,7 +52,7 @@ pub(crate) fn scenario_error(py: Python<'_>, e: &ScenarioError, tables: Option<&
 
 /// A refused parameter of the core.
 pub(crate) fn core_error(py: Python<'_>, e: &ParamError) -> PyErr {
-    param_error(py, &e.to_string(), e.field, PyFloat::new(py, e.value).into_any())
+    param_error(py, &e.to_string(), e.field(), PyFloat::new(py, e.value).into_any())
 }
 
 /// An error of a scenario's file: of the system, or of its contents.

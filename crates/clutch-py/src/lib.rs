@@ -8,6 +8,7 @@ mod paper;
 mod path;
 mod run;
 mod scenario;
+mod session;
 mod stepping;
 mod sweep;
 mod table;
@@ -36,11 +37,16 @@ mod _clutch {
     #[pymodule_export]
     use super::scenario::{Scenario, brake_gain, check, rig, scenarios, stribeck};
     #[pymodule_export]
+    use super::session::run_loop;
+    #[pymodule_export]
     use super::stepping::{Plant, Servo, StickSlip, Tick};
     #[pymodule_export]
     use super::sweep::Sweep;
     #[pymodule_export]
     use super::table::Table;
+    /// Priority of the loop's control thread unless another is given.
+    #[pymodule_export]
+    const DEFAULT_PRIORITY: u8 = super::session::DEFAULT_PRIORITY;
     /// Version of the package.
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

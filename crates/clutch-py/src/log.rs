@@ -63,7 +63,7 @@ impl<'a, R> Columns<'a, R> {
     }
 }
 
-fn commands(records: &[CommandRecord], terms: &[String; 3]) -> Table {
+fn commands(records: &[CommandRecord], terms: &[String]) -> Table {
     let mut c = Columns::new(records, |r| r.time_ns, |r| r.tick);
     c.name("state", STATES, |r| r.state)
         .name("source", COMMAND_SOURCES, |r| r.source)
@@ -81,7 +81,7 @@ fn commands(records: &[CommandRecord], terms: &[String; 3]) -> Table {
         // As the log's own schema does it, where a law calls a term like a field.
         let taken = c.1.iter().any(|(n, _)| n == term);
         let name = if taken { format!("{term}_{i}") } else { term.clone() };
-        c.real(&name, |r| r.terms[i]);
+        c.real(&name, |r| r.terms.get(i).copied().unwrap_or(f64::NAN));
     }
     c.table()
 }

@@ -106,14 +106,15 @@ impl Path {
         wrong: impl Fn(ParamError) -> PyErr,
     ) -> PyResult<Path> {
         let spec = scenario.spec();
-        let encoder = Encoder::new::<f64>(spec.rig.counts_per_rev).map_err(|e| core_error(py, &e))?;
+        let encoder =
+            Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev).map_err(|e| core_error(py, &e))?;
         let ticks = scenario.ticks();
         let mut targets = Vec::new();
         let room = usize::try_from(ticks).is_ok_and(|n| targets.try_reserve_exact(n).is_ok());
         if !room {
             return Err(PyMemoryError::new_err(format!("no memory for a path of {ticks} targets")));
         }
-        match scenario.scalar {
+        match scenario.scalar() {
             ScalarKind::F32 => {
                 let path = spec.path::<f32>().map_err(&wrong)?;
                 targets.extend((0..ticks).map(|k| path.at(k).cast::<f64>()));

@@ -4,7 +4,7 @@ use crate::convert::{
     core_error, from_json, from_table, load_error, overrides, param_error, scenario_error, to_table,
 };
 use crate::path::Path;
-use clutch_core::{BrakeGeometry, Stribeck};
+use clutch_core::{BrakeGeometry, FrictionModel, Stribeck};
 use clutch_sim::ScenarioError;
 use clutch_sim::rig::Rig;
 use clutch_sim::scenario::{BUILT_IN, check_section, override_keys};
@@ -208,6 +208,6 @@ pub(crate) fn brake_gain(py: Python<'_>, table: &Bound<'_, PyDict>) -> PyResult<
     };
     geometry.brake_gain().map_err(|e| {
         let value = PyString::new(py, &e.value.to_string()).into_any();
-        param_error(py, &e.to_string(), e.field, value)
+        param_error(py, &e.to_string(), e.field(), value)
     })
 }

@@ -4,7 +4,7 @@ use crate::convert::core_error;
 use crate::path::{Target, fixed_to_counts};
 use crate::scenario::Scenario;
 use crate::table::{Column, Table};
-use clutch_core::law::{Command, Law, LawTerms, Limit, Output, OutputState, Terms};
+use clutch_core::law::{Command, ControlLaw, Law, LawState, LawTerms, Limit, Output, OutputState, Terms};
 use clutch_core::{
     Counts, Dac, Encoder, FixedCounts, ParamError, Real, ServoOutput, ServoState, StickSlipParams,
     StickSlipState, law,
@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat};
 use std::sync::Mutex;
 
-type State<T> = ServoState<T, OutputState<T>>;
+type State<T> = ServoState<T, LawState<T>>;
 
 /// A servo in one scalar, with its state.
 #[derive(Clone)]
@@ -71,15 +71,11 @@ pub(crate) struct Servo {
     dac: Dac<f64>,
 }
 
-fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
-    ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }
-}
-
 fn begin<T: Real>(py: Python<'_>, scenario: &Scenario) -> PyResult<Running<T>> {
     let spec = scenario.0.spec();
     let wrong = |e: &ParamError| core_error(py, e);
     let params = spec.servo().map_err(|e| wrong(&e))?.cast::<T>();
-    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| wrong(&to_f64(e)))?;
+    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| wrong(&e.cast()))?;
     let begun = spec.prepare::<T>().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
     Ok(Running { state: begun.servo_state(&servo), servo, last: ServoOutput::default() })
 }
@@ -105,8 +101,9 @@ impl<T: Real> Running<T> {
         };
     }
 
-    fn terms(&self) -> [(&'static str, f64); 3] {
-        self.last.command.terms.columns().map(|(name, x)| (name, x.to_f64()))
+    fn terms(&self) -> Vec<(&'static str, f64)> {
+        let values = self.last.command.terms.values().iter().map(|x| x.to_f64());
+        self.servo.law().term_names().iter().copied().zip(values).collect()
     }
 }
 
@@ -145,13 +142,13 @@ impl Servo {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         Ok(Servo {
-            running: match scenario.0.scalar {
+            running: match scenario.0.scalar() {
                 ScalarKind::F32 => Scalar::F32(begin(py, &scenario)?),
                 ScalarKind::F64 => Scalar::F64(begin(py, &scenario)?),
             },
-            whole: spec.rig.encoder_quantised,
-            rounds: spec.rig.dac_quantised,
-            dac: Dac::new(&spec.rig.dac).map_err(|e| core_error(py, &e))?,
+            whole: spec.rig.encoder.quantised,
+            rounds: spec.rig.dac.quantised,
+            dac: Dac::new(&spec.rig.dac.converter).map_err(|e| core_error(py, &e))?,
         })
     }
 
@@ -289,12 +286,13 @@ impl StickSlip {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         let wrong = |e: ParamError| core_error(py, &e);
-        let (encoder, period) = (Encoder::new(spec.rig.counts_per_rev).map_err(wrong)?, spec.period);
+        let (encoder, period) =
+            (Encoder::new(spec.rig.encoder.sensor.counts_per_rev).map_err(wrong)?, spec.period);
         let single = StickSlipParams::default();
         let double = StickSlipParams::default();
-        Ok(StickSlip(match scenario.0.scalar {
+        Ok(StickSlip(match scenario.0.scalar() {
             ScalarKind::F32 => Sticks::F32(
-                clutch_core::StickSlip::new(&single, encoder, period).map_err(|e| wrong(to_f64(e)))?,
+                clutch_core::StickSlip::new(&single, encoder, period).map_err(|e| wrong(e.cast()))?,
                 StickSlipState::default(),
             ),
             ScalarKind::F64 => Sticks::F64(
@@ -391,7 +389,7 @@ impl Plant {
     fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Plant> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
-        let begun = match scenario.0.scalar {
+        let begun = match scenario.0.scalar() {
             ScalarKind::F32 => spec.prepare::<f32>().map(|p| (p.moving, p.volts)),
             ScalarKind::F64 => spec.prepare::<f64>().map(|p| (p.moving, p.volts)),
         };
@@ -404,8 +402,8 @@ impl Plant {
             tick: 0,
             start_voltage,
             voltage: start_voltage,
-            whole: spec.rig.encoder_quantised,
-            rounds: spec.rig.dac_quantised,
+            whole: spec.rig.encoder.quantised,
+            rounds: spec.rig.dac.quantised,
             events: Vec::new(),
             sticks: 0,
         })
@@ -625,16 +623,6 @@ pub(crate) struct PythonState {
     ticks: u64,
 }
 
-/// The only term of a law whose inside is not known.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct PythonTerms(f64);
-
-impl Terms<f64> for PythonTerms {
-    fn columns(&self) -> [(&'static str, f64); 3] {
-        [("python_v", self.0), ("", 0.0), ("", 0.0)]
-    }
-}
-
 impl PythonLaw {
     pub(crate) fn new(callable: Py<PyAny>, output: Output<f64>, period: f64) -> Self {
         PythonLaw { callable, output, period, failure: Mutex::new(None) }
@@ -675,19 +663,21 @@ impl PythonLaw {
     }
 }
 
-impl law::Controller<f64> for PythonLaw {
+impl ControlLaw<f64> for PythonLaw {
     type State = PythonState;
-    type Terms = PythonTerms;
+    /// The only term of a law whose inside is not known.
+    type Terms = [f64; 1];
+    const TERMS: &'static [&'static str] = &["python_v"];
 
     fn start(&self, _: &law::Tick<f64>, _: f64) -> PythonState {
         PythonState::default()
     }
 
-    fn update(&self, state: &mut PythonState, tick: &law::Tick<f64>) -> Command<f64, PythonTerms> {
+    fn update(&self, state: &mut PythonState, tick: &law::Tick<f64>) -> Command<f64, [f64; 1]> {
         let demand = self.ask(tick, state.ticks);
         state.ticks += 1;
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
-        Command { voltage, limit, terms: PythonTerms(demand) }
+        Command { voltage, limit, terms: [demand] }
     }
 }
 

@@ -1,8 +1,9 @@
 //! Sweeps in the background, on all cores.
 
 use crate::convert::{scenario_error, to_table, to_toml};
-use crate::run::{figures, sample_columns};
+use crate::run::sample_columns;
 use crate::table::{Column, Table};
+use clutch_sim::metrics::columns;
 use clutch_sim::{Keep, ScenarioError, sweep};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -79,11 +80,11 @@ impl Sweep {
             .iter()
             .map(|row| row.try_iter()?.map(|v| to_toml(&v?)).collect::<PyResult<Vec<_>>>())
             .collect::<PyResult<Vec<_>>>()?;
-        let known = figures(&Default::default(), &Default::default());
+        let known: Vec<&str> =
+            columns(&Default::default(), &Default::default()).map(|(name, _)| name).collect();
         for name in &metrics {
-            if name != "certified" && !known.iter().any(|(n, _)| n == name) {
-                let names: Vec<&str> = known.iter().map(|(n, _)| *n).collect();
-                let text = format!("metrics: \"{name}\": expected certified, {}", names.join(", "));
+            if name != "certified" && !known.contains(&name.as_str()) {
+                let text = format!("metrics: \"{name}\": expected certified, {}", known.join(", "));
                 return Err(PyValueError::new_err(text));
             }
         }
@@ -228,9 +229,9 @@ fn row(
 ) -> Row {
     match outcome {
         Ok(sweep::Row { certified, run }) => {
-            let all = figures(&run.metrics, &run.detected);
             let value = |name: &String| {
-                let found = all.iter().find(|(n, _)| n == name).and_then(|(_, x)| *x);
+                let found =
+                    columns(&run.metrics, &run.detected).find(|(n, _)| n == name).and_then(|(_, x)| x);
                 if name == "certified" { f64::from(u8::from(certified)) } else { found.unwrap_or(f64::NAN) }
             };
             let metrics = metrics.iter().map(value).collect();

@@ -1,7 +1,7 @@
 //! One run: rig, servo and path in closed loop.
 
 use crate::engine::{EngineError, EngineKind, Event, ExactFlow, Motion};
-use crate::metrics::{Metrics, MetricsBuilder, MetricsSample};
+use crate::metrics::{Detected, Metrics, MetricsBuilder, MetricsSample};
 use crate::moving_rig::MovingRig;
 use crate::progress::{Progress, Report, UNWATCHED};
 use crate::rig::{Rig, RigParams};
@@ -334,20 +334,10 @@ pub struct Run {
     pub metrics: Metrics,
     /// Stick-slip as the encoder shows it: what a loop on hardware would count.
     pub detected: Detected,
+    /// Ticks at which the [`StickSlip`] detector called the shaft stuck, in order.
+    pub detections: Vec<u64>,
     /// Which engine ran.
     pub engine: EngineKind,
-}
-
-/// What the [`StickSlip`] detector saw on the encoder's counts.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Detected {
-    /// Stick-slip cycles per second, after settling.
-    pub stick_slip_cycles_per_s: f64,
-    /// Share of the time that the shaft was seen stuck, after settling.
-    pub stick_time_fraction: f64,
-    /// Ticks at which the detector called the shaft stuck, in order.
-    #[serde(skip)]
-    pub ticks: Vec<u64>,
 }
 
 /// Runs the law of the specification, in the scalar `T`.
@@ -403,7 +393,7 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
     let detector = StickSlip::<f64>::new(&StickSlipParams::default(), encoder, spec.period)?;
     let mut seen_by_encoder = StickSlipState::default();
     let mut before_settling = (0, 0);
-    let mut detected = Detected::default();
+    let mut detections = Vec::new();
     for k in 0..ticks {
         if k % REPORT_EVERY == 0 {
             let told = progress(Progress { total: ticks, finished: REPORT_EVERY.min(ticks - k) });
@@ -453,7 +443,7 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
         }
 
         if detector.update(&mut seen_by_encoder, counts, target.velocity.to_f64()) && keep == Keep::Trace {
-            detected.ticks.push(k);
+            detections.push(k);
         }
         if time < p.settle {
             before_settling = (seen_by_encoder.cycles(), seen_by_encoder.stuck_ticks());
@@ -467,8 +457,9 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
     }
     let metrics = figures.finish();
     let measured = metrics.measured_s.max(period);
-    detected.stick_slip_cycles_per_s = (seen_by_encoder.cycles() - before_settling.0) as f64 / measured;
-    detected.stick_time_fraction =
-        (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured;
-    Ok(Run { trace, events, metrics, detected, engine })
+    let detected = Detected {
+        stick_slip_cycles_per_s: (seen_by_encoder.cycles() - before_settling.0) as f64 / measured,
+        stick_time_fraction: (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured,
+    };
+    Ok(Run { trace, events, metrics, detected, detections, engine })
 }

@@ -12,10 +12,11 @@
 #include <stdint.h>
 #include <string.h>
 
-#define CLUTCH_VERSION 1u
-#define CLUTCH_SCHEMA UINT64_C(0xab8778f18f682fb3)
-#define CLUTCH_MAX_BODY 66u  /* longest frame before stuffing, bytes */
-#define CLUTCH_MAX_FRAME 68u /* longest frame on the wire, bytes */
+#define CLUTCH_VERSION 2u
+#define CLUTCH_SCHEMA UINT64_C(0x4f527cdae8dd5a89)
+#define CLUTCH_MAX_BODY 87u  /* longest frame before stuffing, bytes */
+#define CLUTCH_MAX_FRAME 89u /* longest frame on the wire, bytes */
+#define CLUTCH_MAX_LIST 8u  /* most numbers of a list */
 
 /* BoardState: The present state of the board. */
 #define CLUTCH_BOARD_STATE_BOOT 0u /* Powered up; never configured since; the output is boot_code. */
@@ -53,8 +54,8 @@
 #define CLUTCH_REFUSAL_LATE 9u /* Came too late. A board of version 1 shows this in Sample.status instead; value is the delay, us. */
 #define CLUTCH_REFUSAL_BUSY 10u /* Cannot be done just now: ask again; value is 0. */
 #define CLUTCH_REFUSAL_CODE 11u /* The code is above the converter's top; value is the code. */
-#define CLUTCH_REFUSAL_SETTING 12u /* A setting that is unknown or missing; value is its key. */
-#define CLUTCH_REFUSAL_UNFIT 13u /* The settings make no run; value is the offending one's value as the bits of a real number. */
+#define CLUTCH_REFUSAL_SETTING 12u /* A setting that is missing, or whose value is of a kind that is not known; value is its key. */
+#define CLUTCH_REFUSAL_UNFIT 13u /* The settings make no run; value is the key of the offending one, and above its 16 bits the number of the condition between several that does not hold, or 0. */
 #define CLUTCH_REFUSAL_NO_BOARD 14u /* Nothing answers where the controller's encoder and converter should be; value is 0. */
 #define CLUTCH_REFUSAL_DIFFERS 15u /* Configure differs from the settings; value is 0. */
 
@@ -126,6 +127,25 @@ static inline int32_t clutch_get_i32(const uint8_t *at)
     int32_t value;
     memcpy(&value, &bits, sizeof value); /* a cast would depend on the compiler */
     return value;
+}
+
+/* A list: how many numbers, and each. What is too much is left out. */
+static inline void clutch_put_list(uint8_t *at, const uint32_t *numbers, uint8_t count)
+{
+    uint8_t i;
+    if (count > CLUTCH_MAX_LIST)
+        count = CLUTCH_MAX_LIST;
+    at[0] = count;
+    for (i = 0; i < count; i++)
+        clutch_put_u32(at + 1 + 4 * i, numbers[i]);
+}
+
+static inline uint8_t clutch_get_list(const uint8_t *at, uint32_t *numbers)
+{
+    uint8_t i, count = at[0] > CLUTCH_MAX_LIST ? CLUTCH_MAX_LIST : at[0];
+    for (i = 0; i < count; i++)
+        numbers[i] = clutch_get_u32(at + 1 + 4 * i);
+    return count;
 }
 
 /* CRC-32/ISO-HDLC: that of Ethernet and zip. */
@@ -804,7 +824,7 @@ static inline void clutch_get_taken(const uint8_t *body, clutch_taken_t *m)
 
 /* Telemetry: A sample after consent, and the controller's result for it. Real numbers are sent as their 32 bits. */
 #define CLUTCH_TELEMETRY_KIND 0x8bu
-#define CLUTCH_TELEMETRY_LENGTH 66u
+#define CLUTCH_TELEMETRY_LENGTH 55u /* without the numbers of its list */
 #define CLUTCH_TELEMETRY_RUN 1u
 #define CLUTCH_TELEMETRY_NUMBER 3u
 #define CLUTCH_TELEMETRY_TICK 5u
@@ -820,12 +840,10 @@ static inline void clutch_get_taken(const uint8_t *body, clutch_taken_t *m)
 #define CLUTCH_TELEMETRY_LATENESS_US 28u
 #define CLUTCH_TELEMETRY_ERROR 32u
 #define CLUTCH_TELEMETRY_ERROR_RATE 36u
-#define CLUTCH_TELEMETRY_TERM_0 40u
-#define CLUTCH_TELEMETRY_TERM_1 44u
-#define CLUTCH_TELEMETRY_TERM_2 48u
-#define CLUTCH_TELEMETRY_DEMAND 52u
-#define CLUTCH_TELEMETRY_CODE 56u
-#define CLUTCH_TELEMETRY_CYCLES 58u
+#define CLUTCH_TELEMETRY_DEMAND 40u
+#define CLUTCH_TELEMETRY_CODE 44u
+#define CLUTCH_TELEMETRY_CYCLES 46u
+#define CLUTCH_TELEMETRY_TERMS 50u
 typedef struct {
     uint16_t run; /* The run. */
     uint16_t number; /* One more with each frame of this kind; wraps. A gap is lost telemetry. */
@@ -842,12 +860,11 @@ typedef struct {
     uint32_t lateness_us; /* Time that the answer before took. [us] */
     uint32_t error; /* The error. [bits, rad] */
     uint32_t error_rate; /* Its rate. [bits, rad/s] */
-    uint32_t term_0; /* First term of the law. [bits] */
-    uint32_t term_1; /* Second term of the law. [bits] */
-    uint32_t term_2; /* Third term of the law. [bits] */
     uint32_t demand; /* The law's voltage within its limits. [bits, V] */
     uint16_t code; /* Code given to the converter. [DAC code] */
     uint32_t cycles; /* Clock cycles of the tick before: see ControllerHello.clock_hz. [clock cycles] */
+    uint8_t terms_count; /* at most 8 */
+    uint32_t terms[8]; /* The law's terms: how many, and each. [bits] */
 } clutch_telemetry_t;
 
 /* The frame for the wire; its length, bytes. */
@@ -870,13 +887,11 @@ static inline size_t clutch_encode_telemetry(uint8_t wire[CLUTCH_MAX_FRAME], con
     clutch_put_u32(body + CLUTCH_TELEMETRY_LATENESS_US, m->lateness_us);
     clutch_put_u32(body + CLUTCH_TELEMETRY_ERROR, m->error);
     clutch_put_u32(body + CLUTCH_TELEMETRY_ERROR_RATE, m->error_rate);
-    clutch_put_u32(body + CLUTCH_TELEMETRY_TERM_0, m->term_0);
-    clutch_put_u32(body + CLUTCH_TELEMETRY_TERM_1, m->term_1);
-    clutch_put_u32(body + CLUTCH_TELEMETRY_TERM_2, m->term_2);
     clutch_put_u32(body + CLUTCH_TELEMETRY_DEMAND, m->demand);
     clutch_put_u16(body + CLUTCH_TELEMETRY_CODE, m->code);
     clutch_put_u32(body + CLUTCH_TELEMETRY_CYCLES, m->cycles);
-    return clutch_frame(wire, body, CLUTCH_TELEMETRY_LENGTH);
+    clutch_put_list(body + CLUTCH_TELEMETRY_TERMS, m->terms, m->terms_count);
+    return clutch_frame(wire, body, CLUTCH_TELEMETRY_LENGTH + 4u * (size_t)body[CLUTCH_TELEMETRY_TERMS]);
 }
 
 /* From the body that clutch_push accepted as CLUTCH_TELEMETRY_KIND. */
@@ -897,12 +912,10 @@ static inline void clutch_get_telemetry(const uint8_t *body, clutch_telemetry_t 
     m->lateness_us = clutch_get_u32(body + CLUTCH_TELEMETRY_LATENESS_US);
     m->error = clutch_get_u32(body + CLUTCH_TELEMETRY_ERROR);
     m->error_rate = clutch_get_u32(body + CLUTCH_TELEMETRY_ERROR_RATE);
-    m->term_0 = clutch_get_u32(body + CLUTCH_TELEMETRY_TERM_0);
-    m->term_1 = clutch_get_u32(body + CLUTCH_TELEMETRY_TERM_1);
-    m->term_2 = clutch_get_u32(body + CLUTCH_TELEMETRY_TERM_2);
     m->demand = clutch_get_u32(body + CLUTCH_TELEMETRY_DEMAND);
     m->code = clutch_get_u16(body + CLUTCH_TELEMETRY_CODE);
     m->cycles = clutch_get_u32(body + CLUTCH_TELEMETRY_CYCLES);
+    m->terms_count = clutch_get_list(body + CLUTCH_TELEMETRY_TERMS, m->terms);
 }
 
 /* Ended: Control has ended, but not by a sample. */
@@ -1003,10 +1016,10 @@ static inline void clutch_get_link(const uint8_t *body, clutch_link_t *m)
     m->dropped = clutch_get_u32(body + CLUTCH_LINK_DROPPED);
 }
 
-/* Bytes before stuffing of a frame of this kind, CRC included; 0 for a kind that is not known. */
-static inline size_t clutch_length(uint8_t kind)
+/* Bytes before stuffing of the frame with this body, CRC included; 0 for a kind that is not known. */
+static inline size_t clutch_length(const uint8_t *body)
 {
-    switch (kind) {
+    switch (body[0]) {
     case CLUTCH_DISCOVER_KIND: return CLUTCH_DISCOVER_LENGTH;
     case CLUTCH_CONFIGURE_KIND: return CLUTCH_CONFIGURE_LENGTH;
     case CLUTCH_ARM_KIND: return CLUTCH_ARM_LENGTH;
@@ -1024,7 +1037,7 @@ static inline size_t clutch_length(uint8_t kind)
     case CLUTCH_REFUSED_KIND: return CLUTCH_REFUSED_LENGTH;
     case CLUTCH_CONTROLLER_HELLO_KIND: return CLUTCH_CONTROLLER_HELLO_LENGTH;
     case CLUTCH_TAKEN_KIND: return CLUTCH_TAKEN_LENGTH;
-    case CLUTCH_TELEMETRY_KIND: return CLUTCH_TELEMETRY_LENGTH;
+    case CLUTCH_TELEMETRY_KIND: return CLUTCH_TELEMETRY_LENGTH + 4u * (size_t)body[CLUTCH_TELEMETRY_TERMS];
     case CLUTCH_ENDED_KIND: return CLUTCH_ENDED_LENGTH;
     case CLUTCH_LINK_KIND: return CLUTCH_LINK_LENGTH;
     default: return 0;
@@ -1081,7 +1094,7 @@ static inline int clutch_push(clutch_decoder_t *d, uint8_t byte)
         return CLUTCH_TOO_SHORT;
     if (clutch_crc32(d->body, length - 4u) != clutch_get_u32(d->body + length - 4))
         return CLUTCH_BAD_CRC;
-    expected = clutch_length(d->body[0]);
+    expected = clutch_length(d->body);
     if (expected == 0)
         return CLUTCH_UNKNOWN_KIND;
     if (expected != length)

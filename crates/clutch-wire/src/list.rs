@@ -39,15 +39,20 @@ impl List {
 
     pub(crate) fn put(&self, out: &mut Put<'_>) {
         out.bytes([self.count]);
-        self.numbers().iter().for_each(|number| out.bytes(number.to_le_bytes()));
+        for (place, number) in out.next(self.size()).as_chunks_mut().0.iter_mut().zip(self.numbers()) {
+            *place = number.to_le_bytes();
+        }
     }
 
     pub(crate) fn take(rest: &mut &[u8]) -> Option<List> {
         let [count] = next(rest)?;
         let mut list = List { count, ..List::default() };
-        for place in list.values.get_mut(..usize::from(count))? {
-            *place = u32::from_le_bytes(next(rest)?);
+        let places = list.values.get_mut(..usize::from(count))?;
+        let (bytes, behind) = rest.split_at_checked(size_of_val(places))?;
+        for (place, bytes) in places.iter_mut().zip(bytes.as_chunks().0) {
+            *place = u32::from_le_bytes(*bytes);
         }
+        *rest = behind;
         Some(list)
     }
 

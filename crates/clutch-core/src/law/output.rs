@@ -84,6 +84,7 @@ impl<T: Real> Output<T> {
     ///
     /// # Errors
     /// The first parameter out of range; `period` out of range.
+    #[inline(never)] // each law asks for one: a board needs the code once
     pub fn new(p: &OutputParams<T>, period: Micros) -> Result<Self, ParamError<T>> {
         let period = period.period::<T>()?;
         p.check_rows()?;

@@ -80,10 +80,9 @@ macro_rules! whole {
                 T::from_u64($to(*self))
             }
             #[inline]
-            fn outside(&self, range: &Range, unit: &Unit) -> Option<T> {
-                // In double precision, which holds every number that a range ends with.
+            fn outside(&self, range: &Range, _: &Unit) -> Option<T> {
                 let number = $to(*self);
-                (!range.holds(unit, number as f64)).then_some(T::from_u64(number))
+                (!range.holds_whole(number)).then_some(T::from_u64(number))
             }
             fn cast<U: Real>(&self) -> $ty {
                 *self

@@ -61,13 +61,24 @@ impl Range {
     }
 
     /// `true` if a number, in SI, is within the range, whose ends are in `unit`.
-    #[inline]
+    // Always inlined: range and unit are constants, whose doubles a board without them had better not compute with.
+    #[allow(clippy::inline_always, reason = "see above")]
+    #[inline(always)]
     pub fn holds<T: Real>(&self, unit: &Unit, x: T) -> bool {
         let (low, high) = (T::from_f64(unit.to_si(self.low)), T::from_f64(unit.to_si(self.high)));
         x.is_finite()
             && (x > low || (self.low_in && x == low))
             && (x < high || (self.high_in && x == high))
             && (!self.divides || (T::ONE / x).is_finite())
+    }
+
+    /// `true` if a whole number is within the range, whose ends are whole numbers or infinite.
+    #[allow(clippy::inline_always, reason = "as above")]
+    #[inline(always)]
+    pub fn holds_whole(&self, n: u64) -> bool {
+        let (low, high) = (self.low as u64, self.high as u64);
+        (self.low < 0.0 || n > low || (self.low_in && n == low))
+            && (self.high == f64::INFINITY || n < high || (self.high_in && n == high))
     }
 
     /// The range in words, in the unit of the key or in that of the struct (`si`).

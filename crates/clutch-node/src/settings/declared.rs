@@ -1,4 +1,4 @@
-//! What the settings of a run are: one tree of parameters, each declared once, and the keys that follow.
+//! The settings of a run: one tree of parameters, each declared once, and the keys that follow.
 
 use clutch_core::law::{LawParams, OutputParams};
 use clutch_core::params::{ChoiceInfo, Info, Kind, Range, Row, TableInfo};
@@ -10,7 +10,7 @@ use clutch_core::{
 use core::fmt;
 
 clutch_core::params! {
-    /// How long a board controller waits, and the others for it.
+    /// Waiting times of a board controller, and of encoder and converter for it.
     pub struct RunTimes<> {
         /// The watchdog of encoder and converter.
         watchdog: clutch_core::Micros, "watchdog_us" "" US, Range::ANY;
@@ -48,13 +48,13 @@ clutch_core::params! {
         law: LawParams<f32>, "law";
         /// Output stage.
         output: OutputParams<f32>, "output";
-        /// What the brake does when control has ended.
+        /// The brake's voltage when control has ended.
         on_fault: SafeState<f32>, "safety.on_fault";
-        /// What the supervisor watches.
+        /// Limits of the supervisor.
         limits: LimitParams<f32>, "safety.limits";
         /// The speed that a path may ask for.
         speed: SpeedLimit<f32>, "rig";
-        /// What is known of the plant.
+        /// Bounds on the plant.
         bounds: Bounds<f32>, "bounds";
         /// The path.
         reference: ReferenceParams<'a, f32>, "reference";
@@ -180,18 +180,18 @@ pub struct Setting {
     pub key: u16,
     /// Its name.
     pub name: Name,
-    /// What the table is there for: the meaning of a row that stands in several tables.
+    /// Meaning of the table within the outer one: some tables stand in several places.
     pub within: &'static str,
-    /// What it says.
+    /// Its declaration.
     pub declared: Declared,
 }
 
-/// What a setting says.
+/// The declaration of a setting.
 #[derive(Clone, Copy, Debug)]
 pub enum Declared {
     /// A parameter, and the table that it belongs to.
     Row(&'static Row, &'static TableInfo),
-    /// Which of several tables.
+    /// A choice between tables.
     Choice(&'static ChoiceInfo),
 }
 

@@ -2,8 +2,8 @@
 //!
 //! A board reads no TOML. The host checks the scenario, takes out of it what the controller needs,
 //! and sends it number by number; the board builds the same servo, supervisor and path from the same
-//! numbers with the same constructors. What there is to send follows from the declarations of the parameters
-//! ([`RunSettings`]): a walk over them gives the keys, at both ends. A real number travels as the bits of an `f32`.
+//! numbers with the same constructors. The settings follow from the declarations of the parameters ([`RunSettings`]):
+//! a walk over them gives the keys, at both ends. A real number travels as the bits of an `f32`.
 
 mod declared;
 mod path;
@@ -28,7 +28,7 @@ pub const MAX_KNOTS: usize = 256;
 /// Key of the first number of the points; each has two: time (µs), position (2⁻¹⁶ counts).
 const FIRST_KNOT: u16 = 0x1000;
 
-/// What a board cannot run.
+/// A run that a board cannot take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsupported {
     /// The velocity comes from an observer; boards have the smoothed derivative (5).
@@ -55,20 +55,20 @@ impl core::fmt::Display for Unsupported {
 
 impl core::error::Error for Unsupported {}
 
-/// What settings are made of, on the host.
+/// The parameters of a run, on the host.
 #[derive(Clone, Copy, Debug)]
 pub struct RunParams<'a> {
     /// The servo.
     pub servo: &'a ServoParams<f32>,
     /// The supervisor.
     pub supervisor: &'a SupervisorParams<f32>,
-    /// What is known of the plant.
+    /// Bounds on the plant.
     pub bounds: &'a Bounds<f32>,
     /// The path.
     pub reference: &'a ReferenceParams<'a, f32>,
-    /// Position at which the path begins; what counts is where within a count.
+    /// Position at which the path begins; only its place within a count matters.
     pub start: FixedCounts,
-    /// How long the board waits, and the others for it.
+    /// Waiting times.
     pub times: RunTimes,
     /// Ticks of the run.
     pub ticks: u64,
@@ -78,10 +78,10 @@ pub struct RunParams<'a> {
 #[derive(Clone, Debug)]
 pub struct Settings {
     values: [u64; SETTINGS],
-    /// Which have been set.
+    /// Those that have been set.
     set: [bool; SETTINGS],
     knots: [Knot; MAX_KNOTS],
-    /// How many numbers of points have been set in their order, two each.
+    /// Numbers of points that have been set in their order, two each.
     set_knots: u16,
 }
 
@@ -92,7 +92,7 @@ impl Default for Settings {
     }
 }
 
-/// What settings build.
+/// A run built from settings.
 #[derive(Clone, Copy, Debug)]
 pub struct Built {
     /// The servo.
@@ -101,13 +101,13 @@ pub struct Built {
     pub supervisor: Supervisor<f32>,
     /// The path.
     pub path: Path,
-    /// How long the board waits, and the others for it.
+    /// Waiting times.
     pub times: RunTimes,
     /// Ticks of the run.
     pub ticks: u64,
 }
 
-/// Why settings make no run.
+/// The reason why settings make no run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Misfit {
     /// A setting that was not set: its key.
@@ -118,8 +118,10 @@ pub enum Misfit {
     Unfit {
         /// The key of its setting; `u16::MAX` if it is no setting.
         key: u16,
-        /// What is wrong with it.
-        error: ParamError<f32>,
+        /// The number, from 1, of the relation with other parameters that does not hold; 0 for the number's own range.
+        relation: u8,
+        /// Its value, SI.
+        value: f32,
     },
 }
 
@@ -159,7 +161,7 @@ impl Settings {
             bounds: *run.bounds,
             reference: *run.reference,
         };
-        run.edit(&mut Walk::new(&mut Writer(&mut settings), knots.len() as u64));
+        run.edit(&mut Walk::new(Writer(&mut settings), knots.len() as u64));
         Ok(settings)
     }
 
@@ -215,7 +217,7 @@ impl Settings {
         self.values.get(key).copied().filter(|_| self.set.get(key).copied().unwrap_or(false))
     }
 
-    /// Room for the points of a table; [`Path::target`] knows how many there are.
+    /// Room for the points of a table; [`Path::target`] knows their number.
     #[must_use]
     pub fn knots(&self) -> &[Knot; MAX_KNOTS] {
         &self.knots
@@ -227,10 +229,9 @@ impl Settings {
     /// A setting that is missing, a choice that is not known, a number that a constructor refuses.
     pub fn build(&self) -> Result<Built, Misfit> {
         let mut run = <RunSettings<'static> as Params<f32>>::blank();
-        let mut reader =
-            Reader { settings: self, read: false, misfit: None, error: None, key: None, exact: false };
+        let mut reader = Reader::new(self);
         let points = reader.walk(&mut run, 0).min(MAX_KNOTS as u64);
-        // What the parameters hold now is what was sent, or it is nothing that they can hold.
+        // The parameters now hold the values that were sent, or they cannot hold them.
         reader.read = true;
         reader.walk(&mut run, points);
         if let Some(misfit) = reader.misfit {
@@ -243,16 +244,13 @@ impl Settings {
         self.build_from(&run, points).map_err(|error| {
             reader.error = Some(error);
             reader.walk(&mut run, points.into());
-            Misfit::Unfit { key: reader.key.unwrap_or(u16::MAX), error }
+            let ParamError { relation, value, .. } = error;
+            Misfit::Unfit { key: reader.key.unwrap_or(u16::MAX), relation, value }
         })
     }
 
     fn build_from(&self, run: &RunSettings<'static>, points: u16) -> Result<Built, ParamError<f32>> {
         run.check_rows()?;
-        // The output is checked against the converter, the supervisor takes the ends that it needs.
-        run.dac.check_rows()?;
-        run.output.check_rows()?;
-        run.bounds.check()?;
         let servo = ServoParams {
             period: run.sampling.period,
             encoder: Encoder::new(run.encoder.counts_per_rev)?,
@@ -289,6 +287,8 @@ struct Reader<'a> {
     settings: &'a Settings,
     /// The parameters have been read before.
     read: bool,
+    /// The next one is a real number.
+    real: bool,
     misfit: Option<Misfit>,
     /// The error whose key is looked for.
     error: Option<ParamError<f32>>,
@@ -297,8 +297,12 @@ struct Reader<'a> {
     exact: bool,
 }
 
-impl Reader<'_> {
-    /// Walks over them; how many points a table has.
+impl<'a> Reader<'a> {
+    fn new(settings: &'a Settings) -> Self {
+        Reader { settings, read: false, real: false, misfit: None, error: None, key: None, exact: false }
+    }
+
+    /// Walks over them; the number of points of a table.
     #[inline(never)]
     fn walk(&mut self, run: &mut RunSettings<'static>, points: u64) -> u64 {
         let mut walk = Walk::new(self, points);
@@ -307,22 +311,32 @@ impl Reader<'_> {
     }
 }
 
-impl Visit for Reader<'_> {
-    #[inline(never)]
+impl Visit for &mut Reader<'_> {
+    fn real(&mut self) {
+        self.real = true;
+    }
+
+    #[inline]
     fn visit(&mut self, place: Place, held: u64) -> u64 {
-        let Some(sent) = self.settings.get(place.key) else {
-            self.misfit.get_or_insert(Misfit::Missing(place.key));
+        let (key, real) = (place.key, core::mem::take(&mut self.real));
+        let Some(sent) = self.settings.get(key) else {
+            self.misfit.get_or_insert(Misfit::Missing(key));
             return held;
         };
         if self.read && sent != held {
-            self.misfit.get_or_insert(Misfit::Unknown(place.key));
+            self.misfit.get_or_insert(Misfit::Unknown(key));
+        }
+        // No range holds such a number, and not each is asked for its range before others are compared with it.
+        let value = f32::from_bits(sent as u32);
+        if real && !value.is_finite() {
+            self.misfit.get_or_insert(Misfit::Unfit { key, relation: 0, value });
         }
         if let Some(error) = &self.error
             && (error.table.id(), error.row) == (place.table, place.row)
         {
             let exact = u64::from(error.value.to_bits()) == sent;
             if self.key.is_none() || (exact && !self.exact) {
-                (self.key, self.exact) = (Some(place.key), exact);
+                (self.key, self.exact) = (Some(key), exact);
             }
         }
         sent

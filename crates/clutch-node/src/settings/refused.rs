@@ -1,4 +1,4 @@
-//! Why a board refuses settings, in words.
+//! A board's refusal of settings, in words.
 
 use super::declared::{Declared, Setting};
 use super::{Misfit, Settings};
@@ -12,15 +12,15 @@ impl Misfit {
     pub fn bits(&self) -> u32 {
         match *self {
             Misfit::Missing(key) | Misfit::Unknown(key) => key.into(),
-            Misfit::Unfit { key, error } => u32::from(error.relation) << 16 | u32::from(key),
+            Misfit::Unfit { key, relation, .. } => u32::from(relation) << 16 | u32::from(key),
         }
     }
 }
 
-/// A setting that a board refuses: name, value, and what is expected of it, as a scenario's error has them.
+/// A setting that a board refuses: name, value and expectation, as a scenario's error has them.
 #[derive(Clone, Copy, Debug)]
 pub struct Refusing<'a> {
-    /// What the board was sent.
+    /// The settings that the board was sent.
     pub settings: &'a Settings,
     /// [`Misfit::bits`], as the board reports them.
     pub bits: u32,

@@ -1,9 +1,9 @@
-//! The walk over a run's settings: which key each has.
+//! The walk over a run's settings, and the key of each.
 
-use clutch_core::params::{Choice, Editor, Nested, OptionInfo, Table};
+use clutch_core::params::{Choice, ChoiceInfo, Editor, Table};
 use core::marker::PhantomData;
 
-/// Where a setting stands.
+/// The place of a setting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Place {
     /// Its key.
@@ -14,118 +14,134 @@ pub(super) struct Place {
     pub(super) row: u8,
 }
 
-/// Something done with each setting.
+/// Something that is done with each setting.
 pub(super) trait Visit {
-    /// `held` is what the parameter is, as it goes over the wire; what it is from now on.
+    /// `held` is the parameter's value, as it goes over the wire; its value from now on.
     fn visit(&mut self, place: Place, held: u64) -> u64;
+
+    /// The next setting is a real number.
+    fn real(&mut self) {}
 }
 
 /// Walks over parameters and counts the keys. A key is the place of a parameter among all that are declared: a table's
-/// rows, then the tables below it; a choice, then all that can be chosen.
-pub(super) struct Walk<'a, V> {
-    visit: &'a mut V,
-    /// Key of the first row of the table under way.
-    at: u16,
-    /// Its number.
-    table: u32,
+/// rows, then the tables below it; a choice, then all that can be chosen. The walk meets each in that order, and skips
+/// the options that are not chosen.
+pub(super) struct Walk<V> {
+    pub(super) visit: V,
+    /// The key that comes next.
+    key: u16,
+    /// Number of the table under way, and the key of its first row.
+    table: (u32, u16),
     /// Points of a path that is a table: the path's own parameters do not hold them here.
     pub(super) points: u64,
 }
 
-impl<'a, V: Visit> Walk<'a, V> {
-    pub(super) fn new(visit: &'a mut V, points: u64) -> Self {
-        Walk { visit, at: 0, table: 0, points }
+impl<V: Visit> Walk<V> {
+    pub(super) fn new(visit: V, points: u64) -> Self {
+        Walk { visit, key: 0, table: (0, 0), points }
     }
 
-    #[inline]
-    fn row(&mut self, row: usize, held: u64) -> u64 {
-        let place = Place { key: self.at.wrapping_add(row as u16), table: self.table, row: row as u8 };
+    /// The next setting.
+    #[inline(never)]
+    fn wide(&mut self, held: u64) -> u64 {
+        let (table, first) = self.table;
+        let place = Place { key: self.key, table, row: self.key.wrapping_sub(first) as u8 };
+        self.key = self.key.wrapping_add(1);
         self.visit.visit(place, held)
     }
+
+    /// The next setting of 32 bits.
+    #[inline(never)]
+    fn narrow(&mut self, held: u32) -> u32 {
+        self.wide(held.into()) as u32
+    }
+
+    /// The next setting that is a real number. A call of its own for each row: code for all of it had better be short.
+    #[inline(never)]
+    fn number(&mut self, held: f32) -> f32 {
+        self.visit.real();
+        f32::from_bits(self.narrow(held.to_bits()))
+    }
+
+    /// A table begins here.
+    #[inline(never)]
+    fn begin(&mut self, table: u32) {
+        self.table = (table, self.key);
+    }
+
+    /// Keys of options that are not chosen.
+    #[inline]
+    fn skip(&mut self, keys: &[u8; MOST], chosen: usize) {
+        let keys = keys.get(chosen).or(keys.last()).copied().unwrap_or(0);
+        self.key = self.key.wrapping_add(keys.into());
+    }
 }
 
-/// Most tables below one, and most options of a choice.
-const MOST: usize = 16;
+/// One more than the most options of a choice: the last place is that of an option that is none.
+const MOST: usize = 12;
 
-/// Keys from the first row of `P` to each table below it.
-struct Below<P>(PhantomData<P>);
+/// Keys of the choice `C` that are skipped when an option is chosen: before its first row, and behind its last.
+struct Skipped<C>(PhantomData<C>);
 
-impl<P: Table<f32>> Below<P> {
-    const KEYS: [u16; MOST] = below(P::TABLE.rows.len(), P::TABLE.nested);
-}
-
-/// Keys from that of the choice `C` to the first row of each option.
-struct Options<C>(PhantomData<C>);
-
-impl<C: Choice<f32>> Options<C> {
-    const KEYS: [u16; MOST] = options(C::CHOICE.options);
+impl<C: Choice<f32>> Skipped<C> {
+    const BEFORE: [u8; MOST] = skipped(&C::CHOICE, true);
+    const BEHIND: [u8; MOST] = skipped(&C::CHOICE, false);
 }
 
 #[allow(clippy::indexing_slicing, reason = "at compile time, where it is an error of the compiler's")]
-const fn below(rows: usize, nested: &[Nested]) -> [u16; MOST] {
-    let (mut keys, mut at, mut i) = ([0; MOST], rows, 0);
-    while i < nested.len() {
-        keys[i] = at as u16;
-        at += nested[i].info.places();
+const fn skipped(choice: &ChoiceInfo, before: bool) -> [u8; MOST] {
+    assert!(choice.options.len() < MOST, "a place for each option");
+    let (mut all, mut i) = (0, 0);
+    while i < choice.options.len() {
+        all += choice.options[i].table.places();
+        i += 1;
+    }
+    assert!(all <= u8::MAX as usize, "a byte holds the keys of a choice");
+    let (mut keys, mut at) = ([if before { 0 } else { all as u8 }; MOST], 0);
+    i = 0;
+    while i < choice.options.len() {
+        let own = choice.options[i].table.places();
+        keys[i] = (if before { at } else { all - at - own }) as u8;
+        at += own;
         i += 1;
     }
     keys
 }
 
-#[allow(clippy::indexing_slicing, reason = "at compile time, where it is an error of the compiler's")]
-const fn options(options: &[OptionInfo]) -> [u16; MOST] {
-    let (mut keys, mut at, mut i) = ([0; MOST], 1, 0);
-    while i < options.len() {
-        keys[i] = at as u16;
-        at += options[i].table.places();
-        i += 1;
-    }
-    keys
-}
-
-impl<V: Visit> Editor<f32> for Walk<'_, V> {
+impl<V: Visit> Editor<f32> for Walk<V> {
     #[inline]
-    fn real<P: Table<f32>>(&mut self, row: usize, value: &mut f32) {
-        *value = f32::from_bits(self.row(row, value.to_bits().into()) as u32);
+    fn real<P: Table<f32>>(&mut self, _: usize, value: &mut f32) {
+        *value = self.number(*value);
     }
     #[inline]
-    fn whole<P: Table<f32>>(&mut self, row: usize, value: &mut u64) {
-        *value = self.row(row, *value);
+    fn whole<P: Table<f32>>(&mut self, _: usize, value: &mut u64) {
+        *value = self.wide(*value);
     }
     #[inline]
-    fn switch<P: Table<f32>>(&mut self, row: usize, value: &mut bool) {
-        *value = self.row(row, (*value).into()) == 1;
+    fn switch<P: Table<f32>>(&mut self, _: usize, value: &mut bool) {
+        *value = self.narrow((*value).into()) == 1;
     }
     #[inline]
-    fn word<P: Table<f32>>(&mut self, row: usize, value: &mut usize) {
-        *value = usize::try_from(self.row(row, *value as u64)).unwrap_or(usize::MAX);
+    fn word<P: Table<f32>>(&mut self, _: usize, value: &mut usize) {
+        *value = self.narrow(*value as u32) as usize;
     }
     #[inline]
-    fn other<P: Table<f32>>(&mut self, row: usize, _: Option<&mut dyn core::any::Any>) {
-        self.points = self.row(row, self.points);
-    }
-    #[inline]
-    fn enter<P: Table<f32>>(&mut self, nested: usize, _: bool) -> bool {
-        self.at = self.at.wrapping_add(Below::<P>::KEYS.get(nested).copied().unwrap_or(0));
-        true
-    }
-    #[inline]
-    fn leave<P: Table<f32>>(&mut self, nested: usize) {
-        self.at = self.at.wrapping_sub(Below::<P>::KEYS.get(nested).copied().unwrap_or(0));
+    fn other<P: Table<f32>>(&mut self, _: usize, _: Option<&mut dyn core::any::Any>) {
+        self.points = self.wide(self.points);
     }
     #[inline]
     fn choose<C: Choice<f32>>(&mut self, chosen: usize) -> usize {
-        self.table = 0;
-        let chosen = usize::try_from(self.row(0, chosen as u64)).unwrap_or(usize::MAX);
-        self.at = self.at.wrapping_add(Options::<C>::KEYS.get(chosen).copied().unwrap_or(0));
+        self.begin(0);
+        let chosen = self.narrow(chosen as u32) as usize;
+        self.skip(const { &Skipped::<C>::BEFORE }, chosen);
         chosen
     }
     #[inline]
     fn chose<C: Choice<f32>>(&mut self, chosen: usize) {
-        self.at = self.at.wrapping_sub(Options::<C>::KEYS.get(chosen).copied().unwrap_or(0));
+        self.skip(const { &Skipped::<C>::BEHIND }, chosen);
     }
     #[inline]
     fn table<P: Table<f32>>(&mut self, _: &P) {
-        self.table = const { P::TABLE.id };
+        self.begin(const { P::TABLE.id });
     }
 }

@@ -130,9 +130,11 @@ fn message(out: &mut String, m: &MessageInfo) -> std::fmt::Result {
         let (name, at) = (f.name, format!("CLUTCH_{big}_{}", upper(f.name)));
         writeln!(out, "    clutch_put_list(body + {at}, m->{name}, m->{name}_count);")?;
     }
-    let length =
-        if list.is_some() { "clutch_length(body)".to_owned() } else { format!("CLUTCH_{big}_LENGTH") };
-    writeln!(out, "    return clutch_frame(wire, body, {length});\n}}\n")?;
+    let more = match list {
+        Some(f) => format!(" + 4u * (size_t)body[CLUTCH_{big}_{}]", upper(f.name)),
+        None => String::new(),
+    };
+    writeln!(out, "    return clutch_frame(wire, body, CLUTCH_{big}_LENGTH{more});\n}}\n")?;
     writeln!(out, "/* From the body that clutch_push accepted as CLUTCH_{big}_KIND. */")?;
     writeln!(out, "static inline void clutch_get_{small}(const uint8_t *body, clutch_{small}_t *m)\n{{")?;
     for f in &m.fields[..numbers] {

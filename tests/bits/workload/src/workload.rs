@@ -3,7 +3,7 @@
 use crate::record::{RECORD, record};
 use clutch_core::law::LawState;
 use clutch_core::{
-    Counts, FixedCounts, Servo, ServoState, StickSlip, StickSlipParams, StickSlipState, Target,
+    Counts, FixedCounts, ParamError, Servo, ServoState, StickSlip, StickSlipParams, StickSlipState, Target,
 };
 use clutch_node::{Misfit, Path, Settings};
 
@@ -34,7 +34,9 @@ impl<'a> Workload<'a> {
         let servo = built.servo;
         let detector = StickSlip::new(&StickSlipParams::default(), servo.encoder(), servo.period());
         // Its parameters are no settings.
-        let detector = detector.map_err(|error| Misfit::Unfit { key: u16::MAX, error })?;
+        let unfit =
+            |e: ParamError<f32>| Misfit::Unfit { key: u16::MAX, relation: e.relation, value: e.value };
+        let detector = detector.map_err(unfit)?;
         let mut workload = Workload {
             settings,
             servo,
