@@ -68,7 +68,7 @@ inertia_kg_m2 = {INERTIA}
 viscous_damping_nm_s_rad = {DAMPING}
 brake_gain_nm_v = {GAIN}
 
-[rig.friction]
+[rig.friction.stribeck]
 mu_static = {MU_S}
 mu_dynamic = {MU_D}
 stribeck_velocity_rad_s = {V_S}

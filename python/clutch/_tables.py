@@ -1382,7 +1382,7 @@ class Limits(_Params):
     silence_cycles : int, default 3
         Periods without a sample that end control. A whole number from 2 to 1000 periods.
     deadline_us : int, default 500
-        Longest time from a sample's arrival to its answer. A whole number of at least 1 µs.
+        Longest time from a sample's arrival to its answer. A whole number from 1 to 4 294 967 295 µs.
     overruns : int, default 26
         Answers later than `deadline_us`, within 128 periods, that end control. A whole number from 1 to 128
         within 128 periods.

@@ -99,7 +99,7 @@ PERFECT = [
         0.5,
         {"dormand_prince": 5e-10},
         sticks=10,
-        friction={"stribeck_exponent": 2.0},
+        friction={"stribeck": {"stribeck_exponent": 2.0}},
     ),
     # Measured 4e-11 to 8e-11.
     *(
@@ -261,7 +261,7 @@ WIDE = Plant(v_s=np.radians(1.0))
 DRAGGED = Plant(damping=0.05)
 
 
-WIDER = {"friction": {"stribeck_velocity_rad_s": WIDE.v_s}}
+WIDER = {"friction": {"stribeck": {"stribeck_velocity_rad_s": WIDE.v_s}}}
 DRAG = {"viscous_damping_nm_s_rad": 0.05}
 
 # Law, rig, plant, engine, largest difference after one period: position (rad), velocity (rad/s).
@@ -316,7 +316,7 @@ def released(volts, duration, rig, reference=None, start="rest"):
     }
 
 
-COULOMB = {"mu_static": 0.15, "mu_dynamic": 0.15}
+COULOMB = {"stribeck": {"mu_static": 0.15, "mu_dynamic": 0.15}}
 
 
 @pytest.mark.parametrize("engine", ENGINES)

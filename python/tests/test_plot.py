@@ -382,7 +382,7 @@ def test_contours_are_left_out_on_request_and_where_nothing_sticks():
         ("law.smc.slope_1_s", "law.smc.slope (1/s)"),
         ("law.ctc.kp_1_s2", "law.ctc.kp (1/s²)"),
         ("law.ctc.outer_gain", "law.ctc.outer_gain"),
-        ("rig.friction.mu_static", "rig.friction.mu_static"),
+        ("rig.friction.stribeck.mu_static", "rig.friction.stribeck.mu_static"),
         ("rig.drive.weight.mass_kg", "rig.drive.weight.mass (kg)"),
         ("rig.drive.weight.gravity_m_s2", "rig.drive.weight.gravity (m/s²)"),
         ("rig.inertia_kg_m2", "rig.inertia (kg m²)"),

@@ -33,7 +33,7 @@ crate::params! {
         /// Periods without a sample that end control.
         silence_cycles: u32 = 3, "silence_cycles" "" CYCLES, Range::within(2.0, 1000.0);
         /// Longest time from a sample's arrival to its answer.
-        deadline: Micros = 500, "deadline_us" "" US, Range::at_least(1.0);
+        deadline: Micros = 500, "deadline_us" "" US, Range::within(1.0, 4294967295.0);
         /// Answers later than `deadline_us`, within 128 periods, that end control.
         overruns: u32 = 26, "overruns" "" IN_128, Range::within(1.0, 128.0);
     }

@@ -268,19 +268,14 @@ impl Scenario {
 
     /// The error of a parameter somewhere in the table `section` ("" = the whole file), as this file has it.
     fn at<T: Real>(&self, section: &str, e: &ParamError<T>) -> ScenarioError {
-        let info = &<ScenarioParams as Params<f64>>::INFO;
-        let (info, path, table) = match (section, info.table()) {
-            ("", _) | (_, None) => (info, String::new(), self.table()),
-            (section, Some(root)) => {
-                let below = root.nested.iter().find(|n| n.key == section).map(|n| n.info);
-                let table = self.table().get(section).and_then(Value::as_table);
-                match (below, table) {
-                    (Some(below), Some(table)) => (below, section.to_owned(), table),
-                    _ => (info, String::new(), self.table()),
-                }
-            }
-        };
-        let path = find(info, &path, table, e.table.id()).unwrap_or_else(|| section.to_owned());
+        let nested = <ScenarioParams as Params<f64>>::INFO.table().map_or(&[][..], |file| file.nested);
+        // The rig, which comes first, last: of a table that rig and model both have, the model's is what laws, bounds
+        // and certificate refuse. Errors of a rig come with its section.
+        let mut below = nested.iter().rev().filter(|below| section.is_empty() || below.key == section);
+        let path = below.find_map(|below| {
+            find(below.info, below.key, self.table().get(below.key)?.as_table()?, e.table.id())
+        });
+        let path = path.unwrap_or_else(|| section.to_owned());
         error_of(&self.origin, &path, self.table(), &e.cast())
     }
 
