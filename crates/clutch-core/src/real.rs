@@ -82,7 +82,7 @@ impl Arithmetic for f64 {
 
     #[inline]
     fn splat(x: f64) -> f64 {
-        x as f64
+        x
     }
     #[inline]
     fn less(self, other: f64) -> bool {

@@ -134,10 +134,10 @@ impl Info {
         match self {
             Info::Table(t) => t.places(),
             Info::Choice(c) => {
-                let (mut n, mut i) = (1, 0);
-                while i < c.options.len() {
-                    n += c.options[i].table.places();
-                    i += 1;
+                let (mut n, mut options) = (1, c.options);
+                while let [option, rest @ ..] = options {
+                    n += option.table.places();
+                    options = rest;
                 }
                 n
             }
@@ -172,23 +172,23 @@ impl TableInfo {
     #[doc(hidden)]
     #[must_use]
     pub const fn below(&self, field: &str) -> usize {
-        let mut i = 0;
-        while i < self.nested.len() {
-            if same(self.nested[i].field, field) {
-                return i;
+        let (mut place, mut nested) = (0, self.nested);
+        while let [below, rest @ ..] = nested {
+            if same(below.field, field) {
+                return place;
             }
-            i += 1;
+            (place, nested) = (place + 1, rest);
         }
-        panic!("no such field");
+        no_such_name()
     }
 
     /// As [`Info::places`].
     #[must_use]
     pub const fn places(&self) -> usize {
-        let (mut n, mut i) = (self.rows.len(), 0);
-        while i < self.nested.len() {
-            n += self.nested[i].info.places();
-            i += 1;
+        let (mut n, mut nested) = (self.rows.len(), self.nested);
+        while let [below, rest @ ..] = nested {
+            n += below.info.places();
+            nested = rest;
         }
         n
     }
@@ -210,42 +210,44 @@ impl TableInfo {
     #[doc(hidden)]
     #[must_use]
     pub const fn row_of(rows: &[Row], field: &str) -> u8 {
-        let mut i = 0;
-        while i < rows.len() {
-            if same(rows[i].field, field) {
-                return i as u8;
+        let (mut place, mut rows) = (0, rows);
+        while let [row, rest @ ..] = rows {
+            if same(row.field, field) {
+                return place;
             }
-            i += 1;
+            (place, rows) = (place + 1, rest);
         }
-        panic!("no such field");
+        no_such_name()
     }
 
     /// The place of a name in a list.
     #[doc(hidden)]
     #[must_use]
     pub const fn place(names: &[&str], name: &str) -> u8 {
-        let mut i = 0;
-        while i < names.len() {
-            if same(names[i], name) {
-                return i as u8;
+        let (mut place, mut names) = (0, names);
+        while let [first, rest @ ..] = names {
+            if same(first, name) {
+                return place;
             }
-            i += 1;
+            (place, names) = (place + 1, rest);
         }
-        panic!("no such name");
+        no_such_name()
     }
 }
 
+/// Ends the compilation: these searches run in constants only.
+#[allow(clippy::panic, reason = "it is reached while constants are computed, and never when something runs")]
+const fn no_such_name() -> ! {
+    panic!("no such name")
+}
+
 const fn same(a: &str, b: &str) -> bool {
-    let (a, b) = (a.as_bytes(), b.as_bytes());
-    if a.len() != b.len() {
-        return false;
-    }
-    let mut i = 0;
-    while i < a.len() {
-        if a[i] != b[i] {
-            return false;
+    let (mut a, mut b) = (a.as_bytes(), b.as_bytes());
+    loop {
+        match (a, b) {
+            ([], []) => return true,
+            ([x, rest_a @ ..], [y, rest_b @ ..]) if *x == *y => (a, b) = (rest_a, rest_b),
+            _ => return false,
         }
-        i += 1;
     }
-    true
 }

@@ -264,7 +264,8 @@ macro_rules! __params {
                     #[allow(unused_variables, reason = "some relations are asked for elsewhere")]
                     let $p = self;
                     $($(
-                        if !$holds {
+                        let holds: bool = $holds;
+                        if !holds {
                             return Err($name::$rel.error($crate::params::Leaf::<$t>::number(&$p.$rel_field)));
                         }
                     )?)+
