@@ -264,7 +264,7 @@ fn a_processor_that_fails_sends_encoder_and_converter_to_the_safe_state() {
     let params = VirtualOptions { duration: 5.0, ..VirtualOptions::default() };
     let ended =
         VirtualLoop::new(&scenario, params, station).expect("a rig").run(&path).expect_err("it fails");
-    assert!(ended.to_string().contains("as it was to"), "{ended}");
+    assert!(ended.to_string().contains("as ordered"), "{ended}");
     let mut decoder = Decoder::new();
     let said: Vec<Message> =
         failing.last.iter().filter_map(|b| decoder.push(*b)).collect::<Result<_, _>>().expect("whole frames");
