@@ -48,7 +48,7 @@ pub(crate) fn msrv() -> Result<()> {
     let core = read(&root().join("crates/clutch-core/Cargo.toml"))?;
     let core = core.lines().find_map(|line| line.strip_prefix("rust-version = \"")?.split('"').next());
     let core = core.context("clutch-core names no Rust version")?;
-    check_with(core, &["--package", "clutch-core", "--features", "serde"])
+    check_with(core, &["--package", "clutch-core"])
 }
 
 /// `rustup run` and not `cargo +version`, which a cargo started by cargo does not take.
