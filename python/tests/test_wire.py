@@ -24,7 +24,9 @@ def shown(result):
         name, numbers = f"!{result.name}", result.numbers
     else:
         name, numbers = result
-    text = {key: f"[{' '.join(map(str, value))}]" if isinstance(value, tuple) else value for key, value in numbers.items()}
+    text = {
+        key: f"[{' '.join(map(str, value))}]" if isinstance(value, tuple) else value for key, value in numbers.items()
+    }
     return " ".join([name, *(f"{key}={value}" for key, value in text.items())])
 
 
