@@ -155,7 +155,7 @@ impl Loop {
             Event::Progress(_) => {}
             // A terminal that has gone away does not stop a loop.
             Event::LogEnded => {
-                let _ = writeln!(std::io::stderr(), "\nthe log has ended early; the loop goes on");
+                let _ = writeln!(std::io::stderr(), "\nthe log has ended early; the loop continues");
             }
         });
         if show {

@@ -206,7 +206,7 @@ pub enum Event {
     Announced(Announcement),
     /// Where the run stands, some twenty times a second.
     Progress(Progress),
-    /// The log has ended early; the loop goes on.
+    /// The log has ended early; the loop continues.
     LogEnded,
 }
 
