@@ -279,8 +279,7 @@ class Scenario:
 @final
 class Servo:
     """
-    The law of a scenario with all that it remembers, sampled by you: counts and target in,
-    volts out.
+    The law of a scenario with its state, sampled by you: counts and target in, volts out.
 
     It is the servo that the simulator, the loop and the boards run, bit for bit. It begins as
     `clutch.simulate` does.
@@ -313,12 +312,12 @@ class Servo:
         """
     def copy(self, /) -> Servo:
         """
-        A snapshot: goes on from here by itself.
+        A snapshot: continues from here by itself.
         """
     @property
     def demand(self, /) -> float:
         """
-        Voltage that the law asked of the converter at the last step, V.
+        Voltage that the law demanded of the converter at the last step, V.
         """
     @property
     def error(self, /) -> float:
@@ -333,13 +332,13 @@ class Servo:
     @property
     def limit(self, /) -> int:
         """
-        What decided the last voltage, as in a run's column `limit`: 0 the law, 1 the lowest voltage,
-        2 the highest, 3 a demand that was not a number.
+        The limit that decided the last voltage, as in a run's column `limit`: 0 the law, 1 the
+        lowest voltage, 2 the highest, 3 a demand that was not a number.
         """
     @property
     def limited(self, /) -> bool:
         """
-        Whether a limit of the output decided the last voltage.
+        True if a limit of the output decided the last voltage.
         """
     def start(self, /, counts: SupportsFloat | SupportsIndex, target: Target, voltage: SupportsFloat | SupportsIndex) -> None:
         """
