@@ -48,7 +48,7 @@ enum Verb {
     },
     /// Builds the API documentation, in target/doc.
     Docs,
-    /// Packs the libraries that others build on, and builds them from what was packed.
+    /// Packs the libraries that others build on, and checks them as they were packed.
     Package,
     /// Checks what users build with the oldest Rust that the manifests name; installs it.
     Msrv,
