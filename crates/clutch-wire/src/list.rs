@@ -37,11 +37,11 @@ impl List {
         4_usize.wrapping_mul(self.count.into())
     }
 
+    /// All places, also those beyond the count: a list ends its message, and nothing behind a message's length is sent.
+    /// So there is no length to ask for and no loop.
     pub(crate) fn put(&self, out: &mut Put<'_>) {
         out.bytes([self.count]);
-        for (place, number) in out.next(self.size()).as_chunks_mut().0.iter_mut().zip(self.numbers()) {
-            *place = number.to_le_bytes();
-        }
+        self.values.iter().for_each(|number| out.bytes(number.to_le_bytes()));
     }
 
     pub(crate) fn take(rest: &mut &[u8]) -> Option<List> {
