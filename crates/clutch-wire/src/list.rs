@@ -44,15 +44,13 @@ impl List {
         self.values.iter().for_each(|number| out.bytes(number.to_le_bytes()));
     }
 
+    /// Number by number: a copy of a length that only the frame knows would be bounded by that of any.
     pub(crate) fn take(rest: &mut &[u8]) -> Option<List> {
         let [count] = next(rest)?;
         let mut list = List { count, ..List::default() };
-        let places = list.values.get_mut(..usize::from(count))?;
-        let (bytes, behind) = rest.split_at_checked(size_of_val(places))?;
-        for (place, bytes) in places.iter_mut().zip(bytes.as_chunks().0) {
-            *place = u32::from_le_bytes(*bytes);
+        for place in list.values.get_mut(..usize::from(count))? {
+            *place = u32::from_le_bytes(next(rest)?);
         }
-        *rest = behind;
         Some(list)
     }
 
