@@ -77,6 +77,7 @@ impl Image {
                 SectionKind::Text
                     | SectionKind::Data
                     | SectionKind::ReadOnlyData
+                    | SectionKind::ReadOnlyString
                     | SectionKind::UninitializedData
             );
             if loaded && size > 0 {

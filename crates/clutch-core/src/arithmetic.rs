@@ -4,6 +4,7 @@
 //! A scalar takes a branch where it is cheaper; a vector computes both sides and selects. Each lane of a
 //! vector has the bits that the scalar has: nothing here is fused, and nothing is summed across lanes.
 
+use crate::law::Limit;
 use core::fmt::Debug;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -22,7 +23,7 @@ pub trait Arithmetic:
 {
     /// What a comparison gives: true or false for each lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
-    /// A [`Limit`](crate::law::Limit) for each lane.
+    /// A [`Limit`] for each lane.
     type Limit: Copy + Debug + Default + PartialEq;
 
     /// 0.
@@ -39,7 +40,7 @@ pub trait Arithmetic:
     /// `a` where the mask is true, `b` elsewhere.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// The same limit in each lane.
-    fn limit_of(limit: crate::law::Limit) -> Self::Limit;
+    fn limit_of(limit: Limit) -> Self::Limit;
     /// `a` where the mask is true, `b` elsewhere.
     fn select_limit(mask: Self::Mask, a: Self::Limit, b: Self::Limit) -> Self::Limit;
     /// `true` if the mask is true in every lane: work that no lane needs can be left out.
@@ -59,6 +60,22 @@ pub trait Arithmetic:
     fn min(self, other: Self) -> Self;
     /// Neither infinite nor NaN.
     fn is_finite(self) -> Self::Mask;
+
+    /// `self` between `lowest` and `highest`, the nearer of them beyond, `invalid` for NaN; and the limit that decided.
+    #[inline]
+    fn limited(self, lowest: Self, highest: Self, invalid: Self) -> (Self, Self::Limit) {
+        let inside = lowest.less_or_equal(self) & self.less_or_equal(highest);
+        // Most values are inside.
+        if Self::all(inside) {
+            return (self, Self::limit_of(Limit::None));
+        }
+        let (below, above) = (self.less(lowest), highest.less(self));
+        let of = Self::limit_of;
+        let value = Self::select(above, highest, Self::select(below, lowest, invalid));
+        let limit = Self::select_limit(below, of(Limit::Lowest), of(Limit::Invalid));
+        let limit = Self::select_limit(above, of(Limit::Highest), limit);
+        (Self::select(inside, self, value), Self::select_limit(inside, of(Limit::None), limit))
+    }
 
     /// The sign: −1, 0 or 1; `sgn(0) = 0`, and 0 for NaN.
     #[inline]

@@ -6,6 +6,7 @@
 //! simulator runs the arithmetic of the board.
 
 use crate::arithmetic::Arithmetic;
+use crate::law::Limit;
 use core::fmt::Display;
 use core::ops::{AddAssign, SubAssign};
 
@@ -25,7 +26,7 @@ mod sealed {
 /// ```
 pub trait Real:
     sealed::Sealed
-    + Arithmetic<Mask = bool, Limit = crate::law::Limit>
+    + Arithmetic<Mask = bool, Limit = Limit>
     + PartialOrd
     + Display
     + Send
@@ -76,7 +77,7 @@ pub trait Real:
 
 impl Arithmetic for f64 {
     type Mask = bool;
-    type Limit = crate::law::Limit;
+    type Limit = Limit;
     const ZERO: f64 = 0.0;
     const ONE: f64 = 1.0;
 
@@ -97,11 +98,11 @@ impl Arithmetic for f64 {
         if mask { a } else { b }
     }
     #[inline]
-    fn limit_of(limit: crate::law::Limit) -> crate::law::Limit {
+    fn limit_of(limit: Limit) -> Limit {
         limit
     }
     #[inline]
-    fn select_limit(mask: bool, a: crate::law::Limit, b: crate::law::Limit) -> crate::law::Limit {
+    fn select_limit(mask: bool, a: Limit, b: Limit) -> Limit {
         if mask { a } else { b }
     }
     #[inline]
@@ -131,6 +132,16 @@ impl Arithmetic for f64 {
     #[inline]
     fn is_finite(self) -> bool {
         f64::is_finite(self)
+    }
+    #[inline]
+    fn limited(self, lowest: f64, highest: f64, invalid: f64) -> (f64, Limit) {
+        if self >= lowest {
+            if self <= highest { (self, Limit::None) } else { (highest, Limit::Highest) }
+        } else if self < lowest {
+            (lowest, Limit::Lowest)
+        } else {
+            (invalid, Limit::Invalid)
+        }
     }
     #[inline]
     fn sgn(self) -> f64 {
@@ -210,9 +221,14 @@ impl Real for f64 {
     }
 }
 
+/// Marks a path that is seldom taken: on a board a jump past it is cheaper than to compute it and select.
+#[cold]
+#[inline]
+fn seldom() {}
+
 impl Arithmetic for f32 {
     type Mask = bool;
-    type Limit = crate::law::Limit;
+    type Limit = Limit;
     const ZERO: f32 = 0.0;
     const ONE: f32 = 1.0;
 
@@ -233,11 +249,11 @@ impl Arithmetic for f32 {
         if mask { a } else { b }
     }
     #[inline]
-    fn limit_of(limit: crate::law::Limit) -> crate::law::Limit {
+    fn limit_of(limit: Limit) -> Limit {
         limit
     }
     #[inline]
-    fn select_limit(mask: bool, a: crate::law::Limit, b: crate::law::Limit) -> crate::law::Limit {
+    fn select_limit(mask: bool, a: Limit, b: Limit) -> Limit {
         if mask { a } else { b }
     }
     #[inline]
@@ -279,6 +295,16 @@ impl Arithmetic for f32 {
         f32::is_finite(self)
     }
     #[inline]
+    fn limited(self, lowest: f32, highest: f32, invalid: f32) -> (f32, Limit) {
+        if self >= lowest {
+            if self <= highest { (self, Limit::None) } else { (highest, Limit::Highest) }
+        } else if self < lowest {
+            (lowest, Limit::Lowest)
+        } else {
+            (invalid, Limit::Invalid)
+        }
+    }
+    #[inline]
     fn sgn(self) -> f32 {
         if self > 0.0 {
             1.0
@@ -290,14 +316,12 @@ impl Arithmetic for f32 {
     }
     #[inline]
     fn sat(self) -> f32 {
-        // Between the ends, where a law spends its time, two comparisons decide; NaN fails all.
-        if self > -1.0 {
-            if self < 1.0 { self } else { 1.0 }
-        } else if self <= -1.0 {
-            -1.0
-        } else {
-            0.0
+        // Between the ends, where a law spends its time, two comparisons decide; NaN fails both.
+        if self < 1.0 {
+            return if self > -1.0 { self } else { -1.0 };
         }
+        seldom();
+        if self >= 1.0 { 1.0 } else { 0.0 }
     }
 }
 

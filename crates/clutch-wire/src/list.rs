@@ -37,22 +37,20 @@ impl List {
         4_usize.wrapping_mul(self.count.into())
     }
 
+    /// All places, also those beyond the count: a list ends its message, and nothing behind a message's length is sent.
+    /// So there is no length to ask for and no loop.
     pub(crate) fn put(&self, out: &mut Put<'_>) {
         out.bytes([self.count]);
-        for (place, number) in out.next(self.size()).as_chunks_mut().0.iter_mut().zip(self.numbers()) {
-            *place = number.to_le_bytes();
-        }
+        self.values.iter().for_each(|number| out.bytes(number.to_le_bytes()));
     }
 
+    /// Number by number: a copy of a length that only the frame knows would be bounded by that of any.
     pub(crate) fn take(rest: &mut &[u8]) -> Option<List> {
         let [count] = next(rest)?;
         let mut list = List { count, ..List::default() };
-        let places = list.values.get_mut(..usize::from(count))?;
-        let (bytes, behind) = rest.split_at_checked(size_of_val(places))?;
-        for (place, bytes) in places.iter_mut().zip(bytes.as_chunks().0) {
-            *place = u32::from_le_bytes(*bytes);
+        for place in list.values.get_mut(..usize::from(count))? {
+            *place = u32::from_le_bytes(next(rest)?);
         }
-        *rest = behind;
         Some(list)
     }
 

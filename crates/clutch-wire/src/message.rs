@@ -68,15 +68,6 @@ impl<'a> Put<'a> {
             self.rest = tail;
         }
     }
-
-    /// Room for so many bytes; none if there is not so much.
-    pub(crate) fn next(&mut self, length: usize) -> &'a mut [u8] {
-        let Some((head, tail)) = core::mem::take(&mut self.rest).split_at_mut_checked(length) else {
-            return &mut [];
-        };
-        self.rest = tail;
-        head
-    }
 }
 
 /// The next `N` bytes.

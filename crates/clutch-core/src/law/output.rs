@@ -136,18 +136,7 @@ impl<T: Arithmetic> Output<T> {
     pub fn apply(&self, state: &mut OutputState<T>, demand: T) -> (T, T::Limit) {
         let demand = demand + state.offset;
         state.offset = state.offset * self.decay;
-        let inside = self.lowest.less_or_equal(demand) & demand.less_or_equal(self.highest);
-        // Most demands are inside: a scalar asks no more then.
-        if T::all(inside) {
-            return (demand, T::limit_of(Limit::None));
-        }
-        let (below, above) = (demand.less(self.lowest), self.highest.less(demand));
-        let of = T::limit_of;
-        let voltage = T::select(below, self.lowest, self.on_invalid);
-        let limit = T::select_limit(below, of(Limit::Lowest), of(Limit::Invalid));
-        let voltage = T::select(above, self.highest, voltage);
-        let limit = T::select_limit(above, of(Limit::Highest), limit);
-        (T::select(inside, demand, voltage), T::select_limit(inside, of(Limit::None), limit))
+        demand.limited(self.lowest, self.highest, self.on_invalid)
     }
 }
 

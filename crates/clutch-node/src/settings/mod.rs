@@ -78,8 +78,8 @@ pub struct RunParams<'a> {
 #[derive(Clone, Debug)]
 pub struct Settings {
     values: [u64; SETTINGS],
-    /// Those that have been set.
-    set: [bool; SETTINGS],
+    /// Those that have been set, a bit each.
+    set: [u32; SETTINGS.div_ceil(32)],
     knots: [Knot; MAX_KNOTS],
     /// Numbers of points that have been set in their order, two each.
     set_knots: u16,
@@ -88,7 +88,12 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         const NONE: Knot = Knot { time_us: 0, position: FixedCounts(0) };
-        Settings { values: [0; SETTINGS], set: [false; SETTINGS], knots: [NONE; MAX_KNOTS], set_knots: 0 }
+        Settings {
+            values: [0; SETTINGS],
+            set: [0; SETTINGS.div_ceil(32)],
+            knots: [NONE; MAX_KNOTS],
+            set_knots: 0,
+        }
     }
 }
 
@@ -202,19 +207,21 @@ impl Settings {
             }
             return true;
         }
-        let key = usize::from(key);
-        let (Some(place), Some(set)) = (self.values.get_mut(key), self.set.get_mut(key)) else {
+        let (word, bit) = place(key);
+        let (Some(place), Some(set)) = (self.values.get_mut(usize::from(key)), self.set.get_mut(word)) else {
             return false;
         };
-        (*place, *set) = (value, true);
+        *place = value;
+        *set |= bit;
         true
     }
 
     /// The value of a setting, as it goes over the wire; none if it has not been set.
     #[must_use]
     pub fn get(&self, key: u16) -> Option<u64> {
-        let key = usize::from(key);
-        self.values.get(key).copied().filter(|_| self.set.get(key).copied().unwrap_or(false))
+        let (word, bit) = place(key);
+        let set = self.set.get(word).is_some_and(|set| set & bit != 0);
+        self.values.get(usize::from(key)).copied().filter(|_| set)
     }
 
     /// Room for the points of a table; [`Path::target`] knows their number.
@@ -270,6 +277,11 @@ impl Settings {
             ticks: run.ticks,
         })
     }
+}
+
+/// The word and the bit of a setting among those that have been set.
+fn place(key: u16) -> (usize, u32) {
+    (usize::from(key / 32), 1_u32.wrapping_shl(u32::from(key)))
 }
 
 /// Takes a run's parameters as settings.
