@@ -357,7 +357,7 @@ def test_what_cannot_be_mapped_is_named(gains):
     with pytest.raises(ValueError, match=r"law\.smc\.boundary_rad_s was swept too"):
         plot.sweep_map(gains, "law.smc.kp_v", "run.seed", "max_error_rad")
     n = np.arange(20.0)
-    with pytest.raises(ValueError, match="no grid over a_v and b_v: 20 by 20"):
+    with pytest.raises(ValueError, match="not a grid over a_v and b_v: 20 by 20"):
         plot.sweep_map(Table({"a_v": n, "b_v": n, "mean_error_rad": n}), "a_v", "b_v", "mean_error_rad")
 
 

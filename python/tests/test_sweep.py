@@ -468,8 +468,8 @@ def test_a_refusal_is_raised_once_and_names_the_lowest_row_that_ran(short):
     assert (caught.value.field, caught.value.value) == ("law.smc.kp_v", -1.0)
 
 
-def test_certified_is_no_figure_to_make_small(short):
-    with pytest.raises(ValueError, match="certified is no figure"):
+def test_certified_cannot_be_minimised(short):
+    with pytest.raises(ValueError, match="certified cannot be minimised"):
         clutch.sweep(short, {"law.smc.kp_v": [0.1, 3.0]}).best("certified")
 
 
