@@ -62,16 +62,18 @@ class Certificate(_Record):
             `C_d`, N m s/rad.
         brake_gain_nm_v : tuple of float
             `K_COF`, N m/V.
-        mu_static : tuple of float
-            `μ_s`, no unit.
-        mu_dynamic : tuple of float
-            `μ_d`, no unit.
+        friction_at_rest : tuple of float
+            Friction of a resting shaft, of `μ_s` (23e), no unit.
+        friction_sliding : tuple of float
+            Friction of a fast shaft, of `μ_d` (23d), no unit.
+        friction : tuple of float
+            All that friction can be at any speed, (23f), no unit.
 
         Examples
         --------
         >>> import clutch
         >>> scenario = clutch.Scenario.load("smc_2").override({"bounds.friction_percent": 50})
-        >>> scenario.certificate().bounds.mu_static
+        >>> scenario.certificate().bounds.friction_at_rest
         (0.1, 0.30000000000000004)
         """
 
@@ -81,8 +83,9 @@ class Certificate(_Record):
         drive_torque_nm: tuple[float, float]
         viscous_damping_nm_s_rad: tuple[float, float]
         brake_gain_nm_v: tuple[float, float]
-        mu_static: tuple[float, float]
-        mu_dynamic: tuple[float, float]
+        friction_at_rest: tuple[float, float]
+        friction_sliding: tuple[float, float]
+        friction: tuple[float, float]
 
     @dataclass(frozen=True, kw_only=True, repr=False)
     class Demand(_Record):
