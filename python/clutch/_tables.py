@@ -405,13 +405,15 @@ class Ripple(_Params):
         Root mean square of the variation, as a share of the friction. A finite number of at least 0; a number
         that, times the root of twice the number of waves, stays below 1.
     lowest_waves_per_turn : int
-        Longest wave. A whole number of at least 1 waves per turn; a multiple of spacing_waves_per_turn.
+        Longest wave. A whole number from 1 to 4 294 967 295 waves per turn; a multiple of
+        spacing_waves_per_turn.
     highest_waves_per_turn : int
-        Shortest wave. A whole number of at least 1 waves per turn; a multiple of spacing_waves_per_turn, not
-        below lowest_waves_per_turn, less than 64 spacings above it and at most 1000 spacings.
+        Shortest wave. A whole number from 1 to 4 294 967 295 waves per turn; a multiple of
+        spacing_waves_per_turn, not below lowest_waves_per_turn, less than 64 spacings above it and at most
+        1000 spacings.
     spacing_waves_per_turn : int
-        From one wave to the next: the pattern repeats that often in a turn. A whole number of at least 1
-        waves per turn.
+        From one wave to the next: the pattern repeats that often in a turn. A whole number from 1 to 4 294
+        967 295 waves per turn.
 
     Raises
     ------
@@ -1358,7 +1360,7 @@ class Limits(_Params):
         number from 1 to 128 within 128 periods.
     good_samples : int, default 1
         Samples in a row that have to pass after one was refused before the law answers again. A whole number
-        of at least 1; a number below silence_cycles: an unanswered board goes to its safe state.
+        from 1 to 4 294 967 295; a number below silence_cycles: an unanswered board goes to its safe state.
     following_error_deg : float, default 1.0
         Error at rest that ends control. A finite number above 0 °.
     following_time_s : float, default 0.02

@@ -15,7 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import clutch
-from clutch import _clutch, _errors, _model
+from clutch import _clutch, _errors, _mixins, _model, _record, _tables
+from conftest import ROOT
 
 GEOMETRY = {
     "inner_radius_m": 0.045,
@@ -53,6 +54,7 @@ REQUIRED = {
     clutch.Ctc: {},
     clutch.Smc: {},
     clutch.SmcSign: {},
+    clutch.Pid: {},
     clutch.SmoothedDerivative: {},
     clutch.Observer: {},
     clutch.Output: {},
@@ -137,7 +139,7 @@ def test_every_class_of_the_scenario_is_tested_here():
     classes = {
         c
         for c in vars(_model).values()
-        if inspect.isclass(c) and issubclass(c, _model._Params) and not c.__name__.startswith("_")
+        if inspect.isclass(c) and issubclass(c, _record._Params) and not c.__name__.startswith("_")
     }
     assert classes == {*CLASSES, clutch.Scenario}
 
@@ -295,136 +297,70 @@ def test_a_part_of_the_wrong_class_is_named():
 
 NOT_A_NUMBER = [math.nan, math.inf, -math.inf, "fast", None, object(), [1.0], {}, 1j, b"1", 10**400, True]
 NOT_A_COUNT = [-1, 1.5, math.nan, "many", None, object(), [1], 2**32, 10**400, True]
-ABOVE_0 = [0.0, -1.0, -5e-324]
-AT_LEAST_0 = [-1e-300, -1.0]
-PERCENT_OUT = [-1.0, 100.0]
 
-OUT_OF_RANGE = {
-    clutch.StribeckFriction: {
-        "mu_static": AT_LEAST_0,
-        "mu_dynamic": AT_LEAST_0,
-        "stribeck_velocity_rad_s": ABOVE_0,
-        "stribeck_exponent": ABOVE_0,
-    },
-    clutch.BrakeGeometry: dict.fromkeys(GEOMETRY, ABOVE_0),
+SCHEMA = json.loads((ROOT / "docs/scenario.schema.json").read_text(encoding="utf-8"))
+
+
+def declared(cls):
+    """What the schema says of the fields of a class; of parts nothing."""
+    schema = SCHEMA
+    for part in cls._key.split("."):
+        schema = schema["properties"][part]
+    return {key: row for key, row in schema["properties"].items() if row["type"] != "object"}
+
+
+def beyond(row):
+    """Numbers at the ends that a range leaves out, and beyond those that it takes."""
+    whole = row["type"] == "integer"
+    step = 1 if whole else 1e-9
+    values = [row[end] for end in ("exclusiveMinimum", "exclusiveMaximum") if end in row]
+    for end, sign in (("minimum", -1), ("maximum", 1), ("exclusiveMinimum", -1), ("exclusiveMaximum", 1)):
+        if end in row:
+            values.append(row[end] + sign * step * max(1, abs(row[end])) if not whole else row[end] + sign)
+    return values if whole else [*values, math.nan, math.inf, -math.inf]
+
+
+# What a range cannot say: values that do not fit the object's other ones, lists, texts.
+DEPENDENT = {
     clutch.Ripple: {
-        "rms": [-0.1, 0.3],
-        "lowest_waves_per_turn": [0, 99],
+        "rms": [0.3],
+        "lowest_waves_per_turn": [99],
         "highest_waves_per_turn": [50, 401, 100 + 64 * 50],
-        "spacing_waves_per_turn": [0],
     },
-    clutch.WeightDrive: {"mass_kg": ABOVE_0, "gravity_m_s2": ABOVE_0, "pulley_radius_m": ABOVE_0},
-    clutch.SpringDrive: {"stiffness_nm_rad": ABOVE_0, "rest_deg": []},
     clutch.TableDrive: {
         "points_s_nm": [[], [(0.0, math.nan)], [(math.inf, 1.0)], [(1.0, 1.0), (1.0, 2.0)], [(1.0, 1.0, 1.0)]]
     },
-    clutch.HandDrive: {
-        "mean_nm": [],
-        "rms_nm": AT_LEAST_0,
-        "lowest_frequency_hz": AT_LEAST_0,
-        "highest_frequency_hz": [0.2, 0.1, 50.1],
-    },
-    clutch.Encoder: {"counts_per_rev": [0, 3, 2**24 + 1], "quantised": []},
-    clutch.Dac: {"bits": [0, 17, 256], "lowest_v": [], "highest_v": [-10.0, -11.0], "quantised": []},
-    clutch.Rig: {
-        "inertia_kg_m2": ABOVE_0,
-        "viscous_damping_nm_s_rad": AT_LEAST_0,
-        "brake_gain_nm_v": ABOVE_0,
-        "torque_noise_nm": AT_LEAST_0,
-        "delay_ticks": [1001],
-        "actuator_time_constant_s": ABOVE_0,
-        "speed_limit_deg_s": ABOVE_0,
-    },
-    clutch.Model: {
-        "inertia_kg_m2": ABOVE_0,
-        "drive_torque_nm": ABOVE_0,
-        "viscous_damping_nm_s_rad": AT_LEAST_0,
-        "brake_gain_nm_v": ABOVE_0,
-        "mu_static": [*ABOVE_0],
-        "mu_dynamic": [*ABOVE_0],
-        "stribeck_velocity_rad_s": ABOVE_0,
-        "stribeck_exponent": ABOVE_0,
-    },
-    clutch.Pd: {"kp_v_rad": AT_LEAST_0, "kd_v_s_rad": AT_LEAST_0},
-    clutch.Ctc: {"outer_gain": AT_LEAST_0, "kp_1_s2": AT_LEAST_0, "kd_1_s": AT_LEAST_0},
-    clutch.Smc: {
-        "kp_v": AT_LEAST_0,
-        "kd_v_s_rad": AT_LEAST_0,
-        "slope_1_s": ABOVE_0,
-        "boundary_rad_s": ABOVE_0,
-    },
-    clutch.SmcSign: {"kp_v": AT_LEAST_0, "kd_v_s_rad": AT_LEAST_0, "slope_1_s": ABOVE_0},
-    clutch.SmoothedDerivative: {"smoothing": [*ABOVE_0, 1.0000001]},
-    clutch.Observer: {"disturbance_walk_nm_rt_s": ABOVE_0},
-    clutch.Output: {
-        "lowest_v": AT_LEAST_0,
-        "highest_v": [0.0, -1.0],
-        "on_invalid_v": [-1.0, 10.1],
-        "bumpless_time_s": AT_LEAST_0,
-    },
-    clutch.Ramp: {"rate_deg_s": [1e30]},
-    clutch.Trapezoid: {"distance_deg": [1e30], "speed_deg_s": ABOVE_0, "acceleration_deg_s2": ABOVE_0},
-    clutch.JerkLimited: {
-        "distance_deg": [1e30],
-        "speed_deg_s": ABOVE_0,
-        "acceleration_deg_s2": ABOVE_0,
-        "jerk_deg_s3": ABOVE_0,
-    },
-    clutch.MinimumJerk: {"distance_deg": [1e30], "duration_s": [*ABOVE_0, 1.1e6]},
-    clutch.Sine: {
-        "rate_deg_s": [1e30],
-        "amplitude_deg": [1e30],
-        "frequency_hz": [-0.1, 1e9],
-        "phase_turns": [-1.1, 1.1],
-    },
-    clutch.Chirp: {
-        "rate_deg_s": [1e30],
-        "amplitude_deg": [1e30],
-        "from_hz": [-0.1, 1e9],
-        "to_hz": [-0.1, 1e9],
-        "duration_s": ABOVE_0,
-        "phase_turns": [-1.1, 1.1],
-    },
+    clutch.HandDrive: {"highest_frequency_hz": [0.2, 0.1]},
+    clutch.Dac: {"highest_v": [-10.0, -11.0]},
+    clutch.Output: {"highest_v": [0.0, -1.0], "on_invalid_v": [-1.0, 10.1]},
     clutch.TablePath: {
         "points_s_deg": [[], [(-1.0, 0.0)], [(0.0, math.nan)], [(1.0, 1.0), (1.0, 2.0)], [(1.0,)]],
         "interpolation": ["Cubic", ""],
     },
-    clutch.Sampling: {"period_us": [0, 1_000_001], "scalar": ["f16", "", 64]},
-    clutch.Bounds: {
-        "inertia_percent": PERCENT_OUT,
-        "drive_torque_percent": PERCENT_OUT,
-        "viscous_damping_percent": PERCENT_OUT,
-        "brake_gain_percent": PERCENT_OUT,
-        "friction_percent": PERCENT_OUT,
-        "reach_rate_rad_s2": AT_LEAST_0,
-    },
-    clutch.RunSettings: {
-        "duration_s": ABOVE_0,
-        "settle_s": [-1.0, 5.0, 6.0],
-        "start": ["stop", 1],
-        "start_counts": [1e9, -1e9],
-        "seed": [-1, 2**63],
-        "engine": ["euler", 4],
-    },
-    clutch.HoldVoltage: {"volts_v": [0.0, -1.0]},
-    clutch.RampVoltage: {"rate_v_s": ABOVE_0, "volts_v": [0.0, -1.0]},
-    clutch.HoldThenRelease: {"volts_v": [0.0, -1.0], "after_s": ABOVE_0},
-    clutch.Limits: {
-        "jump_deg": ABOVE_0,
-        "good_samples": [0, 3],
-        "following_error_deg": ABOVE_0,
-        "following_time_s": AT_LEAST_0,
-        "saturation_time_s": ABOVE_0,
-        "stand_still_counts": [0.9],
-        "friction_margin": [0.9],
-        **{name: [0, 129] for name in ["jumps", "lost", "late", "disorder", "overruns"]},
-        "silence_cycles": [1, 1001],
-        "watchdog_cycles": [1, 1001],
-        "valid_cycles": [0, 1001],
-        "deadline_us": [0],
-    },
-    clutch.Safety: {"reason": [3, b"why"]},
+    clutch.Sampling: {"scalar": ["f16", "", 64]},
+    clutch.RunSettings: {"start": ["stop", 1], "engine": ["euler", 4]},
+    clutch.Limits: {"good_samples": [3]},
+    clutch.Safety: {"reason": [3, b"why", "", " "]},
 }
+NUMBERS = [
+    (cls, name, value, row.get("x-unit", ""))
+    for cls in CLASSES
+    for name, row in declared(cls).items()
+    if row["type"] in ("number", "integer") and name in {f.name for f in dataclasses.fields(cls)}
+    for value in beyond(row)
+]
+
+
+@pytest.mark.parametrize(
+    ("cls", "name", "value", "unit"), NUMBERS, ids=[f"{c.__name__}-{n}-{v}" for c, n, v, _ in NUMBERS]
+)
+def test_a_number_out_of_its_range_is_refused_with_its_key_its_value_and_its_unit(cls, name, value, unit):
+    with pytest.raises(clutch.ParamError) as caught:
+        cls(**REQUIRED[cls] | {name: value})
+    assert caught.value.field == name
+    assert same(caught.value.value, value)
+    assert str(caught.value).startswith(f"{cls.__name__}: {name} = ")
+    assert unit in str(caught.value)
 
 
 def wrong_types(cls, name):
@@ -446,10 +382,11 @@ def wrong_types(cls, name):
 
 
 BAD = [
-    (cls, name, value)
-    for cls, names in OUT_OF_RANGE.items()
-    for name, values in names.items()
-    for value in [*values, *wrong_types(cls, name)]
+    (cls, slot.name, value)
+    for cls in CLASSES
+    for slot in _model._slots(cls)
+    if slot.plain
+    for value in [*DEPENDENT.get(cls, {}).get(slot.name, []), *wrong_types(cls, slot.name)]
 ]
 
 
@@ -468,10 +405,50 @@ def test_each_bad_value_is_named(cls, name, value):
         cls(**REQUIRED[cls]).replace(**{name: value})
 
 
-def test_every_field_but_parts_is_tried_with_bad_values():
+def test_every_number_of_every_class_is_tried_out_of_its_range():
+    tried = {(cls, name) for cls, name, _, _ in NUMBERS}
     for cls in CLASSES:
-        plain = {slot.name for slot in _model._slots(cls) if slot.plain}
-        assert plain == set(OUT_OF_RANGE.get(cls, {})), cls
+        for field in dataclasses.fields(cls):
+            if field.type in (int, float, float | None):
+                assert (cls, field.name) in tried
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "value"),
+    [
+        ({"model": clutch.Model(drive_torque_nm=0)}, "model.drive_torque_nm", 0.0),
+        (
+            {"model": clutch.Model(friction=clutch.StribeckFriction(mu_static=0))},
+            "model.friction.stribeck.mu_static",
+            0.0,
+        ),
+        ({"reference": clutch.Ramp(rate_deg_s=1e30)}, "reference.ramp.rate_deg_s", 1e30),
+        (
+            {"reference": clutch.Trapezoid(distance_deg=1e30, speed_deg_s=1, acceleration_deg_s2=1)},
+            "reference.trapezoid.distance_deg",
+            1e30,
+        ),
+        (
+            {"reference": clutch.Sine(rate_deg_s=10, amplitude_deg=0.5, frequency_hz=500)},
+            "reference.sine.frequency_hz",
+            500.0,
+        ),
+        ({"run": clutch.RunSettings(duration_s=5, settle_s=5)}, "run.settle_s", 5.0),
+        ({"run": clutch.RunSettings(duration_s=1e5)}, "run.duration_s", 1e5),
+        ({"law": clutch.Pid(tracking_time_s=1e-4)}, "law.pid.tracking_time_s", 1e-4),
+        ({"output": clutch.Output(highest_v=12)}, "output.highest_v", 12.0),
+        (
+            {"rig": clutch.Rig(brake_gain_nm_v=clutch.BrakeGeometry(**GEOMETRY | {"contact_radius_m": 1e-310}))},
+            "rig.brake_geometry.contact_radius_m",
+            1e-310,
+        ),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_depends_on_other_parts_the_scenario_refuses_with_key_and_value(change, key, value):
+    with pytest.raises(clutch.ParamError) as caught:
+        clutch.Scenario.load("board_smc_2").replace(**change)
+    assert (caught.value.field, caught.value.value) == (key, value)
 
 
 def test_a_scenarios_error_has_the_dotted_key():
@@ -642,22 +619,20 @@ VALID = {
     clutch.HandDrive: hands(),
     clutch.Encoder: each(counts_per_rev=st.integers(4, 2**24), quantised=st.booleans()),
     clutch.Dac: converters(),
-    clutch.Model: FRICTION.flatmap(
-        lambda f: each(
-            inertia_kg_m2=POSITIVE,
-            drive_torque_nm=POSITIVE,
-            viscous_damping_nm_s_rad=number(0, 10),
-            brake_gain_nm_v=POSITIVE,
-            mu_static=st.just(f["mu_static"] + 0.1),
-            mu_dynamic=st.just(f["mu_dynamic"] + 0.1),
-            stribeck_velocity_rad_s=st.just(f["stribeck_velocity_rad_s"]),
-            stribeck_exponent=st.just(f["stribeck_exponent"]),
-        )
-    ),
     clutch.Pd: each(kp_v_rad=GAIN, kd_v_s_rad=GAIN),
     clutch.Ctc: each(outer_gain=GAIN, kp_1_s2=GAIN, kd_1_s=GAIN),
     clutch.Smc: each(kp_v=GAIN, kd_v_s_rad=GAIN, slope_1_s=POSITIVE, boundary_rad_s=POSITIVE),
     clutch.SmcSign: each(kp_v=GAIN, kd_v_s_rad=GAIN, slope_1_s=POSITIVE),
+    clutch.Pid: each(
+        kp_v_rad=GAIN,
+        ki_v_rad_s=GAIN,
+        kd_v_s_rad=GAIN,
+        derivative_time_s=number(0, 10),
+        tracking_time_s=POSITIVE,
+        bias_v=number(-10, 10),
+        velocity_v_s_rad=number(-10, 10),
+        acceleration_v_s2_rad=number(-10, 10),
+    ),
     clutch.SmoothedDerivative: each(smoothing=st.floats(1e-6, 1)),
     clutch.Observer: each(disturbance_walk_nm_rt_s=st.floats(1e-3, 10)),
     clutch.Output: outputs(),
@@ -724,6 +699,13 @@ VALID[clutch.Rig] = each(
     drive=objects(clutch.WeightDrive, clutch.SpringDrive, clutch.TableDrive, clutch.HandDrive),
     encoder=objects(clutch.Encoder),
     dac=objects(clutch.Dac),
+)
+VALID[clutch.Model] = each(
+    inertia_kg_m2=POSITIVE,
+    drive_torque_nm=POSITIVE,
+    viscous_damping_nm_s_rad=number(0, 10),
+    brake_gain_nm_v=POSITIVE,
+    friction=objects(clutch.StribeckFriction),
 )
 VALID[clutch.Safety] = each(
     reason=st.text(st.characters(exclude_categories=["Cs", "Cc", "Z"]), min_size=1),
@@ -1006,7 +988,7 @@ def test_a_notebook_shows_every_part_and_escapes_texts():
 # --- Documentation -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("module", [_errors, _model], ids=lambda m: m.__name__)
+@pytest.mark.parametrize("module", [_errors, _mixins, _model, _tables], ids=lambda m: m.__name__)
 def test_examples_in_the_documentation_are_true(module):
     found = doctest.testmod(module)
     assert found.attempted > 0
@@ -1016,7 +998,8 @@ def test_examples_in_the_documentation_are_true(module):
 def test_every_class_method_and_field_is_documented():
     nested = [c for c in vars(clutch.Certificate).values() if inspect.isclass(c)]
     for cls in [*CLASSES, clutch.Scenario, clutch.Certificate, *nested]:
-        assert ">>>" in cls.__doc__, cls
+        # What must be given cannot be made up: an example shows it where there is one.
+        assert ">>>" in cls.__doc__ or REQUIRED.get(cls), cls
         for f in dataclasses.fields(cls):
             assert f"\n{f.name} : " in inspect.getdoc(cls), (cls, f.name)
         for name, member in vars(cls).items():

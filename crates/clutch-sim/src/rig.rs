@@ -20,11 +20,11 @@ params! {
         /// Root mean square of the variation, as a share of the friction.
         rms: f64, "rms" "" NONE, Range::at_least(0.0);
         /// Longest wave.
-        lowest: u32, "lowest_waves_per_turn" "" WAVES_PER_TURN, Range::at_least(1.0);
+        lowest: u32, "lowest_waves_per_turn" "" WAVES_PER_TURN, Range::within(1.0, 4294967295.0);
         /// Shortest wave.
-        highest: u32, "highest_waves_per_turn" "" WAVES_PER_TURN, Range::at_least(1.0);
+        highest: u32, "highest_waves_per_turn" "" WAVES_PER_TURN, Range::within(1.0, 4294967295.0);
         /// From one wave to the next: the pattern repeats that often in a turn.
-        spacing: u32, "spacing_waves_per_turn" "" WAVES_PER_TURN, Range::at_least(1.0);
+        spacing: u32, "spacing_waves_per_turn" "" WAVES_PER_TURN, Range::within(1.0, 4294967295.0);
     }
     relations(p) {
         /// Waves fit the pattern.

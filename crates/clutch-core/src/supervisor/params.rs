@@ -12,7 +12,7 @@ crate::params! {
         /// Samples beyond `jump_deg`, within 128 periods, that end control. One glitch is tolerated.
         jumps: u32 = 3, "jumps" "" IN_128, Range::within(1.0, 128.0);
         /// Samples in a row that have to pass after one was refused before the law answers again.
-        good_samples: u32 = 1, "good_samples" "" NONE, Range::at_least(1.0);
+        good_samples: u32 = 1, "good_samples" "" NONE, Range::within(1.0, 4294967295.0);
         /// Error at rest that ends control.
         following_error: T = 1.0, "following_error_deg" "" DEG, Range::above(0.0);
         /// How much `following_error_deg` grows with the target's speed.
