@@ -45,6 +45,54 @@ pub struct BoardParams {
     pub boot_code: u16,
 }
 
+impl BoardParams {
+    /// Checks them. A board whose numbers are constants asks while it is compiled: refused at run time, they would leave
+    /// an image that does nothing, of which an optimiser removes the rest without a word.
+    ///
+    /// ```
+    /// # use clutch_node::BoardParams;
+    /// const PARAMS: BoardParams = BoardParams {
+    ///     board: 4711,
+    ///     boot: 0,
+    ///     counts_per_rev: 20_000,
+    ///     dac_bits: 12,
+    ///     dac_lowest_mv: 0,
+    ///     dac_highest_mv: 10_000,
+    ///     period_min_us: 500,
+    ///     period_max_us: 4000,
+    ///     watchdog_max_us: 100_000,
+    ///     boot_code: 1844,
+    /// };
+    /// const _: () = if let Err(refused) = PARAMS.check() { panic!("{}", refused.field) };
+    /// ```
+    ///
+    /// # Errors
+    /// `dac_bits` outside 1…16, `dac_highest` not above `dac_lowest`, `boot_code` above the
+    /// converter's top, periods of 0 or out of order, a watchdog shorter than two periods.
+    pub const fn check(&self) -> Result<(), ParamError<f64>> {
+        let (field, value, expected) = if self.dac_bits < 1 || self.dac_bits > 16 {
+            ("dac_bits", self.dac_bits as f64, "1 to 16 bits")
+        } else if self.dac_highest_mv <= self.dac_lowest_mv {
+            ("dac_highest", self.dac_highest_mv as f64, "a voltage above the lowest, mV")
+        } else if self.boot_code > self.top() {
+            ("boot_code", self.boot_code as f64, "a code that the converter has")
+        } else if self.period_min_us == 0 || self.period_min_us > self.period_max_us {
+            ("period_min", self.period_min_us as f64, "above 0 µs and not above the longest period")
+        } else if self.watchdog_max_us / 2 < self.period_min_us {
+            ("watchdog_max", self.watchdog_max_us as f64, "at least two of the shortest periods, µs")
+        } else {
+            return Ok(());
+        };
+        Err(ParamError { field, value, expected })
+    }
+
+    /// The converter's highest code.
+    const fn top(&self) -> u16 {
+        let bits = if self.dac_bits < 16 { self.dac_bits } else { 16 };
+        ((1_u32 << bits) - 1) as u16
+    }
+}
+
 /// Samples that an Actuate may answer.
 const RECENT: usize = 8;
 
@@ -80,18 +128,10 @@ impl BoardNode {
     /// A board at power-up.
     ///
     /// # Errors
-    /// `dac_bits` outside 1…16, `dac_highest` not above `dac_lowest`, `boot_code` above the
-    /// converter's top, periods of 0 or out of order, a watchdog shorter than two periods.
+    /// Those of [`BoardParams::check`].
     pub fn new(p: &BoardParams) -> Result<Self, ParamError<f64>> {
-        let check = |field, value: f64, holds: bool, expected| {
-            if holds { Ok(()) } else { Err(ParamError { field, value, expected }) }
-        };
-        let bits = f64::from(p.dac_bits);
-        check("dac_bits", bits, (1..=16).contains(&p.dac_bits), "1 to 16 bits")?;
-        let highest = f64::from(p.dac_highest_mv);
-        let expected = "a voltage above the lowest, mV";
-        check("dac_highest", highest, p.dac_highest_mv > p.dac_lowest_mv, expected)?;
-        let board = BoardNode {
+        p.check()?;
+        Ok(BoardNode {
             params: *p,
             decoder: Decoder::new(),
             state: BoardState::Boot,
@@ -110,16 +150,7 @@ impl BoardNode {
             late: false,
             safe_under_way: false,
             armed_at: 0,
-        };
-        let code = f64::from(p.boot_code);
-        check("boot_code", code, p.boot_code <= board.top(), "a code that the converter has")?;
-        let shortest = f64::from(p.period_min_us);
-        let ordered = p.period_min_us > 0 && p.period_min_us <= p.period_max_us;
-        check("period_min", shortest, ordered, "above 0 µs and not above the longest period")?;
-        let watchdog = f64::from(p.watchdog_max_us);
-        let holds = p.watchdog_max_us / 2 >= p.period_min_us;
-        check("watchdog_max", watchdog, holds, "at least two of the shortest periods, µs")?;
-        Ok(board)
+        })
     }
 
     /// The code that the converter is to give now.
@@ -161,10 +192,6 @@ impl BoardNode {
 
     fn driving(&self) -> bool {
         matches!(self.state, BoardState::Armed | BoardState::Running)
-    }
-
-    fn top(&self) -> u16 {
-        ((1_u32 << self.params.dac_bits.min(16)) - 1) as u16
     }
 
     /// Bytes from the controller.
@@ -297,7 +324,7 @@ impl BoardNode {
     fn configure(&mut self, m: &Configure, out: &mut Outbox) {
         let p = &self.params;
         let safe_kind = clutch_wire::SafeKind::from_u8(m.safe_kind);
-        let codes_fit = m.hold_code <= self.top() && m.release_code <= self.top();
+        let codes_fit = m.hold_code <= self.params.top() && m.release_code <= self.params.top();
         let never_arrives = safe_kind == Some(clutch_wire::SafeKind::Ramp) && m.ramp_step == 0;
         let again = self.state == BoardState::Ready && m.run == self.run && m.config == self.config;
         let spent = m.run == self.run && self.state != BoardState::Boot && !again;
@@ -374,7 +401,7 @@ impl BoardNode {
     }
 
     fn actuate(&mut self, now_us: u32, m: &clutch_wire::Actuate, out: &mut Outbox) {
-        if m.code > self.top() {
+        if m.code > self.params.top() {
             let refused = Refused {
                 request: clutch_wire::Actuate::KIND,
                 reason: Refusal::Code as u8,

@@ -103,7 +103,7 @@ impl Acquisition {
     /// At power-up.
     ///
     /// # Errors
-    /// Those of [`BoardNode::new`].
+    /// Those of [`BoardParams::check`].
     pub fn new(params: &BoardParams) -> Result<Self, ParamError<f64>> {
         Ok(Acquisition { node: BoardNode::new(params)?, outbox: Outbox::default() })
     }

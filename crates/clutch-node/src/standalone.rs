@@ -24,7 +24,7 @@ impl Standalone {
     /// A chip at power-up.
     ///
     /// # Errors
-    /// As [`BoardNode::new`].
+    /// Those of [`BoardParams::check`].
     pub fn new(controller: OnboardParams, board: &BoardParams) -> Result<Self, ParamError<f64>> {
         Ok(Standalone {
             controller: Onboard::new(controller),
