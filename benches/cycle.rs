@@ -1,33 +1,31 @@
 //! A control cycle, part by part: the servo alone, under its supervisor, with the frames around it,
-//! and what a log adds to it.
+//! and with the share of a log.
 
 use clutch_core::supervisor::{BoardMode, Sample, State};
 use clutch_core::{Counts, DacCode, FixedCounts, Real, SupervisorState, Target};
 use clutch_log::Record;
-use clutch_loop::records;
-use clutch_loop::setup::{self, Setup};
-use clutch_node::{ControlNode, Notice, Outbox};
+use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::to_log;
+use clutch_node::{ControllerNode, Notice, Outbox};
 use clutch_sim::Scenario;
-use clutch_wire::{Armed, BoardState, Configured, Message, Sample as SampleFrame, encode};
-use criterion::{Criterion, criterion_group, criterion_main};
+use clutch_wire::{Armed, BoardState, Configured, Frame, Message, Sample as SampleFrame, encode};
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 
 const SCENARIO: &str = "name = \"bench\"\n[rig]\nbase = \"paper\"\n[law.smc]\n[reference.ramp]\nrate_deg_s = 20.0\n\
     [run]\nstart = \"rest\"\n[safety]\nreason = \"a weight\"\n[safety.on_fault.hold]\nvolts_v = 4.5\n";
+
+type Group<'a> = BenchmarkGroup<'a, WallTime>;
 
 /// Counts of a shaft at 20 °/s, on its path.
 fn counts(tick: u64) -> i32 {
     (tick * 10 / 9) as i32
 }
 
-fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
-    let set = [("sampling.scalar".to_owned(), scalar.to_owned())];
-    let scenario = Scenario::parse("bench", SCENARIO, &set).expect("a scenario");
-    let setup = Setup::<T>::new(&scenario, 7).expect("a safe state");
-    let path = setup::path::<T>(&scenario).expect("a path");
-    let mut group = c.benchmark_group(format!("cycle, SMC, {scalar}"));
-
-    let (servo, supervisor) = (setup.servo, setup.supervisor);
+/// The servo alone: what the rest is added to.
+fn servo<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) -> Target<T>) {
+    let servo = built.servo;
     let mut state = servo.start(Counts(0), &path(0), T::ZERO);
     let mut tick = 0;
     group.bench_function("path", |b| {
@@ -43,7 +41,10 @@ fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
             servo.tick(&mut state, black_box(Counts(counts(tick))), &path(tick))
         });
     });
+}
 
+fn supervisor<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) -> Target<T>) {
+    let (servo, supervisor) = (built.servo, built.supervisor);
     let mut supervised = SupervisorState::default();
     supervisor.connect(&mut supervised);
     supervisor.arm(&mut supervised, DacCode(2970));
@@ -57,33 +58,39 @@ fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
                 ..Sample::default()
             };
             tick += 1;
-            supervisor.sample(&servo, &mut supervised, black_box(&sample), &path)
+            supervisor.sample(&servo, &mut supervised, black_box(&sample), path)
         });
     });
     // A run that had ended would be measured without its law.
     assert_eq!(supervised.state(), State::Running);
+}
 
-    let frame = |tick: u64| {
-        encode(&Message::Sample(SampleFrame {
-            run: 7,
-            sequence: tick as u16,
-            time_us: (tick * 1000) as u32,
-            counts: counts(tick),
-            status: BoardState::Running as u8,
-        }))
-    };
-    let node = || {
-        let mut node = ControlNode::new(setup.control, servo, supervisor);
-        let mut out = Outbox::default();
-        let path = |_| Target { position: FixedCounts(0), velocity: T::ZERO, acceleration: T::ZERO };
-        for message in [
-            Message::Configured(Configured { run: 7, config: setup.control.config, boot: 1 }),
-            Message::Armed(Armed { run: 7, config: setup.control.config }),
-        ] {
-            node.receive(0, encode(&message).as_bytes(), &path, &mut out, &mut |_| ());
-        }
-        node
-    };
+/// A sample on the wire.
+fn frame(tick: u64) -> Frame {
+    encode(&Message::Sample(SampleFrame {
+        run: 7,
+        sequence: tick as u16,
+        time_us: (tick * 1000) as u32,
+        counts: counts(tick),
+        status: BoardState::Running as u8,
+    }))
+}
+
+/// A controller whose board is armed.
+fn armed<T: Real>(built: &BuiltRun<T>) -> ControllerNode<T> {
+    let mut node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+    let mut out = Outbox::default();
+    let path = |_| Target { position: FixedCounts(0), velocity: T::ZERO, acceleration: T::ZERO };
+    for message in [
+        Message::Configured(Configured { run: 7, config: built.controller.config, boot: 1 }),
+        Message::Armed(Armed { run: 7, config: built.controller.config }),
+    ] {
+        node.receive(0, encode(&message).as_bytes(), &path, &mut out, &mut |_| ());
+    }
+    node
+}
+
+fn frames<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) -> Target<T>) {
     let mut tick = 0;
     group.bench_function("a sample's frame made", |b| {
         b.iter(|| {
@@ -91,28 +98,32 @@ fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
             black_box(frame(black_box(tick)))
         });
     });
-    let (mut controller, mut out, mut tick) = (node(), Outbox::default(), 0);
+    let (mut controller, mut out, mut tick) = (armed(built), Outbox::default(), 0);
     group.bench_function("sample's frame made, bytes in, bytes out", |b| {
         b.iter(|| {
             let bytes = frame(tick);
-            controller.receive(tick * 1_000_000, bytes.as_bytes(), &path, &mut out, &mut |_| ());
+            controller.receive(tick * 1_000_000, bytes.as_bytes(), path, &mut out, &mut |_| ());
             tick += 1;
             black_box(out.as_bytes().len());
             out.clear();
         });
     });
     assert_eq!(controller.state().state(), State::Running);
-    let (mut controller, mut out, mut tick) = (node(), Outbox::default(), 0);
+}
+
+/// What a log adds.
+fn log<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) -> Target<T>) {
+    let (mut controller, mut out, mut tick) = (armed(built), Outbox::default(), 0);
     let (mut ring, mut drain) = rtrb::RingBuffer::<Record>::new(1 << 15);
+    let servo = built.servo;
     let radians = servo.encoder().radians_per_count::<f64>();
     group.bench_function("the same, and both records into the ring", |b| {
         b.iter(|| {
             let bytes = frame(tick);
-            controller.receive(tick * 1_000_000, bytes.as_bytes(), &path, &mut out, &mut |n| {
+            controller.receive(tick * 1_000_000, bytes.as_bytes(), path, &mut out, &mut |n| {
                 if let Notice::Cycle(n) = n {
-                    let _ = ring.push(Record::Sample(records::sample(tick, 0, &n)));
-                    let _ =
-                        ring.push(Record::Command(records::command(tick, &n.cycle, servo.dac(), radians)));
+                    let _ = ring.push(Record::Sample(to_log::sample(tick, 0, &n)));
+                    let _ = ring.push(Record::Command(to_log::command(tick, &n.cycle, servo.dac(), radians)));
                 }
             });
             tick += 1;
@@ -125,6 +136,18 @@ fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
         });
     });
     assert_eq!(controller.state().state(), State::Running);
+}
+
+fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {
+    let set = [("sampling.scalar".to_owned(), scalar.to_owned())];
+    let scenario = Scenario::parse("bench", SCENARIO, &set).expect("a scenario");
+    let built = BuiltRun::<T>::new(&scenario, 7).expect("a safe state");
+    let path = from_scenario::path::<T>(&scenario).expect("a path");
+    let mut group = c.benchmark_group(format!("cycle, SMC, {scalar}"));
+    servo(&mut group, &built, &path);
+    supervisor(&mut group, &built, &path);
+    frames(&mut group, &built, &path);
+    log(&mut group, &built, &path);
     group.finish();
 }
 

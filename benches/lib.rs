@@ -1,3 +1,3 @@
-//! Benchmarks, and what they need: `cargo xtask bench`.
+//! Benchmarks, and their helpers: `cargo xtask bench`.
 
 pub mod machine_code;

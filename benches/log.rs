@@ -1,9 +1,9 @@
-//! The log: what a record costs the log thread, against the mcap crate as it comes, and what it
-//! costs the loop to hand a record over.
+//! The log: the cost of a record for the log thread, against the plain mcap crate, and the loop's
+//! cost to hand a record over.
 //!
 //! Each iteration writes a whole run of 10 000 ticks, sample and command, to a file and finishes
 //! it; `elements` are records. `LogWriter` closes a chunk each 100 ms of log time (100 ticks), so
-//! it compresses worse and asks the system more often than the others; that is in its figures.
+//! it compresses worse and calls the system more often than the others; its figures include that.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use clutch_log::{CHANNELS, CommandRecord, Header, LogWriter, Record, SampleRecord, encode};
@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 const TICKS: u64 = 10_000;
 
-/// What a run logs: counts that step, a path, and terms whose last bits look like noise.
+/// The records of a run: counts that step, a path, and terms whose last bits look like noise.
 fn records() -> Vec<Record> {
     (0..TICKS)
         .flat_map(|tick| {
@@ -48,7 +48,7 @@ fn records() -> Vec<Record> {
                 target_velocity: 0.035,
                 error,
                 error_rate: rate,
-                terms: [rate + 5.0 * error, 4.0 + error, demand - 4.0],
+                terms: [rate + 5.0 * error, 4.0 + error, demand - 4.0].into_iter().collect(),
                 ..CommandRecord::default()
             };
             [Record::Sample(sample), Record::Command(command)]
@@ -56,7 +56,7 @@ fn records() -> Vec<Record> {
         .collect()
 }
 
-/// In memory where there is such a folder, so that the disk is not what is measured.
+/// In memory where there is such a folder, so that the disk is not measured.
 fn file() -> PathBuf {
     let memory = Path::new("/dev/shm");
     let folder = if memory.is_dir() { memory.into() } else { std::env::temp_dir() };
@@ -165,7 +165,7 @@ fn write(c: &mut Criterion) {
     let _ = std::fs::remove_file(path);
 }
 
-/// What the loop pays for a record: a push into the ring, the consumer on the same core.
+/// The loop's cost of a record: a push into the ring, the consumer on the same core.
 fn ring(c: &mut Criterion) {
     let records = records();
     let mut group = c.benchmark_group("log/ring");

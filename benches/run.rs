@@ -4,11 +4,12 @@
 use clutch_core::law::{LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;
 use clutch_sim::engine::EngineKind;
+use clutch_sim::rig::RigBase;
 use clutch_sim::{RigParams, RunSpec, simulate};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 fn ten_seconds(rig: RigParams, law: LawParams, rate_deg_s: f64) -> RunSpec<'static> {
-    let mut spec = RunSpec::new(rig, law, ReferenceParams::Ramp(rate_deg_s.to_radians()));
+    let mut spec = RunSpec::new(rig, law, ReferenceParams::ramp(rate_deg_s.to_radians()));
     spec.run.duration = 10.0;
     spec
 }
@@ -16,8 +17,9 @@ fn ten_seconds(rig: RigParams, law: LawParams, rate_deg_s: f64) -> RunSpec<'stat
 fn rigs(c: &mut Criterion) {
     let mut group = c.benchmark_group("run_10_s");
     group.sample_size(10);
-    for name in RigParams::NAMES {
-        let rig = RigParams::named(name).expect("a built-in rig");
+    for base in RigBase::ALL {
+        let name = base.name();
+        let rig = RigParams::named(*base);
         for (law_name, law) in
             [("pd", LawParams::Pd(PdParams::default())), ("smc", LawParams::Smc(SmcParams::default()))]
         {

@@ -2,25 +2,14 @@
 //! `f64`.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
-use clutch_core::law::{
-    Controller, CtcParams, Law, LawParams, OutputParams, OutputState, PdParams, SmcParams, SmcSignParams,
-    Tick,
-};
+use clutch_core::law::{ControlLaw, Law, LawParams, OutputParams, Tick};
+use clutch_core::params::Choice;
 use clutch_core::{
     Counts, FixedCounts, Micros, ObserverParams, PlantParams, Real, Servo, ServoParams,
     SmoothedDerivativeParams, Target, VelocityParams,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-
-fn laws<T: Real>() -> [(&'static str, LawParams<T>); 4] {
-    [
-        ("pd", LawParams::Pd(PdParams::default())),
-        ("ctc", LawParams::Ctc(CtcParams::default())),
-        ("smc", LawParams::Smc(SmcParams::default())),
-        ("smc_sign", LawParams::SmcSign(SmcSignParams::default())),
-    ]
-}
 
 /// Sixty-four measurements around a path, so that no branch is always the same.
 fn ticks<T: Real>() -> Vec<Tick<T>> {
@@ -39,10 +28,11 @@ fn ticks<T: Real>() -> Vec<Tick<T>> {
 
 fn law_step<T: Real>(c: &mut Criterion, scalar: &str) {
     let mut group = c.benchmark_group(format!("law/{scalar}"));
-    for (name, params) in laws::<T>() {
+    for params in LawParams::<T>::all() {
+        let name = params.name();
         let law = Law::new(&params, &PlantParams::default(), &OutputParams::default(), Micros(1000))
             .expect("Table 2 is in range");
-        let (ticks, mut state, mut i) = (ticks::<T>(), OutputState::default(), 0);
+        let (ticks, mut state, mut i) = (ticks::<T>(), Default::default(), 0);
         group.bench_function(name, |b| {
             b.iter(|| {
                 i = (i + 1) % 64;
@@ -59,7 +49,8 @@ fn servo_tick<T: Real>(c: &mut Criterion, scalar: &str) {
         ("", VelocityParams::SmoothedDerivative(SmoothedDerivativeParams::default())),
         ("_observer", VelocityParams::Observer(ObserverParams::default())),
     ];
-    for (name, params) in laws::<T>() {
+    for params in LawParams::<T>::all() {
+        let name = params.name();
         for (suffix, velocity) in sources {
             let params = ServoParams { velocity, ..ServoParams::paper(params) };
             let servo = Servo::new(&params).expect("the paper's servo is in range");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// The command under test: `CLUTCH_BIN`, or what cargo builds from this tree.
+/// The command under test: `CLUTCH_BIN`, or the one that cargo builds from this tree.
 ///
 /// # Panics
 /// It does not build.

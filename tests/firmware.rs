@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Why there can be no emulated board here, if so; else the folder of its images, built once.
+/// The reason why there can be no emulated board here; else the folder of its images, built once.
 static IMAGES: LazyLock<Result<PathBuf, &str>> = LazyLock::new(|| {
     if !Command::new("qemu-system-arm").arg("--version").output().is_ok_and(|o| o.status.success()) {
         return Err("qemu-system-arm is not installed (Debian and Ubuntu: qemu-system-arm)");
@@ -19,7 +19,7 @@ static IMAGES: LazyLock<Result<PathBuf, &str>> = LazyLock::new(|| {
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let target = root.join("target/firmware");
-    // From within its folder: its flags stand in a file that cargo looks for from there.
+    // From within its folder: cargo looks there for the file with its flags.
     let done = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .args(["build", "--release", "--locked", "--package", "clutch-qemu-mps2", "--target-dir"])
         .arg(&target)

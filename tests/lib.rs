@@ -1,4 +1,4 @@
-//! What the acceptance tests share.
+//! Helpers that the acceptance tests share.
 
 #[path = "bits/native.rs"]
 pub mod bits;

@@ -1,4 +1,4 @@
-//! The images are built and run.
+//! Builds and runs the images.
 
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ const BOARD: [&str; 9] = [
     "-semihosting-config",
 ];
 
-/// What the image printed of one function.
+/// The image's output for one function.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counts {
     pub(crate) calls: usize,
@@ -36,25 +36,25 @@ impl Display for Counts {
     }
 }
 
-/// All that it printed.
+/// The whole output.
 pub(crate) struct Measured {
     /// In the order of the measurements.
     pub(crate) names: Vec<String>,
     pub(crate) counts: BTreeMap<String, Counts>,
 }
 
-/// Why there is nothing to look at; not an error on a machine that lacks the tools.
+/// The reason why there is nothing to examine; not an error on a machine that lacks the tools.
 pub(crate) fn missing(program: &str, option: &str) -> Option<String> {
     let runs = Command::new(program).arg(option).stdout(Stdio::null()).stderr(Stdio::null()).status();
     (!runs.is_ok_and(|s| s.success())).then(|| format!("{program} is not there"))
 }
 
-/// Whether the emulator is there.
+/// A message if the emulator is missing.
 pub(crate) fn no_emulator() -> Option<String> {
     missing(QEMU, "--version")
 }
 
-/// Whether images can be built.
+/// A message if images cannot be built.
 pub(crate) fn no_target() -> Option<String> {
     let asked = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().ok()?;
     let folder = PathBuf::from(String::from_utf8_lossy(&asked.stdout).trim());

@@ -1,10 +1,10 @@
-//! What a control period costs at most on a Cortex-M4F: bounds from the machine code of the linked
-//! image, the most that was measured in the emulator, and the budgets of firmware/budget.toml.
-//! docs/timing.md says what the figures mean.
+//! The highest cost of a control period on a Cortex-M4F: bounds from the machine code of the linked
+//! image, the highest values measured in the emulator, and the budgets of firmware/budget.toml.
+//! docs/timing.md explains the figures.
 //!
-//! `cargo bench --bench budget`, with `-- size` or `-- stack` only that part, and with
-//! `-- loops` all functions and loops that the bounds are made of. It fails
-//! when a measured value exceeds its bound, or a bound its budget.
+//! `cargo bench --bench budget`, with `-- size` or `-- stack` only that part, and with `-- loops`
+//! all functions and loops behind the bounds. It fails when a measured value exceeds its bound, or
+//! a bound its budget.
 
 mod emulator;
 mod memory;
@@ -21,7 +21,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let part = arguments.iter().find(|a| ["size", "stack", "loops"].contains(&a.as_str()));
-    // A filter that means other benchmarks: `cargo bench -- law`.
+    // A filter for other benchmarks: `cargo bench -- law`.
     if matches!(&arguments[..], [filter] if part.is_none() && !filter.starts_with('-') && !"budget".contains(filter.as_str()))
     {
         return ExitCode::SUCCESS;
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// On a machine of CI all has to be there; elsewhere it is said what is not.
+/// On a machine of CI everything has to be there; elsewhere the missing part is reported.
 fn skipped(why: &str) -> Result<()> {
     if std::env::var_os("CI").is_some() {
         bail!("{why}");
@@ -110,7 +110,7 @@ fn all_bounds(image: &Image, plan: &Plan, loops: bool) -> Result<Vec<Cost>> {
         all.push(bounds.of(&item.symbol).map_err(told).with_context(|| item.name.clone())?);
         unused.retain(|name| !bounds.used(false).any(|used| used == name));
         if let Some(fact) = case.names().find(|name| !bounds.used(true).any(|used| used == name)) {
-            bail!("{}: no code is meant by: {fact}", item.name);
+            bail!("{}: this statement applies to no code: {fact}", item.name);
         }
         if loops {
             println!("\n{}:", item.name);
@@ -121,14 +121,18 @@ fn all_bounds(image: &Image, plan: &Plan, loops: bool) -> Result<Vec<Cost>> {
             bounds.loops().for_each(|(address, what)| println!("{address:#x} {what}"));
         }
     }
-    // One that means nothing here may mean something wrong tomorrow.
+    // A statement that applies to nothing here may apply wrongly tomorrow.
     if !unused.is_empty() {
-        bail!("firmware/budget.toml: no code is meant by:\n{}", Vec::from_iter(unused).join("\n"));
+        bail!(
+            "firmware/budget.toml: these statements apply to no code:\n{}",
+            Vec::from_iter(unused).join("\n")
+        );
     }
     Ok(all)
 }
 
-/// The dearest path that was gone, of what is traced: cycles by the table of the bound.
+/// The costliest path that was executed, for each traced function: cycles by the table of the
+/// bound.
 fn gone(path: &Path, image: &Image, plan: &Plan, measured: &Measured) -> Result<BTreeMap<String, Cost>> {
     let facts = plan.facts();
     let (mut ranges, mut entries) = (BTreeMap::new(), BTreeMap::new());
@@ -165,7 +169,7 @@ fn gone(path: &Path, image: &Image, plan: &Plan, measured: &Measured) -> Result<
     Ok(most)
 }
 
-/// Prints the table; what is over.
+/// Prints the table; gives the values over budget.
 fn table(
     plan: &Plan,
     bounds: &[Cost],
@@ -174,7 +178,7 @@ fn table(
 ) -> Vec<String> {
     let mut over = Vec::new();
     println!(
-        "\nBounds of the machine code, Cortex-M4F without wait states, and the most that was measured:\n"
+        "\nBounds of the machine code, Cortex-M4F without wait states, and the highest values measured:\n"
     );
     println!(
         "| function | instructions: bound | budget | measured least / mean / most | cycles: bound | budget | measured | share of {} ms at {} MHz |",
@@ -210,7 +214,7 @@ fn table(
     over
 }
 
-/// Prints how the laws compare with those in C.
+/// Prints the comparison of the laws with those in C.
 fn peers(
     plan: &Plan,
     image: &Image,

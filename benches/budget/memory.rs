@@ -4,13 +4,13 @@ use crate::plan::Memory;
 use anyhow::{Context, Result};
 use clutch_benches::machine_code::{Image, Stack, Stacks};
 
-/// Where RAM begins, on every Cortex-M.
+/// Start of RAM, on every Cortex-M.
 const RAM: u32 = 0x2000_0000;
 /// Bytes that an exception puts on the stack: the registers of core and floating-point unit, and a
 /// word to align them.
 const EXCEPTION: u64 = 104 + 4;
 
-/// Sections with their sizes; what exceeds its budget.
+/// Prints the sections with their sizes; gives the values over budget.
 pub(crate) fn size(image: &Image, budget: &Memory) -> Vec<String> {
     let (mut flash, mut ram) = (0, 0);
     println!(

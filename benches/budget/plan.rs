@@ -40,7 +40,7 @@ pub(crate) struct Item {
     pub(crate) symbol: String,
     /// The name under which the image prints its counts.
     pub(crate) measured: String,
-    /// Whether its cycles along the paths gone are added up, too.
+    /// True if its cycles along the executed paths are added up, too.
     #[serde(default)]
     pub(crate) traced: bool,
     pub(crate) budget: Limit,
@@ -54,11 +54,11 @@ pub(crate) struct Item {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Peer {
-    /// That of the item it is compared with.
+    /// Name of the item it is compared with.
     pub(crate) name: String,
-    /// Its name in the image, and in what the image prints.
+    /// Its name in the image, and in the image's output.
     pub(crate) symbol: String,
-    /// What an earlier version in C executed at most, and its bound.
+    /// The most instructions that an earlier version in C executed, and its bound.
     pub(crate) historic: Option<Limit>,
 }
 
@@ -85,7 +85,7 @@ impl Plan {
         toml::from_str(&text).with_context(|| path.display().to_string())
     }
 
-    /// What holds in every case.
+    /// The facts of every case.
     pub(crate) fn facts(&self) -> Facts {
         Facts { loops: self.loops.clone(), calls: self.calls.clone(), lengths: self.lengths.clone() }
     }
@@ -98,7 +98,7 @@ impl Plan {
 }
 
 impl Item {
-    /// What holds in this case.
+    /// The facts of this case.
     pub(crate) fn case(&self) -> Facts {
         Facts { loops: self.loops.clone(), calls: self.calls.clone(), lengths: Vec::new() }
     }

@@ -1,4 +1,4 @@
-"""How late a thread wakes at 1 kHz: cyclictest, and this project's two wait modes, in turn.
+"""Lateness of a thread that wakes at 1 kHz: cyclictest, and this project's two wait modes, in turn.
 
     python3 benches/latency/lateness.py [--rounds 10] [--cycles 3000] [--cpu 1] [--priority 80]
 

@@ -1,4 +1,4 @@
-//! The longest way through a function.
+//! The longest path through a function.
 
 use super::cost::{cycles, refill, stall};
 use super::decode::{Flow, Instruction};
@@ -9,7 +9,8 @@ use super::{Fault, facts};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Add, Mul};
 
-/// Instructions and cycles, each by itself: the longest way in one is not always that in the other.
+/// Instructions and cycles, each by itself: the longest path in one is not always the longest in
+/// the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
     /// Executed instructions; those that a condition switches off count.
@@ -53,24 +54,24 @@ pub struct Bounds<'a> {
     /// Facts that hold in this case only; they are asked first.
     case: &'a Facts,
     known: BTreeMap<(u32, Option<u64>), Cost>,
-    /// Functions being looked at, the outermost first.
+    /// Functions under examination, the outermost first.
     within: Vec<u32>,
     faults: BTreeSet<String>,
     found: Vec<Fault>,
-    /// Loops and what they were taken for.
+    /// Loops, and the facts used for them.
     told: BTreeMap<u32, String>,
-    /// The facts that were asked, of the case and of all.
+    /// The facts that were used, of the case and of all cases.
     used: BTreeSet<(bool, String)>,
 }
 
 /// Calls of one function that are few.
 #[derive(Default)]
 struct Capped {
-    /// Of one.
+    /// Cost of one call.
     cost: Cost,
-    /// How many, each time that the calling function is called.
+    /// Highest number of calls, each time that the calling function is called.
     most: u64,
-    /// Where they are.
+    /// Blocks with these calls.
     blocks: BTreeSet<usize>,
 }
 
@@ -97,15 +98,15 @@ impl<'a> Bounds<'a> {
     /// The bound of the function of this name, from its first instruction to its return.
     ///
     /// # Errors
-    /// All that stands in the way.
+    /// Everything that prevents a bound.
     pub fn of(&mut self, name: &str) -> Result<Cost, Vec<Fault>> {
         let function = self.image.function(name).map_err(|f| vec![f])?;
         let cost = self.function(function, None);
         if self.found.is_empty() { Ok(cost) } else { Err(std::mem::take(&mut self.found)) }
     }
 
-    /// The functions that have been looked at, with the bound of each; one that works on memory, for
-    /// each length.
+    /// The functions examined so far, with the bound of each; a function that works on memory has
+    /// one for each length.
     pub fn functions(&self) -> impl Iterator<Item = (&Function, Option<u64>, Cost)> {
         let named = |((address, length), cost): (&(u32, Option<u64>), &Cost)| {
             Some((self.image.function_at(*address)?, *length, *cost))
@@ -170,7 +171,7 @@ impl<'a> Bounds<'a> {
         capped.values().fold(path, |sum, c| sum + c.cost * c.most)
     }
 
-    /// What each way costs: the block that it leaves, and the jump.
+    /// The cost of each way: the block that it leaves, and the jump.
     fn ways(
         &mut self,
         function: &Function,
@@ -212,7 +213,8 @@ impl<'a> Bounds<'a> {
         ways
     }
 
-    /// What a call adds where it stands. What calls of a capped number add is kept apart.
+    /// The cost that a call adds in its place. The cost of calls with a capped number is kept
+    /// separately.
     fn call(
         &mut self,
         function: &Function,
@@ -249,7 +251,7 @@ impl<'a> Bounds<'a> {
         let cost = self.function(callee, bytes);
         match cap {
             Some(c) => {
-                // Calls of different lengths: the dearest of them.
+                // Calls of different lengths: the costliest of them.
                 let known = capped.entry(target).or_default();
                 known.cost = known.cost.max(cost);
                 known.most = c.most;
@@ -260,7 +262,7 @@ impl<'a> Bounds<'a> {
         }
     }
 
-    /// How often a loop's head is executed each time that the loop is entered.
+    /// Executions of a loop's head each time that the loop is entered.
     fn rounds(
         &mut self,
         function: &Function,
@@ -283,7 +285,7 @@ impl<'a> Bounds<'a> {
         let stated = fact.and_then(|f| f.most.or_else(|| worked(f)));
         let each = fact.filter(|f| !f.by.is_empty()).map_or(1, |f| graph.least_each_round(round, &f.by));
         if let (Some(stated), Some(fact), 1..) = (stated, fact, each) {
-            // In the last round, the head may be executed and none of what is counted.
+            // In the last round, the head may be executed and none of the counted instructions.
             let most = if !fact.by.is_empty() { stated / each + 1 } else { stated };
             self.told.insert(address, format!("{}: {most}: {}", function.name, fact.why));
             return most.max(1);
@@ -310,9 +312,9 @@ fn length_register(name: &str) -> Option<&'static str> {
     }
 }
 
-/// The constant that a register has been given last, whatever was the case.
+/// The constant that a register has been given last, under any condition.
 fn constant(before: &[Instruction], register: &str) -> Option<u64> {
-    // What only reads its operands, none of which it names twice.
+    // Instructions that only read their operands and name none of them twice.
     let reads = |i: &Instruction| {
         ["str", "strb", "strh", "strd", "cmp", "cmn", "tst", "teq", "push"].contains(&i.name.as_str())
             && !i.text.contains('!')
@@ -329,8 +331,8 @@ fn constant(before: &[Instruction], register: &str) -> Option<u64> {
     digits.strip_prefix("0x").map_or_else(|| digits.parse().ok(), |h| u64::from_str_radix(h, 16).ok())
 }
 
-/// The longest ways from a block within `only`, to each block and out of the function; the ways that
-/// leave `only` or lead back to the block are not gone.
+/// The longest ways from a block within `only`, to each block and out of the function; the ways
+/// that leave `only` or lead back to the block are not followed.
 fn reach(
     ways: &Ways,
     from: usize,
@@ -373,12 +375,12 @@ fn or_longer(ways: &mut Ways, way: (usize, Option<usize>), cost: Cost) {
     ways.entry(way).and_modify(|c| *c = c.max(cost)).or_insert(cost);
 }
 
-/// Puts a loop into its head: what leads out of the loop costs all rounds, too.
+/// Puts a loop into its head: a way out of the loop costs all rounds, too.
 fn collapse<'c>(ways: &mut Ways, round: &Loop, most: u64, capped: impl Iterator<Item = &'c Capped>) {
     let (once, out) = rounds_and_ways_out(ways, round, &round.body);
     let again = most - 1;
     let mut rounds = once * again;
-    // Rounds that call what is called a few times only are as few.
+    // Rounds that contain calls of a capped number are as few.
     for c in capped.filter(|c| c.most < again && !c.blocks.is_disjoint(&round.body)) {
         let rest = round.body.difference(&c.blocks).copied().collect();
         let (without, _) = rounds_and_ways_out(ways, round, &rest);

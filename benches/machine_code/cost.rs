@@ -1,8 +1,9 @@
 //! Cycles of each instruction on a Cortex-M4F whose memory has no wait states.
 //!
 //! From the tables of the Cortex-M4 Technical Reference Manual (also printed as tables 3-25 and 3-27
-//! of TI's SWCU192). Where a table gives a range, its upper end; what depends on a condition is
-//! charged as if it took place. Not in the tables and not charged: savings by back-to-back loads.
+//! of TI's SWCU192). Where a table gives a range, the upper end counts; an instruction that depends
+//! on a condition is charged as if it were executed. Not in the tables and not charged: savings by
+//! back-to-back loads.
 
 use super::decode::{Flow, Instruction};
 
@@ -44,8 +45,8 @@ pub(super) fn cycles(i: &Instruction) -> Option<u64> {
     })
 }
 
-/// Whether the code says that an address is a multiple of four: on the stack, or a constant beside the code.
-/// The other instructions that move words must not be given any other address.
+/// True if the code shows that an address is a multiple of four: on the stack, or a constant beside
+/// the code. The other instructions that move words may only have such addresses.
 fn aligned(i: &Instruction) -> bool {
     let Some((_, address)) = i.text.split_once('[') else { return false };
     let Some(offset) = address.strip_prefix("sp").or(address.strip_prefix("pc")) else { return false };
@@ -55,7 +56,7 @@ fn aligned(i: &Instruction) -> bool {
     digits.is_empty() || number.is_some_and(|n: u32| n.is_multiple_of(4))
 }
 
-/// Cycles for going on at an address other than the next.
+/// Cycles for a jump to an address other than the next.
 pub(super) fn refill(i: &Instruction) -> u64 {
     if matches!(i.flow, Flow::Next | Flow::Trap) { 0 } else { REFILL }
 }

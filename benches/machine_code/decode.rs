@@ -1,9 +1,9 @@
-//! Instructions, and where each leads.
+//! Instructions, and the successors of each.
 
 use capstone::arch::arm::{ArchExtraMode, ArchMode, ArmCC};
 use capstone::prelude::*;
 
-/// Where an instruction leads besides to the next.
+/// The successors of an instruction besides the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Flow {
     /// Only to the next.
@@ -18,7 +18,7 @@ pub(super) enum Flow {
     Return,
     /// Out of the function or to the next.
     MayReturn,
-    /// Where the code does not say.
+    /// To a place that the code does not show.
     Indirect,
     /// Nowhere: a trap.
     Trap,
@@ -52,7 +52,7 @@ impl Decoder {
         Decoder(built.detail(true).build().expect("capstone is built with Arm"))
     }
 
-    /// The instructions of `code` up to its end, or to where it is none.
+    /// The instructions of `code` up to its end, or to the first bytes that are not an instruction.
     pub(super) fn decode(&self, code: &[u8], address: u32) -> Vec<Instruction> {
         let Ok(all) = self.0.disasm_all(code, u64::from(address)) else { return Vec::new() };
         all.iter().filter_map(|i| self.instruction(i)).collect()

@@ -1,4 +1,4 @@
-//! What the code does not say of itself, and somebody has to vouch for.
+//! Facts that the code does not show, and for which somebody has to vouch.
 //!
 //! Functions are named by a part of their names; with a `$` at the end, by the end of their names.
 
@@ -7,11 +7,11 @@ use serde::Deserialize;
 /// Stated bounds.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
-    /// Of loops.
+    /// Bounds of loops.
     pub loops: Vec<LoopFact>,
-    /// Of calls.
+    /// Bounds of calls.
     pub calls: Vec<CallFact>,
-    /// Of lengths given to memcpy and its like.
+    /// Bounds of lengths given to memcpy and the like.
     pub lengths: Vec<LengthFact>,
 }
 
@@ -44,10 +44,11 @@ impl LengthFact {
     }
 }
 
-/// How often a loop goes round, each time that it is entered from outside.
+/// The number of rounds of a loop, each time that it is entered from outside.
 ///
-/// `most` executions of its head; with `by`, `most` executions of instructions of these names. The second way holds however often the compiler has unrolled the loop: it is divided
-/// by how many such instructions each way round has at least.
+/// `most` executions of its head; with `by`, `most` executions of instructions of these names. The
+/// second way holds however often the compiler has unrolled the loop: it is divided by the least
+/// number of such instructions on each way round.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoopFact {
@@ -56,20 +57,20 @@ pub struct LoopFact {
     pub function: String,
     /// Part of the name of a function that the loop's head was inlined from; without it, any loop.
     pub of: Option<String>,
-    /// Whether it has another loop within; without it, either.
+    /// True if it has another loop within; without this field, either.
     pub outer: Option<bool>,
     /// The instructions that are counted; without them, the head.
     #[serde(default)]
     pub by: Vec<String>,
-    /// How many at most.
+    /// Highest number.
     pub most: Option<u64>,
     /// For memcpy and its like, instead: bytes that one of them does.
     pub step: Option<u64>,
-    /// Why that holds.
+    /// Reason why that holds.
     pub why: String,
 }
 
-/// How often a function is called.
+/// The number of calls of a function.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CallFact {
@@ -80,11 +81,11 @@ pub struct CallFact {
     pub of: String,
     /// Calls at most, all places together, each time that the calling function is called.
     pub most: u64,
-    /// Why that holds.
+    /// Reason why that holds.
     pub why: String,
 }
 
-/// How long the memory is that a function has copied, moved or set.
+/// The length of memory that a function has copied, moved or set.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LengthFact {
@@ -95,11 +96,11 @@ pub struct LengthFact {
     pub of: String,
     /// Bytes at most.
     pub most: u64,
-    /// Why that holds.
+    /// Reason why that holds.
     pub why: String,
 }
 
-/// Whether `name` is one that `pattern` means.
+/// True if `pattern` matches `name`.
 pub(super) fn means(pattern: &str, name: &str) -> bool {
     pattern.strip_suffix('$').map_or_else(|| name.contains(pattern), |end| name.ends_with(end))
 }

@@ -1,6 +1,6 @@
-//! What stands in the way of a bound.
+//! The obstacles to a bound.
 
-/// Why there is no bound, and where.
+/// The reason why there is no bound, and its place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Fault {
     /// The image cannot be read.
@@ -12,23 +12,23 @@ pub enum Fault {
     /// A call or jump to where no function begins.
     #[error("{function} at {address:#x}: a jump to {target:#x}, where no function begins")]
     NoTarget {
-        /// Where from.
+        /// The function with the jump.
         function: String,
         /// Address of the jump.
         address: u32,
-        /// Where to.
+        /// Address to which it jumps.
         target: u32,
     },
-    /// Bytes that are no instruction.
+    /// Bytes that are not an instruction.
     #[error("{function} at {address:#x}: not an instruction")]
     Undecodable {
-        /// Where.
+        /// The function.
         function: String,
         /// Address of the bytes.
         address: u32,
     },
-    /// An address in a trace that is no instruction of the image.
-    #[error("a trace has {address:#x}, which is no instruction of the image")]
+    /// An address in a trace that is not an instruction of the image.
+    #[error("a trace has {address:#x}, which is not an instruction of the image")]
     Untraceable {
         /// The address.
         address: u32,
@@ -36,7 +36,7 @@ pub enum Fault {
     /// An instruction without an entry in the table of cycles.
     #[error("{function} at {address:#x}: no cost is known for `{text}`")]
     NoCost {
-        /// Where.
+        /// The function.
         function: String,
         /// Address of the instruction.
         address: u32,
@@ -44,9 +44,9 @@ pub enum Fault {
         text: String,
     },
     /// A call or jump through a register, memory or table.
-    #[error("{function} at {address:#x}: `{text}` goes where the code does not say")]
+    #[error("{function} at {address:#x}: `{text}` goes to a place that the code does not show")]
     Indirect {
-        /// Where.
+        /// The function.
         function: String,
         /// Address of the instruction.
         address: u32,
@@ -54,29 +54,29 @@ pub enum Fault {
         text: String,
     },
     /// A loop without a stated bound.
-    #[error("{function} at {address:#x}: a loop without a stated bound; its code is of: {from}")]
+    #[error("{function} at {address:#x}: a loop without a stated bound; its code comes from: {from}")]
     Unbounded {
-        /// Where.
+        /// The function.
         function: String,
         /// Address of the loop's head.
         address: u32,
         /// The functions that the head was inlined from, innermost first.
         from: String,
     },
-    /// A call of memcpy or its like with a length that the code does not say and nobody states.
+    /// A call of memcpy or the like with a length that neither the code nor a fact gives.
     #[error("{function} at {address:#x}: {callee} of an unknown length")]
     Length {
-        /// Where.
+        /// The function.
         function: String,
         /// Address of the call.
         address: u32,
-        /// What is called.
+        /// The called function.
         callee: String,
     },
     /// A jump into the middle of a loop.
     #[error("{function} at {address:#x}: a jump into the middle of a loop")]
     Irreducible {
-        /// Where.
+        /// The function.
         function: String,
         /// Address of the block that is jumped to.
         address: u32,
@@ -84,22 +84,22 @@ pub enum Fault {
     /// A function that calls itself, by way of others or not.
     #[error("recursion: {0}")]
     Recursion(String),
-    /// The code goes on past the function's end.
+    /// The code continues past the function's end.
     #[error("{function}: the code runs past the function's end")]
     RunsOff {
-        /// Which.
+        /// The function.
         function: String,
     },
     /// No path leads from the entry to a return.
     #[error("{function}: no path leads to a return")]
     NoReturn {
-        /// Which.
+        /// The function.
         function: String,
     },
-    /// The stack pointer is moved by an amount that the code does not say.
+    /// The stack pointer is moved by an amount that the code does not show.
     #[error("{function} at {address:#x}: `{text}` moves the stack pointer by an unknown amount")]
     StackPointer {
-        /// Where.
+        /// The function.
         function: String,
         /// Address of the instruction.
         address: u32,

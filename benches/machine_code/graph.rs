@@ -12,7 +12,7 @@ pub(super) struct Block {
     pub next: Vec<usize>,
     /// A call that ends the function: its target.
     pub tail_call: Option<u32>,
-    /// Whether the function may end here.
+    /// True if the function may end here.
     pub returns: bool,
 }
 

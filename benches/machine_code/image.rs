@@ -23,11 +23,11 @@ pub struct Function {
 pub struct Section {
     /// Name, `.text` for one.
     pub name: String,
-    /// Where it lies when the image runs.
+    /// Its address when the image runs.
     pub address: u32,
     /// Bytes.
     pub size: u32,
-    /// Whether bytes for it are flashed.
+    /// True if bytes for it are flashed.
     pub stored: bool,
 }
 
@@ -36,7 +36,7 @@ pub struct Image {
     functions: BTreeMap<u32, Function>,
     /// Code by section: address and bytes.
     code: Vec<(u32, Vec<u8>)>,
-    /// Where code and constants begin: the linker's `$t` and `$d`.
+    /// Starts of code and of constants: the linker's `$t` and `$d`.
     marks: BTreeMap<u32, bool>,
     sections: Vec<Section>,
     symbols: Vec<String>,
@@ -97,7 +97,7 @@ impl Image {
             if symbol.kind() == SymbolKind::Text && symbol.size() > 0 {
                 let name = plain(name);
                 let function = Function { name, address: address & !1, size: symbol.size() as u32 };
-                // Of several names for one place, the one that sorts first.
+                // If one place has several names, the one that sorts first.
                 image
                     .functions
                     .entry(function.address)
@@ -211,7 +211,7 @@ impl Image {
     /// The instructions of a function.
     ///
     /// # Errors
-    /// Bytes that are no instruction.
+    /// Bytes that are not an instruction.
     pub(super) fn instructions(&self, function: &Function) -> Result<Vec<Instruction>, Fault> {
         let end = function.address + function.size;
         // Constants between the instructions are left out.

@@ -1,14 +1,14 @@
-//! What a linked image for a Cortex-M4F costs at most, read from its machine code: instructions and
-//! cycles of a function, and its stack.
+//! The highest cost of a linked image for a Cortex-M4F, read from its machine code: instructions
+//! and cycles of a function, and its stack.
 //!
 //! ```text
 //! ELF ─► functions ─► instructions ─► blocks ─► longest path ─► bound
 //!                                       ▲             ▲
-//!                          loop bounds, told      costs of instructions
+//!                          loop bounds, stated     costs of instructions
 //! ```
 //!
-//! All that cannot be followed is a [`Fault`]: a loop without a stated bound, a jump into the middle
-//! of one, recursion, a call or jump through a register, an instruction without a cost.
+//! Everything that cannot be followed is a [`Fault`]: a loop without a stated bound, a jump into
+//! the middle of one, recursion, a call or jump through a register, an instruction without a cost.
 
 mod bound;
 mod cost;

@@ -1,4 +1,4 @@
-//! How deep the stack gets.
+//! The depth of the stack.
 
 use super::Fault;
 use super::decode::{Flow, Instruction};
@@ -104,7 +104,7 @@ impl<'a> Stacks<'a> {
     }
 }
 
-/// The depth after an instruction, bytes; none if the code does not say.
+/// The depth after an instruction, bytes; none if the code does not show it.
 fn moved(i: &Instruction, depth: i64) -> Option<i64> {
     let first = i.operands.first().map_or("", String::as_str);
     let number = |o: Option<&String>| {

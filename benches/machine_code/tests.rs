@@ -83,7 +83,7 @@ fn a_loop_goes_round_as_often_as_is_stated() {
 fn an_unrolled_loop_is_bounded_by_what_it_does() {
     // 1: ldrb r2, [r0]; ldrb r3, [r0, #1]; subs r1, #2; bne 1b; bx lr
     let image = image(&[("f", &[0x7802, 0x7843, 0x3902, 0xd1fb, BX_LR])]);
-    // Six bytes are three rounds, and one more in which the loop might have looked whether it is over.
+    // Six bytes are three rounds, and one more in which the loop might have checked if it is over.
     assert_eq!(bound_with(&image, &round(6, Some("ldrb"))), bound_with(&image, &round(4, None)));
     let nothing_to_count = bound_with(&image, &round(6, Some("str")));
     assert!(matches!(&nothing_to_count.unwrap_err()[..], [Fault::Unbounded { .. }]));
@@ -97,7 +97,7 @@ fn rounds_that_call_something_rare_are_rare() {
     let (f, g, why) = ("f".to_owned(), "g".to_owned(), "counted by hand".to_owned());
     let calls = vec![CallFact { function: f, of: g, most: 1, why }];
     let facts = Facts { calls, ..round(10, None) };
-    // Of nine whole rounds one calls g: six instructions and its one, the others have four.
+    // One of nine whole rounds calls g: six instructions and its one; the others have four.
     let rounds = (6 + 1) + 8 * 4;
     let bound = bound_with(&image, &facts).unwrap();
     assert_eq!(bound.instructions, 1 + rounds + 2 + 1);

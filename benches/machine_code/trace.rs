@@ -1,4 +1,4 @@
-//! Cycles along the paths that were gone.
+//! Cycles along the executed paths.
 
 use super::cost::{cycles, refill, stall};
 use super::decode::{Flow, Instruction};
@@ -6,8 +6,8 @@ use super::image::Image;
 use super::{Cost, Fault};
 use std::collections::BTreeMap;
 
-/// What each call of the functions at `entries` cost, in the order of the calls. `trace` has the
-/// address of each instruction executed in these functions and in what they call.
+/// The cost of each call of the functions at `entries`, in the order of the calls. `trace` has the
+/// address of each instruction executed in these functions and in those that they call.
 ///
 /// # Errors
 /// An address that is in no function of the image, or an instruction without a cost.
@@ -18,7 +18,7 @@ pub fn traced(
 ) -> Result<BTreeMap<u32, Vec<Cost>>, Fault> {
     let mut code: BTreeMap<u32, Instruction> = BTreeMap::new();
     for f in image.functions() {
-        // What is no code of a function that is looked at is not looked at either.
+        // Code outside the examined functions is skipped.
         code.extend(image.instructions(f).unwrap_or_default().into_iter().map(|i| (i.address, i)));
     }
     let mut calls: BTreeMap<u32, Vec<Cost>> = entries.iter().map(|e| (*e, Vec::new())).collect();

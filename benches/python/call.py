@@ -1,4 +1,4 @@
-"""A law's step called from Python, against the least that CPython's C API lets such a call cost."""
+"""A law's step called from Python, against the least possible cost of such a call through CPython's C API."""
 
 import importlib.util
 import pathlib
@@ -29,7 +29,7 @@ def build_floor() -> ModuleType:
 
 
 def candidates(rounds: int) -> list[Candidate]:
-    """Ours, the floor, and the loop around both, which is taken off."""
+    """Ours, the floor, and the loop around both, which is subtracted."""
     floor = build_floor()
     per_tick = RATES["J2"] * PERIOD * COUNTS_PER_TURN / TURN
     ticks = range(CALLS)
@@ -37,7 +37,7 @@ def candidates(rounds: int) -> list[Candidate]:
     counts = [int(per_tick * k) + k % 3 for k in ticks]
     positions = [per_tick * k for k in ticks]
 
-    ours = clutch.Controller(clutch.Scenario.from_toml(toml("J2")))
+    ours = clutch.Servo(clutch.Scenario.from_toml(toml("J2")))
     our_targets = [clutch.Target(p, RATES["J2"], 0.0) for p in positions]
     ours.start(0, our_targets[0], 0.0)
     least = floor.Law(KP, KD, SMOOTHING, PERIOD, TURN / COUNTS_PER_TURN, LOWEST, HIGHEST)
@@ -65,5 +65,5 @@ def candidates(rounds: int) -> list[Candidate]:
         for _c, _t in zip(counts, our_targets, strict=True):
             pass
 
-    works = {"clutch.Controller.step": loop_ours, "C-API floor": loop_floor, "empty loop": loop_empty}
+    works = {"clutch.Servo.step": loop_ours, "C-API floor": loop_floor, "empty loop": loop_empty}
     return [Candidate(name, work, rounds) for name, work in works.items()]

@@ -1,4 +1,4 @@
-"""What `import clutch` costs and what it brings along, each time in a fresh interpreter."""
+"""The cost of `import clutch` and the packages it imports, each time in a fresh interpreter."""
 
 import statistics
 import subprocess
@@ -23,5 +23,5 @@ def seconds(rounds: int) -> dict[str, float]:
 
 
 def brought_along() -> list[str]:
-    """Those of the heavy packages that `import clutch` imports."""
+    """The heavy packages that `import clutch` imports."""
     return python(f"import clutch, sys; print(*(m for m in {HEAVY} if m in sys.modules))").split()

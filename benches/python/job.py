@@ -38,7 +38,7 @@ RATES = {"J20": math.radians(20.0), "J2": math.radians(2.0)}  # rad/s
 
 @dataclass(frozen=True)
 class Figures:
-    """What one run, or the mean of many, came to."""
+    """The figures of one run, or the mean of many."""
 
     rms: float  # rad
     max: float  # rad
@@ -46,7 +46,7 @@ class Figures:
 
 
 def gains(n: int) -> list[tuple[float, float]]:
-    """`n` pairs (K_p, K_d) around the job's own, all different: what a sweep goes through."""
+    """`n` pairs (K_p, K_d) around the job's own, all different, for a sweep."""
     side = math.ceil(math.sqrt(n))
     step = 0.4 / side
     factors = [0.8 + step * (i + 0.5) for i in range(side)]
@@ -68,7 +68,7 @@ inertia_kg_m2 = {INERTIA}
 viscous_damping_nm_s_rad = {DAMPING}
 brake_gain_nm_v = {GAIN}
 
-[rig.friction]
+[rig.friction.stribeck]
 mu_static = {MU_S}
 mu_dynamic = {MU_D}
 stribeck_velocity_rad_s = {V_S}

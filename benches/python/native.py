@@ -4,7 +4,7 @@
     python -m venv native && RUSTFLAGS="-C target-cpu=native" native/bin/pip install .
     python benches/python/native.py generic/bin/python native/bin/python
 
-Says whether more could be gained from choosing code by the processor at run time. Processes take turns; each gives
+Shows if a choice of code by the processor at run time could gain more. Processes take turns; each gives
 the CPU seconds of 40 runs on one thread, and the least of its turns counts.
 """
 
@@ -29,7 +29,7 @@ ROUNDS = 7
 
 
 def turn(python: str) -> list[tuple[float, str]]:
-    """CPU seconds and what came out, for J20 and J2."""
+    """CPU seconds and results, for J20 and J2."""
     done = subprocess.run([python, "-c", JOB], capture_output=True, text=True, check=True)
     return [(float(line.split()[0]), line.split()[1]) for line in done.stdout.splitlines()]
 

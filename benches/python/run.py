@@ -29,7 +29,7 @@ MARGIN = 1.25  # how far the cost per run may be above the best
 
 @dataclass
 class Row:
-    """A line of the report. `ratio` is how many times as fast clutch is, if the section does not say else."""
+    """A line of the report. `ratio` is clutch's speed over the candidate's, unless the section says otherwise."""
 
     section: str
     candidate: str
@@ -105,7 +105,7 @@ def scaling(section: str, cells: list[tuple[str, int, float, Candidate]], per_se
 
 
 def scaling_in_runs(job: str, quick: bool) -> list[Row]:
-    """Short runs: what each costs beside the simulation shows."""
+    """Short runs, which show the cost of each run beside the simulation."""
     scenario = ours.scenario(job, duration=1.0, settle=0.0)
     cells = []
     for n in (32, 256) if quick else (32, 1000, 4096, 20000):
@@ -125,7 +125,7 @@ def scaling_in_time(job: str, quick: bool) -> list[Row]:
 
 
 def calls(quick: bool) -> list[Row]:
-    """Cost of one step of the law; the loop around it is taken off."""
+    """Cost of one step of the law; the loop around it is subtracted."""
     mine, floor, empty = call.candidates(5 if quick else 15)
     interleave([mine, floor, empty])
     net = {c.name: (c.cpu - empty.cpu) / call.CALLS for c in (mine, floor)}

@@ -45,7 +45,7 @@ def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
 
 
 def wants_both() -> bool:
-    """Whether the build is for any x86-64, here: not for another machine, and not for one processor."""
+    """True if the build is for any x86-64, here: not for another machine, and not for one processor."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return False
     # The second goes before RUSTFLAGS, in which the level is asked for below.

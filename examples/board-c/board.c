@@ -6,7 +6,7 @@
 
 #define RECENT 8u /* samples that an Actuate may answer */
 
-/* What the board keeps. */
+/* State that the board keeps. */
 static struct {
     board_params_t params;
     clutch_decoder_t decoder;
@@ -17,11 +17,11 @@ static struct {
     uint8_t late;             /* flag for the next sample */
     uint8_t has_answered;     /* an Actuate was applied in this run */
     uint8_t recent;           /* samples of this run, up to RECENT */
-    uint16_t code;            /* what the converter puts out */
+    uint16_t code;            /* output of the converter */
     uint16_t sequence;        /* of the next sample */
     uint16_t answered;        /* sequence number that the last applied Actuate answered */
-    uint32_t taken_us[RECENT]; /* when the last samples were taken, by sequence number modulo RECENT */
-    uint32_t fed_us;          /* when the last Actuate was applied, or consent was given */
+    uint32_t taken_us[RECENT]; /* times of the last samples, by sequence number modulo RECENT */
+    uint32_t fed_us;          /* time of the last applied Actuate, or of consent */
     uint32_t level;           /* of the ramp, 2^-16 codes */
     uint32_t steps;           /* of the safe output so far */
     uint32_t configurations;
@@ -85,8 +85,8 @@ static void make_safe(uint8_t state)
 {
     b.level = (uint32_t)b.code << 16;
     b.steps = 0;
-    /* A copy: it goes on in Ready, where the next run's Configure has come already. With that one's kind it
-     * would go on from numbers that mean something else, and may let go. */
+    /* A copy: it continues in Ready, where the next run's Configure has come already. With that one's kind it
+     * would continue from numbers that mean something else, and may let go. */
     b.ending = b.set;
     b.under_way = 1;
     b.state = state;
@@ -306,7 +306,7 @@ void board_byte(uint8_t byte, uint32_t now_us)
         clutch_ping_t ping;
     } m;
     int kind;
-    /* A code must not feed a watchdog that has run out and was not looked at. */
+    /* A code must not feed a watchdog that has run out and was not checked. */
     board_poll(now_us);
     kind = clutch_push(&b.decoder, byte);
     if (kind <= 0)

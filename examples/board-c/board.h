@@ -1,4 +1,4 @@
-/* A board for the wire protocol of docs/wire.md, version 1: the state machine, in portable C99.
+/* A board for the wire protocol of docs/wire.md, version 2: the state machine, in portable C99.
  *
  * No malloc, no floating point, no library but <stdint.h>, <stddef.h> and <string.h>. It has one board, in
  * static memory, below 300 bytes. It reads no clock: all times are a counter of microseconds that wraps.
@@ -15,10 +15,10 @@
 extern "C" {
 #endif
 
-/* What the board is. `Hello` tells it to the host. */
+/* The board's properties. `Hello` reports them to the host. */
 typedef struct {
     uint32_t board;           /* its serial number; 0 and 1 are the simulated boards */
-    uint32_t boot;            /* another number at each power-up */
+    uint32_t boot;            /* a different number at each power-up */
     uint32_t counts_per_rev;  /* encoder counts per revolution, after quadrature */
     uint8_t dac_bits;         /* converter: bits, 1 to 16 */
     int32_t dac_lowest_mv;    /* at the brake's terminals: voltage of code 0, mV */
@@ -26,10 +26,11 @@ typedef struct {
     uint32_t period_min_us;   /* shortest sampling period, us */
     uint32_t period_max_us;   /* longest sampling period, us */
     uint32_t watchdog_max_us; /* longest watchdog time, us */
-    uint16_t boot_code;       /* output at power-up: what is safe on this rig when nobody controls */
+    uint16_t boot_code;       /* output at power-up: safe on this rig when nobody controls */
 } board_params_t;
 
-/* ---- what you call; all from one thread, none from an interrupt while another of them runs ---- */
+/* ---- functions for you to call; all from one thread, none from an interrupt while another of them runs ----
+ * */
 
 /* Power-up: puts out boot_code, state Boot. NULL if all is well; otherwise nothing is put out, and the text
  * says which parameter is wrong. */
@@ -38,10 +39,10 @@ const char *board_init(const board_params_t *params);
 /* A byte has come. Answers, applies codes. */
 void board_byte(uint8_t byte, uint32_t now_us);
 
-/* A sampling period begins; now_us is when the encoder was read. Sends the sample. */
+/* A sampling period begins; now_us is the time at which the encoder was read. Sends the sample. */
 void board_tick(uint32_t now_us);
 
-/* Looks at the watchdog: call it as often as you can, best from the main loop. */
+/* Checks the watchdog: call it as often as you can, best from the main loop. */
 void board_poll(uint32_t now_us);
 
 /* Set your timer to this: time from tick to tick, us; 0 while there is nothing to sample. */
@@ -53,7 +54,7 @@ uint32_t board_configurations(void);
 /* CLUTCH_BOARD_STATE_... of clutch_wire.h: for a lamp or a display. */
 uint8_t board_state(void);
 
-/* ---- what you write for your hardware ---- */
+/* ---- functions for you to write for your hardware ---- */
 
 /* The encoder's counter as it was at the time given to board_tick; wraps. */
 int32_t read_encoder(void);
@@ -64,8 +65,8 @@ void write_dac(uint16_t code);
 /* Sends bytes, at most 66: all of them or none. Must not wait for the line. */
 void serial_write(const uint8_t *bytes, size_t count);
 
-/* CLUTCH_STATUS_ENCODER_FAULT, CLUTCH_STATUS_DAC_FAULT, both, or 0: what the hardware can tell of itself.
- * Return 0 if it can tell nothing. */
+/* CLUTCH_STATUS_ENCODER_FAULT, CLUTCH_STATUS_DAC_FAULT, both, or 0: the hardware's report about itself.
+ * Return 0 if it has none. */
 uint8_t hardware_faults(void);
 
 #ifdef __cplusplus

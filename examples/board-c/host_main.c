@@ -3,7 +3,7 @@
  *     gcc -std=c99 -O2 -Wall -Wextra -I ../../crates/clutch-wire/include board.c host_main.c -o board_host
  *     ./board_host [SECONDS]
  *
- * Prints the path of the pseudo-terminal, then runs until it is interrupted, or for so many seconds.
+ * Prints the path of the pseudo-terminal, then runs until it is interrupted, or for that many seconds.
  * The shaft: inertia, a weight on a string, viscous drag, a brake with Coulomb friction that sticks.
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
@@ -24,7 +24,7 @@
 #define DAC_BITS 12
 #define DAC_LOWEST_V (-10.0)
 #define DAC_STEP_V (20.0 / 4096.0)
-#define BOOT_CODE 2970 /* 4.5 V: holds the weight with room */
+#define BOOT_CODE 2970 /* 4.5 V: holds the weight with margin */
 
 static int line = -1; /* the board's end of the pseudo-terminal */
 static int client;    /* somebody has the other end open */
@@ -53,7 +53,7 @@ static void move(double seconds)
     torque = drive - sign * friction - drag * shaft.speed;
     next = shaft.speed + torque / inertia * seconds;
     if (shaft.speed != 0 && next * shaft.speed < 0)
-        next = 0; /* friction stops a shaft, it does not turn it round */
+        next = 0; /* friction stops a shaft, it does not reverse it */
     shaft.angle += 0.5 * (shaft.speed + next) * seconds;
     shaft.speed = next;
 }
@@ -79,7 +79,7 @@ static uint32_t micros(uint64_t ns)
     return (uint32_t)(ns / 1000u);
 }
 
-/* ---- what board.c asks for ---- */
+/* ---- the functions that board.c needs ---- */
 
 int32_t read_encoder(void)
 {
@@ -95,7 +95,7 @@ void write_dac(uint16_t code)
 
 void serial_write(const uint8_t *bytes, size_t count)
 {
-    /* What does not fit is dropped: it would come too late to be of use. */
+    /* Bytes that do not fit are dropped: they would come too late to be of use. */
     if (client && write(line, bytes, count) < 0 && errno != EAGAIN)
         client = 0;
 }
@@ -134,7 +134,7 @@ static const char *open_line(void)
     return path;
 }
 
-/* Reads what is there; waits for it up to `until`. */
+/* Reads the available bytes; waits for them up to `until`. */
 static void listen(const char *path, uint64_t until)
 {
     uint64_t now = now_ns(), wait = until > now ? until - now : 0;
@@ -150,7 +150,7 @@ static void listen(const char *path, uint64_t until)
     if (ppoll(&fd, 1, &span, NULL) < 0)
         return; /* a signal */
     if ((fd.revents & POLLHUP) != 0 && (fd.revents & POLLIN) == 0) {
-        /* Nobody has the other end open: ppoll returns at once, so sleep. The board goes on. */
+        /* With no peer connected, ppoll returns immediately, so sleep. The board continues. */
         if (client)
             reset_line(path);
         client = 0;
@@ -215,7 +215,7 @@ int main(int argc, char **argv)
             configurations = board_configurations();
             next_tick = now_ns(); /* the first sample at once */
         }
-        /* Bytes wake it up; without any, the watchdog is looked at each 200 us. */
+        /* Bytes wake it up; without any, the watchdog is checked each 200 us. */
         until = now_ns() + (board_period_us() != 0 ? 200000 : idle_ns);
         listen(path, next_tick < until ? next_tick : until);
         now = now_ns();

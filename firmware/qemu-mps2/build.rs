@@ -1,4 +1,4 @@
-//! Hands the linker this board's memory map, and compiles the laws in C where they are asked for.
+//! Hands the linker this board's memory map, and compiles the laws in C on request.
 
 fn main() {
     let dir = std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets it");
@@ -8,7 +8,7 @@ fn main() {
     peer(&dir);
 }
 
-/// As firmware in C is built, whatever Rust's own level of optimisation.
+/// Built as firmware in C is, at any level of optimisation in Rust.
 #[cfg(feature = "peer")]
 fn peer(dir: &str) {
     let folder = format!("{dir}/../../benches/peer_c");

@@ -1,5 +1,5 @@
-//! Any bytes into the decoder. It must not panic; what it accepts must be the bytes that its
-//! message encodes to; and behind a delimiter the next good frame must be heard.
+//! Any bytes into the decoder. It must not panic; the bytes that it accepts must be those that its
+//! message encodes to; and after a delimiter the next good frame must be received.
 //!
 //! The first byte of the input chooses: the rest as it is, or as the content of a frame with a
 //! right CRC (a fuzzer does not guess 32 bits).
@@ -43,7 +43,7 @@ fuzz_target!(|data: &[u8]| {
                 too_long += 1;
                 assert_eq!(too_long, 1, "said twice");
             }
-            // An error, or silence for what was empty or said before.
+            // An error, or silence for an empty frame or a repeated error.
             _ => assert!(byte != 0 || heard.is_some() || frame.len() == 1 || too_long == 1),
         }
         if byte == 0 {
@@ -52,7 +52,7 @@ fuzz_target!(|data: &[u8]| {
         }
     }
 
-    // Whatever came before.
+    // After any bytes.
     let _ = decoder.push(0);
     let good = Message::Actuate(Actuate { run: 1, sequence: 0, code: 0x00FF, valid_us: 2000 });
     let mut last = None;

@@ -51,7 +51,7 @@ fuzz_target!(|data: &[u8]| {
     };
     let log = read_bytes(&file, &limits);
     if choice % 3 > 0 {
-        // Whatever follows: a limit may end the reading, but the log before it is one.
+        // Any bytes may follow: a limit may end the reading, but the log before it is valid.
         match log {
             Ok(log) => assert!(!log.samples.is_empty()),
             Err(e) => assert!(matches!(e, clutch_log::LogError::Limit { .. }), "{e}"),

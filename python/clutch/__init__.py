@@ -1,8 +1,8 @@
 """Slow, smooth motion of shafts restrained by friction.
 
-A brake can only resist: a weight, a spring or a hand drives a shaft, and a computer decides each millisecond how hard
-a pad presses on a disc. This package scripts experiments with it: simulate, certify, sweep, read logs, replay, plot.
-The physics, the laws and the checks are the Rust crates that drive the hardware; nothing of them is written again
+A brake can only resist: a weight, a spring or a hand drives a shaft, and each millisecond a computer sets how hard a
+pad presses on a disc. This package scripts experiments with it: simulate, certify, sweep, read logs, replay, plot.
+The physics, the laws and the checks are in the Rust crates that drive the hardware; nothing of them is written again
 here.
 
 >>> import clutch
@@ -15,56 +15,22 @@ import importlib
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-# Before the native module: it chooses which.
+# Before the native module, which it chooses.
 from clutch import _processor  # noqa: F401
 
 # isort: split
-from clutch import _clutch
+from clutch import _clutch, _tables
 from clutch._certificate import Certificate
-from clutch._clutch import Controller, Path, Plant, StickSlip, Table, Target, Tick, scenarios
-from clutch._errors import ParamError
+from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
+from clutch._errors import LoopError, ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
-from clutch._model import (
-    Bounds,
-    BrakeGeometry,
-    Chirp,
-    Ctc,
-    Dac,
-    Encoder,
-    HandDrive,
-    Hold,
-    HoldThenRelease,
-    HoldVoltage,
-    JerkLimited,
-    Limits,
-    MinimumJerk,
-    Model,
-    Observer,
-    Output,
-    Pd,
-    Ramp,
-    RampVoltage,
-    Release,
-    Rig,
-    Ripple,
-    RunSettings,
-    Safety,
-    Sampling,
-    Scenario,
-    Sine,
-    Smc,
-    SmcSign,
-    SmoothedDerivative,
-    SpringDrive,
-    StribeckFriction,
-    TableDrive,
-    TablePath,
-    Trapezoid,
-    WeightDrive,
-)
+from clutch._loop import LoopResult, loop
+from clutch._metrics import Metrics
+from clutch._model import Scenario
 from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
-from clutch._run import Metrics, Result, simulate
+from clutch._run import Result, simulate
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
+from clutch._tables import *  # noqa: F403
 
 if TYPE_CHECKING:
     from clutch import dynamics, executors, gym, plot
@@ -72,67 +38,35 @@ if TYPE_CHECKING:
 __version__ = _clutch.VERSION
 
 __all__ = [
-    "Bounds",
-    "BrakeGeometry",
     "Certificate",
-    "Chirp",
-    "Controller",
-    "Ctc",
-    "Dac",
     "Difference",
-    "Encoder",
-    "HandDrive",
-    "Hold",
-    "HoldThenRelease",
-    "HoldVoltage",
-    "JerkLimited",
-    "Limits",
     "Log",
+    "LoopError",
+    "LoopResult",
     "Metrics",
-    "MinimumJerk",
-    "Model",
-    "Observer",
-    "Output",
     "PaperFigure",
     "PaperPanel",
     "ParamError",
     "Path",
-    "Pd",
     "Plant",
-    "Ramp",
-    "RampVoltage",
-    "Release",
     "Replay",
     "Reproduction",
     "Result",
-    "Rig",
-    "Ripple",
-    "RunSettings",
-    "Safety",
     "Samples",
-    "Sampling",
     "Scenario",
-    "Sine",
-    "Smc",
-    "SmcSign",
-    "SmoothedDerivative",
-    "SpringDrive",
+    "Servo",
     "StickSlip",
-    "StribeckFriction",
     "SweepResult",
     "Table",
-    "TableDrive",
-    "TablePath",
     "Target",
     "Tick",
-    "Trapezoid",
-    "WeightDrive",
     "__version__",
     "dynamics",
     "executors",
     "grid",
     "gym",
     "latin_hypercube",
+    "loop",
     "plot",
     "read_log",
     "replay",
@@ -143,8 +77,9 @@ __all__ = [
     "sobol",
     "sweep",
 ]
+__all__ += _tables.__all__
 
-# Each brings a large library along: imported when it is asked for.
+# Each imports a large library, so it is imported on request.
 _LATER = {"dynamics", "executors", "gym", "plot"}
 
 

@@ -1,4 +1,4 @@
-"""What is guaranteed of a scenario's gains."""
+"""The guarantees for a scenario's gains."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -8,10 +8,10 @@ from clutch._record import _Record
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Certificate(_Record):
-    """Whether gains hold every plant within the bounds to the sliding surface, and how far from it at most.
+    """The check that gains hold every plant within the bounds to the sliding surface, and the largest distance from it.
 
-    A certificate is true as a condition: ``if scenario.certificate(): …``. Time is continuous and the sensor
-    exact in it; sampling, encoder steps and delay come on top. docs/theory.md, section 8, derives it.
+    A certificate is true as a condition: ``if scenario.certificate(): …``. In it, time is continuous and the sensor
+    exact; sampling, encoder steps and delay come on top. docs/theory.md, section 8, derives it.
 
     Parameters
     ----------
@@ -22,15 +22,15 @@ class Certificate(_Record):
     law : str
         The law.
     certified : bool
-        Whether the gains are certified.
+        True if the gains are certified.
     reason : str or None
-        What is missing; None if certified.
+        The missing part; None if certified.
     rig_outside_bounds : tuple of str
         A line for each property of the rig that the bounds do not contain.
     bounds : Certificate.Bounds
-        What is believed of the plant.
+        The plant as it is believed to be.
     demand : Certificate.Demand
-        What path, bounds and start ask for.
+        The demands of path, bounds and start.
     ahead : Certificate.Ahead
         The shaft ahead of the path: the brake stops it.
     behind : Certificate.Behind
@@ -50,7 +50,7 @@ class Certificate(_Record):
 
     @dataclass(frozen=True, kw_only=True, repr=False)
     class Bounds(_Record):
-        """What is believed of the plant (23): pairs of lowest and highest value.
+        """The plant as it is believed to be (23): pairs of lowest and highest value.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class Certificate(_Record):
 
     @dataclass(frozen=True, kw_only=True, repr=False)
     class Demand(_Record):
-        """What path, bounds and start ask for.
+        """The demands of path, bounds and start.
 
         Parameters
         ----------
@@ -188,7 +188,7 @@ class Certificate(_Record):
 
     @dataclass(frozen=True, kw_only=True, repr=False)
     class Layer(_Record):
-        """The layer around the sliding surface in which nothing is claimed, and the bound of the error.
+        """The layer around the sliding surface, for which nothing is claimed, and the bound of the error.
 
         Parameters
         ----------
@@ -197,7 +197,7 @@ class Certificate(_Record):
         thickness_rad_s : float
             Thickness of the layer, rad/s.
         error_bound_rad : float
-            Below which the error stays if certified, rad.
+            Bound of the error if certified, rad.
 
         Examples
         --------
@@ -252,5 +252,5 @@ class Certificate(_Record):
     paper: Paper | None
 
     def __bool__(self) -> bool:
-        """Whether the gains are certified."""
+        """True if the gains are certified."""
         return self.certified

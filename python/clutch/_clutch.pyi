@@ -18,11 +18,16 @@ from typing_extensions import CapsuleType
 from clutch import _model
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "VERSION", "Controller", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "StickSlip", "Sweep", "Table", "Target", "Tick", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "scenarios", "simulate", "stribeck"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "run_loop", "scenarios", "simulate", "stribeck"]
 
 BUILD: Final[str]
 """
-Version and commit of the build, as logs tell it.
+Version and commit of the build, as logs record it.
+"""
+
+DEFAULT_PRIORITY: Final[int]
+"""
+Priority of the loop's control thread unless another is given.
 """
 
 VERSION: Final[str]
@@ -31,100 +36,9 @@ Version of the package.
 """
 
 @final
-class Controller:
-    """
-    The law of a scenario with all that it remembers, sampled by you: counts and target in,
-    volts out.
-
-    It is the servo that the simulator, the loop and the boards run, bit for bit. It begins as
-    `clutch.simulate` does.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Law, gains, sampling, encoder, converter; its scalar, f32 or f64.
-
-    Examples
-    --------
-    The loop of `clutch.simulate`, by hand:
-
-    >>> import clutch
-    >>> scenario = clutch.Scenario.load("smc_2").override({"run.duration_s": 2.0})
-    >>> law, plant, path = clutch.Controller(scenario), clutch.Plant(scenario), scenario.path()
-    >>> volts = []
-    >>> for tick in range(len(path)):
-    ...     volts.append(law.step(plant.counts, path.at(tick)))
-    ...     counts = plant.step(volts[-1])
-    >>> volts == clutch.simulate(scenario).samples["voltage_v"].tolist()
-    True
-    """
-    def __copy__(self, /) -> Controller: ...
-    def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Controller: ...
-    @property
-    def code(self, /) -> int:
-        """
-        Code for the converter at the last step.
-        """
-    def copy(self, /) -> Controller:
-        """
-        A snapshot: goes on from here by itself.
-        """
-    @property
-    def demand(self, /) -> float:
-        """
-        Voltage that the law asked of the converter at the last step, V.
-        """
-    @property
-    def error(self, /) -> float:
-        """
-        Position error of the last step as the law saw it, rad.
-        """
-    @property
-    def error_rate(self, /) -> float:
-        """
-        Its rate as the law saw it, rad/s.
-        """
-    @property
-    def limit(self, /) -> int:
-        """
-        What decided the last voltage, as in a run's column `limit`: 0 the law, 1 the lowest voltage,
-        2 the highest, 3 a demand that was not a number.
-        """
-    @property
-    def limited(self, /) -> bool:
-        """
-        Whether a limit of the output decided the last voltage.
-        """
-    def start(self, /, counts: SupportsFloat | SupportsIndex, target: Target, voltage: SupportsFloat | SupportsIndex) -> None:
-        """
-        Begins anew: the shaft at `counts` moves with the target, the brake has been at `voltage`.
-        """
-    def step(self, /, counts: SupportsFloat | SupportsIndex, target: Target) -> float:
-        """
-        One sampling period: the encoder's counts and the target in, the brake's voltage out, V.
-
-        Parameters
-        ----------
-        counts : int
-            The encoder's counts; a fraction if the scenario's sensor is ideal.
-        target : Target
-            The path now.
-
-        Returns
-        -------
-        float
-            The voltage to command, V, as the converter gives it.
-        """
-    @property
-    def terms(self, /) -> dict[str, float]:
-        """
-        The law's intermediate terms at the last step, by name with unit.
-        """
-
-@final
 class Log:
     """
-    A log in memory; `clutch.Log` is its public face.
+    A log in memory; `clutch.Log` is its public form.
     """
     def channels(self, /) -> dict[str, Table]:
         """
@@ -143,12 +57,12 @@ class Log:
     @property
     def metadata(self, /) -> dict[str, str]:
         """
-        What the log says of itself, as texts.
+        The log's description of itself, as texts.
         """
     def replay(self, /, scenario: Scenario | None = None) -> tuple[Table, int, tuple[int, str, float, float] | None]:
         """
-        The recorded counts to the recorded law, or to another scenario's: commands of the replay, ticks,
-        and the first difference (tick, field, logged, replayed).
+        Feeds the recorded counts to the recorded law, or to another scenario's: commands of the
+        replay, ticks, and the first difference (tick, field, logged, replayed).
         """
     @property
     def scenario_toml(self, /) -> str:
@@ -160,15 +74,15 @@ class Log:
 class Paper:
     """
     Outcome of the paper's runs: claims and Table 3 as lists of dicts, and the figures: number, law,
-    panels (rate in °/s, whether experiment, time in s and error in °).
+    panels (rate in °/s, true for the experiment, time in s and error in °).
     """
     def as_documented(self, /) -> list[bool]:
         """
-        Whether each statement holds, or fails as documented.
+        True if each statement holds, or fails as documented.
         """
     def claims(self, /) -> list[dict[str, Any]]:
         """
-        Statements of the paper and what came out: a dict each.
+        Statements of the paper and their results: a dict each.
         """
     def figures(self, /) -> list[tuple[int, str, list[tuple[float, bool, Table]]]]:
         """
@@ -232,7 +146,7 @@ class Plant:
     @property
     def counts(self, /) -> int | float:
         """
-        What the encoder shows: whole counts; a fraction if the scenario's sensor is ideal.
+        The encoder's output: whole counts; a fraction if the scenario's sensor is ideal.
         """
     def events(self, /) -> Table:
         """
@@ -241,7 +155,7 @@ class Plant:
     @property
     def fine_counts(self, /) -> float:
         """
-        Position in counts to 2⁻¹⁶ of one: what an ideal sensor shows.
+        Position in counts to 2⁻¹⁶ of one, as an ideal sensor shows it.
         """
     @property
     def position(self, /) -> float:
@@ -263,12 +177,12 @@ class Plant:
     @property
     def sticks(self, /) -> int:
         """
-        How often it has stuck so far.
+        Number of sticks so far.
         """
     @property
     def stuck(self, /) -> bool:
         """
-        Whether friction holds the shaft.
+        True if friction holds the shaft.
         """
     @property
     def time(self, /) -> float:
@@ -294,7 +208,7 @@ class Run:
     @property
     def engine(self, /) -> str:
         """
-        Which engine ran.
+        Name of the engine that ran.
         """
     @property
     def events(self, /) -> Table:
@@ -319,7 +233,7 @@ class Run:
 @final
 class Scenario:
     """
-    A checked scenario, as the simulator takes it; `clutch.Scenario` is its public face.
+    A checked scenario, as the simulator takes it; `clutch.Scenario` is its public form.
     """
     def __new__(cls, /, tables: dict[str, Any], origin: str = "Scenario") -> Scenario:
         """
@@ -332,7 +246,7 @@ class Scenario:
         """
     def certificate(self, /) -> dict[str, Any]:
         """
-        What `clutch certify --json` prints.
+        The object that `clutch certify --json` prints.
         """
     @staticmethod
     def load(name: str | PathLike[str], overrides: Mapping[str, object] | None = None) -> Scenario:
@@ -363,11 +277,102 @@ class Scenario:
         """
 
 @final
+class Servo:
+    """
+    The law of a scenario with all that it remembers, sampled by you: counts and target in,
+    volts out.
+
+    It is the servo that the simulator, the loop and the boards run, bit for bit. It begins as
+    `clutch.simulate` does.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Law, gains, sampling, encoder, converter; its scalar, f32 or f64.
+
+    Examples
+    --------
+    The loop of `clutch.simulate`, by hand:
+
+    >>> import clutch
+    >>> scenario = clutch.Scenario.load("smc_2").override({"run.duration_s": 2.0})
+    >>> servo, plant, path = clutch.Servo(scenario), clutch.Plant(scenario), scenario.path()
+    >>> volts = []
+    >>> for tick in range(len(path)):
+    ...     volts.append(servo.step(plant.counts, path.at(tick)))
+    ...     counts = plant.step(volts[-1])
+    >>> volts == clutch.simulate(scenario).samples["voltage_v"].tolist()
+    True
+    """
+    def __copy__(self, /) -> Servo: ...
+    def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Servo: ...
+    @property
+    def code(self, /) -> int:
+        """
+        Code for the converter at the last step.
+        """
+    def copy(self, /) -> Servo:
+        """
+        A snapshot: goes on from here by itself.
+        """
+    @property
+    def demand(self, /) -> float:
+        """
+        Voltage that the law asked of the converter at the last step, V.
+        """
+    @property
+    def error(self, /) -> float:
+        """
+        Position error of the last step as the law saw it, rad.
+        """
+    @property
+    def error_rate(self, /) -> float:
+        """
+        Its rate as the law saw it, rad/s.
+        """
+    @property
+    def limit(self, /) -> int:
+        """
+        What decided the last voltage, as in a run's column `limit`: 0 the law, 1 the lowest voltage,
+        2 the highest, 3 a demand that was not a number.
+        """
+    @property
+    def limited(self, /) -> bool:
+        """
+        Whether a limit of the output decided the last voltage.
+        """
+    def start(self, /, counts: SupportsFloat | SupportsIndex, target: Target, voltage: SupportsFloat | SupportsIndex) -> None:
+        """
+        Begins anew: the shaft at `counts` moves with the target, the brake has been at `voltage`.
+        """
+    def step(self, /, counts: SupportsFloat | SupportsIndex, target: Target) -> float:
+        """
+        One sampling period: the encoder's counts and the target in, the brake's voltage out, V.
+
+        Parameters
+        ----------
+        counts : int
+            The encoder's counts; a fraction if the scenario's sensor is ideal.
+        target : Target
+            The path now.
+
+        Returns
+        -------
+        float
+            The voltage to command, V, as the converter gives it.
+        """
+    @property
+    def terms(self, /) -> dict[str, float]:
+        """
+        The law's intermediate terms at the last step, by name with unit.
+        """
+
+@final
 class StickSlip:
     """
     Stick-slip seen from the encoder's counts, sampled by you.
 
-    The shaft counts as stuck when the encoder is silent while the path moves on by more than a count.
+    The shaft counts as stuck when the encoder is silent while the path moves by more than a count.
 
     Parameters
     ----------
@@ -399,7 +404,7 @@ class StickSlip:
     @property
     def stuck(self, /) -> bool:
         """
-        Whether the shaft counts as stuck now.
+        True if the shaft counts as stuck now.
         """
     @property
     def stuck_ticks(self, /) -> int:
@@ -420,13 +425,13 @@ class StickSlip:
         Returns
         -------
         bool
-            Whether a stick is detected at this sample.
+            True if a stick is detected at this sample.
         """
 
 @final
 class Sweep:
     """
-    A sweep that runs in threads of its own; `clutch.sweep` is its public face.
+    A sweep that runs in threads of its own; `clutch.sweep` is its public form.
     """
     def __new__(cls, /, tables: dict[str, Any], keys: Sequence[str], rows: list[list[object]], metrics: Sequence[str], traces: Sequence[str] = ..., every: SupportsIndex = 1, threads: SupportsIndex | None = None) -> Sweep:
         """
@@ -461,7 +466,7 @@ class Sweep:
         """
     def wait(self, /, seconds: SupportsFloat | SupportsIndex) -> bool:
         """
-        Waits so many seconds at most; whether the sweep has ended.
+        Waits at most `seconds`; true if the sweep has ended.
         """
 
 @final
@@ -469,7 +474,7 @@ class Table:
     """
     Named columns of equal length.
 
-    Results, logs and sweeps are tables. Any library that reads Arrow streams takes one as it is
+    Results, logs and sweeps are tables. Any library that reads Arrow streams takes one directly
     (`pyarrow.table(t)`, `polars.DataFrame(t)`, `pandas.DataFrame.from_arrow(t)`), numbers without
     copying.
 
@@ -496,7 +501,7 @@ class Table:
     """
     def __arrow_c_stream__(self, /, requested_schema: Any | None = None) -> CapsuleType:
         """
-        The table as an Arrow C stream: how other libraries read it.
+        The table as an Arrow C stream, which other libraries read.
         """
     def __contains__(self, name: Any, /) -> bool: ...
     def __eq__(self, value: object, /) -> bool: ...
@@ -541,7 +546,7 @@ class Table:
 @final
 class Target:
     """
-    A point of a path: what the law is asked to follow at one tick.
+    A point of a path: the law's target at one tick.
 
     Parameters
     ----------
@@ -582,16 +587,16 @@ class Target:
 @final
 class Tick:
     """
-    What a law written in Python is given each period.
+    The input of a law written in Python, each period.
 
     Parameters
     ----------
     error, error_rate : float
         Position error, target minus position, rad, and its rate, rad/s.
     target_velocity, target_acceleration : float
-        Of the path, rad/s and rad/s².
+        Velocity and acceleration of the path, rad/s and rad/s².
     time : float
-        Since the start of the run, s.
+        Time since the start of the run, s.
 
     Examples
     --------
@@ -641,18 +646,18 @@ def brake_gain(table: dict[str, Any]) -> float:
 
 def check(key: str, name: str, table: dict[str, Any]) -> dict[str, Any]:
     """
-    Checks one table by itself: `key` as `law.smc`, `name` what errors call it. Gives the table
+    Checks one table by itself: `key` as `law.smc`, `name` its name in errors. Gives the table
     back with its defaults filled in.
     """
 
 def main(args: Sequence[str]) -> int:
     """
-    The `clutch` command with these arguments, the program's name first; its exit code.
+    Runs the `clutch` command with these arguments, the program's name first; gives its exit code.
     """
 
 def read_log(path: str | PathLike[str]) -> Log:
     """
-    Reads a log, also one that was cut.
+    Reads a log, even one that was cut.
     """
 
 def reproduce(progress: Callable[[int, int], object] | None = None) -> Paper:
@@ -663,6 +668,12 @@ def reproduce(progress: Callable[[int, int], object] | None = None) -> Paper:
 def rig(name: str) -> dict[str, Any]:
     """
     The table of a built-in rig: `ideal`, `paper`, `bench`.
+    """
+
+def run_loop(scenario: _model.Scenario | Scenario, *, port: str | None, board: str | None, baud: SupportsIndex | None, log: str | PathLike[str] | None, uncertified: bool, faults: Sequence[str], fault_seed: SupportsIndex, strict: bool, pace: str, wait: str, spin_us: SupportsIndex, thread_priority: SupportsIndex, lock_memory: bool, cpu_affinity: SupportsIndex | None) -> tuple[dict[str, Any], str, str, str | None]:
+    """
+    Runs a session; its summary, the same in words, what it had said it would do, and the scenario's text if that was
+    changed for the board's sake.
     """
 
 def scenarios() -> list[str]:

@@ -1,9 +1,11 @@
-"""Tables in the forms of other libraries, each imported only when asked for."""
+"""Tables in the forms of other libraries, each imported only on request."""
 
 from __future__ import annotations
 
 import html
 from typing import TYPE_CHECKING, Any
+
+from clutch._units import attributes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,17 +38,19 @@ def to_arrow(table: Table) -> pa.Table:
 
 
 def to_xarray(table: Table, index: str | None = None) -> xr.Dataset:
-    """Make a dataset of one dimension: the column `index`, or the row's number."""
+    """Make a dataset of one dimension, the column `index` or the row's number; each column knows its unit."""
     import numpy as np
     import xarray as xr
 
     columns: dict[str, Any] = {name: np.asarray(values) for name, values in table.to_dict().items()}
-    if index is None:
-        return xr.Dataset({name: ("row", values) for name, values in columns.items()})
-    if index not in columns:
+    if index is not None and index not in columns:
         raise ValueError(f"index = {index!r}: expected one of the columns {', '.join(columns)}")
-    axis = columns.pop(index)
-    return xr.Dataset({name: (index, values) for name, values in columns.items()}, coords={index: axis})
+
+    def variable(name: str) -> tuple[str, Any, dict[str, str]]:
+        return index or "row", columns[name], attributes(name)
+
+    data = {name: variable(name) for name in columns if name != index}
+    return xr.Dataset(data, coords={} if index is None else {index: variable(index)})
 
 
 def table_html(table: Table, rows: int = 10) -> str:

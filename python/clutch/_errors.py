@@ -1,4 +1,4 @@
-"""The error of a parameter that is out of range."""
+"""What the package raises of its own."""
 
 
 class ParamError(ValueError):
@@ -7,7 +7,7 @@ class ParamError(ValueError):
     Parameters
     ----------
     message : str
-        What is wrong, where, and what is expected.
+        The fault, its place, and the expectation.
     field : str, default ""
         The parameter: within an object its name, as ``kp_v``; within a scenario its dotted key, as
         ``law.smc.kp_v``. Empty if it is about the whole.
@@ -31,3 +31,19 @@ class ParamError(ValueError):
         super().__init__(message)
         self.field = field
         self.value = value
+
+
+class LoopError(RuntimeError):
+    """The loop was refused, or could not be started: gains that are not certified, a port, a board.
+
+    Its text is the one of ``clutch loop``, and says what to do. Nothing has moved.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> try:
+    ...     clutch.loop(port="/dev/ttyNOTHERE7")
+    ... except clutch.LoopError as error:
+    ...     print(str(error).split(";")[0])
+    /dev/ttyNOTHERE7: there is no such device
+    """

@@ -1,4 +1,4 @@
-"""Logs: what a loop or a simulation recorded, and its replay."""
+"""Logs: the record of a loop or a simulation, and its replay."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Log:
-    """A log in memory: what :func:`clutch.read_log` returns.
+    """A log in memory, as :func:`clutch.read_log` returns it.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class Log:
         ``"sample"``, ``"command"``, ``"event"``, ``"link"``, ``"truth"``: those that have records. Columns are named as
         in docs/log.md, with ``time_s``, the time since the start of the run, before them.
     metadata : dict of str to str
-        What the log says of itself: version, port, source, law hash …
+        The log's description of itself: version, port, source, law hash …
     scenario : Scenario
         The scenario that ran.
     complete : bool
@@ -102,7 +102,7 @@ class Replay:
     first : Difference or None
         The first difference, if there is one.
     commands : Table
-        What the law commanded in the replay, a row for each command of the log.
+        The law's commands in the replay, a row for each command of the log.
 
     Examples
     --------
@@ -119,14 +119,14 @@ class Replay:
 
     @property
     def identical(self) -> bool:
-        """Whether every output agrees with the log, bit for bit."""
+        """True if every output agrees with the log, bit for bit."""
         return self.first is None
 
 
 def read_log(path: str | os.PathLike[str]) -> Log:
     """Read an MCAP log of ``clutch loop``, ``clutch sim --log`` or :meth:`clutch.Result.save`.
 
-    Also one that was cut, by a crash or a full disk: ``complete`` is then false.
+    A log that was cut, by a crash or a full disk, is read too: ``complete`` is then false.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def read_log(path: str | os.PathLike[str]) -> Log:
     OSError
         The file cannot be read.
     ValueError
-        It is no log of clutch, or its header is damaged.
+        It is not a log of clutch, or its header is damaged.
 
     Examples
     --------
@@ -163,8 +163,8 @@ def replay(log: Log | str | os.PathLike[str], overrides: Mapping[str, object] | 
     log : Log, str or path
         The log, or its file.
     overrides : mapping, optional
-        Values for dotted keys of its scenario. The law then answers what it would have commanded on the same counts:
-        an open loop, which does not say how the shaft would have moved.
+        Values for dotted keys of its scenario. The law then gives the commands that it would have given on the same
+        counts: an open loop, which does not predict the motion of the shaft.
 
     Returns
     -------

@@ -62,7 +62,7 @@ class PaperFigure:
     number : int
         8 (PD), 9 (computed torque) or 10 (sliding mode).
     law : str
-        As the paper calls it.
+        Its name in the paper.
     panels : tuple of PaperPanel
         A row for each rate, simulation and experiment.
 
@@ -79,13 +79,13 @@ class PaperFigure:
 
 
 class Reproduction:
-    """What came out: the object that :func:`clutch.reproduce` returns.
+    """The outcome: the object that :func:`clutch.reproduce` returns.
 
     Attributes
     ----------
     claims : Table
         A row for each statement: id, paper, measured, unit, low and high (the band in which it agrees; NaN is
-        unbounded), holds, as_documented, fitted (whether the rig ``bench`` was fitted to it), note.
+        unbounded), holds, as_documented, fitted (true if the rig ``bench`` was fitted to it), note.
     table3 : Table
         rate_deg_s, pd_cycles_per_s, smc_cycles_per_s, reduction_percent, spread_points, paper_percent.
     figures : tuple of PaperFigure
@@ -140,7 +140,7 @@ class Reproduction:
 
     @property
     def as_documented(self) -> bool:
-        """Whether every statement holds, or fails just as the documentation says."""
+        """True if every statement holds, or fails just as the documentation says."""
         return all(self.claims["as_documented"].tolist())
 
     def plot(self, number: int) -> Figure:
@@ -172,7 +172,7 @@ def reproduce(*, progress: bool | None = None) -> Reproduction:
     Parameters
     ----------
     progress : bool, optional
-        Whether to show how far it is; by default on a terminal only.
+        True to show the progress; by default on a terminal only.
 
     Returns
     -------

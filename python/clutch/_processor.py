@@ -1,20 +1,20 @@
-"""Which of the wheel's native modules the processor can run."""
+"""The choice of the wheel's native module that the processor can run."""
 
 import os
 import sys
 from pathlib import Path
 
-#: The level of x86-64 that the second module is compiled for: its folder, and what the processor must have for it.
+#: The level of x86-64 that the second module is compiled for: its folder, and the features that it needs.
 LEVEL = "x86-64-v3"
 NEEDS = frozenset(("avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"))
 
-#: The environment variable that chooses, and what it may say.
+#: The environment variable that chooses, and its possible values.
 VARIABLE = "CLUTCH_PROCESSOR"
 CHOICES = ("x86-64", LEVEL)
 
 
 def has_level(cpuinfo: Path = Path("/proc/cpuinfo")) -> bool:
-    """Whether Linux says that the processor has what the level needs, and lets programs use it."""
+    """True if Linux reports that the processor has the features of the level, and lets programs use them."""
     try:
         with cpuinfo.open("rb") as file:
             first = file.read(8192)  # the first processor: they are alike
@@ -27,8 +27,10 @@ def has_level(cpuinfo: Path = Path("/proc/cpuinfo")) -> bool:
 
 
 def folder(package: Path) -> Path | None:
-    """Where the module for processors of that level is, if it is the one to take: the wheel has it, the processor can
-    run it, and the variable does not say otherwise."""
+    """Folder of the module for processors of that level, if it is the one to take.
+
+    It is if the wheel has it, the processor can run it, and the variable does not say otherwise.
+    """
     wanted = os.environ.get(VARIABLE)
     if wanted is not None and wanted not in CHOICES:
         raise ImportError(

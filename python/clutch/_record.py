@@ -1,4 +1,4 @@
-"""What all objects of a scenario share: built from a table, shown, compared, copied, checked by the native module."""
+"""Base of a scenario's objects: built from a table, shown, compared, copied, checked by the native module."""
 
 import re
 import reprlib
@@ -55,7 +55,7 @@ def _plain(value: Any, depth: int = 0) -> Any:
 
 
 def _can_be_written(value: Any) -> bool:
-    """Whether a file can hold a value: the native module takes no other."""
+    """True if a file can hold a value: the native module takes no other."""
     if isinstance(value, dict):
         return all(isinstance(k, str) and _can_be_written(v) for k, v in value.items())
     if isinstance(value, list):
@@ -83,14 +83,15 @@ def _restore(cls: type["_Record"], values: _Tree) -> "_Record":
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class _Record:
-    """Base of all: where the object stands in a file, and how it is built from a table."""
+    """Base of all: the object's place in a file, and its construction from a table."""
 
     _key: ClassVar[str] = ""
 
     @classmethod
-    def _way(cls, part: type["_Record"]) -> list[str]:
-        """The tables from this one to a part: ``["drive", "weight"]`` from Rig to WeightDrive."""
-        return part._key.removeprefix(cls._key).removeprefix(".").split(".")
+    def _way(cls, name: str) -> list[str]:
+        """The tables from one with a field of that name to this: ``["drive", "weight"]`` for WeightDrive."""
+        *_, outer, last = ["", *cls._key.split(".")]
+        return [outer, last] if outer == name else [last]
 
     @classmethod
     def _build(cls, table: _Tree) -> Self:
@@ -100,7 +101,7 @@ class _Record:
             value = table.get(slot.name)
             for part in slot.classes:
                 inner: Any = table
-                for step in cls._way(part):
+                for step in part._way(slot.name):
                     inner = inner.get(step) if isinstance(inner, dict) else None
                 if inner is not None:
                     value = part._build(inner)
@@ -144,13 +145,13 @@ class _Record:
         return f"{type(self).__qualname__}({', '.join(shown)})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # By the constructor: what an older version wrote is checked, and new fields get their defaults.
+        # By the constructor: values that an older version wrote are checked, and new fields get their defaults.
         return _restore, (type(self), {f.name: getattr(self, f.name) for f in fields(self)})
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class _Params(_Record):
-    """Base of what a user writes: checked when it is made."""
+    """Base of the objects that a user writes: checked when they are made."""
 
     def __post_init__(self) -> None:
         try:
@@ -170,7 +171,7 @@ class _Params(_Record):
         for slot in _slots(type(self)):
             value = getattr(self, slot.name)
             if isinstance(value, _Params) and isinstance(value, slot.classes):
-                *way, last = self._way(type(value))
+                *way, last = value._way(slot.name)
                 inner = table
                 for step in way:
                     inner = inner.setdefault(step, {})

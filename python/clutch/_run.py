@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
 from html import escape
 from typing import TYPE_CHECKING, Any
 
 from clutch import _clutch
 from clutch._clutch import Table, Tick
+from clutch._metrics import FIGURES, Metrics
 from clutch._model import Scenario
 
 if TYPE_CHECKING:
@@ -34,66 +34,13 @@ def as_scenario(scenario: ScenarioLike, overrides: Mapping[str, object] | None =
     raise TypeError(f"scenario is of type {kind}: expected a clutch.Scenario, a built-in name or a path")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Metrics:
-    """How well a run went. All figures are taken after the settling time, with the true position.
-
-    Attributes
-    ----------
-    measured_s : float
-        Time over which the figures were taken, s.
-    max_error_rad, rms_error_rad, mean_error_rad : float
-        Largest magnitude, root mean square and mean of the error `e = θ_d − θ`, rad.
-    iae_rad_s : float
-        Integral of the error's magnitude, rad s.
-    stick_slip_cycles_per_s : float
-        Stick-slip cycles (entries into the stuck state) per second.
-    stick_time_fraction : float
-        Share of the time that the shaft was stuck.
-    stair_height_rad : float
-        Largest movement between one stick and the next, rad; 0 with fewer than two.
-    break_away_torque_nm : float or None
-        Mean driving torque at break-away, N m; None if the shaft never broke away.
-    control_variation_v_s : float
-        Total variation of the voltage per second, V/s.
-    jerk_rms_rad_s3 : float
-        Root mean square of the sampled jerk, rad/s³.
-    detected_stick_slip_cycles_per_s, detected_stick_time_fraction : float
-        The same as the encoder shows it: what a loop on hardware would count.
-
-    Examples
-    --------
-    >>> import clutch
-    >>> metrics = clutch.simulate("smc_2").metrics
-    >>> metrics.max_error_rad < 0.003
-    True
-    """
-
-    measured_s: float
-    max_error_rad: float
-    rms_error_rad: float
-    mean_error_rad: float
-    iae_rad_s: float
-    stick_slip_cycles_per_s: float
-    stick_time_fraction: float
-    stair_height_rad: float
-    break_away_torque_nm: float | None
-    control_variation_v_s: float
-    jerk_rms_rad_s3: float
-    detected_stick_slip_cycles_per_s: float
-    detected_stick_time_fraction: float
-
-
-METRICS: tuple[str, ...] = tuple(f.name for f in fields(Metrics))
-
-
 class Result:
-    """A finished run: what :func:`clutch.simulate` returns.
+    """A finished run, as :func:`clutch.simulate` returns it.
 
     Attributes
     ----------
     scenario : Scenario
-        What ran.
+        The scenario that ran.
     metrics : Metrics
         Figures after the settling time.
     engine : str
@@ -166,13 +113,13 @@ class Result:
     def to_xarray(self) -> xr.Dataset:
         """Return the samples as an ``xarray.Dataset`` over ``time_s``; figures are its attributes."""
         data = self.samples.to_xarray("time_s")
-        numbers = {name: getattr(self.metrics, name) for name in METRICS}
+        numbers = {name: getattr(self.metrics, name) for name in FIGURES}
         data.attrs = {"scenario": self.scenario.name, "engine": self.engine}
         data.attrs.update({name: value for name, value in numbers.items() if value is not None})
         return data
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
-        """Give the samples as an Arrow C stream: how other libraries read them."""
+        """Give the samples as an Arrow C stream, which other libraries read."""
         return self.samples.__arrow_c_stream__(requested_schema)
 
     def plot(self) -> Figure:
@@ -187,7 +134,7 @@ class Result:
         Parameters
         ----------
         path : str or path
-            A new file; a log is never written over.
+            A new file; a log is never overwritten.
 
         Raises
         ------
@@ -207,7 +154,7 @@ class Result:
         True
         """
         if self._run is None:
-            raise RuntimeError("the result comes from another process: only there it can be saved")
+            raise RuntimeError("the result comes from another process, and can only be saved there")
         self._run.save(os.fspath(path))
 
     def __len__(self) -> int:
@@ -223,7 +170,7 @@ class Result:
     def _repr_html_(self) -> str:
         rows = "".join(
             f"<tr><td>{name}</td><td>{'–' if value is None else format(value, '.6g')}</td></tr>"
-            for name, value in ((name, getattr(self.metrics, name)) for name in METRICS)
+            for name, value in ((name, getattr(self.metrics, name)) for name in FIGURES)
         )
         return f"<table><caption>{escape(self.scenario.name)}</caption>{rows}</table>"
 
@@ -242,8 +189,8 @@ def simulate(
         A scenario, the name of a built-in one, or a TOML file.
     law : callable, optional
         A law of your own in place of the scenario's: called with a :class:`clutch.Tick` each period, it answers the
-        brake's voltage, V. It stands behind the scenario's output stage (limits, bumpless start) and runs in double
-        precision. What it remembers is its own affair.
+        brake's voltage, V. The scenario's output stage (limits, bumpless start) follows it, and it runs in double
+        precision. It keeps its own state.
     overrides : mapping, optional
         Values for dotted keys of the scenario, as ``{"law.smc.kp_v": 4}``.
 

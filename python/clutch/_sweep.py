@@ -18,10 +18,12 @@ from typing import TYPE_CHECKING, Any, Literal
 from clutch import _clutch, executors
 from clutch._clutch import Table
 from clutch._errors import ParamError
+from clutch._metrics import FIGURES
 from clutch._model import Scenario
 from clutch._record import _Params
 from clutch._record import _plain as _python
-from clutch._run import METRICS, ScenarioLike, as_scenario
+from clutch._run import ScenarioLike, as_scenario
+from clutch._units import attributes
 
 if TYPE_CHECKING:
     import pandas
@@ -32,23 +34,23 @@ if TYPE_CHECKING:
 
 __all__ = ["Samples", "SweepResult", "grid", "latin_hypercube", "samples", "sobol", "sweep"]
 
-#: A range of values: lowest, highest, and "log" or "int" where they are not to be spread evenly as floats.
+#: A range of values: lowest, highest, and "log" or "int" unless they are spread evenly as floats.
 Range = tuple[float, float] | tuple[float, float, Literal["log", "int"]]
 
-#: What a native job gives: a table of its finished rows, traces and refusals by row.
+#: The result of a native job: a table of its finished rows, traces and refusals by row.
 _Result = tuple[Table, dict[int, Table], list[tuple[int, ParamError]]]
 
 #: Columns kept with ``traces=True``.
 _TRACES = ("time_s", "error_rad", "voltage_v")
-#: Rows of a chunk for an executor that does not tell how many workers it has.
+#: Rows of a chunk for an executor that does not report its number of workers.
 _CHUNK = 64
-#: Longest time between two looks at Ctrl-C, s.
+#: Longest time between two checks for Ctrl-C, s.
 _POLL_S = 0.05
 #: A progress bar is shown for sweeps longer than this, s.
 _SHOWN_AFTER_S = 1.0
 
 
-# --- What to run -------------------------------------------------------------------------------
+# --- The runs ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Samples:
     rows
         A tuple of values for each run, in the order of the keys.
     axes
-        Of a full grid: the values of each key, the last of which changes fastest.
+        For a full grid: the values of each key, the last of which changes fastest.
 
     Examples
     --------
@@ -126,7 +128,7 @@ def grid(parameters: Mapping[str, Iterable[Any]]) -> Samples:
     ValueError
         No key, or a key without values.
     TypeError
-        The values of a key are no sequence.
+        The values of a key are not a sequence.
 
     Examples
     --------
@@ -186,7 +188,7 @@ def sobol(ranges: Mapping[str, Range], n: int, *, seed: int = 1) -> Samples:
     n
         Number of points. A power of two keeps the sequence's balance.
     seed
-        Of the scrambling.
+        Seed of the scrambling.
 
     Returns
     -------
@@ -218,7 +220,7 @@ def latin_hypercube(ranges: Mapping[str, Range], n: int, *, seed: int = 1) -> Sa
     n
         Number of points.
     seed
-        Of the points.
+        Seed of the points.
 
     Returns
     -------
@@ -249,7 +251,7 @@ def _spread(name: str, ranges: Mapping[str, Range], n: int, seed: int) -> Sample
 
 
 def _scale(key: str, limits: Range) -> Callable[[float], float]:
-    """What takes 0 … 1 to a range."""
+    """The map from 0 … 1 to a range."""
     low, high = limits[:2]
     how = limits[2] if len(limits) == 3 else "linear"
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
@@ -280,8 +282,9 @@ def _plain(key: str, value: Any) -> Any:
     """A key's value as a file could hold it: Python numbers, lists and dicts."""
     if isinstance(value, _Params):
         table = value._tables()
-        way = value._key.removeprefix(key).split(".")[1:]
-        if value._key != ".".join([key, *way]):
+        *_, name = key.split(".")
+        first, *way = value._way(name)
+        if first != name:
             raise TypeError(f"{key}: a {type(value).__name__} stands at {value._key}")
         for step in reversed(way):
             table = {step: table}
@@ -308,12 +311,12 @@ def sweep(
 ) -> SweepResult:
     """Simulate a scenario with many values of its keys.
 
-    Each run is a run of its own. What comes out is the same bit for bit on any number of threads, in chunks
-    of any size and on any executor, and the same as `simulate` gives for the scenario with these values.
+    Each run is independent. The result is the same bit for bit on any number of threads, in chunks of any size and on
+    any executor, and equals that of `simulate` for the scenario with these values.
 
-    Ctrl-C ends the sweep within a fraction of a second and gives what has finished, with
-    ``interrupted=True``. A chunk whose worker dies is run by another; when the executor itself is gone, the
-    rest is run here, with a warning. No row is lost.
+    Ctrl-C ends the sweep within a fraction of a second and returns the finished rows, with ``interrupted=True``. If a
+    worker dies, another runs its chunk; if the executor itself is gone, the remaining rows run in this process, with
+    a warning. No row is lost.
 
     Parameters
     ----------
@@ -325,7 +328,7 @@ def sweep(
         for each key: `Table`, pandas or polars. Values may be numbers, choices (``"run.engine"``,
         ``"rig.base"``) and whole tables (``"law": [clutch.Pd(), clutch.Smc()]``, or as dicts).
     metrics
-        Names of fields of `Metrics`, and "certified", whether the gains are certified for the row's bounds.
+        Names of fields of `Metrics`, and "certified": true if the gains are certified for the row's bounds.
         Default: all of them.
     seeds
         A number n for the seeds 1 … n, or seeds: each row is run with each. One run is one draw; compare
@@ -333,11 +336,11 @@ def sweep(
     traces
         Columns of samples to keep of each run; True for time, error and voltage. Default: none.
     every
-        Keep one sample of so many, from the first.
+        Keep each `every`-th sample, from the first.
     threads
-        Number of threads here. Default: one for each core.
+        Number of threads in this process. Default: one for each core.
     executor
-        Who runs chunks of rows, each on one thread: see `clutch.executors`. Default: threads here.
+        Runs chunks of rows, each on one thread: see `clutch.executors`. Default: threads of this process.
     chunk
         Rows of a chunk. Default: four chunks for each worker, or 64 rows if their number is not known.
     progress
@@ -415,7 +418,7 @@ def sweep(
 
 
 def _seeds(seeds: int | Iterable[int]) -> tuple[int, ...]:
-    """The seeds 1 … n of a number n, or those given."""
+    """The seeds 1 … n for a number n, or those given."""
     if isinstance(seeds, bool):
         raise TypeError(f"seeds = {seeds}: expected a number of seeds, or seeds")
     try:
@@ -426,7 +429,7 @@ def _seeds(seeds: int | Iterable[int]) -> tuple[int, ...]:
 
 
 def _known_metrics(metrics: str | Sequence[str] | None) -> list[str]:
-    known = [*METRICS, "certified"]
+    known = [*FIGURES, "certified"]
     chosen = [metrics] if isinstance(metrics, str) else known if metrics is None else list(metrics)
     unknown = [m for m in chosen if m not in known]
     if unknown:
@@ -453,18 +456,18 @@ def _known_traces(traces: bool | Sequence[str] | None, scenario: Scenario, chose
 
 @dataclass(frozen=True)
 class _Work:
-    """What all runs of a sweep have in common; it travels to the workers."""
+    """The common part of all runs of a sweep; it travels to the workers."""
 
     tables: dict[str, Any]
     keys: tuple[str, ...]
     metrics: list[str]
     traces: list[str]
     every: int
-    #: Whether refused rows are kept.
+    #: True if refused rows are kept.
     keep: bool
-    #: Tells this sweep from others.
+    #: Distinguishes this sweep from others.
     name: str
-    #: Whether this is the sweep's own process; no longer so once it has travelled.
+    #: True in the sweep's own process; no longer once it has travelled.
     here: bool = True
 
     def __getstate__(self) -> dict[str, Any]:
@@ -482,7 +485,7 @@ class _Work:
 
 
 class _Finished:
-    """What has run, in the order in which it came."""
+    """The finished rows, in the order in which they came."""
 
     def __init__(self, chosen: Samples) -> None:
         self.samples = chosen
@@ -519,7 +522,7 @@ class _Finished:
         rows = np.asarray(numbers, dtype=np.int64)[order]
         columns: dict[str, Any] = {"row": rows}
         for i, key in enumerate(self.samples.keys):
-            # Of all rows, so that its type does not depend on which have finished.
+            # From all rows, so that its type does not depend on which have finished.
             columns[key] = _column([row[i] for row in self.samples.rows])[rows]
         for name in metrics:
             parts = [table[name] for _, table in tables]
@@ -530,7 +533,7 @@ class _Finished:
 
 
 def _column(values: list[Any]) -> Any:
-    """Values of a key as a column; what is neither number nor text is shown as JSON."""
+    """Values of a key as a column; a value that is neither number nor text is shown as JSON."""
     import numpy as np
 
     if values and all(isinstance(v, bool) for v in values):
@@ -557,9 +560,9 @@ def _run_here(work: _Work, finished: _Finished, numbers: list[int], threads: int
 
 
 def _run_there(work: _Work, finished: _Finished, executor: Any, chunk: int | None, show: _Progress) -> list[int]:
-    """Run chunks on an executor; the rows that it could not run."""
+    """Run chunks on an executor; return the rows that it could not run."""
     rows = finished.samples.rows
-    work.job(rows, 1)  # what is wrong with the request itself is said here, not by a worker
+    work.job(rows, 1)  # an error in the request itself is raised here, not by a worker
     workers = executors._workers(executor)
     size = chunk or (max(1, math.ceil(len(rows) / (4 * workers))) if workers else _CHUNK)
     numbers = [range(i, min(i + size, len(rows))) for i in range(0, len(rows), size)]
@@ -580,7 +583,7 @@ def _run_there(work: _Work, finished: _Finished, executor: Any, chunk: int | Non
     if failed:
         why = next(iter(failed.values()))
         warnings.warn(
-            f"{len(left)} of {len(rows)} rows could not be run by the executor and are run here"
+            f"{len(left)} of {len(rows)} rows could not be run by the executor and run in this process instead"
             f" ({type(why).__name__}: {why})",
             RuntimeWarning,
             stacklevel=3,
@@ -588,7 +591,7 @@ def _run_there(work: _Work, finished: _Finished, executor: Any, chunk: int | Non
     return left
 
 
-#: Sweeps that were ended: their chunks in threads of this process look here.
+#: Sweeps that were ended: their chunks in threads of this process check this set.
 _abandoned: set[str] = set()
 
 
@@ -601,9 +604,9 @@ def _run_chunk(work: _Work, rows: Sequence[Sequence[Any]], attempt: int) -> _Res
             if work.name in _abandoned:
                 break
     except KeyboardInterrupt:
-        if work.here:  # an executor that runs what it gets at once: it is the sweep that is to end
+        if work.here:  # an executor that runs a chunk at once: the sweep itself must end
             raise
-        # Of this worker alone, or of all: who asked for the chunk decides what it means.
+        # This worker alone was interrupted, or all: the caller decides which.
         raise RuntimeError("the worker was interrupted") from None
     finally:
         job.cancel()
@@ -635,7 +638,7 @@ class _Progress:
 
 
 class _Line:
-    """The progress bar of those who have no tqdm: a line that is written over."""
+    """The progress bar without tqdm: a line that is overwritten."""
 
     def __init__(self, total: int) -> None:
         self.n, self._total = 0, total
@@ -660,12 +663,12 @@ def _bar(total: int, finished: int) -> Any:
 
 
 def _watched() -> bool:
-    """Whether somebody watches: on a terminal, or in a notebook."""
+    """True if somebody watches: on a terminal, or in a notebook."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return hasattr(shell, "kernel") or (sys.stderr is not None and sys.stderr.isatty())
 
 
-# --- What came out -----------------------------------------------------------------------------
+# --- The result --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, repr=False)
@@ -677,10 +680,10 @@ class SweepResult:
     base
         The scenario that was varied.
     samples
-        The rows asked for.
+        The requested rows.
     table
         A row for each finished run: its number "row", its values of the swept keys, its metrics, and in
-        "error" why the scenario refused it ("" if it did not). Tables as values are shown as JSON.
+        "error" the reason why the scenario refused it ("" if it did not). Tables as values are shown as JSON.
     metrics
         Names of the metrics.
     traces
@@ -688,7 +691,7 @@ class SweepResult:
     seeds
         Number of seeds that each row of values was run with, one after the other.
     interrupted
-        Whether Ctrl-C ended it before all had run.
+        True if Ctrl-C ended it before all had run.
 
     Examples
     --------
@@ -722,7 +725,7 @@ class SweepResult:
 
     @property
     def total(self) -> int:
-        """Number of runs asked for.
+        """Number of requested runs.
 
         Examples
         --------
@@ -807,7 +810,7 @@ class SweepResult:
         if metric not in self.metrics:
             raise ValueError(f"metric {metric!r} was not taken; there are {', '.join(self.metrics)}")
         if metric == "certified":
-            raise ValueError("certified is no figure to make small; select by it, and take the best of another")
+            raise ValueError("certified cannot be minimised; filter by it and rank by another metric")
         runs, texts = self.table["row"].tolist(), self.table["error"]
         columns = {name: self.table[name].tolist() for name in self.metrics}
         groups: dict[int, list[int]] = {}
@@ -837,7 +840,7 @@ class SweepResult:
         value
             A metric.
         ax
-            Where to draw; default: a new figure.
+            Axes to draw on; default: a new figure.
 
         Returns
         -------
@@ -893,7 +896,8 @@ class SweepResult:
     def to_xarray(self) -> xarray.Dataset:
         """The metrics with labelled dimensions: those of a full grid have the keys' names, else it is "row".
 
-        Runs that have not finished are NaN.
+        Runs that have not finished are NaN. Each metric has its unit and its name in words as attributes, which
+        xarray's plots show; each dimension has its unit.
 
         Examples
         --------
@@ -905,10 +909,14 @@ class SweepResult:
         import numpy as np
         import xarray
 
+        def described(name: str) -> dict[str, str]:
+            figure = FIGURES.get(name)
+            return {"long_name": figure.label, "units": figure.unit} if figure else {}
+
         runs, names = self.table["row"], [*self.metrics, "error"]
         if self.samples.axes is None:
-            coords = {key: ("row", np.asarray(self.table[key])) for key in self.keys}
-            columns = {name: ("row", np.asarray(self.table[name])) for name in names}
+            coords = {key: ("row", np.asarray(self.table[key]), attributes(key)) for key in self.keys}
+            columns = {name: ("row", np.asarray(self.table[name]), described(name)) for name in names}
             return xarray.Dataset(columns, coords={"row": runs} | coords)
         axes = [np.asarray(_column(list(axis))) for axis in self.samples.axes]
         shape = [len(axis) for axis in axes]
@@ -918,5 +926,6 @@ class SweepResult:
             if len(self) < self.total:
                 some, column = column, np.full(self.total, "" if name == "error" else math.nan, dtype=column.dtype)
                 column[runs] = some
-            values[name] = (self.keys, column.reshape(shape))
-        return xarray.Dataset(values, coords=dict(zip(self.keys, axes, strict=True)))
+            values[name] = (self.keys, column.reshape(shape), described(name))
+        coords = {key: (key, axis, attributes(key)) for key, axis in zip(self.keys, axes, strict=True)}
+        return xarray.Dataset(values, coords=coords)

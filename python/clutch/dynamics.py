@@ -1,4 +1,4 @@
-"""The shaft as functions ``(t, x, u, params)``, for python-control and for solvers of your own.
+"""The shaft as functions ``(t, x, u, params)``, for python-control and for your own solvers.
 
 The state is ``x = [position rad, velocity rad/s]``, the input ``u = [brake voltage V]``. This is the rig
 alone: equation (1) with friction (2), without encoder, converter, delay and lag.
@@ -108,7 +108,7 @@ def to_control(scenario: ScenarioLike, *, name: str = "shaft") -> Any:
     where the velocity changes its sign: a solver with variable steps does not find the instant at which
     the shaft sticks, chatters about it with ever smaller steps, or steps over short inputs. Where the
     shaft may stick, give the solver a small ``max_step``
-    (``solve_ivp_kwargs={"max_step": 1e-3}``) and mistrust what it says, or take clutch's own engine, which
+    (``solve_ivp_kwargs={"max_step": 1e-3}``) and mistrust its result, or use clutch's own engine, which
     locates each stick and break-away: `clutch.simulate`, or `clutch.Plant` step by step.
 
     Parameters

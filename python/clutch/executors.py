@@ -1,8 +1,8 @@
-"""Executors: who runs the chunks of a sweep when this machine is not enough.
+"""Executors, which run the chunks of a sweep when this machine is not enough.
 
 `clutch.sweep` takes any object with ``submit(function, *arguments)`` that returns a future with ``done()``,
 ``result()`` and ``cancel()``: the executors of ``concurrent.futures``, loky and mpi4py, a
-``distributed.Client`` or its ``get_executor()``, and `RayExecutor`, which gives Ray that face.
+``distributed.Client`` or its ``get_executor()``, and `RayExecutor`, which gives Ray that interface.
 """
 
 from __future__ import annotations
@@ -10,18 +10,19 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Callable
+from concurrent.futures import CancelledError
 from typing import Any, Protocol
 
 __all__ = ["Executor", "Future", "RayExecutor"]
 
-#: Times that a chunk is submitted before it runs here.
+#: Times that a chunk is submitted before it runs in this process.
 _ATTEMPTS = 4
-#: Longest time between two looks at the futures, s. Ctrl-C is answered within it.
+#: Longest time between two checks of the futures, s. Ctrl-C is answered within it.
 _LONGEST_WAIT_S = 0.05
 
 
 class Future(Protocol):
-    """What an executor's ``submit`` returns.
+    """The result of an executor's ``submit``.
 
     Examples
     --------
@@ -33,20 +34,20 @@ class Future(Protocol):
     """
 
     def done(self) -> bool:
-        """Whether it has ended, well or not."""
+        """True if it has ended, with a result or an exception."""
         ...
 
     def result(self) -> Any:
-        """The function's result, or its exception."""
+        """The function's result, or its exception; ``concurrent.futures.CancelledError`` if it was cancelled."""
         ...
 
     def cancel(self) -> Any:
-        """Ask it not to begin."""
+        """Ask it not to begin. A true answer says that it is cancelled."""
         ...
 
 
 class Executor(Protocol):
-    """What `clutch.sweep` asks of an executor.
+    """The interface that `clutch.sweep` needs of an executor.
 
     Examples
     --------
@@ -66,17 +67,32 @@ class Executor(Protocol):
 class _RayFuture:
     def __init__(self, ray: Any, reference: Any) -> None:
         self._ray, self._reference = ray, reference
+        # Kept here: what Ray answers for a cancelled task depends on whether it had begun, and how far it came.
+        self._cancelled = False
 
     def done(self) -> bool:
+        if self._cancelled:
+            return True
         ready, _ = self._ray.wait([self._reference], timeout=0)
         return bool(ready)
 
     def result(self) -> Any:
-        return self._ray.get(self._reference)
+        try:
+            result = None if self._cancelled else self._ray.get(self._reference)
+        except Exception as e:
+            # By another thread meanwhile, or by somebody who has the reference.
+            if self._cancelled or isinstance(e, self._ray.exceptions.TaskCancelledError):
+                raise CancelledError from e
+            raise
+        if self._cancelled:
+            raise CancelledError
+        return result
 
     def cancel(self) -> bool:
-        self._ray.cancel(self._reference)
-        return True
+        if not self.done():
+            self._ray.cancel(self._reference)
+            self._cancelled = True
+        return self._cancelled
 
 
 class RayExecutor:
@@ -133,7 +149,8 @@ class RayExecutor:
         Returns
         -------
         Future
-            With ``done()``, ``result()`` and ``cancel()``.
+            With ``done()``, ``result()`` and ``cancel()``. Cancelling also stops a call that has begun: its worker
+            is interrupted, as by Ctrl-C. ``cancel()`` is false, and changes nothing, once the call has ended.
 
         Examples
         --------
@@ -165,7 +182,7 @@ def _call(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def _workers(executor: Any) -> int | None:
-    """How many chunks run at once, if the executor tells."""
+    """Number of chunks that run at once, if the executor reports it."""
     for name in ("_max_workers", "num_workers"):
         n = getattr(executor, name, None)
         if isinstance(n, int) and n > 0:
@@ -182,15 +199,14 @@ def _run(
 ) -> dict[int, BaseException]:
     """Call ``function(*chunk, attempt)`` for each chunk, and ``done(number, result)`` for each that ended.
 
-    A chunk that fails is submitted again, up to four times in all: whatever its worker died of, another may
-    live.
+    A chunk that fails is submitted again, up to four times in all: if one worker died, another may live.
 
     Returns
     -------
     dict
         The chunks that the executor could not run, by number, each with its last exception.
     """
-    # A future of dask's own wakes nobody up while its event loop is busy; those of its executor do.
+    # dask's own futures wake nobody up while its event loop is busy; those of its executor do.
     if hasattr(executor, "get_executor"):
         executor = executor.get_executor()
     failed: dict[int, BaseException] = {}

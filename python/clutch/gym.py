@@ -28,7 +28,7 @@ _IDS = {
 
 
 class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
-    """An agent in the place of the law: each sampling period it sees what a law sees and says a voltage.
+    """An agent in the place of the law: each sampling period it sees what a law sees and answers with a voltage.
 
     Action: the brake's voltage in V, from 0 to ``output.highest_v``; the converter rounds it.
 
@@ -45,13 +45,13 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
     generator.
 
     Info: ``error_rad`` (true), ``position_rad``, ``velocity_rad_s``, ``counts``, ``time_s``, ``stuck``,
-    ``sticks`` (so far), ``seed``, and ``law_voltage_v``, what the scenario's own law would say now.
+    ``sticks`` (so far), ``seed``, and ``law_voltage_v``, the present answer of the scenario's own law.
 
     Parameters
     ----------
     scenario
-        Scenario, name of a built-in one, or file. Its velocity must be the smoothed derivative: an observer
-        would be told the law's voltages instead of the agent's.
+        Scenario, name of a built-in one, or file. Its velocity must be the smoothed derivative: an observer would be
+        given the law's voltages instead of the agent's.
     overrides
         Dotted keys of the scenario with other values.
     max_error_deg
@@ -140,7 +140,7 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
         super().reset(seed=seed)
         self._seed = int(self.np_random.integers(1 << 31)) if seed is None else seed
         scenario = self.scenario.override({"run.seed": self._seed})
-        self._plant, self._controller = _clutch.Plant(scenario), _clutch.Controller(scenario)
+        self._plant, self._servo = _clutch.Plant(scenario), _clutch.Servo(scenario)
         self._path, self._tick = scenario.path(), 0
         return self._observe()
 
@@ -193,11 +193,11 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
         return self.error_weight * (error / self._count_rad) ** 2
 
     def _observe(self) -> tuple[NDArray[np.float64], dict[str, Any]]:
-        plant, controller, target = self._plant, self._controller, self._path.at(self._tick)
-        law_voltage = controller.step(plant.counts, target)
+        plant, servo, target = self._plant, self._servo, self._path.at(self._tick)
+        law_voltage = servo.step(plant.counts, target)
         seen = (
-            controller.error,
-            controller.error_rate,
+            servo.error,
+            servo.error_rate,
             target.velocity_rad_s,
             target.acceleration_rad_s2,
             plant.voltage,

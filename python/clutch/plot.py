@@ -1,18 +1,18 @@
 """Figures that can be printed: tracking error, stick-slip, friction, gains, logs.
 
 Each function takes what other functions of clutch return and draws it with matplotlib, 85 mm wide (one column
-of a paper) or 170 mm wide. Functions with one panel take ``ax`` and return it; an axes of yours keeps its
-ticks, spines and size. Functions with several panels return the figure. None shows or saves anything: call
+of a paper) or 170 mm wide. Functions with one panel take ``ax`` and return it; your own axes keeps its ticks, spines
+and size. Functions with several panels return the figure. No function shows or saves anything: call
 ``figure.savefig("x.pdf")``, ``matplotlib.pyplot.show()``, or leave it to the notebook.
 
-Angles are drawn in degrees. The keys of a scenario keep their units, so that what is read from an axis can be
-written into a file. Colours are those of Okabe and Ito, which the colour-blind can tell apart.
+Angles are drawn in degrees. The keys of a scenario keep their units, so that you can write a value read from an axis
+into a file. Colours are those of Okabe and Ito, which the colour-blind can distinguish.
 
 matplotlib's settings are changed while a figure is drawn and at no other time. Use the same ones with
 ``with matplotlib.rc_context(clutch.plot.STYLE):``.
 
-A run of more than 20 000 samples is thinned before it is drawn over time: of all samples in a column of 1/600
-inch the smallest and the largest remain, so that no stick, spike or stair is lost.
+A run of more than 20 000 samples is thinned before it is drawn over time: the smallest and the largest of all samples
+in a column of 1/600 inch remain, so that no stick, spike or stair is lost.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ import functools
 import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
+
+from clutch._metrics import FIGURES
+from clutch._units import split
 
 if TYPE_CHECKING:
     import numpy as np
@@ -89,51 +92,13 @@ STYLE: dict[RcKeyType, Any] = {
     "pdf.fonttype": 42,
 }
 
-_UNITS = {
-    "v": "V",
-    "v_s": "V/s",
-    "v_rad": "V/rad",
-    "v_s_rad": "V s/rad",
-    "s": "s",
-    "us": "µs",
-    "1_s": "1/s",
-    "1_s2": "1/s²",
-    "hz": "Hz",
-    "rad": "rad",
-    "rad_s": "rad/s",
-    "rad_s2": "rad/s²",
-    "rad_s3": "rad/s³",
-    "deg": "°",
-    "deg_s": "°/s",
-    "deg_s2": "°/s²",
-    "deg_s3": "°/s³",
-    "turns": "turns",
-    "counts": "counts",
-    "ticks": "ticks",
-    "cycles": "cycles",
-    "cycles_per_s": "cycles/s",
-    "m": "m",
-    "m2": "m²",
-    "m_s2": "m/s²",
-    "kg": "kg",
-    "kg_m2": "kg m²",
-    "nm": "N m",
-    "nm_v": "N m/V",
-    "nm_a": "N m/A",
-    "nm_rad": "N m/rad",
-    "nm_s_rad": "N m s/rad",
-    "nm_rt_s": "N m/√s",
-    "ohm": "Ω",
-    "percent": "%",
-}
-
 _LONG = 20_000
 _COLUMNS_PER_INCH = 600
 _MM = 1 / 25.4
 # Letters of a legend that fit into 85 mm beside the axis' own.
 _ROW = 52
 
-# Where a law keeps its two gains; the certificate of CTC depends on neither alone.
+# The keys of a law's two gains; the certificate of CTC depends on neither alone.
 _GAINS = {
     "law.pd": ("kp_v_rad", "kd_v_s_rad"),
     "law.smc": ("kp_v", "kd_v_s_rad"),
@@ -184,37 +149,23 @@ def _figure(ax: Axes) -> Figure:
     return ax.figure.canvas.figure  # the whole one, also where the axes is in a subfigure
 
 
-def _split(name: str) -> tuple[str, str]:
-    """A key or metric without its unit's suffix, and the unit."""
-    if name == "iae_rad_s":  # an integral over time: the one name in which "_s" multiplies
-        return "iae", "rad s"
-    parts = name.split("_")
-    for i in range(1, len(parts)):
-        unit = _UNITS.get("_".join(parts[i:]))
-        if unit:
-            return "_".join(parts[:i]), unit
-    return name, ""
-
-
 def _label(key: str) -> str:
     """Axis label of a key of the scenario: ``law.smc.kp (V)``."""
-    quantity, unit = _split(key)
+    quantity, unit = split(key)
     return f"{quantity} ({unit})" if unit else quantity
 
 
 def _metric(name: str) -> tuple[str, float]:
-    """Label of a metric, angles in degrees, and the factor that takes it there."""
-    if "." in name:
+    """Label of a column of a sweep, and the factor that takes it into the label's unit."""
+    figure = FIGURES.get(name)
+    if figure is None:
         return _label(name), 1.0
-    quantity, unit = _split(name)
-    words = quantity.replace("_", " ").replace("stick slip", "stick-slip")
-    degrees = unit.replace("rad", "°")
-    factor = 57.29577951308232 if degrees != unit else 1.0
-    return (f"{words} ({degrees})" if unit else words), factor
+    unit = f" ({figure.shown_unit})" if figure.shown_unit else ""
+    return figure.label + unit, figure.factor
 
 
 def _thin(x: NDArray[Any], y: NDArray[Any], columns: int) -> NDArray[np.intp]:
-    """Which samples to draw: the smallest and the largest of each column, the first and the last."""
+    """The samples to draw: the smallest and the largest of each column, the first and the last."""
     import numpy as np
 
     edges = np.linspace(x[0], x[-1], columns + 1)[1:-1]
@@ -316,7 +267,7 @@ def tracking(
     labels : sequence of str, optional
         A name for each run; by default the scenarios' names, with the seeds if these are alike.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; by default a new figure.
+        Axes to draw on; by default a new figure.
 
     Returns
     -------
@@ -326,7 +277,7 @@ def tracking(
     Raises
     ------
     ValueError
-        There is no result, or the number of labels is another one.
+        There is no result, or the number of labels differs from that of the results.
     TypeError
         Something is not a Result.
 
@@ -409,7 +360,7 @@ def stribeck(friction: StribeckFriction, *, velocity_rad_s: ArrayLike | None = N
     velocity_rad_s : array_like, optional
         Magnitudes of the velocity, rad/s, above 0; by default from 1/100 to 100 times the Stribeck velocity.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; by default a new figure.
+        Axes to draw on; by default a new figure.
 
     Returns
     -------
@@ -468,7 +419,7 @@ def phase_plane(result: Result, ax: Axes | None = None) -> Axes:
     result : Result
         A run.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; by default a new figure.
+        Axes to draw on; by default a new figure.
 
     Returns
     -------
@@ -519,7 +470,7 @@ def phase_plane(result: Result, ax: Axes | None = None) -> Axes:
 def stick_slip(
     results: Result | Iterable[Result], *, labels: Sequence[str] | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Draw when the shaft was stuck: a row for each run, a bar from each stick to its break-away.
+    """Draw the times at which the shaft was stuck: a row for each run, a bar from each stick to its break-away.
 
     Bars have a rim of 0.2 pt, so that a stick of a millisecond can be seen in a run of minutes. The number at
     the end of a row is the run's ``metrics.stick_slip_cycles_per_s``, which leaves the settling time out.
@@ -531,7 +482,7 @@ def stick_slip(
     labels : sequence of str, optional
         A name for each run; by default the scenarios' names, with the seeds if these are alike.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; by default a new figure, the higher the more runs there are.
+        Axes to draw on; by default a new figure, the higher the more runs there are.
 
     Returns
     -------
@@ -541,7 +492,7 @@ def stick_slip(
     Raises
     ------
     ValueError
-        There is no result, or the number of labels is another one.
+        There is no result, or the number of labels differs from that of the results.
     TypeError
         Something is not a Result.
 
@@ -571,7 +522,7 @@ def stick_slip(
 
 
 def _swept(column: Any) -> tuple[NDArray[Any], NDArray[np.intp]]:
-    """The values that were swept, in rising order or, for words, as they come; and which one each row has."""
+    """The values that were swept, in rising order or, for words, as they come; and the index of each row's value."""
     import numpy as np
 
     values = np.asarray(column)
@@ -583,7 +534,7 @@ def _swept(column: Any) -> tuple[NDArray[Any], NDArray[np.intp]]:
 
 
 def _cells(values: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64], bool]:
-    """Centres and edges of the cells on an axis, and whether they are more even on a logarithmic one."""
+    """Centres and edges of the cells on an axis, and true if they are more even on a logarithmic one."""
     import numpy as np
 
     if values.dtype.kind != "f":
@@ -633,11 +584,11 @@ def sweep_map(
     x, y : str
         Swept keys of the scenario, as ``"law.smc.kp_v"``.
     value : str
-        The metric to draw, as ``"max_error_rad"``. Angles are drawn in degrees.
+        The metric to draw, as ``"max_error_rad"``, in words and in the unit of ``clutch sim``: errors in degrees.
     contours : str, optional
         The metric of the lines; None for none. The default is left out where the sweep does not have it.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; by default a new figure.
+        Axes to draw on; by default a new figure.
 
     Returns
     -------
@@ -647,8 +598,8 @@ def sweep_map(
     Raises
     ------
     ValueError
-        A column is missing; or another key but ``run.seed`` was swept too, and a mean over it would say
-        nothing; or the rows are no grid.
+        A column is missing; or another key but ``run.seed`` was swept too, and a mean over it would mean nothing; or
+        the rows are not a grid.
 
     Examples
     --------
@@ -676,7 +627,7 @@ def sweep_map(
     (xs, column), (ys, row) = _swept(table[x]), _swept(table[y])
     shape = (len(ys), len(xs))
     if shape[0] * shape[1] > 4 * len(set(zip(column.tolist(), row.tolist(), strict=True))):
-        raise ValueError(f"sweep_map: the rows are no grid over {x} and {y}: {shape[1]} by {shape[0]} values")
+        raise ValueError(f"sweep_map: the rows are not a grid over {x} and {y}: {shape[1]} by {shape[0]} values")
 
     def means(name: str, factor: float) -> np.ma.MaskedArray[Any, Any]:
         values = np.asarray(table[name], dtype=np.float64) * factor
@@ -731,22 +682,21 @@ def _contours(ax: Axes, x: NDArray[Any], y: NDArray[Any], name: str, means: Call
 def certificate_region(
     scenario: Scenario, *, kp: ArrayLike | None = None, kd: ArrayLike | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Draw which gains are certified for every plant within the bounds, and where the scenario's own lie.
+    """Draw the gains that are certified for every plant within the bounds, and the scenario's own.
 
-    ``scenario.override(…).certificate().certified`` is asked for each pair of the gains given, so the border
-    is known to half a step. By default the gains lie around the required ones and the scenario's own, 17 by
-    17, and more are asked for along the border, down to 1/256 of an axis; what is narrower than 1/16 of it
-    may be missed.
+    ``scenario.override(…).certificate().certified`` is evaluated for each pair of the gains given, so the border is
+    known to half a step. By default the gains lie around the required ones and the scenario's own, 17 by 17, and more
+    are evaluated along the border, down to 1/256 of an axis; a region narrower than 1/16 of it may be missed.
 
     Parameters
     ----------
     scenario : Scenario
         With the law PD, SMC or SMC with the sign function.
     kp, kd : array_like, optional
-        Gains to ask for, rising, in the units of ``law.smc.kp_v`` and ``law.smc.kd_v_s_rad``, or of
+        Gains to evaluate, rising, in the units of ``law.smc.kp_v`` and ``law.smc.kd_v_s_rad``, or of
         ``law.pd.kp_v_rad`` and ``law.pd.kd_v_s_rad``; both or neither; at most 3600 pairs.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; by default a new figure.
+        Axes to draw on; by default a new figure.
 
     Returns
     -------
@@ -757,7 +707,7 @@ def certificate_region(
     Raises
     ------
     ValueError
-        The law is another one; or only one of `kp` and `kd` is given, they do not rise, or are too many.
+        The law is none of these; or only one of `kp` and `kd` is given, they do not rise, or are too many.
     ParamError
         A gain is not allowed.
 
@@ -800,7 +750,7 @@ def certificate_region(
         ax.contourf(*gains, region, levels=[0.5, 1.5], colors=[_PALE])
         if not region.all():
             ax.contour(*gains, region, levels=[0.5], colors=[_BLUE], linewidths=0.7)
-    named = ", ".join(f"{gain:g} {_split(key)[1]}" for gain, key in zip(own, keys, strict=True))
+    named = ", ".join(f"{gain:g} {split(key)[1]}" for gain, key in zip(own, keys, strict=True))
     good = scenario.certificate().certified
     (dot,) = ax.plot(
         *([gain] for gain in own),
@@ -828,7 +778,7 @@ def _around(scenario: Scenario, own: list[float]) -> tuple[NDArray[np.float64], 
     """Gains around the required ones and the scenario's own."""
     import numpy as np
 
-    if scenario.law._key == "law.pd":  # what its certificate asks for are volts, and no gain
+    if scenario.law._key == "law.pd":  # its certificate requires volts, not a gain
         kp, kd = (np.geomspace((gain or 1.0) / 20, (gain or 1.0) * 20, _FINE + 1) for gain in own)
         return kp, kd
     ahead = scenario.certificate().ahead
@@ -856,7 +806,7 @@ def _refined(
             return region
         step //= 2
         finer, known = region[::step, ::step], asked[::step, ::step]
-        # What is not asked for is as its neighbour, until a border turns up beside it.
+        # A pair that is not evaluated is taken to equal its neighbour, until a border turns up beside it.
         guess = np.repeat(np.repeat(now, 2, axis=0), 2, axis=1)[:-1, :-1]
         corners = np.stack([now[:-1, :-1], now[:-1, 1:], now[1:, :-1], now[1:, 1:]])
         wanted = np.zeros(finer.shape, dtype=bool)
@@ -934,7 +884,7 @@ _COUNTERS = (
 
 @_styled
 def log_overview(log: Log) -> Figure:
-    """Draw a log of a simulation or a loop: what was measured, what was commanded, what went wrong.
+    """Draw a log of a simulation or a loop: measurements, commands, faults.
 
     Panels without records are left out, so a simulation has no latency and no link. Target and error are
     drawn where the law answered: a safe state has none. Events are marked through all panels, faults in red.
@@ -948,7 +898,7 @@ def log_overview(log: Log) -> Figure:
     -------
     matplotlib.figure.Figure
         Panels over time in s: position in °, by the encoder; error in °, as the law saw it; voltage in V; the
-        supervisor's state; how long answers took in µs; the link's counters.
+        supervisor's state; the time that answers took in µs; the link's counters.
 
     Raises
     ------
@@ -1015,7 +965,7 @@ def log_overview(log: Log) -> Figure:
 
 
 def _states(ax: Axes, command: Table, event: Table | None) -> None:
-    """The supervisor's state, also after the last command, which only the events tell."""
+    """The supervisor's state, also after the last command, which only the events record."""
     import numpy as np
 
     time, states = command["time_s"], list(command["state"])
@@ -1031,7 +981,7 @@ def _states(ax: Axes, command: Table, event: Table | None) -> None:
 
 
 def _counters(ax: Axes, link: Table) -> None:
-    """What went wrong on the link, added up; only what did."""
+    """Faults on the link, added up; only those that occurred."""
     from matplotlib.ticker import MaxNLocator
 
     bad = [name for name in _COUNTERS if link[name].any()]

@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# A shell that starts the tests in the background tells them to ignore Ctrl-C; some wait for one.
+# A shell that starts the tests in the background makes them ignore Ctrl-C; some wait for one.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -309,7 +309,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Result:
-    """What a loop did."""
+    """The record of a loop."""
 
     columns: dict
     events: list

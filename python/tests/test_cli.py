@@ -112,7 +112,7 @@ def test_errors_exit_1_and_are_printed_to_standard_error_only(clutch, tmp_path):
         (("sim", tmp_path / "none.toml"), "none.toml"),
         (("sim", "smc_2", "--set", "law.smc.kp_v=-1"), "kp_v"),
         (("sim", "smc_2", "--set", "law.smc.unknown=1"), "unknown"),
-        (("certify", "smc_2", "--set", "rig.friction.mu_static=-1"), "mu_static"),
+        (("certify", "smc_2", "--set", "rig.friction.stribeck.mu_static=-1"), "mu_static"),
     ]:
         done = clutch(*args, code=1)
         assert done.stdout == "" and word in done.stderr, done.stderr

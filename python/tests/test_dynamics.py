@@ -26,7 +26,7 @@ def oracles_rate(plant, velocity, volts):
 
 @pytest.mark.parametrize("mu_s", [0.2, 0.3])
 def test_the_derivative_is_the_oracles_equation(mu_s):
-    f = clutch.dynamics.derivative(clutch.Scenario.load("smc_2", {"rig.friction.mu_static": mu_s}))
+    f = clutch.dynamics.derivative(clutch.Scenario.load("smc_2", {"rig.friction.stribeck.mu_static": mu_s}))
     plant = oracle.Plant(mu_s=mu_s)
     for velocity in (-1.0, -1e-3, -1e-9, 0.0, 1e-9, 1e-4, 1e-3, 0.035, 0.35, 6.0):
         for volts in (-1.0, 0.0, 0.5, 1.1, 1.68, 1.69, 2.24, 9.0):

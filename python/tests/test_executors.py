@@ -265,7 +265,7 @@ def test_ray_gives_the_same_bits(base, local, ray):
 
 
 def test_a_killed_worker_of_ray_loses_no_row(long, long_local, ray):
-    # Two tasks at once, so that both workers tell their numbers; eval is a function they surely have.
+    # Two tasks at once, so that both workers report their numbers; eval is a function they surely have.
     busy = "[__import__('os').getpid(), __import__('time').sleep(0.3)][0]"
     pids = {future.result() for future in [ray.submit(eval, busy) for _ in range(4)]}
     progress, killed = killing(lambda: pids)
@@ -276,16 +276,138 @@ def test_a_killed_worker_of_ray_loses_no_row(long, long_local, ray):
     same(long_local, result)
 
 
-def test_an_exception_on_ray_is_the_functions_own_and_a_task_can_be_cancelled(ray):
+def test_an_exception_on_ray_is_the_functions_own(ray):
     with pytest.raises(ZeroDivisionError):
         ray.submit(divmod, 1, 0).result()
-    future = ray.submit(time.sleep, 60)
-    future.cancel()
-    begin = time.monotonic()
-    with pytest.raises(Exception) as caught:
-        future.result()
-    assert type(caught.value).__name__ == "TaskCancelledError"
-    assert future.done() and time.monotonic() - begin < 10
+
+
+# --- Futures that are cancelled ------------------------------------------------------------------
+
+
+@pytest.fixture
+def pool(request):
+    """An executor of two workers, by its name."""
+    if request.param == "threads":
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            yield pool
+    elif request.param == "processes":
+        with concurrent.futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+            yield pool
+    else:
+        executor = request.getfixturevalue(request.param)
+        yield executor.get_executor() if request.param == "dask" else executor
+
+
+class Waiting:
+    """A task that notes its begin in a file, and runs until another is there. A worker need not have this module."""
+
+    def __init__(self, pool, folder, name, end):
+        self.file = folder / name
+        self.end = end
+        code = f"""
+import os, time
+open({str(self.file)!r}, "x").close()
+while not os.path.exists({str(end)!r}):
+    time.sleep(0.01)
+"""
+        self.future = pool.submit(exec, code)
+
+    def begun(self):
+        """Waits until it has."""
+        patience = time.monotonic() + 120
+        while not self.file.exists():
+            assert time.monotonic() < patience, "it does not begin"
+            time.sleep(0.01)
+
+
+POOLS = pytest.mark.parametrize("pool", ["threads", "processes", "dask", "ray"], indirect=True)
+
+
+@POOLS
+def test_a_future_that_was_cancelled_before_it_began_raises_cancelled_error(pool, tmp_path):
+    end = tmp_path / "end"
+    # More than a pool of processes hands out in advance. Both workers are busy until the end is there.
+    first = [Waiting(pool, tmp_path, f"first {n}", end) for n in range(6)]
+    try:
+        last = Waiting(pool, tmp_path, "last", end)
+        assert last.future.cancel() and last.future.done()
+        with pytest.raises(concurrent.futures.CancelledError):
+            last.future.result()
+        assert last.future.cancel(), "still cancelled"
+    finally:
+        end.touch()
+    assert [task.future.result() for task in first] == [None] * 6
+    assert not first[0].future.cancel(), "it has ended"
+    assert first[0].future.result() is None
+    assert not last.file.exists()
+
+
+@POOLS
+def test_a_future_that_was_cancelled_after_it_began_raises_cancelled_error(pool, tmp_path):
+    end = tmp_path / "end"
+    task = Waiting(pool, tmp_path, "task", end)
+    try:
+        task.begun()
+        if task.future.cancel():
+            assert task.future.done()
+            with pytest.raises(concurrent.futures.CancelledError):
+                task.future.result()
+        else:  # threads and processes of this machine finish what has begun
+            assert not isinstance(pool, executors.RayExecutor)
+            end.touch()
+            assert task.future.result() is None
+    finally:
+        end.touch()
+
+
+def test_a_call_on_ray_that_is_cancelled_frees_its_worker(ray, tmp_path):
+    never = tmp_path / "never"
+    both = [Waiting(ray, tmp_path, f"task {n}", never) for n in range(2)]
+    for task in both:
+        task.begun()
+        assert task.future.cancel()
+    assert ray.submit(abs, -1).result() == 1
+
+
+@pytest.mark.parametrize("begun", [False, True])
+def test_a_future_of_ray_that_another_cancels_raises_cancelled_error(ray, tmp_path, begun):
+    end = tmp_path / "end"
+    tasks = [Waiting(ray, tmp_path, f"task {n}", end) for n in range(2 if begun else 3)]
+    try:
+        for task in tasks[:2]:
+            task.begun()
+        ray._ray.cancel(tasks[-1].future._reference)
+        with pytest.raises(concurrent.futures.CancelledError) as caught:
+            tasks[-1].future.result()
+        assert caught.value.__cause__ is not None
+    finally:
+        end.touch()
+    assert tasks[0].future.result() is None
+
+
+def test_a_future_of_ray_that_is_cancelled_while_a_thread_waits_for_it_gives_that_thread_no_result():
+    class Ray:
+        """Answers with a result or an exception in the moment in which another thread cancels."""
+
+        exceptions = needed("ray").exceptions
+
+        def __init__(self, answer):
+            self.answer = answer
+
+        def wait(self, references, timeout):
+            return [], references
+
+        def cancel(self, reference):
+            pass
+
+        def get(self, reference):
+            assert future.cancel()
+            return self.answer()
+
+    for answer in [lambda: 1, lambda: 1 // 0]:
+        future = executors._RayFuture(Ray(answer), "reference")
+        with pytest.raises(concurrent.futures.CancelledError):
+            future.result()
 
 
 def test_a_ray_that_runs_already_is_left_running(ray):

@@ -36,7 +36,7 @@ MOVE = {"distance_deg": 90.0, "speed_deg_s": 20.0, "acceleration_deg_s2": 100.0}
 SINE = {"rate_deg_s": 10.0, "amplitude_deg": 0.5, "frequency_hz": 1.0}
 CHIRP = {"rate_deg_s": 10.0, "amplitude_deg": 0.5, "from_hz": 0.1, "to_hz": 3.0, "duration_s": 10.0}
 
-# What must be given; nothing where every field has a default.
+# Required arguments; none where every field has a default.
 REQUIRED = {
     clutch.StribeckFriction: {},
     clutch.BrakeGeometry: GEOMETRY,
@@ -88,7 +88,7 @@ def same(a, b):
 
 
 def text_of(thing):
-    """What ``repr`` gives, evaluated with the public names only."""
+    """The result of ``repr``, evaluated with the public names only."""
     return eval(repr(thing), {name: getattr(clutch, name) for name in dir(clutch)})
 
 

@@ -17,7 +17,7 @@ from oracle import PERIOD, TURN, Brake, Ctc, Dac, Encoder, Loop, Pd, Plant, Smc,
 
 ENGINES = ("dormand_prince", "exact_flow")
 IDEAL_COUNTS = 2**24
-# What the simulator's ideal sensor resolves: 2^-16 of its counts, 5.7e-12 rad.
+# Resolution of the simulator's ideal sensor: 2^-16 of its counts, 5.7e-12 rad.
 IDEAL_SENSOR = Encoder(IDEAL_COUNTS * 2**16)
 PAPER = {"encoder": Encoder(), "dac": Dac()}
 
@@ -37,7 +37,7 @@ class Case:
 
     @property
     def step(self):
-        """What the simulator's paths resolve: 2^-16 of the rig's counts, rad."""
+        """Resolution of the simulator's paths: 2^-16 of the rig's counts, rad."""
         counts = 20_000 if self.scenario["rig"]["base"] == "paper" else IDEAL_COUNTS
         return TURN / counts / 2**16
 
@@ -99,7 +99,7 @@ PERFECT = [
         0.5,
         {"dormand_prince": 5e-10},
         sticks=10,
-        friction={"stribeck_exponent": 2.0},
+        friction={"stribeck": {"stribeck_exponent": 2.0}},
     ),
     # Measured 4e-11 to 8e-11.
     *(
@@ -193,7 +193,7 @@ def test_a_perfect_loop_moves_as_equations_1_2_and_its_law_say(case, engine):
     sticks = len(r.times("stick"))
     assert sticks >= case.sticks, f"the oracle sticks {sticks} times: no test of stick-slip"
     differing = np.flatnonzero(d["stuck"] != r["stuck"])
-    assert differing.size == 0, f"stuck and slipping are told apart otherwise at ticks {differing[:10]}"
+    assert differing.size == 0, f"stuck and slipping differ at ticks {differing[:10]}"
     apart = largest(d["position_rad"], r["position"])
     assert apart <= tolerance, f"(1), (2): positions {apart:.1e} rad apart after {sticks} sticks"
     # A difference in position changes the voltage and with it the velocity of the next period.
@@ -261,7 +261,7 @@ WIDE = Plant(v_s=np.radians(1.0))
 DRAGGED = Plant(damping=0.05)
 
 
-WIDER = {"friction": {"stribeck_velocity_rad_s": WIDE.v_s}}
+WIDER = {"friction": {"stribeck": {"stribeck_velocity_rad_s": WIDE.v_s}}}
 DRAG = {"viscous_damping_nm_s_rad": 0.05}
 
 # Law, rig, plant, engine, largest difference after one period: position (rad), velocity (rad/s).
@@ -316,7 +316,7 @@ def released(volts, duration, rig, reference=None, start="rest"):
     }
 
 
-COULOMB = {"mu_static": 0.15, "mu_dynamic": 0.15}
+COULOMB = {"stribeck": {"mu_static": 0.15, "mu_dynamic": 0.15}}
 
 
 @pytest.mark.parametrize("engine", ENGINES)

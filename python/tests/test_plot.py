@@ -292,7 +292,7 @@ def test_a_map_has_the_means_over_the_seeds_in_the_cells_of_their_keys(gains, tm
     ax = plot.sweep_map(gains, "law.smc.kp_v", "law.smc.boundary_rad_s", "max_error_rad")
     drawn(ax, tmp_path, "map")
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("law.smc.kp (V)", "law.smc.boundary (rad/s)")
-    assert ax.figure.axes[1].get_ylabel() == "max error (°)"
+    assert ax.figure.axes[1].get_ylabel() == "max |error| (°)"
     assert names(ax) == ["lines: stick-slip (cycles/s)"]
     values = mesh(ax).get_array()
     assert values.shape == (2, 3)
@@ -321,7 +321,7 @@ def test_missing_cells_are_empty_before_a_hatched_ground(tmp_path):
     assert np.array_equal(np.ma.getmaskarray(mesh(ax).get_array()), mask)
     assert ax.patch.get_hatch() == "////"
     assert ax.get_xlabel() == "law.pd.kp (V/rad)" and ax.get_ylabel() == "run.seed"
-    assert ax.figure.axes[1].get_ylabel() == "jerk rms (°/s³)"
+    assert ax.figure.axes[1].get_ylabel() == "jerk RMS (rad/s³)"
 
 
 def test_values_spaced_by_factors_get_a_logarithmic_axis_with_plain_numbers():
@@ -382,7 +382,7 @@ def test_contours_are_left_out_on_request_and_where_nothing_sticks():
         ("law.smc.slope_1_s", "law.smc.slope (1/s)"),
         ("law.ctc.kp_1_s2", "law.ctc.kp (1/s²)"),
         ("law.ctc.outer_gain", "law.ctc.outer_gain"),
-        ("rig.friction.mu_static", "rig.friction.mu_static"),
+        ("rig.friction.stribeck.mu_static", "rig.friction.stribeck.mu_static"),
         ("rig.drive.weight.mass_kg", "rig.drive.weight.mass (kg)"),
         ("rig.drive.weight.gravity_m_s2", "rig.drive.weight.gravity (m/s²)"),
         ("rig.inertia_kg_m2", "rig.inertia (kg m²)"),
@@ -402,16 +402,19 @@ def test_a_keys_label_has_the_unit_that_its_name_ends_with(key, label):
 @pytest.mark.parametrize(
     ("name", "label", "factor"),
     [
-        ("max_error_rad", "max error (°)", 180 / np.pi),
-        ("iae_rad_s", "iae (° s)", 180 / np.pi),
-        ("jerk_rms_rad_s3", "jerk rms (°/s³)", 180 / np.pi),
+        ("max_error_rad", "max |error| (°)", 180 / np.pi),
+        ("iae_rad_s", "integral of |error| (° s)", 180 / np.pi),
+        ("jerk_rms_rad_s3", "jerk RMS (rad/s³)", 1.0),
         ("stick_slip_cycles_per_s", "stick-slip (cycles/s)", 1.0),
-        ("stick_time_fraction", "stick time fraction", 1.0),
-        ("break_away_torque_nm", "break away torque (N m)", 1.0),
-        ("control_variation_v_s", "control variation (V/s)", 1.0),
+        ("stick_time_fraction", "time stuck (%)", 100.0),
+        ("break_away_torque_nm", "torque at break-away (mN m)", 1000.0),
+        ("control_variation_v_s", "voltage variation (V/s)", 1.0),
+        ("detected_stick_slip_cycles_per_s", "stick-slip seen by the encoder (cycles/s)", 1.0),
+        ("certified", "certified", 1.0),
+        ("law.smc.kp_v", "law.smc.kp (V)", 1.0),
     ],
 )
-def test_a_metrics_label_is_words_and_its_angles_are_degrees(name, label, factor):
+def test_a_metric_is_drawn_in_the_words_and_the_unit_of_the_command(name, label, factor):
     assert plot._metric(name) == (label, pytest.approx(factor))
 
 
@@ -419,7 +422,7 @@ def test_a_metrics_label_is_words_and_its_angles_are_degrees(name, label, factor
 
 
 def region(ax, kp, kd):
-    """Whether a point lies in the shaded region."""
+    """True if a point lies in the shaded region."""
     return any(path.contains_point((kp, kd)) for one in ax.collections[:1] for path in one.get_paths())
 
 

@@ -247,6 +247,8 @@ def test_a_grid_becomes_a_dataset_with_named_dimensions(short):
     assert dict(data.sizes) == {"law.smc.kp_v": 2, "rig.base": 2, "run.seed": 3}
     one = data["max_error_rad"].sel({"law.smc.kp_v": 4.0, "rig.base": "paper", "run.seed": 3})
     assert float(one) == result.table["max_error_rad"][8]
+    assert data["max_error_rad"].attrs == {"long_name": "max |error|", "units": "rad"}
+    assert not data["certified"].attrs and not data["error"].attrs
     points = clutch.sweep(short, clutch.sobol({"law.smc.kp_v": (2, 6)}, 4)).to_xarray()
     assert dict(points.sizes) == {"row": 4} and "law.smc.kp_v" in points.coords
 
@@ -398,7 +400,7 @@ def test_a_bar_is_shown_on_a_terminal_only_and_only_for_long_sweeps(short, monke
 
 
 def outcome(code):
-    """What a process of its own prints."""
+    """The output of a separate process."""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     return done.stdout

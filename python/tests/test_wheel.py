@@ -39,7 +39,7 @@ def test_a_run_is_that_of_the_command_bit_for_bit(clutch, name):
 def test_law_and_plant_stepped_by_hand_are_the_simulation_bit_for_bit(name):
     scenario = package.Scenario.load(name).override({"run.duration_s": 2.0, "run.settle_s": 0.5})
     run = package.simulate(scenario)
-    law, plant, path = package.Controller(scenario), package.Plant(scenario), scenario.path()
+    law, plant, path = package.Servo(scenario), package.Plant(scenario), scenario.path()
     columns = ("counts", "voltage_v", "demand_v", "limit", "position_rad", "velocity_rad_s", "stuck", "code")
     seen = {column: [] for column in columns}
     for tick in range(len(path)):
@@ -76,7 +76,7 @@ def test_stick_slip_detected_by_hand_is_that_of_the_simulation(name):
 @pytest.mark.parametrize("rig", ["paper", "ideal"])
 def test_an_ideal_sensor_and_converter_are_stepped_by_hand_as_simulated(rig):
     scenario = package.Scenario.load("smc_2", {"rig.base": rig, "run.duration_s": 1.5, "run.engine": "dormand_prince"})
-    law, plant, path = package.Controller(scenario), package.Plant(scenario), scenario.path()
+    law, plant, path = package.Servo(scenario), package.Plant(scenario), scenario.path()
     volts = []
     for tick in range(len(path)):
         volts.append(law.step(plant.counts, path.at(tick)))
@@ -282,7 +282,7 @@ def test_the_columns_of_a_log_are_those_that_any_mcap_reader_finds(clutch, tmp_p
 def test_a_log_is_never_written_over(tmp_path):
     run = package.simulate("smc_2")
     run.save(tmp_path / "run.mcap")
-    with pytest.raises(FileExistsError, match="never written over"):
+    with pytest.raises(FileExistsError, match="never overwritten"):
         run.save(tmp_path / "run.mcap")
     with pytest.raises(OSError, match=r"nowhere"):
         run.save(tmp_path / "nowhere" / "run.mcap")
@@ -362,7 +362,7 @@ def test_no_value_of_any_key_is_anything_but_taken_or_named(key, value):
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), 0.5, 2**31])
 def test_counts_that_no_encoder_has_are_refused(bad):
     scenario = package.Scenario.load("smc_2")
-    law, target = package.Controller(scenario), scenario.path().at(0)
+    law, target = package.Servo(scenario), scenario.path().at(0)
     with pytest.raises((ValueError, OverflowError), match=r"counts = .*: expected a whole number of counts"):
         law.step(bad, target)
     with pytest.raises(TypeError):
@@ -373,7 +373,7 @@ def test_counts_that_no_encoder_has_are_refused(bad):
 
 def test_a_snapshot_of_a_law_goes_on_by_itself():
     scenario = package.Scenario.load("smc_2")
-    law, path = package.Controller(scenario), scenario.path()
+    law, path = package.Servo(scenario), scenario.path()
     for tick in range(100):
         law.step(tick // 9, path.at(tick))
     twin = law.copy()

@@ -14,8 +14,8 @@ DOCUMENT = (ROOT / "docs" / "wire.md").read_text(encoding="utf-8")
 with (ROOT / "tests" / "wire" / "vectors.csv").open(encoding="utf-8", newline="") as file:
     VECTORS = list(csv.DictReader(file))
 
-TYPES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i"}
-SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "i32": 4}
+TYPES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i", "[u32;8]": "B"}
+SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "i32": 4, "[u32;8]": 1}
 
 
 def shown(result):
@@ -24,7 +24,8 @@ def shown(result):
         name, numbers = f"!{result.name}", result.numbers
     else:
         name, numbers = result
-    return " ".join([name, *(f"{key}={value}" for key, value in numbers.items())])
+    text = {key: f"[{' '.join(map(str, value))}]" if isinstance(value, tuple) else value for key, value in numbers.items()}
+    return " ".join([name, *(f"{key}={value}" for key, value in text.items())])
 
 
 def tables():
@@ -34,7 +35,7 @@ def tables():
     for section in generated.split("\n### ")[1:]:
         head = re.match(r"`0x([0-9a-f]{2})` (\w+)\n", section)
         if head:
-            rows = re.findall(r"^\| (\d+) \| (?:`(\w+)`|(CRC)) \| `(\w+)` \|", section, flags=re.M)
+            rows = re.findall(r"^\| (\d+)(?: \+ 4 n)? \| (?:`(\w+)`|(CRC)) \| `([\w;\[\]]+)` \|", section, flags=re.M)
             fields = [(int(offset), name or crc, ty) for offset, name, crc, ty in rows]
             found.append((int(head[1], 16), head[2], fields))
     return found
@@ -75,6 +76,7 @@ def test_tables_of_the_specification_have_the_layouts_of_the_decoder():
         assert (layout.name, layout.length) == (name, end)
         assert layout.fields == tuple(field for _, field, _ in fields)
         assert layout.form.format == "<" + "".join(TYPES[ty] for _, _, ty in fields)
+        assert layout.has_list == (fields[-1][2] == "[u32;8]")
 
 
 def test_the_schema_hash_is_that_of_the_printed_tables():

@@ -8,7 +8,7 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-# Kind, name, fields; `struct` codes: B u8, H u16, I u32, Q u64, i i32.
+# Kind, name, fields; `struct` codes: B u8, H u16, I u32, Q u64, i i32. L: a list of u32 at the end, behind its number.
 LAYOUTS = {
     0x01: ("Discover", "nonce:I version:B schema:Q"),
     0x02: (
@@ -34,14 +34,14 @@ LAYOUTS = {
     0x87: ("Pong", "run:H nonce:I time_us:I"),
     0x88: ("Refused", "request:B reason:B value:I"),
     0x89: (
-        "Controller",
+        "ControllerHello",
         "nonce:I version:B schema:Q settings:Q board:I boot:I clock_hz:I knots:H state:B run:H config:Q",
     ),
     0x8A: ("Taken", "run:H key:H value:Q"),
     0x8B: (
         "Telemetry",
         "run:H number:H tick:I sequence:H time_us:I counts:i status:B flags:B arrival:B states:B cause:B value:I"
-        " lateness_us:I error:I error_rate:I term_0:I term_1:I term_2:I demand:I code:H cycles:I",
+        " lateness_us:I error:I error_rate:I demand:I code:H cycles:I terms:L",
     ),
     0x8C: ("Ended", "run:H tick:I states:B cause:B value:I"),
     0x8D: (
@@ -51,29 +51,46 @@ LAYOUTS = {
 }
 
 
+# Most numbers of a list.
+MOST = 8
+
+
 @dataclass(frozen=True)
 class Layout:
-    """How one kind of body is laid out."""
+    """The layout of one kind of body."""
 
     kind: int
     name: str
     fields: tuple[str, ...]
     form: struct.Struct
+    has_list: bool
 
     @property
     def length(self):
-        """Bytes of the body: kind, fields, CRC."""
+        """Bytes of the body: kind, fields, CRC; without the numbers of a list."""
         return 1 + self.form.size + 4
+
+    @property
+    def longest(self):
+        """The same with as many numbers as a list may have."""
+        return self.length + (4 * MOST if self.has_list else 0)
+
+    def length_of(self, content):
+        """The same with as many numbers as the list of this content claims."""
+        claimed = content[self.form.size] if self.has_list and len(content) > self.form.size else 0
+        return self.length + 4 * claimed
 
 
 def _layout(kind, name, fields):
     names, codes = zip(*(field.split(":") for field in fields.split()), strict=True)
-    return Layout(kind, name, names, struct.Struct("<" + "".join(codes)))
+    # Of a list the number of its numbers.
+    form = struct.Struct("<" + "".join(codes).replace("L", "B"))
+    return Layout(kind, name, names, form, codes[-1] == "L")
 
 
 BY_KIND = {kind: _layout(kind, *rest) for kind, rest in LAYOUTS.items()}
 BY_NAME = {layout.name: layout for layout in BY_KIND.values()}
-LONGEST_BODY = max(layout.length for layout in BY_KIND.values())
+LONGEST_BODY = max(layout.longest for layout in BY_KIND.values())
 
 
 class FrameError(Exception):
@@ -105,7 +122,10 @@ def unstuff(data):
 def encode(name, **fields):
     """The frame of a message."""
     layout = BY_NAME[name]
-    content = bytes([layout.kind]) + layout.form.pack(*(fields[key] for key in layout.fields))
+    values, numbers = [fields[key] for key in layout.fields], ()
+    if layout.has_list:
+        numbers, values[-1] = values[-1], len(values[-1])
+    content = bytes([layout.kind]) + layout.form.pack(*values) + struct.pack(f"<{len(numbers)}I", *numbers)
     return stuff(content + struct.pack("<I", zlib.crc32(content)))
 
 
@@ -121,13 +141,17 @@ def parse(data):
     layout = BY_KIND.get(content[0])
     if layout is None:
         raise FrameError("UnknownKind", kind=content[0])
-    if len(body) != layout.length:
-        raise FrameError("Length", kind=layout.kind, expected=layout.length, got=len(body))
-    return layout.name, dict(zip(layout.fields, layout.form.unpack(content[1:]), strict=True))
+    length = layout.length_of(content)
+    if len(body) != length:
+        raise FrameError("Length", kind=layout.kind, expected=min(length, 255), got=len(body))
+    values = list(layout.form.unpack_from(content, 1))
+    if layout.has_list:
+        values[-1] = struct.unpack_from(f"<{values[-1]}I", content, 1 + layout.form.size)
+    return layout.name, dict(zip(layout.fields, values, strict=True))
 
 
 def receive(stream):
-    """What a receiver that has just started says to a stream: messages and errors in order."""
+    """The results of a receiver that has just started, for a stream: messages and errors in order."""
     said, kept, dropping = [], bytearray(), False
     for byte in stream:
         if byte != 0:

@@ -19,7 +19,7 @@ pub(crate) fn board() -> Option<Board> {
 }
 
 impl Board {
-    /// Runs everything in `input`; the hashes, and the records that were asked for.
+    /// Runs everything in `input`; gives the hashes, and the requested records.
     pub(crate) fn run(&self, name: &str, input: &[u8]) -> (Vec<u32>, Vec<u8>) {
         // The board opens its files in the emulator's folder.
         let folder =

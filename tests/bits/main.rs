@@ -1,9 +1,12 @@
-//! The same bits on every machine: a million ticks here and in the emulator. The wheel repeats them in
+//! The same bits on every machine: more than a million ticks here and in the emulator. The wheel repeats them in
 //! `python/tests/test_bits.py`.
 
 mod emulator;
 
 use clutch_bits::{Job, Kind, RECORD};
+use clutch_core::law::LawParams;
+use clutch_core::params::Choice;
+use clutch_core::reference::ReferenceParams;
 use clutch_tests::bits::{Run, fields, first_difference, table, value};
 use std::sync::LazyLock;
 
@@ -11,13 +14,16 @@ use std::sync::LazyLock;
 static ALL: LazyLock<Vec<Run>> = LazyLock::new(|| Run::all().expect("the scenarios are right"));
 
 #[test]
-fn a_million_ticks_have_every_law_and_path_and_no_number_that_is_none() {
+fn more_than_a_million_ticks_have_every_law_and_path_and_no_number_that_is_none() {
     let ticks: u32 = ALL.iter().map(|run| run.job.ticks).sum();
-    assert_eq!(ticks, 1_000_000);
-    let laws: Vec<u32> = ALL.iter().map(|run| run.settings.numbers.law).collect();
-    let paths: Vec<u32> = ALL.iter().map(|run| run.settings.numbers.path).collect();
-    assert!((0..4).all(|law| laws.contains(&law)), "laws {laws:?}");
-    assert!((1..9).all(|path| paths.contains(&path)), "paths {paths:?}");
+    assert_eq!(ticks, 1_150_000);
+    let laws: Vec<usize> = ALL.iter().map(|run| Choice::<f64>::chosen(&run.law)).collect();
+    let paths: Vec<usize> = ALL.iter().map(|run| run.path).collect();
+    let kinds = <LawParams as Choice<f64>>::CHOICE.options.len();
+    assert!((0..kinds).all(|law| laws.contains(&law)), "laws {laws:?}");
+    // All that move.
+    let kinds = <ReferenceParams<'_> as Choice<f64>>::CHOICE.options.len();
+    assert!((1..kinds).all(|path| paths.contains(&path)), "paths {paths:?}");
     for run in ALL.iter() {
         for (tick, record) in run.records.chunks_exact(RECORD).enumerate() {
             for (field, _, bytes) in fields(record).filter(|(_, kind, _)| *kind == Kind::F32) {
@@ -30,7 +36,7 @@ fn a_million_ticks_have_every_law_and_path_and_no_number_that_is_none() {
 
 #[test]
 fn every_run_of_pd_and_ctc_sticks_and_slips() {
-    for run in ALL.iter().filter(|run| run.settings.numbers.law < 2) {
+    for run in ALL.iter().filter(|run| matches!(run.law, LawParams::Pd(_) | LawParams::Ctc(_))) {
         let (cycles, seconds) = (run.cycles(), u64::from(run.job.ticks) / 1000);
         assert!(cycles >= 2 * seconds, "{}: {cycles} stick-slip cycles in {seconds} s", run.name);
     }
@@ -47,14 +53,18 @@ fn the_counts_given_back_to_the_law_give_the_simulations_outputs() {
                 ("target_acceleration", trace.target_acceleration[tick]),
                 ("error", trace.measured_error[tick]),
                 ("error_rate", trace.error_rate[tick]),
-                ("term_0", trace.terms[0].1[tick]),
-                ("term_1", trace.terms[1].1[tick]),
-                ("term_2", trace.terms[2].1[tick]),
                 ("demand", trace.demand[tick]),
                 ("voltage", trace.voltage[tick]),
                 ("code", trace.code[tick].into()),
                 ("limit", f64::from(trace.limit[tick] as u8)),
             ];
+            for (i, (_, values)) in trace.terms.iter().enumerate() {
+                assert_eq!(
+                    value(record, &format!("term_{i}")),
+                    Some(values[tick]),
+                    "{name}, tick {tick}, term {i}"
+                );
+            }
             for (field, simulated) in simulated {
                 assert_eq!(value(record, field), Some(simulated), "{name}, tick {tick}, {field}");
             }
@@ -109,7 +119,7 @@ fn lowest_bit(name: &str) -> u32 {
     before.map(|field| 8 * field.kind.size() as u32).sum()
 }
 
-/// Runs once more with every record written, and tells the first that differs.
+/// Runs once more with every record written, and reports the first that differs.
 fn told(board: &emulator::Board, run: &Run, job: Job) -> String {
     let (_, theirs) = board.run("told", &run.input(Job { dump: true, ..job }));
     match first_difference(&run.records, &theirs) {

@@ -1,9 +1,11 @@
-//! The runs of the test of equal bits: scenarios, the counts that their simulations gave, and what the
-//! workload makes of these counts on this machine.
+//! The runs of the test of equal bits: scenarios, the counts that their simulations gave, and the
+//! workload's results for these counts on this machine.
 
 use clutch_bits::{FIELDS, Job, Kind, RECORD, Workload, hash, setting_to_bytes};
+use clutch_core::law::LawParams;
+use clutch_core::params::Choice;
 use clutch_core::{Counts, FixedCounts, Micros};
-use clutch_loop::setup::{self, Setup};
+use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_node::Settings;
 use clutch_sim::run::{Keep, Trace, simulate_watched};
 use clutch_sim::{Scenario, progress::UNWATCHED};
@@ -11,7 +13,7 @@ use std::fmt;
 use std::path::Path;
 
 /// Names and scenarios.
-pub const RUNS: [(&str, &str); 11] = [
+pub const RUNS: [(&str, &str); 13] = [
     ("pd_ramp", include_str!("runs/pd_ramp.toml")),
     ("pd_sine_bench", include_str!("runs/pd_sine_bench.toml")),
     ("pd_table_cubic", include_str!("runs/pd_table_cubic.toml")),
@@ -23,18 +25,20 @@ pub const RUNS: [(&str, &str); 11] = [
     ("smc_table_linear", include_str!("runs/smc_table_linear.toml")),
     ("sign_ramp_bench", include_str!("runs/sign_ramp_bench.toml")),
     ("sign_trapezoid", include_str!("runs/sign_trapezoid.toml")),
+    ("pid_ramp_bench", include_str!("runs/pid_ramp_bench.toml")),
+    ("pid_sine", include_str!("runs/pid_sine.toml")),
 ];
 
-/// What went wrong.
+/// The reason of a failure.
 pub type Wrong = Box<dyn std::error::Error + Send + Sync>;
 
-/// A run with everything that a machine needs to repeat it, and what came of it here.
+/// A run with everything that a machine needs to repeat it, and its result here.
 pub struct Run {
     /// Its name.
     pub name: &'static str,
     /// Its scenario as a file.
     pub toml: &'static str,
-    /// What the scenario calls itself.
+    /// The scenario's own name.
     pub title: String,
     /// The settings, as a board gets them.
     pub settings: Settings,
@@ -44,6 +48,12 @@ pub struct Run {
     pub counts: Vec<i32>,
     /// The simulation that gave them.
     pub trace: Trace,
+    /// The law.
+    pub law: LawParams,
+    /// The path's place among the kinds of paths.
+    pub path: usize,
+    /// Bytes of a record that the hash covers.
+    pub hashed: usize,
     /// The records of this machine.
     pub records: Vec<u8>,
     /// Their hash.
@@ -54,11 +64,12 @@ impl Run {
     /// Simulates a scenario, and gives its counts to the workload.
     ///
     /// # Errors
-    /// A scenario that is none, or not one for a board.
+    /// An invalid scenario, or one that is not for a board.
     pub fn new(name: &'static str, toml: &'static str) -> Result<Run, Wrong> {
         let scenario = Scenario::parse(name, toml, &[])?;
         let trace = simulate_watched::<f32>(&scenario.spec(), Keep::Trace, UNWATCHED)?.trace;
-        let settings = setup::settings(&scenario, &Setup::new(&scenario, 0)?, Micros(0), scenario.ticks())?;
+        let settings =
+            from_scenario::settings(&scenario, &BuiltRun::new(&scenario, 0)?, Micros(0), scenario.ticks())?;
         let mut sent = 0;
         settings.each(|_, _| sent += 1);
         let first = trace.target_fixed.first().ok_or("a run without a tick")?.0;
@@ -71,8 +82,10 @@ impl Run {
             spoil: None,
         };
         let counts = trace.counts.clone();
-        let (records, hash) = records(&settings, &job, &counts)?;
-        Ok(Run { name, toml, title: scenario.name, settings, job, counts, trace, records, hash })
+        let (records, hash, hashed) = records(&settings, &job, &counts)?;
+        let (law, path) = (scenario.spec().law, Choice::<f64>::chosen(&scenario.spec().reference));
+        let title = scenario.name().to_owned();
+        Ok(Run { name, toml, title, settings, job, counts, trace, law, path, hashed, records, hash })
     }
 
     /// All of them.
@@ -93,7 +106,7 @@ impl Run {
         last.and_then(|record| value(record, "cycles")).map_or(0, |cycles| cycles as u64)
     }
 
-    /// What the image `mps2-bits` reads, with another header.
+    /// The input of the image `mps2-bits`, with another header.
     #[must_use]
     pub fn input(&self, job: Job) -> Vec<u8> {
         let mut bytes = job.to_bytes().to_vec();
@@ -103,17 +116,18 @@ impl Run {
     }
 }
 
-fn records(settings: &Settings, job: &Job, counts: &[i32]) -> Result<(Vec<u8>, u32), Wrong> {
+fn records(settings: &Settings, job: &Job, counts: &[i32]) -> Result<(Vec<u8>, u32, usize), Wrong> {
     let first = Counts(*counts.first().ok_or("a run without a tick")?);
     let workload = Workload::new(settings, job.origin, first, job.volts);
     let mut workload = workload.map_err(|misfit| format!("{misfit:?}"))?;
+    let hashed = workload.hashed();
     let (mut records, mut hash) = (Vec::with_capacity(counts.len() * RECORD), hash());
     for counts in counts {
         let record = workload.tick(Counts(*counts));
-        hash.update(&record);
+        hash.update(&record[..hashed]);
         records.extend(record);
     }
-    Ok((records, hash.finalize()))
+    Ok((records, hash.finalize(), hashed))
 }
 
 /// The fields of a record with their bytes.
@@ -194,21 +208,21 @@ pub fn table(runs: &[Run]) -> String {
     text
 }
 
-/// Writes what a machine other than the emulator needs to repeat the runs and to compare itself:
-/// scenarios, counts, records, the fields of a record (name and NumPy's type), and a list of the runs
-/// (name, ticks, hash).
+/// Writes the files that a machine other than the emulator needs to repeat the runs and to compare
+/// itself: scenarios, counts, records, the fields of a record (name and NumPy's type), and a list
+/// of the runs (name, ticks, hash).
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write(runs: &[Run], folder: &Path) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
     let mut list = String::new();
-    for Run { name, toml, job, counts, records, hash, .. } in runs {
+    for Run { name, toml, job, counts, records, hash, hashed, .. } in runs {
         let counts: Vec<u8> = counts.iter().flat_map(|counts| counts.to_le_bytes()).collect();
         std::fs::write(folder.join(format!("{name}.toml")), toml)?;
         std::fs::write(folder.join(format!("{name}.counts")), counts)?;
         std::fs::write(folder.join(format!("{name}.records")), records)?;
-        list += &format!("{name} {} {hash:08x}\n", job.ticks);
+        list += &format!("{name} {} {hash:08x} {hashed}\n", job.ticks);
     }
     let fields: String = FIELDS.iter().map(|f| format!("{} {}\n", f.name, f.kind.numpy())).collect();
     std::fs::write(folder.join("fields.txt"), fields)?;

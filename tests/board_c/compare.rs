@@ -1,4 +1,4 @@
-//! The same random sequences into both boards.
+//! Feeds the same random sequences to both boards.
 
 use super::{Random, compiled};
 use clutch_core::Counts;
@@ -12,7 +12,7 @@ use std::io::{Read as _, Write as _};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// What happens to a board.
+/// An event for a board.
 #[derive(Clone, Debug)]
 pub(super) enum Event {
     Power(BoardParams),
@@ -57,7 +57,7 @@ impl Event {
     }
 }
 
-/// What a board shows after an event.
+/// The observable state of a board after an event.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Shown {
     pub(super) bytes: Vec<u8>,
@@ -102,7 +102,7 @@ impl RustBoard {
             code: self.node.code().0,
             state: self.node.state() as u8,
             period_us: self.node.period_us().unwrap_or(0),
-            configurations: 0, // asked of the board in C only, see rules.rs
+            configurations: 0, // checked only on the board in C, see rules.rs
         };
         out.clear();
         shown
@@ -153,7 +153,7 @@ pub(super) fn in_c(program: &Path, events: &[Event]) -> Vec<Shown> {
     shown
 }
 
-/// A host that mostly knows what it does, and now and then does not.
+/// A host that is mostly right, and now and then wrong.
 struct Host {
     now: u32,
     counts: i32,
@@ -283,7 +283,7 @@ impl Host {
         if let Message::Configure(m) = &message
             && !matches!(state, BoardState::Armed | BoardState::Running)
         {
-            // What it will answer shows whether it took it: most of the time it does.
+            // The board's answer shows if it took the frame: most of the time it does.
             self.set = *m;
         }
         let mut bytes = encode(&message).as_bytes().to_vec();
@@ -341,7 +341,7 @@ impl Host {
     }
 }
 
-/// A random sequence and what the board in Rust shows.
+/// A random sequence, and the states of the board in Rust.
 fn sequence(seed: u64) -> Vec<(Event, Shown)> {
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
     // The first numbers of seeds that differ little differ little.
@@ -435,7 +435,7 @@ fn long_run() -> Vec<(Event, Shown)> {
     events.into_iter().map(|event| (event.clone(), board.take(&event))).collect()
 }
 
-/// What the sequences have covered, so that a comparison of nothing cannot pass.
+/// The coverage of the sequences, so that a comparison of nothing cannot pass.
 fn count(seen: &mut BTreeMap<String, u64>, shown: &Shown) {
     let mut add = |key: String| *seen.entry(key).or_insert(0) += 1;
     for message in shown.messages() {

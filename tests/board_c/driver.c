@@ -4,7 +4,7 @@
  *       period_max u32, watchdog_max u32, boot_code u16      power-up
  *   'B' now u32, length u16, bytes                           bytes come
  *   'T' now u32, counts i32, faults u8                       a period begins
- *   'P' now u32                                              the watchdog is looked at
+ *   'P' now u32                                              the watchdog is checked
  *
  * Each is answered: length u16, bytes sent, code u16, state u8, period u32, configurations u32.
  * SPDX-License-Identifier: MIT OR Apache-2.0

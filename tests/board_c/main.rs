@@ -1,4 +1,4 @@
-//! The board in C of examples/board-c: it does what the Rust board does, byte for byte, and runs a
+//! The board in C of examples/board-c: it behaves like the Rust board, byte for byte, and runs a
 //! session in real time on a pseudo-terminal.
 
 mod compare;

@@ -1,4 +1,4 @@
-//! Rules of docs/wire.md, one by one, held against the board in C alone.
+//! Rules of docs/wire.md, one by one, checked on the board in C alone.
 
 use super::compare::{Event, Shown, in_c};
 use super::compiled;
@@ -55,7 +55,7 @@ fn running(configure: Configure, code: u16) -> Vec<Event> {
     ]
 }
 
-/// What the board in C shows after each of the events that follow those of `before`.
+/// The states of the board in C after each of the events that follow those of `before`.
 fn shown(before: Vec<Event>, after: Vec<Event>) -> Option<Vec<Shown>> {
     // A program of its own for each test: they run at the same time.
     let name = format!("board_c_rules_{}", std::thread::current().name()?.replace("::", "_"));
@@ -164,7 +164,7 @@ fn the_safe_output_goes_on_in_ready_with_the_fields_of_the_run_that_ended() {
         let Some(s) = shown(running(RUN, 700), after) else { return };
         assert_eq!(codes(&s), [2000; 7], "kind {kind}");
     }
-    // A ramp that is under way arrives, whatever comes next.
+    // A ramp that is under way reaches its end, whatever comes next.
     let ramp = Configure { safe_kind: 1, hold_code: 1000, ..RUN };
     let after = vec![
         frame(400, Message::Stop(Stop { run: 1, reason: 0 })),

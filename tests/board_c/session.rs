@@ -13,7 +13,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// Ends the board with the test, also when it fails.
+/// Ends the board with the test, even if the test fails.
 struct Board(Child);
 
 impl Drop for Board {
@@ -50,7 +50,7 @@ impl Line {
         self.wait("Sample", |m| if let Message::Sample(s) = m { Some(*s) } else { None })
     }
 
-    /// Answers samples with `code` for so many periods; the counts of the last one.
+    /// Answers samples with `code` for `periods`; gives the counts of the last one.
     fn drive(&mut self, run: u16, code: u16, periods: u32) -> i32 {
         let mut counts = 0;
         for _ in 0..periods {

@@ -1,5 +1,5 @@
-//! The emulated Cortex-M4F board in the controller role: it does what the simulation does, bit for bit, and
-//! what breaks its line ends in the safe state.
+//! The emulated Cortex-M4F board in the controller role: it behaves like the simulation, bit for
+//! bit, and faults of its line end in the safe state.
 
 mod serial;
 mod verb;
@@ -7,12 +7,14 @@ mod verb;
 use clutch_core::supervisor::State;
 use clutch_log::{Limits, LogWriter, Record, Source};
 use clutch_loop::campaign::runs;
-use clutch_loop::emulated::{Emulated, InProcess, Lockstep, emulated};
-use clutch_loop::emulator::{Emulator, SerialBoard};
-use clutch_loop::replay::{PRESENT_CODE, replay};
-use clutch_loop::setup::{self, Setup};
-use clutch_loop::world::{Outcome, World, WorldParams};
-use clutch_node::exchange::Exchange;
+use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::lockstep_board::{InProcessBoard, LockstepBoard};
+use clutch_loop::lockstep_host::{LockstepHost, lockstep_host};
+use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
+use clutch_loop::replay::replay;
+use clutch_loop::to_log::PRESENT_CODE;
+use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions, VirtualReport};
+use clutch_node::lockstep::Exchange;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::{Keep, Metrics, Run, Scenario};
 use clutch_tests::command;
@@ -36,7 +38,8 @@ fn alone() -> RwLockWriteGuard<'static, ()> {
 
 const LAWS: [&str; 3] = ["pd", "ctc", "smc"];
 
-/// The paper's laws at 2 °/s for 10 s, in single precision. Lateness is this machine's and not looked at.
+/// The paper's laws at 2 °/s for 10 s, in single precision. Lateness belongs to this machine and is
+/// not checked.
 fn paper(law: &str, seed: u64) -> Scenario {
     let text = format!(
         "name = \"{law} at 2 °/s\"\n[rig]\nbase = \"paper\"\n[law.{law}]\n[reference.ramp]\nrate_deg_s = 2.0\n\
@@ -48,20 +51,20 @@ fn paper(law: &str, seed: u64) -> Scenario {
 }
 
 /// A run on a board, in lockstep.
-fn on(scenario: &Scenario, board: impl Lockstep, patience_us: u32) -> Outcome {
-    let mut setup = Setup::<f32>::new(scenario, 7).expect("a safe state");
-    setup.control.silence = clutch_core::Micros(patience_us);
-    let ticks = setup.ticks + 1;
+fn on(scenario: &Scenario, board: impl LockstepBoard, patience_us: u32) -> VirtualReport {
+    let mut built = BuiltRun::<f32>::new(scenario, 7).expect("a safe state");
+    built.controller.silence = clutch_core::Micros(patience_us);
+    let ticks = built.ticks + 1;
     let run = &scenario.spec().run;
     let (duration, settle) = (run.duration + 1.0, run.settle);
-    let params = WorldParams { record: true, duration, ticks, settle, ..WorldParams::default() };
-    let end = emulated(scenario, &setup, board, ticks).expect("a board can run it");
-    let path = setup::path::<f32>(scenario).expect("a path");
-    World::new(scenario, params, end).expect("a rig").run(&path).expect("the board answers")
+    let params = VirtualOptions { record: true, duration, ticks, settle, ..VirtualOptions::default() };
+    let station = lockstep_host(scenario, &built, board, ticks).expect("a board can run it");
+    let path = from_scenario::path::<f32>(scenario).expect("a path");
+    VirtualLoop::new(scenario, params, station).expect("a rig").run(&path).expect("the board answers")
 }
 
 /// Figures, codes and motion of the board's run are those of the simulation.
-fn equal(what: &str, board: &Outcome, simulated: &Run) {
+fn equal(what: &str, board: &VirtualReport, simulated: &Run) {
     assert_eq!(board.cause, None, "{what}: control ended");
     // The rig's clock began before the run's: a sum of times differs in its last bits, and nothing else does.
     let (ours, theirs) = (board.metrics, simulated.metrics);
@@ -97,7 +100,7 @@ fn ten_seeds_of_the_papers_laws_on_the_board_are_the_simulation_bit_for_bit() {
     for seed in 1..=10 {
         for law in LAWS {
             let scenario = paper(law, seed);
-            let board = on(&scenario, Emulator::start(&image).expect("a board"), 3000);
+            let board = on(&scenario, QemuBoard::start(&image).expect("a board"), 3000);
             equal(&format!("{law}, seed {seed}"), &board, &simulate(&scenario));
         }
     }
@@ -112,7 +115,7 @@ fn over_its_serial_lines_too_the_board_is_the_simulation() {
             let image = &image;
             scope.spawn(move || {
                 let scenario = paper(law, 1);
-                let board = SerialBoard::start(image).expect("a board");
+                let board = QemuSerialBoard::start(image).expect("a board");
                 equal(law, &on(&scenario, board, 60_000_000), &simulate(&scenario));
             });
         }
@@ -125,8 +128,8 @@ fn every_field_of_every_tick_is_the_one_of_the_same_node_in_this_process() {
     let _beside = beside();
     for law in LAWS {
         let scenario = paper(law, 11);
-        let board = on(&scenario, Emulator::start(&image).expect("a board"), 3000);
-        let here = on(&scenario, InProcess::default(), 3000);
+        let board = on(&scenario, QemuBoard::start(&image).expect("a board"), 3000);
+        let here = on(&scenario, InProcessBoard::default(), 3000);
         assert_eq!(board.records.len(), here.records.len(), "{law}: records");
         for (theirs, ours) in board.records.iter().zip(&here.records) {
             assert_eq!(theirs, ours, "{law}: tick {}", ours.tick());
@@ -160,7 +163,7 @@ fn every_kind_of_path_on_the_board_is_the_simulation() {
              [safety.on_fault.hold]\nvolts_v = 4.5\n[safety.limits]\nfollowing_error_deg = 5.0\n"
         );
         let scenario = Scenario::parse(name, &text, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let board = on(&scenario, Emulator::start(&image).expect("a board"), 3000);
+        let board = on(&scenario, QemuBoard::start(&image).expect("a board"), 3000);
         equal(name, &board, &simulate(&scenario));
     }
 }
@@ -171,10 +174,10 @@ fn the_boards_log_replays_bit_for_bit_on_this_machine() {
     let _beside = beside();
     for law in LAWS {
         let scenario = paper(law, 3);
-        let ran = on(&scenario, Emulator::start(&image).expect("a board"), 3000);
+        let ran = on(&scenario, QemuBoard::start(&image).expect("a board"), 3000);
         let file = scratch(&format!("{law}.mcap"));
-        let setup = Setup::<f32>::new(&scenario, 7).expect("a safe state");
-        let mut header = setup::header(&scenario, &setup.servo, Source::Loop, "emulated", "test");
+        let built = BuiltRun::<f32>::new(&scenario, 7).expect("a safe state");
+        let mut header = from_scenario::header(&scenario, &built.servo, Source::Loop, "emulated", "test");
         header.extra.push((PRESENT_CODE.to_owned(), ran.present.to_string()));
         let mut log = LogWriter::create(&file, &header).expect("a file");
         ran.records.iter().for_each(|r| log.write(r).expect("room for it"));
@@ -191,7 +194,7 @@ fn clutch(args: &[&str]) -> Output {
     Command::new(command()).args(args).stdin(Stdio::null()).output().expect("the command starts")
 }
 
-/// What it printed.
+/// Its output.
 fn shown(done: &Output) -> String {
     String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr)
 }
@@ -212,23 +215,24 @@ fn what_breaks_the_boards_line_ends_in_the_safe_state_in_time_and_is_named() {
     // Seed 3 has the bench, the others the paper's rig.
     for run in runs(2, 2).filter(clutch_loop::campaign::RunId::is_outside) {
         count += 1;
-        let board = Emulator::start(&image).expect("a board");
-        let outcome = run.run_on(board).expect("the board answers");
-        wrong.extend(run.judge(&outcome).map(|what| format!("{}: {what}", run.name())));
+        let board = QemuBoard::start(&image).expect("a board");
+        let report = run.run_on(board).expect("the board answers");
+        wrong.extend(run.judge(&report).map(|what| format!("{}: {what}", run.name())));
     }
     assert!(count > 300, "only {count} runs");
     assert!(wrong.is_empty(), "{} of {count} runs:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// What a processor that fails after so many exchanges of a run still says, and how the emulator ends.
+/// The last frames of a processor that fails after a number of exchanges of a run, and the end of
+/// the emulator.
 struct Failing {
-    board: Option<Emulator>,
+    board: Option<QemuBoard>,
     left: u32,
     last: Vec<u8>,
     code: Option<i32>,
 }
 
-impl Lockstep for &mut Failing {
+impl LockstepBoard for &mut Failing {
     fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
         self.left = self.left.saturating_sub(1);
         if self.left > 0 {
@@ -238,7 +242,7 @@ impl Lockstep for &mut Failing {
         let mut board = self.board.take().ok_or("it has ended")?;
         self.last = board.fail().map_err(|e| e.to_string())?.daq.to_vec();
         self.code = board.ended().map_err(|e| e.to_string())?;
-        Err("its processor has failed, as it was to".to_owned())
+        Err("its processor has failed, as ordered".to_owned())
     }
 }
 
@@ -247,24 +251,25 @@ fn a_processor_that_fails_sends_encoder_and_converter_to_the_safe_state() {
     let Some(image) = image("mps2-controller") else { return };
     let _beside = beside();
     let scenario = paper("smc", 1);
-    let setup = Setup::<f32>::new(&scenario, 7).expect("a safe state");
+    let built = BuiltRun::<f32>::new(&scenario, 7).expect("a safe state");
     let mut failing = Failing {
-        board: Some(Emulator::start(&image).expect("a board")),
+        board: Some(QemuBoard::start(&image).expect("a board")),
         left: 1500,
         last: Vec::new(),
         code: None,
     };
-    let end: Emulated<_, _> =
-        emulated(&scenario, &setup, &mut failing, u64::MAX).expect("a board can run it");
-    let path = setup::path::<f32>(&scenario).expect("a path");
-    let params = WorldParams { duration: 5.0, ..WorldParams::default() };
-    let ended = World::new(&scenario, params, end).expect("a rig").run(&path).expect_err("it fails");
-    assert!(ended.to_string().contains("as it was to"), "{ended}");
+    let station: LockstepHost<_, _> =
+        lockstep_host(&scenario, &built, &mut failing, u64::MAX).expect("a board can run it");
+    let path = from_scenario::path::<f32>(&scenario).expect("a path");
+    let params = VirtualOptions { duration: 5.0, ..VirtualOptions::default() };
+    let ended =
+        VirtualLoop::new(&scenario, params, station).expect("a rig").run(&path).expect_err("it fails");
+    assert!(ended.to_string().contains("as ordered"), "{ended}");
     let mut decoder = Decoder::new();
     let said: Vec<Message> =
         failing.last.iter().filter_map(|b| decoder.push(*b)).collect::<Result<_, _>>().expect("whole frames");
     let stop = clutch_wire::Stop { run: 7, reason: StopReason::Fault as u8 };
-    assert_eq!(said, [Message::Stop(stop)], "the last word of a processor that fails while it drives");
+    assert_eq!(said, [Message::Stop(stop)], "the last frame of a processor that fails while it drives");
     assert_eq!(failing.code, Some(101), "the emulator's exit code after a hard fault");
 }
 
@@ -272,14 +277,14 @@ fn a_processor_that_fails_sends_encoder_and_converter_to_the_safe_state() {
 fn a_processor_that_fails_at_rest_says_nothing() {
     let Some(image) = image("mps2-controller") else { return };
     let _beside = beside();
-    let mut board = Emulator::start(&image).expect("a board");
+    let mut board = QemuBoard::start(&image).expect("a board");
     assert!(board.fail().expect("an answer").daq.is_empty());
     assert_eq!(board.ended().expect("it ends"), Some(101));
 }
 
 #[test]
 fn without_its_image_the_board_says_how_to_build_one() {
-    let Err(error) = Emulator::start(std::path::Path::new("no/such/image")) else {
+    let Err(error) = QemuBoard::start(std::path::Path::new("no/such/image")) else {
         panic!("there is an image")
     };
     assert!(error.to_string().contains("cargo xtask firmware build"), "{error}");

@@ -1,4 +1,4 @@
-//! `clutch hil`: its exit codes, and that a log of what went wrong replays.
+//! `clutch hil`: its exit codes, and the replay of the log of a fault.
 
 use crate::{beside, clutch, scratch, shown};
 use clutch_sim::scenario::BUILT_IN;

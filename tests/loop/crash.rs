@@ -2,14 +2,14 @@
 
 use crate::harness::{Board, Done, Random, alone, clutch, folder, read_log, run, start, unless_held_up};
 use clutch_log::{Header, Record, SampleRecord};
-use clutch_loop::run::LogThread;
+use clutch_loop::log_thread::LogThread;
 use rustix::process::Signal;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Three cycles of a millisecond.
 const WATCHDOG_S: f64 = 3e-3;
-/// What a crash may cost of the log.
+/// The part of the log that a crash may cost.
 const LOST_S: f64 = 0.1;
 
 fn ended_by_itself(done: &Done) -> String {
@@ -33,7 +33,7 @@ fn after_kill_9_at_twenty_random_instants_the_board_is_safe_and_the_log_is_recov
         let what = format!("kill {i} of seed {seed:#x}, {after:.6} s after the first code");
         let (lost, reached) = unless_held_up(&what, || {
             let from = board.heard();
-            // What the loop itself watches is not the subject, and must not end it before the kill.
+            // The loop's own checks are not the subject, and must not end it before the kill.
             let patience = ["--set", "safety.limits.late=120", "--set", "safety.limits.silence_cycles=50"];
             let _ = std::fs::remove_file(&log); // of an attempt that the machine spoiled
             let args = ["loop", "board_smc_2", "--port", &board.port, "--log", log.to_str().unwrap()];
@@ -81,13 +81,14 @@ fn after_kill_9_at_twenty_random_instants_the_board_is_safe_and_the_log_is_recov
             let _ = std::fs::remove_file(&saved);
             let told = run(&["log", "recover", log.to_str().unwrap(), saved.to_str().unwrap()]).expect(0);
             let recovered = read_log(&saved);
-            assert!(recovered.complete, "{what}: {:?} {}", recovered.end, told.out);
+            assert!(recovered.complete, "{what}: {:?} {}", recovered.tail, told.out);
             assert_eq!(recovered.samples, cut.samples, "{what}");
             assert_eq!(recovered.commands, cut.commands, "{what}");
             run(&["log", "info", saved.to_str().unwrap()]).expect(0).prints(&["recovered: original"]);
             run(&["replay", saved.to_str().unwrap()]).expect(0).prints(&["identical over "]);
 
-            // The board's clock stands in both: in the samples of the log, and in what the board says.
+            // The board's clock stands in both: in the samples of the log, and in the board's
+            // output.
             let last = recovered
                 .samples
                 .last()
@@ -102,15 +103,15 @@ fn after_kill_9_at_twenty_random_instants_the_board_is_safe_and_the_log_is_recov
     missing.sort_by(f64::total_cmp);
     noticed.sort();
     println!("missing of the log, s: median {:.4}, most {:.4}", missing[10], missing[19]);
-    println!("wall time from kill to the board's word: median {:?}, most {:?}", noticed[10], noticed[19]);
+    println!("wall time from kill to the board's report: median {:?}, most {:?}", noticed[10], noticed[19]);
     assert!(missing[19] <= LOST_S, "seed {seed:#x}: {} s of the log are missing: {missing:?}", missing[19]);
     assert!(noticed[10] < Duration::from_millis(200), "{noticed:?}");
     let said = board.end();
     assert!(said.matches("Faulted").count() >= 20, "{said}");
 }
 
-/// What a crash costs at worst, at each chunk of a log that is written in real time: the time of the
-/// newest record less that of the newest in the file, just before the file grows.
+/// The highest cost of a crash, at each chunk of a log that is written in real time: the time of
+/// the newest record less that of the newest in the file, just before the file grows.
 #[test]
 fn less_waits_for_the_file_than_a_crash_may_cost() {
     let _alone = alone();

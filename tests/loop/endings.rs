@@ -25,7 +25,7 @@ fn a_signal_ends_in_the_safe_state(name: &str, signal: Signal) {
     ]);
     let _ = board.wait_for(0, "Stopped");
     let read = read_log(&log);
-    assert!(read.complete, "{:?}", read.end);
+    assert!(read.complete, "{:?}", read.tail);
     let operator = clutch_log::names::CAUSES.iter().find(|(_, name)| *name == "Operator").unwrap().0;
     assert!(read.events.iter().any(|event| event.cause == operator), "{:?}", read.events);
     replays_identically(&log);
@@ -58,7 +58,7 @@ fn an_unplugged_port_is_told(name: &str, listen: &[&str]) {
         "the board did not confirm its safe state; its watchdog takes it there",
     ]);
     let read = read_log(&log);
-    assert!(read.complete, "{:?}", read.end);
+    assert!(read.complete, "{:?}", read.tail);
     let lost = clutch_log::EventKind::PortLost as u8;
     assert!(read.events.iter().any(|event| event.kind == lost), "{:?}", read.events);
     replays_identically(&log);

@@ -1,6 +1,6 @@
 //! Broken boards and lines, over a real pseudo-terminal: the loop ends in the safe state and names
-//! the cause. The campaign in virtual time has the numbers; this shows that the real line is no
-//! other.
+//! the cause. The campaign in virtual time has the numbers; this shows that the real line behaves
+//! the same.
 
 use crate::harness::{Board, alone, folder, read_log, replays_identically, run, unless_held_up};
 
@@ -50,7 +50,7 @@ fn ends_with(name: &str, fault: &str, causes: &[(&str, &str)], latest: u64) {
     assert!(report["ticks"].as_u64().unwrap() <= latest, "{fault}: {report:#}");
 
     let read = read_log(&log);
-    assert!(read.complete, "{:?}", read.end);
+    assert!(read.complete, "{:?}", read.tail);
     let number = clutch_log::names::CAUSES.iter().find(|(_, name)| *name == cause).unwrap().0;
     assert!(read.events.iter().any(|event| event.cause == number), "{:?}", read.events);
     // No command leaves the converter's range.

@@ -1,4 +1,4 @@
-//! Starting `clutch`, and listening to it.
+//! Starts `clutch`, and reads its output.
 
 pub(crate) use clutch_tests::command as program;
 
@@ -36,7 +36,7 @@ pub(crate) fn folder(name: &str) -> PathBuf {
     path
 }
 
-/// How a command ended.
+/// The end of a command.
 #[derive(Debug)]
 pub(crate) struct Done {
     pub(crate) code: Option<i32>,
@@ -87,7 +87,7 @@ pub(crate) struct Running {
 fn reader(mut pipe: impl Read + Send + 'static) -> JoinHandle<String> {
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
-        let _ = pipe.read_to_end(&mut bytes); // a child that was killed ends it all the same
+        let _ = pipe.read_to_end(&mut bytes); // a child that was killed ends it too
         String::from_utf8_lossy(&bytes).into_owned()
     })
 }
@@ -114,7 +114,7 @@ impl Running {
         self.child.try_wait().expect("a child").is_none()
     }
 
-    /// Waits for its end, not for ever.
+    /// Waits for its end, but not for ever.
     pub(crate) fn done(mut self) -> Done {
         let end = Instant::now() + Duration::from_secs(120);
         while self.is_running() {
@@ -142,7 +142,7 @@ pub(crate) fn run(args: &[&str]) -> Done {
     start(clutch(args)).done()
 }
 
-/// Whether this user may start programs that ordinary ones do not hold up.
+/// True if this user may start programs that ordinary ones do not hold up.
 fn may_have_priority() -> bool {
     static MAY: OnceLock<bool> = OnceLock::new();
     *MAY.get_or_init(|| {
@@ -172,7 +172,7 @@ pub(crate) struct Board {
     child: Child,
     lines: Arc<Mutex<Vec<Line>>>,
     reader: Option<JoinHandle<()>>,
-    /// Where to connect.
+    /// Its address.
     pub(crate) port: String,
 }
 
@@ -235,7 +235,7 @@ impl Board {
         let _ = self.child.wait();
     }
 
-    /// Interrupts it; all that it has said.
+    /// Interrupts it; gives its whole output.
     pub(crate) fn end(mut self) -> String {
         let _ = kill_process(Pid::from_child(&self.child), Signal::TERM);
         let status = self.child.wait().expect("a child");

@@ -27,7 +27,7 @@ fn the_log_of_every_simulation_with_an_encoder_replays_identically() {
         let _ = run(&["sim", built_in.name, "--log", path]).expect(0);
         let read = read_log(&log);
         assert!(read.complete && read.commands.len() as u64 == scenario.ticks(), "{}", built_in.name);
-        if scenario.spec().rig.encoder_quantised {
+        if scenario.spec().rig.encoder.quantised {
             replays_identically(&log);
             replayed += 1;
         } else {
@@ -108,12 +108,12 @@ fn one_changed_count_is_found_with_its_tick_and_field() {
     );
 }
 
-/// What every run with a log that was cut short has to show.
+/// The checks of every run with a log that was cut short.
 #[track_caller]
 fn cut_short(out: &str, err: &str) {
     assert!(out.contains("the path is done"), "{out}\n{err}");
     assert!(out.contains("no space for the log"), "{out}\n{err}");
-    assert!(err.contains("the log has ended early; the loop goes on"), "{out}\n{err}");
+    assert!(err.contains("the log has ended early; the loop continues"), "{out}\n{err}");
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn a_log_that_may_not_grow_ends_and_the_loop_goes_on() {
 fn a_full_disk_ends_the_log_and_the_loop_goes_on() {
     let _alone = alone();
     let folder = folder("disk-full");
-    // A disk of its own, that nobody but these processes sees.
+    // A separate disk, visible only to these processes.
     let mount = "mount -t tmpfs -o size=64k none \"$1\"";
     let may = Command::new("unshare").args(["-m", "sh", "-c", mount, "sh"]).arg(&folder).output();
     if !may.is_ok_and(|done| done.status.success()) {

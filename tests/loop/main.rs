@@ -2,7 +2,7 @@
 //!
 //! A busy machine must not fail these tests. Boards are patient where timing is not the subject;
 //! where it is, the boards' own clocks are judged, and a run that the machine itself held up is
-//! repeated a few times and told.
+//! repeated a few times and reported.
 
 mod crash;
 mod endings;

@@ -1,5 +1,5 @@
-//! What is not a board, not this board, or not allowed: each message says what to do, and nothing
-//! is armed.
+//! Ports without a board, with the wrong board, or not allowed: each message names the remedy, and
+//! nothing is armed.
 
 use crate::harness::{Board, Device, Done, Random, beside_others, folder, program, run, start};
 use clutch_wire::{Decoder, Discover, Hello, Message, Refusal, Refused, SCHEMA, VERSION, encode};
@@ -55,7 +55,7 @@ fn a_board_of_another_version_is_told_with_both_versions() {
     let says =
         ["speaks version 9 of the protocol", "this program version 1", "Flash a firmware of this release"];
     let _ = looped(refusing(Refusal::Version, 9).port()).expect(1).says(&says);
-    // Also one that does not refuse.
+    // The same for a board that does not refuse.
     let careless = board_that_answers(|message| match message {
         Message::Discover(asked) => Some(Message::Hello(Hello { version: 9, ..hello(asked) })),
         _ => None,
@@ -138,7 +138,7 @@ fn a_port_of_somebody_else_is_told_with_how_to_be_let_in() {
         println!("skipped: only root can start a program as another user");
         return;
     }
-    // Where another user can start it.
+    // In a place from which another user can start it.
     let folder = std::env::temp_dir().join(format!("clutch-other-user-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::set_permissions(&folder, std::fs::Permissions::from_mode(0o755)).unwrap();

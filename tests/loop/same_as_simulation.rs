@@ -1,9 +1,9 @@
-//! The loop over a real line does what the simulation of the same scenario does.
+//! The loop over a real line gives the figures of the simulation of the same scenario.
 //!
 //! The band: RMS error within 10 %, largest error within 0.02° (a count has 0.018°), stick-slip as
 //! the encoder shows it within 20 % and 4 cycles/s. The simulation applies a code at once, a board
-//! some microseconds later: that is what the band is for. Both errors are as the law saw them, from
-//! the encoder; the summary of `clutch sim` tells the true ones, which lie half a count beside.
+//! some microseconds later: the band allows for that. Both errors are as the law saw them, from the
+//! encoder; the summary of `clutch sim` has the true ones, which lie half a count beside.
 
 use crate::harness::{Board, alone, folder, read_log, replays_identically, run, unless_held_up};
 use clutch_log::CommandSource;
@@ -38,7 +38,7 @@ const SMOOTHED: &str = "velocity.smoothed_derivative.smoothing=0.5";
 /// RMS and largest error as the law saw it, °, after the settling time of a second.
 fn errors(log: &Path) -> [f64; 2] {
     let read = read_log(log);
-    assert!(read.complete, "{:?}", read.end);
+    assert!(read.complete, "{:?}", read.tail);
     let law = CommandSource::Law as u8;
     let settled = read.commands.iter().filter(|c| c.source == law && (1000..10_000).contains(&c.tick));
     let errors: Vec<f64> = settled.map(|c| c.error.to_degrees()).collect();
@@ -80,7 +80,7 @@ fn ten_seconds_agree(name: &str, listen: &[&str]) {
         ];
         let done = run(&args);
         let report = done.json();
-        // A machine that stalled for so long says nothing of the loop.
+        // A machine that stalled for so long proves nothing about the loop.
         let longest = report["cycle"]["max_us"].as_f64().unwrap_or(f64::INFINITY);
         if longest > 400e3 {
             return Err(format!("one cycle took {longest} µs"));
@@ -107,10 +107,10 @@ fn ten_seconds_agree(name: &str, listen: &[&str]) {
     {
         assert!((a - b).abs() <= band, "{what}: simulated {a}, looped {b}, band ±{band}");
     }
-    // Not two figures of nothing: the shaft followed its path, with an error.
+    // The figures are not empty: the shaft followed its path, with an error.
     assert!(looped[0] > 0.001 && looped[1] < 0.2, "{looped:?}");
 
-    // The summary tells the same as the log.
+    // The summary has the same figures as the log.
     for (key, logged) in [("rms_error_rad", rms), ("max_error_rad", largest)] {
         let told = report["metrics"][key].as_f64().unwrap().to_degrees();
         assert!((told - logged).abs() < 1e-3 * logged, "{key}: summary {told}°, log {logged}°");

@@ -2,8 +2,8 @@
 
 use clutch_core::Target;
 use clutch_core::supervisor::State;
-use clutch_loop::setup::{self, Setup};
-use clutch_node::{ControlNode, Outbox};
+use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_node::{ControllerNode, Outbox};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::BUILT_IN;
 use clutch_wire::{Armed, BoardState, Configured, Message, Sample, encode};
@@ -12,13 +12,13 @@ use clutch_wire::{Armed, BoardState, Configured, Message, Sample, encode};
 fn samples_that_pile_up_before_consent_do_not_end_the_run() {
     let built_in = BUILT_IN.iter().find(|b| b.name == "board_smc_2").expect("a built-in scenario");
     let scenario = Scenario::parse(built_in.name, built_in.toml, &[]).unwrap();
-    let setup = Setup::<f64>::new(&scenario, 1).unwrap();
-    let (run, config) = (1, setup.control.config);
-    let mut node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-    let path = setup::path::<f64>(&scenario).unwrap();
+    let built = BuiltRun::<f64>::new(&scenario, 1).unwrap();
+    let (run, config) = (1, built.controller.config);
+    let mut node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+    let path = from_scenario::path::<f64>(&scenario).unwrap();
     let path = |tick: u64| -> Target<f64> { path(tick) };
     let mut out = Outbox::default();
-    let mut hear = |node: &mut ControlNode<f64>, now_ns: u64, messages: &[Message]| {
+    let mut hear = |node: &mut ControllerNode<f64>, now_ns: u64, messages: &[Message]| {
         let bytes: Vec<u8> = messages.iter().flat_map(|m| encode(m).as_bytes().to_vec()).collect();
         out.clear();
         node.receive(now_ns, &bytes, &path, &mut out, &mut |_| ());
@@ -31,7 +31,7 @@ fn samples_that_pile_up_before_consent_do_not_end_the_run() {
 
     hear(&mut node, 0, &[Message::Configured(Configured { run, config, boot: 1 })]);
     assert_eq!(node.state().state(), State::Ready);
-    // What waits in the line after a thread was set up for a fifth of a second.
+    // Samples that wait in the line after a thread was set up for a fifth of a second.
     let waiting: Vec<Message> = (0..200).map(|i| sample(i, BoardState::Ready)).collect();
     hear(&mut node, 200_000_000, &waiting);
     assert_eq!(node.state().state(), State::Ready, "{:?}", node.state().cause());

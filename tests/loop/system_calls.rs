@@ -1,4 +1,4 @@
-//! What the control thread asks of the kernel while it runs, as strace sees it.
+//! The control thread's system calls while it runs, as strace sees them.
 
 use crate::harness::{alone, folder, program, start};
 use std::collections::BTreeMap;
@@ -56,7 +56,7 @@ fn count(calls: &[String]) -> BTreeMap<&str, usize> {
     counts
 }
 
-/// Between two writes of an answer there is at most so much. A ping once a second is one write more.
+/// The most that happens between two writes of an answer. A ping once a second is one write more.
 fn per_cycle(calls: &[String], name: &str) -> usize {
     calls
         .split(|call| call == "write")

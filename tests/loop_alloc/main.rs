@@ -3,15 +3,17 @@
 
 use clutch_core::{DacCode, Target};
 use clutch_log::Source;
-use clutch_loop::daq::{self, DaqOptions};
-use clutch_loop::end::Local;
+use clutch_loop::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, Pace};
+use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::log_thread::LogThread;
 use clutch_loop::port::{Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{RealtimeOptions, WaitMode};
-use clutch_loop::run::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Watch};
-use clutch_loop::setup::{self, Setup};
 use clutch_loop::sim_board::PATIENT_BOARD;
-use clutch_node::ControlNode;
+use clutch_loop::sim_board_server::{self, ServeOptions};
+use clutch_loop::station::ControllerStation;
+use clutch_loop::watch::Watch;
+use clutch_node::ControllerNode;
 use clutch_sim::Scenario;
 use clutch_sim::scenario::BUILT_IN;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -22,11 +24,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// The system's allocator, and a count of what a watched thread asks of it.
+/// The system's allocator, and counts of a watched thread's requests.
 struct Watching;
 
 thread_local! {
-    /// Whether this thread is between its first and its last cycle.
+    /// True if this thread is between its first and its last cycle.
     static INSIDE: Cell<bool> = const { Cell::new(false) };
 }
 static TAKEN: AtomicU64 = AtomicU64::new(0);
@@ -35,7 +37,7 @@ static GIVEN_BACK: AtomicU64 = AtomicU64::new(0);
 static SIZE: AtomicU64 = AtomicU64::new(0);
 
 fn note(counter: &AtomicU64, size: usize) {
-    // A thread that ends has no flag any more, and is no control thread.
+    // A thread that ends has lost its flag, and is not a control thread.
     if INSIDE.try_with(Cell::get).unwrap_or(false) {
         counter.fetch_add(1, Ordering::Relaxed);
         SIZE.store(size as u64, Ordering::Relaxed);
@@ -94,32 +96,33 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let address = terminal.address();
     let stop = Arc::new(AtomicBool::new(false));
     let (flag, rig) = (stop.clone(), scenario.clone());
-    let options = DaqOptions { faults: Vec::new(), seed: 1, patient: true, wait: WaitMode::Sleep };
-    let board = std::thread::spawn(move || daq::run(&rig, &options, &mut terminal, &flag, |_| ()));
+    let options = ServeOptions { faults: Vec::new(), seed: 1, patient: true, wait: WaitMode::Sleep };
+    let board =
+        std::thread::spawn(move || sim_board_server::serve(&rig, &options, &mut terminal, &flag, |_| ()));
 
     let mut port = Port::open(&address, &SerialOptions::default()).unwrap().port;
-    let setup = Setup::<f64>::new(&scenario, 0).unwrap();
-    let path = setup::path::<f64>(&scenario).unwrap();
+    let built = BuiltRun::<f64>::new(&scenario, 0).unwrap();
+    let path = from_scenario::path::<f64>(&scenario).unwrap();
     let path = |tick: u64| -> Target<f64> {
         if Some(tick) == spoilt {
             drop(black_box(Box::new(tick)));
         }
         path(tick)
     };
-    let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-    let mut end = Local { node, path: &path };
-    let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(5)).unwrap();
+    let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+    let mut station = ControllerStation { node, path: &path };
+    let hello = Talk::new(&mut port, &mut station).discover(Duration::from_secs(5)).unwrap();
     assert_eq!(hello.board, PATIENT_BOARD);
-    let mut setup = Setup::<f64>::new(&scenario, hello.run.wrapping_add(1).max(1)).unwrap();
-    setup.control.silence = clutch_core::Micros(400_000);
-    let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-    let mut end = Local { node, path: &path };
-    let mut talk = Talk::new(&mut port, &mut end);
+    let mut built = BuiltRun::<f64>::new(&scenario, hello.run.wrapping_add(1).max(1)).unwrap();
+    built.controller.silence = clutch_core::Micros(400_000);
+    let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+    let mut station = ControllerStation { node, path: &path };
+    let mut talk = Talk::new(&mut port, &mut station);
     talk.configure(DacCode(hello.boot_code)).unwrap();
     let clock = talk.clock().unwrap();
 
     let watch = Arc::new(Watch::default());
-    let header = setup::header(&scenario, &setup.servo, Source::Loop, &address.to_string(), "test");
+    let header = from_scenario::header(&scenario, &built.servo, Source::Loop, &address.to_string(), "test");
     let (log_thread, ring) = LogThread::start(&log, &header, watch.clone()).unwrap();
     let options = LoopOptions {
         // The machine's settings are not the subject, and locked memory would stay locked.
@@ -131,12 +134,12 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     for counter in [&TAKEN, &GIVEN_BACK, &SIZE] {
         counter.store(0, Ordering::Relaxed);
     }
-    let (ticks, detector) = (setup.ticks, setup.detector);
+    let (ticks, detector) = (built.ticks, built.detector);
     let report = std::thread::scope(|scope| {
-        let (end, port, watch) = (&mut end, &mut port, &*watch);
+        let (station, port, watch) = (&mut station, &mut port, &*watch);
         let configured =
-            Configured { end, port, ring: Some(ring), watch, ticks, clock, detector, patient: true };
-        scope.spawn(move || run::run(configured, &options)).join().unwrap()
+            ConfiguredRun { station, port, ring: Some(ring), watch, ticks, clock, detector, patient: true };
+        scope.spawn(move || control_loop::run(configured, &options)).join().unwrap()
     });
     stop.store(true, Ordering::Relaxed);
     let _ = board.join().unwrap().unwrap();

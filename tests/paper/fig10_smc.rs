@@ -1,4 +1,4 @@
-//! Fig. 10: positional errors with the sliding-mode controller at 20, 6 and 2 °/s.
+//! Fig. 10: positional errors with sliding mode at 20, 6 and 2 °/s.
 
 use super::holds;
 

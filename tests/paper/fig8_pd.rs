@@ -1,4 +1,4 @@
-//! Fig. 8: positional errors with the PD controller at 100, 20 and 2 °/s.
+//! Fig. 8: positional errors with PD at 100, 20 and 2 °/s.
 
 use super::{OUTCOME, holds};
 

@@ -1,4 +1,4 @@
-//! Fig. 9: positional errors with the computed-torque controller at 20 and 2 °/s.
+//! Fig. 9: positional errors with computed torque at 20 and 2 °/s.
 
 use super::holds;
 

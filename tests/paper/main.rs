@@ -5,7 +5,7 @@ mod fig8_pd;
 mod fig9_ctc;
 mod table3;
 
-use clutch_sim::paper::{Claim, Outcome, reproduce};
+use clutch_sim::paper::{Claim, Kind, Outcome, Place, STATEMENTS, Statement, reproduce};
 use clutch_sim::progress::UNWATCHED;
 use std::sync::LazyLock;
 
@@ -29,10 +29,43 @@ fn every_statement_holds_or_fails_as_documented() {
     }
 }
 
+fn count(such: impl Fn(&Statement) -> bool) -> usize {
+    STATEMENTS.iter().filter(|s| such(s)).count()
+}
+
+#[test]
+fn of_36_statements_33_come_out_five_without_a_run_and_nine_after_a_fit_as_the_readme_says() {
+    let kinds = [Kind::Setting, Kind::Arithmetic, Kind::Simulation, Kind::Experiment];
+    assert_eq!(kinds.map(|kind| count(|s| s.measured.kind() == kind)), [3, 2, 15, 16]);
+    assert_eq!(OUTCOME.claims.iter().filter(|c| c.holds).count(), 33);
+    assert_eq!(count(|s| s.fitted), 9);
+}
+
+#[test]
+fn the_statements_stand_at_the_setup_three_figures_the_table_and_an_equation() {
+    let figures = [8, 9, 10].map(Place::Figure);
+    assert_eq!(figures.map(|place| count(|s| s.place == place)), [12, 10, 6]);
+    let others = [Place::Setup, Place::Table(3), Place::Equation(32)];
+    assert_eq!(others.map(|place| count(|s| s.place == place)), [4, 3, 1]);
+}
+
 #[test]
 fn at_least_two_statements_about_the_experiment_stay_out_of_the_fit() {
-    let outside = OUTCOME.claims.iter().filter(|c| c.id.ends_with("-exp") && !c.fitted).count();
+    let outside = count(|s| s.measured.kind() == Kind::Experiment && !s.fitted);
     assert!(outside >= 2, "{outside}");
+}
+
+#[test]
+fn the_bench_is_fitted_to_statements_about_the_experiment_only() {
+    for s in STATEMENTS.iter().filter(|s| s.fitted) {
+        assert_eq!(s.measured.kind(), Kind::Experiment, "{}", s.id);
+    }
+}
+
+#[test]
+fn each_statement_has_a_name_of_its_own() {
+    let names: std::collections::BTreeSet<_> = STATEMENTS.iter().map(|s| s.id).collect();
+    assert_eq!(names.len(), STATEMENTS.len());
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Cases whose answer is known without any code of ours.
+//! Cases whose answer is known independently of this code.
 
 use clutch_core::law::{LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;
@@ -33,7 +33,8 @@ fn a1_holding_voltages_and_free_motion_of_the_papers_shaft() {
 fn a2_a_constant_brake_stops_the_shaft_at_the_analytic_instant() {
     let flat = StribeckParams { mu_static: 0.15, mu_dynamic: 0.15, ..StribeckParams::default() };
     for (damping, instant, angle_deg) in [(0.001, 0.0504770714, Some(2.5113638)), (0.0, 0.0512339, None)] {
-        let params = PlantParams { friction: flat, viscous_damping: damping, ..PlantParams::default() };
+        let params =
+            PlantParams { friction: flat.into(), viscous_damping: damping, ..PlantParams::default() };
         // Without damping: t = J ω0 / (μ K v − T), exactly.
         let exact = 0.0017 * 100.0_f64.to_radians() / (0.15 * 0.14 * 5.0 - params.drive_torque);
         for (name, mut engine) in engines() {
@@ -63,7 +64,7 @@ fn a3_on_a_ramp_the_offset_is_what_the_gains_and_the_holding_voltage_make_it() {
         ("PD", pd, 100.0, 0.0247423),
         ("SMC", smc, 100.0, 0.0589103),
     ] {
-        let path = ReferenceParams::Ramp(f64::to_radians(rate));
+        let path = ReferenceParams::ramp(f64::to_radians(rate));
         let run = simulate::<f64>(&RunSpec::new(RigParams::ideal(), law, path)).unwrap();
         // The brake is on while the shaft is ahead: e is negative.
         let measured = -run.metrics.mean_error_rad.to_degrees();
@@ -97,7 +98,7 @@ fn coulomb(drive_torque: f64) -> PlantParams {
         drive_torque,
         viscous_damping: 0.0,
         brake_gain: 1.0,
-        friction: StribeckParams { mu_static: 1.0, mu_dynamic: 1.0, ..StribeckParams::default() },
+        friction: StribeckParams { mu_static: 1.0, mu_dynamic: 1.0, ..StribeckParams::default() }.into(),
     }
 }
 
@@ -116,7 +117,7 @@ fn a9_a_coulomb_oscillator_loses_two_percent_of_a_unit_each_half_cycle_and_stops
 #[test]
 fn p3_a_brake_that_closes_at_0_1_s_stops_a_sliding_mass_at_1_1_s_after_0_6_m() {
     let params = PlantParams {
-        friction: StribeckParams { mu_static: 0.5, mu_dynamic: 0.5, ..StribeckParams::default() },
+        friction: StribeckParams { mu_static: 0.5, mu_dynamic: 0.5, ..StribeckParams::default() }.into(),
         ..coulomb(0.0)
     };
     for (name, mut engine) in engines() {

@@ -7,7 +7,8 @@ use clutch_core::reference::ReferenceParams;
 use clutch_sim::engine::EventKind;
 use clutch_sim::{RigParams, Run, RunSpec, simulate};
 
-/// A stick shorter than this (s) is not asked for: nothing on the encoder tells it from motion.
+/// A stick shorter than this (s) is not required: nothing on the encoder distinguishes it from
+/// motion.
 fn visible(rate_deg_s: f64) -> f64 {
     // The detector waits for the path to move 1.25 counts and for 6 ticks.
     (1.25 * 0.018 / rate_deg_s).max(6e-3)
@@ -36,12 +37,12 @@ fn measure(rig: &RigParams, law: LawParams, rate: f64) -> (f64, f64, f64, f64) {
     let (mut hits, mut calls, mut found, mut wanted) = (0, 0, 0, 0);
     let (mut seen, mut truth) = (0.0, 0.0);
     for seed in 1..=10 {
-        let mut spec = RunSpec::new(rig.clone(), law, ReferenceParams::Ramp(rate.to_radians()));
+        let mut spec = RunSpec::new(rig.clone(), law, ReferenceParams::ramp(rate.to_radians()));
         spec.run.seed = seed;
         let run = simulate::<f64>(&spec).unwrap();
         let true_sticks = sticks(&run);
         let called: Vec<f64> =
-            run.detected.ticks.iter().map(|k| *k as f64 * 1e-3).filter(|t| *t >= 1.0).collect();
+            run.detections.iter().map(|k| *k as f64 * 1e-3).filter(|t| *t >= 1.0).collect();
         calls += called.len();
         // A call is right if the shaft was stuck at some time in the silence that led to it.
         let window = visible(rate) + 2e-3;

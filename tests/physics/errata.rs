@@ -1,15 +1,13 @@
-//! What the paper prints and what is true: each erratum with the run that shows it.
+//! The paper's statements and the truth: each erratum with the run that shows it.
 
-use clutch_core::law::{
-    Command, Controller, LawParams, Limit, OutputState, PdParams, PdTerms, SmcParams, SmcSignParams, Tick,
-};
+use clutch_core::law::{Command, ControlLaw, LawParams, Limit, PdParams, SmcParams, SmcSignParams, Tick};
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Servo, StribeckParams};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::{Keep, RigParams, RunSpec, Start, simulate, simulate_servo};
 
 fn ramp(rig: RigParams, law: LawParams) -> RunSpec<'static> {
-    RunSpec::new(rig, law, ReferenceParams::Ramp(2.0_f64.to_radians()))
+    RunSpec::new(rig, law, ReferenceParams::ramp(2.0_f64.to_radians()))
 }
 
 fn last_error_deg(run: &clutch_sim::Run) -> f64 {
@@ -19,16 +17,15 @@ fn last_error_deg(run: &clutch_sim::Run) -> f64 {
 /// (4) as printed, without the minus.
 struct Printed;
 
-impl Controller<f64> for Printed {
-    type State = OutputState<f64>;
-    type Terms = PdTerms<f64>;
-    fn start(&self, _: &Tick<f64>, _: f64) -> Self::State {
-        OutputState::default()
-    }
-    fn update(&self, _: &mut Self::State, tick: &Tick<f64>) -> Command<f64, PdTerms<f64>> {
+impl ControlLaw<f64> for Printed {
+    type State = ();
+    type Terms = [f64; 2];
+    const TERMS: &'static [&'static str] = &["proportional_v", "derivative_v"];
+    fn start(&self, _: &Tick<f64>, _: f64) {}
+    fn update(&self, (): &mut (), tick: &Tick<f64>) -> Command<f64, [f64; 2]> {
         let gains = PdParams::<f64>::default();
-        let terms = PdTerms { proportional: gains.kp * tick.error, derivative: gains.kd * tick.error_rate };
-        let voltage = (terms.proportional + terms.derivative).clamp(0.0, 10.0);
+        let terms = [gains.kp * tick.error, gains.kd * tick.error_rate];
+        let voltage = (terms[0] + terms[1]).clamp(0.0, 10.0);
         Command { voltage, limit: Limit::None, terms }
     }
 }
@@ -92,15 +89,18 @@ fn the_boundary_layer_weakens_the_damping_term_where_the_certificate_says_so() {
 #[test]
 fn the_stribeck_velocity_read_in_degrees_per_second_sticks_at_2_degrees_per_second_too() {
     let mut rig = RigParams::paper();
-    rig.friction = StribeckParams { stribeck_velocity: 0.001_f64.to_radians(), ..rig.friction };
+    rig.friction =
+        StribeckParams { stribeck_velocity: 0.001_f64.to_radians(), ..StribeckParams::default() }.into();
     let run = simulate::<f64>(&ramp(rig, LawParams::Pd(PdParams::default()))).unwrap();
-    // The unit is not printed. Both readings stick at 2 °/s; the figures are not told apart by it.
+    // The unit is not printed. Both readings stick at 2 °/s, so the figures cannot decide between
+    // them.
     assert!(run.metrics.stick_slip_cycles_per_s > 10.0, "{}", run.metrics.stick_slip_cycles_per_s);
 }
 
 #[test]
 fn without_the_encoders_steps_nothing_sticks_at_2_degrees_per_second() {
-    let rig = RigParams { encoder_quantised: false, ..RigParams::paper() };
+    let mut rig = RigParams::paper();
+    rig.encoder.quantised = false;
     let run = simulate::<f64>(&ramp(rig, LawParams::Pd(PdParams::default()))).unwrap();
     assert_eq!(
         run.metrics.stick_slip_cycles_per_s, 0.0,

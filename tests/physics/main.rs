@@ -6,4 +6,5 @@ mod detector;
 mod engines;
 mod errata;
 mod laws;
+mod pid;
 mod single_precision;

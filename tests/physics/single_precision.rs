@@ -13,7 +13,7 @@ fn single_precision_gives_the_same_errors_and_cycles() {
         (LawParams::Smc(SmcParams::default()), 2.0),
         (LawParams::Smc(SmcParams::default()), 20.0),
     ] {
-        let spec = RunSpec::new(RigParams::paper(), law, ReferenceParams::Ramp(f64::to_radians(rate)));
+        let spec = RunSpec::new(RigParams::paper(), law, ReferenceParams::ramp(f64::to_radians(rate)));
         let wide = simulate::<f64>(&spec).unwrap().metrics;
         let narrow = simulate::<f32>(&spec).unwrap().metrics;
         let apart = (wide.max_error_rad - narrow.max_error_rad).abs().to_degrees();
@@ -26,7 +26,7 @@ fn single_precision_gives_the_same_errors_and_cycles() {
 #[test]
 fn the_same_seed_gives_the_same_bytes_and_another_seed_does_not() {
     for rig in [RigParams::paper(), RigParams { torque_noise: 1e-4, ..RigParams::bench() }] {
-        let path = ReferenceParams::Ramp(2.0_f64.to_radians());
+        let path = ReferenceParams::ramp(2.0_f64.to_radians());
         let mut spec = RunSpec::new(rig, LawParams::Smc(SmcParams::default()), path);
         spec.run.duration = 2.0;
         let (a, b) = (simulate::<f32>(&spec).unwrap(), simulate::<f32>(&spec).unwrap());

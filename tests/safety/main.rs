@@ -1,13 +1,14 @@
-//! The fault campaign in virtual time, the supervisor's sensitivity, and what its logs hold.
+//! The fault campaign in virtual time, the supervisor's sensitivity, and the contents of its logs.
 
 use clutch_core::supervisor::{Arrival, Cause, Checks, State};
 use clutch_log::names;
 use clutch_loop::campaign::{CASES, Expected, RunId, Table, runs};
-use clutch_loop::end::Local;
-use clutch_loop::replay::{PRESENT_CODE, replay};
-use clutch_loop::setup::{self, Setup};
-use clutch_loop::world::{World, WorldParams};
-use clutch_node::ControlNode;
+use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::replay::replay;
+use clutch_loop::station::ControllerStation;
+use clutch_loop::to_log::PRESENT_CODE;
+use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions};
+use clutch_node::ControllerNode;
 use clutch_sim::{Keep, Scenario};
 use std::collections::BTreeSet;
 
@@ -21,9 +22,9 @@ fn every_fault_ends_in_the_safe_state_in_time_and_is_named() {
     let (mut count, mut table) = (0, Table::default());
     for run in runs(SEEDS.0, SEEDS.1) {
         count += 1;
-        let outcome = run.run(Checks::ALL, false).expect("the tables of the campaign are right");
-        table.add(&run, &outcome);
-        if let Some(what) = run.judge(&outcome) {
+        let report = run.run(Checks::ALL, false).expect("the tables of the campaign are right");
+        table.add(&run, &report);
+        if let Some(what) = run.judge(&report) {
             wrong.push(format!("{}: {what}", run.name()));
         }
     }
@@ -45,8 +46,8 @@ fn every_fault_ends_in_the_safe_state_in_time_and_is_named() {
 fn without_any_one_of_its_checks_the_campaign_fails() {
     for cause in Cause::CHECKS {
         let fails = |run: RunId| {
-            let outcome = run.run(Checks::ALL.without(cause), false).expect("the tables are right");
-            run.judge(&outcome).is_some()
+            let report = run.run(Checks::ALL.without(cause), false).expect("the tables are right");
+            run.judge(&report).is_some()
         };
         // The seeds of the campaign; the first run that fails is enough.
         let found = runs(SEEDS.0, 3).find(|run| fails(*run));
@@ -63,20 +64,21 @@ fn each_run_leaves_a_log_that_replays_bit_for_bit() {
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let path = folder.join("run.mcap");
     for run in runs(SEEDS.0, SEEDS.1) {
-        // A law or a path that a test breaks is not in the log; what it led to is.
+        // A law or a path that a test breaks is not in the log; its effect is.
         let broken_inside = matches!(
             run.case().broken,
             clutch_loop::campaign::Broken::LawNotFinite
                 | clutch_loop::campaign::Broken::TargetNotFinite
                 | clutch_loop::campaign::Broken::TargetHuge
         );
-        let outcome = run.run(Checks::ALL, true).expect("the tables are right");
+        let report = run.run(Checks::ALL, true).expect("the tables are right");
         let scenario = run.scenario().expect("the tables are right");
-        let setup = Setup::<f64>::new(&scenario, 7).expect("the scenario has a safe state");
-        let mut header = setup::header(&scenario, &setup.servo, clutch_log::Source::Loop, "virtual", "test");
-        header.extra.push((PRESENT_CODE.to_owned(), outcome.present.to_string()));
+        let built = BuiltRun::<f64>::new(&scenario, 7).expect("the scenario has a safe state");
+        let mut header =
+            from_scenario::header(&scenario, &built.servo, clutch_log::Source::Loop, "virtual", "test");
+        header.extra.push((PRESENT_CODE.to_owned(), report.present.to_string()));
         let mut log = clutch_log::LogWriter::create(&path, &header).expect("a temporary file");
-        for record in &outcome.records {
+        for record in &report.records {
             log.write(record).expect("a temporary file");
         }
         log.finish().expect("a temporary file");
@@ -87,7 +89,7 @@ fn each_run_leaves_a_log_that_replays_bit_for_bit() {
             let replayed = replay(&log, &scenario).expect("its own scenario");
             assert_eq!(replayed.first, None, "{}: the replay differs", run.name());
         }
-        if let (Expected::Safe { .. }, Some(cause)) = (run.case().expected, outcome.cause) {
+        if let (Expected::Safe { .. }, Some(cause)) = (run.case().expected, report.cause) {
             let named = log.events.iter().any(|e| e.cause == cause as u8 && e.to == State::Faulted as u8);
             assert!(named, "{}: the log does not name {cause:?}", run.name());
         }
@@ -119,13 +121,13 @@ fn without_latency_the_loop_is_the_simulation_bit_for_bit() {
 
 fn equal(scenario: &Scenario, what: &str) {
     let run = scenario.run(Keep::Trace, clutch_sim::progress::UNWATCHED).expect("a simulation");
-    let outcome = match scenario.scalar {
+    let report = match scenario.scalar() {
         clutch_sim::scenario::ScalarKind::F32 => world::<f32>(scenario),
         clutch_sim::scenario::ScalarKind::F64 => world::<f64>(scenario),
     };
-    assert_eq!(outcome.cause, None, "{what}: control ended");
+    assert_eq!(report.cause, None, "{what}: control ended");
     let mut ticks = 0;
-    let commands = outcome.records.iter().filter_map(|r| match r {
+    let commands = report.records.iter().filter_map(|r| match r {
         clutch_log::Record::Command(c) if c.source == 0 => Some(c),
         _ => None,
     });
@@ -134,7 +136,7 @@ fn equal(scenario: &Scenario, what: &str) {
         ticks += 1;
     }
     assert!(ticks > 2900, "{what}: {ticks} ticks");
-    for (k, (loop_error, simulated)) in outcome.errors.iter().zip(&run.trace.error[1..]).enumerate() {
+    for (k, (loop_error, simulated)) in report.errors.iter().zip(&run.trace.error[1..]).enumerate() {
         assert!(
             (loop_error - simulated).abs() < 1e-12,
             "{what}: the shaft is elsewhere at tick {}: {loop_error} rad instead of {simulated} rad",
@@ -143,12 +145,13 @@ fn equal(scenario: &Scenario, what: &str) {
     }
 }
 
-fn world<T: clutch_core::Real>(scenario: &Scenario) -> clutch_loop::world::Outcome {
-    let setup = Setup::<T>::new(scenario, 7).expect("a safe state");
-    let params = WorldParams { record: true, duration: 2.999, ..WorldParams::default() };
-    let path = setup::path::<T>(scenario).expect("a path");
-    let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-    let mut world = World::new(scenario, params, Local { node, path: &path }).expect("a rig");
+fn world<T: clutch_core::Real>(scenario: &Scenario) -> clutch_loop::virtual_time::VirtualReport {
+    let built = BuiltRun::<T>::new(scenario, 7).expect("a safe state");
+    let params = VirtualOptions { record: true, duration: 2.999, ..VirtualOptions::default() };
+    let path = from_scenario::path::<T>(scenario).expect("a path");
+    let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+    let mut world =
+        VirtualLoop::new(scenario, params, ControllerStation { node, path: &path }).expect("a rig");
     world.run(&path).expect("a run")
 }
 
@@ -197,14 +200,15 @@ fn healthy_runs_of_every_law_and_path_are_never_ended() {
                      [safety]\nreason = \"a weight\"\n[safety.on_fault.hold]\nvolts_v = 9.0\n"
                 );
                 let scenario = Scenario::parse("healthy", &text, &[]).expect("a scenario");
-                let setup = Setup::<f32>::new(&scenario, 7).expect("a safe state");
+                let built = BuiltRun::<f32>::new(&scenario, 7).expect("a safe state");
                 let params =
-                    WorldParams { latency_ns: 80_000, seed, duration: 20.0, ..WorldParams::default() };
-                let path = setup::path::<f32>(&scenario).expect("a path");
-                let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-                let mut world = World::new(&scenario, params, Local { node, path: &path }).expect("a rig");
-                let outcome = world.run(&path).expect("a run");
-                assert_eq!(outcome.cause, None, "{law} at {rate} °/s on {rig}, seed {seed}: a nuisance trip");
+                    VirtualOptions { latency_ns: 80_000, seed, duration: 20.0, ..VirtualOptions::default() };
+                let path = from_scenario::path::<f32>(&scenario).expect("a path");
+                let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+                let mut world = VirtualLoop::new(&scenario, params, ControllerStation { node, path: &path })
+                    .expect("a rig");
+                let report = world.run(&path).expect("a run");
+                assert_eq!(report.cause, None, "{law} at {rate} °/s on {rig}, seed {seed}: a nuisance trip");
             }
         }
     }

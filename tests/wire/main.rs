@@ -1,4 +1,4 @@
-//! The wire protocol: golden bytes, the C header, and what is made from the table of messages.
+//! The wire protocol: golden bytes, the C header, and the files made from the table of messages.
 
 use clutch_wire::{Decoder, FrameError, Message, Sample, encode};
 use std::collections::BTreeMap;

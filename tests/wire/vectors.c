@@ -1,4 +1,4 @@
-/* Reads lines of hexadecimal bytes, and prints what the C codec says of each: the fields of a
+/* Reads lines of hexadecimal bytes, and prints the C codec's result for each: the fields of a
  * Sample or an Actuate, other messages encoded again, errors by name. */
 #include <stdio.h>
 
@@ -29,7 +29,7 @@ static size_t again(uint8_t *wire, const uint8_t *body)
         AGAIN(STOPPED, stopped)
         AGAIN(PONG, pong)
         AGAIN(REFUSED, refused)
-        AGAIN(CONTROLLER, controller)
+        AGAIN(CONTROLLER_HELLO, controller_hello)
         AGAIN(TAKEN, taken)
         AGAIN(TELEMETRY, telemetry)
         AGAIN(ENDED, ended)

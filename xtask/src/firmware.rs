@@ -5,10 +5,10 @@ use anyhow::{Context, Result, bail};
 use clap::{Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 
-/// What the boards run.
+/// The programs of the boards.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
-/// Packages of the boards. One by one: together each would get the features that the other wants of the
-/// libraries.
+/// Packages of the boards. One by one: together each would get the library features that the other
+/// wants.
 pub(crate) const BOARDS: [&str; 2] = ["clutch-qemu-mps2", "clutch-nucleo-g474re"];
 const CHIP: &str = "STM32G474RETx";
 
@@ -18,24 +18,24 @@ pub(crate) enum Verb {
     Build,
     /// Builds the NUCLEO-G474RE's image and flashes it, with probe-rs.
     Flash {
-        /// What the board is to be.
+        /// The role of the board.
         #[arg(long, value_enum)]
         role: Role,
     },
-    /// How much flash and memory the images take.
+    /// Prints the flash and memory that the images take.
     Size,
-    /// The longest way through each law, the codec and the whole tick, in instructions and cycles, against
-    /// what the emulator counts (docs/timing.md).
+    /// Prints the longest path through each law, the codec and the whole tick, in instructions and
+    /// cycles, against the counts of the emulator (docs/timing.md).
     Budget,
-    /// The deepest stack.
+    /// Prints the deepest stack.
     Stack,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 pub(crate) enum Role {
-    /// It closes the loop itself: clutch loop --board.
+    /// The board closes the loop itself: clutch loop --board.
     Controller,
-    /// It samples and obeys: clutch loop --port.
+    /// The board samples and obeys: clutch loop --port.
     Daq,
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn run(verb: &Verb) -> Result<()> {
     }
 }
 
-/// Whether the boards' Rust target is installed.
+/// True if the boards' Rust target is installed.
 pub(crate) fn has_target() -> bool {
     let libraries = program("rustc").args(["--print", "target-libdir", "--target", TARGET]).quietly();
     libraries.is_ok_and(|(known, text)| known && Path::new(text.trim()).is_dir())
@@ -60,15 +60,15 @@ pub(crate) fn image(board: &str) -> Program {
     in_firmware(["build", "--release", "--locked", "--package", board])
 }
 
-/// A cargo in the folder of the images, whose flags stand in a file there.
+/// A cargo in the folder of the images, where a file has the flags.
 pub(crate) fn in_firmware<const N: usize>(args: [&str; N]) -> Program {
     cargo(args).within(&root().join("firmware")).env("CARGO_TARGET_DIR", root().join("target/firmware"))
 }
 
-/// All images; where they lie.
+/// Builds all images; gives their folder.
 fn build() -> Result<PathBuf> {
     program("rustup").args(["target", "add", TARGET]).run().context(
-        "the boards' Rust target is missing, and rustup is not there to add it: install thumbv7em-none-eabihf",
+        "the boards' Rust target is missing, and there is no rustup to add it: install thumbv7em-none-eabihf",
     )?;
     for board in BOARDS {
         image(board).run()?;

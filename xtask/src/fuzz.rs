@@ -4,9 +4,9 @@ use crate::run::program;
 use anyhow::{Result, bail};
 
 /// Targets in `fuzz/fuzz_targets`.
-pub(crate) const TARGETS: [&str; 3] = ["decoder", "log", "onboard"];
+pub(crate) const TARGETS: [&str; 3] = ["decoder", "log", "board_controller"];
 
-/// Fuzzes every target for so many seconds.
+/// Fuzzes every target for `seconds` each.
 pub(crate) fn all(seconds: u32) -> Result<()> {
     install()?;
     for target in TARGETS {
@@ -17,10 +17,10 @@ pub(crate) fn all(seconds: u32) -> Result<()> {
     Ok(())
 }
 
-/// Fuzzes one target; whether it held.
+/// Fuzzes one target; true if it held.
 pub(crate) fn one(target: &str, seconds: u32) -> Result<bool> {
     let time = format!("-max_total_time={seconds}");
-    // Sanitizers have no static C library to go with.
+    // Sanitizers do not work with a static C library.
     let arguments = ["run", "nightly", "cargo", "fuzz", "run", target, "--", &time, "-print_final_stats=1"];
     program("rustup").args(arguments).lines(|_| ())
 }

@@ -2,11 +2,14 @@
 
 mod firmware;
 mod fuzz;
+mod product;
 mod python;
 mod release;
 mod run;
+mod size;
 mod stubs;
 mod test;
+mod touch;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
@@ -22,28 +25,28 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Format, lints and documentation, all without a warning; spelling; licences, duplicates and sources of the
+    /// Checks format, lints and documentation, all without a warning; spelling; licences, duplicates and sources of the
     /// dependencies. Installs the tools for it in .venv.
     Check,
-    /// All tests. Installs what they need: Rust targets, a private virtual environment in .venv,
+    /// Runs all tests. Installs their needs: Rust targets, a private virtual environment in .venv,
     /// for the wheel a second one in the folder for temporary files, and on Debian, as root, the
     /// package that makes such environments.
     Test,
-    /// Only the tests of the wheel: builds it, installs it outside of this tree, tests it there.
+    /// Runs only the tests of the wheel: builds it, installs it outside this tree, tests it there.
     Wheel,
-    /// What CI runs: check, package, msrv, semver, then test.
+    /// Runs the steps of CI: check, package, msrv, semver, then test.
     Ci,
-    /// Benchmarks (criterion). What follows goes to them: `cargo xtask bench -- law`.
+    /// Runs the benchmarks (criterion) with the arguments that follow: `cargo xtask bench -- law`.
     Bench {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,
     },
-    /// The boards' images.
+    /// Builds, flashes and measures the boards' images.
     Firmware {
         #[command(subcommand)]
         verb: firmware::Verb,
     },
-    /// The API documentation, in target/doc.
+    /// Builds the API documentation, in target/doc.
     Docs,
     /// Packs the libraries that others build on, and builds them from what was packed.
     Package,
@@ -57,14 +60,14 @@ enum Verb {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,
     },
-    /// Fuzzes what reads bytes from outside, for so many seconds each; installs cargo-fuzz and a
+    /// Fuzzes each reader of bytes from outside for a number of seconds; installs cargo-fuzz and a
     /// nightly compiler.
     Fuzz {
         /// Seconds for each target.
         #[arg(default_value_t = 60)]
         seconds: u32,
     },
-    /// Runs the fault campaign. With the default seeds it writes the table of docs/safety.md anew.
+    /// Runs the fault campaign. With the default seeds it rewrites the table of docs/safety.md.
     Campaign {
         /// Seeds; each gives about 180 runs.
         seeds: Option<u64>,
@@ -72,13 +75,36 @@ enum Verb {
         #[arg(default_value_t = 1)]
         first: u64,
     },
-    /// How late a thread wakes here, against cyclictest (benches/latency).
+    /// Measures the lateness of a waking thread here, against cyclictest (benches/latency).
     Latency {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         rest: Vec<String>,
     },
-    /// Generates the type stub of the Python package's native module anew.
+    /// Regenerates the type stub of the Python package's native module.
     Stubs,
+    /// Counts the files and places in which a fact of each kind is written: a law, a metric, … Two revisions
+    /// stand side by side.
+    Touch {
+        /// Revisions of git.
+        #[arg(value_name = "REV", default_value = "HEAD")]
+        revisions: Vec<String>,
+        /// Lists each file below the table.
+        #[arg(long)]
+        list: bool,
+    },
+    /// Counts the lines of product code by crate. Two revisions stand side by side.
+    Size {
+        /// Revisions of git.
+        #[arg(value_name = "REV", default_value = "HEAD")]
+        revisions: Vec<String>,
+    },
+    /// Writes what follows from the declarations of parameters: Python's classes, tables of the documentation, the
+    /// schema of scenario files.
+    Generate {
+        /// Only compares.
+        #[arg(long)]
+        check: bool,
+    },
     /// Draws the README's figures again, with `clutch reproduce`.
     Figures,
 }
@@ -112,8 +138,15 @@ fn main() -> Result<()> {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
         Verb::Stubs => stubs::generate(&python::interpreter()?, false).map(drop),
+        Verb::Touch { revisions, list } => touch::print(&revisions, list),
+        Verb::Size { revisions } => size::print(&revisions),
+        Verb::Generate { check } => generate(if check { &["--check"] } else { &[] }),
         Verb::Figures => figures(),
     }
+}
+
+fn generate(args: &[&str]) -> Result<()> {
+    cargo(["run", "--package", "clutch-sim", "--example", "generate", "--"]).args(args).run()
 }
 
 fn check() -> Result<()> {
@@ -144,6 +177,7 @@ fn check() -> Result<()> {
         cargo(["clippy", "--package", "clutch-core", "--features", features, "--", "-D", "warnings"])
             .run()?;
     }
+    generate(&["--check"])?;
     // The images, where their target is; tests build them in any case.
     if firmware::has_target() {
         for board in firmware::BOARDS {

@@ -65,15 +65,15 @@ impl Drop for Wheel {
 }
 
 impl Wheel {
-    /// Builds the source distribution, from it the wheel, and installs that. What the wheel is tested
-    /// with is seen through from `tools`, the environment of [`interpreter`].
+    /// Builds the source distribution, from it the wheel, and installs that. The test tools are
+    /// visible from `tools`, the environment of [`interpreter`].
     pub(crate) fn install(tools: &Path) -> Result<Wheel> {
         let (dist, target) = (root().join("target/dist"), root().join("target"));
         let _ = std::fs::remove_dir_all(&dist);
         program(beside(tools, "maturin")).args(["sdist", "--out"]).arg(&dist).run()?;
         let sdist = the_one(&dist, "tar.gz")?;
         let pip = |python: &Path| program(python).args(["-m", "pip", "--disable-pip-version-check"]);
-        // Its own build environment would need maturin from the net once more.
+        // A separate build environment would download maturin once more.
         pip(tools)
             .args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"])
             .arg(&dist)
@@ -97,7 +97,7 @@ impl Wheel {
             .args(["-c", "import sysconfig; print(sysconfig.get_path('purelib'))"])
             .quietly()?;
         if !found {
-            bail!("{} does not tell its packages: {site}", tools.display());
+            bail!("{} does not report its packages: {site}", tools.display());
         }
         std::fs::write(Path::new(own.trim()).join("tools.pth"), site)?;
         Ok(wheel)

@@ -1,4 +1,4 @@
-//! Running programs, with what they print passed on.
+//! Runs programs, and passes their output on.
 
 use anyhow::{Context, Result, bail};
 use std::ffi::OsStr;
@@ -67,7 +67,7 @@ impl Program {
         Ok(())
     }
 
-    /// Runs it, hands each line of its output to `line`, and says whether it succeeded.
+    /// Runs it, hands each line of its output to `line`; true if it succeeded.
     pub(crate) fn lines(mut self, mut line: impl FnMut(&str)) -> Result<bool> {
         let shown = self.announce();
         let mut child =
@@ -82,9 +82,15 @@ impl Program {
         Ok(child.wait()?.success())
     }
 
-    /// Runs it unseen; whether it succeeded, and what it printed on either stream.
-    pub(crate) fn quietly(mut self) -> Result<(bool, String)> {
-        let shown = self.announce();
+    /// Runs it unseen; gives its success, and its output on both streams.
+    pub(crate) fn quietly(self) -> Result<(bool, String)> {
+        self.announce();
+        self.silently()
+    }
+
+    /// The same, without a word of it.
+    pub(crate) fn silently(mut self) -> Result<(bool, String)> {
+        let shown = self.shown();
         let output = self.0.output().with_context(|| format!("cannot start: {shown}"))?;
         let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         Ok((output.status.success(), text.into_owned()))

@@ -1,5 +1,5 @@
-//! The type stub of the native module: generated from the Rust docs, with what PyO3 cannot name
-//! filled in.
+//! The type stub of the native module: generated from the Rust docs; this module fills in the types
+//! that PyO3 cannot name.
 
 use crate::python;
 use crate::run::{program, root};
@@ -8,7 +8,8 @@ use std::path::Path;
 
 const STUB: &str = "python/clutch/_clutch.pyi";
 
-/// What the generator writes, and what it means. Each must be found: a change in the module shows.
+/// The generator's text, and its replacement. Each text must be found, so that a change in the
+/// module shows.
 const NAMED: &[(&str, &str)] = &[
     // Its imports: `CapsuleType` is in `types` from Python 3.13 on only.
     (
@@ -29,8 +30,8 @@ const NAMED: &[(&str, &str)] = &[
         "-> tuple[Table, dict[int, Table], list[tuple[int, ParamError]]]",
     ),
     (
-        "def __new__(cls, /, scenario: Any) -> Controller",
-        "def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Controller",
+        "def __new__(cls, /, scenario: Any) -> Servo",
+        "def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Servo",
     ),
     (
         "def __new__(cls, /, scenario: Any) -> Plant",
@@ -71,6 +72,8 @@ const NAMED: &[(&str, &str)] = &[
         "def simulate(scenario: Any, law: Any | None = None)",
         "def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] | None = None)",
     ),
+    ("def run_loop(scenario: Any,", "def run_loop(scenario: _model.Scenario | Scenario,"),
+    ("-> tuple[Any, str, str, str | None]:", "-> tuple[dict[str, Any], str, str, str | None]:"),
     ("velocity: Incomplete) -> Incomplete", "velocity: NDArray[np.float64]) -> NDArray[np.float64]"),
     ("table: dict", "table: dict[str, Any]"),
     ("tables: dict,", "tables: dict[str, Any],"),
@@ -99,7 +102,7 @@ pub(crate) fn generate(python: &Path, check: bool) -> Result<bool> {
     if check {
         let kept = std::fs::read_to_string(root().join(STUB)).unwrap_or_default();
         if kept != text {
-            println!("{STUB} is not what the module gives: run `cargo xtask stubs`");
+            println!("{STUB} differs from the module: run `cargo xtask stubs`");
         }
         return Ok(kept == text);
     }

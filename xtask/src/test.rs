@@ -7,8 +7,8 @@ use crate::run::{cargo, program, root};
 use crate::stubs;
 use anyhow::{Result, bail};
 
-/// What the core must compile for: a core without atomics, one with a floating-point unit, and
-/// RISC-V.
+/// Targets for which the core must compile: a core without atomics, one with a floating-point unit,
+/// and RISC-V.
 const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
 
 /// Checks that need the targets: two builds each, the two link tests, the example, two boards, the budgets.
@@ -19,14 +19,14 @@ struct Tally {
     passed: u64,
     failed: u64,
     skipped: u64,
-    /// What failed, by name.
+    /// The failed tests, by name.
     failures: Vec<String>,
 }
 
 impl Tally {
     /// Reads the closing lines of libtest (`test result: ok. 3 passed; 0 failed; …`) and of
-    /// pytest (`3 passed, 1 skipped in 2.1s`), and the names of what failed (`test NAME ... FAILED`,
-    /// `FAILED NAME - why`).
+    /// pytest (`3 passed, 1 skipped in 2.1s`), and the names of the failed tests
+    /// (`test NAME ... FAILED`, `FAILED NAME - why`).
     fn read(&mut self, line: &str) {
         if let Some(name) = line.strip_prefix("test ").and_then(|l| l.strip_suffix(" ... FAILED")) {
             self.failures.push(name.to_owned());
@@ -145,7 +145,7 @@ pub(crate) fn all() -> Result<()> {
             tally.check(&format!("the images of {board} build"), built);
         }
         // As a test, not as a benchmark: the figures are the machine code's, not this machine's.
-        // With the packages of the tests above: what is compiled for them serves here, too.
+        // With the packages of the tests above, whose builds serve here, too.
         let budget = cargo(["test", "--workspace", "--exclude", "clutch-py", "--bench", "budget"]);
         tally.check("bounds, measurements, memory and stack keep their budgets", budget.lines(|_| ())?);
     }

@@ -1,4 +1,4 @@
-/* The floor of a law's step called from Python: what CPython's own C API costs at least for the same arguments.
+/* The floor of a law's step called from Python: the least cost of CPython's own C API for the same arguments.
  *
  * A C type with a METH_FASTCALL method: a whole number of counts and a target in, PD (4) with (5) and its limits,
  * a float out. No checks beyond those without which it would crash. */

@@ -1,10 +1,10 @@
 //! `clutch certify`.
 
+use crate::args::ScenarioArgs;
+use crate::output::{Exit, json, print};
 use crate::table::{number, quantities};
-use crate::{Outcome, ScenarioArgs, json, print};
 use clap::Args;
 use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
-use clutch_core::law::LawParams;
 use clutch_core::{Bounds, Interval};
 use clutch_sim::scenario::Plan;
 use clutch_sim::{Scenario, ScenarioError};
@@ -15,7 +15,7 @@ use serde_json::{Value, json as value};
 /// Exit code 0: certified; 2: not certified.
 #[derive(Args)]
 #[command(after_help = "Example:\n  clutch certify smc_2 --set bounds.friction_percent=20\n\n\
-    docs/theory.md derives the conditions and says what they do not cover.")]
+    docs/theory.md derives the conditions and gives their limits.")]
 pub(crate) struct Certify {
     #[command(flatten)]
     scenario: ScenarioArgs,
@@ -25,14 +25,14 @@ pub(crate) struct Certify {
 }
 
 impl Certify {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;
         let shown =
             if self.json { json(&certificate(&scenario)?)? } else { text(&scenario, &plan, &outside) };
         print(&shown)?;
-        Ok(if plan.certificate.certified() { Outcome::Done } else { Outcome::NotCertified })
+        Ok(if plan.certificate.certified() { Exit::Done } else { Exit::NotCertified })
     }
 }
 
@@ -42,7 +42,7 @@ fn reason(s: Shortfall) -> &'static str {
             "K_p is too small for the worst corner: the weakest brake against the strongest drive, at the path's \
              acceleration and the reaching rate wanted"
         }
-        Shortfall::Kd => "K_d is too small: it does not pay for f |ė|",
+        Shortfall::Kd => "K_d is too small: it does not cover f |ė|",
         Shortfall::Voltage => "output.highest_v is too small for the brake to stop the strongest drive",
         Shortfall::Drive => "the drive is too weak for the path: a released shaft does not catch up",
         Shortfall::Start => {
@@ -57,17 +57,11 @@ fn reason(s: Shortfall) -> &'static str {
              follow: raise K_d (PD, CTC), or thin the boundary (SMC), or follow a slower path"
         }
         Shortfall::Slope => "the surface's slope f is below C_d/J: raise K_p against K_d",
-        Shortfall::Surface => "the law has no sliding surface: K_p and K_d must both be above 0",
+        Shortfall::Surface => {
+            "the law has no sliding surface, of which the certificate speaks: PD and CTC have one if K_p and K_d are above \
+             0, PID has none"
+        }
         _ => "not certified",
-    }
-}
-
-fn law_name(p: &LawParams) -> &'static str {
-    match p {
-        LawParams::Pd(_) => "PD (4)",
-        LawParams::Ctc(_) => "CTC (11)",
-        LawParams::Smc(_) => "SMC (31), with boundary layer",
-        LawParams::SmcSign(_) => "SMC (29), with the sign function",
     }
 }
 
@@ -81,7 +75,7 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
     let deg = |x: f64| number(x.to_degrees());
     let law = scenario.spec().law;
     let is_smc = plan.paper.is_some();
-    let mut out = format!("{}\n{}\n\n", scenario.name, law_name(&law));
+    let mut out = format!("{}\n{}\n\n", scenario.name(), law.title());
     out += &quantities(
         "Bounds",
         &[
@@ -89,8 +83,8 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
             ("driving torque M g R_p", range(&b.drive_torque), "N m"),
             ("viscous damping C_d", range(&b.viscous_damping), "N m s/rad"),
             ("brake gain K_COF", range(&b.brake_gain), "N m/V"),
-            ("friction mu_s", range(&b.mu_static), ""),
-            ("friction mu_d", range(&b.mu_dynamic), ""),
+            ("friction at rest", range(&b.friction_at_rest), ""),
+            ("friction, fast", range(&b.friction_sliding), ""),
             ("path: velocity v_d", deg(d.velocity), "°/s"),
             ("path: acceleration a_d", deg(d.acceleration), "°/s²"),
             ("reaching rate γ wanted", number(d.reach_rate), "rad/s²"),
@@ -159,7 +153,7 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
         Some(s) => format!("\nNOT certified: {}\n", reason(s)),
     };
     if !outside.is_empty() {
-        out += "\nThe scenario's rig lies outside these bounds; the certificate does not speak of it:\n";
+        out += "\nThe scenario's rig lies outside these bounds; the certificate does not cover it:\n";
         for line in outside {
             out += &format!("  {line}\n");
         }
@@ -180,9 +174,9 @@ pub fn certificate(scenario: &Scenario) -> Result<Value, ScenarioError> {
     let paper =
         |p: &PaperConditions| value!({"kp_26_v": p.kp, "kd_27_v_s_rad": p.kd, "gamma_28_rad_s2": p.gamma});
     Ok(value!({
-        "scenario": scenario.name,
+        "scenario": scenario.name(),
         "version": env!("CARGO_PKG_VERSION"),
-        "law": law_name(&scenario.spec().law),
+        "law": scenario.spec().law.title(),
         "certified": c.certified(),
         "reason": c.shortfall.map(reason),
         "rig_outside_bounds": outside,
@@ -225,7 +219,8 @@ fn bounds_json(b: &Bounds, pair: &dyn Fn(&Interval) -> Value) -> Value {
         "drive_torque_nm": pair(&b.drive_torque),
         "viscous_damping_nm_s_rad": pair(&b.viscous_damping),
         "brake_gain_nm_v": pair(&b.brake_gain),
-        "mu_static": pair(&b.mu_static),
-        "mu_dynamic": pair(&b.mu_dynamic),
+        "friction_at_rest": pair(&b.friction_at_rest),
+        "friction_sliding": pair(&b.friction_sliding),
+        "friction": pair(&b.friction),
     })
 }

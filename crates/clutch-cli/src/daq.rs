@@ -1,18 +1,18 @@
 //! `clutch daq`.
 
-use crate::{Outcome, ScenarioArgs, print};
+use crate::args::ScenarioArgs;
+use crate::output::{Exit, print};
+use crate::signals::stop_flag;
 use anyhow::Context;
 use clap::Args;
-use clutch_loop::daq::{self, DaqNotice, DaqOptions};
 use clutch_loop::faults::Fault;
 use clutch_loop::port::{Address, ClientEvent, Endpoint, Listener, PseudoTerminal};
 use clutch_loop::realtime::WaitMode;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use clutch_loop::sim_board_server::{self, ServeNotice, ServeOptions};
 
 /// Simulates a board in real time: a pseudo-terminal or a TCP address to drive with `clutch loop`.
 ///
-/// Prints the path to connect to, then tells of clients and of its state until it is interrupted.
+/// Prints the path to connect to, then reports clients and its state until it is interrupted.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  clutch daq board_smc_2\n  clutch daq board_smc_2 --listen tcp://127.0.0.1:5000\n  \
@@ -26,20 +26,21 @@ pub(crate) struct Daq {
     /// Listens on a TCP address of this machine instead of a pseudo-terminal.
     #[arg(long, value_name = "tcp://HOST:PORT")]
     listen: Option<Address>,
-    /// Breaks something; may be given several times.
+    /// Injects a fault; may be given several times.
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
-    /// Seed of the faults that hit at random.
+    /// Seed of the random faults.
     #[arg(long, default_value_t = 1)]
     fault_seed: u64,
-    /// Lets the board's clock wait, up to five seconds, for a controller that a busy machine holds up. Without it a
-    /// controller that is silent for the watchdog's time meets the safe state, as on hardware.
+    /// Lets the board's clock wait, up to five seconds, for a controller that a busy machine holds
+    /// up. Without it, the board goes to its safe state when the controller is silent for the
+    /// watchdog's time, as on hardware.
     #[arg(long)]
     patient: bool,
 }
 
 impl Daq {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let scenario = self.scenario.load()?;
         scenario.safety()?;
         if self.patient && self.fault.iter().any(|f| f.kind.silences()) {
@@ -60,26 +61,26 @@ impl Daq {
         };
         let mut text = format!(
             "{path}\n{}: simulated board; connect with: clutch loop {} --port {path}\n",
-            scenario.name,
+            scenario.name(),
             self.scenario.scenario.display()
         );
         for fault in &self.fault {
             text += &format!("fault: {fault} (seconds after arming; seed {})\n", self.fault_seed);
         }
         print(&text)?;
-        let options = DaqOptions {
+        let options = ServeOptions {
             faults: self.fault,
             seed: self.fault_seed,
             patient: self.patient,
             wait: WaitMode::Sleep,
         };
-        let report = daq::run(&scenario, &options, endpoint.as_mut(), &stop, |notice| {
+        let report = sim_board_server::serve(&scenario, &options, endpoint.as_mut(), &stop, |notice| {
             // A terminal that has gone away does not stop a board.
             let _ = print(&match notice {
-                DaqNotice::Client(ClientEvent::Connected) => "client connected\n".to_owned(),
-                DaqNotice::Client(ClientEvent::Left) => "client left\n".to_owned(),
-                DaqNotice::State(state, time) => format!("{time:10.6} s  {state:?}\n"),
-                DaqNotice::Faulted(silent) => {
+                ServeNotice::Client(ClientEvent::Connected) => "client connected\n".to_owned(),
+                ServeNotice::Client(ClientEvent::Left) => "client left\n".to_owned(),
+                ServeNotice::State(state, time) => format!("{time:10.6} s  {state:?}\n"),
+                ServeNotice::Faulted(silent) => {
                     format!("              {:.3} ms after the last code that was applied\n", silent * 1e3)
                 }
             });
@@ -92,15 +93,6 @@ impl Daq {
             );
         }
         print(&(text + "\n"))?;
-        Ok(Outcome::Done)
+        Ok(Exit::Done)
     }
-}
-
-/// Set by Ctrl-C and SIGTERM.
-pub(crate) fn stop_flag() -> anyhow::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP] {
-        signal_hook::flag::register(signal, stop.clone()).context("signals could not be caught")?;
-    }
-    Ok(stop)
 }

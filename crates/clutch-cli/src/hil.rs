@@ -1,26 +1,28 @@
 //! `clutch hil`.
 
-use crate::loop_verb::cause_text;
-use crate::table::quantities;
-use crate::{Outcome, ScenarioArgs, json, key_value, print, sim};
+use crate::args::{ScenarioArgs, key_value};
+use crate::output::{BUILD, Exit, json, not_certified, print};
+use crate::sim;
+use crate::table::{number, quantities};
 use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
-use clutch_log::{LogWriter, Source};
-use clutch_loop::emulated::{Lockstep, emulated};
-use clutch_loop::emulator::{Emulator, SerialBoard};
 use clutch_loop::faults::Fault;
-use clutch_loop::replay::PRESENT_CODE;
-use clutch_loop::setup::{self, Setup};
-use clutch_loop::world::{Outcome as Ran, World, WorldParams};
+use clutch_loop::lockstep_session::{LockstepOptions, LockstepSession};
+use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
+use clutch_loop::session::SessionError;
+use clutch_loop::summary::cause_text;
+use clutch_loop::virtual_time::VirtualReport as Ran;
 use clutch_sim::Scenario;
+use std::io::Write;
 use std::path::PathBuf;
 
 /// Runs the loop on an emulated Cortex-M4F board, with the simulated rig as its encoder and converter.
 ///
-/// Hardware in the loop, without the hardware: the board's own image runs in qemu-system-arm, takes a step,
-/// and waits for the simulation to take one. Time is computed, so that a run takes as long as it takes, and is
-/// the same each time, bit for bit; the figures are those of `clutch sim` in single precision.
+/// This is hardware in the loop, without the hardware: the board's own image runs in
+/// qemu-system-arm, takes a step, and waits for the simulation to take one. Time is computed, so
+/// that a run is the same each time, bit for bit, however long it takes; the figures are those of
+/// `clutch sim` in single precision.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask firmware build && clutch hil\n  clutch hil board_smc_2 --log run.mcap && \
@@ -41,7 +43,7 @@ pub(crate) struct Hil {
         default_value = "target/firmware/thumbv7em-none-eabihf/release/mps2-controller"
     )]
     image: PathBuf,
-    /// How the board is reached.
+    /// Link to the board.
     #[arg(long, value_enum, default_value = "memory")]
     link: Link,
     /// Writes an MCAP log, with the shaft's true motion.
@@ -50,13 +52,13 @@ pub(crate) struct Hil {
     /// Runs a law that is not certified for the scenario's bounds.
     #[arg(long)]
     uncertified: bool,
-    /// Breaks something on line or rig; see `clutch daq --help`.
+    /// Injects a fault on line or rig; see `clutch daq --help`.
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
-    /// Seed of the faults that hit at random.
+    /// Seed of the random faults.
     #[arg(long, default_value_t = 1)]
     fault_seed: u64,
-    /// How long a frame takes between board and rig, µs.
+    /// Time that a frame takes between board and rig, µs.
     #[arg(long, default_value_t = 0, value_name = "US", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     latency_us: u32,
     /// Prints the summary as JSON, and nothing else, on standard output.
@@ -68,97 +70,78 @@ pub(crate) struct Hil {
 enum Link {
     /// Through the emulator's own files: some 20 000 cycles a second, the same each time.
     Memory,
-    /// Through the board's two serial lines, interrupts and clock: some 500 to 2000 cycles a second. Late
-    /// answers are not looked at, as this machine decides how late they are.
+    /// Through the board's two serial lines, interrupts and clock: some 500 to 2000 cycles a
+    /// second. Late answers are not checked, since this machine decides the lateness.
     Uart,
 }
 
 impl Hil {
-    pub(crate) fn run(mut self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
         if self.link == Link::Uart {
             self.set.push(("safety.limits.deadline_us".to_owned(), "1000000".to_owned()));
         }
         let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone() };
-        let scenario = crate::single_precision(&args, args.load()?)?;
-        let certified = scenario.plan()?.certificate.certified();
-        if !certified && !self.uncertified {
-            print(&crate::not_certified(&scenario, &self.scenario))?;
-            return Ok(Outcome::NotCertified);
-        }
-        if let Some(log) = &self.log {
-            crate::new_log(log)?;
-        }
-        let mut setup = Setup::<f32>::new(&scenario, 1)?;
-        if self.link == Link::Uart {
-            // The board's own clock runs on while this machine computes.
-            setup.control.silence = Micros(10_000_000);
+        let session = match LockstepSession::new(args.load()?, self.options()) {
+            Ok(session) => session,
+            Err(refusal @ SessionError::NotCertified { .. }) => {
+                print(&not_certified(&refusal, &self.scenario))?;
+                return Ok(Exit::NotCertified);
+            }
+            Err(refusal) => return Err(refusal.into()),
+        };
+        if let Some(note) = session.note() {
+            let _ = writeln!(std::io::stderr(), "note: {note}"); // a terminal that has gone away
         }
         let started = std::time::Instant::now();
         let ran = match self.link {
-            Link::Memory => self.on(&scenario, &setup, Emulator::start(&self.image)?)?,
-            Link::Uart => self.on(&scenario, &setup, SerialBoard::start(&self.image)?)?,
+            Link::Memory => session.run(|| QemuBoard::start(&self.image))?,
+            Link::Uart => session.run(|| QemuSerialBoard::start(&self.image))?,
         };
         let took = started.elapsed().as_secs_f64();
-        if let Some(file) = &self.log {
-            let mut header =
-                setup::header(&scenario, &setup.servo, Source::Loop, "emulated board", crate::BUILD);
-            header.extra.push((PRESENT_CODE.to_owned(), ran.present.to_string()));
-            header.extra.push(("board".to_owned(), "emulated".to_owned()));
-            header.extra.push(("certified".to_owned(), certified.to_string()));
-            let mut log = LogWriter::create(file, &header)?;
-            for record in &ran.records {
-                log.write(record)?;
-            }
-            log.finish()?;
-        }
-        print(&if self.json { summary(&scenario, &ran, took)? } else { self.text(&scenario, &ran, took) })?;
-        Ok(match ran.end.cause {
-            Cause::Done => Outcome::Done,
-            Cause::None => Outcome::Failed,
-            _ => Outcome::Fault,
+        let scenario = session.scenario();
+        print(&if self.json { summary(scenario, &ran, took)? } else { self.text(scenario, &ran, took) })?;
+        Ok(match ran.standing.cause {
+            Cause::Done => Exit::Done,
+            Cause::None => Exit::Failed,
+            _ => Exit::Fault,
         })
     }
 
-    fn on(&self, scenario: &Scenario, setup: &Setup<f32>, board: impl Lockstep) -> anyhow::Result<Ran> {
-        // The last period is the one in which the run ends.
-        let ticks = setup.ticks + 1;
-        let params = WorldParams {
-            latency_ns: u64::from(self.latency_us) * 1000,
+    fn options(&self) -> LockstepOptions {
+        LockstepOptions {
+            log: self.log.clone(),
+            uncertified: self.uncertified,
             faults: self.fault.clone(),
-            stall: None,
             seed: self.fault_seed,
-            record: self.log.is_some(),
-            duration: scenario.spec().run.duration + 1.0,
-            ticks,
-            settle: scenario.spec().run.settle,
-        };
-        let end = emulated(scenario, setup, board, ticks)?;
-        let path = setup::path::<f32>(scenario)?;
-        Ok(World::new(scenario, params, end)?.run(&path)?)
+            latency_ns: u64::from(self.latency_us) * 1000,
+            // The board's own clock runs on while this machine computes.
+            silence: (self.link == Link::Uart).then_some(Micros(10_000_000)),
+            version: BUILD.to_owned(),
+        }
     }
 
     fn text(&self, scenario: &Scenario, ran: &Ran, took: f64) -> String {
         let title = format!(
             "{}\n{} ticks on the emulated board in {took:.1} s, seed {}; figures over {} s after settling",
-            scenario.name,
+            scenario.name(),
             ran.answers,
             scenario.spec().run.seed,
-            crate::table::number(ran.metrics.measured_s)
+            number(ran.metrics.measured_s)
         );
         let mut text = quantities(&title, &sim::figures(&ran.metrics));
         if let Some(file) = &self.log {
             text += &format!("log: {0}; clutch replay {0}\n", file.display());
         }
         let board = ran.board.map_or("gone".to_owned(), |s| format!("{s:?}").to_lowercase());
-        let end = &ran.end;
-        text += &match end.cause {
+        let standing = &ran.standing;
+        text += &match standing.cause {
             Cause::None => {
-                let state = format!("{:?}", end.state).to_lowercase();
+                let state = format!("{:?}", standing.state).to_lowercase();
                 format!("control did not end: the board is {state}, encoder and converter are {board}\n")
             }
             cause => {
                 let fault = if cause == Cause::Done { "" } else { "FAULT: " };
-                let what = cause_text(cause, end.value, true, false);
+                let what = cause_text(cause, standing.value, true, false);
                 format!("{fault}{what}; encoder and converter are {board}\n")
             }
         };
@@ -168,17 +151,17 @@ impl Hil {
 
 fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> anyhow::Result<String> {
     json(&serde_json::json!({
-        "scenario": scenario.name,
+        "scenario": scenario.name(),
         "version": env!("CARGO_PKG_VERSION"),
         "seed": scenario.spec().run.seed,
         "ticks": ran.answers,
         "took_s": took,
         "metrics": ran.metrics,
-        "state": format!("{:?}", ran.end.state),
-        "cause": format!("{:?}", ran.end.cause),
-        "cause_text": cause_text(ran.end.cause, ran.end.value, true, false),
-        "value": ran.end.value,
+        "state": format!("{:?}", ran.standing.state),
+        "cause": format!("{:?}", ran.standing.cause),
+        "cause_text": cause_text(ran.standing.cause, ran.standing.value, true, false),
+        "value": ran.standing.value,
         "board": ran.board.map(|s| format!("{s:?}")),
-        "lost": ran.end.lost,
+        "lost": ran.standing.lost,
     }))
 }

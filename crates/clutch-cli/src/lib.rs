@@ -1,36 +1,35 @@
-//! What the `clutch` command is made of: the verbs, drawing, reports.
+//! The parts of the `clutch` command: the verbs, drawing, reports.
 //!
-//! The verbs hold no control or friction of their own: they call `clutch-sim` and show what it
-//! says.
+//! The verbs hold no control or friction of their own: they call `clutch-sim` and show its results.
 
+mod args;
 pub mod certify;
 mod daq;
 mod hil;
 mod log;
 mod loop_verb;
+mod output;
 pub mod plot;
 mod replay;
 pub mod report;
 mod reproduce;
 mod scenario;
+mod signals;
 mod sim;
 mod table;
 
-use anyhow::Context;
-use clap::{Args, Parser, Subcommand};
-use clutch_sim::Scenario;
-use clutch_sim::progress::Report;
-use clutch_sim::scenario::ScalarKind;
-use indicatif::{ProgressBar, ProgressStyle};
+use clap::{Parser, Subcommand};
+use output::Exit;
 use std::ffi::OsString;
-use std::io::{ErrorKind, Write};
-use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::io::Write;
+
+pub use loop_verb::summary;
+pub use output::BUILD;
 
 /// Slow, smooth motion of shafts restrained by friction.
 ///
 /// Simulates a shaft that a weight drives and a computer brakes, certifies the gains of its
-/// control law, and reproduces the paper that this is built on.
+/// control law, and reproduces the paper behind it.
 ///
 /// Drives a shaft over a serial line to a data-acquisition board, or to a simulated one; logs,
 /// and replays its logs.
@@ -61,66 +60,6 @@ enum Verb {
     Reproduce(reproduce::Reproduce),
 }
 
-/// A scenario and what to change in it.
-#[derive(Args)]
-struct ScenarioArgs {
-    /// Scenario file, or the name of a built-in scenario (`clutch scenario list`).
-    #[arg(value_name = "SCENARIO.toml")]
-    scenario: PathBuf,
-    /// Overrides a key of the scenario; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
-    set: Vec<(String, String)>,
-}
-
-fn key_value(text: &str) -> Result<(String, String), String> {
-    let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE, as law.smc.kp_v=4")?;
-    Ok((key.trim().to_owned(), value.trim().to_owned()))
-}
-
-impl ScenarioArgs {
-    fn load(&self) -> anyhow::Result<Scenario> {
-        Ok(Scenario::load(&self.scenario, &self.set)?)
-    }
-}
-
-/// The scenario as a board takes it that closes the loop itself; says so if that changes it.
-fn single_precision(args: &ScenarioArgs, scenario: Scenario) -> anyhow::Result<Scenario> {
-    if scenario.scalar == ScalarKind::F32 {
-        return Ok(scenario);
-    }
-    let _ = writeln!(
-        std::io::stderr(),
-        "note: such a board calculates in single precision: sampling.scalar = \"f32\""
-    );
-    let mut set = args.set.clone();
-    set.push(("sampling.scalar".to_owned(), "f32".to_owned()));
-    Ok(Scenario::load(&args.scenario, &set)?)
-}
-
-/// Why nothing was started, and what to do.
-fn not_certified(scenario: &Scenario, file: &Path) -> String {
-    format!(
-        "{}: the gains are not certified for these bounds and this path, so nothing was started.\n\
-         `clutch certify {}` says why; --uncertified runs it all the same.\n",
-        scenario.name,
-        file.display()
-    )
-}
-
-/// How a verb ended, if not with an error.
-enum Outcome {
-    /// Exit code 0.
-    Done,
-    /// Exit code 2.
-    NotCertified,
-    /// Exit code 1, though everything ran.
-    Failed,
-    /// Exit code 3.
-    Fault,
-    /// Exit code 4.
-    Stopped,
-}
-
 /// Runs the command with its arguments, the program's name first; its exit code.
 #[must_use]
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
@@ -128,7 +67,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(cli) => cli,
         Err(e) => {
             let asked_for = !e.use_stderr(); // --help, --version
-            let _ = e.print(); // nobody is left to be told
+            let _ = e.print(); // nobody is left to receive it
             return if asked_for { 0 } else { 64 };
         }
     };
@@ -144,13 +83,13 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Reproduce(v) => v.run(),
     };
     match outcome {
-        Ok(Outcome::Done) => 0,
-        Ok(Outcome::Failed) => 1,
-        Ok(Outcome::NotCertified) => 2,
-        Ok(Outcome::Fault) => 3,
-        Ok(Outcome::Stopped) => 4,
+        Ok(Exit::Done) => 0,
+        Ok(Exit::Failed) => 1,
+        Ok(Exit::NotCertified) => 2,
+        Ok(Exit::Fault) => 3,
+        Ok(Exit::Stopped) => 4,
         Err(e) => {
-            // Some errors tell their source themselves.
+            // Some errors contain their source themselves.
             let mut text = e.to_string();
             for source in e.chain().skip(1).map(ToString::to_string) {
                 if !text.contains(&source) {
@@ -161,49 +100,4 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
             1
         }
     }
-}
-
-/// Runs long work under a progress bar; the bar shows on a terminal only.
-fn with_progress<T>(unit: &str, work: impl FnOnce(Report<'_>) -> T) -> T {
-    let style = ProgressStyle::with_template(&format!(
-        "{{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{eta}} left"
-    ));
-    let bar = ProgressBar::no_length().with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let result = work(&|p| {
-        bar.set_length(p.total);
-        bar.inc(p.finished);
-        ControlFlow::Continue(())
-    });
-    bar.finish_and_clear();
-    result
-}
-
-/// Prints to standard output. A reader that has gone away (`| head`) is not an error.
-fn print(text: &str) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
-        other => other.context("standard output"),
-    }
-}
-
-/// Version and commit, as logs tell it.
-pub const BUILD: &str = env!("CLUTCH_BUILD");
-
-/// A log is never written over: it may be the only record of a run.
-fn new_log(path: &Path) -> anyhow::Result<()> {
-    if path.exists() {
-        anyhow::bail!("{}: exists already; name a new file for the log", path.display());
-    }
-    Ok(())
-}
-
-/// Writes a file; errors name it.
-fn write(path: &Path, bytes: impl AsRef<[u8]>) -> anyhow::Result<()> {
-    std::fs::write(path, bytes).with_context(|| format!("{}: cannot be written", path.display()))
-}
-
-/// Pretty JSON with a line end.
-fn json(value: &impl serde::Serialize) -> anyhow::Result<String> {
-    Ok(serde_json::to_string_pretty(value)? + "\n")
 }

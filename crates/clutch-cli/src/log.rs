@@ -1,11 +1,11 @@
 //! `clutch log`.
 
-use crate::{Outcome, print};
+use crate::output::{Exit, print};
 use clap::{Args, Subcommand};
 use clutch_log::Limits;
 use std::path::PathBuf;
 
-/// Looks into logs, and saves those that were cut.
+/// Inspects logs, and recovers those that were cut.
 #[derive(Args)]
 pub(crate) struct Log {
     #[command(subcommand)]
@@ -14,7 +14,7 @@ pub(crate) struct Log {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Says what a log holds: channels, time, scenario, and whether it was finished.
+    /// Reports the contents of a log: channels, time, scenario, and its completeness.
     #[command(after_help = "Example:\n  clutch log info run.mcap")]
     Info {
         /// The log.
@@ -34,7 +34,7 @@ enum Verb {
 }
 
 impl Log {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let text = match self.verb {
             Verb::Info { log } => clutch_log::info(&log, &Limits::default())?.to_string(),
             Verb::Recover { from, to } => {
@@ -45,6 +45,6 @@ impl Log {
             }
         };
         print(&(text.trim_end().to_owned() + "\n"))?;
-        Ok(Outcome::Done)
+        Ok(Exit::Done)
     }
 }

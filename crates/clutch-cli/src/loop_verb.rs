@@ -1,34 +1,23 @@
 //! `clutch loop`.
 
-use crate::daq::stop_flag;
-use crate::table::{number, quantities};
-use crate::{Outcome, ScenarioArgs, key_value, print};
+use crate::args::{ScenarioArgs, key_value};
+use crate::output::{BUILD, Exit, json, not_certified, print};
+use crate::signals::stop_flag;
+use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use clutch_core::law::Law;
-use clutch_core::supervisor::{Cause, State};
-use clutch_core::{DacCode, Micros, Real, SafeState};
-use clutch_log::Source;
-use clutch_loop::daq::{self, DaqOptions, DaqReport};
-use clutch_loop::emulated::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE};
-use clutch_loop::end::{End, Local, Remote};
+use clutch_loop::control_loop::Pace;
 use clutch_loop::faults::Fault;
-use clutch_loop::port::{Address, DeviceKind, Endpoint, Port, PseudoTerminal, SerialOptions};
-use clutch_loop::preflight::Talk;
-use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode, describe_system};
-use clutch_loop::replay::PRESENT_CODE;
-use clutch_loop::run::{self, Configured, LogThread, LoopOptions, LoopReport, Pace, Ring, Watch};
-use clutch_loop::setup::{self, Setup};
-use clutch_loop::sim_board::{PATIENT_BOARD, STRICT_BOARD};
-use clutch_node::{ControlNode, RemoteNode, present_code};
-use clutch_sim::Scenario;
-use clutch_sim::scenario::ScalarKind;
-use clutch_wire::Hello;
+use clutch_loop::port::Address;
+use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode};
+use clutch_loop::session::{Board, Event, Progress, Session, SessionError, SessionOptions};
+use clutch_loop::summary::{Summary, Verdict};
+use clutch_sim::Metrics;
+use clutch_sim::metrics::Detected;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum PaceArg {
@@ -57,14 +46,14 @@ enum WaitArg {
 /// Closes the loop on a board over a serial line, or on a simulated one.
 ///
 /// Without --port it starts the simulated board in the background and runs over a real
-/// pseudo-terminal. It checks board, path and gains, says what it will do, arms, and runs to the
-/// path's end; Ctrl-C ends in the safe state.
+/// pseudo-terminal. It checks board, path and gains, prints its plan, arms, and runs to the path's
+/// end; Ctrl-C ends in the safe state.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  clutch loop\n  clutch loop mine.toml --port /dev/ttyACM0 --log run.mcap\n  \
     clutch loop --fault freeze:at=2 --strict\n\n\
     Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run, and the brake is in the \
-    safe state; 4 stopped by Ctrl-C or SIGTERM, likewise. docs/loop.md is the guide, docs/safety.md says what is watched."
+    safe state; 4 stopped by Ctrl-C or SIGTERM, likewise. docs/loop.md is the guide, docs/safety.md lists the checks."
 )]
 pub(crate) struct Loop {
     /// Scenario file, or the name of a built-in scenario; board_smc_2 if none is given.
@@ -76,7 +65,8 @@ pub(crate) struct Loop {
     /// The board's port; without it a board is simulated.
     #[arg(long, value_name = "PATH|tcp://HOST:PORT")]
     port: Option<Address>,
-    /// The port of a board that closes the loop itself (docs/firmware.md): it is set up, armed, and looked at.
+    /// The port of a board that closes the loop itself (docs/firmware.md): it is set up, armed, and
+    /// watched.
     #[arg(long, value_name = "PATH|tcp://HOST:PORT", conflicts_with_all = ["port", "fault", "strict"])]
     board: Option<Address>,
     /// Line rate of the port, baud; no effect on USB, pseudo-terminals and TCP.
@@ -104,25 +94,25 @@ pub(crate) struct Loop {
     #[arg(long, alias = "thread_priority", default_value_t = clutch_loop::realtime::DEFAULT_PRIORITY,
         value_parser = clap::value_parser!(u8).range(0..=99))]
     thread_priority: u8,
-    /// What a late answer does.
+    /// Effect of a late answer.
     #[arg(long, value_enum, default_value = "manage")]
     overruns: OverrunsArg,
-    /// What starts a cycle.
+    /// Start of a cycle.
     #[arg(long, value_enum, default_value = "sample")]
     pace: PaceArg,
-    /// How the loop waits.
+    /// Wait mode of the loop.
     #[arg(long, value_enum, default_value = "sleep")]
     wait: WaitArg,
-    /// How long before a sample spinning begins, with --wait spin, µs.
+    /// Time before a sample at which spinning begins, with --wait spin, µs.
     #[arg(long, default_value_t = 150, value_name = "US")]
     spin_us: u32,
-    /// Breaks something on the simulated board; see `clutch daq --help`.
+    /// Injects a fault on the simulated board; see `clutch daq --help`.
     #[arg(long, value_name = "KIND:KEY=VALUE,…", conflicts_with = "port")]
     fault: Vec<Fault>,
-    /// Seed of the faults that hit at random.
+    /// Seed of the random faults.
     #[arg(long, default_value_t = 1)]
     fault_seed: u64,
-    /// Keeps the simulated board's clock from waiting when this machine stalls: as on hardware.
+    /// Keeps the simulated board's clock running when this machine stalls, as on hardware.
     #[arg(long, conflicts_with = "port")]
     strict: bool,
     /// Prints the summary as JSON, and nothing else, on standard output.
@@ -130,36 +120,60 @@ pub(crate) struct Loop {
     json: bool,
 }
 
-/// The simulated board, beside the loop.
-struct Background {
-    stop: Arc<AtomicBool>,
-    thread: std::thread::JoinHandle<Result<DaqReport, daq::DaqError>>,
-}
-
-impl Background {
-    fn start(scenario: &Scenario, options: DaqOptions) -> anyhow::Result<(Background, Address)> {
-        let (mut terminal, _) = PseudoTerminal::open().context("a pseudo-terminal could not be opened")?;
-        let address = terminal.address();
-        let stop = Arc::new(AtomicBool::new(false));
-        let (scenario, flag) = (scenario.clone(), stop.clone());
-        let thread = std::thread::Builder::new()
-            .name("clutch-board".to_owned())
-            .spawn(move || daq::run(&scenario, &options, &mut terminal, &flag, |_| ()))
-            .context("the simulated board could not be started")?;
-        Ok((Background { stop, thread }, address))
-    }
-
-    fn end(self) -> anyhow::Result<DaqReport> {
-        self.stop.store(true, Ordering::Relaxed);
-        match self.thread.join() {
-            Ok(report) => Ok(report?),
-            Err(_) => bail!("the simulated board came to a bad end; please report this as a defect"),
-        }
-    }
-}
-
 impl Loop {
-    pub(crate) fn run(mut self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
+        self.set_shortcuts()?;
+        let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone() };
+        let scenario = args.load()?;
+        if let Some(log) = &self.log
+            && log.canonicalize().is_ok_and(|l| self.scenario.canonicalize().is_ok_and(|s| s == l))
+        {
+            bail!("{}: is the scenario; name another file for the log", log.display());
+        }
+        let session = match Session::new(scenario, self.options()) {
+            Ok(session) => session,
+            Err(refusal @ SessionError::NotCertified { .. }) => {
+                self.say(&not_certified(&refusal, &self.scenario))?;
+                return Ok(Exit::NotCertified);
+            }
+            Err(refusal) => return Err(refusal.into()),
+        };
+        let stop = stop_flag()?;
+        // A log on a limited disk must end the log and not the loop.
+        let ignored = Arc::new(AtomicBool::new(false));
+        signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
+            .context("signals could not be caught")?;
+        let show = std::io::stderr().is_terminal();
+        let mut said = Ok(());
+        let ran = session.run(&stop, &mut |event| match event {
+            // What cannot be said is not done: nothing has moved yet.
+            Event::Announced(announcement) => {
+                said = self.say(&announcement.to_string());
+                stop.fetch_or(said.is_err(), Ordering::Relaxed);
+            }
+            Event::Progress(progress) if show => status(&progress),
+            Event::Progress(_) => {}
+            // A terminal that has gone away does not stop a loop.
+            Event::LogEnded => {
+                let _ = writeln!(std::io::stderr(), "\nthe log has ended early; the loop goes on");
+            }
+        });
+        if show {
+            let _ = write!(std::io::stderr(), "\r\x1b[K");
+        }
+        let ran = ran?;
+        said?;
+        print(&if self.json { json(&ran.to_json())? } else { summary(&ran) })?;
+        Ok(match ran.verdict() {
+            Verdict::Done => Exit::Done,
+            Verdict::Stopped => Exit::Stopped,
+            Verdict::Fault => Exit::Fault,
+            Verdict::NotArmed => Exit::Failed,
+        })
+    }
+
+    /// Options that stand for keys of the scenario.
+    fn set_shortcuts(&mut self) -> anyhow::Result<()> {
         if let Some(duration) = self.duration {
             self.set.push(("run.duration_s".to_owned(), format!("{duration:?}")));
         }
@@ -178,19 +192,37 @@ impl Loop {
         if matches!(self.overruns, OverrunsArg::Fault) {
             self.set.push(("safety.limits.overruns".to_owned(), "1".to_owned()));
         }
-        let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone() };
-        let mut scenario = args.load()?;
-        if self.board.is_some() {
-            scenario = crate::single_precision(&args, scenario)?;
-        }
-        if let Some(log) = &self.log
-            && log.canonicalize().is_ok_and(|l| self.scenario.canonicalize().is_ok_and(|s| s == l))
-        {
-            bail!("{}: is the scenario; name another file for the log", log.display());
-        }
-        match scenario.scalar {
-            ScalarKind::F32 => self.run_in::<f32>(&scenario),
-            ScalarKind::F64 => self.run_in::<f64>(&scenario),
+        Ok(())
+    }
+
+    fn options(&self) -> SessionOptions {
+        SessionOptions {
+            board: match (&self.port, &self.board) {
+                (Some(port), _) => Board::Daq(port.clone()),
+                (None, Some(port)) => Board::Controller(port.clone()),
+                (None, None) => Board::Simulated {
+                    faults: self.fault.clone(),
+                    seed: self.fault_seed,
+                    strict: self.strict,
+                },
+            },
+            baud: self.baud,
+            log: self.log.clone(),
+            uncertified: self.uncertified,
+            realtime: RealtimeOptions {
+                thread_priority: self.thread_priority,
+                lock_memory: self.lock_memory,
+                cpu_affinity: self.cpu_affinity,
+                wait: match self.wait {
+                    WaitArg::Sleep => WaitMode::Sleep,
+                    WaitArg::Spin => WaitMode::SleepSpin { spin_us: self.spin_us },
+                },
+            },
+            pace: match self.pace {
+                PaceArg::Sample => Pace::Sample,
+                PaceArg::Clock => Pace::Clock,
+            },
+            version: BUILD.to_owned(),
         }
     }
 
@@ -202,428 +234,44 @@ impl Loop {
         }
         print(text)
     }
-
-    fn run_in<T: Real>(&self, scenario: &Scenario) -> anyhow::Result<Outcome> {
-        let safety = scenario.safety()?;
-        let plan = scenario.plan()?;
-        let certified = plan.certificate.certified();
-        if !certified && !self.uncertified {
-            self.say(&crate::not_certified(scenario, &self.scenario))?;
-            return Ok(Outcome::NotCertified);
-        }
-        if let Some(log) = &self.log {
-            crate::new_log(log)?;
-        }
-        let stop = stop_flag()?;
-        // A log on a limited disk must end the log and not the loop.
-        let ignored = Arc::new(AtomicBool::new(false));
-        signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
-            .context("signals could not be caught")?;
-
-        // The board.
-        let (background, address) = match self.port.as_ref().or(self.board.as_ref()) {
-            Some(address) => (None, address.clone()),
-            None => {
-                let options = DaqOptions {
-                    faults: self.fault.clone(),
-                    seed: self.fault_seed,
-                    patient: !self.strict && !self.fault.iter().any(|f| f.kind.silences()),
-                    wait: WaitMode::Sleep,
-                };
-                let (board, address) = Background::start(scenario, options)?;
-                (Some(board), address)
-            }
-        };
-        let run =
-            Run { verb: self, scenario, address: &address, certified, safety, plan: &plan, stop: &stop };
-        let outcome = match &self.board {
-            None => run.on_board::<T>(),
-            Some(_) => run.on_controller(),
-        };
-        let board = background.map(Background::end).transpose();
-        let (report, log_line) = outcome?;
-        let board = board?;
-        let stopped = stop.load(Ordering::Relaxed);
-        let text = if self.json {
-            crate::json(&as_json(scenario, &report, certified, board.as_ref(), stopped))?
-        } else {
-            summary(scenario, &report, &log_line, board.as_ref(), (stopped, self.fault.len()))
-        };
-        print(&text)?;
-        Ok(if report.state == State::Faulted || report.port_error.is_some() {
-            Outcome::Fault
-        } else if stopped {
-            Outcome::Stopped
-        } else if !report.begun {
-            Outcome::Failed
-        } else if report.cause == Cause::Operator {
-            Outcome::Fault // nobody here has stopped it: the board has missed this machine
-        } else {
-            Outcome::Done
-        })
-    }
 }
 
-/// A run that has been checked, and where it is to go.
-struct Run<'a> {
-    verb: &'a Loop,
-    scenario: &'a Scenario,
-    address: &'a Address,
-    certified: bool,
-    safety: &'a clutch_sim::scenario::Safety,
-    plan: &'a clutch_sim::scenario::Plan,
-    stop: &'a Arc<AtomicBool>,
-}
-
-impl Run<'_> {
-    /// Opens the port, whose line carries frames of these lengths each cycle.
-    fn open(&self, frames: (usize, usize)) -> anyhow::Result<(Port, Vec<String>)> {
-        let options = SerialOptions { baud: self.verb.baud, low_latency: true };
-        let opened = Port::open(self.address, &options)?;
-        let (port, mut notes) = (opened.port, opened.notes);
-        let period = Duration::from_micros(u64::from(self.scenario.spec().period.0));
-        if port.kind().has_line_rate() {
-            notes.extend(port.check_baud(frames, period)?);
-        }
-        Ok((port, notes))
-    }
-
-    /// Whether encoder and converter are those of the scenario.
-    fn check(&self, hello: &Hello, port: &Port) -> anyhow::Result<()> {
-        let mut lines = setup::misfits(self.scenario, hello);
-        let simulated = hello.board == PATIENT_BOARD || hello.board == STRICT_BOARD;
-        let real = !matches!(port.kind(), DeviceKind::PseudoTerminal | DeviceKind::Tcp);
-        if simulated && real && self.verb.board.is_none() {
-            lines.push(format!(
-                "board: its serial number {} is kept for simulated boards; give it another",
-                hello.board
-            ));
-        }
-        if lines.is_empty() {
-            return Ok(());
-        }
-        let address = self.address.to_string();
-        Err(clutch_loop::preflight::PreflightError::Misfit { address, lines }.into())
-    }
-
-    /// A new run on a board with this clock: what it waits for when the clock waits.
-    fn setup<T: Real>(&self, hello: &Hello) -> anyhow::Result<Setup<T>> {
-        let mut setup = Setup::<T>::new(self.scenario, hello.run.wrapping_add(1).max(1))?;
-        if hello.board == PATIENT_BOARD {
-            // Its clock waits when this machine stalls, and so does our patience.
-            setup.control.silence = Micros(5_500_000);
-        }
-        Ok(setup)
-    }
-
-    /// The loop is closed here.
-    fn on_board<T: Real>(&self) -> anyhow::Result<(LoopReport, String)> {
-        // A sample and its answer, each cycle.
-        let (mut port, notes) = self.open((15, 20))?;
-        // Who is there?
-        let mut end = local(&Setup::<T>::new(self.scenario, 0)?, setup::path(self.scenario)?);
-        let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
-        self.check(&hello, &port)?;
-        let setup = self.setup::<T>(&hello)?;
-        let mut end = local(&setup, setup::path(self.scenario)?);
-        self.tell(&hello, &port, &notes)?;
-        let hold = setup.supervisor.safe_codes().hold;
-        let (log, ring, watch) = self.log(&setup, present_code(&hello, hold), &board_text(&hello))?;
-        // Consent was starting this command.
-        let mut talk = Talk::new(&mut port, &mut end);
-        talk.configure(present_code(&hello, hold))?;
-        let clock = talk.clock()?;
-        let (end, port) = (&mut end, &mut port);
-        let (ticks, detector, patient) = (setup.ticks, setup.detector, hello.board == PATIENT_BOARD);
-        let configured = Configured { end, port, ring, watch: &watch, patient, ticks, clock, detector };
-        self.drive(configured, log)
-    }
-
-    /// The loop is closed on the board.
-    fn on_controller(&self) -> anyhow::Result<(LoopReport, String)> {
-        // Telemetry each cycle; now and then a word to it.
-        let (mut port, notes) = self.open((0, clutch_wire::Telemetry::LENGTH + 2))?;
-        let remote = |setup: &Setup<f32>, patient: bool| -> anyhow::Result<_> {
-            let configure = ControlNode::new(setup.control, setup.servo, setup.supervisor).configuration();
-            let silence = if patient { 5_500_000_000 } else { BOARD_SILENCE_NS };
-            let node = RemoteNode::new(setup.servo, configure, ALIVE_NS, silence);
-            Ok(Remote { node, path: setup::path::<f32>(self.scenario)? })
-        };
-        let mut end = remote(&Setup::<f32>::new(self.scenario, 0)?, false)?;
-        let hello = Talk::new(&mut port, &mut end).discover(Duration::from_secs(2))?;
-        let clock_hz = end.node.controller().map_or(0, |c| c.clock_hz);
-        let text = end.node.controller().map_or_else(String::new, controller_text);
-        self.check(&hello, &port)?;
-        let setup = self.setup::<f32>(&hello)?;
-        let patient = hello.board == PATIENT_BOARD;
-        let host_silence = if patient { setup.control.silence } else { HOST_SILENCE };
-        let settings = setup::settings(self.scenario, &setup, host_silence, setup.ticks)?;
-        let mut end = remote(&setup, patient)?;
-        self.tell(&hello, &port, &notes)?;
-        self.verb.say(&format!("the loop is closed on the board: {text}\n"))?;
-        let hold = setup.supervisor.safe_codes().hold;
-        let (log, ring, watch) = self.log(&setup, present_code(&hello, hold), &text)?;
-        let mut talk = Talk::new(&mut port, &mut end);
-        talk.upload(&settings)?;
-        talk.configure(hold)?;
-        let clock = talk.clock()?;
-        let (end, port, detector) = (&mut end, &mut port, setup.detector);
-        let ticks = setup.ticks;
-        let configured = Configured { end, port, ring, watch: &watch, patient, ticks, clock, detector };
-        let (mut report, line) = self.drive(configured, log)?;
-        report.clock_hz = clock_hz;
-        Ok((report, line))
-    }
-
-    /// Says what will be done.
-    fn tell(&self, hello: &Hello, port: &Port, notes: &[String]) -> anyhow::Result<()> {
-        self.verb.say(&self.plan_text(hello, port.kind()))?;
-        for note in notes {
-            self.verb.say(&format!("note: {note}\n"))?;
-        }
-        Ok(())
-    }
-
-    /// The log before the board is armed: what cannot be logged is known before anything moves.
-    fn log<T: Real>(
-        &self,
-        setup: &Setup<T>,
-        present: DacCode,
-        board: &str,
-    ) -> anyhow::Result<(Option<LogThread>, Option<Ring>, Arc<Watch>)> {
-        let watch = Arc::new(Watch { stop: self.stop.clone(), ..Watch::default() });
-        let Some(path) = &self.verb.log else { return Ok((None, None, watch)) };
-        let address = self.address.to_string();
-        let mut header = setup::header(self.scenario, &setup.servo, Source::Loop, &address, crate::BUILD);
-        header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
-        header.extra.push(("board".to_owned(), board.to_owned()));
-        header.extra.push(("certified".to_owned(), self.certified.to_string()));
-        let (thread, ring) = LogThread::start(path, &header, watch.clone())?;
-        Ok((Some(thread), Some(ring), watch))
-    }
-
-    /// Runs it on a thread of its own, and shows where it stands.
-    fn drive<E: End + Send>(
-        &self,
-        configured: Configured<'_, E>,
-        log: Option<LogThread>,
-    ) -> anyhow::Result<(LoopReport, String)> {
-        let (verb, watch, ticks) = (self.verb, configured.watch, configured.ticks);
-        let spec = self.scenario.spec();
-        let spin_us = verb.spin_us;
-        let options = LoopOptions {
-            realtime: RealtimeOptions {
-                thread_priority: verb.thread_priority,
-                lock_memory: verb.lock_memory,
-                cpu_affinity: verb.cpu_affinity,
-                wait: match verb.wait {
-                    WaitArg::Sleep => WaitMode::Sleep,
-                    WaitArg::Spin => WaitMode::SleepSpin { spin_us },
-                },
-            },
-            pace: match verb.pace {
-                PaceArg::Sample => Pace::Sample,
-                PaceArg::Clock => Pace::Clock,
-            },
-            settle: spec.run.settle,
-            hooks: (|| (), || ()),
-        };
-        let show = std::io::stderr().is_terminal();
-        let report = std::thread::scope(|scope| {
-            let control = std::thread::Builder::new()
-                .name("clutch-control".to_owned())
-                .spawn_scoped(scope, move || run::run(configured, &options));
-            let control = control.context("the control thread could not be started")?;
-            let mut refused_told = false;
-            while !control.is_finished() {
-                if show {
-                    status(watch, spec.period.0, ticks);
-                }
-                if watch.log_ended.load(Ordering::Relaxed) && !refused_told {
-                    refused_told = true;
-                    let _ = writeln!(std::io::stderr(), "\nthe log has ended early; the loop goes on");
-                }
-                std::thread::sleep(Duration::from_millis(50));
-            }
-            if show {
-                let _ = write!(std::io::stderr(), "\r\x1b[K");
-            }
-            control.join().map_err(|_| anyhow::anyhow!("the control thread came to a bad end; the board's watchdog has put the brake into the safe state. Please report this as a defect"))
-        })?;
-        let mut line = match log.map(LogThread::finish) {
-            None => String::new(),
-            Some(Ok(summary)) => {
-                let path = verb.log.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
-                format!("log: {path}, {} records; clutch replay {path}\n", summary.records)
-            }
-            Some(Err(error)) => format!("log: {error}\n"),
-        };
-        for note in &report.notes {
-            line += &format!("note: {note}\n");
-        }
-        Ok((report, line))
-    }
-
-    fn plan_text(&self, hello: &Hello, kind: DeviceKind) -> String {
-        let Run { scenario, address, certified, safety, plan, .. } = *self;
-        let spec = scenario.spec();
-        let board = board_text(hello);
-        let safe = match safety.supervisor.on_fault {
-            SafeState::Hold { volts } => format!("hold with {} V", number(volts)),
-            SafeState::Ramp { volts_per_s, volts } => {
-                format!("ramp by {} V/s to {} V, and hold", number(volts_per_s), number(volts))
-            }
-            SafeState::Release => "release".to_owned(),
-            SafeState::HoldThenRelease { volts, after } => {
-                format!("hold with {} V for {} s, then release", number(volts), number(after))
-            }
-        };
-        let (boot, holds) = setup::boot_output(scenario, hello, plan);
-        let system = describe_system();
-        let mut text = format!("{}\n", scenario.name);
-        let mut row = |name: &str, value: String| text += &format!("  {name:<12}{value}\n");
-        row("port", format!("{address}, {}", kind.describe()));
-        row(
-            "board",
-            format!(
-                "{board}; {} counts/rev, {} bit, powers up at {} V",
-                hello.counts_per_rev,
-                hello.dac_bits,
-                number(boot)
-            ),
-        );
-        row("loop", format!("{} µs, answers due within {} µs", spec.period.0, safety.supervisor.deadline.0));
-        row(
-            "path",
-            format!(
-                "{} s, up to {} °/s",
-                number(spec.run.duration),
-                number(plan.envelope.velocity.to_degrees())
-            ),
-        );
-        row(
-            "gains",
-            if certified {
-                "certified for the bounds given".into()
-            } else {
-                "NOT certified; run all the same, as asked".into()
-            },
-        );
-        row("safe state", format!("{safe}: {}", safety.reason));
-        row("watchdog", format!("{} cycles on the board", safety.watchdog_cycles));
-        if let Some(first) = system.first() {
-            row("system", first.clone());
-        }
-        if !holds {
-            text += "note: the board powers up at a voltage that does not hold the shaft; set its power-up output to the safe state's\n";
-        }
-        if hello.board != PATIENT_BOARD && hello.board != STRICT_BOARD {
-            text +=
-                "note: a brake that a motor presses lets go when its power fails; no software changes that\n";
-        }
-        text
-    }
-}
-
-fn local<T: Real, P>(setup: &Setup<T>, path: P) -> Local<T, Law<T>, P> {
-    Local { node: ControlNode::new(setup.control, setup.servo, setup.supervisor), path }
-}
-
-fn controller_text(c: &clutch_wire::Controller) -> String {
-    let name =
-        if c.board <= STRICT_BOARD { "emulated".to_owned() } else { format!("number {:08x}", c.board) };
-    let clock =
-        if c.clock_hz > 0 { format!(", {} MHz", number(f64::from(c.clock_hz) / 1e6)) } else { String::new() };
-    format!("{name}{clock}")
-}
-
-fn board_text(hello: &Hello) -> String {
-    match hello.board {
-        PATIENT_BOARD => "simulated; its clock waits when this machine stalls".to_owned(),
-        STRICT_BOARD => "simulated, in real time".to_owned(),
-        serial => format!("number {serial:08x}"),
-    }
-}
-
-fn status(watch: &Watch, period_us: u32, ticks: u64) {
-    let time = |n: u64| n as f64 * f64::from(period_us) / 1e6;
-    let load = |a: &std::sync::atomic::AtomicI64| a.load(Ordering::Relaxed) as f64;
+fn status(p: &Progress) {
     let line = format!(
         "\r\x1b[K{:7.2} of {:.2} s   error {:+8.4}°   {:6.3} V   lost {}   late {}",
-        time(watch.tick.load(Ordering::Relaxed)),
-        time(ticks),
-        (load(&watch.error_nrad) * 1e-9).to_degrees(),
-        load(&watch.millivolts) / 1e3,
-        watch.lost.load(Ordering::Relaxed),
-        watch.late_answers.load(Ordering::Relaxed),
+        p.time,
+        p.duration,
+        p.error.to_degrees(),
+        p.volts,
+        p.lost,
+        p.late_answers,
     );
     let _ = std::io::stderr().write_all(line.as_bytes()); // a terminal that has gone away
 }
 
-/// What ended control, in words; `v` is what the check saw, `stopped` whether somebody here has stopped it.
-pub(crate) fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> String {
-    match cause {
-        Cause::Done => "the path is done".into(),
-        Cause::Operator if on_the_board && !stopped => {
-            "the board has not heard this machine for too long, and has ended the run".into()
-        }
-        Cause::Operator => "stopped by the operator".into(),
-        Cause::Lost => format!("{v} samples lost within 128 cycles"),
-        Cause::Late => "too many samples or answers came late".into(),
-        Cause::Duplicated => format!("{v} samples came twice within 128 cycles"),
-        Cause::Reordered => format!("{v} samples came out of order within 128 cycles"),
-        Cause::Jump => format!("the encoder jumped, by {v} counts at last"),
-        Cause::StandStill => format!(
-            "the encoder shows no movement, though the shaft must have gone {} °: encoder frozen, or shaft blocked",
-            number(v.to_degrees())
-        ),
-        Cause::FollowingError => format!("following error of {} °", number(v.to_degrees())),
-        Cause::Saturation => "the brake's voltage was at its limit for too long".into(),
-        Cause::NotFinite => "the law's demand was not a number".into(),
-        Cause::Deadline => format!("answers came too late, the last after {v} µs"),
-        // The board's own supervisor tells for how many periods.
-        Cause::Silence if on_the_board && v > 0.0 => "the board's encoder and converter fell silent".into(),
-        Cause::Silence => "the board fell silent".into(),
-        Cause::Board => match v as u8 {
-            1 => "the board's watchdog went off: it got no valid answer in time".into(),
-            2 => "the board sees no encoder".into(),
-            3 => "the board's converter does not follow".into(),
-            _ => "the board went to its safe state by itself".into(),
-        },
-        Cause::Target => {
-            "the path's target is not a number, or moves faster than rig.speed_limit_deg_s".into()
-        }
-        Cause::None => "control did not begin".into(),
-    }
-}
-
-fn summary(
-    scenario: &Scenario,
-    r: &LoopReport,
-    log_line: &str,
-    board: Option<&DaqReport>,
-    (stopped, faults): (bool, usize),
-) -> String {
+/// The summary of a session, as the command prints it.
+#[must_use]
+pub fn summary(s: &Summary) -> String {
+    let r = &s.report;
     let m = &r.metrics;
-    let deg = |x: f64| number(x.to_degrees());
     let us = |ns: u64| number(ns as f64 / 1e3);
     let latency = |s: &CycleSummary| {
         format!("{} / {} / {} / {}", us(s.p50_ns), us(s.p99_ns), us(s.p99_9_ns), us(s.max_ns))
     };
     let title = format!(
         "{}\n{} ticks; figures over {} s after settling, from the encoder",
-        scenario.name,
+        s.scenario,
         r.ticks,
         number(m.measured_s)
     );
     let mut text = quantities(
         &title,
         &[
-            ("max |error|", deg(m.max_error_rad), "°"),
-            ("RMS error", deg(m.rms_error_rad), "°"),
-            ("mean error (target − position)", deg(m.mean_error_rad), "°"),
-            ("stick-slip seen by the encoder", number(m.stick_slip_cycles_per_s), "cycles/s"),
-            ("voltage variation", number(m.control_variation_v_s), "V/s"),
+            row(&Metrics::MAX_ERROR, m),
+            row(&Metrics::RMS_ERROR, m),
+            row(&Metrics::MEAN_ERROR, m),
+            (Detected::STICK_SLIP.label, number(m.stick_slip_cycles_per_s), Detected::STICK_SLIP.shown_unit),
+            row(&Metrics::VARIATION, m),
             ("samples received", r.link.received.to_string(), ""),
             ("samples lost", r.lost.to_string(), ""),
             (
@@ -638,114 +286,9 @@ fn summary(
             ("cycle time p50 / p99 / p99.9 / max", latency(&r.interval), "µs"),
         ],
     );
-    if r.clock_hz > 0 {
-        let us = |cycles: u64| number(cycles as f64 * 1e6 / f64::from(r.clock_hz));
-        let c = &r.tick_cycles;
-        text += &format!(
-            "a tick on the board p50 / p99.9 / max: {} / {} / {} clock cycles, {} / {} / {} µs\n",
-            c.p50_ns,
-            c.p99_9_ns,
-            c.max_ns,
-            us(c.p50_ns),
-            us(c.p99_9_ns),
-            us(c.max_ns)
-        );
+    for line in s.remarks() {
+        text += &line;
+        text.push('\n');
     }
-    if r.untold > 0 {
-        text += &format!(
-            "{} cycles of the board did not reach this machine; they are missing in the log\n",
-            r.untold
-        );
-    }
-    if r.log_dropped > 0 {
-        text += &format!("the log dropped {} records: its thread did not keep up\n", r.log_dropped);
-    }
-    if r.cut_writes > 0 {
-        text += &format!("the line took {} frames only in part: its buffer was full\n", r.cut_writes);
-    }
-    if let Some(board) = board
-        && board.waits > 0
-    {
-        text += &format!(
-            "the simulated board's clock waited {} times for the loop, {:.3} s in all: this machine stalled\n",
-            board.waits, board.waited
-        );
-    }
-    if board.is_some_and(|b| b.hits == 0) && faults > 0 {
-        text += "the fault that was asked for had not begun\n";
-    }
-    text += log_line;
-    if let Some(error) = &r.port_error {
-        text += &format!("{error}\n");
-    }
-    let safe = match (r.state, r.board_safe) {
-        (State::Released, true) => "the brake is released",
-        (_, true) => "the board is in its safe state",
-        (_, false) if r.on_the_board => {
-            "the board did not confirm its safe state; it goes there by itself when it misses this machine"
-        }
-        (_, false) => "the board did not confirm its safe state; its watchdog takes it there",
-    };
-    if !r.begun && r.state != State::Faulted {
-        if r.cause == Cause::None && stopped {
-            return text + "stopped before the board was armed; its output is as it was\n";
-        }
-        if stopped {
-            return text + &format!("stopped before the board said that it was armed; {safe}\n");
-        }
-        return text
-            + &match &r.refused {
-                Some(m) => format!("the board was not armed: {}\n", clutch_loop::preflight::why(m)),
-                None => format!("the board did not say that it was armed; {safe}\n"),
-            };
-    }
-    let missed = r.cause == Cause::Operator && !stopped;
-    let fault = if r.state == State::Faulted || missed { "FAULT: " } else { "" };
-    text += &format!("{fault}{}; {safe}\n", cause_text(r.cause, r.value, r.on_the_board, stopped));
     text
-}
-
-fn as_json(
-    scenario: &Scenario,
-    r: &LoopReport,
-    certified: bool,
-    board: Option<&DaqReport>,
-    stopped: bool,
-) -> serde_json::Value {
-    let latency = |s: &CycleSummary| {
-        serde_json::json!({
-            "p50_us": s.p50_ns as f64 / 1e3, "p99_us": s.p99_ns as f64 / 1e3,
-            "p99_9_us": s.p99_9_ns as f64 / 1e3, "max_us": s.max_ns as f64 / 1e3, "count": s.count,
-        })
-    };
-    serde_json::json!({
-        "scenario": scenario.name,
-        "version": env!("CARGO_PKG_VERSION"),
-        "state": format!("{:?}", r.state),
-        "cause": format!("{:?}", r.cause),
-        "cause_text": cause_text(r.cause, r.value, r.on_the_board, stopped),
-        "value": r.value,
-        "certified": certified,
-        "ticks": r.ticks,
-        "metrics": r.metrics,
-        "samples": {
-            "received": r.link.received, "lost": r.lost, "late": r.link.late, "duplicated": r.link.duplicated,
-            "reordered": r.link.reordered, "implausible": r.implausible,
-        },
-        "bad_frames": r.link.bad_frames,
-        "deadline_misses": r.deadline_misses,
-        "response": latency(&r.response),
-        "cycle": latency(&r.interval),
-        "tick_clock_cycles": (r.clock_hz > 0).then(|| serde_json::json!({
-            "clock_hz": r.clock_hz, "p50": r.tick_cycles.p50_ns, "p99_9": r.tick_cycles.p99_9_ns,
-            "max": r.tick_cycles.max_ns,
-        })),
-        "untold": r.untold,
-        "log_dropped": r.log_dropped,
-        "cut_writes": r.cut_writes,
-        "board_safe": r.board_safe,
-        "board_waits": board.map(|b| b.waits),
-        "port_error": r.port_error,
-        "notes": r.notes,
-    })
 }

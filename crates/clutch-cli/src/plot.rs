@@ -1,8 +1,8 @@
 //! Drawings of curves, as SVG and PNG.
 //!
 //! A [`Figure`] is a grid of [`Panel`]s, each with its own axes. One layout serves both
-//! formats. Nothing of the machine goes in – no font, no clock, no random number – so the same
-//! data give the same bytes.
+//! formats. It uses nothing of the machine – no font, no clock, no random number – so the same data
+//! give the same bytes.
 //!
 //! A curve is drawn from at most four of its points per pixel column: the first, the lowest, the
 //! highest and the last of those that follow one another in the column. The envelope of a curve of
@@ -41,7 +41,7 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Ends of the vertical axis; none, or no interval = from the data and the guide lines.
     pub y_range: Option<(f64, f64)>,
-    /// Whether a value holds until the next one: stairs instead of straight lines.
+    /// True if a value holds until the next one: stairs instead of straight lines.
     pub step: bool,
     /// Heights of dashed horizontal guide lines.
     pub lines: Vec<f64>,
@@ -127,32 +127,32 @@ impl Figure {
     /// Another ending, as [`svg`](Self::svg) and [`png`](Self::png), or the file cannot be written; the
     /// file is named.
     pub fn save(&self, path: &Path) -> anyhow::Result<()> {
-        let bytes = match check_ending(path)? {
-            Ending::Svg => self.svg()?.into_bytes(),
-            Ending::Png => self.png()?,
+        let bytes = match figure_format(path)? {
+            FigureFormat::Svg => self.svg()?.into_bytes(),
+            FigureFormat::Png => self.png()?,
         };
         std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
     }
 }
 
-/// How a figure is kept.
+/// The format of a figure's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
+pub enum FigureFormat {
     /// `.svg`
     Svg,
     /// `.png`
     Png,
 }
 
-/// What the name of a figure's file asks for.
+/// The format that the name of a figure's file requests.
 ///
 /// # Errors
 /// An ending other than `.svg` and `.png`; the file is named.
-pub fn check_ending(path: &Path) -> anyhow::Result<Ending> {
+pub fn figure_format(path: &Path) -> anyhow::Result<FigureFormat> {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     match ending.as_deref() {
-        Some("svg") => Ok(Ending::Svg),
-        Some("png") => Ok(Ending::Png),
+        Some("svg") => Ok(FigureFormat::Svg),
+        Some("png") => Ok(FigureFormat::Png),
         _ => bail!("cannot draw {}: the name of a figure must end in .svg or .png", path.display()),
     }
 }
@@ -163,7 +163,7 @@ const PANEL: (f64, f64) = (600.0, 350.0);
 const LARGEST: f64 = 21e6;
 /// 192 dpi.
 const PIXELS_PER_METRE: u32 = 7559;
-/// Beyond this a value is no datum: squares and differences stay finite.
+/// Beyond this a value is not a datum: squares and differences stay finite.
 const BEYOND: f64 = 1e150;
 
 const FAMILY: &str = "DejaVu Sans, sans-serif";
@@ -314,7 +314,7 @@ impl Axis {
         Some("×10".chars().chain(raised).collect())
     }
 
-    /// Where a value lies: 0 at the lower end, 1 at the upper.
+    /// Position of a value: 0 at the lower end, 1 at the upper.
     fn share(&self, value: f64) -> f64 {
         ((value - self.lo) / (self.hi - self.lo)).clamp(-1e4, 1e4)
     }
@@ -388,7 +388,7 @@ struct Area {
 struct Placed {
     x: Axis,
     y: Axis,
-    /// Where the curves go.
+    /// Area of the curves.
     area: Area,
     /// Baseline of the title.
     title: f64,
@@ -410,7 +410,7 @@ struct Entry {
     left: f64,
 }
 
-/// Where everything goes.
+/// Places of all parts.
 #[derive(Clone, Debug)]
 struct Layout {
     /// Size of the figure, px.
@@ -531,8 +531,8 @@ fn legend(panel: &Panel, width: f64) -> anyhow::Result<Vec<Entry>> {
     Ok(entries)
 }
 
-/// Of points in px, those that decide the picture: of each run within one pixel column the first,
-/// the lowest, the highest and the last.
+/// The points in px that decide the picture: the first, the lowest, the highest and the last of
+/// each run within one pixel column.
 fn decimate(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
     let mut rest = points;
@@ -570,7 +570,7 @@ fn clip(a: (f64, f64), b: (f64, f64), area: Area) -> Option<((f64, f64), (f64, f
     (enter <= leave).then(|| (at(enter), at(leave)))
 }
 
-/// What a curve looks like in px.
+/// A curve's shape in px.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Trail {
     /// Connected lines.
@@ -620,7 +620,7 @@ impl Trail {
     }
 }
 
-/// What a drawing is made of.
+/// The elements of a drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// Lines and texts.
@@ -750,11 +750,12 @@ impl<DB: DrawingBackend> Canvas<DB> {
         if text.is_empty() {
             return Ok(());
         }
-        // Control characters are no part of XML.
+        // Control characters are not part of XML.
         let text = &text.replace(char::is_control, " ");
         let em = self.units(size);
         if self.kind == Kind::Vector {
-            // To plotters a font's size is 1.24 em, and the top of a text 0.76 em above its baseline.
+            // For plotters, a font's size is 1.24 em, and the top of a text 0.76 em above its
+            // baseline.
             let mut font = FontDesc::new(FontFamily::Name(FAMILY), 1.24 * em, FontStyle::Normal);
             let ascent = 0.76 * size;
             let (mut x, mut y) = at;
@@ -776,7 +777,7 @@ impl<DB: DrawingBackend> Canvas<DB> {
         };
         let at = (self.units(at.0), self.units(at.1));
         for mut glyph in glyphs {
-            // The space between letters is no whole number of pixels, and need not be.
+            // The space between letters is not a whole number of pixels, and need not be.
             glyph.position.x += start + if upwards { -at.1 } else { at.0 } as f32;
             glyph.position.y += if upwards { at.0 } else { at.1 } as f32;
             let Some(letter) = font.outline_glyph(glyph) else { continue };

@@ -1,8 +1,9 @@
 //! `clutch replay`.
 
+use crate::args::key_value;
+use crate::output::{BUILD, Exit, print};
 use crate::plot::{self, Figure, Panel, Series};
 use crate::table::{number, quantities};
-use crate::{Outcome, key_value, print};
 use clap::Args;
 use clutch_log::{CommandRecord, Limits, Log};
 use clutch_loop::replay::replay;
@@ -11,8 +12,8 @@ use std::path::PathBuf;
 
 /// Feeds a log's encoder counts to its law again and compares every output bit for bit.
 ///
-/// With --set the law gets other parameters: an open-loop replay, which answers what those would
-/// have commanded on the same counts, not how the shaft would have moved.
+/// With --set the law gets other parameters: an open-loop replay, which gives the commands that
+/// those would have caused on the same counts, and does not predict the motion of the shaft.
 ///
 /// Exit code 0: identical, or replayed with --set; 3: the outputs differ.
 #[derive(Args)]
@@ -32,9 +33,9 @@ pub(crate) struct Replay {
 }
 
 impl Replay {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         if let Some(file) = &self.plot {
-            plot::check_ending(file)?;
+            plot::figure_format(file)?;
         }
         let log = clutch_log::read(&self.log, &Limits::default())?;
         let origin = format!("{}: its scenario", self.log.display());
@@ -46,37 +47,36 @@ impl Replay {
         let n = replayed.commands.len();
         let mut text = String::new();
         if !log.complete {
-            text += "the log was cut; what is readable is replayed\n";
+            text += "the log was cut; its readable part is replayed\n";
         }
         if replayed.dropped > 0 {
             text += &format!(
-                "the log dropped {} records; a difference after the first gap says nothing of the law\n",
+                "the log dropped {} records; a difference after the first gap proves nothing about the law\n",
                 replayed.dropped
             );
         }
         if !self.set.is_empty() {
             text += &compare(&log.commands, &replayed.commands);
             print(&text)?;
-            return Ok(Outcome::Done);
+            return Ok(Exit::Done);
         }
         let outcome = match &replayed.first {
             None => {
                 text += &format!("identical over {n} ticks\n");
-                Outcome::Done
+                Exit::Done
             }
             Some(d) => {
                 text += &format!(
                     "differs: tick {}, {}: logged {:?}, replayed {:?}\n",
                     d.tick, d.field, d.logged, d.replayed
                 );
-                if log.header.version != crate::BUILD {
+                if log.header.version != BUILD {
                     text += &format!(
                         "the log was written by version {}, this is {}\n",
-                        log.header.version,
-                        crate::BUILD
+                        log.header.version, BUILD
                     );
                 }
-                Outcome::Fault
+                Exit::Fault
             }
         };
         print(&text)?;

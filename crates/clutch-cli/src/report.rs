@@ -1,4 +1,4 @@
-//! What came out, as a page to read and as a table for a terminal.
+//! The results, as a page to read and as a table for a terminal.
 
 use clutch_sim::paper::Claim;
 use comfy_table::{ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle, Width};
@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 pub struct ReportFigure {
     /// Short name, unique in the page: the figure's anchor is `#figure-` and this name.
     pub id: String,
-    /// What the figure shows, in words that also serve who cannot see it.
+    /// The content of the figure, in words that also serve readers who cannot see it.
     pub caption: String,
     /// The drawing, put into the page as it is: from [`Figure::svg`](crate::plot::Figure::svg), whose
     /// elements have no ids that could clash.
@@ -65,8 +65,8 @@ pub fn html(
     page.0
 }
 
-/// The claims as a table of at most 100 columns, in plain text. The band has the unit of what was
-/// measured.
+/// The claims as a table of at most 100 columns, in plain text. The band has the unit of the
+/// measurement.
 #[must_use]
 pub fn claims_table(claims: &[Claim]) -> String {
     let rule = LineStyle::none().fill('─').junction('─');
@@ -82,7 +82,7 @@ pub fn claims_table(claims: &[Claim]) -> String {
         let paper = format!("{}{fitted}", claim.paper.replace(" °", "\u{a0}°").replace(" %", "\u{a0}%"));
         table.add_row([claim.id, &paper, &measured(claim), &range(claim.band), Verdict::of(claim).text()]);
     }
-    // The statement takes what the others leave.
+    // The statement takes the width that the others leave.
     for (number, width) in [(0, 24), (1, 0), (2, 18), (3, 18), (4, 14)] {
         if let Some(column) = table.column_mut(number) {
             column.set_padding((0, 1));
@@ -94,7 +94,7 @@ pub fn claims_table(claims: &[Claim]) -> String {
     table.trim_fmt().replace('\u{a0}', " ")
 }
 
-/// What a claim comes to.
+/// The verdict on a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Verdict {
     Holds,
@@ -162,7 +162,8 @@ fn inside(value: f64, band: [Option<f64>; 2]) -> bool {
     band[0].is_none_or(|lo| value >= lo) && band[1].is_none_or(|hi| value <= hi)
 }
 
-/// What was measured: four digits, and more if these would put it on the other side of the band's end.
+/// The measurement: four digits, and more if these would put it on the other side of the band's
+/// end.
 fn measured(claim: &Claim) -> String {
     if claim.measured.is_nan() {
         return number(claim.measured, 4);
@@ -280,7 +281,7 @@ impl Page {
         let Some((header, rows)) = rows.split_first() else { return };
         self.raw("<div class=\"scroll\" role=\"region\" aria-labelledby=\"table-3\" tabindex=\"0\">\n");
         self.raw("<table class=\"narrow\">\n");
-        self.element("caption", "", "Table 3 of the paper, and what came out here.");
+        self.element("caption", "", "Table 3 of the paper, and the results here.");
         self.raw("<thead>\n<tr>\n");
         for (column, name) in header.iter().enumerate() {
             self.element(
@@ -314,7 +315,7 @@ impl Page {
     }
 
     fn settings(&mut self, settings: &[(String, String)]) {
-        self.raw("<table class=\"narrow\">\n").element("caption", "", "What the runs were made with.");
+        self.raw("<table class=\"narrow\">\n").element("caption", "", "The settings of the runs.");
         self.raw(
             "<thead>\n<tr>\n<th scope=\"col\">setting</th>\n<th scope=\"col\">value</th>\n</tr>\n</thead>\n",
         );

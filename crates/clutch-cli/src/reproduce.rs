@@ -1,11 +1,12 @@
 //! `clutch reproduce`.
 
+use crate::output::{Exit, json, print, with_progress, write};
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{ReportFigure, claims_table, html};
 use crate::table::number;
-use crate::{Outcome, json, print, with_progress, write};
 use anyhow::Context;
 use clap::Args;
+use clutch_core::FrictionParams;
 use clutch_sim::paper::{self, FigureData, SEEDS, Table3Row};
 use std::path::PathBuf;
 
@@ -16,13 +17,13 @@ use std::path::PathBuf;
 #[command(after_help = "Example:\n  clutch reproduce --out reproduce\n\n\
     Then open reproduce/report.html in a browser.")]
 pub(crate) struct Reproduce {
-    /// Folder for figures, table and report; made if it is not there.
+    /// Folder for figures, table and report; created if missing.
     #[arg(long, value_name = "DIR", default_value = "reproduce")]
     out: PathBuf,
 }
 
 impl Reproduce {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let dir = &self.out;
         std::fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
         let outcome = with_progress("runs", paper::reproduce)?;
@@ -71,7 +72,7 @@ impl Reproduce {
             claims_table(&outcome.claims),
             dir.display()
         ))?;
-        Ok(if unexpected.is_empty() { Outcome::Done } else { Outcome::Failed })
+        Ok(if unexpected.is_empty() { Exit::Done } else { Exit::Failed })
     }
 }
 
@@ -130,7 +131,6 @@ fn intro() -> Vec<String> {
 fn settings() -> Vec<(String, String)> {
     let row = |a: &str, b: String| (a.to_owned(), b);
     let bench = clutch_sim::RigParams::bench();
-    let f = bench.friction;
     vec![
         row("Version", env!("CARGO_PKG_VERSION").to_owned()),
         row(
@@ -142,12 +142,14 @@ fn settings() -> Vec<(String, String)> {
         row("Seeds", format!("{SEEDS:?}")),
         row(
             "Bench: friction",
-            format!(
-                "mu_s {}, mu_d {}, Stribeck velocity {} rad/s",
-                number(f.mu_static),
-                number(f.mu_dynamic),
-                number(f.stribeck_velocity)
-            ),
+            match bench.friction {
+                FrictionParams::Stribeck(f) => format!(
+                    "mu_s {}, mu_d {}, Stribeck velocity {} rad/s",
+                    number(f.mu_static),
+                    number(f.mu_dynamic),
+                    number(f.stribeck_velocity)
+                ),
+            },
         ),
         row(
             "Bench: along the disc",

@@ -1,16 +1,16 @@
 //! `clutch scenario`.
 
-use crate::{Outcome, print};
+use crate::output::{Exit, json, print};
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use clutch_sim::scenario::{BUILT_IN, BuiltIn};
+use clutch_sim::scenario::{BUILT_IN, BuiltIn, schema};
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Hands out the built-in scenarios.
+/// Lists, prints and copies the built-in scenarios; prints the schema with which editors complete a file.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml"
+    after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml\n  clutch scenario schema > scenario.schema.json"
 )]
 pub(crate) struct ScenarioVerb {
     #[command(subcommand)]
@@ -19,16 +19,16 @@ pub(crate) struct ScenarioVerb {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Lists their names and titles.
+    /// Lists the names and titles of the built-in scenarios.
     #[command(after_help = "Example:\n  clutch scenario list")]
     List,
-    /// Prints one.
+    /// Prints a built-in scenario.
     #[command(after_help = "Example:\n  clutch scenario show smc_2 > mine.toml")]
     Show {
         /// Its name.
         name: String,
     },
-    /// Writes one to a new file, as a beginning of your own.
+    /// Writes a built-in scenario to a new file, as the start of your own.
     #[command(after_help = "Example:\n  clutch scenario new mine.toml --from bench_pd_2")]
     New {
         /// The file, which must not exist yet.
@@ -37,6 +37,9 @@ enum Verb {
         #[arg(long, value_name = "NAME", default_value = "smc_2")]
         from: String,
     },
+    /// Prints the JSON Schema of scenario files, with which editors complete and check them.
+    #[command(after_help = "Example:\n  clutch scenario schema > scenario.schema.json")]
+    Schema,
 }
 
 fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
@@ -47,7 +50,7 @@ fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
 }
 
 impl ScenarioVerb {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         match self.verb {
             Verb::List => {
                 let lines: Vec<String> = BUILT_IN
@@ -59,17 +62,18 @@ impl ScenarioVerb {
                     .collect();
                 print(&(lines.join("\n") + "\n"))?;
             }
+            Verb::Schema => print(&json(&schema())?)?,
             Verb::Show { name } => print(find(&name)?.toml)?,
             Verb::New { file, from } => {
                 let text = find(&from)?.toml;
                 let shown = file.display();
-                // Never over a file that is there.
+                // An existing file is never overwritten.
                 let mut out = std::fs::File::create_new(&file)
                     .with_context(|| format!("{shown}: cannot be created"))?;
                 out.write_all(text.as_bytes()).with_context(|| format!("{shown}: cannot be written"))?;
                 print(&format!("wrote {shown}; run it with: clutch sim {shown}\n"))?;
             }
         }
-        Ok(Outcome::Done)
+        Ok(Exit::Done)
     }
 }

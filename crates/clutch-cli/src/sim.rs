@@ -1,20 +1,20 @@
 //! `clutch sim`.
 
+use crate::args::ScenarioArgs;
+use crate::output::{BUILD, Exit, json, new_log, print, with_progress};
 use crate::plot::{self, Figure, Panel, Series};
-use crate::table::{number, quantities};
-use crate::{Outcome, ScenarioArgs, json, print};
+use crate::table::{number, quantities, row};
 use anyhow::Context;
 use clap::Args;
-use clutch_loop::records;
+use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
-use clutch_sim::metrics::Reaching;
-use clutch_sim::run::Detected;
-use clutch_sim::scenario::ScalarKind;
+use clutch_sim::metrics::Detected;
+use clutch_sim::reaching::Reaching;
 use clutch_sim::{Keep, Metrics, Run, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Simulates a scenario and prints how well the shaft followed its path.
+/// Simulates a scenario and prints figures of the shaft's motion along its path.
 #[derive(Args)]
 #[command(after_help = "Example:\n  clutch sim smc_2 --set law.smc.kp_v=4 --csv run.csv --plot run.svg\n\n\
     Columns of the CSV are in SI units and radians; docs/scenario.md explains them.")]
@@ -39,8 +39,8 @@ pub(crate) struct Sim {
 struct Summary<'a> {
     scenario: &'a str,
     version: &'static str,
-    engine: EngineKind,
-    scalar: ScalarKind,
+    engine: &'static str,
+    scalar: &'static str,
     seed: u64,
     metrics: Metrics,
     detected: &'a Detected,
@@ -60,9 +60,9 @@ struct Path {
 }
 
 impl Sim {
-    pub(crate) fn run(self) -> anyhow::Result<Outcome> {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
         if let Some(file) = &self.plot {
-            plot::check_ending(file)?; // before a long run, not after
+            plot::figure_format(file)?; // before a long run, not after
         }
         let files = [Some(&self.scenario.scenario), self.csv.as_ref(), self.plot.as_ref(), self.log.as_ref()];
         let files: Vec<&PathBuf> = files.into_iter().flatten().collect();
@@ -75,25 +75,25 @@ impl Sim {
             }
         }
         if let Some(log) = &self.log {
-            crate::new_log(log)?;
+            new_log(log)?;
         }
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
-        let run = crate::with_progress("samples", |progress| scenario.run(Keep::Trace, progress))?;
+        let run = with_progress("samples", |progress| scenario.run(Keep::Trace, progress))?;
         if let Some(file) = &self.csv {
             csv(&run, file)?;
         }
         if let Some(file) = &self.log {
-            records::save_simulation(file, &scenario, &run, crate::BUILD)?;
+            to_log::save_simulation(file, &scenario, &run, BUILD)?;
         }
         if let Some(file) = &self.plot {
             figure(&scenario, &run).save(file)?;
         }
         let summary = Summary {
-            scenario: &scenario.name,
+            scenario: scenario.name(),
             version: env!("CARGO_PKG_VERSION"),
-            engine: run.engine,
-            scalar: scenario.scalar,
+            engine: run.engine.name(),
+            scalar: scenario.scalar().name(),
             seed: scenario.spec().run.seed,
             metrics: run.metrics,
             detected: &run.detected,
@@ -109,53 +109,38 @@ impl Sim {
             rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
         };
         print(&if self.json { json(&summary)? } else { text(&summary, &run) })?;
-        Ok(Outcome::Done)
+        Ok(Exit::Done)
     }
 }
 
-/// The same place, also by another way of writing it.
+/// True for the same place, even if it is written differently.
 fn same_file(a: &PathBuf, b: &PathBuf) -> bool {
     a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// The figures of the shaft's true motion: name, value, unit.
+/// The figures of the shaft's true motion, but for the time over which they were taken.
 pub(crate) fn figures(m: &Metrics) -> Vec<(&'static str, String, &'static str)> {
-    let deg = |x: f64| number(x.to_degrees());
-    let optional = |x: Option<f64>| x.map_or("–".to_owned(), number);
-    vec![
-        ("max |error|", deg(m.max_error_rad), "°"),
-        ("RMS error", deg(m.rms_error_rad), "°"),
-        ("mean error (target − position)", deg(m.mean_error_rad), "°"),
-        ("integral of |error|", deg(m.iae_rad_s), "° s"),
-        ("stick-slip", number(m.stick_slip_cycles_per_s), "cycles/s"),
-        ("time stuck", number(100.0 * m.stick_time_fraction), "%"),
-        ("stair height", deg(m.stair_height_rad), "°"),
-        ("torque at break-away", optional(m.break_away_torque_nm.map(|t| 1e3 * t)), "mN m"),
-        ("voltage variation", number(m.control_variation_v_s), "V/s"),
-        ("jerk RMS", number(m.jerk_rms_rad_s3), "rad/s³"),
-    ]
+    Metrics::FIGURES.iter().filter(|f| f.name != Metrics::MEASURED.name).map(|f| row(f, m)).collect()
 }
 
 fn text(s: &Summary<'_>, run: &Run) -> String {
     let m = &s.metrics;
-    let scalar = match s.scalar {
-        ScalarKind::F32 => "f32",
-        ScalarKind::F64 => "f64",
-    };
-    let engine = match s.engine {
+    let engine = match run.engine {
         EngineKind::ExactFlow => "exact flow",
         EngineKind::DormandPrince | EngineKind::Auto => "Dormand–Prince",
     };
     let title = format!(
-        "{}\n{} ticks, seed {}, servo in {scalar}, engine {engine}; figures over {} s after settling",
+        "{}\n{} ticks, seed {}, servo in {}, engine {engine}; figures over {} s after settling",
         s.scenario,
         run.trace.time.len(),
         s.seed,
+        s.scalar,
         number(m.measured_s)
     );
     let mut rows = figures(m);
-    let seen = number(s.detected.stick_slip_cycles_per_s);
-    rows.insert(5, ("stick-slip seen by the encoder", seen, "cycles/s"));
+    // Beside what it was in truth.
+    let truth = rows.iter().position(|(label, ..)| *label == Metrics::STICK_SLIP.label);
+    rows.insert(truth.map_or(0, |i| i + 1), row(&Detected::STICK_SLIP, s.detected));
     if let Some(time) = s.reaching.time_s {
         rows.push(("sliding surface reached after", number(time), "s"));
         if let Some(bound) = s.reaching.bound_s {
@@ -237,7 +222,7 @@ fn figure(scenario: &Scenario, run: &Run) -> Figure {
         lines: Vec::new(),
     };
     Figure {
-        title: scenario.name.clone(),
+        title: scenario.name().to_owned(),
         columns: 1,
         panels: vec![
             panel("Position error", "error (°)", vec![over_time("error", &t.error, degrees)], false),

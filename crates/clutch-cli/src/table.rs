@@ -1,5 +1,7 @@
 //! Plain tables for a terminal.
 
+pub(crate) use clutch_loop::summary::number;
+use clutch_sim::metrics::Figure;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
 
 /// Rows of name, value and unit, under a title.
@@ -23,12 +25,7 @@ pub(crate) fn quantities(title: &str, rows: &[(&str, String, &str)]) -> String {
     text
 }
 
-/// A number with about five significant digits.
-pub(crate) fn number(x: f64) -> String {
-    if x == 0.0 {
-        return "0".into();
-    }
-    let digits = (4.0 - x.abs().log10().floor()).clamp(0.0, 12.0) as usize;
-    let text = format!("{x:.digits$}");
-    if digits == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
+/// A figure as a row of [`quantities`]: in words, its value, its unit.
+pub(crate) fn row<M>(figure: &Figure<M>, m: &M) -> (&'static str, String, &'static str) {
+    (figure.label, figure.shown(m).map_or("–".to_owned(), number), figure.shown_unit)
 }

@@ -6,7 +6,7 @@
 //! ```
 #![cfg_attr(not(test), no_std)]
 
-use clutch_core::law::{Controller, CtcParams, Law, LawParams, OutputParams};
+use clutch_core::law::{ControlLaw, CtcParams, Law, LawParams, OutputParams};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
     Counts, DacCode, Encoder, FixedCounts, ParamError, PlantParams, Servo, ServoParams, ServoState,
@@ -20,7 +20,8 @@ fn model() -> PlantParams<f32> {
         mu_dynamic: 0.26,
         stribeck_velocity: 0.02, // rad/s
         ..StribeckParams::default()
-    };
+    }
+    .into();
     PlantParams { inertia: 0.0042, drive_torque: 0.11, brake_gain: 0.09, friction, ..PlantParams::default() }
 }
 
@@ -28,7 +29,7 @@ fn model() -> PlantParams<f32> {
 pub struct Control {
     servo: Servo<f32>,
     path: Reference<'static, f32>,
-    state: ServoState<f32, <Law<f32> as Controller<f32>>::State>,
+    state: ServoState<f32, <Law<f32> as ControlLaw<f32>>::State>,
     tick: u64,
 }
 
@@ -43,10 +44,10 @@ impl Control {
         let servo = Servo::<f32>::new(&ServoParams {
             model: model(),
             // The driver of this brake ends at 8 V; on a demand that is not a number it brakes fully, too.
-            output: OutputParams { highest: 8.0, on_invalid: 8.0, ..OutputParams::default() },
+            output: OutputParams::within(0.0, 8.0),
             ..ServoParams::paper(LawParams::Ctc(CtcParams::default()))
         })?;
-        let path = ReferenceParams::Ramp(2.0_f32.to_radians());
+        let path = ReferenceParams::ramp(2.0_f32.to_radians());
         let from = FixedCounts::from_counts(i64::from(counts.0));
         let path = Reference::new(&path, from, Encoder::PAPER, servo.period())?;
         let state = servo.start(counts, &path.at(0), applied);

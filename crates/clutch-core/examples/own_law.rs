@@ -5,9 +5,7 @@
 //! ```
 #![allow(clippy::std_instead_of_core, clippy::float_cmp_const, reason = "it runs on the host")]
 
-use clutch_core::law::{
-    Command, Controller, LawParams, Output, OutputParams, PdParams, SmcParams, Terms, Tick,
-};
+use clutch_core::law::{Command, ControlLaw, LawParams, Output, OutputParams, PdParams, SmcParams, Tick};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{Counts, FixedCounts, Micros, ParamError, Plant, PlantParams, Servo, ServoParams};
 
@@ -23,39 +21,24 @@ struct SuperTwisting {
     output: Output<f64>,
 }
 
-#[derive(Clone, Copy, Default)]
-struct SuperTwistingTerms {
-    /// `σ`, rad/s.
-    surface: f64,
-    /// `−k √|σ| sgn σ`, V.
-    root: f64,
-    /// `−w`, V.
-    integral: f64,
-}
-
-impl Terms<f64> for SuperTwistingTerms {
-    fn columns(&self) -> [(&'static str, f64); 3] {
-        [("surface_rad_s", self.surface), ("root_v", self.root), ("integral_v", self.integral)]
-    }
-}
-
-impl Controller<f64> for SuperTwisting {
+impl ControlLaw<f64> for SuperTwisting {
     /// `−w`, V.
     type State = f64;
-    type Terms = SuperTwistingTerms;
+    type Terms = [f64; 3];
+    const TERMS: &'static [&'static str] = &["surface_rad_s", "root_v", "integral_v"];
 
     fn start(&self, _: &Tick<f64>, applied: f64) -> f64 {
         applied // without a bump
     }
 
-    fn update(&self, integral: &mut f64, tick: &Tick<f64>) -> Command<f64, SuperTwistingTerms> {
+    fn update(&self, integral: &mut f64, tick: &Tick<f64>) -> Command<f64, [f64; 3]> {
         let surface = self.slope * tick.error + tick.error_rate;
         let root = -self.root * surface.abs().sqrt().copysign(surface);
         let (voltage, limit) = self.output.apply(&mut Default::default(), root + *integral);
         // It winds no further than the brake can follow.
         let moved = *integral - self.step.copysign(surface);
         *integral = moved.max(self.output.lowest()).min(self.output.highest());
-        Command { voltage, limit, terms: SuperTwistingTerms { surface, root, integral: *integral } }
+        Command { voltage, limit, terms: [surface, root, *integral] }
     }
 }
 
@@ -85,9 +68,9 @@ impl Shaft {
 }
 
 /// Ten seconds at 2 °/s; the root mean square of the error in degrees, and how often the shaft stuck, after one second.
-fn run<C: Controller<f64>>(servo: &Servo<f64, C>) -> Result<(f64, u32), ParamError> {
+fn run<C: ControlLaw<f64>>(servo: &Servo<f64, C>) -> Result<(f64, u32), ParamError> {
     let encoder = servo.encoder();
-    let path = ReferenceParams::Ramp(2.0_f64.to_radians());
+    let path = ReferenceParams::ramp(2.0_f64.to_radians());
     let path = Reference::new(&path, FixedCounts(0), encoder, servo.period())?;
     let plant = Plant::new(&PlantParams::default())?;
     let volts = plant.holding_voltage_sliding();

@@ -1,16 +1,24 @@
 //! What is known of the plant: intervals instead of numbers, as (23) of the paper.
 
-use crate::error::{cast, require};
+use crate::friction::FrictionModel;
+use crate::params::{Range, Table};
 use crate::{ParamError, PlantParams, Real};
 
-/// A closed interval.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Interval<T = f64> {
-    /// Lower end.
-    pub low: T,
-    /// Upper end.
-    pub high: T,
+crate::params! {
+    /// A closed interval.
+    #[derive(Default)]
+    pub struct Interval<T> {
+        /// Lower end.
+        low: T, "low" "" NONE, Range::ANY;
+        /// Upper end.
+        high: T, "high" "" NONE, Range::ANY;
+    }
+    relations(p) {
+        /// A supervisor can work with the lower end.
+        LOW_USABLE: low, "a finite number that the parameter may be";
+        /// A supervisor can work with the upper end.
+        HIGH_USABLE: high, "a finite number that the parameter may be";
+    }
 }
 
 impl<T: Real> Interval<T> {
@@ -19,43 +27,49 @@ impl<T: Real> Interval<T> {
         let (a, b) = (value * (T::ONE - share), value * (T::ONE + share));
         Interval { low: a.min(b), high: a.max(b) }
     }
+
+    /// `low (1 − share) … high (1 + share)` of an interval of positive numbers.
+    fn widened(self, share: T) -> Self {
+        Interval { low: self.low * (T::ONE - share), high: self.high * (T::ONE + share) }
+    }
 }
 
-/// How well each parameter is known, as a share of its value (0.2 = ±20 %); `Default` = exactly.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Tolerances<T = f64> {
-    /// Of the inertia.
-    pub inertia: T,
-    /// Of the driving torque.
-    pub drive_torque: T,
-    /// Of the viscous damping.
-    pub viscous_damping: T,
-    /// Of the brake gain `K_COF`.
-    pub brake_gain: T,
-    /// Of both coefficients of friction.
-    pub friction: T,
+crate::params! {
+    /// How well each parameter of the model is known, as a share of its value: 20 % stands for ±20 %. The
+    /// defaults say exactly.
+    pub struct Tolerances<T>: Default {
+        /// ± on the inertia `J`, (23a).
+        inertia: T = 0.0, "inertia_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
+        /// ± on the driving torque `T_u`, (23b).
+        drive_torque: T = 0.0, "drive_torque_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
+        /// ± on the viscous damping `C_d`, (23c).
+        viscous_damping: T = 0.0, "viscous_damping_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
+        /// ± on the brake gain `K_COF`, (23h).
+        brake_gain: T = 0.0, "brake_gain_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
+        /// ± on the friction, in motion (23d) and at rest (23e).
+        friction: T = 0.0, "friction_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
+    }
 }
 
-cast!(Interval { low, high });
-cast!(Bounds { } nested { inertia, drive_torque, viscous_damping, brake_gain, mu_static, mu_dynamic });
-cast!(Tolerances { inertia, drive_torque, viscous_damping, brake_gain, friction });
-
-/// The bounds (23) on the plant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds<T = f64> {
-    /// `J_0 … J_1` (23a), kg m².
-    pub inertia: Interval<T>,
-    /// `(M g R_p)_1 … (M g R_p)_2` (23b), N m.
-    pub drive_torque: Interval<T>,
-    /// Up to `C_d1` (23c), N m s/rad.
-    pub viscous_damping: Interval<T>,
-    /// `K_COF1 … K_COF2` (23h), N m/V.
-    pub brake_gain: Interval<T>,
-    /// Of `μ_s` (23e).
-    pub mu_static: Interval<T>,
-    /// Of `μ_d` (23d).
-    pub mu_dynamic: Interval<T>,
+crate::params! {
+    /// The bounds (23) on the plant.
+    pub struct Bounds<T> {}
+    nested {
+        /// `J_0 … J_1` (23a), kg m².
+        inertia: Interval<T>, "inertia_kg_m2";
+        /// `(M g R_p)_1 … (M g R_p)_2` (23b), N m.
+        drive_torque: Interval<T>, "drive_torque_nm";
+        /// Up to `C_d1` (23c), N m s/rad.
+        viscous_damping: Interval<T>, "viscous_damping_nm_s_rad";
+        /// `K_COF1 … K_COF2` (23h), N m/V.
+        brake_gain: Interval<T>, "brake_gain_nm_v";
+        /// `|μ|` at rest: of `μ_s` (23e).
+        friction_at_rest: Interval<T>, "friction_at_rest";
+        /// `|μ|` of a fast shaft: of `μ_d` (23d).
+        friction_sliding: Interval<T>, "friction_sliding";
+        /// All that `|μ|` can be at any speed.
+        friction: Interval<T>, "friction";
+    }
 }
 
 impl<T: Real> Bounds<T> {
@@ -65,43 +79,32 @@ impl<T: Real> Bounds<T> {
     /// A tolerance negative or so large that its parameter could reach 0; a parameter of the
     /// plant out of range; a driving torque not above 0.
     pub fn around(plant: &PlantParams<T>, tolerance: &Tolerances<T>) -> Result<Self, ParamError<T>> {
-        crate::Plant::new(plant)?;
-        let share = |field, value: T| {
-            let inside = value >= T::ZERO && value < T::ONE;
-            require(field, value, inside, "a share of at least 0 and below 1 (0.2 stands for ±20 %)")
-        };
+        let friction = crate::Plant::new(plant)?;
+        let friction = friction.friction();
+        tolerance.check_rows()?;
         let t = tolerance;
-        require(
-            "drive_torque",
-            plant.drive_torque,
-            plant.drive_torque > T::ZERO,
-            "a torque above 0 N m: without one a brake moves nothing",
-        )?;
-        let mu = plant.friction;
-        require("mu_static", mu.mu_static, mu.mu_static > T::ZERO, "a number above 0")?;
-        require("mu_dynamic", mu.mu_dynamic, mu.mu_dynamic > T::ZERO, "a number above 0")?;
+        PlantParams::DRIVES.require(plant.drive_torque, plant.drive_torque > T::ZERO)?;
+        friction.check_divisor()?;
         Ok(Bounds {
-            inertia: Interval::around(plant.inertia, share("inertia", t.inertia)?),
-            drive_torque: Interval::around(plant.drive_torque, share("drive_torque", t.drive_torque)?),
-            viscous_damping: Interval::around(
-                plant.viscous_damping,
-                share("viscous_damping", t.viscous_damping)?,
-            ),
-            brake_gain: Interval::around(plant.brake_gain, share("brake_gain", t.brake_gain)?),
-            mu_static: Interval::around(mu.mu_static, share("friction", t.friction)?),
-            mu_dynamic: Interval::around(mu.mu_dynamic, t.friction),
+            inertia: Interval::around(plant.inertia, t.inertia),
+            drive_torque: Interval::around(plant.drive_torque, t.drive_torque),
+            viscous_damping: Interval::around(plant.viscous_damping, t.viscous_damping),
+            brake_gain: Interval::around(plant.brake_gain, t.brake_gain),
+            friction_at_rest: Interval::around(friction.at_rest(), t.friction),
+            friction_sliding: Interval::around(friction.sliding(), t.friction),
+            friction: friction.envelope().widened(t.friction),
         })
     }
 
     /// Least brake torque per volt over all corners and speeds, N m/V.
     #[must_use]
     pub fn weakest_brake(&self) -> T {
-        self.mu_static.low.min(self.mu_dynamic.low) * self.brake_gain.low
+        self.friction.low * self.brake_gain.low
     }
 
     /// Greatest brake torque per volt over all corners and speeds, N m/V.
     #[must_use]
     pub fn strongest_brake(&self) -> T {
-        self.mu_static.high.max(self.mu_dynamic.high) * self.brake_gain.high
+        self.friction.high * self.brake_gain.high
     }
 }

@@ -38,23 +38,24 @@
 //! so that any `K_p` passes, and (28) overstates the reaching rate.
 
 use crate::bounds::Bounds;
-use crate::error::require;
-use crate::law::Law;
+use crate::law::{Asked, Law, Surface};
+use crate::params::{Range, Table};
 use crate::{ParamError, Real};
 
-/// What the path and the start ask for, and the reaching rate wanted.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Demand<T = f64> {
-    /// `v_d` (23g): highest velocity of the path, rad/s.
-    pub velocity: T,
-    /// `a_d` (23g): highest acceleration of the path, rad/s².
-    pub acceleration: T,
-    /// `γ` in (15): reaching rate wanted, rad/s².
-    pub reach_rate: T,
-    /// `|ė|` at the start, rad/s: 0 on the path, the path's velocity from rest.
-    pub start_error_rate: T,
-    /// Largest jump of the path's velocity on the way, rad/s.
-    pub velocity_jump: T,
+crate::params! {
+    /// What the path and the start ask for, and the reaching rate wanted.
+    pub struct Demand<T>: Default {
+        /// Highest velocity of the path (23g).
+        velocity: T = 0.0, "velocity_rad_s" "v_d" RAD_S, Range::at_least(0.0);
+        /// Highest acceleration of the path (23g).
+        acceleration: T = 0.0, "acceleration_rad_s2" "a_d" RAD_S2, Range::at_least(0.0);
+        /// Reaching rate wanted (15).
+        reach_rate: T = 0.0, "reach_rate_rad_s2" "γ" RAD_S2, Range::at_least(0.0);
+        /// `|ė|` at the start: 0 on the path, the path's velocity from rest.
+        start_error_rate: T = 0.0, "start_error_rate_rad_s" "" RAD_S, Range::at_least(0.0);
+        /// Largest jump of the path's velocity on the way.
+        velocity_jump: T = 0.0, "velocity_jump_rad_s" "" RAD_S, Range::at_least(0.0);
+    }
 }
 
 /// Why gains are not certified.
@@ -120,60 +121,6 @@ pub struct Certificate<T = f64> {
     pub shortfall: Option<Shortfall>,
 }
 
-/// A law as both sides see it.
-struct Form<T> {
-    slope: T,
-    layer: T,
-    kp: T,
-    /// `K_d` and the boundary's weakening of it; none for an affine law.
-    kd: Option<T>,
-    weakened: bool,
-}
-
-/// `fastest` gives the largest `|ė|` that the ahead side allows for a slope, rad/s.
-fn form<T: Real>(law: &Law<T>, demand: &Demand<T>, fastest: impl Fn(T) -> T) -> Option<Form<T>> {
-    let highest = law.output().highest();
-    match law {
-        Law::Smc(l) => Some(Form {
-            slope: l.slope(),
-            layer: l.boundary(),
-            kp: l.kp(),
-            kd: Some(l.kd()),
-            weakened: l.boundary() > T::ZERO,
-        }),
-        Law::Pd(l) => {
-            let p = l.params();
-            (p.kd > T::ZERO && p.kp > T::ZERO).then(|| Form {
-                slope: p.kp / p.kd,
-                layer: highest / p.kd,
-                kp: highest,
-                kd: None,
-                weakened: false,
-            })
-        }
-        Law::Ctc(l) => {
-            let (p, m) = (l.params(), l.model().params());
-            // (11) is u = [T − J θ̈_d − C θ̇ − J K K_d σ] / (μ K_COF) with the model's values.
-            let gain = m.inertia * p.outer_gain * p.kd;
-            (gain > T::ZERO && p.kp > T::ZERO).then(|| {
-                let mu = m.friction.mu_static.max(m.friction.mu_dynamic);
-                let inertia = m.inertia * demand.acceleration;
-                let slope = p.kp / p.kd;
-                let drag = m.viscous_damping * (demand.velocity + fastest(slope));
-                let upper = highest * mu * m.brake_gain - m.drive_torque + inertia + drag;
-                let lower = m.drive_torque + inertia;
-                Form {
-                    slope: p.kp / p.kd,
-                    layer: upper.max(lower) / gain,
-                    kp: highest,
-                    kd: None,
-                    weakened: false,
-                }
-            })
-        }
-    }
-}
-
 /// The sound certificate of a law over all plants within bounds.
 ///
 /// ```
@@ -197,15 +144,7 @@ pub fn certify<T: Real>(
     bounds: &Bounds<T>,
     demand: &Demand<T>,
 ) -> Result<Certificate<T>, ParamError<T>> {
-    for (field, value, expected) in [
-        ("velocity", demand.velocity, "a finite number of at least 0 rad/s"),
-        ("acceleration", demand.acceleration, "a finite number of at least 0 rad/s²"),
-        ("reach_rate", demand.reach_rate, "a finite number of at least 0 rad/s²"),
-        ("start_error_rate", demand.start_error_rate, "a finite number of at least 0 rad/s"),
-        ("velocity_jump", demand.velocity_jump, "a finite number of at least 0 rad/s"),
-    ] {
-        require(field, value, value >= T::ZERO, expected)?;
-    }
+    demand.check_rows()?;
     let (lowest, highest) = (law.output().lowest(), law.output().highest());
     let brake = bounds.weakest_brake();
     let inertia = bounds.inertia.high;
@@ -213,10 +152,11 @@ pub fn certify<T: Real>(
     let base = (torque + inertia * (demand.acceleration + demand.reach_rate)) / brake;
     let per_rate = |left: T, slope: T| if slope > T::ZERO { left / slope } else { T::ZERO };
     let ahead = |slope: T| per_rate((highest - base) * brake / inertia, slope);
-    let form_of = form(law, demand, ahead);
-    let missing = form_of.is_none();
-    let Form { slope, layer, kp, kd, weakened } =
-        form_of.unwrap_or(Form { slope: T::ZERO, layer: T::ZERO, kp: highest, kd: None, weakened: false });
+    let asked = Asked { velocity: demand.velocity, acceleration: demand.acceleration, fastest: &ahead };
+    let surface = law.surface(&asked);
+    let missing = surface.is_none();
+    let Surface { slope, layer, kp, kd, weakened, .. } =
+        surface.unwrap_or(Surface::affine(T::ZERO, T::ZERO, highest));
 
     // Ahead: the brake against the strongest drive.
     let kd_required = if kd.is_some() { inertia * slope / brake } else { T::ZERO };
@@ -318,7 +258,7 @@ pub fn paper_conditions<T: Real>(
     kp: T,
     slope: T,
 ) -> PaperConditions<T> {
-    let brake = (bounds.mu_static.high + bounds.mu_dynamic.high) * bounds.brake_gain.high;
+    let brake = (bounds.friction_at_rest.high + bounds.friction_sliding.high) * bounds.brake_gain.high;
     let (inertia, torque) = (bounds.inertia.low, bounds.drive_torque.low);
     let drag = bounds.viscous_damping.high * demand.velocity;
     PaperConditions {
@@ -486,8 +426,8 @@ mod tests {
     fn bad_demands_and_tolerances_are_named() {
         let l = law(LawParams::Smc(SmcParams::default()));
         let bad = Demand { reach_rate: f64::NAN, ..Demand::default() };
-        assert_eq!(certify(&l, &bounds(Tolerances::default()), &bad).unwrap_err().field, "reach_rate");
+        assert_eq!(certify(&l, &bounds(Tolerances::default()), &bad).unwrap_err().field(), "reach_rate");
         let t = Tolerances { friction: 1.0, ..Tolerances::default() };
-        assert_eq!(Bounds::around(&PlantParams::default(), &t).unwrap_err().field, "friction");
+        assert_eq!(Bounds::around(&PlantParams::default(), &t).unwrap_err().field(), "friction");
     }
 }

@@ -4,12 +4,11 @@
 //! as integers and only then converted: after a minute at 100 °/s the step of an absolute angle
 //! in `f32` is 7.6e-6 rad, and a difference over 1 ms is coarse by 0.44 °/s.
 
-use crate::error::{cast, require};
+use crate::params::{Range, Table};
 use crate::{ParamError, Real};
 
 /// Encoder counts as the counter gives them; wraps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
 pub struct Counts(pub i32);
 
 impl Counts {
@@ -24,7 +23,6 @@ impl Counts {
 
 /// A position in 2⁻¹⁶ counts, unwrapped: ±1.4e14 counts, exact over any run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
 pub struct FixedCounts(pub i64);
 
 impl FixedCounts {
@@ -63,12 +61,10 @@ impl FixedCounts {
 
 /// A code for the digital-to-analogue converter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
 pub struct DacCode(pub u16);
 
 /// A time span in microseconds: the sampling period `T`, for one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
 pub struct Micros(pub u32);
 
 impl Micros {
@@ -84,9 +80,24 @@ impl Micros {
     /// # Errors
     /// Field `period` if it is 0 or above 1 000 000 µs.
     pub fn period<T: Real>(self) -> Result<T, ParamError<T>> {
-        let value = T::from_u64(u64::from(self.0));
-        require("period", value, self.0 > 0 && self.0 <= 1_000_000, "1 to 1 000 000 µs")?;
+        Table::<T>::check_rows(&SamplingParams { period: self })?;
         Ok(self.seconds())
+    }
+}
+
+crate::params! {
+    /// When a servo is asked.
+    pub struct SamplingParams<>: Default {
+        /// Time from sample to sample, in (5).
+        period: Micros = 1000, "period_us" "T" US, Range::within(1.0, 1e6);
+    }
+}
+
+crate::params! {
+    /// The angle sensor: `counts = ⌊θ N/2π⌋`.
+    pub struct EncoderParams<>: Default {
+        /// Counts per revolution, after quadrature. The paper's resolution is 0.018°.
+        counts_per_rev: u32 = 20000, "counts_per_rev" "N" COUNTS_PER_REV, Range::within(4.0, 16777216.0);
     }
 }
 
@@ -105,12 +116,7 @@ impl Encoder {
     /// # Errors
     /// Field `counts_per_rev` outside 4…16 777 216 (the integers that `f32` holds exactly).
     pub fn new<T: Real>(counts_per_rev: u32) -> Result<Encoder, ParamError<T>> {
-        require(
-            "counts_per_rev",
-            T::from_u64(u64::from(counts_per_rev)),
-            (4..=1 << 24).contains(&counts_per_rev),
-            "4 to 16 777 216 counts per revolution",
-        )?;
+        Table::<T>::check_rows(&EncoderParams { counts_per_rev })?;
         Ok(Encoder { counts_per_rev })
     }
 
@@ -135,24 +141,21 @@ impl Encoder {
     }
 }
 
-/// A digital-to-analogue converter: number of bits and the range it spans.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct DacParams<T = f64> {
-    /// Resolution, bits.
-    pub bits: u8,
-    /// Voltage of code 0, V.
-    pub lowest: T,
-    /// Voltage one step above the highest code, V.
-    pub highest: T,
-}
-
-cast!(DacParams { lowest, highest } keep { bits });
-
-impl<T: Real> Default for DacParams<T> {
-    /// The paper's converter: 12 bit over ±10 V, 4.88 mV a step.
-    fn default() -> Self {
-        DacParams { bits: 12, lowest: T::from_i32(-10), highest: T::from_i32(10) }
+crate::params! {
+    /// The converter from codes to volts. The paper's has 12 bit over ±10 V, 4.88 mV a step.
+    pub struct DacParams<T>: Default {
+        /// Resolution.
+        bits: u8 = 12, "bits" "" BITS, Range::within(1.0, 16.0);
+        /// Voltage of code 0.
+        lowest: T = -10.0, "lowest_v" "" V, Range::ANY;
+        /// Voltage one step above that of the highest code, which so is 9.9951 V by default.
+        highest: T = 10.0, "highest_v" "" V, Range::ANY;
+    }
+    relations(p) {
+        /// The range is not empty.
+        ABOVE_LOWEST: highest, "a voltage above lowest_v" => p.highest > p.lowest;
+        /// A step of the converter is a number.
+        DIVISIBLE: highest, "a voltage so far above lowest_v, and no farther, that a step between two codes is a finite number above 0 V";
     }
 }
 
@@ -178,15 +181,12 @@ impl<T: Real> Dac<T> {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// Field `bits` outside 1…16, `lowest` not finite, `highest` not above `lowest`.
+    /// The first parameter out of range.
     pub fn new(p: &DacParams<T>) -> Result<Self, ParamError<T>> {
-        let bits = T::from_i32(i32::from(p.bits));
-        require("bits", bits, (1..=16).contains(&p.bits), "1 to 16 bits")?;
-        require("lowest", p.lowest, true, "a finite voltage, V")?;
-        require("highest", p.highest, p.highest > p.lowest, "a voltage above the lowest, V")?;
+        p.check_rows()?;
         let codes = 1_i32 << p.bits;
         let step = (p.highest - p.lowest) / T::from_i32(codes);
-        require("highest", p.highest, step > T::ZERO && step.is_finite(), "a range that a step divides, V")?;
+        DacParams::DIVISIBLE.require(p.highest, step > T::ZERO && step.is_finite())?;
         Ok(Dac {
             lowest: p.lowest,
             step,
@@ -238,11 +238,11 @@ mod tests {
     #[test]
     fn out_of_range_converters_are_named() {
         let bad = DacParams { bits: 0, ..DacParams::<f64>::default() };
-        assert_eq!(Dac::new(&bad).unwrap_err().field, "bits");
+        assert_eq!(Dac::new(&bad).unwrap_err().field(), "bits");
         let bad = DacParams { highest: -10.0, ..DacParams::<f64>::default() };
-        assert_eq!(Dac::new(&bad).unwrap_err().field, "highest");
-        assert_eq!(Micros(0).period::<f64>().unwrap_err().field, "period");
-        assert_eq!(Encoder::new::<f64>(3).unwrap_err().field, "counts_per_rev");
+        assert_eq!(Dac::new(&bad).unwrap_err().field(), "highest");
+        assert_eq!(Micros(0).period::<f64>().unwrap_err().field(), "period");
+        assert_eq!(Encoder::new::<f64>(3).unwrap_err().field(), "counts_per_rev");
     }
 
     proptest! {

@@ -7,24 +7,18 @@
 //! It is a first-order low-pass on the backward difference; nothing is estimated. The
 //! difference is taken in integers, so it stays exact however far the shaft has turned.
 
-use crate::error::{cast, require};
-use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
+use crate::params::{Range, Table};
+use crate::{Arithmetic, Encoder, FixedCounts, Micros, ParamError, Real};
 
-/// Parameters of (5); `Default` = 0.2, the value that reproduces the paper's figures.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct SmoothedDerivativeParams<T = f64> {
-    /// `K_Kal` in (5): share of the newest difference, above 0 and at most 1 (no smoothing).
-    /// The paper gives 0.2 to 1.
-    #[doc(alias = "K_Kal")]
-    pub smoothing: T,
-}
-
-cast!(SmoothedDerivativeParams { smoothing });
-
-impl<T: Real> Default for SmoothedDerivativeParams<T> {
-    fn default() -> Self {
-        SmoothedDerivativeParams { smoothing: T::from_f64(0.2) }
+crate::params! {
+    /// The smoothed difference (5), which the paper calls a Kalman filter: a first-order low-pass on the backward
+    /// difference of the error.
+    ///
+    /// `ė_k = (1 − K_Kal) ė_{k−1} + K_Kal (e_k − e_{k−1})/T`.
+    pub struct SmoothedDerivativeParams<T>: Default {
+        /// Share of the newest difference in (5); 1 smooths nothing. The paper gives 0.2 to 1, and 0.2 reproduces its
+        /// figures.
+        smoothing: T = 0.2, "smoothing" "K_Kal" NONE, Range::above(0.0).up_to(1.0);
     }
 }
 
@@ -61,12 +55,7 @@ impl<T: Real> SmoothedDerivative<T> {
         encoder: Encoder,
         period: Micros,
     ) -> Result<Self, ParamError<T>> {
-        require(
-            "smoothing",
-            p.smoothing,
-            p.smoothing > T::ZERO && p.smoothing <= T::ONE,
-            "a number above 0 and at most 1",
-        )?;
+        p.check_rows()?;
         let period = period.period::<T>()?;
         Ok(SmoothedDerivative {
             keep: T::ONE - p.smoothing,
@@ -79,8 +68,17 @@ impl<T: Real> SmoothedDerivative<T> {
     pub fn update(&self, state: &mut DerivativeState<T>, error: FixedCounts) -> T {
         let difference: T = error.minus(state.previous);
         state.previous = error;
-        state.rate = self.keep * state.rate + self.scale * difference;
+        state.rate = self.smooth(state.rate, difference);
         state.rate
+    }
+}
+
+impl<T: Arithmetic> SmoothedDerivative<T> {
+    /// The next rate from the last one, rad/s, and the difference of the error, counts.
+    #[inline]
+    #[must_use]
+    pub fn smooth(&self, rate: T, difference: T) -> T {
+        self.keep * rate + self.scale * difference
     }
 }
 
@@ -129,7 +127,7 @@ mod tests {
                 Encoder::PAPER,
                 Micros(1000),
             );
-            assert_eq!(e.unwrap_err().field, "smoothing");
+            assert_eq!(e.unwrap_err().field(), "smoothing");
         }
     }
 }

@@ -118,7 +118,7 @@ pub fn check_path<T: Real>(
     let weakest = bounds.weakest_brake();
     let residual = bounds.strongest_brake() * output.lowest();
     let mut envelope = Envelope {
-        holding_voltage: bounds.drive_torque.high / (bounds.mu_static.low * bounds.brake_gain.low),
+        holding_voltage: bounds.drive_torque.high / (bounds.friction_at_rest.low * bounds.brake_gain.low),
         ..Envelope::default()
     };
     let (mut last_velocity, mut last_acceleration) = (start_velocity, T::ZERO);
@@ -194,7 +194,7 @@ mod tests {
         assert!((e.holding_voltage - 1.681714).abs() < 1e-6);
         assert!((e.highest_voltage - 1.681714).abs() < 1e-6);
         let v = 2.0_f64.to_radians();
-        let e = check(&ReferenceParams::Ramp(v), v, Tolerances::default()).unwrap();
+        let e = check(&ReferenceParams::ramp(v), v, Tolerances::default()).unwrap();
         assert!((e.highest_voltage - (0.047088 - 0.001 * v) / 0.021).abs() < 1e-9);
         assert_eq!((e.start_jump, e.velocity_jump), (0.0, 0.0));
     }
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn a_ramp_from_rest_jumps_at_its_start_and_nowhere_else() {
         let v = 2.0_f64.to_radians();
-        let e = check(&ReferenceParams::Ramp(v), 0.0, Tolerances::default()).unwrap();
+        let e = check(&ReferenceParams::ramp(v), 0.0, Tolerances::default()).unwrap();
         assert_eq!((e.start_jump, e.velocity_jump), (v, 0.0));
     }
 

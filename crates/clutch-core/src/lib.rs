@@ -15,7 +15,7 @@
 //! | [`supervisor`] | what may reach the law, and when control ends in the [`SafeState`] |
 //!
 //! No allocation, no `unsafe`, no reachable panic (a link test shows it), and the same bits on
-//! every target for one scalar type. Features: `linalg` (the observer, on nalgebra), `serde`.
+//! every target for one scalar type. Features: `linalg` (the observer, on nalgebra).
 //! Formatting of errors is outside of the no-panic promise: `core` formats floats.
 #![no_std]
 #![cfg_attr(
@@ -33,16 +33,19 @@
 #[cfg(test)]
 extern crate std;
 
+mod arithmetic;
 mod bounds;
 pub mod certificate;
 mod codes;
 mod derivative;
 mod error;
 mod feasibility;
-mod friction;
+mod fnv;
+pub mod friction;
 pub mod law;
 #[cfg(feature = "linalg")]
 mod observer;
+pub mod params;
 mod plant;
 mod real;
 pub mod reference;
@@ -52,19 +55,23 @@ mod stick_slip;
 pub mod supervisor;
 mod velocity;
 
+pub use arithmetic::{Arithmetic, Each};
 pub use bounds::{Bounds, Interval, Tolerances};
-pub use codes::{Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros};
+pub use codes::{
+    Counts, Dac, DacCode, DacParams, Encoder, EncoderParams, FixedCounts, Micros, SamplingParams,
+};
 pub use derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeParams};
 pub use error::ParamError;
 pub use feasibility::{Envelope, Infeasible, Obstacle, check_path};
-pub use friction::{BrakeGeometry, Stribeck, StribeckParams};
+pub use fnv::{FNV_64, fnv1a_64};
+pub use friction::{BrakeGeometry, Friction, FrictionModel, FrictionParams, Stribeck, StribeckParams};
 #[cfg(feature = "linalg")]
 pub use observer::{Estimate, Observer, ObserverGains, ObserverParams, ObserverState};
 pub use plant::{GRAVITY, Plant, PlantParams};
 pub use real::{Real, sin_cos_turns};
 pub use reference::Target;
-pub use safe_state::{SafeCodes, SafeKind, SafeRun, SafeState};
-pub use servo::{Daq, Servo, ServoOutput, ServoParams, ServoState};
+pub use safe_state::{SafeCodes, SafeHold, SafeHoldThenRelease, SafeKind, SafeRamp, SafeRun, SafeState};
+pub use servo::{Servo, ServoOutput, ServoParams, ServoState};
 pub use stick_slip::{StickSlip, StickSlipParams, StickSlipState};
-pub use supervisor::{Supervisor, SupervisorParams, SupervisorState};
+pub use supervisor::{LimitParams, SpeedLimit, Supervisor, SupervisorParams, SupervisorState};
 pub use velocity::{VelocityParams, VelocitySource, VelocityState};

@@ -26,42 +26,41 @@
 //! At a constant speed any slower observer looks better; the default is the one of the three
 //! that wins in every row against (5). A tick takes 25 ns on an x86-64 host, (5) takes 2.4 ns.
 
-use crate::error::{cast, require};
+use crate::friction::FrictionModel;
+use crate::params::{Range, Table};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Plant, Real};
 use nalgebra::{Matrix3, Vector3};
 
-/// Parameters of the observer; `Default` = 0.1, chosen by the module's table.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct ObserverParams<T = f64> {
-    /// `q_d`: how fast the disturbance torque wanders, N m/√s: by this much (standard
-    /// deviation) in one second, and with the root of the time. Larger follows friction faster
-    /// and lets more of the encoder's steps through.
-    #[doc(alias = "process_noise")]
-    pub disturbance_walk: T,
-}
-
-cast!(ObserverParams { disturbance_walk });
-
-impl<T: Real> Default for ObserverParams<T> {
-    fn default() -> Self {
-        ObserverParams { disturbance_walk: T::from_f64(0.1) }
+crate::params! {
+    /// A stationary Kalman filter for position, velocity and the torque that nobody measures. It predicts with the
+    /// model.
+    pub struct ObserverParams<T>: Default {
+        /// How fast the disturbance torque wanders: by this much (standard deviation) in one second, and with
+        /// the root of the time. Larger follows friction faster and lets more of the encoder's steps through.
+        disturbance_walk: T = 0.1, "disturbance_walk_nm_rt_s" "q_d" NM_RT_S, Range::above(0.0);
+    }
+    relations(p) {
+        /// Gains come out.
+        STABLE: disturbance_walk, "a number in N m/√s for which stable gains exist in this precision";
     }
 }
 
-/// Stationary gains on the innovation, the measured angle less the predicted one.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct ObserverGains<T = f64> {
-    /// To the position; no unit.
-    pub position: T,
-    /// To the velocity, 1/s.
-    pub velocity: T,
-    /// To the disturbance torque, N m/rad.
-    pub disturbance: T,
+crate::params! {
+    /// Stationary gains on the innovation, the measured angle less the predicted one.
+    #[derive(Default)]
+    pub struct ObserverGains<T> {
+        /// To the position.
+        position: T, "position" "" NONE, Range::above(0.0);
+        /// To the velocity.
+        velocity: T, "velocity_1_s" "" PER_S, Range::above(0.0);
+        /// To the disturbance torque.
+        disturbance: T, "disturbance_nm_rad" "" NM_RAD, Range::above(0.0);
+    }
+    relations(p) {
+        /// The error dies away.
+        STABLE: disturbance, "three gains with which the error dies away: smaller ones, N m/rad";
+    }
 }
-
-cast!(ObserverGains { position, velocity, disturbance });
 
 /// What the observer believes after a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -178,18 +177,10 @@ impl<T: Real> Observer<T> {
         encoder: Encoder,
         period: Micros,
     ) -> Result<Self, ParamError<T>> {
-        let walk = require(
-            "disturbance_walk",
-            p.disturbance_walk,
-            p.disturbance_walk > T::ZERO,
-            "a finite number above 0 N m/√s",
-        )?;
+        p.check_rows()?;
+        let walk = p.disturbance_walk;
         period.period::<T>()?;
-        let out_of_range = ParamError {
-            field: "disturbance_walk",
-            value: walk,
-            expected: "a number in N m/√s for which stable gains exist in this precision",
-        };
+        let out_of_range = ObserverParams::STABLE.error(walk);
         let plant_params = plant.params();
         let gains = design(
             walk.to_f64(),
@@ -213,23 +204,15 @@ impl<T: Real> Observer<T> {
         encoder: Encoder,
         period: Micros,
     ) -> Result<Self, ParamError<T>> {
-        let ObserverGains { position, velocity, disturbance } = *gains;
-        require("position", position, position > T::ZERO, "a finite number above 0")?;
-        require("velocity", velocity, velocity > T::ZERO, "a finite number above 0 1/s")?;
-        require("disturbance", disturbance, disturbance > T::ZERO, "a finite number above 0 N m/rad")?;
+        gains.check_rows()?;
         let p = plant.params();
         let model = Model::new(p.inertia, p.viscous_damping, period.period()?);
-        require(
-            "disturbance",
-            disturbance,
-            error_dies_away(gains, &model),
-            "three gains with which the error dies away: smaller ones, N m/rad",
-        )?;
+        ObserverGains::STABLE.require(gains.disturbance, error_dies_away(gains, &model))?;
         let radians_per_count = encoder.radians_per_count::<T>();
         Ok(Observer {
             model,
             gains: *gains,
-            slowing_per_volt: model.phi23 * p.friction.mu_dynamic * p.brake_gain,
+            slowing_per_volt: model.phi23 * plant.friction().sliding() * p.brake_gain,
             drive_torque: p.drive_torque,
             radians_per_count,
             half_count: radians_per_count / T::from_i32(2),
@@ -386,7 +369,7 @@ mod tests {
     fn balance(rate: f64) -> f64 {
         let plant = plant::<f64>();
         let p = plant.params();
-        (p.drive_torque - p.viscous_damping * rate) / (p.friction.mu_dynamic * p.brake_gain)
+        (p.drive_torque - p.viscous_damping * rate) / (plant.friction().sliding() * p.brake_gain)
     }
 
     /// RMS errors of the velocity by the observer and by (5), °/s, over `rate + ripple
@@ -588,11 +571,11 @@ mod tests {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-160] {
             let p = ObserverParams { disturbance_walk: bad };
             let e = Observer::new(&p, &plant(), Encoder::PAPER, MS).unwrap_err();
-            assert_eq!(e.field, "disturbance_walk");
+            assert_eq!(e.field(), "disturbance_walk");
         }
         let p = ObserverParams::default();
         assert_eq!(
-            Observer::new(&p, &plant::<f64>(), Encoder::PAPER, Micros(0)).unwrap_err().field,
+            Observer::new(&p, &plant::<f64>(), Encoder::PAPER, Micros(0)).unwrap_err().field(),
             "period"
         );
         let good = *observer::<f64>().gains();
@@ -605,7 +588,7 @@ mod tests {
             (ObserverGains { disturbance: 100.0 * good.disturbance, ..good }, "disturbance"),
             (ObserverGains { position: 2.1, ..good }, "disturbance"),
         ] {
-            assert_eq!(with(bad).unwrap_err().field, field);
+            assert_eq!(with(bad).unwrap_err().field(), field);
         }
     }
 

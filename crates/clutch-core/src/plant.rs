@@ -6,44 +6,33 @@
 //!
 //! At rest the shaft stays at rest while `|T_u| ≤ μ_s K_COF v_a`.
 
-use crate::error::{cast, require};
-use crate::friction::{Stribeck, StribeckParams};
+use crate::friction::{Friction, FrictionModel, FrictionParams};
+use crate::params::{Range, Table};
 use crate::{ParamError, Real};
 
 /// Standard gravity as the paper rounds it, m/s².
 pub const GRAVITY: f64 = 9.81;
 
-/// Parameters of (1); `Default` = Table 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct PlantParams<T = f64> {
-    /// `J` in (1): total moment of inertia, kg m².
-    #[doc(alias = "J")]
-    pub inertia: T,
-    /// `T_u = M g R_p` in (1): driving torque, N m. Either sign.
-    #[doc(alias = "T_u")]
-    pub drive_torque: T,
-    /// `C_d` in (1): viscous damping, N m s/rad.
-    #[doc(alias = "C_d")]
-    pub viscous_damping: T,
-    /// `K_COF` in (18): brake torque per volt and unit of μ, N m/V.
-    #[doc(alias = "K_COF")]
-    pub brake_gain: T,
-    /// The friction law (2).
-    pub friction: StribeckParams<T>,
-}
-
-cast!(PlantParams { inertia, drive_torque, viscous_damping, brake_gain } nested { friction });
-
-impl<T: Real> Default for PlantParams<T> {
-    fn default() -> Self {
-        PlantParams {
-            inertia: T::from_f64(0.0017),
-            drive_torque: T::from_f64(0.2 * GRAVITY * 0.024),
-            viscous_damping: T::from_f64(0.001),
-            brake_gain: T::from_f64(0.14),
-            friction: StribeckParams::default(),
-        }
+crate::params! {
+    /// The shaft (1) as laws, observers and certificates believe it to be; the defaults are Table 1's, whatever the
+    /// rig is.
+    pub struct PlantParams<T>: Default {
+        /// Total moment of inertia, in (1).
+        inertia: T = 0.0017, "inertia_kg_m2" "J" KG_M2, Range::divisor();
+        /// Driving torque `T_u = M g R_p` in (1). Either sign for a plant alone.
+        drive_torque: T = 0.047088000000000005, "drive_torque_nm" "T_u" NM, Range::ANY;
+        /// Viscous damping, in (1).
+        viscous_damping: T = 0.001, "viscous_damping_nm_s_rad" "C_d" NM_S_RAD, Range::at_least(0.0);
+        /// Brake torque per volt and unit of μ, (18).
+        brake_gain: T = 0.14, "brake_gain_nm_v" "K_COF" NM_V, Range::above(0.0);
+    }
+    nested {
+        /// Friction of pad on disc.
+        friction: FrictionParams<T>, "friction";
+    }
+    relations(p) {
+        /// Something moves the shaft.
+        DRIVES: drive_torque, "a torque above 0 N m: without one a brake moves nothing";
     }
 }
 
@@ -59,7 +48,7 @@ impl<T: Real> Default for PlantParams<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plant<T> {
     params: PlantParams<T>,
-    friction: Stribeck<T>,
+    friction: Friction<T>,
     inverse_inertia: T,
 }
 
@@ -67,40 +56,30 @@ impl<T: Real> Plant<T> {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// `inertia` or `brake_gain` not positive, `viscous_damping` negative, a friction
-    /// parameter out of range, any of them not finite.
+    /// The first parameter out of range.
     pub fn new(p: &PlantParams<T>) -> Result<Self, ParamError<T>> {
+        p.check_rows()?;
+        let friction = Friction::build(&p.friction)?;
         let inverse_inertia = T::ONE / p.inertia;
-        require(
-            "inertia",
-            p.inertia,
-            p.inertia > T::ZERO && inverse_inertia.is_finite(),
-            "a finite number above 0 kg m²",
-        )?;
-        require("drive_torque", p.drive_torque, true, "a finite torque, N m")?;
-        require(
-            "viscous_damping",
-            p.viscous_damping,
-            p.viscous_damping >= T::ZERO,
-            "a finite number of at least 0 N m s/rad",
-        )?;
-        require("brake_gain", p.brake_gain, p.brake_gain > T::ZERO, "a finite number above 0 N m/V")?;
-        let friction = Stribeck::new(&p.friction)?;
         Ok(Plant { params: *p, friction, inverse_inertia })
     }
+}
 
+impl<T> Plant<T> {
     /// The parameters it was built from.
     #[must_use]
     pub fn params(&self) -> &PlantParams<T> {
         &self.params
     }
 
-    /// The friction law (2).
+    /// The friction.
     #[must_use]
-    pub fn friction(&self) -> &Stribeck<T> {
+    pub fn friction(&self) -> &Friction<T> {
         &self.friction
     }
+}
 
+impl<T: Real> Plant<T> {
     /// Friction torque of the brake at a velocity and a voltage, N m; 0 for a negative voltage.
     #[inline]
     #[must_use]
@@ -112,7 +91,7 @@ impl<T: Real> Plant<T> {
     #[inline]
     #[must_use]
     pub fn break_away_torque(&self, volts: T) -> T {
-        self.params.friction.mu_static * self.params.brake_gain * volts.max(T::ZERO)
+        self.friction.at_rest() * self.params.brake_gain * volts.max(T::ZERO)
     }
 
     /// `θ̈` of (1) for a shaft in motion, rad/s².
@@ -127,14 +106,14 @@ impl<T: Real> Plant<T> {
     /// Lowest voltage that holds the resting shaft, V: `|T_u| / (μ_s K_COF)`.
     #[must_use]
     pub fn holding_voltage_static(&self) -> T {
-        self.params.drive_torque.abs() / (self.params.friction.mu_static * self.params.brake_gain)
+        self.params.drive_torque.abs() / (self.friction.at_rest() * self.params.brake_gain)
     }
 
     /// Voltage at which the sliding shaft neither gains nor loses speed, V, without viscous
     /// damping: `|T_u| / (μ_d K_COF)`.
     #[must_use]
     pub fn holding_voltage_sliding(&self) -> T {
-        self.params.drive_torque.abs() / (self.params.friction.mu_dynamic * self.params.brake_gain)
+        self.params.drive_torque.abs() / (self.friction.sliding() * self.params.brake_gain)
     }
 }
 
@@ -159,7 +138,7 @@ mod tests {
             (PlantParams { viscous_damping: -1.0, ..d }, "viscous_damping"),
             (PlantParams { brake_gain: 0.0, ..d }, "brake_gain"),
         ] {
-            assert_eq!(Plant::new(&bad).unwrap_err().field, field);
+            assert_eq!(Plant::new(&bad).unwrap_err().field(), field);
         }
     }
 }

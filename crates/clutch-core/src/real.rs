@@ -5,8 +5,9 @@
 //! into a multiply-add. So one input gives one output, bit for bit, on x86-64, ARM and RISC-V: the
 //! simulator runs the arithmetic of the board.
 
-use core::fmt::{Debug, Display};
-use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use crate::arithmetic::Arithmetic;
+use core::fmt::Display;
+use core::ops::{AddAssign, SubAssign};
 
 mod sealed {
     pub trait Sealed {}
@@ -14,37 +15,24 @@ mod sealed {
     impl Sealed for f64 {}
 }
 
-/// `f32` or `f64`; sealed.
+/// `f32` or `f64`; sealed. Its arithmetic is [`Arithmetic`]'s; the rest is what constructors need.
 ///
 /// ```
-/// use clutch_core::Real;
+/// use clutch_core::{Arithmetic, Real};
 /// fn sgn<T: Real>(x: T) -> T { x.sgn() }
 /// assert_eq!(sgn(-2.0_f32), -1.0);
 /// assert_eq!(sgn(0.0_f64), 0.0); // the field's convention here: sgn(0) = 0
 /// ```
 pub trait Real:
     sealed::Sealed
-    + Copy
-    + Default
-    + PartialEq
+    + Arithmetic<Mask = bool, Limit = crate::law::Limit>
     + PartialOrd
-    + Debug
     + Display
     + Send
     + Sync
-    + 'static
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
     + AddAssign
     + SubAssign
 {
-    /// 0.
-    const ZERO: Self;
-    /// 1.
-    const ONE: Self;
     /// π.
     const PI: Self;
     /// The distance from 1 to the next larger value.
@@ -66,58 +54,18 @@ pub trait Real:
     fn to_i64(self) -> i64;
     /// The integer part, saturating at 0 and 65 535; NaN gives 0.
     fn to_u16(self) -> u16;
-    /// |self|.
-    fn abs(self) -> Self;
     /// e to the power of self.
     fn exp(self) -> Self;
-    /// e to the power of −self for 0 ≤ self ≤ [`Real::EXP_NEG_MAX`]; NaN for NaN. In `f32` the
-    /// error is at most 1.5e-7, and 1.6e-7 (1 + self) of the value.
-    ///
-    /// Outside that range the result is not an exponential.
-    fn exp_neg(self) -> Self;
     /// Natural logarithm; −∞ for 0, NaN for a negative argument.
     fn ln(self) -> Self;
-    /// self to the power of `n`.
-    fn powf(self, n: Self) -> Self;
     /// Square root; NaN for a negative argument.
     fn sqrt(self) -> Self;
     /// Largest integer not above self.
     fn floor(self) -> Self;
-    /// The larger of the two; the other one if one is NaN.
-    fn max(self, other: Self) -> Self;
-    /// The smaller of the two; the other one if one is NaN.
-    fn min(self, other: Self) -> Self;
-    /// Neither infinite nor NaN.
-    fn is_finite(self) -> bool;
     /// Sine and cosine for |self| ≤ π/4, without double precision in `f32`.
     ///
     /// Outside that range the result is not a sine.
     fn sin_cos_octant(self) -> (Self, Self);
-
-    /// The sign: −1, 0 or 1; `sgn(0) = 0`, and 0 for NaN.
-    #[inline]
-    fn sgn(self) -> Self {
-        if self > Self::ZERO {
-            Self::ONE
-        } else if self < Self::ZERO {
-            -Self::ONE
-        } else {
-            Self::ZERO
-        }
-    }
-
-    /// `sat(self)` of (30): the identity between −1 and 1, the sign outside; 0 for NaN.
-    #[inline]
-    fn sat(self) -> Self {
-        // Between the ends, where a law spends its time, two comparisons decide; NaN fails all.
-        if self > -Self::ONE {
-            if self < Self::ONE { self } else { Self::ONE }
-        } else if self <= -Self::ONE {
-            -Self::ONE
-        } else {
-            Self::ZERO
-        }
-    }
 
     /// Limits self to `[lo, hi]` and never panics; NaN gives `lo`.
     #[inline]
@@ -126,9 +74,88 @@ pub trait Real:
     }
 }
 
-impl Real for f64 {
+impl Arithmetic for f64 {
+    type Mask = bool;
+    type Limit = crate::law::Limit;
     const ZERO: f64 = 0.0;
     const ONE: f64 = 1.0;
+
+    #[inline]
+    fn splat(x: f64) -> f64 {
+        x
+    }
+    #[inline]
+    fn less(self, other: f64) -> bool {
+        self < other
+    }
+    #[inline]
+    fn less_or_equal(self, other: f64) -> bool {
+        self <= other
+    }
+    #[inline]
+    fn select(mask: bool, a: f64, b: f64) -> f64 {
+        if mask { a } else { b }
+    }
+    #[inline]
+    fn limit_of(limit: crate::law::Limit) -> crate::law::Limit {
+        limit
+    }
+    #[inline]
+    fn select_limit(mask: bool, a: crate::law::Limit, b: crate::law::Limit) -> crate::law::Limit {
+        if mask { a } else { b }
+    }
+    #[inline]
+    fn all(mask: bool) -> bool {
+        mask
+    }
+    #[inline]
+    fn abs(self) -> f64 {
+        libm::fabs(self)
+    }
+    #[inline]
+    fn exp_neg(self) -> f64 {
+        libm::exp(-self)
+    }
+    #[inline]
+    fn powf(self, n: f64) -> f64 {
+        libm::pow(self, n)
+    }
+    #[inline]
+    fn max(self, other: f64) -> f64 {
+        libm::fmax(self, other)
+    }
+    #[inline]
+    fn min(self, other: f64) -> f64 {
+        libm::fmin(self, other)
+    }
+    #[inline]
+    fn is_finite(self) -> bool {
+        f64::is_finite(self)
+    }
+    #[inline]
+    fn sgn(self) -> f64 {
+        if self > 0.0 {
+            1.0
+        } else if self < 0.0 {
+            -1.0
+        } else {
+            0.0
+        }
+    }
+    #[inline]
+    fn sat(self) -> f64 {
+        // Between the ends, where a law spends its time, two comparisons decide; NaN fails all.
+        if self > -1.0 {
+            if self < 1.0 { self } else { 1.0 }
+        } else if self <= -1.0 {
+            -1.0
+        } else {
+            0.0
+        }
+    }
+}
+
+impl Real for f64 {
     const PI: f64 = core::f64::consts::PI;
     const EPSILON: f64 = f64::EPSILON;
     const EXP_NEG_MAX: f64 = f64::MAX;
@@ -162,24 +189,12 @@ impl Real for f64 {
         self as u16
     }
     #[inline]
-    fn abs(self) -> f64 {
-        libm::fabs(self)
-    }
-    #[inline]
     fn exp(self) -> f64 {
         libm::exp(self)
     }
     #[inline]
-    fn exp_neg(self) -> f64 {
-        libm::exp(-self)
-    }
-    #[inline]
     fn ln(self) -> f64 {
         libm::log(self)
-    }
-    #[inline]
-    fn powf(self, n: f64) -> f64 {
-        libm::pow(self, n)
     }
     #[inline]
     fn sqrt(self) -> f64 {
@@ -190,26 +205,103 @@ impl Real for f64 {
         libm::floor(self)
     }
     #[inline]
-    fn max(self, other: f64) -> f64 {
-        libm::fmax(self, other)
-    }
-    #[inline]
-    fn min(self, other: f64) -> f64 {
-        libm::fmin(self, other)
-    }
-    #[inline]
-    fn is_finite(self) -> bool {
-        f64::is_finite(self)
-    }
-    #[inline]
     fn sin_cos_octant(self) -> (f64, f64) {
         libm::sincos(self)
     }
 }
 
-impl Real for f32 {
+impl Arithmetic for f32 {
+    type Mask = bool;
+    type Limit = crate::law::Limit;
     const ZERO: f32 = 0.0;
     const ONE: f32 = 1.0;
+
+    #[inline]
+    fn splat(x: f64) -> f32 {
+        x as f32
+    }
+    #[inline]
+    fn less(self, other: f32) -> bool {
+        self < other
+    }
+    #[inline]
+    fn less_or_equal(self, other: f32) -> bool {
+        self <= other
+    }
+    #[inline]
+    fn select(mask: bool, a: f32, b: f32) -> f32 {
+        if mask { a } else { b }
+    }
+    #[inline]
+    fn limit_of(limit: crate::law::Limit) -> crate::law::Limit {
+        limit
+    }
+    #[inline]
+    fn select_limit(mask: bool, a: crate::law::Limit, b: crate::law::Limit) -> crate::law::Limit {
+        if mask { a } else { b }
+    }
+    #[inline]
+    fn all(mask: bool) -> bool {
+        mask
+    }
+    #[inline]
+    fn abs(self) -> f32 {
+        libm::fabsf(self)
+    }
+    /// 2⁻ⁿ 2⁻ᶠ with f in ±1/2: a polynomial, minimax to 1.1e-7 with the value and slope of 2⁻ᶠ at 0.
+    /// On a Cortex-M4F these are 28 instructions; `libm::expf` takes up to 82.
+    #[inline]
+    fn exp_neg(self) -> f32 {
+        use core::f32::consts::{LN_2, LOG2_E};
+        // A sum with it is rounded to an integer, and has 127 − n in its low bits.
+        const TO_INTEGER: f32 = 12_582_912.0 + 127.0; // 1.5 · 2²³, and the bias of an exponent
+        let y = self * LOG2_E;
+        let rounded = TO_INTEGER - y;
+        let f = y + (rounded - TO_INTEGER);
+        let power = f32::from_bits(rounded.to_bits() << 23);
+        let tail = 0.240_222_83 + f * (-0.055_505_585 + f * (0.009_669_66 + f * -0.001_330_051_6));
+        power * (1.0 + f * (-LN_2 + f * tail))
+    }
+    #[inline]
+    fn powf(self, n: f32) -> f32 {
+        libm::powf(self, n)
+    }
+    #[inline]
+    fn max(self, other: f32) -> f32 {
+        libm::fmaxf(self, other)
+    }
+    #[inline]
+    fn min(self, other: f32) -> f32 {
+        libm::fminf(self, other)
+    }
+    #[inline]
+    fn is_finite(self) -> bool {
+        f32::is_finite(self)
+    }
+    #[inline]
+    fn sgn(self) -> f32 {
+        if self > 0.0 {
+            1.0
+        } else if self < 0.0 {
+            -1.0
+        } else {
+            0.0
+        }
+    }
+    #[inline]
+    fn sat(self) -> f32 {
+        // Between the ends, where a law spends its time, two comparisons decide; NaN fails all.
+        if self > -1.0 {
+            if self < 1.0 { self } else { 1.0 }
+        } else if self <= -1.0 {
+            -1.0
+        } else {
+            0.0
+        }
+    }
+}
+
+impl Real for f32 {
     const PI: f32 = core::f32::consts::PI;
     const EPSILON: f32 = f32::EPSILON;
     const EXP_NEG_MAX: f32 = 87.0; // the least power of e that is a normal number
@@ -243,34 +335,12 @@ impl Real for f32 {
         self as u16
     }
     #[inline]
-    fn abs(self) -> f32 {
-        libm::fabsf(self)
-    }
-    #[inline]
     fn exp(self) -> f32 {
         libm::expf(self)
-    }
-    /// 2⁻ⁿ 2⁻ᶠ with f in ±1/2: a polynomial, minimax to 1.1e-7 with the value and slope of 2⁻ᶠ at 0.
-    /// On a Cortex-M4F these are 28 instructions; `libm::expf` takes up to 82.
-    #[inline]
-    fn exp_neg(self) -> f32 {
-        use core::f32::consts::{LN_2, LOG2_E};
-        // A sum with it is rounded to an integer, and has 127 − n in its low bits.
-        const TO_INTEGER: f32 = 12_582_912.0 + 127.0; // 1.5 · 2²³, and the bias of an exponent
-        let y = self * LOG2_E;
-        let rounded = TO_INTEGER - y;
-        let f = y + (rounded - TO_INTEGER);
-        let power = f32::from_bits(rounded.to_bits() << 23);
-        let tail = 0.240_222_83 + f * (-0.055_505_585 + f * (0.009_669_66 + f * -0.001_330_051_6));
-        power * (1.0 + f * (-LN_2 + f * tail))
     }
     #[inline]
     fn ln(self) -> f32 {
         libm::logf(self)
-    }
-    #[inline]
-    fn powf(self, n: f32) -> f32 {
-        libm::powf(self, n)
     }
     #[inline]
     fn sqrt(self) -> f32 {
@@ -279,18 +349,6 @@ impl Real for f32 {
     #[inline]
     fn floor(self) -> f32 {
         libm::floorf(self)
-    }
-    #[inline]
-    fn max(self, other: f32) -> f32 {
-        libm::fmaxf(self, other)
-    }
-    #[inline]
-    fn min(self, other: f32) -> f32 {
-        libm::fminf(self, other)
-    }
-    #[inline]
-    fn is_finite(self) -> bool {
-        f32::is_finite(self)
     }
     /// Taylor series to x⁹ and x¹⁰: the remainder at π/4 is below 2e-9. `libm::sinf` works in
     /// double precision inside, which costs a thousand instructions on a Cortex-M4F.

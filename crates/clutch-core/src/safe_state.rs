@@ -12,60 +12,93 @@
 //!
 //! What runs is [`SafeCodes`], whole numbers only, so that controller and board go the same way.
 
-use crate::error::require;
+use crate::params::{Params, Range, Relation};
 use crate::{Dac, DacCode, Micros, ParamError, Real};
 
-/// Which safe state, and its numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum SafeState<T = f64> {
-    /// Holds the shaft with a voltage.
-    Hold {
-        /// Brake voltage, V.
-        volts: T,
-    },
+crate::params! {
+    /// Holds the shaft with a voltage, at once.
+    pub struct SafeHold<T> {
+        /// Voltage, enough to stop the strongest drive with the weakest brake of the bounds.
+        volts: T, "volts_v" "" V, Range::above(0.0);
+    }
+    relations(p) {
+        /// The converter reaches the voltage.
+        REACHED: volts, "a voltage that the converter reaches, at most rig.dac.highest_v";
+    }
+}
+
+crate::params! {
     /// Brakes with a rising (or falling) voltage, then holds.
-    Ramp {
-        /// Rate, V/s.
-        volts_per_s: T,
-        /// Brake voltage at the end, V.
-        volts: T,
-    },
-    /// Lets go.
-    Release,
-    /// Holds for a time, then lets go.
-    HoldThenRelease {
-        /// Brake voltage, V.
-        volts: T,
-        /// How long it holds, s.
-        after: T,
-    },
+    pub struct SafeRamp<T> {
+        /// Rate at which the voltage goes up or down from the present one.
+        rate: T, "rate_v_s" "" V_S, Range::above(0.0);
+        /// Voltage at the end, enough to stop the strongest drive with the weakest brake of the bounds.
+        volts: T, "volts_v" "" V, Range::above(0.0);
+    }
+    relations(p) {
+        /// A period's step is a number of codes.
+        RESOLVED: rate, "a rate that is a step of 2⁻¹⁶ to 60 000 codes of rig.dac per sampling.period_us";
+        /// The converter reaches the voltage.
+        REACHED: volts, "a voltage that the converter reaches, at most rig.dac.highest_v";
+    }
+}
+
+crate::params! {
+    /// Holds the shaft with a voltage, at once, and after a time lets go.
+    pub struct SafeHoldThenRelease<T> {
+        /// Voltage, enough to stop the strongest drive with the weakest brake of the bounds.
+        volts: T, "volts_v" "" V, Range::above(0.0);
+        /// Time of holding, after which it lets go.
+        after: T, "after_s" "" S, Range::above(0.0);
+    }
+    relations(p) {
+        /// The converter reaches the voltage.
+        REACHED: volts, "a voltage that the converter reaches, at most rig.dac.highest_v";
+        /// The time is a number of periods.
+        COUNTED: after, "a time of 1 to 4e9 times sampling.period_us";
+    }
+}
+
+crate::choice! {
+    /// Safe state: what the brake does when control has ended.
+    pub enum SafeState<T> {
+        /// Holds the shaft with a voltage, at once.
+        Hold(SafeHold<T>) = "hold",
+        /// Brakes with a rising (or falling) voltage, then holds.
+        Ramp(SafeRamp<T>) = "ramp",
+        /// Lets go: 0 V, or the converter's lowest voltage above it.
+        Release = "release",
+        /// Holds the shaft with a voltage, at once, and after a time lets go.
+        HoldThenRelease(SafeHoldThenRelease<T>) = "hold_then_release",
+    }
 }
 
 impl<T: Real> SafeState<T> {
-    /// The same in another scalar, each number rounded to the nearest.
+    /// Holds with `volts`, V.
     #[must_use]
-    pub fn cast<U: Real>(&self) -> SafeState<U> {
-        let to = |x: T| U::from_f64(x.to_f64());
-        match *self {
-            SafeState::Hold { volts } => SafeState::Hold { volts: to(volts) },
-            SafeState::Ramp { volts_per_s, volts } => {
-                SafeState::Ramp { volts_per_s: to(volts_per_s), volts: to(volts) }
-            }
-            SafeState::Release => SafeState::Release,
-            SafeState::HoldThenRelease { volts, after } => {
-                SafeState::HoldThenRelease { volts: to(volts), after: to(after) }
-            }
-        }
+    pub const fn hold(volts: T) -> Self {
+        SafeState::Hold(SafeHold { volts })
+    }
+
+    /// Goes to `volts` at `rate`, V/s.
+    #[must_use]
+    pub const fn ramp(rate: T, volts: T) -> Self {
+        SafeState::Ramp(SafeRamp { rate, volts })
+    }
+
+    /// Holds with `volts` for the time `after`, s, then lets go.
+    #[must_use]
+    pub const fn hold_then_release(volts: T, after: T) -> Self {
+        SafeState::HoldThenRelease(SafeHoldThenRelease { volts, after })
     }
 
     /// The voltage that it holds with, V; none if it only lets go.
     #[must_use]
     pub fn holding_voltage(&self) -> Option<T> {
         match *self {
-            SafeState::Hold { volts }
-            | SafeState::Ramp { volts, .. }
-            | SafeState::HoldThenRelease { volts, .. } => Some(volts),
+            SafeState::Hold(SafeHold { volts })
+            | SafeState::Ramp(SafeRamp { volts, .. })
+            | SafeState::HoldThenRelease(SafeHoldThenRelease { volts, .. }) => Some(volts),
             SafeState::Release => None,
         }
     }
@@ -104,34 +137,36 @@ impl SafeCodes {
     /// Checks a safe state against a converter and a sampling period.
     ///
     /// # Errors
-    /// `volts` not above 0 or beyond the converter's range; `volts_per_s` or `after` not above
-    /// 0, or so small or so large that a period or a code does not resolve it.
+    /// A voltage that is not above 0 or that the converter does not reach; a rate or a time that is not above 0,
+    /// or so small or so large that a period or a code does not resolve it.
     pub fn new<T: Real>(state: &SafeState<T>, dac: &Dac<T>, period: Micros) -> Result<Self, ParamError<T>> {
         let seconds = period.period::<T>()?;
-        let hold = |volts: T| {
+        state.check()?;
+        let hold = |volts: T, reached: Relation| {
             let top = dac.volts(DacCode(u16::MAX));
-            let expected = "a voltage above 0 V that the converter reaches, V";
-            require("volts", volts, volts > T::ZERO && volts <= top + dac.step(), expected)?;
+            reached.require(volts, volts <= top + dac.step())?;
             Ok(dac.code(volts))
         };
         let codes = SafeCodes { release: dac.code(T::ZERO), ..SafeCodes::default() };
         Ok(match *state {
-            SafeState::Hold { volts } => SafeCodes { kind: SafeKind::Hold, hold: hold(volts)?, ..codes },
-            SafeState::Ramp { volts_per_s, volts } => {
-                let step = volts_per_s * seconds / dac.step() * T::from_i32(1 << 16);
-                let fits = step >= T::ONE && step < T::from_f64(4e9);
-                let expected = "a rate above 0 V/s that is a step of 2⁻¹⁶ to 60 000 codes per period";
-                require("volts_per_s", volts_per_s, fits, expected)?;
+            SafeState::Hold(SafeHold { volts }) => {
+                SafeCodes { kind: SafeKind::Hold, hold: hold(volts, SafeHold::REACHED)?, ..codes }
+            }
+            SafeState::Ramp(SafeRamp { rate, volts }) => {
+                let step = rate * seconds / dac.step() * T::from_i32(1 << 16);
+                SafeRamp::RESOLVED.require(rate, step >= T::ONE && step < T::from_f64(4e9))?;
                 let ramp_step = step.floor().to_i64() as u32;
-                SafeCodes { kind: SafeKind::Ramp, hold: hold(volts)?, ramp_step, ..codes }
+                let hold = hold(volts, SafeRamp::REACHED)?;
+                SafeCodes { kind: SafeKind::Ramp, hold, ramp_step, ..codes }
             }
             SafeState::Release => SafeCodes { kind: SafeKind::Release, hold: codes.release, ..codes },
-            SafeState::HoldThenRelease { volts, after } => {
+            SafeState::HoldThenRelease(SafeHoldThenRelease { volts, after }) => {
                 let periods = after / seconds + T::from_f64(0.5);
                 let fits = periods >= T::ONE && periods < T::from_f64(4e9);
-                require("after", after, fits, "a time of 1 to 4e9 periods, s")?;
+                SafeHoldThenRelease::COUNTED.require(after, fits)?;
                 let hold_periods = periods.floor().to_i64() as u32;
-                SafeCodes { kind: SafeKind::HoldThenRelease, hold: hold(volts)?, hold_periods, ..codes }
+                let hold = hold(volts, SafeHoldThenRelease::REACHED)?;
+                SafeCodes { kind: SafeKind::HoldThenRelease, hold, hold_periods, ..codes }
             }
         })
     }
@@ -201,7 +236,7 @@ mod tests {
 
     #[test]
     fn hold_is_there_in_the_first_period() {
-        assert_eq!(first(SafeState::Hold { volts: 5.0 }, 2048, 2), [3072, 3072]);
+        assert_eq!(first(SafeState::hold(5.0), 2048, 2), [3072, 3072]);
     }
 
     #[test]
@@ -212,28 +247,28 @@ mod tests {
     #[test]
     fn a_ramp_comes_from_either_side_and_ends_at_its_voltage() {
         // 1000 V/s are 1 V or 204.8 codes a period.
-        let ramp = SafeState::Ramp { volts_per_s: 1000.0, volts: 2.0 };
+        let ramp = SafeState::ramp(1000.0, 2.0);
         assert_eq!(first(ramp, 2048, 3), [2252, 2457, 2458]);
         assert_eq!(first(ramp, 2800, 3), [2595, 2458, 2458]);
     }
 
     #[test]
     fn holding_ends_after_its_time() {
-        let state = SafeState::HoldThenRelease { volts: 5.0, after: 0.002 };
+        let state = SafeState::hold_then_release(5.0, 0.002);
         assert_eq!(first(state, 2048, 4), [3072, 3072, 2048, 2048]);
     }
 
     #[test]
     fn bad_numbers_are_named() {
         for (bad, field) in [
-            (SafeState::Hold { volts: 0.0 }, "volts"),
-            (SafeState::Hold { volts: 10.5 }, "volts"),
-            (SafeState::Hold { volts: f64::NAN }, "volts"),
-            (SafeState::Ramp { volts_per_s: 0.0, volts: 5.0 }, "volts_per_s"),
-            (SafeState::Ramp { volts_per_s: 1e12, volts: 5.0 }, "volts_per_s"),
-            (SafeState::HoldThenRelease { volts: 5.0, after: 0.0 }, "after"),
+            (SafeState::hold(0.0), "volts"),
+            (SafeState::hold(10.5), "volts"),
+            (SafeState::hold(f64::NAN), "volts"),
+            (SafeState::ramp(0.0, 5.0), "rate"),
+            (SafeState::ramp(1e12, 5.0), "rate"),
+            (SafeState::hold_then_release(5.0, 0.0), "after"),
         ] {
-            assert_eq!(codes(bad).unwrap_err().field, field, "{bad:?}");
+            assert_eq!(codes(bad).unwrap_err().field(), field, "{bad:?}");
         }
     }
 }

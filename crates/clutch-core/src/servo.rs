@@ -6,31 +6,14 @@
 //! ```
 //!
 //! The same type runs in the simulator, in the loop on Linux and on a board. It owns no clock
-//! and no I/O; [`Daq`] is the environment it needs.
+//! and no I/O.
 
-use crate::error::{cast, require};
-use crate::law::{Command, Controller, Law, LawParams, OutputParams, Tick};
+use crate::law::{Command, ControlLaw, Law, LawParams, OutputParams, Tick};
 use crate::velocity::{VelocityParams, VelocitySource, VelocityState};
 use crate::{
-    Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros, ParamError, Plant, PlantParams, Real,
-    Target,
+    Arithmetic, Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros, ParamError, Plant,
+    PlantParams, Real, Target,
 };
-
-/// The data-acquisition board: one encoder, one converter.
-pub trait Daq {
-    /// What can go wrong.
-    type Error;
-    /// The encoder's counts now.
-    ///
-    /// # Errors
-    /// The board's own.
-    fn read(&mut self) -> Result<Counts, Self::Error>;
-    /// Gives the converter a code.
-    ///
-    /// # Errors
-    /// The board's own.
-    fn write(&mut self, code: DacCode) -> Result<(), Self::Error>;
-}
 
 /// Everything a servo is built from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,8 +34,6 @@ pub struct ServoParams<T = f64> {
     pub output: OutputParams<T>,
 }
 
-cast!(ServoParams { } keep { period, encoder } nested { dac, velocity, model, law, output });
-
 impl<T: Real> ServoParams<T> {
     /// The paper's hardware with the given law: 1 ms, 20 000 counts/rev, 12 bit over ±10 V.
     #[must_use]
@@ -70,16 +51,28 @@ impl<T: Real> ServoParams<T> {
 }
 
 impl<T: Real> ServoParams<T> {
-    /// Whether the converter reaches the output's limits.
+    /// The same in another scalar, each real number rounded to the nearest.
+    #[must_use]
+    pub fn cast<U: Real>(&self) -> ServoParams<U> {
+        ServoParams {
+            period: self.period,
+            encoder: self.encoder,
+            dac: self.dac.cast(),
+            velocity: self.velocity.cast(),
+            model: self.model.cast(),
+            law: self.law.cast(),
+            output: self.output.cast(),
+        }
+    }
+
+    /// Checks that reaches the output's limits.
     ///
     /// # Errors
     /// Field `lowest` or `highest` of the output.
     pub fn check_output(&self) -> Result<(), ParamError<T>> {
         let (out, dac) = (&self.output, &self.dac);
-        let expected = "a voltage that the converter reaches: not above the top of its range, V";
-        require("highest", out.highest, out.highest <= dac.highest, expected)?;
-        let expected = "a voltage that the converter reaches: not below the bottom of its range, V";
-        require("lowest", out.lowest, out.lowest >= dac.lowest, expected)?;
+        OutputParams::HIGHEST_REACHED.require(out.highest, out.highest <= dac.highest)?;
+        OutputParams::LOWEST_REACHED.require(out.lowest, out.lowest >= dac.lowest)?;
         Ok(())
     }
 }
@@ -121,7 +114,7 @@ pub struct ServoState<T, S> {
 
 /// What a tick gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ServoOutput<T, Terms> {
+pub struct ServoOutput<T: Arithmetic, Terms> {
     /// The code for the converter.
     pub code: DacCode,
     /// The voltage that the code stands for, V.
@@ -139,12 +132,14 @@ impl<T: Real> Servo<T> {
     /// The first parameter out of range, by name; also output limits (`lowest`, `highest`) beyond
     /// the converter's range, at which it would clip unseen.
     pub fn new(p: &ServoParams<T>) -> Result<Self, ParamError<T>> {
+        let servo = Servo::with_law(p, Law::new(&p.law, &p.model, &p.output, p.period)?)?;
+        // Of numbers that output and converter have taken by themselves.
         p.check_output()?;
-        Servo::with_law(p, Law::new(&p.law, &p.model, &p.output, p.period)?)
+        Ok(servo)
     }
 }
 
-impl<T: Real, C: Controller<T>> Servo<T, C> {
+impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
     /// A servo around a law of your own; `p.law` and `p.output` are not used.
     ///
     /// # Errors
@@ -261,23 +256,6 @@ impl<T: Real, C: Controller<T>> Servo<T, C> {
         (state.position, state.last, state.applied) = before;
     }
 
-    /// Reads the board, ticks, writes the board.
-    ///
-    /// # Errors
-    /// The board's own. After a failed read nothing has changed; after a failed write the
-    /// servo's state has moved on by the tick whose code was lost.
-    pub fn run<D: Daq>(
-        &self,
-        state: &mut ServoState<T, C::State>,
-        daq: &mut D,
-        target: &Target<T>,
-    ) -> Result<ServoOutput<T, C::Terms>, D::Error> {
-        let counts = daq.read()?;
-        let output = self.tick(state, counts, target);
-        daq.write(output.code)?;
-        Ok(output)
-    }
-
     #[inline]
     fn measure(&self, position: FixedCounts, target: &Target<T>, error_rate: T) -> Tick<T> {
         let counts: T = target.position.minus(position);
@@ -295,29 +273,6 @@ mod tests {
     use super::*;
     use crate::law::PdParams;
 
-    /// A board that gives counts and keeps codes, until it fails.
-    struct Board {
-        counts: Counts,
-        code: Option<DacCode>,
-        reads: bool,
-        writes: bool,
-    }
-
-    impl Daq for Board {
-        type Error = &'static str;
-        fn read(&mut self) -> Result<Counts, &'static str> {
-            if self.reads { Ok(self.counts) } else { Err("read") }
-        }
-        fn write(&mut self, code: DacCode) -> Result<(), &'static str> {
-            if self.writes {
-                self.code = Some(code);
-                Ok(())
-            } else {
-                Err("write")
-            }
-        }
-    }
-
     fn servo() -> Servo<f64> {
         Servo::new(&ServoParams::paper(LawParams::Pd(PdParams::default()))).unwrap()
     }
@@ -327,27 +282,13 @@ mod tests {
     }
 
     #[test]
-    fn a_board_gets_the_code_of_the_tick() {
+    fn two_counts_ahead_give_the_voltage_of_the_law() {
         let servo = servo();
         let mut state = servo.start(Counts(0), &target(0), 0.0);
-        let mut board = Board { counts: Counts(2), code: None, reads: true, writes: true };
-        let out = servo.run(&mut state, &mut board, &target(0)).unwrap();
-        assert_eq!(board.code, Some(out.code));
+        let out = servo.tick(&mut state, Counts(2), &target(0));
         // Two counts ahead: 5000 V/rad · 6.28e-4 rad + 50 V s/rad · 0.2 · 0.628 rad/s = 9.42 V.
         assert!((out.command.voltage - 9.424_777_960_769).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_failed_read_changes_nothing_and_a_failed_write_is_told() {
-        let servo = servo();
-        let mut state = servo.start(Counts(0), &target(0), 0.0);
-        let before = state;
-        let mut board = Board { counts: Counts(2), code: None, reads: false, writes: false };
-        assert_eq!(servo.run(&mut state, &mut board, &target(0)), Err("read"));
-        assert_eq!(state, before);
-        board.reads = true;
-        assert_eq!(servo.run(&mut state, &mut board, &target(0)), Err("write"));
-        assert_eq!(board.code, None);
+        assert_eq!(out.code, servo.dac().code(out.command.voltage));
     }
 
     #[test]
@@ -369,7 +310,7 @@ mod tests {
         }
     }
 
-    type LawState<T> = <Law<T> as Controller<T>>::State;
+    type LawState<T> = <Law<T> as ControlLaw<T>>::State;
 
     /// Ticks 0 to `before` one by one, then `lost` samples bridged, then one tick.
     fn across<T: Real>(

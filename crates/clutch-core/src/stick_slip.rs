@@ -8,27 +8,19 @@
 //!
 //! How often it agrees with the simulator's ground truth is measured in `docs/theory.md`.
 
-use crate::error::{cast, require};
+use crate::params::{Range, Table};
 use crate::{Counts, Encoder, Micros, ParamError, Real};
 
-/// When silence counts as sticking.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct StickSlipParams<T = f64> {
-    /// Movement of the path during which the encoder shows none, counts. Above 1, or a shaft in
-    /// even motion would count as stuck.
-    pub gap: T,
-    /// Shortest silence, periods.
-    pub ticks: u32,
-}
-
-impl<T: Real> Default for StickSlipParams<T> {
-    fn default() -> Self {
-        StickSlipParams { gap: T::from_f64(1.25), ticks: 6 }
+crate::params! {
+    /// When silence counts as sticking.
+    pub struct StickSlipParams<T>: Default {
+        /// Movement of the path during which the encoder shows none. Above 1 count, or a shaft in even motion
+        /// would count as stuck.
+        gap: T = 1.25, "gap_counts" "" COUNTS, Range::above(1.0);
+        /// Shortest silence.
+        ticks: u32 = 6, "silence_ticks" "" TICKS, Range::within(1.0, 4294967295.0);
     }
 }
-
-cast!(StickSlipParams { gap } keep { ticks });
 
 /// The detector, checked.
 ///
@@ -102,8 +94,7 @@ impl<T: Real> StickSlip<T> {
     /// # Errors
     /// `gap` not above 1, `ticks` 0, `period` out of range.
     pub fn new(p: &StickSlipParams<T>, encoder: Encoder, period: Micros) -> Result<Self, ParamError<T>> {
-        require("gap", p.gap, p.gap > T::ONE, "a finite number above 1 count")?;
-        require("ticks", T::from_u64(u64::from(p.ticks)), p.ticks > 0, "at least 1 period")?;
+        p.check_rows()?;
         let counts_per_tick_second = encoder.counts_per_radian::<T>() * period.period::<T>()?;
         Ok(StickSlip { gap: p.gap, ticks: p.ticks, counts_per_tick_second })
     }

@@ -5,33 +5,14 @@ use crate::derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeP
 use crate::observer::{Observer, ObserverParams, ObserverState};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Plant, Real, Target};
 
-/// Which velocity source, and its parameters; `Default` = (5) with `K_Kal` 0.2.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[non_exhaustive]
-pub enum VelocityParams<T = f64> {
-    /// The smoothed backward difference of the error (5).
-    SmoothedDerivative(SmoothedDerivativeParams<T>),
-    /// The Kalman observer on position, velocity and disturbance torque.
-    #[cfg(feature = "linalg")]
-    Observer(ObserverParams<T>),
-}
-
-impl<T: Real> Default for VelocityParams<T> {
-    fn default() -> Self {
-        VelocityParams::SmoothedDerivative(SmoothedDerivativeParams::default())
-    }
-}
-
-impl<T: Real> VelocityParams<T> {
-    /// The same in another scalar, each number rounded to the nearest.
-    #[must_use]
-    pub fn cast<U: Real>(&self) -> VelocityParams<U> {
-        match self {
-            VelocityParams::SmoothedDerivative(p) => VelocityParams::SmoothedDerivative(p.cast()),
-            #[cfg(feature = "linalg")]
-            VelocityParams::Observer(p) => VelocityParams::Observer(p.cast()),
-        }
+crate::choice! {
+    /// Source of the velocity that laws are given.
+    pub enum VelocityParams<T>: Default {
+        /// The smoothed backward difference of the error (5).
+        SmoothedDerivative(SmoothedDerivativeParams<T>) = "smoothed_derivative",
+        /// A Kalman observer of position, velocity and disturbance torque.
+        #[cfg(feature = "linalg")]
+        Observer(ObserverParams<T>) = "observer",
     }
 }
 

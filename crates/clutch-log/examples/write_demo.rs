@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         law_hash: 0x0123_4567_89ab_cdef,
         port: "/dev/ttyUSB0".into(),
         source: Source::Simulation,
-        term_names: ["surface_rad_s".into(), "equivalent_v".into(), "switching_v".into()],
+        term_names: vec!["surface_rad_s".into(), "equivalent_v".into(), "switching_v".into()],
         started_unix_ns: 1_700_000_000_000_000_000,
         extra: vec![("operator".into(), "nobody".into())],
         ..Header::default()
@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             target_acceleration: -0.0,
             error: (6.0 * t).sin() * 1e-3,
             error_rate: (6.0 * t).cos() * 6e-3,
-            terms: [t, -t, if tick == 0 { f64::NAN } else { 1.0 / t }],
+            terms: [t, -t, if tick == 0 { f64::NAN } else { 1.0 / t }].into_iter().collect(),
         }))?;
         log.write(&Record::Truth(TruthRecord {
             tick,

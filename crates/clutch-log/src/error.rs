@@ -1,10 +1,10 @@
-//! What can go wrong, with file, place and expectation.
+//! The errors of logs, with file, place and expectation.
 
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Why a log was not written or not read.
+/// The reason why a log was not written or not read.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LogError {
@@ -13,12 +13,12 @@ pub enum LogError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What was tried.
+        /// The action that was tried.
         action: &'static str,
         /// The system's answer.
         source: io::Error,
     },
-    /// No space left, quota reached, or the file is as large as it may get. Told once; the
+    /// No space left, quota reached, or the file is as large as it may get. Reported once; the
     /// writer is dead after it.
     #[error("{}: no space for the log: {source}; {written} records are in the file", path.display())]
     Full {
@@ -30,7 +30,7 @@ pub enum LogError {
         source: io::Error,
     },
     /// A write after an error.
-    #[error("{}: the log ended after {written} records, with the error told then", path.display())]
+    #[error("{}: the log ended after {written} records, with the error reported then", path.display())]
     Closed {
         /// The file.
         path: PathBuf,
@@ -42,7 +42,7 @@ pub enum LogError {
     NotAFile {
         /// The path.
         path: PathBuf,
-        /// What it is.
+        /// The kind of thing that it is.
         found: &'static str,
     },
     /// Another program's file.
@@ -50,9 +50,9 @@ pub enum LogError {
     NotALog {
         /// The file.
         path: PathBuf,
-        /// What it has instead.
+        /// Its content at that place.
         found: String,
-        /// What a log has there.
+        /// The content that a log has there.
         expected: &'static str,
     },
     /// Cut so early that not even the header is whole.
@@ -68,11 +68,11 @@ pub enum LogError {
     Header {
         /// The file.
         path: PathBuf,
-        /// Which.
+        /// Its key.
         key: String,
         /// Its value.
         value: String,
-        /// What is expected.
+        /// The expectation.
         expected: &'static str,
     },
     /// More than [`Limits`](crate::Limits) allow.
@@ -81,22 +81,22 @@ pub enum LogError {
     Limit {
         /// The file.
         path: PathBuf,
-        /// What, with its unit.
+        /// The quantity, with its unit.
         what: &'static str,
-        /// How much.
+        /// Its value.
         value: u64,
-        /// How much is allowed.
+        /// The highest value allowed.
         limit: u64,
     },
-    /// A record of the header that cannot be read. Damage further on is no error: see
+    /// A record of the header that cannot be read. Damage further on is not an error: see
     /// [`Scanned`](crate::Scanned).
     #[error("{}: byte {offset}: {what}", path.display())]
     Corrupt {
         /// The file.
         path: PathBuf,
-        /// Where the record starts, bytes.
+        /// Start of the record, bytes.
         offset: u64,
-        /// What is wrong, and what was expected.
+        /// The fault, and the expectation.
         what: String,
     },
     /// A log cannot be recovered into itself.
@@ -112,7 +112,7 @@ impl LogError {
         LogError::Io { path: path.into(), action, source }
     }
 
-    /// An error while writing: a full disk is told apart.
+    /// An error while writing: a full disk has its own variant.
     pub(crate) fn writing(path: &Path, written: u64, source: io::Error) -> LogError {
         use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         match source.kind() {
@@ -124,7 +124,7 @@ impl LogError {
     }
 }
 
-/// What `path` is, if it exists and is no regular file: a log is never written into a device
+/// The kind of `path`, if it exists and is not a regular file: a log is never written into a device
 /// or a pipe, and opening a pipe would wait for its other end.
 pub(crate) fn require_file(path: &Path, file: &std::fs::Metadata) -> Result<(), LogError> {
     let kind = file.file_type();

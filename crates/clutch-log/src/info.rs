@@ -1,4 +1,4 @@
-//! What a log holds, without holding it.
+//! The contents of a log, without holding them.
 
 use crate::error::LogError;
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
@@ -19,7 +19,7 @@ pub struct ChannelInfo {
     pub span_ns: Option<(u64, u64)>,
 }
 
-/// What a log holds.
+/// The contents of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Info {
     /// The file.
@@ -55,7 +55,7 @@ impl Info {
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (s, h) = (&self.scanned, &self.scanned.header);
-        writeln!(f, "{}: {}", self.path.display(), s.end)?;
+        writeln!(f, "{}: {}", self.path.display(), s.tail)?;
         writeln!(f, "  {} of {} by clutch {}", h.source, Quoted(&h.scenario_name), h.version)?;
         writeln!(
             f,
@@ -106,7 +106,7 @@ impl fmt::Display for Quoted<'_> {
     }
 }
 
-/// Says what a log holds, also of one that was cut.
+/// Gives the contents of a log, even of one that was cut.
 ///
 /// # Errors
 /// As for [`read`](crate::read); the number of records is not limited.

@@ -16,7 +16,10 @@ pub use info::{ChannelInfo, Info, info};
 pub use names::{Arrival, CommandSource, EventKind};
 pub use proto::{CHANNELS, Channel, Field, Kind, channel_table, encode};
 pub use read::{Log, read, read_bytes};
-pub use record::{CommandRecord, EventRecord, Header, LinkRecord, Record, SampleRecord, Source, TruthRecord};
+pub use record::{
+    CommandRecord, EventRecord, Header, LinkRecord, MAX_TERMS, Record, SampleRecord, Source, Terms,
+    TruthRecord,
+};
 pub use recover::{Recovered, recover};
-pub use scan::{Damage, End, Limits, Scanned, scan};
+pub use scan::{Damage, Limits, Scanned, Tail, scan};
 pub use write::{CHUNK_BYTES, CHUNK_NS, LogWriter, Summary};

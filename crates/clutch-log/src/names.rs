@@ -1,4 +1,4 @@
-//! What the small numbers in records mean: the one table of names.
+//! The meanings of the small numbers in records: the one table of names.
 //!
 //! The schemas in the file carry these names, so viewers show `Holding`, not 4.
 
@@ -45,7 +45,7 @@ macro_rules! named {
 }
 
 named! {
-    /// How the sample of a tick came in.
+    /// The arrival of a tick's sample.
     Arrival,
     /// Names of [`Arrival`].
     ARRIVALS {
@@ -65,7 +65,7 @@ named! {
 }
 
 named! {
-    /// Who chose the code of a command.
+    /// The origin of a command's code.
     CommandSource,
     /// Names of [`CommandSource`].
     COMMAND_SOURCES {
@@ -79,13 +79,13 @@ named! {
 }
 
 named! {
-    /// What an event tells.
+    /// The kind of an event.
     EventKind,
     /// Names of [`EventKind`].
     EVENT_KINDS {
         /// The supervisor went from one state to another.
         StateChange = 0,
-        /// Control ended, and not by a sample: silence, the board's own report, an operator, the
+        /// Control ended, but not by a sample: silence, the board's own report, an operator, the
         /// path's end.
         Ended = 1,
         /// The ring was full: `value` records were dropped.
@@ -106,7 +106,7 @@ pub const STATES: Names = &[
     (6, "Faulted"),
 ];
 
-/// Why the supervisor changed its state.
+/// The cause of a change of the supervisor's state.
 pub const CAUSES: Names = &[
     (0, "None"),
     (1, "Lost"),
@@ -126,5 +126,5 @@ pub const CAUSES: Names = &[
     (15, "Done"),
 ];
 
-/// Whether and where the output stage changed the law's demand.
+/// The limit at which the output stage changed the law's demand, if any.
 pub const LIMITS: Names = &[(0, "Unlimited"), (1, "Lowest"), (2, "Highest"), (3, "Invalid")];

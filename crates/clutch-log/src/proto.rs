@@ -1,7 +1,7 @@
 //! The channel table: topics, protobuf messages, their fields, and the way to records and back.
 
 use crate::names::{self, Names};
-use crate::record::{CommandRecord, EventRecord, LinkRecord, Record, SampleRecord, TruthRecord};
+use crate::record::{CommandRecord, EventRecord, LinkRecord, MAX_TERMS, Record, SampleRecord, TruthRecord};
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{
@@ -10,7 +10,7 @@ use prost_types::{
 };
 use std::fmt::Write as _;
 
-/// A field of a message: what viewers show.
+/// A field of a message, as viewers show it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Its number on the wire; never used for anything else later.
@@ -19,7 +19,7 @@ pub struct Field {
     pub name: &'static str,
     /// Its protobuf type.
     pub kind: Kind,
-    /// What it means.
+    /// Its meaning.
     pub meaning: &'static str,
 }
 
@@ -68,7 +68,7 @@ pub struct Channel {
     pub topic: &'static str,
     /// Protobuf message: `clutch.Sample`.
     pub message: &'static str,
-    /// What is in it, and how often.
+    /// Its content, and its rate.
     pub meaning: &'static str,
     /// Its fields.
     pub fields: &'static [Field],
@@ -90,12 +90,12 @@ macro_rules! message {
 // come back as +0.0. The schema says plain `double`; a zero on the wire is valid there.
 message!(Sample, SAMPLE {
     1 tick: u64, (uint64), Kind::Uint64, "tick of the run, from 0";
-    2 arrival: u32, (uint32), Kind::Enum("Arrival", names::ARRIVALS), "how the sample came in";
+    2 arrival: u32, (uint32), Kind::Enum("Arrival", names::ARRIVALS), "arrival of the sample";
     3 sequence: u32, (uint32), Kind::Uint32, "the board's sequence number, wraps at 2^16";
     4 board_time_us: u32, (uint32), Kind::Uint32, "the board's clock at the measurement, µs, wraps at 2^32";
     5 counts: i32, (sint32), Kind::Sint32, "encoder counts, wrap at 2^32";
     6 status: u32, (uint32), Kind::Uint32, "the board's status bits";
-    7 age_us: u32, (uint32), Kind::Uint32, "how old the sample was when it was used, µs";
+    7 age_us: u32, (uint32), Kind::Uint32, "age of the sample when it was used, µs";
     8 lateness_us: u32, (uint32), Kind::Uint32, "time that the answer to the sample before took, µs";
     9 superseded: bool, (bool), Kind::Bool, "a newer sample had come with it; not answered";
 });
@@ -103,8 +103,8 @@ message!(Sample, SAMPLE {
 message!(Command, COMMAND {
     1 tick: u64, (uint64), Kind::Uint64, "tick of the run, from 0";
     2 state: u32, (uint32), Kind::Enum("State", names::STATES), "state of the supervisor";
-    3 source: u32, (uint32), Kind::Enum("Source", names::COMMAND_SOURCES), "who chose the code";
-    4 limit: u32, (uint32), Kind::Enum("Limit", names::LIMITS), "what the output stage did to the demand";
+    3 source: u32, (uint32), Kind::Enum("Source", names::COMMAND_SOURCES), "origin of the code";
+    4 limit: u32, (uint32), Kind::Enum("Limit", names::LIMITS), "effect of the output stage on the demand";
     5 code: u32, (uint32), Kind::Uint32, "code for the converter";
     6 voltage_v: Option<f64>, (double, optional), Kind::Double, "voltage of the code, V";
     7 demand_v: Option<f64>, (double, optional), Kind::Double, "the law's output before limits, V";
@@ -114,18 +114,23 @@ message!(Command, COMMAND {
     11 target_acceleration_rad_s2: Option<f64>, (double, optional), Kind::Double, "target acceleration, rad/s²";
     12 error_rad: Option<f64>, (double, optional), Kind::Double, "position error as the law saw it, rad";
     13 error_rate_rad_s: Option<f64>, (double, optional), Kind::Double, "its rate as the law saw it, rad/s";
-    14 term_0: Option<f64>, (double, optional), Kind::Double, "the law's first term; the file has the law's name for it";
+    14 term_0: Option<f64>, (double, optional), Kind::Double, "the law's first term; the file has the law's name for it, and as many terms as the law";
     15 term_1: Option<f64>, (double, optional), Kind::Double, "the law's second term, likewise";
     16 term_2: Option<f64>, (double, optional), Kind::Double, "the law's third term, likewise";
+    17 term_3: Option<f64>, (double, optional), Kind::Double, "the law's fourth term, likewise";
+    18 term_4: Option<f64>, (double, optional), Kind::Double, "the law's fifth term, likewise";
+    19 term_5: Option<f64>, (double, optional), Kind::Double, "the law's sixth term, likewise";
+    20 term_6: Option<f64>, (double, optional), Kind::Double, "the law's seventh term, likewise";
+    21 term_7: Option<f64>, (double, optional), Kind::Double, "the law's eighth term, likewise";
 });
 
 message!(Event, EVENT {
     1 tick: u64, (uint64), Kind::Uint64, "tick of the run, from 0";
-    2 kind: u32, (uint32), Kind::Enum("Kind", names::EVENT_KINDS), "what happened";
+    2 kind: u32, (uint32), Kind::Enum("Kind", names::EVENT_KINDS), "kind of event";
     3 from_state: u32, (uint32), Kind::Enum("State", names::STATES), "state before";
     4 to_state: u32, (uint32), Kind::Enum("State", names::STATES), "state after";
     5 cause: u32, (uint32), Kind::Enum("Cause", names::CAUSES), "why";
-    6 value: Option<f64>, (double, optional), Kind::Double, "what the check saw, in the check's unit";
+    6 value: Option<f64>, (double, optional), Kind::Double, "value that the check saw, in the check's unit";
 });
 
 message!(Link, LINK {
@@ -158,7 +163,7 @@ pub const CHANNELS: [Channel; 6] = [
     Channel {
         topic: "/sample",
         message: "clutch.Sample",
-        meaning: "The measurement of a tick, or that none came.",
+        meaning: "The measurement of a tick, or its absence.",
         fields: SAMPLE,
     },
     Channel {
@@ -170,7 +175,7 @@ pub const CHANNELS: [Channel; 6] = [
     Channel {
         topic: "/event",
         message: "clutch.Event",
-        meaning: "What the supervisor, the gate, the log or the port had to tell.",
+        meaning: "A report of the supervisor, the gate, the log or the port.",
         fields: EVENT,
     },
     Channel {
@@ -236,13 +241,13 @@ pub fn channel_table() -> String {
     text
 }
 
-/// The schema of a channel: a `FileDescriptorSet`. `terms` name the last three fields of
-/// `/command`.
-pub(crate) fn schema(channel: &Channel, terms: &[String; 3]) -> Vec<u8> {
+/// The schema of a channel: a `FileDescriptorSet`. `terms` name the last fields of `/command`, which has as many.
+pub(crate) fn schema(channel: &Channel, terms: &[String]) -> Vec<u8> {
     let short = channel.message.trim_start_matches("clutch.");
     let mut names: Vec<String> = channel.fields.iter().map(|f| f.name.to_owned()).collect();
     if channel.fields == COMMAND {
-        let first = names.len() - terms.len();
+        let first = names.len() - MAX_TERMS;
+        names.truncate(first + terms.len());
         for (i, term) in terms.iter().enumerate() {
             let mut name = field_name(term, i);
             // Two fields of one name would make the whole schema invalid.
@@ -324,7 +329,7 @@ fn field_name(term: &str, index: usize) -> String {
 /// Appends the record's message, as it stands in the log without the envelope (tick and time
 /// are in the envelope's `sequence` and `log_time`, too).
 pub fn encode(record: &Record, out: &mut Vec<u8>) {
-    out.reserve(192); // the longest message has 16 fields: no second allocation
+    out.reserve(240); // the longest message has 21 fields: no second allocation
     let done = match record {
         Record::Sample(r) => Sample {
             tick: r.tick,
@@ -339,7 +344,8 @@ pub fn encode(record: &Record, out: &mut Vec<u8>) {
         }
         .encode(out),
         Record::Command(r) => {
-            let [term_0, term_1, term_2] = r.terms.map(Some);
+            let [term_0, term_1, term_2, term_3, term_4, term_5, term_6, term_7] =
+                std::array::from_fn(|i| r.terms.get(i).copied());
             Command {
                 tick: r.tick,
                 state: r.state.into(),
@@ -357,6 +363,11 @@ pub fn encode(record: &Record, out: &mut Vec<u8>) {
                 term_0,
                 term_1,
                 term_2,
+                term_3,
+                term_4,
+                term_5,
+                term_6,
+                term_7,
             }
             .encode(out)
         }
@@ -437,7 +448,10 @@ pub(crate) fn decode(channel: usize, time_ns: u64, data: &[u8]) -> Result<Record
                 target_acceleration: real(m.target_acceleration_rad_s2),
                 error: real(m.error_rad),
                 error_rate: real(m.error_rate_rad_s),
-                terms: [m.term_0, m.term_1, m.term_2].map(real),
+                terms: [m.term_0, m.term_1, m.term_2, m.term_3, m.term_4, m.term_5, m.term_6, m.term_7]
+                    .into_iter()
+                    .map_while(|term| term)
+                    .collect(),
             })
         }
         2 => {
@@ -519,19 +533,21 @@ mod tests {
 
     #[test]
     fn a_terms_name_becomes_a_valid_field_that_no_other_field_has() {
-        let named = |terms: [&str; 3]| {
-            let set = schema(&CHANNELS[COMMAND_CHANNEL], &terms.map(String::from));
+        let named = |terms: &[&str]| {
+            let names: Vec<String> = terms.iter().map(|&term| term.into()).collect();
+            let set = schema(&CHANNELS[COMMAND_CHANNEL], &names);
             let set = FileDescriptorSet::decode(&set[..]).expect("a descriptor");
             let fields = &set.file[0].message_type[0].field;
             let mut all: Vec<_> = fields.iter().map(|f| f.name().to_owned()).collect();
             let terms = all[13..].to_vec();
             all.sort_unstable();
             all.dedup();
-            assert_eq!(all.len(), 16, "{terms:?}");
+            assert_eq!(all.len(), 13 + terms.len(), "{terms:?}");
             terms
         };
-        assert_eq!(named(["surface_rad_s", "Ff Torque/N·m", "x"]), ["surface_rad_s", "ff_torque_n_m", "x"]);
-        assert_eq!(named(["", "·", "3rd"]), ["term_0", "term_1", "term_3rd"]);
-        assert_eq!(named(["error_rad", "same", "same"])[0], "error_rad_0");
+        assert_eq!(named(&["surface_rad_s", "Ff Torque/N·m", "x"]), ["surface_rad_s", "ff_torque_n_m", "x"]);
+        assert_eq!(named(&["", "·", "3rd"]), ["term_0", "term_1", "term_3rd"]);
+        assert_eq!(named(&["error_rad", "same", "same"])[0], "error_rad_0");
+        assert_eq!(named(&["a", "b", "c", "d", "e", "f", "g", "h"]).len(), MAX_TERMS);
     }
 }

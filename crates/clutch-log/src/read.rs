@@ -2,13 +2,13 @@
 
 use crate::error::LogError;
 use crate::record::{CommandRecord, EventRecord, Header, LinkRecord, Record, SampleRecord, TruthRecord};
-use crate::scan::{Damage, Each, End, Limits, Scanned, scan_bytes, scan_file};
+use crate::scan::{Damage, Each, Limits, Scanned, Tail, scan_bytes, scan_file};
 use std::path::Path;
 
 /// A log, each channel in the order of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Log {
-    /// What the log says of itself.
+    /// The log's description of itself.
     pub header: Header,
     /// Channel `/sample`.
     pub samples: Vec<SampleRecord>,
@@ -22,11 +22,11 @@ pub struct Log {
     pub truths: Vec<TruthRecord>,
     /// Finished by its writer and without damage. If not, see `end` and `damage`.
     pub complete: bool,
-    /// How the file ends.
-    pub end: End,
+    /// The end of the file.
+    pub tail: Tail,
     /// The first damaged place that was skipped.
     pub damage: Option<Damage>,
-    /// How many damaged places were skipped.
+    /// Number of damaged places that were skipped.
     pub damaged: u64,
     /// Size of the file, bytes.
     pub file_bytes: u64,
@@ -42,7 +42,7 @@ impl Log {
     }
 }
 
-/// Reads a log, also one that was cut: then `complete` is false.
+/// Reads a log, even one that was cut: then `complete` is false.
 ///
 /// # Errors
 /// No such file, or no log; more than `limits` allow; a header that cannot be read.
@@ -84,7 +84,7 @@ fn collect(
         Ok(())
     })?;
     let complete = seen.complete();
-    let Scanned { header, end, damage, damaged, file_bytes, left_out_bytes, .. } = seen;
+    let Scanned { header, tail, damage, damaged, file_bytes, left_out_bytes, .. } = seen;
     Ok(Log {
         header,
         samples,
@@ -93,7 +93,7 @@ fn collect(
         links,
         truths,
         complete,
-        end,
+        tail,
         damage,
         damaged,
         file_bytes,

@@ -1,15 +1,15 @@
-//! The records, and what a log says of itself.
+//! The records, and a log's description of itself.
 
 use std::fmt;
 
-/// One record, without heap: what goes through the ring from the control thread.
+/// One record, without heap: it goes through the ring from the control thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Record {
-    /// A measurement, or that none came.
+    /// A measurement, or its absence.
     Sample(SampleRecord),
     /// A command, with every term of the law.
     Command(CommandRecord),
-    /// What the supervisor, the gate, the log or the port had to tell.
+    /// A report of the supervisor, the gate, the log or the port.
     Event(EventRecord),
     /// Counters of the link, since the start of the run.
     Link(LinkRecord),
@@ -50,7 +50,7 @@ pub struct SampleRecord {
     pub tick: u64,
     /// Time since the start of the run, ns.
     pub time_ns: u64,
-    /// How it came in: [`Arrival`](crate::Arrival) as a number.
+    /// Its arrival: [`Arrival`](crate::Arrival) as a number.
     pub arrival: u8,
     /// The board's sequence number; wraps.
     pub sequence: u16,
@@ -60,7 +60,7 @@ pub struct SampleRecord {
     pub counts: i32,
     /// The board's status bits.
     pub status: u8,
-    /// How old the sample was when it was used, µs.
+    /// Age of the sample when it was used, µs.
     pub age_us: u32,
     /// Time that the answer to the sample before took, µs.
     pub lateness_us: u32,
@@ -68,7 +68,36 @@ pub struct SampleRecord {
     pub superseded: bool,
 }
 
-/// A command and how the law came to it.
+/// The most terms that a law has in a log.
+pub const MAX_TERMS: usize = 8;
+
+/// Terms of a law: up to [`MAX_TERMS`], without an allocation. What is beyond is left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Terms {
+    values: [f64; MAX_TERMS],
+    count: u8,
+}
+
+impl FromIterator<f64> for Terms {
+    fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Terms {
+        let mut all = Terms::default();
+        for (to, term) in all.values.iter_mut().zip(terms) {
+            *to = term;
+            all.count += 1;
+        }
+        all
+    }
+}
+
+impl std::ops::Deref for Terms {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.values[..usize::from(self.count)]
+    }
+}
+
+/// A command, with the values that led the law to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CommandRecord {
     /// Tick of the run, from 0.
@@ -77,9 +106,9 @@ pub struct CommandRecord {
     pub time_ns: u64,
     /// The supervisor's state: see [`STATES`](crate::names::STATES).
     pub state: u8,
-    /// Who chose the code: [`CommandSource`](crate::CommandSource) as a number.
+    /// Origin of the code: [`CommandSource`](crate::CommandSource) as a number.
     pub source: u8,
-    /// What the output stage did to the demand: see [`LIMITS`](crate::names::LIMITS).
+    /// Effect of the output stage on the demand: see [`LIMITS`](crate::names::LIMITS).
     pub limit: u8,
     /// Code for the converter.
     pub code: u16,
@@ -99,8 +128,8 @@ pub struct CommandRecord {
     pub error: f64,
     /// Its rate as the law saw it, rad/s.
     pub error_rate: f64,
-    /// The law's own three terms; [`Header::term_names`] names them.
-    pub terms: [f64; 3],
+    /// The law's own terms; [`Header::term_names`] names them.
+    pub terms: Terms,
 }
 
 /// Something that happened once.
@@ -110,15 +139,15 @@ pub struct EventRecord {
     pub tick: u64,
     /// Time since the start of the run, ns.
     pub time_ns: u64,
-    /// What: [`EventKind`](crate::EventKind) as a number.
+    /// Its kind: [`EventKind`](crate::EventKind) as a number.
     pub kind: u8,
     /// State before: see [`STATES`](crate::names::STATES).
     pub from: u8,
     /// State after.
     pub to: u8,
-    /// Why: see [`CAUSES`](crate::names::CAUSES).
+    /// Its cause: see [`CAUSES`](crate::names::CAUSES).
     pub cause: u8,
-    /// The number that goes with it: what the check saw, in the check's unit.
+    /// The number that goes with it: the value that the check saw, in the check's unit.
     pub value: f64,
 }
 
@@ -164,7 +193,7 @@ pub struct TruthRecord {
     pub stuck: bool,
 }
 
-/// Where the records of a log come from.
+/// The source of a log's records.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Source {
     /// `clutch sim`.
@@ -203,7 +232,7 @@ impl fmt::Display for Source {
     }
 }
 
-/// What a log says of itself; written before the first record.
+/// A log's description of itself; written before the first record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// Name of the scenario.
@@ -218,14 +247,14 @@ pub struct Header {
     pub law_hash: u64,
     /// The port: a path, an address, or nothing.
     pub port: String,
-    /// Where the records come from.
+    /// Source of the records.
     pub source: Source,
     /// Scalar of the law: `f32` or `f64`.
     pub scalar: String,
     /// Sampling period, µs.
     pub period_us: u32,
     /// Names of [`CommandRecord::terms`], with units: `surface_rad_s`.
-    pub term_names: [String; 3],
+    pub term_names: Vec<String>,
     /// Start of the run, ns since 1970-01-01 UTC.
     pub started_unix_ns: u64,
     /// Anything else. Each key once; read back sorted by key.
@@ -244,7 +273,7 @@ impl Default for Header {
             source: Source::default(),
             scalar: "f64".into(),
             period_us: 1000,
-            term_names: ["term_0".into(), "term_1".into(), "term_2".into()],
+            term_names: Vec::new(),
             started_unix_ns: 0,
             extra: Vec::new(),
         }

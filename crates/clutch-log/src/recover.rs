@@ -1,4 +1,4 @@
-//! A finished log from one that was cut.
+//! Makes a finished log from one that was cut.
 
 use crate::error::LogError;
 use crate::record::Header;
@@ -7,10 +7,10 @@ use crate::write::{LogWriter, Summary};
 use std::fmt;
 use std::path::Path;
 
-/// Key in [`Header::extra`] of a recovered log: what the original had lost.
+/// Key in [`Header::extra`] of a recovered log: the losses of the original.
 const RECOVERED: &str = "recovered";
 
-/// What was saved, and what was not.
+/// The saved records, and the losses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recovered {
     /// The new file.
@@ -29,7 +29,7 @@ impl fmt::Display for Recovered {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let until = self.until_ns as f64 * 1e-9;
         let (s, to) = (&self.scanned, self.summary.path.display());
-        write!(f, "{to}: {} records, up to {until:.3} s; the original is {}", self.records, s.end)?;
+        write!(f, "{to}: {} records, up to {until:.3} s; the original is {}", self.records, s.tail)?;
         write!(f, ", {} of its {} bytes left out", self.left_out_bytes, s.file_bytes)?;
         if let Some(damage) = &s.damage {
             write!(f, "; {} damaged places, the first: {damage}", s.damaged)?;
@@ -39,7 +39,7 @@ impl fmt::Display for Recovered {
 }
 
 /// Writes every record of `from` that can be read to a new, finished log `to`, which is
-/// overwritten. Damaged chunks in the middle are skipped and told. The records are the same bit
+/// overwritten. Damaged chunks in the middle are skipped and reported. The records are the same bit
 /// for bit; the header gets the extra key `recovered`.
 ///
 /// # Errors
@@ -52,7 +52,7 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>, limits: &Limits) ->
     {
         return Err(LogError::SameFile { path: to.into() });
     }
-    // Twice through the file: the new header tells how the old file ends.
+    // The file is read twice: the new header reports the end of the old file.
     let scanned = scan_file(from, limits, true, &mut |_, _| Ok(()))?;
     let mut header: Header = scanned.header.clone();
     header.extra.retain(|(key, _)| key != RECOVERED);
@@ -60,7 +60,7 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>, limits: &Limits) ->
         RECOVERED.into(),
         format!(
             "original {}; {} of {} bytes left out",
-            scanned.end, scanned.left_out_bytes, scanned.file_bytes
+            scanned.tail, scanned.left_out_bytes, scanned.file_bytes
         ),
     ));
     let mut log = LogWriter::create(to, &header)?;

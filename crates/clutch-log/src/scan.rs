@@ -2,10 +2,10 @@
 //!
 //! The file's records (opcode, length, body) are walked here and not by the `mcap` crate: its
 //! readers abort on a length of 2⁶⁴ − 1 and on an attachment shorter than its own fields, give
-//! nothing of a chunk that is cut, and decompress whatever a chunk claims to hold. Here a length
-//! is compared with what is left of the file before anything is allocated, a chunk is
-//! decompressed into a buffer of at most [`Limits::max_chunk_bytes`], and its checksum is
-//! verified before the first record of it is believed.
+//! nothing of a chunk that is cut, and decompress everything that a chunk claims to hold. Here a
+//! length is compared with what is left of the file before anything is allocated, a chunk is
+//! decompressed into a buffer of at most [`Limits::max_chunk_bytes`], and its checksum is verified
+//! before the first record of it is believed.
 
 use crate::error::{LogError, require_file};
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
-/// What a reader accepts. The defaults hold for hours of logging at 1 kHz. They let a hostile file
+/// The bounds of a reader. The defaults hold for hours of logging at 1 kHz. They let a hostile file
 /// take 2.3 GB at most for records (20 million of 112 bytes) and five minutes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
@@ -53,9 +53,9 @@ impl Default for Limits {
     }
 }
 
-/// How a log ends.
+/// The end of a log.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum Tail {
     /// Finished by its writer.
     Finished,
     /// Cut, by a crash or a full disk: the file is whole up to byte `at`, where a record starts
@@ -63,24 +63,24 @@ pub enum End {
     Cut {
         /// Offset, bytes.
         at: u64,
-        /// What was cut.
+        /// The part that was cut.
         inside: &'static str,
     },
     /// From byte `at` on the file makes no sense.
     Broken {
         /// Offset, bytes.
         at: u64,
-        /// What stands there, and what was expected.
+        /// The content at that place, and the expectation.
         what: String,
     },
 }
 
-impl fmt::Display for End {
+impl fmt::Display for Tail {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            End::Finished => write!(f, "complete"),
-            End::Cut { at, inside } => write!(f, "cut at byte {at}, inside {inside}"),
-            End::Broken { at, what } => write!(f, "broken at byte {at}: {what}"),
+            Tail::Finished => write!(f, "complete"),
+            Tail::Cut { at, inside } => write!(f, "cut at byte {at}, inside {inside}"),
+            Tail::Broken { at, what } => write!(f, "broken at byte {at}: {what}"),
         }
     }
 }
@@ -90,7 +90,7 @@ impl fmt::Display for End {
 pub struct Damage {
     /// Offset of the record of the file, bytes.
     pub at: u64,
-    /// What is wrong, and what was expected.
+    /// The fault, and the expectation.
     pub what: String,
 }
 
@@ -100,16 +100,16 @@ impl fmt::Display for Damage {
     }
 }
 
-/// What a walk through a log saw.
+/// The findings of a walk through a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scanned {
-    /// What the log says of itself.
+    /// The log's description of itself.
     pub header: Header,
-    /// How it ends.
-    pub end: End,
+    /// Its end.
+    pub tail: Tail,
     /// The first damage that was skipped.
     pub damage: Option<Damage>,
-    /// How many damaged places were skipped.
+    /// Number of damaged places that were skipped.
     pub damaged: u64,
     /// Size of the file, bytes.
     pub file_bytes: u64,
@@ -131,7 +131,7 @@ impl Scanned {
     /// Finished by its writer and without damage.
     #[must_use]
     pub fn complete(&self) -> bool {
-        self.end == End::Finished && self.damaged == 0
+        self.tail == Tail::Finished && self.damaged == 0
     }
 }
 
@@ -150,7 +150,7 @@ pub fn scan(
 
 pub(crate) type Each<'a> = &'a mut dyn FnMut(&Header, Record) -> Result<(), LogError>;
 
-/// `lenient`: what is over a limit is skipped as damage, and is no error.
+/// With `lenient`, a part over a limit is skipped as damage instead of an error.
 pub(crate) fn scan_file(
     path: &Path,
     limits: &Limits,
@@ -175,7 +175,7 @@ pub(crate) fn scan_bytes(
     Scan::new(bytes, bytes.len() as u64, path, limits, false).run(each)
 }
 
-/// What a channel of the file holds.
+/// The content of a channel of the file.
 #[derive(Clone, Copy)]
 enum Held {
     /// The channel in this row of [`CHANNELS`].
@@ -193,7 +193,7 @@ struct Scan<'a, R> {
     lenient: bool,
     started: Instant,
     time: Duration,
-    /// Of the data section, then of the summary.
+    /// Checksum of the data section, then of the summary.
     crc: crc::Digest<'static, u32, Table<16>>,
     named: bool,
     attached: bool,
@@ -205,7 +205,7 @@ struct Scan<'a, R> {
     seen: Scanned,
 }
 
-/// What to do after a record of the file.
+/// The next step after a record of the file.
 enum Next {
     More,
     End,
@@ -232,7 +232,7 @@ impl<'a, R: Read> Scan<'a, R> {
             unpack: None,
             seen: Scanned {
                 header: Header::default(),
-                end: End::Finished,
+                tail: Tail::Finished,
                 damage: None,
                 damaged: 0,
                 file_bytes: size,
@@ -267,16 +267,16 @@ impl<'a, R: Read> Scan<'a, R> {
             self.fill(&mut head, 9)?;
             let mut fields = Bytes(&head);
             let (Some(opcode), Some(length)) = (fields.u8(), fields.u64()) else {
-                break End::Cut { at: self.at, inside: "the head of a record" };
+                break Tail::Cut { at: self.at, inside: "the head of a record" };
             };
             let left = self.size.saturating_sub(self.at).saturating_sub(9);
             if length > left {
                 break if length > self.limits.max_record_bytes {
                     let what =
                         format!("a record of {length} bytes: expected at most the {left} left in the file");
-                    End::Broken { at: self.at, what }
+                    Tail::Broken { at: self.at, what }
                 } else {
-                    End::Cut { at: self.at, inside: name_of_record(opcode) }
+                    Tail::Cut { at: self.at, inside: name_of_record(opcode) }
                 };
             }
             if length > self.limits.max_record_bytes {
@@ -292,7 +292,7 @@ impl<'a, R: Read> Scan<'a, R> {
             self.fill(&mut body, length)?;
             if body.len() as u64 != length {
                 // The file became shorter meanwhile.
-                break End::Cut { at: self.at, inside: name_of_record(opcode) };
+                break Tail::Cut { at: self.at, inside: name_of_record(opcode) };
             }
             let next = self.record(opcode, &head, &body, each)?;
             self.at += 9 + length;
@@ -302,16 +302,16 @@ impl<'a, R: Read> Scan<'a, R> {
         };
         if !(self.named && self.attached) {
             return Err(match end {
-                End::Finished => {
+                Tail::Finished => {
                     self.foreign("no record of it is ours".into(), "a metadata record \"clutch\"")
                 }
                 _ => LogError::NoHeader { path: self.path.into(), at: self.at },
             });
         }
-        if end != End::Finished {
+        if end != Tail::Finished {
             self.seen.left_out_bytes += self.size.saturating_sub(self.at);
         }
-        self.seen.end = end;
+        self.seen.tail = end;
         Ok(self.seen)
     }
 
@@ -369,7 +369,7 @@ impl<'a, R: Read> Scan<'a, R> {
         let mut fields = Bytes(body);
         let name = fields.text().unwrap_or_default();
         match name {
-            // Only the first counts: what follows cannot take the log's name from it.
+            // Only the first counts: a later one cannot take the log's name from it.
             METADATA if !self.named => match fields.map() {
                 Some(map) => {
                     self.header(map)?;
@@ -419,7 +419,7 @@ impl<'a, R: Read> Scan<'a, R> {
         h.version = text("version");
         h.port = text("port");
         h.scalar = text("scalar");
-        h.term_names = ["term_0", "term_1", "term_2"].map(text);
+        h.term_names = (0..crate::MAX_TERMS).map_while(|i| map.remove(&format!("term_{i}"))).collect();
         Ok(())
     }
 
@@ -500,8 +500,8 @@ impl<'a, R: Read> Scan<'a, R> {
         match compression {
             "" => chunk.extend_from_slice(packed),
             "zstd" => {
-                // Exactly as much room as the chunk claims, and that is within the limit: zstd
-                // stops there. The room is not touched before something is written to it.
+                // The room is exactly the chunk's claim, which is within the limit: zstd stops
+                // there. The room is not touched before something is written to it.
                 chunk.reserve_exact(size as usize);
                 let unpack = match &mut self.unpack {
                     Some(unpack) => unpack,
@@ -586,17 +586,17 @@ impl<'a, R: Read> Scan<'a, R> {
     }
 
     /// After the footer.
-    fn last_magic(&mut self) -> Result<End, LogError> {
+    fn last_magic(&mut self) -> Result<Tail, LogError> {
         let left = self.size.saturating_sub(self.at);
         let mut magic = Vec::new();
         self.fill(&mut magic, left.min(9))?; // one more than expected shows that there is more
         let at = self.at;
         Ok(if magic == mcap::MAGIC {
-            End::Finished
+            Tail::Finished
         } else if mcap::MAGIC.starts_with(&magic) {
-            End::Cut { at, inside: "the last magic" }
+            Tail::Cut { at, inside: "the last magic" }
         } else {
-            End::Broken { at, what: "something after the footer: expected the magic and the end".into() }
+            Tail::Broken { at, what: "something after the footer: expected the magic and the end".into() }
         })
     }
 
@@ -665,7 +665,7 @@ fn name_of_record(opcode: u8) -> &'static str {
     }
 }
 
-/// What is left of a record's body. Little-endian, as MCAP is; `None` if it is too short.
+/// The rest of a record's body. Little-endian, as MCAP is; `None` if it is too short.
 struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {

@@ -2,7 +2,7 @@
 
 use crate::error::{LogError, require_file};
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
-use crate::record::{Header, Record};
+use crate::record::{Header, MAX_TERMS, Record};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use prost::Message;
@@ -15,13 +15,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Longest span of log time in one chunk, ns: what a crash can cost.
+/// Longest span of log time in one chunk, ns: the highest cost of a crash.
 pub const CHUNK_NS: u64 = 100_000_000;
 
 /// A chunk is closed before it grows past this, bytes before compression.
 pub const CHUNK_BYTES: usize = 1 << 20;
 
-/// Most text in a header, bytes: far from what the reader refuses.
+/// Most text in a header, bytes: far below the reader's limit.
 const HEADER_BYTES: u64 = 4 << 20;
 
 /// Least time between two `fdatasync`.
@@ -41,11 +41,11 @@ pub(crate) const FORMAT: u32 = 1;
 
 /// Writes a log. Belongs to the log thread: it calls the system and waits for the disk.
 ///
-/// A writer that is dropped closes its chunk but does not finish the file: a reader then says
+/// A writer that is dropped closes its chunk but does not finish the file: a reader then reports
 /// that the log is not complete.
 ///
 /// A process whose file size is limited (`ulimit -f`) must ignore `SIGXFSZ`: the kernel kills it
-/// otherwise, before [`LogError::Full`] can be told.
+/// otherwise, before [`LogError::Full`] can be reported.
 pub struct LogWriter {
     path: PathBuf,
     file: Arc<File>,
@@ -66,7 +66,7 @@ pub struct LogWriter {
     synced: Instant,
 }
 
-/// What a finished log holds.
+/// The contents of a finished log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Summary {
     /// The file.
@@ -97,7 +97,7 @@ impl LogWriter {
     /// Creates the file, or empties it, and writes the header to the disk.
     ///
     /// # Errors
-    /// `path` is no regular file; the system refuses; the disk is full; a key in
+    /// `path` is not a regular file; the system refuses; the disk is full; a key in
     /// [`Header::extra`] stands there twice; the header has more than 4 MiB of text.
     pub fn create(path: impl AsRef<Path>, header: &Header) -> Result<LogWriter, LogError> {
         let path = path.as_ref();
@@ -148,7 +148,7 @@ impl LogWriter {
         let log_time = self.started_unix_ns.wrapping_add(time_ns);
         let header = MessageHeader {
             channel_id: self.channels[row],
-            sequence: record.tick() as u32, // the low 32 bits: that is what the docs promise
+            sequence: record.tick() as u32, // the low 32 bits: as the docs promise
             log_time,
             publish_time: log_time,
         };
@@ -167,7 +167,7 @@ impl LogWriter {
     }
 
     /// Closes the chunk and hands it to the system, so that a crash of this process leaves it in
-    /// the file. To be called at least every 100 ms. Once a second it also waits for the disk.
+    /// the file. Call it at least every 100 ms. Once a second it also waits for the disk.
     ///
     /// # Errors
     /// As for [`write`](LogWriter::write).
@@ -234,7 +234,7 @@ impl LogWriter {
         LogError::Closed { path: self.path.clone(), written: self.written() }
     }
 
-    /// Lets go of the writer without its last words: dropping it would write an index.
+    /// Drops the writer without an index, which its own drop would write.
     fn abandon(&mut self) {
         if let Some(writer) = self.writer.take() {
             drop(writer.into_inner());
@@ -245,7 +245,7 @@ impl LogWriter {
 impl Drop for LogWriter {
     fn drop(&mut self) {
         if self.writer.is_some() {
-            let _ = self.flush(); // nobody is left to be told
+            let _ = self.flush(); // nobody is left to receive the error
         }
         self.abandon();
     }
@@ -285,7 +285,7 @@ impl Write for Sink {
 }
 
 impl Seek for Sink {
-    /// Tells the position; the writer never goes elsewhere.
+    /// Gives the position; the writer never goes elsewhere.
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         match to {
             SeekFrom::Current(0) => Ok(self.position + self.pending.len() as u64),
@@ -359,6 +359,10 @@ fn metadata(path: &Path, h: &Header) -> Result<(Metadata, Metadata), LogError> {
         .chain(h.extra.iter().chain(&h.parameters).flat_map(|(k, v)| [k, v]))
         .map(|text| text.len() as u64)
         .sum();
+    if h.term_names.len() > MAX_TERMS {
+        let (path, what, value) = (path.into(), "terms of a law", h.term_names.len() as u64);
+        return Err(LogError::Limit { path, what, value, limit: MAX_TERMS as u64 });
+    }
     if value > HEADER_BYTES {
         let (path, what) = (path.into(), "bytes of text in the header");
         return Err(LogError::Limit { path, what, value, limit: HEADER_BYTES });

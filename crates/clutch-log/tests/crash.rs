@@ -1,5 +1,5 @@
-//! What a crash and a full disk leave. The tests that end themselves run in processes of their own:
-//! this binary again, with one ignored test.
+//! The remains after a crash and after a full disk. The tests that end themselves run in processes
+//! of their own: this binary again, with one ignored test.
 #![cfg(unix)]
 
 mod common;
@@ -77,7 +77,7 @@ fn kill_9_costs_at_most_100_ms() {
     println!("worst loss in 20 kills: {worst} ms");
 }
 
-/// Writes until there is no space left; checks what is told and what is left.
+/// Writes until there is no space left; checks the report and the remains.
 #[test]
 #[ignore = "the child of the tests on full disks"]
 fn child_writes_until_the_disk_is_full() {
@@ -102,7 +102,7 @@ fn child_writes_until_the_disk_is_full() {
     let written = *written;
     assert!(e.to_string().contains(&format!("{written} records")), "{e}");
     assert!(written > 1000 && written <= tick && tick - written <= 101, "{written} of {tick}");
-    // Told once; dead after it, also when there is space again.
+    // Reported once; dead after it, even when there is space again.
     for _ in 0..3 {
         let e = log.write(&Record::Sample(sample(tick))).unwrap_err();
         assert!(matches!(e, LogError::Closed { written: w, .. } if w == written), "{e}");
@@ -115,7 +115,7 @@ fn child_writes_until_the_disk_is_full() {
     assert!(!back.complete);
     // The last chunk may be whole without its index.
     let read = back.samples.len() as u64;
-    assert!(read >= written && read <= tick, "{written} told, {read} read, {tick} accepted");
+    assert!(read >= written && read <= tick, "{written} reported, {read} read, {tick} accepted");
     assert!(back.samples.iter().zip(0..).all(|(s, tick)| s.tick == tick));
     println!("full: {e}; {read} read back");
 }

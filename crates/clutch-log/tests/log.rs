@@ -3,7 +3,7 @@
 mod common;
 
 use clutch_log::{
-    CHUNK_NS, End, Header, Limits, LogError, LogWriter, Record, SampleRecord, info, read, read_bytes,
+    CHUNK_NS, Header, Limits, LogError, LogWriter, Record, SampleRecord, Tail, info, read, read_bytes,
     recover, scan,
 };
 use common::{Folder, Numbers, bits, header, record, small_log};
@@ -68,7 +68,7 @@ fn every_record_and_the_header_come_back_bit_for_bit() {
         assert_eq!(bits(a), bits(b), "{a:?} came back as {b:?}");
     }
     let log = read(&path, &Limits::default()).unwrap();
-    assert!(log.complete, "{} {:?}", log.end, log.damage);
+    assert!(log.complete, "{} {:?}", log.tail, log.damage);
     assert_eq!(log.header, header());
     assert_eq!(log.records(), 20_000);
     for (topic, count) in summary.channels {
@@ -94,9 +94,10 @@ proptest::proptest! {
         law_hash: u64, period_us: u32, started_unix_ns: u64,
     ) {
         let [scenario_name, scenario_toml, version, port, scalar, a, b, c] = texts;
+        let term_names = vec![a, b, c];
         let header = Header {
             scenario_name, scenario_toml, parameters, version, law_hash, port,
-            source: clutch_log::Source::Replay, scalar, period_us, term_names: [a, b, c], started_unix_ns,
+            source: clutch_log::Source::Replay, scalar, period_us, term_names, started_unix_ns,
             extra: extra.into_iter().collect(),
         };
         let folder = Folder::new("any-header");
@@ -187,11 +188,11 @@ fn a_file_cut_at_any_byte_gives_every_whole_chunk() {
                 assert_eq!(log.records(), expected, "cut at {cut}");
                 assert!(!log.complete, "cut at {cut}");
                 assert!(
-                    matches!(log.end, End::Cut { at, .. } if at <= cut as u64),
+                    matches!(log.tail, Tail::Cut { at, .. } if at <= cut as u64),
                     "cut at {cut}: {}",
-                    log.end
+                    log.tail
                 );
-                let End::Cut { at, .. } = log.end else { unreachable!() };
+                let Tail::Cut { at, .. } = log.tail else { unreachable!() };
                 assert_eq!(log.left_out_bytes, cut as u64 - at, "cut at {cut}");
                 if cut >= ends[0].0 {
                     assert_eq!(log.header, header(), "cut at {cut}");
@@ -235,7 +236,7 @@ fn a_cut_log_is_recovered_into_a_finished_one_and_says_so() {
     let recovered = recover(&from, &to, &Limits::default()).unwrap();
     assert_eq!(recovered.records as usize, ends[3].1);
     assert_eq!(recovered.until_ns, records[ends[3].1 - 1].time_ns());
-    let End::Cut { at, .. } = recovered.scanned.end else { panic!("{}", recovered.scanned.end) };
+    let Tail::Cut { at, .. } = recovered.scanned.tail else { panic!("{}", recovered.scanned.tail) };
     assert_eq!(recovered.left_out_bytes, cut as u64 - at);
     let back = in_order(&to);
     assert!(back.iter().map(bits).eq(records[..ends[3].1].iter().map(bits)));
@@ -252,8 +253,8 @@ fn a_cut_log_is_recovered_into_a_finished_one_and_says_so() {
     // Once more: the key does not stand there twice.
     let again = recover(&to, folder.file("again.mcap"), &Limits::default()).unwrap();
     assert_eq!(
-        (again.records, again.left_out_bytes, again.scanned.end),
-        (recovered.records, 0, End::Finished)
+        (again.records, again.left_out_bytes, again.scanned.tail),
+        (recovered.records, 0, Tail::Finished)
     );
     // Into itself, by another name too.
     assert!(matches!(recover(&from, &from, &Limits::default()), Err(LogError::SameFile { .. })));
@@ -273,7 +274,7 @@ fn a_damaged_chunk_is_skipped_and_told() {
     std::fs::write(&path, &bytes).unwrap();
     let log = read(&path, &Limits::default()).unwrap();
     assert_eq!(log.records(), records.len() - (ends[2].1 - ends[1].1));
-    assert!(!log.complete && log.end == End::Finished);
+    assert!(!log.complete && log.tail == Tail::Finished);
     assert_eq!(log.damaged, 2, "the chunk and the data's checksum: {:?}", log.damage);
     let damage = log.damage.unwrap();
     assert!((ends[1].0 as u64..ends[2].0 as u64).contains(&damage.at), "{damage}");
@@ -455,8 +456,8 @@ fn a_record_of_two_to_the_64_bytes_is_the_end_of_the_log() {
         let log = read_bytes(&bytes, &Limits::default()).unwrap();
         assert_eq!(log.records(), ends[3].1);
         assert!(log.records() < records.len() && !log.complete);
-        assert!(matches!(log.end, End::Broken { at, .. } if at == end as u64), "{}", log.end);
-        assert!(log.end.to_string().contains(&length.to_string()), "{}", log.end);
+        assert!(matches!(log.tail, Tail::Broken { at, .. } if at == end as u64), "{}", log.tail);
+        assert!(log.tail.to_string().contains(&length.to_string()), "{}", log.tail);
     }
 }
 
@@ -469,7 +470,7 @@ fn a_bomb_costs_neither_memory_nor_time() {
     let made = started.elapsed();
     assert!(bomb.len() < 1 << 20);
 
-    // It says what it is: refused unread.
+    // It declares its size: refused unread.
     let mut bytes = head.clone();
     bytes.extend(chunk_record(4 << 30, 0, &bomb));
     let path = folder.file("honest.mcap");
@@ -484,7 +485,7 @@ fn a_bomb_costs_neither_memory_nor_time() {
     let recovered = recover(&path, folder.file("to.mcap"), &Limits::default()).unwrap();
     assert_eq!((recovered.scanned.damaged, recovered.scanned.chunks), (1, 2));
 
-    // It says that it is small: unpacked so far and no further.
+    // It declares a small size: unpacked to that size and no further.
     let mut bytes = head.clone();
     bytes.extend(chunk_record(1 << 20, 0, &bomb));
     let log = read_bytes(&bytes, &Limits::default()).unwrap();
@@ -586,7 +587,7 @@ fn what_is_no_log_is_named() {
             "{e}"
         );
     }
-    // Of a clutch to come.
+    // A log of a future clutch.
     let (_, mut bytes) = small_log(&path, 3);
     let at = bytes.windows(6).position(|w| w == b"format").unwrap() + 6 + 4;
     bytes[at] = b'2';

@@ -5,7 +5,7 @@
 
 use clutch_core::supervisor::Checks;
 use clutch_loop::campaign::{Table, runs};
-use clutch_loop::emulator::Emulator;
+use clutch_loop::qemu_board::QemuBoard;
 use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for run in runs(first, seeds).filter(|run| image.is_none() || run.is_outside()) {
         let outcome = match &image {
             None => run.run(Checks::ALL, false)?,
-            Some(image) => run.run_on(Emulator::start(image)?)?,
+            Some(image) => run.run_on(QemuBoard::start(image)?)?,
         };
         table.add(&run, &outcome);
         count += 1;

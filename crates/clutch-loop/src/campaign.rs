@@ -5,16 +5,17 @@
 //! the table of `docs/safety.md`; the tests run it with fewer seeds, and show that it fails when
 //! any one of the supervisor's checks is taken out.
 
-use crate::emulated::{Lockstep, emulated};
-use crate::end::Local;
 use crate::faults::{Direction, Fault, FaultKind, StuckAt};
-use crate::setup::{self, Setup, SetupError};
+use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::lockstep_board::LockstepBoard;
+use crate::lockstep_host::lockstep_host;
 use crate::sim_board::SimBoardError;
-use crate::world::{Outcome, Stall, World, WorldError, WorldParams};
-use clutch_core::law::{Command, Controller, Law, Tick};
+use crate::station::ControllerStation;
+use crate::virtual_time::{Stall, VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
+use clutch_core::law::{Command, ControlLaw, Law, Tick};
 use clutch_core::supervisor::{Cause, Checks};
 use clutch_core::{Real, Servo, Target};
-use clutch_node::ControlNode;
+use clutch_node::ControllerNode;
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Scenario, ScenarioError};
 use clutch_wire::BoardState;
@@ -238,13 +239,13 @@ pub enum CampaignError {
     Scenario(#[from] ScenarioError),
     /// Its set-up.
     #[error(transparent)]
-    Setup(#[from] SetupError),
+    Build(#[from] BuildError),
     /// Its board.
     #[error(transparent)]
     Board(#[from] SimBoardError),
-    /// Its controller's end.
+    /// Its controller, or the host of one.
     #[error(transparent)]
-    World(#[from] WorldError),
+    VirtualLoop(#[from] VirtualError),
 }
 
 impl RunId {
@@ -312,9 +313,9 @@ impl RunId {
     ///
     /// # Errors
     /// None, unless a row of the tables is wrong.
-    pub fn run(&self, checks: Checks, record: bool) -> Result<Outcome, CampaignError> {
+    pub fn run(&self, checks: Checks, record: bool) -> Result<VirtualReport, CampaignError> {
         let scenario = self.scenario()?;
-        match scenario.scalar {
+        match scenario.scalar() {
             ScalarKind::F32 => self.run_in::<f32>(&scenario, checks, record),
             ScalarKind::F64 => self.run_in::<f64>(&scenario, checks, record),
         }
@@ -331,25 +332,25 @@ impl RunId {
     ///
     /// # Errors
     /// The board failed.
-    pub fn run_on(&self, link: impl Lockstep) -> Result<Outcome, CampaignError> {
+    pub fn run_on(&self, link: impl LockstepBoard) -> Result<VirtualReport, CampaignError> {
         let scenario = self.scenario_in("f32")?;
-        let setup = Setup::<f32>::new(&scenario, 7)?;
-        let params = self.world(setup.servo.period().seconds(), false);
-        let end = emulated(&scenario, &setup, link, u64::MAX)?;
-        let path = setup::path::<f32>(&scenario)?;
-        let outcome = World::new(&scenario, params, end)?.run(&path)?;
-        Ok(self.with_onset(outcome, self.onset()))
+        let built = BuiltRun::<f32>::new(&scenario, 7)?;
+        let params = self.world(built.servo.period().seconds(), false);
+        let station = lockstep_host(&scenario, &built, link, u64::MAX)?;
+        let path = from_scenario::path::<f32>(&scenario)?;
+        let report = VirtualLoop::new(&scenario, params, station)?.run(&path)?;
+        Ok(self.with_onset(report, self.onset()))
     }
 
     /// What is broken in the world around the controller.
-    fn world(&self, period: f64, record: bool) -> WorldParams {
+    fn world(&self, period: f64, record: bool) -> VirtualOptions {
         let onset = self.onset();
-        let mut params = WorldParams {
+        let mut params = VirtualOptions {
             latency_ns: 50_000,
             seed: self.seed,
             record,
             duration: onset + 1.6,
-            ..WorldParams::default()
+            ..VirtualOptions::default()
         };
         let fault = |kind, direction| Fault { direction, ..Fault::new(kind, onset) };
         match self.case().broken {
@@ -381,11 +382,11 @@ impl RunId {
     }
 
     /// A fault that the line does not show showed at its onset.
-    fn with_onset(&self, mut outcome: Outcome, onset: f64) -> Outcome {
-        if outcome.hit.is_none() && !matches!(self.case().expected, Expected::Tolerated) {
-            outcome.hit = Some(onset);
+    fn with_onset(&self, mut report: VirtualReport, onset: f64) -> VirtualReport {
+        if report.hit.is_none() && !matches!(self.case().expected, Expected::Tolerated) {
+            report.hit = Some(onset);
         }
-        outcome
+        report
     }
 
     fn run_in<T: Real>(
@@ -393,12 +394,12 @@ impl RunId {
         scenario: &Scenario,
         checks: Checks,
         record: bool,
-    ) -> Result<Outcome, CampaignError> {
-        let setup = Setup::<T>::with_checks(scenario, 7, checks)?;
-        let period: f64 = setup.servo.period().seconds();
+    ) -> Result<VirtualReport, CampaignError> {
+        let built = BuiltRun::<T>::with_checks(scenario, 7, checks)?;
+        let period: f64 = built.servo.period().seconds();
         let params = self.world(period, record);
         let onset_tick = (self.onset() / period) as u64;
-        let path = setup::path::<T>(scenario)?;
+        let path = from_scenario::path::<T>(scenario)?;
         let nan = T::from_f64(f64::NAN);
         let broken = self.case().broken;
         let path = move |tick: u64| {
@@ -412,28 +413,22 @@ impl RunId {
                 _ => target,
             }
         };
-        let outcome = if broken == Broken::LawNotFinite {
-            let law = BrokenLaw { law: *setup.servo.law(), from: onset_tick };
-            let servo = Servo::with_law(&setup.params, law).map_err(|e| {
-                SetupError::Param(clutch_core::ParamError {
-                    field: e.field,
-                    value: e.value.to_f64(),
-                    expected: e.expected,
-                })
-            })?;
-            let node = ControlNode::new(setup.control, servo, setup.supervisor);
-            World::new(scenario, params, Local { node, path: &path })?.run(&path)?
+        let report = if broken == Broken::LawNotFinite {
+            let law = BrokenLaw { law: *built.servo.law(), from: onset_tick };
+            let servo = Servo::with_law(&built.params, law).map_err(|e| BuildError::Param(e.cast()))?;
+            let node = ControllerNode::new(built.controller, servo, built.supervisor);
+            VirtualLoop::new(scenario, params, ControllerStation { node, path: &path })?.run(&path)?
         } else {
-            let node = ControlNode::new(setup.control, setup.servo, setup.supervisor);
-            World::new(scenario, params, Local { node, path: &path })?.run(&path)?
+            let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+            VirtualLoop::new(scenario, params, ControllerStation { node, path: &path })?.run(&path)?
         };
         let onset = if self.is_outside() { self.onset() } else { onset_tick as f64 * period };
-        Ok(self.with_onset(outcome, onset))
+        Ok(self.with_onset(report, onset))
     }
 
-    /// Whether the outcome is what must come of it; what is wrong if not.
+    /// Whether the report says what must come of it; what is wrong if not.
     #[must_use]
-    pub fn judge(&self, o: &Outcome) -> Option<String> {
+    pub fn judge(&self, o: &VirtualReport) -> Option<String> {
         let top = 10.0;
         if o.volts.0 < -1e-9 || o.volts.1 > top {
             return Some(format!("commanded {} to {} V, outside of 0 to {top} V", o.volts.0, o.volts.1));
@@ -488,9 +483,10 @@ struct BrokenLaw<T> {
     from: u64,
 }
 
-impl<T: Real> Controller<T> for BrokenLaw<T> {
-    type State = (<Law<T> as Controller<T>>::State, u64);
-    type Terms = <Law<T> as Controller<T>>::Terms;
+impl<T: Real> ControlLaw<T> for BrokenLaw<T> {
+    type State = (<Law<T> as ControlLaw<T>>::State, u64);
+    type Terms = <Law<T> as ControlLaw<T>>::Terms;
+    const TERMS: &'static [&'static str] = &[];
 
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
         (self.law.start(tick, applied), 0)
@@ -522,18 +518,18 @@ pub struct Table {
 
 impl Table {
     /// Takes a run in.
-    pub fn add(&mut self, run: &RunId, outcome: &Outcome) {
+    pub fn add(&mut self, run: &RunId, report: &VirtualReport) {
         let row = self.rows.entry(run.case).or_default();
         row.runs += 1;
-        if let (Some(safe), Some(hit)) = (outcome.safe, outcome.hit) {
+        if let (Some(safe), Some(hit)) = (report.safe, report.hit) {
             let longest = &mut row.longest[usize::from(run.on_bench())];
             *longest = longest.max(safe - hit);
         }
         // The bench's own limit is twice the paper rig's; the column is in the paper rig's terms.
         let speed = PATHS[run.path].3 / 20.0;
         let scale = speed * speed * if run.on_bench() { 2.0 } else { 1.0 };
-        row.overrun = row.overrun.max(outcome.overrun.to_degrees() / scale);
-        let cause = outcome.cause.map_or("–".to_owned(), |c| format!("{c:?}"));
+        row.overrun = row.overrun.max(report.overrun.to_degrees() / scale);
+        let cause = report.cause.map_or("–".to_owned(), |c| format!("{c:?}"));
         *row.causes.entry(cause).or_default() += 1;
     }
 }

@@ -1,18 +1,40 @@
 //! The real-time loop over a serial line, and the simulated board.
+//!
+//! | file | is |
+//! |---|---|
+//! | `from_scenario` | from a checked scenario to a run that is built |
+//! | `station` | this machine at its line: the controller, or the host of a board controller |
+//! | `port`, `realtime` | the line's device; the machine's clock, priorities and memory |
+//! | `preflight` | what station and board say to each other before consent |
+//! | `session`, `summary` | a scenario and options in; refusals, events and a summary out |
+//! | `control_loop` | the run on its control thread |
+//! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
+//! | `virtual_time` | the same run with a computed clock |
+//! | `sim_board`, `sim_board_server` | a board on a rig, both simulated; the same in real time behind a port |
+//! | `faults`, `faulty_line`, `campaign` | what breaks, a line on which it breaks, and the campaign over all of it |
+//! | `lockstep_board`, `lockstep_host`, `lockstep_session` | a board controller that is asked instead of keeping time, its host, and a session with it |
+//! | `qemu_board` | such a board, emulated |
+//! | `to_log`, `replay` | what a log gets; a log's counts to the law again |
 
 pub mod campaign;
-pub mod daq;
-pub mod emulated;
-pub mod emulator;
-pub mod end;
+pub mod control_loop;
 pub mod faults;
-pub mod line;
+pub mod faulty_line;
+pub mod from_scenario;
+pub mod lockstep_board;
+pub mod lockstep_host;
+pub mod lockstep_session;
+pub mod log_thread;
 pub mod port;
 pub mod preflight;
+pub mod qemu_board;
 pub mod realtime;
-pub mod records;
 pub mod replay;
-pub mod run;
-pub mod setup;
+pub mod session;
 pub mod sim_board;
-pub mod world;
+pub mod sim_board_server;
+pub mod station;
+pub mod summary;
+pub mod to_log;
+pub mod virtual_time;
+pub mod watch;

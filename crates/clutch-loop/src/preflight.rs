@@ -1,10 +1,10 @@
 //! Before a run: who is on the line, and does it fit.
 
-use crate::end::{End, Remote, Tells};
+use crate::from_scenario::BuildError;
 use crate::port::{Port, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
-use crate::setup::SetupError;
-use clutch_node::{Notice, Outbox, SETTINGS, Settings};
+use crate::station::{HostStation, Station, StationNotice};
+use clutch_node::{Notice, Outbox, Refusing, Settings};
 use clutch_wire::{Hello, Refusal, Refused};
 use rustix::fd::AsFd;
 use std::time::Duration;
@@ -17,7 +17,7 @@ pub enum PreflightError {
     Port(#[from] PortError),
     /// The scenario.
     #[error(transparent)]
-    Setup(#[from] SetupError),
+    Build(#[from] BuildError),
     /// Nobody answers.
     #[error(
         "{address}: nothing answers. Is this the board's port, is the board powered, and does it speak at this baud \
@@ -136,9 +136,9 @@ pub enum PreflightError {
     },
 }
 
-/// The board's reason in words.
+/// The board's reason in words; `settings` are those that it was sent, if any.
 #[must_use]
-pub fn why(m: &Refused) -> String {
+pub fn why(m: &Refused, settings: Option<&Settings>) -> String {
     match Refusal::from_u8(m.reason) {
         Some(Refusal::State) => {
             "another controller drives it now; stop that one first (a board whose controller has died is free after its watchdog's time)".into()
@@ -149,24 +149,27 @@ pub fn why(m: &Refused) -> String {
         Some(Refusal::Watchdog) => format!("its watchdog cannot be set to {} µs", m.value),
         Some(Refusal::Safe) => "it does not know the safe state, or its converter has no such code".into(),
         Some(Refusal::Busy) => "it is busy".into(),
-        Some(Refusal::Setting) => match SETTINGS.iter().find(|s| u32::from(s.key) == m.value) {
-            Some(setting) => format!("the setting {} is missing, or of a kind that it does not know", setting.name),
-            None => format!("the setting {:#06x} is missing or unknown", m.value),
+        Some(reason @ (Refusal::Setting | Refusal::Unfit)) => match settings {
+            Some(settings) => {
+                Refusing { settings, bits: m.value, lacks: reason == Refusal::Setting }.to_string()
+            }
+            None => format!("it refuses the setting {:#06x}", m.value & 0xffff),
         },
-        Some(Refusal::Unfit) => format!("it cannot run with {} in its settings", f32::from_bits(m.value)),
         Some(Refusal::NoBoard) => "it finds no encoder and converter".into(),
         Some(Refusal::Differs) => "its settings say something else than the run; start again".into(),
         _ => format!("reason {}, value {}", m.reason, m.value),
     }
 }
 
-/// A line with a controller's state machine at its end, spoken to step by step.
-pub struct Talk<'a, E> {
+/// A line with a station at its end, spoken to step by step.
+pub struct Talk<'a, S> {
     port: &'a mut Port,
-    end: &'a mut E,
+    station: &'a mut S,
     out: Outbox,
     bytes: u64,
     echo: bool,
+    /// Those that were sent, for words of what the board refuses.
+    settings: Option<Settings>,
 }
 
 /// A board's clock against ours.
@@ -178,10 +181,10 @@ pub struct ClockOffset {
     pub round_trip_us: u64,
 }
 
-impl<'a, E: End> Talk<'a, E> {
+impl<'a, S: Station> Talk<'a, S> {
     /// On an open port.
-    pub fn new(port: &'a mut Port, end: &'a mut E) -> Self {
-        Talk { port, end, out: Outbox::default(), bytes: 0, echo: false }
+    pub fn new(port: &'a mut Port, station: &'a mut S) -> Self {
+        Talk { port, station, out: Outbox::default(), bytes: 0, echo: false, settings: None }
     }
 
     fn address(&self) -> String {
@@ -192,8 +195,8 @@ impl<'a, E: End> Talk<'a, E> {
     fn exchange<R>(
         &mut self,
         patience: Duration,
-        ask: impl Fn(&mut E, &mut Outbox),
-        mut answer: impl FnMut(&Tells<E>) -> Option<R>,
+        ask: impl Fn(&mut S, &mut Outbox),
+        mut answer: impl FnMut(&StationNotice<S>) -> Option<R>,
     ) -> Result<Option<R>, PreflightError> {
         let until = monotonic_ns() + patience.as_nanos() as u64;
         let mut again = 0;
@@ -206,7 +209,7 @@ impl<'a, E: End> Talk<'a, E> {
             }
             if now >= again {
                 again = now + 100_000_000;
-                ask(self.end, &mut self.out);
+                ask(self.station, &mut self.out);
             }
             if !self.out.as_bytes().is_empty() {
                 self.port.write(self.out.as_bytes()).map_err(|e| self.port.explain(&e))?;
@@ -219,7 +222,7 @@ impl<'a, E: End> Talk<'a, E> {
             self.bytes += count as u64;
             let echo = &mut self.echo;
             let bytes = buffer.get(..count).unwrap_or(&[]);
-            self.end.receive(monotonic_ns(), bytes, &mut self.out, &mut |n| {
+            self.station.receive(monotonic_ns(), bytes, &mut self.out, &mut |n| {
                 *echo |= matches!(n, Notice::Echo);
                 if found.is_none() {
                     found = answer(&n);
@@ -244,9 +247,9 @@ impl<'a, E: End> Talk<'a, E> {
         let nonce = (monotonic_ns() / 1000) as u32;
         let said = self.exchange(
             patience,
-            |end, out| end.discover(nonce, out),
+            |station, out| station.discover(nonce, out),
             |n| match n {
-                Notice::Controller(m) if m.nonce == nonce => {
+                Notice::ControllerHello(m) if m.nonce == nonce => {
                     controller = Some(*m);
                     None
                 }
@@ -264,7 +267,7 @@ impl<'a, E: End> Talk<'a, E> {
             Some(Said::Hello(hello)) if hello.schema != clutch_wire::SCHEMA => {
                 Err(PreflightError::Schema { address, board: hello.schema as u32 })
             }
-            Some(Said::Hello(hello)) => match (controller, E::IS_CONTROLLER) {
+            Some(Said::Hello(hello)) => match (controller, S::LOOKS_ON) {
                 (Some(_), false) => Err(PreflightError::IsController { address }),
                 (None, true) => Err(PreflightError::IsNoController { address }),
                 (Some(m), true) if m.settings != clutch_node::SETTINGS_HASH => {
@@ -278,7 +281,7 @@ impl<'a, E: End> Talk<'a, E> {
             Some(Said::No(m)) if m.reason == Refusal::Schema as u8 => {
                 Err(PreflightError::Schema { address, board: m.value })
             }
-            Some(Said::No(m)) => Err(PreflightError::Refused { address, what: "known", why: why(&m) }),
+            Some(Said::No(m)) => Err(PreflightError::Refused { address, what: "known", why: why(&m, None) }),
             None if controller.is_some() => Err(PreflightError::NoBoard { address }),
             None if self.echo => Err(PreflightError::Echo { address }),
             None if self.bytes > 0 => Err(PreflightError::Foreign { address, bytes: self.bytes }),
@@ -293,7 +296,7 @@ impl<'a, E: End> Talk<'a, E> {
     pub fn configure(&mut self, present: clutch_core::DacCode) -> Result<(), PreflightError> {
         let said = self.exchange(
             Duration::from_secs(1),
-            |end, out| end.configure(present, out),
+            |station, out| station.configure(present, out),
             |n| match n {
                 Notice::Configured => Some(None),
                 Notice::Refused(m) if m.request == clutch_wire::Configure::KIND => Some(Some(*m)),
@@ -307,7 +310,9 @@ impl<'a, E: End> Talk<'a, E> {
         let address = self.address();
         match said {
             Some(None) => Ok(()),
-            Some(Some(m)) => Err(PreflightError::Refused { address, what, why: why(&m) }),
+            Some(Some(m)) => {
+                Err(PreflightError::Refused { address, what, why: why(&m, self.settings.as_ref()) })
+            }
             None => Err(PreflightError::Lost { address, what }),
         }
     }
@@ -323,7 +328,7 @@ impl<'a, E: End> Talk<'a, E> {
             sent[nonce as usize] = monotonic_ns();
             let answer = self.exchange(
                 Duration::from_millis(90),
-                |end, out| end.ping(nonce, out),
+                |station, out| station.ping(nonce, out),
                 |n| match n {
                     // On a slow line the answer to an earlier one.
                     Notice::Pong(n, time_us) => {
@@ -342,7 +347,7 @@ impl<'a, E: End> Talk<'a, E> {
     }
 }
 
-impl<P: Fn(u64) -> clutch_core::Target<f32>> Talk<'_, Remote<P>> {
+impl<P: Fn(u64) -> clutch_core::Target<f32>> Talk<'_, HostStation<P>> {
     /// Sends a run's settings, each until the board has said that it has it.
     ///
     /// # Errors
@@ -350,10 +355,11 @@ impl<P: Fn(u64) -> clutch_core::Target<f32>> Talk<'_, Remote<P>> {
     pub fn upload(&mut self, settings: &Settings) -> Result<(), PreflightError> {
         let mut all = Vec::new();
         settings.each(|key, value| all.push((key, value)));
+        self.settings = Some(settings.clone());
         for (key, value) in all {
             let said = self.exchange(
                 Duration::from_secs(1),
-                |end, out| end.node.set(key, value, out),
+                |station, out| station.node.set(key, value, out),
                 |n| match n {
                     Notice::Taken(m) if (m.key, m.value) == (key, value) => Some(None),
                     Notice::Refused(m) if m.request == clutch_wire::Set::KIND => Some(Some(*m)),

@@ -1,7 +1,7 @@
 //! Replay: the recorded counts to the recorded law, every output compared bit for bit.
 
-use crate::records;
-use crate::setup::{self, Setup, SetupError};
+use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::to_log::{self, PRESENT_CODE, START_VOLTAGE};
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Cycle, Sample, State};
 use clutch_core::{Counts, DacCode, FixedCounts, Micros, Real, SupervisorState, Target};
 use clutch_log::{CommandRecord, EventKind, EventRecord, Log, SampleRecord, Source};
@@ -14,7 +14,7 @@ use clutch_wire::{BoardState, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LAT
 pub enum ReplayError {
     /// Its scenario.
     #[error(transparent)]
-    Setup(#[from] SetupError),
+    Build(#[from] BuildError),
     /// It does not say something that a replay needs.
     #[error("the log lacks {0}: it was not written by `clutch loop` or `clutch sim --log`")]
     Lacks(&'static str),
@@ -60,10 +60,10 @@ pub struct Replay {
 }
 
 /// Fields of a command that have to agree; times do not.
-fn fields<'a>(c: &CommandRecord, terms: &'a [String; 3]) -> [(&'a str, u64, f64); 16] {
+fn fields<'a>(c: &CommandRecord, terms: &'a [String]) -> Vec<(&'a str, u64, f64)> {
     let real = |name: &'a str, x: f64| (name, x.to_bits(), x);
     let whole = |name: &'a str, x: u64| (name, x, x as f64);
-    [
+    let mut fields = vec![
         whole("tick", c.tick),
         whole("state", c.state.into()),
         whole("source", c.source.into()),
@@ -77,10 +77,9 @@ fn fields<'a>(c: &CommandRecord, terms: &'a [String; 3]) -> [(&'a str, u64, f64)
         real("target_acceleration_rad_s2", c.target_acceleration),
         real("error_rad", c.error),
         real("error_rate_rad_s", c.error_rate),
-        real(&terms[0], c.terms[0]),
-        real(&terms[1], c.terms[1]),
-        real(&terms[2], c.terms[2]),
-    ]
+    ];
+    fields.extend(terms.iter().zip(c.terms.iter()).map(|(name, value)| real(name, *value)));
+    fields
 }
 
 /// Replays a log under a scenario: its own, or one with other parameters.
@@ -88,7 +87,7 @@ fn fields<'a>(c: &CommandRecord, terms: &'a [String; 3]) -> [(&'a str, u64, f64)
 /// # Errors
 /// The scenario is not one for a run like the log's.
 pub fn replay(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayError> {
-    match scenario.scalar {
+    match scenario.scalar() {
         ScalarKind::F32 => replay_in::<f32>(log, scenario),
         ScalarKind::F64 => replay_in::<f64>(log, scenario),
     }
@@ -125,11 +124,6 @@ fn extra<'a>(log: &'a Log, key: &str) -> Option<&'a str> {
     log.header.extra.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str())
 }
 
-/// Key of the header under which the code at arming stands.
-pub const PRESENT_CODE: &str = "present_code";
-/// Key of the header under which a simulation's voltage at the start stands: its bits, in hex.
-pub const START_VOLTAGE: &str = "start_voltage_bits";
-
 fn seen(s: &SampleRecord) -> Sample {
     Sample {
         sequence: s.sequence,
@@ -154,9 +148,9 @@ fn looped<T: Real>(
 ) -> Result<Vec<CommandRecord>, ReplayError> {
     let present = extra(log, PRESENT_CODE).and_then(|v| v.parse().ok());
     let present = present.ok_or(ReplayError::Lacks("the code at arming"))?;
-    let setup = Setup::<T>::new(scenario, 0)?;
-    let (servo, supervisor) = (&setup.servo, &setup.supervisor);
-    let path = setup::path::<T>(scenario)?;
+    let built = BuiltRun::<T>::new(scenario, 0)?;
+    let (servo, supervisor) = (&built.servo, &built.supervisor);
+    let path = from_scenario::path::<T>(scenario)?;
     let radians = servo.encoder().radians_per_count::<f64>();
     let mut state = SupervisorState::default();
     supervisor.connect(&mut state);
@@ -189,7 +183,7 @@ fn looped<T: Real>(
             Target { position: target.position.plus(origin), ..target }
         };
         let cycle = supervisor.sample(servo, &mut state, &seen(sample), target);
-        commands.push(records::command(sample.time_ns, &cycle, servo.dac(), radians));
+        commands.push(to_log::command(sample.time_ns, &cycle, servo.dac(), radians));
     }
     Ok(commands)
 }
@@ -200,20 +194,14 @@ fn simulated<T: Real>(
     scenario: &Scenario,
 ) -> Result<Vec<CommandRecord>, ReplayError> {
     let spec = scenario.spec();
-    if !spec.rig.encoder_quantised {
+    if !spec.rig.encoder.quantised {
         return Err(ReplayError::Ideal);
     }
     let volts = extra(log, START_VOLTAGE).and_then(|v| u64::from_str_radix(v, 16).ok());
     let volts = f64::from_bits(volts.ok_or(ReplayError::Lacks("the voltage at the start"))?);
-    let params = spec.servo().map_err(SetupError::from)?.cast::<T>();
-    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| {
-        SetupError::from(clutch_core::ParamError {
-            field: e.field,
-            value: e.value.to_f64(),
-            expected: e.expected,
-        })
-    })?;
-    let path = spec.path::<T>().map_err(SetupError::from)?;
+    let params = spec.servo().map_err(BuildError::from)?.cast::<T>();
+    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| BuildError::from(e.cast::<f64>()))?;
+    let path = spec.path::<T>().map_err(BuildError::from)?;
     let radians = servo.encoder().radians_per_count::<f64>();
     let Some(first) = samples.first() else { return Ok(Vec::new()) };
     let mut state = servo.start(Counts(first.counts), &path.at(0), T::from_f64(volts));
@@ -223,7 +211,7 @@ fn simulated<T: Real>(
             let target = path.at(sample.tick);
             let output = servo.tick(&mut state, Counts(sample.counts), &target);
             let cycle = simulated_cycle(sample.tick, target, output);
-            records::command(sample.time_ns, &cycle, servo.dac(), radians)
+            to_log::command(sample.time_ns, &cycle, servo.dac(), radians)
         })
         .collect())
 }

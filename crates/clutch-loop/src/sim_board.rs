@@ -23,6 +23,12 @@ pub enum SimBoardError {
     /// A parameter of the board.
     #[error(transparent)]
     Param(#[from] ParamError),
+    /// The scenario's converter or period is one that no board has.
+    #[error(transparent)]
+    Board(#[from] clutch_node::BoardMisfit),
+    /// A converter cannot be stuck at a voltage that it has not, V.
+    #[error("fault dac-stuck = {0}: expected a voltage that the scenario's converter has, V")]
+    Stuck(f64),
     /// The engine gave up.
     #[error(transparent)]
     Motion(#[from] EngineError),
@@ -79,23 +85,22 @@ impl SimBoard {
         let safety = scenario.safety()?;
         let rig = Rig::new(&spec.rig, spec.run.seed)?;
         let engine = spec.engine(&rig)?;
-        let dac = Dac::new(&spec.rig.dac)?;
+        let dac = Dac::new(&spec.rig.dac.converter)?;
         for fault in faults {
             if let FaultKind::DacStuck(StuckAt::Volts(volts)) = fault.kind
-                && !(volts >= spec.rig.dac.lowest && volts <= spec.rig.dac.highest)
+                && !(volts >= spec.rig.dac.converter.lowest && volts <= spec.rig.dac.converter.highest)
             {
-                let expected = "a voltage that the scenario's converter has, V (fault dac-stuck)";
-                return Err(ParamError { field: "volts", value: volts, expected }.into());
+                return Err(SimBoardError::Stuck(volts));
             }
         }
-        let codes = SafeCodes::new(&safety.supervisor.on_fault, &dac, spec.period)?;
+        let codes = SafeCodes::new(&safety.on_fault, &dac, spec.period)?;
         let params = BoardParams {
             board: if patient { PATIENT_BOARD } else { STRICT_BOARD },
             boot,
-            counts_per_rev: spec.rig.counts_per_rev,
-            dac_bits: spec.rig.dac.bits,
-            dac_lowest_mv: millivolts(spec.rig.dac.lowest),
-            dac_highest_mv: millivolts(spec.rig.dac.highest),
+            counts_per_rev: spec.rig.encoder.sensor.counts_per_rev,
+            dac_bits: spec.rig.dac.converter.bits,
+            dac_lowest_mv: millivolts(spec.rig.dac.converter.lowest),
+            dac_highest_mv: millivolts(spec.rig.dac.converter.highest),
             period_min_us: 100,
             period_max_us: 1_000_000,
             watchdog_max_us: 10_000_000,

@@ -13,7 +13,7 @@
 //! board and the firmware run.
 
 use crate::outbox::Outbox;
-use clutch_core::{Counts, DacCode, ParamError, SafeCodes, SafeKind, SafeRun};
+use clutch_core::{Counts, DacCode, SafeCodes, SafeKind, SafeRun};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, Hello, Message,
     Pong, Refusal, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, StopReason,
@@ -46,8 +46,8 @@ pub struct BoardParams {
 }
 
 impl BoardParams {
-    /// Checks them. A board whose numbers are constants asks while it is compiled: refused at run time, they would leave
-    /// an image that does nothing, of which an optimiser removes the rest without a word.
+    /// Checks them. A board whose numbers are constants checks them when it is compiled: refused at run time, they
+    /// would leave an image that does nothing, and an optimiser removes the rest of it without a word.
     ///
     /// ```
     /// # use clutch_node::BoardParams;
@@ -63,27 +63,25 @@ impl BoardParams {
     ///     watchdog_max_us: 100_000,
     ///     boot_code: 1844,
     /// };
-    /// const _: () = if let Err(refused) = PARAMS.check() { panic!("{}", refused.field) };
+    /// const _: () = assert!(PARAMS.check().is_ok());
     /// ```
     ///
     /// # Errors
-    /// `dac_bits` outside 1…16, `dac_highest` not above `dac_lowest`, `boot_code` above the
-    /// converter's top, periods of 0 or out of order, a watchdog shorter than two periods.
-    pub const fn check(&self) -> Result<(), ParamError<f64>> {
-        let (field, value, expected) = if self.dac_bits < 1 || self.dac_bits > 16 {
-            ("dac_bits", self.dac_bits as f64, "1 to 16 bits")
+    /// The first parameter that no board can have.
+    pub const fn check(&self) -> Result<(), BoardMisfit> {
+        Err(if self.dac_bits < 1 || self.dac_bits > 16 {
+            BoardMisfit::DacBits(self.dac_bits)
         } else if self.dac_highest_mv <= self.dac_lowest_mv {
-            ("dac_highest", self.dac_highest_mv as f64, "a voltage above the lowest, mV")
+            BoardMisfit::DacHighest(self.dac_highest_mv)
         } else if self.boot_code > self.top() {
-            ("boot_code", self.boot_code as f64, "a code that the converter has")
+            BoardMisfit::BootCode(self.boot_code)
         } else if self.period_min_us == 0 || self.period_min_us > self.period_max_us {
-            ("period_min", self.period_min_us as f64, "above 0 µs and not above the longest period")
+            BoardMisfit::PeriodMin(self.period_min_us)
         } else if self.watchdog_max_us / 2 < self.period_min_us {
-            ("watchdog_max", self.watchdog_max_us as f64, "at least two of the shortest periods, µs")
+            BoardMisfit::WatchdogMax(self.watchdog_max_us)
         } else {
             return Ok(());
-        };
-        Err(ParamError { field, value, expected })
+        })
     }
 
     /// The converter's highest code.
@@ -92,6 +90,41 @@ impl BoardParams {
         ((1_u32 << bits) - 1) as u16
     }
 }
+
+/// Why a board cannot be as its parameters say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BoardMisfit {
+    /// [`BoardParams::dac_bits`] is outside 1…16.
+    DacBits(u8),
+    /// [`BoardParams::dac_highest_mv`] is not above the lowest voltage.
+    DacHighest(i32),
+    /// [`BoardParams::boot_code`] is above the converter's top.
+    BootCode(u16),
+    /// [`BoardParams::period_min_us`] is 0, or above the longest period.
+    PeriodMin(u32),
+    /// [`BoardParams::watchdog_max_us`] is below two of the shortest periods.
+    WatchdogMax(u32),
+}
+
+impl core::fmt::Display for BoardMisfit {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            BoardMisfit::DacBits(n) => write!(f, "dac_bits = {n}: expected 1 to 16 bits"),
+            BoardMisfit::DacHighest(n) => {
+                write!(f, "dac_highest_mv = {n}: expected a voltage above the lowest, mV")
+            }
+            BoardMisfit::BootCode(n) => write!(f, "boot_code = {n}: expected a code that the converter has"),
+            BoardMisfit::PeriodMin(n) => {
+                write!(f, "period_min_us = {n}: expected a time above 0 µs and not above the longest period")
+            }
+            BoardMisfit::WatchdogMax(n) => {
+                write!(f, "watchdog_max_us = {n}: expected at least two of the shortest periods, µs")
+            }
+        }
+    }
+}
+
+impl core::error::Error for BoardMisfit {}
 
 /// Samples that an Actuate may answer.
 const RECENT: usize = 8;
@@ -129,7 +162,7 @@ impl BoardNode {
     ///
     /// # Errors
     /// Those of [`BoardParams::check`].
-    pub fn new(p: &BoardParams) -> Result<Self, ParamError<f64>> {
+    pub fn new(p: &BoardParams) -> Result<Self, BoardMisfit> {
         p.check()?;
         Ok(BoardNode {
             params: *p,

@@ -1,27 +1,58 @@
-#![doc = include_str!("../README.md")]
+//! What stands at a serial line, as state machines without I/O and without a clock: the nodes.
+//!
+//! ```text
+//!  encoder ─► BoardNode ──Sample──► ControllerNode ─► supervisor ─► servo
+//!  pad     ◄─ watchdog  ◄─Actuate──                ◄─────────────────┘
+//! ```
+//!
+//! The controller may run on a board itself; then a host looks on:
+//!
+//! ```text
+//!  HostNode ◄──settings, telemetry──► BoardController (a ControllerNode) ◄──as above──► BoardNode
+//! ```
+//!
+//! [`BoardNode`] is what a board at encoder and converter does: it samples, applies codes, and goes to the
+//! safe state by itself when the controller falls silent. [`ControllerNode`] is what drives it. Bytes
+//! and times go in, bytes and notices come out; the Linux loop, the simulated board, the tests in
+//! virtual time and firmware run the same two. No allocation, no `unsafe`, no reachable panic.
+//!
+//! | file | runs on | is |
+//! |---|---|---|
+//! | `controller` | PC or board | the node that closes the loop |
+//! | `board` | board | samples out, codes in, a watchdog |
+//! | `host` | PC | what sets a board controller up and looks on |
+//! | `board_controller` | board | a controller that a host looks at |
+//! | `one_chip` | board | a board controller and its board in one memory |
+//! | `hardware` | board | what a board's program does each period, in either role |
+//! | `wide_counter` | board | a counter of 16 bits as one of 32 |
+//! | `lockstep` | both | a board controller that is asked instead of keeping time |
+//! | `settings`, `telemetry` | both | a run on its way to a board controller, and its cycles on their way back |
+//! | `notice`, `outbox` | both | what a node reports, and its frames on their way out |
 #![no_std]
 
 mod board;
-mod control;
-mod counter;
-pub mod exchange;
-mod onboard;
+mod board_controller;
+mod controller;
+mod hardware;
+mod host;
+pub mod lockstep;
+mod notice;
+mod one_chip;
 mod outbox;
-mod remote;
-mod runner;
 mod settings;
-mod standalone;
 mod telemetry;
+mod wide_counter;
 
-pub use board::{BoardNode, BoardParams};
-pub use control::{ControlNode, ControlParams, CycleNotice, Ending, LinkCounts, Notice};
-pub use counter::WideCounter;
-pub use onboard::{Onboard, OnboardParams, Ports, present_code};
+pub use board::{BoardMisfit, BoardNode, BoardParams};
+pub use board_controller::{BoardController, BoardControllerParams, Outboxes, present_code};
+pub use controller::{ControllerNode, ControllerParams};
+pub use hardware::{DaqBoard, Hardware, Role, receive, tick};
+pub use host::HostNode;
+pub use notice::{CycleNotice, Ending, LinkCounts, Notice, Standing};
+pub use one_chip::OneChip;
 pub use outbox::Outbox;
-pub use remote::{RemoteNode, Told};
-pub use runner::{Acquisition, Hardware, Role, receive, tick};
 pub use settings::{
-    Built, MAX_KNOTS, Misfit, Numbers, Path, RunParams, SETTINGS, SETTINGS_HASH, SettingInfo, Settings,
-    Unsupported,
+    Built, Declared, MAX_KNOTS, Misfit, Name, Path, Refusing, RunParams, RunSettings, RunTimes, SETTINGS,
+    SETTINGS_HASH, Setting, Settings, Unsupported,
 };
-pub use standalone::Standalone;
+pub use wide_counter::WideCounter;

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
 use clutch_core::{Counts, DacCode};
-use clutch_node::{BoardNode, BoardParams, Outbox};
+use clutch_node::{BoardMisfit, BoardNode, BoardParams, Outbox};
 use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, Message,
     Ping, Pong, Refusal, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, SafeKind,
@@ -152,16 +152,16 @@ fn at_power_up_the_output_is_the_boards_own_and_nothing_is_sent() {
 
 #[test]
 fn a_board_that_cannot_be_is_named() {
-    for (bad, field) in [
-        (BoardParams { dac_bits: 0, ..PARAMS }, "dac_bits"),
-        (BoardParams { dac_bits: 17, ..PARAMS }, "dac_bits"),
-        (BoardParams { dac_highest_mv: -10_000, ..PARAMS }, "dac_highest"),
-        (BoardParams { boot_code: 4096, ..PARAMS }, "boot_code"),
-        (BoardParams { period_min_us: 0, ..PARAMS }, "period_min"),
-        (BoardParams { period_max_us: 499, ..PARAMS }, "period_min"),
-        (BoardParams { watchdog_max_us: 999, ..PARAMS }, "watchdog_max"),
+    for (bad, misfit) in [
+        (BoardParams { dac_bits: 0, ..PARAMS }, BoardMisfit::DacBits(0)),
+        (BoardParams { dac_bits: 17, ..PARAMS }, BoardMisfit::DacBits(17)),
+        (BoardParams { dac_highest_mv: -10_000, ..PARAMS }, BoardMisfit::DacHighest(-10_000)),
+        (BoardParams { boot_code: 4096, ..PARAMS }, BoardMisfit::BootCode(4096)),
+        (BoardParams { period_min_us: 0, ..PARAMS }, BoardMisfit::PeriodMin(0)),
+        (BoardParams { period_max_us: 499, ..PARAMS }, BoardMisfit::PeriodMin(500)),
+        (BoardParams { watchdog_max_us: 999, ..PARAMS }, BoardMisfit::WatchdogMax(999)),
     ] {
-        assert_eq!(BoardNode::new(&bad).unwrap_err().field, field);
+        assert_eq!(BoardNode::new(&bad).unwrap_err(), misfit);
     }
     assert!(BoardNode::new(&BoardParams { dac_bits: 16, boot_code: u16::MAX, ..PARAMS }).is_ok());
 }

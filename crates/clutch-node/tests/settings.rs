@@ -4,16 +4,21 @@
 
 mod desk;
 
-use clutch_core::law::{CtcParams, LawParams, OutputParams, PdParams, SmcParams, SmcSignParams};
+use clutch_core::law::{CtcParams, LawParams, OutputParams, PdParams, PidParams, SmcParams, SmcSignParams};
+use clutch_core::params::{Kind, Params};
 use clutch_core::reference::{
     Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, ReferenceParams, Sine, Table, Trapezoid,
 };
+use clutch_core::{FNV_64, LimitParams, fnv1a_64};
 use clutch_core::{
     FixedCounts, Micros, ObserverParams, SafeState, Servo, ServoParams, SmoothedDerivativeParams,
     SupervisorParams, VelocityParams,
 };
-use clutch_node::{Built, MAX_KNOTS, Misfit, SETTINGS, Settings, Unsupported};
-use desk::Plan;
+use clutch_node::{
+    Built, Declared, MAX_KNOTS, Misfit, Refusing, RunSettings, SETTINGS, SETTINGS_HASH, Setting, Settings,
+    Unsupported,
+};
+use desk::{Plan, key};
 use proptest::prelude::*;
 
 const FIRST_KNOT: u16 = 0x1000;
@@ -49,8 +54,10 @@ fn the_same(plan: &Plan) -> (Settings, Built) {
     (settings, built)
 }
 
-fn key(name: &str) -> u16 {
-    SETTINGS.iter().find(|s| s.name == name).unwrap().key
+fn pairs(settings: &Settings) -> Vec<(u16, u64)> {
+    let mut pairs = Vec::new();
+    settings.each(|key, value| pairs.push((key, value)));
+    pairs
 }
 
 /// The settings of a plan with one number changed.
@@ -62,12 +69,14 @@ fn with(name: &str, value: u64) -> Settings {
 
 #[test]
 fn each_law_is_built_as_it_was_planned() {
-    for law in [
+    let other = [
         LawParams::Pd(PdParams { kp: 1.5, kd: 0.25 }),
         LawParams::Ctc(CtcParams { outer_gain: 3.0, kp: 70.0, kd: 1.25 }),
         LawParams::Smc(SmcParams { kp: 20.0, kd: 3.0, slope: 11.0, boundary: 0.5 }),
         LawParams::SmcSign(SmcSignParams { kp: 20.0, kd: 3.0, slope: 11.0 }),
-    ] {
+        LawParams::Pid(PidParams { ki: 3.0, tracking_time: 0.5, bias: 2.5, ..PidParams::default() }),
+    ];
+    for law in LawParams::<f32>::all().into_iter().chain(other) {
         let plan = Plan { servo: ServoParams { law, ..Plan::new().servo }, ..Plan::new() };
         the_same(&plan);
     }
@@ -76,10 +85,10 @@ fn each_law_is_built_as_it_was_planned() {
 #[test]
 fn each_safe_state_is_built_as_it_was_planned() {
     for on_fault in [
-        SafeState::Hold { volts: 4.5 },
-        SafeState::Ramp { volts_per_s: 100.0, volts: 5.5 },
+        SafeState::hold(4.5),
+        SafeState::ramp(100.0, 5.5),
         SafeState::Release,
-        SafeState::HoldThenRelease { volts: 5.0, after: 1.5 },
+        SafeState::hold_then_release(5.0, 1.5),
     ] {
         the_same(&Plan { limits: SupervisorParams::new(on_fault), ..Plan::new() });
     }
@@ -90,7 +99,7 @@ fn each_path_is_the_planned_one_bit_for_bit_from_its_first_whole_count_on() {
     let table = |interpolation| ReferenceParams::Table(Table { knots: &KNOTS, interpolation });
     let paths = [
         ReferenceParams::Hold,
-        ReferenceParams::Ramp(0.3),
+        ReferenceParams::ramp(0.3),
         ReferenceParams::Trapezoid(Trapezoid { distance: 0.2, speed: 0.5, acceleration: 5.0 }),
         ReferenceParams::JerkLimited(JerkLimited {
             distance: 0.2,
@@ -119,14 +128,14 @@ fn each_path_is_the_planned_one_bit_for_bit_from_its_first_whole_count_on() {
             let path = plan.path();
             let mut moves = false;
             for tick in 0..1000 {
-                let (target, planned) = (built.path.target(settings.points(), tick), path(tick));
+                let (target, planned) = (built.path.target(settings.knots(), tick), path(tick));
                 assert_eq!(target.position, planned.position, "{reference:?} at {tick}");
                 let bits = |t: clutch_core::Target<f32>| (t.velocity.to_bits(), t.acceleration.to_bits());
                 assert_eq!(bits(target), bits(planned), "{reference:?} at {tick}");
                 moves |= target.velocity != 0.0;
             }
             assert_eq!(moves, reference != ReferenceParams::Hold, "{reference:?}");
-            let first = built.path.target(settings.points(), 0).position;
+            let first = built.path.target(settings.knots(), 0).position;
             assert!((0..1 << 16).contains(&first.0), "{reference:?} begins within a count: {first:?}");
         }
     }
@@ -159,7 +168,10 @@ proptest! {
                 model,
                 ..new.servo
             },
-            limits: SupervisorParams { jumps, following_error, ..new.limits },
+            limits: SupervisorParams {
+                limits: LimitParams { jumps, following_error, ..new.limits.limits },
+                ..new.limits
+            },
             start: FixedCounts(start),
             watchdog: Micros(times[0]),
             silence: Micros(times[2]),
@@ -168,8 +180,9 @@ proptest! {
             ..new
         };
         let settings = sent(&plan.pairs());
-        prop_assert_eq!(settings.numbers, plan.settings().numbers);
         let built = settings.build().unwrap();
+        prop_assert_eq!((built.times, built.ticks), (plan.run_params().times, ticks));
+        prop_assert_eq!(pairs(&settings), plan.pairs());
         prop_assert_eq!(built.servo, Servo::new(&plan.servo).unwrap());
         prop_assert_eq!(built.supervisor, plan.supervisor());
     }
@@ -178,44 +191,117 @@ proptest! {
 #[test]
 fn a_setting_that_was_left_out_is_named_whichever_it_is() {
     let reference = ReferenceParams::Table(Table { knots: &KNOTS, interpolation: Interpolation::Linear });
-    let all = Plan { reference, ..Plan::new() }.pairs();
-    assert_eq!(all.len(), SETTINGS.len() + 2 * KNOTS.len());
-    for missing in 0..all.len() {
-        let (mut rest, (key, _)) = (all.clone(), all[missing]);
-        rest.remove(missing);
-        assert_eq!(sent(&rest).build().unwrap_err(), Misfit::Missing(key), "without {key:#06x}");
+    for law in LawParams::<f32>::all() {
+        let plan = Plan { reference, servo: ServoParams { law, ..Plan::new().servo }, ..Plan::new() };
+        let all = plan.pairs();
+        for missing in 0..all.len() {
+            let (mut rest, (key, _)) = (all.clone(), all[missing]);
+            rest.remove(missing);
+            assert_eq!(sent(&rest).build().unwrap_err(), Misfit::Missing(key), "without {key:#06x}");
+        }
     }
 }
 
 #[test]
-fn a_kind_that_is_not_known_is_named() {
-    for (name, kinds) in [("law", 4), ("safe", 4), ("path", 9)] {
-        assert_eq!(with(name, kinds).build().unwrap_err(), Misfit::Unknown(key(name)));
-        assert_eq!(with(name, u32::MAX.into()).build().unwrap_err(), Misfit::Unknown(key(name)));
-    }
+fn settings_come_in_any_order() {
+    let mut pairs = Plan::new().pairs();
+    pairs.reverse();
+    let built = sent(&pairs).build().unwrap();
+    assert_eq!(built.servo, Servo::new(&Plan::new().servo).unwrap());
 }
 
 #[test]
-fn a_number_that_a_constructor_refuses_is_told_with_its_value() {
-    for (name, value, field) in [
-        ("counts_per_rev", 3.0, "counts_per_rev"),
-        ("period_us", 0.0, "period"),
-        ("dac_bits", 17.0, "bits"),
-        ("jumps", 129.0, "jumps"),
-    ] {
-        let Misfit::Param(e) = with(name, value as u64).build().unwrap_err() else { panic!("{name}") };
-        assert_eq!((e.field, e.value), (field, value));
-    }
-    for (name, value) in [("inertia", -1.0), ("smoothing", 2.0), ("jump", 0.0), ("output_on_invalid", 10.5)] {
-        let Misfit::Param(e) = with(name, f32::to_bits(value).into()).build().unwrap_err() else {
-            panic!("{name}")
+fn a_choice_or_a_word_that_is_not_known_is_named() {
+    for setting in Setting::all() {
+        let known = match setting.declared {
+            Declared::Choice(choice) => choice.options.len(),
+            Declared::Row(row, _) => match row.kind {
+                Kind::Word(words) => words.len(),
+                _ => continue,
+            },
         };
-        assert_eq!(e.value, value, "{name}");
+        let reference = ReferenceParams::Table(Table { knots: &KNOTS, interpolation: Interpolation::Linear });
+        for value in [known as u64, u64::from(u32::MAX), 1 << 32, u64::MAX] {
+            let mut settings = sent(&Plan { reference, ..Plan::new() }.pairs());
+            assert!(settings.set(setting.key, value));
+            assert_eq!(
+                settings.build().unwrap_err(),
+                Misfit::Unknown(setting.key),
+                "{} = {value}",
+                setting.name
+            );
+        }
     }
-    let Misfit::Param(e) = with("path_0", f32::NAN.to_bits().into()).build().unwrap_err() else { panic!() };
-    assert!(e.field == "rate" && e.value.is_nan());
-    let many_bits = with("dac_bits", 256 + 12).build().unwrap_err();
-    assert!(matches!(many_bits, Misfit::Param(e) if e.field == "bits"), "not taken for 12: {many_bits:?}");
+}
+
+/// What a host says of settings that a board refuses.
+fn refusal(settings: &Settings) -> String {
+    let misfit = settings.build().unwrap_err();
+    let lacks = !matches!(misfit, Misfit::Unfit { .. });
+    Refusing { settings, bits: misfit.bits(), lacks }.to_string()
+}
+
+#[test]
+fn a_number_that_a_constructor_refuses_is_told_with_key_value_and_expectation() {
+    let real = |x: f32| u64::from(x.to_bits());
+    for (name, value, text) in [
+        (
+            "rig.encoder.counts_per_rev",
+            3,
+            "3: expected a whole number from 4 to 16 777 216 counts per revolution",
+        ),
+        ("sampling.period_us", 0, "0: expected a whole number from 1 to 1 000 000 µs"),
+        ("rig.dac.bits", 17, "17: expected a whole number from 1 to 16 bits"),
+        ("safety.limits.jumps", 129, "129: expected a whole number from 1 to 128 within 128 periods"),
+        (
+            "model.inertia_kg_m2",
+            real(-1.0),
+            "-1: expected a finite number above 0 kg m² whose inverse is finite, too",
+        ),
+        ("law.pd.kp_v_rad", real(f32::NAN), "NaN: expected a finite number of at least 0 V/rad"),
+        ("safety.limits.jump_deg", real(-1.0_f32.to_radians()), "-1: expected a finite number above 0 °"),
+        (
+            "output.on_invalid_v",
+            real(10.5),
+            "10.5: expected a voltage from lowest_v to highest_v (it does not follow them)",
+        ),
+        ("reference.ramp.rate_deg_s", real(f32::INFINITY), "inf: expected a finite number, °/s"),
+        ("start_counts_x65536", 65536, "65536: expected a whole number from 0 to 65 535"),
+        (
+            "rig.dac.bits",
+            256 + 12,
+            "268: the board lacks it, or knows no such value: expected a whole number from 1 to 16 bits",
+        ),
+        (
+            "law",
+            5,
+            "5: the board lacks it, or knows no such value: expected one of: pd, ctc, smc, smc_sign, pid",
+        ),
+        ("bounds.brake_gain_nm_v.high", real(f32::INFINITY), "inf: expected a finite number"),
+    ] {
+        assert_eq!(refusal(&with(name, value)), format!("{name} = {text}"));
+    }
+    let pairs = Plan::new().pairs();
+    assert_eq!(refusal(&sent(&pairs[1..])), "ticks: missing");
+}
+
+#[test]
+fn each_row_is_refused_by_name_when_it_is_no_number() {
+    for law in LawParams::<f32>::all() {
+        let plan = Plan { servo: ServoParams { law, ..Plan::new().servo }, ..Plan::new() };
+        for (key, _) in plan.pairs() {
+            let setting = Setting::of(key).unwrap();
+            let Declared::Row(row, _) = setting.declared else { continue };
+            if row.kind != Kind::Real {
+                continue;
+            }
+            let mut settings = sent(&plan.pairs());
+            settings.set(key, u64::from(f32::NAN.to_bits()));
+            let text = refusal(&settings);
+            assert!(text.starts_with(&format!("{} = NaN: expected a ", setting.name)), "{text}");
+            assert!(text.contains(row.unit.text), "{text}");
+        }
+    }
 }
 
 #[test]
@@ -223,29 +309,43 @@ fn points_of_a_table_have_to_rise_in_time() {
     let reference = ReferenceParams::Table(Table { knots: &KNOTS, interpolation: Interpolation::Cubic });
     let mut settings = sent(&Plan { reference, ..Plan::new() }.pairs());
     assert!(settings.set(FIRST_KNOT + 2 * 3, KNOTS[2].time_us));
-    let Misfit::Param(e) = settings.build().unwrap_err() else { panic!() };
-    assert_eq!((e.field, e.value), ("knots", 3.0));
+    let key = key("reference.table.points_s_deg");
+    assert_eq!(settings.build().unwrap_err(), Misfit::Unfit { key, relation: 2, value: 3.0 });
+    let text = "reference.table.points_s_deg = 5 points: expected times of at least 0 s that rise from point to point";
+    assert_eq!(refusal(&settings), text);
 }
 
 #[test]
-fn a_value_fits_its_type_or_is_not_taken() {
-    for setting in SETTINGS {
-        let wide = matches!(setting.ty, "u64" | "i64");
-        for value in [1 << 32, u64::MAX] {
-            let mut settings = Settings::default();
-            assert_eq!(settings.set(setting.key, value), wide, "{}", setting.name);
-            let unchanged = settings.numbers == Settings::default().numbers;
-            assert_eq!(unchanged, !wide, "{}", setting.name);
-        }
-        assert!(Settings::default().set(setting.key, u32::MAX.into()), "{}", setting.name);
+fn settings_are_found_by_their_keys_in_the_order_of_the_declarations() {
+    let names: Vec<String> = Setting::all().map(|s| s.name.to_string()).collect();
+    assert_eq!(names.len(), SETTINGS);
+    assert_eq!(SETTINGS, <RunSettings<'static> as Params<f32>>::INFO.places());
+    assert!((0..SETTINGS as u16).all(|key| Setting::of(key).unwrap().key == key));
+    assert!(Setting::of(SETTINGS as u16).is_none() && Setting::of(u16::MAX).is_none());
+    for (i, name) in names.iter().enumerate() {
+        assert!(!names[..i].contains(name), "{name} twice");
     }
+    // What the host sends is named as a scenario names it.
+    let plan = Plan::new();
+    let sent: Vec<String> = plan.pairs().iter().map(|(key, _)| names[usize::from(*key)].clone()).collect();
+    for name in ["ticks", "sampling.period_us", "law", "law.pd.kd_v_s_rad", "safety.on_fault.hold.volts_v"] {
+        assert!(sent.contains(&name.to_owned()), "{name}");
+    }
+    assert!(!sent.iter().any(|name| name.starts_with("law.smc")), "{sent:?}");
+}
+
+#[test]
+fn the_hash_is_that_of_names_types_and_units() {
+    let text: String = Setting::all().map(|s| format!("{}:{}:{}\n", s.name, s.kind(), s.unit())).collect();
+    assert_eq!(SETTINGS_HASH, fnv1a_64(FNV_64, text.as_bytes()), "{text}");
+    assert!(text.contains("\nlaw:pd/ctc/smc/smc_sign/pid:\nlaw.pd.kp_v_rad:f32:V/rad\n"), "{text}");
 }
 
 #[test]
 fn settings_have_a_key_each_and_there_are_no_others() {
     let last = FIRST_KNOT + 2 * MAX_KNOTS as u16 - 1;
     for key in 0..=u16::MAX {
-        let known = usize::from(key) < SETTINGS.len() || (FIRST_KNOT..=last).contains(&key);
+        let known = usize::from(key) < SETTINGS || (FIRST_KNOT..=last).contains(&key);
         assert_eq!(Settings::knows(key), known, "{key:#06x}");
         assert_eq!(Settings::default().set(key, 0), known, "{key:#06x}");
     }
@@ -260,22 +360,23 @@ fn a_table_has_as_many_points_as_there_is_room_for_and_not_one_more() {
     };
     let plan = Plan { reference: reference(MAX_KNOTS), ..Plan::new() };
     let (settings, built) = the_same(&plan);
-    assert_eq!(built.path.target(settings.points(), 255), plan.path()(255));
+    assert_eq!(built.path.target(settings.knots(), 255), plan.path()(255));
     let many = Plan { reference: reference(MAX_KNOTS + 1), ..Plan::new() };
     assert_eq!(Settings::new(&many.run_params()).unwrap_err(), Unsupported::Knots(MAX_KNOTS + 1));
     // And a host that does not count.
-    let mut settings = sent(&plan.pairs());
-    assert!(settings.set(key("knots"), MAX_KNOTS as u64 + 1));
-    let beyond = FIRST_KNOT + 2 * MAX_KNOTS as u16;
-    assert_eq!(settings.build().unwrap_err(), Misfit::Missing(beyond));
-    assert!(settings.points().is_empty());
+    let points = key("reference.table.points_s_deg");
+    for many in [MAX_KNOTS as u64 + 1, 1 << 32, u64::MAX] {
+        let mut settings = sent(&plan.pairs());
+        assert!(settings.set(points, many));
+        assert_eq!(settings.build().unwrap_err(), Misfit::Unknown(points));
+    }
 }
 
 #[test]
 fn a_table_without_points_is_refused() {
     let reference = ReferenceParams::Table(Table { knots: &[], interpolation: Interpolation::Linear });
     let settings = sent(&Plan { reference, ..Plan::new() }.pairs());
-    assert!(matches!(settings.build().unwrap_err(), Misfit::Param(e) if e.field == "knots"));
+    assert_eq!(refusal(&settings), "reference.table.points_s_deg = 0 points: expected at least one point");
 }
 
 #[test]

@@ -23,11 +23,23 @@ pub(crate) fn param_error(py: Python<'_>, message: &str, field: &str, value: Bou
     }
 }
 
+/// A `clutch.LoopError`.
+pub(crate) fn loop_error(py: Python<'_>, message: &str) -> PyErr {
+    let made = py
+        .import("clutch._errors")
+        .and_then(|m| m.getattr("LoopError"))
+        .and_then(|class| class.call1((message,)));
+    match made {
+        Ok(error) => PyErr::from_value(error),
+        Err(e) => e,
+    }
+}
+
 /// A scenario's error; its value is looked up in the tables it came from.
 pub(crate) fn scenario_error(py: Python<'_>, e: &ScenarioError, tables: Option<&Table>) -> PyErr {
     // An error about a whole table is about no one value.
     let found = tables.and_then(|t| lookup(t, &e.key)).filter(|v| !v.is_table()).map(|v| from_toml(py, v));
-    // A default is in no table, and errors tell it as a file would have it.
+    // A default is in no table, and errors show it as a file would have it.
     let told = || format!("x = {}", e.value).parse::<Table>().ok()?.remove("x");
     let value = match found.or_else(|| told().map(|v| from_toml(py, &v))) {
         Some(Ok(value)) => value,
@@ -40,10 +52,10 @@ pub(crate) fn scenario_error(py: Python<'_>, e: &ScenarioError, tables: Option<&
 
 /// A refused parameter of the core.
 pub(crate) fn core_error(py: Python<'_>, e: &ParamError) -> PyErr {
-    param_error(py, &e.to_string(), e.field, PyFloat::new(py, e.value).into_any())
+    param_error(py, &e.to_string(), e.field(), PyFloat::new(py, e.value).into_any())
 }
 
-/// An error of a scenario's file: of the system, or of what is in it.
+/// An error of a scenario's file: of the system, or of its contents.
 pub(crate) fn load_error(py: Python<'_>, e: &LoadError) -> PyErr {
     match e {
         LoadError::Io { name, error } => os_error(py, Path::new(name), &e.to_string(), error),
@@ -51,7 +63,7 @@ pub(crate) fn load_error(py: Python<'_>, e: &LoadError) -> PyErr {
     }
 }
 
-/// An error of a log: `OSError` for the system's, `ValueError` for what is in the file.
+/// An error of a log: `OSError` for the system's, `ValueError` for the file's contents.
 pub(crate) fn log_error(py: Python<'_>, e: &LogError) -> PyErr {
     let text = e.to_string();
     match e {
@@ -121,7 +133,7 @@ fn nested_to_toml(value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
             PyValueError::new_err(format!("{value}: expected a whole number from −2^63 to 2^63 − 1"))
         });
     }
-    // NumPy's scalars and arrays say what they are as Python's own.
+    // NumPy's scalars and arrays convert themselves to Python's own types.
     if let Ok(own) = value.call_method0("tolist")
         && !own.is(value)
         && own.get_type().getattr("__module__")?.eq("builtins")?

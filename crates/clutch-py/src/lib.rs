@@ -1,19 +1,21 @@
-//! The native module `clutch._clutch`: wrappers around the Rust crates, and nothing of its own.
+//! The native module `clutch._clutch`: wrappers around the Rust crates, without logic of its own.
 //!
-//! `python/clutch` is the public package; what it shows of this module it names `clutch.…`.
+//! `python/clutch` is the public package; it exports parts of this module as `clutch.…`.
 
 mod convert;
 mod log;
 mod paper;
+mod path;
 mod run;
 mod scenario;
+mod session;
 mod stepping;
 mod sweep;
 mod table;
 
 use pyo3::prelude::*;
 
-/// The `clutch` command with these arguments, the program's name first; its exit code.
+/// Runs the `clutch` command with these arguments, the program's name first; gives its exit code.
 #[pyfunction]
 fn main(py: Python<'_>, args: Vec<std::ffi::OsString>) -> u8 {
     py.detach(|| clutch_cli::main(args))
@@ -29,19 +31,26 @@ mod _clutch {
     #[pymodule_export]
     use super::paper::{Paper, reproduce};
     #[pymodule_export]
+    use super::path::{Path, Target};
+    #[pymodule_export]
     use super::run::{Run, simulate};
     #[pymodule_export]
     use super::scenario::{Scenario, brake_gain, check, rig, scenarios, stribeck};
     #[pymodule_export]
-    use super::stepping::{Controller, Path, Plant, StickSlip, Target, Tick};
+    use super::session::run_loop;
+    #[pymodule_export]
+    use super::stepping::{Plant, Servo, StickSlip, Tick};
     #[pymodule_export]
     use super::sweep::Sweep;
     #[pymodule_export]
     use super::table::Table;
+    /// Priority of the loop's control thread unless another is given.
+    #[pymodule_export]
+    const DEFAULT_PRIORITY: u8 = super::session::DEFAULT_PRIORITY;
     /// Version of the package.
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
-    /// Version and commit of the build, as logs tell it.
+    /// Version and commit of the build, as logs record it.
     #[pymodule_export]
     const BUILD: &str = clutch_cli::BUILD;
 }

@@ -12,14 +12,14 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A log in memory; `clutch.Log` is its public face.
+/// A log in memory; `clutch.Log` is its public form.
 #[pyclass(frozen, module = "clutch._clutch")]
 pub(crate) struct Log {
     log: Arc<clutch_log::Log>,
     origin: String,
 }
 
-/// Reads a log, also one that was cut.
+/// Reads a log, even one that was cut.
 #[pyfunction]
 pub(crate) fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Log> {
     let read = py.detach(|| clutch_log::read(&path, &Limits::default()));
@@ -63,7 +63,7 @@ impl<'a, R> Columns<'a, R> {
     }
 }
 
-fn commands(records: &[CommandRecord], terms: &[String; 3]) -> Table {
+fn commands(records: &[CommandRecord], terms: &[String]) -> Table {
     let mut c = Columns::new(records, |r| r.time_ns, |r| r.tick);
     c.name("state", STATES, |r| r.state)
         .name("source", COMMAND_SOURCES, |r| r.source)
@@ -81,7 +81,7 @@ fn commands(records: &[CommandRecord], terms: &[String; 3]) -> Table {
         // As the log's own schema does it, where a law calls a term like a field.
         let taken = c.1.iter().any(|(n, _)| n == term);
         let name = if taken { format!("{term}_{i}") } else { term.clone() };
-        c.real(&name, |r| r.terms[i]);
+        c.real(&name, |r| r.terms.get(i).copied().unwrap_or(f64::NAN));
     }
     c.table()
 }
@@ -144,7 +144,7 @@ impl Log {
         Ok(dict)
     }
 
-    /// What the log says of itself, as texts.
+    /// The log's description of itself, as texts.
     #[getter]
     fn metadata<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let h = &self.log.header;
@@ -180,10 +180,10 @@ impl Log {
         self.log.damaged
     }
 
-    /// The recorded counts to the recorded law, or to another scenario's: commands of the replay, ticks,
-    /// and the first difference (tick, field, logged, replayed).
+    /// Feeds the recorded counts to the recorded law, or to another scenario's: commands of the
+    /// replay, ticks, and the first difference (tick, field, logged, replayed).
     #[pyo3(signature = (scenario=None))]
-    #[allow(clippy::type_complexity, reason = "what clutch.replay makes its object of")]
+    #[allow(clippy::type_complexity, reason = "the parts of clutch.replay's object")]
     fn replay(
         &self,
         py: Python<'_>,

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Outcome of the paper's runs: claims and Table 3 as lists of dicts, and the figures: number, law,
-/// panels (rate in °/s, whether experiment, time in s and error in °).
+/// panels (rate in °/s, true for the experiment, time in s and error in °).
 #[pyclass(frozen, module = "clutch._clutch")]
 pub(crate) struct Paper {
     outcome: Outcome,
@@ -54,7 +54,7 @@ pub(crate) fn reproduce(py: Python<'_>, progress: Option<Bound<'_, PyAny>>) -> P
     })
 }
 
-/// Panels of a figure: rate, whether experiment, samples.
+/// Panels of a figure: rate, true for the experiment, samples.
 type Panels = Vec<(f64, bool, Table)>;
 
 fn figure(f: &FigureData) -> (u32, &'static str, Panels) {
@@ -68,12 +68,12 @@ fn figure(f: &FigureData) -> (u32, &'static str, Panels) {
 
 #[pymethods]
 impl Paper {
-    /// Statements of the paper and what came out: a dict each.
+    /// Statements of the paper and their results: a dict each.
     fn claims<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         to_python(py, &self.outcome.claims)
     }
 
-    /// Whether each statement holds, or fails as documented.
+    /// True if each statement holds, or fails as documented.
     fn as_documented(&self) -> Vec<bool> {
         self.outcome.claims.iter().map(clutch_sim::paper::Claim::as_expected).collect()
     }

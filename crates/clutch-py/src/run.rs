@@ -6,10 +6,11 @@ use crate::stepping::{PythonLaw, event_table, native, output_stage};
 use crate::table::{Column, Table};
 use clutch_core::law::Limit;
 use clutch_core::{ParamError, Servo};
-use clutch_loop::records::{SaveError, save_simulation};
+use clutch_loop::to_log::{SaveError, save_simulation};
 use clutch_sim::engine::EngineKind;
+use clutch_sim::metrics::columns;
 use clutch_sim::progress::Progress;
-use clutch_sim::{Keep, Metrics, RunError, ScenarioError, simulate_servo};
+use clutch_sim::{Keep, RunError, ScenarioError, simulate_servo};
 use pyo3::exceptions::{PyFileExistsError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -74,28 +75,6 @@ fn with_python_law(
     }
 }
 
-/// Figures by name, with the two that the encoder shows.
-pub(crate) fn figures(
-    m: &Metrics,
-    detected: &clutch_sim::run::Detected,
-) -> [(&'static str, Option<f64>); 13] {
-    [
-        ("measured_s", Some(m.measured_s)),
-        ("max_error_rad", Some(m.max_error_rad)),
-        ("rms_error_rad", Some(m.rms_error_rad)),
-        ("mean_error_rad", Some(m.mean_error_rad)),
-        ("iae_rad_s", Some(m.iae_rad_s)),
-        ("stick_slip_cycles_per_s", Some(m.stick_slip_cycles_per_s)),
-        ("stick_time_fraction", Some(m.stick_time_fraction)),
-        ("stair_height_rad", Some(m.stair_height_rad)),
-        ("break_away_torque_nm", m.break_away_torque_nm),
-        ("control_variation_v_s", Some(m.control_variation_v_s)),
-        ("jerk_rms_rad_s3", Some(m.jerk_rms_rad_s3)),
-        ("detected_stick_slip_cycles_per_s", Some(detected.stick_slip_cycles_per_s)),
-        ("detected_stick_time_fraction", Some(detected.stick_time_fraction)),
-    ]
-}
-
 /// Samples as columns, the memory shared with the run.
 pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)> {
     let limit = run.trace.limit.iter().map(|l| match l {
@@ -122,14 +101,12 @@ pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)
         ("limit".into(), limit),
         ("stuck".into(), Column::part(run, |r| &r.trace.stuck)),
     ];
-    for i in 0..3 {
+    for i in 0..run.trace.terms.len() {
         let name = run.trace.terms[i].0;
-        // A law may call a term like a column: PD's demand_v is its sum before the output stage.
+        // A law may call a term like a column.
         let name =
             if columns.iter().any(|(n, _)| n == name) { format!("law_{name}") } else { name.to_owned() };
-        if !run.trace.terms[i].0.is_empty() {
-            columns.push((name, Column::part(run, |r| r.trace.terms[i].1.as_slice())));
-        }
+        columns.push((name, Column::part(run, |r| r.trace.terms[i].1.as_slice())));
     }
     columns
 }
@@ -152,13 +129,13 @@ impl Run {
     #[getter]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        for (name, value) in figures(&self.run.metrics, &self.run.detected) {
+        for (name, value) in columns(&self.run.metrics, &self.run.detected) {
             dict.set_item(name, value)?;
         }
         Ok(dict)
     }
 
-    /// Which engine ran.
+    /// Name of the engine that ran.
     #[getter]
     fn engine(&self) -> &'static str {
         match self.run.engine {
@@ -175,13 +152,13 @@ impl Run {
             ));
         }
         if path.exists() {
-            let text = format!("{}: exists already; a log is never written over", path.display());
+            let text = format!("{}: exists already; a log is never overwritten", path.display());
             return Err(PyFileExistsError::new_err(text));
         }
         let written = py.detach(|| save_simulation(&path, &self.scenario.0, &self.run, clutch_cli::BUILD));
         written.map_err(|e| match e {
             SaveError::Log(e) => crate::convert::log_error(py, &e),
-            SaveError::Setup(e) => {
+            SaveError::Build(e) => {
                 let source = std::io::Error::other(e.to_string());
                 os_error(py, &path, &e.to_string(), &source)
             }

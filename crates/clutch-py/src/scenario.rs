@@ -3,8 +3,8 @@
 use crate::convert::{
     core_error, from_json, from_table, load_error, overrides, param_error, scenario_error, to_table,
 };
-use crate::stepping::Path;
-use clutch_core::{BrakeGeometry, Stribeck};
+use crate::path::Path;
+use clutch_core::{BrakeGeometry, FrictionModel, Stribeck};
 use clutch_sim::ScenarioError;
 use clutch_sim::rig::Rig;
 use clutch_sim::scenario::{BUILT_IN, check_section, override_keys};
@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyString};
 use std::sync::Arc;
 use toml::{Table, Value};
 
-/// A checked scenario, as the simulator takes it; `clutch.Scenario` is its public face.
+/// A checked scenario, as the simulator takes it; `clutch.Scenario` is its public form.
 #[pyclass(frozen, module = "clutch._clutch")]
 #[derive(Clone)]
 pub(crate) struct Scenario(pub(crate) Arc<clutch_sim::Scenario>);
@@ -74,7 +74,7 @@ impl Scenario {
         self.0.canonical()
     }
 
-    /// What `clutch certify --json` prints.
+    /// The object that `clutch certify --json` prints.
     fn certificate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = py.detach(|| clutch_cli::certify::certificate(&self.0));
         from_json(py, &found.map_err(|e| self.error(py, &e))?)
@@ -82,7 +82,7 @@ impl Scenario {
 
     /// The path, sampled.
     fn path(&self, py: Python<'_>) -> PyResult<Path> {
-        Path::new(py, self)
+        Path::new(py, &self.0, |e| self.error(py, &self.0.run_error(&e.into())))
     }
 
     /// The number of ticks in a run.
@@ -131,7 +131,7 @@ pub(crate) fn checked(
     made.map(|s| Scenario(Arc::new(s))).map_err(|e| scenario_error(py, &e, Some(&table)))
 }
 
-/// Checks one table by itself: `key` as `law.smc`, `name` what errors call it. Gives the table
+/// Checks one table by itself: `key` as `law.smc`, `name` its name in errors. Gives the table
 /// back with its defaults filled in.
 #[pyfunction]
 pub(crate) fn check<'py>(
@@ -208,6 +208,6 @@ pub(crate) fn brake_gain(py: Python<'_>, table: &Bound<'_, PyDict>) -> PyResult<
     };
     geometry.brake_gain().map_err(|e| {
         let value = PyString::new(py, &e.value.to_string()).into_any();
-        param_error(py, &e.to_string(), e.field, value)
+        param_error(py, &e.to_string(), e.field(), value)
     })
 }

@@ -1,179 +1,28 @@
 //! Law and plant stepped by the user, and laws written in Python.
 
 use crate::convert::core_error;
+use crate::path::{Target, fixed_to_counts};
 use crate::scenario::Scenario;
 use crate::table::{Column, Table};
-use clutch_core::law::{Command, Law, LawTerms, Limit, Output, OutputState, Terms};
+use clutch_core::law::{Command, ControlLaw, Law, LawState, LawTerms, Limit, Output, OutputState, Terms};
 use clutch_core::{
-    Counts, Dac, Encoder, FixedCounts, ParamError, Real, Servo, ServoOutput, ServoState, StickSlipParams,
+    Counts, Dac, Encoder, FixedCounts, ParamError, Real, ServoOutput, ServoState, StickSlipParams,
     StickSlipState, law,
 };
 use clutch_sim::MovingRig;
 use clutch_sim::engine::{Event, EventKind, Motion};
 use clutch_sim::scenario::ScalarKind;
-use pyo3::exceptions::{
-    PyAttributeError, PyIndexError, PyMemoryError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError,
-};
+use pyo3::exceptions::{PyAttributeError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat};
 use std::sync::Mutex;
 
-type State<T> = ServoState<T, OutputState<T>>;
-
-fn fixed_to_counts(position: FixedCounts) -> f64 {
-    position.minus::<f64>(FixedCounts(0))
-}
-
-/// A point of a path: what the law is asked to follow at one tick.
-///
-/// Parameters
-/// ----------
-/// position_counts : float
-///     Target position, encoder counts from the encoder's zero; kept to 2⁻¹⁶ counts.
-/// velocity_rad_s : float
-///     Target velocity, rad/s.
-/// acceleration_rad_s2 : float
-///     Target acceleration, rad/s².
-///
-/// Examples
-/// --------
-/// >>> import clutch
-/// >>> clutch.Target(12.5, 0.035)
-/// Target(12.5, 0.035, 0.0)
-#[pyclass(frozen, module = "clutch", eq)]
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) struct Target(clutch_core::Target<f64>);
-
-#[pymethods]
-impl Target {
-    #[new]
-    #[pyo3(signature = (position_counts, velocity_rad_s=0.0, acceleration_rad_s2=0.0))]
-    fn new(position_counts: f64, velocity_rad_s: f64, acceleration_rad_s2: f64) -> PyResult<Target> {
-        let named = [
-            ("position_counts", position_counts),
-            ("velocity_rad_s", velocity_rad_s),
-            ("acceleration_rad_s2", acceleration_rad_s2),
-        ];
-        if let Some((name, value)) = named.iter().find(|(_, x)| !x.is_finite() || x.abs() >= 1e12) {
-            return Err(PyValueError::new_err(format!(
-                "{name} = {value}: expected a finite number below 1e12"
-            )));
-        }
-        Ok(Target(clutch_core::Target {
-            position: FixedCounts::from_real(position_counts),
-            velocity: velocity_rad_s,
-            acceleration: acceleration_rad_s2,
-        }))
-    }
-
-    /// Target position, counts.
-    #[getter]
-    fn position_counts(&self) -> f64 {
-        fixed_to_counts(self.0.position)
-    }
-
-    /// Target velocity, rad/s.
-    #[getter]
-    fn velocity_rad_s(&self) -> f64 {
-        self.0.velocity
-    }
-
-    /// Target acceleration, rad/s².
-    #[getter]
-    fn acceleration_rad_s2(&self) -> f64 {
-        self.0.acceleration
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (f64, f64, f64)) {
-        let t = slf.get();
-        (slf.get_type().into_any(), (t.position_counts(), t.0.velocity, t.0.acceleration))
-    }
-
-    fn __repr__(&self) -> String {
-        format!("Target({:?}, {:?}, {:?})", self.position_counts(), self.0.velocity, self.0.acceleration)
-    }
-}
-
-/// A scenario's path, sampled at its period.
-///
-/// Examples
-/// --------
-/// >>> import clutch
-/// >>> path = clutch.Scenario.load("minimum_jerk").path()
-/// >>> path.at(0).velocity_rad_s
-/// 0.0
-/// >>> len(path) == len(path.table())
-/// True
-#[pyclass(frozen, module = "clutch")]
-pub(crate) struct Path {
-    targets: Vec<clutch_core::Target<f64>>,
-    period: f64,
-    radians_per_count: f64,
-}
-
-impl Path {
-    pub(crate) fn new(py: Python<'_>, scenario: &Scenario) -> PyResult<Path> {
-        let spec = scenario.0.spec();
-        let encoder = Encoder::new::<f64>(spec.rig.counts_per_rev).map_err(|e| core_error(py, &e))?;
-        let wrong = |e: ParamError| scenario.error(py, &scenario.0.run_error(&e.into()));
-        let ticks = scenario.0.ticks();
-        let mut targets = Vec::new();
-        let room = usize::try_from(ticks).is_ok_and(|n| targets.try_reserve_exact(n).is_ok());
-        if !room {
-            return Err(PyMemoryError::new_err(format!("no memory for a path of {ticks} targets")));
-        }
-        match scenario.0.scalar {
-            ScalarKind::F32 => {
-                let path = spec.path::<f32>().map_err(wrong)?;
-                targets.extend((0..ticks).map(|k| path.at(k).cast::<f64>()));
-            }
-            ScalarKind::F64 => {
-                let path = spec.path::<f64>().map_err(wrong)?;
-                targets.extend((0..ticks).map(|k| path.at(k)));
-            }
-        }
-        Ok(Path { targets, period: spec.period.seconds(), radians_per_count: encoder.radians_per_count() })
-    }
-}
-
-#[pymethods]
-impl Path {
-    /// The target at a tick of the run, from 0.
-    fn at(&self, tick: i64) -> PyResult<Target> {
-        let n = self.targets.len();
-        let target = usize::try_from(tick).ok().and_then(|tick| self.targets.get(tick));
-        target.map(|t| Target(*t)).ok_or_else(|| {
-            PyIndexError::new_err(format!("tick {tick}: expected one of the run's, 0 to {}", n - 1))
-        })
-    }
-
-    fn __len__(&self) -> usize {
-        self.targets.len()
-    }
-
-    /// Columns time_s, position_rad, velocity_rad_s, acceleration_rad_s2.
-    fn table(&self) -> Table {
-        let of = |f: &dyn Fn(&clutch_core::Target<f64>) -> f64| {
-            Column::own(self.targets.iter().map(f).collect::<Vec<f64>>())
-        };
-        let time: Vec<f64> = (0..self.targets.len()).map(|k| k as f64 * self.period).collect();
-        Table::of([
-            ("time_s", Column::own(time)),
-            ("position_rad", of(&|t| fixed_to_counts(t.position) * self.radians_per_count)),
-            ("velocity_rad_s", of(&|t| t.velocity)),
-            ("acceleration_rad_s2", of(&|t| t.acceleration)),
-        ])
-    }
-
-    fn __repr__(&self) -> String {
-        format!("Path({} ticks of {} s)", self.targets.len(), self.period)
-    }
-}
+type State<T> = ServoState<T, LawState<T>>;
 
 /// A servo in one scalar, with its state.
 #[derive(Clone)]
 struct Running<T: Real> {
-    servo: Servo<T>,
+    servo: clutch_core::Servo<T>,
     state: State<T>,
     last: ServoOutput<T, LawTerms<T>>,
 }
@@ -181,15 +30,14 @@ struct Running<T: Real> {
 #[derive(Clone)]
 #[allow(
     clippy::large_enum_variant,
-    reason = "one lives in each controller; a box would cost each step a cache line"
+    reason = "one lives in each servo; a box would cost each step a cache line"
 )]
 enum Scalar {
     F32(Running<f32>),
     F64(Running<f64>),
 }
 
-/// The law of a scenario with all that it remembers, sampled by you: counts and target in,
-/// volts out.
+/// The law of a scenario with its state, sampled by you: counts and target in, volts out.
 ///
 /// It is the servo that the simulator, the loop and the boards run, bit for bit. It begins as
 /// `clutch.simulate` does.
@@ -205,16 +53,16 @@ enum Scalar {
 ///
 /// >>> import clutch
 /// >>> scenario = clutch.Scenario.load("smc_2").override({"run.duration_s": 2.0})
-/// >>> law, plant, path = clutch.Controller(scenario), clutch.Plant(scenario), scenario.path()
+/// >>> servo, plant, path = clutch.Servo(scenario), clutch.Plant(scenario), scenario.path()
 /// >>> volts = []
 /// >>> for tick in range(len(path)):
-/// ...     volts.append(law.step(plant.counts, path.at(tick)))
+/// ...     volts.append(servo.step(plant.counts, path.at(tick)))
 /// ...     counts = plant.step(volts[-1])
 /// >>> volts == clutch.simulate(scenario).samples["voltage_v"].tolist()
 /// True
 #[pyclass(module = "clutch")]
 #[derive(Clone)]
-pub(crate) struct Controller {
+pub(crate) struct Servo {
     running: Scalar,
     /// Counts are fractions where the rig's sensor is ideal.
     whole: bool,
@@ -223,15 +71,11 @@ pub(crate) struct Controller {
     dac: Dac<f64>,
 }
 
-fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
-    ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }
-}
-
 fn begin<T: Real>(py: Python<'_>, scenario: &Scenario) -> PyResult<Running<T>> {
     let spec = scenario.0.spec();
     let wrong = |e: &ParamError| core_error(py, e);
     let params = spec.servo().map_err(|e| wrong(&e))?.cast::<T>();
-    let servo = Servo::<T>::new(&params).map_err(|e| wrong(&to_f64(e)))?;
+    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| wrong(&e.cast()))?;
     let begun = spec.prepare::<T>().map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
     Ok(Running { state: begun.servo_state(&servo), servo, last: ServoOutput::default() })
 }
@@ -257,8 +101,9 @@ impl<T: Real> Running<T> {
         };
     }
 
-    fn terms(&self) -> [(&'static str, f64); 3] {
-        self.last.command.terms.columns().map(|(name, x)| (name, x.to_f64()))
+    fn terms(&self) -> Vec<(&'static str, f64)> {
+        let values = self.last.command.terms.values().iter().map(|x| x.to_f64());
+        self.servo.law().term_names().iter().copied().zip(values).collect()
     }
 }
 
@@ -291,19 +136,19 @@ fn checked_counts(counts: f64, whole: bool) -> PyResult<f64> {
 }
 
 #[pymethods]
-impl Controller {
+impl Servo {
     #[new]
-    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Controller> {
+    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Servo> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
-        Ok(Controller {
-            running: match scenario.0.scalar {
+        Ok(Servo {
+            running: match scenario.0.scalar() {
                 ScalarKind::F32 => Scalar::F32(begin(py, &scenario)?),
                 ScalarKind::F64 => Scalar::F64(begin(py, &scenario)?),
             },
-            whole: spec.rig.encoder_quantised,
-            rounds: spec.rig.dac_quantised,
-            dac: Dac::new(&spec.rig.dac).map_err(|e| core_error(py, &e))?,
+            whole: spec.rig.encoder.quantised,
+            rounds: spec.rig.dac.quantised,
+            dac: Dac::new(&spec.rig.dac.converter).map_err(|e| core_error(py, &e))?,
         })
     }
 
@@ -357,20 +202,20 @@ impl Controller {
         either!(&self.running, r => r.last.tick.error_rate.to_f64())
     }
 
-    /// Voltage that the law asked of the converter at the last step, V.
+    /// Voltage that the law demanded of the converter at the last step, V.
     #[getter]
     fn demand(&self) -> f64 {
         either!(&self.running, r => r.last.command.voltage.to_f64())
     }
 
-    /// Whether a limit of the output decided the last voltage.
+    /// True if a limit of the output decided the last voltage.
     #[getter]
     fn limited(&self) -> bool {
         either!(&self.running, r => r.last.command.limit != Limit::None)
     }
 
-    /// What decided the last voltage, as in a run's column `limit`: 0 the law, 1 the lowest voltage,
-    /// 2 the highest, 3 a demand that was not a number.
+    /// The limit that decided the last voltage, as in a run's column `limit`: 0 the law, 1 the
+    /// lowest voltage, 2 the highest, 3 a demand that was not a number.
     #[getter]
     fn limit(&self) -> u8 {
         either!(&self.running, r => r.last.command.limit as u8)
@@ -386,12 +231,12 @@ impl Controller {
         Ok(dict)
     }
 
-    /// A snapshot: goes on from here by itself.
-    fn copy(&self) -> Controller {
+    /// A snapshot: continues from here by itself.
+    fn copy(&self) -> Servo {
         self.clone()
     }
 
-    fn __copy__(&self) -> Controller {
+    fn __copy__(&self) -> Servo {
         self.clone()
     }
 }
@@ -404,7 +249,7 @@ enum Sticks {
 
 /// Stick-slip seen from the encoder's counts, sampled by you.
 ///
-/// The shaft counts as stuck when the encoder is silent while the path moves on by more than a count.
+/// The shaft counts as stuck when the encoder is silent while the path moves by more than a count.
 ///
 /// Parameters
 /// ----------
@@ -441,12 +286,13 @@ impl StickSlip {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         let wrong = |e: ParamError| core_error(py, &e);
-        let (encoder, period) = (Encoder::new(spec.rig.counts_per_rev).map_err(wrong)?, spec.period);
+        let (encoder, period) =
+            (Encoder::new(spec.rig.encoder.sensor.counts_per_rev).map_err(wrong)?, spec.period);
         let single = StickSlipParams::default();
         let double = StickSlipParams::default();
-        Ok(StickSlip(match scenario.0.scalar {
+        Ok(StickSlip(match scenario.0.scalar() {
             ScalarKind::F32 => Sticks::F32(
-                clutch_core::StickSlip::new(&single, encoder, period).map_err(|e| wrong(to_f64(e)))?,
+                clutch_core::StickSlip::new(&single, encoder, period).map_err(|e| wrong(e.cast()))?,
                 StickSlipState::default(),
             ),
             ScalarKind::F64 => Sticks::F64(
@@ -468,7 +314,7 @@ impl StickSlip {
     /// Returns
     /// -------
     /// bool
-    ///     Whether a stick is detected at this sample.
+    ///     True if a stick is detected at this sample.
     fn update(&mut self, counts: f64, velocity_rad_s: f64) -> PyResult<bool> {
         let counts = Counts(checked_counts(counts, true)? as i64 as i32);
         Ok(match &mut self.0 {
@@ -477,7 +323,7 @@ impl StickSlip {
         })
     }
 
-    /// Whether the shaft counts as stuck now.
+    /// True if the shaft counts as stuck now.
     #[getter]
     fn stuck(&self) -> bool {
         seen!(self, state => state.stuck())
@@ -543,7 +389,7 @@ impl Plant {
     fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Plant> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
-        let begun = match scenario.0.scalar {
+        let begun = match scenario.0.scalar() {
             ScalarKind::F32 => spec.prepare::<f32>().map(|p| (p.moving, p.volts)),
             ScalarKind::F64 => spec.prepare::<f64>().map(|p| (p.moving, p.volts)),
         };
@@ -556,8 +402,8 @@ impl Plant {
             tick: 0,
             start_voltage,
             voltage: start_voltage,
-            whole: spec.rig.encoder_quantised,
-            rounds: spec.rig.dac_quantised,
+            whole: spec.rig.encoder.quantised,
+            rounds: spec.rig.dac.quantised,
             events: Vec::new(),
             sticks: 0,
         })
@@ -594,7 +440,7 @@ impl Plant {
         self.counts(py)
     }
 
-    /// What the encoder shows: whole counts; a fraction if the scenario's sensor is ideal.
+    /// The encoder's output: whole counts; a fraction if the scenario's sensor is ideal.
     #[getter]
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         if self.whole {
@@ -604,7 +450,7 @@ impl Plant {
         }
     }
 
-    /// Position in counts to 2⁻¹⁶ of one: what an ideal sensor shows.
+    /// Position in counts to 2⁻¹⁶ of one, as an ideal sensor shows it.
     #[getter]
     fn fine_counts(&self) -> f64 {
         fixed_to_counts(self.moving.fine_counts())
@@ -622,13 +468,13 @@ impl Plant {
         self.moving.shaft().velocity
     }
 
-    /// Whether friction holds the shaft.
+    /// True if friction holds the shaft.
     #[getter]
     fn stuck(&self) -> bool {
         self.moving.shaft().motion == Motion::Stuck
     }
 
-    /// How often it has stuck so far.
+    /// Number of sticks so far.
     #[getter]
     fn sticks(&self) -> usize {
         self.sticks
@@ -688,16 +534,16 @@ pub(crate) fn native(scenario: &Bound<'_, PyAny>) -> PyResult<Scenario> {
     Ok(inner.cast::<Scenario>()?.get().clone())
 }
 
-/// What a law written in Python is given each period.
+/// The input of a law written in Python, each period.
 ///
 /// Parameters
 /// ----------
 /// error, error_rate : float
 ///     Position error, target minus position, rad, and its rate, rad/s.
 /// target_velocity, target_acceleration : float
-///     Of the path, rad/s and rad/s².
+///     Velocity and acceleration of the path, rad/s and rad/s².
 /// time : float
-///     Since the start of the run, s.
+///     Time since the start of the run, s.
 ///
 /// Examples
 /// --------
@@ -770,21 +616,11 @@ pub(crate) struct PythonLaw {
     failure: Mutex<Option<PyErr>>,
 }
 
-/// What it has: the callable remembers for itself.
+/// Its state: the callable keeps its own.
 #[derive(Clone, Default)]
 pub(crate) struct PythonState {
     output: OutputState<f64>,
     ticks: u64,
-}
-
-/// The only term of a law whose inside is not known.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct PythonTerms(f64);
-
-impl Terms<f64> for PythonTerms {
-    fn columns(&self) -> [(&'static str, f64); 3] {
-        [("python_v", self.0), ("", 0.0), ("", 0.0)]
-    }
 }
 
 impl PythonLaw {
@@ -797,7 +633,7 @@ impl PythonLaw {
         self.failure.lock().ok()?.take()
     }
 
-    /// The run is lost: what it still does is of no use.
+    /// The run is lost: its remaining results are of no use.
     pub(crate) fn failed(&self) -> bool {
         self.failure.lock().map_or(true, |f| f.is_some())
     }
@@ -827,19 +663,21 @@ impl PythonLaw {
     }
 }
 
-impl law::Controller<f64> for PythonLaw {
+impl ControlLaw<f64> for PythonLaw {
     type State = PythonState;
-    type Terms = PythonTerms;
+    /// The only term of a law whose inside is not known.
+    type Terms = [f64; 1];
+    const TERMS: &'static [&'static str] = &["python_v"];
 
     fn start(&self, _: &law::Tick<f64>, _: f64) -> PythonState {
         PythonState::default()
     }
 
-    fn update(&self, state: &mut PythonState, tick: &law::Tick<f64>) -> Command<f64, PythonTerms> {
+    fn update(&self, state: &mut PythonState, tick: &law::Tick<f64>) -> Command<f64, [f64; 1]> {
         let demand = self.ask(tick, state.ticks);
         state.ticks += 1;
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
-        Command { voltage, limit, terms: PythonTerms(demand) }
+        Command { voltage, limit, terms: [demand] }
     }
 }
 

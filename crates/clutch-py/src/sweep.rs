@@ -1,8 +1,9 @@
 //! Sweeps in the background, on all cores.
 
 use crate::convert::{scenario_error, to_table, to_toml};
-use crate::run::{figures, sample_columns};
+use crate::run::sample_columns;
 use crate::table::{Column, Table};
+use clutch_sim::metrics::columns;
 use clutch_sim::{Keep, ScenarioError, sweep};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -13,14 +14,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// What a row leaves behind.
+/// The result of a row.
 struct Row {
     metrics: Vec<f64>,
     error: Option<ScenarioError>,
     trace: Option<Table>,
 }
 
-/// What the threads of a sweep and Python share.
+/// The state that the threads of a sweep share with Python.
 struct Shared {
     rows: Mutex<BTreeMap<usize, Row>>,
     finished: AtomicUsize,
@@ -29,11 +30,11 @@ struct Shared {
     stop: AtomicBool,
     ended: Mutex<bool>,
     bell: Condvar,
-    /// What a thread said when it panicked.
+    /// The message of a thread that panicked.
     broke: Mutex<Option<String>>,
 }
 
-/// Tells that a sweep has ended, however it did.
+/// Reports the end of a sweep, however it came.
 struct AtEnd(Arc<Shared>);
 
 impl Drop for AtEnd {
@@ -48,7 +49,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A sweep that runs in threads of its own; `clutch.sweep` is its public face.
+/// A sweep that runs in threads of its own; `clutch.sweep` is its public form.
 #[pyclass(frozen, module = "clutch._clutch")]
 pub(crate) struct Sweep {
     sweep: Arc<sweep::Sweep>,
@@ -79,11 +80,11 @@ impl Sweep {
             .iter()
             .map(|row| row.try_iter()?.map(|v| to_toml(&v?)).collect::<PyResult<Vec<_>>>())
             .collect::<PyResult<Vec<_>>>()?;
-        let known = figures(&Default::default(), &Default::default());
+        let known: Vec<&str> =
+            columns(&Default::default(), &Default::default()).map(|(name, _)| name).collect();
         for name in &metrics {
-            if name != "certified" && !known.iter().any(|(n, _)| n == name) {
-                let names: Vec<&str> = known.iter().map(|(n, _)| *n).collect();
-                let text = format!("metrics: \"{name}\": expected certified, {}", names.join(", "));
+            if name != "certified" && !known.contains(&name.as_str()) {
+                let text = format!("metrics: \"{name}\": expected certified, {}", known.join(", "));
                 return Err(PyValueError::new_err(text));
             }
         }
@@ -162,12 +163,12 @@ impl Sweep {
         self.sweep.len()
     }
 
-    /// Waits so many seconds at most; whether the sweep has ended.
+    /// Waits at most `seconds`; true if the sweep has ended.
     fn wait(&self, py: Python<'_>, seconds: f64) -> PyResult<bool> {
         if seconds.is_nan() || seconds < 0.0 {
             return Err(PyValueError::new_err(format!("seconds = {seconds}: expected at least 0")));
         }
-        // What is longer than a Duration can tell is for ever.
+        // A time beyond the range of Duration is for ever.
         let time = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
         Ok(py.detach(|| {
             let ended = locked(&self.shared.ended);
@@ -182,7 +183,7 @@ impl Sweep {
     }
 
     /// Finished rows: a table (run, each metric, error), traces by row, and for each refused row its error.
-    #[allow(clippy::type_complexity, reason = "what clutch.sweep makes its object of")]
+    #[allow(clippy::type_complexity, reason = "the parts of clutch.sweep's object")]
     fn result<'py>(&self, py: Python<'py>) -> PyResult<(Table, Bound<'py, PyDict>, Vec<(usize, Py<PyAny>)>)> {
         if let Some(said) = locked(&self.shared.broke).clone() {
             return Err(PyRuntimeError::new_err(format!("a thread of the sweep broke: {said}")));
@@ -228,9 +229,9 @@ fn row(
 ) -> Row {
     match outcome {
         Ok(sweep::Row { certified, run }) => {
-            let all = figures(&run.metrics, &run.detected);
             let value = |name: &String| {
-                let found = all.iter().find(|(n, _)| n == name).and_then(|(_, x)| *x);
+                let found =
+                    columns(&run.metrics, &run.detected).find(|(n, _)| n == name).and_then(|(_, x)| x);
                 if name == "certified" { f64::from(u8::from(certified)) } else { found.unwrap_or(f64::NAN) }
             };
             let metrics = metrics.iter().map(value).collect();

@@ -1,6 +1,6 @@
-//! Named columns of equal length: what results, logs and sweeps give to Python.
+//! Named columns of equal length, which results, logs and sweeps give to Python.
 //!
-//! A column's numbers stay where the simulation wrote them; NumPy and Arrow are shown that memory.
+//! A column's numbers stay where the simulation wrote them; NumPy and Arrow read that memory.
 
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{
@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 /// Owner of a column's memory.
 pub(crate) type Owner = Arc<dyn OwnerOfMemory>;
-/// What can own it.
+/// A possible owner.
 pub(crate) trait OwnerOfMemory: Send + Sync + RefUnwindSafe + UnwindSafe {}
 impl<T: Send + Sync + RefUnwindSafe + UnwindSafe> OwnerOfMemory for T {}
 
@@ -185,7 +185,7 @@ impl Column {
                 Column::own(plain("int64")?.extract::<PyReadonlyArray1<'_, i64>>()?.as_slice()?.to_vec())
             }
             "b" => Column::own(plain("bool")?.extract::<PyReadonlyArray1<'_, bool>>()?.as_slice()?.to_vec()),
-            // Of a list NumPy would make texts of all that stands among texts.
+            // NumPy turns every element of a mixed list into a string.
             "U" | "O" | "T" if values.hasattr("dtype")? => {
                 match array.call_method0("tolist")?.extract::<Vec<String>>() {
                     Ok(texts) => Column::text(texts),
@@ -231,12 +231,12 @@ fn primitive<P: ArrowPrimitiveType>(c: &Shared<P::Native>) -> ArrayRef {
     Arc::new(PrimitiveArray::<P>::new(ScalarBuffer::new(buffer, 0, c.len), None))
 }
 
-/// What Arrow holds for as long as it reads a column; never looked into.
+/// The owner that Arrow holds for as long as it reads a column; never read.
 struct Kept(#[allow(dead_code)] Owner);
 
 /// Named columns of equal length.
 ///
-/// Results, logs and sweeps are tables. Any library that reads Arrow streams takes one as it is
+/// Results, logs and sweeps are tables. Any library that reads Arrow streams takes one directly
 /// (`pyarrow.table(t)`, `polars.DataFrame(t)`, `pandas.DataFrame.from_arrow(t)`), numbers without
 /// copying.
 ///
@@ -274,7 +274,7 @@ impl PartialEq for Table {
 }
 
 impl Table {
-    /// Of columns that are known to be of one length.
+    /// A table of columns that are known to be of one length.
     pub(crate) fn of(columns: impl IntoIterator<Item = (impl Into<String>, Column)>) -> Table {
         let (names, columns): (Vec<_>, Vec<_>) = columns.into_iter().map(|(n, c)| (n.into(), c)).unzip();
         let rows = columns.first().map_or(0, Column::len);
@@ -392,14 +392,14 @@ impl Table {
         made_elsewhere(slf, "to_xarray", index)
     }
 
-    /// The table as an Arrow C stream: how other libraries read it.
+    /// The table as an Arrow C stream, which other libraries read.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        let _ = requested_schema; // a hint, which a producer may leave unheard
+        let _ = requested_schema; // a hint, which a producer may ignore
         let wrong = |e: ArrowError| PyValueError::new_err(e.to_string());
         let batch = self.batch().map_err(wrong)?;
         let schema = batch.schema();
@@ -430,7 +430,7 @@ impl Table {
     }
 }
 
-/// Of keys and values, for small tables of texts.
+/// A table of keys and values, for small tables of texts.
 pub(crate) fn pairs<'py>(py: Python<'py>, pairs: &[(String, String)]) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     for (key, value) in pairs {

@@ -1,16 +1,16 @@
 //! Finds the `bench` rig: the stand-in for the paper's experiment.
 //!
 //! An evolution strategy over the parameters in which a real bench differs from the paper's own
-//! simulation. It is fitted to Table 3, to the PD controller's smooth motion and error at 20 and
-//! 100 °/s, its error and its stick-slip at 2 to 10 °/s, and to the computed-torque controller's
+//! simulation. It is fitted to Table 3, to PD's smooth motion and error at 20 and
+//! 100 °/s, its error and its stick-slip at 2 to 10 °/s, and to computed torque's
 //! stick-slip just below 20 °/s; every other statement of section 4 stays out of the fit. Same arguments, same result.
 //!
 //! `cargo xtask calibrate [--generations N] [--seed S]`
 
+use clutch_core::StribeckParams;
 use clutch_core::law::{CtcParams, LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;
-use clutch_core::{GRAVITY, StribeckParams};
-use clutch_sim::drive::DriveParams;
+use clutch_sim::drive::{DriveParams, WeightDrive};
 use clutch_sim::paper::{TABLE3, reduction};
 use clutch_sim::rig::RippleParams;
 use clutch_sim::{Metrics, RigParams, RunSpec, simulate};
@@ -50,8 +50,9 @@ fn rig(x: &Point) -> RigParams {
             mu_dynamic: x[1],
             stribeck_velocity: x[2],
             stribeck_exponent: 1.0,
-        },
-        drive: DriveParams::Weight { mass: 0.2 * x[3], gravity: GRAVITY, pulley_radius: 0.024 },
+        }
+        .into(),
+        drive: DriveParams::Weight(WeightDrive { mass: 0.2 * x[3], ..WeightDrive::default() }),
         ripple: Some(ripple(x)),
         delay_ticks: 1,
         ..RigParams::paper()
@@ -59,7 +60,7 @@ fn rig(x: &Point) -> RigParams {
 }
 
 fn measure(x: &Point, law: LawParams, rate_deg_s: f64, seed: u64) -> Option<Metrics> {
-    let mut spec = RunSpec::new(rig(x), law, ReferenceParams::Ramp(rate_deg_s.to_radians()));
+    let mut spec = RunSpec::new(rig(x), law, ReferenceParams::ramp(rate_deg_s.to_radians()));
     spec.run.seed = seed;
     simulate::<f64>(&spec).ok().map(|r| r.metrics)
 }

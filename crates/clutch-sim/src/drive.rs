@@ -1,44 +1,82 @@
 //! What drives the shaft: a weight, a spring, a table over time, or a hand.
 
-use clutch_core::ParamError;
+use crate::tables::Points;
+use clutch_core::params::{Params, Range};
+use clutch_core::{ParamError, params};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Parameters of a driving torque.
-#[derive(Clone, Debug, PartialEq)]
-pub enum DriveParams {
-    /// A weight on a pulley: `M g R_p`.
-    Weight {
-        /// `M`, kg.
-        mass: f64,
-        /// `g`, m/s².
-        gravity: f64,
-        /// `R_p`, m.
-        pulley_radius: f64,
-    },
-    /// A spring: `stiffness · (rest − θ)`.
-    Spring {
-        /// N m/rad.
-        stiffness: f64,
-        /// Angle at which it pulls no more, rad from the start.
-        rest: f64,
-    },
-    /// Torque at points in time, straight lines between, constant outside.
-    Table(
-        /// (s, N m), with rising times.
-        Vec<(f64, f64)>,
-    ),
-    /// A hand: a mean with a random part whose power lies evenly in a band of frequencies.
-    Hand {
-        /// Mean, N m.
-        mean: f64,
-        /// Root mean square of the random part, N m.
-        rms: f64,
-        /// Lower end of the band, Hz.
-        lowest_frequency: f64,
-        /// Upper end of the band, Hz.
-        highest_frequency: f64,
-    },
+params! {
+    /// A weight on a pulley, as in the paper: the torque is `T_u = M g R_p` in (1).
+    #[derive(Copy)]
+    pub struct WeightDrive<f64>: Default {
+        /// Mass, in (1).
+        mass: f64 = 0.2, "mass_kg" "M" KG, Range::above(0.0);
+        /// Acceleration of gravity in (1), as the paper rounds it.
+        gravity: f64 = 9.81, "gravity_m_s2" "g" M_S2, Range::above(0.0);
+        /// Radius of the pulley, in (1).
+        pulley_radius: f64 = 0.024, "pulley_radius_m" "R_p" M, Range::above(0.0);
+    }
+}
+
+params! {
+    /// A spring: the torque is `stiffness · (rest − θ)`. It needs the engine `dormand_prince`.
+    #[derive(Copy)]
+    pub struct SpringDrive<f64> {
+        /// Stiffness.
+        stiffness: f64, "stiffness_nm_rad" "" NM_RAD, Range::above(0.0);
+        /// Angle from the start at which it pulls no more.
+        rest: f64, "rest_deg" "" DEG, Range::ANY;
+    }
+}
+
+params! {
+    /// A torque over time: straight lines between points, constant outside. It needs the engine `dormand_prince`.
+    pub struct TableDrive<f64> {
+        /// Points of time and torque; times rise.
+        points: Points, "points_s_nm" "" S_NM, Range::ANY;
+    }
+    relations(p) {
+        /// There is a torque.
+        NOT_EMPTY: points, "at least one point" => !p.points.0.is_empty();
+    }
+}
+
+params! {
+    /// A hand: a mean torque and a random part in a band of frequencies.
+    ///
+    /// The random part is 48 sines, one at random in each slice of the band; the seed of the run decides them. It
+    /// needs the engine `dormand_prince`.
+    #[derive(Copy)]
+    pub struct HandDrive<f64> {
+        /// Mean torque.
+        mean: f64, "mean_nm" "" NM, Range::ANY;
+        /// Root mean square of the random part.
+        rms: f64, "rms_nm" "" NM, Range::at_least(0.0);
+        /// Lower end of the band.
+        lowest_frequency: f64, "lowest_frequency_hz" "" HZ, Range::at_least(0.0);
+        /// Upper end of the band; a hand is no faster than 50 Hz.
+        highest_frequency: f64, "highest_frequency_hz" "" HZ, Range::above(0.0).up_to(50.0);
+    }
+    relations(p) {
+        /// The band is not empty.
+        BAND: highest_frequency, "a frequency above lowest_frequency_hz" =>
+            p.highest_frequency > p.lowest_frequency;
+    }
+}
+
+clutch_core::choice! {
+    /// What drives the shaft.
+    pub enum DriveParams<f64>: Default {
+        /// A weight on a pulley.
+        Weight(WeightDrive) = "weight",
+        /// A spring.
+        Spring(SpringDrive) = "spring",
+        /// A torque over time.
+        Table(TableDrive) = "table",
+        /// A hand.
+        Hand(HandDrive) = "hand",
+    }
 }
 
 /// Sines in a hand's random part.
@@ -71,71 +109,23 @@ impl Drive {
     /// Checks the parameters; `seed` decides a hand's phases and frequencies.
     ///
     /// # Errors
-    /// Names the parameter: one that is not finite, a mass or pulley radius not above 0, times that do
-    /// not rise, a negative rms, a band that is empty or reaches below 0 Hz.
+    /// The first parameter out of range; of points that do not rise, the value is the number (from 0).
     pub fn new(p: &DriveParams, seed: u64) -> Result<Drive, ParamError> {
-        let bad = |field, value, expected| Err(ParamError { field, value, expected });
+        p.check()?;
         match p {
-            DriveParams::Weight { mass, gravity, pulley_radius } => {
-                for (field, value, expected) in [
-                    ("mass", *mass, "a finite number above 0 kg"),
-                    ("gravity", *gravity, "a finite number above 0 m/s²"),
-                    ("pulley_radius", *pulley_radius, "a finite number above 0 m"),
-                ] {
-                    if !(value > 0.0 && value.is_finite()) {
-                        return bad(field, value, expected);
-                    }
-                }
+            DriveParams::Weight(WeightDrive { mass, gravity, pulley_radius }) => {
                 Ok(Drive::Constant(mass * gravity * pulley_radius))
             }
-            DriveParams::Spring { stiffness, rest } => {
-                if !(*stiffness > 0.0 && stiffness.is_finite()) {
-                    return bad("stiffness", *stiffness, "a finite number above 0 N m/rad");
-                }
-                if !rest.is_finite() {
-                    return bad("rest", *rest, "a finite angle, rad");
-                }
+            DriveParams::Spring(SpringDrive { stiffness, rest }) => {
                 Ok(Drive::Spring { stiffness: *stiffness, rest: *rest })
             }
-            DriveParams::Table(points) => {
-                if points.is_empty() {
-                    return bad("points", 0.0, "at least one point");
-                }
-                for (i, (t, torque)) in points.iter().enumerate() {
-                    if !(t.is_finite() && torque.is_finite()) {
-                        return bad(
-                            "points",
-                            i as f64,
-                            "finite times (s) and torques (N m); the value is the number (from 0) of the point that is not",
-                        );
-                    }
-                    if i > 0 && points[i - 1].0 >= *t {
-                        return bad(
-                            "points",
-                            i as f64,
-                            "times that rise from point to point; the value is the number (from 0) of the point that does not",
-                        );
-                    }
-                }
-                Ok(Drive::Table(points.clone()))
-            }
-            DriveParams::Hand { mean, rms, lowest_frequency: lowest, highest_frequency: highest } => {
-                if !mean.is_finite() {
-                    return bad("mean", *mean, "a finite torque, N m");
-                }
-                if !(*rms >= 0.0 && rms.is_finite()) {
-                    return bad("rms", *rms, "a finite torque of at least 0 N m");
-                }
-                if !(*lowest >= 0.0 && lowest.is_finite()) {
-                    return bad("lowest_frequency", *lowest, "a finite frequency of at least 0 Hz");
-                }
-                if !(highest > lowest && *highest <= 50.0) {
-                    return bad(
-                        "highest_frequency",
-                        *highest,
-                        "a frequency above the lowest and at most 50 Hz (a hand is slower)",
-                    );
-                }
+            DriveParams::Table(TableDrive { points: Points(points) }) => Ok(Drive::Table(points.clone())),
+            DriveParams::Hand(HandDrive {
+                mean,
+                rms,
+                lowest_frequency: lowest,
+                highest_frequency: highest,
+            }) => {
                 let mut rng = Pcg64::seed_from_u64(seed ^ 0x6861_6e64); // a stream apart from the noise
                 let amplitude = rms * libm::sqrt(2.0 / f64::from(HAND_SINES));
                 let width = (highest - lowest) / f64::from(HAND_SINES);
@@ -211,7 +201,9 @@ mod tests {
 
     #[test]
     fn a_table_is_straight_between_its_points_and_constant_outside() {
-        let d = Drive::new(&DriveParams::Table(vec![(1.0, 0.1), (2.0, 0.3)]), 0).unwrap();
+        let d =
+            Drive::new(&DriveParams::Table(TableDrive { points: Points(vec![(1.0, 0.1), (2.0, 0.3)]) }), 0)
+                .unwrap();
         assert_eq!(d.torque(0.0, 0.0), 0.1);
         assert!((d.torque(1.25, 0.0) - 0.15).abs() < 1e-15);
         assert_eq!(d.torque(9.0, 0.0), 0.3);
@@ -219,7 +211,12 @@ mod tests {
 
     #[test]
     fn a_hand_has_its_mean_and_rms_and_repeats_with_its_seed() {
-        let p = DriveParams::Hand { mean: 0.05, rms: 0.01, lowest_frequency: 0.2, highest_frequency: 5.0 };
+        let p = DriveParams::Hand(HandDrive {
+            mean: 0.05,
+            rms: 0.01,
+            lowest_frequency: 0.2,
+            highest_frequency: 5.0,
+        });
         let d = Drive::new(&p, 7).unwrap();
         let n = 200_000;
         let (mut sum, mut square) = (0.0, 0.0);
@@ -236,12 +233,17 @@ mod tests {
 
     #[test]
     fn each_bad_parameter_is_named() {
-        let weight = |mass| DriveParams::Weight { mass, gravity: 9.81, pulley_radius: 0.024 };
-        assert_eq!(Drive::new(&weight(-1.0), 0).unwrap_err().field, "mass");
-        assert_eq!(Drive::new(&weight(f64::NAN), 0).unwrap_err().field, "mass");
-        let table = DriveParams::Table(vec![(0.0, 1.0), (0.0, 2.0)]);
-        assert_eq!(Drive::new(&table, 0).unwrap_err().field, "points");
-        let hand = DriveParams::Hand { mean: 0.0, rms: 0.01, lowest_frequency: 2.0, highest_frequency: 1.0 };
-        assert_eq!(Drive::new(&hand, 0).unwrap_err().field, "highest_frequency");
+        let weight = |mass| DriveParams::Weight(WeightDrive { mass, ..WeightDrive::default() });
+        assert_eq!(Drive::new(&weight(-1.0), 0).unwrap_err().field(), "mass");
+        assert_eq!(Drive::new(&weight(f64::NAN), 0).unwrap_err().field(), "mass");
+        let table = DriveParams::Table(TableDrive { points: Points(vec![(0.0, 1.0), (0.0, 2.0)]) });
+        assert_eq!(Drive::new(&table, 0).unwrap_err().field(), "points");
+        let hand = DriveParams::Hand(HandDrive {
+            mean: 0.0,
+            rms: 0.01,
+            lowest_frequency: 2.0,
+            highest_frequency: 1.0,
+        });
+        assert_eq!(Drive::new(&hand, 0).unwrap_err().field(), "highest_frequency");
     }
 }

@@ -6,13 +6,16 @@ pub mod metrics;
 pub mod moving_rig;
 pub mod paper;
 pub mod progress;
+pub mod reaching;
 pub mod rig;
 pub mod run;
 pub mod scenario;
 pub mod sweep;
+mod tables;
 
 pub use metrics::Metrics;
 pub use moving_rig::MovingRig;
 pub use rig::RigParams;
 pub use run::{Keep, Run, RunError, RunParams, RunSpec, Start, simulate, simulate_servo};
 pub use scenario::{Scenario, ScenarioError};
+pub use tables::{Points, Text};

@@ -1,63 +1,151 @@
 //! How well a run went: one definition of each figure, for simulation, hardware and logs.
 //!
+//! A figure is a row of a table below and a line of [`MetricsBuilder::finish`]. From the row come its place in the
+//! summaries and JSON of the command, in Python's `Metrics`, among the columns of a sweep, on the axes of plots and
+//! in docs/scenario.md.
+//!
 //! All figures are taken after the settling time. `e = θ_d − θ` with the true position where it
 //! is known (simulation), else the measured one.
 
 use crate::engine::{Event, EventKind};
-use crate::run::Trace;
-use clutch_core::certificate::Certificate;
 use serde::Serialize;
 
-/// The figures of a run; SI and radians.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Metrics {
-    /// Time over which the figures were taken, s.
-    pub measured_s: f64,
-    /// Largest `|e|`, rad.
-    pub max_error_rad: f64,
-    /// Root mean square of `e`, rad.
-    pub rms_error_rad: f64,
-    /// Mean of `e`, rad.
-    pub mean_error_rad: f64,
-    /// Integral of `|e|`, rad s.
-    pub iae_rad_s: f64,
-    /// Stick-slip cycles (entries into the stuck state) per second.
-    pub stick_slip_cycles_per_s: f64,
-    /// Share of the time that the shaft was stuck.
-    pub stick_time_fraction: f64,
-    /// Stair height: largest movement between one stick and the next, rad; 0 with fewer than two.
-    pub stair_height_rad: f64,
-    /// Mean of the driving torque at which the shaft broke away, N m; none if it never did.
-    pub break_away_torque_nm: Option<f64>,
-    /// Total variation of the voltage, per second, V/s.
-    pub control_variation_v_s: f64,
-    /// Root mean square of the second difference of the sampled velocity over T², rad/s³.
-    pub jerk_rms_rad_s3: f64,
+/// What is known of a figure without a run.
+#[derive(Debug)]
+pub struct Figure<M: 'static> {
+    /// Name, ending with the unit: a column of a sweep, an attribute in Python.
+    pub name: &'static str,
+    /// The field of JSON.
+    pub field: &'static str,
+    /// In words, for people.
+    pub label: &'static str,
+    /// Unit of the value; 1 for a plain number.
+    pub unit: &'static str,
+    /// Unit in which people are shown it.
+    pub shown_unit: &'static str,
+    /// From the one to the other.
+    pub factor: f64,
+    /// One sentence, without the unit.
+    pub meaning: &'static str,
+    /// Whether a run may have none.
+    pub optional: bool,
+    value: fn(&M) -> Option<f64>,
 }
 
-/// When the sliding surface was reached, against the bound (15).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Reaching {
-    /// Time until `σ = f e + ė`, with the true velocity, was first within the law's layer, s; none
-    /// if it never was, or for a law without a surface.
-    pub time_s: Option<f64>,
-    /// The bound (15) of the certificate, s; none where nothing is certified or `γ` is 0.
-    pub bound_s: Option<f64>,
-}
-
-impl Reaching {
-    /// Of a run, by the surface and the layer of the law's certificate.
+impl<M> Figure<M> {
+    /// The value in [`Figure::unit`]; none where the run has none.
     #[must_use]
-    pub fn new(trace: &Trace, c: &Certificate) -> Reaching {
-        let surface = |i: usize| c.slope * trace.error[i] + trace.target_velocity[i] - trace.velocity[i];
-        // A law without a layer never is within it; a hair's breadth stands in.
-        let within = c.layer.max(1e-3);
-        let first = (0..trace.time.len()).find(|i| surface(*i).abs() <= within);
-        Reaching {
-            time_s: first.filter(|_| c.slope > 0.0).map(|i| trace.time[i]),
-            bound_s: if trace.time.is_empty() { None } else { c.reaching_time(surface(0)) },
-        }
+    pub fn of(&self, m: &M) -> Option<f64> {
+        (self.value)(m)
     }
+
+    /// The value in the unit that people are shown.
+    #[must_use]
+    pub fn shown(&self, m: &M) -> Option<f64> {
+        self.of(m).map(|x| x * self.factor)
+    }
+}
+
+/// What a figure's field may be.
+trait Value {
+    const OPTIONAL: bool;
+}
+
+impl Value for f64 {
+    const OPTIONAL: bool = false;
+}
+
+impl Value for Option<f64> {
+    const OPTIONAL: bool = true;
+}
+
+const SAME: f64 = 1.0;
+const DEGREES: f64 = 1.0_f64.to_degrees();
+const PERCENT: f64 = 100.0;
+const MILLI: f64 = 1e3;
+
+/// A struct of figures, and for each of them its [`Figure`].
+macro_rules! figures {
+    ($(#[$about:meta])* pub struct $name:ident, columns $prefix:literal {
+        $(
+            #[doc = $meaning:literal]
+            $row:ident $field:ident: $type:ty, $label:literal, $unit:literal shown as $shown:literal $factor:ident;
+        )+
+    }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+        pub struct $name {
+            $(
+                #[doc = $meaning]
+                #[doc = concat!("\n\nUnit: ", $unit)]
+                pub $field: $type,
+            )+
+        }
+
+        impl $name {
+            $(
+                #[doc = concat!("[`", stringify!($name), "::", stringify!($field), "`].")]
+                pub const $row: Figure<$name> = Figure {
+                    name: concat!($prefix, stringify!($field)),
+                    field: stringify!($field),
+                    label: $label,
+                    unit: $unit,
+                    shown_unit: $shown,
+                    factor: $factor,
+                    meaning: $meaning.trim_ascii_start(),
+                    optional: <$type as Value>::OPTIONAL,
+                    value: |m| m.$field.into(),
+                };
+            )+
+
+            /// Every figure, in the order of the fields.
+            pub const FIGURES: &[Figure<$name>] = &[$($name::$row),+];
+        }
+    };
+}
+
+figures! {
+    /// The figures of a run; SI and radians.
+    pub struct Metrics, columns "" {
+        /// Time over which the figures were taken.
+        MEASURED measured_s: f64, "time measured", "s" shown as "s" SAME;
+        /// Largest magnitude of the error `e = θ_d − θ`.
+        MAX_ERROR max_error_rad: f64, "max |error|", "rad" shown as "°" DEGREES;
+        /// Root mean square of the error.
+        RMS_ERROR rms_error_rad: f64, "RMS error", "rad" shown as "°" DEGREES;
+        /// Mean of the error.
+        MEAN_ERROR mean_error_rad: f64, "mean error (target − position)", "rad" shown as "°" DEGREES;
+        /// Integral of the error's magnitude.
+        IAE iae_rad_s: f64, "integral of |error|", "rad s" shown as "° s" DEGREES;
+        /// Stick-slip cycles: entries into the stuck state.
+        STICK_SLIP stick_slip_cycles_per_s: f64, "stick-slip", "cycles/s" shown as "cycles/s" SAME;
+        /// Share of the time that the shaft was stuck.
+        STICK_TIME stick_time_fraction: f64, "time stuck", "1" shown as "%" PERCENT;
+        /// Stair height: largest movement between one stick and the next, 0 with fewer than two.
+        STAIR_HEIGHT stair_height_rad: f64, "stair height", "rad" shown as "°" DEGREES;
+        /// Mean of the driving torque at which the shaft broke away.
+        BREAK_AWAY break_away_torque_nm: Option<f64>, "torque at break-away", "N m" shown as "mN m" MILLI;
+        /// Total variation of the voltage, per time.
+        VARIATION control_variation_v_s: f64, "voltage variation", "V/s" shown as "V/s" SAME;
+        /// Root mean square of the sampled jerk, the second difference of the velocity over T².
+        JERK jerk_rms_rad_s3: f64, "jerk RMS", "rad/s³" shown as "rad/s³" SAME;
+    }
+}
+
+figures! {
+    /// Stick-slip as the encoder shows it: what a loop on hardware would count.
+    pub struct Detected, columns "detected_" {
+        /// Stick-slip cycles as the encoder shows them: what a loop on hardware would count.
+        STICK_SLIP stick_slip_cycles_per_s: f64, "stick-slip seen by the encoder", "cycles/s" shown as "cycles/s" SAME;
+        /// Share of the time that the shaft was stuck, as the encoder shows it.
+        STICK_TIME stick_time_fraction: f64, "time stuck seen by the encoder", "1" shown as "%" PERCENT;
+    }
+}
+
+/// All figures of a run by the names of their columns.
+pub fn columns(m: &Metrics, d: &Detected) -> impl Iterator<Item = (&'static str, Option<f64>)> {
+    let of_motion = Metrics::FIGURES.iter().map(|f| (f.name, f.of(m)));
+    of_motion.chain(Detected::FIGURES.iter().map(|f| (f.name, f.of(d))))
 }
 
 /// One sample for the figures.

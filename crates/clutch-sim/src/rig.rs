@@ -2,23 +2,54 @@
 
 use crate::drive::{Drive, DriveParams};
 use crate::engine::Model;
-use clutch_core::{Dac, DacParams, Encoder, GRAVITY, ParamError, Plant, PlantParams, StribeckParams};
+use clutch_core::friction::{FrictionModel, FrictionParams};
+use clutch_core::params::{Params, Range, Table};
+use clutch_core::{
+    BrakeGeometry, Dac, DacParams, Encoder, EncoderParams, ParamError, Plant, PlantParams, SpeedLimit, params,
+};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Friction that varies along the disc: a band of waves with equal amplitudes and random phases.
-///
-/// A disc is closed, so each wave fits a whole number of times into a turn.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RippleParams {
-    /// Root mean square of the variation, as a share of the friction.
-    pub rms: f64,
-    /// Waves per turn of the longest wave; a multiple of the spacing.
-    pub lowest: u32,
-    /// Waves per turn of the shortest wave; a multiple of the spacing.
-    pub highest: u32,
-    /// Waves per turn from one wave to the next: the pattern repeats that often in a turn.
-    pub spacing: u32,
+params! {
+    /// Friction that varies along the disc: a band of waves with one amplitude and random phases.
+    ///
+    /// The factor on friction is `1 + A Σ sin(n θ + φ_n)` over `n = lowest, lowest + spacing, …, highest`; the seed of
+    /// the run decides the phases. A disc is closed, so each wave fits a whole number of times into a turn. It
+    /// needs the engine `dormand_prince`.
+    pub struct RippleParams<f64> {
+        /// Root mean square of the variation, as a share of the friction.
+        rms: f64, "rms" "" NONE, Range::at_least(0.0);
+        /// Longest wave.
+        lowest: u32, "lowest_waves_per_turn" "" WAVES_PER_TURN, Range::at_least(1.0);
+        /// Shortest wave.
+        highest: u32, "highest_waves_per_turn" "" WAVES_PER_TURN, Range::at_least(1.0);
+        /// From one wave to the next: the pattern repeats that often in a turn.
+        spacing: u32, "spacing_waves_per_turn" "" WAVES_PER_TURN, Range::at_least(1.0);
+    }
+    relations(p) {
+        /// Waves fit the pattern.
+        LOWEST_FITS: lowest, "a multiple of spacing_waves_per_turn" => p.lowest.is_multiple_of(p.spacing);
+        /// Waves fit the pattern, and are not too many.
+        HIGHEST_FITS: highest,
+            "a multiple of spacing_waves_per_turn, not below lowest_waves_per_turn, less than 64 spacings above it and at most 1000 spacings" =>
+            p.highest >= p.lowest
+                && p.highest.is_multiple_of(p.spacing)
+                && (p.highest - p.lowest) / p.spacing < 64
+                && p.highest / p.spacing <= 1000;
+        /// Friction does not reach 0.
+        POSITIVE: rms, "a number that, times the root of twice the number of waves, stays below 1" =>
+            p.amplitude() * f64::from(p.waves()) < 1.0;
+    }
+}
+
+impl RippleParams {
+    fn waves(&self) -> u32 {
+        (self.highest - self.lowest) / self.spacing + 1
+    }
+
+    fn amplitude(&self) -> f64 {
+        self.rms * libm::sqrt(2.0 / f64::from(self.waves()))
+    }
 }
 
 /// The factor `1 + amplitude Σ_n sin(n θ + φ_n)` on friction, `n = lowest … highest`.
@@ -36,36 +67,10 @@ impl Ripple {
     /// Checks the parameters; `seed` decides the phases.
     ///
     /// # Errors
-    /// `spacing` 0; `lowest` or `highest` no multiple of it, out of order, or more than 64 waves;
-    /// an `rms` with which friction could reach 0.
+    /// The first parameter out of range.
     pub fn new(p: &RippleParams, seed: u64) -> Result<Ripple, ParamError> {
-        let bad = |field, value, expected| Err(ParamError { field, value, expected });
-        if p.spacing == 0 {
-            return bad("spacing_waves_per_turn", 0.0, "at least 1 wave per turn");
-        }
-        if p.lowest == 0 || !p.lowest.is_multiple_of(p.spacing) {
-            return bad(
-                "lowest_waves_per_turn",
-                f64::from(p.lowest),
-                "a multiple of the spacing, above 0 waves per turn",
-            );
-        }
-        if p.highest < p.lowest
-            || !p.highest.is_multiple_of(p.spacing)
-            || (p.highest - p.lowest) / p.spacing >= 64
-            || p.highest / p.spacing > 1000
-        {
-            return bad(
-                "highest_waves_per_turn",
-                f64::from(p.highest),
-                "a multiple of the spacing, not below the lowest, less than 64 spacings above it and at most 1000 spacings, waves per turn",
-            );
-        }
-        let waves = (p.highest - p.lowest) / p.spacing + 1;
-        let amplitude = p.rms * libm::sqrt(2.0 / f64::from(waves));
-        if !(p.rms >= 0.0 && amplitude * f64::from(waves) < 1.0) {
-            return bad("rms", p.rms, "at least 0 and, times the root of twice the number of waves, below 1");
-        }
+        p.check_rows()?;
+        let (waves, amplitude) = (p.waves(), p.amplitude());
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x7269_7070_6c65);
         let phases = (0..waves).map(|_| libm::sincos(core::f64::consts::TAU * rng.random::<f64>())).collect();
         Ok(Ripple { amplitude, spacing: f64::from(p.spacing), skipped: p.lowest / p.spacing - 1, phases })
@@ -96,106 +101,153 @@ impl Ripple {
     }
 }
 
-/// Parameters of a rig, SI and radians.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RigParams {
-    /// `J` in (1), kg m².
-    pub inertia: f64,
-    /// `C_d` in (1), N m s/rad.
-    pub viscous_damping: f64,
-    /// `K_COF` in (18), N m/V.
-    pub brake_gain: f64,
-    /// The friction law (2).
-    pub friction: StribeckParams,
-    /// Friction along the disc; none = even.
-    pub ripple: Option<RippleParams>,
-    /// What drives the shaft.
-    pub drive: DriveParams,
-    /// Torque noise, held from sample to sample: root mean square, N m.
-    pub torque_noise: f64,
-    /// Encoder: counts per revolution.
-    pub counts_per_rev: u32,
-    /// Whether the encoder floors to whole counts; an ideal sensor resolves 2⁻¹⁶ of them.
-    pub encoder_quantised: bool,
-    /// The converter.
-    pub dac: DacParams,
-    /// Whether the converter rounds to its steps.
-    pub dac_quantised: bool,
-    /// Whole sampling periods from sample to voltage.
-    pub delay_ticks: u32,
-    /// First-order lag from voltage to normal force, s; none = at once.
-    pub actuator_time_constant: Option<f64>,
-    /// Highest speed that a path may ask for, rad/s.
-    pub speed_limit: f64,
+clutch_core::words! {
+    /// Rig that a scenario's own is laid over.
+    pub enum RigBase {
+        /// The paper's shaft with a perfect sensor and a perfect converter.
+        Ideal = "ideal",
+        /// The paper's simulation: Table 1, an encoder that floors, a 12-bit converter over ±10 V.
+        Paper = "paper" default,
+        /// A stand-in for the paper's experiment: friction other than the laws believe, uneven along the disc, and
+        /// a tick of delay. Found by `cargo xtask calibrate`; docs/bench-rig.md.
+        Bench = "bench",
+    }
 }
 
+params! {
+    /// The angle sensor: `counts = ⌊θ N/2π⌋`.
+    #[derive(Copy)]
+    pub struct RigEncoder<f64>: Default {
+        /// `true` if it gives whole counts, rounded down; else it resolves 2⁻¹⁶ counts.
+        quantised: bool = true, "quantised" "" NONE, Range::ANY;
+    }
+    flat {
+        /// Its resolution.
+        sensor: EncoderParams;
+    }
+}
+
+params! {
+    /// The converter from codes to volts; the paper's has 12 bit over ±10 V, 4.88 mV a step.
+    #[derive(Copy)]
+    pub struct RigDac<f64>: Default {
+        /// `true` if it rounds to its steps; else the law's voltage goes out as it is.
+        quantised: bool = true, "quantised" "" NONE, Range::ANY;
+    }
+    flat {
+        /// Its bits and its range.
+        converter: DacParams;
+    }
+}
+
+params! {
+    /// The shaft as it is, with its drive, brake, encoder and converter. The defaults are the paper's.
+    ///
+    /// `J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇` (1). What law and certificate believe of it is another thing:
+    /// the model.
+    pub struct RigParams<f64> {
+        /// Rig whose values stand where the scenario has none.
+        base: RigBase, "base" "" NONE, Range::ANY;
+        /// Total moment of inertia, in (1).
+        inertia: f64 = 0.0017, "inertia_kg_m2" "J" KG_M2, Range::divisor();
+        /// Viscous damping, in (1).
+        viscous_damping: f64 = 0.001, "viscous_damping_nm_s_rad" "C_d" NM_S_RAD, Range::at_least(0.0);
+        /// Brake torque per volt and unit of μ, (18), 0.14 in each base: a number, or what the geometry of the brake gives.
+        brake_gain: Option<f64>, "brake_gain_nm_v" "K_COF" NM_V, Range::above(0.0);
+        /// Root mean square of a random torque, normally distributed, held from sample to sample.
+        torque_noise: f64 = 0.0, "torque_noise_nm" "" NM, Range::at_least(0.0);
+        /// Whole sampling periods from sample to voltage.
+        delay_ticks: u32 = 0, "delay_ticks" "" TICKS, Range::within(0.0, 1000.0);
+        /// First-order lag from voltage to normal force; absent if there is none. It needs the engine
+        /// `dormand_prince`.
+        actuator_time_constant: Option<f64>, "actuator_time_constant_s" "" S, Range::above(0.0);
+    }
+    nested {
+        /// Friction of pad on disc.
+        friction: FrictionParams, "friction";
+        /// What drives the shaft.
+        drive: DriveParams, "drive";
+        /// The angle sensor.
+        encoder: RigEncoder, "encoder";
+        /// The converter.
+        dac: RigDac, "dac";
+    }
+    optional {
+        /// Geometry of the brake, in the place of `brake_gain_nm_v`.
+        brake_geometry: BrakeGeometry, "brake_geometry";
+        /// Friction along the disc; absent if it is even.
+        ripple: RippleParams, "ripple";
+    }
+    flat {
+        /// Highest speed that a path may ask for.
+        speed: SpeedLimit;
+    }
+    relations(p) {
+        /// The gain is given once.
+        ONE_GAIN: brake_gain, "either brake_gain_nm_v or a table brake_geometry, not both" =>
+            p.brake_gain.is_some() != p.brake_geometry.is_some();
+    }
+}
+
+/// Rigs as they differ from the defaults of their rows.
+const BASES: [(RigBase, &str); 3] = [
+    (RigBase::Ideal, include_str!("../rigs/ideal.toml")),
+    (RigBase::Paper, include_str!("../rigs/paper.toml")),
+    (RigBase::Bench, include_str!("../rigs/bench.toml")),
+];
+
 impl RigParams {
-    /// The paper's simulation: Table 1, an encoder of 20 000 counts per revolution that floors,
-    /// a 12-bit converter over ±10 V.
+    /// The rig that a base names.
+    #[must_use]
+    pub fn named(base: RigBase) -> Self {
+        let table = RigParams::base_table(base);
+        crate::tables::read_known("rig", &table)
+    }
+
+    /// What a base says, as a scenario would: the keys in which it differs from the paper's rig.
+    pub(crate) fn base_table(base: RigBase) -> toml::Table {
+        let text = BASES.iter().find(|(b, _)| *b == base).map_or("", |(_, text)| text);
+        let mut table: toml::Table = text.parse().unwrap_or_default();
+        table.insert("base".into(), base.name().into());
+        table
+    }
+
+    /// The paper's simulation.
     #[must_use]
     pub fn paper() -> Self {
-        let plant = PlantParams::<f64>::default();
-        RigParams {
-            inertia: plant.inertia,
-            viscous_damping: plant.viscous_damping,
-            brake_gain: plant.brake_gain,
-            friction: plant.friction,
-            ripple: None,
-            drive: DriveParams::Weight { mass: 0.2, gravity: GRAVITY, pulley_radius: 0.024 },
-            torque_noise: 0.0,
-            counts_per_rev: 20_000,
-            encoder_quantised: true,
-            dac: DacParams::default(),
-            dac_quantised: true,
-            delay_ticks: 0,
-            actuator_time_constant: None,
-            speed_limit: 360.0_f64.to_radians(),
-        }
+        RigParams::named(RigBase::Paper)
     }
 
     /// The paper's shaft with a perfect sensor and a perfect converter.
     #[must_use]
     pub fn ideal() -> Self {
-        // A fine grid of counts, each divided by 2¹⁶: 6e-12 rad.
-        RigParams {
-            counts_per_rev: 1 << 24,
-            encoder_quantised: false,
-            dac_quantised: false,
-            ..RigParams::paper()
-        }
+        RigParams::named(RigBase::Ideal)
     }
 
-    /// A stand-in for the paper's experiment: friction other than the laws believe, uneven along
-    /// the disc, and a tick of delay. Found by `cargo xtask calibrate`; see docs/bench-rig.md.
+    /// The stand-in for the paper's experiment.
     #[must_use]
     pub fn bench() -> Self {
-        RigParams {
-            friction: StribeckParams {
-                mu_static: 0.203,
-                mu_dynamic: 0.104,
-                stribeck_velocity: 0.00144,
-                stribeck_exponent: 1.0,
-            },
-            ripple: Some(RippleParams { rms: 0.15, lowest: 136, highest: 544, spacing: 34 }),
-            drive: DriveParams::Weight { mass: 0.2 * 1.047, gravity: GRAVITY, pulley_radius: 0.024 },
-            delay_ticks: 1,
-            ..RigParams::paper()
-        }
+        RigParams::named(RigBase::Bench)
     }
 
-    /// The rig of that name.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        match name {
-            "ideal" => Some(RigParams::ideal()),
-            "paper" => Some(RigParams::paper()),
-            "bench" => Some(RigParams::bench()),
-            _ => None,
+    /// `K_COF`, given or by the geometry, N m/V.
+    ///
+    /// # Errors
+    /// A geometry that gives none; both or none given.
+    pub fn gain(&self) -> Result<f64, ParamError> {
+        match (&self.brake_geometry, self.brake_gain) {
+            (Some(geometry), None) => geometry.brake_gain(),
+            (None, Some(gain)) => Ok(gain),
+            (_, gain) => Err(RigParams::ONE_GAIN.error(gain.unwrap_or(f64::NAN))),
         }
     }
+}
 
-    /// Names of the built-in rigs.
-    pub const NAMES: [&'static str; 3] = ["ideal", "paper", "bench"];
+impl Default for RigParams {
+    /// The paper's.
+    fn default() -> Self {
+        RigParams::paper()
+    }
 }
 
 /// A checked rig.
@@ -219,35 +271,21 @@ impl Rig {
     /// # Errors
     /// The first parameter out of range, by name.
     pub fn new(p: &RigParams, seed: u64) -> Result<Rig, ParamError> {
-        let bad = |field, value, expected| Err(ParamError { field, value, expected });
+        p.check()?;
         let drive = Drive::new(&p.drive, seed)?;
         let plant = Plant::new(&PlantParams {
             inertia: p.inertia,
             drive_torque: drive.torque(0.0, 0.0),
             viscous_damping: p.viscous_damping,
-            brake_gain: p.brake_gain,
+            brake_gain: p.gain()?,
             friction: p.friction,
         })?;
-        if !(p.torque_noise >= 0.0 && p.torque_noise.is_finite()) {
-            return bad("torque_noise", p.torque_noise, "a finite torque of at least 0 N m");
-        }
-        if p.delay_ticks > 1000 {
-            return bad("delay_ticks", f64::from(p.delay_ticks), "0 to 1000 periods");
-        }
-        if let Some(t) = p.actuator_time_constant
-            && !(t > 0.0 && t.is_finite())
-        {
-            return bad("actuator_time_constant", t, "a finite time above 0 s");
-        }
-        if !(p.speed_limit > 0.0 && p.speed_limit.is_finite()) {
-            return bad("speed_limit", p.speed_limit, "a finite number above 0 rad/s");
-        }
         let ripple = p.ripple.as_ref().map(|r| Ripple::new(r, seed)).transpose()?;
         Ok(Rig {
             model: Model { plant, ripple },
             drive,
-            encoder: Encoder::new(p.counts_per_rev)?,
-            dac: Dac::new(&p.dac)?,
+            encoder: Encoder::new(p.encoder.sensor.counts_per_rev)?,
+            dac: Dac::new(&p.dac.converter)?,
             params: p.clone(),
         })
     }
@@ -275,7 +313,7 @@ impl Rig {
     pub fn resting_voltage(&self) -> f64 {
         let swing = self.model.ripple.as_ref().map_or(0.0, Ripple::largest);
         let volts = 1.25 * self.model.plant.holding_voltage_static() / (1.0 - swing);
-        if volts.is_finite() { volts.min(self.params.dac.highest) } else { 0.0 }
+        if volts.is_finite() { volts.min(self.params.dac.converter.highest) } else { 0.0 }
     }
 
     /// Voltage that holds the sliding shaft at a velocity, V: friction and viscous drag carry
@@ -283,10 +321,10 @@ impl Rig {
     #[must_use]
     pub fn sliding_voltage(&self, velocity: f64) -> f64 {
         let p = self.model.plant.params();
-        let mu = self.model.plant.friction().magnitude(velocity);
+        let mu = self.model.plant.friction().level(velocity);
         let volts = (p.drive_torque - p.viscous_damping * velocity) / (mu * p.brake_gain);
         // Without friction there is no such voltage.
-        if volts.is_finite() { volts.max(0.0).min(self.params.dac.highest) } else { 0.0 }
+        if volts.is_finite() { volts.max(0.0).min(self.params.dac.converter.highest) } else { 0.0 }
     }
 }
 
@@ -330,21 +368,27 @@ mod tests {
         for (bad, field) in [
             (RippleParams { rms: 0.4, ..good.clone() }, "rms"),
             (RippleParams { rms: f64::NAN, ..good.clone() }, "rms"),
-            (RippleParams { lowest: 170, ..good.clone() }, "lowest_waves_per_turn"),
-            (RippleParams { highest: 120, ..good.clone() }, "highest_waves_per_turn"),
-            (RippleParams { spacing: 0, ..good }, "spacing_waves_per_turn"),
+            (RippleParams { lowest: 170, ..good.clone() }, "lowest"),
+            (RippleParams { highest: 120, ..good.clone() }, "highest"),
+            (RippleParams { spacing: 0, ..good }, "spacing"),
         ] {
-            assert_eq!(Ripple::new(&bad, 1).unwrap_err().field, field);
+            assert_eq!(Ripple::new(&bad, 1).unwrap_err().field(), field);
         }
         let rig = RigParams::paper;
         for (bad, field) in [
             (RigParams { torque_noise: -1.0, ..rig() }, "torque_noise"),
             (RigParams { delay_ticks: 1001, ..rig() }, "delay_ticks"),
             (RigParams { actuator_time_constant: Some(0.0), ..rig() }, "actuator_time_constant"),
-            (RigParams { speed_limit: f64::NAN, ..rig() }, "speed_limit"),
-            (RigParams { counts_per_rev: 0, ..rig() }, "counts_per_rev"),
+            (RigParams { speed: SpeedLimit { speed_limit: f64::NAN }, ..rig() }, "speed_limit"),
+            (
+                RigParams {
+                    encoder: RigEncoder { sensor: EncoderParams { counts_per_rev: 0 }, quantised: true },
+                    ..rig()
+                },
+                "counts_per_rev",
+            ),
         ] {
-            assert_eq!(Rig::new(&bad, 1).unwrap_err().field, field);
+            assert_eq!(Rig::new(&bad, 1).unwrap_err().field(), field);
         }
     }
 }

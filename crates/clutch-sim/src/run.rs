@@ -1,60 +1,55 @@
 //! One run: rig, servo and path in closed loop.
 
 use crate::engine::{EngineError, EngineKind, Event, ExactFlow, Motion};
-use crate::metrics::{Metrics, MetricsBuilder, MetricsSample};
+use crate::metrics::{Detected, Metrics, MetricsBuilder, MetricsSample};
 use crate::moving_rig::MovingRig;
 use crate::progress::{Progress, Report, UNWATCHED};
 use crate::rig::{Rig, RigParams};
-use clutch_core::law::{Controller, LawParams, Limit, OutputParams, Terms};
+use clutch_core::law::{ControlLaw, LawParams, Limit, OutputParams, Terms};
+use clutch_core::params::{Range, Table};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
     Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, ServoState, StickSlip,
-    StickSlipParams, StickSlipState, VelocityParams,
+    StickSlipParams, StickSlipState, VelocityParams, params,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// How the shaft begins.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Start {
-    /// On the path: at its velocity, the brake at the voltage that keeps it. (12) and (13)
-    /// assume a path without jumps.
-    #[default]
-    OnPath,
-    /// Held at rest, with a quarter more than the voltage that this takes.
-    Rest,
+clutch_core::words! {
+    /// Motion of the shaft at the beginning.
+    pub enum Start {
+        /// On the path: at its velocity, the brake at the voltage that keeps it. (12) and (13) assume a path without
+        /// jumps.
+        OnPath = "on_path" default,
+        /// Held at rest, with a quarter more than the voltage that this takes.
+        Rest = "rest",
+    }
 }
 
-/// When and how long.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunParams {
-    /// Length, s.
-    pub duration: f64,
-    /// What is left out of the figures at the start, s.
-    pub settle: f64,
-    /// How the shaft begins.
-    pub start: Start,
-    /// Position at which shaft and path begin, counts; none = somewhere within the first count,
-    /// drawn from the seed. Where the path lies between the encoder's edges decides how often a
-    /// slow shaft sticks, and nobody mounts an encoder to a fraction of a count.
-    pub start_counts: Option<f64>,
-    /// Seed of everything random: start, ripple phases, noise, a hand.
-    pub seed: u64,
-    /// Which engine.
-    pub engine: EngineKind,
-}
-
-impl Default for RunParams {
-    fn default() -> Self {
-        RunParams {
-            duration: 5.0,
-            settle: 1.0,
-            start: Start::OnPath,
-            start_counts: None,
-            seed: 1,
-            engine: EngineKind::Auto,
-        }
+params! {
+    /// Length, beginning, seed and engine of a run.
+    #[derive(Copy)]
+    pub struct RunParams<f64>: Default {
+        /// Length.
+        duration: f64 = 5.0, "duration_s" "" S, Range::above(0.0);
+        /// Time at the start that is left out of the figures.
+        settle: f64 = 1.0, "settle_s" "" S, Range::at_least(0.0);
+        /// Motion of the shaft at the beginning.
+        start: Start = "on_path", "start" "" NONE, Range::ANY;
+        /// Position at which shaft and path begin; absent: somewhere within the first count, drawn from the seed.
+        /// Where the path lies between the encoder's edges decides how often a slow shaft sticks, and nobody mounts
+        /// an encoder to a fraction of a count.
+        start_counts: Option<f64>, "start_counts" "" COUNTS, Range::above(-1e9).below(1e9);
+        /// Seed of everything random: start, ripple phases, noise, a hand.
+        seed: u64 = 1, "seed" "" NONE, Range::within(0.0, 9223372036854775807.0);
+        /// What integrates the motion.
+        engine: EngineKind = "auto", "engine" "" NONE, Range::ANY;
+    }
+    relations(p) {
+        /// Samples fit the memory.
+        FITS: duration, "a time of 1 to 10 million times sampling.period_us: a run keeps every sample";
+        /// Figures have samples.
+        SETTLES: settle, "a time that ends at least sampling.period_us before run.duration_s does";
     }
 }
 
@@ -82,23 +77,13 @@ impl RunParams {
     /// Checks duration and settling time against the period.
     ///
     /// # Errors
-    /// `period` out of range; `duration` shorter than a period or longer than 10 million of
-    /// them; `settle` negative or not less than the duration.
+    /// The first parameter out of range, or one that does not fit the period.
     pub fn check(&self, period: Micros) -> Result<(), ParamError> {
         let shortest: f64 = period.period()?;
-        let bad = |field, value, expected| Err(ParamError { field, value, expected });
-        if !(self.duration >= shortest && self.duration.is_finite() && self.ticks(period) <= LONGEST) {
-            let expected = "at least one period and at most 10 million: a run keeps every sample, s";
-            return bad("duration", self.duration, expected);
-        }
-        if !(self.settle >= 0.0 && self.settle <= self.duration - shortest) {
-            return bad("settle", self.settle, "at least 0 s and at least a period less than the duration");
-        }
-        if let Some(counts) = self.start_counts
-            && (!counts.is_finite() || counts.abs() >= 1e9)
-        {
-            return bad("start_counts", counts, "a finite number below 1e9 counts");
-        }
+        self.check_rows()?;
+        let fits = self.duration >= shortest && self.ticks(period) <= LONGEST;
+        RunParams::FITS.require(self.duration, fits)?;
+        RunParams::SETTLES.require(self.settle, self.settle <= self.duration - shortest)?;
         Ok(())
     }
 }
@@ -159,9 +144,9 @@ impl<'a> RunSpec<'a> {
     /// # Errors
     /// A parameter out of range.
     pub fn path<T: Real>(&self) -> Result<Reference<'a, T>, ParamError> {
-        let encoder = Encoder::new::<f64>(self.rig.counts_per_rev)?;
+        let encoder = Encoder::new::<f64>(self.rig.encoder.sensor.counts_per_rev)?;
         let start = self.run.start_position();
-        Reference::new(&self.reference.cast(), start, encoder, self.period).map_err(to_f64)
+        Reference::new(&self.reference.cast(), start, encoder, self.period).map_err(|e| e.cast())
     }
 
     /// Rig and path as a run in the scalar `T` begins.
@@ -178,8 +163,7 @@ impl<'a> RunSpec<'a> {
         let first = reference.at(0);
         let begin = first.position.minus::<f64>(FixedCounts(0)) * encoder.radians_per_count::<f64>();
         if i32::try_from(first.position.0 >> FixedCounts::FRACTION_BITS).is_err() {
-            let expected = "a path that begins within ±2³¹ counts, rad";
-            return Err(ParamError { field: "points", value: begin, expected }.into());
+            return Err(RunError::Begin(begin));
         }
         let velocity = if p.start == Start::OnPath { first.velocity.to_f64() } else { 0.0 };
         let volts =
@@ -195,8 +179,8 @@ impl<'a> RunSpec<'a> {
     pub fn servo(&self) -> Result<ServoParams, ParamError> {
         Ok(ServoParams {
             period: self.period,
-            encoder: Encoder::new(self.rig.counts_per_rev)?,
-            dac: self.rig.dac,
+            encoder: Encoder::new(self.rig.encoder.sensor.counts_per_rev)?,
+            dac: self.rig.dac.converter,
             velocity: self.velocity,
             model: self.model,
             law: self.law,
@@ -211,6 +195,12 @@ pub enum RunError {
     /// A parameter is out of range.
     #[error(transparent)]
     Param(#[from] ParamError),
+    /// The path begins where no counter can be, rad.
+    #[error("the path begins at {0} rad: expected a beginning within ±2³¹ counts")]
+    Begin(f64),
+    /// The servo is one of another run.
+    #[error("the servo has another period or another encoder than the run")]
+    OtherServo,
     /// The engine cannot take the rig.
     #[error("engine = exact_flow needs {0}; use engine = dormand_prince or auto")]
     Engine(&'static str),
@@ -249,9 +239,9 @@ pub struct Prepared<'a, T> {
 impl<T: Real> Prepared<'_, T> {
     /// The servo's state for the first tick.
     #[must_use]
-    pub fn servo_state<C: Controller<T>>(&self, servo: &Servo<T, C>) -> ServoState<T, C::State> {
+    pub fn servo_state<C: ControlLaw<T>>(&self, servo: &Servo<T, C>) -> ServoState<T, C::State> {
         let (first, volts) = (self.reference.at(0), T::from_f64(self.volts));
-        if self.moving.rig().params.encoder_quantised {
+        if self.moving.rig().params.encoder.quantised {
             servo.start(self.moving.counts(), &first, volts)
         } else {
             servo.start_at(self.moving.fine_counts(), &first, volts)
@@ -297,17 +287,12 @@ pub struct Trace {
     /// Whether the shaft was stuck at the sample.
     pub stuck: Vec<bool>,
     /// The law's terms: names and columns.
-    pub terms: [(&'static str, Vec<f64>); 3],
+    pub terms: Vec<(&'static str, Vec<f64>)>,
 }
 
 impl Trace {
     /// Without samples, and with room for so many: growing copies everything, again and again.
     fn with_room(n: u64) -> Result<Self, RunError> {
-        fn room<T>(n: u64) -> Result<Vec<T>, RunError> {
-            let mut column = Vec::new();
-            let fits = usize::try_from(n).is_ok_and(|n| column.try_reserve_exact(n).is_ok());
-            if fits { Ok(column) } else { Err(RunError::Memory(n)) }
-        }
         Ok(Trace {
             time: room(n)?,
             target_position: room(n)?,
@@ -326,9 +311,16 @@ impl Trace {
             limit: room(n)?,
             start_voltage: 0.0,
             stuck: room(n)?,
-            terms: [("", room(n)?), ("", room(n)?), ("", room(n)?)],
+            terms: Vec::new(),
         })
     }
+}
+
+/// A column with room for so many samples.
+fn room<T>(n: u64) -> Result<Vec<T>, RunError> {
+    let mut column = Vec::new();
+    let fits = usize::try_from(n).is_ok_and(|n| column.try_reserve_exact(n).is_ok());
+    if fits { Ok(column) } else { Err(RunError::Memory(n)) }
 }
 
 /// A run's outcome.
@@ -342,20 +334,10 @@ pub struct Run {
     pub metrics: Metrics,
     /// Stick-slip as the encoder shows it: what a loop on hardware would count.
     pub detected: Detected,
+    /// Ticks at which the [`StickSlip`] detector called the shaft stuck, in order.
+    pub detections: Vec<u64>,
     /// Which engine ran.
     pub engine: EngineKind,
-}
-
-/// What the [`StickSlip`] detector saw on the encoder's counts.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Detected {
-    /// Stick-slip cycles per second, after settling.
-    pub stick_slip_cycles_per_s: f64,
-    /// Share of the time that the shaft was seen stuck, after settling.
-    pub stick_time_fraction: f64,
-    /// Ticks at which the detector called the shaft stuck, in order.
-    #[serde(skip)]
-    pub ticks: Vec<u64>,
 }
 
 /// Runs the law of the specification, in the scalar `T`.
@@ -375,7 +357,7 @@ pub fn simulate_watched<T: Real>(
     keep: Keep,
     progress: Report<'_>,
 ) -> Result<Run, RunError> {
-    let servo = Servo::<T>::new(&spec.servo()?.cast()).map_err(to_f64)?;
+    let servo = Servo::<T>::new(&spec.servo()?.cast()).map_err(|e| e.cast())?;
     simulate_servo(spec, &servo, keep, progress)
 }
 
@@ -383,23 +365,15 @@ pub fn simulate_watched<T: Real>(
 ///
 /// # Errors
 /// As [`simulate_watched`].
-pub fn simulate_servo<T: Real, C: Controller<T>>(
+pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
     spec: &RunSpec<'_>,
     servo: &Servo<T, C>,
     keep: Keep,
     progress: Report<'_>,
 ) -> Result<Run, RunError> {
-    let encoder = Encoder::new::<f64>(spec.rig.counts_per_rev)?;
-    if servo.period() != spec.period {
-        let value = f64::from(servo.period().0);
-        return Err(
-            ParamError { field: "period", value, expected: "a servo with the run's period, µs" }.into()
-        );
-    }
-    if servo.encoder() != encoder {
-        let value = f64::from(servo.encoder().counts_per_rev());
-        let expected = "a servo with the rig's encoder, counts per revolution";
-        return Err(ParamError { field: "counts_per_rev", value, expected }.into());
+    let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev)?;
+    if servo.period() != spec.period || servo.encoder() != encoder {
+        return Err(RunError::OtherServo);
     }
     let prepared = spec.prepare::<T>()?;
     let mut state = prepared.servo_state(servo);
@@ -411,12 +385,15 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
 
     let kept = if keep == Keep::Trace { ticks } else { 0 };
     let mut trace = Trace { start_voltage: volts, ..Trace::with_room(kept)? };
+    for name in servo.law().term_names() {
+        trace.terms.push((name, room(kept)?));
+    }
     let mut events = Vec::new();
     let mut figures = MetricsBuilder::new(period, p.settle);
     let detector = StickSlip::<f64>::new(&StickSlipParams::default(), encoder, spec.period)?;
     let mut seen_by_encoder = StickSlipState::default();
     let mut before_settling = (0, 0);
-    let mut detected = Detected::default();
+    let mut detections = Vec::new();
     for k in 0..ticks {
         if k % REPORT_EVERY == 0 {
             let told = progress(Progress { total: ticks, finished: REPORT_EVERY.min(ticks - k) });
@@ -430,12 +407,12 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
         moving.begin_period();
         let shaft = *moving.shaft();
         let counts = moving.counts();
-        let out = if spec.rig.encoder_quantised {
+        let out = if spec.rig.encoder.quantised {
             servo.tick(&mut state, counts, &target)
         } else {
             servo.tick_at(&mut state, moving.fine_counts(), &target)
         };
-        let commanded = if spec.rig.dac_quantised {
+        let commanded = if spec.rig.dac.quantised {
             moving.rig().dac.volts(out.code)
         } else {
             out.command.voltage.to_f64()
@@ -460,14 +437,13 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
             trace.demand.push(out.command.voltage.to_f64());
             trace.limit.push(out.command.limit);
             trace.stuck.push(shaft.motion == Motion::Stuck);
-            for (column, (name, value)) in trace.terms.iter_mut().zip(out.command.terms.columns()) {
-                column.0 = name;
+            for (column, value) in trace.terms.iter_mut().zip(out.command.terms.values()) {
                 column.1.push(value.to_f64());
             }
         }
 
         if detector.update(&mut seen_by_encoder, counts, target.velocity.to_f64()) && keep == Keep::Trace {
-            detected.ticks.push(k);
+            detections.push(k);
         }
         if time < p.settle {
             before_settling = (seen_by_encoder.cycles(), seen_by_encoder.stuck_ticks());
@@ -481,12 +457,9 @@ pub fn simulate_servo<T: Real, C: Controller<T>>(
     }
     let metrics = figures.finish();
     let measured = metrics.measured_s.max(period);
-    detected.stick_slip_cycles_per_s = (seen_by_encoder.cycles() - before_settling.0) as f64 / measured;
-    detected.stick_time_fraction =
-        (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured;
-    Ok(Run { trace, events, metrics, detected, engine })
-}
-
-fn to_f64<T: Real>(e: ParamError<T>) -> ParamError {
-    ParamError { field: e.field, value: e.value.to_f64(), expected: e.expected }
+    let detected = Detected {
+        stick_slip_cycles_per_s: (seen_by_encoder.cycles() - before_settling.0) as f64 / measured,
+        stick_time_fraction: (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured,
+    };
+    Ok(Run { trace, events, metrics, detected, detections, engine })
 }

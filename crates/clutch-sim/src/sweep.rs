@@ -7,6 +7,7 @@ use crate::progress::UNWATCHED;
 use crate::run::{Keep, Run};
 use crate::scenario::{Scenario, ScenarioError};
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use toml::{Table, Value};
 
@@ -17,6 +18,8 @@ pub struct Sweep {
     base: Table,
     keys: Vec<String>,
     rows: Vec<Vec<Value>>,
+    /// A scenario of which every row is a variation; none if the row that was tried first is refused.
+    shared: OnceLock<Option<Scenario>>,
 }
 
 /// A row that ran.
@@ -48,7 +51,7 @@ impl Sweep {
     pub fn new(origin: &str, base: Table, keys: Vec<String>, rows: Vec<Vec<Value>>) -> Result<Sweep, Misfit> {
         match rows.iter().position(|row| row.len() != keys.len()) {
             Some(row) => Err(Misfit { row, values: rows[row].len(), keys: keys.len() }),
-            None => Ok(Sweep { origin: origin.into(), base, keys, rows }),
+            None => Ok(Sweep { origin: origin.into(), base, keys, rows, shared: OnceLock::new() }),
         }
     }
 
@@ -73,7 +76,16 @@ impl Sweep {
     /// There is no such row.
     pub fn scenario(&self, row: usize) -> Result<Scenario, ScenarioError> {
         let set: Vec<_> = self.keys.iter().cloned().zip(self.rows[row].iter().cloned()).collect();
-        Scenario::from_table(&self.origin, self.base.clone(), &set)
+        // The first row decides what the keys are, and makes what all rows share.
+        let shared = self.shared.get_or_init(|| self.from_base(&set).ok());
+        match shared.as_ref().and_then(|scenario| scenario.with(&set)) {
+            Some(outcome) => outcome,
+            None => self.from_base(&set),
+        }
+    }
+
+    fn from_base(&self, set: &[(String, Value)]) -> Result<Scenario, ScenarioError> {
+        Scenario::from_table(&self.origin, self.base.clone(), set)
     }
 
     /// Runs all rows on so many threads. `done` is called from these, with each finished row,

@@ -1,8 +1,8 @@
 /* The serial DAQ protocol, for boards in C99 or C++11. Generated from the table of clutch-wire:
  *     cargo run -p clutch-wire --example table -- header
- * Do not edit. What the fields mean and what a board must do: docs/wire.md.
+ * Do not edit. docs/wire.md has the meaning of the fields and the duties of a board.
  *
- * Works with any byte order and alignment: nothing is cast, bytes are put together one by one.
+ * Works with any byte order and alignment: nothing is cast, bytes are assembled one by one.
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
 #ifndef CLUTCH_WIRE_H
@@ -12,12 +12,13 @@
 #include <stdint.h>
 #include <string.h>
 
-#define CLUTCH_VERSION 1u
-#define CLUTCH_SCHEMA UINT64_C(0xa97bd1b77a40015b)
-#define CLUTCH_MAX_BODY 66u  /* longest frame before stuffing, bytes */
-#define CLUTCH_MAX_FRAME 68u /* longest frame on the wire, bytes */
+#define CLUTCH_VERSION 2u
+#define CLUTCH_SCHEMA UINT64_C(0x4f527cdae8dd5a89)
+#define CLUTCH_MAX_BODY 87u  /* longest frame before stuffing, bytes */
+#define CLUTCH_MAX_FRAME 89u /* longest frame on the wire, bytes */
+#define CLUTCH_MAX_LIST 8u  /* most numbers of a list */
 
-/* BoardState: What the board is doing. */
+/* BoardState: The present state of the board. */
 #define CLUTCH_BOARD_STATE_BOOT 0u /* Powered up; never configured since; the output is boot_code. */
 #define CLUTCH_BOARD_STATE_READY 1u /* Configured; samples go out; the output is as it was, or a safe output goes on. */
 #define CLUTCH_BOARD_STATE_ARMED 2u /* The host has consented; the first Actuate starts the run. */
@@ -25,38 +26,38 @@
 #define CLUTCH_BOARD_STATE_STOPPED 4u /* Stopped by the host; the safe output is on. */
 #define CLUTCH_BOARD_STATE_FAULTED 5u /* A fault is latched; the safe output is on. */
 
-/* SafeKind: How the board goes to its safe output. */
+/* SafeKind: The board's way to its safe output. */
 #define CLUTCH_SAFE_KIND_HOLD 0u /* hold_code at once. */
 #define CLUTCH_SAFE_KIND_RAMP 1u /* From the present code to hold_code, by ramp_step each period. */
 #define CLUTCH_SAFE_KIND_RELEASE 2u /* release_code at once. */
 #define CLUTCH_SAFE_KIND_HOLD_THEN_RELEASE 3u /* hold_code at once, release_code after hold_periods. */
 
-/* BoardFault: Why the board went to its safe output by itself. */
+/* BoardFault: The reason why the board went to its safe output by itself. */
 #define CLUTCH_BOARD_FAULT_WATCHDOG 1u /* No Actuate was applied for watchdog_us; value is the time since the last one, us. */
 #define CLUTCH_BOARD_FAULT_ENCODER 2u /* The encoder's reading cannot be trusted; value is the board's own detail. */
 #define CLUTCH_BOARD_FAULT_CONVERTER 3u /* The converter did not take a code; value is the board's own detail. */
 
-/* StopReason: Why the host stops the run. */
+/* StopReason: The host's reason to stop the run. */
 #define CLUTCH_STOP_REASON_DONE 0u /* The run is over. */
 #define CLUTCH_STOP_REASON_OPERATOR 1u /* Somebody asked for it. */
 #define CLUTCH_STOP_REASON_FAULT 2u /* The host saw a fault; the board latches it. */
 
-/* Refusal: Why the board does not do what a frame asks for. */
+/* Refusal: The board's reason to refuse a frame. */
 #define CLUTCH_REFUSAL_VERSION 1u /* Another version of the protocol; value is the board's. */
 #define CLUTCH_REFUSAL_SCHEMA 2u /* Another table of messages; value is the low 32 bits of the board's schema hash. */
 #define CLUTCH_REFUSAL_RUN 3u /* The run number is not a new one (Configure) or not the configured one; value is the board's. */
 #define CLUTCH_REFUSAL_CONFIG 4u /* The configuration hash is not the configured one; value is the low 32 bits of the board's. */
-#define CLUTCH_REFUSAL_STATE 5u /* Not in this state; value is the BoardState, and of a controller its own state of control. */
+#define CLUTCH_REFUSAL_STATE 5u /* Not in this state; value is the BoardState, or a controller's own state of control. */
 #define CLUTCH_REFUSAL_PERIOD 6u /* The period is out of the board's range; value is the period asked for, us. */
 #define CLUTCH_REFUSAL_WATCHDOG 7u /* The watchdog time is below two periods or above the board's limit; value is the time asked for, us. */
 #define CLUTCH_REFUSAL_SAFE 8u /* No such safe output: unknown kind, or a code above the converter's top; value is the kind. */
 #define CLUTCH_REFUSAL_LATE 9u /* Came too late. A board of version 1 shows this in Sample.status instead; value is the delay, us. */
 #define CLUTCH_REFUSAL_BUSY 10u /* Cannot be done just now: ask again; value is 0. */
 #define CLUTCH_REFUSAL_CODE 11u /* The code is above the converter's top; value is the code. */
-#define CLUTCH_REFUSAL_SETTING 12u /* A setting that is unknown or missing; value is its key. */
-#define CLUTCH_REFUSAL_UNFIT 13u /* The settings make no run; value is the offending one's value as the bits of a real number. */
+#define CLUTCH_REFUSAL_SETTING 12u /* A setting that is missing, or whose value is of a kind that is not known; value is its key. */
+#define CLUTCH_REFUSAL_UNFIT 13u /* The settings make no run; value is the key of the offending one, and above its 16 bits the number of the condition between several that does not hold, or 0. */
 #define CLUTCH_REFUSAL_NO_BOARD 14u /* Nothing answers where the controller's encoder and converter should be; value is 0. */
-#define CLUTCH_REFUSAL_DIFFERS 15u /* Configure does not say what the settings say; value is 0. */
+#define CLUTCH_REFUSAL_DIFFERS 15u /* Configure differs from the settings; value is 0. */
 
 /* Bits of the field status of Sample. */
 #define CLUTCH_STATUS_STATE 0x07u /* The bits that hold the BoardState. */
@@ -69,7 +70,7 @@
 #define CLUTCH_TELEMETRY_ANSWERED 0x02u /* The sample was answered. */
 #define CLUTCH_TELEMETRY_ASKED 0x04u /* The law was asked: error, rate, terms and demand are set. */
 #define CLUTCH_TELEMETRY_TARGETED 0x08u /* The path was asked for its target. */
-#define CLUTCH_TELEMETRY_LIMIT 0x30u /* Which limit decided the voltage: 0 none, 1 the lowest, 2 the highest, 3 a demand that was not a number. */
+#define CLUTCH_TELEMETRY_LIMIT 0x30u /* The limit that decided the voltage: 0 none, 1 the lowest, 2 the highest, 3 a demand that was not a number. */
 
 /* Integers, little-endian. */
 static inline void clutch_put_u8(uint8_t *at, uint8_t value)
@@ -128,6 +129,25 @@ static inline int32_t clutch_get_i32(const uint8_t *at)
     return value;
 }
 
+/* A list: how many numbers, and each. What is too much is left out. */
+static inline void clutch_put_list(uint8_t *at, const uint32_t *numbers, uint8_t count)
+{
+    uint8_t i;
+    if (count > CLUTCH_MAX_LIST)
+        count = CLUTCH_MAX_LIST;
+    at[0] = count;
+    for (i = 0; i < count; i++)
+        clutch_put_u32(at + 1 + 4 * i, numbers[i]);
+}
+
+static inline uint8_t clutch_get_list(const uint8_t *at, uint32_t *numbers)
+{
+    uint8_t i, count = at[0] > CLUTCH_MAX_LIST ? CLUTCH_MAX_LIST : at[0];
+    for (i = 0; i < count; i++)
+        numbers[i] = clutch_get_u32(at + 1 + 4 * i);
+    return count;
+}
+
 /* CRC-32/ISO-HDLC: that of Ethernet and zip. */
 static inline uint32_t clutch_crc32(const uint8_t *bytes, size_t count)
 {
@@ -163,7 +183,7 @@ static inline size_t clutch_frame(uint8_t *wire, uint8_t *body, size_t length)
     return length + 2;
 }
 
-/* Discover: Asks the board who it is. Any state. The layout is the same in all versions. */
+/* Discover: Asks for the board's identity. Any state. The layout is the same in all versions. */
 #define CLUTCH_DISCOVER_KIND 0x01u
 #define CLUTCH_DISCOVER_LENGTH 18u
 #define CLUTCH_DISCOVER_NONCE 1u
@@ -211,11 +231,11 @@ typedef struct {
     uint64_t config; /* The host's hash of the scenario; the board stores and echoes it. */
     uint32_t period_us; /* Time from sample to sample. [us] */
     uint32_t watchdog_us; /* Longest time without an applied Actuate while armed or running. [us] */
-    uint8_t safe_kind; /* How to go to the safe output: a SafeKind. */
+    uint8_t safe_kind; /* Way to the safe output: a SafeKind. */
     uint16_t hold_code; /* The code that holds. [DAC code] */
     uint16_t release_code; /* The code that releases. [DAC code] */
     uint32_t ramp_step; /* Step of the ramp to hold_code. [2^-16 DAC codes per period] */
-    uint32_t hold_periods; /* How long HoldThenRelease holds. [periods] */
+    uint32_t hold_periods; /* Time for which HoldThenRelease holds. [periods] */
 } clutch_configure_t;
 
 /* The frame for the wire; its length, bytes. */
@@ -318,7 +338,7 @@ static inline void clutch_get_actuate(const uint8_t *body, clutch_actuate_t *m)
 #define CLUTCH_STOP_REASON 3u
 typedef struct {
     uint16_t run; /* The configured run. */
-    uint8_t reason; /* Why: a StopReason. */
+    uint8_t reason; /* Reason: a StopReason. */
 } clutch_stop_t;
 
 /* The frame for the wire; its length, bytes. */
@@ -372,8 +392,8 @@ static inline void clutch_get_ping(const uint8_t *body, clutch_ping_t *m)
 #define CLUTCH_SET_KEY 3u
 #define CLUTCH_SET_VALUE 5u
 typedef struct {
-    uint16_t run; /* Number of the run to come; the first setting of another run forgets those before. */
-    uint16_t key; /* Which setting. */
+    uint16_t run; /* Number of the run to come; the first setting of another run discards those before. */
+    uint16_t key; /* Number of the setting. */
     uint64_t value; /* Its value: a whole number, or the bits of a real one of 32 bits. */
 } clutch_set_t;
 
@@ -396,7 +416,7 @@ static inline void clutch_get_set(const uint8_t *body, clutch_set_t *m)
     m->value = clutch_get_u64(body + CLUTCH_SET_VALUE);
 }
 
-/* Hello: Who the board is, what it can do, and what it is doing. Answers Discover. */
+/* Hello: The board's identity, abilities and present state. Answers Discover. */
 #define CLUTCH_HELLO_KIND 0x81u
 #define CLUTCH_HELLO_LENGTH 64u
 #define CLUTCH_HELLO_NONCE 1u
@@ -429,7 +449,7 @@ typedef struct {
     uint32_t period_max_us; /* Longest period. [us] */
     uint32_t watchdog_max_us; /* Longest watchdog time. [us] */
     uint16_t boot_code; /* The code put out from power-up to the first safe output or run. [DAC code] */
-    uint8_t state; /* What the board is doing: a BoardState. */
+    uint8_t state; /* The present state of the board: a BoardState. */
     uint16_t run; /* The latched run; 0 if none since power-up. */
     uint64_t config; /* The latched hash; 0 if none since power-up. */
 } clutch_hello_t;
@@ -548,7 +568,7 @@ static inline void clutch_get_armed(const uint8_t *body, clutch_armed_t *m)
 typedef struct {
     uint16_t run; /* The run. */
     uint16_t sequence; /* 0 after Configure, then one more each period; wraps. */
-    uint32_t time_us; /* When it was taken, by the board's clock; wraps. [us] */
+    uint32_t time_us; /* Time of the measurement, by the board's clock; wraps. [us] */
     int32_t counts; /* The encoder's counter; wraps. [counts] */
     uint8_t status; /* BoardState and flags. */
 } clutch_sample_t;
@@ -587,8 +607,8 @@ static inline void clutch_get_sample(const uint8_t *body, clutch_sample_t *m)
 typedef struct {
     uint16_t run; /* The run. */
     uint16_t sequence; /* Sequence number of the newest sample. */
-    uint32_t time_us; /* When, by the board's clock. [us] */
-    uint8_t cause; /* Why: a BoardFault. */
+    uint32_t time_us; /* Time of the fault, by the board's clock. [us] */
+    uint8_t cause; /* Cause: a BoardFault. */
     uint32_t value; /* Detail of the cause. */
 } clutch_fault_t;
 
@@ -655,7 +675,7 @@ static inline void clutch_get_stopped(const uint8_t *body, clutch_stopped_t *m)
 typedef struct {
     uint16_t run; /* The run of Ping. */
     uint32_t nonce; /* The nonce of Ping. */
-    uint32_t time_us; /* When Ping was taken, by the board's clock. [us] */
+    uint32_t time_us; /* Time at which Ping was taken, by the board's clock. [us] */
 } clutch_pong_t;
 
 /* The frame for the wire; its length, bytes. */
@@ -677,7 +697,7 @@ static inline void clutch_get_pong(const uint8_t *body, clutch_pong_t *m)
     m->time_us = clutch_get_u32(body + CLUTCH_PONG_TIME_US);
 }
 
-/* Refused: The board does not do what a frame asks for. The layout is the same in all versions. */
+/* Refused: The board refuses a frame. The layout is the same in all versions. */
 #define CLUTCH_REFUSED_KIND 0x88u
 #define CLUTCH_REFUSED_LENGTH 11u
 #define CLUTCH_REFUSED_REQUEST 1u
@@ -685,7 +705,7 @@ static inline void clutch_get_pong(const uint8_t *body, clutch_pong_t *m)
 #define CLUTCH_REFUSED_VALUE 3u
 typedef struct {
     uint8_t request; /* Kind of the frame that is refused. */
-    uint8_t reason; /* Why: a Refusal. */
+    uint8_t reason; /* Reason: a Refusal. */
     uint32_t value; /* Detail of the reason. */
 } clutch_refused_t;
 
@@ -708,20 +728,20 @@ static inline void clutch_get_refused(const uint8_t *body, clutch_refused_t *m)
     m->value = clutch_get_u32(body + CLUTCH_REFUSED_VALUE);
 }
 
-/* Controller: A board in the controller role. Answers Discover; the Hello of the board that it drives follows. */
-#define CLUTCH_CONTROLLER_KIND 0x89u
-#define CLUTCH_CONTROLLER_LENGTH 51u
-#define CLUTCH_CONTROLLER_NONCE 1u
-#define CLUTCH_CONTROLLER_VERSION 5u
-#define CLUTCH_CONTROLLER_SCHEMA 6u
-#define CLUTCH_CONTROLLER_SETTINGS 14u
-#define CLUTCH_CONTROLLER_BOARD 22u
-#define CLUTCH_CONTROLLER_BOOT 26u
-#define CLUTCH_CONTROLLER_CLOCK_HZ 30u
-#define CLUTCH_CONTROLLER_KNOTS 34u
-#define CLUTCH_CONTROLLER_STATE 36u
-#define CLUTCH_CONTROLLER_RUN 37u
-#define CLUTCH_CONTROLLER_CONFIG 39u
+/* ControllerHello: A board in the controller role. Answers Discover; the Hello of the board that it drives follows. */
+#define CLUTCH_CONTROLLER_HELLO_KIND 0x89u
+#define CLUTCH_CONTROLLER_HELLO_LENGTH 51u
+#define CLUTCH_CONTROLLER_HELLO_NONCE 1u
+#define CLUTCH_CONTROLLER_HELLO_VERSION 5u
+#define CLUTCH_CONTROLLER_HELLO_SCHEMA 6u
+#define CLUTCH_CONTROLLER_HELLO_SETTINGS 14u
+#define CLUTCH_CONTROLLER_HELLO_BOARD 22u
+#define CLUTCH_CONTROLLER_HELLO_BOOT 26u
+#define CLUTCH_CONTROLLER_HELLO_CLOCK_HZ 30u
+#define CLUTCH_CONTROLLER_HELLO_KNOTS 34u
+#define CLUTCH_CONTROLLER_HELLO_STATE 36u
+#define CLUTCH_CONTROLLER_HELLO_RUN 37u
+#define CLUTCH_CONTROLLER_HELLO_CONFIG 39u
 typedef struct {
     uint32_t nonce; /* The nonce of Discover. */
     uint8_t version; /* The board's version of the protocol. */
@@ -729,46 +749,46 @@ typedef struct {
     uint64_t settings; /* The board's hash of its table of settings. */
     uint32_t board; /* The board's own serial number; 0 and 1 are emulated boards. */
     uint32_t boot; /* Another number at each power-up. */
-    uint32_t clock_hz; /* What Telemetry.cycles counts; 0 if it counts nothing. [Hz] */
+    uint32_t clock_hz; /* Frequency of Telemetry.cycles; 0 if it counts nothing. [Hz] */
     uint16_t knots; /* Points that a path given as a table may have. */
-    uint8_t state; /* Where control stands: the supervisor's state. */
+    uint8_t state; /* State of control: the supervisor's state. */
     uint16_t run; /* The latched run; 0 if none since power-up. */
     uint64_t config; /* The latched hash; 0 if none since power-up. */
-} clutch_controller_t;
+} clutch_controller_hello_t;
 
 /* The frame for the wire; its length, bytes. */
-static inline size_t clutch_encode_controller(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_controller_t *m)
+static inline size_t clutch_encode_controller_hello(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_controller_hello_t *m)
 {
     uint8_t body[CLUTCH_MAX_BODY];
-    body[0] = CLUTCH_CONTROLLER_KIND;
-    clutch_put_u32(body + CLUTCH_CONTROLLER_NONCE, m->nonce);
-    clutch_put_u8(body + CLUTCH_CONTROLLER_VERSION, m->version);
-    clutch_put_u64(body + CLUTCH_CONTROLLER_SCHEMA, m->schema);
-    clutch_put_u64(body + CLUTCH_CONTROLLER_SETTINGS, m->settings);
-    clutch_put_u32(body + CLUTCH_CONTROLLER_BOARD, m->board);
-    clutch_put_u32(body + CLUTCH_CONTROLLER_BOOT, m->boot);
-    clutch_put_u32(body + CLUTCH_CONTROLLER_CLOCK_HZ, m->clock_hz);
-    clutch_put_u16(body + CLUTCH_CONTROLLER_KNOTS, m->knots);
-    clutch_put_u8(body + CLUTCH_CONTROLLER_STATE, m->state);
-    clutch_put_u16(body + CLUTCH_CONTROLLER_RUN, m->run);
-    clutch_put_u64(body + CLUTCH_CONTROLLER_CONFIG, m->config);
-    return clutch_frame(wire, body, CLUTCH_CONTROLLER_LENGTH);
+    body[0] = CLUTCH_CONTROLLER_HELLO_KIND;
+    clutch_put_u32(body + CLUTCH_CONTROLLER_HELLO_NONCE, m->nonce);
+    clutch_put_u8(body + CLUTCH_CONTROLLER_HELLO_VERSION, m->version);
+    clutch_put_u64(body + CLUTCH_CONTROLLER_HELLO_SCHEMA, m->schema);
+    clutch_put_u64(body + CLUTCH_CONTROLLER_HELLO_SETTINGS, m->settings);
+    clutch_put_u32(body + CLUTCH_CONTROLLER_HELLO_BOARD, m->board);
+    clutch_put_u32(body + CLUTCH_CONTROLLER_HELLO_BOOT, m->boot);
+    clutch_put_u32(body + CLUTCH_CONTROLLER_HELLO_CLOCK_HZ, m->clock_hz);
+    clutch_put_u16(body + CLUTCH_CONTROLLER_HELLO_KNOTS, m->knots);
+    clutch_put_u8(body + CLUTCH_CONTROLLER_HELLO_STATE, m->state);
+    clutch_put_u16(body + CLUTCH_CONTROLLER_HELLO_RUN, m->run);
+    clutch_put_u64(body + CLUTCH_CONTROLLER_HELLO_CONFIG, m->config);
+    return clutch_frame(wire, body, CLUTCH_CONTROLLER_HELLO_LENGTH);
 }
 
-/* From the body that clutch_push accepted as CLUTCH_CONTROLLER_KIND. */
-static inline void clutch_get_controller(const uint8_t *body, clutch_controller_t *m)
+/* From the body that clutch_push accepted as CLUTCH_CONTROLLER_HELLO_KIND. */
+static inline void clutch_get_controller_hello(const uint8_t *body, clutch_controller_hello_t *m)
 {
-    m->nonce = clutch_get_u32(body + CLUTCH_CONTROLLER_NONCE);
-    m->version = clutch_get_u8(body + CLUTCH_CONTROLLER_VERSION);
-    m->schema = clutch_get_u64(body + CLUTCH_CONTROLLER_SCHEMA);
-    m->settings = clutch_get_u64(body + CLUTCH_CONTROLLER_SETTINGS);
-    m->board = clutch_get_u32(body + CLUTCH_CONTROLLER_BOARD);
-    m->boot = clutch_get_u32(body + CLUTCH_CONTROLLER_BOOT);
-    m->clock_hz = clutch_get_u32(body + CLUTCH_CONTROLLER_CLOCK_HZ);
-    m->knots = clutch_get_u16(body + CLUTCH_CONTROLLER_KNOTS);
-    m->state = clutch_get_u8(body + CLUTCH_CONTROLLER_STATE);
-    m->run = clutch_get_u16(body + CLUTCH_CONTROLLER_RUN);
-    m->config = clutch_get_u64(body + CLUTCH_CONTROLLER_CONFIG);
+    m->nonce = clutch_get_u32(body + CLUTCH_CONTROLLER_HELLO_NONCE);
+    m->version = clutch_get_u8(body + CLUTCH_CONTROLLER_HELLO_VERSION);
+    m->schema = clutch_get_u64(body + CLUTCH_CONTROLLER_HELLO_SCHEMA);
+    m->settings = clutch_get_u64(body + CLUTCH_CONTROLLER_HELLO_SETTINGS);
+    m->board = clutch_get_u32(body + CLUTCH_CONTROLLER_HELLO_BOARD);
+    m->boot = clutch_get_u32(body + CLUTCH_CONTROLLER_HELLO_BOOT);
+    m->clock_hz = clutch_get_u32(body + CLUTCH_CONTROLLER_HELLO_CLOCK_HZ);
+    m->knots = clutch_get_u16(body + CLUTCH_CONTROLLER_HELLO_KNOTS);
+    m->state = clutch_get_u8(body + CLUTCH_CONTROLLER_HELLO_STATE);
+    m->run = clutch_get_u16(body + CLUTCH_CONTROLLER_HELLO_RUN);
+    m->config = clutch_get_u64(body + CLUTCH_CONTROLLER_HELLO_CONFIG);
 }
 
 /* Taken: The setting is taken. Answers Set. */
@@ -802,9 +822,9 @@ static inline void clutch_get_taken(const uint8_t *body, clutch_taken_t *m)
     m->value = clutch_get_u64(body + CLUTCH_TAKEN_VALUE);
 }
 
-/* Telemetry: A sample after consent, and what the controller made of it. Real numbers are told as their 32 bits. */
+/* Telemetry: A sample after consent, and the controller's result for it. Real numbers are sent as their 32 bits. */
 #define CLUTCH_TELEMETRY_KIND 0x8bu
-#define CLUTCH_TELEMETRY_LENGTH 66u
+#define CLUTCH_TELEMETRY_LENGTH 55u /* without the numbers of its list */
 #define CLUTCH_TELEMETRY_RUN 1u
 #define CLUTCH_TELEMETRY_NUMBER 3u
 #define CLUTCH_TELEMETRY_TICK 5u
@@ -820,34 +840,31 @@ static inline void clutch_get_taken(const uint8_t *body, clutch_taken_t *m)
 #define CLUTCH_TELEMETRY_LATENESS_US 28u
 #define CLUTCH_TELEMETRY_ERROR 32u
 #define CLUTCH_TELEMETRY_ERROR_RATE 36u
-#define CLUTCH_TELEMETRY_TERM_0 40u
-#define CLUTCH_TELEMETRY_TERM_1 44u
-#define CLUTCH_TELEMETRY_TERM_2 48u
-#define CLUTCH_TELEMETRY_DEMAND 52u
-#define CLUTCH_TELEMETRY_CODE 56u
-#define CLUTCH_TELEMETRY_CYCLES 58u
+#define CLUTCH_TELEMETRY_DEMAND 40u
+#define CLUTCH_TELEMETRY_CODE 44u
+#define CLUTCH_TELEMETRY_CYCLES 46u
+#define CLUTCH_TELEMETRY_TERMS 50u
 typedef struct {
     uint16_t run; /* The run. */
-    uint16_t number; /* One more with each frame of this kind; wraps. A gap is telemetry that got lost. */
+    uint16_t number; /* One more with each frame of this kind; wraps. A gap is lost telemetry. */
     uint32_t tick; /* The run's tick, low half. */
-    uint16_t sequence; /* Of the sample. */
-    uint32_t time_us; /* Of the sample. [us] */
-    int32_t counts; /* Of the sample. [counts] */
-    uint8_t status; /* Of the sample: BoardState and flags. */
-    uint8_t flags; /* What the controller saw: bits. */
-    uint8_t arrival; /* How the sample came: the supervisor's number for it. */
+    uint16_t sequence; /* Sequence number of the sample. */
+    uint32_t time_us; /* Time of the sample. [us] */
+    int32_t counts; /* Counts of the sample. [counts] */
+    uint8_t status; /* Status of the sample: BoardState and flags. */
+    uint8_t flags; /* The controller's findings: bits. */
+    uint8_t arrival; /* Arrival of the sample: the supervisor's number for it. */
     uint8_t states; /* The supervisor's state after it (high half) and before it (low half). */
-    uint8_t cause; /* Why control ended, if it has: the supervisor's number for it. */
-    uint32_t value; /* What the check that ended it saw. [bits] */
+    uint8_t cause; /* Cause of the end of control, if it has ended: the supervisor's number for it. */
+    uint32_t value; /* Value that the check that ended control saw. [bits] */
     uint32_t lateness_us; /* Time that the answer before took. [us] */
     uint32_t error; /* The error. [bits, rad] */
     uint32_t error_rate; /* Its rate. [bits, rad/s] */
-    uint32_t term_0; /* First term of the law. [bits] */
-    uint32_t term_1; /* Second term of the law. [bits] */
-    uint32_t term_2; /* Third term of the law. [bits] */
     uint32_t demand; /* The law's voltage within its limits. [bits, V] */
-    uint16_t code; /* What the converter was given. [DAC code] */
-    uint32_t cycles; /* Clock cycles of the tick before: see Controller.clock_hz. [clock cycles] */
+    uint16_t code; /* Code given to the converter. [DAC code] */
+    uint32_t cycles; /* Clock cycles of the tick before: see ControllerHello.clock_hz. [clock cycles] */
+    uint8_t terms_count; /* at most 8 */
+    uint32_t terms[8]; /* The law's terms: how many, and each. [bits] */
 } clutch_telemetry_t;
 
 /* The frame for the wire; its length, bytes. */
@@ -870,13 +887,11 @@ static inline size_t clutch_encode_telemetry(uint8_t wire[CLUTCH_MAX_FRAME], con
     clutch_put_u32(body + CLUTCH_TELEMETRY_LATENESS_US, m->lateness_us);
     clutch_put_u32(body + CLUTCH_TELEMETRY_ERROR, m->error);
     clutch_put_u32(body + CLUTCH_TELEMETRY_ERROR_RATE, m->error_rate);
-    clutch_put_u32(body + CLUTCH_TELEMETRY_TERM_0, m->term_0);
-    clutch_put_u32(body + CLUTCH_TELEMETRY_TERM_1, m->term_1);
-    clutch_put_u32(body + CLUTCH_TELEMETRY_TERM_2, m->term_2);
     clutch_put_u32(body + CLUTCH_TELEMETRY_DEMAND, m->demand);
     clutch_put_u16(body + CLUTCH_TELEMETRY_CODE, m->code);
     clutch_put_u32(body + CLUTCH_TELEMETRY_CYCLES, m->cycles);
-    return clutch_frame(wire, body, CLUTCH_TELEMETRY_LENGTH);
+    clutch_put_list(body + CLUTCH_TELEMETRY_TERMS, m->terms, m->terms_count);
+    return clutch_frame(wire, body, CLUTCH_TELEMETRY_LENGTH + 4u * (size_t)body[CLUTCH_TELEMETRY_TERMS]);
 }
 
 /* From the body that clutch_push accepted as CLUTCH_TELEMETRY_KIND. */
@@ -897,15 +912,13 @@ static inline void clutch_get_telemetry(const uint8_t *body, clutch_telemetry_t 
     m->lateness_us = clutch_get_u32(body + CLUTCH_TELEMETRY_LATENESS_US);
     m->error = clutch_get_u32(body + CLUTCH_TELEMETRY_ERROR);
     m->error_rate = clutch_get_u32(body + CLUTCH_TELEMETRY_ERROR_RATE);
-    m->term_0 = clutch_get_u32(body + CLUTCH_TELEMETRY_TERM_0);
-    m->term_1 = clutch_get_u32(body + CLUTCH_TELEMETRY_TERM_1);
-    m->term_2 = clutch_get_u32(body + CLUTCH_TELEMETRY_TERM_2);
     m->demand = clutch_get_u32(body + CLUTCH_TELEMETRY_DEMAND);
     m->code = clutch_get_u16(body + CLUTCH_TELEMETRY_CODE);
     m->cycles = clutch_get_u32(body + CLUTCH_TELEMETRY_CYCLES);
+    m->terms_count = clutch_get_list(body + CLUTCH_TELEMETRY_TERMS, m->terms);
 }
 
-/* Ended: Control has ended, and not by a sample. */
+/* Ended: Control has ended, but not by a sample. */
 #define CLUTCH_ENDED_KIND 0x8cu
 #define CLUTCH_ENDED_LENGTH 17u
 #define CLUTCH_ENDED_RUN 1u
@@ -917,8 +930,8 @@ typedef struct {
     uint16_t run; /* The run. */
     uint32_t tick; /* The run's tick, low half. */
     uint8_t states; /* The supervisor's state after it (high half) and before it (low half). */
-    uint8_t cause; /* Why: the supervisor's number for it. */
-    uint32_t value; /* What the check saw. [bits] */
+    uint8_t cause; /* Cause: the supervisor's number for it. */
+    uint32_t value; /* Value that the check saw. [bits] */
 } clutch_ended_t;
 
 /* The frame for the wire; its length, bytes. */
@@ -944,7 +957,7 @@ static inline void clutch_get_ended(const uint8_t *body, clutch_ended_t *m)
     m->value = clutch_get_u32(body + CLUTCH_ENDED_VALUE);
 }
 
-/* Link: What the controller's own line has carried; each second, and at each end. */
+/* Link: Counters of the controller's own line; each second, and at each end. */
 #define CLUTCH_LINK_KIND 0x8du
 #define CLUTCH_LINK_LENGTH 43u
 #define CLUTCH_LINK_RUN 1u
@@ -967,7 +980,7 @@ typedef struct {
     uint32_t bad_frames; /* Frames that were not whole. */
     uint32_t rejected; /* Samples that were not believed. */
     uint32_t deadline_misses; /* Answers later than the deadline. */
-    uint32_t dropped; /* Frames to the host that found no room. */
+    uint32_t dropped; /* Frames to the host for which there was no room. */
 } clutch_link_t;
 
 /* The frame for the wire; its length, bytes. */
@@ -1003,10 +1016,10 @@ static inline void clutch_get_link(const uint8_t *body, clutch_link_t *m)
     m->dropped = clutch_get_u32(body + CLUTCH_LINK_DROPPED);
 }
 
-/* Bytes before stuffing of a frame of this kind, CRC included; 0 for a kind that is not known. */
-static inline size_t clutch_length(uint8_t kind)
+/* Bytes before stuffing of the frame with this body, CRC included; 0 for a kind that is not known. */
+static inline size_t clutch_length(const uint8_t *body)
 {
-    switch (kind) {
+    switch (body[0]) {
     case CLUTCH_DISCOVER_KIND: return CLUTCH_DISCOVER_LENGTH;
     case CLUTCH_CONFIGURE_KIND: return CLUTCH_CONFIGURE_LENGTH;
     case CLUTCH_ARM_KIND: return CLUTCH_ARM_LENGTH;
@@ -1022,19 +1035,19 @@ static inline size_t clutch_length(uint8_t kind)
     case CLUTCH_STOPPED_KIND: return CLUTCH_STOPPED_LENGTH;
     case CLUTCH_PONG_KIND: return CLUTCH_PONG_LENGTH;
     case CLUTCH_REFUSED_KIND: return CLUTCH_REFUSED_LENGTH;
-    case CLUTCH_CONTROLLER_KIND: return CLUTCH_CONTROLLER_LENGTH;
+    case CLUTCH_CONTROLLER_HELLO_KIND: return CLUTCH_CONTROLLER_HELLO_LENGTH;
     case CLUTCH_TAKEN_KIND: return CLUTCH_TAKEN_LENGTH;
-    case CLUTCH_TELEMETRY_KIND: return CLUTCH_TELEMETRY_LENGTH;
+    case CLUTCH_TELEMETRY_KIND: return CLUTCH_TELEMETRY_LENGTH + 4u * (size_t)body[CLUTCH_TELEMETRY_TERMS];
     case CLUTCH_ENDED_KIND: return CLUTCH_ENDED_LENGTH;
     case CLUTCH_LINK_KIND: return CLUTCH_LINK_LENGTH;
     default: return 0;
     }
 }
 
-/* What clutch_push says besides a kind. */
+/* Results of clutch_push besides a kind. */
 #define CLUTCH_NOTHING 0        /* no frame ends here */
 #define CLUTCH_BAD_COBS (-1)    /* a code points past the end */
-#define CLUTCH_TOO_LONG (-2)    /* more bytes than the longest frame; said once */
+#define CLUTCH_TOO_LONG (-2)    /* more bytes than the longest frame; reported once */
 #define CLUTCH_TOO_SHORT (-3)   /* shorter than a kind and a CRC */
 #define CLUTCH_BAD_CRC (-4)     /* the checksum does not hold */
 #define CLUTCH_UNKNOWN_KIND (-5)
@@ -1081,7 +1094,7 @@ static inline int clutch_push(clutch_decoder_t *d, uint8_t byte)
         return CLUTCH_TOO_SHORT;
     if (clutch_crc32(d->body, length - 4u) != clutch_get_u32(d->body + length - 4))
         return CLUTCH_BAD_CRC;
-    expected = clutch_length(d->body[0]);
+    expected = clutch_length(d->body);
     if (expected == 0)
         return CLUTCH_UNKNOWN_KIND;
     if (expected != length)

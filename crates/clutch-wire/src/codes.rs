@@ -1,11 +1,11 @@
-//! What the numbers in the fields mean.
+//! The meanings of the numbers in the fields.
 
 /// A set of numbers that a field may hold.
 #[derive(Clone, Copy, Debug)]
 pub struct CodeInfo {
     /// Name of the set: the enum's.
     pub name: &'static str,
-    /// What it says.
+    /// Its meaning.
     pub doc: &'static str,
     /// The numbers.
     pub values: &'static [CodeValue],
@@ -18,7 +18,7 @@ pub struct CodeValue {
     pub name: &'static str,
     /// The number.
     pub value: u8,
-    /// What it means.
+    /// Its meaning.
     pub doc: &'static str,
 }
 
@@ -61,7 +61,7 @@ macro_rules! codes {
 }
 
 codes! {
-    /// What the board is doing.
+    /// The present state of the board.
     BoardState {
         /// Powered up; never configured since; the output is `boot_code`.
         Boot = 0,
@@ -77,7 +77,7 @@ codes! {
         Faulted = 5,
     }
 
-    /// How the board goes to its safe output.
+    /// The board's way to its safe output.
     SafeKind {
         /// `hold_code` at once.
         Hold = 0,
@@ -89,7 +89,7 @@ codes! {
         HoldThenRelease = 3,
     }
 
-    /// Why the board went to its safe output by itself.
+    /// The reason why the board went to its safe output by itself.
     BoardFault {
         /// No `Actuate` was applied for `watchdog_us`; `value` is the time since the last one, µs.
         Watchdog = 1,
@@ -99,7 +99,7 @@ codes! {
         Converter = 3,
     }
 
-    /// Why the host stops the run.
+    /// The host's reason to stop the run.
     StopReason {
         /// The run is over.
         Done = 0,
@@ -109,7 +109,7 @@ codes! {
         Fault = 2,
     }
 
-    /// Why the board does not do what a frame asks for.
+    /// The board's reason to refuse a frame.
     Refusal {
         /// Another version of the protocol; `value` is the board's.
         Version = 1,
@@ -120,7 +120,7 @@ codes! {
         Run = 3,
         /// The configuration hash is not the configured one; `value` is the low 32 bits of the board's.
         Config = 4,
-        /// Not in this state; `value` is the `BoardState`, and of a controller its own state of control.
+        /// Not in this state; `value` is the `BoardState`, or a controller's own state of control.
         State = 5,
         /// The period is out of the board's range; `value` is the period asked for, µs.
         Period = 6,
@@ -136,13 +136,14 @@ codes! {
         Busy = 10,
         /// The code is above the converter's top; `value` is the code.
         Code = 11,
-        /// A setting that is unknown or missing; `value` is its key.
+        /// A setting that is missing, or whose value is of a kind that is not known; `value` is its key.
         Setting = 12,
-        /// The settings make no run; `value` is the offending one's value as the bits of a real number.
+        /// The settings make no run; `value` is the key of the offending one, and above its 16 bits the number of
+        /// the condition between several that does not hold, or 0.
         Unfit = 13,
         /// Nothing answers where the controller's encoder and converter should be; `value` is 0.
         NoBoard = 14,
-        /// `Configure` does not say what the settings say; `value` is 0.
+        /// `Configure` differs from the settings; `value` is 0.
         Differs = 15,
     }
 }
@@ -170,7 +171,7 @@ bits! {
     TELEMETRY_ASKED = 0x04 "Asked";
     /// The path was asked for its target.
     TELEMETRY_TARGETED = 0x08 "Targeted";
-    /// Which limit decided the voltage: 0 none, 1 the lowest, 2 the highest, 3 a demand that was not a number.
+    /// The limit that decided the voltage: 0 none, 1 the lowest, 2 the highest, 3 a demand that was not a number.
     TELEMETRY_LIMIT = 0x30 "Limit";
 }
 

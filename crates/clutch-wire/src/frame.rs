@@ -13,8 +13,8 @@ pub const MAX_BODY: usize = LONGEST;
 /// The longest frame on the wire, bytes: one of stuffing and the delimiter come on top.
 pub const MAX_FRAME: usize = MAX_BODY + 2;
 
-// Below 254 bytes COBS costs exactly one byte, and a code of 0xFF cannot be complete: there is one
-// way only to stuff a frame. The table's lengths and the decoder's counters are bytes.
+// Below 254 bytes COBS costs exactly one byte, and a code of 0xFF cannot be complete: there is only
+// one way to stuff a frame. The table's lengths and the decoder's counters are bytes.
 const _: () = assert!(MAX_FRAME < 254, "a frame must fit one block of COBS");
 
 /// The bytes of one frame, delimiter included.
@@ -66,28 +66,28 @@ fn stuff(body: &[u8; MAX_BODY], length: usize) -> Frame {
     Frame { bytes, length: length.wrapping_add(2) }
 }
 
-/// Why bytes were dropped.
+/// The reason why bytes were dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
     /// The stuffing is wrong: a code points past the end of the frame.
     Cobs,
-    /// More bytes without a delimiter than the longest frame has. Said once; the rest is dropped
-    /// without a word.
+    /// More bytes without a delimiter than the longest frame has. Reported once; the rest is
+    /// dropped silently.
     TooLong,
     /// Shorter than a kind and a CRC.
     TooShort,
     /// The checksum does not hold.
     Crc {
-        /// As the frame says.
+        /// The checksum in the frame.
         expected: u32,
-        /// As its bytes say.
+        /// The checksum of its bytes.
         computed: u32,
     },
     /// Not the length that its kind has. Bytes before stuffing.
     Length {
         /// Kind of the frame.
         kind: u8,
-        /// Length of that kind, bytes.
+        /// Length of that kind, bytes, with as many numbers as its list claims; 255 stands for more, too.
         expected: u8,
         /// Length of the frame, bytes.
         got: u8,
@@ -121,8 +121,8 @@ impl core::error::Error for FrameError {}
 
 /// Finds frames in a stream of bytes, in constant memory.
 ///
-/// It starts as if a delimiter had just come. Whatever happened before, the next delimiter puts it
-/// in step again: garbage costs at most the one frame that it runs into.
+/// It starts as if a delimiter had just come. The next delimiter always puts it in step again:
+/// garbage costs at most the one frame that it runs into.
 #[derive(Clone, Copy, Debug)]
 pub struct Decoder {
     body: [u8; MAX_BODY],
@@ -186,7 +186,7 @@ impl Decoder {
         self.length = self.length.wrapping_add(1);
     }
 
-    // A function of its own in machine code, too: the timing analysis is told how often it is called.
+    // Kept as a function in machine code: the timing analysis has a stated number of its calls.
     #[inline(never)]
     fn finish(&mut self) -> Option<Result<Message, FrameError>> {
         let (length, count, left, dropping) = (self.length, self.count, self.left, self.dropping);
@@ -201,7 +201,7 @@ impl Decoder {
     }
 }
 
-/// The checksum first: what it does not vouch for says nothing about kind and length.
+/// The checksum comes first: without it, kind and length mean nothing.
 fn parse(body: &[u8]) -> Result<Message, FrameError> {
     let Some((content, crc)) = body.split_last_chunk::<4>() else {
         return Err(FrameError::TooShort);
@@ -213,12 +213,13 @@ fn parse(body: &[u8]) -> Result<Message, FrameError> {
     if expected != computed {
         return Err(FrameError::Crc { expected, computed });
     }
-    let Some(length) = Message::length(kind) else {
+    let Some(length) = Message::length(kind, fields) else {
         return Err(FrameError::UnknownKind(kind));
     };
     if length != body.len() {
-        // Both are below 254, see MAX_FRAME.
-        return Err(FrameError::Length { kind, expected: length as u8, got: body.len() as u8 });
+        // A list may claim more than any frame has; what came is below 254, see MAX_FRAME.
+        let expected = u8::try_from(length).unwrap_or(u8::MAX);
+        return Err(FrameError::Length { kind, expected, got: body.len() as u8 });
     }
     Message::take(kind, fields).ok_or(FrameError::UnknownKind(kind))
 }

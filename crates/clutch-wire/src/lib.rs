@@ -7,6 +7,7 @@ extern crate std;
 
 mod codes;
 mod frame;
+mod list;
 mod message;
 
 pub use codes::{
@@ -15,15 +16,16 @@ pub use codes::{
     TELEMETRY_ASKED, TELEMETRY_LIMIT, TELEMETRY_SUPERSEDED, TELEMETRY_TARGETED,
 };
 pub use frame::{Decoder, Frame, FrameError, MAX_BODY, MAX_FRAME, encode};
+pub use list::List;
 pub use message::{
-    Actuate, Arm, Armed, Configure, Configured, Controller, Direction, Discover, Ended, Fault, FieldInfo,
-    Hello, Link, Message, MessageInfo, Ping, Pong, Refused, SCHEMA, Sample, Set, Stop, Stopped, TABLE, Taken,
-    Telemetry,
+    Actuate, Arm, Armed, Configure, Configured, ControllerHello, Direction, Discover, Ended, Fault,
+    FieldInfo, Hello, Link, Message, MessageInfo, Ping, Pong, Refused, SCHEMA, Sample, Set, Stop, Stopped,
+    TABLE, Taken, Telemetry,
 };
 
 /// Version of the protocol: of the rules, of the codes' meanings and of the framing. A change of
 /// the table alone shows in [`SCHEMA`].
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 
 #[cfg(test)]
 mod tests;

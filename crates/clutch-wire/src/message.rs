@@ -1,6 +1,9 @@
 //! The one table of messages: structs, lengths, coding, description and schema hash come from it.
 
-/// Who sends a message.
+use crate::list::List;
+use clutch_core::{FNV_64, fnv1a_64};
+
+/// The sender of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// From the host to the board; kinds below 0x80.
@@ -16,11 +19,13 @@ pub struct MessageInfo {
     pub name: &'static str,
     /// First byte of its frame.
     pub kind: u8,
-    /// Who sends it.
+    /// Its sender.
     pub direction: Direction,
-    /// Bytes before stuffing: kind, fields and CRC. On the wire two more.
+    /// Bytes before stuffing: kind, fields and CRC, without the numbers of a list. On the wire two more.
     pub length: u8,
-    /// What it says.
+    /// Most numbers of the list that ends it, four bytes each; 0 if it has none.
+    pub list: u8,
+    /// Its meaning.
     pub doc: &'static str,
     /// Its fields in order.
     pub fields: &'static [FieldInfo],
@@ -31,21 +36,22 @@ pub struct MessageInfo {
 pub struct FieldInfo {
     /// Name, as the struct's.
     pub name: &'static str,
-    /// `u8`, `u16`, `u32`, `u64` or `i32`; little-endian.
+    /// `u8`, `u16`, `u32`, `u64` or `i32`; little-endian. `[u32;8]`: up to eight, and in front of them their number
+    /// in a byte.
     pub ty: &'static str,
-    /// Where it starts, bytes from the start of the frame before stuffing (the kind is at 0).
+    /// Its place, bytes from the start of the frame before stuffing (the kind is at 0).
     pub offset: u8,
     /// Its unit; empty for a plain number.
     pub unit: &'static str,
-    /// What it says.
+    /// Its meaning.
     pub doc: &'static str,
 }
 
-/// Bytes before stuffing that are no fields: kind and CRC.
+/// Bytes before stuffing that are not fields: kind and CRC.
 const AROUND: usize = 1 + 4;
 
-/// Writes fields one after the other. What does not fit is left out, which the lengths of the
-/// table rule out; this way nothing can panic.
+/// Writes fields one after the other. A field that does not fit is left out, which the lengths of
+/// the table rule out; this way nothing can panic.
 pub(crate) struct Put<'a> {
     rest: &'a mut [u8],
 }
@@ -62,11 +68,20 @@ impl<'a> Put<'a> {
             self.rest = tail;
         }
     }
+
+    /// Room for so many bytes; none if there is not so much.
+    pub(crate) fn next(&mut self, length: usize) -> &'a mut [u8] {
+        let Some((head, tail)) = core::mem::take(&mut self.rest).split_at_mut_checked(length) else {
+            return &mut [];
+        };
+        self.rest = tail;
+        head
+    }
 }
 
 /// The next `N` bytes.
 #[inline]
-fn next<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+pub(crate) fn next<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, tail) = rest.split_first_chunk::<N>()?;
     *rest = tail;
     Some(*head)
@@ -78,6 +93,7 @@ macro_rules! messages {
         $kind:literal $direction:ident $name:ident {
             $($(#[doc = $field_doc:literal])+ $field:ident: $ty:ident $([$unit:literal])?,)+
         }
+        $(then $(#[doc = $list_doc:literal])+ $list:ident [$list_unit:literal])?
     )+) => {
         $(
             $(#[doc = $doc])+
@@ -88,28 +104,40 @@ macro_rules! messages {
                     $(#[doc = concat!("\n\nUnit: ", $unit, ".")])?
                     pub $field: $ty,
                 )+
+                $(
+                    $(#[doc = $list_doc])+
+                    #[doc = concat!("\n\nUnit: ", $list_unit, ".")]
+                    pub $list: List,
+                )?
             }
 
             impl $name {
                 /// First byte of the frame.
                 pub const KIND: u8 = $kind;
-                /// Bytes before stuffing: kind, fields and CRC.
-                pub const LENGTH: usize = AROUND $(+ size_of::<$ty>())+;
+                /// Bytes before stuffing: kind, fields and CRC, without the numbers of a list.
+                pub const LENGTH: usize = AROUND $(+ size_of::<$ty>())+ $(+ listed!($list 1))?;
+                /// The same of the longest.
+                const LONGEST: usize = $name::LENGTH $(+ listed!($list 4 * List::MOST))?;
 
                 #[inline]
-                fn put(&self, out: &mut Put<'_>) {
+                fn put(&self, out: &mut Put<'_>) -> usize {
                     out.bytes([$kind]);
                     $(out.bytes(self.$field.to_le_bytes());)+
+                    $(self.$list.put(out);)?
+                    ($name::LENGTH - 4) $(.wrapping_add(self.$list.size()))?
                 }
 
                 #[inline]
                 fn take(mut rest: &[u8]) -> Option<Self> {
-                    Some($name { $($field: <$ty>::from_le_bytes(next(&mut rest)?),)+ })
+                    Some($name {
+                        $($field: <$ty>::from_le_bytes(next(&mut rest)?),)+
+                        $($list: List::take(&mut rest)?,)?
+                    })
                 }
             }
         )+
 
-        /// What one frame says.
+        /// The content of one frame.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Message {
             $($(#[doc = $doc])+ $name($name),)+
@@ -120,18 +148,19 @@ macro_rules! messages {
             #[inline]
             pub(crate) fn put(&self, out: &mut Put<'_>) -> usize {
                 match self {
-                    $(Message::$name(message) => {
-                        message.put(out);
-                        $name::LENGTH.wrapping_sub(4)
-                    })+
+                    $(Message::$name(message) => message.put(out),)+
                 }
             }
 
-            /// Bytes before stuffing of a frame of this kind; nothing for a kind that is not in the table.
+            /// Bytes before stuffing of a frame of this kind with these fields; nothing for a kind that is not in
+            /// the table.
             #[inline]
-            pub(crate) fn length(kind: u8) -> Option<usize> {
+            pub(crate) fn length(kind: u8, fields: &[u8]) -> Option<usize> {
+                let _ = fields; // most have no list
                 match kind {
-                    $($kind => Some($name::LENGTH),)+
+                    $($kind => Some(
+                        $name::LENGTH $(.wrapping_add(listed!($list List::claimed(fields, $name::LENGTH - AROUND - 1))))?
+                    ),)+
                     _ => None,
                 }
             }
@@ -152,6 +181,7 @@ macro_rules! messages {
             kind: $kind,
             direction: Direction::$direction,
             length: $name::LENGTH as u8,
+            list: 0 $(+ listed!($list List::MOST as u8))?,
             doc: concat!($($doc),+),
             fields: {
                 #[allow(unused_assignments, reason = "the last field's end starts no other field")]
@@ -167,7 +197,13 @@ macro_rules! messages {
                             unit: concat!("" $(, $unit)?),
                             doc: concat!($($field_doc),+),
                         }
-                    }),+]
+                    },)+ $(FieldInfo {
+                        name: stringify!($list),
+                        ty: "[u32;8]",
+                        offset: end,
+                        unit: $list_unit,
+                        doc: concat!($($list_doc),+),
+                    })?]
                 };
                 FIELDS
             },
@@ -176,16 +212,23 @@ macro_rules! messages {
         /// The longest frame before stuffing, bytes.
         pub(crate) const LONGEST: usize = {
             let mut longest = 0;
-            $(if $name::LENGTH > longest {
-                longest = $name::LENGTH;
+            $(if $name::LONGEST > longest {
+                longest = $name::LONGEST;
             })+
             longest
         };
     };
 }
 
+/// What a message with a list has more.
+macro_rules! listed {
+    ($list:ident $($what:tt)+) => {
+        $($what)+
+    };
+}
+
 messages! {
-    /// Asks the board who it is. Any state. The layout is the same in all versions.
+    /// Asks for the board's identity. Any state. The layout is the same in all versions.
     0x01 ToBoard Discover {
         /// Number that the answer echoes.
         nonce: u32,
@@ -205,7 +248,7 @@ messages! {
         period_us: u32 ["µs"],
         /// Longest time without an applied `Actuate` while armed or running.
         watchdog_us: u32 ["µs"],
-        /// How to go to the safe output: a `SafeKind`.
+        /// Way to the safe output: a `SafeKind`.
         safe_kind: u8,
         /// The code that holds.
         hold_code: u16 ["DAC code"],
@@ -213,7 +256,7 @@ messages! {
         release_code: u16 ["DAC code"],
         /// Step of the ramp to `hold_code`.
         ramp_step: u32 ["2⁻¹⁶ DAC codes per period"],
-        /// How long `HoldThenRelease` holds.
+        /// Time for which `HoldThenRelease` holds.
         hold_periods: u32 ["periods"],
     }
 
@@ -241,7 +284,7 @@ messages! {
     0x05 ToBoard Stop {
         /// The configured run.
         run: u16,
-        /// Why: a `StopReason`.
+        /// Reason: a `StopReason`.
         reason: u8,
     }
 
@@ -255,15 +298,15 @@ messages! {
 
     /// One setting of the run to come. For boards in the controller role: the loop then runs on them.
     0x07 ToBoard Set {
-        /// Number of the run to come; the first setting of another run forgets those before.
+        /// Number of the run to come; the first setting of another run discards those before.
         run: u16,
-        /// Which setting.
+        /// Number of the setting.
         key: u16,
         /// Its value: a whole number, or the bits of a real one of 32 bits.
         value: u64,
     }
 
-    /// Who the board is, what it can do, and what it is doing. Answers `Discover`.
+    /// The board's identity, abilities and present state. Answers `Discover`.
     0x81 ToHost Hello {
         /// The nonce of `Discover`.
         nonce: u32,
@@ -291,7 +334,7 @@ messages! {
         watchdog_max_us: u32 ["µs"],
         /// The code put out from power-up to the first safe output or run.
         boot_code: u16 ["DAC code"],
-        /// What the board is doing: a `BoardState`.
+        /// The present state of the board: a `BoardState`.
         state: u8,
         /// The latched run; 0 if none since power-up.
         run: u16,
@@ -323,7 +366,7 @@ messages! {
         run: u16,
         /// 0 after `Configure`, then one more each period; wraps.
         sequence: u16,
-        /// When it was taken, by the board's clock; wraps.
+        /// Time of the measurement, by the board's clock; wraps.
         time_us: u32 ["µs"],
         /// The encoder's counter; wraps.
         counts: i32 ["counts"],
@@ -337,9 +380,9 @@ messages! {
         run: u16,
         /// Sequence number of the newest sample.
         sequence: u16,
-        /// When, by the board's clock.
+        /// Time of the fault, by the board's clock.
         time_us: u32 ["µs"],
-        /// Why: a `BoardFault`.
+        /// Cause: a `BoardFault`.
         cause: u8,
         /// Detail of the cause.
         value: u32,
@@ -361,22 +404,22 @@ messages! {
         run: u16,
         /// The nonce of `Ping`.
         nonce: u32,
-        /// When `Ping` was taken, by the board's clock.
+        /// Time at which `Ping` was taken, by the board's clock.
         time_us: u32 ["µs"],
     }
 
-    /// The board does not do what a frame asks for. The layout is the same in all versions.
+    /// The board refuses a frame. The layout is the same in all versions.
     0x88 ToHost Refused {
         /// Kind of the frame that is refused.
         request: u8,
-        /// Why: a `Refusal`.
+        /// Reason: a `Refusal`.
         reason: u8,
         /// Detail of the reason.
         value: u32,
     }
 
     /// A board in the controller role. Answers `Discover`; the `Hello` of the board that it drives follows.
-    0x89 ToHost Controller {
+    0x89 ToHost ControllerHello {
         /// The nonce of `Discover`.
         nonce: u32,
         /// The board's version of the protocol.
@@ -389,11 +432,11 @@ messages! {
         board: u32,
         /// Another number at each power-up.
         boot: u32,
-        /// What `Telemetry.cycles` counts; 0 if it counts nothing.
+        /// Frequency of `Telemetry.cycles`; 0 if it counts nothing.
         clock_hz: u32 ["Hz"],
         /// Points that a path given as a table may have.
         knots: u16,
-        /// Where control stands: the supervisor's state.
+        /// State of control: the supervisor's state.
         state: u8,
         /// The latched run; 0 if none since power-up.
         run: u16,
@@ -411,31 +454,31 @@ messages! {
         value: u64,
     }
 
-    /// A sample after consent, and what the controller made of it. Real numbers are told as their 32 bits.
+    /// A sample after consent, and the controller's result for it. Real numbers are sent as their 32 bits.
     0x8B ToHost Telemetry {
         /// The run.
         run: u16,
-        /// One more with each frame of this kind; wraps. A gap is telemetry that got lost.
+        /// One more with each frame of this kind; wraps. A gap is lost telemetry.
         number: u16,
         /// The run's tick, low half.
         tick: u32,
-        /// Of the sample.
+        /// Sequence number of the sample.
         sequence: u16,
-        /// Of the sample.
+        /// Time of the sample.
         time_us: u32 ["µs"],
-        /// Of the sample.
+        /// Counts of the sample.
         counts: i32 ["counts"],
-        /// Of the sample: `BoardState` and flags.
+        /// Status of the sample: `BoardState` and flags.
         status: u8,
-        /// What the controller saw: bits.
+        /// The controller's findings: bits.
         flags: u8,
-        /// How the sample came: the supervisor's number for it.
+        /// Arrival of the sample: the supervisor's number for it.
         arrival: u8,
         /// The supervisor's state after it (high half) and before it (low half).
         states: u8,
-        /// Why control ended, if it has: the supervisor's number for it.
+        /// Cause of the end of control, if it has ended: the supervisor's number for it.
         cause: u8,
-        /// What the check that ended it saw.
+        /// Value that the check that ended control saw.
         value: u32 ["bits"],
         /// Time that the answer before took.
         lateness_us: u32 ["µs"],
@@ -443,21 +486,18 @@ messages! {
         error: u32 ["bits, rad"],
         /// Its rate.
         error_rate: u32 ["bits, rad/s"],
-        /// First term of the law.
-        term_0: u32 ["bits"],
-        /// Second term of the law.
-        term_1: u32 ["bits"],
-        /// Third term of the law.
-        term_2: u32 ["bits"],
         /// The law's voltage within its limits.
         demand: u32 ["bits, V"],
-        /// What the converter was given.
+        /// Code given to the converter.
         code: u16 ["DAC code"],
-        /// Clock cycles of the tick before: see `Controller.clock_hz`.
+        /// Clock cycles of the tick before: see `ControllerHello.clock_hz`.
         cycles: u32 ["clock cycles"],
     }
+    then
+        /// The law's terms: how many, and each.
+        terms ["bits"]
 
-    /// Control has ended, and not by a sample.
+    /// Control has ended, but not by a sample.
     0x8C ToHost Ended {
         /// The run.
         run: u16,
@@ -465,13 +505,13 @@ messages! {
         tick: u32,
         /// The supervisor's state after it (high half) and before it (low half).
         states: u8,
-        /// Why: the supervisor's number for it.
+        /// Cause: the supervisor's number for it.
         cause: u8,
-        /// What the check saw.
+        /// Value that the check saw.
         value: u32 ["bits"],
     }
 
-    /// What the controller's own line has carried; each second, and at each end.
+    /// Counters of the controller's own line; each second, and at each end.
     0x8D ToHost Link {
         /// The run.
         run: u16,
@@ -491,18 +531,9 @@ messages! {
         rejected: u32,
         /// Answers later than the deadline.
         deadline_misses: u32,
-        /// Frames to the host that found no room.
+        /// Frames to the host for which there was no room.
         dropped: u32,
     }
-}
-
-/// FNV-1a, 64 bit, one piece of text after the other.
-const fn fnv(mut hash: u64, mut text: &[u8]) -> u64 {
-    while let [byte, rest @ ..] = text {
-        hash = (hash ^ *byte as u64).wrapping_mul(0x0000_0100_0000_01b3);
-        text = rest;
-    }
-    hash
 }
 
 /// A hexadecimal digit, lower case.
@@ -517,20 +548,20 @@ const fn digit(value: u8) -> u8 {
 /// The line of `Ping`, for one: `06 Ping run:u16 nonce:u32`. Two ends with the same hash agree on
 /// every byte of every frame.
 pub const SCHEMA: u64 = {
-    let mut hash = 0xcbf2_9ce4_8422_2325;
+    let mut hash = FNV_64;
     let mut table = TABLE;
     while let [message, others @ ..] = table {
-        hash = fnv(hash, &[digit(message.kind >> 4), digit(message.kind & 15), b' ']);
-        hash = fnv(hash, message.name.as_bytes());
+        hash = fnv1a_64(hash, &[digit(message.kind >> 4), digit(message.kind & 15), b' ']);
+        hash = fnv1a_64(hash, message.name.as_bytes());
         let mut fields = message.fields;
         while let [field, rest @ ..] = fields {
-            hash = fnv(hash, b" ");
-            hash = fnv(hash, field.name.as_bytes());
-            hash = fnv(hash, b":");
-            hash = fnv(hash, field.ty.as_bytes());
+            hash = fnv1a_64(hash, b" ");
+            hash = fnv1a_64(hash, field.name.as_bytes());
+            hash = fnv1a_64(hash, b":");
+            hash = fnv1a_64(hash, field.ty.as_bytes());
             fields = rest;
         }
-        hash = fnv(hash, b"\n");
+        hash = fnv1a_64(hash, b"\n");
         table = others;
     }
     hash

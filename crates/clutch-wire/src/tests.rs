@@ -39,14 +39,21 @@ fn accepted(bytes: &[u8]) -> Vec<Message> {
 /// Any message, with zeros and ones as often as all else together.
 fn any_message() -> impl Strategy<Value = Message> {
     let byte = prop_oneof![2 => any::<u8>(), 1 => Just(0), 1 => Just(0xFF)];
-    (0..TABLE.len(), proptest::collection::vec(byte, MAX_BODY))
-        .prop_map(|(i, bytes)| Message::take(TABLE[i].kind, &bytes).expect("the table has this kind"))
+    (0..TABLE.len(), proptest::collection::vec(byte, MAX_BODY), 0..=List::MOST as u8)
+        .prop_map(|(i, bytes, count)| taken(&TABLE[i], bytes, count))
+}
+
+/// A message of these fields, and of so many numbers if it has a list.
+fn taken(info: &MessageInfo, mut fields: Vec<u8>, count: u8) -> Message {
+    if info.list > 0 {
+        fields[usize::from(info.length) - 6] = count;
+    }
+    Message::take(info.kind, &fields).expect("the table has this kind")
 }
 
 /// One of each, with fields that are not zero.
 fn one_of_each() -> Vec<Message> {
-    let bytes: Vec<u8> = (1..=MAX_BODY as u8).collect();
-    TABLE.iter().map(|m| Message::take(m.kind, &bytes).expect("the table has this kind")).collect()
+    TABLE.iter().map(|m| taken(m, (1..=MAX_BODY as u8).collect(), 3)).collect()
 }
 
 fn sample(sequence: u16) -> Message {
@@ -62,9 +69,13 @@ fn the_checksum_is_the_one_that_the_world_knows() {
 #[test]
 fn a_frame_is_its_content_checksum_and_stuffing_by_the_textbook() {
     for (message, info) in one_of_each().iter().zip(TABLE) {
-        let content: Vec<u8> = [info.kind].into_iter().chain(1..=info.length - 5).collect();
+        let mut content: Vec<u8> = [info.kind].into_iter().chain(1..=info.length - 5).collect();
+        if info.list > 0 {
+            content[usize::from(info.length) - 5] = 3;
+            content.extend(info.length - 4..info.length - 4 + 3 * 4);
+        }
         assert_eq!(encode(message).as_bytes(), framed(&content), "{message:?}");
-        assert_eq!(encode(message).as_bytes().len(), usize::from(info.length) + 2);
+        assert_eq!(encode(message).as_bytes().len(), content.len() + 4 + 2);
     }
 }
 
@@ -73,7 +84,7 @@ fn frames_of_the_cycle_take_at_most_twenty_bytes() {
     assert_eq!(Sample::LENGTH + 2, 20);
     assert_eq!(Actuate::LENGTH + 2, 15);
     assert_eq!(encode(&sample(0)).as_bytes().len(), 20);
-    assert_eq!(MAX_FRAME, 68);
+    assert_eq!(MAX_FRAME, 89);
 }
 
 #[test]
@@ -87,19 +98,44 @@ fn the_table_has_no_gaps_and_its_kinds_tell_the_direction() {
                 "u16" => 2,
                 "u32" | "i32" => 4,
                 "u64" => 8,
+                "[u32;8]" => 1,
                 other => panic!("{other} is not an integer of the wire"),
             };
             assert!(!field.doc.is_empty());
         }
         assert_eq!(message.length, end + 4, "{}", message.name);
         assert_eq!(message.direction == Direction::ToHost, message.kind >= 0x80);
-        assert_eq!(Message::length(message.kind), Some(usize::from(message.length)));
+        assert_eq!(Message::length(message.kind, &[]), Some(usize::from(message.length)));
+        let list = message.fields.iter().position(|field| field.ty == "[u32;8]");
+        assert_eq!(list, (message.list > 0).then(|| message.fields.len() - 1), "{}", message.name);
     }
     let mut kinds: Vec<u8> = TABLE.iter().map(|m| m.kind).collect();
     kinds.dedup();
     assert_eq!(kinds.len(), TABLE.len());
     assert!(kinds.is_sorted());
     assert!(!kinds.contains(&0));
+}
+
+#[test]
+fn a_list_has_the_numbers_that_it_was_given_and_no_more_than_it_may() {
+    assert_eq!(List::new([7, 0, 9]).numbers(), [7, 0, 9]);
+    assert_eq!(List::default().numbers(), [0; 0]);
+    assert_eq!(List::new(1..100).numbers(), [1, 2, 3, 4, 5, 6, 7, 8]);
+}
+
+#[test]
+fn a_list_that_claims_other_than_it_has_is_of_the_wrong_length() {
+    let fields = [&[0x8B][..], &[7; Telemetry::LENGTH - 6]].concat();
+    let listed =
+        |count: u8, numbers: usize| framed(&[&fields[..], &[count], &std::vec![9; 4 * numbers]].concat());
+    let [Ok(Message::Telemetry(m))] = heard(&listed(2, 2))[..] else { panic!("two numbers") };
+    assert_eq!(m.terms.numbers(), [0x0909_0909; 2]);
+    for (count, numbers, expected) in [(0, 1, 55), (3, 2, 67), (1, 2, 59), (9, 8, 91), (255, 8, 255)] {
+        let got = (Telemetry::LENGTH + 4 * numbers) as u8;
+        assert_eq!(heard(&listed(count, numbers)), [Err(FrameError::Length { kind: 0x8B, expected, got })]);
+    }
+    // Nine numbers are longer than any frame.
+    assert_eq!(heard(&listed(9, 9)), [Err(FrameError::TooLong)]);
 }
 
 #[test]
@@ -231,7 +267,7 @@ proptest! {
     ) {
         let mut decoder = Decoder::new();
         for &byte in &bytes {
-            // What is accepted is what would have been sent.
+            // A decoder accepts only what an encoder would have sent.
             if let Some(Ok(found)) = decoder.push(byte) {
                 prop_assert_eq!(heard(encode(&found).as_bytes()), [Ok(found)]);
             }

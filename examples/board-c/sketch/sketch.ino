@@ -2,7 +2,7 @@
  *
  * NOT RUN ON HARDWARE. It was compiled only against stand-ins for the Arduino functions, so registers, pins
  * and clocks are from the data sheet and nothing else. Read it as the outline of your own sketch, and go
- * through the checklist of docs/board.md before a brake is connected.
+ * through the checklist of docs/board.md before you connect a brake.
  *
  * Copy board.c, board.h and clutch_wire.h into this folder. build_opt.h makes the serial buffers larger: with
  * the usual 64 bytes the longest frame (66) never fits.
@@ -20,8 +20,8 @@
 #include <IWatchdog.h>
 
 static const uint32_t BAUD = 921600;
-static const uint16_t BOOT_CODE = 1844;       /* 4.5 V of 0 to 10 V: choose what is safe on your rig */
-static const uint32_t HANG_US = 20000;        /* the hardware watchdog resets a program that hangs so long */
+static const uint16_t BOOT_CODE = 1844;       /* 4.5 V of 0 to 10 V: choose the safe code for your rig */
+static const uint32_t HANG_US = 20000;        /* the hardware watchdog resets a program that hangs for this long */
 static const uint32_t BOARD_ID = 4711;        /* the board's own serial number; 0 and 1 are taken */
 
 static HardwareTimer *sampling;
@@ -30,14 +30,14 @@ static volatile bool pending;                 /* a sample was taken and is not s
 static volatile uint32_t taken_us;
 static volatile int32_t taken_counts;
 
-/* The board's clock. Not micros(): that is put together from two counters, and in an interrupt it can be a
+/* The board's clock. Not micros(): that is composed of two counters, and in an interrupt it can be a
  * millisecond behind. */
 static uint32_t clock_us()
 {
     return TIM5->CNT;
 }
 
-/* The interrupt does nothing but take the sample: time and counts belong together. */
+/* The interrupt only takes the sample: time and counts belong together. */
 static void take_sample()
 {
     taken_us = clock_us();
@@ -45,7 +45,7 @@ static void take_sample()
     pending = true;
 }
 
-/* ---- what board.c asks for ---- */
+/* ---- the functions that board.c needs ---- */
 
 extern "C" int32_t read_encoder(void)
 {
@@ -86,7 +86,7 @@ static void start_encoder()
     HAL_GPIO_Init(GPIOA, &pins);
     TIM2->ARR = 0xFFFFFFFF;
     TIM2->CCMR1 = TIM_CCMR1_CC1S_0 | TIM_CCMR1_CC2S_0 | (3u << TIM_CCMR1_IC1F_Pos) | (3u << TIM_CCMR1_IC2F_Pos);
-    TIM2->CCER = 0; /* if the counts fall while the weight sinks: TIM_CCER_CC1P turns the direction round */
+    TIM2->CCER = 0; /* if the counts fall while the weight sinks: TIM_CCER_CC1P reverses the direction */
     TIM2->SMCR = TIM_SMCR_SMS_0 | TIM_SMCR_SMS_1;
     TIM2->CR1 = TIM_CR1_CEN;
 }
@@ -101,7 +101,7 @@ static void start_clock()
     TIM5->CR1 = TIM_CR1_CEN;
 }
 
-/* Another number at each power-up. */
+/* A different number at each power-up. */
 static uint32_t next_boot()
 {
     uint32_t boot;
@@ -113,7 +113,7 @@ static uint32_t next_boot()
 
 void setup()
 {
-    /* First of all the output, and only then the switch that lets it through to the brake. */
+    /* The output comes first, and only then the switch that connects it to the brake. */
     analogWriteResolution(12);
     analogWrite(PA4, BOOT_CODE);
     pinMode(PB5, OUTPUT);
@@ -135,7 +135,7 @@ void setup()
     params.boot_code = BOOT_CODE;
     if (board_init(&params) != NULL) {
         digitalWrite(PB5, LOW);
-        for (;;) { /* a parameter above is wrong: stay in what the hardware alone gives */
+        for (;;) { /* a parameter above is wrong: stay with the output of the hardware alone */
         }
     }
     sampling = new HardwareTimer(TIM6);
@@ -143,7 +143,7 @@ void setup()
     IWatchdog.begin(HANG_US);
 }
 
-/* Sends the sample if one is there. */
+/* Sends the sample if there is one. */
 static void serve_sample()
 {
     if (!pending)

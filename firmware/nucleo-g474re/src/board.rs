@@ -1,6 +1,6 @@
-//! The board: clocks, encoder, converter, serial line, watchdog. Another board is another such file.
+//! The board: clocks, encoder, converter, serial line, watchdog. For another board, write another
+//! such file.
 
-use crate::fault::stop;
 use clutch_core::{Counts, DacCode};
 use clutch_node::{BoardParams, Hardware, WideCounter};
 use cortex_m::peripheral::DWT;
@@ -21,16 +21,16 @@ use embedded_io_async::Write;
 use static_cell::ConstStaticCell;
 
 /// OUTPUT WHEN NOBODY CONTROLS: at power-up, after a reset, in a fault handler. It is a property of
-/// the rig that the board is built into. 4.5 V of 10 V holds the paper's weight; where a hand moves
-/// the shaft, 0 (an open brake) may be the safe one. THE PULL AT THE DRIVER'S INPUT MUST GIVE THE
-/// SAME VOLTAGE, since until this program runs the pin floats: docs/firmware.md.
+/// the rig that the board is built into. 4.5 V of 10 V holds the paper's weight; if a person moves the shaft
+/// and an open brake is safe, set it to 0. THE PULL AT THE DRIVER'S INPUT MUST GIVE THE SAME VOLTAGE, since
+/// until this program runs the pin floats: docs/firmware.md.
 pub const BOOT_CODE: DacCode = DacCode(1844);
 
 /// Counts per turn of the shaft, four for each line of the encoder.
 const COUNTS_PER_REV: u32 = 20_000;
 
 /// Voltage at the brake for code 0 and for code 4096, mV: 3.3 V times the driver's gain of 3.03.
-/// Put in what you measure at the brake's terminals, and the same into the scenario.
+/// Enter the values that you measure at the brake's terminals, here and in the scenario.
 const DRIVER_MV: (i32, i32) = (0, 10_000);
 
 /// What the board is, but for what each has of its own: serial number, and number of the power-up.
@@ -46,15 +46,13 @@ const PARAMS: BoardParams = BoardParams {
     watchdog_max_us: 100_000,
     boot_code: BOOT_CODE.0,
 };
-const _: () = if let Err(refused) = PARAMS.check() {
-    panic!("{}", refused.field)
-};
+const _: () = assert!(PARAMS.check().is_ok(), "a number above is out of range: see BoardParams::check");
 
-/// Of the debugger's serial port, which is the host's.
+/// Baud rate of the debugger's serial port, which is the host's.
 const BAUD: u32 = 921_600;
 
-/// A program that completes no period for so long is reset, µs. The clock of this watchdog may be
-/// off by several percent; two of the longest periods are far within.
+/// Time without a completed period after which the program is reset, µs. The clock of this watchdog
+/// may be off by several percent; two of the longest periods are far within.
 const WATCHDOG_US: u32 = 10_000;
 
 /// The core's clock, Hz.
@@ -84,14 +82,25 @@ pub struct Board {
     line: BufferedUartTx<'static>,
     /// Its serial number.
     pub board: u32,
-    /// Another number at each power-up.
+    /// A different number at each power-up.
     pub boot: u32,
+}
+
+/// For a program that cannot continue: puts the safe output out and waits for the reset. Trusts none of the contents
+/// of memory.
+pub fn stop() -> ! {
+    cortex_m::interrupt::disable();
+    pac::DAC1.dhr12r(0).write(|w| w.set_dhr(BOOT_CODE.0));
+    loop {
+        cortex_m::asm::nop();
+    }
 }
 
 /// Starts the board, its output first.
 pub fn start() -> (Board, Line) {
     let mut config = embassy_stm32::Config::default();
-    // The crystal, not the internal oscillator: the host measures this clock, and 1 % is no clock.
+    // The crystal, not the internal oscillator: the host measures this clock, and an error of 1 %
+    // is too much.
     config.rcc.hse = Some(Hse { freq: Hertz(24_000_000), mode: HseMode::Oscillator });
     config.rcc.pll = Some(Pll {
         source: PllSource::HSE,
@@ -138,17 +147,17 @@ pub fn start() -> (Board, Line) {
 }
 
 impl Board {
-    /// What the board is. Constants, not a field: their checks are then done by the compiler, and
-    /// no `f64` of an error's value is left in the image.
+    /// The board's parameters. They are constants, not a field: the compiler then does their
+    /// checks, and no `f64` of an error's value is left in the image.
     #[must_use]
     pub fn params(&self) -> BoardParams {
         BoardParams { board: self.board, boot: self.boot, ..PARAMS }
     }
 }
 
-/// A number of the chip's noise source: the second, since its manual wants the first thrown away.
-/// None if there is none within some milliseconds. embassy's driver would try again for ever, on a
-/// stack that ends.
+/// A number of the chip's noise source: the second, since its manual wants the first discarded.
+/// None if none comes within some milliseconds. embassy's driver would try again for ever, on a
+/// finite stack.
 fn random() -> Option<u32> {
     pac::RCC.ahb2enr().modify(|w| w.set_rngen(true));
     pac::RNG.cr().write(|w| w.set_rngen(true));
@@ -180,8 +189,8 @@ impl Hardware for Board {
         false
     }
 
-    /// Its output register has another code: a converter that was reset or lost its clock. What the
-    /// pin gives is not seen.
+    /// Its output register has another code: a converter that was reset or lost its clock. The
+    /// pin's voltage is not seen.
     fn converter_fault(&self) -> bool {
         self.converter.read() != self.told.0
     }
@@ -197,8 +206,8 @@ impl Hardware for Board {
 
     fn send(&mut self, frames: &[u8]) {
         // One poll: all of it if there is room now, and nothing otherwise. No interrupt in between:
-        // one that sends the last byte while the write looks whether there is any would leave the
-        // transmitter asleep with these.
+        // one that sends the last byte while the write checks for any would leave the transmitter
+        // asleep with these.
         let _ = cortex_m::interrupt::free(|_| poll_once(self.line.write(frames)));
     }
 

@@ -1,20 +1,10 @@
-//! When the program cannot go on: the output of [`BOOT_CODE`], and no word to the watchdog, which
-//! then resets the board into its power-up state. Nothing here trusts what is in memory, and nobody
-//! is told: text for a panic, with its formatting of numbers, would be most of the image.
+//! For a program that cannot continue: [`stop`], the safe output and no more feeding of the watchdog, which then
+//! resets the board into its power-up state. Nothing here trusts the contents of memory, and nothing is reported:
+//! text for a panic, with its formatting of numbers, would be most of the image.
 
-use crate::board::BOOT_CODE;
+use crate::board::stop;
 use core::panic::PanicInfo;
 use cortex_m_rt::{ExceptionFrame, exception};
-use embassy_stm32::pac;
-
-/// Puts the safe output out and waits for the reset.
-pub fn stop() -> ! {
-    cortex_m::interrupt::disable();
-    pac::DAC1.dhr12r(0).write(|w| w.set_dhr(BOOT_CODE.0));
-    loop {
-        cortex_m::asm::nop();
-    }
-}
 
 #[panic_handler]
 fn panic(_: &PanicInfo<'_>) -> ! {
@@ -33,7 +23,7 @@ unsafe fn NonMaskableInt() -> ! {
     stop()
 }
 
-// An interrupt that nobody has asked for.
+// An unexpected interrupt.
 #[exception]
 unsafe fn DefaultHandler(_: i16) -> ! {
     stop()

@@ -1,5 +1,5 @@
 //! clutch on a NUCLEO-G474RE. The board is `board`; the rest is the same on any board that embassy
-//! knows. Wiring, power-up and flashing: docs/firmware.md. Not yet run on hardware.
+//! supports. Wiring, power-up and flashing: docs/firmware.md. Not yet run on hardware.
 #![no_std]
 
 pub mod board;

@@ -1,8 +1,7 @@
-//! The control task: one task, in an interrupt of its own, owns node and hardware. Periods and bytes
-//! come to it one after the other, so nothing is shared and nothing locks.
+//! The control task: one task, in an interrupt of its own, owns node and hardware. Periods and
+//! bytes reach it one after the other, so nothing is shared and nothing locks.
 
-use crate::board::{self, Board, CONTROL, Line};
-use crate::fault::stop;
+use crate::board::{self, Board, CONTROL, Line, stop};
 use clutch_node::{Role, receive, tick};
 use embassy_executor::{InterruptExecutor, SpawnError, SpawnToken};
 use embassy_futures::select::{Either, select};
@@ -11,7 +10,7 @@ use embassy_stm32::interrupt::InterruptExt;
 use embassy_time::{Duration, Ticker};
 use embedded_io_async::Read;
 
-/// Bytes that are looked at in one go: what a period may have to wait for.
+/// Bytes that are processed at a time: the longest wait of a period.
 const CHUNK: usize = 32;
 
 /// Period until a host has configured one, µs.
@@ -43,7 +42,7 @@ pub async fn run(role: &mut impl Role, mut board: Board, mut line: Line) -> ! {
     let mut period_us = BOOT_PERIOD_US;
     let mut beat = every(period_us);
     loop {
-        // In this order: a period that is due goes before bytes that wait.
+        // In this order: a period that is due takes precedence over waiting bytes.
         match select(beat.next(), line.read(&mut bytes)).await {
             Either::First(()) => tick(role, &mut board),
             Either::Second(Ok(count)) => receive(role, &mut board, &bytes[..count]),

@@ -15,7 +15,7 @@ impl HostFile {
         HostFile::keep(File::open(path).ok()?)
     }
 
-    /// Opens a file to write; without creating it that is refused.
+    /// Creates a file to write; opening one for writing without creating it is refused.
     pub fn create(path: &CStr) -> Option<HostFile> {
         HostFile::keep(File::create(path).ok()?)
     }
@@ -26,18 +26,18 @@ impl HostFile {
         Some(HostFile(fd))
     }
 
-    /// Borrowing asserts what is asked here first; so no panic is left.
+    /// Borrowing asserts the condition that is checked here first, so that no panic is left.
     fn fd(&self) -> Option<BorrowedFd<'_>> {
         // SAFETY: never closed.
         (self.0 != -1).then(|| unsafe { BorrowedFd::borrow_raw(self.0) })
     }
 
-    /// Reads some bytes; how many, and none at the end or on an error.
+    /// Reads some bytes; gives their number, 0 at the end or on an error.
     pub fn read(&self, buffer: &mut [u8]) -> usize {
         self.fd().and_then(|fd| sys::read(fd, buffer).ok()).unwrap_or(0)
     }
 
-    /// Writes all bytes; whether that was possible.
+    /// Writes all bytes; true if that was possible.
     pub fn write(&self, mut bytes: &[u8]) -> bool {
         while !bytes.is_empty() {
             let written = self.fd().and_then(|fd| sys::write(fd, bytes).ok()).filter(|n| *n > 0);

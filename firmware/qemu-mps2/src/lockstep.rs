@@ -1,13 +1,13 @@
-//! Lockstep over two files: each request brings the time and what has arrived, each answer takes back
-//! what is to be sent.
+//! Lockstep over two files: each request brings the time and the bytes that have arrived, each
+//! answer takes back the bytes to be sent.
 
-use crate::fault;
 use crate::files::HostFile;
-use clutch_node::exchange::{Exchange, LONGEST, answer};
-use clutch_node::{Onboard, Ports};
+use crate::last_word;
+use clutch_node::lockstep::{Exchange, LONGEST, answer};
+use clutch_node::{BoardController, Outboxes};
 use semihosting::process;
 
-/// A request at this time is a test's: the processor is to fail.
+/// A request at this time comes from a test: the processor must fail.
 const FAIL_AT: u64 = u64::MAX;
 
 /// Both files.
@@ -31,12 +31,13 @@ impl Link {
 }
 
 /// Answers until the files are closed.
-pub fn run(link: Link, mut node: Onboard) -> ! {
+pub fn run(link: Link, mut node: BoardController) -> ! {
     let mut buffer = [0; LONGEST];
     let mut used = 0;
-    let mut ports = Ports::default();
+    let mut outboxes = Outboxes::default();
     loop {
-        // One read brings one request, as its writer writes it in one piece; but nothing promises that.
+        // One read brings one request, as its writer writes it in one piece; but nothing guarantees
+        // that.
         let whole = Exchange::length(buffer.get(..used).unwrap_or(&[]));
         if whole.is_none_or(|n| n > used) {
             let Some(room) = buffer.get_mut(used..).filter(|r| !r.is_empty()) else { process::exit(2) };
@@ -48,17 +49,17 @@ pub fn run(link: Link, mut node: Onboard) -> ! {
         }
         let Some(request) = buffer.get(..used).and_then(Exchange::read) else { process::exit(2) };
         if request.time_ns == FAIL_AT {
-            fault::fail();
+            cortex_m::asm::udf(); // an instruction that is none
         }
-        if !link.answer(&answer(&mut node, &request, &mut ports)) {
+        if !link.answer(&answer(&mut node, &request, &mut outboxes)) {
             process::exit(3);
         }
-        fault::prepare(node.last_word());
+        last_word::prepare(node.last_word());
         used = 0;
     }
 }
 
-/// The last word of a processor that has failed.
+/// The last frame of a processor that has failed.
 pub fn last_word(frame: &[u8]) {
     if let Some(link) = Link::open() {
         let _ = link.answer(&Exchange { time_ns: u64::MAX, lateness_us: 0, host: &[], daq: frame });

@@ -1,4 +1,4 @@
-//! No panic is reachable: the handler calls a symbol that nobody defines, so an image with a path
+//! No panic is reachable: the handler calls a symbol that is not defined, so an image with a path
 //! to a panic does not link.
 
 use core::panic::PanicInfo;

@@ -1,8 +1,8 @@
-//! Two UARTs and a clock: the board as any other.
+//! Two UARTs and a clock: a board like any other.
 
-use crate::fault;
+use crate::last_word;
 use clutch_core::Micros;
-use clutch_node::{Onboard, Outbox, Ports};
+use clutch_node::{BoardController, Outbox, Outboxes};
 use core::ptr::{read_volatile, write_volatile};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::interrupt::InterruptNumber;
@@ -89,7 +89,7 @@ static FROM_DAQ: Received = Received(core::cell::UnsafeCell::new(Queue::new()));
 static MILLIS: AtomicU32 = AtomicU32::new(0);
 
 impl Received {
-    /// In the handler. What finds no room is lost; its frame fails its check.
+    /// Called in the handler. A byte without room is lost; its frame fails its check.
     fn take(&self, uart: Uart) {
         uart.write(INTCLR, CLEAR_RX);
         if uart.read(STATE) & RX_FULL != 0 {
@@ -99,7 +99,7 @@ impl Received {
         }
     }
 
-    /// In the loop, with interrupts off.
+    /// Called in the loop, with interrupts off.
     fn drain(&self, _: &cortex_m::interrupt::CriticalSection, bytes: &mut [u8; 64]) -> usize {
         // SAFETY: interrupts are off.
         let queue = unsafe { &mut *self.0.get() };
@@ -154,7 +154,8 @@ impl Clock {
                 break before.wrapping_mul(1000).wrapping_add(within);
             }
         };
-        // The counter has begun anew and its interrupt has not been taken yet: time stands still for so long.
+        // The counter has begun anew and its interrupt has not been taken yet: until then, time
+        // stands still.
         let passed = narrow.wrapping_sub(self.seen);
         if passed.cast_signed() > 0 {
             self.wide = self.wide.wrapping_add(u64::from(passed));
@@ -179,7 +180,7 @@ impl Watchdog {
     }
 
     fn start() -> Watchdog {
-        // The first time that it runs out is an interrupt, the second a reset.
+        // Its first timeout is an interrupt, the second a reset.
         Self::register(Self::LOAD, CLOCK_HZ / 2);
         Self::register(Self::CTRL, 3);
         Watchdog
@@ -191,17 +192,18 @@ impl Watchdog {
 }
 
 /// The board's loop.
-pub fn run(mut node: Onboard) -> ! {
+pub fn run(mut node: BoardController) -> ! {
     let mut clock = Clock::start();
     let mut watchdog = Watchdog::start();
     HOST.enable();
     DAQ.enable();
-    let (mut ports, mut host, mut daq) = (Ports::default(), [0; 64], [0; 64]);
+    let (mut outboxes, mut host, mut daq) = (Outboxes::default(), [0; 64], [0; 64]);
     loop {
         let (host_bytes, daq_bytes) = cortex_m::interrupt::free(|cs| {
             let (a, b) = (FROM_HOST.drain(cs, &mut host), FROM_DAQ.drain(cs, &mut daq));
             if a == 0 && b == 0 {
-                // Wakes for a masked interrupt, too: none is missed between looking and sleeping.
+                // Wakes for a masked interrupt, too: none is missed between the check and the
+                // sleep.
                 cortex_m::asm::wfi();
             }
             (a, b)
@@ -209,28 +211,29 @@ pub fn run(mut node: Onboard) -> ! {
         let arrived = clock.now_us();
         let now_ns = arrived.saturating_mul(1000);
         if daq_bytes > 0 {
-            node.daq(now_ns, daq.get(..daq_bytes).unwrap_or(&[]), &mut ports);
+            node.daq(now_ns, daq.get(..daq_bytes).unwrap_or(&[]), &mut outboxes);
         }
-        // The answer before anything else; what the host has to say to encoder and converter is none.
-        let ticked = !ports.daq.is_empty();
-        DAQ.flush(&mut ports.daq);
+        // The answer comes before anything else; a frame from the host to encoder and converter is
+        // not an answer.
+        let ticked = !outboxes.daq.is_empty();
+        DAQ.flush(&mut outboxes.daq);
         if ticked {
             let late = clock.now_us().wrapping_sub(arrived);
             node.answered(Micros(u32::try_from(late).unwrap_or(u32::MAX)));
         }
-        node.host(now_ns, host.get(..host_bytes).unwrap_or(&[]), &mut ports);
-        node.poll(now_ns, &mut ports);
-        DAQ.flush(&mut ports.daq);
+        node.host(now_ns, host.get(..host_bytes).unwrap_or(&[]), &mut outboxes);
+        node.poll(now_ns, &mut outboxes);
+        DAQ.flush(&mut outboxes.daq);
         // While it drives a shaft, only a completed tick shows that the board works.
         if ticked || !node.driving() {
             watchdog.feed();
         }
-        HOST.flush(&mut ports.host);
-        fault::prepare(node.last_word());
+        HOST.flush(&mut outboxes.host);
+        last_word::prepare(node.last_word());
     }
 }
 
-/// The last word of a processor that has failed; over a line that is open.
+/// The last frame of a processor that has failed, over a line that is open.
 pub fn last_word(frame: &[u8]) {
     if DAQ.read(CTRL) & ENABLE_TX != 0 {
         DAQ.send(frame);

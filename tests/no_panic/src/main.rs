@@ -2,8 +2,8 @@
 //!
 //! The panic handler calls a symbol that does not exist. If the optimiser leaves one path to a
 //! panic, the link fails; if the image links, there is none, and no sum in them overflows
-//! either. Everything that goes in is opaque, and what a constructor has checked is made opaque
-//! again before it is used, so a tick is proven for any bits in its coefficients.
+//! either. All input is opaque, and a value that a constructor has checked is made opaque again
+//! before it is used, so a tick is proven for any bits in its coefficients.
 //!
 //! ```text
 //! cargo build --release --manifest-path tests/no_panic/Cargo.toml --target thumbv7em-none-eabihf
@@ -13,7 +13,7 @@
 //! links at the levels 2, 3 and s, also for thumbv6m and riscv32imac; at z nalgebra's products,
 //! no longer inlined, keep two checks of their lengths.
 //!
-//! To find a surviving path, link it all the same and look for the callers of `core::panicking`:
+//! To find a surviving path, link anyway and look for the callers of `core::panicking`:
 //!
 //! ```text
 //! RUSTFLAGS="-C link-arg=--defsym=__panic_path_survived=0" cargo build …
@@ -41,11 +41,11 @@ use clutch_core::{
     StickSlipParams, StickSlipState, Stribeck, StribeckParams, Supervisor, SupervisorParams, Target,
     Tolerances, VelocityParams, VelocitySource, check_path, sin_cos_turns,
 };
-use clutch_node::exchange::Exchange;
+use clutch_node::lockstep::Exchange;
 use clutch_node::{
-    Acquisition, BoardNode, BoardParams, ControlNode, ControlParams, Hardware, Onboard, OnboardParams,
-    Outbox, Path, Ports, RemoteNode, Role, RunParams, Settings, Standalone, WideCounter, present_code,
-    receive, tick,
+    BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
+    DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Path, Role, RunParams, Settings, WideCounter,
+    present_code, receive, tick,
 };
 use clutch_wire::{BoardState, Configure, Decoder, Hello, StopReason, encode};
 use core::hint::black_box;
@@ -59,7 +59,7 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     unsafe { __panic_path_survived() }
 }
 
-/// Whatever the optimiser must not know.
+/// A value that the optimiser must not know.
 static mut INPUT: u64 = 0;
 
 fn word() -> u64 {
@@ -80,7 +80,7 @@ fn micros() -> Micros {
     Micros(word() as u32)
 }
 
-/// The same value, of which the optimiser knows nothing any more.
+/// The same value, about which the optimiser no longer knows anything.
 fn opaque<X>(x: X) -> X {
     black_box(x)
 }
@@ -90,7 +90,7 @@ fn sink<X>(x: X) {
     black_box(&x);
 }
 
-/// Takes either outcome of a constructor; gives back what it made, opaque.
+/// Takes either outcome of a constructor; gives its result back, opaque.
 fn made<X, E>(result: Result<X, E>) -> Option<X> {
     match opaque(result) {
         Ok(x) => Some(x),
@@ -547,7 +547,7 @@ fn supervisor<T: Real, U: Real>() {
     let mut state = SupervisorState::default();
     v.connect(&mut state);
     sink(v.arm(&mut state, DacCode(word() as u16)));
-    // Whatever it has seen: no field is known any more.
+    // After any input: no field is known any more.
     let mut state = opaque(state);
     let sample = Sample {
         sequence: word() as u16,
@@ -589,7 +589,7 @@ fn wire() {
     let mut decoder = opaque(Decoder::new());
     for byte in bytes(&any_bytes()) {
         let heard = decoder.push(*byte);
-        // What the decoder gives, the encoder takes: any kind, any fields.
+        // The encoder takes any message that the decoder gives: any kind, any fields.
         if let Some(Ok(message)) = opaque(heard) {
             black_box(encode(&message).as_bytes());
         }
@@ -663,11 +663,11 @@ impl Hardware for Unknown {
 }
 
 fn runner(params: &BoardParams) {
-    if let Some(role) = made(Acquisition::new(params)) {
+    if let Some(role) = made(DaqBoard::new(params)) {
         periods(role);
     }
-    if let Some(mut chip) = made(Standalone::new(onboard_params(), params)) {
-        // What the runner does not call.
+    if let Some(mut chip) = made(OneChip::new(board_controller_params(), params)) {
+        // The functions that the runner does not call.
         chip.poll(word());
         sink((chip.state() == BoardState::Running, chip.code()));
         periods(opaque(chip));
@@ -689,14 +689,14 @@ fn periods(mut role: impl Role) {
 
 fn control_node<T: Real>() {
     let Some((servo, supervisor)) = checked_supervisor::<T>() else { return };
-    let params = ControlParams {
+    let params = ControllerParams {
         run: word() as u16,
         config: word(),
         watchdog: micros(),
         valid: micros(),
         silence: micros(),
     };
-    let mut node = opaque(ControlNode::new(params, servo, supervisor));
+    let mut node = opaque(ControllerNode::new(params, servo, supervisor));
     let mut out = opaque(Outbox::default());
     let path = |_| target();
     loop {
@@ -722,15 +722,15 @@ fn control_node<T: Real>() {
     }
 }
 
-fn onboard_params() -> OnboardParams {
-    OnboardParams { board: word() as u32, boot: word() as u32, clock_hz: word() as u32 }
+fn board_controller_params() -> BoardControllerParams {
+    BoardControllerParams { board: word() as u32, boot: word() as u32, clock_hz: word() as u32 }
 }
 
-/// The controller role: the board's end, the host's end, and what goes between them.
+/// The controller role: the board's end, the host's end, and the frames between them.
 fn controller_role() {
     numbers();
     sent();
-    onboard();
+    board_controller();
     exchange();
 }
 
@@ -786,7 +786,7 @@ fn sent() {
     if let Some(built) = made(settings.build()) {
         target_of(&built.path, settings.points());
         target_of(&built.path, knots);
-        remote_node(&built.path, knots);
+        host_node(&built.path, knots);
     }
 }
 
@@ -794,9 +794,9 @@ fn target_of(path: &Path, knots: &[Knot]) {
     sink(path.target(knots, word()));
 }
 
-fn onboard() {
-    let mut node = opaque(Onboard::new(onboard_params()));
-    let mut out = opaque(Ports::default());
+fn board_controller() {
+    let mut node = opaque(BoardController::new(board_controller_params()));
+    let mut out = opaque(Outboxes::default());
     loop {
         node.host(word(), bytes(&any_bytes()), &mut out);
         node = opaque(node);
@@ -815,7 +815,7 @@ fn onboard() {
     }
 }
 
-fn remote_node(path: &Path, knots: &[Knot]) {
+fn host_node(path: &Path, knots: &[Knot]) {
     let Some(servo) = made(Servo::new(&servo_params())) else { return };
     let configure = Configure {
         run: word() as u16,
@@ -828,7 +828,7 @@ fn remote_node(path: &Path, knots: &[Knot]) {
         ramp_step: word() as u32,
         hold_periods: word() as u32,
     };
-    let mut node = opaque(RemoteNode::new(servo, configure, word(), word()));
+    let mut node = opaque(HostNode::new(servo, configure, word(), word()));
     let mut out = opaque(Outbox::default());
     let path = |tick| path.target(knots, tick);
     loop {
@@ -840,7 +840,7 @@ fn remote_node(path: &Path, knots: &[Knot]) {
         node.receive(word(), bytes(&any_bytes()), &path, &mut |notice| sink(notice));
         node = opaque(node);
         node.poll(word(), &mut out, &mut |notice| sink(notice));
-        sink((node.poll_at(), node.origin(), *node.counts(), *node.told(), node.controller().copied()));
+        sink((node.poll_at(), node.origin(), *node.counts(), *node.standing(), node.controller().copied()));
         sink(node.servo().period());
         drain(&mut out);
         match word() {

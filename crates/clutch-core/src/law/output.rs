@@ -1,35 +1,46 @@
 //! The end that all laws share: bumpless start, limits, and what a non-number becomes.
 
-use crate::error::{cast, require};
-use crate::{Micros, ParamError, Real};
+use crate::params::{Range, Table};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
-/// Output stage of a law; `Default` = the paper's 0 to 10 V without bumpless start, braking
-/// fully on an invalid demand.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct OutputParams<T = f64> {
-    /// Lowest voltage, V. Above 0 the pad never lifts.
-    pub lowest: T,
-    /// Highest voltage, V.
-    pub highest: T,
-    /// Voltage applied when the demand is not a number, V; between the two limits.
-    pub on_invalid: T,
-    /// Time constant with which the difference between the voltage found at start and the
-    /// law's first demand decays, s; 0 starts with the law's own demand.
-    pub bumpless_time: T,
+crate::params! {
+    /// Output stage of a law. The defaults are the paper's 0 to 10 V without bumpless start, and full braking on
+    /// an invalid demand.
+    pub struct OutputParams<T>: Default {
+        /// Lowest voltage: a pad can only push. Above 0 the pad never lifts.
+        lowest: T = 0.0, "lowest_v" "" V, Range::at_least(0.0);
+        /// Highest voltage. Lower `on_invalid_v` together with it.
+        highest: T = 10.0, "highest_v" "" V, Range::ANY;
+        /// Voltage for a demand that is not a number.
+        on_invalid: T = 10.0, "on_invalid_v" "" V, Range::ANY;
+        /// Time constant of a bumpless start, with which the difference between the voltage found at start and the
+        /// law's first demand decays; 0 starts with the law's own demand.
+        bumpless_time: T = 0.0, "bumpless_time_s" "" S, Range::at_least(0.0);
+    }
+    relations(p) {
+        /// The range is not empty.
+        ABOVE_LOWEST: highest, "a voltage above lowest_v" => p.highest > p.lowest;
+        /// The voltage for an invalid demand is one of the range.
+        WITHIN_LIMITS: on_invalid, "a voltage from lowest_v to highest_v (it does not follow them)" =>
+            p.on_invalid >= p.lowest && p.on_invalid <= p.highest;
+        /// The converter reaches the lowest voltage.
+        LOWEST_REACHED: lowest, "a voltage that the converter reaches: not below rig.dac.lowest_v";
+        /// The converter reaches the highest voltage.
+        HIGHEST_REACHED: highest, "a voltage that the converter reaches: not above rig.dac.highest_v";
+    }
 }
 
-cast!(OutputParams { lowest, highest, on_invalid, bumpless_time });
-
-impl<T: Real> Default for OutputParams<T> {
-    fn default() -> Self {
-        let highest = T::from_i32(10);
-        OutputParams { lowest: T::ZERO, highest, on_invalid: highest, bumpless_time: T::ZERO }
+impl<T: Real> OutputParams<T> {
+    /// The default output stage with these limits, V; an invalid demand brakes with the higher.
+    #[must_use]
+    pub fn within(lowest: T, highest: T) -> Self {
+        OutputParams { lowest, highest, on_invalid: highest, bumpless_time: T::ZERO }
     }
 }
 
 /// Whether and where the output stage changed the demand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Limit {
     /// The demand went out as it was.
     #[default]
@@ -40,6 +51,17 @@ pub enum Limit {
     Highest,
     /// The demand was not a number; the voltage for that case went out.
     Invalid,
+}
+
+impl Limit {
+    /// Every limit, by its number in logs and on the wire.
+    pub const ALL: [Limit; 4] = [Limit::None, Limit::Lowest, Limit::Highest, Limit::Invalid];
+
+    /// The limit of that number.
+    #[must_use]
+    pub fn from_u8(number: u8) -> Option<Limit> {
+        Limit::ALL.get(usize::from(number)).copied()
+    }
 }
 
 /// The checked output stage.
@@ -61,31 +83,26 @@ impl<T: Real> Output<T> {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// `lowest` negative (a pad cannot pull), `highest` not above it, `on_invalid` outside the
-    /// two, `bumpless_time` negative; `period` out of range.
+    /// The first parameter out of range; `period` out of range.
+    #[inline(never)] // each law asks for one: a board needs the code once
     pub fn new(p: &OutputParams<T>, period: Micros) -> Result<Self, ParamError<T>> {
         let period = period.period::<T>()?;
-        require(
-            "lowest",
-            p.lowest,
-            p.lowest >= T::ZERO,
-            "a finite voltage of at least 0 V: a pad can only push",
-        )?;
-        require("highest", p.highest, p.highest > p.lowest, "a finite voltage above the lowest, V")?;
-        require(
-            "on_invalid",
-            p.on_invalid,
-            p.on_invalid >= p.lowest && p.on_invalid <= p.highest,
-            "a voltage from the lowest to the highest, V (it does not follow them)",
-        )?;
-        require(
-            "bumpless_time",
-            p.bumpless_time,
-            p.bumpless_time >= T::ZERO,
-            "a finite time of at least 0 s",
-        )?;
+        p.check_rows()?;
         let decay = if p.bumpless_time > T::ZERO { (-(period / p.bumpless_time)).exp() } else { T::ZERO };
         Ok(Output { lowest: p.lowest, highest: p.highest, on_invalid: p.on_invalid, decay })
+    }
+}
+
+impl<T: Arithmetic> Output<T> {
+    /// The output stages of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Output<L> {
+        Output {
+            lowest: each(&|o| o.lowest),
+            highest: each(&|o| o.highest),
+            on_invalid: each(&|o| o.on_invalid),
+            decay: each(&|o| o.decay),
+        }
     }
 
     /// Lowest voltage, V.
@@ -100,26 +117,37 @@ impl<T: Real> Output<T> {
         self.highest
     }
 
+    /// Voltage for an invalid demand, V.
+    #[must_use]
+    pub fn on_invalid(&self) -> T {
+        self.on_invalid
+    }
+
     /// The state from which a law that demands `demand` starts at the voltage `applied`.
     #[must_use]
     pub fn start(&self, demand: T, applied: T) -> OutputState<T> {
         let offset = applied - demand;
-        let bumpless = self.decay > T::ZERO && offset.is_finite();
-        OutputState { offset: if bumpless { offset } else { T::ZERO } }
+        let bumpless = T::ZERO.less(self.decay) & offset.is_finite();
+        OutputState { offset: T::select(bumpless, offset, T::ZERO) }
     }
 
     /// A law's demand in, the voltage out, V.
     #[inline]
-    pub fn apply(&self, state: &mut OutputState<T>, demand: T) -> (T, Limit) {
+    pub fn apply(&self, state: &mut OutputState<T>, demand: T) -> (T, T::Limit) {
         let demand = demand + state.offset;
         state.offset = state.offset * self.decay;
-        if demand >= self.lowest {
-            if demand <= self.highest { (demand, Limit::None) } else { (self.highest, Limit::Highest) }
-        } else if demand < self.lowest {
-            (self.lowest, Limit::Lowest)
-        } else {
-            (self.on_invalid, Limit::Invalid)
+        let inside = self.lowest.less_or_equal(demand) & demand.less_or_equal(self.highest);
+        // Most demands are inside: a scalar asks no more then.
+        if T::all(inside) {
+            return (demand, T::limit_of(Limit::None));
         }
+        let (below, above) = (demand.less(self.lowest), self.highest.less(demand));
+        let of = T::limit_of;
+        let voltage = T::select(below, self.lowest, self.on_invalid);
+        let limit = T::select_limit(below, of(Limit::Lowest), of(Limit::Invalid));
+        let voltage = T::select(above, self.highest, voltage);
+        let limit = T::select_limit(above, of(Limit::Highest), limit);
+        (T::select(inside, demand, voltage), T::select_limit(inside, of(Limit::None), limit))
     }
 }
 
@@ -162,7 +190,7 @@ mod tests {
             (OutputParams { on_invalid: 11.0, ..d }, "on_invalid"),
             (OutputParams { bumpless_time: f64::NAN, ..d }, "bumpless_time"),
         ] {
-            assert_eq!(Output::new(&bad, Micros(1000)).unwrap_err().field, field);
+            assert_eq!(Output::new(&bad, Micros(1000)).unwrap_err().field(), field);
         }
     }
 }

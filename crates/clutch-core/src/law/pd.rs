@@ -7,26 +7,17 @@
 //! The paper prints (4) without the minus. With `e = θ_d − θ > 0` the shaft lags and the brake
 //! has to let go; as printed it holds harder and the shaft never comes back.
 
-use super::output::{Output, OutputParams, OutputState};
-use super::{Command, Controller, Terms, Tick};
-use crate::error::{cast, require};
-use crate::{Micros, ParamError, Real};
+use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
+use crate::params::{Range, Table};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
-/// Gains of (4); `Default` = Table 2.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct PdParams<T = f64> {
-    /// `K_p` in (4), V/rad.
-    pub kp: T,
-    /// `K_d` in (4), V s/rad.
-    pub kd: T,
-}
-
-cast!(PdParams { kp, kd });
-
-impl<T: Real> Default for PdParams<T> {
-    fn default() -> Self {
-        PdParams { kp: T::from_i32(5000), kd: T::from_i32(50) }
+crate::params! {
+    /// Proportional–derivative control (4): `u = −(K_p e + K_d ė)`. The gains' defaults are Table 2's.
+    pub struct PdParams<T>: Default {
+        /// Proportional gain of (4).
+        kp: T = 5000.0, "kp_v_rad" "K_p" V_RAD, Range::at_least(0.0);
+        /// Derivative gain of (4).
+        kd: T = 50.0, "kd_v_s_rad" "K_d" V_S_RAD, Range::at_least(0.0);
     }
 }
 
@@ -37,61 +28,37 @@ pub struct Pd<T> {
     output: Output<T>,
 }
 
-/// Intermediate terms of (4).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PdTerms<T> {
-    /// `−K_p e`, V.
-    pub proportional: T,
-    /// `−K_d ė`, V.
-    pub derivative: T,
-}
-
-impl<T: Real> Terms<T> for PdTerms<T> {
-    fn columns(&self) -> [(&'static str, T); 3] {
-        [
-            ("proportional_v", self.proportional),
-            ("derivative_v", self.derivative),
-            ("demand_v", self.proportional + self.derivative),
-        ]
-    }
-}
-
 impl<T: Real> Pd<T> {
     /// Checks gains and output stage.
     ///
     /// # Errors
-    /// `kp` or `kd` negative or not finite; a bad output stage or period.
+    /// The first parameter out of range.
     pub fn new(p: &PdParams<T>, output: &OutputParams<T>, period: Micros) -> Result<Self, ParamError<T>> {
-        require("kp", p.kp, p.kp >= T::ZERO, "a finite number of at least 0 V/rad")?;
-        require("kd", p.kd, p.kd >= T::ZERO, "a finite number of at least 0 V s/rad")?;
+        p.check_rows()?;
         Ok(Pd { params: *p, output: Output::new(output, period)? })
-    }
-
-    /// The gains.
-    #[must_use]
-    pub fn params(&self) -> &PdParams<T> {
-        &self.params
-    }
-
-    /// The output stage.
-    #[must_use]
-    pub fn output(&self) -> &Output<T> {
-        &self.output
-    }
-
-    #[inline]
-    fn terms(&self, tick: &Tick<T>) -> (T, PdTerms<T>) {
-        let terms = PdTerms {
-            proportional: -(self.params.kp * tick.error),
-            derivative: -(self.params.kd * tick.error_rate),
-        };
-        (terms.proportional + terms.derivative, terms)
     }
 }
 
-impl<T: Real> Controller<T> for Pd<T> {
+impl<T: Arithmetic> Pd<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Pd<L> {
+        let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
+        Pd { params: PdParams { kp: each(&|law| law.params.kp), kd: each(&|law| law.params.kd) }, output }
+    }
+
+    #[inline]
+    fn terms(&self, tick: &Tick<T>) -> (T, [T; 2]) {
+        let proportional = -(self.params.kp * tick.error);
+        let derivative = -(self.params.kd * tick.error_rate);
+        (proportional + derivative, [proportional, derivative])
+    }
+}
+
+impl<T: Arithmetic> ControlLaw<T> for Pd<T> {
     type State = OutputState<T>;
-    type Terms = PdTerms<T>;
+    type Terms = [T; 2];
+    const TERMS: &'static [&'static str] = &["proportional_v", "derivative_v"];
 
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
         self.output.start(self.terms(tick).0, applied)
@@ -102,5 +69,24 @@ impl<T: Real> Controller<T> for Pd<T> {
         let (demand, terms) = self.terms(tick);
         let (voltage, limit) = self.output.apply(state, demand);
         Command { voltage, limit, terms }
+    }
+}
+
+impl<T: Real> Listed<T> for Pd<T> {
+    type Params = PdParams<T>;
+    const TITLE: &'static str = "PD (4)";
+
+    fn build(p: &PdParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
+        Pd::new(p, beside.output, beside.period)
+    }
+
+    fn output(&self) -> &Output<T> {
+        &self.output
+    }
+
+    fn surface(&self, _: &Asked<'_, T>) -> Option<Surface<T>> {
+        let PdParams { kp, kd } = self.params;
+        let highest = self.output.highest();
+        (kd > T::ZERO && kp > T::ZERO).then(|| Surface::affine(kp / kd, highest / kd, highest))
     }
 }

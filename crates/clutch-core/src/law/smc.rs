@@ -1,192 +1,91 @@
-//! Sliding-mode control, with the sign function and with the saturation boundary layer.
+//! Sliding-mode control with the saturation boundary layer.
 //!
 //! ```text
 //! σ = f e + ė                                                     (13)
-//! u = −{K_p sgn(σ)   + K_d sgn(σ ė) ė}                            (29)
 //! u = −{K_p sat(σ/ε) + K_d sat(σ ė/ε) ė}                          (31)
 //! ```
 //!
 //! `ε` divides `σ` (rad/s) and `σ ė` (rad²/s²) alike; the paper gives it no unit.
 
-use super::output::{Output, OutputParams, OutputState};
-use super::{Command, Controller, Terms, Tick};
-use crate::error::{cast, require};
-use crate::{Micros, ParamError, Real};
+use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
+use crate::params::{Range, Table};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
-/// Gains of (31); `Default` = Table 2.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct SmcParams<T = f64> {
-    /// `K_p` in (31), V.
-    pub kp: T,
-    /// `K_d` in (31), V s/rad.
-    pub kd: T,
-    /// `f` in (13): slope of the sliding surface, 1/s.
-    #[doc(alias = "f")]
-    #[doc(alias = "lambda")]
-    pub slope: T,
-    /// `ε` in (30): thickness of the boundary layer, rad/s.
-    #[doc(alias = "epsilon")]
-    pub boundary: T,
-}
-
-cast!(SmcParams { kp, kd, slope, boundary });
-cast!(SmcSignParams { kp, kd, slope });
-
-impl<T: Real> Default for SmcParams<T> {
-    fn default() -> Self {
-        SmcParams {
-            kp: T::from_i32(3),
-            kd: T::from_i32(400),
-            slope: T::from_i32(70),
-            boundary: T::from_f64(0.1),
-        }
+crate::params! {
+    /// Sliding-mode control with a boundary layer (31). The gains' defaults are Table 2's.
+    ///
+    /// `u = −{K_p sat(σ/ε) + K_d sat(σ ė/ε) ė}` with `σ = f e + ė`.
+    pub struct SmcParams<T>: Default {
+        /// Switching gain of (31).
+        kp: T = 3.0, "kp_v" "K_p" V, Range::at_least(0.0);
+        /// Damping gain of (31).
+        kd: T = 400.0, "kd_v_s_rad" "K_d" V_S_RAD, Range::at_least(0.0);
+        /// Slope of the sliding surface (13).
+        slope: T = 70.0, "slope_1_s" "f" PER_S, Range::above(0.0);
+        /// Thickness of the boundary layer (30).
+        boundary: T = 0.1, "boundary_rad_s" "ε" RAD_S, Range::divisor();
     }
 }
 
-/// Gains of (29); `Default` = Table 2.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct SmcSignParams<T = f64> {
-    /// `K_p` in (29), V.
-    pub kp: T,
-    /// `K_d` in (29), V s/rad.
-    pub kd: T,
-    /// `f` in (13): slope of the sliding surface, 1/s.
-    pub slope: T,
-}
-
-impl<T: Real> Default for SmcSignParams<T> {
-    fn default() -> Self {
-        let SmcParams { kp, kd, slope, .. } = SmcParams::default();
-        SmcSignParams { kp, kd, slope }
-    }
-}
-
-/// How the law switches across the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Switching<T> {
-    Sign,
-    Saturation { inverse_boundary: T },
-}
-
-/// The law (29) or (31), checked.
+/// The law (31), checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smc<T> {
-    kp: T,
-    kd: T,
-    slope: T,
-    switching: Switching<T>,
+    params: SmcParams<T>,
+    inverse_boundary: T,
     output: Output<T>,
 }
 
-/// Intermediate terms of (29) and (31).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SmcTerms<T> {
-    /// `σ` in (13), rad/s.
-    pub surface: T,
-    /// `−K_p sat(σ/ε)`, V.
-    pub switching: T,
-    /// `−K_d sat(σ ė/ε) ė`, V.
-    pub damping: T,
-}
-
-impl<T: Real> Terms<T> for SmcTerms<T> {
-    fn columns(&self) -> [(&'static str, T); 3] {
-        [("surface_rad_s", self.surface), ("switching_v", self.switching), ("damping_v", self.damping)]
-    }
-}
-
 impl<T: Real> Smc<T> {
-    /// The law (31), with the boundary layer.
+    /// Checks gains and output stage.
     ///
     /// # Errors
-    /// `kp` or `kd` negative, `slope` or `boundary` not positive, any of them not finite; a bad
-    /// output stage or period.
+    /// The first parameter out of range.
     pub fn new(p: &SmcParams<T>, output: &OutputParams<T>, period: Micros) -> Result<Self, ParamError<T>> {
+        p.check_rows()?;
         let inverse_boundary = T::ONE / p.boundary;
-        require(
-            "boundary",
-            p.boundary,
-            p.boundary > T::ZERO && inverse_boundary.is_finite(),
-            "a finite number above 0 rad/s",
-        )?;
-        let gains = SmcSignParams { kp: p.kp, kd: p.kd, slope: p.slope };
-        let law = Smc::with_sign(&gains, output, period)?;
-        Ok(Smc { switching: Switching::Saturation { inverse_boundary }, ..law })
+        Ok(Smc { params: *p, inverse_boundary, output: Output::new(output, period)? })
     }
+}
 
-    /// The law (29), with the sign function: it chatters.
-    ///
-    /// # Errors
-    /// As [`Smc::new`], without the boundary.
-    pub fn with_sign(
-        p: &SmcSignParams<T>,
-        output: &OutputParams<T>,
-        period: Micros,
-    ) -> Result<Self, ParamError<T>> {
-        require("kp", p.kp, p.kp >= T::ZERO, "a finite number of at least 0 V")?;
-        require("kd", p.kd, p.kd >= T::ZERO, "a finite number of at least 0 V s/rad")?;
-        require("slope", p.slope, p.slope > T::ZERO, "a finite number above 0 1/s")?;
-        let output = Output::new(output, period)?;
-        Ok(Smc { kp: p.kp, kd: p.kd, slope: p.slope, switching: Switching::Sign, output })
-    }
+/// `σ` of (13), and what the two parts of a sliding law make of `σ` and `σ ė`.
+#[inline]
+pub(super) fn switched<T: Arithmetic>(
+    (kp, kd, slope): (T, T, T),
+    tick: &Tick<T>,
+    switch: impl Fn(T) -> T,
+) -> (T, [T; 3]) {
+    let surface = slope * tick.error + tick.error_rate;
+    let across = surface * tick.error_rate;
+    let switching = -(kp * switch(surface));
+    let damping = -(kd * switch(across) * tick.error_rate);
+    (switching + damping, [surface, switching, damping])
+}
 
-    /// `K_p`, V.
+impl<T: Arithmetic> Smc<T> {
+    /// The laws of several lanes as one.
     #[must_use]
-    pub fn kp(&self) -> T {
-        self.kp
-    }
-
-    /// `K_d`, V s/rad.
-    #[must_use]
-    pub fn kd(&self) -> T {
-        self.kd
-    }
-
-    /// `f`, 1/s.
-    #[must_use]
-    pub fn slope(&self) -> T {
-        self.slope
-    }
-
-    /// `ε`, rad/s; 0 for the sign function.
-    #[must_use]
-    pub fn boundary(&self) -> T {
-        match self.switching {
-            Switching::Sign => T::ZERO,
-            Switching::Saturation { inverse_boundary } => T::ONE / inverse_boundary,
-        }
-    }
-
-    /// The output stage.
-    #[must_use]
-    pub fn output(&self) -> &Output<T> {
-        &self.output
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Smc<L> {
+        let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
+        let params = SmcParams {
+            kp: each(&|law| law.params.kp),
+            kd: each(&|law| law.params.kd),
+            slope: each(&|law| law.params.slope),
+            boundary: each(&|law| law.params.boundary),
+        };
+        Smc { params, inverse_boundary: each(&|law| law.inverse_boundary), output }
     }
 
     #[inline]
-    fn terms(&self, tick: &Tick<T>) -> (T, SmcTerms<T>) {
-        let surface = self.slope * tick.error + tick.error_rate;
-        let across = surface * tick.error_rate;
-        let (switch, damp) = match self.switching {
-            Switching::Sign => (surface.sgn(), across.sgn()),
-            Switching::Saturation { inverse_boundary } => {
-                ((surface * inverse_boundary).sat(), (across * inverse_boundary).sat())
-            }
-        };
-        let terms = SmcTerms {
-            surface,
-            switching: -(self.kp * switch),
-            damping: -(self.kd * damp * tick.error_rate),
-        };
-        (terms.switching + terms.damping, terms)
+    fn terms(&self, tick: &Tick<T>) -> (T, [T; 3]) {
+        let SmcParams { kp, kd, slope, .. } = self.params;
+        switched((kp, kd, slope), tick, |x| (x * self.inverse_boundary).sat())
     }
 }
 
-impl<T: Real> Controller<T> for Smc<T> {
+impl<T: Arithmetic> ControlLaw<T> for Smc<T> {
     type State = OutputState<T>;
-    type Terms = SmcTerms<T>;
+    type Terms = [T; 3];
+    const TERMS: &'static [&'static str] = &["surface_rad_s", "switching_v", "damping_v"];
 
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
         self.output.start(self.terms(tick).0, applied)
@@ -197,5 +96,25 @@ impl<T: Real> Controller<T> for Smc<T> {
         let (demand, terms) = self.terms(tick);
         let (voltage, limit) = self.output.apply(state, demand);
         Command { voltage, limit, terms }
+    }
+}
+
+impl<T: Real> Listed<T> for Smc<T> {
+    type Params = SmcParams<T>;
+    const TITLE: &'static str = "SMC (31), with boundary layer";
+
+    fn build(p: &SmcParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
+        Smc::new(p, beside.output, beside.period)
+    }
+
+    fn output(&self) -> &Output<T> {
+        &self.output
+    }
+
+    fn surface(&self, _: &Asked<'_, T>) -> Option<Surface<T>> {
+        let SmcParams { kp, kd, slope, .. } = self.params;
+        // The layer as the law computes with it.
+        let layer = T::ONE / self.inverse_boundary;
+        Some(Surface { slope, layer, kp, kd: Some(kd), weakened: layer > T::ZERO, sliding: true })
     }
 }

@@ -26,7 +26,7 @@ pub use profile::{JerkLimited, MinimumJerk, Trapezoid};
 pub use table::{Interpolation, Knot, Table};
 pub use wave::{Chirp, Sine};
 
-use crate::error::{cast, require};
+use crate::params::{Range, Table as _};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 use profile::Profile;
 use wave::Wave;
@@ -42,45 +42,54 @@ pub struct Target<T> {
     pub acceleration: T,
 }
 
-cast!(Target { velocity, acceleration } keep { position });
-
-/// Which path, and its parameters.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum ReferenceParams<'a, T = f64> {
-    /// Stay at the start.
-    Hold,
-    /// Constant rate from the first tick, rad/s; the paper's path.
-    Ramp(T),
-    /// Rest to rest with bounded velocity and acceleration.
-    Trapezoid(Trapezoid<T>),
-    /// Rest to rest with bounded velocity, acceleration and jerk.
-    JerkLimited(JerkLimited<T>),
-    /// Rest to rest with the least jerk over a given time.
-    MinimumJerk(MinimumJerk<T>),
-    /// A sine on a ramp.
-    Sine(Sine<T>),
-    /// A sine of rising or falling frequency on a ramp.
-    Chirp(Chirp<T>),
-    /// Points in time.
-    Table(Table<'a>),
+impl<T: Real> Target<T> {
+    /// The same in another scalar, velocity and acceleration rounded to the nearest.
+    #[must_use]
+    pub fn cast<U: Real>(&self) -> Target<U> {
+        let to = |x: T| U::from_f64(x.to_f64());
+        Target { position: self.position, velocity: to(self.velocity), acceleration: to(self.acceleration) }
+    }
 }
 
-impl<'a, T: Real> ReferenceParams<'a, T> {
-    /// The same in another scalar, each number rounded to the nearest; a table's points are
-    /// integers and stay as they are.
+crate::params! {
+    /// Constant rate from the first tick: the paper's path.
+    pub struct Ramp<T> {
+        /// Rate, to which the velocity jumps at the start. A brake follows only the sign of its drive.
+        rate: T, "rate_deg_s" "" DEG_S, Range::ANY;
+    }
+    relations(p) {
+        /// Counts hold the rate.
+        RATE: rate, "a finite rate below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s";
+    }
+}
+
+crate::choice! {
+    /// Planned path of the shaft.
+    pub enum ReferenceParams<'a, T> {
+        /// Stays at the start.
+        Hold = "hold",
+        /// Constant rate from the first tick.
+        Ramp(Ramp<T>) = "ramp",
+        /// Rest to rest with bounded velocity and acceleration.
+        Trapezoid(Trapezoid<T>) = "trapezoid",
+        /// Rest to rest with bounded velocity, acceleration and jerk.
+        JerkLimited(JerkLimited<T>) = "jerk_limited",
+        /// Rest to rest with the least jerk over a given time.
+        MinimumJerk(MinimumJerk<T>) = "minimum_jerk",
+        /// A sine on a ramp.
+        Sine(Sine<T>) = "sine",
+        /// A sine of rising or falling frequency on a ramp.
+        Chirp(Chirp<T>) = "chirp",
+        /// Points in time.
+        Table(Table<'a>) = "table",
+    }
+}
+
+impl<T> ReferenceParams<'_, T> {
+    /// A ramp of this rate, rad/s.
     #[must_use]
-    pub fn cast<U: Real>(&self) -> ReferenceParams<'a, U> {
-        match self {
-            ReferenceParams::Hold => ReferenceParams::Hold,
-            ReferenceParams::Ramp(rate) => ReferenceParams::Ramp(U::from_f64(rate.to_f64())),
-            ReferenceParams::Trapezoid(p) => ReferenceParams::Trapezoid(p.cast()),
-            ReferenceParams::JerkLimited(p) => ReferenceParams::JerkLimited(p.cast()),
-            ReferenceParams::MinimumJerk(p) => ReferenceParams::MinimumJerk(p.cast()),
-            ReferenceParams::Sine(p) => ReferenceParams::Sine(p.cast()),
-            ReferenceParams::Chirp(p) => ReferenceParams::Chirp(p.cast()),
-            ReferenceParams::Table(table) => ReferenceParams::Table(*table),
-        }
+    pub const fn ramp(rate: T) -> Self {
+        ReferenceParams::Ramp(Ramp { rate })
     }
 }
 
@@ -89,7 +98,7 @@ impl<'a, T: Real> ReferenceParams<'a, T> {
 /// ```
 /// use clutch_core::{Encoder, FixedCounts, Micros, reference::{Reference, ReferenceParams}};
 /// let two_deg_s = 2.0_f64.to_radians();
-/// let ramp = Reference::new(&ReferenceParams::Ramp(two_deg_s), FixedCounts(0), Encoder::PAPER, Micros(1000))?;
+/// let ramp = Reference::new(&ReferenceParams::ramp(two_deg_s), FixedCounts(0), Encoder::PAPER, Micros(1000))?;
 /// let after_9_s = ramp.at(9_000); // 18° are 1000 counts
 /// assert!((after_9_s.position.0 - (1000 << 16)).abs() <= 1);
 /// assert_eq!(after_9_s.velocity, two_deg_s);
@@ -123,8 +132,9 @@ impl<'a, T: Real> Reference<'a, T> {
         let scale = Scale { counts_per_radian: encoder.counts_per_radian(), period: seconds };
         let kind = match p {
             ReferenceParams::Hold => Kind::Profile(Profile::ramp(T::ZERO, scale)),
-            ReferenceParams::Ramp(rate) => {
-                Kind::Profile(Profile::ramp(representable_rate("rate", *rate, scale)?, scale))
+            ReferenceParams::Ramp(p) => {
+                p.check_rows()?;
+                Kind::Profile(Profile::ramp(Ramp::RATE.require(p.rate, scale.holds_rate(p.rate))?, scale))
             }
             ReferenceParams::Trapezoid(p) => Kind::Profile(Profile::trapezoid(p, scale)?),
             ReferenceParams::JerkLimited(p) => Kind::Profile(Profile::jerk_limited(p, scale)?),
@@ -132,7 +142,7 @@ impl<'a, T: Real> Reference<'a, T> {
             ReferenceParams::Sine(p) => Kind::Wave(Wave::sine(p, scale)?),
             ReferenceParams::Chirp(p) => Kind::Wave(Wave::chirp(p, scale)?),
             ReferenceParams::Table(table) => {
-                table.check()?;
+                table.check_points()?;
                 Kind::Table(*table, table::Scale::new(encoder, period))
             }
         };
@@ -178,21 +188,30 @@ impl<T: Real> Scale<T> {
     fn seconds(&self, ticks: u64) -> T {
         T::from_u64(ticks) * self.period
     }
+
+    /// 2⁻⁴⁰ counts per tick in 64 bits hold a rate, rad/s.
+    fn holds_rate(&self, rate: T) -> bool {
+        (rate * self.counts_per_radian * self.period).abs() < T::from_i32(4_000_000)
+    }
+
+    /// Fixed-point counts hold a distance, rad.
+    fn holds_distance(&self, distance: T) -> bool {
+        (distance * self.counts_per_radian).abs() < T::from_f64(1e12)
+    }
+
+    /// Ticks count a time, s; not if it is NaN.
+    fn counts_time(&self, time: T) -> bool {
+        time < self.period * T::from_f64(1e15)
+    }
+
+    /// Samples see a frequency, Hz.
+    fn samples(&self, frequency: T) -> bool {
+        frequency * self.period < T::from_f64(0.5)
+    }
 }
 
 /// `rate · ticks`, exact.
 fn advance(rate: i64, ticks: u64) -> FixedCounts {
     let product = i128::from(rate).wrapping_mul(i128::from(ticks));
     FixedCounts((product >> (RATE_BITS - FixedCounts::FRACTION_BITS)) as i64)
-}
-
-/// A rate that 2⁻⁴⁰ counts per tick in 64 bits can hold.
-fn representable_rate<T: Real>(field: &'static str, rate: T, scale: Scale<T>) -> Result<T, ParamError<T>> {
-    let counts_per_tick = (rate * scale.counts_per_radian * scale.period).abs();
-    require(
-        field,
-        rate,
-        counts_per_tick < T::from_i32(4_000_000),
-        "a finite rate below 4e6 counts per period, rad/s",
-    )
 }

@@ -1,50 +1,74 @@
 //! Paths made of polynomial pieces: ramp, trapezoid, jerk-limited, minimum jerk.
 
-use super::{Scale, Target, advance, representable_rate};
-use crate::error::{cast, require};
+use super::{Scale, Target, advance};
+use crate::params::{Range, Table};
 use crate::{FixedCounts, ParamError, Real};
 
-/// Rest to rest with a trapezoidal velocity; a triangle where the distance is too short.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Trapezoid<T = f64> {
-    /// Distance, rad. Either sign; a brake follows only the sign of its drive.
-    pub distance: T,
-    /// Highest speed, rad/s.
-    pub speed: T,
-    /// Acceleration and deceleration, rad/s².
-    pub acceleration: T,
+crate::params! {
+    /// Rest to rest with a trapezoidal velocity; a triangle where the distance is too short.
+    pub struct Trapezoid<T> {
+        /// Distance. Either sign; a brake follows only the sign of its drive.
+        distance: T, "distance_deg" "" DEG, Range::ANY;
+        /// Highest speed.
+        speed: T, "speed_deg_s" "" DEG_S, Range::above(0.0);
+        /// Acceleration and deceleration.
+        acceleration: T, "acceleration_deg_s2" "" DEG_S2, Range::above(0.0);
+    }
+    relations(p) {
+        /// Counts hold the distance.
+        DISTANCE: distance, "a finite distance below 1e12 counts of rig.encoder.counts_per_rev, °";
+        /// Counts hold the speed.
+        SPEED: speed, "a finite speed below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s";
+        /// The speed ends the path.
+        SPEED_ENDS: speed, "a speed high enough to end within 1e15 periods, °/s";
+        /// The acceleration ends the path.
+        ACCELERATION_ENDS: acceleration, "an acceleration high enough to end within 1e15 periods, °/s²";
+    }
 }
 
-cast!(Trapezoid { distance, speed, acceleration });
-
-/// Rest to rest with bounded jerk: seven pieces, fewer where a bound is not reached.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct JerkLimited<T = f64> {
-    /// Distance, rad. Either sign; a brake follows only the sign of its drive.
-    pub distance: T,
-    /// Highest speed, rad/s.
-    pub speed: T,
-    /// Highest acceleration and deceleration, rad/s².
-    pub acceleration: T,
-    /// Highest jerk, rad/s³.
-    pub jerk: T,
+crate::params! {
+    /// Rest to rest with bounded jerk: seven pieces, fewer where a bound is not reached.
+    pub struct JerkLimited<T> {
+        /// Distance. Either sign; a brake follows only the sign of its drive.
+        distance: T, "distance_deg" "" DEG, Range::ANY;
+        /// Highest speed.
+        speed: T, "speed_deg_s" "" DEG_S, Range::above(0.0);
+        /// Highest acceleration and deceleration.
+        acceleration: T, "acceleration_deg_s2" "" DEG_S2, Range::above(0.0);
+        /// Highest jerk.
+        jerk: T, "jerk_deg_s3" "" DEG_S3, Range::above(0.0);
+    }
+    relations(p) {
+        /// Counts hold the distance.
+        DISTANCE: distance, "a finite distance below 1e12 counts of rig.encoder.counts_per_rev, °";
+        /// Counts hold the speed.
+        SPEED: speed, "a finite speed below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s";
+        /// The speed ends the path.
+        SPEED_ENDS: speed, "a speed high enough to end within 1e15 periods, °/s";
+        /// The acceleration ends the path.
+        ACCELERATION_ENDS: acceleration, "an acceleration high enough to end within 1e15 periods, °/s²";
+        /// The jerk ends the path.
+        JERK_ENDS: jerk, "a jerk high enough to end within 1e15 periods, °/s³";
+    }
 }
 
-cast!(JerkLimited { distance, speed, acceleration, jerk });
-
-/// Rest to rest along `10 s³ − 15 s⁴ + 6 s⁵`, `s = t/duration` (Flash and Hogan 1985).
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct MinimumJerk<T = f64> {
-    /// Distance, rad. Either sign; a brake follows only the sign of its drive.
-    pub distance: T,
-    /// Time, s.
-    pub duration: T,
+crate::params! {
+    /// Rest to rest along `10 s³ − 15 s⁴ + 6 s⁵`, `s = t/duration` (Flash and Hogan 1985).
+    pub struct MinimumJerk<T> {
+        /// Distance. Either sign; a brake follows only the sign of its drive.
+        distance: T, "distance_deg" "" DEG, Range::ANY;
+        /// Time of the path.
+        duration: T, "duration_s" "" S, Range::above(0.0).up_to(1e6);
+    }
+    relations(p) {
+        /// Counts hold the distance.
+        DISTANCE: distance, "a finite distance below 1e12 counts of rig.encoder.counts_per_rev, °";
+        /// Ticks resolve the time.
+        DURATION: duration, "a time of at least sampling.period_us, s";
+        /// Counts hold the speed.
+        STEEP: duration, "a time in which the highest speed stays below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, s";
+    }
 }
-
-cast!(MinimumJerk { distance, duration });
 
 /// One piece: from its first tick until the next piece's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,17 +127,12 @@ impl<T: Real> Profile<T> {
     }
 
     pub(super) fn trapezoid(p: &Trapezoid<T>, scale: Scale<T>) -> Result<Self, ParamError<T>> {
-        require_distance(p.distance, scale)?;
-        let speed = require_speed(p.speed, scale)?;
-        let a = require(
-            "acceleration",
-            p.acceleration,
-            p.acceleration > T::ZERO,
-            "a finite number above 0 rad/s²",
-        )?;
-        let length = p.distance.abs();
-        require("speed", speed, ends(length / speed, scale), ENOUGH)?;
-        require("acceleration", a, ends((length / a).sqrt(), scale), ENOUGH)?;
+        p.check_rows()?;
+        Trapezoid::DISTANCE.require(p.distance, scale.holds_distance(p.distance))?;
+        Trapezoid::SPEED.require(p.speed, scale.holds_rate(p.speed))?;
+        let (speed, a, length) = (p.speed, p.acceleration, p.distance.abs());
+        Trapezoid::SPEED_ENDS.require(speed, scale.counts_time(length / speed))?;
+        Trapezoid::ACCELERATION_ENDS.require(a, scale.counts_time((length / a).sqrt()))?;
         let speed = speed.min((length * a).sqrt());
         let rise = speed / a;
         let cruise = if speed > T::ZERO { (length / speed - rise).max(T::ZERO) } else { T::ZERO };
@@ -126,21 +145,16 @@ impl<T: Real> Profile<T> {
     }
 
     pub(super) fn jerk_limited(p: &JerkLimited<T>, scale: Scale<T>) -> Result<Self, ParamError<T>> {
-        require_distance(p.distance, scale)?;
-        let speed = require_speed(p.speed, scale)?;
-        let a = require(
-            "acceleration",
-            p.acceleration,
-            p.acceleration > T::ZERO,
-            "a finite number above 0 rad/s²",
-        )?;
-        let j = require("jerk", p.jerk, p.jerk > T::ZERO, "a finite number above 0 rad/s³")?;
+        p.check_rows()?;
+        JerkLimited::DISTANCE.require(p.distance, scale.holds_distance(p.distance))?;
+        JerkLimited::SPEED.require(p.speed, scale.holds_rate(p.speed))?;
+        let (speed, a, j) = (p.speed, p.acceleration, p.jerk);
         let (length, two) = (p.distance.abs(), T::from_i32(2));
         // The time of half the move if nothing but the jerk were bounded.
         let by_jerk = (length / (two * j)).powf(T::ONE / T::from_i32(3));
-        require("speed", speed, ends(length / speed, scale), ENOUGH)?;
-        require("acceleration", a, ends((length / a).sqrt(), scale), ENOUGH)?;
-        require("jerk", j, ends(by_jerk, scale), ENOUGH)?;
+        JerkLimited::SPEED_ENDS.require(speed, scale.counts_time(length / speed))?;
+        JerkLimited::ACCELERATION_ENDS.require(a, scale.counts_time((length / a).sqrt()))?;
+        JerkLimited::JERK_ENDS.require(j, scale.counts_time(by_jerk))?;
         // The peak speed for which rise and fall alone make up the distance.
         let highest = if j * by_jerk <= a {
             j * by_jerk * by_jerk
@@ -169,16 +183,11 @@ impl<T: Real> Profile<T> {
     }
 
     pub(super) fn minimum_jerk(p: &MinimumJerk<T>, scale: Scale<T>) -> Result<Self, ParamError<T>> {
-        require_distance(p.distance, scale)?;
-        let d = require(
-            "duration",
-            p.duration,
-            p.duration >= scale.period && p.duration <= T::from_i32(1_000_000),
-            "a time of at least one period and at most 1e6 s", // its fifth power must fit f32
-        )?;
+        p.check_rows()?; // the fifth power of the longest time fits f32
+        MinimumJerk::DISTANCE.require(p.distance, scale.holds_distance(p.distance))?;
+        let d = MinimumJerk::DURATION.require(p.duration, p.duration >= scale.period)?;
         // The steepest point of the polynomial is 15/8 of the mean rate.
-        representable_rate("duration", T::from_f64(1.875) * p.distance / d, scale)
-            .map_err(|e| ParamError { value: d, ..e })?;
+        MinimumJerk::STEEP.require(d, scale.holds_rate(T::from_f64(1.875) * p.distance / d))?;
         let c3 = T::from_i32(10) * p.distance / (d * d * d);
         let c4 = T::from_i32(-15) * p.distance / (d * d * d * d);
         let c5 = T::from_i32(6) * p.distance / (d * d * d * d * d);
@@ -291,22 +300,4 @@ impl<T: Real> Builder<T> {
         }
         self.profile
     }
-}
-
-fn require_distance<T: Real>(distance: T, scale: Scale<T>) -> Result<T, ParamError<T>> {
-    let counts = (distance * scale.counts_per_radian).abs();
-    require("distance", distance, counts < T::from_f64(1e12), "a finite distance below 1e12 counts, rad")
-}
-
-fn require_speed<T: Real>(speed: T, scale: Scale<T>) -> Result<T, ParamError<T>> {
-    require("speed", speed, speed > T::ZERO, "a finite number above 0 rad/s")?;
-    representable_rate("speed", speed, scale)
-}
-
-/// What a bound must be.
-const ENOUGH: &str = "enough to end within 1e15 periods";
-
-/// Whether a time is one that ticks can count; not if it is NaN.
-fn ends<T: Real>(time: T, scale: Scale<T>) -> bool {
-    time < scale.period * T::from_f64(1e15)
 }

@@ -1,11 +1,11 @@
 //! A path through points in time.
 
 use super::Target;
+use crate::params::{self, Editor, Kind, Leaf, Range, Unit};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 
 /// A point of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Knot {
     /// Time from the start, µs.
     pub time_us: u64,
@@ -13,25 +13,58 @@ pub struct Knot {
     pub position: FixedCounts,
 }
 
-/// How to go from point to point.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum Interpolation {
-    /// Straight lines: the velocity jumps at each point.
-    Linear,
-    /// Monotone cubics (Fritsch and Butland 1984): the velocity is continuous and a rising
-    /// table never runs backwards, which a brake could not follow.
-    #[default]
-    Cubic,
+crate::words! {
+    /// How to go from point to point.
+    pub enum Interpolation {
+        /// Straight lines: the velocity jumps at each point.
+        Linear = "linear",
+        /// Monotone cubics (Fritsch and Butland 1984): the velocity is continuous and a rising table never runs
+        /// backwards, which a brake could not follow.
+        Cubic = "cubic" default,
+    }
 }
 
-/// Points and interpolation. Before the first point the path rests there, after the last too.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Table<'a> {
-    /// Points with rising times.
-    pub knots: &'a [Knot],
-    /// How to go from point to point.
-    pub interpolation: Interpolation,
+crate::params! {
+    /// Points in time. Before the first point the path rests there, after the last too.
+    pub struct Table<'a> {
+        /// Points of time and angle, from the start; times rise. A brake follows only angles that do not fall.
+        knots: &'a [Knot], "points_s_deg" "" S_DEG, Range::at_least(0.0).below(1e12);
+        /// How to go from point to point.
+        interpolation: Interpolation = "cubic", "interpolation" "" NONE, Range::ANY;
+    }
+    relations(p) {
+        /// There is a path.
+        NOT_EMPTY: knots, "at least one point";
+        /// Time goes on.
+        RISING: knots, "times of at least 0 s that rise from point to point";
+        /// Counts hold the points.
+        HELD: knots, "positions below 7e13 counts of rig.encoder.counts_per_rev";
+    }
+}
+
+impl<'a, T: Real> Leaf<T> for &'a [Knot] {
+    const KIND: Kind = Kind::Points;
+    type Literal = ();
+    type As<U: Real> = &'a [Knot];
+
+    fn of((): (), _: &Unit) -> Self {
+        &[]
+    }
+    fn blank() -> Self {
+        &[]
+    }
+    fn edit<P: params::Table<T>, E: Editor<T>>(&mut self, row: usize, editor: &mut E) {
+        editor.other::<P>(row, None);
+    }
+    fn number(&self) -> T {
+        T::from_u64(self.len() as u64)
+    }
+    fn outside(&self, _: &Range, _: &Unit) -> Option<T> {
+        None
+    }
+    fn cast<U: Real>(&self) -> Self {
+        self
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,27 +102,24 @@ impl<T: Real> Interval<T> {
     }
 }
 
-impl Table<'_> {
-    pub(super) fn check<T: Real>(&self) -> Result<(), ParamError<T>> {
-        if self.knots.is_empty() {
-            return Err(ParamError { field: "knots", value: T::ZERO, expected: "at least one point" });
-        }
+impl<'a> Table<'a> {
+    /// The same: points are whole numbers.
+    #[must_use]
+    pub fn cast(&self) -> Table<'a> {
+        *self
+    }
+
+    /// Checks the points; the value of an error is the number (from 0) of the point.
+    pub(super) fn check_points<T: Real>(&self) -> Result<(), ParamError<T>> {
+        Table::NOT_EMPTY.require(T::ZERO, !self.knots.is_empty())?;
         let rising = |w: &[Knot]| matches!(w, [a, b] if a.time_us < b.time_us);
         if let Some(i) = self.knots.windows(2).position(|w| !rising(w)) {
-            return Err(ParamError {
-                field: "knots",
-                value: T::from_u64(i as u64 + 1),
-                expected: "times that rise from point to point; the value is the number (from 0) of the point that does not",
-            });
+            return Err(Table::RISING.error(T::from_u64(i as u64 + 1)));
         }
         // So that no difference between two points overflows.
         match self.knots.iter().position(|k| k.position.0.unsigned_abs() >= 1 << 62) {
             None => Ok(()),
-            Some(i) => Err(ParamError {
-                field: "knots",
-                value: T::from_u64(i as u64),
-                expected: "positions below 7e13 counts; the value is the number (from 0) of the point beyond",
-            }),
+            Some(i) => Err(Table::HELD.error(T::from_u64(i as u64))),
         }
     }
 

@@ -1,46 +1,64 @@
 //! Sine and chirp on a ramp. The phase is an integer in 2⁻⁶⁴ turns, so it never drifts.
 
-use super::{Scale, Target, advance, representable_rate};
-use crate::error::{cast, require};
+use super::{Scale, Target, advance};
+use crate::params::{Range, Table};
 use crate::{ParamError, Real, sin_cos_turns};
 
-/// `rate · t + amplitude · [sin(2π f t + phase) − sin(phase)]`.
-///
-/// A brake follows it only while the velocity keeps its sign: `2π f · amplitude ≤ rate`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Sine<T = f64> {
-    /// Rate of the ramp below, rad/s.
-    pub rate: T,
-    /// Amplitude, rad.
-    pub amplitude: T,
-    /// Frequency `f`, Hz; below half the sampling rate.
-    pub frequency: T,
-    /// Phase at the start, in turns; −0.25 starts at the rate of the ramp.
-    pub phase: T,
+crate::params! {
+    /// A sine on a ramp: `rate · t + amplitude · [sin(2π f t + phase) − sin(phase)]`.
+    ///
+    /// A brake follows it only while the velocity keeps its sign: `2π f · amplitude ≤ rate`.
+    pub struct Sine<T> {
+        /// Rate of the ramp below the sine.
+        rate: T, "rate_deg_s" "" DEG_S, Range::ANY;
+        /// Amplitude of the sine.
+        amplitude: T, "amplitude_deg" "" DEG, Range::ANY;
+        /// Frequency.
+        frequency: T, "frequency_hz" "f" HZ, Range::at_least(0.0);
+        /// Phase at the start; −0.25 starts at the rate of the ramp.
+        phase: T = -0.25, "phase_turns" "" TURNS, Range::within(-1.0, 1.0);
+    }
+    relations(p) {
+        /// Counts hold the rate.
+        RATE: rate, "a finite rate below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s";
+        /// Counts hold the amplitude.
+        AMPLITUDE: amplitude, "a finite amplitude below 1e12 counts of rig.encoder.counts_per_rev, °";
+        /// Samples see the frequency.
+        NYQUIST: frequency, "a frequency below half the sampling rate, which sampling.period_us gives, Hz";
+    }
 }
 
-cast!(Sine { rate, amplitude, frequency, phase });
-
-/// A [`Sine`] whose frequency goes linearly from one value to another and stays there.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Chirp<T = f64> {
-    /// Rate of the ramp below, rad/s.
-    pub rate: T,
-    /// Amplitude, rad.
-    pub amplitude: T,
-    /// Frequency at the start, Hz; below half the sampling rate.
-    pub from: T,
-    /// Frequency at the end, Hz; below half the sampling rate.
-    pub to: T,
-    /// Time from one to the other, s.
-    pub duration: T,
-    /// Phase at the start, in turns; −0.25 starts at the rate of the ramp.
-    pub phase: T,
+crate::params! {
+    /// A sine on a ramp, whose frequency goes linearly from one value to another and stays there.
+    ///
+    /// A brake follows it only while the velocity keeps its sign: `2π f · amplitude ≤ rate` for either frequency `f`.
+    pub struct Chirp<T> {
+        /// Rate of the ramp below the sine.
+        rate: T, "rate_deg_s" "" DEG_S, Range::ANY;
+        /// Amplitude of the sine.
+        amplitude: T, "amplitude_deg" "" DEG, Range::ANY;
+        /// Frequency at the start.
+        from: T, "from_hz" "" HZ, Range::at_least(0.0);
+        /// Frequency at the end.
+        to: T, "to_hz" "" HZ, Range::at_least(0.0);
+        /// Time from one to the other.
+        duration: T, "duration_s" "" S, Range::above(0.0);
+        /// Phase at the start; −0.25 starts at the rate of the ramp.
+        phase: T = -0.25, "phase_turns" "" TURNS, Range::within(-1.0, 1.0);
+    }
+    relations(p) {
+        /// Counts hold the rate.
+        RATE: rate, "a finite rate below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s";
+        /// Counts hold the amplitude.
+        AMPLITUDE: amplitude, "a finite amplitude below 1e12 counts of rig.encoder.counts_per_rev, °";
+        /// Samples see the first frequency.
+        FROM_NYQUIST: from, "a frequency below half the sampling rate, which sampling.period_us gives, Hz";
+        /// Samples see the last frequency.
+        TO_NYQUIST: to, "a frequency below half the sampling rate, which sampling.period_us gives, Hz";
+        /// Ticks count the time.
+        COUNTED: duration, "a time of 1 to 4e9 times sampling.period_us";
+    }
 }
-
-cast!(Chirp { rate, amplitude, from, to, duration, phase });
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Wave<T> {
@@ -63,46 +81,31 @@ pub(super) struct Wave<T> {
 
 impl<T: Real> Wave<T> {
     pub(super) fn sine(p: &Sine<T>, scale: Scale<T>) -> Result<Self, ParamError<T>> {
-        let f = require_frequency("frequency", p.frequency, scale)?;
-        Wave::new(p.rate, p.amplitude, p.phase, f, T::ZERO, 0, scale)
+        p.check_rows()?;
+        Sine::NYQUIST.require(p.frequency, scale.samples(p.frequency))?;
+        Sine::RATE.require(p.rate, scale.holds_rate(p.rate))?;
+        Sine::AMPLITUDE.require(p.amplitude, scale.holds_distance(p.amplitude))?;
+        Ok(Wave::new(p.rate, p.amplitude, p.phase, p.frequency, T::ZERO, 0, scale))
     }
 
     pub(super) fn chirp(p: &Chirp<T>, scale: Scale<T>) -> Result<Self, ParamError<T>> {
-        let from = require_frequency("from", p.from, scale)?;
-        let to = require_frequency("to", p.to, scale)?;
+        p.check_rows()?;
+        let from = Chirp::FROM_NYQUIST.require(p.from, scale.samples(p.from))?;
+        let to = Chirp::TO_NYQUIST.require(p.to, scale.samples(p.to))?;
+        Chirp::RATE.require(p.rate, scale.holds_rate(p.rate))?;
+        Chirp::AMPLITUDE.require(p.amplitude, scale.holds_distance(p.amplitude))?;
         // The nearest: 0.3 s are 300 ms, though 0.3/0.001 is a hair less.
         let ticks = (p.duration / scale.period + T::from_f64(0.5)).floor();
-        require(
-            "duration",
-            p.duration,
-            ticks >= T::ONE && ticks < T::from_f64(4e9),
-            "a time of at least one period and at most 4e9 periods, s",
-        )?;
-        Wave::new(p.rate, p.amplitude, p.phase, from, (to - from) / ticks, ticks.to_i64() as u64, scale)
+        Chirp::COUNTED.require(p.duration, ticks >= T::ONE && ticks < T::from_f64(4e9))?;
+        let rise = (to - from) / ticks;
+        Ok(Wave::new(p.rate, p.amplitude, p.phase, from, rise, ticks.to_i64() as u64, scale))
     }
 
-    fn new(
-        rate: T,
-        amplitude: T,
-        phase: T,
-        from: T,
-        rise: T,
-        last_tick: u64,
-        scale: Scale<T>,
-    ) -> Result<Self, ParamError<T>> {
-        representable_rate("rate", rate, scale)?;
-        let counts = (amplitude * scale.counts_per_radian).abs();
-        require(
-            "amplitude",
-            amplitude,
-            counts < T::from_f64(1e12),
-            "a finite amplitude below 1e12 counts, rad",
-        )?;
-        require("phase", phase, phase.abs() <= T::ONE, "−1 to 1 turns")?;
+    fn new(rate: T, amplitude: T, phase: T, from: T, rise: T, last_tick: u64, scale: Scale<T>) -> Self {
         // 2⁶⁴ as a product of what both scalars hold exactly.
         let turn = T::from_i64(1 << 32) * T::from_i64(1 << 32);
         let start_phase = ((phase - phase.floor()) * T::from_i64(1 << 62)).to_i64().wrapping_shl(2) as u64;
-        Ok(Wave {
+        Wave {
             rate: scale.rate(rate),
             velocity: rate,
             amplitude,
@@ -114,7 +117,7 @@ impl<T: Real> Wave<T> {
             from,
             rise,
             scale,
-        })
+        }
     }
 
     pub(super) fn at(&self, tick: u64) -> Target<T> {
@@ -138,9 +141,4 @@ impl<T: Real> Wave<T> {
             acceleration: self.amplitude * (omega_rise * cos - omega * omega * sin),
         }
     }
-}
-
-fn require_frequency<T: Real>(field: &'static str, f: T, scale: Scale<T>) -> Result<T, ParamError<T>> {
-    let below_nyquist = f * scale.period < T::from_f64(0.5);
-    require(field, f, f >= T::ZERO && below_nyquist, "at least 0 and below half the sampling rate, Hz")
 }

@@ -1,75 +1,89 @@
 //! The supervisor's parameters and what they become in ticks and counts.
 
-use crate::error::{cast, require};
+use crate::params::{Range, Table};
 use crate::safe_state::SafeState;
-use crate::{Bounds, Micros, ParamError, Real, ServoParams, Target};
+use crate::{Bounds, Interval, Micros, ParamError, Real, ServoParams, Target};
+
+crate::params! {
+    /// What the supervisor watches. The defaults are for the paper's shaft at 1 kHz.
+    pub struct LimitParams<T>: Default {
+        /// Largest departure of a sample from where the last ones lead that a shaft can make in a period.
+        jump: T = 0.15, "jump_deg" "" DEG, Range::above(0.0);
+        /// Samples beyond `jump_deg`, within 128 periods, that end control. One glitch is tolerated.
+        jumps: u32 = 3, "jumps" "" IN_128, Range::within(1.0, 128.0);
+        /// Samples in a row that have to pass after one was refused before the law answers again.
+        good_samples: u32 = 1, "good_samples" "" NONE, Range::at_least(1.0);
+        /// Error at rest that ends control.
+        following_error: T = 1.0, "following_error_deg" "" DEG, Range::above(0.0);
+        /// How much `following_error_deg` grows with the target's speed.
+        following_time: T = 0.02, "following_time_s" "" S, Range::at_least(0.0);
+        /// Time at a limit of the voltage that ends control.
+        saturation_time: T = 0.2, "saturation_time_s" "" S, Range::above(0.0);
+        /// Distance that the shaft must have gone without a count.
+        stand_still: T = 1.1, "stand_still_counts" "" COUNTS, Range::at_least(1.0);
+        /// How many times the friction at the upper bound may be exceeded before a shaft under brake is expected
+        /// to move.
+        friction_margin: T = 1.8, "friction_margin" "" NONE, Range::at_least(1.0);
+        /// Lost samples within 128 periods that end control.
+        lost: u32 = 26, "lost" "" IN_128, Range::within(1.0, 128.0);
+        /// Late samples, and codes that the board refuses as late, within 128 periods that end control.
+        late: u32 = 26, "late" "" IN_128, Range::within(1.0, 128.0);
+        /// Duplicated, or reordered, samples within 128 periods that end control.
+        disorder: u32 = 2, "disorder" "" IN_128, Range::within(1.0, 128.0);
+        /// Periods without a sample that end control.
+        silence_cycles: u32 = 3, "silence_cycles" "" CYCLES, Range::within(2.0, 1000.0);
+        /// Longest time from a sample's arrival to its answer.
+        deadline: Micros = 500, "deadline_us" "" US, Range::within(1.0, 4294967295.0);
+        /// Answers later than `deadline_us`, within 128 periods, that end control.
+        overruns: u32 = 26, "overruns" "" IN_128, Range::within(1.0, 128.0);
+    }
+    relations(p) {
+        /// The encoder resolves the jump.
+        JUMP_COUNTS: jump, "an angle of at least one count of rig.encoder.counts_per_rev and below 2³⁰ of them, °";
+        /// The board hears of a good sample in time.
+        GOOD_IN_TIME: good_samples,
+            "a number below silence_cycles: an unanswered board goes to its safe state" =>
+            p.good_samples < p.silence_cycles;
+        /// Ticks count the time.
+        SATURATION_COUNTED: saturation_time, "a time of 1 to 4e9 times sampling.period_us";
+    }
+}
 
 /// Limits within which control goes on. There is no `Default`: the safe state has to be chosen;
 /// [`SupervisorParams::new`] takes it and fills in the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct SupervisorParams<T = f64> {
     /// What the brake does when control ends.
     pub on_fault: SafeState<T>,
-    /// Highest speed that a target may have, rad/s.
-    pub speed_limit: T,
-    /// Largest departure of a sample from dead reckoning that a shaft can make in a period, rad.
-    pub jump: T,
-    /// Samples beyond that, within 128 periods, that end control. One glitch is tolerated.
-    pub jumps: u32,
-    /// Samples in a row that have to pass after one was refused before the law answers again.
-    pub good_samples: u32,
-    /// Limit of the error at rest, rad.
-    pub following_error: T,
-    /// How much the limit grows with the target's speed, s.
-    pub following_time: T,
-    /// Time at a limit of the output that ends control, s.
-    pub saturation_time: T,
-    /// Distance that the shaft must have gone without a count, counts.
-    pub stand_still: T,
-    /// How many times the friction at the upper bound may be exceeded before a shaft under brake
-    /// is expected to move.
-    pub friction_margin: T,
-    /// Lost samples within 128 periods that end control.
-    pub lost: u32,
-    /// Late samples and late answers within 128 periods that end control.
-    pub late: u32,
-    /// Duplicated, or reordered, samples within 128 periods that end control.
-    pub disorder: u32,
-    /// Periods without a sample that end control; the board's watchdog has as many.
-    pub silence_cycles: u32,
-    /// Longest time from a sample's arrival to its answer.
-    pub deadline: Micros,
-    /// Answers later than that within 128 periods that end control.
-    pub overruns: u32,
+    /// Highest speed that a target may have.
+    pub speed: SpeedLimit<T>,
+    /// What is watched.
+    pub limits: LimitParams<T>,
 }
 
-cast!(SupervisorParams {
-    speed_limit, jump, following_error, following_time, saturation_time, stand_still, friction_margin
-} keep { jumps, good_samples, lost, late, disorder, silence_cycles, deadline, overruns } nested { on_fault });
+crate::params! {
+    /// The speed that a path may ask for.
+    pub struct SpeedLimit<T>: Default {
+        /// Highest speed that a path may ask for: a guard against a slip of units. On a board a target that moves
+        /// faster ends control.
+        speed_limit: T = 360.0, "speed_limit_deg_s" "" DEG_S, Range::above(0.0);
+    }
+}
 
 impl<T: Real> SupervisorParams<T> {
     /// The given safe state with limits for the paper's shaft at 1 kHz.
     #[must_use]
     pub fn new(on_fault: SafeState<T>) -> Self {
-        let degree = T::PI / T::from_i32(180);
+        SupervisorParams { on_fault, speed: SpeedLimit::default(), limits: LimitParams::default() }
+    }
+
+    /// The same in another scalar, each real number rounded to the nearest.
+    #[must_use]
+    pub fn cast<U: Real>(&self) -> SupervisorParams<U> {
         SupervisorParams {
-            on_fault,
-            speed_limit: T::from_i32(360) * degree,
-            jump: T::from_f64(0.15) * degree,
-            jumps: 3,
-            good_samples: 1,
-            following_error: degree,
-            following_time: T::from_f64(0.02),
-            saturation_time: T::from_f64(0.2),
-            stand_still: T::from_f64(1.1),
-            friction_margin: T::from_f64(1.8),
-            lost: 26,
-            late: 26,
-            disorder: 2,
-            silence_cycles: 3,
-            deadline: Micros(500),
-            overruns: 26,
+            on_fault: self.on_fault.cast(),
+            speed: self.speed.cast(),
+            limits: self.limits.cast(),
         }
     }
 }
@@ -114,56 +128,22 @@ impl<T: Real> Limits<T> {
     ) -> Result<Self, ParamError<T>> {
         let period = servo.period.period::<T>()?;
         let per_radian: T = servo.encoder.counts_per_radian();
-        let above_0 = |field, value: T, expected| require(field, value, value > T::ZERO, expected);
-        let events = |field, n: u32| {
-            let value = T::from_u64(u64::from(n));
-            require(field, value, (1..=128).contains(&n), "1 to 128 within 128 periods")
-        };
-        above_0("speed_limit", p.speed_limit, "a finite speed above 0 rad/s")?;
+        p.speed.check_rows()?;
+        let speed_limit = p.speed.speed_limit;
+        let p = &p.limits;
+        p.check_rows()?;
         let counts = p.jump * per_radian;
-        let expected = "an angle of at least one count and below 2³⁰ of them, rad";
-        require("jump", p.jump, counts >= T::ONE && counts < T::from_i32(1 << 30), expected)?;
-        events("jumps", p.jumps)?;
-        events("lost", p.lost)?;
-        events("late", p.late)?;
-        events("disorder", p.disorder)?;
-        events("overruns", p.overruns)?;
-        let cycles = T::from_u64(u64::from(p.silence_cycles));
-        let fits = (2..=1000).contains(&p.silence_cycles);
-        require("silence_cycles", cycles, fits, "2 to 1000 periods")?;
-        let good = T::from_u64(u64::from(p.good_samples));
-        let expected =
-            "at least 1, and fewer than silence_cycles: an unanswered board goes to its safe state";
-        let fits = p.good_samples >= 1 && p.good_samples < p.silence_cycles;
-        require("good_samples", good, fits, expected)?;
-        above_0("following_error", p.following_error, "a finite angle above 0 rad")?;
-        let expected = "a finite time of at least 0 s";
-        require("following_time", p.following_time, p.following_time >= T::ZERO, expected)?;
+        LimitParams::JUMP_COUNTS.require(p.jump, counts >= T::ONE && counts < T::from_i32(1 << 30))?;
         let saturation = p.saturation_time / period + T::from_f64(0.5);
         let fits = saturation >= T::ONE && saturation < T::from_f64(4e9);
-        require("saturation_time", p.saturation_time, fits, "a time of 1 to 4e9 periods, s")?;
-        let expected = "a number of at least 1 count";
-        require("stand_still", p.stand_still, p.stand_still >= T::ONE, expected)?;
-        let expected = "a number of at least 1";
-        require("friction_margin", p.friction_margin, p.friction_margin >= T::ONE, expected)?;
-        let deadline = T::from_u64(u64::from(p.deadline.0));
-        require("deadline", deadline, p.deadline.0 >= 1, "at least 1 µs")?;
+        LimitParams::SATURATION_COUNTED.require(p.saturation_time, fits)?;
         let inertia = bounds.inertia.high;
-        above_0("inertia", inertia, "bounds on the inertia that end at a finite number above 0 kg m²")?;
-        let drive = bounds.drive_torque.low;
-        require(
-            "drive_torque",
-            drive,
-            true,
-            "bounds on the driving torque that begin at a finite number, N m",
-        )?;
+        Interval::HIGH_USABLE.require(inertia, inertia > T::ZERO)?;
+        let drive = Interval::LOW_USABLE.require(bounds.drive_torque.low, true)?;
         let drag = bounds.viscous_damping.high;
-        let expected = "bounds on the viscous damping that end at a finite number of at least 0 N m s/rad";
-        require("viscous_damping", drag, drag >= T::ZERO, expected)?;
-        let strongest = bounds.mu_static.high.max(bounds.mu_dynamic.high) * bounds.brake_gain.high;
-        let expected =
-            "bounds on friction and brake gain whose ends give a finite number of at least 0 N m/V";
-        require("brake_gain", strongest, strongest >= T::ZERO, expected)?;
+        Interval::HIGH_USABLE.require(drag, drag >= T::ZERO)?;
+        let strongest = bounds.strongest_brake();
+        Interval::HIGH_USABLE.require(strongest, strongest >= T::ZERO)?;
         Ok(Limits {
             period,
             radians_per_count: servo.encoder.radians_per_count(),
@@ -181,8 +161,8 @@ impl<T: Real> Limits<T> {
             deadline: p.deadline,
             overruns: p.overruns,
             still: T::from_f64(1e-6),
-            speed_limit: p.speed_limit,
-            speed_counts: p.speed_limit * per_radian * period + T::ONE,
+            speed_limit,
+            speed_counts: speed_limit * per_radian * period + T::ONE,
             drive: drive / inertia,
             brake: strongest * p.friction_margin / inertia,
             drag: drag / inertia,

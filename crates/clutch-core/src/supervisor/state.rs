@@ -2,7 +2,7 @@
 
 use crate::law::LawTerms;
 use crate::safe_state::SafeRun;
-use crate::{Counts, DacCode, Micros, Real, ServoOutput, ServoState, Target};
+use crate::{Arithmetic, Counts, DacCode, Micros, Real, ServoOutput, ServoState, Target};
 
 /// Where control stands; see the [module](super)'s diagram.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -214,7 +214,7 @@ impl Arrival {
 
 /// What a sample led to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cycle<T, Terms = LawTerms<T>> {
+pub struct Cycle<T: Arithmetic, Terms = LawTerms<T>> {
     /// Period of the run, from 0 at the first answer.
     pub tick: u64,
     /// What became of the sample.

@@ -3,8 +3,8 @@
 //! The paper's shaft, in both scalars. A path of one count a period is 18 °/s at 1 kHz.
 
 use super::*;
+use crate::law::CtcParams;
 use crate::law::{Command, Law, LawParams, OutputParams, PdParams, SmcParams, Tick};
-use crate::law::{CtcParams, PdTerms};
 use crate::{Counts, FixedCounts, Micros, PlantParams, SafeState, Tolerances};
 use proptest::prelude::*;
 use std::format;
@@ -29,7 +29,7 @@ macro_rules! in_both_scalars {
 }
 
 fn params<T: Real>() -> SupervisorParams<T> {
-    SupervisorParams::new(SafeState::Hold { volts: T::from_i32(5) })
+    SupervisorParams::new(SafeState::hold(T::from_i32(5)))
 }
 
 fn paper<T: Real>() -> ServoParams<T> {
@@ -51,7 +51,7 @@ fn line<T: Real>(origin: i64, rate: i64) -> impl Fn(u64) -> Target<T> + Copy {
 }
 
 /// A supervised servo that is fed sample by sample.
-struct Rig<T: Real, C: Controller<T> = Law<T>> {
+struct Rig<T: Real, C: ControlLaw<T> = Law<T>> {
     servo: Servo<T, C>,
     supervisor: Supervisor<T>,
     state: SupervisorState<T, C::State>,
@@ -80,7 +80,7 @@ impl<T: Real> Rig<T> {
     }
 }
 
-impl<T: Real, C: Controller<T>> Rig<T, C> {
+impl<T: Real, C: ControlLaw<T>> Rig<T, C> {
     fn around(p: &SupervisorParams<T>, s: &ServoParams<T>, servo: Servo<T, C>) -> Self {
         let supervisor = Supervisor::new(p, s, &bounds()).unwrap();
         let state = SupervisorState::default();
@@ -291,7 +291,7 @@ in_both_scalars! {
         let count = crate::Encoder::PAPER.radians_per_count::<f64>();
         for counts in [1.5, 3.0, 8.5] {
             let must = (1..).find(|n| travel(f64::from(*n) * 1e-3) > counts * count).unwrap();
-            let p = SupervisorParams { stand_still: T::from_f64(counts), ..params() };
+            let p = SupervisorParams { limits: LimitParams { stand_still: T::from_f64(counts), ..params().limits }, ..params() };
             let mut rig = Rig::<T>::with(&p, &paper()).arm();
             rig.path = (1000, 0);
             for n in 0..must {
@@ -418,7 +418,7 @@ in_both_scalars! {
     }
 
     fn a_target_may_have_the_speed_limit_and_no_more<T>() {
-        let limit = params::<T>().speed_limit;
+        let limit = params::<T>().speed.speed_limit;
         for sign in [T::ONE, -T::ONE] {
             // At 0.02 s · 360 °/s the following error may be 8.2°, so only the speed can trip.
             answered(&Rig::<T>::running().aimed(|t| Target { velocity: sign * limit, ..t }));
@@ -596,22 +596,23 @@ enum Spoilt {
 /// A law of 2 V that answers `what` in its fourth tick.
 struct Breaks(Spoilt);
 
-impl<T: Real> Controller<T> for Breaks {
+impl<T: Real> ControlLaw<T> for Breaks {
     type State = u32;
-    type Terms = PdTerms<T>;
+    type Terms = [T; 2];
+    const TERMS: &'static [&'static str] = &["first", "second"];
 
     fn start(&self, _: &Tick<T>, _: T) -> u32 {
         0
     }
 
-    fn update(&self, state: &mut u32, _: &Tick<T>) -> Command<T, PdTerms<T>> {
+    fn update(&self, state: &mut u32, _: &Tick<T>) -> Command<T, [T; 2]> {
         *state += 1;
         let nan = T::from_f64(f64::NAN);
         let good = Command { voltage: T::from_i32(2), ..Command::default() };
         match self.0 {
             _ if *state < 4 => good,
             Spoilt::Nothing => good,
-            Spoilt::Term => Command { terms: PdTerms { derivative: nan, ..PdTerms::default() }, ..good },
+            Spoilt::Term => Command { terms: [T::ZERO, nan], ..good },
             Spoilt::Voltage => Command { voltage: nan, ..good },
             Spoilt::Invalid => Command { limit: Limit::Invalid, ..good },
         }
@@ -724,7 +725,7 @@ in_both_scalars! {
     fn every_event_in_every_state_leads_where_the_diagram_says<T>() {
         for (from, _) in DIAGRAM {
             for event in EVENTS {
-                let mut on_fault = SafeState::Hold { volts: T::from_i32(5) };
+                let mut on_fault = SafeState::hold(T::from_i32(5));
                 if from == State::Released {
                     on_fault = SafeState::Release;
                 }
@@ -805,7 +806,7 @@ in_both_scalars! {
 
     fn a_ramp_goes_one_step_with_each_fresh_sample_and_none_with_another<T>() {
         // 1000 V/s to 5 V are 204.8 codes a period, from 0 V on: five periods.
-        let on_fault = SafeState::Ramp { volts_per_s: T::from_i32(1000), volts: T::from_i32(5) };
+        let on_fault = SafeState::ramp(T::from_i32(1000), T::from_i32(5));
         let mut rig = Rig::<T>::with(&SupervisorParams { on_fault, ..params() }, &paper()).arm().warm();
         assert_eq!(rig.state.code(), ZERO_VOLTS);
         let cycle = rig.send(Sample { encoder_fault: true, ..rig.fresh() });
@@ -826,7 +827,7 @@ in_both_scalars! {
     }
 
     fn hold_then_release_lets_go_after_its_time_and_says_released_when_it_does<T>() {
-        let on_fault = SafeState::HoldThenRelease { volts: T::from_i32(5), after: T::from_f64(0.003) };
+        let on_fault = SafeState::hold_then_release(T::from_i32(5), T::from_f64(0.003));
         let mut rig = Rig::<T>::with(&SupervisorParams { on_fault, ..params() }, &paper()).arm().warm();
         rig.supervisor.stop(&mut rig.state, Cause::Done);
         let mut seen = Vec::from([(rig.state.state(), rig.state.code())]);
@@ -839,7 +840,7 @@ in_both_scalars! {
     }
 
     fn after_a_fault_hold_then_release_lets_go_and_stays_faulted<T>() {
-        let on_fault = SafeState::HoldThenRelease { volts: T::from_i32(5), after: T::from_f64(0.002) };
+        let on_fault = SafeState::hold_then_release(T::from_i32(5), T::from_f64(0.002));
         let mut rig = Rig::<T>::with(&SupervisorParams { on_fault, ..params() }, &paper()).arm().warm();
         faulted(&rig.send(Sample { encoder_fault: true, ..rig.fresh() }), Cause::Board);
         let codes: Vec<_> = (0..3).map(|_| (rig.good().code, rig.state.state())).collect();
@@ -935,7 +936,7 @@ in_both_scalars! {
 
     fn the_law_answers_again_with_the_kth_good_sample_in_a_row<T>() {
         for k in 1..=2 {
-            let p = SupervisorParams { good_samples: k, ..params() };
+            let p = SupervisorParams { limits: LimitParams { good_samples: k, ..params().limits }, ..params() };
             let mut rig = Rig::<T>::with(&p, &paper()).arm().warm();
             rig.off(1000);
             for n in 1..k {
@@ -961,67 +962,70 @@ in_both_scalars! {
         let count: T = crate::Encoder::PAPER.radians_per_count();
         let f = T::from_f64;
         let table = [
-            (SupervisorParams { on_fault: SafeState::Hold { volts: f(0.0) }, ..d }, "volts"),
-            (SupervisorParams { on_fault: SafeState::Hold { volts: f(10.1) }, ..d }, "volts"),
-            (SupervisorParams { on_fault: SafeState::Ramp { volts_per_s: f(0.0), volts: f(5.0) }, ..d }, "volts_per_s"),
-            (SupervisorParams { on_fault: SafeState::HoldThenRelease { volts: f(5.0), after: f(0.0) }, ..d }, "after"),
-            (SupervisorParams { speed_limit: f(0.0), ..d }, "speed_limit"),
-            (SupervisorParams { speed_limit: infinite, ..d }, "speed_limit"),
-            (SupervisorParams { jump: count * f(0.99), ..d }, "jump"),
-            (SupervisorParams { jump: count * f(1.1e9), ..d }, "jump"),
-            (SupervisorParams { jump: nan, ..d }, "jump"),
-            (SupervisorParams { jumps: 0, ..d }, "jumps"),
-            (SupervisorParams { jumps: 129, ..d }, "jumps"),
-            (SupervisorParams { good_samples: 0, ..d }, "good_samples"),
-            (SupervisorParams { good_samples: 3, ..d }, "good_samples"),
-            (SupervisorParams { following_error: f(0.0), ..d }, "following_error"),
-            (SupervisorParams { following_error: nan, ..d }, "following_error"),
-            (SupervisorParams { following_time: f(-0.1), ..d }, "following_time"),
-            (SupervisorParams { following_time: infinite, ..d }, "following_time"),
-            (SupervisorParams { saturation_time: f(0.0004), ..d }, "saturation_time"),
-            (SupervisorParams { saturation_time: f(5e6), ..d }, "saturation_time"),
-            (SupervisorParams { stand_still: f(0.9), ..d }, "stand_still"),
-            (SupervisorParams { stand_still: infinite, ..d }, "stand_still"),
-            (SupervisorParams { friction_margin: f(0.9), ..d }, "friction_margin"),
-            (SupervisorParams { friction_margin: nan, ..d }, "friction_margin"),
-            (SupervisorParams { lost: 0, ..d }, "lost"),
-            (SupervisorParams { lost: 129, ..d }, "lost"),
-            (SupervisorParams { late: 0, ..d }, "late"),
-            (SupervisorParams { late: 129, ..d }, "late"),
-            (SupervisorParams { disorder: 0, ..d }, "disorder"),
-            (SupervisorParams { disorder: 129, ..d }, "disorder"),
-            (SupervisorParams { silence_cycles: 1, ..d }, "silence_cycles"),
-            (SupervisorParams { silence_cycles: 1001, ..d }, "silence_cycles"),
-            (SupervisorParams { deadline: Micros(0), ..d }, "deadline"),
-            (SupervisorParams { overruns: 0, ..d }, "overruns"),
-            (SupervisorParams { overruns: 129, ..d }, "overruns"),
+            (SupervisorParams { on_fault: SafeState::hold(f(0.0)), ..d }, "volts"),
+            (SupervisorParams { on_fault: SafeState::hold(f(10.1)), ..d }, "volts"),
+            (SupervisorParams { on_fault: SafeState::ramp(f(0.0), f(5.0)), ..d }, "rate"),
+            (SupervisorParams { on_fault: SafeState::hold_then_release(f(5.0), f(0.0)), ..d }, "after"),
+            (SupervisorParams { speed: SpeedLimit { speed_limit: f(0.0) }, ..d }, "speed_limit"),
+            (SupervisorParams { speed: SpeedLimit { speed_limit: infinite }, ..d }, "speed_limit"),
+            (SupervisorParams { limits: LimitParams { jump: count * f(0.99), ..d.limits }, ..d }, "jump"),
+            (SupervisorParams { limits: LimitParams { jump: count * f(1.1e9), ..d.limits }, ..d }, "jump"),
+            (SupervisorParams { limits: LimitParams { jump: nan, ..d.limits }, ..d }, "jump"),
+            (SupervisorParams { limits: LimitParams { jumps: 0, ..d.limits }, ..d }, "jumps"),
+            (SupervisorParams { limits: LimitParams { jumps: 129, ..d.limits }, ..d }, "jumps"),
+            (SupervisorParams { limits: LimitParams { good_samples: 0, ..d.limits }, ..d }, "good_samples"),
+            (SupervisorParams { limits: LimitParams { good_samples: 3, ..d.limits }, ..d }, "good_samples"),
+            (SupervisorParams { limits: LimitParams { following_error: f(0.0), ..d.limits }, ..d }, "following_error"),
+            (SupervisorParams { limits: LimitParams { following_error: nan, ..d.limits }, ..d }, "following_error"),
+            (SupervisorParams { limits: LimitParams { following_time: f(-0.1), ..d.limits }, ..d }, "following_time"),
+            (SupervisorParams { limits: LimitParams { following_time: infinite, ..d.limits }, ..d }, "following_time"),
+            (SupervisorParams { limits: LimitParams { saturation_time: f(0.0004), ..d.limits }, ..d }, "saturation_time"),
+            (SupervisorParams { limits: LimitParams { saturation_time: f(5e6), ..d.limits }, ..d }, "saturation_time"),
+            (SupervisorParams { limits: LimitParams { stand_still: f(0.9), ..d.limits }, ..d }, "stand_still"),
+            (SupervisorParams { limits: LimitParams { stand_still: infinite, ..d.limits }, ..d }, "stand_still"),
+            (SupervisorParams { limits: LimitParams { friction_margin: f(0.9), ..d.limits }, ..d }, "friction_margin"),
+            (SupervisorParams { limits: LimitParams { friction_margin: nan, ..d.limits }, ..d }, "friction_margin"),
+            (SupervisorParams { limits: LimitParams { lost: 0, ..d.limits }, ..d }, "lost"),
+            (SupervisorParams { limits: LimitParams { lost: 129, ..d.limits }, ..d }, "lost"),
+            (SupervisorParams { limits: LimitParams { late: 0, ..d.limits }, ..d }, "late"),
+            (SupervisorParams { limits: LimitParams { late: 129, ..d.limits }, ..d }, "late"),
+            (SupervisorParams { limits: LimitParams { disorder: 0, ..d.limits }, ..d }, "disorder"),
+            (SupervisorParams { limits: LimitParams { disorder: 129, ..d.limits }, ..d }, "disorder"),
+            (SupervisorParams { limits: LimitParams { silence_cycles: 1, ..d.limits }, ..d }, "silence_cycles"),
+            (SupervisorParams { limits: LimitParams { silence_cycles: 1001, ..d.limits }, ..d }, "silence_cycles"),
+            (SupervisorParams { limits: LimitParams { deadline: Micros(0), ..d.limits }, ..d }, "deadline"),
+            (SupervisorParams { limits: LimitParams { overruns: 0, ..d.limits }, ..d }, "overruns"),
+            (SupervisorParams { limits: LimitParams { overruns: 129, ..d.limits }, ..d }, "overruns"),
         ];
         for (bad, field) in table {
             let error = Supervisor::new(&bad, &paper(), &bounds()).unwrap_err();
-            assert_eq!(error.field, field, "{bad:?}");
+            assert_eq!(error.field(), field, "{bad:?}");
         }
         let slow = ServoParams { period: Micros(0), ..paper() };
-        assert_eq!(Supervisor::new(&d, &slow, &bounds()).unwrap_err().field, "period");
+        assert_eq!(Supervisor::new(&d, &slow, &bounds()).unwrap_err().field(), "period");
         let (b, not) = (bounds::<T>(), |low| crate::Interval { low, high: nan });
         for (bad, field) in [
-            (Bounds { inertia: not(f(0.001)), ..b }, "inertia"),
-            (Bounds { inertia: crate::Interval { low: f(0.0), high: f(0.0) }, ..b }, "inertia"),
-            (Bounds { drive_torque: not(nan), ..b }, "drive_torque"),
-            (Bounds { viscous_damping: not(f(0.0)), ..b }, "viscous_damping"),
-            (Bounds { brake_gain: not(f(0.1)), ..b }, "brake_gain"),
+            (Bounds { inertia: not(f(0.001)), ..b }, "high"),
+            (Bounds { inertia: crate::Interval { low: f(0.0), high: f(0.0) }, ..b }, "high"),
+            (Bounds { drive_torque: not(nan), ..b }, "low"),
+            (Bounds { viscous_damping: not(f(0.0)), ..b }, "high"),
+            (Bounds { brake_gain: not(f(0.1)), ..b }, "high"),
         ] {
-            assert_eq!(Supervisor::new(&d, &paper(), &bad).unwrap_err().field, field, "{bad:?}");
+            assert_eq!(Supervisor::new(&d, &paper(), &bad).unwrap_err().field(), field, "{bad:?}");
         }
         let at_the_limits = SupervisorParams {
-            jumps: 128, lost: 128, late: 1, disorder: 1, overruns: 128, silence_cycles: 1000, good_samples: 999,
-            jump: count * f(1.01), stand_still: f(1.0), friction_margin: f(1.0), following_time: f(0.0),
-            deadline: Micros(1), saturation_time: f(0.0006), ..d
+            limits: LimitParams {
+                jumps: 128, lost: 128, late: 1, disorder: 1, overruns: 128, silence_cycles: 1000, good_samples: 999,
+                jump: count * f(1.01), stand_still: f(1.0), friction_margin: f(1.0), following_time: f(0.0),
+                deadline: Micros(1), saturation_time: f(0.0006), ..d.limits
+            },
+            ..d
         };
         assert!(Supervisor::new(&at_the_limits, &paper(), &bounds()).is_ok());
     }
 
     fn a_cast_keeps_every_parameter<T>() {
-        let p = SupervisorParams::<T> { jumps: 4, lost: 5, late: 6, disorder: 7, overruns: 8, ..params() };
+        let p = SupervisorParams::<T> { limits: LimitParams { jumps: 4, lost: 5, late: 6, disorder: 7, overruns: 8, ..params().limits }, ..params() };
         assert_eq!(p.cast::<f64>().cast::<T>(), p);
     }
 }
@@ -1068,7 +1072,7 @@ fn replay<T: Real>(
     counts: &[i32],
     fate: impl Fn(usize) -> Fate,
 ) -> Vec<Option<Cycle<T>>> {
-    let p = SupervisorParams { good_samples, ..params() };
+    let p = SupervisorParams { limits: LimitParams { good_samples, ..params().limits }, ..params() };
     let mut rig = Rig::<T>::with(&p, &ServoParams::paper(laws(law))).arm();
     let mut cycles = Vec::new();
     for (k, counts) in counts.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What the tests of this crate share.
+//! Helpers that the tests of this crate share.
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses its own part")]
 
 use clutch_log::{
@@ -60,7 +60,7 @@ pub fn header() -> Header {
         source: Source::Loop,
         scalar: "f32".into(),
         period_us: 500,
-        term_names: ["surface_rad_s".into(), "Equivalent/V".into(), "switching_v".into()],
+        term_names: vec!["surface_rad_s".into(), "Equivalent/V".into(), "switching_v".into()],
         started_unix_ns: 1_700_000_000_123_456_789,
         extra: vec![("a".into(), "1".into()), ("board".into(), "α\n\"β\"".into())],
     }
@@ -116,7 +116,7 @@ pub fn record(n: &mut Numbers, tick: u64, time_ns: u64) -> Record {
             target_acceleration: real(n),
             error: real(n),
             error_rate: real(n),
-            terms: [real(n), real(n), real(n)],
+            terms: [real(n), real(n), real(n)].into_iter().collect(),
         }),
         2 => Record::Event(EventRecord {
             tick,

@@ -1,6 +1,6 @@
 //! The line to the board: a serial device, a pseudo-terminal or a TCP connection.
 //!
-//! [`Port`] is the controller's end. It owns one non-blocking file descriptor; [`Port::read`] and
+//! [`Port`] is a station's end. It owns one non-blocking file descriptor; [`Port::read`] and
 //! [`Port::write`] make one system call each and never allocate. Waiting is the caller's, with
 //! [`wait_readable`](crate::realtime::wait_readable).
 //!
@@ -68,7 +68,7 @@ pub struct Opened {
     pub notes: Vec<String>,
 }
 
-/// The controller's end of the line: one non-blocking file descriptor, locked while it is open.
+/// A station's end of the line: one non-blocking file descriptor, locked while it is open.
 #[derive(Debug)]
 pub struct Port {
     fd: OwnedFd,

@@ -124,7 +124,7 @@ impl Endpoint for PseudoTerminal {
     }
 }
 
-/// A line on which nobody is returns from waiting at once: sleep instead of turning round.
+/// With no peer connected, poll returns immediately; sleep instead of busy-looping.
 pub(super) fn wait_or_sleep(fd: rustix::fd::BorrowedFd<'_>, until_ns: u64, mode: WaitMode) -> Readiness {
     /// How soon a new client is noticed at the latest, ns.
     const NAP: u64 = 10_000_000;

@@ -1,8 +1,8 @@
 //! A host, a board in the controller role, and encoder and converter, on one desk.
 //!
 //! ```text
-//!  RemoteNode ◄──► Onboard ◄──► BoardNode
-//!                     └ what it reads from there a ControlNode reads too: the twin
+//!  HostNode ◄──► BoardController ◄──► BoardNode
+//!                     └ what it reads from there a ControllerNode reads too: the twin
 //! ```
 //!
 //! Frames are passed by hand and times are computed.
@@ -16,13 +16,13 @@ use clutch_core::{
     SupervisorParams, Target, Tolerances,
 };
 use clutch_node::{
-    BoardNode, BoardParams, ControlNode, ControlParams, Notice, Onboard, OnboardParams, Outbox, Ports,
-    RemoteNode, RunParams, Settings,
+    BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
+    HostNode, Notice, Outbox, Outboxes, RunParams, RunTimes, Setting, Settings,
 };
 use clutch_wire::{Decoder, Message, encode};
 use core::mem::take;
 
-pub type Told = Notice<f32, LawTerms<f32>>;
+pub type Heard = Notice<f32, LawTerms<f32>>;
 
 pub const CONFIG: u64 = 0x0123_4567_89ab_cdef;
 pub const BOARD: BoardParams = BoardParams {
@@ -37,7 +37,8 @@ pub const BOARD: BoardParams = BoardParams {
     watchdog_max_us: 30_000,
     boot_code: 2867,
 };
-pub const ONBOARD: OnboardParams = OnboardParams { board: 77, boot: 3, clock_hz: 25_000_000 };
+pub const BOARD_CONTROLLER: BoardControllerParams =
+    BoardControllerParams { board: 77, boot: 3, clock_hz: 25_000_000 };
 pub const MS: u64 = 1_000_000;
 /// The host pings so often, and believes in the board for so long.
 pub const ALIVE_NS: u64 = 20 * MS;
@@ -64,9 +65,9 @@ impl Plan {
         Plan {
             run: 5,
             servo: paper(LawParams::Pd(PdParams::default())),
-            limits: SupervisorParams::new(SafeState::Hold { volts: 5.0 }),
+            limits: SupervisorParams::new(SafeState::hold(5.0)),
             bounds: Bounds::around(&PlantParams::default(), &Tolerances::default()).unwrap(),
-            reference: ReferenceParams::Ramp(54.0_f32.to_radians()),
+            reference: ReferenceParams::ramp(54.0_f32.to_radians()),
             start: FixedCounts(0),
             watchdog: Micros(3000),
             silence: Micros(3000),
@@ -82,10 +83,12 @@ impl Plan {
             bounds: &self.bounds,
             reference: &self.reference,
             start: self.start,
-            watchdog: self.watchdog,
-            valid: Micros(2000),
-            silence: self.silence,
-            host_silence: self.host_silence,
+            times: RunTimes {
+                watchdog: self.watchdog,
+                valid: Micros(2000),
+                silence: self.silence,
+                host_silence: self.host_silence,
+            },
             ticks: self.ticks,
         }
     }
@@ -105,20 +108,20 @@ impl Plan {
         Supervisor::new(&self.limits, &self.servo, &self.bounds).unwrap()
     }
 
-    pub fn control(&self) -> ControlNode<f32> {
-        let params = ControlParams {
+    pub fn control(&self) -> ControllerNode<f32> {
+        let params = ControllerParams {
             run: self.run,
             config: CONFIG,
             watchdog: self.watchdog,
             valid: Micros(2000),
             silence: self.silence,
         };
-        ControlNode::new(params, Servo::new(&self.servo).unwrap(), self.supervisor())
+        ControllerNode::new(params, Servo::new(&self.servo).unwrap(), self.supervisor())
     }
 
-    pub fn remote(&self) -> RemoteNode {
+    pub fn host(&self) -> HostNode {
         let configure = self.control().configuration();
-        RemoteNode::new(Servo::new(&self.servo).unwrap(), configure, ALIVE_NS, BOARD_SILENCE_NS)
+        HostNode::new(Servo::new(&self.servo).unwrap(), configure, ALIVE_NS, BOARD_SILENCE_NS)
     }
 
     /// The planned path from the count on which it begins.
@@ -139,6 +142,11 @@ pub fn paper(law: LawParams<f32>) -> ServoParams<f32> {
     ServoParams { output: OutputParams { bumpless_time: 0.05, ..paper.output }, ..paper }
 }
 
+/// The key of a setting.
+pub fn key(name: &str) -> u16 {
+    Setting::all().find(|s| s.name.to_string() == name).unwrap_or_else(|| panic!("{name}")).key
+}
+
 pub fn drain(out: &mut Outbox) -> Vec<u8> {
     let bytes = out.as_bytes().to_vec();
     out.clear();
@@ -152,27 +160,27 @@ pub fn frames(bytes: &[u8]) -> Vec<Message> {
 }
 
 /// Two notices are the same in every field and bit, but for the bits of what is not a number.
-pub fn words(notices: &[Told]) -> Vec<String> {
+pub fn words(notices: &[Heard]) -> Vec<String> {
     notices.iter().map(|n| format!("{n:?}")).collect()
 }
 
 pub struct Desk {
     pub plan: Plan,
-    pub remote: RemoteNode,
-    pub onboard: Onboard,
+    pub host: HostNode,
+    pub board_controller: BoardController,
     pub board: BoardNode,
-    pub twin: ControlNode<f32>,
+    pub twin: ControllerNode<f32>,
     pub now_ns: u64,
-    pub to_onboard: Outbox,
-    pub ports: Ports,
+    pub to_board: Outbox,
+    pub outboxes: Outboxes,
     pub up: Outbox,
     /// Whether the host looks at the clock.
     pub host_alive: bool,
     /// What the host has been sent: bytes, and with what each read of it came.
     pub sent: Vec<u8>,
     /// What the host and the twin make of it.
-    pub notices: Vec<Told>,
-    pub expected: Vec<Told>,
+    pub notices: Vec<Heard>,
+    pub expected: Vec<Heard>,
     /// Counts that the shaft goes in a period.
     pub speed: i32,
     periods: i32,
@@ -183,13 +191,13 @@ impl Desk {
     pub fn new(plan: Plan) -> Desk {
         let mut desk = Desk {
             plan,
-            remote: plan.remote(),
-            onboard: Onboard::new(ONBOARD),
+            host: plan.host(),
+            board_controller: BoardController::new(BOARD_CONTROLLER),
             board: BoardNode::new(&BOARD).unwrap(),
             twin: plan.control(),
             now_ns: 1000 * MS,
-            to_onboard: Outbox::default(),
-            ports: Ports::default(),
+            to_board: Outbox::default(),
+            outboxes: Outboxes::default(),
             up: Outbox::default(),
             host_alive: true,
             sent: Vec::new(),
@@ -212,41 +220,45 @@ impl Desk {
         let mut heard = Vec::new();
         for _ in 0..10 {
             let up = drain(&mut self.up);
-            let down = drain(&mut self.to_onboard);
-            if up.is_empty() && down.is_empty() && self.ports.daq.is_empty() && self.ports.host.is_empty() {
+            let down = drain(&mut self.to_board);
+            if up.is_empty()
+                && down.is_empty()
+                && self.outboxes.daq.is_empty()
+                && self.outboxes.host.is_empty()
+            {
                 return heard;
             }
-            self.onboard.host(self.now_ns, &down, &mut self.ports);
+            self.board_controller.host(self.now_ns, &down, &mut self.outboxes);
             if !up.is_empty() {
-                self.onboard.daq(self.now_ns, &up, &mut self.ports);
+                self.board_controller.daq(self.now_ns, &up, &mut self.outboxes);
                 let (path, expected) = (self.plan.path(), &mut self.expected);
                 self.twin.receive(self.now_ns, &up, &path, &mut Outbox::default(), &mut |n| expected.push(n));
             }
-            let daq = drain(&mut self.ports.daq);
+            let daq = drain(&mut self.outboxes.daq);
             self.board.receive(self.now_us(), &daq, &mut self.up);
-            let host = drain(&mut self.ports.host);
+            let host = drain(&mut self.outboxes.host);
             heard.extend(frames(&host));
             self.sent.extend_from_slice(&host);
             let notices = &mut self.notices;
-            self.remote.receive(self.now_ns, &host, &self.plan.path(), &mut |n| notices.push(n));
+            self.host.receive(self.now_ns, &host, &self.plan.path(), &mut |n| notices.push(n));
         }
         panic!("they never come to an end: {heard:?}");
     }
 
     /// A frame from the host, whether the host's own state machine would send it or not.
     pub fn says(&mut self, message: Message) -> Vec<Message> {
-        self.to_onboard.append(encode(&message).as_bytes());
+        self.to_board.append(encode(&message).as_bytes());
         self.settle()
     }
 
-    pub fn asks(&mut self, f: impl FnOnce(&mut RemoteNode, &mut Outbox)) -> Vec<Message> {
-        f(&mut self.remote, &mut self.to_onboard);
+    pub fn asks(&mut self, f: impl FnOnce(&mut HostNode, &mut Outbox)) -> Vec<Message> {
+        f(&mut self.host, &mut self.to_board);
         self.settle()
     }
 
     pub fn uploads(&mut self, pairs: &[(u16, u64)]) {
         for (key, value) in pairs {
-            let heard = self.asks(|remote, out| remote.set(*key, *value, out));
+            let heard = self.asks(|host, out| host.set(*key, *value, out));
             let taken = clutch_wire::Taken { run: self.plan.run, key: *key, value: *value };
             assert_eq!(heard, [Message::Taken(taken)]);
         }
@@ -255,20 +267,20 @@ impl Desk {
     /// With the settings and the board's answer to Configure.
     pub fn configures(&mut self) {
         self.uploads(&self.plan.pairs());
-        let heard = self.asks(|remote, out| remote.configure(out));
+        let heard = self.asks(|host, out| host.configure(out));
         assert!(matches!(heard[..], [Message::Configured(_)]), "{heard:?}");
-        assert_eq!((self.onboard.state(), self.remote.told().state), (State::Ready, State::Ready));
+        assert_eq!((self.board_controller.state(), self.host.standing().state), (State::Ready, State::Ready));
     }
 
     pub fn arms(&mut self) {
-        let heard = self.asks(|remote, out| remote.arm(out));
+        let heard = self.asks(|host, out| host.arm(out));
         assert!(matches!(heard[..], [Message::Armed(_)]), "{heard:?}");
-        assert_eq!((self.onboard.state(), self.remote.told().state), (State::Armed, State::Armed));
+        assert_eq!((self.board_controller.state(), self.host.standing().state), (State::Armed, State::Armed));
     }
 
     pub fn ready(plan: Plan) -> Desk {
         let mut desk = Desk::new(plan);
-        let heard = desk.asks(|remote, out| remote.discover(7, out));
+        let heard = desk.asks(|host, out| host.discover(7, out));
         assert_eq!(heard.len(), 2, "the controller and its board: {heard:?}");
         desk.configures();
         desk
@@ -279,7 +291,10 @@ impl Desk {
         desk.follows(3);
         desk.arms();
         desk.follows(5);
-        assert_eq!((desk.onboard.state(), desk.remote.told().state), (State::Running, State::Running));
+        assert_eq!(
+            (desk.board_controller.state(), desk.host.standing().state),
+            (State::Running, State::Running)
+        );
         desk
     }
 
@@ -299,10 +314,10 @@ impl Desk {
 
     /// Both ends look at the clock.
     pub fn polls(&mut self) -> Vec<Message> {
-        self.onboard.poll(self.now_ns, &mut self.ports);
+        self.board_controller.poll(self.now_ns, &mut self.outboxes);
         if self.host_alive {
             let notices = &mut self.notices;
-            self.remote.poll(self.now_ns, &mut self.to_onboard, &mut |n| notices.push(n));
+            self.host.poll(self.now_ns, &mut self.to_board, &mut |n| notices.push(n));
         }
         self.settle()
     }
@@ -324,16 +339,16 @@ impl Desk {
 
     /// Another run with the same boards.
     pub fn next(&mut self, plan: Plan) {
-        (self.plan, self.remote, self.twin) = (plan, plan.remote(), plan.control());
+        (self.plan, self.host, self.twin) = (plan, plan.host(), plan.control());
         self.twin.configure(plan.supervisor().safe_codes().hold, &mut Outbox::default());
         (self.notices, self.expected, self.sent) = (Vec::new(), Vec::new(), Vec::new());
     }
 
     /// The samples of which the host and the twin heard since the last look; of those before consent the
     /// host does not hear.
-    pub fn cycles(&mut self) -> (Vec<Told>, Vec<Told>) {
-        let told = |n: &Told| matches!(n, Notice::Cycle(c) if c.cycle.state != State::Ready);
-        let cycles = |notices: &mut Vec<Told>| take(notices).into_iter().filter(told).collect();
+    pub fn cycles(&mut self) -> (Vec<Heard>, Vec<Heard>) {
+        let told = |n: &Heard| matches!(n, Notice::Cycle(c) if c.cycle.state != State::Ready);
+        let cycles = |notices: &mut Vec<Heard>| take(notices).into_iter().filter(told).collect();
         assert!(!self.notices.iter().any(|n| matches!(n, Notice::Cycle(_)) && !told(n)));
         (cycles(&mut self.notices), cycles(&mut self.expected))
     }

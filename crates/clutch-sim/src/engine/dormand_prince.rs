@@ -7,6 +7,7 @@
 //! 6 (1980) 19–26.
 
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, break_away};
+use clutch_core::friction::FrictionModel;
 
 /// Error allowed per step: relative, and absolute in rad and rad/s.
 const TOLERANCE: f64 = 1e-11;
@@ -52,7 +53,7 @@ impl Slip<'_> {
         // Friction acts against the way the shaft slips, also in the stages of a step that looks
         // beyond the stop: there it keeps its value at rest.
         let speed = (self.sign * velocity).max(0.0);
-        let mu = self.model.plant.friction().magnitude(speed) * self.model.friction_factor(position);
+        let mu = self.model.plant.friction().level(speed) * self.model.friction_factor(position);
         let brake = self.sign * mu * p.brake_gain * self.input.volts.at(s).max(0.0);
         [
             velocity,

@@ -17,6 +17,7 @@
 //! 3. stuck: nothing to integrate; break-away is a comparison.
 
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, Volts, break_away};
+use clutch_core::friction::FrictionModel;
 
 /// Speed, in Stribeck velocities, above which the exponential is lost in rounding.
 const LINEAR_ABOVE: f64 = 37.0;
@@ -47,9 +48,8 @@ impl ExactFlow {
     /// Why this engine cannot take a rig; `None` if it can.
     #[must_use]
     pub fn refuses(model: &Model, drive_is_constant: bool, actuator_lags: bool) -> Option<&'static str> {
-        #[allow(clippy::float_cmp_const, reason = "the closed form holds for exactly 1")]
-        if model.plant.params().friction.stribeck_exponent != 1.0 {
-            Some("a Stribeck exponent of 1")
+        if model.plant.friction().exponential().is_none() {
+            Some("friction that falls exponentially with the speed (Stribeck's with an exponent of 1)")
         } else if model.ripple.is_some() {
             Some("friction that does not vary along the disc")
         } else if !drive_is_constant {
@@ -265,6 +265,9 @@ impl Engine for ExactFlow {
             return Err(EngineError::Refused(needs));
         }
         let volts = input.volts.at(0.0);
+        let Some(friction) = model.plant.friction().exponential() else {
+            return Err(EngineError::Refused("friction that falls exponentially with the speed"));
+        };
         let (p, torque) = (model.plant.params(), input.torque(0.0, shaft.position));
         let (brake, holds) = (p.brake_gain * volts.max(0.0), model.break_away_torque(0.0, volts));
         let mut s = 0.0;
@@ -282,10 +285,10 @@ impl Engine for ExactFlow {
             }
             let sign = shaft.motion.sign();
             let flow = Flow {
-                drive: (sign * torque - brake * p.friction.mu_dynamic) / p.inertia,
+                drive: (sign * torque - brake * friction.sliding) / p.inertia,
                 drag: p.viscous_damping / p.inertia,
-                stribeck: brake * (p.friction.mu_static - p.friction.mu_dynamic) / p.inertia,
-                v_s: p.friction.stribeck_velocity,
+                stribeck: brake * (friction.at_rest - friction.sliding) / p.inertia,
+                v_s: friction.velocity,
             };
             let piece = flow.piece(sign * shaft.velocity, input.duration - s);
             s += piece.time;

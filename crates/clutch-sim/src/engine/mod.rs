@@ -247,18 +247,17 @@ pub trait Engine {
     }
 }
 
-/// Which engine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EngineKind {
-    /// The exact flow where the rig allows it, else Dormand–Prince.
-    #[default]
-    Auto,
-    /// Dormand and Prince's 5(4) pair, the paper's solver, with events: takes every rig.
-    DormandPrince,
-    /// The closed form of the motion between samples: Stribeck exponent 1, friction even along
-    /// the disc, torque and voltage held between samples.
-    ExactFlow,
+clutch_core::words! {
+    /// Engine that integrates the motion.
+    pub enum EngineKind {
+        /// The exact flow where the rig allows it, else Dormand–Prince.
+        Auto = "auto" default,
+        /// Dormand and Prince's 5(4) pair, the paper's solver, with events: takes every rig.
+        DormandPrince = "dormand_prince",
+        /// The closed form of the motion between samples: friction that falls exponentially with the speed and is
+        /// even along the disc, torque and voltage held between samples.
+        ExactFlow = "exact_flow",
+    }
 }
 
 /// Longest time without an event that a search for break-away may step over, as a share of the

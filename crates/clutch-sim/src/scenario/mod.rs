@@ -3,28 +3,33 @@
 //! The rig begins as a copy of the one that `rig.base` names; every key in the file overrides
 //! its value. Unknown keys are errors. `docs/scenario.md` lists all keys.
 
+pub mod describe;
 mod error;
-mod file;
+mod params;
+mod schema;
 mod section;
 
 pub use error::ScenarioError;
-pub use file::ScalarKind;
+pub use params::{Safety, ScalarKind, ScenarioBounds, ScenarioLimits, ScenarioParams, ScenarioSampling};
+pub use schema::schema;
 pub use section::check_section;
 
 use crate::progress::Report;
-use crate::rig::{Rig, RigParams, Ripple};
+use crate::rig::{Rig, RigBase, RigParams, Ripple};
 use crate::run::{Keep, Run, RunError, RunSpec, Start, simulate_watched};
+use crate::tables::{self, check, checked, complete, find, lookup, read, row_at, shown};
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
-use clutch_core::law::{Law, LawParams, Output};
-use clutch_core::reference::{Knot, Reference};
+use clutch_core::friction::FrictionModel;
+use clutch_core::law::{Asked, Law, Output};
+use clutch_core::params::{Choice, Kind, Params};
+use clutch_core::reference::{Knot, Reference, ReferenceParams, Table as PathTable};
 use clutch_core::{
-    Bounds, Dac, Envelope, FixedCounts, Interval, Micros, Obstacle, ParamError, Plant, Real, Supervisor,
-    SupervisorParams, Tolerances, VelocitySource, check_path,
+    Bounds, Dac, Encoder, Envelope, FixedCounts, Interval, Obstacle, ParamError, Plant, Real, Supervisor,
+    SupervisorParams, VelocitySource, check_path,
 };
-use error::Locator;
-use file::File;
 use std::io::ErrorKind;
 use std::path::Path;
+use std::sync::{Arc, OnceLock};
 use toml::{Table, Value};
 
 /// A built-in scenario.
@@ -49,6 +54,7 @@ built_in!(
     "pd_2",
     "ctc_2",
     "smc_2",
+    "pid_2",
     "bench_pd_2",
     "bench_smc_2",
     "observer_smc_2",
@@ -59,33 +65,17 @@ built_in!(
     "board_minimum_jerk",
 );
 
-/// How a run on a board ends, and what ends it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Safety {
-    /// Why this safe state is the right one for this rig, in the operator's words.
-    pub reason: String,
-    /// Limits and safe state.
-    pub supervisor: SupervisorParams,
-    /// Periods without a valid code after which the board goes to the safe state by itself.
-    pub watchdog_cycles: u32,
-    /// Periods after its sample during which a code is valid.
-    pub valid_cycles: u32,
-}
-
 /// A checked scenario.
 #[derive(Clone, Debug)]
 pub struct Scenario {
-    /// Its title.
-    pub name: String,
-    /// Scalar that the servo runs in.
-    pub scalar: ScalarKind,
-    spec: RunSpec<'static>,
-    reference: file::ReferenceFile,
+    origin: String,
+    /// What the file says, and defaults: made of the tables of `base`, with `changes` not yet in it.
+    base: Arc<Table>,
+    changes: Vec<(String, Value)>,
+    /// Both together, made when it is asked for: a sweep has thousands of scenarios, of which few are shown.
+    table: OnceLock<Table>,
+    params: ScenarioParams,
     knots: Vec<Knot>,
-    tolerances: Tolerances,
-    reach_rate: f64,
-    safety: Option<Safety>,
-    locator: Locator,
     /// Made once: it walks the whole path.
     plan: Option<Plan>,
 }
@@ -157,8 +147,54 @@ impl Scenario {
     ) -> Result<Scenario, ScenarioError> {
         override_keys(origin, &mut table, set)?;
         merge_base(origin, &mut table)?;
-        let file: File = error::deserialize(origin, &table)?;
-        Scenario::check(origin, &file)
+        complete(origin, "", &<ScenarioParams as Params<f64>>::INFO, &mut table)?;
+        let params: ScenarioParams = read(&table);
+        let mut scenario = Scenario {
+            origin: origin.into(),
+            base: Arc::new(table),
+            changes: Vec::new(),
+            table: OnceLock::new(),
+            params,
+            knots: Vec::new(),
+            plan: None,
+        };
+        scenario.make(None)?;
+        Ok(scenario)
+    }
+
+    /// This scenario with other values: what a row of a sweep is made of. Only what the keys touch is checked and
+    /// planned anew; none if one of the keys changes more than a value, as `rig.base` does, or a table of points.
+    pub(crate) fn with(&self, set: &[(String, Value)]) -> Option<Result<Scenario, ScenarioError>> {
+        let mut scenario = Scenario {
+            origin: self.origin.clone(),
+            base: self.base.clone(),
+            changes: self.changes.clone(),
+            table: OnceLock::new(),
+            params: self.params.clone(),
+            knots: self.knots.clone(),
+            plan: None,
+        };
+        // The path is walked anew unless all keys are ones that it knows nothing of.
+        let mut keeps_path = true;
+        for (key, value) in set {
+            let row = row_at(&self.params, key)?;
+            let section = key.split('.').next().unwrap_or_default();
+            let plain = matches!(row.kind, Kind::Real | Kind::Whole | Kind::Switch | Kind::Word(_));
+            // A parameter that may be absent decides what else may be there.
+            if !plain || key == "rig.base" || row.optional {
+                return None;
+            }
+            keeps_path &= matches!(section, "law" | "velocity" | "safety")
+                || (section == "rig" && !key.starts_with("rig.encoder") && key != "rig.speed_limit_deg_s");
+            let value = match checked(&self.origin, key, row, value.clone()) {
+                Ok(value) => value,
+                Err(e) => return Some(Err(e)),
+            };
+            tables::set(&mut scenario.params, key, &value);
+            scenario.changes.push((key.clone(), value));
+        }
+        let envelope = self.plan.as_ref().filter(|_| keeps_path).map(|plan| plan.envelope);
+        Some(scenario.make(envelope).map(|()| scenario))
     }
 
     /// The built-in scenario of that name.
@@ -193,79 +229,93 @@ impl Scenario {
         }
     }
 
-    fn check(origin: &str, file: &File) -> Result<Scenario, ScenarioError> {
-        let locator = Locator::new(origin, file);
-        let rig = file.rig.params().map_err(|e| locator.at("rig", &e))?;
-        let run = file.run.params();
-        let model = file.model.params();
-        let checked = Rig::new(&rig, run.seed).map_err(|e| locator.at("rig", &e))?;
-        Bounds::around(&model, &Tolerances::default()).map_err(|e| locator.at("model", &e))?;
-        let tolerances = file.bounds.tolerances();
-        Bounds::around(&model, &tolerances).map_err(|e| {
-            let expected = "at least 0 and below 100 %";
-            locator.at("bounds", &ParamError { expected, ..e })
-        })?;
-        let knots = file.reference.knots(checked.encoder).map_err(|e| locator.at("reference", &e))?;
-        let spec = RunSpec {
-            rig,
-            period: Micros(file.sampling.period_us),
-            velocity: file.velocity.params(),
-            model,
-            law: file.law.params(),
-            output: file.output.params(),
-            // Replaced at each use by the file's own path, which borrows the knots.
-            reference: clutch_core::reference::ReferenceParams::Hold,
-            run,
-        };
-        let mut scenario = Scenario {
-            name: file.name.clone(),
-            scalar: file.sampling.scalar,
-            spec,
-            reference: file.reference.clone(),
-            knots,
-            tolerances,
-            reach_rate: file.bounds.reach_rate_rad_s2,
-            safety: file.safety.as_ref().map(|s| s.safety(checked.params.speed_limit)),
-            locator,
-            plan: None,
-        };
-        scenario.plan = Some(scenario.check_parts()?);
-        Ok(scenario)
+    /// Checks what relates parameters, and builds each part once, so that whatever is wrong is said before anything
+    /// runs. `envelope` is what the path asks for, if it is known.
+    fn make(&mut self, envelope: Option<Envelope<f64>>) -> Result<(), ScenarioError> {
+        if let Some((path, e)) = check(&self.params, "") {
+            return Err(error_of(&self.origin, &path, self.table(), &e));
+        }
+        self.knots = self.read_knots()?;
+        self.check_parts()?;
+        let plan = self.make_plan(envelope)?;
+        self.params.safety.as_ref().map_or(Ok(()), |s| self.check_safety(s, &plan))?;
+        self.plan = Some(plan);
+        Ok(())
     }
 
-    /// Builds each part once, so that whatever is wrong is said before anything runs.
-    fn check_parts(&self) -> Result<Plan, ScenarioError> {
-        let (spec, at) = (self.spec(), &self.locator);
-        spec.period.period::<f64>().map_err(|e| at.at("sampling", &e))?;
-        match self.scalar {
+    /// Points of a path that is a table, in the core's terms.
+    fn read_knots(&self) -> Result<Vec<Knot>, ScenarioError> {
+        let key = "reference.table";
+        let Some(Value::Table(table)) = lookup(&self.base, key) else { return Ok(Vec::new()) };
+        let points = table.get("points_s_deg").and_then(Value::as_array);
+        let encoder = Encoder::new::<f64>(self.params.rig.encoder.sensor.counts_per_rev)
+            .map_err(|e| self.at("rig", &e))?;
+        points
+            .into_iter()
+            .flatten()
+            .filter_map(tables::pair)
+            .enumerate()
+            .map(|(i, (time, angle))| {
+                let counts = angle.to_radians() * encoder.counts_per_radian::<f64>();
+                if counts.abs() >= 1e12 {
+                    return Err(self.at("reference", &PathTable::HELD.error(i as f64)));
+                }
+                let time_us = libm::rint(time * 1e6) as u64;
+                Ok(Knot { time_us, position: FixedCounts::from_real(counts) })
+            })
+            .collect()
+    }
+
+    /// The error of a parameter somewhere in the table `section` ("" = the whole file), as this file has it.
+    fn at<T: Real>(&self, section: &str, e: &ParamError<T>) -> ScenarioError {
+        let nested = <ScenarioParams as Params<f64>>::INFO.table().map_or(&[][..], |file| file.nested);
+        // The rig, which comes first, last: of a table that rig and model both have, the model's is what laws, bounds
+        // and certificate refuse. Errors of a rig come with its section.
+        let mut below = nested.iter().rev().filter(|below| section.is_empty() || below.key == section);
+        let path = below.find_map(|below| {
+            find(below.info, below.key, self.table().get(below.key)?.as_table()?, e.table.id())
+        });
+        let path = path.unwrap_or_else(|| section.to_owned());
+        error_of(&self.origin, &path, self.table(), &e.cast())
+    }
+
+    fn message(&self, key: &str, message: String) -> ScenarioError {
+        ScenarioError::new(&self.origin, key, "", message)
+    }
+
+    /// An error of the path as a whole.
+    fn path_message(&self, message: String) -> ScenarioError {
+        let kind =
+            <ReferenceParams<'static> as Choice<f64>>::CHOICE.options[self.params.reference.chosen()].key;
+        self.message(&format!("reference.{kind}"), message)
+    }
+
+    fn check_parts(&self) -> Result<(), ScenarioError> {
+        let spec = self.spec();
+        match self.scalar() {
             ScalarKind::F32 => self.check_servo::<f32>(&spec)?,
             ScalarKind::F64 => self.check_servo::<f64>(&spec)?,
         }
-        spec.run.check(spec.period).map_err(|e| at.at("run", &e))?;
-        let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| at.at("rig", &e))?;
-        spec.engine(&rig).map_err(|e| at.message("run.engine", e.to_string()))?;
-        self.path().map_err(|e| at.at("reference", &e))?;
-        if self.scalar == ScalarKind::F32 {
+        spec.run.check(spec.period).map_err(|e| self.at("run", &e))?;
+        let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| self.at("rig", &e))?;
+        spec.engine(&rig).map_err(|e| self.message("run.engine", e.to_string()))?;
+        self.path().map_err(|e| self.at("reference", &e))?;
+        if self.scalar() == ScalarKind::F32 {
             // What is in range in f64 can be nothing, or beyond everything, in f32.
-            spec.path::<f32>().map_err(|e| at.at("reference", &e))?;
+            spec.path::<f32>().map_err(|e| self.single("reference", &e))?;
         }
-        let plan = self.make_plan()?;
-        self.safety.as_ref().map_or(Ok(()), |s| self.check_safety(s, &plan))?;
-        Ok(plan)
+        Ok(())
     }
 
     fn check_safety(&self, safety: &Safety, plan: &Plan) -> Result<(), ScenarioError> {
-        let (spec, at) = (self.spec(), &self.locator);
-        let wrong = |e: ParamError| at.at("safety", &e);
-        section::check_reason(&safety.reason, at)?;
-        let servo = spec.servo().map_err(|e| at.at("rig", &e))?;
-        Supervisor::new(&safety.supervisor, &servo, &plan.bounds).map_err(wrong)?;
-        section::check_cycles(safety).map_err(wrong)?;
+        let servo = self.spec().servo().map_err(|e| self.at("rig", &e))?;
+        let supervisor = self.supervisor(safety);
+        Supervisor::new(&supervisor, &servo, &plan.bounds).map_err(|e| self.at("safety", &e))?;
         // A brake that is to hold must hold the strongest drive with the weakest brake.
         let b = &plan.bounds;
         let needed = b.drive_torque.high / b.weakest_brake();
-        match safety.supervisor.on_fault.holding_voltage() {
-            Some(volts) if volts < needed => Err(at.message(
+        match safety.on_fault.holding_voltage() {
+            Some(volts) if volts < needed => Err(self.message(
                 "safety.on_fault",
                 format!("holds with {volts} V, and the strongest drive against the weakest brake of [bounds] needs {needed:.4} V; twice as much is usual"),
             )),
@@ -273,23 +323,55 @@ impl Scenario {
         }
     }
 
+    /// What the supervisor of a run on a board watches.
+    #[must_use]
+    pub fn supervisor(&self, safety: &Safety) -> SupervisorParams {
+        SupervisorParams {
+            on_fault: safety.on_fault,
+            speed: self.params.rig.speed,
+            limits: safety.limits.supervisor,
+        }
+    }
+
     /// The servo part by part, in the scalar that it runs in.
     fn check_servo<T: Real>(&self, spec: &RunSpec<'_>) -> Result<(), ScenarioError> {
-        let at = |section: &'static str| {
-            move |e: ParamError<T>| {
-                let value = e.value.to_f64();
-                self.locator.at(section, &ParamError { field: e.field, value, expected: e.expected })
-            }
-        };
-        let servo = spec.servo().map_err(|e| self.locator.at("rig", &e))?.cast::<T>();
+        let at = |section: &'static str| move |e: ParamError<T>| self.single(section, &e);
+        let servo = spec.servo().map_err(|e| self.at("rig", &e))?.cast::<T>();
         let model = Plant::new(&servo.model).map_err(at("model"))?;
         Output::new(&servo.output, servo.period).map_err(at("output"))?;
         servo.check_output().map_err(at("output"))?;
-        Law::new(&servo.law, &servo.model, &servo.output, servo.period)
-            .map_err(|e| at(if e.field.starts_with("mu_") { "model" } else { "law" })(e))?;
+        // A law with a model divides by its friction.
+        Law::new(&servo.law, &servo.model, &servo.output, servo.period).map_err(at(""))?;
         VelocitySource::new(&servo.velocity, &model, servo.encoder, servo.period).map_err(at("velocity"))?;
         Dac::new(&servo.dac).map_err(at("rig"))?;
         Ok(())
+    }
+
+    /// As [`Scenario::at`], of a part in the servo's scalar: what single precision cannot hold is said so.
+    fn single<T: Real>(&self, section: &str, e: &ParamError<T>) -> ScenarioError {
+        let mut error = self.at(section, e);
+        if self.scalar() == ScalarKind::F32 && e.relation == 0 {
+            error.message.push_str(", in single precision (sampling.scalar = \"f32\")");
+        }
+        error
+    }
+
+    /// Its title.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.params.name.0
+    }
+
+    /// Scalar that the servo runs in.
+    #[must_use]
+    pub fn scalar(&self) -> ScalarKind {
+        self.params.sampling.scalar
+    }
+
+    /// Every parameter, SI and radians.
+    #[must_use]
+    pub fn params(&self) -> &ScenarioParams {
+        &self.params
     }
 
     /// How a run on a board ends.
@@ -297,8 +379,8 @@ impl Scenario {
     /// # Errors
     /// The scenario has no table `[safety]`.
     pub fn safety(&self) -> Result<&Safety, ScenarioError> {
-        self.safety.as_ref().ok_or_else(|| {
-            self.locator.message(
+        self.params.safety.as_ref().ok_or_else(|| {
+            self.message(
                 "safety",
                 "missing; a run on a board needs a safe state, and there is no default. For a shaft that a weight or a spring drives:\n\n\
                  [safety]\nreason = \"a weight drives the shaft\"\n\n[safety.on_fault.hold]\nvolts_v = 4.5\n\n\
@@ -311,7 +393,19 @@ impl Scenario {
     /// Every key with its tables, and its value, defaults filled in.
     #[must_use]
     pub fn parameters(&self) -> Vec<(String, String)> {
-        self.locator.flattened()
+        fn walk(table: &Table, path: &str, out: &mut Vec<(String, String)>) {
+            for (key, value) in table {
+                let key = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                match value {
+                    Value::Table(t) if t.is_empty() => out.push((key, "{}".to_owned())),
+                    Value::Table(t) => walk(t, &key, out),
+                    value => out.push((key, shown(value))),
+                }
+            }
+        }
+        let mut out = Vec::new();
+        walk(self.table(), "", &mut out);
+        out
     }
 
     /// The scenario as TOML with every default filled in; parsing it gives the same scenario.
@@ -323,24 +417,46 @@ impl Scenario {
     /// The scenario as a table with every default filled in.
     #[must_use]
     pub fn table(&self) -> &Table {
-        self.locator.table()
+        self.table.get_or_init(|| {
+            let mut table = Table::clone(&self.base);
+            // Keys of rows that are there already: nothing can be wrong.
+            let _ = override_keys(&self.origin, &mut table, &self.changes);
+            table
+        })
     }
 
     /// The specification of the run.
     #[must_use]
     pub fn spec(&self) -> RunSpec<'_> {
-        RunSpec { reference: self.reference.params(&self.knots), ..self.spec.clone() }
+        let p = &self.params;
+        RunSpec {
+            rig: p.rig.clone(),
+            period: p.sampling.sampling.period,
+            velocity: p.velocity,
+            model: p.model,
+            law: p.law,
+            output: p.output,
+            reference: self.reference(),
+            run: p.run,
+        }
+    }
+
+    fn reference(&self) -> ReferenceParams<'_> {
+        match self.params.reference {
+            ReferenceParams::Table(t) => ReferenceParams::Table(PathTable { knots: &self.knots, ..t }),
+            other => other,
+        }
     }
 
     /// The number of ticks in the run.
     #[must_use]
     pub fn ticks(&self) -> u64 {
-        self.spec.run.ticks(self.spec.period)
+        self.params.run.ticks(self.params.sampling.sampling.period)
     }
 
     fn path(&self) -> Result<Reference<'_, f64>, ParamError> {
-        let encoder = clutch_core::Encoder::new::<f64>(self.spec.rig.counts_per_rev)?;
-        Reference::new(&self.reference.params(&self.knots), FixedCounts(0), encoder, self.spec.period)
+        let encoder = Encoder::new::<f64>(self.params.rig.encoder.sensor.counts_per_rev)?;
+        Reference::new(&self.reference(), FixedCounts(0), encoder, self.params.sampling.sampling.period)
     }
 
     /// Path and gains against the bounds of the believed plant.
@@ -348,29 +464,48 @@ impl Scenario {
     /// # Errors
     /// None for a checked scenario.
     pub fn plan(&self) -> Result<Plan, ScenarioError> {
-        self.plan.clone().map_or_else(|| self.make_plan(), Ok)
+        self.plan.clone().map_or_else(|| self.make_plan(None), Ok)
     }
 
-    fn make_plan(&self) -> Result<Plan, ScenarioError> {
-        let (spec, at) = (self.spec(), &self.locator);
-        let param = |section: &'static str| move |e: ParamError| at.at(section, &e);
-        let path = self.path().map_err(param("reference"))?;
-        let bounds = Bounds::around(&spec.model, &self.tolerances).map_err(param("bounds"))?;
-        let law = Law::new(&spec.law, &spec.model, &spec.output, spec.period).map_err(param("law"))?;
+    fn make_plan(&self, envelope: Option<Envelope<f64>>) -> Result<Plan, ScenarioError> {
+        let p = &self.params;
+        let period = p.sampling.sampling.period;
+        let bounds = Bounds::around(&p.model, &p.bounds.tolerances).map_err(|e| self.at("", &e))?;
+        let law = Law::new(&p.law, &p.model, &p.output, period).map_err(|e| self.at("", &e))?;
+        let envelope = envelope.map_or_else(|| self.walk_path(&bounds, law.output()), Ok)?;
+        let demand = Demand {
+            velocity: envelope.velocity,
+            acceleration: envelope.largest_acceleration(),
+            reach_rate: p.bounds.reach_rate,
+            start_error_rate: envelope.start_jump,
+            velocity_jump: envelope.velocity_jump,
+        };
+        let certificate = certify(&law, &bounds, &demand).map_err(|e| self.at("bounds", &e))?;
+        let asked = Asked { velocity: 0.0, acceleration: 0.0, fastest: &|_| 0.0 };
+        let surface = law.surface(&asked).filter(|surface| surface.sliding);
+        let paper = surface.map(|s| paper_conditions(&bounds, &demand, s.kp, s.slope));
+        Ok(Plan { envelope, bounds, certificate, paper, demand })
+    }
+
+    /// What the path asks of drive and brake.
+    fn walk_path(&self, bounds: &Bounds, limits: &Output<f64>) -> Result<Envelope<f64>, ScenarioError> {
+        let p = &self.params;
+        let period = p.sampling.sampling.period;
+        let path = self.path().map_err(|e| self.at("reference", &e))?;
         let first = path.at(0).velocity;
-        let start_velocity = if spec.run.start == Start::OnPath { first } else { 0.0 };
-        let envelope = check_path(&path, self.ticks(), spec.period, start_velocity, &bounds, law.output())
+        let start_velocity = if p.run.start == Start::OnPath { first } else { 0.0 };
+        let envelope = check_path(&path, self.ticks(), period, start_velocity, bounds, limits)
             .map_err(|e| {
                 let at_time = format!("a brake cannot follow the path from t = {:.4} s on", e.time);
                 let (asked, available) = (e.asked, e.available);
-                at.path(match e.obstacle {
+                self.path_message(match e.obstacle {
                     Obstacle::Reverse => format!(
                         "{at_time}: it runs backwards at {:.4} °/s, and a brake drives nothing; keep the velocity at or above 0",
                         -asked.to_degrees()
                     ),
-                    Obstacle::Acceleration if available <= 0.0 && spec.output.lowest > 0.0 => format!(
+                    Obstacle::Acceleration if available <= 0.0 && p.output.lowest > 0.0 => format!(
                         "{at_time}: with output.lowest_v = {} the brake never lets go enough for the drive to keep the path; lower it",
-                        spec.output.lowest
+                        p.output.lowest
                     ),
                     Obstacle::Acceleration => format!(
                         "{at_time}: it accelerates at {:.5} °/s², and the drive grants {:.5} °/s²; accelerate more slowly",
@@ -383,28 +518,15 @@ impl Scenario {
                     Obstacle::NotFinite => format!("{at_time}: its velocity or acceleration is not a number"),
                 })
             })?;
-        let limit = spec.rig.speed_limit;
+        let limit = p.rig.speed.speed_limit;
         if envelope.velocity > limit * (1.0 + 1e-9) {
-            return Err(at.path(format!(
+            return Err(self.path_message(format!(
                 "the path's velocity of {:.4} °/s is above rig.speed_limit_deg_s = {:.4}; lower it or raise the limit (angles here are in degrees: 1 rad/s is 57.3 °/s)",
                 envelope.velocity.to_degrees(),
                 limit.to_degrees()
             )));
         }
-        let demand = Demand {
-            velocity: envelope.velocity,
-            acceleration: envelope.largest_acceleration(),
-            reach_rate: self.reach_rate,
-            start_error_rate: envelope.start_jump,
-            velocity_jump: envelope.velocity_jump,
-        };
-        let certificate = certify(&law, &bounds, &demand).map_err(param("bounds"))?;
-        let paper = match &spec.law {
-            LawParams::Smc(p) => Some(paper_conditions(&bounds, &demand, p.kp, p.slope)),
-            LawParams::SmcSign(p) => Some(paper_conditions(&bounds, &demand, p.kp, p.slope)),
-            _ => None,
-        };
-        Ok(Plan { envelope, bounds, certificate, paper, demand })
+        Ok(envelope)
     }
 
     /// Runs it, keeping what is asked for and telling of its progress in samples.
@@ -413,7 +535,7 @@ impl Scenario {
     /// A motion that cannot be followed; the end of `progress`'s patience.
     pub fn run(&self, keep: Keep, progress: Report<'_>) -> Result<Run, ScenarioError> {
         let spec = self.spec();
-        let run = match self.scalar {
+        let run = match self.scalar() {
             ScalarKind::F32 => simulate_watched::<f32>(&spec, keep, progress),
             ScalarKind::F64 => simulate_watched::<f64>(&spec, keep, progress),
         };
@@ -424,11 +546,13 @@ impl Scenario {
     #[must_use]
     pub fn run_error(&self, e: &RunError) -> ScenarioError {
         match e {
-            RunError::Param(e) => self.locator.at("", e),
-            RunError::Engine(_) => self.locator.message("run.engine", e.to_string()),
-            RunError::Motion(_) => self.locator.message("rig", e.to_string()),
-            RunError::Memory(_) => self.locator.message("run.duration_s", e.to_string()),
-            RunError::Stopped => self.locator.message("", e.to_string()),
+            RunError::Param(e) => self.at("", e),
+            RunError::Engine(_) => self.message("run.engine", e.to_string()),
+            RunError::Motion(_) => self.message("rig", e.to_string()),
+            RunError::Begin(_) => self.path_message(e.to_string()),
+            RunError::OtherServo => self.message("", e.to_string()),
+            RunError::Memory(_) => self.message("run.duration_s", e.to_string()),
+            RunError::Stopped => self.message("", e.to_string()),
         }
     }
 
@@ -438,7 +562,7 @@ impl Scenario {
     /// # Errors
     /// None for a checked scenario.
     pub fn outside_bounds(&self, bounds: &Bounds) -> Result<Vec<String>, ScenarioError> {
-        let rig = Rig::new(&self.spec.rig, self.spec.run.seed).map_err(|e| self.locator.at("rig", &e))?;
+        let rig = Rig::new(&self.params.rig, self.params.run.seed).map_err(|e| self.at("rig", &e))?;
         let p = rig.model.plant.params();
         let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
         let (low, high) = rig.drive.range();
@@ -458,13 +582,14 @@ impl Scenario {
             }
         };
         let friction = |mu: f64| (mu * (1.0 - swing), mu * (1.0 + swing));
-        let (s, d) = (friction(p.friction.mu_static), friction(p.friction.mu_dynamic));
+        let (s, d) =
+            (friction(rig.model.plant.friction().at_rest()), friction(rig.model.plant.friction().sliding()));
         check("inertia", p.inertia, p.inertia, &bounds.inertia);
         check("driving torque", low, high, &bounds.drive_torque);
         check("viscous damping", p.viscous_damping, p.viscous_damping, &bounds.viscous_damping);
         check("brake gain", p.brake_gain, p.brake_gain, &bounds.brake_gain);
-        check("static friction", s.0, s.1, &bounds.mu_static);
-        check("dynamic friction", d.0, d.1, &bounds.mu_dynamic);
+        check("static friction", s.0, s.1, &bounds.friction_at_rest);
+        check("dynamic friction", d.0, d.1, &bounds.friction_sliding);
         Ok(lines)
     }
 }
@@ -484,23 +609,21 @@ fn read_table(origin: &str, text: &str) -> Result<Table, ScenarioError> {
 /// Lays the file's rig over the one that `rig.base` names.
 fn merge_base(origin: &str, table: &mut Table) -> Result<(), ScenarioError> {
     let Some(Value::Table(own)) = table.get_mut("rig") else { return Ok(()) };
-    let expected = format!("the name of a rig: {}", RigParams::NAMES.join(", "));
-    let name = match own.get("base") {
-        Some(Value::String(name)) => name.clone(),
-        other => {
-            let value = other.map_or("missing".to_owned(), error::shown);
-            return Err(ScenarioError::value(origin, "rig.base", &value, &expected));
-        }
+    let names: Vec<&str> = RigBase::ALL.iter().map(|base| base.name()).collect();
+    let expected = format!("the name of a rig: {}", names.join(", "));
+    let base = match own.get("base") {
+        Some(Value::String(name)) => RigBase::named(name).ok_or_else(|| format!("\"{name}\"")),
+        other => Err(other.map_or("missing".to_owned(), shown)),
     };
-    let Some(base) = RigParams::named(&name) else {
-        return Err(ScenarioError::value(origin, "rig.base", &format!("\"{name}\""), &expected));
-    };
-    let mut merged = error::to_table(&file::RigFile::new(&name, &base));
+    let base = base.map_err(|value| ScenarioError::value(origin, "rig.base", &value, &expected))?;
+    let mut merged = RigParams::base_table(base);
     // Alternatives: naming one drops the base's other.
-    if let (Some(Value::Table(own)), Some(Value::Table(base))) = (own.get("drive"), merged.get("drive"))
-        && own.keys().any(|k| !base.contains_key(k))
-    {
-        merged.remove("drive");
+    for choice in ["drive", "friction"] {
+        if let (Some(Value::Table(own)), Some(Value::Table(base))) = (own.get(choice), merged.get(choice))
+            && own.keys().any(|k| !base.contains_key(k))
+        {
+            merged.remove(choice);
+        }
     }
     if own.contains_key("brake_geometry") {
         merged.remove("brake_gain_nm_v");
@@ -508,6 +631,26 @@ fn merge_base(origin: &str, table: &mut Table) -> Result<(), ScenarioError> {
     overlay(&mut merged, std::mem::take(own));
     *own = merged;
     Ok(())
+}
+
+/// The error of a parameter of the table at `path`, as the file has it.
+fn error_of(origin: &str, path: &str, table: &Table, e: &ParamError) -> ScenarioError {
+    let (Some(info), Some(row)) = (e.table(), e.row()) else {
+        return ScenarioError::new(origin, path, "", e.to_string());
+    };
+    let key = if path.is_empty() { row.key.to_owned() } else { format!("{path}.{}", row.key) };
+    let value = match lookup(table, &key) {
+        // A table's own text would be long; the core says which point.
+        Some(Value::Array(_)) => format!("(point {})", e.value),
+        Some(value) => shown(value),
+        None => row.unit.from_si(e.value).to_string(),
+    };
+    let expected = match e.relation() {
+        Some(relation) => relation.expected.to_owned(),
+        None => row.range.words(row.kind, &row.unit, false).to_string(),
+    };
+    let _ = info;
+    ScenarioError::value(origin, &key, &value, &expected)
 }
 
 fn overlay(base: &mut Table, over: Table) {

@@ -1,6 +1,8 @@
 //! The C header: layouts as offsets, and a codec, for boards written in C or C++.
 
-use clutch_wire::{CODES, MAX_BODY, MAX_FRAME, MessageInfo, SCHEMA, STATUS, TABLE, TELEMETRY, VERSION};
+use clutch_wire::{
+    CODES, FieldInfo, List, MAX_BODY, MAX_FRAME, MessageInfo, SCHEMA, STATUS, TABLE, TELEMETRY, VERSION,
+};
 use std::fmt::Write as _;
 
 /// `HoldThenRelease` as `hold_then_release`.
@@ -43,6 +45,7 @@ fn write_all(out: &mut String) -> std::fmt::Result {
     writeln!(out, "#define CLUTCH_SCHEMA UINT64_C({SCHEMA:#018x})")?;
     writeln!(out, "#define CLUTCH_MAX_BODY {MAX_BODY}u  /* longest frame before stuffing, bytes */")?;
     writeln!(out, "#define CLUTCH_MAX_FRAME {MAX_FRAME}u /* longest frame on the wire, bytes */")?;
+    writeln!(out, "#define CLUTCH_MAX_LIST {}u  /* most numbers of a list */", List::MOST)?;
     for set in CODES {
         writeln!(out, "\n/* {}: {} */", set.name, ascii(set.doc))?;
         for v in set.values {
@@ -65,11 +68,16 @@ fn write_all(out: &mut String) -> std::fmt::Result {
     }
     writeln!(
         out,
-        "\n/* Bytes before stuffing of a frame of this kind, CRC included; 0 for a kind that is not known. */"
+        "\n/* Bytes before stuffing of the frame with this body, CRC included; 0 for a kind that is not known. */"
     )?;
-    writeln!(out, "static inline size_t clutch_length(uint8_t kind)\n{{\n    switch (kind) {{")?;
+    writeln!(out, "static inline size_t clutch_length(const uint8_t *body)\n{{\n    switch (body[0]) {{")?;
     for m in TABLE {
-        writeln!(out, "    case CLUTCH_{0}_KIND: return CLUTCH_{0}_LENGTH;", upper(m.name))?;
+        let big = upper(m.name);
+        let list = match list_of(m) {
+            Some(list) => format!(" + 4u * (size_t)body[CLUTCH_{big}_{}]", upper(list.name)),
+            None => String::new(),
+        };
+        writeln!(out, "    case CLUTCH_{big}_KIND: return CLUTCH_{big}_LENGTH{list};")?;
     }
     writeln!(out, "    default: return 0;\n    }}\n}}")?;
     out.push_str(DECODER);
@@ -83,18 +91,30 @@ fn ascii(doc: &str) -> String {
     text
 }
 
+/// The list that ends a message, if one does.
+fn list_of(m: &MessageInfo) -> Option<&FieldInfo> {
+    m.fields.last().filter(|_| m.list > 0)
+}
+
 fn message(out: &mut String, m: &MessageInfo) -> std::fmt::Result {
     let (big, small) = (upper(m.name), snake(m.name));
+    let list = list_of(m);
+    let numbers = m.fields.len() - usize::from(list.is_some());
     writeln!(out, "\n/* {}: {} */", m.name, ascii(m.doc))?;
     writeln!(out, "#define CLUTCH_{big}_KIND {:#04x}u", m.kind)?;
-    writeln!(out, "#define CLUTCH_{big}_LENGTH {}u", m.length)?;
+    let without = if list.is_some() { " /* without the numbers of its list */" } else { "" };
+    writeln!(out, "#define CLUTCH_{big}_LENGTH {}u{without}", m.length)?;
     for f in m.fields {
         writeln!(out, "#define CLUTCH_{big}_{} {}u", upper(f.name), f.offset)?;
     }
     writeln!(out, "typedef struct {{")?;
-    for f in m.fields {
+    for f in &m.fields[..numbers] {
         let unit = if f.unit.is_empty() { String::new() } else { format!(" [{}]", ascii(f.unit)) };
         writeln!(out, "    {} {}; /* {}{unit} */", c_type(f.ty), f.name, ascii(f.doc))?;
+    }
+    if let Some(f) = list {
+        writeln!(out, "    uint8_t {}_count; /* at most {} */", f.name, m.list)?;
+        writeln!(out, "    uint32_t {}[{}]; /* {} [{}] */", f.name, m.list, ascii(f.doc), ascii(f.unit))?;
     }
     writeln!(out, "}} clutch_{small}_t;\n")?;
     writeln!(out, "/* The frame for the wire; its length, bytes. */")?;
@@ -103,23 +123,35 @@ fn message(out: &mut String, m: &MessageInfo) -> std::fmt::Result {
         "static inline size_t clutch_encode_{small}(uint8_t wire[CLUTCH_MAX_FRAME], const clutch_{small}_t *m)"
     )?;
     writeln!(out, "{{\n    uint8_t body[CLUTCH_MAX_BODY];\n    body[0] = CLUTCH_{big}_KIND;")?;
-    for f in m.fields {
+    for f in &m.fields[..numbers] {
         writeln!(out, "    clutch_put_{}(body + CLUTCH_{big}_{}, m->{});", f.ty, upper(f.name), f.name)?;
     }
-    writeln!(out, "    return clutch_frame(wire, body, CLUTCH_{big}_LENGTH);\n}}\n")?;
+    if let Some(f) = list {
+        let (name, at) = (f.name, format!("CLUTCH_{big}_{}", upper(f.name)));
+        writeln!(out, "    clutch_put_list(body + {at}, m->{name}, m->{name}_count);")?;
+    }
+    let more = match list {
+        Some(f) => format!(" + 4u * (size_t)body[CLUTCH_{big}_{}]", upper(f.name)),
+        None => String::new(),
+    };
+    writeln!(out, "    return clutch_frame(wire, body, CLUTCH_{big}_LENGTH{more});\n}}\n")?;
     writeln!(out, "/* From the body that clutch_push accepted as CLUTCH_{big}_KIND. */")?;
     writeln!(out, "static inline void clutch_get_{small}(const uint8_t *body, clutch_{small}_t *m)\n{{")?;
-    for f in m.fields {
+    for f in &m.fields[..numbers] {
         writeln!(out, "    m->{} = clutch_get_{}(body + CLUTCH_{big}_{});", f.name, f.ty, upper(f.name))?;
+    }
+    if let Some(f) = list {
+        let (name, at) = (f.name, format!("CLUTCH_{big}_{}", upper(f.name)));
+        writeln!(out, "    m->{name}_count = clutch_get_list(body + {at}, m->{name});")?;
     }
     writeln!(out, "}}")
 }
 
 const HEAD: &str = r"/* The serial DAQ protocol, for boards in C99 or C++11. Generated from the table of clutch-wire:
  *     cargo run -p clutch-wire --example table -- header
- * Do not edit. What the fields mean and what a board must do: docs/wire.md.
+ * Do not edit. docs/wire.md has the meaning of the fields and the duties of a board.
  *
- * Works with any byte order and alignment: nothing is cast, bytes are put together one by one.
+ * Works with any byte order and alignment: nothing is cast, bytes are assembled one by one.
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
 #ifndef CLUTCH_WIRE_H
@@ -189,6 +221,25 @@ static inline int32_t clutch_get_i32(const uint8_t *at)
     return value;
 }
 
+/* A list: how many numbers, and each. What is too much is left out. */
+static inline void clutch_put_list(uint8_t *at, const uint32_t *numbers, uint8_t count)
+{
+    uint8_t i;
+    if (count > CLUTCH_MAX_LIST)
+        count = CLUTCH_MAX_LIST;
+    at[0] = count;
+    for (i = 0; i < count; i++)
+        clutch_put_u32(at + 1 + 4 * i, numbers[i]);
+}
+
+static inline uint8_t clutch_get_list(const uint8_t *at, uint32_t *numbers)
+{
+    uint8_t i, count = at[0] > CLUTCH_MAX_LIST ? CLUTCH_MAX_LIST : at[0];
+    for (i = 0; i < count; i++)
+        numbers[i] = clutch_get_u32(at + 1 + 4 * i);
+    return count;
+}
+
 /* CRC-32/ISO-HDLC: that of Ethernet and zip. */
 static inline uint32_t clutch_crc32(const uint8_t *bytes, size_t count)
 {
@@ -226,10 +277,10 @@ static inline size_t clutch_frame(uint8_t *wire, uint8_t *body, size_t length)
 ";
 
 const DECODER: &str = r"
-/* What clutch_push says besides a kind. */
+/* Results of clutch_push besides a kind. */
 #define CLUTCH_NOTHING 0        /* no frame ends here */
 #define CLUTCH_BAD_COBS (-1)    /* a code points past the end */
-#define CLUTCH_TOO_LONG (-2)    /* more bytes than the longest frame; said once */
+#define CLUTCH_TOO_LONG (-2)    /* more bytes than the longest frame; reported once */
 #define CLUTCH_TOO_SHORT (-3)   /* shorter than a kind and a CRC */
 #define CLUTCH_BAD_CRC (-4)     /* the checksum does not hold */
 #define CLUTCH_UNKNOWN_KIND (-5)
@@ -276,7 +327,7 @@ static inline int clutch_push(clutch_decoder_t *d, uint8_t byte)
         return CLUTCH_TOO_SHORT;
     if (clutch_crc32(d->body, length - 4u) != clutch_get_u32(d->body + length - 4))
         return CLUTCH_BAD_CRC;
-    expected = clutch_length(d->body[0]);
+    expected = clutch_length(d->body);
     if (expected == 0)
         return CLUTCH_UNKNOWN_KIND;
     if (expected != length)

@@ -1,5 +1,5 @@
-//! Prints what is made from the table of messages. The results are committed; a test holds them
-//! against what this prints now.
+//! Prints the files made from the table of messages. They are committed; a test compares them with
+//! the present output.
 //!
 //! ```sh
 //! cargo run -p clutch-wire --example table -- header > crates/clutch-wire/include/clutch_wire.h

@@ -23,7 +23,8 @@ fn write_all(out: &mut String) -> std::fmt::Result {
     writeln!(out, "|---|---|---|---|---|")?;
     for m in TABLE {
         let by = if m.direction == Direction::ToBoard { "host" } else { "board" };
-        writeln!(out, "| `{:#04x}` | {} | {by} | {} | {} |", m.kind, m.name, m.length, m.length + 2)?;
+        let n = if m.list > 0 { " + 4 n" } else { "" };
+        writeln!(out, "| `{:#04x}` | {} | {by} | {}{n} | {}{n} |", m.kind, m.name, m.length, m.length + 2)?;
     }
     for m in TABLE {
         writeln!(out, "\n### `{:#04x}` {}\n\n{}\n", m.kind, m.name, m.doc.trim())?;
@@ -33,7 +34,8 @@ fn write_all(out: &mut String) -> std::fmt::Result {
             let unit = if f.unit.is_empty() { "–" } else { f.unit };
             writeln!(out, "| {} | `{}` | `{}` | {unit} | {} |", f.offset, f.name, f.ty, f.doc.trim())?;
         }
-        writeln!(out, "| {} | CRC | `u32` | – | Of all bytes before it. |", m.length - 4)?;
+        let n = if m.list > 0 { " + 4 n" } else { "" };
+        writeln!(out, "| {}{n} | CRC | `u32` | – | Checksum of all bytes before it. |", m.length - 4)?;
     }
     for set in CODES {
         writeln!(out, "\n### {}\n\n{}\n", set.name, set.doc.trim())?;

@@ -50,7 +50,7 @@ fn content(mut wire: &[u8]) -> Vec<u8> {
     body
 }
 
-/// All that a decoder says to these bytes.
+/// All results of a decoder for these bytes.
 pub(crate) fn heard(bytes: &[u8]) -> Vec<Result<Message, FrameError>> {
     let mut decoder = Decoder::new();
     bytes.iter().filter_map(|byte| decoder.push(*byte)).collect()
@@ -138,7 +138,14 @@ pub(crate) fn text() -> String {
             ("high bits set", counting(0xA0)),
             ("every other byte zero", alternating),
         ];
-        for (name, bytes) in patterns {
+        for ((name, mut bytes), count) in patterns.into_iter().zip([0_u8, 8, 2, 5, 3]) {
+            // As many numbers as the list says.
+            if info.list > 0 {
+                bytes.truncate(fields - 1);
+                let numbers: Vec<u8> = bytes[..4 * usize::from(count)].into();
+                bytes.push(count);
+                bytes.extend(numbers);
+            }
             rows.push((
                 "frame",
                 format!("{}: {name}", info.name),
@@ -166,6 +173,15 @@ pub(crate) fn text() -> String {
     bad("kind of no message as long as a sample", framed(&[0x89, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]));
     bad("a sample one byte short", framed(&[0x84; 13]));
     bad("a sample one byte long", framed(&[0x84; 15]));
+    let telemetry = TABLE.iter().find(|m| m.list > 0).expect("a message with a list");
+    let listed = |count: u8, numbers: usize| {
+        let fields = vec![7; usize::from(telemetry.length) - 6];
+        framed(&[&[telemetry.kind], &fields[..], &[count], &vec![9; 4 * numbers]].concat())
+    };
+    bad("a list of two numbers that claims three", listed(3, 2));
+    bad("a list of two numbers that claims one", listed(1, 2));
+    bad("a list that claims more than any frame has", listed(255, 8));
+    bad("a list of more numbers than one may have", listed(9, 8));
     bad("an actuate of kind sample", framed(&[0x84, 1, 0, 7, 0, 0, 8, 0xD0, 7]));
     let mut flipped = sample.clone();
     flipped[10] ^= 0x10;

@@ -1,20 +1,19 @@
-//! The board as controller: it closes the loop, and a host looks on: `clutch loop --board`.
+//! The board as controller: it closes the loop, and a host watches: `clutch loop --board`.
 #![no_std]
 #![no_main]
 
-use clutch_node::{OnboardParams, Standalone};
-use clutch_nucleo_g474re::board::{Board, CLOCK_HZ, Line};
-use clutch_nucleo_g474re::fault::stop;
+use clutch_node::{BoardControllerParams, OneChip};
+use clutch_nucleo_g474re::board::{Board, CLOCK_HZ, Line, stop};
 use clutch_nucleo_g474re::run;
 use cortex_m_rt::entry;
 use static_cell::StaticCell;
 
 #[embassy_executor::task]
 async fn control(board: Board, line: Line) -> ! {
-    let params = OnboardParams { board: board.board, boot: board.boot, clock_hz: CLOCK_HZ };
-    // In memory of its own: a task keeps what it is given once more for each call on the way.
-    static ROLE: StaticCell<Standalone> = StaticCell::new();
-    let role = ROLE.init_with(|| Standalone::new(params, &board.params()).unwrap_or_else(|_| stop()));
+    let params = BoardControllerParams { board: board.board, boot: board.boot, clock_hz: CLOCK_HZ };
+    // In a memory cell of its own: a task keeps a copy of each argument for every call on the way.
+    static ROLE: StaticCell<OneChip> = StaticCell::new();
+    let role = ROLE.init_with(|| OneChip::new(params, &board.params()).unwrap_or_else(|_| stop()));
     run::run(role, board, line).await
 }
 

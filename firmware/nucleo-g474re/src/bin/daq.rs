@@ -2,18 +2,17 @@
 #![no_std]
 #![no_main]
 
-use clutch_node::Acquisition;
-use clutch_nucleo_g474re::board::{Board, Line};
-use clutch_nucleo_g474re::fault::stop;
+use clutch_node::DaqBoard;
+use clutch_nucleo_g474re::board::{Board, Line, stop};
 use clutch_nucleo_g474re::run;
 use cortex_m_rt::entry;
 use static_cell::StaticCell;
 
 #[embassy_executor::task]
 async fn control(board: Board, line: Line) -> ! {
-    // In memory of its own: a task keeps what it is given once more for each call on the way.
-    static ROLE: StaticCell<Acquisition> = StaticCell::new();
-    let role = ROLE.init_with(|| Acquisition::new(&board.params()).unwrap_or_else(|_| stop()));
+    // In a memory cell of its own: a task keeps a copy of each argument for every call on the way.
+    static ROLE: StaticCell<DaqBoard> = StaticCell::new();
+    let role = ROLE.init_with(|| DaqBoard::new(&board.params()).unwrap_or_else(|_| stop()));
     run::run(role, board, line).await
 }
 

@@ -1,6 +1,6 @@
 //! The runs of the test of equal bits, on the emulated board. Reads them from the file `bits.in` in the
-//! emulator's directory, prints the hash of each on a line of its own, and writes the records of those
-//! that ask for it to `bits.out`.
+//! emulator's directory, prints the hash of each on a line of its own, and writes the records of
+//! those that request it to `bits.out`.
 #![no_std]
 #![no_main]
 
@@ -16,10 +16,10 @@ use cortex_m_rt::entry;
 use files::HostFile;
 use semihosting::process;
 
-/// Bytes that are asked of the host at once.
+/// Bytes requested from the host at once.
 const ROOM: usize = 4096;
 
-/// Codes on exit: what was wrong.
+/// Codes on exit: the fault.
 enum Failed {
     Files = 2,
     Input = 3,
@@ -77,7 +77,7 @@ fn run(job: &Job, input: &mut Input, records: &HostFile) -> Result<u32, Failed> 
         {
             *byte ^= 1 << (bit % 8);
         }
-        hash.update(&record);
+        hash.update(record.get(..workload.hashed()).unwrap_or_default());
         if job.dump && !records.write(&record) {
             return Err(Failed::Files);
         }

@@ -1,4 +1,4 @@
-//! What a control period costs, in executed instructions: calls each function that has a budget
+//! The cost of a control period, in executed instructions: calls each function that has a budget
 //! over an adversarial set of inputs, and prints `name calls least mean most`.
 //!
 //! Run it with `-icount shift=7,align=off,sleep=off`: the timer then counts instructions.

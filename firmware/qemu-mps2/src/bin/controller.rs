@@ -2,11 +2,11 @@
 //!
 //! | files `to_fw` and `from_fw` in the emulator's directory | link |
 //! |---|---|
-//! | are there | lockstep: time and bytes come through them; what `clutch hil` starts |
-//! | are not | UART0 is the host's line, UART1 that of encoder and converter; real time |
+//! | exist | lockstep: time and bytes come through them; `clutch hil` starts this |
+//! | do not exist | UART0 is the host's line, UART1 that of encoder and converter; real time |
 //!
-//! The first does some 20 000 cycles a second and repeats bit for bit. The second is a board as any
-//! other, and a slow one.
+//! The first does some 20 000 cycles a second and repeats bit for bit. The second is a board like
+//! any other, but a slow one.
 #![no_std]
 #![no_main]
 
@@ -14,6 +14,8 @@
 mod fault;
 #[path = "../files.rs"]
 mod files;
+#[path = "../last_word.rs"]
+mod last_word;
 #[path = "../lockstep.rs"]
 mod lockstep;
 #[path = "../panic.rs"]
@@ -21,7 +23,7 @@ mod panic;
 #[path = "../serial.rs"]
 mod serial;
 
-use clutch_node::{Onboard, OnboardParams};
+use clutch_node::{BoardController, BoardControllerParams};
 use cortex_m_rt::entry;
 
 /// Serial number of the emulated board: one that keeps its own time.
@@ -29,8 +31,8 @@ const BOARD: u32 = 1;
 
 #[entry]
 fn main() -> ! {
-    // No cycle counter: the emulator does not know how long an instruction takes.
-    let node = Onboard::new(OnboardParams { board: BOARD, boot: 1, clock_hz: 0 });
+    // No cycle counter: the emulator does not know the time of an instruction.
+    let node = BoardController::new(BoardControllerParams { board: BOARD, boot: 1, clock_hz: 0 });
     match lockstep::Link::open() {
         Some(link) => lockstep::run(link, node),
         None => serial::run(node),

@@ -1,9 +1,9 @@
-//! The functions that have a budget, each by itself and under its name: what firmware calls that
+//! The functions that have a budget, each by itself and under its name: the calls of firmware that
 //! uses the crates.
 
-use clutch_core::law::{Controller, Ctc, OutputState, Pd, Smc, Tick};
+use clutch_core::law::{ControlLaw, Ctc, LawState, OutputState, Pd, Pid, Smc, SmcSign, Tick};
 use clutch_core::{Counts, Servo, ServoState, Target};
-use clutch_node::{Onboard, Ports};
+use clutch_node::{BoardController, Outboxes};
 use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
 
 /// Bytes of one frame, as they come over the line: one delimiter, at their end.
@@ -14,7 +14,7 @@ pub struct Bytes {
 }
 
 impl Bytes {
-    /// Of a message.
+    /// Makes the bytes of a message.
     pub fn of(message: &Message) -> Bytes {
         let mut bytes = [0; MAX_FRAME];
         let frame = encode(message);
@@ -55,17 +55,35 @@ pub extern "C" fn step_ctc(law: &Ctc<f32>, state: &mut OutputState<f32>, tick: &
     law.update(state, tick).voltage
 }
 
-/// The laws (29) and (31).
+/// The law (31).
 #[inline(never)]
 #[unsafe(no_mangle)]
 pub extern "C" fn step_smc(law: &Smc<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
     law.update(state, tick).voltage
 }
 
-/// A servo, what it remembers, and where it shall be.
+/// The law (29).
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn step_smc_sign(law: &SmcSign<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
+    law.update(state, tick).voltage
+}
+
+/// PID.
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn step_pid(
+    law: &Pid<f32>,
+    state: &mut <Pid<f32> as ControlLaw<f32>>::State,
+    tick: &Tick<f32>,
+) -> f32 {
+    law.update(state, tick).voltage
+}
+
+/// A servo, its state, and its target.
 pub struct Axis {
     pub servo: Servo<f32>,
-    pub state: ServoState<f32, OutputState<f32>>,
+    pub state: ServoState<f32, LawState<f32>>,
     pub target: Target<f32>,
 }
 
@@ -101,14 +119,14 @@ pub extern "C" fn encode_actuate(answer: &Actuate, frame: &mut Option<Frame>) {
 #[inline(never)]
 #[unsafe(no_mangle)]
 pub extern "C" fn whole_tick(session: &mut Session, bytes: &Bytes) {
-    session.ports.host.clear();
-    session.ports.daq.clear();
-    session.node.daq(session.now_ns, bytes.as_slice(), &mut session.ports);
+    session.outboxes.host.clear();
+    session.outboxes.daq.clear();
+    session.node.daq(session.now_ns, bytes.as_slice(), &mut session.outboxes);
 }
 
 /// A controller and its lines.
 pub struct Session {
-    pub node: Onboard,
-    pub ports: Ports,
+    pub node: BoardController,
+    pub outboxes: Outboxes,
     pub now_ns: u64,
 }

@@ -2,33 +2,34 @@
 
 use crate::inputs::{CORNERS, Random, ticks};
 use crate::kernels::{
-    Axis, Bytes, decode_sample, encode_actuate, nothing, servo_tick, step_ctc, step_pd, step_smc,
+    Axis, Bytes, decode_sample, encode_actuate, nothing, servo_tick, step_ctc, step_pd, step_pid, step_smc,
+    step_smc_sign,
 };
 use crate::meter::{Tally, instructions, line};
 use clutch_core::law::{
-    Controller, Ctc, CtcParams, LawParams, OutputParams, OutputState, Pd, PdParams, Smc, SmcParams,
-    SmcSignParams, Tick,
+    ControlLaw, Ctc, CtcParams, LawParams, OutputParams, Pd, PdParams, Pid, PidParams, Smc, SmcParams,
+    SmcSign, SmcSignParams, Tick,
 };
 use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, StribeckParams, Target};
 use clutch_wire::{Actuate, Decoder, Message, Sample};
 
 pub const PERIOD: Micros = Micros(1000);
-/// Of ordinary and of wild inputs.
+/// Number of ordinary and of wild inputs.
 pub const OF_EACH: u32 = 1000;
 
-/// With a bumpless start: its offset is what a law remembers.
+/// With a bumpless start: its offset is the state of a law.
 pub fn output() -> OutputParams<f32> {
     OutputParams { bumpless_time: 0.05, lowest: 0.5, ..OutputParams::default() }
 }
 
-fn law<L: Controller<f32, State = OutputState<f32>>>(
+fn law<L: ControlLaw<f32>>(
     name: &'static str,
-    step: extern "C" fn(&L, &mut OutputState<f32>, &Tick<f32>) -> f32,
+    step: extern "C" fn(&L, &mut L::State, &Tick<f32>) -> f32,
     law: &L,
 ) {
     let mut tally = Tally::new(name);
     let mut random = Random::new(1);
-    let mut state = OutputState::default();
+    let mut state = L::State::default();
     ticks(&mut Random::new(2), OF_EACH, |tick, _| {
         if random.below(8) == 0 {
             state = law.start(&tick, random.around(10.0));
@@ -40,6 +41,11 @@ fn law<L: Controller<f32, State = OutputState<f32>>>(
     tally.print();
 }
 
+/// PID with all that it has.
+fn pid() -> PidParams<f32> {
+    PidParams { derivative_time: 0.002, bias: 2.0, velocity: 0.5, acceleration: 0.1, ..PidParams::default() }
+}
+
 /// Measures and prints.
 pub fn measure() -> Option<()> {
     // SAFETY: a function without arguments.
@@ -48,11 +54,12 @@ pub fn measure() -> Option<()> {
     let (plant, output) = (PlantParams::default(), output());
     law("step_pd", step_pd, &Pd::new(&PdParams::default(), &output, PERIOD).ok()?);
     law("step_ctc", step_ctc, &Ctc::new(&CtcParams::default(), &plant, &output, PERIOD).ok()?);
-    let friction = StribeckParams { stribeck_exponent: 2.0, ..plant.friction };
-    let curved = PlantParams { friction, ..plant };
+    let friction = StribeckParams { stribeck_exponent: 2.0, ..StribeckParams::default() };
+    let curved = PlantParams { friction: friction.into(), ..plant };
     law("step_ctc_powf", step_ctc, &Ctc::new(&CtcParams::default(), &curved, &output, PERIOD).ok()?);
     law("step_smc", step_smc, &Smc::new(&SmcParams::default(), &output, PERIOD).ok()?);
-    law("step_smc_sign", step_smc, &Smc::with_sign(&SmcSignParams::default(), &output, PERIOD).ok()?);
+    law("step_smc_sign", step_smc_sign, &SmcSign::new(&SmcSignParams::default(), &output, PERIOD).ok()?);
+    law("step_pid", step_pid, &Pid::new(&pid(), &output, PERIOD).ok()?);
 
     servo()?;
     codec();
@@ -66,7 +73,7 @@ fn servo() -> Option<()> {
     let servo = Servo::<f32>::new(&ServoParams::paper(LawParams::Smc(SmcParams::default()))).ok()?;
     let mut axis = Axis { servo, state: servo.start(Counts(0), &target, 0.0), target };
     for call in 0..4 * OF_EACH {
-        // Near the target, and anywhere; a target that is no number, now and then.
+        // Near the target, and anywhere; a target that is not a number, now and then.
         let near = call % 4 != 0;
         let any = FixedCounts((u64::from(random.next()) << 32 | u64::from(random.next())) as i64);
         axis.target = Target {

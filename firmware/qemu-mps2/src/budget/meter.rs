@@ -1,4 +1,4 @@
-//! Counts the instructions of a call, and prints what was counted.
+//! Counts the instructions of a call, and prints the counts.
 
 use core::arch::asm;
 use cortex_m::peripheral::SYST;

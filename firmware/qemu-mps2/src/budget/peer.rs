@@ -3,10 +3,10 @@
 use crate::inputs::{Random, ticks};
 use crate::laws::{OF_EACH, PERIOD, output};
 use crate::meter::{Tally, instructions, line};
-use clutch_core::PlantParams;
 use clutch_core::law::{
-    Controller, Ctc, CtcParams, OutputState, Pd, PdParams, Smc, SmcParams, SmcSignParams,
+    ControlLaw, Ctc, CtcParams, OutputState, Pd, PdParams, Smc, SmcParams, SmcSign, SmcSignParams,
 };
+use clutch_core::{PlantParams, StribeckParams};
 
 /// `peer_tick`
 #[repr(C)]
@@ -32,9 +32,9 @@ unsafe extern "C" {
     fn peer_smc_sign(law: *const PeerLaw<4>, offset: *mut f32, tick: *const PeerTick) -> f32;
 }
 
-/// Counts the C version, and how often its answer to an ordinary input is more than a millivolt
-/// from ours: it may fuse a product and a sum.
-fn law<const N: usize, L: Controller<f32, State = OutputState<f32>>>(
+/// Counts the C version, and the number of ordinary inputs for which its answer is more than a
+/// millivolt from ours: it may fuse a product and a sum.
+fn law<const N: usize, L: ControlLaw<f32, State = OutputState<f32>>>(
     name: &'static str,
     step: Step<N>,
     gains: [f32; N],
@@ -71,7 +71,7 @@ pub fn measure() -> Option<()> {
     let (plant, output) = (PlantParams::<f32>::default(), output());
     let p = PdParams::<f32>::default();
     law("peer_pd", peer_pd, [p.kp, p.kd], &Pd::new(&p, &output, PERIOD).ok()?);
-    let (p, f) = (CtcParams::<f32>::default(), &plant.friction);
+    let (p, f) = (CtcParams::<f32>::default(), StribeckParams::<f32>::default());
     let gains = [
         p.outer_gain,
         p.kp,
@@ -89,6 +89,6 @@ pub fn measure() -> Option<()> {
     let gains = [p.kp, p.kd, p.slope, 1.0 / p.boundary];
     law("peer_smc", peer_smc, gains, &Smc::new(&p, &output, PERIOD).ok()?);
     let p = SmcSignParams::<f32>::default();
-    law("peer_smc_sign", peer_smc_sign, gains, &Smc::with_sign(&p, &output, PERIOD).ok()?);
+    law("peer_smc_sign", peer_smc_sign, gains, &SmcSign::new(&p, &output, PERIOD).ok()?);
     Some(())
 }

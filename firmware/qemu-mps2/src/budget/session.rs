@@ -1,4 +1,4 @@
-//! Whole periods of a controller: runs in which the line and the board do what they can.
+//! Whole periods of a controller: runs in which the line and the board do everything they can.
 
 use crate::inputs::Random;
 use crate::kernels::{Bytes, Session, whole_tick};
@@ -9,7 +9,10 @@ use clutch_core::{
     Bounds, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams, Supervisor, SupervisorParams,
     Tolerances,
 };
-use clutch_node::{ControlNode, ControlParams, Onboard, OnboardParams, Ports, RunParams, Settings};
+use clutch_node::{
+    BoardController, BoardControllerParams, ControllerNode, ControllerParams, Outboxes, RunParams, RunTimes,
+    Settings,
+};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configured, Discover, Fault, Hello, Message, Pong, Refused, SCHEMA,
     STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Set, Stop, StopReason, Stopped, VERSION,
@@ -27,16 +30,16 @@ fn session(kind: u32) -> Option<Session> {
     let servo = ServoParams::<f32>::paper(law);
     let bounds = Bounds::around(&PlantParams::default(), &Tolerances::default()).ok()?;
     let on_fault = match kind % 4 {
-        0 => SafeState::Hold { volts: 5.0 },
-        1 => SafeState::Ramp { volts_per_s: 1000.0, volts: 5.0 },
+        0 => SafeState::hold(5.0),
+        1 => SafeState::ramp(1000.0, 5.0),
         2 => SafeState::Release,
-        _ => SafeState::HoldThenRelease { volts: 5.0, after: 0.01 },
+        _ => SafeState::hold_then_release(5.0, 0.01),
     };
     let knots =
         [0, 20_000, 40_000, 60_000].map(|us| Knot { time_us: us, position: FixedCounts(us as i64 * 60) });
     let table = |interpolation| ReferenceParams::Table(Table { knots: &knots, interpolation });
     let path = match kind % 5 {
-        0 => ReferenceParams::Ramp(0.35),
+        0 => ReferenceParams::ramp(0.35),
         1 => ReferenceParams::MinimumJerk(MinimumJerk { distance: 0.02, duration: 0.06 }),
         2 => ReferenceParams::Sine(Sine { rate: 0.3, amplitude: 0.001, frequency: 5.0, phase: 0.0 }),
         3 => table(Interpolation::Linear),
@@ -50,24 +53,21 @@ fn session(kind: u32) -> Option<Session> {
         bounds: &bounds,
         reference: &path,
         start: FixedCounts(0),
-        watchdog,
-        valid,
-        silence,
-        host_silence: Micros(1_000_000),
+        times: RunTimes { watchdog, valid, silence, host_silence: Micros(1_000_000) },
         ticks: u64::from(PERIODS) - 5,
     })
     .ok()?;
     let mut session = Session {
-        node: Onboard::new(OnboardParams { board: 1, boot: 1, clock_hz: 0 }),
-        ports: Ports::default(),
+        node: BoardController::new(BoardControllerParams { board: 1, boot: 1, clock_hz: 0 }),
+        outboxes: Outboxes::default(),
         now_ns: 0,
     };
     session.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
-    session.node.daq(0, encode(&hello(RUN)).as_bytes(), &mut session.ports);
+    session.node.daq(0, encode(&hello(RUN)).as_bytes(), &mut session.outboxes);
     settings.each(|key, value| session.asks(&Message::Set(Set { run: RUN, key, value })));
-    let params = ControlParams { run: RUN, config: CONFIG, watchdog, valid, silence };
+    let params = ControllerParams { run: RUN, config: CONFIG, watchdog, valid, silence };
     let supervisor = Supervisor::new(&supervisor, &servo, &bounds).ok()?;
-    let node = ControlNode::new(params, Servo::new(&servo).ok()?, supervisor);
+    let node = ControllerNode::new(params, Servo::new(&servo).ok()?, supervisor);
     session.asks(&Message::Configure(node.configuration()));
     Some(session)
 }
@@ -75,9 +75,9 @@ fn session(kind: u32) -> Option<Session> {
 impl Session {
     /// A frame of the host's, which is not measured.
     fn asks(&mut self, message: &Message) {
-        self.ports.host.clear();
-        self.ports.daq.clear();
-        self.node.host(self.now_ns, encode(message).as_bytes(), &mut self.ports);
+        self.outboxes.host.clear();
+        self.outboxes.daq.clear();
+        self.node.host(self.now_ns, encode(message).as_bytes(), &mut self.outboxes);
     }
 
     /// A period; its instructions.
@@ -126,7 +126,7 @@ fn other(random: &mut Random) -> Message {
     }
 }
 
-/// What is amiss with the frame of a period.
+/// The fault in the frame of a period.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Amiss {
     Nothing,
@@ -136,11 +136,11 @@ enum Amiss {
     Reordered,
     /// The counts are those of no shaft.
     Jump,
-    /// What the board says of itself.
+    /// The board's report about itself.
     Status,
     /// A byte is not as it was sent.
     Corrupted,
-    /// It is no sample.
+    /// It is not a sample.
     Other,
     /// The answer before was late.
     Late,
@@ -202,7 +202,7 @@ pub fn measure() -> Option<()> {
             session.asks(&Message::Arm(Arm { run: RUN, config: CONFIG }));
             others.add(session.period(&Bytes::of(&Message::Armed(Armed { run: RUN, config: CONFIG }))));
         }
-        // How often something is amiss differs from run to run: a run that ends early tries little.
+        // The frequency of faults differs from run to run: a run that ends early tries little.
         let rarity = [4, 12, 40].get(kind as usize % 3).copied()?;
         let (sequence, counts) = (random.next() as u16, random.next() as i32);
         let mut sample = Sample { run: RUN, sequence, time_us: 0, counts, status: BoardState::Running as u8 };

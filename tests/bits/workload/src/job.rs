@@ -1,4 +1,4 @@
-//! What the emulated board reads from a file: a header, the settings, the counts; then the next run.
+//! The file that the emulated board reads: a header, the settings, the counts; then the next run.
 
 use clutch_core::FixedCounts;
 
@@ -18,9 +18,9 @@ pub struct Job {
     pub ticks: u32,
     /// Settings that follow.
     pub settings: u32,
-    /// Whether to write each record to a file.
+    /// True to write each record to a file.
     pub dump: bool,
-    /// Tick and bit of its record that the board shall spoil, so that a test sees it found.
+    /// Tick and bit of its record that the board must spoil, for the test of the test.
     pub spoil: Option<(u32, u32)>,
 }
 

@@ -1,5 +1,5 @@
-//! What the test of equal bits runs on every machine: a servo in `f32` along a path, its counts
-//! given, every output of every tick as bytes, and a running hash of them.
+//! The workload of the test of equal bits on every machine: a servo in `f32` along a path, its
+//! counts given, every output of every tick as bytes, and a running hash of them.
 #![no_std]
 
 mod job;
@@ -7,5 +7,5 @@ mod record;
 mod workload;
 
 pub use job::{HEADER, Job, SETTING, setting_from_bytes, setting_to_bytes};
-pub use record::{FIELDS, Field, Kind, RECORD, hash};
+pub use record::{FIELDS, Field, Kind, RECORD, hash, hashed};
 pub use workload::Workload;

@@ -1,10 +1,10 @@
 //! A tick's outputs as bytes.
 
-use clutch_core::law::{LawTerms, Terms};
+use clutch_core::law::{LawTerms, MAX_TERMS, Terms};
 use clutch_core::{ServoOutput, StickSlipState, Target};
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 
-/// How a field's bytes are to be read; all are little-endian.
+/// The type of a field's bytes; all are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Unsigned, 8 bit.
@@ -60,6 +60,7 @@ pub const FIELDS: &[Field] = &[
     Field { name: "target_acceleration", kind: Kind::F32 },
     Field { name: "error", kind: Kind::F32 },
     Field { name: "error_rate", kind: Kind::F32 },
+    // The law's terms, here and at the end; 0 beyond those that it has.
     Field { name: "term_0", kind: Kind::F32 },
     Field { name: "term_1", kind: Kind::F32 },
     Field { name: "term_2", kind: Kind::F32 },
@@ -71,6 +72,11 @@ pub const FIELDS: &[Field] = &[
     Field { name: "cycles", kind: Kind::U32 },
     Field { name: "stuck_ticks", kind: Kind::U32 },
     Field { name: "stair", kind: Kind::U32 },
+    Field { name: "term_3", kind: Kind::F32 },
+    Field { name: "term_4", kind: Kind::F32 },
+    Field { name: "term_5", kind: Kind::F32 },
+    Field { name: "term_6", kind: Kind::F32 },
+    Field { name: "term_7", kind: Kind::F32 },
 ];
 
 /// Bytes of a record.
@@ -83,6 +89,15 @@ pub const RECORD: usize = {
     sum
 };
 
+/// Bytes of a record that its hash covers, for a law of so many terms: of the terms at the end those that it has.
+#[must_use]
+pub const fn hashed(terms: usize) -> usize {
+    RECORD - 4 * MAX_TERMS.saturating_sub(if terms > TERMS_WITHIN { terms } else { TERMS_WITHIN })
+}
+
+/// Terms that stand within a record and not at its end.
+const TERMS_WITHIN: usize = 3;
+
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// The running hash of a run's records: the CRC-32 that zlib, and so Python, has.
@@ -91,7 +106,7 @@ pub fn hash() -> Digest<'static, u32> {
     CRC.digest()
 }
 
-/// Fills a record from its begin.
+/// Fills a record from its beginning.
 struct Writer {
     bytes: [u8; RECORD],
     at: usize,
@@ -107,22 +122,24 @@ impl Writer {
     }
 }
 
-/// What a tick gave, in the order of [`FIELDS`].
+/// The outputs of a tick, in the order of [`FIELDS`].
 pub(crate) fn record(
     target: &Target<f32>,
     output: &ServoOutput<f32, LawTerms<f32>>,
     sticks: &StickSlipState<f32>,
 ) -> [u8; RECORD] {
-    let [(_, term_0), (_, term_1), (_, term_2)] = output.command.terms.columns();
-    Writer { bytes: [0; RECORD], at: 0 }
+    let mut terms = [0.0; MAX_TERMS];
+    terms.iter_mut().zip(output.command.terms.values()).for_each(|(term, value)| *term = *value);
+    let (within, behind) = terms.split_at(TERMS_WITHIN);
+    let reals =
+        |writer: Writer, reals: &[f32]| reals.iter().fold(writer, |w, real| w.put(real.to_le_bytes()));
+    let writer = Writer { bytes: [0; RECORD], at: 0 }
         .put(target.position.0.to_le_bytes())
         .put(target.velocity.to_le_bytes())
         .put(target.acceleration.to_le_bytes())
         .put(output.tick.error.to_le_bytes())
-        .put(output.tick.error_rate.to_le_bytes())
-        .put(term_0.to_le_bytes())
-        .put(term_1.to_le_bytes())
-        .put(term_2.to_le_bytes())
+        .put(output.tick.error_rate.to_le_bytes());
+    let writer = reals(writer, within)
         .put(output.command.voltage.to_le_bytes())
         .put(output.voltage.to_le_bytes())
         .put(output.code.0.to_le_bytes())
@@ -131,6 +148,6 @@ pub(crate) fn record(
         // A run has fewer ticks than 32 bits count.
         .put((sticks.cycles() as u32).to_le_bytes())
         .put((sticks.stuck_ticks() as u32).to_le_bytes())
-        .put(sticks.stair().to_le_bytes())
-        .bytes
+        .put(sticks.stair().to_le_bytes());
+    reals(writer, behind).bytes
 }

@@ -1,9 +1,9 @@
 //! A run, tick by tick.
 
-use crate::record::{RECORD, record};
-use clutch_core::law::OutputState;
+use crate::record::{RECORD, hashed, record};
+use clutch_core::law::{ControlLaw, LawState};
 use clutch_core::{
-    Counts, FixedCounts, Servo, ServoState, StickSlip, StickSlipParams, StickSlipState, Target,
+    Counts, FixedCounts, ParamError, Servo, ServoState, StickSlip, StickSlipParams, StickSlipState, Target,
 };
 use clutch_node::{Misfit, Path, Settings};
 
@@ -13,7 +13,7 @@ pub struct Workload<'a> {
     servo: Servo<f32>,
     path: Path,
     detector: StickSlip<f32>,
-    state: ServoState<f32, OutputState<f32>>,
+    state: ServoState<f32, LawState<f32>>,
     sticks: StickSlipState<f32>,
     origin: FixedCounts,
     tick: u64,
@@ -32,7 +32,11 @@ impl<'a> Workload<'a> {
     ) -> Result<Self, Misfit> {
         let built = settings.build()?;
         let servo = built.servo;
-        let detector = StickSlip::new(&StickSlipParams::default(), servo.encoder(), servo.period())?;
+        let detector = StickSlip::new(&StickSlipParams::default(), servo.encoder(), servo.period());
+        // Its parameters are no settings.
+        let unfit =
+            |e: ParamError<f32>| Misfit::Unfit { key: u16::MAX, relation: e.relation, value: e.value };
+        let detector = detector.map_err(unfit)?;
         let mut workload = Workload {
             settings,
             servo,
@@ -48,8 +52,14 @@ impl<'a> Workload<'a> {
     }
 
     fn target(&self) -> Target<f32> {
-        let target = self.path.target(self.settings.points(), self.tick);
+        let target = self.path.target(self.settings.knots(), self.tick);
         Target { position: target.position.plus(self.origin), ..target }
+    }
+
+    /// Bytes of a record that the hash of the run covers.
+    #[must_use]
+    pub fn hashed(&self) -> usize {
+        hashed(self.servo.law().term_names().len())
     }
 
     /// One period: counts in, every output out.

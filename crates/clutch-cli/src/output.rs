@@ -1,0 +1,73 @@
+//! What verbs leave: text, files, an exit code.
+
+use anyhow::Context;
+use clutch_loop::session::SessionError;
+use clutch_sim::progress::Report;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::{ErrorKind, Write};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// How a verb ended, if not with an error.
+pub(crate) enum Exit {
+    /// Exit code 0.
+    Done,
+    /// Exit code 2.
+    NotCertified,
+    /// Exit code 1, though everything ran.
+    Failed,
+    /// Exit code 3.
+    Fault,
+    /// Exit code 4.
+    Stopped,
+}
+
+/// Version and commit, as logs tell it.
+pub const BUILD: &str = env!("CLUTCH_BUILD");
+
+/// That nothing was started, and what to do.
+pub(crate) fn not_certified(refusal: &SessionError, file: &Path) -> String {
+    format!("{refusal}\n`clutch certify {}` says why; --uncertified runs it all the same.\n", file.display())
+}
+
+/// A log is never written over: it may be the only record of a run.
+pub(crate) fn new_log(path: &Path) -> anyhow::Result<()> {
+    if path.exists() {
+        anyhow::bail!("{}: exists already; name a new file for the log", path.display());
+    }
+    Ok(())
+}
+
+/// Runs long work under a progress bar; the bar shows on a terminal only.
+pub(crate) fn with_progress<T>(unit: &str, work: impl FnOnce(Report<'_>) -> T) -> T {
+    let style = ProgressStyle::with_template(&format!(
+        "{{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{eta}} left"
+    ));
+    let bar = ProgressBar::no_length().with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let result = work(&|p| {
+        bar.set_length(p.total);
+        bar.inc(p.finished);
+        ControlFlow::Continue(())
+    });
+    bar.finish_and_clear();
+    result
+}
+
+/// Prints to standard output. A reader that has gone away (`| head`) is not an error.
+pub(crate) fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("standard output"),
+    }
+}
+
+/// Writes a file; errors name it.
+pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) -> anyhow::Result<()> {
+    std::fs::write(path, bytes).with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// Pretty JSON with a line end.
+pub(crate) fn json(value: &impl serde::Serialize) -> anyhow::Result<String> {
+    Ok(serde_json::to_string_pretty(value)? + "\n")
+}

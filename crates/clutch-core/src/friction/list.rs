@@ -1,0 +1,81 @@
+//! What follows from the list of friction models.
+
+macro_rules! frictions {
+    ($($module:ident $model:ident $params:ident $doc:literal;)+) => {
+        $(
+            mod $module;
+            pub use $module::{$model, $params};
+        )+
+
+        crate::choice! {
+            /// Friction model, and its parameters.
+            pub enum FrictionParams<T>: Default {
+                $(#[doc = $doc] $model($params<T>) = stringify!($module),)+
+            }
+        }
+
+        /// A checked friction: whichever model was chosen.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Friction<T> {
+            $(#[doc = $doc] $model($model<T>),)+
+        }
+
+        $(
+            impl<T> From<$params<T>> for FrictionParams<T> {
+                fn from(p: $params<T>) -> Self {
+                    FrictionParams::$model(p)
+                }
+            }
+        )+
+
+        impl<T: Arithmetic> FrictionModel<T> for Friction<T> {
+            type Params = FrictionParams<T>;
+
+            fn build(p: &FrictionParams<T>) -> Result<Self, ParamError<T>> where T: Real {
+                Ok(match p {
+                    $(FrictionParams::$model(p) => Friction::$model($model::build(p)?),)+
+                })
+            }
+            #[inline]
+            fn level(&self, velocity: T) -> T {
+                match self {
+                    $(Friction::$model(f) => f.level(velocity),)+
+                }
+            }
+            #[inline]
+            fn quick_level(&self, velocity: T) -> Option<T> {
+                match self {
+                    $(Friction::$model(f) => f.quick_level(velocity),)+
+                }
+            }
+            #[inline]
+            fn at_rest(&self) -> T {
+                match self {
+                    $(Friction::$model(f) => f.at_rest(),)+
+                }
+            }
+            #[inline]
+            fn sliding(&self) -> T {
+                match self {
+                    $(Friction::$model(f) => f.sliding(),)+
+                }
+            }
+            fn envelope(&self) -> Interval<T> where T: Real {
+                match self {
+                    $(Friction::$model(f) => f.envelope(),)+
+                }
+            }
+            fn exponential(&self) -> Option<Exponential<T>> where T: Real {
+                match self {
+                    $(Friction::$model(f) => f.exponential(),)+
+                }
+            }
+            fn check_divisor(&self) -> Result<(), ParamError<T>> where T: Real {
+                match self {
+                    $(Friction::$model(f) => f.check_divisor(),)+
+                }
+            }
+        }
+    };
+}
+pub(super) use frictions;

@@ -1,0 +1,88 @@
+//! Dry friction of a pad on a disc.
+//!
+//! ```text
+//! T_f = μ(θ̇) K_COF max(v_a, 0)                                the friction term of (1)
+//! ```
+//!
+//! A friction model is a file of this folder and a line in the list below: its parameters, and what
+//! [`FrictionModel`] asks. Plant, computed torque, observer, bounds and certificate ask the trait, and never
+//! one model's parameters. Two readings are settled here: `sgn(0) = 0`, and a pad can only push, so that a
+//! negative voltage gives no normal force.
+
+mod geometry;
+mod list;
+
+pub use geometry::BrakeGeometry;
+
+use crate::{Arithmetic, Interval, ParamError, Real};
+
+list::frictions! {
+    stribeck Stribeck StribeckParams "Stribeck's curve (2).";
+}
+
+/// A friction that depends on the velocity alone.
+pub trait FrictionModel<T: Arithmetic>: Sized {
+    /// Its parameters.
+    type Params;
+
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// The first parameter out of range.
+    fn build(p: &Self::Params) -> Result<Self, ParamError<T>>
+    where
+        T: Real;
+
+    /// `|μ|` at a velocity (rad/s); towards rest, its limit.
+    fn level(&self, velocity: T) -> T;
+
+    /// As [`FrictionModel::level`], where it is cheap; `None` where a board had better call a function of its own.
+    #[inline]
+    fn quick_level(&self, velocity: T) -> Option<T> {
+        Some(self.level(velocity))
+    }
+
+    /// `|μ|` up to which a resting shaft stays at rest.
+    fn at_rest(&self) -> T;
+
+    /// `|μ|` of a fast shaft.
+    fn sliding(&self) -> T;
+
+    /// All that `|μ|` can be, rest included.
+    fn envelope(&self) -> Interval<T>
+    where
+        T: Real;
+
+    /// The curve, if it falls exponentially from rest to a fast shaft: a closed form exists for such.
+    fn exponential(&self) -> Option<Exponential<T>>
+    where
+        T: Real,
+    {
+        None
+    }
+
+    /// Checks that something may divide by `|μ|` at any velocity.
+    ///
+    /// # Errors
+    /// The parameter by which it can be 0.
+    fn check_divisor(&self) -> Result<(), ParamError<T>>
+    where
+        T: Real;
+
+    /// `μ(θ̇)` with its sign; 0 at rest.
+    #[inline]
+    fn coefficient(&self, velocity: T) -> T {
+        self.level(velocity) * velocity.sgn()
+    }
+}
+
+/// `|μ|(θ̇) = sliding + (at_rest − sliding) exp(−|θ̇|/velocity)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exponential<T> {
+    /// At rest.
+    pub at_rest: T,
+    /// Of a fast shaft.
+    pub sliding: T,
+    /// Velocity at which all but 1/e of the fall is done, rad/s.
+    pub velocity: T,
+}

@@ -1,0 +1,183 @@
+//! What follows from the list of laws.
+
+macro_rules! laws {
+    ($($module:ident $law:ident $params:ident $doc:literal;)+) => {
+        $(
+            mod $module;
+            pub use $module::{$law, $params};
+        )+
+
+        crate::choice! {
+            /// Control law, and its gains.
+            pub enum LawParams<T> {
+                $(#[doc = $doc] $law($params<T>) = stringify!($module),)+
+            }
+        }
+
+        $(
+            impl<T> From<$params<T>> for LawParams<T> {
+                fn from(p: $params<T>) -> Self {
+                    LawParams::$law(p)
+                }
+            }
+        )+
+
+        impl<T: Real> LawParams<T> {
+            /// Each law of the list, with its defaults.
+            #[must_use]
+            pub fn all() -> [Self; [$(stringify!($law)),+].len()] {
+                [$(LawParams::$law($params::default())),+]
+            }
+
+            /// The law's name, as people read it.
+            #[must_use]
+            pub fn title(&self) -> &'static str {
+                match self {
+                    $(LawParams::$law(_) => <$law<T> as Listed<T>>::TITLE,)+
+                }
+            }
+        }
+
+        /// The closed set of laws: what a configuration file, the wire and a log can name.
+        ///
+        /// ```
+        /// use clutch_core::{Micros, law::{ControlLaw, Law, LawParams, SmcParams, Tick}};
+        /// let params = LawParams::Smc(SmcParams::default());
+        /// let law = Law::<f64>::new(&params, &Default::default(), &Default::default(), Micros(1000))?;
+        /// let mut state = Default::default();
+        /// // The shaft is 0.1° ahead: the surface is beyond the layer, the brake gets K_p = 3 V.
+        /// let tick = Tick { error: -0.1_f64.to_radians(), ..Tick::default() };
+        /// assert_eq!(law.update(&mut state, &tick).voltage, 3.0);
+        /// # Ok::<(), clutch_core::ParamError>(())
+        /// ```
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Law<T> {
+            $(#[doc = $doc] $law($law<T>),)+
+        }
+
+        /// What the law that runs remembers.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum LawState<T: Arithmetic> {
+            $(#[doc = $doc] $law(<$law<T> as ControlLaw<T>>::State),)+
+        }
+
+        impl<T: Arithmetic> Default for LawState<T> {
+            /// The first law's, at rest; another law takes it for its own at rest.
+            #[allow(unreachable_code, reason = "the first of the list is taken")]
+            fn default() -> Self {
+                $(return LawState::$law(Default::default());)+
+            }
+        }
+
+        /// The terms of whichever law ran.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum LawTerms<T: Arithmetic> {
+            $(#[doc = $doc] $law(<$law<T> as ControlLaw<T>>::Terms),)+
+        }
+
+        impl<T: Arithmetic> Default for LawTerms<T> {
+            #[allow(unreachable_code, reason = "the first of the list is taken")]
+            fn default() -> Self {
+                $(return LawTerms::$law(Default::default());)+
+            }
+        }
+
+        impl<T: Arithmetic> Terms<T> for LawTerms<T> {
+            #[inline]
+            fn values(&self) -> &[T] {
+                match self {
+                    $(LawTerms::$law(terms) => Terms::values(terms),)+
+                }
+            }
+        }
+
+        const _: () = {
+            $(assert!(<$law<f64> as ControlLaw<f64>>::TERMS.len() <= MAX_TERMS);)+
+        };
+
+        impl<T: Real> Law<T> {
+            /// Checks gains, output stage and, for a law that has a model, the believed plant.
+            ///
+            /// # Errors
+            /// As the chosen law's constructor.
+            pub fn new(
+                p: &LawParams<T>,
+                model: &PlantParams<T>,
+                output: &OutputParams<T>,
+                period: Micros,
+            ) -> Result<Self, ParamError<T>> {
+                let beside = Beside { model, output, period };
+                Ok(match p {
+                    $(LawParams::$law(p) => Law::$law(Listed::build(p, &beside)?),)+
+                })
+            }
+
+            /// The output stage.
+            #[must_use]
+            pub fn output(&self) -> &Output<T> {
+                match self {
+                    $(Law::$law(law) => Listed::output(law),)+
+                }
+            }
+
+            /// The sliding surface, if the law has one.
+            #[must_use]
+            pub fn surface(&self, asked: &Asked<'_, T>) -> Option<Surface<T>> {
+                match self {
+                    $(Law::$law(law) => Listed::surface(law, asked),)+
+                }
+            }
+
+            /// Terms of this law from their values; what is missing is 0, what is too much is left out.
+            #[must_use]
+            pub fn terms_of(&self, values: &[T]) -> LawTerms<T> {
+                match self {
+                    $(Law::$law(_) => {
+                        let mut terms = <$law<T> as ControlLaw<T>>::Terms::default();
+                        for (to, from) in terms.iter_mut().zip(values) {
+                            *to = *from;
+                        }
+                        LawTerms::$law(terms)
+                    })+
+                }
+            }
+        }
+
+        impl<T: Arithmetic> ControlLaw<T> for Law<T> {
+            type State = LawState<T>;
+            type Terms = LawTerms<T>;
+            /// None: which law was chosen is not known here.
+            const TERMS: &'static [&'static str] = &[];
+
+            fn term_names(&self) -> &'static [&'static str] {
+                match self {
+                    $(Law::$law(_) => <$law<T> as ControlLaw<T>>::TERMS,)+
+                }
+            }
+
+            fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
+                match self {
+                    $(Law::$law(law) => LawState::$law(ControlLaw::start(law, tick, applied)),)+
+                }
+            }
+
+            #[inline]
+            fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
+                match self {
+                    $(Law::$law(law) => {
+                        if !matches!(state, LawState::$law(_)) {
+                            *state = LawState::$law(Default::default());
+                        }
+                        let Command { voltage, limit, terms } = match state {
+                            LawState::$law(own) => law.update(own, tick),
+                            // The line above leaves no other.
+                            _ => Command::default(),
+                        };
+                        Command { voltage, limit, terms: LawTerms::$law(terms) }
+                    })+
+                }
+            }
+        }
+    };
+}
+pub(super) use laws;

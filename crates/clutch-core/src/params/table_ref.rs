@@ -1,0 +1,59 @@
+//! The table that an error speaks of.
+
+use super::{Table, TableInfo};
+use crate::Real;
+use core::fmt;
+
+/// A table, by its number; on a host also by what is known of it.
+///
+/// A board reports a number: were the words within its reach, they would take a fifth of its flash.
+#[derive(Clone, Copy)]
+pub struct TableRef {
+    id: u32,
+    #[cfg(not(target_os = "none"))]
+    info: &'static TableInfo,
+}
+
+impl TableRef {
+    /// The table of this type.
+    #[must_use]
+    pub const fn of<T: Real, P: Table<T>>() -> TableRef {
+        TableRef {
+            id: P::TABLE.id,
+            #[cfg(not(target_os = "none"))]
+            info: &P::TABLE,
+        }
+    }
+
+    /// [`TableInfo::id`].
+    #[must_use]
+    pub const fn id(self) -> u32 {
+        self.id
+    }
+
+    /// What is known of it; nothing on a board.
+    #[must_use]
+    pub const fn info(self) -> Option<&'static TableInfo> {
+        #[cfg(not(target_os = "none"))]
+        return Some(self.info);
+        #[cfg(target_os = "none")]
+        None
+    }
+}
+
+impl PartialEq for TableRef {
+    fn eq(&self, other: &TableRef) -> bool {
+        self.id == other.id
+    }
+}
+
+impl Eq for TableRef {}
+
+impl fmt::Debug for TableRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.info() {
+            Some(info) => f.write_str(info.name),
+            None => write!(f, "table {:#010x}", self.id),
+        }
+    }
+}

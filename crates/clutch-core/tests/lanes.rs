@@ -1,0 +1,206 @@
+//! A vector of lanes that is declared outside of the core: each lane has the bits of the scalar.
+
+use clutch_core::law::{
+    ControlLaw, Limit, OutputParams, Pd, PdParams, Pid, PidParams, Smc, SmcParams, SmcSign, SmcSignParams,
+    Terms, Tick,
+};
+use clutch_core::{Arithmetic, Each, Micros};
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+const N: usize = 4;
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Lanes([f64; N]);
+
+#[derive(Clone, Copy)]
+struct Mask([bool; N]);
+
+impl Lanes {
+    fn each(self, f: impl Fn(f64) -> f64) -> Lanes {
+        Lanes(self.0.map(f))
+    }
+    fn with(self, other: Lanes, f: impl Fn(f64, f64) -> f64) -> Lanes {
+        Lanes(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+    fn compared(self, other: Lanes, f: impl Fn(f64, f64) -> bool) -> Mask {
+        Mask(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+}
+
+macro_rules! operators {
+    ($($of:ident $f:ident $op:tt;)+) => { $(
+        impl $of for Lanes {
+            type Output = Lanes;
+            fn $f(self, other: Lanes) -> Lanes {
+                self.with(other, |a, b| a $op b)
+            }
+        }
+    )+ };
+}
+operators! { Add add +; Sub sub -; Mul mul *; Div div /; }
+
+impl Neg for Lanes {
+    type Output = Lanes;
+    fn neg(self) -> Lanes {
+        self.each(|a| -a)
+    }
+}
+impl BitAnd for Mask {
+    type Output = Mask;
+    fn bitand(self, other: Mask) -> Mask {
+        Mask(std::array::from_fn(|i| self.0[i] && other.0[i]))
+    }
+}
+impl BitOr for Mask {
+    type Output = Mask;
+    fn bitor(self, other: Mask) -> Mask {
+        Mask(std::array::from_fn(|i| self.0[i] || other.0[i]))
+    }
+}
+impl Not for Mask {
+    type Output = Mask;
+    fn not(self) -> Mask {
+        Mask(self.0.map(|a| !a))
+    }
+}
+
+impl Arithmetic for Lanes {
+    type Mask = Mask;
+    type Limit = [Limit; N];
+    const ZERO: Lanes = Lanes([0.0; N]);
+    const ONE: Lanes = Lanes([1.0; N]);
+
+    fn splat(x: f64) -> Lanes {
+        Lanes([x; N])
+    }
+    fn less(self, other: Lanes) -> Mask {
+        self.compared(other, |a, b| a < b)
+    }
+    fn less_or_equal(self, other: Lanes) -> Mask {
+        self.compared(other, |a, b| a <= b)
+    }
+    fn select(mask: Mask, a: Lanes, b: Lanes) -> Lanes {
+        Lanes(std::array::from_fn(|i| if mask.0[i] { a.0[i] } else { b.0[i] }))
+    }
+    fn limit_of(limit: Limit) -> [Limit; N] {
+        [limit; N]
+    }
+    fn select_limit(mask: Mask, a: [Limit; N], b: [Limit; N]) -> [Limit; N] {
+        std::array::from_fn(|i| if mask.0[i] { a[i] } else { b[i] })
+    }
+    fn all(mask: Mask) -> bool {
+        mask.0.iter().all(|a| *a)
+    }
+    fn abs(self) -> Lanes {
+        self.each(Arithmetic::abs)
+    }
+    fn exp_neg(self) -> Lanes {
+        self.each(Arithmetic::exp_neg)
+    }
+    fn powf(self, n: Lanes) -> Lanes {
+        self.with(n, Arithmetic::powf)
+    }
+    fn max(self, other: Lanes) -> Lanes {
+        self.with(other, Arithmetic::max)
+    }
+    fn min(self, other: Lanes) -> Lanes {
+        self.with(other, Arithmetic::min)
+    }
+    fn is_finite(self) -> Mask {
+        Mask(self.0.map(|a| a.is_finite()))
+    }
+}
+
+/// Measurements that meet the layer, both limits, the surface, and a number that is none.
+fn tick(k: u32, lane: usize) -> Tick<f64> {
+    let x = f64::from((k * 37 + 11 * lane as u32) % 101) / 50.0 - 1.0;
+    let error = if k % 211 == 7 { f64::NAN } else { 0.002 * x * x * x };
+    let error_rate = if k % 223 == 9 { f64::NAN } else { 0.3 * x };
+    Tick { error, error_rate, target_velocity: 0.035, target_acceleration: 0.1 * x }
+}
+
+/// Runs a law of each lane by itself and all of them as one, and compares bits.
+fn same_bits<S, V>(laws: [S; N], as_one: impl Fn(Each<'_, S, f64, Lanes>) -> V)
+where
+    S: ControlLaw<f64>,
+    V: ControlLaw<Lanes>,
+{
+    let vector = as_one(&|get| Lanes(std::array::from_fn(|i| get(&laws[i]))));
+    let at = |k: u32| -> ([Tick<f64>; N], Tick<Lanes>) {
+        let ticks: [Tick<f64>; N] = std::array::from_fn(|i| tick(k, i));
+        let of = |get: fn(&Tick<f64>) -> f64| Lanes(std::array::from_fn(|i| get(&ticks[i])));
+        let all = Tick {
+            error: of(|t| t.error),
+            error_rate: of(|t| t.error_rate),
+            target_velocity: of(|t| t.target_velocity),
+            target_acceleration: of(|t| t.target_acceleration),
+        };
+        (ticks, all)
+    };
+    let (ticks, all) = at(0);
+    let mut states: Vec<S::State> = (0..N).map(|i| laws[i].start(&ticks[i], 2.25)).collect();
+    let mut state = vector.start(&all, Lanes::splat(2.25));
+    let mut limits = [0; 4];
+    for k in 0..20_000 {
+        let (ticks, all) = at(k);
+        let together = vector.update(&mut state, &all);
+        for i in 0..N {
+            let alone = laws[i].update(&mut states[i], &ticks[i]);
+            limits[alone.limit as usize] += 1;
+            assert_eq!(alone.voltage.to_bits(), together.voltage.0[i].to_bits(), "tick {k}, lane {i}");
+            assert_eq!(alone.limit, together.limit[i], "tick {k}, lane {i}");
+            let bits = |x: &f64| if x.is_nan() { u64::MAX } else { x.to_bits() };
+            for (a, b) in alone.terms.values().iter().zip(together.terms.values()) {
+                assert_eq!(bits(a), bits(&b.0[i]), "tick {k}, lane {i}");
+            }
+        }
+    }
+    assert!(limits.iter().all(|n| *n > 0), "each way out of the output stage is met: {limits:?}");
+}
+
+const PERIOD: Micros = Micros(1000);
+
+fn output() -> OutputParams {
+    OutputParams { on_invalid: 4.0, bumpless_time: 0.02, ..OutputParams::within(0.5, 9.0) }
+}
+
+fn scaled(i: usize) -> f64 {
+    1.0 + 0.3 * i as f64
+}
+
+#[test]
+fn each_law_has_in_each_lane_the_bits_of_the_scalar() {
+    same_bits(
+        std::array::from_fn(|i| {
+            let p = PdParams { kp: 5000.0 * scaled(i), kd: 20.0 };
+            Pd::new(&p, &output(), PERIOD).unwrap()
+        }),
+        |each| Pd::in_lanes(each),
+    );
+    same_bits(
+        std::array::from_fn(|i| {
+            let p = SmcParams { kp: 3.0 * scaled(i), boundary: 0.1 * scaled(i), ..SmcParams::default() };
+            Smc::new(&p, &output(), PERIOD).unwrap()
+        }),
+        |each| Smc::in_lanes(each),
+    );
+    same_bits(
+        std::array::from_fn(|i| {
+            let p = SmcSignParams { kp: 3.0 * scaled(i), ..SmcSignParams::default() };
+            SmcSign::new(&p, &output(), PERIOD).unwrap()
+        }),
+        |each| SmcSign::in_lanes(each),
+    );
+    same_bits(
+        std::array::from_fn(|i| {
+            let p = PidParams {
+                kp: 5000.0,
+                derivative_time: 0.003 * scaled(i),
+                bias: 4.0,
+                ..PidParams::default()
+            };
+            Pid::new(&p, &output(), PERIOD).unwrap()
+        }),
+        |each| Pid::in_lanes(each),
+    );
+}

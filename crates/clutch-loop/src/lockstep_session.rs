@@ -1,0 +1,133 @@
+//! A session with a board controller in lockstep: the board's own image, and the simulated rig as its encoder and
+//! converter, in virtual time.
+
+use crate::faults::Fault;
+use crate::from_scenario::{self, BuiltRun};
+use crate::lockstep_board::LockstepBoard;
+use crate::lockstep_host::lockstep_host;
+use crate::qemu_board::QemuError;
+use crate::session::{self, SessionError};
+use crate::to_log::PRESENT_CODE;
+use crate::virtual_time::{VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
+use clutch_core::Micros;
+use clutch_log::{LogWriter, Source};
+use clutch_sim::Scenario;
+use std::path::PathBuf;
+
+/// How a session in lockstep runs.
+#[derive(Clone, Debug)]
+pub struct LockstepOptions {
+    /// A new file for a log, with the shaft's true motion.
+    pub log: Option<PathBuf>,
+    /// Whether gains run that are not certified for the scenario's bounds.
+    pub uncertified: bool,
+    /// What goes wrong on line and rig.
+    pub faults: Vec<Fault>,
+    /// Seed of what goes wrong at random.
+    pub seed: u64,
+    /// How long a frame takes between board and rig, ns.
+    pub latency_ns: u64,
+    /// Silence of encoder and converter that the board bears, if its clock runs on while this machine computes.
+    pub silence: Option<Micros>,
+    /// Version and commit of the build, for the log.
+    pub version: String,
+}
+
+/// A session in lockstep was refused, or could not go on.
+#[derive(Debug, thiserror::Error)]
+pub enum LockstepError {
+    /// Scenario, gains or log.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The emulated board.
+    #[error(transparent)]
+    Board(#[from] QemuError),
+    /// The run.
+    #[error(transparent)]
+    Virtual(#[from] VirtualError),
+}
+
+/// A checked session in lockstep, in single precision as the board calculates.
+#[derive(Clone, Debug)]
+pub struct LockstepSession {
+    scenario: Scenario,
+    options: LockstepOptions,
+    certified: bool,
+    changed: bool,
+}
+
+impl LockstepSession {
+    /// Checks everything that can be checked without a board.
+    ///
+    /// # Errors
+    /// As [`session::check`].
+    pub fn new(scenario: Scenario, options: LockstepOptions) -> Result<Self, SessionError> {
+        let single = from_scenario::in_single_precision(&scenario)?;
+        let changed = single.is_some();
+        let scenario = single.unwrap_or(scenario);
+        let plan = session::check(&scenario, options.uncertified, options.log.as_deref())?;
+        let certified = plan.certificate.certified();
+        Ok(LockstepSession { scenario, options, certified, changed })
+    }
+
+    /// The scenario as it will run.
+    #[must_use]
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// What was changed in the scenario for the board's sake.
+    #[must_use]
+    pub fn note(&self) -> Option<&'static str> {
+        self.changed.then_some(from_scenario::SINGLE_PRECISION)
+    }
+
+    /// Starts a board, and runs it to the path's end or to a fault.
+    ///
+    /// # Errors
+    /// The board does not start or ends; it does not take the run; the log cannot be written.
+    pub fn run<L: LockstepBoard>(
+        &self,
+        start: impl FnOnce() -> Result<L, QemuError>,
+    ) -> Result<VirtualReport, LockstepError> {
+        let (scenario, o) = (&self.scenario, &self.options);
+        let mut built = BuiltRun::<f32>::new(scenario, 1).map_err(SessionError::from)?;
+        if let Some(silence) = o.silence {
+            built.controller.silence = silence;
+        }
+        // The last period is the one in which the run ends.
+        let ticks = built.ticks + 1;
+        let params = VirtualOptions {
+            latency_ns: o.latency_ns,
+            faults: o.faults.clone(),
+            stall: None,
+            seed: o.seed,
+            record: o.log.is_some(),
+            duration: scenario.spec().run.duration + 1.0,
+            ticks,
+            settle: scenario.spec().run.settle,
+        };
+        let station = lockstep_host(scenario, &built, start()?, ticks).map_err(SessionError::from)?;
+        let path = from_scenario::path::<f32>(scenario).map_err(SessionError::from)?;
+        let on_rig = VirtualLoop::new(scenario, params, station).map_err(VirtualError::from);
+        let report = on_rig?.run(&path)?;
+        self.log(&built, &report)?;
+        Ok(report)
+    }
+
+    fn log(&self, built: &BuiltRun<f32>, report: &VirtualReport) -> Result<(), SessionError> {
+        let Some(file) = &self.options.log else { return Ok(()) };
+        let version = &self.options.version;
+        let mut header =
+            from_scenario::header(&self.scenario, &built.servo, Source::Loop, "emulated board", version);
+        header.extra.push((PRESENT_CODE.to_owned(), report.present.to_string()));
+        header.extra.push(("board".to_owned(), "emulated".to_owned()));
+        header.extra.push(("certified".to_owned(), self.certified.to_string()));
+        let mut log = LogWriter::create(file, &header)?;
+        for record in &report.records {
+            log.write(record)?;
+        }
+        log.finish()?;
+        Ok(())
+    }
+}

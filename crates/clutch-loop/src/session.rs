@@ -1,0 +1,609 @@
+//! A session of the loop: a scenario and options in; refusals, events and a summary out.
+//!
+//! [`Session::new`] refuses what can be refused before a port is opened. [`Session::run`] opens it, asks the board
+//! who it is, says what it will do, configures and arms the board, runs to the path's end, and leaves the board in
+//! its safe state. Starting it is the consent.
+
+use crate::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, Pace};
+use crate::faults::Fault;
+use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::log_thread::{LogThread, Ring};
+use crate::port::{Address, DeviceKind, Endpoint, Port, PortError, PseudoTerminal, SerialOptions};
+use crate::preflight::{PreflightError, Talk};
+use crate::realtime::{RealtimeOptions, WaitMode, describe_system};
+use crate::sim_board::{PATIENT_BOARD, STRICT_BOARD};
+use crate::sim_board_server::{ServeError, ServeOptions, ServeReport, serve};
+use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, ControllerStation, HOST_SILENCE, HostStation, Station};
+use crate::summary::{LogSummary, Summary, number};
+use crate::to_log::PRESENT_CODE;
+use crate::watch::Watch;
+use clutch_core::law::Law;
+use clutch_core::{DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState};
+use clutch_log::{LogError, Source};
+use clutch_node::{ControllerNode, HostNode, present_code};
+use clutch_sim::scenario::{Plan, ScalarKind};
+use clutch_sim::{Scenario, ScenarioError};
+use clutch_wire::{Actuate, ControllerHello, Hello, Sample, Telemetry};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{JoinHandle, ScopedJoinHandle};
+use std::time::Duration;
+
+/// How often a run is looked at.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// How long a board may take to say who it is.
+const GREETING: Duration = Duration::from_secs(2);
+/// Silence that a patient board's clock may cost: what it waits for, and half a second.
+const PATIENT_SILENCE: Micros = Micros(5_500_000);
+/// Bytes that stuffing and the end of a frame add.
+const AROUND_A_BODY: usize = 2;
+
+/// The board of a session.
+#[derive(Clone, Debug)]
+pub enum Board {
+    /// Simulated in the background, and reached over a real pseudo-terminal.
+    Simulated {
+        /// What goes wrong on it.
+        faults: Vec<Fault>,
+        /// Seed of what goes wrong at random.
+        seed: u64,
+        /// Whether its clock waits for nobody, as on hardware.
+        strict: bool,
+    },
+    /// In the role daq: the loop is closed here.
+    Daq(Address),
+    /// In the role controller: the loop is closed there, and this machine looks on.
+    Controller(Address),
+}
+
+/// How a session runs.
+#[derive(Clone, Debug)]
+pub struct SessionOptions {
+    /// The board.
+    pub board: Board,
+    /// Line rate of its port, baud; none for the usual one. Without effect on USB, pseudo-terminals and TCP.
+    pub baud: Option<u32>,
+    /// A new file for a log.
+    pub log: Option<PathBuf>,
+    /// Whether gains run that are not certified for the scenario's bounds.
+    pub uncertified: bool,
+    /// Priority, memory, core, wait.
+    pub realtime: RealtimeOptions,
+    /// What starts a cycle.
+    pub pace: Pace,
+    /// Version and commit of the build, for log and summary.
+    pub version: String,
+}
+
+/// On a patient simulated board, without a log.
+impl Default for SessionOptions {
+    fn default() -> Self {
+        SessionOptions {
+            board: Board::Simulated { faults: Vec::new(), seed: 1, strict: false },
+            baud: None,
+            log: None,
+            uncertified: false,
+            realtime: RealtimeOptions::default(),
+            pace: Pace::default(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        }
+    }
+}
+
+/// A session was refused, or could not go on.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The scenario.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The scenario makes no run.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// The gains are not certified, and were not asked for all the same.
+    #[error(
+        "{scenario}: the gains are not certified for these bounds and this path, so nothing was started."
+    )]
+    NotCertified {
+        /// The scenario's name.
+        scenario: String,
+    },
+    /// A log is never written over: it may be the only record of a run.
+    #[error("{}: exists already; name a new file for the log", path.display())]
+    LogExists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The log.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The port.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// The board, before consent.
+    #[error(transparent)]
+    Preflight(#[from] PreflightError),
+    /// The simulated board.
+    #[error(transparent)]
+    Serve(#[from] ServeError),
+    /// The system.
+    #[error("{what}: {error}")]
+    System {
+        /// What could not be done.
+        what: &'static str,
+        /// Why not.
+        error: std::io::Error,
+    },
+    /// A defect of this program.
+    #[error("{0}. Please report this as a defect")]
+    Panicked(&'static str),
+}
+
+fn system(what: &'static str) -> impl Fn(std::io::Error) -> SessionError {
+    move |error| SessionError::System { what, error }
+}
+
+/// The plan of a scenario for a run on a board: there is a safe state, a brake can follow the path, the gains are
+/// certified or uncertified ones were asked for, and the log is a new file.
+///
+/// # Errors
+/// The first of these that does not hold.
+pub fn check(scenario: &Scenario, uncertified: bool, log: Option<&Path>) -> Result<Plan, SessionError> {
+    scenario.safety()?;
+    let plan = scenario.plan()?;
+    if !plan.certificate.certified() && !uncertified {
+        return Err(SessionError::NotCertified { scenario: scenario.name().to_owned() });
+    }
+    match log {
+        Some(path) if path.exists() => Err(SessionError::LogExists { path: path.to_owned() }),
+        _ => Ok(plan),
+    }
+}
+
+/// What a session is about to do, and on what.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Announcement {
+    /// The scenario's name.
+    pub title: String,
+    /// Name and value.
+    pub rows: Vec<(&'static str, String)>,
+    /// What there is to say beside, a line each.
+    pub remarks: Vec<String>,
+}
+
+impl fmt::Display for Announcement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.title)?;
+        for (name, value) in &self.rows {
+            writeln!(f, "  {name:<12}{value}")?;
+        }
+        self.remarks.iter().try_for_each(|line| writeln!(f, "{line}"))
+    }
+}
+
+/// Where a run stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Progress {
+    /// Time of the run so far, s.
+    pub time: f64,
+    /// Its length, s.
+    pub duration: f64,
+    /// Error, rad.
+    pub error: f64,
+    /// Brake voltage, V.
+    pub volts: f64,
+    /// Samples lost.
+    pub lost: u64,
+    /// Answers later than the deadline.
+    pub late_answers: u64,
+}
+
+/// What happens while a session runs.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// What it is about to do: the board has said who it is, and nothing has moved.
+    Announced(Announcement),
+    /// Where the run stands, some twenty times a second.
+    Progress(Progress),
+    /// The log has ended early; the loop goes on.
+    LogEnded,
+}
+
+/// A checked session.
+#[derive(Clone, Debug)]
+pub struct Session {
+    scenario: Scenario,
+    options: SessionOptions,
+    plan: Plan,
+    /// What was changed in the scenario for the board's sake.
+    note: Option<String>,
+}
+
+impl Session {
+    /// Checks everything that can be checked without a board. A board that closes the loop itself calculates in
+    /// single precision: its scenario is made one of that.
+    ///
+    /// # Errors
+    /// As [`check`].
+    pub fn new(scenario: Scenario, options: SessionOptions) -> Result<Session, SessionError> {
+        let single = match options.board {
+            Board::Controller(_) => from_scenario::in_single_precision(&scenario)?,
+            _ => None,
+        };
+        let note = single.as_ref().map(|_| from_scenario::SINGLE_PRECISION.to_owned());
+        let scenario = single.unwrap_or(scenario);
+        let plan = check(&scenario, options.uncertified, options.log.as_deref())?;
+        Ok(Session { scenario, options, plan, note })
+    }
+
+    /// Whether the gains are certified for the scenario's bounds.
+    #[must_use]
+    pub fn certified(&self) -> bool {
+        self.plan.certificate.certified()
+    }
+
+    /// The scenario as it will run.
+    #[must_use]
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// Runs it, on this thread and some of its own, until the path's end, a fault, or `stop`; `event` is called on
+    /// this thread and may set `stop`. The board is in its safe state then, as far as it can be known.
+    ///
+    /// # Errors
+    /// What keeps the run from beginning: port, board, log. What ends it later is in the summary.
+    pub fn run(&self, stop: &Arc<AtomicBool>, event: &mut dyn FnMut(Event)) -> Result<Summary, SessionError> {
+        let (simulated, address, faults) = match &self.options.board {
+            Board::Daq(address) | Board::Controller(address) => (None, address.clone(), 0),
+            Board::Simulated { faults, seed, strict } => {
+                let patient = !strict && !faults.iter().any(|f| f.kind.silences());
+                let options =
+                    ServeOptions { faults: faults.clone(), seed: *seed, patient, wait: WaitMode::Sleep };
+                let (board, address) = SimulatedBoard::start(&self.scenario, options)?;
+                (Some(board), address, faults.len())
+            }
+        };
+        let mut course = Course { session: self, address: &address, stop, event };
+        let ran = match (&self.options.board, self.scenario.scalar()) {
+            (Board::Controller(_), _) => course.on_controller(),
+            (_, ScalarKind::F32) => course.on_daq::<f32>(),
+            (_, ScalarKind::F64) => course.on_daq::<f64>(),
+        };
+        let board = simulated.map(SimulatedBoard::stop).transpose();
+        let (report, log) = ran?;
+        Ok(Summary {
+            scenario: self.scenario.name().to_owned(),
+            version: self.options.version.clone(),
+            certified: self.certified(),
+            stopped: stop.load(Ordering::Relaxed),
+            faults,
+            report,
+            board: board?,
+            log,
+        })
+    }
+}
+
+/// The simulated board, beside the loop.
+struct SimulatedBoard {
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<Result<ServeReport, ServeError>>,
+}
+
+impl SimulatedBoard {
+    fn start(scenario: &Scenario, options: ServeOptions) -> Result<(SimulatedBoard, Address), SessionError> {
+        let (mut terminal, _) =
+            PseudoTerminal::open().map_err(system("a pseudo-terminal could not be opened"))?;
+        let address = terminal.address();
+        let stop = Arc::new(AtomicBool::new(false));
+        let (scenario, flag) = (scenario.clone(), stop.clone());
+        let thread = std::thread::Builder::new()
+            .name("clutch-board".to_owned())
+            .spawn(move || serve(&scenario, &options, &mut terminal, &flag, |_| ()))
+            .map_err(system("the simulated board could not be started"))?;
+        Ok((SimulatedBoard { stop, thread }, address))
+    }
+
+    fn stop(self) -> Result<ServeReport, SessionError> {
+        self.stop.store(true, Ordering::Relaxed);
+        let end = self.thread.join();
+        let report = end.map_err(|_| SessionError::Panicked("the simulated board came to a bad end"))?;
+        Ok(report?)
+    }
+}
+
+/// A log that was begun before the board was armed: what cannot be logged is known before anything moves.
+struct Logging {
+    thread: Option<LogThread>,
+    ring: Option<Ring>,
+    watch: Arc<Watch>,
+}
+
+/// A session on its way.
+struct Course<'a> {
+    session: &'a Session,
+    address: &'a Address,
+    stop: &'a Arc<AtomicBool>,
+    event: &'a mut dyn FnMut(Event),
+}
+
+type Ran = (LoopReport, Option<LogSummary>);
+
+impl Course<'_> {
+    /// The loop is closed here.
+    fn on_daq<T: Real>(&mut self) -> Result<Ran, SessionError> {
+        let scenario = &self.session.scenario;
+        let (mut port, notes) = self.open((Sample::LENGTH, Actuate::LENGTH))?;
+        let mut station = controller(&BuiltRun::<T>::new(scenario, 0)?, from_scenario::path(scenario)?);
+        let hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
+        self.check_fit(&hello, &port)?;
+        let built = self.built::<T>(&hello)?;
+        let mut station = controller(&built, from_scenario::path(scenario)?);
+        self.announce(&hello, &port, &notes, None)?;
+        let present = present_code(&hello, built.supervisor.safe_codes().hold);
+        let log = self.log(&built, present, &board_text(&hello))?;
+        let mut talk = Talk::new(&mut port, &mut station);
+        talk.configure(present)?;
+        let clock = talk.clock()?;
+        let configured = ConfiguredRun {
+            station: &mut station,
+            port: &mut port,
+            ring: log.ring,
+            watch: &log.watch,
+            patient: hello.board == PATIENT_BOARD,
+            ticks: built.ticks,
+            clock,
+            detector: built.detector,
+        };
+        self.drive(configured, log.thread)
+    }
+
+    /// The loop is closed on the board.
+    fn on_controller(&mut self) -> Result<Ran, SessionError> {
+        let scenario = &self.session.scenario;
+        // Telemetry each cycle; now and then a word to it.
+        let (mut port, notes) = self.open((Telemetry::LENGTH, 0))?;
+        let mut station = host(scenario, &BuiltRun::<f32>::new(scenario, 0)?, false)?;
+        let hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
+        let clock_hz = station.node.controller().map_or(0, |c| c.clock_hz);
+        let board = station.node.controller().map_or_else(String::new, controller_text);
+        self.check_fit(&hello, &port)?;
+        let patient = hello.board == PATIENT_BOARD;
+        let built = self.built::<f32>(&hello)?;
+        let host_silence = if patient { built.controller.silence } else { HOST_SILENCE };
+        let settings = from_scenario::settings(scenario, &built, host_silence, built.ticks)?;
+        let mut station = host(scenario, &built, patient)?;
+        self.announce(&hello, &port, &notes, Some(&board))?;
+        let hold = built.supervisor.safe_codes().hold;
+        let log = self.log(&built, present_code(&hello, hold), &board)?;
+        let mut talk = Talk::new(&mut port, &mut station);
+        talk.upload(&settings)?;
+        talk.configure(hold)?;
+        let clock = talk.clock()?;
+        let configured = ConfiguredRun {
+            station: &mut station,
+            port: &mut port,
+            ring: log.ring,
+            watch: &log.watch,
+            patient,
+            ticks: built.ticks,
+            clock,
+            detector: built.detector,
+        };
+        let (report, log) = self.drive(configured, log.thread)?;
+        Ok((LoopReport { clock_hz, ..report }, log))
+    }
+
+    /// Opens the port, whose line carries frames with bodies of these lengths each cycle, from the board and to it.
+    fn open(&self, (up, down): (usize, usize)) -> Result<(Port, Vec<String>), SessionError> {
+        let options = SerialOptions { baud: self.session.options.baud, low_latency: true };
+        let opened = Port::open(self.address, &options)?;
+        let (port, mut notes) = (opened.port, opened.notes);
+        let period = Duration::from_micros(u64::from(self.session.scenario.spec().period.0));
+        if port.kind().has_line_rate() {
+            let on_the_line = |body: usize| if body > 0 { body + AROUND_A_BODY } else { 0 };
+            notes.extend(port.check_baud((on_the_line(down), on_the_line(up)), period)?);
+        }
+        Ok((port, notes))
+    }
+
+    /// Whether encoder and converter are those of the scenario.
+    fn check_fit(&self, hello: &Hello, port: &Port) -> Result<(), PreflightError> {
+        let mut lines = from_scenario::misfits(&self.session.scenario, hello);
+        let real = !matches!(port.kind(), DeviceKind::PseudoTerminal | DeviceKind::Tcp);
+        let is_controller = matches!(self.session.options.board, Board::Controller(_));
+        if is_simulated(hello) && real && !is_controller {
+            lines.push(format!(
+                "board: its serial number {} is kept for simulated boards; give it another",
+                hello.board
+            ));
+        }
+        if lines.is_empty() {
+            return Ok(());
+        }
+        Err(PreflightError::Misfit { address: self.address.to_string(), lines })
+    }
+
+    /// A new run on a board with this clock: when the clock waits, so does our patience.
+    fn built<T: Real>(&self, hello: &Hello) -> Result<BuiltRun<T>, BuildError> {
+        let mut built = BuiltRun::<T>::new(&self.session.scenario, hello.run.wrapping_add(1).max(1))?;
+        if hello.board == PATIENT_BOARD {
+            built.controller.silence = PATIENT_SILENCE;
+        }
+        Ok(built)
+    }
+
+    /// Says what will be done; `controller` is the board that closes the loop, if one does.
+    fn announce(
+        &mut self,
+        hello: &Hello,
+        port: &Port,
+        notes: &[String],
+        controller: Option<&str>,
+    ) -> Result<(), SessionError> {
+        let mut announcement = self.announcement(hello, port.kind())?;
+        let remarks = &mut announcement.remarks;
+        remarks.extend(self.session.note.iter().chain(notes).map(|note| format!("note: {note}")));
+        remarks.extend(controller.map(|board| format!("the loop is closed on the board: {board}")));
+        (self.event)(Event::Announced(announcement));
+        Ok(())
+    }
+
+    fn announcement(&self, hello: &Hello, kind: DeviceKind) -> Result<Announcement, SessionError> {
+        let Session { scenario, plan, .. } = self.session;
+        let (spec, safety) = (scenario.spec(), scenario.safety()?);
+        let safe = match safety.on_fault {
+            SafeState::Hold(SafeHold { volts }) => format!("hold with {} V", number(volts)),
+            SafeState::Ramp(SafeRamp { rate, volts }) => {
+                format!("ramp by {} V/s to {} V, and hold", number(rate), number(volts))
+            }
+            SafeState::Release => "release".to_owned(),
+            SafeState::HoldThenRelease(SafeHoldThenRelease { volts, after }) => {
+                format!("hold with {} V for {} s, then release", number(volts), number(after))
+            }
+        };
+        let (boot, holds) = from_scenario::boot_output(scenario, hello, plan);
+        let board = format!(
+            "{}; {} counts/rev, {} bit, powers up at {} V",
+            board_text(hello),
+            hello.counts_per_rev,
+            hello.dac_bits,
+            number(boot)
+        );
+        let fastest = number(plan.envelope.velocity.to_degrees());
+        let gains = if self.session.certified() {
+            "certified for the bounds given"
+        } else {
+            "NOT certified; run all the same, as asked"
+        };
+        let mut rows = vec![
+            ("port", format!("{}, {}", self.address, kind.describe())),
+            ("board", board),
+            (
+                "loop",
+                format!(
+                    "{} µs, answers due within {} µs",
+                    spec.period.0, safety.limits.supervisor.deadline.0
+                ),
+            ),
+            ("path", format!("{} s, up to {fastest} °/s", number(spec.run.duration))),
+            ("gains", gains.to_owned()),
+            ("safe state", format!("{safe}: {}", safety.reason.0)),
+            ("watchdog", format!("{} cycles on the board", safety.limits.watchdog_cycles)),
+        ];
+        rows.extend(describe_system().first().map(|system| ("system", system.clone())));
+        let mut remarks = Vec::new();
+        if !holds {
+            remarks.push("note: the board powers up at a voltage that does not hold the shaft; set its power-up output to the safe state's".to_owned());
+        }
+        if !is_simulated(hello) {
+            remarks.push(
+                "note: a brake that a motor presses lets go when its power fails; no software changes that"
+                    .to_owned(),
+            );
+        }
+        Ok(Announcement { title: scenario.name().to_owned(), rows, remarks })
+    }
+
+    /// Begins the log.
+    fn log<T: Real>(
+        &self,
+        built: &BuiltRun<T>,
+        present: DacCode,
+        board: &str,
+    ) -> Result<Logging, SessionError> {
+        let Session { scenario, options, .. } = self.session;
+        let watch = Arc::new(Watch { stop: self.stop.clone(), ..Watch::default() });
+        let Some(path) = &options.log else { return Ok(Logging { thread: None, ring: None, watch }) };
+        let port = self.address.to_string();
+        let mut header = from_scenario::header(scenario, &built.servo, Source::Loop, &port, &options.version);
+        header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
+        header.extra.push(("board".to_owned(), board.to_owned()));
+        header.extra.push(("certified".to_owned(), self.session.certified().to_string()));
+        let (thread, ring) = LogThread::start(path, &header, watch.clone())?;
+        Ok(Logging { thread: Some(thread), ring: Some(ring), watch })
+    }
+
+    /// Runs it on a thread of its own, and looks at it from this one.
+    fn drive<S: Station + Send>(
+        &mut self,
+        configured: ConfiguredRun<'_, S>,
+        log: Option<LogThread>,
+    ) -> Result<Ran, SessionError> {
+        let (watch, ticks) = (configured.watch, configured.ticks);
+        let SessionOptions { realtime, pace, log: path, .. } = &self.session.options;
+        let settle = self.session.scenario.spec().run.settle;
+        let options = LoopOptions { realtime: *realtime, pace: *pace, settle, hooks: (|| (), || ()) };
+        let report = std::thread::scope(|scope| {
+            let control = std::thread::Builder::new()
+                .name("clutch-control".to_owned())
+                .spawn_scoped(scope, move || control_loop::run(configured, &options))
+                .map_err(system("the control thread could not be started"))?;
+            self.look_on(&control, watch, ticks);
+            control.join().map_err(|_| SessionError::Panicked("the control thread came to a bad end; the board's watchdog has put the brake into the safe state"))
+        })?;
+        let log = log.zip(path.as_ref()).map(|(thread, path)| LogSummary {
+            path: path.clone(),
+            records: thread.finish().map(|summary| summary.records).map_err(|error| error.to_string()),
+        });
+        Ok((report, log))
+    }
+
+    /// Tells where the run stands until it is over.
+    fn look_on(&mut self, control: &ScopedJoinHandle<'_, LoopReport>, watch: &Watch, ticks: u64) {
+        let period = self.session.scenario.spec().period.seconds::<f64>();
+        let mut log_ended = false;
+        while !control.is_finished() {
+            (self.event)(Event::Progress(Progress {
+                time: watch.tick.load(Ordering::Relaxed) as f64 * period,
+                duration: ticks as f64 * period,
+                error: watch.error_nrad.load(Ordering::Relaxed) as f64 * 1e-9,
+                volts: watch.millivolts.load(Ordering::Relaxed) as f64 / 1e3,
+                lost: watch.lost.load(Ordering::Relaxed),
+                late_answers: watch.late_answers.load(Ordering::Relaxed),
+            }));
+            if watch.log_ended.load(Ordering::Relaxed) && !log_ended {
+                log_ended = true;
+                (self.event)(Event::LogEnded);
+            }
+            std::thread::sleep(LOOK_EVERY);
+        }
+    }
+}
+
+fn controller<T: Real, P>(built: &BuiltRun<T>, path: P) -> ControllerStation<T, Law<T>, P> {
+    ControllerStation { node: ControllerNode::new(built.controller, built.servo, built.supervisor), path }
+}
+
+fn host<'a>(
+    scenario: &'a Scenario,
+    built: &BuiltRun<f32>,
+    patient: bool,
+) -> Result<HostStation<impl Fn(u64) -> clutch_core::Target<f32> + 'a>, BuildError> {
+    let configure = ControllerNode::new(built.controller, built.servo, built.supervisor).configuration();
+    let silence = if patient { u64::from(PATIENT_SILENCE.0) * 1000 } else { BOARD_SILENCE_NS };
+    let node = HostNode::new(built.servo, configure, ALIVE_NS, silence);
+    Ok(HostStation { node, path: from_scenario::path::<f32>(scenario)? })
+}
+
+fn is_simulated(hello: &Hello) -> bool {
+    hello.board == PATIENT_BOARD || hello.board == STRICT_BOARD
+}
+
+fn controller_text(c: &ControllerHello) -> String {
+    let name =
+        if c.board <= STRICT_BOARD { "emulated".to_owned() } else { format!("number {:08x}", c.board) };
+    let clock =
+        if c.clock_hz > 0 { format!(", {} MHz", number(f64::from(c.clock_hz) / 1e6)) } else { String::new() };
+    format!("{name}{clock}")
+}
+
+fn board_text(hello: &Hello) -> String {
+    match hello.board {
+        PATIENT_BOARD => "simulated; its clock waits when this machine stalls".to_owned(),
+        STRICT_BOARD => "simulated, in real time".to_owned(),
+        serial => format!("number {serial:08x}"),
+    }
+}

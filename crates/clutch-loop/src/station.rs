@@ -1,0 +1,220 @@
+//! What this machine is at its line: the controller itself, or the host of a board that is the controller.
+//!
+//! Both are asked the same, and report the same, so that pre-flight, loop and virtual time need not know
+//! which of the two it is.
+
+use clutch_core::law::{ControlLaw, LawTerms, Terms};
+use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Real, Target};
+use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
+use clutch_wire::StopReason;
+
+/// How often the host shows that it lives, and after which silence the board ends a run.
+pub const ALIVE_NS: u64 = 100_000_000;
+/// See [`ALIVE_NS`].
+pub const HOST_SILENCE: Micros = Micros(1_000_000);
+/// After so long without a word of the board, control has ended for the host.
+pub const BOARD_SILENCE_NS: u64 = 1_000_000_000;
+
+/// What a station reports.
+pub type StationNotice<S> = Notice<<S as Station>::Scalar, <S as Station>::Terms>;
+
+/// A controller, or the host of one, at a line. Times are this machine's monotonic clock, or a computed one, ns.
+pub trait Station {
+    /// The scalar of its law.
+    type Scalar: Real;
+    /// The terms of its law.
+    type Terms: Terms<Self::Scalar>;
+    /// Whether a board closes the loop, and this machine looks on. Then what comes over the line are reports, each with a time of its
+    /// own, and the board ends the run by itself; samples are heard together, as the newest of them counts.
+    const LOOKS_ON: bool;
+
+    /// Asks who is there.
+    fn discover(&mut self, nonce: u32, out: &mut Outbox);
+    /// Tells the board of the run; `present` is the code that its converter has now.
+    fn configure(&mut self, present: DacCode, out: &mut Outbox);
+    /// Consent.
+    fn arm(&mut self, out: &mut Outbox);
+    /// Asks for the board's clock.
+    fn ping(&mut self, nonce: u32, out: &mut Outbox);
+    /// Ends control as wanted.
+    fn stop(&mut self, reason: StopReason, out: &mut Outbox);
+    /// The line is gone.
+    fn disconnect(&mut self);
+    /// Reports how long the last answer took, from sample to write.
+    fn answered(&mut self, lateness: Micros);
+    /// When [`Station::poll`] has to be called at the latest, ns.
+    fn poll_at(&self) -> Option<u64>;
+    /// Looks at the clock.
+    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(StationNotice<Self>));
+    /// Bytes from the line.
+    fn receive(
+        &mut self,
+        now_ns: u64,
+        bytes: &[u8],
+        out: &mut Outbox,
+        notices: &mut impl FnMut(StationNotice<Self>),
+    );
+
+    /// Where control stands.
+    fn standing(&self) -> Standing<Self::Scalar>;
+    /// What the line to encoder and converter has carried.
+    fn counts(&self) -> &LinkCounts;
+    /// Where the path begins.
+    fn origin(&self) -> FixedCounts;
+    /// The encoder.
+    fn encoder(&self) -> Encoder;
+    /// The converter.
+    fn dac(&self) -> &Dac<Self::Scalar>;
+    /// The sampling period.
+    fn period(&self) -> Micros;
+    /// Why it cannot go on, if it cannot.
+    fn failure(&self) -> Option<String> {
+        None
+    }
+}
+
+/// A controller in this process, with its path.
+pub struct ControllerStation<T: Real, C: ControlLaw<T>, P> {
+    /// The controller.
+    pub node: ControllerNode<T, C>,
+    /// The path, from position 0 on.
+    pub path: P,
+}
+
+impl<T: Real, C: ControlLaw<T>, P: Fn(u64) -> Target<T>> Station for ControllerStation<T, C, P> {
+    type Scalar = T;
+    type Terms = C::Terms;
+    const LOOKS_ON: bool = false;
+
+    fn discover(&mut self, nonce: u32, out: &mut Outbox) {
+        self.node.discover(nonce, out);
+    }
+    fn configure(&mut self, present: DacCode, out: &mut Outbox) {
+        self.node.configure(present, out);
+    }
+    fn arm(&mut self, out: &mut Outbox) {
+        self.node.arm(out);
+    }
+    fn ping(&mut self, nonce: u32, out: &mut Outbox) {
+        self.node.ping(nonce, out);
+    }
+    fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
+        self.node.stop(reason, out);
+    }
+    fn disconnect(&mut self) {
+        self.node.disconnect();
+    }
+    fn answered(&mut self, lateness: Micros) {
+        self.node.answered(lateness);
+    }
+    fn poll_at(&self) -> Option<u64> {
+        self.node.poll_at()
+    }
+    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(StationNotice<Self>)) {
+        self.node.poll(now_ns, out, notices);
+    }
+    fn receive(
+        &mut self,
+        now_ns: u64,
+        bytes: &[u8],
+        out: &mut Outbox,
+        notices: &mut impl FnMut(StationNotice<Self>),
+    ) {
+        self.node.receive(now_ns, bytes, &self.path, out, notices);
+    }
+    fn standing(&self) -> Standing<T> {
+        let s = self.node.state();
+        Standing {
+            state: s.state(),
+            cause: s.cause(),
+            value: s.value(),
+            tick: s.tick(),
+            lost: s.lost(),
+            rejected: s.rejected(),
+            deadline_misses: s.deadline_misses(),
+            untold: 0,
+        }
+    }
+    fn counts(&self) -> &LinkCounts {
+        self.node.counts()
+    }
+    fn origin(&self) -> FixedCounts {
+        self.node.origin()
+    }
+    fn encoder(&self) -> Encoder {
+        self.node.servo().encoder()
+    }
+    fn dac(&self) -> &Dac<T> {
+        self.node.servo().dac()
+    }
+    fn period(&self) -> Micros {
+        self.node.servo().period()
+    }
+}
+
+/// The host of a board controller, with the path that the board follows.
+pub struct HostStation<P> {
+    /// The host.
+    pub node: HostNode,
+    /// The path, from position 0 on.
+    pub path: P,
+}
+
+impl<P: Fn(u64) -> Target<f32>> Station for HostStation<P> {
+    type Scalar = f32;
+    type Terms = LawTerms<f32>;
+    const LOOKS_ON: bool = true;
+
+    fn discover(&mut self, nonce: u32, out: &mut Outbox) {
+        self.node.discover(nonce, out);
+    }
+    fn configure(&mut self, _: DacCode, out: &mut Outbox) {
+        self.node.configure(out);
+    }
+    fn arm(&mut self, out: &mut Outbox) {
+        self.node.arm(out);
+    }
+    fn ping(&mut self, nonce: u32, out: &mut Outbox) {
+        self.node.ping(nonce, out);
+    }
+    fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
+        self.node.stop(reason, out);
+    }
+    fn disconnect(&mut self) {
+        self.node.disconnect();
+    }
+    fn answered(&mut self, _: Micros) {}
+    fn poll_at(&self) -> Option<u64> {
+        self.node.poll_at()
+    }
+    fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(StationNotice<Self>)) {
+        self.node.poll(now_ns, out, notices);
+    }
+    fn receive(
+        &mut self,
+        now_ns: u64,
+        bytes: &[u8],
+        _: &mut Outbox,
+        notices: &mut impl FnMut(StationNotice<Self>),
+    ) {
+        self.node.receive(now_ns, bytes, &self.path, notices);
+    }
+    fn standing(&self) -> Standing<f32> {
+        *self.node.standing()
+    }
+    fn counts(&self) -> &LinkCounts {
+        self.node.counts()
+    }
+    fn origin(&self) -> FixedCounts {
+        self.node.origin()
+    }
+    fn encoder(&self) -> Encoder {
+        self.node.servo().encoder()
+    }
+    fn dac(&self) -> &Dac<f32> {
+        self.node.servo().dac()
+    }
+    fn period(&self) -> Micros {
+        self.node.servo().period()
+    }
+}

@@ -1,0 +1,259 @@
+//! The summary of a session: its figures, and what ended it in words.
+
+use crate::control_loop::LoopReport;
+use crate::preflight;
+use crate::realtime::CycleSummary;
+use crate::sim_board_server::ServeReport;
+use clutch_core::supervisor::{Cause, State};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// A number with about five significant digits.
+#[must_use]
+pub fn number(x: f64) -> String {
+    if x == 0.0 {
+        return "0".into();
+    }
+    let digits = (4.0 - x.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    let text = format!("{x:.digits$}");
+    if digits == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
+}
+
+/// How a session ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The path is done.
+    Done,
+    /// Somebody here stopped it.
+    Stopped,
+    /// A fault ended the run, or the port was lost.
+    Fault,
+    /// The board did not take consent.
+    NotArmed,
+}
+
+impl Verdict {
+    /// As JSON and Python have it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Verdict::Done => "done",
+            Verdict::Stopped => "stopped",
+            Verdict::Fault => "fault",
+            Verdict::NotArmed => "not_armed",
+        }
+    }
+}
+
+/// What became of a session's log.
+#[derive(Clone, Debug)]
+pub struct LogSummary {
+    /// Its file.
+    pub path: PathBuf,
+    /// Records in it; or why it ended early.
+    pub records: Result<u64, String>,
+}
+
+/// What a session leaves.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// The scenario's name.
+    pub scenario: String,
+    /// Version and commit of the build.
+    pub version: String,
+    /// Whether the gains are certified for the scenario's bounds.
+    pub certified: bool,
+    /// Whether somebody here has stopped it.
+    pub stopped: bool,
+    /// Faults that were asked for.
+    pub faults: usize,
+    /// What the loop saw.
+    pub report: LoopReport,
+    /// What the simulated board saw, if there was one.
+    pub board: Option<ServeReport>,
+    /// The log, if there was to be one.
+    pub log: Option<LogSummary>,
+}
+
+impl Summary {
+    /// How the session ended.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        let r = &self.report;
+        if r.state == State::Faulted || r.port_error.is_some() {
+            Verdict::Fault
+        } else if self.stopped {
+            Verdict::Stopped
+        } else if !r.begun {
+            Verdict::NotArmed
+        } else if r.cause == Cause::Operator {
+            Verdict::Fault // nobody here has stopped it: the board has missed this machine
+        } else {
+            Verdict::Done
+        }
+    }
+
+    /// What ended control, in words.
+    #[must_use]
+    pub fn cause_text(&self) -> String {
+        cause_text(self.report.cause, self.report.value, self.report.on_the_board, self.stopped)
+    }
+
+    /// What there is to say beside the figures, a line each; the last says why control ended, and whether the
+    /// board is safe.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<String> {
+        let r = &self.report;
+        let mut lines = Vec::new();
+        if r.clock_hz > 0 {
+            let us = |cycles: u64| number(cycles as f64 * 1e6 / f64::from(r.clock_hz));
+            let c = &r.tick_cycles;
+            lines.push(format!(
+                "a tick on the board p50 / p99.9 / max: {} / {} / {} clock cycles, {} / {} / {} µs",
+                c.p50_ns,
+                c.p99_9_ns,
+                c.max_ns,
+                us(c.p50_ns),
+                us(c.p99_9_ns),
+                us(c.max_ns)
+            ));
+        }
+        if r.untold > 0 {
+            lines.push(format!(
+                "{} cycles of the board did not reach this machine; they are missing in the log",
+                r.untold
+            ));
+        }
+        if r.log_dropped > 0 {
+            lines.push(format!("the log dropped {} records: its thread did not keep up", r.log_dropped));
+        }
+        if r.cut_writes > 0 {
+            lines.push(format!("the line took {} frames only in part: its buffer was full", r.cut_writes));
+        }
+        if let Some(board) = self.board.filter(|b| b.waits > 0) {
+            lines.push(format!(
+                "the simulated board's clock waited {} times for the loop, {:.3} s in all: this machine stalled",
+                board.waits, board.waited
+            ));
+        }
+        if self.board.is_some_and(|b| b.hits == 0) && self.faults > 0 {
+            lines.push("the fault that was asked for had not begun".into());
+        }
+        lines.extend(self.log.as_ref().map(|log| match &log.records {
+            Ok(records) => format!("log: {0}, {records} records; clutch replay {0}", log.path.display()),
+            Err(error) => format!("log: {error}"),
+        }));
+        lines.extend(r.notes.iter().map(|note| format!("note: {note}")));
+        lines.extend(r.port_error.clone());
+        lines.push(self.last_line());
+        lines
+    }
+
+    /// Why control ended, and whether the board is safe.
+    #[must_use]
+    pub fn last_line(&self) -> String {
+        let r = &self.report;
+        let safe = match (r.state, r.board_safe) {
+            (State::Released, true) => "the brake is released",
+            (_, true) => "the board is in its safe state",
+            (_, false) if r.on_the_board => {
+                "the board did not confirm its safe state; it goes there by itself when it misses this machine"
+            }
+            (_, false) => "the board did not confirm its safe state; its watchdog takes it there",
+        };
+        if r.begun || r.state == State::Faulted {
+            let missed = r.cause == Cause::Operator && !self.stopped;
+            let fault = if r.state == State::Faulted || missed { "FAULT: " } else { "" };
+            return format!("{fault}{}; {safe}", self.cause_text());
+        }
+        match &r.refused {
+            _ if self.stopped && r.cause == Cause::None => {
+                "stopped before the board was armed; its output is as it was".into()
+            }
+            _ if self.stopped => format!("stopped before the board said that it was armed; {safe}"),
+            Some(m) => format!("the board was not armed: {}", preflight::why(m, None)),
+            None => format!("the board did not say that it was armed; {safe}"),
+        }
+    }
+
+    /// The whole as one JSON object, SI and radians; times of answers and cycles in µs.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let r = &self.report;
+        let latency = |s: &CycleSummary| {
+            json!({
+                "p50_us": s.p50_ns as f64 / 1e3, "p99_us": s.p99_ns as f64 / 1e3,
+                "p99_9_us": s.p99_9_ns as f64 / 1e3, "max_us": s.max_ns as f64 / 1e3, "count": s.count,
+            })
+        };
+        json!({
+            "scenario": self.scenario,
+            "version": self.version,
+            "verdict": self.verdict().name(),
+            "state": format!("{:?}", r.state),
+            "cause": format!("{:?}", r.cause),
+            "cause_text": self.cause_text(),
+            "value": r.value,
+            "certified": self.certified,
+            "ticks": r.ticks,
+            "metrics": r.metrics,
+            "samples": {
+                "received": r.link.received, "lost": r.lost, "late": r.link.late,
+                "duplicated": r.link.duplicated, "reordered": r.link.reordered, "implausible": r.implausible,
+            },
+            "bad_frames": r.link.bad_frames,
+            "deadline_misses": r.deadline_misses,
+            "response": latency(&r.response),
+            "cycle": latency(&r.interval),
+            "tick_clock_cycles": (r.clock_hz > 0).then(|| json!({
+                "clock_hz": r.clock_hz, "p50": r.tick_cycles.p50_ns, "p99_9": r.tick_cycles.p99_9_ns,
+                "max": r.tick_cycles.max_ns,
+            })),
+            "untold": r.untold,
+            "log_dropped": r.log_dropped,
+            "cut_writes": r.cut_writes,
+            "board_safe": r.board_safe,
+            "board_waits": self.board.map(|b| b.waits),
+            "port_error": r.port_error,
+            "notes": r.notes,
+        })
+    }
+}
+
+/// What ended control, in words; `v` is what the check saw, `stopped` whether somebody here has stopped it.
+#[must_use]
+pub fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> String {
+    match cause {
+        Cause::Done => "the path is done".into(),
+        Cause::Operator if on_the_board && !stopped => {
+            "the board has not heard this machine for too long, and has ended the run".into()
+        }
+        Cause::Operator => "stopped by the operator".into(),
+        Cause::Lost => format!("{v} samples lost within 128 cycles"),
+        Cause::Late => "too many samples or answers came late".into(),
+        Cause::Duplicated => format!("{v} samples came twice within 128 cycles"),
+        Cause::Reordered => format!("{v} samples came out of order within 128 cycles"),
+        Cause::Jump => format!("the encoder jumped, by {v} counts at last"),
+        Cause::StandStill => format!(
+            "the encoder shows no movement, though the shaft must have gone {} °: encoder frozen, or shaft blocked",
+            number(v.to_degrees())
+        ),
+        Cause::FollowingError => format!("following error of {} °", number(v.to_degrees())),
+        Cause::Saturation => "the brake's voltage was at its limit for too long".into(),
+        Cause::NotFinite => "the law's demand was not a number".into(),
+        Cause::Deadline => format!("answers came too late, the last after {v} µs"),
+        // The board's own supervisor tells for how many periods.
+        Cause::Silence if on_the_board && v > 0.0 => "the board's encoder and converter fell silent".into(),
+        Cause::Silence => "the board fell silent".into(),
+        Cause::Board => match v as u8 {
+            1 => "the board's watchdog went off: it got no valid answer in time".into(),
+            2 => "the board sees no encoder".into(),
+            3 => "the board's converter does not follow".into(),
+            _ => "the board went to its safe state by itself".into(),
+        },
+        Cause::Target => {
+            "the path's target is not a number, or moves faster than rig.speed_limit_deg_s".into()
+        }
+        Cause::None => "control did not begin".into(),
+    }
+}

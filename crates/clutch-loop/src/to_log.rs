@@ -1,0 +1,240 @@
+//! What a log gets of each sample, of the link and of the shaft.
+
+use crate::from_scenario::{self, BuildError};
+use clutch_core::law::Terms;
+use clutch_core::supervisor::{Cycle, State};
+use clutch_core::{Dac, FixedCounts, Real, Servo};
+use clutch_log::{
+    CommandRecord, CommandSource, EventKind, EventRecord, LinkRecord, LogError, LogWriter, Record,
+    SampleRecord, Source, TruthRecord,
+};
+use clutch_node::{CycleNotice, Ending, LinkCounts};
+use clutch_sim::engine::Motion;
+use clutch_sim::scenario::ScalarKind;
+use clutch_sim::{MovingRig, Scenario};
+use std::path::Path;
+
+/// Key of the header under which the code at arming stands.
+pub const PRESENT_CODE: &str = "present_code";
+/// Key of the header under which a simulation's voltage at the start stands: its bits, in hex.
+pub const START_VOLTAGE: &str = "start_voltage_bits";
+
+/// Of a sample: as it came.
+#[must_use]
+pub fn sample<T: Real, X>(time_ns: u64, age_us: u32, n: &CycleNotice<T, X>) -> SampleRecord {
+    SampleRecord {
+        tick: n.cycle.tick,
+        time_ns,
+        arrival: n.cycle.arrival as u8,
+        sequence: n.sample.sequence,
+        board_time_us: n.sample.time_us,
+        counts: n.sample.counts,
+        status: n.sample.status,
+        age_us,
+        lateness_us: n.lateness.0,
+        superseded: n.superseded,
+    }
+}
+
+/// Of a sample: what it led to. Every real is a double; a number in single precision is one
+/// exactly.
+#[must_use]
+pub fn command<T: Real, X: Terms<T>>(
+    time_ns: u64,
+    cycle: &Cycle<T, X>,
+    dac: &Dac<T>,
+    radians_per_count: f64,
+) -> CommandRecord {
+    let safe = matches!(cycle.state, State::Holding | State::Released | State::Faulted);
+    let source = match (safe, cycle.output.is_some()) {
+        (true, _) => CommandSource::Safe,
+        (false, true) => CommandSource::Law,
+        (false, false) => CommandSource::Unanswered,
+    };
+    let target = cycle.target;
+    let mut record = CommandRecord {
+        tick: cycle.tick,
+        time_ns,
+        state: cycle.state as u8,
+        source: source as u8,
+        code: cycle.code.0,
+        voltage: dac.volts(cycle.code).to_f64(),
+        target_fixed: target.position.0,
+        target_position: target.position.minus::<f64>(FixedCounts(0)) * radians_per_count,
+        target_velocity: target.velocity.to_f64(),
+        target_acceleration: target.acceleration.to_f64(),
+        ..CommandRecord::default()
+    };
+    if let Some(out) = &cycle.output {
+        record.limit = out.command.limit as u8;
+        record.demand = out.command.voltage.to_f64();
+        record.error = out.tick.error.to_f64();
+        record.error_rate = out.tick.error_rate.to_f64();
+        record.terms = out.command.terms.values().iter().map(|value| value.to_f64()).collect();
+    }
+    record
+}
+
+/// A change of the supervisor's state, if this was one.
+#[must_use]
+pub fn change<T: Real, X>(time_ns: u64, cycle: &Cycle<T, X>) -> Option<Record> {
+    let Cycle { from, state, cause, value, tick, .. } = *cycle;
+    (from != state)
+        .then(|| event(EventKind::StateChange, time_ns, &Ending { from, state, cause, value, tick }))
+}
+
+/// An end that no sample brought: silence, the board's own report, an operator, the path's end.
+#[must_use]
+pub fn ended<T: Real>(time_ns: u64, ending: &Ending<T>) -> Record {
+    event(EventKind::Ended, time_ns, ending)
+}
+
+fn event<T: Real>(kind: EventKind, time_ns: u64, e: &Ending<T>) -> Record {
+    Record::Event(EventRecord {
+        tick: e.tick,
+        time_ns,
+        kind: kind as u8,
+        from: e.from as u8,
+        to: e.state as u8,
+        cause: e.cause as u8,
+        value: e.value.to_f64(),
+    })
+}
+
+/// Of a simulation: every sample with its command and the shaft's true state.
+fn of_simulation<T: Real>(
+    run: &clutch_sim::Run,
+    dac: &Dac<T>,
+    period: clutch_core::Micros,
+) -> impl Iterator<Item = [Record; 3]> {
+    let t = &run.trace;
+    let period_ns = u64::from(period.0) * 1000;
+    (0..t.time.len()).map(move |i| {
+        let tick = i as u64;
+        let time_ns = tick * period_ns;
+        // A target was rounded to the law's scalar before the law saw it.
+        let cast = |x: f64| T::from_f64(x).to_f64();
+        [
+            Record::Sample(SampleRecord {
+                tick,
+                time_ns,
+                sequence: tick as u16,
+                board_time_us: (time_ns / 1000) as u32,
+                counts: t.counts[i],
+                status: clutch_wire::BoardState::Running as u8,
+                ..SampleRecord::default()
+            }),
+            Record::Command(CommandRecord {
+                tick,
+                time_ns,
+                state: State::Running as u8,
+                source: CommandSource::Law as u8,
+                limit: t.limit[i] as u8,
+                code: t.code[i],
+                voltage: dac.volts(clutch_core::DacCode(t.code[i])).to_f64(),
+                demand: t.demand[i],
+                target_fixed: t.target_fixed[i].0,
+                target_position: t.target_position[i],
+                target_velocity: cast(t.target_velocity[i]),
+                target_acceleration: cast(t.target_acceleration[i]),
+                error: t.measured_error[i],
+                error_rate: t.error_rate[i],
+                terms: t.terms.iter().map(|(_, values)| values[i]).collect(),
+            }),
+            Record::Truth(TruthRecord {
+                tick,
+                time_ns,
+                position: t.position[i],
+                velocity: t.velocity[i],
+                stuck: t.stuck[i],
+            }),
+        ]
+    })
+}
+
+/// Writes a simulation as a log, with the channels that a loop writes and the shaft's true motion;
+/// `version` is the build's.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn save_simulation(
+    path: &Path,
+    scenario: &Scenario,
+    run: &clutch_sim::Run,
+    version: &str,
+) -> Result<(), SaveError> {
+    match scenario.scalar() {
+        ScalarKind::F32 => save_in::<f32>(path, scenario, run, version),
+        ScalarKind::F64 => save_in::<f64>(path, scenario, run, version),
+    }
+}
+
+/// A simulation could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum SaveError {
+    /// The file.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The scenario.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+}
+
+fn save_in<T: Real>(
+    path: &Path,
+    scenario: &Scenario,
+    run: &clutch_sim::Run,
+    version: &str,
+) -> Result<(), SaveError> {
+    let spec = scenario.spec();
+    let params = spec.servo().map_err(BuildError::from)?;
+    let servo = Servo::<T>::new(&params.cast()).map_err(|e| BuildError::from(e.cast::<f64>()))?;
+    let mut header = from_scenario::header(scenario, &servo, Source::Simulation, "", version);
+    let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
+    header.extra.push((START_VOLTAGE.to_owned(), bits));
+    let mut log = LogWriter::create(path, &header)?;
+    for tick in of_simulation(run, servo.dac(), spec.period) {
+        for record in &tick {
+            log.write(record)?;
+        }
+    }
+    log.finish()?;
+    Ok(())
+}
+
+/// The link's counters; `(lost, implausible, deadline misses, dropped by the log)` come from
+/// elsewhere.
+#[must_use]
+pub fn link(
+    time_ns: u64,
+    tick: u64,
+    counts: &LinkCounts,
+    (lost, rejected_samples, deadline_misses, log_dropped): (u64, u64, u64, u64),
+) -> LinkRecord {
+    LinkRecord {
+        tick,
+        time_ns,
+        received: counts.received,
+        lost,
+        late: counts.late,
+        duplicated: counts.duplicated,
+        reordered: counts.reordered,
+        rejected_frames: counts.bad_frames,
+        rejected_samples,
+        deadline_misses,
+        log_dropped,
+    }
+}
+
+/// The shaft as it truly is.
+#[must_use]
+pub fn truth(time_ns: u64, tick: u64, rig: &MovingRig) -> TruthRecord {
+    let shaft = rig.shaft();
+    TruthRecord {
+        tick,
+        time_ns,
+        position: shaft.position,
+        velocity: shaft.velocity,
+        stuck: shaft.motion == Motion::Stuck,
+    }
+}

@@ -1,0 +1,462 @@
+//! ControlLaw, line and simulated board in virtual time: what the fault campaign runs.
+//!
+//! The same state machines, frames and rig as in real time; only the clock is computed. A run of
+//! one second takes some milliseconds and repeats bit for bit.
+
+use crate::faults::{Direction, Fault};
+use crate::faulty_line::FaultyLine;
+use crate::preflight;
+use crate::sim_board::{SimBoard, SimBoardError};
+use crate::station::{Station, StationNotice};
+use crate::to_log;
+use clutch_core::supervisor::{Cause, State};
+use clutch_core::{DacCode, Micros, Real, Target};
+use clutch_log::Record;
+use clutch_node::{Ending, Notice, Outbox, Standing};
+use clutch_sim::engine::{Event, Motion, Shaft};
+use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
+use clutch_sim::{Metrics, Scenario};
+use clutch_wire::{BoardState, Refused, StopReason};
+
+/// Time that a controller takes for an answer, over a part of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stall {
+    /// When it begins, s after arming.
+    pub at: f64,
+    /// Until when, s after arming.
+    pub until: f64,
+    /// How long each answer takes then, s.
+    pub answer: f64,
+}
+
+/// How a run in virtual time is made.
+#[derive(Clone, Debug)]
+pub struct VirtualOptions {
+    /// One way, ns.
+    pub latency_ns: u64,
+    /// What goes wrong on line and board.
+    pub faults: Vec<Fault>,
+    /// A controller that is too slow.
+    pub stall: Option<Stall>,
+    /// Seed of the line's faults.
+    pub seed: u64,
+    /// Whether records are kept.
+    pub record: bool,
+    /// Time after arming at which the run ends, s; the safe state is watched until then.
+    pub duration: f64,
+    /// Ticks after which the run is over and an orderly stop follows.
+    pub ticks: u64,
+    /// Time left out of the figures, s.
+    pub settle: f64,
+}
+
+/// A line that loses nothing and takes no time, a controller that never stalls, and no end but that of the
+/// duration, which has to be given.
+impl Default for VirtualOptions {
+    fn default() -> Self {
+        VirtualOptions {
+            latency_ns: 0,
+            faults: Vec::new(),
+            stall: None,
+            seed: 1,
+            record: false,
+            duration: 0.0,
+            ticks: u64::MAX,
+            settle: 0.0,
+        }
+    }
+}
+
+/// What became of a run.
+#[derive(Clone, Debug, Default)]
+pub struct VirtualReport {
+    /// Why the controller ended control, if by a fault.
+    pub cause: Option<Cause>,
+    /// Where the controller stood last, and why.
+    pub standing: Standing<f64>,
+    /// When the fault first showed, s after arming.
+    pub hit: Option<f64>,
+    /// When the controller faulted, s after arming.
+    pub tripped: Option<f64>,
+    /// When the board's safe output was in force, s after arming.
+    pub safe: Option<f64>,
+    /// How far the shaft went beyond the path's position at the moment of the safe output, rad.
+    pub overrun: f64,
+    /// Largest distance between shaft and path until the end or the safe output, rad.
+    pub largest_error: f64,
+    /// Lowest and highest voltage that the board was told, V.
+    pub volts: (f64, f64),
+    /// Ticks in which the law answered.
+    pub answers: u64,
+    /// What a log would hold.
+    pub records: Vec<Record>,
+    /// The code that the converter had when the controller was armed.
+    pub present: u16,
+    /// True errors, one per sample from arming on, rad.
+    pub errors: Vec<f64>,
+    /// The board's state at the end.
+    pub board: Option<BoardState>,
+    /// Figures of the shaft's true motion under control, as a simulation has them; the last period of the
+    /// run, in which it ends, is not among them.
+    pub metrics: Metrics,
+}
+
+/// A run in virtual time could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum VirtualError {
+    /// The board or its rig.
+    #[error(transparent)]
+    Board(#[from] SimBoardError),
+    /// The station.
+    #[error("{0}")]
+    Station(String),
+    /// Encoder and converter, or the controller, before control began.
+    #[error("the board did not take the run: {0}")]
+    Refused(String),
+}
+
+/// A sample of the shaft that waits for its answer.
+struct Sampled {
+    shaft: Shaft,
+    /// When, by the rig's clock, s.
+    rig_time: f64,
+    /// The run's tick, once the controller has told.
+    tick: Option<u64>,
+}
+
+/// ControlLaw, line and board.
+pub struct VirtualLoop<S> {
+    board: SimBoard,
+    station: S,
+    up: FaultyLine,
+    down: FaultyLine,
+    params: VirtualOptions,
+    now_ns: u64,
+}
+
+impl<S: Station> VirtualLoop<S> {
+    /// A station, and the scenario's rig on a board.
+    ///
+    /// # Errors
+    /// As [`SimBoard::new`].
+    pub fn new(scenario: &Scenario, params: VirtualOptions, station: S) -> Result<Self, SimBoardError> {
+        let line = |way| FaultyLine::new(way, params.latency_ns, &params.faults, params.seed);
+        Ok(VirtualLoop {
+            board: SimBoard::new(scenario, &params.faults, 1, false)?,
+            station,
+            up: line(Direction::Up),
+            down: line(Direction::Down),
+            params,
+            now_ns: 0,
+        })
+    }
+
+    /// Discovers, configures, arms, and runs to the end; `path` is the one that the controller follows.
+    ///
+    /// # Errors
+    /// The engine gave up, or the station.
+    pub fn run(&mut self, path: &impl Fn(u64) -> Target<S::Scalar>) -> Result<VirtualReport, VirtualError> {
+        let mut course = Course::new(self, path);
+        course.discover()?;
+        while let Some(now) = course.next_event() {
+            if now >= course.end_ns {
+                course.stop_the_clock()?;
+                break;
+            }
+            let armed_for = course.board_turn(now)?;
+            if now < course.busy_until {
+                continue;
+            }
+            course.station_turn(now, armed_for)?;
+            // Nothing to come: a board that has started anew, and a controller that has given up.
+            if course.end_ns == u64::MAX && now > 1_000 * course.period_ns {
+                break;
+            }
+        }
+        course.report()
+    }
+
+    /// An error if the station cannot go on.
+    fn sound(&self) -> Result<(), VirtualError> {
+        self.station.failure().map_or(Ok(()), |why| Err(VirtualError::Station(why)))
+    }
+}
+
+/// How far station and board are with each other.
+#[derive(Clone, Copy, Default)]
+struct Handshake {
+    greeted: bool,
+    configured: bool,
+    asked: bool,
+    armed: bool,
+}
+
+/// What a turn of the station brought.
+struct Heard<T> {
+    records: Vec<Record>,
+    ended: Option<Ending<T>>,
+    refused: Option<Refused>,
+}
+
+/// A run on its way.
+struct Course<'a, S: Station, P> {
+    on: &'a mut VirtualLoop<S>,
+    path: &'a P,
+    report: VirtualReport,
+    figures: MetricsBuilder,
+    period: f64,
+    period_ns: u64,
+    /// Frames of the station.
+    out: Outbox,
+    /// Frames of the board.
+    up: Outbox,
+    hands: Handshake,
+    /// The code that the converter had at the start.
+    present: DacCode,
+    /// When the board was armed.
+    origin_ns: u64,
+    /// When the run is over; not before the board is armed.
+    end_ns: u64,
+    safe_at: Option<u64>,
+    /// The station makes an answer until then.
+    busy_until: u64,
+    waiting: Option<Sampled>,
+    /// Samples that the board has taken.
+    sampled: u64,
+    /// How many it had taken when control began.
+    first_sample: Option<u64>,
+}
+
+impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
+    fn new(on: &'a mut VirtualLoop<S>, path: &'a P) -> Self {
+        let (period, present) = (on.station.period(), on.board.code());
+        Course {
+            report: VirtualReport {
+                volts: (f64::INFINITY, f64::NEG_INFINITY),
+                present: present.0,
+                ..VirtualReport::default()
+            },
+            figures: MetricsBuilder::new(period.seconds(), on.params.settle),
+            period: period.seconds(),
+            period_ns: u64::from(period.0) * 1000,
+            out: Outbox::default(),
+            up: Outbox::default(),
+            hands: Handshake::default(),
+            present,
+            origin_ns: 0,
+            end_ns: u64::MAX,
+            safe_at: None,
+            busy_until: 0,
+            waiting: None,
+            sampled: 0,
+            first_sample: None,
+            on,
+            path,
+        }
+    }
+
+    /// Asks who is there.
+    fn discover(&mut self) -> Result<(), VirtualError> {
+        self.on.station.discover(1, &mut self.out);
+        self.on.sound()?;
+        self.on.down.send(0, None, self.out.as_bytes());
+        self.out.clear();
+        Ok(())
+    }
+
+    /// When something falls due next, on the board, on the line, or for the station.
+    fn next_event(&mut self) -> Option<u64> {
+        let v = &mut *self.on;
+        let heard = v.up.next_ns().map(|t| t.max(self.busy_until));
+        let poll = v.station.poll_at().map(|t| t.max(self.busy_until));
+        let next = [v.board.next_ns(), heard, v.down.next_ns(), poll].into_iter().flatten().min()?;
+        v.now_ns = next.max(v.now_ns);
+        Some(v.now_ns)
+    }
+
+    /// The run is over: the rig moves to its end, and no further.
+    fn stop_the_clock(&mut self) -> Result<(), VirtualError> {
+        self.on.now_ns = self.end_ns;
+        Ok(self.on.board.step(self.end_ns, &mut self.up)?)
+    }
+
+    /// The board: its clock first, then what has arrived. Time since it was armed, s.
+    fn board_turn(&mut self, now: u64) -> Result<Option<f64>, VirtualError> {
+        let v = &mut *self.on;
+        let before = v.board.armed_for(now);
+        if v.board.next_ns().is_some_and(|t| t <= now) {
+            v.board.step(now, &mut self.up)?;
+        }
+        while let Some(bytes) = v.down.arrived(now) {
+            v.board.receive(now, &bytes, &mut self.up)?;
+            if v.board.next_ns().is_some_and(|t| t <= now) {
+                v.board.step(now, &mut self.up)?;
+            }
+        }
+        let armed_for = v.board.armed_for(now);
+        if before.is_none() && armed_for.is_some() {
+            self.origin_ns = now;
+            self.end_ns = now + (v.params.duration * 1e9) as u64;
+        }
+        v.up.send(now, armed_for, self.up.as_bytes());
+        self.up.clear();
+        if v.board.samples() != self.sampled {
+            self.sampled = v.board.samples();
+            self.sample_taken();
+        }
+        let state = self.on.board.node().state();
+        let safe = matches!(state, BoardState::Stopped | BoardState::Faulted | BoardState::Boot);
+        if armed_for.is_some() && safe && self.safe_at.is_none() {
+            self.safe_at = Some(now);
+            self.report.safe = armed_for;
+        }
+        Ok(armed_for)
+    }
+
+    /// The board has taken a sample: the period before it goes into the figures.
+    fn sample_taken(&mut self) {
+        let events = self.on.board.take_events();
+        if let Some(Sampled { shaft, rig_time, tick: Some(tick) }) = self.waiting.take()
+            && tick + 1 < self.on.params.ticks
+        {
+            let time = tick as f64 * self.period;
+            let error = self.target(tick) - shaft.position;
+            let voltage = self.on.board.volts();
+            self.figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage });
+            // The rig's clock began before the run's.
+            let of_run = |e: &Event| Event { time: e.time - rig_time + time, ..*e };
+            let events: Vec<Event> = events.iter().map(of_run).collect();
+            self.figures.period(time, shaft.motion == Motion::Stuck, &events);
+        }
+        let rig = self.on.board.rig();
+        let (shaft, rig_time) = (*rig.shaft(), rig.time());
+        self.waiting = Some(Sampled { shaft, rig_time, tick: None });
+        if let Some(first) = self.first_sample
+            && self.safe_at.is_none()
+        {
+            let error = self.target(self.sampled - first) - shaft.position;
+            self.report.largest_error = self.report.largest_error.max(error.abs());
+            self.report.errors.push(error);
+        }
+    }
+
+    /// The station: what it hears, what follows from that, and what it sends.
+    fn station_turn(&mut self, now: u64, armed_for: Option<f64>) -> Result<(), VirtualError> {
+        let time_ns = now.saturating_sub(self.origin_ns);
+        let mut heard = self.hear(now, time_ns);
+        self.on.sound()?;
+        if let Some(m) = heard.refused {
+            return Err(VirtualError::Refused(preflight::why(&m, None)));
+        }
+        if self.hands.configured && !self.hands.asked && self.on.board.samples() >= 3 {
+            self.hands.asked = true;
+            self.on.station.arm(&mut self.out);
+        }
+        heard.records.extend(heard.ended.map(|ending| to_log::ended(time_ns, &ending)));
+        heard.records.extend(self.follow(time_ns, armed_for));
+        if self.on.params.record {
+            self.report.records.append(&mut heard.records);
+        }
+        self.answer(now, armed_for);
+        Ok(())
+    }
+
+    /// What has come over the line, and what the clock says.
+    fn hear(&mut self, now: u64, time_ns: u64) -> Heard<S::Scalar> {
+        let VirtualLoop { board, station, up, .. } = &mut *self.on;
+        let (hands, waiting, report) = (&mut self.hands, &mut self.waiting, &mut self.report);
+        let (dac, radians) = (*station.dac(), station.encoder().radians_per_count::<f64>());
+        let mut heard = Heard { records: Vec::new(), ended: None, refused: None };
+        let mut greeted = false;
+        let mut notices = |n: StationNotice<S>| match n {
+            Notice::Hello(_) => greeted = true,
+            Notice::Configured => hands.configured = true,
+            Notice::Armed => hands.armed = true,
+            Notice::Cycle(n) if hands.armed => {
+                if let Some(waiting) = waiting.as_mut().filter(|_| n.cycle.answer.is_some()) {
+                    waiting.tick = Some(n.cycle.tick);
+                }
+                report.answers += u64::from(n.cycle.answer.is_some());
+                let volts = dac.volts(n.cycle.code).to_f64();
+                report.volts = (report.volts.0.min(volts), report.volts.1.max(volts));
+                let records = &mut heard.records;
+                records.push(Record::Sample(to_log::sample(time_ns, 0, &n)));
+                records.push(Record::Command(to_log::command(time_ns, &n.cycle, &dac, radians)));
+                records.extend(to_log::change(time_ns, &n.cycle));
+                records.push(Record::Truth(to_log::truth(time_ns, n.cycle.tick, board.rig())));
+            }
+            Notice::Ended(ending) => heard.ended = Some(ending),
+            Notice::Refused(m) if !hands.armed => heard.refused = Some(m),
+            _ => {}
+        };
+        while let Some(bytes) = up.arrived(now) {
+            station.receive(now, &bytes, &mut self.out, &mut notices);
+        }
+        station.poll(now, &mut self.out, &mut notices);
+        if greeted && !self.hands.greeted {
+            self.hands.greeted = true;
+            station.configure(self.present, &mut self.out);
+        }
+        heard
+    }
+
+    /// Where control stands now: its beginning and a fault are noted, and the path's end stops it.
+    fn follow(&mut self, time_ns: u64, armed_for: Option<f64>) -> Option<Record> {
+        let Standing { state, cause, tick, .. } = self.on.station.standing();
+        if state == State::Running && self.first_sample.is_none() {
+            self.first_sample = Some(self.sampled);
+        }
+        if state == State::Faulted && self.report.tripped.is_none() {
+            self.report.tripped = armed_for;
+            self.report.cause = Some(cause);
+        }
+        if S::LOOKS_ON || state != State::Running || tick + 1 < self.on.params.ticks {
+            return None;
+        }
+        self.on.station.stop(StopReason::Done, &mut self.out);
+        let Standing { state: to, cause, value, .. } = self.on.station.standing();
+        Some(to_log::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }))
+    }
+
+    /// Sends what there is to send, as late as the stall that was asked for makes it.
+    fn answer(&mut self, now: u64, armed_for: Option<f64>) {
+        if self.out.as_bytes().is_empty() {
+            return;
+        }
+        let v = &mut *self.on;
+        let stall = v.params.stall.filter(|s| armed_for.is_some_and(|t| t >= s.at && t < s.until));
+        let takes = stall.map_or(0, |s| (s.answer * 1e9) as u64);
+        self.busy_until = now.saturating_add(takes);
+        v.station.answered(Micros((takes / 1000) as u32));
+        v.down.send(self.busy_until, armed_for, self.out.as_bytes());
+        self.out.clear();
+    }
+
+    /// What became of it.
+    fn report(mut self) -> Result<VirtualReport, VirtualError> {
+        self.on.sound()?;
+        let now_ns = self.on.now_ns;
+        let overrun = self.on.board.rig().shaft().position - self.path_at(self.safe_at.unwrap_or(now_ns));
+        let v = &self.on;
+        self.report.standing = v.station.standing().map(Real::to_f64);
+        self.report.board = Some(v.board.node().state());
+        let hits = [v.up.hits().1, v.down.hits().1, v.board.first_hit_ns()];
+        let first = hits.into_iter().flatten().min();
+        self.report.hit = first.map(|t| t.saturating_sub(self.origin_ns) as f64 / 1e9);
+        self.report.metrics = self.figures.finish();
+        self.report.overrun = self.report.overrun.max(overrun);
+        Ok(self.report)
+    }
+
+    /// The path's position at a time, rad.
+    fn path_at(&self, at_ns: u64) -> f64 {
+        self.target(at_ns.saturating_sub(self.origin_ns) / self.period_ns)
+    }
+
+    /// The path's position at a tick, rad.
+    fn target(&self, tick: u64) -> f64 {
+        let radians = self.on.station.encoder().radians_per_count::<f64>();
+        let position = (self.path)(tick).position.plus(self.on.station.origin());
+        position.minus::<f64>(clutch_core::FixedCounts(0)) * radians
+    }
+}

@@ -1,0 +1,119 @@
+//! A session from Rust: refusals before anything moves, events in order, a summary that says how it ended.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
+
+use clutch_core::supervisor::Cause;
+use clutch_loop::faults::Fault;
+use clutch_loop::port::Address;
+use clutch_loop::realtime::RealtimeOptions;
+use clutch_loop::session::{Board, Event, Session, SessionError, SessionOptions};
+use clutch_loop::summary::{Summary, Verdict};
+use clutch_sim::Scenario;
+use clutch_sim::scenario::ScalarKind;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+fn scenario(name: &str, set: &[(&str, &str)]) -> Scenario {
+    let set: Vec<_> = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    Scenario::load(name.as_ref(), &set).unwrap()
+}
+
+/// The machine's settings are not the subject.
+fn options() -> SessionOptions {
+    let realtime = RealtimeOptions { thread_priority: 0, lock_memory: false, ..RealtimeOptions::default() };
+    SessionOptions { realtime, ..SessionOptions::default() }
+}
+
+fn faults(text: &str) -> Board {
+    Board::Simulated { faults: vec![text.parse::<Fault>().unwrap()], seed: 1, strict: false }
+}
+
+/// Runs it; its summary, and the events without where the run stood.
+fn run(session: &Session, stop: &Arc<AtomicBool>, stop_after_s: f64) -> (Summary, Vec<Event>) {
+    let mut events = Vec::new();
+    let summary = session.run(stop, &mut |event| match event {
+        Event::Progress(p) => stop.store(p.time >= stop_after_s, Ordering::Relaxed),
+        other => events.push(other),
+    });
+    (summary.unwrap(), events)
+}
+
+#[test]
+fn what_can_be_refused_without_a_board_is_refused_before_one_is_looked_for() {
+    let nowhere = Board::Daq("/dev/ttyNOTHERE7".parse::<Address>().unwrap());
+    let options = SessionOptions { board: nowhere, ..options() };
+    let refused = |scenario, options| Session::new(scenario, options).unwrap_err();
+    let weak = scenario("board_smc_2", &[("law.smc.kp_v", "0.1")]);
+    let refusal = refused(weak.clone(), options.clone());
+    assert!(matches!(&refusal, SessionError::NotCertified { scenario } if *scenario == weak.name()));
+    let asked_for = Session::new(weak, SessionOptions { uncertified: true, ..options.clone() }).unwrap();
+    assert!(!asked_for.certified());
+
+    let refusal = refused(scenario("pd_2", &[]), options.clone());
+    assert!(refusal.to_string().contains("a run on a board needs a safe state"), "{refusal}");
+
+    let log = std::env::temp_dir().join(format!("clutch-session-{}.mcap", std::process::id()));
+    std::fs::write(&log, "the only record of a run").unwrap();
+    let refusal =
+        refused(scenario("board_smc_2", &[]), SessionOptions { log: Some(log.clone()), ..options.clone() });
+    assert!(matches!(refusal, SessionError::LogExists { .. }), "{refusal}");
+    assert_eq!(std::fs::read_to_string(&log).unwrap(), "the only record of a run");
+    std::fs::remove_file(&log).unwrap();
+
+    // And the port only when it runs.
+    let session = Session::new(scenario("board_smc_2", &[]), options).unwrap();
+    let refusal = session.run(&Arc::default(), &mut |event| panic!("{event:?}")).unwrap_err();
+    assert!(refusal.to_string().starts_with("/dev/ttyNOTHERE7: there is no such device"), "{refusal}");
+}
+
+#[test]
+fn a_board_that_closes_the_loop_gets_a_scenario_in_single_precision() {
+    let double = scenario("board_smc_2", &[]);
+    assert_eq!(double.scalar(), ScalarKind::F64);
+    let address = "/dev/ttyNOTHERE7".parse::<Address>().unwrap();
+    let options = SessionOptions { board: Board::Controller(address), ..options() };
+    let session = Session::new(double.clone(), options).unwrap();
+    assert_eq!(session.scenario().scalar(), ScalarKind::F32);
+    let set = [("sampling.scalar", "f32")];
+    assert_eq!(session.scenario().canonical(), scenario("board_smc_2", &set).canonical());
+    let session = Session::new(double.clone(), self::options()).unwrap();
+    assert_eq!(session.scenario().canonical(), double.canonical());
+}
+
+#[test]
+fn the_path_is_announced_run_to_its_end_and_done() {
+    let session = Session::new(scenario("board_smc_2", &[("run.duration_s", "1.2")]), options()).unwrap();
+    let (summary, events) = run(&session, &Arc::default(), f64::INFINITY);
+    let [Event::Announced(announcement)] = &events[..] else { panic!("{events:?}") };
+    assert_eq!(announcement.title, session.scenario().name());
+    let gains = announcement.rows.iter().find(|(name, _)| *name == "gains").unwrap();
+    assert_eq!(gains.1, "certified for the bounds given");
+    assert_eq!(
+        (summary.verdict(), summary.report.cause, summary.report.ticks),
+        (Verdict::Done, Cause::Done, 1200)
+    );
+    assert_eq!(summary.last_line(), "the path is done; the board is in its safe state");
+    assert_eq!(summary.to_json()["verdict"], "done");
+}
+
+#[test]
+fn a_stop_is_no_fault_and_a_fault_is_no_stop() {
+    let session = Session::new(scenario("board_smc_2", &[]), options()).unwrap();
+    let (summary, _) = run(&session, &Arc::default(), 0.2);
+    assert_eq!((summary.verdict(), summary.report.board_safe), (Verdict::Stopped, true));
+    assert!(summary.report.ticks < 5_000, "{}", summary.report.ticks);
+
+    let options = SessionOptions { board: faults("loss:at=0.3"), ..options() };
+    let session = Session::new(scenario("board_smc_2", &[("run.duration_s", "2.0")]), options).unwrap();
+    let (summary, _) = run(&session, &Arc::default(), f64::INFINITY);
+    assert_eq!((summary.verdict(), summary.report.cause), (Verdict::Fault, Cause::Board));
+    assert_eq!(summary.last_line(), "FAULT: the board sees no encoder; the board is in its safe state");
+}
+
+#[test]
+fn what_is_stopped_before_consent_moves_nothing() {
+    let session = Session::new(scenario("board_smc_2", &[]), options()).unwrap();
+    let stop = Arc::new(AtomicBool::new(true));
+    let summary = session.run(&stop, &mut |_| ()).unwrap();
+    assert_eq!((summary.verdict(), summary.report.begun), (Verdict::Stopped, false));
+    assert_eq!(summary.last_line(), "stopped before the board was armed; its output is as it was");
+}

@@ -1,0 +1,447 @@
+//! The controller role: the loop runs on the board, and a host looks on.
+//!
+//! ```text
+//!            Set… Configure Arm Stop Ping            Configure Arm Actuate Stop
+//!   host ────────────────────────────────► BoardController ───────────────────────────► encoder and
+//!        ◄──────────────────────────────── (loop)  ◄─────────────────────────── converter
+//!          Taken Configured Armed Telemetry           Configured Armed Sample
+//! ```
+//!
+//! Towards encoder and converter it is a [`ControllerNode`], the one that runs on Linux; they are a
+//! [`crate::BoardNode`] behind another serial line, or on the same chip ([`crate::OneChip`]). Towards
+//! the host it speaks the same protocol as a board, with settings before and telemetry instead of
+//! samples. A host that falls silent ends the run in the safe state.
+
+use crate::board::misunderstood;
+use crate::controller::{ControllerNode, ControllerParams};
+use crate::notice::{Ending, Notice};
+use crate::outbox::Outbox;
+use crate::settings::{Built, MAX_KNOTS, Misfit, Path, SETTINGS_HASH, Settings};
+use crate::telemetry::{frame, states};
+use clutch_core::law::LawTerms;
+use clutch_core::supervisor::State;
+use clutch_core::{DacCode, Micros};
+use clutch_wire::{
+    Armed, BoardState, Configure, Configured, ControllerHello, Decoder, Discover, Ended, Hello, Link,
+    Message, Pong, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Taken, VERSION,
+};
+
+/// What a board in the controller role is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BoardControllerParams {
+    /// Its serial number; 0 and 1 are emulated boards.
+    pub board: u32,
+    /// A number that changes at each power-up.
+    pub boot: u32,
+    /// What [`BoardController::spent`] counts, Hz; 0 if it is not called.
+    pub clock_hz: u32,
+}
+
+/// Frames on their way out.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Outboxes {
+    /// To the host.
+    pub host: Outbox,
+    /// To encoder and converter.
+    pub daq: Outbox,
+}
+
+/// How often the host is told what the line has carried.
+const LINK_EVERY_NS: u64 = 1_000_000_000;
+
+/// A run that the host has configured.
+#[derive(Clone, Debug)]
+struct Run {
+    control: ControllerNode<f32>,
+    path: Path,
+    number: u16,
+    config: u64,
+    ticks: u64,
+    host_silence_ns: u64,
+    /// Telemetry so far.
+    told: u16,
+}
+
+/// The controller role's state machine. Times are the board's monotonic clock, ns.
+#[derive(Clone, Debug)]
+pub struct BoardController {
+    params: BoardControllerParams,
+    decoder: Decoder,
+    settings: Settings,
+    /// The run that the settings are for.
+    settings_run: u16,
+    /// Hears encoder and converter while there is no run.
+    introduced: Decoder,
+    /// Encoder and converter, once they have answered.
+    hello: Option<Hello>,
+    run: Option<Run>,
+    heard_ns: u64,
+    linked_ns: u64,
+    spent: u32,
+}
+
+type Cycle = Notice<f32, LawTerms<f32>>;
+
+impl BoardController {
+    /// A board at power-up.
+    #[must_use]
+    pub fn new(params: BoardControllerParams) -> Self {
+        BoardController {
+            params,
+            decoder: Decoder::new(),
+            settings: Settings::default(),
+            settings_run: 0,
+            introduced: Decoder::new(),
+            hello: None,
+            run: None,
+            heard_ns: 0,
+            linked_ns: 0,
+            spent: 0,
+        }
+    }
+
+    /// Where control stands.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.run.as_ref().map_or(State::Disconnected, |r| r.control.state().state())
+    }
+
+    /// Whether it drives, or has the consent to.
+    #[must_use]
+    pub fn driving(&self) -> bool {
+        self.run.as_ref().is_some_and(Run::driving)
+    }
+
+    /// What tells encoder and converter to go to the safe state, for a handler that can trust nothing else;
+    /// none while nothing is driven.
+    #[must_use]
+    pub fn last_word(&self) -> Option<Outbox> {
+        let run = self.run.as_ref().filter(|r| r.driving())?;
+        let mut out = Outbox::default();
+        out.push(&Message::Stop(Stop { run: run.number, reason: StopReason::Fault as u8 }));
+        Some(out)
+    }
+
+    /// Clock cycles that the last tick took, for the telemetry of the next.
+    pub fn spent(&mut self, cycles: u32) {
+        self.spent = cycles;
+    }
+
+    /// Reports how long the last answer took, from sample to write.
+    pub fn answered(&mut self, lateness: Micros) {
+        if let Some(run) = &mut self.run {
+            run.control.answered(lateness);
+        }
+    }
+
+    /// When [`BoardController::poll`] has to be called at the latest, ns; none while nothing is awaited.
+    #[must_use]
+    pub fn poll_at(&self) -> Option<u64> {
+        let run = self.run.as_ref()?;
+        let host = (run.driving() && run.host_silence_ns > 0)
+            .then(|| self.heard_ns.saturating_add(run.host_silence_ns));
+        match (run.control.poll_at(), host) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// Looks at the clock: silence of encoder and converter, silence of the host.
+    pub fn poll(&mut self, now_ns: u64, out: &mut Outboxes) {
+        let Some(run) = &mut self.run else { return };
+        let (number, mut ends) = (run.number, false);
+        let host = &mut out.host;
+        run.control.poll(now_ns, &mut out.daq, &mut |n: Cycle| {
+            if let Notice::Ended(ending) = n {
+                host.push(&ended(number, &ending));
+                ends = true;
+            }
+        });
+        if ends {
+            tell_link(run, &mut out.host);
+        }
+        let silent = now_ns.saturating_sub(self.heard_ns);
+        if run.driving() && run.host_silence_ns > 0 && silent >= run.host_silence_ns {
+            run.end(StopReason::Operator, out);
+        }
+    }
+
+    /// Bytes from the host.
+    pub fn host(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outboxes) {
+        for byte in bytes {
+            if let Some(Ok(message)) = self.decoder.push(*byte) {
+                self.message(now_ns, &message, out);
+            }
+        }
+    }
+
+    /// Bytes from encoder and converter.
+    pub fn daq(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outboxes) {
+        let Some(run) = &mut self.run else {
+            self.introduction(bytes, out);
+            return;
+        };
+        let drove = run.driving();
+        let (number, config, boot) = (run.number, run.config, self.params.boot);
+        let (host, told, path, knots) = (&mut out.host, &mut run.told, &run.path, self.settings.knots());
+        let (spent, mut armed, mut hello, mut ends) = (&mut self.spent, false, None, false);
+        let at = |tick: u64| path.target(knots, tick);
+        run.control.receive(now_ns, bytes, &at, &mut out.daq, &mut |n: Cycle| match n {
+            // Before consent nothing is driven, and the line stays free.
+            Notice::Cycle(n) if n.cycle.state == State::Ready => {}
+            Notice::Cycle(mut n) => {
+                n.cycles = core::mem::take(spent);
+                *told = told.wrapping_add(1);
+                host.push(&Message::Telemetry(frame(number, *told, &n)));
+            }
+            Notice::Configured => host.push(&Message::Configured(Configured { run: number, config, boot })),
+            Notice::Armed => {
+                armed = true;
+                host.push(&Message::Armed(Armed { run: number, config }));
+            }
+            Notice::Refused(m) => host.push(&Message::Refused(m)),
+            Notice::Pong(nonce, time_us) => {
+                host.push(&Message::Pong(Pong { run: number, nonce, time_us }));
+            }
+            Notice::Stopped(m) => host.push(&Message::Stopped(m)),
+            Notice::BoardFault(m) => host.push(&Message::Fault(m)),
+            // Before the telemetry of the sample that shows it.
+            Notice::Ended(ending) => {
+                ends = true;
+                host.push(&ended(number, &ending));
+            }
+            Notice::Hello(m) => hello = Some(m),
+            Notice::ControllerHello(_) | Notice::Taken(_) | Notice::BadFrame(_) | Notice::Echo => {}
+        });
+        if let Some(m) = hello {
+            self.hello = Some(m);
+            host.push(&Message::Hello(m));
+        }
+        if armed && let Some(hello) = &mut self.hello {
+            // From now on the converter has not the code of power-up any more.
+            hello.state = BoardState::Armed as u8;
+        }
+        if ends || (drove && !run.driving()) {
+            tell_link(run, &mut out.host);
+        }
+        let state = run.control.state();
+        if state.state() == State::Running && state.tick().saturating_add(1) >= run.ticks {
+            run.end(StopReason::Done, out);
+        }
+        if run.driving() && now_ns.saturating_sub(self.linked_ns) >= LINK_EVERY_NS {
+            self.linked_ns = now_ns;
+            tell_link(run, &mut out.host);
+        }
+    }
+
+    /// Before there is a run: who are encoder and converter?
+    fn introduction(&mut self, bytes: &[u8], out: &mut Outboxes) {
+        for byte in bytes {
+            match self.introduced.push(*byte) {
+                Some(Ok(Message::Hello(m))) => {
+                    self.hello = Some(m);
+                    out.host.push(&Message::Hello(m));
+                }
+                Some(Ok(Message::Refused(m))) => out.host.push(&Message::Refused(m)),
+                _ => {}
+            }
+        }
+    }
+
+    fn message(&mut self, now_ns: u64, message: &Message, out: &mut Outboxes) {
+        match message {
+            // What only a host says shows that it lives; an echo of this board's own words does not.
+            Message::Discover(_)
+            | Message::Set(_)
+            | Message::Configure(_)
+            | Message::Arm(_)
+            | Message::Stop(_)
+            | Message::Ping(_) => self.heard_ns = now_ns,
+            _ => return,
+        }
+        match message {
+            Message::Discover(m) => self.discover(m, out),
+            Message::Set(m) => self.set(m, &mut out.host),
+            Message::Configure(m) => {
+                if let Err((reason, value)) = self.configure(now_ns, m, out) {
+                    let request = Configure::KIND;
+                    out.host.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
+                }
+            }
+            Message::Arm(m) => {
+                let state = self.state();
+                let refusal = match &mut self.run {
+                    Some(run) if run.number == m.run && run.config == m.config => match state {
+                        State::Ready | State::Armed | State::Running => {
+                            run.control.arm(&mut out.daq);
+                            return;
+                        }
+                        _ => (Refusal::State, state as u32),
+                    },
+                    _ => (Refusal::Run, u32::from(self.number())),
+                };
+                let (reason, value) = (refusal.0 as u8, refusal.1);
+                let request = clutch_wire::Arm::KIND;
+                out.host.push(&Message::Refused(Refused { request, reason, value }));
+            }
+            Message::Stop(m) => self.stop(m, out),
+            Message::Ping(m) => match &mut self.run {
+                Some(run) if run.number == m.run => run.control.ping(m.nonce, &mut out.daq),
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+
+    fn number(&self) -> u16 {
+        self.run.as_ref().map_or(0, |r| r.number)
+    }
+
+    fn discover(&mut self, m: &Discover, out: &mut Outboxes) {
+        if let Some(refused) = misunderstood(m) {
+            out.host.push(&Message::Refused(refused));
+            return;
+        }
+        out.host.push(&Message::ControllerHello(ControllerHello {
+            nonce: m.nonce,
+            version: VERSION,
+            schema: SCHEMA,
+            settings: SETTINGS_HASH,
+            board: self.params.board,
+            boot: self.params.boot,
+            clock_hz: self.params.clock_hz,
+            knots: MAX_KNOTS as u16,
+            state: self.state() as u8,
+            run: self.number(),
+            config: self.run.as_ref().map_or(0, |r| r.config),
+        }));
+        out.daq.push(&Message::Discover(*m));
+    }
+
+    fn set(&mut self, m: &Set, host: &mut Outbox) {
+        let refusal = if self.driving() {
+            Some((Refusal::State, self.state() as u32))
+        } else if !Settings::knows(m.key) {
+            Some((Refusal::Setting, u32::from(m.key)))
+        } else {
+            if m.run != self.settings_run {
+                self.settings = Settings::default();
+                self.settings_run = m.run;
+            }
+            // Consent is to what was configured: a setting behind it takes it back. Were a consent
+            // on its way already, the watchdog of encoder and converter would end it.
+            if matches!(self.state(), State::Disconnected | State::Ready) {
+                self.run = None;
+            }
+            (!self.settings.set(m.key, m.value)).then_some((Refusal::Setting, u32::from(m.key)))
+        };
+        host.push(&match refusal {
+            None => Message::Taken(Taken { run: m.run, key: m.key, value: m.value }),
+            Some((reason, value)) => {
+                Message::Refused(Refused { request: Set::KIND, reason: reason as u8, value })
+            }
+        });
+    }
+
+    fn configure(&mut self, now_ns: u64, m: &Configure, out: &mut Outboxes) -> Result<(), (Refusal, u32)> {
+        if self.driving() {
+            return Err((Refusal::State, self.state() as u32));
+        }
+        let Some(hello) = self.hello else { return Err((Refusal::NoBoard, 0)) };
+        if m.run != self.settings_run {
+            return Err((Refusal::Run, self.settings_run.into()));
+        }
+        let built: Built = self.settings.build().map_err(|misfit| match misfit {
+            Misfit::Missing(_) | Misfit::Unknown(_) => (Refusal::Setting, misfit.bits()),
+            Misfit::Unfit { .. } => (Refusal::Unfit, misfit.bits()),
+        })?;
+        let times = &built.times;
+        let params = ControllerParams {
+            run: m.run,
+            config: m.config,
+            watchdog: times.watchdog,
+            valid: times.valid,
+            silence: times.silence,
+        };
+        let mut control = ControllerNode::new(params, built.servo, built.supervisor);
+        // What the host asks for and what the settings say is one run, or none.
+        if control.configuration() != *m {
+            return Err((Refusal::Differs, 0));
+        }
+        control.configure(present_code(&hello, built.supervisor.safe_codes().hold), &mut out.daq);
+        self.run = Some(Run {
+            control,
+            path: built.path,
+            number: m.run,
+            config: m.config,
+            ticks: built.ticks,
+            host_silence_ns: u64::from(times.host_silence.0).saturating_mul(1000),
+            told: 0,
+        });
+        self.linked_ns = now_ns;
+        Ok(())
+    }
+
+    fn stop(&mut self, m: &Stop, out: &mut Outboxes) {
+        let Some(run) = self.run.as_mut().filter(|r| r.number == m.run) else { return };
+        let reason = if m.reason == StopReason::Done as u8 { StopReason::Done } else { StopReason::Operator };
+        if !run.end(reason, out) {
+            // It has ended before. Encoder and converter are told again, and say where they are.
+            out.daq.push(&Message::Stop(*m));
+        }
+    }
+}
+
+impl Run {
+    fn driving(&self) -> bool {
+        matches!(self.control.state().state(), State::Armed | State::Running)
+    }
+
+    /// Ends control as wanted and tells the host; whether there was anything to end.
+    fn end(&mut self, reason: StopReason, out: &mut Outboxes) -> bool {
+        let from = self.control.state().state();
+        self.control.stop(reason, &mut out.daq);
+        let ends = self.control.state().state() != from;
+        if ends {
+            out.host.push(&ended(self.number, &self.control.ending(from)));
+            tell_link(self, &mut out.host);
+        }
+        ends
+    }
+}
+
+fn ended(run: u16, ending: &Ending<f32>) -> Message {
+    Message::Ended(Ended {
+        run,
+        tick: ending.tick as u32,
+        states: states(ending.from, ending.state),
+        cause: ending.cause as u8,
+        value: ending.value.to_bits(),
+    })
+}
+
+fn tell_link(run: &Run, host: &mut Outbox) {
+    let (counts, state) = (run.control.counts(), run.control.state());
+    host.push(&Message::Link(Link {
+        run: run.number,
+        received: counts.received as u32,
+        lost: state.lost() as u32,
+        late: counts.late as u32,
+        duplicated: counts.duplicated as u32,
+        reordered: counts.reordered as u32,
+        bad_frames: counts.bad_frames as u32,
+        rejected: state.rejected() as u32,
+        deadline_misses: state.deadline_misses() as u32,
+        dropped: host.dropped(),
+    }));
+}
+
+/// The code that a converter has before the first answer of a run: that of power-up, or the safe
+/// state's of the run before.
+#[must_use]
+pub fn present_code(hello: &Hello, hold: DacCode) -> DacCode {
+    match BoardState::from_u8(hello.state) {
+        Some(BoardState::Boot) => DacCode(hello.boot_code),
+        _ => hold,
+    }
+}

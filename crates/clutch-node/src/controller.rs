@@ -1,0 +1,353 @@
+//! The controller: handshake, cycle, stop. On a PC, and within [`crate::BoardController`].
+
+use crate::notice::{CycleNotice, Ending, LinkCounts, Notice};
+use crate::outbox::Outbox;
+use clutch_core::law::{ControlLaw, Law};
+use clutch_core::supervisor::{BoardMode, Cause, Sample as Seen, State};
+use clutch_core::{
+    Counts, DacCode, FixedCounts, Micros, Real, SafeKind, Servo, Supervisor, SupervisorState, Target,
+};
+use clutch_wire::{
+    Actuate, Arm, BoardState, Configure, Decoder, Discover, Message, Ping, SCHEMA, STATUS_DAC_FAULT,
+    STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop, StopReason, VERSION,
+};
+
+/// What a run is, on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ControllerParams {
+    /// Number of the run; another for each run on a board.
+    pub run: u16,
+    /// Hash of the scenario.
+    pub config: u64,
+    /// The board's watchdog.
+    pub watchdog: Micros,
+    /// How long after its sample a code is valid.
+    pub valid: Micros,
+    /// Time without a sample after which the supervisor's check of silence is asked. A simulated
+    /// board's clock may wait for a machine that stalls; there it is longer than the check's own
+    /// cycles.
+    pub silence: Micros,
+}
+
+/// The controller's state machine. Times are the host's monotonic clock, ns.
+#[derive(Clone, Debug)]
+pub struct ControllerNode<T: Real, C: ControlLaw<T> = Law<T>> {
+    params: ControllerParams,
+    servo: Servo<T, C>,
+    supervisor: Supervisor<T>,
+    state: SupervisorState<T, C::State>,
+    decoder: Decoder,
+    counts: LinkCounts,
+    /// The code that the converter has before the first answer.
+    present: DacCode,
+    /// Where the path begins: the counts of the first sample that is answered.
+    origin: FixedCounts,
+    last_sample_ns: Option<u64>,
+    /// The supervisor has been told of this silence.
+    silence_told: bool,
+    lateness: Micros,
+    stopping: Option<StopReason>,
+}
+
+impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
+    /// A controller that has not spoken yet.
+    #[must_use]
+    pub fn new(params: ControllerParams, servo: Servo<T, C>, supervisor: Supervisor<T>) -> Self {
+        ControllerNode {
+            params,
+            servo,
+            supervisor,
+            state: SupervisorState::default(),
+            decoder: Decoder::new(),
+            counts: LinkCounts::default(),
+            present: supervisor.safe_codes().hold,
+            origin: FixedCounts::default(),
+            last_sample_ns: None,
+            silence_told: false,
+            lateness: Micros(0),
+            stopping: None,
+        }
+    }
+
+    /// The supervisor's state.
+    #[must_use]
+    pub fn state(&self) -> &SupervisorState<T, C::State> {
+        &self.state
+    }
+
+    /// What the line has carried.
+    #[must_use]
+    pub fn counts(&self) -> &LinkCounts {
+        &self.counts
+    }
+
+    /// Where the path begins.
+    #[must_use]
+    pub fn origin(&self) -> FixedCounts {
+        self.origin
+    }
+
+    /// The servo.
+    #[must_use]
+    pub fn servo(&self) -> &Servo<T, C> {
+        &self.servo
+    }
+
+    /// Asks who is there.
+    pub fn discover(&mut self, nonce: u32, out: &mut Outbox) {
+        out.push(&Message::Discover(Discover { nonce, version: VERSION, schema: SCHEMA }));
+    }
+
+    /// Tells the board of the run; `present` is the code that its converter has now. The pre-flight has taken place.
+    pub fn configure(&mut self, present: DacCode, out: &mut Outbox) {
+        self.present = present;
+        out.push(&Message::Configure(self.configuration()));
+    }
+
+    /// What the board is told of the run.
+    #[must_use]
+    pub fn configuration(&self) -> Configure {
+        let safe = self.supervisor.safe_codes();
+        Configure {
+            run: self.params.run,
+            config: self.params.config,
+            period_us: self.servo.period().0,
+            watchdog_us: self.params.watchdog.0,
+            safe_kind: match safe.kind {
+                SafeKind::Hold => clutch_wire::SafeKind::Hold,
+                SafeKind::Ramp => clutch_wire::SafeKind::Ramp,
+                SafeKind::Release => clutch_wire::SafeKind::Release,
+                SafeKind::HoldThenRelease => clutch_wire::SafeKind::HoldThenRelease,
+            } as u8,
+            hold_code: safe.hold.0,
+            release_code: safe.release.0,
+            ramp_step: safe.ramp_step,
+            hold_periods: safe.hold_periods,
+        }
+    }
+
+    /// Consent.
+    pub fn arm(&mut self, out: &mut Outbox) {
+        out.push(&Message::Arm(Arm { run: self.params.run, config: self.params.config }));
+    }
+
+    /// Asks for the board's clock.
+    pub fn ping(&mut self, nonce: u32, out: &mut Outbox) {
+        out.push(&Message::Ping(Ping { run: self.params.run, nonce }));
+    }
+
+    /// Ends control as wanted: `Done` or `Operator`.
+    pub fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
+        if self.stopping.is_some() {
+            return; // what ended control first is what the board is told, again and again
+        }
+        let cause = if reason == StopReason::Done { Cause::Done } else { Cause::Operator };
+        self.supervisor.stop(&mut self.state, cause);
+        self.send_stop(reason, out);
+    }
+
+    /// The line is gone.
+    pub fn disconnect(&mut self) {
+        self.supervisor.disconnect(&mut self.state);
+    }
+
+    /// Reports how long the last answer took, from sample to write.
+    pub fn answered(&mut self, lateness: Micros) {
+        self.lateness = lateness;
+    }
+
+    /// When [`ControllerNode::poll`] has to be called at the latest, ns; none while nothing is
+    /// awaited.
+    #[must_use]
+    pub fn poll_at(&self) -> Option<u64> {
+        let watched = matches!(self.state.state(), State::Ready | State::Armed | State::Running);
+        let silence = u64::from(self.params.silence.0).saturating_mul(1000);
+        self.last_sample_ns.filter(|_| watched && !self.silence_told).map(|t| t.saturating_add(silence))
+    }
+
+    /// Looks at the clock: silence.
+    pub fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
+        if self.poll_at().is_some_and(|at| now_ns >= at) {
+            self.silence_told = true;
+            let from = self.state.state();
+            self.supervisor.silence(&mut self.state, u32::MAX);
+            self.after_fault(from, out, notices);
+        }
+    }
+
+    /// Bytes from the board. `path` is the planned path from position 0 on.
+    pub fn receive(
+        &mut self,
+        now_ns: u64,
+        bytes: &[u8],
+        path: &impl Fn(u64) -> Target<T>,
+        out: &mut Outbox,
+        notices: &mut impl FnMut(Notice<T, C::Terms>),
+    ) {
+        // A sample waits until it is known whether a newer one came with it.
+        let mut waiting: Option<Sample> = None;
+        for byte in bytes {
+            let message = match self.decoder.push(*byte) {
+                None => continue,
+                Some(Ok(message)) => message,
+                Some(Err(error)) => {
+                    self.counts.bad_frames = self.counts.bad_frames.wrapping_add(1);
+                    notices(Notice::BadFrame(error));
+                    continue;
+                }
+            };
+            let sample = match message {
+                Message::Sample(sample) => Some(sample),
+                _ => None,
+            };
+            if let Some(earlier) = waiting.take() {
+                let newer = sample.is_some_and(|s| {
+                    s.run == earlier.run && (s.sequence.wrapping_sub(earlier.sequence) as i16) > 0
+                });
+                self.sample(now_ns, &earlier, newer, path, out, notices);
+            }
+            match sample {
+                Some(sample) => waiting = Some(sample),
+                None => self.message(&message, out, notices),
+            }
+        }
+        if let Some(sample) = waiting {
+            self.sample(now_ns, &sample, false, path, out, notices);
+        }
+    }
+
+    // A function of its own in machine code, too: the timing analysis is told how often it is called.
+    #[inline(never)]
+    fn message(
+        &mut self,
+        message: &Message,
+        out: &mut Outbox,
+        notices: &mut impl FnMut(Notice<T, C::Terms>),
+    ) {
+        let (run, config) = (self.params.run, self.params.config);
+        match message {
+            Message::Hello(m) => notices(Notice::Hello(*m)),
+            Message::ControllerHello(m) => notices(Notice::ControllerHello(*m)),
+            Message::Configured(m) if m.run == run && m.config == config => {
+                self.supervisor.connect(&mut self.state);
+                notices(Notice::Configured);
+            }
+            Message::Armed(m) if m.run == run && m.config == config => {
+                self.supervisor.arm(&mut self.state, self.present);
+                notices(Notice::Armed);
+            }
+            Message::Refused(m) => notices(Notice::Refused(*m)),
+            Message::Pong(m) if m.run == run => notices(Notice::Pong(m.nonce, m.time_us)),
+            Message::Stopped(m) if m.run == run => notices(Notice::Stopped(*m)),
+            Message::Fault(m) if m.run == run => {
+                notices(Notice::BoardFault(*m));
+                let from = self.state.state();
+                self.supervisor.board_fault(&mut self.state, T::from_i32(i32::from(m.cause)));
+                self.after_fault(from, out, notices);
+            }
+            Message::Discover(_)
+            | Message::Configure(_)
+            | Message::Arm(_)
+            | Message::Actuate(_)
+            | Message::Stop(_)
+            | Message::Ping(_)
+            | Message::Set(_) => notices(Notice::Echo),
+            // Of another run.
+            _ => {}
+        }
+    }
+
+    // A function of its own in machine code, too: the timing analysis is told how often it is called.
+    #[inline(never)]
+    fn sample(
+        &mut self,
+        now_ns: u64,
+        sample: &Sample,
+        superseded: bool,
+        path: &impl Fn(u64) -> Target<T>,
+        out: &mut Outbox,
+        notices: &mut impl FnMut(Notice<T, C::Terms>),
+    ) {
+        if sample.run != self.params.run {
+            self.counts.foreign = self.counts.foreign.wrapping_add(1);
+            return;
+        }
+        self.counts.received = self.counts.received.wrapping_add(1);
+        self.last_sample_ns = Some(now_ns);
+        self.silence_told = false;
+        let board = BoardState::from_u8(sample.status & 0x07);
+        let seen = Seen {
+            sequence: sample.sequence,
+            counts: Counts(sample.counts),
+            board: match board {
+                Some(BoardState::Ready) => BoardMode::Ready,
+                Some(BoardState::Armed | BoardState::Running) => BoardMode::Driving,
+                _ => BoardMode::Safe,
+            },
+            encoder_fault: sample.status & STATUS_ENCODER_FAULT != 0,
+            converter_fault: sample.status & STATUS_DAC_FAULT != 0,
+            command_late: sample.status & STATUS_LATE != 0,
+            // Before consent no answer is due: samples that pile up while the control thread starts
+            // say nothing of the line.
+            superseded: superseded && self.state.state() != State::Ready,
+            lateness: self.lateness,
+        };
+        let lateness = core::mem::take(&mut self.lateness);
+        if self.state.state() == State::Armed {
+            self.origin = FixedCounts::from_counts(i64::from(sample.counts));
+        }
+        let origin = self.origin;
+        let from_here = |tick: u64| {
+            let target = path(tick);
+            Target { position: target.position.plus(origin), ..target }
+        };
+        let cycle = self.supervisor.sample(&self.servo, &mut self.state, &seen, from_here);
+        if let Some(code) = cycle.answer {
+            out.push(&Message::Actuate(Actuate {
+                run: self.params.run,
+                sequence: sample.sequence,
+                code: code.0,
+                valid_us: u16::try_from(self.params.valid.0).unwrap_or(u16::MAX),
+            }));
+        }
+        self.count(cycle.arrival);
+        notices(Notice::Cycle(CycleNotice { sample: *sample, superseded, lateness, cycles: 0, cycle }));
+        if cycle.from != State::Faulted && cycle.state == State::Faulted {
+            self.send_stop(StopReason::Fault, out);
+        } else if let Some(reason) = self.stopping {
+            // Until the board says that it has heard.
+            if seen.board == BoardMode::Driving {
+                self.send_stop(reason, out);
+            }
+        }
+    }
+
+    fn count(&mut self, arrival: clutch_core::supervisor::Arrival) {
+        use clutch_core::supervisor::Arrival;
+        let counter = match arrival {
+            Arrival::Late => &mut self.counts.late,
+            Arrival::Duplicate => &mut self.counts.duplicated,
+            Arrival::Reordered => &mut self.counts.reordered,
+            _ => return,
+        };
+        *counter = counter.wrapping_add(1);
+    }
+
+    fn after_fault(&mut self, from: State, out: &mut Outbox, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
+        if self.state.state() == State::Faulted && self.stopping.is_none() {
+            notices(Notice::Ended(self.ending(from)));
+            self.send_stop(StopReason::Fault, out);
+        }
+    }
+
+    /// How control has ended; `from` is the state before.
+    pub(crate) fn ending(&self, from: State) -> Ending<T> {
+        let s = &self.state;
+        Ending { from, state: s.state(), cause: s.cause(), value: s.value(), tick: s.tick() }
+    }
+
+    fn send_stop(&mut self, reason: StopReason, out: &mut Outbox) {
+        self.stopping = Some(reason);
+        out.push(&Message::Stop(Stop { run: self.params.run, reason: reason as u8 }));
+    }
+}

@@ -1,0 +1,163 @@
+//! What a board's program does each period, and with each byte that comes: the same on all boards.
+//!
+//! ```text
+//!  encoder ─┐          ┌─► converter      1. the code goes out
+//!           ├─► role ──┼─► watchdog       2. only then is the watchdog fed
+//!  line ────┘          └─► line           3. and only then are frames handed over
+//! ```
+//!
+//! A board gives a [`Hardware`]; the role is a node of this crate. Both functions must be called
+//! from one place, so that neither interrupts the other: nothing here locks.
+
+use crate::board::{BoardMisfit, BoardNode, BoardParams};
+use crate::one_chip::OneChip;
+use crate::outbox::Outbox;
+use clutch_core::{Counts, DacCode, Micros};
+
+/// What a board's one file gives. Nothing of it may wait.
+pub trait Hardware {
+    /// Time since the start, µs. Never goes back.
+    fn now_us(&self) -> u64;
+
+    /// The encoder's counts now.
+    fn counts(&mut self) -> Counts;
+
+    /// The encoder reports that it cannot be trusted; a board that cannot know says `false`.
+    fn encoder_fault(&self) -> bool;
+
+    /// The converter does not give the code that it was told last.
+    fn converter_fault(&self) -> bool;
+
+    /// Puts a code out.
+    fn put_out(&mut self, code: DacCode);
+
+    /// Feeds the hardware watchdog. Called once a period, when its code is out, and from nowhere
+    /// else.
+    fn feed_watchdog(&mut self);
+
+    /// Hands frames to the line: all of them or, without room, none.
+    fn send(&mut self, frames: &[u8]);
+
+    /// A counter of the core's clock cycles; wraps.
+    fn cycles(&self) -> u32;
+}
+
+/// What a board is to the host. Times are [`Hardware::now_us`].
+pub trait Role {
+    /// Bytes from the host.
+    fn receive(&mut self, now_us: u64, bytes: &[u8]);
+
+    /// A period begins. Afterwards [`Role::code`] is what this period's sample led to.
+    fn sample(&mut self, now_us: u64, counts: Counts, encoder_fault: bool, converter_fault: bool);
+
+    /// What the converter is to give now.
+    fn code(&self) -> DacCode;
+
+    /// The sampling period, µs; none before one was configured.
+    fn period_us(&self) -> Option<u32>;
+
+    /// Frames for the host.
+    fn outbox(&mut self) -> &mut Outbox;
+
+    /// The code of the last sample is out: what that took, in cycles of the core and in time.
+    fn answered(&mut self, cycles: u32, lateness: Micros);
+}
+
+/// One sampling period: sample, code, watchdog, frames.
+pub fn tick(role: &mut impl Role, hardware: &mut impl Hardware) {
+    let begun = hardware.cycles();
+    let now_us = hardware.now_us();
+    let counts = hardware.counts();
+    let (encoder_fault, converter_fault) = (hardware.encoder_fault(), hardware.converter_fault());
+    role.sample(now_us, counts, encoder_fault, converter_fault);
+    hardware.put_out(role.code());
+    hardware.feed_watchdog();
+    let lateness = Micros(hardware.now_us().wrapping_sub(now_us) as u32);
+    role.answered(hardware.cycles().wrapping_sub(begun), lateness);
+    send(role, hardware);
+}
+
+/// Bytes from the host. A code among them goes out at once; the watchdog gets nothing from them.
+pub fn receive(role: &mut impl Role, hardware: &mut impl Hardware, bytes: &[u8]) {
+    role.receive(hardware.now_us(), bytes);
+    hardware.put_out(role.code());
+    send(role, hardware);
+}
+
+fn send(role: &mut impl Role, hardware: &mut impl Hardware) {
+    let outbox = role.outbox();
+    if !outbox.as_bytes().is_empty() {
+        hardware.send(outbox.as_bytes());
+        outbox.clear();
+    }
+}
+
+/// The board as a host's data acquisition: the host closes the loop.
+#[derive(Clone, Debug)]
+pub struct DaqBoard {
+    node: BoardNode,
+    outbox: Outbox,
+}
+
+impl DaqBoard {
+    /// At power-up.
+    ///
+    /// # Errors
+    /// Those of [`BoardParams::check`].
+    pub fn new(params: &BoardParams) -> Result<Self, BoardMisfit> {
+        Ok(DaqBoard { node: BoardNode::new(params)?, outbox: Outbox::default() })
+    }
+}
+
+impl Role for DaqBoard {
+    fn receive(&mut self, now_us: u64, bytes: &[u8]) {
+        self.node.receive(now_us as u32, bytes, &mut self.outbox);
+    }
+
+    fn sample(&mut self, now_us: u64, counts: Counts, encoder_fault: bool, converter_fault: bool) {
+        self.node.sample(now_us as u32, counts, encoder_fault, converter_fault, &mut self.outbox);
+    }
+
+    fn code(&self) -> DacCode {
+        self.node.code()
+    }
+
+    fn period_us(&self) -> Option<u32> {
+        self.node.period_us()
+    }
+
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
+    }
+
+    /// A sample has no room for it.
+    fn answered(&mut self, _cycles: u32, _lateness: Micros) {}
+}
+
+/// The board as controller: it closes the loop by itself.
+impl Role for OneChip {
+    fn receive(&mut self, now_us: u64, bytes: &[u8]) {
+        self.host(now_us, bytes);
+    }
+
+    fn sample(&mut self, now_us: u64, counts: Counts, encoder_fault: bool, converter_fault: bool) {
+        OneChip::sample(self, now_us, counts, encoder_fault, converter_fault);
+    }
+
+    fn code(&self) -> DacCode {
+        OneChip::code(self)
+    }
+
+    fn period_us(&self) -> Option<u32> {
+        OneChip::period_us(self)
+    }
+
+    fn outbox(&mut self) -> &mut Outbox {
+        self.to_host()
+    }
+
+    fn answered(&mut self, cycles: u32, lateness: Micros) {
+        self.spent(cycles);
+        OneChip::answered(self, lateness);
+    }
+}

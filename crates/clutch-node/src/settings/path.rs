@@ -1,0 +1,62 @@
+//! The path of a run, with the points of a table kept elsewhere.
+
+use super::MAX_KNOTS;
+use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
+use clutch_core::{Encoder, FixedCounts, Micros, ParamError, Target};
+
+/// A path, without the points of a table.
+#[derive(Clone, Copy, Debug)]
+pub struct Path {
+    kind: Kind,
+    encoder: Encoder,
+    period: Micros,
+    start: FixedCounts,
+    /// Whole counts at the start: a path is given from there on.
+    first: FixedCounts,
+}
+
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "there is one of it")]
+enum Kind {
+    Formula(Reference<'static, f32>),
+    Table(Interpolation, usize),
+}
+
+impl Path {
+    /// The path of these parameters; `knots` are the points of a table, of which it has `points`.
+    pub(super) fn new(
+        p: &ReferenceParams<'static, f32>,
+        (knots, points): (&[Knot; MAX_KNOTS], usize),
+        start: FixedCounts,
+        encoder: Encoder,
+        period: Micros,
+    ) -> Result<Path, ParamError<f32>> {
+        let kind = match p {
+            ReferenceParams::Table(Table { interpolation, .. }) => {
+                let knots = knots.get(..points).unwrap_or(&[]);
+                let table = ReferenceParams::Table(Table { knots, interpolation: *interpolation });
+                Reference::<f32>::new(&table, start, encoder, period)?;
+                Kind::Table(*interpolation, points)
+            }
+            formula => Kind::Formula(Reference::new(formula, start, encoder, period)?),
+        };
+        let path = Path { kind, encoder, period, start, first: FixedCounts(0) };
+        let first = path.target(knots, 0).position.0 >> FixedCounts::FRACTION_BITS;
+        Ok(Path { first: FixedCounts::from_counts(first), ..path })
+    }
+
+    /// Where the shaft shall be at a tick, from the count on which the run begins; `knots` are the settings'.
+    #[must_use]
+    pub fn target(&self, knots: &[Knot; MAX_KNOTS], tick: u64) -> Target<f32> {
+        let target = match &self.kind {
+            Kind::Formula(reference) => reference.at(tick),
+            Kind::Table(interpolation, points) => {
+                let knots = knots.get(..*points).unwrap_or(&[]);
+                let table = Table { knots, interpolation: *interpolation };
+                let target = table.at(tick, self.encoder, self.period);
+                Target { position: target.position.plus(self.start), ..target }
+            }
+        };
+        Target { position: FixedCounts(target.position.0.wrapping_sub(self.first.0)), ..target }
+    }
+}

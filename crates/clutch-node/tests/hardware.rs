@@ -1,0 +1,192 @@
+//! What a board's program does in each period and with each byte, and a counter of 16 bits.
+#![allow(missing_docs, reason = "the tests' names say what holds")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
+
+use clutch_core::{Counts, DacCode, Micros};
+use clutch_node::{BoardParams, DaqBoard, Hardware, Outbox, Role, WideCounter, receive, tick};
+use clutch_wire::{Actuate, Arm, Configure, Decoder, Message, SafeKind, Sample, encode};
+use core::mem::take;
+use proptest::prelude::*;
+
+const BOOT_CODE: u16 = 1844;
+const PARAMS: BoardParams = BoardParams {
+    board: 42,
+    boot: 9,
+    counts_per_rev: 20_000,
+    dac_bits: 12,
+    dac_lowest_mv: 0,
+    dac_highest_mv: 10_000,
+    period_min_us: 500,
+    period_max_us: 5000,
+    watchdog_max_us: 100_000,
+    boot_code: BOOT_CODE,
+};
+const CONFIGURE: Configure = Configure {
+    run: 5,
+    config: 7,
+    period_us: 2000,
+    watchdog_us: 6000,
+    safe_kind: SafeKind::Hold as u8,
+    hold_code: 3072,
+    release_code: 0,
+    ramp_step: 0,
+    hold_periods: 0,
+};
+
+/// What was done with the hardware, in its order.
+#[derive(Debug, PartialEq)]
+enum Done {
+    Sampled,
+    PutOut(u16),
+    FedWatchdog,
+    Sent(Vec<Message>),
+}
+
+#[derive(Default)]
+struct Desk {
+    now_us: u64,
+    cycles: u32,
+    counts: i32,
+    encoder_fault: bool,
+    done: Vec<Done>,
+}
+
+impl Hardware for Desk {
+    fn now_us(&self) -> u64 {
+        self.now_us
+    }
+    fn counts(&mut self) -> Counts {
+        self.done.push(Done::Sampled);
+        Counts(self.counts)
+    }
+    fn encoder_fault(&self) -> bool {
+        self.encoder_fault
+    }
+    fn converter_fault(&self) -> bool {
+        false
+    }
+    /// Takes 7 µs, 1190 cycles.
+    fn put_out(&mut self, code: DacCode) {
+        self.now_us += 7;
+        self.cycles = self.cycles.wrapping_add(1190);
+        self.done.push(Done::PutOut(code.0));
+    }
+    fn feed_watchdog(&mut self) {
+        self.done.push(Done::FedWatchdog);
+    }
+    fn send(&mut self, frames: &[u8]) {
+        let mut decoder = Decoder::new();
+        self.done
+            .push(Done::Sent(frames.iter().filter_map(|b| decoder.push(*b)).map(Result::unwrap).collect()));
+    }
+    fn cycles(&self) -> u32 {
+        self.cycles
+    }
+}
+
+impl Desk {
+    fn hears(&mut self, role: &mut impl Role, message: &Message) -> Vec<Done> {
+        receive(role, self, encode(message).as_bytes());
+        take(&mut self.done)
+    }
+
+    fn ticks(&mut self, role: &mut impl Role) -> Vec<Done> {
+        tick(role, self);
+        take(&mut self.done)
+    }
+}
+
+fn driving() -> (DaqBoard, Desk) {
+    let (mut board, mut desk) = (DaqBoard::new(&PARAMS).unwrap(), Desk::default());
+    desk.hears(&mut board, &Message::Configure(CONFIGURE));
+    desk.hears(&mut board, &Message::Arm(Arm { run: 5, config: 7 }));
+    (board, desk)
+}
+
+#[test]
+fn a_period_puts_its_code_out_before_it_feeds_the_watchdog_and_that_before_it_sends() {
+    let (mut board, mut desk) = driving();
+    (desk.now_us, desk.counts) = ((1 << 32) + 3000, -7);
+    let sample = Sample { run: 5, sequence: 0, time_us: 3000, counts: -7, status: 2 };
+    assert_eq!(
+        desk.ticks(&mut board),
+        [
+            Done::Sampled,
+            Done::PutOut(BOOT_CODE),
+            Done::FedWatchdog,
+            Done::Sent(vec![Message::Sample(sample)])
+        ]
+    );
+}
+
+#[test]
+fn before_a_host_has_come_a_period_holds_the_power_up_output_feeds_the_watchdog_and_says_nothing() {
+    let (mut board, mut desk) = (DaqBoard::new(&PARAMS).unwrap(), Desk::default());
+    assert_eq!(board.period_us(), None);
+    assert_eq!(desk.ticks(&mut board), [Done::Sampled, Done::PutOut(BOOT_CODE), Done::FedWatchdog]);
+}
+
+#[test]
+fn a_code_from_the_host_goes_out_at_once_and_bytes_never_feed_the_watchdog() {
+    let (mut board, mut desk) = driving();
+    desk.ticks(&mut board);
+    let code = Actuate { run: 5, sequence: 0, code: 2500, valid_us: 2000 };
+    assert_eq!(desk.hears(&mut board, &Message::Actuate(code)), [Done::PutOut(2500)]);
+    assert_eq!(board.period_us(), Some(2000));
+}
+
+#[test]
+fn a_fault_of_the_hardware_is_answered_with_the_safe_output_within_its_period() {
+    let (mut board, mut desk) = driving();
+    desk.encoder_fault = true;
+    assert_eq!(desk.ticks(&mut board)[1], Done::PutOut(3072));
+}
+
+/// A role that has one code, 100, and keeps what it is told.
+#[derive(Default)]
+struct Clerk {
+    outbox: Outbox,
+    told: Vec<(u32, Micros)>,
+}
+
+impl Role for Clerk {
+    fn receive(&mut self, _: u64, _: &[u8]) {}
+    fn sample(&mut self, _: u64, _: Counts, _: bool, _: bool) {}
+    fn code(&self) -> DacCode {
+        DacCode(100)
+    }
+    fn period_us(&self) -> Option<u32> {
+        None
+    }
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
+    }
+    fn answered(&mut self, cycles: u32, lateness: Micros) {
+        self.told.push((cycles, lateness));
+    }
+}
+
+#[test]
+fn the_role_is_told_what_a_period_took_up_to_its_code_also_when_the_clocks_wrap() {
+    let mut desk = Desk { now_us: u64::from(u32::MAX) - 3, cycles: u32::MAX - 100, ..Desk::default() };
+    let mut clerk = Clerk::default();
+    desk.ticks(&mut clerk);
+    desk.hears(&mut clerk, &Message::Arm(Arm { run: 5, config: 7 }));
+    assert_eq!(clerk.told, [(1190, Micros(7))]);
+}
+
+proptest! {
+    #[test]
+    fn a_counter_of_16_bits_follows_every_walk_of_less_than_half_its_range_a_step(
+        start: u16,
+        steps in prop::collection::vec(any::<i16>(), 0..200),
+    ) {
+        let mut counter = WideCounter::new(start);
+        let (mut raw, mut shaft) = (start, 0_i32);
+        for step in steps {
+            raw = raw.wrapping_add_signed(step);
+            shaft += i32::from(step);
+            prop_assert_eq!(counter.read(raw), Counts(shaft));
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! A session of the loop: `clutch.loop`.
+
+use crate::convert::{core_error, from_json, log_error, loop_error};
+use crate::scenario::Scenario;
+use crate::stepping::native;
+use clutch_loop::control_loop::Pace;
+use clutch_loop::faults::Fault;
+use clutch_loop::from_scenario::BuildError;
+use clutch_loop::port::Address;
+use clutch_loop::preflight::PreflightError;
+use clutch_loop::realtime::{RealtimeOptions, WaitMode};
+use clutch_loop::session::{Board, Event, Session, SessionError, SessionOptions};
+use pyo3::exceptions::{PyFileExistsError, PyValueError};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Priority of the control thread unless another is given.
+pub(crate) use clutch_loop::realtime::DEFAULT_PRIORITY;
+
+fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> PyResult<T> {
+    text.parse().map_err(|e: T::Err| PyValueError::new_err(e.to_string()))
+}
+
+/// One of two words.
+fn chosen<T>(name: &str, word: &str, choices: [(&str, T); 2]) -> PyResult<T> {
+    let expected = choices.each_ref().map(|(w, _)| format!("{w:?}")).join(" or ");
+    let found = choices.into_iter().find(|(w, _)| *w == word);
+    found
+        .map(|(_, choice)| choice)
+        .ok_or_else(|| PyValueError::new_err(format!("{name} = {word:?}: expected {expected}")))
+}
+
+fn error(py: Python<'_>, scenario: &Scenario, e: &SessionError) -> PyErr {
+    match e {
+        SessionError::Scenario(e)
+        | SessionError::Build(BuildError::Scenario(e))
+        | SessionError::Preflight(PreflightError::Build(BuildError::Scenario(e))) => scenario.error(py, e),
+        SessionError::Build(BuildError::Param(e))
+        | SessionError::Preflight(PreflightError::Build(BuildError::Param(e))) => core_error(py, e),
+        SessionError::Log(e) => log_error(py, e),
+        SessionError::LogExists { .. } => PyFileExistsError::new_err(e.to_string()),
+        SessionError::NotCertified { .. } => loop_error(
+            py,
+            &format!("{e}\n`scenario.certificate()` says why; uncertified=True runs it all the same."),
+        ),
+        _ => loop_error(py, &e.to_string()),
+    }
+}
+
+/// Runs a session; its summary, the same in words, what it had said it would do, and the scenario's text if that was
+/// changed for the board's sake.
+#[pyfunction]
+#[pyo3(signature = (
+    scenario, *, port, board, baud, log, uncertified, faults, fault_seed, strict, pace, wait, spin_us, thread_priority,
+    lock_memory, cpu_affinity
+))]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "those of clutch.loop, which gives them their names and defaults"
+)]
+pub(crate) fn run_loop<'py>(
+    py: Python<'py>,
+    scenario: &Bound<'py, PyAny>,
+    port: Option<&str>,
+    board: Option<&str>,
+    baud: Option<u32>,
+    log: Option<PathBuf>,
+    uncertified: bool,
+    faults: Vec<String>,
+    fault_seed: u64,
+    strict: bool,
+    pace: &str,
+    wait: &str,
+    spin_us: u32,
+    thread_priority: u8,
+    lock_memory: bool,
+    cpu_affinity: Option<usize>,
+) -> PyResult<(Bound<'py, PyAny>, String, String, Option<String>)> {
+    let scenario = native(scenario)?;
+    if thread_priority > 99 {
+        return Err(PyValueError::new_err(format!("thread_priority = {thread_priority}: expected 0 to 99")));
+    }
+    let given = [port.is_some(), board.is_some(), strict || !faults.is_empty()];
+    if given.into_iter().filter(|given| *given).count() > 1 {
+        return Err(PyValueError::new_err(
+            "expected one of: port; board; strict and faults, which are the simulated board's",
+        ));
+    }
+    let faults = faults.iter().map(|text| parsed::<Fault>(text)).collect::<PyResult<_>>()?;
+    let options = SessionOptions {
+        board: match (port, board) {
+            (Some(port), _) => Board::Daq(parsed::<Address>(port)?),
+            (None, Some(port)) => Board::Controller(parsed::<Address>(port)?),
+            (None, None) => Board::Simulated { faults, seed: fault_seed, strict },
+        },
+        baud,
+        log,
+        uncertified,
+        realtime: RealtimeOptions {
+            thread_priority,
+            lock_memory,
+            cpu_affinity,
+            wait: chosen(
+                "wait",
+                wait,
+                [("sleep", WaitMode::Sleep), ("spin", WaitMode::SleepSpin { spin_us })],
+            )?,
+        },
+        pace: chosen("pace", pace, [("sample", Pace::Sample), ("clock", Pace::Clock)])?,
+        version: clutch_cli::BUILD.to_owned(),
+    };
+    let session = Session::new((*scenario.0).clone(), options).map_err(|e| error(py, &scenario, &e))?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let (mut announced, mut interrupt) = (String::new(), None);
+    let ran = py.detach(|| {
+        session.run(&stop, &mut |event| match event {
+            Event::Announced(announcement) => announced = announcement.to_string(),
+            // A signal waits, as Ctrl-C: the run ends in the safe state, and then the exception is raised.
+            Event::Progress(_) => {
+                if interrupt.is_none()
+                    && let Err(e) = Python::attach(|py| py.check_signals())
+                {
+                    interrupt = Some(e);
+                    stop.store(true, Ordering::Relaxed);
+                }
+            }
+            Event::LogEnded => {}
+        })
+    });
+    if let Some(interrupt) = interrupt {
+        if let Ok(summary) = &ran {
+            interrupt.value(py).call_method1("add_note", (summary.last_line(),))?;
+        }
+        return Err(interrupt);
+    }
+    let summary = ran.map_err(|e| error(py, &scenario, &e))?;
+    let ran_as = session.scenario();
+    let changed = (ran_as.scalar() != scenario.0.scalar()).then(|| ran_as.canonical());
+    Ok((from_json(py, &summary.to_json())?, clutch_cli::summary(&summary), announced, changed))
+}

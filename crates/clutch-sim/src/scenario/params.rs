@@ -1,0 +1,115 @@
+//! The tables of a scenario: those of core, rig and run, and the few that are a scenario's own.
+
+use crate::rig::RigParams;
+use crate::run::RunParams;
+use crate::tables::Text;
+use clutch_core::law::{LawParams, OutputParams};
+use clutch_core::params::Range;
+use clutch_core::reference::ReferenceParams;
+use clutch_core::{LimitParams, PlantParams, SafeState, SamplingParams, Tolerances, VelocityParams, params};
+
+clutch_core::words! {
+    /// Scalar that the servo runs in.
+    pub enum ScalarKind {
+        /// Single precision, as on a board.
+        F32 = "f32",
+        /// Double precision.
+        F64 = "f64" default,
+    }
+}
+
+params! {
+    /// When the servo is asked, and the scalar that it computes in.
+    #[derive(Copy)]
+    pub struct ScenarioSampling<f64>: Default {
+        /// Scalar that path and servo compute in; a board has `f32`. The shaft is always in `f64`.
+        scalar: ScalarKind = "f64", "scalar" "" NONE, Range::ANY;
+    }
+    flat {
+        /// The sampling period.
+        sampling: SamplingParams;
+    }
+}
+
+params! {
+    /// How well the believed plant is known, (23), and the reaching rate that the certificate shall give: for the
+    /// certificate and the check of the path.
+    #[derive(Copy)]
+    pub struct ScenarioBounds<f64>: Default {
+        /// Rate of reaching the sliding surface that the certificate shall give, in (15); above 0 the reaching time gets
+        /// a bound.
+        reach_rate: f64 = 0.0, "reach_rate_rad_s2" "γ" RAD_S2, Range::at_least(0.0);
+    }
+    flat {
+        /// How well each parameter of the model is known.
+        tolerances: Tolerances;
+    }
+}
+
+params! {
+    /// What ends a run on a board: limits of the supervisor, and how long board and codes wait. docs/safety.md says why
+    /// each default is what it is.
+    #[derive(Copy)]
+    pub struct ScenarioLimits<f64>: Default {
+        /// Periods without a valid code after which the board goes to its safe state by itself. Keep it equal to
+        /// `silence_cycles`.
+        watchdog_cycles: u32 = 3, "watchdog_cycles" "" CYCLES, Range::within(2.0, 1000.0);
+        /// Periods after its sample during which a code is valid; at most 65.535 ms.
+        valid_cycles: u32 = 2, "valid_cycles" "" CYCLES, Range::within(1.0, 1000.0);
+    }
+    flat {
+        /// What the supervisor watches.
+        supervisor: LimitParams;
+    }
+}
+
+params! {
+    /// How a run on a board ends, and what ends it. Only what drives a board needs it; there is no default safe state.
+    pub struct Safety<f64> {
+        /// Why this safe state is the right one for this rig, in the operator's words; printed before each run.
+        reason: Text, "reason" "" NONE, Range::ANY;
+    }
+    nested {
+        /// What the brake does when control has ended.
+        on_fault: SafeState, "on_fault";
+        /// What ends control.
+        limits: ScenarioLimits, "limits";
+    }
+    relations(p) {
+        /// A safe state is somebody's choice, who says why.
+        REASONED: reason, "why this safe state is right for this rig, as \"a weight drives the shaft\"" =>
+            !p.reason.0.trim().is_empty();
+    }
+}
+
+params! {
+    /// A scenario: rig, believed plant, law, path, sampling, bounds, run, safety.
+    pub struct ScenarioParams<f64> {
+        /// Title of the output, any text.
+        name: Text, "name" "" NONE, Range::ANY;
+    }
+    nested {
+        /// The shaft as it is.
+        rig: RigParams, "rig";
+        /// The shaft as law, observer and certificate believe it to be.
+        model: PlantParams, "model";
+        /// The law and its gains.
+        law: LawParams, "law";
+        /// Source of the velocity that the law is given.
+        velocity: VelocityParams, "velocity";
+        /// Limits of the voltage, bumpless start.
+        output: OutputParams, "output";
+        /// The path.
+        reference: ReferenceParams<'static>, "reference";
+        /// Sampling period, scalar.
+        sampling: ScenarioSampling, "sampling";
+        /// How well the believed plant is known.
+        bounds: ScenarioBounds, "bounds";
+        /// Length, beginning, seed and engine.
+        run: RunParams, "run";
+    }
+    optional {
+        /// How a run on a board ends, and what ends it: `clutch loop` and `clutch daq` need it.
+        safety: Safety, "safety";
+    }
+}

@@ -1,0 +1,438 @@
+//! Every parameter of a scenario, at its limits, below and above them, and as no number: in a file, by `--set` and in a
+//! row of a sweep. What is refused is named with its key, its value and what is expected, unit included; what is taken
+//! arrives in the parameters as it was given.
+
+use clutch_core::params::{Choice, Conversion, Editor, Info, Kind, Params, Range, Row, Table as Parameters};
+use clutch_sim::scenario::ScenarioParams;
+use clutch_sim::scenario::describe::{Entry, entries, row_is_required, table_is_required};
+use clutch_sim::sweep::Sweep;
+use clutch_sim::{Points, Scenario, ScenarioError, Text};
+use std::any::Any;
+use std::collections::BTreeMap;
+use toml::{Table, Value};
+
+/// Values with which a scenario is good, where one made of the range alone is not. Keys or their ends.
+const SAMPLES: &[(&str, &str)] = &[
+    ("name", "\"rows\""),
+    ("rig.base", "\"paper\""),
+    ("rig.ripple.rms", "0.05"),
+    ("amplitude_deg", "0.1"),
+    ("volts_v", "4.5"),
+    ("safety.reason", "\"a weight drives the shaft\""),
+];
+
+/// A parameter and a good scenario that has its table.
+struct Place {
+    key: String,
+    row: &'static Row,
+    base: Table,
+}
+
+/// Every parameter of every table and of every option.
+fn places() -> Vec<Place> {
+    let mut keys = Vec::new();
+    keys_of(&<ScenarioParams as Params<f64>>::INFO, "", &mut keys);
+    let place = |(key, row): (String, &'static Row)| {
+        let mut base = Table::new();
+        fill(&<ScenarioParams as Params<f64>>::INFO, "", &key, &mut base);
+        Place { key, row, base }
+    };
+    keys.into_iter().map(place).collect()
+}
+
+fn join(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+}
+
+fn keys_of(info: &'static Info, path: &str, keys: &mut Vec<(String, &'static Row)>) {
+    let mut table = |table, path: &str| {
+        for entry in entries(table) {
+            match entry {
+                Entry::Row(row, _) => keys.push((join(path, row.key), row)),
+                Entry::Below(nested) => keys_of(nested.info, &join(path, nested.key), keys),
+            }
+        }
+    };
+    match info {
+        Info::Table(info) => table(info, path),
+        Info::Choice(choice) => choice.options.iter().for_each(|o| table(o.table, &join(path, o.key))),
+    }
+}
+
+/// Fills in what a file has to say, and the table of the key `wanted`.
+fn fill(info: &'static Info, path: &str, wanted: &str, out: &mut Table) {
+    let leads = |path: &str| wanted.starts_with(&format!("{path}."));
+    let (table, path, out) = match info {
+        Info::Table(table) => (table, path.to_owned(), out),
+        Info::Choice(choice) => {
+            let options = choice.options.iter();
+            let option =
+                options.clone().find(|o| leads(&join(path, o.key))).or(options.clone().next()).unwrap();
+            let below = out.entry(option.key).or_insert(Value::Table(Table::new()));
+            (option.table, join(path, option.key), below.as_table_mut().unwrap())
+        }
+    };
+    for entry in entries(table) {
+        match entry {
+            Entry::Row(row, _) if row_is_required(row) => {
+                out.insert(row.key.to_owned(), sample(&join(&path, row.key), row));
+            }
+            Entry::Row(..) => {}
+            Entry::Below(nested) => {
+                let at = join(&path, nested.key);
+                if leads(&at) || table_is_required(nested) {
+                    let mut below = Table::new();
+                    fill(nested.info, &at, wanted, &mut below);
+                    out.insert(nested.key.to_owned(), Value::Table(below));
+                }
+            }
+        }
+    }
+}
+
+/// A good value.
+fn sample(key: &str, row: &Row) -> Value {
+    if let Some((_, text)) = SAMPLES.iter().find(|(end, _)| key == *end || key.ends_with(&format!(".{end}")))
+    {
+        return value(text);
+    }
+    if !row.default.is_empty() {
+        return value(row.default);
+    }
+    let Range { low, high, .. } = row.range;
+    let middle = match (low.is_finite(), high.is_finite()) {
+        (true, true) => (low + high) / 2.0,
+        (true, false) => low + 1.0,
+        _ => 1.0,
+    };
+    match row.kind {
+        Kind::Real => Value::Float(middle),
+        Kind::Whole => Value::Integer(middle as i64),
+        Kind::Switch => Value::Boolean(true),
+        Kind::Word(words) => Value::String(words[0].name.to_owned()),
+        Kind::Text => Value::String("text".to_owned()),
+        Kind::Points => value("[[0.0, 0.0], [1.0, 1.0]]"),
+    }
+}
+
+fn value(text: &str) -> Value {
+    format!("x = {text}").parse::<Table>().expect(text).remove("x").expect("a value")
+}
+
+/// A value as an error shows it.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Float(x) => x.to_string(),
+        other => other.to_string(),
+    }
+}
+
+/// What is outside of a range, and what is at its ends or just within.
+fn around(row: &Row) -> (Vec<Value>, Vec<Value>) {
+    let Range { low, low_in, high, high_in, divides } = row.range;
+    let (mut out, mut within) = (Vec::new(), Vec::new());
+    match row.kind {
+        Kind::Real => {
+            out.extend([f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(Value::Float));
+            for (end, taken, sign) in [(low, low_in, -1.0), (high, high_in, 1.0)] {
+                if !end.is_finite() {
+                    continue;
+                }
+                let hair = 1e-9 * end.abs().max(1.0);
+                out.push(Value::Float(end + sign * hair));
+                if taken { &mut within } else { &mut out }.push(Value::Float(end));
+                within.push(Value::Float(end - sign * hair));
+            }
+            if divides {
+                // Its inverse is not finite.
+                out.push(Value::Float(1e-310));
+            }
+        }
+        Kind::Whole => {
+            // The largest that a file can hold: as a real number it is one more.
+            let high = if high < i64::MAX as f64 { high as i64 } else { i64::MAX };
+            let low = low.max(0.0) as i64;
+            out.push(Value::Integer(low - 1));
+            out.extend([value("nan"), value("inf"), value("-inf"), value("2.5")]);
+            within.push(Value::Integer(low));
+            if row.range.high.is_finite() {
+                out.extend(high.checked_add(1).map(Value::Integer));
+                within.push(Value::Integer(high));
+            }
+        }
+        Kind::Switch => {
+            out.extend([value("1"), value("nan"), value("\"yes\"")]);
+            within.extend([value("true"), value("false")]);
+        }
+        Kind::Word(words) => {
+            out.extend([value("\"nothing of that kind\""), value("1"), value("nan")]);
+            within.extend(words.iter().map(|word| Value::String(word.name.to_owned())));
+        }
+        Kind::Text => {
+            out.extend([value("3"), value("nan")]);
+            within.push(value("\"any ° text\""));
+        }
+        Kind::Points => {
+            out.extend(
+                ["[[0.0, nan], [1.0, 1.0]]", "[[inf, 0.0]]", "[[1.0, 0.0], [1.0, 1.0]]", "[[0.0]]", "nan"]
+                    .map(value),
+            );
+            if low.is_finite() {
+                out.push(value(&format!("[[{:?}, 0.0], [{:?}, 1.0]]", low - 1e-9, low + 1.0)));
+                within.push(value(&format!("[[{low:?}, 0.0], [{:?}, 1.0]]", low + 1.0)));
+            }
+            within.push(value("[[0.0, 0.0], [1.0, 1.0]]"));
+        }
+    }
+    (out, within)
+}
+
+/// Whether a row's own range, or the kind of its value, is what a message speaks of.
+fn speaks_of_the_range(row: &Row, message: &str) -> bool {
+    match row.kind {
+        // Of a base it says what the words are.
+        Kind::Word(words) => words.iter().all(|word| message.contains(word.name)),
+        kind => message.starts_with(&format!("expected {}", row.range.words(kind, &row.unit, false))),
+    }
+}
+
+#[track_caller]
+fn is_refused(place: &Place, value: &Value, outcome: Result<Scenario, ScenarioError>, how: &str) {
+    let Place { key, row, .. } = place;
+    let error = match outcome {
+        Ok(_) => panic!("{key} = {value}, {how}: taken"),
+        Err(error) => error,
+    };
+    let said = format!("{key} = {value}, {how}: {error}");
+    assert_eq!(error.key, *key, "{said}");
+    let point = row.kind == Kind::Points && error.value.starts_with("(point ");
+    assert!(error.value == shown(value) || point, "{said}");
+    let number = matches!(value, Value::Float(_) | Value::Integer(_));
+    let of_kind = match row.kind {
+        Kind::Real => number,
+        Kind::Whole => value.is_integer(),
+        Kind::Switch => value.is_bool(),
+        Kind::Word(_) | Kind::Text => value.is_str(),
+        Kind::Points => value.is_array(),
+    };
+    if of_kind || !matches!(row.kind, Kind::Real | Kind::Whole) {
+        assert!(speaks_of_the_range(row, &error.message), "{said}");
+        assert!(error.message.contains(row.unit.text), "{said}");
+    } else {
+        assert!(error.message.contains("whole number"), "{said}");
+    }
+    // A path with the key, the value and the unit: what a person reads.
+    assert!(error.to_string().starts_with(&format!("rows: {key} = ")), "{said}");
+}
+
+/// The parameter is what was given, or something that depends on other keys is wrong with the scenario.
+#[track_caller]
+fn is_taken(place: &Place, value: &Value, outcome: Result<Scenario, ScenarioError>, how: &str) {
+    let Place { key, row, .. } = place;
+    match outcome {
+        Err(error) => assert!(
+            error.key != *key
+                || !speaks_of_the_range(row, &error.message)
+                || !error.message.contains("expected"),
+            "{key} = {value}, {how}: {error}"
+        ),
+        Ok(scenario) => {
+            let mut values = Values::default();
+            scenario.params().clone().edit(&mut values);
+            let found = values.found.get(key).unwrap_or_else(|| panic!("{key}, {how}: not there"));
+            let expected = Values::of(row, value);
+            assert!(*found == expected, "{key} = {value}, {how}: {found:?} instead of {expected:?}");
+        }
+    }
+}
+
+/// What each parameter is, by its key.
+#[derive(Default)]
+struct Values {
+    path: Vec<&'static str>,
+    found: BTreeMap<String, Given>,
+}
+
+#[derive(Debug, PartialEq)]
+enum Given {
+    Number(f64),
+    Word(usize),
+    Text(String),
+    Points(Vec<(f64, f64)>),
+    /// A list that the core only borrows.
+    Borrowed,
+}
+
+impl Values {
+    fn insert<P: Parameters<f64>>(&mut self, row: usize, given: Given) {
+        let path = self.path.iter().filter(|part| !part.is_empty());
+        let key = path.fold(String::new(), |path, part| join(&path, part));
+        self.found.insert(join(&key, P::ROWS[row].key), given);
+    }
+
+    /// What a parameter should be.
+    fn of(row: &Row, value: &Value) -> Given {
+        let number = |x: f64| match row.unit.conversion {
+            Conversion::None => x,
+            Conversion::Degrees => x.to_radians(),
+            Conversion::Percent => x / 100.0,
+        };
+        match (row.kind, value) {
+            (Kind::Word(words), Value::String(text)) => {
+                Given::Word(words.iter().position(|word| word.name == text).unwrap())
+            }
+            (Kind::Points, Value::Array(_)) if row.field == "knots" => Given::Borrowed,
+            (Kind::Points, Value::Array(points)) => {
+                let pair = |p: &Value| (p[0].as_float().unwrap(), p[1].as_float().unwrap());
+                Given::Points(points.iter().map(pair).collect())
+            }
+            (_, Value::Float(x)) => Given::Number(number(*x)),
+            (_, Value::Integer(n)) => Given::Number(number(*n as f64)),
+            (_, Value::Boolean(on)) => Given::Number(f64::from(*on)),
+            (_, Value::String(text)) => Given::Text(text.clone()),
+            (_, other) => panic!("{other}"),
+        }
+    }
+}
+
+impl Editor<f64> for Values {
+    fn real<P: Parameters<f64>>(&mut self, row: usize, value: &mut f64) {
+        self.insert::<P>(row, Given::Number(*value));
+    }
+    fn whole<P: Parameters<f64>>(&mut self, row: usize, value: &mut u64) {
+        self.insert::<P>(row, Given::Number(*value as f64));
+    }
+    fn switch<P: Parameters<f64>>(&mut self, row: usize, value: &mut bool) {
+        self.insert::<P>(row, Given::Number(f64::from(*value)));
+    }
+    fn word<P: Parameters<f64>>(&mut self, row: usize, value: &mut usize) {
+        self.insert::<P>(row, Given::Word(*value));
+    }
+    fn other<P: Parameters<f64>>(&mut self, row: usize, value: Option<&mut dyn Any>) {
+        let given = match value {
+            None => Given::Borrowed,
+            Some(value) => match value.downcast_ref::<Points>() {
+                Some(points) => Given::Points(points.0.clone()),
+                None => Given::Text(value.downcast_ref::<Text>().unwrap().0.clone()),
+            },
+        };
+        self.insert::<P>(row, given);
+    }
+    fn enter<P: Parameters<f64>>(&mut self, nested: usize, present: bool) -> bool {
+        self.path.push(P::TABLE.nested[nested].key);
+        present
+    }
+    fn leave<P: Parameters<f64>>(&mut self, _: usize) {
+        self.path.pop();
+    }
+    fn choose<C: Choice<f64>>(&mut self, chosen: usize) -> usize {
+        self.path.push(C::CHOICE.options[chosen].key);
+        chosen
+    }
+    fn chose<C: Choice<f64>>(&mut self, _: usize) {
+        self.path.pop();
+    }
+}
+
+/// The scenario from a file, by `--set`, and as the second row of a sweep whose first is good.
+fn each_way(place: &Place, value: &Value) -> [(&'static str, Result<Scenario, ScenarioError>); 3] {
+    let Place { key, row, base } = place;
+    let mut file = base.clone();
+    let parts: Vec<&str> = key.split('.').collect();
+    let mut at = &mut file;
+    for part in &parts[..parts.len() - 1] {
+        at = at.entry(*part).or_insert(Value::Table(Table::new())).as_table_mut().unwrap();
+    }
+    at.insert(row.key.to_owned(), value.clone());
+    let set = [(key.clone(), value.to_string())];
+    let rows = vec![vec![sample(key, row)], vec![value.clone()]];
+    let sweep = Sweep::new("rows", base.clone(), vec![key.clone()], rows).unwrap();
+    sweep.scenario(0).unwrap_or_else(|e| panic!("{key}, in a sweep: {e}"));
+    [
+        ("in a file", Scenario::parse("rows", &file.to_string(), &[])),
+        ("by --set", Scenario::parse("rows", &base.to_string(), &set)),
+        ("in a row of a sweep", sweep.scenario(1)),
+    ]
+}
+
+#[test]
+fn every_table_is_part_of_a_good_scenario() {
+    let places = places();
+    for Place { key, base, .. } in &places {
+        Scenario::parse("rows", &base.to_string(), &[])
+            .unwrap_or_else(|e| panic!("{key}: {e}; a value for SAMPLES?\n{base}"));
+    }
+    assert!(places.len() > 90, "{}", places.len());
+}
+
+#[test]
+fn a_value_out_of_range_is_refused_with_its_key_its_value_and_its_unit() {
+    for place in places() {
+        for value in around(place.row).0 {
+            for (how, outcome) in each_way(&place, &value) {
+                is_refused(&place, &value, outcome, how);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_value_at_the_end_of_its_range_is_taken_as_it_is() {
+    for place in places() {
+        for value in around(place.row).1 {
+            for (how, outcome) in each_way(&place, &value) {
+                is_taken(&place, &value, outcome, how);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_whole_number_that_its_parameter_cannot_hold_is_refused() {
+    for place in places() {
+        if place.row.kind == Kind::Whole && place.row.range.high.is_infinite() {
+            let value = Value::Integer(1 << 32);
+            for (how, outcome) in each_way(&place, &value) {
+                is_taken(&place, &value, outcome, how);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_table_that_is_laid_over_a_base_is_named_with_its_own_key() {
+    // The rig of this base has other tables with keys that end alike.
+    let place = places().into_iter().find(|place| place.key == "rig.drive.hand.rms_nm").unwrap();
+    let mut base = place.base;
+    base["rig"]["base"] = Value::String("bench".to_owned());
+    let set = [("rig.drive.hand.rms_nm".to_owned(), "-1".to_owned())];
+    let error = Scenario::parse("bench", &base.to_string(), &set).unwrap_err().to_string();
+    assert_eq!(error, "bench: rig.drive.hand.rms_nm = -1: expected a finite number of at least 0 N m");
+}
+
+#[test]
+fn an_angle_of_the_supervisor_is_refused_in_degrees() {
+    let place = places().into_iter().find(|place| place.key == "safety.limits.jump_deg").unwrap();
+    let set = [("safety.limits.jump_deg".to_owned(), "-1".to_owned())];
+    let error = Scenario::parse("board", &place.base.to_string(), &set).unwrap_err().to_string();
+    assert_eq!(error, "board: safety.limits.jump_deg = -1: expected a finite number above 0 °");
+    // What depends on the encoder is told in degrees, too.
+    let set = [("safety.limits.jump_deg".to_owned(), "0.001".to_owned())];
+    let error = Scenario::parse("board", &place.base.to_string(), &set).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "board: safety.limits.jump_deg = 0.001: expected an angle of at least one count of rig.encoder.counts_per_rev \
+         and below 2³⁰ of them, °"
+    );
+}
+
+#[test]
+fn a_table_in_two_places_is_named_by_its_own() {
+    // The same friction model is the rig's and the model's.
+    let place = places().into_iter().find(|place| place.key == "model.friction.stribeck.mu_static").unwrap();
+    let set = [("model.friction.stribeck.mu_static".to_owned(), "0".to_owned())];
+    let error = Scenario::parse("two", &place.base.to_string(), &set).unwrap_err();
+    assert_eq!((error.key.as_str(), error.value.as_str()), ("model.friction.stribeck.mu_static", "0"));
+    let set = [("rig.friction.stribeck.mu_static".to_owned(), "0".to_owned())];
+    Scenario::parse("two", &place.base.to_string(), &set).unwrap();
+}

@@ -1,0 +1,242 @@
+"""The loop on a board, simulated or real: what ``clutch loop`` runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from clutch import _clutch
+from clutch._model import Scenario
+from clutch._run import Metrics, ScenarioLike, as_scenario
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopResult:
+    """A finished session of the loop: what :func:`clutch.loop` returns.
+
+    ``print`` it for the summary of ``clutch loop``.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What ran. For a board that closes the loop itself it is one in single precision.
+    verdict : str
+        ``"done"``: the path is done. ``"stopped"``: stopped from here. ``"fault"``: a fault ended the run, or the port
+        was lost. ``"not_armed"``: the board did not take consent.
+    state, cause, cause_text : str
+        Where control ended, why, and why in words.
+    value : float
+        What the check saw that ended it.
+    certified : bool
+        Whether the gains are certified for the scenario's bounds.
+    ticks : int
+        Periods in which the law was asked.
+    metrics : Metrics
+        Figures after the settling time, **from the encoder**: the true position is not known here. The torque at
+        break-away is None.
+    samples : dict of str to int
+        ``received``, ``lost``, ``late``, ``duplicated``, ``reordered``, ``implausible``.
+    bad_frames, deadline_misses, untold, log_dropped, cut_writes : int
+        Frames with errors; answers that came too late; cycles of a board controller that did not reach this machine;
+        records that the log dropped; frames that the line took only in part.
+    response, cycle : dict of str to float
+        From a sample to its answer, and from answer to answer: ``p50_us``, ``p99_us``, ``p99_9_us``, ``max_us``,
+        ``count``.
+    tick_clock_cycles : dict of str to float or None
+        Clock cycles of a tick, of a board that counts them: ``clock_hz``, ``p50``, ``p99_9``, ``max``.
+    board_safe : bool
+        Whether the board said that it is in its safe state.
+    board_waits : int or None
+        How often the simulated board's clock waited for this machine.
+    port_error : str or None
+        The port's error, if it ended the run.
+    notes : list of str
+        What the system refused (priority, memory), and what to do about it.
+    log : Path or None
+        The log's file.
+    announcement : str
+        What the session said it would do, before anything moved.
+    version : str
+        Version and commit of the build.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> result = clutch.loop(duration=1.2)
+    >>> result.verdict, result.ticks, result.samples["lost"]
+    ('done', 1200, 0)
+    """
+
+    scenario: Scenario
+    verdict: Literal["done", "stopped", "fault", "not_armed"]
+    state: str
+    cause: str
+    cause_text: str
+    value: float
+    certified: bool
+    ticks: int
+    metrics: Metrics
+    samples: dict[str, int]
+    bad_frames: int
+    deadline_misses: int
+    untold: int
+    log_dropped: int
+    cut_writes: int
+    response: dict[str, float]
+    cycle: dict[str, float]
+    tick_clock_cycles: dict[str, float] | None
+    board_safe: bool
+    board_waits: int | None
+    port_error: str | None
+    notes: list[str]
+    log: Path | None
+    announcement: str = field(repr=False)
+    version: str
+    _text: str = field(repr=False)
+
+    def __str__(self) -> str:
+        return self._text
+
+    def __repr__(self) -> str:
+        m = self.metrics
+        return (
+            f"<LoopResult {self.scenario.name!r}: {self.verdict}, {self.ticks} ticks, "
+            f"max error {m.max_error_rad:.6f} rad, {m.stick_slip_cycles_per_s:.3g} stick-slip cycles/s>"
+        )
+
+
+def loop(
+    scenario: ScenarioLike = "board_smc_2",
+    *,
+    overrides: Mapping[str, object] | None = None,
+    duration: float | None = None,
+    port: str | os.PathLike[str] | None = None,
+    board: str | os.PathLike[str] | None = None,
+    baud: int | None = None,
+    log: str | os.PathLike[str] | None = None,
+    uncertified: bool = False,
+    strict: bool = False,
+    faults: Sequence[str] = (),
+    fault_seed: int = 1,
+    pace: Literal["sample", "clock"] = "sample",
+    wait: Literal["sleep", "spin"] = "sleep",
+    spin_us: int = 150,
+    thread_priority: int = _clutch.DEFAULT_PRIORITY,
+    lock_memory: bool = False,
+    cpu_affinity: int | None = None,
+) -> LoopResult:
+    """Close the loop on a board, simulated or real: the session of ``clutch loop``.
+
+    It makes the checks that the command makes, in the same order, and calling it is the consent. The loop runs on a
+    thread of its own without Python: other Python threads do not hold it up. Ctrl-C ends the run in the safe state, and
+    then raises `KeyboardInterrupt`.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path, default "board_smc_2"
+        A scenario with a table ``[safety]``, the name of a built-in one, or a TOML file.
+    overrides : mapping, optional
+        Values for dotted keys of the scenario, as ``{"law.smc.kp_v": 4}``.
+    duration : float, optional
+        Length of the run instead of ``run.duration_s``, s.
+    port : str or path, optional
+        The board's port, as ``/dev/ttyACM0`` or ``tcp://127.0.0.1:5000``. Without it a board is simulated, and spoken
+        to over a real pseudo-terminal.
+    board : str or path, optional
+        The port of a board that closes the loop itself: it is set up, armed, and looked at.
+    baud : int, optional
+        Line rate of the port, baud. No effect on USB, pseudo-terminals and TCP.
+    log : str or path, optional
+        Write an MCAP log to this new file.
+    uncertified : bool, default False
+        Run a law that is not certified for the scenario's bounds.
+    strict : bool, default False
+        Keep the simulated board's clock from waiting when this machine stalls: as on hardware.
+    faults : sequence of str, optional
+        Break something on the simulated board, as ``["freeze:at=2"]``: docs/loop.md has the kinds.
+    fault_seed : int, default 1
+        Seed of the faults that hit at random.
+    pace : {"sample", "clock"}
+        What starts a cycle: the board's sample, or this machine's clock.
+    wait : {"sleep", "spin"}
+        How the loop waits: the kernel wakes it, or it wakes early and spins.
+    spin_us : int, default 150
+        How long before a sample it begins to spin, µs.
+    thread_priority : int
+        Priority of the loop's thread under SCHED_FIFO, 1 to 99; 0 stays with the ordinary scheduler.
+    lock_memory : bool, default False
+        Keep all memory of this process in RAM, from now on. The command does; a Python process may hold much, and is
+        asked first.
+    cpu_affinity : int, optional
+        The core on which the loop's thread stays.
+
+    Returns
+    -------
+    LoopResult
+        The summary's figures. A fault that ends a run raises nothing: look at ``verdict``.
+
+    Raises
+    ------
+    ParamError
+        A value that the scenario refuses; its ``field`` is the key.
+    LoopError
+        Gains that are not certified, a port, a board: with the text of the command. Nothing has moved.
+    OSError
+        The scenario cannot be read, or the log not be written.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> result = clutch.loop("board_smc_2", duration=1.2)
+    >>> print(str(result).splitlines()[-1])
+    the path is done; the board is in its safe state
+
+    With a fault of the encoder:
+
+    >>> clutch.loop(duration=2, faults=["loss:at=0.5"]).cause_text
+    'the board sees no encoder'
+    """
+    given = dict(overrides or {})
+    if duration is not None:
+        given["run.duration_s"] = float(duration)
+    checked = as_scenario(scenario, given)
+    summary, text, announcement, changed = _clutch.run_loop(
+        checked,
+        port=_text(port),
+        board=_text(board),
+        baud=baud,
+        log=None if log is None else os.fspath(log),
+        uncertified=uncertified,
+        faults=list(faults),
+        fault_seed=fault_seed,
+        strict=strict,
+        pace=pace,
+        wait=wait,
+        spin_us=spin_us,
+        thread_priority=thread_priority,
+        lock_memory=lock_memory,
+        cpu_affinity=cpu_affinity,
+    )
+    figures: dict[str, Any] = dict(summary)
+    del figures["scenario"]
+    if figures["value"] is None:  # JSON has no number that is none
+        figures["value"] = float("nan")
+    metrics = figures.pop("metrics")
+    # The encoder is all that is seen here: what it detects is what there is.
+    for name in ("stick_slip_cycles_per_s", "stick_time_fraction"):
+        metrics[f"detected_{name}"] = metrics[name]
+    return LoopResult(
+        scenario=checked if changed is None else Scenario.from_toml(changed),
+        metrics=Metrics(**metrics),
+        log=None if log is None else Path(log),
+        announcement=announcement.rstrip("\n"),
+        _text=text.rstrip("\n"),
+        **figures,
+    )
+
+
+def _text(port: str | os.PathLike[str] | None) -> str | None:
+    return None if port is None else os.fspath(port)

@@ -1,0 +1,1517 @@
+"""Tables of a scenario as frozen dataclasses: written by `cargo xtask generate` from the declarations in Rust.
+
+The native module, which holds the physics, checks the ranges.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+from clutch import _mixins
+from clutch._record import _Params
+
+__all__ = [
+    "Bounds",
+    "BrakeGeometry",
+    "Chirp",
+    "Ctc",
+    "Dac",
+    "Encoder",
+    "HandDrive",
+    "Hold",
+    "HoldThenRelease",
+    "HoldVoltage",
+    "JerkLimited",
+    "Limits",
+    "MinimumJerk",
+    "Model",
+    "Observer",
+    "Output",
+    "Pd",
+    "Pid",
+    "Ramp",
+    "RampVoltage",
+    "Release",
+    "Rig",
+    "Ripple",
+    "RunSettings",
+    "Safety",
+    "Sampling",
+    "Sine",
+    "Smc",
+    "SmcSign",
+    "SmoothedDerivative",
+    "SpringDrive",
+    "StribeckFriction",
+    "TableDrive",
+    "TablePath",
+    "Trapezoid",
+    "WeightDrive",
+]
+
+#: Units by the endings of keys, metrics and columns.
+UNITS = {
+    "kg_m2": "kg m²",
+    "nm_s_rad": "N m s/rad",
+    "nm_rt_s": "N m/√s",
+    "nm_rad": "N m/rad",
+    "nm_v": "N m/V",
+    "nm_a": "N m/A",
+    "v_s2_rad": "V s²/rad",
+    "v_s_rad": "V s/rad",
+    "v_rad_s": "V/(rad s)",
+    "v_rad": "V/rad",
+    "rad_s2": "rad/s²",
+    "rad_s": "rad/s",
+    "deg_s3": "°/s³",
+    "deg_s2": "°/s²",
+    "deg_s": "°/s",
+    "deg": "°",
+    "1_s2": "1/s²",
+    "1_s": "1/s",
+    "m_s2": "m/s²",
+    "m2": "m²",
+    "kg": "kg",
+    "nm": "N m",
+    "v_s": "V/s",
+    "ohm": "Ω",
+    "hz": "Hz",
+    "us": "µs",
+    "percent": "%",
+    "turns": "turns",
+    "counts": "counts",
+    "counts_per_rev": "counts per revolution",
+    "waves_per_turn": "waves per turn",
+    "cycles_per_s": "cycles/s",
+    "cycles": "periods",
+    "ticks": "periods",
+    "bits": "bits",
+    "s_deg": "s, °",
+    "s_nm": "s, N m",
+    "m": "m",
+    "s": "s",
+    "v": "V",
+    "rad_s3": "rad/s³",
+    "rad": "rad",
+    "ms": "ms",
+    "mv": "mV",
+    "mnm": "mN m",
+    "mm": "mm",
+}
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class StribeckFriction(_mixins.StribeckFriction):
+    """Dry friction of pad on disc, Stribeck's curve (2). The defaults are Table 1's.
+
+    `μ(θ̇) = [μ_d + (μ_s − μ_d) exp(−|θ̇/θ̇_s|^δ)] sgn(θ̇)`. A static coefficient below the dynamic one is
+    taken: such a pair never sticks and slips.
+
+    Parameters
+    ----------
+    mu_static : float, default 0.2
+        Coefficient of friction at rest, in (2). `μ_s`: a finite number of at least 0; a number above 0 where
+        it is the model's: computed torque and bounds divide by it.
+    mu_dynamic : float, default 0.15
+        Coefficient of friction of a fast shaft, in (2). `μ_d`: a finite number of at least 0; a number above
+        0 where it is the model's: computed torque and bounds divide by it.
+    stribeck_velocity_rad_s : float, default 0.001
+        Stribeck velocity in (2), at which all but 1/e of the drop from `μ_s` to `μ_d` is done. `θ̇_s`: a
+        finite number above 0 rad/s whose inverse is finite, too.
+    stribeck_exponent : float, default 1.0
+        Stribeck exponent in (2). Other than 1 needs the engine `dormand_prince`. `δ`: a finite number above
+        0.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.StribeckFriction(mu_static=0.25)
+    StribeckFriction(mu_static=0.25, mu_dynamic=0.15, stribeck_velocity_rad_s=0.001, stribeck_exponent=1.0)
+    """
+
+    _key: ClassVar[str] = "rig.friction.stribeck"
+
+    mu_static: float = 0.2
+    mu_dynamic: float = 0.15
+    stribeck_velocity_rad_s: float = 0.001
+    stribeck_exponent: float = 1.0
+
+
+Friction = StribeckFriction
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class WeightDrive(_Params):
+    """A weight on a pulley, as in the paper: the torque is `T_u = M g R_p` in (1).
+
+    Parameters
+    ----------
+    mass_kg : float, default 0.2
+        Mass, in (1). `M`: a finite number above 0 kg.
+    gravity_m_s2 : float, default 9.81
+        Acceleration of gravity in (1), as the paper rounds it. `g`: a finite number above 0 m/s².
+    pulley_radius_m : float, default 0.024
+        Radius of the pulley, in (1). `R_p`: a finite number above 0 m.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.WeightDrive().mass_kg
+    0.2
+    """
+
+    _key: ClassVar[str] = "rig.drive.weight"
+
+    mass_kg: float = 0.2
+    gravity_m_s2: float = 9.81
+    pulley_radius_m: float = 0.024
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SpringDrive(_Params):
+    """A spring: the torque is `stiffness · (rest − θ)`. It needs the engine `dormand_prince`.
+
+    Parameters
+    ----------
+    stiffness_nm_rad : float
+        Stiffness. A finite number above 0 N m/rad.
+    rest_deg : float
+        Angle from the start at which it pulls no more. A finite number, °.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.SpringDrive(stiffness_nm_rad=0.02, rest_deg=180)
+    SpringDrive(stiffness_nm_rad=0.02, rest_deg=180.0)
+    """
+
+    _key: ClassVar[str] = "rig.drive.spring"
+
+    stiffness_nm_rad: float
+    rest_deg: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class TableDrive(_Params):
+    """A torque over time: straight lines between points, constant outside. It needs the engine
+    `dormand_prince`.
+
+    Parameters
+    ----------
+    points_s_nm : sequence of (float, float)
+        Points of time and torque; times rise. A list of at least one pair [s, N m] of finite numbers, with
+        times that rise; at least one point.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.TableDrive(points_s_nm=[(0, 0.045), (2, 0.055)])
+    TableDrive(points_s_nm=((0.0, 0.045), (2.0, 0.055)))
+    """
+
+    _key: ClassVar[str] = "rig.drive.table"
+
+    points_s_nm: Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class HandDrive(_Params):
+    """A hand: a mean torque and a random part in a band of frequencies.
+
+    The random part is 48 sines, one at random in each slice of the band; the seed of the run decides them. It
+    needs the engine `dormand_prince`.
+
+    Parameters
+    ----------
+    mean_nm : float
+        Mean torque. A finite number, N m.
+    rms_nm : float
+        Root mean square of the random part. A finite number of at least 0 N m.
+    lowest_frequency_hz : float
+        Lower end of the band. A finite number of at least 0 Hz.
+    highest_frequency_hz : float
+        Upper end of the band; a hand is no faster than 50 Hz. A number above 0 and at most 50 Hz; a frequency
+        above lowest_frequency_hz.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.HandDrive(mean_nm=0.06, rms_nm=0.008, lowest_frequency_hz=0.2, highest_frequency_hz=4)
+    HandDrive(mean_nm=0.06, rms_nm=0.008, lowest_frequency_hz=0.2, highest_frequency_hz=4.0)
+    """
+
+    _key: ClassVar[str] = "rig.drive.hand"
+
+    mean_nm: float
+    rms_nm: float
+    lowest_frequency_hz: float
+    highest_frequency_hz: float
+
+
+Drive = WeightDrive | SpringDrive | TableDrive | HandDrive
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Encoder(_Params):
+    """The angle sensor: `counts = ⌊θ N/2π⌋`.
+
+    Parameters
+    ----------
+    counts_per_rev : int, default 20000
+        Counts per revolution, after quadrature. The paper's resolution is 0.018°. `N`: a whole number from 4
+        to 16 777 216 counts per revolution.
+    quantised : bool, default True
+        `true` if it gives whole counts, rounded down; else it resolves 2⁻¹⁶ counts.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Encoder().counts_per_rev
+    20000
+    """
+
+    _key: ClassVar[str] = "rig.encoder"
+
+    counts_per_rev: int = 20000
+    quantised: bool = True
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Dac(_Params):
+    """The converter from codes to volts; the paper's has 12 bit over ±10 V, 4.88 mV a step.
+
+    Parameters
+    ----------
+    bits : int, default 12
+        Resolution. A whole number from 1 to 16 bits.
+    lowest_v : float, default -10.0
+        Voltage of code 0. A finite number, V.
+    highest_v : float, default 10.0
+        Voltage one step above that of the highest code, which so is 9.9951 V by default. A finite number, V;
+        a voltage above lowest_v; a voltage so far above lowest_v, and no farther, that a step between two
+        codes is a finite number above 0 V.
+    quantised : bool, default True
+        `true` if it rounds to its steps; else the law's voltage goes out as it is.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Dac().bits
+    12
+    """
+
+    _key: ClassVar[str] = "rig.dac"
+
+    bits: int = 12
+    lowest_v: float = -10.0
+    highest_v: float = 10.0
+    quantised: bool = True
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BrakeGeometry(_mixins.BrakeGeometry):
+    """The linkage from motor voltage to friction torque, as Table 1 lists it: `K_COF = r_i K_t A/(A_lever R_a
+    r_c)` (18).
+
+    Parameters
+    ----------
+    inner_radius_m : float
+        Inner radius of the brake disc. `r_i`: a finite number above 0 m.
+    torque_constant_nm_a : float
+        Torque constant of the motor. Not printed in the paper. `K_t`: a finite number above 0 N m/A.
+    pad_area_m2 : float
+        Area of contact between pad and disc. `A`: a finite number above 0 m².
+    lever_area_m2 : float
+        Area of the tip of the lever. `A_lever`: a finite number above 0 m².
+    armature_resistance_ohm : float
+        Armature resistance. Not printed in the paper. `R_a`: a finite number above 0 Ω.
+    contact_radius_m : float
+        Distance from the motor's shaft to the contact on the disc. `r_c`: a finite number above 0 m; a
+        distance with which K_COF of (18) is a finite number above 0 N m/V.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    The paper's lengths and areas with an assumed motor:
+
+    >>> import clutch
+    >>> brake = clutch.BrakeGeometry(
+    ...     inner_radius_m=0.045, torque_constant_nm_a=0.0508, pad_area_m2=0.040,
+    ...     lever_area_m2=0.032, armature_resistance_ohm=0.6, contact_radius_m=0.034,
+    ... )
+    >>> rig = clutch.Rig(brake_gain_nm_v=brake)
+    """
+
+    _key: ClassVar[str] = "rig.brake_geometry"
+
+    inner_radius_m: float
+    torque_constant_nm_a: float
+    pad_area_m2: float
+    lever_area_m2: float
+    armature_resistance_ohm: float
+    contact_radius_m: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Ripple(_Params):
+    """Friction that varies along the disc: a band of waves with one amplitude and random phases.
+
+    The factor on friction is `1 + A Σ sin(n θ + φ_n)` over `n = lowest, lowest + spacing, …, highest`; the
+    seed of the run decides the phases. A disc is closed, so each wave fits a whole number of times into a
+    turn. It needs the engine `dormand_prince`.
+
+    Parameters
+    ----------
+    rms : float
+        Root mean square of the variation, as a share of the friction. A finite number of at least 0; a number
+        that, times the root of twice the number of waves, stays below 1.
+    lowest_waves_per_turn : int
+        Longest wave. A whole number of at least 1 waves per turn; a multiple of spacing_waves_per_turn.
+    highest_waves_per_turn : int
+        Shortest wave. A whole number of at least 1 waves per turn; a multiple of spacing_waves_per_turn, not
+        below lowest_waves_per_turn, less than 64 spacings above it and at most 1000 spacings.
+    spacing_waves_per_turn : int
+        From one wave to the next: the pattern repeats that often in a turn. A whole number of at least 1
+        waves per turn.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> ripple = clutch.Ripple(
+    ...     rms=0.05, lowest_waves_per_turn=100, highest_waves_per_turn=400, spacing_waves_per_turn=50
+    ... )
+    >>> clutch.Rig(ripple=ripple).ripple.rms
+    0.05
+    """
+
+    _key: ClassVar[str] = "rig.ripple"
+
+    rms: float
+    lowest_waves_per_turn: int
+    highest_waves_per_turn: int
+    spacing_waves_per_turn: int
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Rig(_mixins.Rig):
+    """The shaft as it is, with its drive, brake, encoder and converter. The defaults are the paper's.
+
+    `J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇` (1). What law and certificate believe of it is another
+    thing: the model.
+
+    Parameters
+    ----------
+    inertia_kg_m2 : float, default 0.0017
+        Total moment of inertia, in (1). `J`: a finite number above 0 kg m² whose inverse is finite, too.
+    viscous_damping_nm_s_rad : float, default 0.001
+        Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
+    brake_gain_nm_v : float or BrakeGeometry, default 0.14
+        Brake torque per volt and unit of μ, (18), 0.14 in each base: a number, or what the geometry of the
+        brake gives. `K_COF`: a finite number above 0 N m/V.
+    torque_noise_nm : float, default 0.0
+        Root mean square of a random torque, normally distributed, held from sample to sample. A finite number
+        of at least 0 N m.
+    delay_ticks : int, default 0
+        Whole sampling periods from sample to voltage. A whole number from 0 to 1000 periods.
+    actuator_time_constant_s : float or None, default None
+        First-order lag from voltage to normal force; absent if there is none. It needs the engine
+        `dormand_prince`. A finite number above 0 s.
+    speed_limit_deg_s : float, default 360.0
+        Highest speed that a path may ask for: a guard against a slip of units. On a board a target that moves
+        faster ends control. A finite number above 0 °/s.
+    friction : StribeckFriction
+        Friction of pad on disc. By default `StribeckFriction()`.
+    drive : WeightDrive, SpringDrive, TableDrive or HandDrive
+        What drives the shaft. By default `WeightDrive()`.
+    encoder : Encoder
+        The angle sensor. By default `Encoder()`.
+    dac : Dac
+        The converter. By default `Dac()`.
+    ripple : Ripple or None, default None
+        Friction along the disc; absent if it is even.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> rig = clutch.Rig(delay_ticks=1, friction=clutch.StribeckFriction(mu_static=0.25))
+    >>> rig.friction.mu_static
+    0.25
+    """
+
+    _key: ClassVar[str] = "rig"
+
+    inertia_kg_m2: float = 0.0017
+    viscous_damping_nm_s_rad: float = 0.001
+    brake_gain_nm_v: float | BrakeGeometry = 0.14
+    torque_noise_nm: float = 0.0
+    delay_ticks: int = 0
+    actuator_time_constant_s: float | None = None
+    speed_limit_deg_s: float = 360.0
+    friction: Friction = field(default_factory=StribeckFriction)
+    drive: Drive = field(default_factory=WeightDrive)
+    encoder: Encoder = field(default_factory=Encoder)
+    dac: Dac = field(default_factory=Dac)
+    ripple: Ripple | None = None
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Model(_Params):
+    """The shaft (1) as laws, observers and certificates believe it to be; the defaults are Table 1's,
+    whatever the rig is.
+
+    Parameters
+    ----------
+    inertia_kg_m2 : float, default 0.0017
+        Total moment of inertia, in (1). `J`: a finite number above 0 kg m² whose inverse is finite, too.
+    drive_torque_nm : float, default 0.047088000000000005
+        Driving torque `T_u = M g R_p` in (1). Either sign for a plant alone. `T_u`: a finite number, N m; a
+        torque above 0 N m: without one a brake moves nothing.
+    viscous_damping_nm_s_rad : float, default 0.001
+        Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
+    brake_gain_nm_v : float, default 0.14
+        Brake torque per volt and unit of μ, (18). `K_COF`: a finite number above 0 N m/V.
+    friction : StribeckFriction
+        Friction of pad on disc. By default `StribeckFriction()`.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Model(drive_torque_nm=0.054).friction.mu_dynamic
+    0.15
+    """
+
+    _key: ClassVar[str] = "model"
+
+    inertia_kg_m2: float = 0.0017
+    drive_torque_nm: float = 0.047088000000000005
+    viscous_damping_nm_s_rad: float = 0.001
+    brake_gain_nm_v: float = 0.14
+    friction: Friction = field(default_factory=StribeckFriction)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Pd(_Params):
+    """Proportional–derivative control (4): `u = −(K_p e + K_d ė)`. The gains' defaults are Table 2's.
+
+    Parameters
+    ----------
+    kp_v_rad : float, default 5000.0
+        Proportional gain of (4). `K_p`: a finite number of at least 0 V/rad.
+    kd_v_s_rad : float, default 50.0
+        Derivative gain of (4). `K_d`: a finite number of at least 0 V s/rad.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Pd().kp_v_rad
+    5000.0
+    """
+
+    _key: ClassVar[str] = "law.pd"
+
+    kp_v_rad: float = 5000.0
+    kd_v_s_rad: float = 50.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Ctc(_Params):
+    """Computed-torque control (11): the plant that `Model` describes, solved for the voltage. The gains'
+    defaults are Table 2's.
+
+    `τ = −K (K_p e + K_d ė)`, `u = [T_u − J (θ̈_d − τ) − C_d θ̇]/(μ(θ̇) K_COF)`.
+
+    Parameters
+    ----------
+    outer_gain : float, default 90.0
+        Outer gain of (10). `K`: a finite number of at least 0.
+    kp_1_s2 : float, default 100.0
+        Proportional gain of (10). `K_p`: a finite number of at least 0 1/s².
+    kd_1_s : float, default 0.7
+        Derivative gain of (10). `K_d`: a finite number of at least 0 1/s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Ctc().outer_gain
+    90.0
+    """
+
+    _key: ClassVar[str] = "law.ctc"
+
+    outer_gain: float = 90.0
+    kp_1_s2: float = 100.0
+    kd_1_s: float = 0.7
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Smc(_Params):
+    """Sliding-mode control with a boundary layer (31). The gains' defaults are Table 2's.
+
+    `u = −{K_p sat(σ/ε) + K_d sat(σ ė/ε) ė}` with `σ = f e + ė`.
+
+    Parameters
+    ----------
+    kp_v : float, default 3.0
+        Switching gain of (31). `K_p`: a finite number of at least 0 V.
+    kd_v_s_rad : float, default 400.0
+        Damping gain of (31). `K_d`: a finite number of at least 0 V s/rad.
+    slope_1_s : float, default 70.0
+        Slope of the sliding surface (13). `f`: a finite number above 0 1/s.
+    boundary_rad_s : float, default 0.1
+        Thickness of the boundary layer (30). `ε`: a finite number above 0 rad/s whose inverse is finite, too.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Smc(kp_v=4)
+    Smc(kp_v=4.0, kd_v_s_rad=400.0, slope_1_s=70.0, boundary_rad_s=0.1)
+    """
+
+    _key: ClassVar[str] = "law.smc"
+
+    kp_v: float = 3.0
+    kd_v_s_rad: float = 400.0
+    slope_1_s: float = 70.0
+    boundary_rad_s: float = 0.1
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SmcSign(_Params):
+    """Sliding-mode control with the sign function (29), without a boundary layer: it chatters. The gains'
+    defaults are Table 2's.
+
+    `u = −{K_p sgn(σ) + K_d sgn(σ ė) ė}` with `σ = f e + ė`.
+
+    Parameters
+    ----------
+    kp_v : float, default 3.0
+        Switching gain of (29). `K_p`: a finite number of at least 0 V.
+    kd_v_s_rad : float, default 400.0
+        Damping gain of (29). `K_d`: a finite number of at least 0 V s/rad.
+    slope_1_s : float, default 70.0
+        Slope of the sliding surface (13). `f`: a finite number above 0 1/s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.SmcSign().kp_v
+    3.0
+    """
+
+    _key: ClassVar[str] = "law.smc_sign"
+
+    kp_v: float = 3.0
+    kd_v_s_rad: float = 400.0
+    slope_1_s: float = 70.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Pid(_Params):
+    """PID control with feed-forward, a filtered derivative, and an integral that does not wind up at a limit.
+
+    `u = u_0 − (K_p e + K_i ∫ e dt + K_d d + K_v θ̇_d + K_a θ̈_d)`, `τ ḋ = ė − d`. A start is bumpless where
+    there is an integral. The feed-forward of a believed plant is `u_0 = T_u/(μ K_COF)`, `K_v = C_d/(μ
+    K_COF)`, `K_a = J/(μ K_COF)`.
+
+    Parameters
+    ----------
+    kp_v_rad : float, default 1000.0
+        Proportional gain. `K_p`: a finite number of at least 0 V/rad.
+    ki_v_rad_s : float, default 10000.0
+        Integral gain. `K_i`: a finite number of at least 0 V/(rad s).
+    kd_v_s_rad : float, default 20.0
+        Derivative gain. `K_d`: a finite number of at least 0 V s/rad.
+    derivative_time_s : float, default 0.0
+        Time constant of the derivative's filter; 0 takes the error rate as it is. `τ`: a finite number of at
+        least 0 s.
+    tracking_time_s : float, default 0.05
+        Time in which the integral follows a limit of the output. `T_t`: a finite number above 0 s; a time of
+        at least sampling.period_us, s.
+    bias_v : float, default 0.0
+        Voltage without error, at rest. `u_0`: a finite number, V.
+    velocity_v_s_rad : float, default 0.0
+        Feed-forward of the path's velocity. `K_v`: a finite number, V s/rad.
+    acceleration_v_s2_rad : float, default 0.0
+        Feed-forward of the path's acceleration. `K_a`: a finite number, V s²/rad.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Pid().kp_v_rad
+    1000.0
+    """
+
+    _key: ClassVar[str] = "law.pid"
+
+    kp_v_rad: float = 1000.0
+    ki_v_rad_s: float = 10000.0
+    kd_v_s_rad: float = 20.0
+    derivative_time_s: float = 0.0
+    tracking_time_s: float = 0.05
+    bias_v: float = 0.0
+    velocity_v_s_rad: float = 0.0
+    acceleration_v_s2_rad: float = 0.0
+
+
+Law = Pd | Ctc | Smc | SmcSign | Pid
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SmoothedDerivative(_Params):
+    """The smoothed difference (5), which the paper calls a Kalman filter: a first-order low-pass on the
+    backward difference of the error.
+
+    `ė_k = (1 − K_Kal) ė_{k−1} + K_Kal (e_k − e_{k−1})/T`.
+
+    Parameters
+    ----------
+    smoothing : float, default 0.2
+        Share of the newest difference in (5); 1 smooths nothing. The paper gives 0.2 to 1, and 0.2 reproduces
+        its figures. `K_Kal`: a number above 0 and at most 1.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.SmoothedDerivative().smoothing
+    0.2
+    """
+
+    _key: ClassVar[str] = "velocity.smoothed_derivative"
+
+    smoothing: float = 0.2
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Observer(_Params):
+    """A stationary Kalman filter for position, velocity and the torque that nobody measures. It predicts with
+    the model.
+
+    Parameters
+    ----------
+    disturbance_walk_nm_rt_s : float, default 0.1
+        How fast the disturbance torque wanders: by this much (standard deviation) in one second, and with the
+        root of the time. Larger follows friction faster and lets more of the encoder's steps through. `q_d`:
+        a finite number above 0 N m/√s; a number in N m/√s for which stable gains exist in this precision.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Observer().disturbance_walk_nm_rt_s
+    0.1
+    """
+
+    _key: ClassVar[str] = "velocity.observer"
+
+    disturbance_walk_nm_rt_s: float = 0.1
+
+
+Velocity = SmoothedDerivative | Observer
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Output(_Params):
+    """Output stage of a law. The defaults are the paper's 0 to 10 V without bumpless start, and full braking
+    on an invalid demand.
+
+    Parameters
+    ----------
+    lowest_v : float, default 0.0
+        Lowest voltage: a pad can only push. Above 0 the pad never lifts. A finite number of at least 0 V; a
+        voltage that the converter reaches: not below rig.dac.lowest_v.
+    highest_v : float, default 10.0
+        Highest voltage. Lower `on_invalid_v` together with it. A finite number, V; a voltage above lowest_v;
+        a voltage that the converter reaches: not above rig.dac.highest_v.
+    on_invalid_v : float, default 10.0
+        Voltage for a demand that is not a number. A finite number, V; a voltage from lowest_v to highest_v
+        (it does not follow them).
+    bumpless_time_s : float, default 0.0
+        Time constant of a bumpless start, with which the difference between the voltage found at start and
+        the law's first demand decays; 0 starts with the law's own demand. A finite number of at least 0 s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Output(highest_v=8, on_invalid_v=8)
+    Output(lowest_v=0.0, highest_v=8.0, on_invalid_v=8.0, bumpless_time_s=0.0)
+    """
+
+    _key: ClassVar[str] = "output"
+
+    lowest_v: float = 0.0
+    highest_v: float = 10.0
+    on_invalid_v: float = 10.0
+    bumpless_time_s: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Hold(_Params):
+    """Stays at the start.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Hold()
+    Hold()
+    """
+
+    _key: ClassVar[str] = "reference.hold"
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Ramp(_Params):
+    """Constant rate from the first tick: the paper's path.
+
+    Parameters
+    ----------
+    rate_deg_s : float
+        Rate, to which the velocity jumps at the start. A brake follows only the sign of its drive. A finite
+        number, °/s; a finite rate below 4e6 counts of rig.encoder.counts_per_rev per sampling.period_us, °/s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Ramp(rate_deg_s=2)
+    Ramp(rate_deg_s=2.0)
+    """
+
+    _key: ClassVar[str] = "reference.ramp"
+
+    rate_deg_s: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Trapezoid(_Params):
+    """Rest to rest with a trapezoidal velocity; a triangle where the distance is too short.
+
+    Parameters
+    ----------
+    distance_deg : float
+        Distance. Either sign; a brake follows only the sign of its drive. A finite number, °; a finite
+        distance below 1e12 counts of rig.encoder.counts_per_rev, °.
+    speed_deg_s : float
+        Highest speed. A finite number above 0 °/s; a finite speed below 4e6 counts of
+        rig.encoder.counts_per_rev per sampling.period_us, °/s; a speed high enough to end within 1e15
+        periods, °/s.
+    acceleration_deg_s2 : float
+        Acceleration and deceleration. A finite number above 0 °/s²; an acceleration high enough to end within
+        1e15 periods, °/s².
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Trapezoid(distance_deg=90, speed_deg_s=20, acceleration_deg_s2=100)
+    Trapezoid(distance_deg=90.0, speed_deg_s=20.0, acceleration_deg_s2=100.0)
+    """
+
+    _key: ClassVar[str] = "reference.trapezoid"
+
+    distance_deg: float
+    speed_deg_s: float
+    acceleration_deg_s2: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class JerkLimited(_Params):
+    """Rest to rest with bounded jerk: seven pieces, fewer where a bound is not reached.
+
+    Parameters
+    ----------
+    distance_deg : float
+        Distance. Either sign; a brake follows only the sign of its drive. A finite number, °; a finite
+        distance below 1e12 counts of rig.encoder.counts_per_rev, °.
+    speed_deg_s : float
+        Highest speed. A finite number above 0 °/s; a finite speed below 4e6 counts of
+        rig.encoder.counts_per_rev per sampling.period_us, °/s; a speed high enough to end within 1e15
+        periods, °/s.
+    acceleration_deg_s2 : float
+        Highest acceleration and deceleration. A finite number above 0 °/s²; an acceleration high enough to
+        end within 1e15 periods, °/s².
+    jerk_deg_s3 : float
+        Highest jerk. A finite number above 0 °/s³; a jerk high enough to end within 1e15 periods, °/s³.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> path = clutch.JerkLimited(
+    ...     distance_deg=90, speed_deg_s=20, acceleration_deg_s2=100, jerk_deg_s3=1000
+    ... )
+    """
+
+    _key: ClassVar[str] = "reference.jerk_limited"
+
+    distance_deg: float
+    speed_deg_s: float
+    acceleration_deg_s2: float
+    jerk_deg_s3: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class MinimumJerk(_Params):
+    """Rest to rest along `10 s³ − 15 s⁴ + 6 s⁵`, `s = t/duration` (Flash and Hogan 1985).
+
+    Parameters
+    ----------
+    distance_deg : float
+        Distance. Either sign; a brake follows only the sign of its drive. A finite number, °; a finite
+        distance below 1e12 counts of rig.encoder.counts_per_rev, °.
+    duration_s : float
+        Time of the path. A number above 0 and at most 1 000 000 s; a time of at least sampling.period_us, s;
+        a time in which the highest speed stays below 4e6 counts of rig.encoder.counts_per_rev per
+        sampling.period_us, s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.MinimumJerk(distance_deg=90, duration_s=6)
+    MinimumJerk(distance_deg=90.0, duration_s=6.0)
+    """
+
+    _key: ClassVar[str] = "reference.minimum_jerk"
+
+    distance_deg: float
+    duration_s: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Sine(_Params):
+    """A sine on a ramp: `rate · t + amplitude · [sin(2π f t + phase) − sin(phase)]`.
+
+    A brake follows it only while the velocity keeps its sign: `2π f · amplitude ≤ rate`.
+
+    Parameters
+    ----------
+    rate_deg_s : float
+        Rate of the ramp below the sine. A finite number, °/s; a finite rate below 4e6 counts of
+        rig.encoder.counts_per_rev per sampling.period_us, °/s.
+    amplitude_deg : float
+        Amplitude of the sine. A finite number, °; a finite amplitude below 1e12 counts of
+        rig.encoder.counts_per_rev, °.
+    frequency_hz : float
+        Frequency. `f`: a finite number of at least 0 Hz; a frequency below half the sampling rate, which
+        sampling.period_us gives, Hz.
+    phase_turns : float, default -0.25
+        Phase at the start; −0.25 starts at the rate of the ramp. A number from -1 to 1 turns.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Sine(rate_deg_s=10, amplitude_deg=1.5, frequency_hz=1)
+    Sine(rate_deg_s=10.0, amplitude_deg=1.5, frequency_hz=1.0, phase_turns=-0.25)
+    """
+
+    _key: ClassVar[str] = "reference.sine"
+
+    rate_deg_s: float
+    amplitude_deg: float
+    frequency_hz: float
+    phase_turns: float = -0.25
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Chirp(_Params):
+    """A sine on a ramp, whose frequency goes linearly from one value to another and stays there.
+
+    A brake follows it only while the velocity keeps its sign: `2π f · amplitude ≤ rate` for either frequency
+    `f`.
+
+    Parameters
+    ----------
+    rate_deg_s : float
+        Rate of the ramp below the sine. A finite number, °/s; a finite rate below 4e6 counts of
+        rig.encoder.counts_per_rev per sampling.period_us, °/s.
+    amplitude_deg : float
+        Amplitude of the sine. A finite number, °; a finite amplitude below 1e12 counts of
+        rig.encoder.counts_per_rev, °.
+    from_hz : float
+        Frequency at the start. A finite number of at least 0 Hz; a frequency below half the sampling rate,
+        which sampling.period_us gives, Hz.
+    to_hz : float
+        Frequency at the end. A finite number of at least 0 Hz; a frequency below half the sampling rate,
+        which sampling.period_us gives, Hz.
+    duration_s : float
+        Time from one to the other. A finite number above 0 s; a time of 1 to 4e9 times sampling.period_us.
+    phase_turns : float, default -0.25
+        Phase at the start; −0.25 starts at the rate of the ramp. A number from -1 to 1 turns.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Chirp(rate_deg_s=10, amplitude_deg=0.5, from_hz=0.1, to_hz=3, duration_s=10).to_hz
+    3.0
+    """
+
+    _key: ClassVar[str] = "reference.chirp"
+
+    rate_deg_s: float
+    amplitude_deg: float
+    from_hz: float
+    to_hz: float
+    duration_s: float
+    phase_turns: float = -0.25
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class TablePath(_Params):
+    """Points in time. Before the first point the path rests there, after the last too.
+
+    Parameters
+    ----------
+    points_s_deg : sequence of (float, float)
+        Points of time and angle, from the start; times rise. A brake follows only angles that do not fall. A
+        list of at least one pair [s, °] of finite numbers, with times that rise from 0 s on; at least one
+        point; times of at least 0 s that rise from point to point; positions below 7e13 counts of
+        rig.encoder.counts_per_rev.
+    interpolation : {"linear", "cubic"}, default "cubic"
+        How to go from point to point. `linear`: Straight lines: the velocity jumps at each point. `cubic`:
+        Monotone cubics (Fritsch and Butland 1984): the velocity is continuous and a rising table never runs
+        backwards, which a brake could not follow.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.TablePath(points_s_deg=[(0.5, 0), (2, 20)])
+    TablePath(points_s_deg=((0.5, 0.0), (2.0, 20.0)), interpolation='cubic')
+    """
+
+    _key: ClassVar[str] = "reference.table"
+
+    points_s_deg: Sequence[tuple[float, float]]
+    interpolation: Literal["linear", "cubic"] = "cubic"
+
+
+Reference = Hold | Ramp | Trapezoid | JerkLimited | MinimumJerk | Sine | Chirp | TablePath
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Sampling(_Params):
+    """When the servo is asked, and the scalar that it computes in.
+
+    Parameters
+    ----------
+    period_us : int, default 1000
+        Time from sample to sample, in (5). `T`: a whole number from 1 to 1 000 000 µs.
+    scalar : {"f32", "f64"}, default "f64"
+        Scalar that path and servo compute in; a board has `f32`. The shaft is always in `f64`. `f32`: Single
+        precision, as on a board. `f64`: Double precision.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Sampling().period_us
+    1000
+    """
+
+    _key: ClassVar[str] = "sampling"
+
+    period_us: int = 1000
+    scalar: Literal["f32", "f64"] = "f64"
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Bounds(_Params):
+    """How well the believed plant is known, (23), and the reaching rate that the certificate shall give: for
+    the certificate and the check of the path.
+
+    Parameters
+    ----------
+    inertia_percent : float, default 0.0
+        ± on the inertia `J`, (23a). A number of at least 0 and below 100 %.
+    drive_torque_percent : float, default 0.0
+        ± on the driving torque `T_u`, (23b). A number of at least 0 and below 100 %.
+    viscous_damping_percent : float, default 0.0
+        ± on the viscous damping `C_d`, (23c). A number of at least 0 and below 100 %.
+    brake_gain_percent : float, default 0.0
+        ± on the brake gain `K_COF`, (23h). A number of at least 0 and below 100 %.
+    friction_percent : float, default 0.0
+        ± on the friction, in motion (23d) and at rest (23e). A number of at least 0 and below 100 %.
+    reach_rate_rad_s2 : float, default 0.0
+        Rate of reaching the sliding surface that the certificate shall give, in (15); above 0 the reaching
+        time gets a bound. `γ`: a finite number of at least 0 rad/s².
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Bounds(friction_percent=20, brake_gain_percent=20).friction_percent
+    20.0
+    """
+
+    _key: ClassVar[str] = "bounds"
+
+    inertia_percent: float = 0.0
+    drive_torque_percent: float = 0.0
+    viscous_damping_percent: float = 0.0
+    brake_gain_percent: float = 0.0
+    friction_percent: float = 0.0
+    reach_rate_rad_s2: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class RunSettings(_Params):
+    """Length, beginning, seed and engine of a run.
+
+    Parameters
+    ----------
+    duration_s : float, default 5.0
+        Length. A finite number above 0 s; a time of 1 to 10 million times sampling.period_us: a run keeps
+        every sample.
+    settle_s : float, default 1.0
+        Time at the start that is left out of the figures. A finite number of at least 0 s; a time that ends
+        at least sampling.period_us before run.duration_s does.
+    start : {"on_path", "rest"}, default "on_path"
+        Motion of the shaft at the beginning. `on_path`: On the path: at its velocity, the brake at the
+        voltage that keeps it. (12) and (13) assume a path without jumps. `rest`: Held at rest, with a quarter
+        more than the voltage that this takes.
+    start_counts : float or None, default None
+        Position at which shaft and path begin; absent: somewhere within the first count, drawn from the seed.
+        Where the path lies between the encoder's edges decides how often a slow shaft sticks, and nobody
+        mounts an encoder to a fraction of a count. A number above -1 000 000 000 and below 1 000 000 000
+        counts.
+    seed : int, default 1
+        Seed of everything random: start, ripple phases, noise, a hand. A whole number from 0 to
+        9223372036854776000.
+    engine : {"auto", "dormand_prince", "exact_flow"}, default "auto"
+        What integrates the motion. `auto`: The exact flow where the rig allows it, else Dormand–Prince.
+        `dormand_prince`: Dormand and Prince's 5(4) pair, the paper's solver, with events: takes every rig.
+        `exact_flow`: The closed form of the motion between samples: friction that falls exponentially with
+        the speed and is even along the disc, torque and voltage held between samples.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.RunSettings(duration_s=10, seed=7).seed
+    7
+    """
+
+    _key: ClassVar[str] = "run"
+
+    duration_s: float = 5.0
+    settle_s: float = 1.0
+    start: Literal["on_path", "rest"] = "on_path"
+    start_counts: float | None = None
+    seed: int = 1
+    engine: Literal["auto", "dormand_prince", "exact_flow"] = "auto"
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class HoldVoltage(_Params):
+    """Holds the shaft with a voltage, at once.
+
+    Parameters
+    ----------
+    volts_v : float
+        Voltage, enough to stop the strongest drive with the weakest brake of the bounds. A finite number
+        above 0 V; a voltage that the converter reaches, at most rig.dac.highest_v.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.HoldVoltage(volts_v=4.5)
+    HoldVoltage(volts_v=4.5)
+    """
+
+    _key: ClassVar[str] = "safety.on_fault.hold"
+
+    volts_v: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class RampVoltage(_Params):
+    """Brakes with a rising (or falling) voltage, then holds.
+
+    Parameters
+    ----------
+    rate_v_s : float
+        Rate at which the voltage goes up or down from the present one. A finite number above 0 V/s; a rate
+        that is a step of 2⁻¹⁶ to 60 000 codes of rig.dac per sampling.period_us.
+    volts_v : float
+        Voltage at the end, enough to stop the strongest drive with the weakest brake of the bounds. A finite
+        number above 0 V; a voltage that the converter reaches, at most rig.dac.highest_v.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.RampVoltage(rate_v_s=50, volts_v=4.5)
+    RampVoltage(rate_v_s=50.0, volts_v=4.5)
+    """
+
+    _key: ClassVar[str] = "safety.on_fault.ramp"
+
+    rate_v_s: float
+    volts_v: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Release(_Params):
+    """Lets go: 0 V, or the converter's lowest voltage above it.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Release()
+    Release()
+    """
+
+    _key: ClassVar[str] = "safety.on_fault.release"
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class HoldThenRelease(_Params):
+    """Holds the shaft with a voltage, at once, and after a time lets go.
+
+    Parameters
+    ----------
+    volts_v : float
+        Voltage, enough to stop the strongest drive with the weakest brake of the bounds. A finite number
+        above 0 V; a voltage that the converter reaches, at most rig.dac.highest_v.
+    after_s : float
+        Time of holding, after which it lets go. A finite number above 0 s; a time of 1 to 4e9 times
+        sampling.period_us.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.HoldThenRelease(volts_v=4.5, after_s=2)
+    HoldThenRelease(volts_v=4.5, after_s=2.0)
+    """
+
+    _key: ClassVar[str] = "safety.on_fault.hold_then_release"
+
+    volts_v: float
+    after_s: float
+
+
+SafeState = HoldVoltage | RampVoltage | Release | HoldThenRelease
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Limits(_Params):
+    """What ends a run on a board: limits of the supervisor, and how long board and codes wait. docs/safety.md
+    says why each default is what it is.
+
+    Parameters
+    ----------
+    jump_deg : float, default 0.15
+        Largest departure of a sample from where the last ones lead that a shaft can make in a period. A
+        finite number above 0 °; an angle of at least one count of rig.encoder.counts_per_rev and below 2³⁰ of
+        them, °.
+    jumps : int, default 3
+        Samples beyond `jump_deg`, within 128 periods, that end control. One glitch is tolerated. A whole
+        number from 1 to 128 within 128 periods.
+    good_samples : int, default 1
+        Samples in a row that have to pass after one was refused before the law answers again. A whole number
+        of at least 1; a number below silence_cycles: an unanswered board goes to its safe state.
+    following_error_deg : float, default 1.0
+        Error at rest that ends control. A finite number above 0 °.
+    following_time_s : float, default 0.02
+        How much `following_error_deg` grows with the target's speed. A finite number of at least 0 s.
+    saturation_time_s : float, default 0.2
+        Time at a limit of the voltage that ends control. A finite number above 0 s; a time of 1 to 4e9 times
+        sampling.period_us.
+    stand_still_counts : float, default 1.1
+        Distance that the shaft must have gone without a count. A finite number of at least 1 counts.
+    friction_margin : float, default 1.8
+        How many times the friction at the upper bound may be exceeded before a shaft under brake is expected
+        to move. A finite number of at least 1.
+    lost : int, default 26
+        Lost samples within 128 periods that end control. A whole number from 1 to 128 within 128 periods.
+    late : int, default 26
+        Late samples, and codes that the board refuses as late, within 128 periods that end control. A whole
+        number from 1 to 128 within 128 periods.
+    disorder : int, default 2
+        Duplicated, or reordered, samples within 128 periods that end control. A whole number from 1 to 128
+        within 128 periods.
+    silence_cycles : int, default 3
+        Periods without a sample that end control. A whole number from 2 to 1000 periods.
+    deadline_us : int, default 500
+        Longest time from a sample's arrival to its answer. A whole number from 1 to 4 294 967 295 µs.
+    overruns : int, default 26
+        Answers later than `deadline_us`, within 128 periods, that end control. A whole number from 1 to 128
+        within 128 periods.
+    watchdog_cycles : int, default 3
+        Periods without a valid code after which the board goes to its safe state by itself. Keep it equal to
+        `silence_cycles`. A whole number from 2 to 1000 periods.
+    valid_cycles : int, default 2
+        Periods after its sample during which a code is valid; at most 65.535 ms. A whole number from 1 to
+        1000 periods.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Limits(following_error_deg=0.5).following_time_s
+    0.02
+    """
+
+    _key: ClassVar[str] = "safety.limits"
+
+    jump_deg: float = 0.15
+    jumps: int = 3
+    good_samples: int = 1
+    following_error_deg: float = 1.0
+    following_time_s: float = 0.02
+    saturation_time_s: float = 0.2
+    stand_still_counts: float = 1.1
+    friction_margin: float = 1.8
+    lost: int = 26
+    late: int = 26
+    disorder: int = 2
+    silence_cycles: int = 3
+    deadline_us: int = 500
+    overruns: int = 26
+    watchdog_cycles: int = 3
+    valid_cycles: int = 2
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Safety(_Params):
+    """How a run on a board ends, and what ends it. Only what drives a board needs it; there is no default
+    safe state.
+
+    Parameters
+    ----------
+    reason : str
+        Why this safe state is the right one for this rig, in the operator's words; printed before each run.
+    on_fault : HoldVoltage, RampVoltage, Release or HoldThenRelease
+        What the brake does when control has ended.
+    limits : Limits
+        What ends control. By default `Limits()`.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Safety(reason="a weight drives the shaft", on_fault=clutch.HoldVoltage(volts_v=4.5))
+    Safety(reason='a weight drives the shaft', on_fault=HoldVoltage(volts_v=4.5))
+    """
+
+    _key: ClassVar[str] = "safety"
+
+    reason: str
+    on_fault: SafeState
+    limits: Limits = field(default_factory=Limits)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class _Scenario(_Params):
+    """A scenario: rig, believed plant, law, path, sampling, bounds, run, safety.
+
+    Parameters
+    ----------
+    name : str
+        Title of the output, any text. By default the law's and the path's name.
+    rig : Rig
+        The shaft as it is. By default `Rig()`.
+    model : Model
+        The shaft as law, observer and certificate believe it to be. By default `Model()`.
+    law : Pd, Ctc, Smc, SmcSign or Pid
+        The law and its gains.
+    velocity : SmoothedDerivative or Observer
+        Source of the velocity that the law is given. By default `SmoothedDerivative()`.
+    output : Output
+        Limits of the voltage, bumpless start. By default `Output()`.
+    reference : Hold, Ramp, Trapezoid, JerkLimited, MinimumJerk, Sine, Chirp or TablePath
+        The path.
+    sampling : Sampling
+        Sampling period, scalar. By default `Sampling()`.
+    bounds : Bounds
+        How well the believed plant is known. By default `Bounds()`.
+    run : RunSettings
+        Length, beginning, seed and engine. By default `RunSettings()`.
+    safety : Safety or None, default None
+        How a run on a board ends, and what ends it: `clutch loop` and `clutch daq` need it.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Scenario(law=clutch.Smc(kp_v=4), reference=clutch.Ramp(rate_deg_s=2)).name
+    'SMC, ramp'
+    >>> try:
+    ...     clutch.Scenario(law=clutch.Smc(), reference=clutch.Ramp(rate_deg_s=-2))
+    ... except clutch.ParamError as error:
+    ...     print(error.field)
+    reference.ramp
+    """
+
+    name: str = ""
+    rig: Rig = field(default_factory=Rig)
+    model: Model = field(default_factory=Model)
+    law: Law
+    velocity: Velocity = field(default_factory=SmoothedDerivative)
+    output: Output = field(default_factory=Output)
+    reference: Reference
+    sampling: Sampling = field(default_factory=Sampling)
+    bounds: Bounds = field(default_factory=Bounds)
+    run: RunSettings = field(default_factory=RunSettings)
+    safety: Safety | None = None

@@ -1,0 +1,60 @@
+//! The figures of a run: one table, from which the committed files come.
+
+use clutch_sim::metrics::{Detected, Metrics, columns};
+use clutch_sim::progress::UNWATCHED;
+use clutch_sim::{Keep, Scenario};
+use std::collections::BTreeSet;
+
+#[allow(dead_code, reason = "an example's `main`; here only what it writes is called")]
+#[path = "../../crates/clutch-sim/examples/metrics.rs"]
+mod generated;
+
+fn kept(path: &str) -> String {
+    std::fs::read_to_string(format!("{}/../{path}", env!("CARGO_MANIFEST_DIR"))).unwrap()
+}
+
+#[test]
+fn committed_files_are_what_the_table_gives_now() {
+    let stale = "is stale: run `cargo run -p clutch-sim --example metrics`";
+    assert!(kept(generated::PYTHON) == generated::python(), "{} {stale}", generated::PYTHON);
+    let page = kept(generated::PAGE);
+    assert!(generated::page(&page).is_some_and(|now| now == page), "{} {stale}", generated::PAGE);
+}
+
+#[test]
+fn a_figures_name_ends_with_its_unit() {
+    let suffix = |unit: &str| match unit {
+        "1" => "_fraction",
+        "s" => "_s",
+        "rad" => "_rad",
+        "rad s" => "_rad_s",
+        "rad/s³" => "_rad_s3",
+        "cycles/s" => "_cycles_per_s",
+        "N m" => "_nm",
+        "V/s" => "_v_s",
+        other => panic!("{other}: a unit without a suffix"),
+    };
+    for (name, unit) in Metrics::FIGURES.iter().map(|f| (f.name, f.unit)) {
+        assert!(name.ends_with(suffix(unit)), "{name} in {unit}");
+    }
+    for f in Detected::FIGURES {
+        assert!(f.name.ends_with(suffix(f.unit)), "{} in {}", f.name, f.unit);
+    }
+}
+
+#[test]
+fn json_has_each_figure_under_its_field_and_columns_have_them_all() {
+    let scenario = Scenario::built_in("pd_2").unwrap().unwrap();
+    let run = scenario.run(Keep::Figures, UNWATCHED).unwrap();
+    let json = serde_json::to_value((&run.metrics, &run.detected)).unwrap();
+    let count = [&json[0], &json[1]].map(|object| object.as_object().unwrap().len());
+    assert_eq!(count, [Metrics::FIGURES.len(), Detected::FIGURES.len()]);
+    for f in Metrics::FIGURES {
+        assert_eq!(json[0][f.field].as_f64(), f.of(&run.metrics), "{}", f.name);
+    }
+    for f in Detected::FIGURES {
+        assert_eq!(json[1][f.field].as_f64(), f.of(&run.detected), "{}", f.name);
+    }
+    let names: BTreeSet<_> = columns(&run.metrics, &run.detected).map(|(name, _)| name).collect();
+    assert_eq!(names.len(), count[0] + count[1]);
+}
