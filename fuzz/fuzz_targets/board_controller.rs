@@ -6,7 +6,7 @@
 //! steps, so that a run is reached, between bytes and well-formed frames of any content.
 #![no_main]
 
-use clutch_core::law::{CtcParams, LawParams, PdParams, SmcParams, SmcSignParams};
+use clutch_core::law::LawParams;
 use clutch_core::reference::{
     Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, ReferenceParams, Sine, Table, Trapezoid,
 };
@@ -15,7 +15,7 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, Built, ControllerNode, ControllerParams,
-    HostNode, OneChip, Outbox, Outboxes, RunParams, SETTINGS, Settings,
+    HostNode, OneChip, Outbox, Outboxes, RunParams, RunTimes, SETTINGS, Settings,
 };
 use clutch_wire::{Decoder, Message, StopReason, TABLE};
 use libfuzzer_sys::fuzz_target;
@@ -61,6 +61,11 @@ impl Input<'_> {
         let info = &TABLE[usize::from(self.byte()) % TABLE.len()];
         let mut content = vec![info.kind];
         content.extend(self.some(usize::from(info.length) - 5));
+        if info.list > 0 {
+            let count = self.byte() % (info.list + 1);
+            *content.last_mut().expect("a list's count") = count;
+            content.extend(self.some(4 * usize::from(count)));
+        }
         content.extend(CRC.checksum(&content).to_le_bytes());
         let mut frame = Vec::new();
         for block in content.split(|byte| *byte == 0) {
@@ -75,21 +80,18 @@ impl Input<'_> {
 /// The settings of a run, and the run that they build.
 fn plan(input: &mut Input<'_>) -> Option<(Settings, Built)> {
     let [kinds, path, host_silence] = input.take();
-    let law = match kinds & 3 {
-        0 => LawParams::Pd(PdParams::default()),
-        1 => LawParams::Ctc(CtcParams::default()),
-        2 => LawParams::Smc(SmcParams::default()),
-        _ => LawParams::SmcSign(SmcSignParams::default()),
-    };
+    let laws = LawParams::all();
+    // By the two bits that have always chosen, and a third.
+    let law = laws[usize::from(kinds & 3 | kinds >> 2 & 4) % laws.len()];
     let on_fault = match kinds >> 2 & 3 {
-        0 => SafeState::Hold { volts: 5.0 },
-        1 => SafeState::Ramp { volts_per_s: 100.0, volts: 5.0 },
+        0 => SafeState::hold(5.0),
+        1 => SafeState::ramp(100.0, 5.0),
         2 => SafeState::Release,
-        _ => SafeState::HoldThenRelease { volts: 5.0, after: 0.01 },
+        _ => SafeState::hold_then_release(5.0, 0.01),
     };
     let reference = match path % 9 {
         0 => ReferenceParams::Hold,
-        1 => ReferenceParams::Ramp(0.9),
+        1 => ReferenceParams::ramp(0.9),
         2 => ReferenceParams::Trapezoid(Trapezoid { distance: 0.02, speed: 0.9, acceleration: 50.0 }),
         3 => ReferenceParams::JerkLimited(JerkLimited {
             distance: 0.02,
@@ -116,17 +118,19 @@ fn plan(input: &mut Input<'_>) -> Option<(Settings, Built)> {
         bounds: &Bounds::around(&PlantParams::default(), &Tolerances::default()).expect("the paper's"),
         reference: &reference,
         start: FixedCounts(0),
-        watchdog: Micros(3000),
-        valid: Micros(2000),
-        silence: Micros(3000),
-        host_silence: Micros(u32::from(host_silence) * 1000),
+        times: RunTimes {
+            watchdog: Micros(3000),
+            valid: Micros(2000),
+            silence: Micros(3000),
+            host_silence: Micros(u32::from(host_silence) * 1000),
+        },
         ticks: 200,
     })
     .expect("boards have all of it");
     for _ in 0..path >> 6 {
         // One number of the run, or one of a point; any value.
-        let key = usize::from(input.byte()) % (SETTINGS.len() + 6);
-        let key = if key < SETTINGS.len() { key } else { 0x1000 + key - SETTINGS.len() };
+        let key = usize::from(input.byte()) % (SETTINGS + 6);
+        let key = if key < SETTINGS { key } else { 0x1000 + key - SETTINGS };
         let value = u64::from_le_bytes(input.take());
         let fits = settings.set(key as u16, value);
         assert_eq!(settings.set(key as u16, value), fits);
@@ -134,7 +138,7 @@ fn plan(input: &mut Input<'_>) -> Option<(Settings, Built)> {
     let built = settings.build().ok()?;
     // Far on, far back, at the start.
     for tick in [0, 1, 1000, u64::from(u32::MAX), u64::MAX] {
-        let _ = built.path.target(settings.points(), tick);
+        let _ = built.path.target(settings.knots(), tick);
     }
     Some((settings, built))
 }
@@ -167,19 +171,19 @@ struct Bench {
 
 impl Bench {
     fn new((settings, built): (Settings, Built)) -> Bench {
-        let n = &settings.numbers;
+        let times = &built.times;
         let params = ControllerParams {
             run: 5,
             config: 7,
-            watchdog: Micros(n.watchdog_us),
-            valid: Micros(n.valid_us),
-            silence: Micros(n.silence_us),
+            watchdog: times.watchdog,
+            valid: times.valid,
+            silence: times.silence,
         };
         let configure = ControllerNode::new(params, built.servo, built.supervisor).configuration();
         let host = HostNode::new(built.servo, configure, 20_000_000, 200_000_000);
         let this = BoardControllerParams { board: 1, boot: 1, clock_hz: 1 };
         Bench {
-            top: ((1_u32 << n.dac_bits) - 1) as u16,
+            top: built.servo.dac().code(f32::INFINITY).0,
             settings,
             built,
             chip_host: host.clone(),
@@ -221,8 +225,8 @@ impl Bench {
     /// The output of both goes to its addressee.
     fn settle(&mut self) {
         let now_ns = self.now_ns();
-        let (path, points) = (&self.built.path, self.settings.points());
-        let at = |tick| path.target(points, tick);
+        let (path, knots) = (&self.built.path, self.settings.knots());
+        let at = |tick| path.target(knots, tick);
         for _ in 0..4 {
             let (bytes, messages) = frames(&mut self.outboxes.daq);
             for message in messages {
@@ -342,8 +346,8 @@ impl Bench {
             }
             13 => {
                 let frame = input.frame();
-                let (path, points) = (&self.built.path, self.settings.points());
-                let at = |tick| path.target(points, tick);
+                let (path, knots) = (&self.built.path, self.settings.knots());
+                let at = |tick| path.target(knots, tick);
                 self.host.receive(self.now_us.saturating_mul(1000), &frame, &at, &mut |_| ());
             }
             14 => {

@@ -22,7 +22,7 @@ fn with_its_own_gains_it_hardly_sticks_at_2_deg_s_on_ten_discs_of_the_bench() {
 fn an_integral_takes_away_the_mean_error_that_pd_keeps() {
     // A model that is wrong by a fifth leaves PD behind or ahead; here the drive is.
     let drive = ("rig.drive.weight.mass_kg", "0.24".to_owned());
-    let pid = metrics(&[drive.clone()]).mean_error_rad.abs();
+    let pid = metrics(std::slice::from_ref(&drive)).mean_error_rad.abs();
     let pd =
         metrics(&[drive, ("law.pid.ki_v_rad_s", "0.0".to_owned()), ("law.pid.bias_v", "2.24".to_owned())]);
     assert!(pid.to_degrees() < 0.015, "{}°", pid.to_degrees());

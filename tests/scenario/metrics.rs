@@ -1,25 +1,9 @@
-//! The figures of a run: one table, from which the committed files come.
+//! The figures of a run: names, units and what each is.
 
 use clutch_sim::metrics::{Detected, Metrics, columns};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::{Keep, Scenario};
 use std::collections::BTreeSet;
-
-#[allow(dead_code, reason = "an example's `main`; here only what it writes is called")]
-#[path = "../../crates/clutch-sim/examples/metrics.rs"]
-mod generated;
-
-fn kept(path: &str) -> String {
-    std::fs::read_to_string(format!("{}/../{path}", env!("CARGO_MANIFEST_DIR"))).unwrap()
-}
-
-#[test]
-fn committed_files_are_what_the_table_gives_now() {
-    let stale = "is stale: run `cargo run -p clutch-sim --example metrics`";
-    assert!(kept(generated::PYTHON) == generated::python(), "{} {stale}", generated::PYTHON);
-    let page = kept(generated::PAGE);
-    assert!(generated::page(&page).is_some_and(|now| now == page), "{} {stale}", generated::PAGE);
-}
 
 #[test]
 fn a_figures_name_ends_with_its_unit() {

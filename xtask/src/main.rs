@@ -98,8 +98,8 @@ enum Verb {
         #[arg(value_name = "REV", default_value = "HEAD")]
         revisions: Vec<String>,
     },
-    /// Writes what follows from the declarations of parameters: Python's classes, tables of the documentation, the
-    /// schema of scenario files.
+    /// Writes what follows from the declarations of parameters and figures: Python's classes, tables of the
+    /// documentation, the schema of scenario files. A test compares them.
     Generate {
         /// Only compares.
         #[arg(long)]
@@ -177,7 +177,6 @@ fn check() -> Result<()> {
         cargo(["clippy", "--package", "clutch-core", "--features", features, "--", "-D", "warnings"])
             .run()?;
     }
-    generate(&["--check"])?;
     // The images, where their target is; tests build them in any case.
     if firmware::has_target() {
         for board in firmware::BOARDS {

@@ -26,7 +26,7 @@ const TESTS: &[&str] = &[
 /// generated from the revision on at which its head says so.
 pub(crate) const GENERATED: &[(&str, &str)] = &[
     ("python/clutch/_clutch.pyi", "cargo xtask stubs"),
-    ("python/clutch/_metrics.py", "cargo run -p clutch-sim --example metrics"),
+    ("python/clutch/_metrics.py", "cargo xtask generate"),
     ("python/clutch/_tables.py", "cargo xtask generate"),
     ("docs/scenario.schema.json", "cargo xtask generate"),
     ("crates/clutch-wire/include/clutch_wire.h", "cargo run -p clutch-wire --example table -- header"),
@@ -243,7 +243,7 @@ mod tests {
             assert!(is_product(path), "{path}");
         }
         for path in [
-            "crates/clutch-sim/examples/metrics.rs",
+            "crates/clutch-sim/examples/generate/metrics.rs",
             "crates/clutch-core/src/supervisor/tests.rs",
             "crates/clutch-node/tests/board.rs",
             "python/clutch/_clutch.pyi",

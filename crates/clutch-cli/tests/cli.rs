@@ -72,7 +72,10 @@ fn a_folder_or_bytes_instead_of_a_scenario_are_named() {
 fn a_bad_value_names_file_key_value_and_expectation_and_nothing_is_printed_as_a_result() {
     let o = clutch(&["sim", "smc_2", "--set", "rig.inertia_kg_m2=-1"]);
     assert_eq!(o.status.code(), Some(1));
-    assert_eq!(err(&o), "clutch: smc_2: rig.inertia_kg_m2 = -1: expected a finite number above 0 kg m² whose inverse is finite, too\n");
+    assert_eq!(
+        err(&o),
+        "clutch: smc_2: rig.inertia_kg_m2 = -1: expected a finite number above 0 kg m² whose inverse is finite, too\n"
+    );
     assert!(out(&o).is_empty());
 }
 

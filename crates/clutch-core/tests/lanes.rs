@@ -1,4 +1,11 @@
 //! A vector of lanes that is declared outside of the core: each lane has the bits of the scalar.
+#![allow(
+    clippy::std_instead_of_core,
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    clippy::redundant_closure,
+    reason = "it runs on the host"
+)]
 
 use clutch_core::law::{
     ControlLaw, Limit, OutputParams, Pd, PdParams, Pid, PidParams, Smc, SmcParams, SmcSign, SmcSignParams,

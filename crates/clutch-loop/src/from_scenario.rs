@@ -157,7 +157,7 @@ pub fn in_single_precision(scenario: &Scenario) -> Result<Option<Scenario>, Scen
         return Ok(None);
     }
     let set = [("sampling.scalar".to_owned(), "f32".to_owned())];
-    Scenario::parse(&scenario.name(), &scenario.canonical(), &set).map(Some)
+    Scenario::parse(scenario.name(), &scenario.canonical(), &set).map(Some)
 }
 
 /// The scenario's path from the count on which a run begins: its first point lies within that

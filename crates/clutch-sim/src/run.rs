@@ -41,7 +41,7 @@ params! {
         /// an encoder to a fraction of a count.
         start_counts: Option<f64>, "start_counts" "" COUNTS, Range::above(-1e9).below(1e9);
         /// Seed of everything random: start, ripple phases, noise, a hand.
-        seed: u64 = 1, "seed" "" NONE, Range::within(0.0, 9223372036854775807.0);
+        seed: u64 = 1, "seed" "" NONE, Range::within(0.0, i64::MAX as f64);
         /// What integrates the motion.
         engine: EngineKind = "auto", "engine" "" NONE, Range::ANY;
     }

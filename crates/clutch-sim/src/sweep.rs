@@ -77,14 +77,14 @@ impl Sweep {
     pub fn scenario(&self, row: usize) -> Result<Scenario, ScenarioError> {
         let set: Vec<_> = self.keys.iter().cloned().zip(self.rows[row].iter().cloned()).collect();
         // The first row decides what the keys are, and makes what all rows share.
-        let shared = self.shared.get_or_init(|| self.from_base(&set).ok());
+        let shared = self.shared.get_or_init(|| self.on_base(&set).ok());
         match shared.as_ref().and_then(|scenario| scenario.with(&set)) {
             Some(outcome) => outcome,
-            None => self.from_base(&set),
+            None => self.on_base(&set),
         }
     }
 
-    fn from_base(&self, set: &[(String, Value)]) -> Result<Scenario, ScenarioError> {
+    fn on_base(&self, set: &[(String, Value)]) -> Result<Scenario, ScenarioError> {
         Scenario::from_table(&self.origin, self.base.clone(), set)
     }
 

@@ -27,25 +27,25 @@
 
 use clutch_core::certificate::{Demand, certify, paper_conditions};
 use clutch_core::law::{
-    Command, Controller, Ctc, CtcParams, Law, LawParams, LawTerms, Limit, Output, OutputParams, Pd, PdParams,
-    Smc, SmcParams, SmcSignParams, Terms, Tick,
+    Command, ControlLaw, Ctc, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid, Smc, SmcSign, Terms,
+    Tick,
 };
-use clutch_core::reference::{
-    Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, Reference, ReferenceParams, Sine, Table, Trapezoid,
-};
+use clutch_core::params::{self, Choice, Editor, Params};
+use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Checks, Sample, State, SupervisorState};
 use clutch_core::{
-    Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams, Daq, DerivativeState, Encoder, FixedCounts,
-    Interval, Micros, Observer, ObserverGains, ObserverParams, Plant, PlantParams, Real, SafeCodes, SafeKind,
-    SafeRun, SafeState, Servo, ServoParams, SmoothedDerivative, SmoothedDerivativeParams, StickSlip,
-    StickSlipParams, StickSlipState, Stribeck, StribeckParams, Supervisor, SupervisorParams, Target,
-    Tolerances, VelocityParams, VelocitySource, check_path, sin_cos_turns,
+    Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams, DerivativeState, Encoder, FixedCounts, Friction,
+    FrictionModel, FrictionParams, Interval, Micros, Observer, ObserverGains, ObserverParams, Plant,
+    PlantParams, Real, SafeCodes, SafeKind, SafeRun, SafeState, Servo, ServoParams, SmoothedDerivative,
+    SmoothedDerivativeParams, StickSlip, StickSlipParams, StickSlipState, Stribeck, StribeckParams,
+    Supervisor, SupervisorParams, Target, Tolerances, VelocityParams, VelocitySource, check_path,
+    sin_cos_turns,
 };
 use clutch_node::lockstep::Exchange;
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
-    DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Path, Role, RunParams, Settings, WideCounter,
-    present_code, receive, tick,
+    DaqBoard, Hardware, HostNode, MAX_KNOTS, OneChip, Outbox, Outboxes, Path, Role, RunParams, Settings,
+    WideCounter, present_code, receive, tick,
 };
 use clutch_wire::{BoardState, Configure, Decoder, Hello, StopReason, encode};
 use core::hint::black_box;
@@ -78,6 +78,42 @@ fn fixed() -> FixedCounts {
 
 fn micros() -> Micros {
     Micros(word() as u32)
+}
+
+/// Any values of all that is declared, and any choice.
+struct Any;
+
+impl<T: Real> Editor<T> for Any {
+    fn real<P: params::Table<T>>(&mut self, _: usize, value: &mut T) {
+        *value = real();
+    }
+    fn whole<P: params::Table<T>>(&mut self, _: usize, value: &mut u64) {
+        *value = word();
+    }
+    fn switch<P: params::Table<T>>(&mut self, _: usize, value: &mut bool) {
+        *value = flag();
+    }
+    fn word<P: params::Table<T>>(&mut self, _: usize, value: &mut usize) {
+        *value = word() as usize;
+    }
+    fn present<P: params::Table<T>>(&mut self, _: usize, _: bool) -> bool {
+        flag()
+    }
+    fn enter<P: params::Table<T>>(&mut self, _: usize, _: bool) -> bool {
+        flag()
+    }
+    fn choose<C: Choice<T>>(&mut self, _: usize) -> usize {
+        word() as usize
+    }
+}
+
+/// Parameters of which nothing is known.
+fn any<T: Real, P: Params<T>>() -> P {
+    let mut params = opaque(P::blank());
+    params.edit(&mut Any);
+    let params = opaque(params);
+    sink(made(params.check()));
+    params
 }
 
 /// The same value, about which the optimiser no longer knows anything.
@@ -165,54 +201,23 @@ fn codes<T: Real>() {
     sink(made(micros().period::<T>()));
     let e = encoder::<T>();
     sink((e.counts_per_rev(), e.radians_per_count::<T>(), e.counts_per_radian::<T>()));
-    if let Some(dac) = made(Dac::new(&dac_params::<T>())) {
+    if let Some(dac) = made(Dac::new(&any::<T, DacParams<T>>())) {
         sink((dac.code(real()), dac.volts(DacCode(word() as u16)), dac.step()));
     }
 }
 
-fn dac_params<T: Real>() -> DacParams<T> {
-    sink(DacParams::<T>::default());
-    DacParams { bits: word() as u8, lowest: real(), highest: real() }
-}
-
-fn stribeck_params<T: Real>() -> StribeckParams<T> {
-    sink(StribeckParams::<T>::default());
-    StribeckParams {
-        mu_static: real(),
-        mu_dynamic: real(),
-        stribeck_velocity: real(),
-        stribeck_exponent: real(),
-    }
-}
-
 fn friction<T: Real>() {
-    if let Some(s) = made(Stribeck::new(&stribeck_params::<T>())) {
-        sink((*s.params(), s.magnitude(real()), s.coefficient(real())));
+    sink(made(Stribeck::new(&any::<T, StribeckParams<T>>())));
+    if let Some(f) = made(Friction::build(&any::<T, FrictionParams<T>>())) {
+        sink([f.level(real()), f.coefficient(real()), f.at_rest(), f.sliding()]);
+        sink((f.quick_level(real()), f.envelope(), f.exponential(), made(f.check_divisor())));
     }
-    let geometry = BrakeGeometry::<T> {
-        inner_radius: real(),
-        torque_constant: real(),
-        pad_area: real(),
-        lever_area: real(),
-        armature_resistance: real(),
-        contact_radius: real(),
-    };
+    let geometry = any::<T, BrakeGeometry<T>>();
     sink(made(geometry.brake_gain()));
 }
 
-fn plant_params<T: Real>() -> PlantParams<T> {
-    sink(PlantParams::<T>::default());
-    PlantParams {
-        inertia: real(),
-        drive_torque: real(),
-        viscous_damping: real(),
-        brake_gain: real(),
-        friction: stribeck_params(),
-    }
-}
-
 fn plant<T: Real>() {
-    if let Some(p) = made(Plant::new(&plant_params::<T>())) {
+    if let Some(p) = made(Plant::new(&any::<T, PlantParams<T>>())) {
         sink((*p.params(), *p.friction()));
         sink([p.brake_torque(real(), real()), p.break_away_torque(real()), p.acceleration(real(), real())]);
         sink([p.holding_voltage_static(), p.holding_voltage_sliding()]);
@@ -223,24 +228,17 @@ fn target<T: Real>() -> Target<T> {
     Target { position: fixed(), velocity: real(), acceleration: real() }
 }
 
-/// One of the closed set, by an opaque choice.
-fn velocity_params<T: Real>() -> VelocityParams<T> {
-    match word() {
-        0 => VelocityParams::default(),
-        1 => VelocityParams::SmoothedDerivative(SmoothedDerivativeParams { smoothing: real() }),
-        _ => VelocityParams::Observer(ObserverParams { disturbance_walk: real() }),
-    }
-}
-
 fn velocity<T: Real>() {
-    let p = SmoothedDerivativeParams::<T> { smoothing: real() };
+    let p = any::<T, SmoothedDerivativeParams<T>>();
     if let Some(d) = made(SmoothedDerivative::new(&p, encoder::<T>(), micros())) {
         let mut state = opaque(DerivativeState::at(fixed()));
         sink(d.update(&mut state, fixed()));
         sink(state);
     }
-    let Some(plant) = made(Plant::new(&plant_params::<T>())) else { return };
-    if let Some(v) = made(VelocitySource::new(&velocity_params(), &plant, encoder::<T>(), micros())) {
+    let Some(plant) = made(Plant::new(&any::<T, PlantParams<T>>())) else { return };
+    if let Some(v) =
+        made(VelocitySource::new(&any::<T, VelocityParams<T>>(), &plant, encoder::<T>(), micros()))
+    {
         let mut state = opaque(v.start(fixed(), &target()));
         sink(v.update(&mut state, fixed(), &target(), real()));
         sink(state);
@@ -248,9 +246,8 @@ fn velocity<T: Real>() {
 }
 
 fn observer<T: Real>() {
-    let Some(plant) = made(Plant::new(&plant_params::<T>())) else { return };
-    sink(ObserverParams::<T>::default());
-    let p = ObserverParams { disturbance_walk: real() };
+    let Some(plant) = made(Plant::new(&any::<T, PlantParams<T>>())) else { return };
+    let p = any::<T, ObserverParams<T>>();
     sink(made(Observer::new(&p, &plant, encoder::<T>(), micros())));
     let gains = ObserverGains { position: real(), velocity: real(), disturbance: real() };
     if let Some(o) = made(Observer::with_gains(&gains, &plant, encoder::<T>(), micros())) {
@@ -260,88 +257,45 @@ fn observer<T: Real>() {
     }
 }
 
-fn output_params<T: Real>() -> OutputParams<T> {
-    sink(OutputParams::<T>::default());
-    OutputParams { lowest: real(), highest: real(), on_invalid: real(), bumpless_time: real() }
-}
-
-fn law_params<T: Real>() -> LawParams<T> {
-    match word() {
-        0 => LawParams::Pd(PdParams { kp: real(), kd: real() }),
-        1 => LawParams::Ctc(CtcParams { outer_gain: real(), kp: real(), kd: real() }),
-        2 => LawParams::Smc(SmcParams { kp: real(), kd: real(), slope: real(), boundary: real() }),
-        3 => LawParams::SmcSign(SmcSignParams { kp: real(), kd: real(), slope: real() }),
-        4 => LawParams::Pd(PdParams::default()),
-        5 => LawParams::Ctc(CtcParams::default()),
-        6 => LawParams::Smc(SmcParams::default()),
-        _ => LawParams::SmcSign(SmcSignParams::default()),
-    }
-}
-
 /// Start and update of any law.
-fn runs<T: Real, C: Controller<T>>(law: Option<C>) {
+fn runs<T: Real, C: ControlLaw<T>>(law: Option<C>) {
     let Some(law) = law else { return };
     let tick =
         Tick { error: real::<T>(), error_rate: real(), target_velocity: real(), target_acceleration: real() };
     sink(tick.velocity());
     let mut state = opaque(law.start(&tick, real()));
     let Command { voltage, limit, terms } = law.update(&mut state, &tick);
-    sink((voltage, limit == Limit::Invalid, terms.columns()));
+    black_box(terms.values());
+    sink((voltage, limit, law.term_names().len()));
     sink(state);
 }
 
 fn laws<T: Real>() {
     sink(LawTerms::<T>::default());
-    let (model, out) = (plant_params::<T>(), output_params::<T>());
+    let (model, out) = (any::<T, PlantParams<T>>(), any::<T, OutputParams<T>>());
     if let Some(o) = made(Output::new(&out, micros())) {
         let mut state = opaque(o.start(real(), real()));
         sink((o.lowest(), o.highest(), o.apply(&mut state, real())));
         sink(state);
     }
-    let law = made(Law::new(&law_params(), &model, &out, micros()));
+    let law = made(Law::new(&any::<T, LawParams<T>>(), &model, &out, micros()));
     sink(law.as_ref().map(|l| *l.output()));
     runs(law);
+    sink(law.as_ref().map(|l| l.terms_of(&opaque([real(); 9]))));
     // Each law also alone: a board may hold only one.
-    let pd = made(Pd::new(&PdParams { kp: real(), kd: real() }, &out, micros()));
-    sink(pd.as_ref().map(|l| (*l.params(), *l.output())));
-    runs(pd);
-    let p = CtcParams { outer_gain: real(), kp: real(), kd: real() };
-    let ctc = made(Ctc::new(&p, &model, &out, micros()));
-    sink(ctc.as_ref().map(|l| (*l.params(), *l.model(), *l.output())));
-    runs(ctc);
-    let p = SmcParams { kp: real(), kd: real(), slope: real(), boundary: real() };
-    let smc = made(Smc::new(&p, &out, micros()));
-    sink(smc.as_ref().map(|l| ([l.kp(), l.kd(), l.slope(), l.boundary()], *l.output())));
-    runs(smc);
-    let p = SmcSignParams { kp: real(), kd: real(), slope: real() };
-    runs(made(Smc::with_sign(&p, &out, micros())));
+    runs(made(Pd::new(&any(), &out, micros())));
+    runs(made(Ctc::new(&any(), &model, &out, micros())));
+    runs(made(Smc::new(&any(), &out, micros())));
+    runs(made(SmcSign::new(&any(), &out, micros())));
+    runs(made(Pid::new(&any(), &out, micros())));
 }
 
 fn reference_params<T: Real>(knots: &[Knot]) -> ReferenceParams<'_, T> {
-    match word() {
-        0 => ReferenceParams::Hold,
-        1 => ReferenceParams::Ramp(real()),
-        2 => ReferenceParams::Trapezoid(Trapezoid { distance: real(), speed: real(), acceleration: real() }),
-        3 => ReferenceParams::JerkLimited(JerkLimited {
-            distance: real(),
-            speed: real(),
-            acceleration: real(),
-            jerk: real(),
-        }),
-        4 => ReferenceParams::MinimumJerk(MinimumJerk { distance: real(), duration: real() }),
-        5 => {
-            ReferenceParams::Sine(Sine { rate: real(), amplitude: real(), frequency: real(), phase: real() })
+    match any() {
+        ReferenceParams::Table(Table { interpolation, .. }) => {
+            ReferenceParams::Table(Table { knots, interpolation })
         }
-        6 => ReferenceParams::Chirp(Chirp {
-            rate: real(),
-            amplitude: real(),
-            from: real(),
-            to: real(),
-            duration: real(),
-            phase: real(),
-        }),
-        7 => ReferenceParams::Table(Table { knots, interpolation: Interpolation::Linear }),
-        _ => ReferenceParams::Table(Table { knots, interpolation: Interpolation::Cubic }),
+        other => other,
     }
 }
 
@@ -355,18 +309,11 @@ fn references<T: Real>() {
 }
 
 fn bounds<T: Real>() -> Option<Bounds<T>> {
-    let t = Tolerances {
-        inertia: real(),
-        drive_torque: real(),
-        viscous_damping: real(),
-        brake_gain: real(),
-        friction: real(),
-    };
-    made(Bounds::around(&plant_params::<T>(), &t))
+    made(Bounds::around(&any::<T, PlantParams<T>>(), &any()))
 }
 
 fn certificate<T: Real>() {
-    sink((Tolerances::<T>::default(), Demand::<T>::default()));
+    sink(Demand::<T>::default());
     let Some(b) = bounds::<T>() else { return };
     sink([b.weakest_brake(), b.strongest_brake()]);
     let demand = Demand {
@@ -377,7 +324,12 @@ fn certificate<T: Real>() {
         velocity_jump: real(),
     };
     sink(paper_conditions(&b, &demand, real(), real()));
-    let Some(law) = made(Law::new(&law_params(), &plant_params(), &output_params(), micros())) else {
+    let Some(law) = made(Law::new(
+        &any::<T, LawParams<T>>(),
+        &any::<T, PlantParams<T>>(),
+        &any::<T, OutputParams<T>>(),
+        micros(),
+    )) else {
         return;
     };
     if let Some(c) = made(certify(&law, &b, &demand)) {
@@ -386,7 +338,10 @@ fn certificate<T: Real>() {
 }
 
 fn feasibility<T: Real>() {
-    let (Some(b), Some(out)) = (bounds::<T>(), made(Output::new(&output_params(), micros()))) else { return };
+    let (Some(b), Some(out)) = (bounds::<T>(), made(Output::new(&any::<T, OutputParams<T>>(), micros())))
+    else {
+        return;
+    };
     let knots = opaque([Knot { time_us: word(), position: fixed() }; 3]);
     let Some(path) = made(Reference::new(&reference_params(&knots), fixed(), encoder::<T>(), micros()))
     else {
@@ -398,8 +353,7 @@ fn feasibility<T: Real>() {
 }
 
 fn stick_slip<T: Real>() {
-    sink(StickSlipParams::<T>::default());
-    let p = StickSlipParams { gap: real::<T>(), ticks: word() as u32 };
+    let p = any::<T, StickSlipParams<T>>();
     if let Some(d) = made(StickSlip::new(&p, encoder::<T>(), micros())) {
         let mut state = opaque(StickSlipState::default());
         sink(d.update(&mut state, Counts(word() as i32), real()));
@@ -408,30 +362,16 @@ fn stick_slip<T: Real>() {
     }
 }
 
-/// A board of opaque answers.
-struct Board;
-
-impl Daq for Board {
-    type Error = u8;
-    fn read(&mut self) -> Result<Counts, u8> {
-        if word() == 0 { Err(0) } else { Ok(Counts(word() as i32)) }
-    }
-    fn write(&mut self, code: DacCode) -> Result<(), u8> {
-        sink(code);
-        if word() == 0 { Err(1) } else { Ok(()) }
-    }
-}
-
 fn servo<T: Real>() {
-    sink(ServoParams::<T>::paper(law_params()));
+    sink(ServoParams::<T>::paper(any::<T, _>()));
     let p = servo_params::<T>();
     turns(made(Servo::new(&p)));
-    if let Some(pd) = made(Pd::new(&PdParams { kp: real(), kd: real() }, &p.output, p.period)) {
+    if let Some(pd) = made(Pd::new(&any(), &p.output, p.period)) {
         turns(made(Servo::with_law(&p, pd)));
     }
 }
 
-fn turns<T: Real, C: Controller<T>>(servo: Option<Servo<T, C>>) {
+fn turns<T: Real, C: ControlLaw<T>>(servo: Option<Servo<T, C>>) {
     let Some(servo) = servo else { return };
     sink((servo.encoder(), *servo.dac(), servo.period()));
     black_box(servo.law());
@@ -441,7 +381,6 @@ fn turns<T: Real, C: Controller<T>>(servo: Option<Servo<T, C>>) {
     sink(servo.tick_at(&mut state, fixed(), &target()));
     let (next, steps) = (target(), (word() as u32, word() as u32));
     servo.bridge(&mut state, (Counts(word() as i32), &next), &target(), steps);
-    sink(servo.run(&mut state, &mut Board, &target()));
     sink(state);
 }
 
@@ -449,16 +388,17 @@ fn casts<T: Real, U: Real>() {
     sink(target::<T>().cast::<U>());
     sink(ObserverGains::<T> { position: real(), velocity: real(), disturbance: real() }.cast::<U>());
     let p = ServoParams::<T> {
-        dac: dac_params(),
-        velocity: velocity_params(),
-        model: plant_params(),
-        output: output_params(),
-        ..ServoParams::paper(law_params())
+        dac: any::<T, _>(),
+        velocity: any::<T, _>(),
+        model: any::<T, _>(),
+        output: any::<T, _>(),
+        ..ServoParams::paper(any::<T, _>())
     };
     sink(p.cast::<U>());
-    sink(StickSlipParams::<T> { gap: real(), ticks: word() as u32 }.cast::<U>());
-    sink(Tolerances::<T>::default().cast::<U>());
-    sink(Interval::<T> { low: real(), high: real() }.cast::<U>());
+    sink(any::<T, StickSlipParams<T>>().cast::<U>());
+    sink(any::<T, Tolerances<T>>().cast::<U>());
+    sink(any::<T, Interval<T>>().cast::<U>());
+    sink(any::<T, ReferenceParams<'_, T>>().cast::<U>());
     sink(bounds::<T>().map(|b| b.cast::<U>()));
 }
 
@@ -466,20 +406,10 @@ fn flag() -> bool {
     word() != 0
 }
 
-/// One of the closed set, by an opaque choice.
-fn on_fault<T: Real>() -> SafeState<T> {
-    match word() {
-        0 => SafeState::Hold { volts: real() },
-        1 => SafeState::Ramp { volts_per_s: real(), volts: real() },
-        2 => SafeState::Release,
-        _ => SafeState::HoldThenRelease { volts: real(), after: real() },
-    }
-}
-
 fn safe_state<T: Real, U: Real>() {
-    let state = opaque(on_fault::<T>());
+    let state = any::<T, SafeState<T>>();
     sink((state.cast::<U>(), state.holding_voltage()));
-    let Some(dac) = made(Dac::new(&dac_params::<T>())) else { return };
+    let Some(dac) = made(Dac::new(&any::<T, DacParams<T>>())) else { return };
     sink(made(SafeCodes::new(&state, &dac, micros())));
     // Any numbers, also such as no constructor gives: a board takes them from the wire.
     let codes = SafeCodes {
@@ -503,34 +433,17 @@ fn servo_params<T: Real>() -> ServoParams<T> {
     ServoParams {
         period: micros(),
         encoder: encoder::<T>(),
-        dac: dac_params(),
-        velocity: velocity_params(),
-        model: plant_params(),
-        law: law_params(),
-        output: output_params(),
+        dac: any::<T, _>(),
+        velocity: any::<T, _>(),
+        model: any::<T, _>(),
+        law: any::<T, _>(),
+        output: any::<T, _>(),
     }
 }
 
 fn supervisor_params<T: Real>() -> SupervisorParams<T> {
-    sink(SupervisorParams::new(on_fault::<T>()));
-    SupervisorParams {
-        on_fault: on_fault(),
-        speed_limit: real(),
-        jump: real(),
-        jumps: word() as u32,
-        good_samples: word() as u32,
-        following_error: real(),
-        following_time: real(),
-        saturation_time: real(),
-        stand_still: real(),
-        friction_margin: real(),
-        lost: word() as u32,
-        late: word() as u32,
-        disorder: word() as u32,
-        silence_cycles: word() as u32,
-        deadline: micros(),
-        overruns: word() as u32,
-    }
+    sink(SupervisorParams::new(any::<T, SafeState<T>>()));
+    SupervisorParams { on_fault: any(), speed: any(), limits: any() }
 }
 
 fn checked_supervisor<T: Real>() -> Option<(Servo<T>, Supervisor<T>)> {
@@ -770,10 +683,7 @@ fn sent() {
         bounds: &bounds,
         reference: &reference_params(knots),
         start: fixed(),
-        watchdog: micros(),
-        valid: micros(),
-        silence: micros(),
-        host_silence: micros(),
+        times: any::<f32, _>(),
         ticks: word(),
     };
     if let Some(settings) = made(Settings::new(&run)) {
@@ -784,14 +694,9 @@ fn sent() {
     let settings = opaque(settings);
     settings.each(|key, value| sink((key, value)));
     if let Some(built) = made(settings.build()) {
-        target_of(&built.path, settings.points());
-        target_of(&built.path, knots);
-        host_node(&built.path, knots);
+        sink(built.path.target(settings.knots(), word()));
+        host_node(&built.path, settings.knots());
     }
-}
-
-fn target_of(path: &Path, knots: &[Knot]) {
-    sink(path.target(knots, word()));
 }
 
 fn board_controller() {
@@ -815,7 +720,7 @@ fn board_controller() {
     }
 }
 
-fn host_node(path: &Path, knots: &[Knot]) {
+fn host_node(path: &Path, knots: &[Knot; MAX_KNOTS]) {
     let Some(servo) = made(Servo::new(&servo_params())) else { return };
     let configure = Configure {
         run: word() as u16,

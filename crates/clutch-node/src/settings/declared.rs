@@ -117,7 +117,11 @@ impl fmt::Display for Name {
     }
 }
 
-#[allow(clippy::indexing_slicing, clippy::panic, reason = "at compile time, where it is an error of the compiler's")]
+#[allow(
+    clippy::indexing_slicing,
+    clippy::panic,
+    reason = "at compile time, where it is an error of the compiler's"
+)]
 const fn hash_table(mut hash: u64, name: Name, table: &TableInfo) -> u64 {
     let mut i = 0;
     while i < table.rows.len() {

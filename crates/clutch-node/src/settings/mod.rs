@@ -167,9 +167,9 @@ impl Settings {
 
     /// Every setting as its key and its value on the wire, the points of a table last.
     pub fn each(&self, mut f: impl FnMut(u16, u64)) {
-        for ((key, value), set) in (0..).zip(&self.values).zip(&self.set) {
-            if *set {
-                f(key, *value);
+        for key in 0..SETTINGS as u16 {
+            if let Some(value) = self.get(key) {
+                f(key, value);
             }
         }
         let mut key = FIRST_KNOT;

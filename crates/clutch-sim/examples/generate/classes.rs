@@ -1,6 +1,6 @@
 //! Python's classes: which there are, and what the declarations do not say of them.
 
-use crate::places::Place;
+use super::places::Place;
 use clutch_core::params::{ChoiceInfo, TableInfo};
 
 /// What a class has that its declaration does not say. A class without a line here is named after its table, and its

@@ -1,14 +1,15 @@
-//! Writes what follows from the declarations of parameters and is kept in the tree: Python's classes, the tables of
-//! documentation, the schema of scenario files.
+//! Writes what follows from the declarations of parameters and figures and is kept in the tree: Python's classes, tables
+//! of the documentation, the schema of scenario files. A test compares.
 //!
 //! `cargo xtask generate [--check]`
 
 mod classes;
+mod metrics;
 mod pages;
 mod places;
 mod python;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 fn main() -> Result<(), String> {
     let check = match std::env::args().skip(1).collect::<Vec<_>>().as_slice() {
@@ -16,41 +17,44 @@ fn main() -> Result<(), String> {
         [flag] if flag == "--check" => true,
         other => return Err(format!("{other:?}: expected nothing or --check")),
     };
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let places = places::places();
-    let classes = classes::classes(&places)?;
-    let schema = format!("{:#}\n", clutch_sim::scenario::schema());
-    let mut made =
-        vec![("python/clutch/_tables.py", python::module(&classes)), ("docs/scenario.schema.json", schema)];
-    for (page, sections) in [
-        ("docs/scenario.md", &pages::keys as &dyn Fn(&_, &_) -> _),
-        ("docs/notation.md", &pages::symbols),
-        ("docs/api.md", &|page, places| pages::references(page, places, &classes)),
-    ] {
-        let text = read(&root.join(page))?;
-        made.push((page, sections(&text, &places).map_err(|e| format!("{page}: {e}"))?));
+    let stale = stale()?;
+    if check && !stale.is_empty() {
+        let names: Vec<&str> = stale.iter().map(|(name, _)| *name).collect();
+        let names = names.join(", ");
+        return Err(format!("not what the declarations give: {names}; run `cargo xtask generate`"));
     }
-    let mut stale = Vec::new();
-    for (name, text) in made {
-        let path = root.join(name);
-        if read(&path).unwrap_or_default() == text {
-            continue;
-        }
-        if check {
-            stale.push(name);
-        } else {
-            std::fs::write(&path, text).map_err(|e| format!("{name}: {e}"))?;
-            println!("wrote {name}");
-        }
+    for (name, text) in stale {
+        std::fs::write(path(name), text).map_err(|e| format!("{name}: {e}"))?;
+        println!("wrote {name}");
     }
-    match stale.as_slice() {
-        [] => Ok(()),
-        names => {
-            Err(format!("not what the declarations give: {}; run `cargo xtask generate`", names.join(", ")))
-        }
-    }
+    Ok(())
 }
 
-fn read(path: &Path) -> Result<String, String> {
-    std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))
+/// Files that are not what the declarations give, with what they should be.
+pub(crate) fn stale() -> Result<Vec<(&'static str, String)>, String> {
+    let mut all = made()?;
+    all.retain(|(name, text)| read(name).unwrap_or_default() != *text);
+    Ok(all)
+}
+
+fn made() -> Result<Vec<(&'static str, String)>, String> {
+    let places = places::places();
+    let classes = classes::classes(&places)?;
+    let keys = pages::keys(&read("docs/scenario.md")?, &places)?;
+    Ok(vec![
+        ("python/clutch/_tables.py", python::module(&classes)),
+        ("python/clutch/_metrics.py", metrics::python()),
+        ("docs/scenario.schema.json", format!("{:#}\n", clutch_sim::scenario::schema())),
+        ("docs/scenario.md", metrics::page(&keys).ok_or("docs/scenario.md: no markers of metrics")?),
+        ("docs/notation.md", pages::symbols(&read("docs/notation.md")?, &places)?),
+        ("docs/api.md", pages::references(&read("docs/api.md")?, &places, &classes)?),
+    ])
+}
+
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(name)
+}
+
+fn read(name: &str) -> Result<String, String> {
+    std::fs::read_to_string(path(name)).map_err(|e| format!("{name}: {e}"))
 }

@@ -3,8 +3,8 @@
 //! `<!-- keys:begin rig model -->` … `<!-- keys:end -->` takes every table at and below `rig` and `model`, but for those
 //! of which another marker of the page names a longer key; `.` is the file itself.
 
-use crate::classes::Class;
-use crate::places::{Place, default_at, join};
+use super::classes::Class;
+use super::places::{Place, default_at, join};
 use clutch_core::params::{Info, Kind, Nested, Row};
 use clutch_sim::scenario::describe::{
     Entry, default_option, entries, expected, meaning, paragraphs, row_is_required, table_is_required,

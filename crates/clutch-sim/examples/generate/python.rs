@@ -1,7 +1,7 @@
 //! Python's classes: `python/clutch/_tables.py`.
 
-use crate::classes::{Class, name, union};
-use crate::places::{Place, default_at, join};
+use super::classes::{Class, name, union};
+use super::places::{Place, default_at, join};
 use clutch_core::params::{ChoiceInfo, Info, Kind, Nested, Row, TableInfo, UNITS};
 use clutch_sim::scenario::describe::{
     Entry, capital, default_option, description, entries, paragraphs, table_is_required,
