@@ -27,7 +27,7 @@ macro_rules! named {
         impl $name {
             /// From the number in a record.
             #[must_use]
-            pub fn from_number(number: u8) -> Option<Self> {
+            pub const fn from_number(number: u8) -> Option<Self> {
                 match number { $($number => Some($name::$value),)* _ => None }
             }
 

@@ -45,6 +45,52 @@ pub struct BoardParams {
     pub boot_code: u16,
 }
 
+impl BoardParams {
+    /// Checks them. A board whose numbers are constants checks them when it is compiled: refused at run time, they
+    /// would leave an image that does nothing, and an optimiser removes the rest of it without a word.
+    ///
+    /// ```
+    /// # use clutch_node::BoardParams;
+    /// const PARAMS: BoardParams = BoardParams {
+    ///     board: 4711,
+    ///     boot: 0,
+    ///     counts_per_rev: 20_000,
+    ///     dac_bits: 12,
+    ///     dac_lowest_mv: 0,
+    ///     dac_highest_mv: 10_000,
+    ///     period_min_us: 500,
+    ///     period_max_us: 4000,
+    ///     watchdog_max_us: 100_000,
+    ///     boot_code: 1844,
+    /// };
+    /// const _: () = assert!(PARAMS.check().is_ok());
+    /// ```
+    ///
+    /// # Errors
+    /// The first parameter that no board can have.
+    pub const fn check(&self) -> Result<(), BoardMisfit> {
+        Err(if self.dac_bits < 1 || self.dac_bits > 16 {
+            BoardMisfit::DacBits(self.dac_bits)
+        } else if self.dac_highest_mv <= self.dac_lowest_mv {
+            BoardMisfit::DacHighest(self.dac_highest_mv)
+        } else if self.boot_code > self.top() {
+            BoardMisfit::BootCode(self.boot_code)
+        } else if self.period_min_us == 0 || self.period_min_us > self.period_max_us {
+            BoardMisfit::PeriodMin(self.period_min_us)
+        } else if self.watchdog_max_us / 2 < self.period_min_us {
+            BoardMisfit::WatchdogMax(self.watchdog_max_us)
+        } else {
+            return Ok(());
+        })
+    }
+
+    /// The converter's highest code.
+    const fn top(&self) -> u16 {
+        let bits = if self.dac_bits < 16 { self.dac_bits } else { 16 };
+        ((1_u32 << bits) - 1) as u16
+    }
+}
+
 /// Why a board cannot be as its parameters say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoardMisfit {
@@ -115,15 +161,10 @@ impl BoardNode {
     /// A board at power-up.
     ///
     /// # Errors
-    /// The first parameter that no board can have.
+    /// Those of [`BoardParams::check`].
     pub fn new(p: &BoardParams) -> Result<Self, BoardMisfit> {
-        if !(1..=16).contains(&p.dac_bits) {
-            return Err(BoardMisfit::DacBits(p.dac_bits));
-        }
-        if p.dac_highest_mv <= p.dac_lowest_mv {
-            return Err(BoardMisfit::DacHighest(p.dac_highest_mv));
-        }
-        let board = BoardNode {
+        p.check()?;
+        Ok(BoardNode {
             params: *p,
             decoder: Decoder::new(),
             state: BoardState::Boot,
@@ -142,17 +183,7 @@ impl BoardNode {
             late: false,
             safe_under_way: false,
             armed_at: 0,
-        };
-        if p.boot_code > board.top() {
-            return Err(BoardMisfit::BootCode(p.boot_code));
-        }
-        if p.period_min_us == 0 || p.period_min_us > p.period_max_us {
-            return Err(BoardMisfit::PeriodMin(p.period_min_us));
-        }
-        if p.watchdog_max_us / 2 < p.period_min_us {
-            return Err(BoardMisfit::WatchdogMax(p.watchdog_max_us));
-        }
-        Ok(board)
+        })
     }
 
     /// The code that the converter is to give now.
@@ -194,10 +225,6 @@ impl BoardNode {
 
     fn driving(&self) -> bool {
         matches!(self.state, BoardState::Armed | BoardState::Running)
-    }
-
-    fn top(&self) -> u16 {
-        ((1_u32 << self.params.dac_bits.min(16)) - 1) as u16
     }
 
     /// Bytes from the controller.
@@ -330,7 +357,7 @@ impl BoardNode {
     fn configure(&mut self, m: &Configure, out: &mut Outbox) {
         let p = &self.params;
         let safe_kind = clutch_wire::SafeKind::from_u8(m.safe_kind);
-        let codes_fit = m.hold_code <= self.top() && m.release_code <= self.top();
+        let codes_fit = m.hold_code <= self.params.top() && m.release_code <= self.params.top();
         let never_arrives = safe_kind == Some(clutch_wire::SafeKind::Ramp) && m.ramp_step == 0;
         let again = self.state == BoardState::Ready && m.run == self.run && m.config == self.config;
         let spent = m.run == self.run && self.state != BoardState::Boot && !again;
@@ -407,7 +434,7 @@ impl BoardNode {
     }
 
     fn actuate(&mut self, now_us: u32, m: &clutch_wire::Actuate, out: &mut Outbox) {
-        if m.code > self.top() {
+        if m.code > self.params.top() {
             let refused = Refused {
                 request: clutch_wire::Actuate::KIND,
                 reason: Refusal::Code as u8,

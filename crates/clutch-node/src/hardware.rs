@@ -103,7 +103,7 @@ impl DaqBoard {
     /// At power-up.
     ///
     /// # Errors
-    /// Those of [`BoardNode::new`].
+    /// Those of [`BoardParams::check`].
     pub fn new(params: &BoardParams) -> Result<Self, BoardMisfit> {
         Ok(DaqBoard { node: BoardNode::new(params)?, outbox: Outbox::default() })
     }

@@ -24,7 +24,7 @@ impl OneChip {
     /// A chip at power-up.
     ///
     /// # Errors
-    /// As [`BoardNode::new`].
+    /// Those of [`BoardParams::check`].
     pub fn new(controller: BoardControllerParams, board: &BoardParams) -> Result<Self, BoardMisfit> {
         Ok(OneChip {
             controller: BoardController::new(controller),

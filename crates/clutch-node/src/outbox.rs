@@ -15,11 +15,17 @@ pub struct Outbox {
 
 impl Default for Outbox {
     fn default() -> Self {
-        Outbox { bytes: [0; CAPACITY], used: 0, dropped: 0 }
+        Outbox::new()
     }
 }
 
 impl Outbox {
+    /// Nothing to be written.
+    #[must_use]
+    pub const fn new() -> Outbox {
+        Outbox { bytes: [0; CAPACITY], used: 0, dropped: 0 }
+    }
+
     /// Adds a frame.
     pub fn push(&mut self, message: &Message) {
         self.append(encode(message).as_bytes());

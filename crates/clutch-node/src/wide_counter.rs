@@ -13,7 +13,7 @@ pub struct WideCounter {
 impl WideCounter {
     /// Begins at 0, with the timer at `raw`.
     #[must_use]
-    pub fn new(raw: u16) -> Self {
+    pub const fn new(raw: u16) -> Self {
         WideCounter { last: raw, counts: Counts(0) }
     }
 

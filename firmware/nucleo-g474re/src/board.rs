@@ -33,6 +33,21 @@ const COUNTS_PER_REV: u32 = 20_000;
 /// Enter the values that you measure at the brake's terminals, here and in the scenario.
 const DRIVER_MV: (i32, i32) = (0, 10_000);
 
+/// What the board is, but for what each has of its own: serial number, and number of the power-up.
+const PARAMS: BoardParams = BoardParams {
+    board: 0,
+    boot: 0,
+    counts_per_rev: COUNTS_PER_REV,
+    dac_bits: 12,
+    dac_lowest_mv: DRIVER_MV.0,
+    dac_highest_mv: DRIVER_MV.1,
+    period_min_us: 500,
+    period_max_us: 4000,
+    watchdog_max_us: 100_000,
+    boot_code: BOOT_CODE.0,
+};
+const _: () = assert!(PARAMS.check().is_ok(), "a number above is out of range: see BoardParams::check");
+
 /// Baud rate of the debugger's serial port, which is the host's.
 const BAUD: u32 = 921_600;
 
@@ -136,18 +151,7 @@ impl Board {
     /// checks, and no `f64` of an error's value is left in the image.
     #[must_use]
     pub fn params(&self) -> BoardParams {
-        BoardParams {
-            board: self.board,
-            boot: self.boot,
-            counts_per_rev: COUNTS_PER_REV,
-            dac_bits: 12,
-            dac_lowest_mv: DRIVER_MV.0,
-            dac_highest_mv: DRIVER_MV.1,
-            period_min_us: 500,
-            period_max_us: 4000,
-            watchdog_max_us: 100_000,
-            boot_code: BOOT_CODE.0,
-        }
+        BoardParams { board: self.board, boot: self.boot, ..PARAMS }
     }
 }
 
