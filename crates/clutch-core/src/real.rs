@@ -38,7 +38,7 @@ pub trait Real:
     const PI: Self;
     /// The distance from 1 to the next larger value.
     const EPSILON: Self;
-    /// The largest argument of [`Real::exp_neg`].
+    /// The largest argument of [`Arithmetic::exp_neg`].
     const EXP_NEG_MAX: Self;
 
     /// The nearest value to `x`.

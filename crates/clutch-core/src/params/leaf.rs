@@ -3,7 +3,7 @@
 use super::{Editor, Kind, Range, Table, Unit};
 use crate::{Micros, Real};
 
-/// The type of a field that a row of [`params!`](crate::params) declares.
+/// The type of a field that a row of [`params!`](crate::params!) declares.
 pub trait Leaf<T: Real>: Clone {
     /// Its kind.
     const KIND: Kind;

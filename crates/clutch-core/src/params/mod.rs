@@ -1,4 +1,4 @@
-//! Parameters, each declared once: [`params!`](crate::params) declares a table, [`choice!`](crate::choice)
+//! Parameters, each declared once: [`params!`](crate::params!) declares a table, [`choice!`](crate::choice)
 //! one of several, [`words!`](crate::words) one of several words.
 //!
 //! A row gives the field, its key with its unit, its symbol, its range, its default and its meaning. From it

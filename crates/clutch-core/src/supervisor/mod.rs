@@ -17,7 +17,7 @@
 //! Every sample passes a gate before it touches the law: sequence, board's status, plausible
 //! counts, plausible target. What does not pass is not answered; the board keeps its code for at
 //! most its watchdog's three cycles, then goes to the safe state by itself. After a sample that
-//! was refused the law answers again once [`SupervisorParams::good_samples`] have passed in a row.
+//! was refused the law answers again once [`LimitParams::good_samples`] have passed in a row.
 //!
 //! | check | fails when |
 //! |---|---|
