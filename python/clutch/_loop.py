@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from clutch import _clutch
+from clutch._metrics import Metrics
 from clutch._model import Scenario
-from clutch._run import Metrics, ScenarioLike, as_scenario
+from clutch._run import ScenarioLike, as_scenario
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -438,9 +438,9 @@ def test_every_number_of_every_class_is_tried_out_of_its_range():
         ({"law": clutch.Pid(tracking_time_s=1e-4)}, "law.pid.tracking_time_s", 1e-4),
         ({"output": clutch.Output(highest_v=12)}, "output.highest_v", 12.0),
         (
-            {"rig": clutch.Rig(brake_gain_nm_v=clutch.BrakeGeometry(**GEOMETRY | {"contact_radius_m": 1e-310}))},
+            {"rig": clutch.Rig(brake_gain_nm_v=clutch.BrakeGeometry(**GEOMETRY | {"contact_radius_m": 1e-312}))},
             "rig.brake_geometry.contact_radius_m",
-            1e-310,
+            1e-312,
         ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

@@ -34,6 +34,8 @@ enum Verb {
     Test,
     /// Runs only the tests of the wheel: builds it, installs it outside this tree, tests it there.
     Wheel,
+    /// Runs only the tests of what boards take (the core for their targets, link tests, images, budgets), and fuzzing.
+    Boards,
     /// Runs the steps of CI: check, package, msrv, semver, then test.
     Ci,
     /// Runs the benchmarks (criterion) with the arguments that follow: `cargo xtask bench -- law`.
@@ -114,6 +116,7 @@ fn main() -> Result<()> {
         Verb::Check => check(),
         Verb::Test => test::all(),
         Verb::Wheel => test::wheel(),
+        Verb::Boards => test::boards(),
         Verb::Ci => {
             test::targets()?; // the lints of the images need theirs
             check()?;
@@ -137,7 +140,7 @@ fn main() -> Result<()> {
         Verb::Latency { rest } => {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
-        Verb::Stubs => stubs::generate(&python::interpreter()?, false).map(drop),
+        Verb::Stubs => stubs::generate(&python::interpreter()?),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),
         Verb::Size { revisions } => size::print(&revisions),
         Verb::Generate { check } => generate(if check { &["--check"] } else { &[] }),

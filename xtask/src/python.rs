@@ -1,6 +1,6 @@
 //! Python: a private environment for tools, and the wheel in one of its own.
 
-use crate::run::{Program, cargo, program, root};
+use crate::run::{Program, program, root};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,7 @@ fn make_environment(python: &Path, venv: &Path, args: &[&str]) -> Result<()> {
     let (made, text) = make().context("the tests need Python 3.11 or later as `python3`")?;
     if !made {
         // Debian keeps ensurepip in a package of its own.
-        install_debian("python3-venv").with_context(|| format!("python3 -m venv failed:\n{text}"))?;
+        install_debian(&["python3-venv"]).with_context(|| format!("python3 -m venv failed:\n{text}"))?;
         let (made, text) = make()?;
         if !made {
             bail!("python3 -m venv failed:\n{text}");
@@ -52,10 +52,12 @@ pub(crate) fn beside(python: &Path, name: &str) -> PathBuf {
 
 /// The wheel in an environment of its own, outside of this tree.
 pub(crate) struct Wheel {
-    /// Its folder, gone when this is dropped.
+    /// Holds the unpacked source distribution and the environment; gone when this is dropped.
     folder: PathBuf,
-    /// Its interpreter.
-    pub(crate) python: PathBuf,
+    /// The unpacked source distribution.
+    source: PathBuf,
+    /// The environment's interpreter.
+    python: PathBuf,
 }
 
 impl Drop for Wheel {
@@ -68,45 +70,55 @@ impl Wheel {
     /// Builds the source distribution, from it the wheel, and installs that. The test tools are
     /// visible from `tools`, the environment of [`interpreter`].
     pub(crate) fn install(tools: &Path) -> Result<Wheel> {
-        let (dist, target) = (root().join("target/dist"), root().join("target"));
+        let dist = root().join("target/dist");
         let _ = std::fs::remove_dir_all(&dist);
+        let folder = std::env::temp_dir().join(format!("clutch-wheel-{}", std::process::id()));
+        let environment = folder.join("environment");
+        let _ = std::fs::remove_dir_all(&folder);
+        let unpacked = folder.join("unpacked");
+        std::fs::create_dir_all(&unpacked).with_context(|| folder.display().to_string())?;
         program(beside(tools, "maturin")).args(["sdist", "--out"]).arg(&dist).run()?;
-        let sdist = the_one(&dist, "tar.gz")?;
+        // With the time of now (-m): maturin packs each file with one date, and cargo would not see a change.
+        program("tar").arg("-xmf").arg(the_one(&dist, ".tar.gz")?).arg("-C").arg(&unpacked).run()?;
+        let source = the_one(&unpacked, "")?;
+        let wheel = Wheel { folder, source, python: environment.join("bin/python") };
         let pip = |python: &Path| program(python).args(["-m", "pip", "--disable-pip-version-check"]);
         // A separate build environment would download maturin once more.
-        pip(tools)
+        wheel
+            .built(pip(tools), tools)?
             .args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"])
             .arg(&dist)
-            .arg(&sdist)
-            .env("CARGO_TARGET_DIR", &target)
-            .env("PATH", path_with(tools)?)
+            .arg(&wheel.source)
             .run()?;
-        let folder = std::env::temp_dir().join(format!("clutch-wheel-{}", std::process::id()));
-        make_environment(tools, &folder, &["--clear", "--without-pip"])?;
-        let wheel = Wheel { python: folder.join("bin/python"), folder };
+        make_environment(tools, &environment, &["--without-pip"])?;
         pip(tools)
             .arg("--python")
             .arg(&wheel.python)
             .args(["install", "--quiet", "--no-deps"])
-            .arg(the_one(&dist, "whl")?)
+            .arg(the_one(&dist, ".whl")?)
             .run()?;
-        let (found, site) = program(tools)
-            .args(["-c", "import sysconfig; print(sysconfig.get_path('purelib'))"])
-            .quietly()?;
-        let (_, own) = program(&wheel.python)
-            .args(["-c", "import sysconfig; print(sysconfig.get_path('purelib'))"])
-            .quietly()?;
-        if !found {
-            bail!("{} does not report its packages: {site}", tools.display());
-        }
-        std::fs::write(Path::new(own.trim()).join("tools.pth"), site)?;
+        let site = |python: &Path| -> Result<String> {
+            let ask = ["-c", "import sysconfig; print(sysconfig.get_path('purelib'))"];
+            let (found, site) = program(python).args(ask).quietly()?;
+            if !found {
+                bail!("{} does not report its packages: {site}", python.display());
+            }
+            Ok(site)
+        };
+        std::fs::write(Path::new(site(&wheel.python)?.trim()).join("tools.pth"), site(tools)?)?;
         Ok(wheel)
+    }
+
+    /// A program that builds from the unpacked source, into this tree's folder of builds.
+    pub(crate) fn built(&self, program: Program, tools: &Path) -> Result<Program> {
+        let target = root().join("target");
+        Ok(program.within(&self.source).env("CARGO_TARGET_DIR", target).env("PATH", path_with(tools)?))
     }
 
     /// A program of the environment, to be run outside of the tree.
     pub(crate) fn program(&self, tools: &Path) -> Result<Program> {
         Ok(program(&self.python).within(&self.folder).env("PATH", {
-            let mut path = self.folder.join("bin").into_os_string();
+            let mut path = self.python.with_file_name("").into_os_string();
             path.push(":");
             path.push(path_with(tools)?);
             path
@@ -122,7 +134,7 @@ fn path_with(python: &Path) -> Result<std::ffi::OsString> {
     Ok(path)
 }
 
-/// The only file of that kind in a folder.
+/// The only entry of a folder with that ending.
 fn the_one(folder: &Path, ending: &str) -> Result<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder)? {
@@ -133,23 +145,21 @@ fn the_one(folder: &Path, ending: &str) -> Result<PathBuf> {
     }
     match &found[..] {
         [one] => Ok(one.clone()),
-        _ => bail!("{}: expected one file *.{ending}, found {}", folder.display(), found.len()),
+        _ => bail!("{}: expected one *{ending}, found {}", folder.display(), found.len()),
     }
 }
 
-/// Builds the binary that the wheel's command is compared with: with few optimisations, as the tests have built
-/// it already. The wheel, with all of them, must give the same bits.
-pub(crate) fn binary() -> Result<PathBuf> {
-    cargo(["build", "--package", "clutch-cli"]).run()?;
-    Ok(root().join("target/debug/clutch"))
-}
-
-/// Installs a package of Debian, as root.
-pub(crate) fn install_debian(package: &str) -> Result<()> {
+/// Installs packages of Debian, as root.
+pub(crate) fn install_debian(packages: &[&str]) -> Result<()> {
     let (root, id) = program("id").arg("-u").quietly()?;
     if !root || id.trim() != "0" {
-        bail!("please install {package} (Debian and Ubuntu: sudo apt-get install {package})");
+        let names = packages.join(" ");
+        bail!("please install {names} (Debian and Ubuntu: sudo apt-get install {names})");
     }
     program("apt-get").args(["update", "-q"]).run()?;
-    program("apt-get").env("DEBIAN_FRONTEND", "noninteractive").args(["install", "-y", "-q", package]).run()
+    program("apt-get")
+        .env("DEBIAN_FRONTEND", "noninteractive")
+        .args(["install", "-y", "-q"])
+        .args(packages)
+        .run()
 }

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, bail};
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 /// The workspace's root.
 pub(crate) fn root() -> PathBuf {
@@ -23,6 +23,38 @@ pub(crate) fn program(name: impl AsRef<OsStr>) -> Program {
 /// The cargo that runs this.
 pub(crate) fn cargo<const N: usize>(args: [&str; N]) -> Program {
     program(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())).args(args)
+}
+
+/// A verb of this program that runs in the background, its output unseen until the end.
+pub(crate) fn beside(verb: &str) -> Result<Beside> {
+    let path = root().join("target").join(format!("{verb}.log"));
+    let log = std::fs::File::create(&path).with_context(|| path.display().to_string())?;
+    let mut verb = program(std::env::current_exe()?).arg(verb);
+    verb.announce();
+    let child = verb.0.stdout(log.try_clone()?).stderr(log).spawn()?;
+    Ok(Beside { child, path })
+}
+
+/// A program in the background; stopped when this is dropped.
+pub(crate) struct Beside {
+    child: Child,
+    path: PathBuf,
+}
+
+impl Beside {
+    /// Its success, and its output on both streams.
+    pub(crate) fn output(mut self) -> Result<(bool, String)> {
+        let done = self.child.wait()?;
+        let text = std::fs::read(&self.path).with_context(|| self.path.display().to_string())?;
+        Ok((done.success(), String::from_utf8_lossy(&text).into_owned()))
+    }
+}
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
 }
 
 impl Program {

@@ -1,8 +1,8 @@
 //! The type stub of the native module: generated from the Rust docs; this module fills in the types
 //! that PyO3 cannot name.
 
-use crate::python;
-use crate::run::{program, root};
+use crate::python::{self, Wheel};
+use crate::run::{Program, program, root};
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 
@@ -81,13 +81,26 @@ const NAMED: &[(&str, &str)] = &[
     (") -> dict:", ") -> dict[str, Any]:"),
 ];
 
-/// Generates the stub; with `check` only compares.
-pub(crate) fn generate(python: &Path, check: bool) -> Result<bool> {
+/// Writes the stub, from this tree.
+pub(crate) fn generate(python: &Path) -> Result<()> {
+    let text = text(program(python::beside(python, "maturin")).args(["generate-stubs"]))?;
+    Ok(std::fs::write(root().join(STUB), text)?)
+}
+
+/// True if the stub is the one of the wheel's module, whose build serves here.
+pub(crate) fn hold(python: &Path, wheel: &Wheel) -> Result<bool> {
+    let maturin = program(python::beside(python, "maturin")).args(["generate-stubs", "--profile", "release"]);
+    let made = text(wheel.built(maturin, python)?)?;
+    let holds = std::fs::read_to_string(root().join(STUB)).is_ok_and(|kept| kept == made);
+    if !holds {
+        println!("{STUB} differs from the module: run `cargo xtask stubs`");
+    }
+    Ok(holds)
+}
+
+fn text(maturin: Program) -> Result<String> {
     let out = root().join("target/stubs");
-    program(python::beside(python, "maturin"))
-        .args(["generate-stubs", "--quiet", "--out"])
-        .arg(&out)
-        .run()?;
+    maturin.args(["--quiet", "--out"]).arg(&out).run()?;
     let made = out.join("clutch/_clutch.pyi");
     let mut text = std::fs::read_to_string(&made).with_context(|| made.display().to_string())?;
     for (found, named) in NAMED {
@@ -99,13 +112,5 @@ pub(crate) fn generate(python: &Path, check: bool) -> Result<bool> {
         }
         text = text.replace(found, named);
     }
-    if check {
-        let kept = std::fs::read_to_string(root().join(STUB)).unwrap_or_default();
-        if kept != text {
-            println!("{STUB} differs from the module: run `cargo xtask stubs`");
-        }
-        return Ok(kept == text);
-    }
-    std::fs::write(root().join(STUB), text)?;
-    Ok(true)
+    Ok(text)
 }

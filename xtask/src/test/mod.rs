@@ -1,0 +1,211 @@
+//! All tests; the time of each stage and the number of tests at the end.
+
+mod tally;
+
+use crate::firmware;
+use crate::fuzz;
+use crate::python;
+use crate::run::{Program, beside, cargo, program, root};
+use crate::stubs;
+use anyhow::{Result, bail};
+use tally::Tally;
+
+/// Targets for which the core must compile: a core without atomics, one with a floating-point unit,
+/// and RISC-V.
+const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
+
+/// Checks that need the targets: two builds each, the two link tests, the example, two boards, the budgets.
+const SKIPPED_WITHOUT_TARGETS: u64 = 2 * TARGETS.len() as u64 + 6;
+
+/// What is built for this machine. Always the same selection: with another one cargo gives libraries other
+/// features, and compiles them once more. The wheel's module only links inside of Python.
+const WORKSPACE: [&str; 3] = ["--workspace", "--exclude", "clutch-py"];
+
+/// Runs everything, counts, and fails at the end if anything failed.
+pub(crate) fn all() -> Result<()> {
+    let mut tally = Tally::new();
+    tally.stage("programs that tests need");
+    if std::env::var_os("CI").is_some() {
+        programs()?;
+    }
+    // Before the tests: some build images for an emulated board.
+    targets()?;
+    let mut sound = host(&mut tally)?;
+    // Both are mostly builds that link for long on one core; nothing in them keeps a clock. Each has folders of its own.
+    let boards = beside("boards")?;
+    sound &= wheel_of(&mut tally)?;
+    tally.stage("boards, beside the wheel");
+    let (ended, text) = boards.output()?;
+    print!("{text}");
+    tally.add(ended, &text);
+    tally.end(sound)
+}
+
+/// What boards take, and what fuzzing finds, alone.
+pub(crate) fn boards() -> Result<()> {
+    let mut tally = Tally::new();
+    boards_of(&mut tally, targets()?)?;
+    fuzzing(&mut tally)?;
+    tally.end(true)
+}
+
+/// The Python part alone.
+pub(crate) fn wheel() -> Result<()> {
+    let mut tally = Tally::new();
+    let sound = wheel_of(&mut tally)?;
+    tally.end(sound)
+}
+
+/// Installs the programs without which tests skip themselves on a user's machine.
+fn programs() -> Result<()> {
+    // The program, and the Debian package that has it.
+    let needed = [
+        ("gcc", "gcc"),
+        ("strace", "strace"),
+        ("qemu-system-arm", "qemu-system-arm"),
+        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+    ];
+    let is_missing = |name: &str| program(name).args(["--version"]).quietly().is_err();
+    let missing: Vec<&str> =
+        needed.iter().filter(|(name, _)| is_missing(name)).map(|(_, package)| *package).collect();
+    if missing.is_empty() { Ok(()) } else { python::install_debian(&missing) }
+}
+
+/// Adds the embedded targets. Without rustup they are skipped on a user's machine, not in CI.
+pub(crate) fn targets() -> Result<&'static [&'static str]> {
+    match program("rustup").args(["target", "add"]).args(TARGETS).quietly() {
+        Ok((true, _)) => Ok(&TARGETS),
+        other if std::env::var_os("CI").is_none() => {
+            let why = other.map_or_else(|e| e.to_string(), |(_, text)| text);
+            println!("skipped: builds for embedded targets, because rustup cannot add them: {}", why.trim());
+            Ok(&[])
+        }
+        other => bail!("rustup cannot add the targets {TARGETS:?}: {other:?}"),
+    }
+}
+
+/// What runs on this machine, an emulated board included.
+fn host(tally: &mut Tally) -> Result<bool> {
+    tally.stage("build of the tests");
+    let clutch = compared()?;
+    let built = cargo(["test"]).args(WORKSPACE).arg("--no-run").lines(|_| ())?;
+    tally.check("the tests build", built);
+    if !built {
+        return Ok(false);
+    }
+    tally.stage("tests");
+    let tests = ["test", "--no-fail-fast"];
+    // Some run the command: the one that was built with them.
+    let sound = cargo(tests).args(WORKSPACE).env("CLUTCH_BIN", clutch).lines(|l| tally.read(l))?;
+    tally.stage("tests of the core as firmware takes it");
+    // Without the features that the workspace turns on.
+    let core = ["--package", "clutch-core", "--lib"];
+    Ok(sound & cargo(tests).args(core).lines(|l| tally.read(l))?)
+}
+
+/// Builds what the wheel is compared with, and the command that tests run: with few optimisations, as the tests.
+/// The wheel, with all of them, must give the same bits.
+fn compared() -> Result<std::path::PathBuf> {
+    let programs = ["--bin", "clutch", "--example", "write_demo", "--example", "bits"];
+    cargo(["build"]).args(WORKSPACE).args(programs).run()?;
+    Ok(root().join("target/debug/clutch"))
+}
+
+/// What boards take: builds for embedded targets, link tests, images, budgets.
+fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
+    if embedded.is_empty() {
+        tally.skip(SKIPPED_WITHOUT_TARGETS);
+        return Ok(());
+    }
+    tally.stage("builds of the core for boards");
+    // Of its own, or they would wait while the wheel is built.
+    let folder = ["build", "--release", "--target-dir", "target/embedded", "--package", "clutch-core"];
+    let core = |args: &[&str]| cargo(folder).args(args).quietly();
+    for target in embedded {
+        for features in ["", "linalg"] {
+            let with = if features.is_empty() { "no feature" } else { features };
+            let built = core(&["--target", target, "--features", features])?;
+            tally.check_quiet(&format!("clutch-core builds for {target} with {with}"), built);
+        }
+    }
+    no_panic(tally)?;
+    let example = core(&["--target", firmware::TARGET, "--example", "own_friction"])?;
+    tally.check_quiet("the example with friction numbers of one's own builds for a Cortex-M4F", example);
+    tally.stage("images");
+    for board in firmware::BOARDS {
+        tally.check_quiet(&format!("the images of {board} build"), firmware::image(board).quietly()?);
+    }
+    tally.stage("budgets");
+    // As a test, not as a benchmark: the figures are the machine code's, not this machine's.
+    let budget = cargo(["test"]).args(WORKSPACE).args(["--bench", "budget"]).lines(|_| ())?;
+    tally.check("bounds, measurements, memory and stack keep their budgets", budget);
+    Ok(())
+}
+
+/// The core links without a reachable panic; the same with one put in does not.
+fn no_panic(tally: &mut Tally) -> Result<()> {
+    let image = || {
+        cargo(["build", "--release", "--manifest-path", "tests/no_panic/Cargo.toml"]).args([
+            "--target",
+            "thumbv7em-none-eabihf",
+            "--target-dir",
+            "target/no_panic",
+        ])
+    };
+    tally.check_quiet("no panic is reachable in clutch-core (link test)", image().quietly()?);
+    let (links, text) = image().args(["--features", "control"]).quietly()?;
+    let refused = !links && text.contains("__panic_path_survived");
+    tally.check("the link test sees a panic that is put in (control)", refused);
+    Ok(())
+}
+
+/// Each reader of bytes from outside, with as many inputs of chance as it read in 20 s when they were counted.
+fn fuzzing(tally: &mut Tally) -> Result<()> {
+    if std::env::var_os("CI").is_none() {
+        println!(
+            "skipped: fuzzing, which needs a nightly compiler; `cargo xtask fuzz` installs it and fuzzes"
+        );
+        tally.skip(fuzz::TARGETS.len() as u64);
+        return Ok(());
+    }
+    tally.stage("build of the fuzz targets");
+    fuzz::install()?;
+    fuzz::build()?;
+    tally.stage("fuzzing");
+    for (target, runs) in fuzz::TARGETS {
+        let held = fuzz::one(target, &format!("-runs={runs}"))?;
+        tally.check(&format!("fuzzing {target} with {runs} inputs finds nothing"), held);
+    }
+    Ok(())
+}
+
+/// The wheel: built from its source distribution, installed outside of this tree, tested there.
+fn wheel_of(tally: &mut Tally) -> Result<bool> {
+    tally.stage("Python packages");
+    let tools = python::interpreter()?;
+    let ruff = program(python::beside(&tools, "ruff")).arg("check").args(python::SOURCES);
+    tally.check_quiet("ruff finds nothing in the Python sources", ruff.quietly()?);
+    tally.stage("build of the wheel");
+    let wheel = python::Wheel::install(&tools)?;
+    tally.stage("types of the wheel");
+    tally.check("the type stub is what the native module gives", stubs::hold(&tools, &wheel)?);
+    let settings = root().join("pyproject.toml");
+    let python = |args: &[&str]| -> Result<Program> { Ok(wheel.program(&tools)?.arg("-m").args(args)) };
+    let strict = python(&["mypy", "--strict", "-p", "clutch", "--config-file"])?.arg(&settings);
+    tally.check_quiet("mypy --strict finds nothing in the installed package", strict.quietly()?);
+    let stubtest = python(&["mypy.stubtest", "clutch._clutch", "--mypy-config-file"])?.arg(&settings);
+    tally.check_quiet("the type stub agrees with the module at run time", stubtest.quietly()?);
+    tally.stage("what the wheel is compared with");
+    let clutch = compared()?;
+    let built = |name: &str| root().join("target/debug/examples").join(name);
+    let bits = root().join("target/bits");
+    program(built("bits")).arg(&bits).run()?;
+    tally.stage("tests of the wheel");
+    python(&["pytest", "--color=no", "-q"])?
+        .arg(root().join("python/tests"))
+        .env("CLUTCH_BIN", clutch)
+        .env("CLUTCH_LOG_DEMO", built("write_demo"))
+        .env("CLUTCH_BITS", bits)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .lines(|l| tally.read(l))
+}
