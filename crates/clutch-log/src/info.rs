@@ -1,7 +1,8 @@
 //! The contents of a log, without holding them.
 
 use crate::error::LogError;
-use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
+use crate::proto::{CHANNELS, PARAMETER_CHANNEL};
+use crate::record;
 use crate::scan::{Limits, Scanned, scan_file};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -118,7 +119,7 @@ pub fn info(path: impl AsRef<Path>, limits: &Limits) -> Result<Info, LogError> {
         .map(|c| ChannelInfo { topic: c.topic, message: c.message, records: 0, span_ns: None })
         .collect();
     let scanned = scan_file(path, limits, false, &mut |_, record| {
-        if let Some(c) = channels.get_mut(proto::channel_of(&record)) {
+        if let Some(c) = channels.get_mut(record::channel_of(&record)) {
             let time = record.time_ns();
             c.records += 1;
             let (first, last) = c.span_ns.unwrap_or((time, time));

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod error;
+mod header;
 mod info;
 pub mod names;
 mod proto;
@@ -12,13 +13,14 @@ mod scan;
 mod write;
 
 pub use error::LogError;
+pub use header::{Header, Source};
 pub use info::{ChannelInfo, Info, info};
 pub use names::{Arrival, CommandSource, EventKind};
-pub use proto::{CHANNELS, Channel, Field, Kind, channel_table, encode};
+pub use proto::{CHANNELS, Channel, Field, Kind, Value, channel_table};
 pub use read::{Log, read, read_bytes};
 pub use record::{
-    CommandRecord, EventRecord, Header, LinkRecord, MAX_TERMS, Record, SampleRecord, Source, Terms,
-    TruthRecord,
+    CommandRecord, EventRecord, InChannel, LinkRecord, MAX_TERMS, Record, SampleRecord, Terms, TruthRecord,
+    encode,
 };
 pub use recover::{Recovered, recover};
 pub use scan::{Damage, Limits, Scanned, Tail, scan};

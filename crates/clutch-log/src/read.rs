@@ -1,7 +1,8 @@
 //! A whole log in memory.
 
 use crate::error::LogError;
-use crate::record::{CommandRecord, EventRecord, Header, LinkRecord, Record, SampleRecord, TruthRecord};
+use crate::header::Header;
+use crate::record::{CommandRecord, EventRecord, LinkRecord, Record, SampleRecord, TruthRecord};
 use crate::scan::{Damage, Each, Limits, Scanned, Tail, scan_bytes, scan_file};
 use std::path::Path;
 

@@ -1,72 +1,10 @@
-//! The records, and a log's description of itself.
+//! The records: each field is written down once, here, with its number in the log, its type and its meaning. From
+//! the table come the record, its protobuf message, the way from one to the other, the channel table of docs/log.md
+//! and the columns of Python.
 
-use std::fmt;
-
-/// One record, without heap: it goes through the ring from the control thread.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Record {
-    /// A measurement, or its absence.
-    Sample(SampleRecord),
-    /// A command, with every term of the law.
-    Command(CommandRecord),
-    /// A report of the supervisor, the gate, the log or the port.
-    Event(EventRecord),
-    /// Counters of the link, since the start of the run.
-    Link(LinkRecord),
-    /// The plant's true state: simulation only.
-    Truth(TruthRecord),
-}
-
-impl Record {
-    /// Tick of the run, from 0.
-    #[must_use]
-    pub fn tick(&self) -> u64 {
-        match self {
-            Record::Sample(r) => r.tick,
-            Record::Command(r) => r.tick,
-            Record::Event(r) => r.tick,
-            Record::Link(r) => r.tick,
-            Record::Truth(r) => r.tick,
-        }
-    }
-
-    /// Time since the start of the run, ns.
-    #[must_use]
-    pub fn time_ns(&self) -> u64 {
-        match self {
-            Record::Sample(r) => r.time_ns,
-            Record::Command(r) => r.time_ns,
-            Record::Event(r) => r.time_ns,
-            Record::Link(r) => r.time_ns,
-            Record::Truth(r) => r.time_ns,
-        }
-    }
-}
-
-/// A measurement as it came from the board.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SampleRecord {
-    /// Tick of the run, from 0.
-    pub tick: u64,
-    /// Time since the start of the run, ns.
-    pub time_ns: u64,
-    /// Its arrival: [`Arrival`](crate::Arrival) as a number.
-    pub arrival: u8,
-    /// The board's sequence number; wraps.
-    pub sequence: u16,
-    /// The board's clock at the measurement, µs; wraps.
-    pub board_time_us: u32,
-    /// Encoder counts; wrap.
-    pub counts: i32,
-    /// The board's status bits.
-    pub status: u8,
-    /// Age of the sample when it was used, µs.
-    pub age_us: u32,
-    /// Time that the answer to the sample before took, µs.
-    pub lateness_us: u32,
-    /// A newer sample had come with it; it was not answered.
-    pub superseded: bool,
-}
+use crate::names;
+use crate::proto::{Channel, Field, Kind, Value};
+use prost::Message;
 
 /// The most terms that a law has in a log.
 pub const MAX_TERMS: usize = 8;
@@ -97,185 +35,352 @@ impl std::ops::Deref for Terms {
     }
 }
 
-/// A command, with the values that led the law to it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CommandRecord {
-    /// Tick of the run, from 0.
-    pub tick: u64,
+/// A value of a record's field, and how a message has it.
+trait Stored: Sized {
+    type Message;
+    fn put(self) -> Self::Message;
+    /// An error in words if the record's type cannot hold it.
+    fn take(field: &str, message: Self::Message) -> Result<Self, String>;
+    fn value(self) -> Value;
+}
+
+macro_rules! stored {
+    ($($whole:ty => $message:ty),*) => { $(impl Stored for $whole {
+        type Message = $message;
+        fn put(self) -> $message { self.into() }
+        fn take(field: &str, message: $message) -> Result<Self, String> {
+            let bits = 8 * size_of::<Self>();
+            Self::try_from(message).map_err(|_| format!("{field} = {message}: expected at most {bits} bits"))
+        }
+        fn value(self) -> Value { Value::Whole(self as i64) }
+    })* };
+}
+stored!(u8 => u32, u16 => u32, u32 => u32, u64 => u64, i32 => i32, i64 => i64);
+
+impl Stored for f64 {
+    // The encoder would leave out 0.0, and −0.0 with it, which would come back as +0.0. The schema says plain
+    // `double`: there a zero may be written, and what is absent is zero, as for any reader of proto3.
+    type Message = Option<f64>;
+    fn put(self) -> Option<f64> {
+        Some(self)
+    }
+    fn take(_: &str, message: Option<f64>) -> Result<f64, String> {
+        Ok(message.unwrap_or_default())
+    }
+    fn value(self) -> Value {
+        Value::Real(self)
+    }
+}
+
+impl Stored for bool {
+    type Message = bool;
+    fn put(self) -> bool {
+        self
+    }
+    fn take(_: &str, message: bool) -> Result<bool, String> {
+        Ok(message)
+    }
+    fn value(self) -> Value {
+        Value::Flag(self)
+    }
+}
+
+/// A record that has a channel of its own.
+pub trait InChannel {
+    /// The channel.
+    const CHANNEL: Channel;
     /// Time since the start of the run, ns.
-    pub time_ns: u64,
-    /// The supervisor's state: see [`STATES`](crate::names::STATES).
-    pub state: u8,
-    /// Origin of the code: [`CommandSource`](crate::CommandSource) as a number.
-    pub source: u8,
-    /// Effect of the output stage on the demand: see [`LIMITS`](crate::names::LIMITS).
-    pub limit: u8,
-    /// Code for the converter.
-    pub code: u16,
-    /// Voltage of the code, V.
-    pub voltage: f64,
-    /// The law's output before limits, V.
-    pub demand: f64,
-    /// Target position, 2⁻¹⁶ counts.
-    pub target_fixed: i64,
-    /// Target position, rad.
-    pub target_position: f64,
-    /// Target velocity, rad/s.
-    pub target_velocity: f64,
-    /// Target acceleration, rad/s².
-    pub target_acceleration: f64,
-    /// Position error as the law saw it, rad.
-    pub error: f64,
-    /// Its rate as the law saw it, rad/s.
-    pub error_rate: f64,
-    /// The law's own terms; [`Header::term_names`] names them.
-    pub terms: Terms,
+    fn time_ns(&self) -> u64;
+    /// The values of [`Channel::fields`]; of the terms only those that the record's law has.
+    fn values(&self) -> impl Iterator<Item = Value>;
 }
 
-/// Something that happened once.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct EventRecord {
-    /// Tick of the run, from 0.
-    pub tick: u64,
-    /// Time since the start of the run, ns.
-    pub time_ns: u64,
-    /// Its kind: [`EventKind`](crate::EventKind) as a number.
-    pub kind: u8,
-    /// State before: see [`STATES`](crate::names::STATES).
-    pub from: u8,
-    /// State after.
-    pub to: u8,
-    /// Its cause: see [`CAUSES`](crate::names::CAUSES).
-    pub cause: u8,
-    /// The number that goes with it: the value that the check saw, in the check's unit.
-    pub value: f64,
+/// The type of a field, in the schema.
+macro_rules! kind {
+    (uint32) => {
+        Kind::Uint32
+    };
+    (uint64) => {
+        Kind::Uint64
+    };
+    (sint32) => {
+        Kind::Sint32
+    };
+    (sint64) => {
+        Kind::Sint64
+    };
+    (double) => {
+        Kind::Double
+    };
+    (bool) => {
+        Kind::Bool
+    };
+    (string) => {
+        Kind::String
+    };
+    (uint32, $name:literal $names:path) => {
+        Kind::Enum($name, $names)
+    };
 }
 
-/// Counters since the start of the run.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LinkRecord {
-    /// Tick of the run, from 0.
-    pub tick: u64,
-    /// Time since the start of the run, ns.
-    pub time_ns: u64,
-    /// Samples received.
-    pub received: u64,
-    /// Samples that never came.
-    pub lost: u64,
-    /// Samples after their deadline.
-    pub late: u64,
-    /// Samples that came twice.
-    pub duplicated: u64,
-    /// Samples that came after a newer one.
-    pub reordered: u64,
-    /// Frames refused: wrong checksum, length or type.
-    pub rejected_frames: u64,
-    /// Samples refused by the plausibility gate.
-    pub rejected_samples: u64,
-    /// Cycles that ended after their deadline.
-    pub deadline_misses: u64,
-    /// Records that the full ring dropped.
-    pub log_dropped: u64,
+/// The table. A row is: meaning; number in the message, name in the log, field of the record, its type, protobuf's type
+/// (for the encoder an `optional` one keeps each zero); of a small number its enum's name and the names of the values.
+/// Below the rows are the numbers and names of the law's terms, if the record has them.
+macro_rules! records {
+    ($(
+        $(#[doc = $doc:literal])*
+        $variant:ident = $record:ident, $topic:literal, $content:literal {
+            $(
+                #[doc = $meaning:literal]
+                $tag:tt $name:ident = $field:ident: $type:ty, $proto:ident $(($optional:ident))?
+                    $(of $enum:literal $names:path)?;
+            )*
+            $($terms:ident { $(#[doc = $term_meaning:literal] $term_tag:tt $term:ident;)* })?
+        }
+    )*) => {
+        /// One record, without heap: it goes through the ring from the control thread.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Record {
+            $($(#[doc = $doc])* $variant($record)),*
+        }
+
+        impl Record {
+            /// Tick of the run, from 0.
+            #[must_use]
+            pub fn tick(&self) -> u64 {
+                match self { $(Record::$variant(r) => r.tick),* }
+            }
+
+            /// Time since the start of the run, ns.
+            #[must_use]
+            pub fn time_ns(&self) -> u64 {
+                match self { $(Record::$variant(r) => r.time_ns),* }
+            }
+        }
+
+        /// The channels that hold records, in the order of the table.
+        pub(crate) const RECORDS: [Channel; [$($topic),*].len()] = [$($record::CHANNEL),*];
+
+        /// Row of the record's channel in [`RECORDS`].
+        pub(crate) fn channel_of(record: &Record) -> usize {
+            enum Row { $($variant),* }
+            match record { $(Record::$variant(_) => Row::$variant as usize),* }
+        }
+
+        /// Appends the record's message, as it stands in the log without the envelope (tick and time
+        /// are in the envelope's `sequence` and `log_time`, too).
+        pub fn encode(record: &Record, out: &mut Vec<u8>) {
+            out.reserve(240); // the longest message has 21 fields: no second allocation
+            let done = match record { $(Record::$variant(r) => message::$variant::of(r).encode(out)),* };
+            debug_assert!(done.is_ok(), "a Vec grows: encoding into it cannot fail");
+        }
+
+        /// The record in a message of the channel in row `channel` of [`RECORDS`].
+        pub(crate) fn decode(channel: usize, time_ns: u64, data: &[u8]) -> Result<Record, String> {
+            type Decode = fn(u64, &[u8]) -> Result<Record, String>;
+            const DECODE: [Decode; RECORDS.len()] = [$(|time_ns, data| {
+                let message = message::$variant::decode(data).map_err(|e| e.to_string())?;
+                message.record(time_ns).map(Record::$variant)
+            }),*];
+            DECODE.get(channel).ok_or_else(|| format!("channel {channel} holds no records"))?(time_ns, data)
+        }
+
+        $(
+            $(#[doc = $doc])*
+            #[derive(Clone, Copy, Debug, Default, PartialEq)]
+            pub struct $record {
+                /// Tick of the run, from 0.
+                pub tick: u64,
+                /// Time since the start of the run, ns.
+                pub time_ns: u64,
+                $(
+                    #[doc = $meaning]
+                    $(#[doc = concat!("The number of one of [`", stringify!($names), "`](crate::", stringify!($names), ").")])?
+                    pub $field: $type,
+                )*
+                $(
+                    /// The law's own terms; [`Header::term_names`](crate::Header::term_names) names them.
+                    pub $terms: Terms,
+                )?
+            }
+
+            impl InChannel for $record {
+                const CHANNEL: Channel = Channel {
+                    topic: $topic,
+                    message: concat!("clutch.", stringify!($variant)),
+                    meaning: $content,
+                    fields: &[
+                        Field { number: 1, name: "tick", kind: Kind::Uint64, meaning: "Tick of the run, from 0." },
+                        $(Field {
+                            number: $tag,
+                            name: stringify!($name),
+                            kind: kind!($proto $(, $enum $names)?),
+                            meaning: $meaning.trim_ascii(),
+                        },)*
+                        $($(Field {
+                            number: $term_tag,
+                            name: stringify!($term),
+                            kind: Kind::Double,
+                            meaning: $term_meaning.trim_ascii(),
+                        },)*)?
+                    ],
+                    terms: 0 $(+ [$($term_tag),*].len())?,
+                };
+
+                fn time_ns(&self) -> u64 {
+                    self.time_ns
+                }
+
+                fn values(&self) -> impl Iterator<Item = Value> {
+                    let values = [self.tick.value(), $(self.$field.value()),*].into_iter();
+                    $(let values = values.chain(self.$terms.iter().map(|term| term.value()));)?
+                    values
+                }
+            }
+        )*
+
+        /// Protobuf's messages.
+        mod message {
+            use super::*;
+
+            $(
+                #[derive(Clone, PartialEq, Message)]
+                pub(super) struct $variant {
+                    #[prost(uint64, tag = 1)]
+                    tick: u64,
+                    $(
+                        #[prost($proto $(, $optional)?, tag = $tag)]
+                        $name: <$type as Stored>::Message,
+                    )*
+                    $($(#[prost(double, optional, tag = $term_tag)] $term: Option<f64>,)*)?
+                }
+
+                impl $variant {
+                    pub(super) fn of(r: &$record) -> $variant {
+                        $(let [$($term),*] = std::array::from_fn(|i| r.$terms.get(i).copied());)?
+                        $variant { tick: r.tick, $($name: r.$field.put(),)* $($($term),*)? }
+                    }
+
+                    pub(super) fn record(self, time_ns: u64) -> Result<$record, String> {
+                        Ok($record {
+                            tick: self.tick,
+                            time_ns,
+                            $($field: Stored::take(stringify!($name), self.$name)?,)*
+                            $($terms: [$(self.$term),*].into_iter().map_while(|term| term).collect(),)?
+                        })
+                    }
+                }
+            )*
+        }
+    };
 }
 
-/// The plant's true state, which only a simulation knows.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TruthRecord {
-    /// Tick of the run, from 0.
-    pub tick: u64,
-    /// Time since the start of the run, ns.
-    pub time_ns: u64,
-    /// Angle of the shaft, rad.
-    pub position: f64,
-    /// Its velocity, rad/s.
-    pub velocity: f64,
-    /// Held by static friction.
-    pub stuck: bool,
-}
-
-/// The source of a log's records.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Source {
-    /// `clutch sim`.
-    #[default]
-    Simulation,
-    /// `clutch loop`.
-    Loop,
-    /// `clutch replay`.
-    Replay,
-}
-
-impl Source {
-    /// Every source.
-    pub const ALL: [Source; 3] = [Source::Simulation, Source::Loop, Source::Replay];
-
-    /// As in the file: `simulation`, `loop`, `replay`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Source::Simulation => "simulation",
-            Source::Loop => "loop",
-            Source::Replay => "replay",
+records! {
+    /// A measurement as it came from the board.
+    Sample = SampleRecord, "/sample", "The measurement of a tick, or its absence." {
+        /// Arrival of the sample.
+        2 arrival = arrival: u8, uint32 of "Arrival" names::ARRIVALS;
+        /// The board's sequence number, wraps at 2^16.
+        3 sequence = sequence: u16, uint32;
+        /// The board's clock at the measurement, µs, wraps at 2^32.
+        4 board_time_us = board_time_us: u32, uint32;
+        /// Encoder counts, wrap at 2^32.
+        5 counts = counts: i32, sint32;
+        /// The board's status bits.
+        6 status = status: u8, uint32;
+        /// Age of the sample when it was used, µs.
+        7 age_us = age_us: u32, uint32;
+        /// Time that the answer to the sample before took, µs.
+        8 lateness_us = lateness_us: u32, uint32;
+        /// A newer sample had come with it; not answered.
+        9 superseded = superseded: bool, bool;
+    }
+    /// A command, with the values that led the law to it.
+    Command = CommandRecord, "/command", "The command of a tick, with every term of the law." {
+        /// State of the supervisor.
+        2 state = state: u8, uint32 of "State" names::STATES;
+        /// Origin of the code.
+        3 source = source: u8, uint32 of "Source" names::COMMAND_SOURCES;
+        /// Effect of the output stage on the demand.
+        4 limit = limit: u8, uint32 of "Limit" names::LIMITS;
+        /// Code for the converter.
+        5 code = code: u16, uint32;
+        /// Voltage of the code, V.
+        6 voltage_v = voltage: f64, double (optional);
+        /// The law's output before limits, V.
+        7 demand_v = demand: f64, double (optional);
+        /// Target position, 2^-16 counts.
+        8 target_counts_x65536 = target_fixed: i64, sint64;
+        /// Target position, rad.
+        9 target_position_rad = target_position: f64, double (optional);
+        /// Target velocity, rad/s.
+        10 target_velocity_rad_s = target_velocity: f64, double (optional);
+        /// Target acceleration, rad/s².
+        11 target_acceleration_rad_s2 = target_acceleration: f64, double (optional);
+        /// Position error as the law saw it, rad.
+        12 error_rad = error: f64, double (optional);
+        /// Its rate as the law saw it, rad/s.
+        13 error_rate_rad_s = error_rate: f64, double (optional);
+        terms {
+            /// The law's first term; the file has the law's name for it, and as many terms as the law.
+            14 term_0;
+            /// The law's second term, likewise.
+            15 term_1;
+            /// The law's third term, likewise.
+            16 term_2;
+            /// The law's fourth term, likewise.
+            17 term_3;
+            /// The law's fifth term, likewise.
+            18 term_4;
+            /// The law's sixth term, likewise.
+            19 term_5;
+            /// The law's seventh term, likewise.
+            20 term_6;
+            /// The law's eighth term, likewise.
+            21 term_7;
         }
     }
-
-    /// From its name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Source> {
-        Source::ALL.into_iter().find(|s| s.name() == name)
+    /// A report of the supervisor, the gate, the log or the port.
+    Event = EventRecord, "/event", "A report of the supervisor, the gate, the log or the port." {
+        /// Kind of event.
+        2 kind = kind: u8, uint32 of "Kind" names::EVENT_KINDS;
+        /// State before.
+        3 from_state = from: u8, uint32 of "State" names::STATES;
+        /// State after.
+        4 to_state = to: u8, uint32 of "State" names::STATES;
+        /// Why.
+        5 cause = cause: u8, uint32 of "Cause" names::CAUSES;
+        /// Value that the check saw, in the check's unit.
+        6 value = value: f64, double (optional);
     }
-}
-
-impl fmt::Display for Source {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+    /// Counters of the link, since the start of the run.
+    Link = LinkRecord, "/link", "Counters since the start of the run." {
+        /// Samples received.
+        2 received = received: u64, uint64;
+        /// Samples that never came.
+        3 lost = lost: u64, uint64;
+        /// Samples after their deadline.
+        4 late = late: u64, uint64;
+        /// Samples that came twice.
+        5 duplicated = duplicated: u64, uint64;
+        /// Samples that came after a newer one.
+        6 reordered = reordered: u64, uint64;
+        /// Frames with a wrong checksum, length or type.
+        7 rejected_frames = rejected_frames: u64, uint64;
+        /// Samples refused by the plausibility gate.
+        8 rejected_samples = rejected_samples: u64, uint64;
+        /// Cycles that ended after their deadline.
+        9 deadline_misses = deadline_misses: u64, uint64;
+        /// Records that the full ring dropped.
+        10 log_dropped = log_dropped: u64, uint64;
     }
-}
-
-/// A log's description of itself; written before the first record.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Header {
-    /// Name of the scenario.
-    pub scenario_name: String,
-    /// The whole scenario, TOML.
-    pub scenario_toml: String,
-    /// Every parameter, flattened: `law.kp` → `12.5`.
-    pub parameters: Vec<(String, String)>,
-    /// Version of the build.
-    pub version: String,
-    /// Hash of the law and its parameters.
-    pub law_hash: u64,
-    /// The port: a path, an address, or nothing.
-    pub port: String,
-    /// Source of the records.
-    pub source: Source,
-    /// Scalar of the law: `f32` or `f64`.
-    pub scalar: String,
-    /// Sampling period, µs.
-    pub period_us: u32,
-    /// Names of [`CommandRecord::terms`], with units: `surface_rad_s`.
-    pub term_names: Vec<String>,
-    /// Start of the run, ns since 1970-01-01 UTC.
-    pub started_unix_ns: u64,
-    /// Anything else. Each key once; read back sorted by key.
-    pub extra: Vec<(String, String)>,
-}
-
-impl Default for Header {
-    fn default() -> Self {
-        Header {
-            scenario_name: String::new(),
-            scenario_toml: String::new(),
-            parameters: Vec::new(),
-            version: env!("CARGO_PKG_VERSION").into(),
-            law_hash: 0,
-            port: String::new(),
-            source: Source::default(),
-            scalar: "f64".into(),
-            period_us: 1000,
-            term_names: Vec::new(),
-            started_unix_ns: 0,
-            extra: Vec::new(),
-        }
+    /// The plant's true state, which only a simulation knows.
+    Truth = TruthRecord, "/truth", "The plant's true state, which only a simulation knows." {
+        /// Angle of the shaft, rad.
+        2 position_rad = position: f64, double (optional);
+        /// Its velocity, rad/s.
+        3 velocity_rad_s = velocity: f64, double (optional);
+        /// Held by static friction.
+        4 stuck = stuck: bool, bool;
     }
 }

@@ -1,7 +1,7 @@
 //! Makes a finished log from one that was cut.
 
 use crate::error::LogError;
-use crate::record::Header;
+use crate::header::Header;
 use crate::scan::{Limits, Scanned, scan_file};
 use crate::write::{LogWriter, Summary};
 use std::fmt;

@@ -8,8 +8,9 @@
 //! before the first record of it is believed.
 
 use crate::error::{LogError, require_file};
+use crate::header::{Header, Source};
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
-use crate::record::{Header, Record, Source};
+use crate::record::{self, Record};
 use crate::write::{ENVELOPE, FORMAT, METADATA, METADATA_EXTRA, SCENARIO};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use mcap::records::op;
@@ -571,7 +572,7 @@ impl<'a, R: Read> Scan<'a, R> {
                     }
                     Some(Held::Row(row)) => {
                         let time_ns = log_time.wrapping_sub(self.seen.header.started_unix_ns);
-                        match proto::decode(*row, time_ns, fields.0) {
+                        match record::decode(*row, time_ns, fields.0) {
                             Ok(record) => each(&self.seen.header, record)?,
                             Err(what) => {
                                 return Ok(Err(format!("a message on {}: {what}", CHANNELS[*row].topic)));

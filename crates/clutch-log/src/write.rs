@@ -1,8 +1,9 @@
 //! Writing: chunks that are whole in the file within 100 ms.
 
 use crate::error::{LogError, require_file};
+use crate::header::Header;
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
-use crate::record::{Header, MAX_TERMS, Record};
+use crate::record::{self, MAX_TERMS, Record};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use prost::Message;
@@ -141,9 +142,9 @@ impl LogWriter {
         {
             self.flush()?;
         }
-        let row = proto::channel_of(record);
+        let row = record::channel_of(record);
         self.payload.clear();
-        proto::encode(record, &mut self.payload);
+        record::encode(record, &mut self.payload);
         // Wraps, so that any two numbers come back from their sum.
         let log_time = self.started_unix_ns.wrapping_add(time_ns);
         let header = MessageHeader {

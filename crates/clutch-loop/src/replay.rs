@@ -4,7 +4,7 @@ use crate::from_scenario::{self, BuildError, BuiltRun};
 use crate::to_log::{self, PRESENT_CODE, START_VOLTAGE};
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Cycle, Sample, State};
 use clutch_core::{Counts, DacCode, FixedCounts, Micros, Real, SupervisorState, Target};
-use clutch_log::{CommandRecord, EventKind, EventRecord, Log, SampleRecord, Source};
+use clutch_log::{CommandRecord, EventKind, EventRecord, InChannel, Kind, Log, SampleRecord, Source, Value};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::ScalarKind;
 use clutch_wire::{BoardState, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE};
@@ -59,27 +59,33 @@ pub struct Replay {
     pub dropped: u64,
 }
 
-/// Fields of a command that have to agree; times do not.
-fn fields<'a>(c: &CommandRecord, terms: &'a [String]) -> Vec<(&'a str, u64, f64)> {
-    let real = |name: &'a str, x: f64| (name, x.to_bits(), x);
-    let whole = |name: &'a str, x: u64| (name, x, x as f64);
-    let mut fields = vec![
-        whole("tick", c.tick),
-        whole("state", c.state.into()),
-        whole("source", c.source.into()),
-        whole("code", c.code.into()),
-        real("voltage_v", c.voltage),
-        real("demand_v", c.demand),
-        whole("limit", c.limit.into()),
-        ("target_counts_x65536", c.target_fixed as u64, c.target_fixed as f64),
-        real("target_position_rad", c.target_position),
-        real("target_velocity_rad_s", c.target_velocity),
-        real("target_acceleration_rad_s2", c.target_acceleration),
-        real("error_rad", c.error),
-        real("error_rate_rad_s", c.error_rate),
-    ];
-    fields.extend(terms.iter().zip(c.terms.iter()).map(|(name, value)| real(name, *value)));
-    fields
+/// The first field in which two commands differ, in its bits; times may.
+fn difference(
+    columns: &[(String, Kind)],
+    logged: &CommandRecord,
+    replayed: &CommandRecord,
+) -> Option<Difference> {
+    // A term that a law does not have is no number.
+    let number = |value: Option<Value>| match value {
+        Some(Value::Whole(x)) => x as f64,
+        Some(Value::Real(x)) => x,
+        Some(Value::Flag(x)) => f64::from(u8::from(x)),
+        None => f64::NAN,
+    };
+    let bits = |value: Option<Value>| match value {
+        Some(Value::Real(x)) => Some(Value::Whole(x.to_bits() as i64)),
+        other => other,
+    };
+    let (mut a, mut b) = (logged.values(), replayed.values());
+    columns.iter().find_map(|(field, _)| {
+        let (logged_value, replayed_value) = (a.next(), b.next());
+        (bits(logged_value) != bits(replayed_value)).then(|| Difference {
+            tick: logged.tick,
+            field: field.clone(),
+            logged: number(logged_value),
+            replayed: number(replayed_value),
+        })
+    })
 }
 
 /// Replays a log under a scenario: its own, or one with other parameters.
@@ -104,18 +110,9 @@ fn replay_in<T: Real>(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayEr
         Source::Simulation => simulated::<T>(log, samples, scenario)?,
         Source::Loop | Source::Replay => looped::<T>(log, samples, scenario)?,
     };
-    let first = log.commands.iter().zip(&commands).find_map(|(logged, replayed)| {
-        let terms = &log.header.term_names;
-        let pairs = fields(logged, terms).into_iter().zip(fields(replayed, terms));
-        pairs.into_iter().find_map(|(a, b)| {
-            (a.1 != b.1).then_some(Difference {
-                tick: logged.tick,
-                field: a.0.to_owned(),
-                logged: a.2,
-                replayed: b.2,
-            })
-        })
-    });
+    let columns = CommandRecord::CHANNEL.columns(&log.header.term_names);
+    let mut ticks = log.commands.iter().zip(&commands);
+    let first = ticks.find_map(|(logged, replayed)| difference(&columns, logged, replayed));
     let dropped = log.links.iter().map(|l| l.log_dropped).max().unwrap_or(0);
     Ok(Replay { commands, first, dropped })
 }

@@ -3,12 +3,13 @@
 use crate::convert::{log_error, scenario_error};
 use crate::scenario::Scenario;
 use crate::table::{Column, Table, pairs};
-use clutch_log::names::{ARRIVALS, CAUSES, COMMAND_SOURCES, EVENT_KINDS, LIMITS, Names, STATES, name_of};
-use clutch_log::{CommandRecord, Limits};
+use clutch_log::names::{Names, name_of};
+use clutch_log::{InChannel, Kind, Limits, Value};
 use clutch_loop::replay;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::iter;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -27,106 +28,81 @@ pub(crate) fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Log> {
     Ok(Log { log, origin: path.display().to_string() })
 }
 
-/// Columns of records: numbers by a function each, small numbers by their names.
-struct Columns<'a, R>(&'a [R], Vec<(String, Column)>);
+/// A column that grows by a record.
+enum Growing {
+    Whole(Vec<i64>),
+    Real(Vec<f64>),
+    Flag(Vec<bool>),
+    Name(Names, Vec<&'static str>),
+}
 
-impl<'a, R> Columns<'a, R> {
-    fn new(records: &'a [R], time_ns: impl Fn(&R) -> u64, tick: impl Fn(&R) -> u64) -> Self {
-        let mut c = Columns(records, Vec::new());
-        c.real("time_s", |r| time_ns(r) as f64 / 1e9);
-        c.whole("tick", |r| tick(r) as i64);
-        c
+impl Growing {
+    fn of(kind: Kind) -> Growing {
+        match kind {
+            Kind::Double => Growing::Real(Vec::new()),
+            Kind::Bool => Growing::Flag(Vec::new()),
+            Kind::Enum(_, names) => Growing::Name(names, Vec::new()),
+            Kind::Uint32 | Kind::Uint64 | Kind::Sint32 | Kind::Sint64 | Kind::String => {
+                Growing::Whole(Vec::new())
+            }
+        }
     }
 
-    fn real(&mut self, name: &str, f: impl Fn(&R) -> f64) -> &mut Self {
-        self.1.push((name.into(), Column::own(self.0.iter().map(f).collect::<Vec<f64>>())));
-        self
+    /// Of a term that the record does not have: NaN.
+    fn push(&mut self, value: Option<Value>) {
+        match (self, value) {
+            (Growing::Name(names, all), Some(Value::Whole(x))) => {
+                all.push(u8::try_from(x).map_or("?", |x| name_of(names, x)));
+            }
+            (Growing::Whole(all), Some(Value::Whole(x))) => all.push(x),
+            (Growing::Flag(all), Some(Value::Flag(x))) => all.push(x),
+            (Growing::Real(all), Some(Value::Real(x))) => all.push(x),
+            (Growing::Real(all), _) => all.push(f64::NAN),
+            (Growing::Name(_, _) | Growing::Whole(_) | Growing::Flag(_), _) => {
+                unreachable!("a field's value is of its kind: both are made from one row")
+            }
+        }
     }
 
-    fn whole(&mut self, name: &str, f: impl Fn(&R) -> i64) -> &mut Self {
-        self.1.push((name.into(), Column::own(self.0.iter().map(f).collect::<Vec<i64>>())));
-        self
-    }
-
-    fn flag(&mut self, name: &str, f: impl Fn(&R) -> bool) -> &mut Self {
-        self.1.push((name.into(), Column::own(self.0.iter().map(f).collect::<Vec<bool>>())));
-        self
-    }
-
-    fn name(&mut self, name: &str, names: Names, f: impl Fn(&R) -> u8) -> &mut Self {
-        self.1.push((name.into(), Column::text(self.0.iter().map(|r| name_of(names, f(r))))));
-        self
-    }
-
-    fn table(self) -> Table {
-        Table::of(self.1)
+    fn column(self) -> Column {
+        match self {
+            Growing::Whole(all) => Column::own(all),
+            Growing::Real(all) => Column::own(all),
+            Growing::Flag(all) => Column::own(all),
+            Growing::Name(_, all) => Column::text(all),
+        }
     }
 }
 
-fn commands(records: &[CommandRecord], terms: &[String]) -> Table {
-    let mut c = Columns::new(records, |r| r.time_ns, |r| r.tick);
-    c.name("state", STATES, |r| r.state)
-        .name("source", COMMAND_SOURCES, |r| r.source)
-        .name("limit", LIMITS, |r| r.limit)
-        .whole("code", |r| r.code.into())
-        .real("voltage_v", |r| r.voltage)
-        .real("demand_v", |r| r.demand)
-        .whole("target_counts_x65536", |r| r.target_fixed)
-        .real("target_position_rad", |r| r.target_position)
-        .real("target_velocity_rad_s", |r| r.target_velocity)
-        .real("target_acceleration_rad_s2", |r| r.target_acceleration)
-        .real("error_rad", |r| r.error)
-        .real("error_rate_rad_s", |r| r.error_rate);
-    for (i, term) in terms.iter().enumerate() {
-        // As the log's own schema does it, where a law calls a term like a field.
-        let taken = c.1.iter().any(|(n, _)| n == term);
-        let name = if taken { format!("{term}_{i}") } else { term.clone() };
-        c.real(&name, |r| r.terms.get(i).copied().unwrap_or(f64::NAN));
+/// The records of a channel: the time, and the channel's fields. `terms` name the last ones of commands.
+fn table<R: InChannel>(records: &[R], terms: &[String]) -> Table {
+    let mut columns: Vec<(String, Growing)> =
+        R::CHANNEL.columns(terms).into_iter().map(|(name, kind)| (name, Growing::of(kind))).collect();
+    for record in records {
+        let mut values = record.values();
+        columns.iter_mut().for_each(|(_, column)| column.push(values.next()));
     }
-    c.table()
+    let time = records.iter().map(|r| r.time_ns() as f64 / 1e9).collect::<Vec<f64>>();
+    let columns = columns.into_iter().map(|(name, column)| (name, column.column()));
+    Table::of(iter::once((TIME.to_owned(), Column::own(time))).chain(columns))
 }
+
+/// The column before a channel's fields.
+const TIME: &str = "time_s";
 
 impl Log {
     fn tables(&self) -> Vec<(&'static str, Table)> {
+        fn named<R: InChannel>(records: &[R], terms: &[String]) -> (&'static str, Table) {
+            (R::CHANNEL.topic.trim_start_matches('/'), table(records, terms))
+        }
         let log = &self.log;
-        let mut sample = Columns::new(&log.samples, |r| r.time_ns, |r| r.tick);
-        sample
-            .name("arrival", ARRIVALS, |r| r.arrival)
-            .whole("sequence", |r| r.sequence.into())
-            .whole("board_time_us", |r| r.board_time_us.into())
-            .whole("counts", |r| r.counts.into())
-            .whole("status", |r| r.status.into())
-            .whole("age_us", |r| r.age_us.into())
-            .whole("lateness_us", |r| r.lateness_us.into())
-            .flag("superseded", |r| r.superseded);
-        let mut event = Columns::new(&log.events, |r| r.time_ns, |r| r.tick);
-        event
-            .name("kind", EVENT_KINDS, |r| r.kind)
-            .name("from_state", STATES, |r| r.from)
-            .name("to_state", STATES, |r| r.to)
-            .name("cause", CAUSES, |r| r.cause)
-            .real("value", |r| r.value);
-        let mut link = Columns::new(&log.links, |r| r.time_ns, |r| r.tick);
-        link.whole("received", |r| r.received as i64)
-            .whole("lost", |r| r.lost as i64)
-            .whole("late", |r| r.late as i64)
-            .whole("duplicated", |r| r.duplicated as i64)
-            .whole("reordered", |r| r.reordered as i64)
-            .whole("rejected_frames", |r| r.rejected_frames as i64)
-            .whole("rejected_samples", |r| r.rejected_samples as i64)
-            .whole("deadline_misses", |r| r.deadline_misses as i64)
-            .whole("log_dropped", |r| r.log_dropped as i64);
-        let mut truth = Columns::new(&log.truths, |r| r.time_ns, |r| r.tick);
-        truth
-            .real("position_rad", |r| r.position)
-            .real("velocity_rad_s", |r| r.velocity)
-            .flag("stuck", |r| r.stuck);
+        let terms = &log.header.term_names;
         vec![
-            ("sample", sample.table()),
-            ("command", commands(&log.commands, &log.header.term_names)),
-            ("event", event.table()),
-            ("link", link.table()),
-            ("truth", truth.table()),
+            named(&log.samples, terms),
+            named(&log.commands, terms),
+            named(&log.events, terms),
+            named(&log.links, terms),
+            named(&log.truths, terms),
         ]
     }
 }
@@ -201,6 +177,6 @@ impl Log {
         let replayed = replayed.map_err(|e| PyValueError::new_err(format!("{}: {e}", self.origin)))?;
         let first = replayed.first.as_ref().map(|d| (d.tick, d.field.clone(), d.logged, d.replayed));
         let terms = &self.log.header.term_names;
-        Ok((commands(&replayed.commands, terms), replayed.commands.len(), first))
+        Ok((table(&replayed.commands, terms), replayed.commands.len(), first))
     }
 }
