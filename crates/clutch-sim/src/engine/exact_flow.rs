@@ -1,44 +1,59 @@
-//! The motion between two samples in closed form, where friction follows (2) with δ = 1.
+//! The motion between two samples where friction follows (2) with δ = 1: closed form above the Stribeck layer, power
+//! series within it.
 //!
-//! With voltage and torque held, and the speed `ω ≥ 0` taken along the motion,
+//! With voltage and torque held, and the speed `ω = v_s s ≥ 0` taken along the motion,
 //!
 //! ```text
-//! J ω̇ = T − b μ_d − C ω − b Δμ exp(−ω/v_s),     b = K_COF v_a,  Δμ = μ_s − μ_d
+//! ṡ = φ,   φ = A − G s − q,   q = K e^(−s),        A = (T − b μ_d)/(J v_s),  G = C/J,
+//! φ̇ = (q − G) φ,   q̇ = −q φ                        K = b Δμ/(J v_s),  b = K_COF v_a,  Δμ = μ_s − μ_d
 //! ```
 //!
-//! 1. `ω > 37 v_s`: the last term is below half an ulp of `μ_d`; the rest is linear, with
-//!    velocity, position and the instant of leaving the range in closed form.
-//! 2. below: with the viscous drag frozen at a velocity `ω_m`, `a = (T − b μ_d − C ω_m)/J`,
-//!    `k = b Δμ/J` and `z = exp(ω/v_s)`, the equation is `ż = (a z − k)/v_s`: linear again.
-//!    Velocity, and the instant at which it has a given value, cost a logarithm. What the drag
-//!    does beyond its frozen value is a perturbation, `δω̇ = −(C/J)(ω − ω_m) + (k/v_s) e^{−ω/v_s}
-//!    δω`, which the same quadrature integrates that gives the position: Gauss–Legendre on pieces
-//!    that end at fixed multiples of `v_s`, where the curve bends.
-//! 3. stuck: nothing to integrate; break-away is a comparison.
+//! 1. Where `q` is lost in rounding the rest is linear: velocity, position and the instant of leaving the range are in
+//!    closed form.
+//! 2. In the layer `s`, `φ` and `q` are power series in time; all that the recurrence of their coefficients needs is one
+//!    product of two series. A step is as long as the last two terms of `φ` stay below [`TOLERANCE`] of `φ` itself.
+//!    So the error is relative to the rate even where that is nearly nothing, as at a break-away; the layer blows up an
+//!    error no more than it blows up the motion. `φ` is carried on as a number of its own and not taken anew as a
+//!    difference of large ones.
+//! 3. `φ` never changes its sign: in an interval the speed only rises or only falls. The shaft stops once at most, and
+//!    there is no balance to step over.
+//! 4. Stuck: nothing to integrate; break-away is a comparison.
 
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, Volts, break_away};
 use clutch_core::friction::FrictionModel;
 
-/// Speed, in Stribeck velocities, above which the exponential is lost in rounding.
-const LINEAR_ABOVE: f64 = 37.0;
-/// Speeds, in Stribeck velocities, at which pieces end: above the first the curve is nearly
-/// straight, below the second it bends most.
-const BORDERS: [f64; 2] = [8.0, 2.5];
-/// Error of the velocity from which a piece is taken a second time, rad/s.
-const SQUARE: f64 = 1e-10;
+/// Terms of a power series.
+const TERMS: usize = 18;
+/// The last two terms of a series, as a share of the rate of speed.
+const TOLERANCE: f64 = 1e-11;
+/// Longest step of a series, in Stribeck velocities: beyond, `e^(−s)` would need more terms.
+const LONGEST: f64 = 6.0;
+/// Share of `q` in the rate of speed below which first order is enough: the second is its square.
+const FRINGE: f64 = 1e-5;
+/// What a quadrature may leave out, as a share of the time.
+const QUADRATURE: f64 = 1e-10;
+/// Way of a quadrature in the middle of the layer, in Stribeck velocities.
+const REACH: f64 = 3.0;
+/// Time, in the motion's own, that five terms of a series bridge.
+const SHORT: f64 = 0.02;
+/// Gauss and Legendre's eight points on [0, 1]: place, weight, and the weight that gives the seventh coefficient of
+/// a series in Legendre's polynomials.
+const NODES: [[f64; 3]; 8] = [
+    [0.019855071751231912, 0.05061426814518853, -0.11769245644771334],
+    [0.10166676129318664, 0.11119051722668721, 0.37789693708459166],
+    [0.2372337950418355, 0.15685332293894344, -0.6317745531190041],
+    [0.4082826787521751, 0.18134189168918083, 0.7849065579218123],
+    [0.5917173212478248, 0.18134189168918083, -0.7849065579218123],
+    [0.7627662049581645, 0.15685332293894344, 0.6317745531190041],
+    [0.8983332387068134, 0.11119051722668721, -0.37789693708459166],
+    [0.9801449282487681, 0.05061426814518853, 0.11769245644771334],
+];
+/// Distance from balance, as a share of the speed, that no double shows.
+const BALANCED: f64 = 1e-17;
+/// Speed, in Stribeck velocities, from which on `q` is lost in rounding where it would be below 20 at rest and by the end.
+const LINEAR_ABOVE: f64 = 40.0;
 /// Pieces in one interval before the engine gives up.
 const PIECE_LIMIT: u32 = 10_000;
-
-/// Gauss–Legendre, five points on [0, 1].
-const NODES: [f64; 5] =
-    [0.046_910_077_030_668_0, 0.230_765_344_947_158_45, 0.5, 0.769_234_655_052_841_5, 0.953_089_922_969_332];
-const WEIGHTS: [f64; 5] = [
-    0.118_463_442_528_094_54,
-    0.239_314_335_249_683_23,
-    0.284_444_444_444_444_44,
-    0.239_314_335_249_683_23,
-    0.118_463_442_528_094_54,
-];
 
 /// The fast engine.
 #[derive(Clone, Copy, Debug, Default)]
@@ -62,24 +77,211 @@ impl ExactFlow {
     }
 }
 
-/// The constants of one interval, seen along the motion.
+/// The constants of one interval, seen along the motion; speeds are in Stribeck velocities.
 #[derive(Clone, Copy)]
 struct Flow {
-    /// `(T − b μ_d)/J`
+    /// `A`, 1/s.
     drive: f64,
-    /// `C/J`
+    /// `A − K`, 1/s: what is left of the torque at rest. The difference of the torques: near a break-away that of `A`
+    /// and `K` has lost its digits.
+    excess: f64,
+    /// `G`, 1/s.
     drag: f64,
-    /// `k = b Δμ/J`
+    /// `K`, 1/s.
     stribeck: f64,
-    v_s: f64,
+    /// Speed above which `q` is lost in rounding.
+    edge: f64,
 }
 
-/// One piece of motion.
-struct Piece {
+/// A state within an interval.
+#[derive(Clone, Copy)]
+struct State {
+    /// Since the begin of the interval, s.
     time: f64,
-    velocity: f64,
-    distance: f64,
-    stops: bool,
+    /// `s`.
+    speed: f64,
+    /// `φ`, 1/s, where it is more than the speed gives.
+    rate: Option<f64>,
+    /// `∫ s dt`, s.
+    way: f64,
+}
+
+/// `(1 − e^{−x})/x` and `(x − 1 + e^{−x})/x²`, for `x ≥ 0`.
+fn decay_means(x: f64) -> (f64, f64) {
+    if x > 0.1 {
+        let mean = -libm::expm1(-x) / x;
+        return (mean, (1.0 - mean) / x);
+    }
+    // Σ (−x)^n/(n+2)!
+    let terms = if x < 1e-3 { 5 } else { 10 };
+    let second = (2..2 + terms).rev().fold(0.0, |sum, n| (1.0 - x * sum) * INVERSE[n]);
+    (1.0 - x * second, second)
+}
+
+impl Flow {
+    /// `φ` at a speed, where `q` is `slip`.
+    fn rate(&self, speed: f64, slip: f64) -> f64 {
+        if speed < 1.0 {
+            self.excess - self.drag * speed - self.stribeck * libm::expm1(-speed)
+        } else {
+            self.drive - self.drag * speed - slip
+        }
+    }
+
+    /// Follows the motion from a speed for `left` seconds, or until it stops.
+    fn run(&self, speed: f64, left: f64) -> Option<(State, bool)> {
+        let mut at = State { time: 0.0, speed, rate: None, way: 0.0 };
+        for _ in 0..PIECE_LIMIT {
+            let rest = left - at.time;
+            if rest <= 0.0 {
+                return Some((at, false));
+            }
+            let stops = if at.speed > self.edge || self.stribeck == 0.0 {
+                self.linear(&mut at, rest, if self.stribeck == 0.0 { 0.0 } else { self.edge });
+                self.stribeck == 0.0 && at.speed == 0.0
+            } else {
+                self.layer(&mut at, rest)
+            };
+            if stops {
+                at.speed = 0.0;
+                return Some((at, true));
+            }
+        }
+        None
+    }
+
+    /// The motion without `q`: to the end, or until it has fallen to a speed.
+    fn linear(&self, at: &mut State, rest: f64, to: f64) {
+        let rate = self.drive - self.drag * at.speed;
+        // s − to = −rate (1 − e^{−Gt})/G
+        let fall = (at.speed - to) / -rate;
+        let share = self.drag * fall;
+        // The fall is never steeper than at first.
+        let reached = if rate >= 0.0 || fall >= rest || share >= 1.0 {
+            f64::INFINITY
+        } else if self.drag == 0.0 {
+            fall
+        } else {
+            -libm::log1p(-share) / self.drag
+        };
+        let reaches = reached < rest;
+        let time = if reaches { reached } else { rest };
+        let (mean, second) = decay_means(self.drag * time);
+        at.way += at.speed * time + rate * time * time * second;
+        at.time += time;
+        at.speed = if reaches { to } else { at.speed + rate * time * mean };
+        at.rate = None;
+    }
+
+    /// A piece in the layer, by the cheapest way that is sure of its error; true if it ends with a stop.
+    fn layer(&self, at: &mut State, rest: f64) -> bool {
+        let slip = self.stribeck * libm::exp(-at.speed);
+        let rate = at.rate.unwrap_or_else(|| self.rate(at.speed, slip));
+        if rate.abs() <= BALANCED * at.speed * (self.drag - slip) {
+            at.way += at.speed * rest;
+            at.time += rest;
+            return false;
+        }
+        if self.fringe(at, rate + slip, slip, rest) {
+            return false;
+        }
+        self.quadrature(at, rate, slip, rest).unwrap_or_else(|| series(at, rate, slip, self.drag, rest))
+    }
+
+    /// The outside of the layer, where `q` is below [`FRINGE`] of the rest: linear, and what `q` does beside that to first
+    /// order, `δ̇ = −G δ − K e^(−l)` with `l` the linear motion. With `dl = φ dt` its integrals are those of `e^(−l)`
+    /// over `φ²`, which is all but constant where `e^(−l)` is not small. False where the motion is not of this kind.
+    fn fringe(&self, at: &mut State, from: f64, slip: f64, rest: f64) -> bool {
+        let to = if from > 0.0 {
+            if slip > FRINGE * from {
+                return false;
+            }
+            0.0
+        } else {
+            libm::log(self.stribeck / (FRINGE * from.abs()))
+        };
+        let steep = self.drag <= 1e-3 * from.abs();
+        if !(steep && self.stribeck > 0.0 && (from > 0.0 || at.speed > to + REACH)) {
+            return false;
+        }
+        let begin = *at;
+        self.linear(at, rest, to);
+        let end = self.drive - self.drag * at.speed;
+        let x = (at.speed - begin.speed).abs();
+        let (fall, correction) = (-libm::expm1(-x), 1.0 + 2.0 * self.drag / from);
+        let (deviation, way) = if from > 0.0 {
+            let share = slip / from * correction;
+            (-end / from * share * fall, -share / from * (x - fall))
+        } else {
+            let share = self.stribeck * libm::exp(-at.speed) / end * correction;
+            (share * fall, -share / -end.abs() * (fall - x * libm::exp(-x)))
+        };
+        at.way += way;
+        at.speed += deviation - 0.5 * deviation * deviation;
+        true
+    }
+
+    /// The inside of the layer: `t = ∫ ds/φ` and `∫ s ds/φ` from the speed now to one that is guessed. What is left of
+    /// the time, a little before or behind the end, is a short series of known terms. None where the integrand is too
+    /// steep for [`NODES`], as in a soft break-away.
+    fn quadrature(&self, at: &mut State, now: f64, slip: f64, rest: f64) -> Option<bool> {
+        // With the drag as it is now, and then as it is half-way, the motion is in closed form.
+        let guess = |drive: f64| {
+            let y = -slip * rest * decay_mean(drive * rest);
+            if y <= -1.0 { -f64::INFINITY } else { drive * rest + libm::log1p(y) }
+        };
+        let reach = if slip > 1e-2 * now || -slip > 2.5e-5 * now { REACH } else { 2.0 * REACH };
+        let lowest = -at.speed.min(reach);
+        let mut way = guess(now + slip).clamp(lowest, reach);
+        if self.drag * rest > 1e-3 && way > lowest && way < reach {
+            way = guess(now + slip - 0.5 * self.drag * way).clamp(lowest, reach);
+        }
+        // The cheaper exponential where the difference keeps its digits.
+        let long = way.abs() > 0.5;
+        let rate = |way: f64| {
+            let fall = if long { libm::exp(-way) - 1.0 } else { libm::expm1(-way) };
+            now - self.drag * way - slip * fall
+        };
+        let (mut time, mut moment, mut last) = (0.0, 0.0, 0.0);
+        for [node, weight, seventh] in NODES {
+            let inverse = 1.0 / rate(node * way);
+            time += weight * inverse;
+            moment += weight * node * inverse;
+            last += seventh * inverse;
+        }
+        // The coefficients of a series in Legendre's polynomials fall like those of a power series: what eight nodes
+        // leave out is about the square of what the seventh coefficient is.
+        if !(time * way > 0.0 && (last / time) * (last / time) <= QUADRATURE) {
+            return None;
+        }
+        let (time, moment) = (time * way, moment * way * way);
+        let stops = way == -at.speed;
+        let left = rest - time;
+        let mut to = State {
+            time: at.time + time,
+            speed: at.speed + way,
+            rate: Some(rate(way)),
+            way: at.way + at.speed * time + moment,
+        };
+        let slip = slip * libm::exp(-way);
+        let short = left.abs() * (rate(way).abs() + slip.abs() + self.drag) <= SHORT;
+        if left < 0.0 && !short {
+            return None;
+        }
+        if left <= 0.0 || short && !stops {
+            let (g1, rate) = (slip - self.drag, rate(way));
+            let g2 = g1 * g1 - slip * rate;
+            let g3 = g1 * g1 * g1 - 4.0 * g1 * slip * rate + slip * rate * rate;
+            to.way += left * (to.speed + left / 2.0 * rate * (1.0 + left / 3.0 * (g1 + left / 4.0 * g2)));
+            to.speed += left * rate * (1.0 + left / 2.0 * (g1 + left / 3.0 * (g2 + left / 4.0 * g3)));
+            to.rate = None;
+            to.time = at.time + rest;
+            *at = to;
+            return Some(false);
+        }
+        *at = to;
+        Some(stops)
+    }
 }
 
 /// `(1 − e^{−x})/x`
@@ -87,169 +289,86 @@ fn decay_mean(x: f64) -> f64 {
     if x.abs() < 1e-300 { 1.0 } else { -libm::expm1(-x) / x }
 }
 
-/// Motion in the layer with the drag frozen.
-#[derive(Clone, Copy)]
-struct Frozen {
-    w0: f64,
-    /// `exp(−w0/v_s)`
-    inverse_z0: f64,
-    a: f64,
-    k: f64,
-    v_s: f64,
+/// A step in the layer, where `q` is `slip`: to the end, as far as the series goes, or to the stop.
+fn series(at: &mut State, now: f64, slip: f64, drag: f64, rest: f64) -> bool {
+    // Time is counted in the motion's own, so that no coefficient leaves the range of numbers.
+    let unit = now.abs() + slip.abs() + drag;
+    let drag = drag / unit;
+    let (mut q, mut rate) = ([0.0; TERMS], [0.0; TERMS]);
+    (q[0], rate[0]) = (slip / unit, now / unit);
+    for n in 1..TERMS {
+        let product: f64 = q[..n].iter().zip(rate[..n].iter().rev()).map(|(q, rate)| q * rate).sum();
+        q[n] = -product * INVERSE[n];
+        rate[n] = (product - drag * rate[n - 1]) * INVERSE[n];
+    }
+    let end = rest * unit;
+    let mut step = end.min(LONGEST / rate[0].abs());
+    let allowed = TOLERANCE * rate[0].abs();
+    for n in [TERMS - 2, TERMS - 1] {
+        let last = rate[n].abs();
+        if last * power(step, n) > allowed {
+            step = libm::pow(allowed / last, INVERSE[n]);
+        }
+    }
+    // ṡ = φ, so s and ∫ s dt have the coefficients of φ, divided once and twice.
+    let speed = |t: f64| at.speed + t * horner(t, |n| rate[n] * INVERSE[n + 1]);
+    let stops = rate[0] < 0.0 && speed(step) <= 0.0;
+    if stops {
+        step = instant(speed, |t| horner(t, |n| rate[n]), step);
+    }
+    let way = at.speed * step + step * step * horner(step, |n| rate[n] * INVERSE[n + 1] * INVERSE[n + 2]);
+    let to = State {
+        time: if step >= end { at.time + rest } else { at.time + step / unit },
+        speed: speed(step),
+        rate: Some(horner(step, |n| rate[n]) * unit),
+        way: at.way + way / unit,
+    };
+    *at = to;
+    stops
 }
 
-impl Frozen {
-    /// Velocity after `t`; negative where the shaft has stopped before.
-    fn velocity(&self, t: f64) -> f64 {
-        let y = -(self.k * t / self.v_s) * self.inverse_z0 * decay_mean(self.a * t / self.v_s);
-        if y <= -1.0 { -1.0 } else { self.w0 + self.a * t + self.v_s * libm::log1p(y) }
+/// `1/n`.
+const INVERSE: [f64; TERMS + 2] = {
+    let mut all = [0.0; TERMS + 2];
+    let mut n = 1;
+    while n < all.len() {
+        all[n] = 1.0 / n as f64;
+        n += 1;
     }
+    all
+};
 
-    /// The instant at which the velocity is `to`; meaningful only if it ever is.
-    fn reaches(&self, to: f64) -> f64 {
-        // z(t) = z1 where e^{at/v} = (a z1 − k)/(a z0 − k).
-        let d = self.a - self.k * self.inverse_z0;
-        let rise = libm::expm1((to - self.w0) / self.v_s);
-        let y = self.a * rise / d;
-        if y.abs() < 1e-12 {
-            self.v_s * rise / d
-        } else if y.abs() < 0.5 {
-            self.v_s / self.a * libm::log1p(y)
-        } else {
-            // The same with ln(z1/z0) taken out: y near −1 has lost its digits.
-            let fall = -self.k * self.inverse_z0 * libm::expm1((self.w0 - to) / self.v_s);
-            ((to - self.w0) + self.v_s * libm::log1p(fall / d)) / self.a
-        }
-    }
-
-    /// How much a deviation of the velocity at `t` has grown when the velocity is `w1` at `t1`.
-    fn growth(&self, t: f64, w: f64, t1: f64, w1: f64) -> f64 {
-        libm::exp((w - w1 + self.a * (t1 - t)) / self.v_s)
-    }
+/// The sum of a series at `t`.
+fn horner(t: f64, coefficient: impl Fn(usize) -> f64) -> f64 {
+    (0..TERMS).rev().fold(0.0, |sum, n| sum * t + coefficient(n))
 }
 
-impl Flow {
-    /// Velocity and distance after `t` where the Stribeck term is nothing.
-    fn linear(&self, w0: f64, t: f64) -> (f64, f64) {
-        let x = self.drag * t;
-        let mean = decay_mean(x);
-        // ∫ t·(1−e^{−ct})/(ct) has the closed form below; for small ct the series avoids the
-        // cancellation.
-        let mean2 = if x.abs() < 1e-3 {
-            0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x / 120.0))
-        } else {
-            (1.0 - mean) / x
-        };
-        let rate = self.drive - self.drag * w0;
-        (w0 + rate * t * mean, w0 * t + rate * t * t * mean2)
-    }
+/// `t^n`.
+fn power(t: f64, n: usize) -> f64 {
+    (0..n).fold(1.0, |power, _| power * t)
+}
 
-    /// Time until the linear motion has speed `to`, if it ever has.
-    fn linear_reaches(&self, w0: f64, to: f64) -> Option<f64> {
-        let rate = self.drive - self.drag * w0;
-        if rate >= 0.0 {
-            return None;
-        }
-        let y = (w0 - to) / -rate;
-        if self.drag * y < 1e-12 {
-            return Some(y);
-        }
-        // w0 − to = −rate (1 − e^{−ct})/c
-        let share = self.drag * y;
-        (share < 1.0).then(|| -libm::log1p(-share) / self.drag)
-    }
-
-    /// The next piece of motion from speed `w0`, no longer than `left`.
-    fn piece(&self, w0: f64, left: f64) -> Piece {
-        let edge = LINEAR_ABOVE * self.v_s;
-        let plain = self.stribeck == 0.0;
-        if plain || w0 > edge {
-            let to = if plain { 0.0 } else { edge };
-            let reached = self.linear_reaches(w0, to).filter(|t| *t < left);
-            let time = reached.unwrap_or(left);
-            let (velocity, distance) = self.linear(w0, time);
-            let velocity = if reached.is_some() { to } else { velocity };
-            return Piece { time, velocity, distance, stops: plain && reached.is_some() };
-        }
-        // In the layer. With frozen drag the velocity rises or falls throughout.
-        let inverse_z0 = libm::exp(-w0 / self.v_s);
-        let frozen = |at: f64| Frozen {
-            w0,
-            inverse_z0,
-            a: self.drive - self.drag * at,
-            k: self.stribeck,
-            v_s: self.v_s,
-        };
-        let longest = left.min(30.0 * self.v_s / (self.drive - self.drag * w0).abs());
-        let guess = frozen(w0).velocity(longest);
-        let rising = guess > w0;
-        let border = if rising {
-            BORDERS.iter().rev().map(|b| b * self.v_s).find(|b| *b > w0 && *b < guess)
+/// Where a falling speed is 0, within `(0, beyond]`: Newton's method, halving where it would leave the bracket.
+fn instant(speed: impl Fn(f64) -> f64, rate: impl Fn(f64) -> f64, beyond: f64) -> f64 {
+    let (mut before, mut after) = (0.0, beyond);
+    let mut t = beyond;
+    for _ in 0..100 {
+        let s = speed(t);
+        if s > 0.0 {
+            before = t
         } else {
-            BORDERS.iter().map(|b| b * self.v_s).find(|b| *b < w0 && *b > guess)
-        };
-        let to = border.unwrap_or(guess.max(0.0));
-        let middle = 0.5 * (w0 + to);
-        let (piece, better) = self.frozen_piece(frozen(middle), middle, longest, border, left);
-        // Where the layer blows the drag's deviation up, its square counts: freeze the drag at the
-        // velocity at which nothing deviates, to first order, by the end.
-        if better.1 > SQUARE {
-            self.frozen_piece(frozen(better.0), better.0, longest, border, left).0
-        } else {
-            piece
+            after = t
         }
+        let mut next = t - s / rate(t);
+        if !(next > before && next < after) {
+            next = 0.5 * (before + after);
+        }
+        if (next - t).abs() <= 1e-16 * after || next <= before || next >= after {
+            return next;
+        }
+        t = next;
     }
-
-    /// A piece with the drag frozen at `middle` and the rest of it as a perturbation; the velocity
-    /// at which freezing leaves no deviation at the end, and what the square of the deviation
-    /// does to the velocity.
-    fn frozen_piece(
-        &self,
-        flow: Frozen,
-        middle: f64,
-        longest: f64,
-        border: Option<f64>,
-        left: f64,
-    ) -> (Piece, (f64, f64)) {
-        let w0 = flow.w0;
-        let mut time = longest;
-        let mut velocity = flow.velocity(time);
-        let mut stops = false;
-        match border {
-            Some(border) if (velocity > border) == (border > w0) => {
-                (time, velocity) = (flow.reaches(border).clamp(0.0, time), border);
-            }
-            _ if velocity <= 0.0 => {
-                (time, velocity) = (flow.reaches(0.0).clamp(0.0, time), 0.0);
-                stops = true;
-            }
-            _ => {}
-        }
-        let (mut mean, mut deviation, mut shift, mut total) = (0.0, 0.0, 0.0, 0.0);
-        for (node, weight) in NODES.iter().zip(WEIGHTS) {
-            let t = node * time;
-            let w = flow.velocity(t);
-            let growth = flow.growth(t, w, time, velocity);
-            mean += weight * w;
-            total += weight * growth;
-            deviation += weight * (w - middle) * growth;
-            // Simpson over what is left of the piece; half-way the growth is near its root.
-            let sum = 1.0 + 4.0 * libm::sqrt(growth) + growth;
-            shift += weight * (w - middle) * (time - t) * sum / 6.0;
-        }
-        let better = middle + deviation / total;
-        let deviation = -self.drag * time * deviation;
-        let square = deviation * deviation / self.v_s;
-        let distance = time * (mean - self.drag * shift);
-        let piece = if stops {
-            // A deviation at the end is a stop a little later or earlier.
-            let time = (time - deviation / (flow.a - flow.k)).clamp(0.0, left);
-            Piece { time, velocity: 0.0, distance, stops }
-        } else {
-            Piece { time, velocity: (velocity + deviation).max(0.0), distance, stops }
-        };
-        (piece, (better, square))
-    }
+    t
 }
 
 impl Engine for ExactFlow {
@@ -270,43 +389,50 @@ impl Engine for ExactFlow {
         };
         let (p, torque) = (model.plant.params(), input.torque(0.0, shaft.position));
         let (brake, holds) = (p.brake_gain * volts.max(0.0), model.break_away_torque(0.0, volts));
-        let mut s = 0.0;
+        let (v_s, unit) = (friction.velocity, p.inertia * friction.velocity);
+        let stribeck = brake * (friction.at_rest - friction.sliding) / unit;
         let event = |kind, s: f64, position| Event { time: input.time + s, kind, position, torque };
-        for _ in 0..PIECE_LIMIT {
-            if s >= input.duration {
-                return Ok(());
-            }
+        let mut s = 0.0;
+        // Stuck or not at first, it stops once at most, and then rises or stays.
+        loop {
             if shaft.motion == Motion::Stuck {
-                if break_away(model, input, shaft.position, s).is_none() {
+                if s >= input.duration || break_away(model, input, shaft.position, s).is_none() {
                     return Ok(());
                 }
                 shaft.motion = Motion::along(torque);
                 events.push(event(EventKind::BreakAway, s, shaft.position));
             }
-            let sign = shaft.motion.sign();
+            let (sign, left) = (shaft.motion.sign(), input.duration - s);
             let flow = Flow {
-                drive: (sign * torque - brake * friction.sliding) / p.inertia,
+                drive: (sign * torque - brake * friction.sliding) / unit,
+                excess: (sign * torque - holds) / unit,
                 drag: p.viscous_damping / p.inertia,
-                stribeck: brake * (friction.at_rest - friction.sliding) / p.inertia,
-                v_s: friction.velocity,
+                stribeck,
+                edge: if stribeck.abs() * left < 20.0 {
+                    LINEAR_ABOVE
+                } else {
+                    LINEAR_ABOVE + libm::log(stribeck.abs() * left)
+                },
             };
-            let piece = flow.piece(sign * shaft.velocity, input.duration - s);
-            s += piece.time;
-            shaft.position += sign * piece.distance;
-            shaft.velocity = sign * piece.velocity;
-            if !(shaft.position.is_finite() && shaft.velocity.is_finite()) {
+            let Some((end, stops)) = flow.run(sign * shaft.velocity / v_s, left) else {
+                return Err(EngineError::TooManySteps { time: input.time, limit: PIECE_LIMIT });
+            };
+            if !(end.way.is_finite() && end.speed.is_finite()) {
                 return Err(EngineError::NotFinite { time: input.time });
             }
-            if piece.stops {
-                shaft.velocity = 0.0;
-                if torque.abs() <= holds {
-                    shaft.motion = Motion::Stuck;
-                    events.push(event(EventKind::Stick, s, shaft.position));
-                } else {
-                    shaft.motion = Motion::along(torque);
-                }
+            shaft.position += sign * v_s * end.way;
+            shaft.velocity = sign * v_s * end.speed;
+            if !stops {
+                return Ok(());
             }
+            s += end.time;
+            shaft.velocity = 0.0;
+            if torque.abs() <= holds {
+                shaft.motion = Motion::Stuck;
+                events.push(event(EventKind::Stick, s, shaft.position));
+                return Ok(());
+            }
+            shaft.motion = Motion::along(torque);
         }
-        Err(EngineError::TooManySteps { time: input.time, limit: PIECE_LIMIT })
     }
 }
