@@ -5,6 +5,7 @@ mod acceptance;
 mod detector;
 mod engines;
 mod errata;
+mod intervals;
 mod laws;
 mod pid;
 mod single_precision;

@@ -1,6 +1,6 @@
 //! Fuzzing, with cargo-fuzz.
 
-use crate::run::{Program, program};
+use crate::run::{Program, program, root};
 use anyhow::{Result, bail};
 
 /// Targets in `fuzz/fuzz_targets`, each with the number of inputs that tests try: as many as took 20 s.
@@ -20,7 +20,10 @@ pub(crate) fn all(seconds: u32) -> Result<()> {
 
 /// Fuzzes one target until `end`, an option of libFuzzer; true if it held.
 pub(crate) fn one(target: &str, end: &str) -> Result<bool> {
-    cargo_fuzz(&["run", target, "--", end, "-print_final_stats=1"]).lines(|_| ())
+    // Of its two folders libFuzzer fills the first; the one in the tree is only read.
+    let (found, seeds) = (format!("target/corpus/{target}"), format!("fuzz/corpus/{target}"));
+    std::fs::create_dir_all(root().join(&found))?;
+    cargo_fuzz(&["run", target, &found, &seeds, "--", end, "-print_final_stats=1"]).lines(|_| ())
 }
 
 /// Builds every target.

@@ -77,6 +77,12 @@ enum Verb {
         #[arg(default_value_t = 1)]
         first: u64,
     },
+    /// Compares the engines with SciPy over random single intervals: the table of docs/theory.md, section 10.
+    Intervals {
+        /// Intervals, half of them of extreme parameters.
+        #[arg(default_value_t = 12_000)]
+        count: u32,
+    },
     /// Measures the lateness of a waking thread here, against cyclictest (benches/latency).
     Latency {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -137,6 +143,12 @@ fn main() -> Result<()> {
         }
         Verb::Fuzz { seconds } => fuzz::all(seconds),
         Verb::Campaign { seeds, first } => campaign(seeds, first),
+        Verb::Intervals { count } => {
+            cargo(["build", "--release", "--package", "clutch-sim", "--example", "intervals"]).run()?;
+            let script =
+                ["python/tests/intervals.py", "target/release/examples/intervals", &count.to_string()];
+            run::program(python::interpreter()?).args(script).run()
+        }
         Verb::Latency { rest } => {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }

@@ -188,6 +188,14 @@ impl Drive {
         points.iter().skip(first).map(|p| p.0).take_while(move |t| *t < to)
     }
 
+    /// The most that the torque of a shaft at rest bends between two corners, N m/s².
+    pub(crate) fn curvature(&self) -> f64 {
+        match self {
+            Drive::Constant(_) | Drive::Spring { .. } | Drive::Table(_) => 0.0,
+            Drive::Hand { sines, .. } => sines.iter().map(|(a, w, _)| a.abs() * w * w).sum(),
+        }
+    }
+
     /// Changes neither with time nor with position.
     #[must_use]
     pub fn is_constant(&self) -> bool {

@@ -103,10 +103,14 @@ fn host(tally: &mut Tally) -> Result<bool> {
     Ok(sound & cargo(tests).args(core).lines(|l| tally.read(l))?)
 }
 
+/// What the tests of the wheel run beside it.
+const EXAMPLES: [&str; 3] = ["write_demo", "bits", "intervals"];
+
 /// Builds what the wheel is compared with, and the command that tests run: with few optimisations, as the tests.
 /// The wheel, with all of them, must give the same bits.
 fn compared() -> Result<std::path::PathBuf> {
-    let programs = ["--bin", "clutch", "--example", "write_demo", "--example", "bits"];
+    let mut programs = vec!["--bin", "clutch"];
+    EXAMPLES.iter().for_each(|name| programs.extend(["--example", name]));
     cargo(["build"]).args(WORKSPACE).args(programs).run()?;
     Ok(root().join("target/debug/clutch"))
 }
@@ -206,6 +210,7 @@ fn wheel_of(tally: &mut Tally) -> Result<bool> {
         .env("CLUTCH_BIN", clutch)
         .env("CLUTCH_LOG_DEMO", built("write_demo"))
         .env("CLUTCH_BITS", bits)
+        .env("CLUTCH_INTERVALS", built("intervals"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .lines(|l| tally.read(l))
 }

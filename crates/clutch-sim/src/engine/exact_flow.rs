@@ -1,5 +1,4 @@
-//! The motion between two samples where friction follows (2) with δ = 1: closed form above the Stribeck layer, power
-//! series within it.
+//! The motion between two samples where friction follows (2) with δ = 1.
 //!
 //! With voltage and torque held, and the speed `ω = v_s s ≥ 0` taken along the motion,
 //!
@@ -8,30 +7,31 @@
 //! φ̇ = (q − G) φ,   q̇ = −q φ                        K = b Δμ/(J v_s),  b = K_COF v_a,  Δμ = μ_s − μ_d
 //! ```
 //!
-//! 1. Where `q` is lost in rounding the rest is linear: velocity, position and the instant of leaving the range are in
-//!    closed form.
-//! 2. In the layer `s`, `φ` and `q` are power series in time; all that the recurrence of their coefficients needs is one
-//!    product of two series. A step is as long as the last two terms of `φ` stay below [`TOLERANCE`] of `φ` itself.
-//!    So the error is relative to the rate even where that is nearly nothing, as at a break-away; the layer blows up an
-//!    error no more than it blows up the motion. `φ` is carried on as a number of its own and not taken anew as a
-//!    difference of large ones.
-//! 3. `φ` never changes its sign: in an interval the speed only rises or only falls. The shaft stops once at most, and
-//!    there is no balance to step over.
+//! An interval is cut into pieces, each taken by the cheapest way that is sure of its error:
+//!
+//! 1. Where `q` is lost in rounding the motion is linear: velocity, position and the instant of leaving the range are in
+//!    closed form; at the fringe of the layer with what `q` does to first order.
+//! 2. In the layer `t = ∫ ds/φ` and `∫ s ds/φ` by quadrature to a speed that the motion with frozen drag gives.
+//! 3. Where the integrand is too steep, as in a soft break-away, `s`, `φ` and `q` are power series in time; all that the
+//!    recurrence of their coefficients needs is one product of two series. The error is relative to the rate even where
+//!    that is nearly nothing: the layer blows it up no more than it blows up the motion. `φ` is carried on as a number
+//!    of its own and not taken anew as a difference of large ones.
 //! 4. Stuck: nothing to integrate; break-away is a comparison.
+//!
+//! `φ` never changes its sign: in an interval the speed only rises or only falls. The shaft stops once at most, and
+//! there is no balance to step over. docs/theory.md has the derivation and the errors that were measured.
 
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, Volts, break_away};
 use clutch_core::friction::FrictionModel;
 
 /// Terms of a power series.
 const TERMS: usize = 18;
-/// The last two terms of a series, as a share of the rate of speed.
-const TOLERANCE: f64 = 1e-11;
+/// What a piece may leave out, as a share of what it is: of a quadrature the time, of a series the rate of speed.
+const TOLERANCE: f64 = 1e-10;
 /// Longest step of a series, in Stribeck velocities: beyond, `e^(−s)` would need more terms.
 const LONGEST: f64 = 6.0;
 /// Share of `q` in the rate of speed below which first order is enough: the second is its square.
 const FRINGE: f64 = 1e-5;
-/// What a quadrature may leave out, as a share of the time.
-const QUADRATURE: f64 = 1e-10;
 /// Way of a quadrature in the middle of the layer, in Stribeck velocities.
 const REACH: f64 = 3.0;
 /// Time, in the motion's own, that five terms of a series bridge.
@@ -133,7 +133,8 @@ impl Flow {
         let mut at = State { time: 0.0, speed, rate: None, way: 0.0 };
         for _ in 0..PIECE_LIMIT {
             let rest = left - at.time;
-            if rest <= 0.0 {
+            // The caller reports what is no number.
+            if rest <= 0.0 || !at.speed.is_finite() {
                 return Some((at, false));
             }
             let stops = if at.speed > self.edge || self.stribeck == 0.0 {
@@ -198,7 +199,7 @@ impl Flow {
             }
             0.0
         } else {
-            libm::log(self.stribeck / (FRINGE * from.abs()))
+            libm::log(self.stribeck / (FRINGE * from.abs())).max(REACH)
         };
         let steep = self.drag <= 1e-3 * from.abs();
         if !(steep && self.stribeck > 0.0 && (from > 0.0 || at.speed > to + REACH)) {
@@ -251,7 +252,7 @@ impl Flow {
         }
         // The coefficients of a series in Legendre's polynomials fall like those of a power series: what eight nodes
         // leave out is about the square of what the seventh coefficient is.
-        if !(time * way > 0.0 && (last / time) * (last / time) <= QUADRATURE) {
+        if !(time * way > 0.0 && (last / time) * (last / time) <= TOLERANCE) {
             return None;
         }
         let (time, moment) = (time * way, moment * way * way);
@@ -276,6 +277,9 @@ impl Flow {
             to.speed += left * rate * (1.0 + left / 2.0 * (g1 + left / 3.0 * (g2 + left / 4.0 * g3)));
             to.rate = None;
             to.time = at.time + rest;
+            if to.speed < 0.0 {
+                return None; // it stops at the very end
+            }
             *at = to;
             return Some(false);
         }

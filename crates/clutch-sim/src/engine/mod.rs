@@ -107,6 +107,16 @@ pub enum Volts {
 }
 
 impl Volts {
+    /// The most that the voltage bends downwards from `s` on, V/s².
+    fn curvature(self, s: f64) -> f64 {
+        match self {
+            Volts::Held(_) => 0.0,
+            Volts::Lag { from, to, time_constant } => {
+                (from - to).max(0.0) * libm::exp(-s / time_constant) / (time_constant * time_constant)
+            }
+        }
+    }
+
     /// `s` seconds after the sample, V.
     #[inline]
     pub(crate) fn at(self, s: f64) -> f64 {
@@ -260,35 +270,60 @@ clutch_core::words! {
     }
 }
 
-/// Longest time without an event that a search for break-away may step over, as a share of the
-/// interval, where torque or voltage change within it.
-const BREAK_AWAY_STEPS: u32 = 8;
+/// Halvings of an interval that a search for break-away makes at most: one of a millisecond then is 1e-18 s long.
+const HALVINGS: u32 = 50;
+/// Halvings after which an instant that no bound excludes is passed over: the excess of torque there is below what its
+/// curvature makes in a millionth of the interval.
+const EXCLUDED: u32 = 20;
 
 /// The first instant after `s` at which a stuck shaft breaks away, if it does before the end.
 ///
-/// The instant given back is on the far side of the root: there the torque exceeds friction.
+/// The instant given back is on the far side of the root: there the torque exceeds friction. No root is stepped over:
+/// between two instants the excess of torque over friction rises above its ends by an eighth of the time squared times
+/// the bound of its curvature, at most; where that is not enough to exclude a root, the time is halved.
 fn break_away(model: &Model, input: &Input<'_>, position: f64, s: f64) -> Option<f64> {
     let excess =
         |s: f64| input.torque(s, position).abs() - model.break_away_torque(position, input.volts.at(s));
-    if excess(s) > 0.0 {
+    let begin = excess(s);
+    if begin > 0.0 {
         return Some(s);
     }
     if input.is_constant() {
         return None;
     }
-    let step = (input.duration - s) / f64::from(BREAK_AWAY_STEPS);
-    let mut before = s;
-    for i in 1..=BREAK_AWAY_STEPS {
-        let mut after = if i == BREAK_AWAY_STEPS { input.duration } else { s + step * f64::from(i) };
-        if excess(after) > 0.0 {
-            // Halving to the last bit of an interval of a millisecond: below 1e-18 s.
-            for _ in 0..52 {
-                let middle = 0.5 * (before + after);
-                if excess(middle) > 0.0 { after = middle } else { before = middle }
+    let search = Search { input, excess, friction: model.break_away_torque(position, 1.0) };
+    search.first((s, begin), (input.duration, excess(input.duration)), 0)
+}
+
+/// A search for the first root of the excess of torque.
+struct Search<'a, F> {
+    input: &'a Input<'a>,
+    excess: F,
+    /// What friction holds for each volt, N m/V.
+    friction: f64,
+}
+
+impl<F: Fn(f64) -> f64> Search<'_, F> {
+    /// The first instant with an excess after `a`, which has none; `a` and `b` are instants and their excess.
+    fn first(&self, a: (f64, f64), b: (f64, f64), halvings: u32) -> Option<f64> {
+        let none_at_the_end = b.1 <= 0.0;
+        if none_at_the_end {
+            let length = b.0 - a.0;
+            // |T| bends upwards where T changes its sign: that only lowers it between two ends.
+            let curvature = self.input.drive.curvature() + self.friction * self.input.volts.curvature(a.0);
+            if a.1.max(b.1) + 0.125 * curvature * length * length <= 0.0 || halvings >= EXCLUDED {
+                return None;
             }
-            return Some(after);
         }
-        before = after;
+        let middle = 0.5 * (a.0 + b.0);
+        if halvings >= HALVINGS || middle <= a.0 || middle >= b.0 {
+            return (!none_at_the_end).then_some(b.0);
+        }
+        let m = (middle, (self.excess)(middle));
+        match self.first(a, m, halvings + 1) {
+            Some(instant) => Some(instant),
+            None if m.1 > 0.0 => Some(m.0),
+            None => self.first(m, b, halvings + 1),
+        }
     }
-    None
 }

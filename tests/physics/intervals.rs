@@ -1,0 +1,214 @@
+//! Single intervals: reference numbers, hard break-aways, and an interval in parts.
+
+use clutch_core::{PlantParams, StribeckParams};
+use clutch_sim::drive::Drive;
+use clutch_sim::engine::{DormandPrince, Engine, Event, EventKind, ExactFlow, Input, Model, Shaft, Volts};
+use clutch_sim::rig::{Ripple, RippleParams};
+use clutch_tests::{engines, model};
+use proptest::prelude::*;
+
+fn stribeck(mu_static: f64, mu_dynamic: f64, stribeck_velocity: f64) -> StribeckParams {
+    StribeckParams { mu_static, mu_dynamic, stribeck_velocity, ..StribeckParams::default() }
+}
+
+fn input(drive: &Drive, volts: f64, duration: f64) -> Input<'_> {
+    Input { time: 0.0, duration, origin: 0.0, volts: Volts::Held(volts), drive, noise: 0.0 }
+}
+
+fn moved(engine: &mut dyn Engine, model: &Model, input: &Input<'_>, velocity: f64) -> (Shaft, Vec<Event>) {
+    let (mut shaft, mut events) = (Shaft::new(0.0, velocity), Vec::new());
+    engine.advance(model, input, &mut shaft, &mut events).expect("the motion can be followed");
+    (shaft, events)
+}
+
+/// The shaft of Table 1 at rest under a voltage whose static limit is a little below the torque: the time to 2.5 Stribeck
+/// velocities, by two independent quadratures.
+#[test]
+fn a_soft_break_away_takes_the_time_that_quadrature_gives() {
+    for (excess, damping, seconds) in [
+        (1e-6, 0.0, 1.70218766907e-3),
+        (1e-9, 0.0, 2.69983781296e-3),
+        (1e-6, 0.001, 1.70235371e-3),
+        (1e-9, 0.001, 2.70008863e-3),
+    ] {
+        let plant = PlantParams { viscous_damping: damping, ..PlantParams::default() };
+        let torque = plant.drive_torque;
+        let volts = (torque - excess) / (0.2 * plant.brake_gain);
+        let drive = Drive::Constant(torque);
+        // The excess itself is a difference: its digits decide. 1e-9 s is 1e-5 of the speed here.
+        for (name, mut engine) in engines() {
+            let (shaft, events) = moved(engine.as_mut(), &model(&plant), &input(&drive, volts, seconds), 0.0);
+            assert!((shaft.velocity / 0.0025 - 1.0).abs() < 1e-5, "{name}: {} rad/s", shaft.velocity);
+            assert_eq!(events.len(), 1, "{name}");
+        }
+    }
+}
+
+#[test]
+fn much_drag_in_the_layer_is_followed() {
+    let plant = PlantParams {
+        inertia: 1e-3,
+        viscous_damping: 0.05,
+        brake_gain: 0.14,
+        friction: stribeck(0.2, 0.1, 0.1).into(),
+        ..PlantParams::default()
+    };
+    let drive = Drive::Constant(0.05);
+    for ((name, mut engine), tolerance) in engines().into_iter().zip([1e-8, 5e-10]) {
+        let (shaft, _) = moved(engine.as_mut(), &model(&plant), &input(&drive, 2.0, 20e-3), 0.2);
+        assert!((shaft.position / 5.4196106505e-3 - 1.0).abs() < tolerance, "{name}: {}", shaft.position);
+        assert!((shaft.velocity / 0.3290117386 - 1.0).abs() < tolerance, "{name}: {}", shaft.velocity);
+    }
+}
+
+/// 0.5 + 0.6 sin(2π 40 t) of the static limit passes it at asin(5/6)/(2π 40), and comes back within the interval.
+#[test]
+fn a_torque_that_rises_and_falls_within_an_interval_breaks_the_shaft_away() {
+    let plant = PlantParams::default();
+    let limit = 0.2 * plant.brake_gain * 2.0;
+    let w = std::f64::consts::TAU * 40.0;
+    let drive = Drive::Hand { mean: 0.5 * limit, sines: vec![(0.6 * limit, w, 0.0)] };
+    let (_, events) = moved(&mut DormandPrince::default(), &model(&plant), &input(&drive, 2.0, 0.1), 0.0);
+    assert_eq!(events[0].kind, EventKind::BreakAway);
+    assert!((events[0].time - (0.5_f64 / 0.6).asin() / w).abs() < 1e-9, "{events:?}");
+}
+
+/// The peak of the torque is above the limit by a millionth for 90 µs of 100 ms.
+#[test]
+fn a_short_peak_above_the_limit_is_not_stepped_over() {
+    let plant = PlantParams::default();
+    let limit = 0.2 * plant.brake_gain * 2.0;
+    let w = std::f64::consts::TAU * 33.0;
+    for (share, events) in [(1.0 + 1e-6, 1), (1.0 - 1e-6, 0)] {
+        let drive = Drive::Hand { mean: 0.0, sines: vec![(share * limit, w, 0.3)] };
+        let (shaft, seen) =
+            moved(&mut DormandPrince::default(), &model(&plant), &input(&drive, 2.0, 8e-3), 0.0);
+        assert_eq!(seen.iter().filter(|e| e.kind == EventKind::BreakAway).count(), events, "{shaft:?}");
+    }
+}
+
+/// A brake that opens through a lag lets go where its voltage has fallen to the torque.
+#[test]
+fn a_brake_that_opens_with_a_lag_lets_go_at_the_instant_of_its_curve() {
+    let plant = PlantParams::default();
+    let drive = Drive::Constant(plant.drive_torque);
+    for lag in [1e-3, 1e-5, 1e-7] {
+        let volts = Volts::Lag { from: 5.0, to: 1.0, time_constant: lag };
+        let opening = Input { volts, ..input(&drive, 0.0, 5e-3) };
+        let (_, events) = moved(&mut DormandPrince::default(), &model(&plant), &opening, 0.0);
+        let holding = plant.drive_torque / (0.2 * plant.brake_gain);
+        let expected = lag * ((5.0 - 1.0) / (holding - 1.0)).ln();
+        assert!(
+            (events[0].time - expected).abs() < 1e-9 * lag.max(1e-6),
+            "{lag} s: {events:?}, {expected} s"
+        );
+    }
+}
+
+#[test]
+fn noise_below_the_limit_moves_a_shaft_at_the_limit_by_nothing_in_an_hour() {
+    let plant = PlantParams::default();
+    let m = model(&plant);
+    // All but the noise's largest value of the static limit: 100.0 %.
+    let volts = (plant.drive_torque + 1e-6) / (0.2 * plant.brake_gain);
+    let drive = Drive::Constant(plant.drive_torque);
+    for (name, mut engine) in engines() {
+        let (mut shaft, mut events) = (Shaft::new(0.3, 0.0), Vec::new());
+        for tick in 0..3_600_000_u32 {
+            let noise = 9.99e-7 * f64::from(tick.wrapping_mul(2_654_435_761)) / f64::from(u32::MAX);
+            let held = Input { noise, ..input(&drive, volts, 1e-3) };
+            engine.advance(&m, &held, &mut shaft, &mut events).unwrap();
+        }
+        assert_eq!((shaft.position, shaft.velocity, events.len()), (0.3, 0.0, 0), "{name}");
+    }
+}
+
+/// What moves the shaft, by number.
+fn drive(kind: u8, torque: f64) -> Drive {
+    match kind {
+        0 => Drive::Constant(torque),
+        1 => Drive::Spring { stiffness: 0.5 * torque.abs(), rest: 1.5 * torque.signum() },
+        2 => Drive::Table(vec![(0.0, torque), (2e-3, 0.2 * torque), (7e-3, 1.4 * torque)]),
+        _ => Drive::Hand {
+            mean: torque,
+            sines: vec![(0.5 * torque.abs(), 400.0, 0.1), (0.3 * torque.abs(), 3000.0, 2.0)],
+        },
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, rng_seed: proptest::test_runner::RngSeed::Fixed(2), ..ProptestConfig::default() })]
+
+    /// To 1e-9 (exact flow) or 1e-8 (Dormand–Prince) of what moves in that time, wherever the motion is not a coin on its edge: a break-away so soft that a bit
+    /// of the torque decides its instant.
+    #[test]
+    fn an_interval_in_parts_is_the_interval_whole(
+        velocity in prop_oneof![Just(0.0), -1.0_f64..1.0], volts in 0.0_f64..10.0, share in -2.0_f64..2.0,
+        v_s in -4.0_f64..0.0, ratio in 1.0_f64..2.5, drag in 0.0_f64..0.3, parts in 2_u32..20,
+        kind in 0_u8..4, ripple in any::<bool>(), lag in any::<bool>(), exact in any::<bool>(),
+    ) {
+        let duration = 1e-2;
+        let plant = PlantParams {
+            viscous_damping: drag * 0.0017 / duration,
+            friction: stribeck(0.15 * ratio, 0.15, 10.0_f64.powf(v_s)).into(),
+            ..PlantParams::default()
+        };
+        let mut m = model(&plant);
+        let limit = m.plant.break_away_torque(volts).max(1e-3);
+        let drive = drive(if exact { 0 } else { kind }, share * limit);
+        let volts = if lag && !exact {
+            Volts::Lag { from: volts, to: 5.0, time_constant: 1e-3 }
+        } else {
+            Volts::Held(volts)
+        };
+        if ripple && !exact {
+            let waves = RippleParams { rms: 0.05, lowest: 20, highest: 60, spacing: 20 };
+            m.ripple = Some(Ripple::new(&waves, 3).unwrap());
+        }
+        let whole = Input { volts, ..input(&drive, 0.0, duration) };
+        let engine = || -> Box<dyn Engine> {
+            if exact { Box::new(ExactFlow) } else { Box::new(DormandPrince::default()) }
+        };
+        let (once, once_events) = moved(engine().as_mut(), &m, &whole, velocity);
+        prop_assume!((share.abs() - 1.0).abs() > 1e-3);
+        let (mut shaft, mut events) = (Shaft::new(0.0, velocity), Vec::new());
+        let mut piecewise = engine();
+        for part in 0..parts {
+            let from = duration * f64::from(part) / f64::from(parts);
+            let to = duration * f64::from(part + 1) / f64::from(parts);
+            let volts = match volts {
+                Volts::Held(v) => Volts::Held(v),
+                Volts::Lag { from: at, to, time_constant } => {
+                    Volts::Lag { from: to + (at - to) * (-from / time_constant).exp(), to, time_constant }
+                }
+            };
+            let input = Input { time: from, duration: to - from, volts, ..whole };
+            piecewise.advance(&m, &input, &mut shaft, &mut events).unwrap();
+        }
+        let fastest = velocity.abs().max(once.velocity.abs()).max(shaft.velocity.abs()).max(10.0_f64.powf(v_s));
+        prop_assert_eq!(once.motion, shaft.motion);
+        prop_assert_eq!(once_events.len(), events.len());
+        let tolerance = if exact { 1e-9 } else { 1e-8 };
+        let (way, speed) = ((once.position - shaft.position).abs(), (once.velocity - shaft.velocity).abs());
+        prop_assert!(way < tolerance * fastest * duration, "{} rad apart", way);
+        prop_assert!(speed < tolerance * fastest, "{} rad/s apart", speed);
+    }
+
+    /// Torque times way, less what the shaft has gained, went into friction and drag: never below nothing.
+    #[test]
+    fn no_interval_gains_energy(
+        velocity in -3.0_f64..3.0, volts in 0.0_f64..10.0, torque in -0.2_f64..0.2, v_s in -6.0_f64..0.0,
+        milliseconds in 1_u32..50,
+    ) {
+        let plant = PlantParams { friction: stribeck(0.2, 0.15, 10.0_f64.powf(v_s)).into(), ..PlantParams::default() };
+        let drive = Drive::Constant(torque);
+        for (name, mut engine) in engines() {
+            let (shaft, _) =
+                moved(engine.as_mut(), &model(&plant), &input(&drive, volts, 1e-3 * f64::from(milliseconds)), velocity);
+            let gained = 0.5 * plant.inertia * (shaft.velocity.powi(2) - velocity.powi(2));
+            let given = torque * shaft.position;
+            let rounding = 1e-7 * (given.abs() + gained.abs());
+            prop_assert!(given - gained >= -rounding, "{}: {} J given, {} J gained", name, given, gained);
+        }
+    }
+}
