@@ -8,7 +8,7 @@
 
 use crate::friction::{Friction, FrictionModel, FrictionParams};
 use crate::params::{Range, Table};
-use crate::{ParamError, Real};
+use crate::{Arithmetic, Each, ParamError, Real};
 
 /// Standard gravity as the paper rounds it, m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -62,6 +62,22 @@ impl<T: Real> Plant<T> {
         let friction = Friction::build(&p.friction)?;
         let inverse_inertia = T::ONE / p.inertia;
         Ok(Plant { params: *p, friction, inverse_inertia })
+    }
+}
+
+impl<T: Arithmetic> Plant<T> {
+    /// The plants of several lanes as one; none if their frictions are not of one model.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Option<Plant<L>> {
+        let friction = Friction::in_lanes(&|get| each(&|plant| get(&plant.friction)))?;
+        let params = PlantParams {
+            inertia: each(&|plant| plant.params.inertia),
+            drive_torque: each(&|plant| plant.params.drive_torque),
+            viscous_damping: each(&|plant| plant.params.viscous_damping),
+            brake_gain: each(&|plant| plant.params.brake_gain),
+            friction: friction.params(),
+        };
+        Some(Plant { params, friction, inverse_inertia: each(&|plant| plant.inverse_inertia) })
     }
 }
 

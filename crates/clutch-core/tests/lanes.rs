@@ -8,10 +8,10 @@
 )]
 
 use clutch_core::law::{
-    ControlLaw, Limit, OutputParams, Pd, PdParams, Pid, PidParams, Smc, SmcParams, SmcSign, SmcSignParams,
-    Terms, Tick,
+    ControlLaw, Ctc, CtcParams, Limit, OutputParams, Pd, PdParams, Pid, PidParams, Smc, SmcParams, SmcSign,
+    SmcSignParams, Terms, Tick,
 };
-use clutch_core::{Arithmetic, Each, Micros};
+use clutch_core::{Arithmetic, Each, Micros, PlantParams, StribeckParams};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 const N: usize = 4;
@@ -210,4 +210,21 @@ fn each_law_has_in_each_lane_the_bits_of_the_scalar() {
         }),
         |each| Pid::in_lanes(each),
     );
+    // Each lane believes in another friction; a power in one of them takes it in all.
+    for exponent in [1.0, 1.5] {
+        same_bits(
+            std::array::from_fn(|i| {
+                let friction = StribeckParams {
+                    mu_static: 0.2 * scaled(i),
+                    stribeck_velocity: 0.001 * scaled(i),
+                    stribeck_exponent: if i == 0 { exponent } else { 1.0 },
+                    ..StribeckParams::default()
+                };
+                let model = PlantParams { friction: friction.into(), ..PlantParams::default() };
+                let p = CtcParams { outer_gain: 900.0 * scaled(i), ..CtcParams::default() };
+                Ctc::new(&p, &model, &output(), PERIOD).unwrap()
+            }),
+            |each| Ctc::in_lanes(each).unwrap(),
+        );
+    }
 }

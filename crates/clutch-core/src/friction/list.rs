@@ -28,6 +28,34 @@ macro_rules! frictions {
             }
         )+
 
+        impl<T: Arithmetic> Friction<T> {
+            /// The frictions of several lanes as one; none if they are not of one model.
+            #[must_use]
+            #[allow(unreachable_patterns, reason = "the list may have one model")]
+            pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Option<Friction<L>> {
+                $({
+                    let is = each(&|f| if matches!(f, Friction::$model(_)) { T::ONE } else { T::ZERO });
+                    if L::all(L::ONE.less_or_equal(is)) {
+                        return Some(Friction::$model($model::in_lanes(&|get| {
+                            each(&|f| match f {
+                                Friction::$model(f) => get(f),
+                                _ => T::ZERO,
+                            })
+                        })));
+                    }
+                })+
+                None
+            }
+
+            /// The parameters it was built from.
+            #[must_use]
+            pub fn params(&self) -> FrictionParams<T> {
+                match self {
+                    $(Friction::$model(f) => FrictionParams::$model(*f.params()),)+
+                }
+            }
+        }
+
         impl<T: Arithmetic> FrictionModel<T> for Friction<T> {
             type Params = FrictionParams<T>;
 

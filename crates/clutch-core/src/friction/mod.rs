@@ -14,7 +14,7 @@ mod list;
 
 pub use geometry::BrakeGeometry;
 
-use crate::{Arithmetic, Interval, ParamError, Real};
+use crate::{Arithmetic, Each, Interval, ParamError, Real};
 
 list::frictions! {
     stribeck Stribeck StribeckParams "Stribeck's curve (2).";

@@ -6,7 +6,7 @@
 
 use super::{Exponential, FrictionModel};
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Interval, ParamError, Real};
+use crate::{Arithmetic, Each, Interval, ParamError, Real};
 
 crate::params! {
     /// Dry friction of pad on disc, Stribeck's curve (2). The defaults are Table 1's.
@@ -71,15 +71,35 @@ impl<T: Real> Stribeck<T> {
             vanishes_at: vanishes_at.min(T::EXP_NEG_MAX),
         })
     }
+}
 
+impl<T: Arithmetic> Stribeck<T> {
     /// The parameters it was built from.
     #[must_use]
     pub fn params(&self) -> &StribeckParams<T> {
         &self.params
     }
-}
 
-impl<T: Arithmetic> Stribeck<T> {
+    /// The curves of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Stribeck<L> {
+        let stribeck_exponent = each(&|f| f.params.stribeck_exponent);
+        let is_one = stribeck_exponent.less_or_equal(L::ONE) & L::ONE.less_or_equal(stribeck_exponent);
+        Stribeck {
+            params: StribeckParams {
+                mu_static: each(&|f| f.params.mu_static),
+                mu_dynamic: each(&|f| f.params.mu_dynamic),
+                stribeck_velocity: each(&|f| f.params.stribeck_velocity),
+                stribeck_exponent,
+            },
+            inverse_velocity: each(&|f| f.inverse_velocity),
+            // To the power of 1 a number has the same bits.
+            exponent_is_one: L::all(is_one),
+            drop: each(&|f| f.drop),
+            vanishes_at: each(&|f| f.vanishes_at),
+        }
+    }
+
     #[inline]
     fn falling(&self, exponent: T) -> T {
         let vanished = self.vanishes_at.less_or_equal(exponent);

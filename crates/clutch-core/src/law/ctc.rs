@@ -11,7 +11,7 @@
 use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Micros, ParamError, Plant, PlantParams, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Plant, PlantParams, Real};
 
 crate::params! {
     /// Computed-torque control (11): the plant that `Model` describes, solved for the voltage. The gains'
@@ -61,6 +61,19 @@ impl<T: Real> Ctc<T> {
 }
 
 impl<T: Arithmetic> Ctc<T> {
+    /// The laws of several lanes as one; none if the frictions that they believe in are not of one model.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Option<Ctc<L>> {
+        let params = CtcParams {
+            outer_gain: each(&|law| law.params.outer_gain),
+            kp: each(&|law| law.params.kp),
+            kd: each(&|law| law.params.kd),
+        };
+        let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
+        let model = Plant::in_lanes(&|get| each(&|law| get(&law.model)))?;
+        Some(Ctc { params, model, output })
+    }
+
     #[inline]
     fn terms(&self, tick: &Tick<T>, mu: T) -> (T, [T; 3]) {
         let (p, m) = (&self.params, self.model.params());
