@@ -262,6 +262,8 @@ def test_the_table_goes_to_data_frames_and_arrow(short):
     assert result.to_polars()["rms_error_rad"].to_list() == expected
     assert result.to_arrow()["rms_error_rad"].to_pylist() == expected
     assert pyarrow.table(result)["rms_error_rad"].to_pylist() == expected
+    units = {field.name: (field.metadata or {}).get(b"units") for field in pyarrow.table(result).schema}
+    assert units["rms_error_rad"] == b"rad" and units["iae_rad_s"] == b"rad s" and units["certified"] is None
     assert polars.DataFrame(result)["rms_error_rad"].to_list() == expected
     assert isinstance(pandas.DataFrame.from_arrow(result), pandas.DataFrame)
 

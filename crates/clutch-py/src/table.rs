@@ -9,11 +9,14 @@ use arrow_array::{
 };
 use arrow_buffer::{Buffer, ScalarBuffer};
 use arrow_schema::{ArrowError, Field, Schema};
+use clutch_core::params::Unit;
+use clutch_sim::metrics::{Detected, Metrics};
 use numpy::ndarray::ArrayView1;
 use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict, PyList, PyMapping, PyString};
+use std::collections::HashMap;
 use std::panic::{RefUnwindSafe, UnwindSafe};
 use std::ptr::NonNull;
 use std::sync::Arc;
@@ -289,11 +292,25 @@ impl Table {
 
     fn batch(&self) -> Result<RecordBatch, ArrowError> {
         let arrays: Vec<ArrayRef> = self.columns.iter().map(Column::to_arrow).collect();
-        let field = |(name, a): (&String, &ArrayRef)| Field::new(name, a.data_type().clone(), false);
+        let field = |(name, a): (&String, &ArrayRef)| {
+            let units = unit_of(name).map(|unit| ("units".to_owned(), unit.to_owned()));
+            let units: HashMap<String, String> = units.into_iter().collect();
+            Field::new(name, a.data_type().clone(), false).with_metadata(units)
+        };
         let fields: Vec<Field> = self.names.iter().zip(&arrays).map(field).collect();
         // The number of rows for a table without columns, which is one, too.
         let options = RecordBatchOptions::new().with_row_count(Some(self.rows));
         RecordBatch::try_new_with_options(Arc::new(Schema::new(fields)), arrays, &options)
+    }
+}
+
+/// The unit of a column, which a figure's row gives, else the ending of the name; none for a plain number.
+fn unit_of(name: &str) -> Option<&'static str> {
+    let run = Metrics::FIGURES.iter().map(|f| (f.name, f.unit));
+    let mut figures = run.chain(Detected::FIGURES.iter().map(|f| (f.name, f.unit)));
+    match figures.find(|(figure, _)| *figure == name) {
+        Some((_, unit)) => (unit != "1").then_some(unit),
+        None => Unit::of_key(name).map(|unit| unit.text),
     }
 }
 
