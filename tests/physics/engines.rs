@@ -6,7 +6,7 @@ use clutch_core::{PlantParams, StribeckParams};
 use clutch_sim::Points;
 use clutch_sim::drive::{Drive, DriveParams, TableDrive};
 use clutch_sim::engine::{EngineKind, EventKind, Shaft};
-use clutch_sim::rig::RippleParams;
+use clutch_sim::ripple::RippleParams;
 use clutch_sim::{RigParams, Run, RunError, RunSpec, Start, simulate};
 use clutch_tests::{advance, engines, model};
 use proptest::prelude::*;

@@ -3,7 +3,7 @@
 use clutch_core::{PlantParams, StribeckParams};
 use clutch_sim::drive::Drive;
 use clutch_sim::engine::{DormandPrince, Engine, Event, EventKind, ExactFlow, Input, Model, Shaft, Volts};
-use clutch_sim::rig::{Ripple, RippleParams};
+use clutch_sim::ripple::{Ripple, RippleParams};
 use clutch_tests::{engines, model};
 use proptest::prelude::*;
 

@@ -12,7 +12,7 @@ use clutch_core::law::{CtcParams, LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;
 use clutch_sim::drive::{DriveParams, WeightDrive};
 use clutch_sim::paper::{TABLE3, reduction};
-use clutch_sim::rig::RippleParams;
+use clutch_sim::ripple::RippleParams;
 use clutch_sim::{Metrics, RigParams, RunSpec, simulate};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};

@@ -8,6 +8,7 @@ pub mod paper;
 pub mod progress;
 pub mod reaching;
 pub mod rig;
+pub mod ripple;
 pub mod run;
 pub mod scenario;
 pub mod sweep;

@@ -18,7 +18,7 @@ pub use dormand_prince::DormandPrince;
 pub use exact_flow::ExactFlow;
 
 use crate::drive::Drive;
-use crate::rig::Ripple;
+use crate::ripple::Ripple;
 use clutch_core::Plant;
 
 /// Whether the shaft is stuck, and which way it slips.

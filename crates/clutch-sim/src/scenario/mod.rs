@@ -15,7 +15,8 @@ pub use schema::schema;
 pub use section::check_section;
 
 use crate::progress::Report;
-use crate::rig::{Rig, RigBase, RigParams, Ripple};
+use crate::rig::{Rig, RigBase, RigParams};
+use crate::ripple::Ripple;
 use crate::run::{Keep, Run, RunError, RunSpec, Start, simulate_watched};
 use crate::tables::{self, check, checked, complete, find, lookup, read, row_at, shown};
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
