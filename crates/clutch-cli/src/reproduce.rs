@@ -6,7 +6,7 @@ use crate::report::{ReportFigure, claims_table, html};
 use crate::table::number;
 use anyhow::Context;
 use clap::Args;
-use clutch_core::FrictionParams;
+use clutch_sim::Scenario;
 use clutch_sim::paper::{self, FigureData, SEEDS, Table3Row};
 use std::path::PathBuf;
 
@@ -142,14 +142,7 @@ fn settings() -> Vec<(String, String)> {
         row("Seeds", format!("{SEEDS:?}")),
         row(
             "Bench: friction",
-            match bench.friction {
-                FrictionParams::Stribeck(f) => format!(
-                    "mu_s {}, mu_d {}, Stribeck velocity {} rad/s",
-                    number(f.mu_static),
-                    number(f.mu_dynamic),
-                    number(f.stribeck_velocity)
-                ),
-            },
+            bench_friction(),
         ),
         row(
             "Bench: along the disc",
@@ -165,6 +158,16 @@ fn settings() -> Vec<(String, String)> {
         ),
         row("Bench: delay", format!("{} sampling period", bench.delay_ticks)),
     ]
+}
+
+/// The parameters of the bench's friction, by their keys.
+fn bench_friction() -> String {
+    let Some(Ok(scenario)) = Scenario::built_in("bench_pd_2") else { return "?".to_owned() };
+    let of_friction = |(key, value): (String, String)| {
+        let key = key.strip_prefix("rig.friction.")?.to_owned();
+        Some(format!("{key} = {value}"))
+    };
+    scenario.parameters().into_iter().filter_map(of_friction).collect::<Vec<_>>().join(", ")
 }
 
 fn table3_cells(rows: &[Table3Row]) -> Vec<Vec<String>> {
