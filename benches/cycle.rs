@@ -111,7 +111,7 @@ fn frames<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u6
     assert_eq!(controller.state().state(), State::Running);
 }
 
-/// What a log adds.
+/// The time that a log adds.
 fn log<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) -> Target<T>) {
     let (mut controller, mut out, mut tick) = (armed(built), Outbox::default(), 0);
     let (mut ring, mut drain) = rtrb::RingBuffer::<Record>::new(1 << 15);

@@ -123,7 +123,7 @@ fn noise_below_the_limit_moves_a_shaft_at_the_limit_by_nothing_in_an_hour() {
     }
 }
 
-/// What moves the shaft, by number.
+/// The drive that moves the shaft, by number.
 fn drive(kind: u8, torque: f64) -> Drive {
     match kind {
         0 => Drive::Constant(torque),

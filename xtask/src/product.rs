@@ -22,8 +22,8 @@ const TESTS: &[&str] = &[
     "firmware/qemu-mps2/src/budget/",
 ];
 
-/// What a verb or an example of a crate writes, and what does so. A product file among them counts as
-/// generated from the revision on at which its head says so.
+/// The files that a verb or an example of a crate writes, and the command that does so. A product file among them
+/// counts as generated from the revision on at which its head says so.
 pub(crate) const GENERATED: &[(&str, &str)] = &[
     ("python/clutch/_clutch.pyi", "cargo xtask stubs"),
     ("python/clutch/_metrics.py", "cargo xtask generate"),

@@ -1,5 +1,5 @@
-//! What those who build on the packages rely on: that they are complete, that an old compiler will do, and that
-//! their interfaces keep.
+//! Checks of what those who build on the packages rely on: that they are complete, that an old compiler will do, and
+//! that their interfaces keep.
 
 use crate::run::{cargo, program, root};
 use anyhow::{Context, Result, ensure};

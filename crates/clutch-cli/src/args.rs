@@ -1,4 +1,4 @@
-//! What several verbs take: a scenario, and what to change in it.
+//! Arguments of several verbs: a scenario, and what to change in it.
 
 use clap::Args;
 use clutch_sim::Scenario;

@@ -1,4 +1,4 @@
-//! What verbs leave: text, files, an exit code.
+//! The results of verbs: text, files, an exit code.
 
 use anyhow::Context;
 use clutch_loop::session::SessionError;
@@ -8,7 +8,7 @@ use std::io::{ErrorKind, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// How a verb ended, if not with an error.
+/// The end of a verb, if it was not an error.
 pub(crate) enum Exit {
     /// Exit code 0.
     Done,

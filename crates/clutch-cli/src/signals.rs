@@ -1,4 +1,4 @@
-//! What Ctrl-C and its like do.
+//! The effect of Ctrl-C and its like.
 
 use anyhow::Context;
 use std::sync::Arc;

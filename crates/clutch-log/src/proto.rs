@@ -72,7 +72,7 @@ pub struct Channel {
     pub meaning: &'static str,
     /// Its fields.
     pub fields: &'static [Field],
-    /// How many of them, the last ones, are terms of the law, which has its own names for them.
+    /// The number of them, the last ones, that are terms of the law, which has its own names for them.
     pub terms: usize,
 }
 

@@ -9,7 +9,7 @@ use prost::Message;
 /// The most terms that a law has in a log.
 pub const MAX_TERMS: usize = 8;
 
-/// Terms of a law: up to [`MAX_TERMS`], without an allocation. What is beyond is left out.
+/// Terms of a law: up to [`MAX_TERMS`], without an allocation. Terms beyond them are left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terms {
     values: [f64; MAX_TERMS],
@@ -348,7 +348,7 @@ records! {
         3 from_state = from: u8, uint32 of "State" names::STATES;
         /// State after.
         4 to_state = to: u8, uint32 of "State" names::STATES;
-        /// Why.
+        /// Cause of the event.
         5 cause = cause: u8, uint32 of "Cause" names::CAUSES;
         /// Value that the check saw, in the check's unit.
         6 value = value: f64, double (optional);

@@ -1,4 +1,4 @@
-//! How late a thread wakes at 1 kHz on this machine, in the loop's own wait modes.
+//! The lateness of a thread that wakes at 1 kHz on this machine, in the loop's own wait modes.
 //!
 //! `benches/latency/lateness.py` runs it in turn with cyclictest. Alone:
 //!

@@ -22,7 +22,7 @@ use clutch_wire::BoardState;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// What is broken, from an onset on.
+/// The defect, from an onset on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Broken {
     /// A fault of line or board.
@@ -45,7 +45,7 @@ pub enum Broken {
     ControllerDies,
 }
 
-/// What must come of it.
+/// The outcome that the defect must have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Expected {
     /// The safe output is in force within a time (s), with one of these causes.
@@ -54,7 +54,7 @@ pub enum Expected {
         within: f64,
         /// Causes that may be named.
         causes: &'static [Cause],
-        /// Whether software can keep the shaft from running past the path.
+        /// True if software can keep the shaft from running past the path.
         avoidable: bool,
     },
     /// The board alone is left to act; the controller is gone.
@@ -69,13 +69,13 @@ pub enum Expected {
 /// A row of the campaign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
-    /// What it is called in tables and messages.
+    /// Its name in tables and messages.
     pub name: &'static str,
     /// Hazards of `docs/safety.md` that it stands for.
     pub hazards: &'static str,
-    /// What is broken.
+    /// The defect.
     pub broken: Broken,
-    /// What must come of it.
+    /// The outcome that the defect must have.
     pub expected: Expected,
     /// Periods without an answer that board and supervisor wait.
     pub watchdog_cycles: u32,
@@ -288,7 +288,7 @@ impl RunId {
         Scenario::parse("campaign", &text, &[])
     }
 
-    /// Whether the rig is the bench, whose friction is a third weaker and uneven.
+    /// True if the rig is the bench, whose friction is a third weaker and uneven.
     #[must_use]
     pub fn on_bench(&self) -> bool {
         self.seed.is_multiple_of(3) && !self.case().narrow
@@ -302,7 +302,7 @@ impl RunId {
         OVERRUN_DEG * speed * speed * if self.on_bench() { 2.0 } else { 1.0 }
     }
 
-    /// When the fault begins, s after arming.
+    /// The onset of the fault, s after arming.
     #[must_use]
     pub fn onset(&self) -> f64 {
         let (from, to) = PATHS[self.path].2;
@@ -321,7 +321,7 @@ impl RunId {
         }
     }
 
-    /// Whether a board that closes the loop can be broken so from outside: its law and its path cannot.
+    /// True if a board that closes the loop can be broken so from outside: its law and its path cannot.
     #[must_use]
     pub fn is_outside(&self) -> bool {
         let broken = self.case().broken;
@@ -342,7 +342,7 @@ impl RunId {
         Ok(self.with_onset(report, self.onset()))
     }
 
-    /// What is broken in the world around the controller.
+    /// Options of the run, with the defect in the world around the controller.
     fn world(&self, period: f64, record: bool) -> VirtualOptions {
         let onset = self.onset();
         let mut params = VirtualOptions {
@@ -426,7 +426,7 @@ impl RunId {
         Ok(self.with_onset(report, onset))
     }
 
-    /// Whether the report says what must come of it; what is wrong if not.
+    /// Checks that the report shows the outcome that the defect must have; says what is wrong if not.
     #[must_use]
     pub fn judge(&self, o: &VirtualReport) -> Option<String> {
         let top = 10.0;
@@ -500,7 +500,7 @@ impl<T: Real> ControlLaw<T> for BrokenLaw<T> {
     }
 }
 
-/// What the runs of one case came to.
+/// The results of the runs of one case.
 #[derive(Clone, Debug, Default)]
 struct Row {
     runs: u64,

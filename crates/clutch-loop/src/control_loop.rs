@@ -32,7 +32,7 @@ use rustix::fd::AsFd;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// What starts a cycle.
+/// The event that starts a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pace {
     /// The board's sample: one clock, the board's.
@@ -42,12 +42,12 @@ pub enum Pace {
     Clock,
 }
 
-/// How the loop runs.
+/// Options of the loop.
 #[derive(Clone, Copy, Debug)]
 pub struct LoopOptions {
     /// Priority, memory, core, wait.
     pub realtime: RealtimeOptions,
-    /// What starts a cycle.
+    /// The event that starts a cycle.
     pub pace: Pace,
     /// Time left out of the figures, s.
     pub settle: f64,
@@ -55,20 +55,20 @@ pub struct LoopOptions {
     pub hooks: (fn(), fn()),
 }
 
-/// How it went.
+/// The report of a run.
 #[derive(Clone, Debug)]
 pub struct LoopReport {
-    /// Where control ended.
+    /// The state in which control ended.
     pub state: State,
-    /// Why.
+    /// The cause of the end.
     pub cause: Cause,
-    /// What the check that ended it saw.
+    /// The value seen by the check that ended control.
     pub value: f64,
     /// Ticks in which the law was asked.
     pub ticks: u64,
     /// Tracking figures from the encoder, sticking as [`StickSlip`] sees it; no torque.
     pub metrics: Metrics,
-    /// What the line carried.
+    /// Counts of what the line carried.
     pub link: LinkCounts,
     /// Samples lost.
     pub lost: u64,
@@ -80,31 +80,31 @@ pub struct LoopReport {
     pub response: CycleSummary,
     /// Time between two answers, ns.
     pub interval: CycleSummary,
-    /// What the board's clock cycles count, Hz; 0 if it counts none.
+    /// Frequency of the clock whose cycles the board counts, Hz; 0 if it counts none.
     pub clock_hz: u32,
     /// Clock cycles of a tick, where the board counts them.
     pub tick_cycles: CycleSummary,
     /// Telemetry of the board that did not come.
     pub untold: u64,
-    /// What the system refused.
+    /// The requests that the system refused.
     pub notes: Vec<String>,
     /// Records that did not fit into the ring.
     pub log_dropped: u64,
     /// Writes that the line took only in part: its buffer was full.
     pub cut_writes: u64,
-    /// Whether control began.
+    /// True if control began.
     pub begun: bool,
-    /// Whether the board is the controller, and ends control by itself when it misses this machine.
+    /// True if the board is the controller, and ends control by itself when it misses this machine.
     pub on_the_board: bool,
-    /// Whether the board said that it is in its safe state.
+    /// True if the board said that it is in its safe state.
     pub board_safe: bool,
-    /// Why the board did not take consent, if it did not.
+    /// The reason why the board did not take consent, if it did not.
     pub refused: Option<Refused>,
     /// The port's error, if it ended the run.
     pub port_error: Option<String>,
 }
 
-/// How long the control thread waits for the board to say that it is safe.
+/// Time for which the control thread waits for the board to say that it is safe.
 const FAREWELL: Duration = Duration::from_millis(300);
 
 /// Everything that a run needs, after the pre-flight: the board is configured.
@@ -113,15 +113,15 @@ pub struct ConfiguredRun<'a, S> {
     pub station: &'a mut S,
     /// The open port.
     pub port: &'a mut Port,
-    /// Where records go, if anywhere.
+    /// The ring into which records go, if they go anywhere.
     pub ring: Option<Ring>,
-    /// What a watcher sees.
+    /// The values that a watcher sees.
     pub watch: &'a Watch,
     /// Ticks of the run; a board that is the controller has been told, and ends it by itself.
     pub ticks: u64,
     /// The board's clock.
     pub clock: ClockOffset,
-    /// What sees stick-slip in the counts.
+    /// The detector that sees stick-slip in the counts.
     pub detector: StickSlip<f64>,
     /// The board is simulated and its clock waits for this machine: a stall is then no late answer.
     pub patient: bool,
@@ -138,7 +138,7 @@ pub fn run<S: Station>(configured: ConfiguredRun<'_, S>, options: &LoopOptions) 
     control.report(notes, port_error)
 }
 
-/// When what is due that no sample brings, by this machine's clock, ns.
+/// Times at which the work is due that no sample brings, by this machine's clock, ns.
 struct Due {
     /// The next cycle, if this machine's clock starts them.
     cycle: u64,
@@ -166,7 +166,7 @@ impl Due {
         }
     }
 
-    /// Whether the board has had its time to say that it is safe.
+    /// True if the board has had its time to say that it is safe.
     fn farewell_over(&mut self, now: u64) -> bool {
         now >= *self.farewell.get_or_insert(now + FAREWELL.as_nanos() as u64)
     }
@@ -210,7 +210,7 @@ struct Control<'a, S: Station> {
     cut: u64,
 }
 
-/// What one call of the node brought, gathered for use after it.
+/// The notices of one call of the node, gathered for use after it.
 #[derive(Clone, Copy)]
 struct Batch<T: Arithmetic, X> {
     cycles: [Option<CycleNotice<T, X>>; 32],
@@ -289,7 +289,7 @@ impl<'a, S: Station> Control<'a, S> {
         }
     }
 
-    /// One wake-up: read, decide, write. Whether the line is still there.
+    /// One wake-up: read, decide, write. An error if the line is gone.
     fn cycle(&mut self, arrived_ns: u64, buffer: &mut [u8]) -> Result<(), std::io::Error> {
         let count = self.port.read(buffer)?;
         let bytes = buffer.get(..count).unwrap_or(&[]);
@@ -360,8 +360,8 @@ impl<'a, S: Station> Control<'a, S> {
         Ok(())
     }
 
-    /// Writes what is to be written. What the line does not take is lost, and counted: its frame
-    /// fails its check, and the next answer is worth more.
+    /// Writes what is to be written. The part that the line does not take is lost, and counted: its
+    /// frame fails its check, and the next answer is worth more.
     fn send(&mut self) -> Result<(), std::io::Error> {
         let bytes = self.out.as_bytes();
         if !bytes.is_empty() {
@@ -372,7 +372,7 @@ impl<'a, S: Station> Control<'a, S> {
         Ok(())
     }
 
-    /// What need not be done before the answer is on its way: log, figures, watcher.
+    /// The work that need not be done before the answer is on its way: log, figures, watcher.
     fn after(&mut self, now: u64, batch: &Batch<S::Scalar, S::Terms>) {
         let time_ns = now.saturating_sub(self.start_ns);
         self.refused = self.refused.or(batch.refused);
@@ -432,7 +432,7 @@ impl<'a, S: Station> Control<'a, S> {
         w.late_answers.store(state.deadline_misses, Ordering::Relaxed);
     }
 
-    /// What the board tells of its own times: those of its answers, its samples, its ticks.
+    /// Records the times that the board reports of its own: those of its answers, its samples, its ticks.
     fn on_the_board(&mut self, n: &CycleNotice<S::Scalar, S::Terms>) {
         if n.cycle.answer.is_none() {
             return;
@@ -495,7 +495,8 @@ impl<'a, S: Station> Control<'a, S> {
         }
     }
 
-    /// Before consent: asks for it, again each 100 ms. When there was something to hear; none if there will be no run.
+    /// Before consent: asks for it, again each 100 ms. Gives the time at which there was something to hear; none if
+    /// there will be no run.
     fn ask_for_consent(&mut self, due: &mut Due) -> Result<Option<u64>, std::io::Error> {
         let now = monotonic_ns();
         let leave = now >= due.give_up || self.watch.stop.load(Ordering::Relaxed);
@@ -544,7 +545,7 @@ impl<'a, S: Station> Control<'a, S> {
         if self.patient { woke } else { meant }
     }
 
-    /// After a cycle: ends control that is to end, and looks after the link. Whether all is over.
+    /// After a cycle: ends control that is to end, and looks after the link. True if all is over.
     fn is_over(&mut self, due: &mut Due) -> bool {
         let now = monotonic_ns();
         let standing = self.station.standing();
@@ -567,7 +568,7 @@ impl<'a, S: Station> Control<'a, S> {
         false
     }
 
-    /// The line is gone: the station and the log are told. Why, in words.
+    /// The line is gone: the station and the log are told. Gives the reason in words.
     fn port_lost(&mut self, error: &std::io::Error) -> String {
         let from = self.station.standing().state;
         self.station.disconnect();
@@ -585,7 +586,7 @@ impl<'a, S: Station> Control<'a, S> {
         self.port.explain(error).to_string()
     }
 
-    /// How it went.
+    /// The report of a run.
     fn report(mut self, notes: Vec<String>, port_error: Option<String>) -> LoopReport {
         self.housekeeping(monotonic_ns());
         let standing = self.station.standing();

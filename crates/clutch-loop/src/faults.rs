@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Which way frames go.
+/// The way that frames go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// From the board to the controller.
@@ -20,16 +20,16 @@ impl Direction {
     }
 }
 
-/// Where a converter can be stuck.
+/// The output at which a converter can be stuck.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StuckAt {
-    /// Where it is when the fault begins.
+    /// The output that it has when the fault begins.
     Last,
     /// At a voltage, V.
     Volts(f64),
 }
 
-/// What goes wrong.
+/// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultKind {
     /// Frames vanish.
@@ -59,7 +59,7 @@ pub enum FaultKind {
 }
 
 impl FaultKind {
-    /// Whether it is the line's (or the whole board's), so that a controller does not answer. A board
+    /// True if it is the line's (or the whole board's), so that a controller does not answer. A board
     /// whose clock waits for its controller would hide such a fault.
     #[must_use]
     pub fn silences(self) -> bool {
@@ -83,15 +83,15 @@ impl FaultKind {
 /// A fault and when it is there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    /// What goes wrong.
+    /// The kind of the fault.
     pub kind: FaultKind,
-    /// When it begins, s after the board was armed.
+    /// Its start, s after the board was armed.
     pub at: f64,
-    /// How long it lasts, s.
+    /// Its duration, s.
     pub lasting: f64,
     /// Probability with which each frame or period within that time is hit.
     pub probability: f64,
-    /// Which frames.
+    /// The way of the frames that it concerns.
     pub direction: Direction,
 }
 
@@ -102,20 +102,20 @@ impl Fault {
         Fault { kind, at, lasting: f64::INFINITY, probability: 1.0, direction: Direction::Both }
     }
 
-    /// Whether it is there `time` seconds after arming.
+    /// True if it is there `time` seconds after arming.
     #[must_use]
     pub fn active(&self, time: f64) -> bool {
         time >= self.at && time < self.at + self.lasting
     }
 
-    /// Whether it concerns frames that go `way`.
+    /// True if it concerns frames that go `way`.
     #[must_use]
     pub fn covers(&self, way: Direction) -> bool {
         self.direction.covers(way)
     }
 }
 
-/// Why a fault could not be read.
+/// The reason why a fault could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "fault \"{text}\": {problem}\nexpected KIND:KEY=VALUE,…, as drop:p=0.05 or freeze:at=2 or delay:at=1,for=0.1,ms=5\n\

@@ -99,7 +99,7 @@ impl FaultyLine {
         }
     }
 
-    /// When the next bytes arrive.
+    /// The time at which the next bytes arrive.
     #[must_use]
     pub fn next_ns(&self) -> Option<u64> {
         self.under_way.front().map(|(t, _)| *t)

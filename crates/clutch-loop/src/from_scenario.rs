@@ -56,7 +56,7 @@ pub enum BuildError {
     Scalar,
 }
 
-/// What a run on a board is made of, in the scalar `T`.
+/// The parts of a run on a board, in the scalar `T`.
 #[derive(Clone, Debug)]
 pub struct BuiltRun<T: Real> {
     /// The servo's parameters, for one built around another law.
@@ -67,7 +67,7 @@ pub struct BuiltRun<T: Real> {
     pub supervisor: Supervisor<T>,
     /// Numbers for the wire.
     pub controller: ControllerParams,
-    /// What sees stick-slip in the counts.
+    /// The detector that sees stick-slip in the counts.
     pub detector: StickSlip<f64>,
     /// Ticks of the run.
     pub ticks: u64,
@@ -114,7 +114,7 @@ impl<T: Real> BuiltRun<T> {
     }
 }
 
-/// What a board needs to close the loop by itself; the run ends there after so many ticks.
+/// The settings that a board needs to close the loop by itself; the run ends there after so many ticks.
 ///
 /// # Errors
 /// The scenario is not one in single precision, or asks for what boards do not have.
@@ -145,7 +145,7 @@ pub fn settings(
     })?)
 }
 
-/// What [`in_single_precision`] says when it changes something.
+/// The note for a scenario in which [`in_single_precision`] changes something.
 pub const SINGLE_PRECISION: &str = "such a board calculates in single precision: sampling.scalar = \"f32\"";
 
 /// The scenario as a board takes it that closes the loop itself; none if it is one already.
@@ -212,7 +212,7 @@ pub fn header<T: Real>(
     }
 }
 
-/// Why a board does not fit a scenario: a line each; empty if it does.
+/// The reasons why a board does not fit a scenario: a line each; empty if it does.
 #[must_use]
 pub fn misfits(scenario: &Scenario, hello: &Hello) -> Vec<String> {
     let spec = scenario.spec();

@@ -4,7 +4,7 @@ use crate::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_node::lockstep::{Exchange, answer};
 use clutch_node::{BoardController, BoardControllerParams, Outboxes};
 
-/// Who answers in lockstep.
+/// A board that answers in lockstep.
 pub trait LockstepBoard {
     /// A request, and the answer; or why there is none.
     ///

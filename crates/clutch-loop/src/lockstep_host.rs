@@ -65,7 +65,7 @@ impl<L: LockstepBoard, P: Fn(u64) -> Target<f32>> LockstepHost<L, P> {
         self.link
     }
 
-    /// What the host has to say and these bytes go to the board; what it has to say comes back.
+    /// The host's frames and these bytes go to the board; the board's frames come back.
     fn turn(&mut self, daq: &[u8], out: &mut Outbox, notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>)) {
         if self.failure.is_some() {
             return;

@@ -14,18 +14,18 @@ use clutch_log::{LogWriter, Source};
 use clutch_sim::Scenario;
 use std::path::PathBuf;
 
-/// How a session in lockstep runs.
+/// Options of a session in lockstep.
 #[derive(Clone, Debug)]
 pub struct LockstepOptions {
     /// A new file for a log, with the shaft's true motion.
     pub log: Option<PathBuf>,
-    /// Whether gains run that are not certified for the scenario's bounds.
+    /// True if gains may run that are not certified for the scenario's bounds.
     pub uncertified: bool,
-    /// What goes wrong on line and rig.
+    /// The faults of line and rig.
     pub faults: Vec<Fault>,
     /// Seed of what goes wrong at random.
     pub seed: u64,
-    /// How long a frame takes between board and rig, ns.
+    /// Time that a frame takes between board and rig, ns.
     pub latency_ns: u64,
     /// Silence of encoder and converter that the board bears, if its clock runs on while this machine computes.
     pub silence: Option<Micros>,
@@ -76,7 +76,7 @@ impl LockstepSession {
         &self.scenario
     }
 
-    /// What was changed in the scenario for the board's sake.
+    /// The change made in the scenario for the board's sake.
     #[must_use]
     pub fn note(&self) -> Option<&'static str> {
         self.changed.then_some(from_scenario::SINGLE_PRECISION)

@@ -12,7 +12,7 @@ pub type Ring = rtrb::Producer<Record>;
 
 /// Records of a log that wait for their thread.
 const RING: usize = 1 << 15;
-/// How often a chunk of the log goes to the file. With the ring's 20 ms this leaves a busy machine
+/// Interval at which a chunk of the log goes to the file. With the ring's 20 ms this leaves a busy machine
 /// 20 ms of the 100 ms that a crash may cost.
 const LOG_FLUSH: Duration = Duration::from_millis(60);
 /// A log that is written beside the loop.

@@ -76,7 +76,7 @@ pub enum PreflightError {
     Misfit {
         /// The port.
         address: String,
-        /// What differs.
+        /// The differences.
         lines: Vec<String>,
     },
     /// The board said no.
@@ -84,9 +84,9 @@ pub enum PreflightError {
     Refused {
         /// The port.
         address: String,
-        /// What was asked: "configured" or "armed".
+        /// The state that was asked for: "known", "set up" or "configured".
         what: &'static str,
-        /// Why.
+        /// The board's reason.
         why: String,
     },
     /// The board closes the loop itself, and was to be a mere board.
@@ -131,7 +131,7 @@ pub enum PreflightError {
     Lost {
         /// The port.
         address: String,
-        /// What was asked.
+        /// The request, in words.
         what: &'static str,
     },
 }
@@ -234,7 +234,7 @@ impl<'a, S: Station> Talk<'a, S> {
         }
     }
 
-    /// Who is there?
+    /// Asks who is there.
     ///
     /// # Errors
     /// Silence, noise, an echo, another version; each says what to do.
@@ -383,7 +383,7 @@ impl ClockOffset {
         }
     }
 
-    /// How old a sample of the board's clock is at a time of ours (ns), µs.
+    /// The age of a sample of the board's clock at a time of ours (ns), µs.
     #[must_use]
     pub fn age_us(&self, board_us: u32, now_ns: u64) -> u32 {
         // The board's clock wraps after 71 minutes: the difference is taken in its 32 bits.

@@ -29,23 +29,23 @@ pub enum QemuError {
     /// No image.
     #[error("{}: no such file. Build the emulated board's image: cargo xtask firmware build", path.display())]
     NoImage {
-        /// Where it was looked for.
+        /// The path at which it was looked for.
         path: PathBuf,
     },
     /// The system.
     #[error("the emulated board could not be {what}: {error}")]
     System {
-        /// What was tried.
+        /// The action that was tried.
         what: &'static str,
-        /// Why not.
+        /// The system's answer.
         error: std::io::Error,
     },
     /// It has ended.
     #[error("the emulated board has ended ({status}): {said}")]
     Ended {
-        /// How.
+        /// Its exit status.
         status: String,
-        /// What the emulator printed.
+        /// The text that the emulator printed.
         said: String,
     },
     /// It does not answer.
@@ -182,7 +182,7 @@ impl QemuBoard {
         self.exchange(&Exchange { time_ns: u64::MAX, lateness_us: 0, host: &[], daq: &[] })
     }
 
-    /// How the emulator ended; waits for it.
+    /// The exit code of the emulator; waits for its end.
     ///
     /// # Errors
     /// The system's.
@@ -257,7 +257,7 @@ impl QemuSerialBoard {
         })
     }
 
-    /// What goes to the board; and what it says to that.
+    /// Sends a request to the board, and gives its answer.
     ///
     /// # Errors
     /// It has ended, or does not answer.
@@ -320,7 +320,7 @@ impl QemuSerialBoard {
     }
 }
 
-/// What is there.
+/// Reads the bytes that are there.
 fn read(stream: &mut UnixStream, into: &mut Vec<u8>) -> Result<(), QemuError> {
     let mut buffer = [0; 1024];
     loop {

@@ -31,9 +31,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{JoinHandle, ScopedJoinHandle};
 use std::time::Duration;
 
-/// How often a run is looked at.
+/// Interval at which a run is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// How long a board may take to say who it is.
+/// The longest time that a board may take to say who it is.
 const GREETING: Duration = Duration::from_secs(2);
 /// Silence that a patient board's clock may cost: what it waits for, and half a second.
 const PATIENT_SILENCE: Micros = Micros(5_500_000);
@@ -45,11 +45,11 @@ const AROUND_A_BODY: usize = 2;
 pub enum Board {
     /// Simulated in the background, and reached over a real pseudo-terminal.
     Simulated {
-        /// What goes wrong on it.
+        /// Its faults.
         faults: Vec<Fault>,
         /// Seed of what goes wrong at random.
         seed: u64,
-        /// Whether its clock waits for nobody, as on hardware.
+        /// True if its clock waits for nobody, as on hardware.
         strict: bool,
     },
     /// In the role daq: the loop is closed here.
@@ -58,7 +58,7 @@ pub enum Board {
     Controller(Address),
 }
 
-/// How a session runs.
+/// Options of a session.
 #[derive(Clone, Debug)]
 pub struct SessionOptions {
     /// The board.
@@ -67,11 +67,11 @@ pub struct SessionOptions {
     pub baud: Option<u32>,
     /// A new file for a log.
     pub log: Option<PathBuf>,
-    /// Whether gains run that are not certified for the scenario's bounds.
+    /// True if gains may run that are not certified for the scenario's bounds.
     pub uncertified: bool,
     /// Priority, memory, core, wait.
     pub realtime: RealtimeOptions,
-    /// What starts a cycle.
+    /// The event that starts a cycle.
     pub pace: Pace,
     /// Version and commit of the build, for log and summary.
     pub version: String,
@@ -130,9 +130,9 @@ pub enum SessionError {
     /// The system.
     #[error("{what}: {error}")]
     System {
-        /// What could not be done.
+        /// The action that failed, in words.
         what: &'static str,
-        /// Why not.
+        /// The system's answer.
         error: std::io::Error,
     },
     /// A defect of this program.
@@ -161,14 +161,14 @@ pub fn check(scenario: &Scenario, uncertified: bool, log: Option<&Path>) -> Resu
     }
 }
 
-/// What a session is about to do, and on what.
+/// The announcement of what a session is about to do, and on what.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Announcement {
     /// The scenario's name.
     pub title: String,
     /// Name and value.
     pub rows: Vec<(&'static str, String)>,
-    /// What there is to say beside, a line each.
+    /// Further remarks, a line each.
     pub remarks: Vec<String>,
 }
 
@@ -182,7 +182,7 @@ impl fmt::Display for Announcement {
     }
 }
 
-/// Where a run stands.
+/// The progress of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Progress {
     /// Time of the run so far, s.
@@ -199,12 +199,12 @@ pub struct Progress {
     pub late_answers: u64,
 }
 
-/// What happens while a session runs.
+/// An event while a session runs.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// What it is about to do: the board has said who it is, and nothing has moved.
+    /// The announcement of what it is about to do: the board has said who it is, and nothing has moved.
     Announced(Announcement),
-    /// Where the run stands, some twenty times a second.
+    /// The progress of the run, some twenty times a second.
     Progress(Progress),
     /// The log has ended early; the loop continues.
     LogEnded,
@@ -216,7 +216,7 @@ pub struct Session {
     scenario: Scenario,
     options: SessionOptions,
     plan: Plan,
-    /// What was changed in the scenario for the board's sake.
+    /// The change made in the scenario for the board's sake.
     note: Option<String>,
 }
 
@@ -237,7 +237,7 @@ impl Session {
         Ok(Session { scenario, options, plan, note })
     }
 
-    /// Whether the gains are certified for the scenario's bounds.
+    /// True if the gains are certified for the scenario's bounds.
     #[must_use]
     pub fn certified(&self) -> bool {
         self.plan.certificate.certified()
@@ -253,7 +253,7 @@ impl Session {
     /// this thread and may set `stop`. The board is in its safe state then, as far as it can be known.
     ///
     /// # Errors
-    /// What keeps the run from beginning: port, board, log. What ends it later is in the summary.
+    /// Obstacles that keep the run from beginning: port, board, log. The cause that ends it later is in the summary.
     pub fn run(&self, stop: &Arc<AtomicBool>, event: &mut dyn FnMut(Event)) -> Result<Summary, SessionError> {
         let (simulated, address, faults) = match &self.options.board {
             Board::Daq(address) | Board::Controller(address) => (None, address.clone(), 0),
@@ -409,7 +409,7 @@ impl Course<'_> {
         Ok((port, notes))
     }
 
-    /// Whether encoder and converter are those of the scenario.
+    /// Checks that encoder and converter are those of the scenario.
     fn check_fit(&self, hello: &Hello, port: &Port) -> Result<(), PreflightError> {
         let mut lines = from_scenario::misfits(&self.session.scenario, hello);
         let real = !matches!(port.kind(), DeviceKind::PseudoTerminal | DeviceKind::Tcp);

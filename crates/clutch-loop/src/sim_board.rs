@@ -130,7 +130,7 @@ impl SimBoard {
         })
     }
 
-    /// What has happened to the shaft since the last call: it stuck, it broke away.
+    /// The shaft's events since the last call: it stuck, it broke away.
     pub fn take_events(&mut self) -> Vec<Event> {
         std::mem::take(&mut self.events)
     }
@@ -147,7 +147,7 @@ impl SimBoard {
         &self.rig
     }
 
-    /// Whether the shaft is stuck now.
+    /// True if the shaft is stuck now.
     #[must_use]
     pub fn stuck(&self) -> bool {
         self.rig.shaft().motion == Motion::Stuck
@@ -165,7 +165,7 @@ impl SimBoard {
         self.armed_ns.map(|t| now_ns.saturating_sub(t) as f64 / 1e9)
     }
 
-    /// When a fault of the board's hardware first showed, ns.
+    /// The time at which a fault of the board's hardware first showed, ns.
     #[must_use]
     pub fn first_hit_ns(&self) -> Option<u64> {
         self.first_hit_ns
@@ -177,7 +177,7 @@ impl SimBoard {
         self.samples
     }
 
-    /// When [`SimBoard::step`] has to be called next, ns.
+    /// The time at which [`SimBoard::step`] has to be called next, ns.
     #[must_use]
     pub fn next_ns(&self) -> Option<u64> {
         let watchdog = self.node.watchdog_at().map(|at| self.unwrap_us(at));
@@ -215,7 +215,7 @@ impl SimBoard {
         Ok(())
     }
 
-    /// What is due by now: a sample, the watchdog, a fault.
+    /// Does what is due by now: a sample, the watchdog, a fault.
     ///
     /// # Errors
     /// The engine gave up.

@@ -1,10 +1,10 @@
 //! The simulated board in real time, on a pseudo-terminal or a TCP address.
 //!
-//! Its samples fall due by the machine's clock. What it simulates never runs ahead of them: when
+//! Its samples fall due by the machine's clock. Its simulation never runs ahead of them: when
 //! the machine wakes the board late, the board's clock is set back by as much, so that the shaft's
 //! motion between two samples is always one period. A patient board also waits for a controller
 //! that has not answered yet, as a busy machine holds either up; without faults on request, a run
-//! then goes on as if the machine had not stalled. How often and how long is counted.
+//! then goes on as if the machine had not stalled. These waits are counted, and their time is summed up.
 
 use crate::faults::{Direction, Fault};
 use crate::faulty_line::FaultyLine;
@@ -20,26 +20,26 @@ use std::time::Duration;
 /// Longest time for which a patient board waits.
 pub const PATIENCE: Duration = Duration::from_secs(5);
 
-/// How far before the sample a patient board's clock waits, ns.
+/// Time before the sample at which a patient board's clock waits, ns.
 const WAIT_NS: u64 = 100_000;
 
 /// A wake-up that is later than this sets the board's clock back, ns.
 const SLIP_NS: u64 = 500_000;
 
-/// How the simulated board runs.
+/// Options of the simulated board.
 #[derive(Clone, Debug)]
 pub struct ServeOptions {
-    /// What goes wrong.
+    /// The faults of line and board.
     pub faults: Vec<Fault>,
     /// Seed of what goes wrong at random.
     pub seed: u64,
-    /// Whether the board's clock waits for the controller.
+    /// True if the board's clock waits for the controller.
     pub patient: bool,
-    /// How it waits for its next sample.
+    /// The way in which it waits for its next sample.
     pub wait: WaitMode,
 }
 
-/// What the board tells while it runs.
+/// A notice of the board while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ServeNotice {
     /// A client came or left.
@@ -51,7 +51,7 @@ pub enum ServeNotice {
     Faulted(f64),
 }
 
-/// How it went.
+/// The report of a simulated board.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ServeReport {
     /// Samples taken since the last configuration.

@@ -1,4 +1,4 @@
-//! What this machine is at its line: the controller itself, or the host of a board that is the controller.
+//! The role of this machine at its line: the controller itself, or the host of a board that is the controller.
 //!
 //! Both are asked the same, and report the same, so that pre-flight, loop and virtual time need not know
 //! which of the two it is.
@@ -8,14 +8,15 @@ use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Real, Target};
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
 use clutch_wire::StopReason;
 
-/// How often the host shows that it lives, and after which silence the board ends a run.
+/// The interval at which the host shows that it lives, ns; [`HOST_SILENCE`] is the silence after which the board ends
+/// a run.
 pub const ALIVE_NS: u64 = 100_000_000;
 /// See [`ALIVE_NS`].
 pub const HOST_SILENCE: Micros = Micros(1_000_000);
 /// After so long without a word of the board, control has ended for the host.
 pub const BOARD_SILENCE_NS: u64 = 1_000_000_000;
 
-/// What a station reports.
+/// A report of a station.
 pub type StationNotice<S> = Notice<<S as Station>::Scalar, <S as Station>::Terms>;
 
 /// A controller, or the host of one, at a line. Times are this machine's monotonic clock, or a computed one, ns.
@@ -24,8 +25,9 @@ pub trait Station {
     type Scalar: Real;
     /// The terms of its law.
     type Terms: Terms<Self::Scalar>;
-    /// Whether a board closes the loop, and this machine looks on. Then what comes over the line are reports, each with a time of its
-    /// own, and the board ends the run by itself; samples are heard together, as the newest of them counts.
+    /// True if a board closes the loop, and this machine looks on. Then what comes over the line are reports, each with
+    /// a time of its own, and the board ends the run by itself; samples are heard together, as the newest of them
+    /// counts.
     const LOOKS_ON: bool;
 
     /// Asks who is there.
@@ -42,7 +44,7 @@ pub trait Station {
     fn disconnect(&mut self);
     /// Reports how long the last answer took, from sample to write.
     fn answered(&mut self, lateness: Micros);
-    /// When [`Station::poll`] has to be called at the latest, ns.
+    /// The latest time at which [`Station::poll`] has to be called, ns.
     fn poll_at(&self) -> Option<u64>;
     /// Looks at the clock.
     fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(StationNotice<Self>));
@@ -55,11 +57,11 @@ pub trait Station {
         notices: &mut impl FnMut(StationNotice<Self>),
     );
 
-    /// Where control stands.
+    /// The state of control.
     fn standing(&self) -> Standing<Self::Scalar>;
-    /// What the line to encoder and converter has carried.
+    /// Counts of what the line to encoder and converter has carried.
     fn counts(&self) -> &LinkCounts;
-    /// Where the path begins.
+    /// The position at which the path begins.
     fn origin(&self) -> FixedCounts;
     /// The encoder.
     fn encoder(&self) -> Encoder;
@@ -67,7 +69,7 @@ pub trait Station {
     fn dac(&self) -> &Dac<Self::Scalar>;
     /// The sampling period.
     fn period(&self) -> Micros;
-    /// Why it cannot go on, if it cannot.
+    /// The reason why it cannot go on, if it cannot.
     fn failure(&self) -> Option<String> {
         None
     }

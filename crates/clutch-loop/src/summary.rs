@@ -19,7 +19,7 @@ pub fn number(x: f64) -> String {
     if digits == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
 }
 
-/// How a session ended.
+/// The verdict on the end of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The path is done.
@@ -45,7 +45,7 @@ impl Verdict {
     }
 }
 
-/// What became of a session's log.
+/// The fate of a session's log.
 #[derive(Clone, Debug)]
 pub struct LogSummary {
     /// Its file.
@@ -54,29 +54,29 @@ pub struct LogSummary {
     pub records: Result<u64, String>,
 }
 
-/// What a session leaves.
+/// The results of a session.
 #[derive(Clone, Debug)]
 pub struct Summary {
     /// The scenario's name.
     pub scenario: String,
     /// Version and commit of the build.
     pub version: String,
-    /// Whether the gains are certified for the scenario's bounds.
+    /// True if the gains are certified for the scenario's bounds.
     pub certified: bool,
-    /// Whether somebody here has stopped it.
+    /// True if somebody here has stopped it.
     pub stopped: bool,
     /// Faults that were asked for.
     pub faults: usize,
-    /// What the loop saw.
+    /// The report of the loop.
     pub report: LoopReport,
-    /// What the simulated board saw, if there was one.
+    /// The report of the simulated board, if there was one.
     pub board: Option<ServeReport>,
     /// The log, if there was to be one.
     pub log: Option<LogSummary>,
 }
 
 impl Summary {
-    /// How the session ended.
+    /// The verdict on the end of the session.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         let r = &self.report;
@@ -93,13 +93,13 @@ impl Summary {
         }
     }
 
-    /// What ended control, in words.
+    /// The cause of the end of control, in words.
     #[must_use]
     pub fn cause_text(&self) -> String {
         cause_text(self.report.cause, self.report.value, self.report.on_the_board, self.stopped)
     }
 
-    /// What there is to say beside the figures, a line each; the last says why control ended, and whether the
+    /// The remarks beside the figures, a line each; the last says why control ended, and whether the
     /// board is safe.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
@@ -149,7 +149,7 @@ impl Summary {
         lines
     }
 
-    /// Why control ended, and whether the board is safe.
+    /// The last of the remarks: why control ended, and whether the board is safe.
     #[must_use]
     pub fn last_line(&self) -> String {
         let r = &self.report;
@@ -220,7 +220,8 @@ impl Summary {
     }
 }
 
-/// What ended control, in words; `v` is what the check saw, `stopped` whether somebody here has stopped it.
+/// The cause of the end of control, in words; `v` is what the check saw, `stopped` is true if somebody here has
+/// stopped it.
 #[must_use]
 pub fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> String {
     match cause {

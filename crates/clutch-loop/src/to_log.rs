@@ -1,4 +1,4 @@
-//! What a log gets of each sample, of the link and of the shaft.
+//! The records that a log gets of each sample, of the link and of the shaft.
 
 use crate::from_scenario::{self, BuildError};
 use clutch_core::law::Terms;

@@ -21,26 +21,26 @@ use clutch_wire::{BoardState, Refused, StopReason};
 /// Time that a controller takes for an answer, over a part of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stall {
-    /// When it begins, s after arming.
+    /// Its start, s after arming.
     pub at: f64,
-    /// Until when, s after arming.
+    /// Its end, s after arming.
     pub until: f64,
-    /// How long each answer takes then, s.
+    /// Time that each answer takes then, s.
     pub answer: f64,
 }
 
-/// How a run in virtual time is made.
+/// Options of a run in virtual time.
 #[derive(Clone, Debug)]
 pub struct VirtualOptions {
     /// One way, ns.
     pub latency_ns: u64,
-    /// What goes wrong on line and board.
+    /// The faults of line and board.
     pub faults: Vec<Fault>,
     /// A controller that is too slow.
     pub stall: Option<Stall>,
     /// Seed of the line's faults.
     pub seed: u64,
-    /// Whether records are kept.
+    /// True if records are kept.
     pub record: bool,
     /// Time after arming at which the run ends, s; the safe state is watched until then.
     pub duration: f64,
@@ -67,20 +67,20 @@ impl Default for VirtualOptions {
     }
 }
 
-/// What became of a run.
+/// The outcome of a run.
 #[derive(Clone, Debug, Default)]
 pub struct VirtualReport {
-    /// Why the controller ended control, if by a fault.
+    /// The cause for which the controller ended control, if by a fault.
     pub cause: Option<Cause>,
-    /// Where the controller stood last, and why.
+    /// The controller's last state, and its cause.
     pub standing: Standing<f64>,
-    /// When the fault first showed, s after arming.
+    /// The time at which the fault first showed, s after arming.
     pub hit: Option<f64>,
-    /// When the controller faulted, s after arming.
+    /// The time at which the controller faulted, s after arming.
     pub tripped: Option<f64>,
-    /// When the board's safe output was in force, s after arming.
+    /// The time at which the board's safe output was in force, s after arming.
     pub safe: Option<f64>,
-    /// How far the shaft went beyond the path's position at the moment of the safe output, rad.
+    /// The distance by which the shaft went beyond the path's position at the moment of the safe output, rad.
     pub overrun: f64,
     /// Largest distance between shaft and path until the end or the safe output, rad.
     pub largest_error: f64,
@@ -88,7 +88,7 @@ pub struct VirtualReport {
     pub volts: (f64, f64),
     /// Ticks in which the law answered.
     pub answers: u64,
-    /// What a log would hold.
+    /// The records that a log would hold.
     pub records: Vec<Record>,
     /// The code that the converter had when the controller was armed.
     pub present: u16,
@@ -118,7 +118,7 @@ pub enum VirtualError {
 /// A sample of the shaft that waits for its answer.
 struct Sampled {
     shaft: Shaft,
-    /// When, by the rig's clock, s.
+    /// Its time by the rig's clock, s.
     rig_time: f64,
     /// The run's tick, once the controller has told.
     tick: Option<u64>,
@@ -182,7 +182,7 @@ impl<S: Station> VirtualLoop<S> {
     }
 }
 
-/// How far station and board are with each other.
+/// The steps that station and board have made with each other.
 #[derive(Clone, Copy, Default)]
 struct Handshake {
     greeted: bool,
@@ -191,7 +191,7 @@ struct Handshake {
     armed: bool,
 }
 
-/// What a turn of the station brought.
+/// The results of a turn of the station.
 struct Heard<T> {
     records: Vec<Record>,
     ended: Option<Ending<T>>,
@@ -213,9 +213,9 @@ struct Course<'a, S: Station, P> {
     hands: Handshake,
     /// The code that the converter had at the start.
     present: DacCode,
-    /// When the board was armed.
+    /// The time at which the board was armed.
     origin_ns: u64,
-    /// When the run is over; not before the board is armed.
+    /// The time at which the run is over; not before the board is armed.
     end_ns: u64,
     safe_at: Option<u64>,
     /// The station makes an answer until then.
@@ -223,7 +223,7 @@ struct Course<'a, S: Station, P> {
     waiting: Option<Sampled>,
     /// Samples that the board has taken.
     sampled: u64,
-    /// How many it had taken when control began.
+    /// The number that it had taken when control began.
     first_sample: Option<u64>,
 }
 
@@ -264,7 +264,7 @@ impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
         Ok(())
     }
 
-    /// When something falls due next, on the board, on the line, or for the station.
+    /// The time at which something falls due next, on the board, on the line, or for the station.
     fn next_event(&mut self) -> Option<u64> {
         let v = &mut *self.on;
         let heard = v.up.next_ns().map(|t| t.max(self.busy_until));
@@ -361,7 +361,7 @@ impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
         Ok(())
     }
 
-    /// What has come over the line, and what the clock says.
+    /// Takes in what has come over the line, and what the clock says.
     fn hear(&mut self, now: u64, time_ns: u64) -> Heard<S::Scalar> {
         let VirtualLoop { board, station, up, .. } = &mut *self.on;
         let (hands, waiting, report) = (&mut self.hands, &mut self.waiting, &mut self.report);
@@ -400,7 +400,7 @@ impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
         heard
     }
 
-    /// Where control stands now: its beginning and a fault are noted, and the path's end stops it.
+    /// Follows the state of control: its beginning and a fault are noted, and the path's end stops it.
     fn follow(&mut self, time_ns: u64, armed_for: Option<f64>) -> Option<Record> {
         let Standing { state, cause, tick, .. } = self.on.station.standing();
         if state == State::Running && self.first_sample.is_none() {
@@ -432,7 +432,7 @@ impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
         self.out.clear();
     }
 
-    /// What became of it.
+    /// The outcome of the run.
     fn report(mut self) -> Result<VirtualReport, VirtualError> {
         self.on.sound()?;
         let now_ns = self.on.now_ns;

@@ -1,9 +1,9 @@
-//! What may be seen of a loop while it runs: atomics that its threads write.
+//! The values of a loop that may be seen while it runs: atomics that its threads write.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU64};
 
-/// What a watcher sees while the loop runs.
+/// The values that a watcher sees while the loop runs.
 #[derive(Debug, Default)]
 pub struct Watch {
     /// Set to end the run in the safe state.

@@ -20,7 +20,7 @@ use clutch_wire::{
     Stopped, VERSION,
 };
 
-/// What a board is.
+/// Parameters of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardParams {
     /// Its serial number; 0 is the simulated board, whose clock may wait for the controller.
@@ -91,7 +91,7 @@ impl BoardParams {
     }
 }
 
-/// Why a board cannot be as its parameters say.
+/// The reason why a board cannot be as its parameters say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoardMisfit {
     /// [`BoardParams::dac_bits`] is outside 1…16.
@@ -147,7 +147,7 @@ pub struct BoardNode {
     sequence: u16,
     /// Times of the last samples, by the low bits of their sequence; none before there was one.
     recent: [Option<u32>; RECENT],
-    /// When the last code was applied, or consent given.
+    /// The time at which the last code was applied, or consent given.
     fed_us: u32,
     /// Sequence that the last applied code answered.
     answered: Option<u16>,
@@ -192,7 +192,7 @@ impl BoardNode {
         self.code
     }
 
-    /// Where the board stands.
+    /// The board's state.
     #[must_use]
     pub fn state(&self) -> BoardState {
         self.state
@@ -204,19 +204,19 @@ impl BoardNode {
         (self.state != BoardState::Boot).then_some(self.period_us)
     }
 
-    /// When [`BoardNode::poll`] has to be called at the latest; none while nothing is watched.
+    /// The latest time at which [`BoardNode::poll`] has to be called; none while nothing is watched.
     #[must_use]
     pub fn watchdog_at(&self) -> Option<u32> {
         self.driving().then(|| self.fed_us.wrapping_add(self.watchdog_us))
     }
 
-    /// When the last code was applied, or consent given.
+    /// The time at which the last code was applied, or consent given.
     #[must_use]
     pub fn fed_us(&self) -> u32 {
         self.fed_us
     }
 
-    /// Whether the newest sample has been answered, or needs no answer.
+    /// True if the newest sample has been answered, or needs no answer.
     #[must_use]
     pub fn is_answered(&self) -> bool {
         let awaited = self.driving() && self.sequence != self.armed_at;

@@ -26,14 +26,14 @@ use clutch_wire::{
     Message, Pong, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Taken, VERSION,
 };
 
-/// What a board in the controller role is.
+/// Parameters of a board in the controller role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardControllerParams {
     /// Its serial number; 0 and 1 are emulated boards.
     pub board: u32,
     /// A number that changes at each power-up.
     pub boot: u32,
-    /// What [`BoardController::spent`] counts, Hz; 0 if it is not called.
+    /// Frequency of the clock whose cycles [`BoardController::spent`] is given, Hz; 0 if it is not called.
     pub clock_hz: u32,
 }
 
@@ -46,7 +46,7 @@ pub struct Outboxes {
     pub daq: Outbox,
 }
 
-/// How often the host is told what the line has carried.
+/// Interval at which the host is told what the line has carried.
 const LINK_EVERY_NS: u64 = 1_000_000_000;
 
 /// A run that the host has configured.
@@ -100,20 +100,20 @@ impl BoardController {
         }
     }
 
-    /// Where control stands.
+    /// The state of control.
     #[must_use]
     pub fn state(&self) -> State {
         self.run.as_ref().map_or(State::Disconnected, |r| r.control.state().state())
     }
 
-    /// Whether it drives, or has the consent to.
+    /// True if it drives, or has the consent to.
     #[must_use]
     pub fn driving(&self) -> bool {
         self.run.as_ref().is_some_and(Run::driving)
     }
 
-    /// What tells encoder and converter to go to the safe state, for a handler that can trust nothing else;
-    /// none while nothing is driven.
+    /// The frame that tells encoder and converter to go to the safe state, for a handler that can trust nothing
+    /// else; none while nothing is driven.
     #[must_use]
     pub fn last_word(&self) -> Option<Outbox> {
         let run = self.run.as_ref().filter(|r| r.driving())?;
@@ -134,7 +134,7 @@ impl BoardController {
         }
     }
 
-    /// When [`BoardController::poll`] has to be called at the latest, ns; none while nothing is awaited.
+    /// The latest time at which [`BoardController::poll`] has to be called, ns; none while nothing is awaited.
     #[must_use]
     pub fn poll_at(&self) -> Option<u64> {
         let run = self.run.as_ref()?;

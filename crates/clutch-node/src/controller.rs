@@ -12,7 +12,7 @@ use clutch_wire::{
     STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop, StopReason, VERSION,
 };
 
-/// What a run is, on the wire.
+/// Parameters of a run, on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ControllerParams {
     /// Number of the run; another for each run on a board.
@@ -21,7 +21,7 @@ pub struct ControllerParams {
     pub config: u64,
     /// The board's watchdog.
     pub watchdog: Micros,
-    /// How long after its sample a code is valid.
+    /// Time after its sample for which a code is valid.
     pub valid: Micros,
     /// Time without a sample after which the supervisor's check of silence is asked. A simulated
     /// board's clock may wait for a machine that stalls; there it is longer than the check's own
@@ -40,7 +40,7 @@ pub struct ControllerNode<T: Real, C: ControlLaw<T> = Law<T>> {
     counts: LinkCounts,
     /// The code that the converter has before the first answer.
     present: DacCode,
-    /// Where the path begins: the counts of the first sample that is answered.
+    /// The position at which the path begins: the counts of the first sample that is answered.
     origin: FixedCounts,
     last_sample_ns: Option<u64>,
     /// The supervisor has been told of this silence.
@@ -75,13 +75,13 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         &self.state
     }
 
-    /// What the line has carried.
+    /// Counts of what the line has carried.
     #[must_use]
     pub fn counts(&self) -> &LinkCounts {
         &self.counts
     }
 
-    /// Where the path begins.
+    /// The position at which the path begins.
     #[must_use]
     pub fn origin(&self) -> FixedCounts {
         self.origin
@@ -104,7 +104,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         out.push(&Message::Configure(self.configuration()));
     }
 
-    /// What the board is told of the run.
+    /// The message that tells the board of the run.
     #[must_use]
     pub fn configuration(&self) -> Configure {
         let safe = self.supervisor.safe_codes();
@@ -156,7 +156,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         self.lateness = lateness;
     }
 
-    /// When [`ControllerNode::poll`] has to be called at the latest, ns; none while nothing is
+    /// The latest time at which [`ControllerNode::poll`] has to be called, ns; none while nothing is
     /// awaited.
     #[must_use]
     pub fn poll_at(&self) -> Option<u64> {
@@ -340,7 +340,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         }
     }
 
-    /// How control has ended; `from` is the state before.
+    /// The end of control; `from` is the state before.
     pub(crate) fn ending(&self, from: State) -> Ending<T> {
         let s = &self.state;
         Ending { from, state: s.state(), cause: s.cause(), value: s.value(), tick: s.tick() }

@@ -1,4 +1,4 @@
-//! What a board's program does each period, and with each byte that comes: the same on all boards.
+//! The work of a board's program in each period, and with each byte that comes: the same on all boards.
 //!
 //! ```text
 //!  encoder ─┐          ┌─► converter      1. the code goes out
@@ -14,7 +14,7 @@ use crate::one_chip::OneChip;
 use crate::outbox::Outbox;
 use clutch_core::{Counts, DacCode, Micros};
 
-/// What a board's one file gives. Nothing of it may wait.
+/// The functions that a board's one file gives. None of them may wait.
 pub trait Hardware {
     /// Time since the start, µs. Never goes back.
     fn now_us(&self) -> u64;
@@ -42,7 +42,7 @@ pub trait Hardware {
     fn cycles(&self) -> u32;
 }
 
-/// What a board is to the host. Times are [`Hardware::now_us`].
+/// A board's role towards the host. Times are [`Hardware::now_us`].
 pub trait Role {
     /// Bytes from the host.
     fn receive(&mut self, now_us: u64, bytes: &[u8]);
@@ -50,7 +50,7 @@ pub trait Role {
     /// A period begins. Afterwards [`Role::code`] is what this period's sample led to.
     fn sample(&mut self, now_us: u64, counts: Counts, encoder_fault: bool, converter_fault: bool);
 
-    /// What the converter is to give now.
+    /// The code that the converter is to give now.
     fn code(&self) -> DacCode;
 
     /// The sampling period, µs; none before one was configured.

@@ -21,7 +21,7 @@ pub struct HostNode {
     standing: Standing<f32>,
     counts: LinkCounts,
     controller: Option<ControllerHello>,
-    /// Where the path begins; none before it is known.
+    /// The position at which the path begins; none before it is known.
     origin: Option<FixedCounts>,
     /// Number of the last telemetry; they begin with 1 at each Configure.
     number: u16,
@@ -64,13 +64,13 @@ impl HostNode {
         }
     }
 
-    /// Where control stands.
+    /// The state of control.
     #[must_use]
     pub fn standing(&self) -> &Standing<f32> {
         &self.standing
     }
 
-    /// What the board's own line has carried.
+    /// Counts of what the board's own line has carried.
     #[must_use]
     pub fn counts(&self) -> &LinkCounts {
         &self.counts
@@ -88,7 +88,7 @@ impl HostNode {
         &self.servo
     }
 
-    /// Where the path begins.
+    /// The position at which the path begins.
     #[must_use]
     pub fn origin(&self) -> FixedCounts {
         self.origin.unwrap_or_default()
@@ -144,7 +144,7 @@ impl HostNode {
         matches!(self.standing.state, State::Armed | State::Running)
     }
 
-    /// When [`HostNode::poll`] has to be called at the latest, ns.
+    /// The latest time at which [`HostNode::poll`] has to be called, ns.
     #[must_use]
     pub fn poll_at(&self) -> Option<u64> {
         if self.asks_to_stop() {
@@ -289,8 +289,8 @@ impl HostNode {
         }
     }
 
-    /// Where the path begins, when the telemetry that says so got lost: a whole number of counts, from
-    /// where the path and the shaft are and what lies between.
+    /// The position at which the path begins, when the telemetry that says so got lost: a whole number of counts,
+    /// from where the path and the shaft are and what lies between.
     fn origin_from(&self, m: &Telemetry, position: FixedCounts) -> FixedCounts {
         const HALF: i64 = 1 << (FixedCounts::FRACTION_BITS - 1);
         let encoder = self.servo.encoder();

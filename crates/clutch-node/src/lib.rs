@@ -1,4 +1,4 @@
-//! What stands at a serial line, as state machines without I/O and without a clock: the nodes.
+//! The nodes at a serial line, as state machines without I/O and without a clock.
 //!
 //! ```text
 //!  encoder ─► BoardNode ──Sample──► ControllerNode ─► supervisor ─► servo

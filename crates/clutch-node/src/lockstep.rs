@@ -41,7 +41,7 @@ impl<'a> Exchange<'a> {
         Some(length)
     }
 
-    /// How long the one is that begins so; nothing before its head is there.
+    /// The length of the one that begins so; nothing before its head is there.
     #[must_use]
     pub fn length(buffer: &[u8]) -> Option<usize> {
         let (host, daq) = Self::lengths(buffer)?;

@@ -1,10 +1,10 @@
-//! What a controller, or the host of one, reports to its environment.
+//! The reports of a controller, or of the host of one, to its environment.
 
 use clutch_core::supervisor::{Cause, Cycle, State};
 use clutch_core::{Arithmetic, Micros};
 use clutch_wire::{ControllerHello, Fault, FrameError, Hello, Refused, Sample, Stopped, Taken};
 
-/// What the line has carried.
+/// Counts of what the line has carried.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkCounts {
     /// Samples of this run.
@@ -26,17 +26,17 @@ pub struct LinkCounts {
 pub struct CycleNotice<T: Arithmetic, Terms> {
     /// The sample as it came.
     pub sample: Sample,
-    /// Whether a newer one was there already.
+    /// True if a newer one was there already.
     pub superseded: bool,
     /// Time that the answer to the sample before took.
     pub lateness: Micros,
     /// Clock cycles of the tick before, where a board counts them; else 0.
     pub cycles: u32,
-    /// What it led to.
+    /// The cycle that it led to.
     pub cycle: Cycle<T, Terms>,
 }
 
-/// What a controller, or the host of one, reports.
+/// A report of a controller, or of the host of one.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::large_enum_variant, reason = "lives on the stack for one call; nothing allocates here")]
 pub enum Notice<T: Arithmetic, Terms> {
@@ -75,22 +75,22 @@ pub struct Ending<T> {
     pub from: State,
     /// And after it.
     pub state: State,
-    /// Why.
+    /// The cause of the end.
     pub cause: Cause,
-    /// What the check saw.
+    /// The value that the check saw.
     pub value: T,
     /// The run's tick.
     pub tick: u64,
 }
 
-/// Where control stands: of a controller at once, of a board controller as it reported last.
+/// The state of control: of a controller at once, of a board controller as it reported last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Standing<T> {
     /// The supervisor's state.
     pub state: State,
-    /// Why control ended.
+    /// The cause of the end of control.
     pub cause: Cause,
-    /// What the check that ended it saw.
+    /// The value seen by the check that ended control.
     pub value: T,
     /// The run's tick.
     pub tick: u64,

@@ -81,7 +81,7 @@ impl OneChip {
         self.board.code()
     }
 
-    /// Where the board stands.
+    /// The board's state.
     #[must_use]
     pub fn state(&self) -> BoardState {
         self.board.state()

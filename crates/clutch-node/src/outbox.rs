@@ -4,7 +4,7 @@ use clutch_wire::{Message, encode};
 
 const CAPACITY: usize = 512;
 
-/// Frames that wait to be written. What does not fit is counted and dropped: the line is then
+/// Frames that wait to be written. A frame that does not fit is counted and dropped: the line is then
 /// so far behind that its frames would be of no use.
 #[derive(Clone, Copy, Debug)]
 pub struct Outbox {
@@ -43,7 +43,7 @@ impl Outbox {
         }
     }
 
-    /// What is to be written.
+    /// The bytes that are to be written.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8] {
         self.bytes.get(..self.used).unwrap_or(&[])

@@ -23,7 +23,7 @@ pub(crate) fn both_states(states: u8) -> Option<(State, State)> {
     Some((State::from_u8(states & 0x0f)?, State::from_u8(states >> 4)?))
 }
 
-/// What goes to the host.
+/// The telemetry that goes to the host.
 pub(crate) fn frame(run: u16, number: u16, n: &CycleNotice<f32, LawTerms<f32>>) -> Telemetry {
     let (c, out) = (&n.cycle, n.cycle.output.unwrap_or_default());
     let flag = |on: bool, bit: u8| if on { bit } else { 0 };
@@ -57,8 +57,8 @@ pub(crate) fn frame(run: u16, number: u16, n: &CycleNotice<f32, LawTerms<f32>>) 
     }
 }
 
-/// What the host makes of it; `servo` is the board's, `target` the path's. None for numbers that mean nothing: a
-/// state, an arrival or a cause that is none, terms of another law.
+/// The notice that the host makes of it; `servo` is the board's, `target` the path's. None for numbers that mean
+/// nothing: a state, an arrival or a cause that is none, terms of another law.
 pub(crate) fn notice(
     m: &Telemetry,
     servo: &Servo<f32>,

@@ -86,7 +86,7 @@ fn another_version_or_schema_is_refused_and_not_passed_on() {
 
 // Settings and Configure.
 
-/// What Configure of the planned run is answered with, when other settings were sent.
+/// The answer to Configure of the planned run, when other settings were sent.
 fn answer_to(plan: &Plan, pairs: &[(u16, u64)]) -> Vec<Message> {
     let mut desk = Desk::new(*plan);
     desk.says(discover());
@@ -609,7 +609,7 @@ fn what_the_line_has_carried_is_told_each_second() {
 
 // What gets lost on the way to the host.
 
-/// What a host makes of frames: how often it was told of a sample, and where it thinks control stands.
+/// A host's view of frames: how often it was told of a sample, and where it thinks control stands.
 fn replay(desk: &Desk, bytes: &[u8]) -> (Vec<desk::Heard>, clutch_node::HostNode) {
     let (mut host, mut notices) = (desk.plan.host(), Vec::new());
     host.receive(0, bytes, &desk.plan.path(), &mut |n| notices.push(n));

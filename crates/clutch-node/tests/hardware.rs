@@ -1,4 +1,4 @@
-//! What a board's program does in each period and with each byte, and a counter of 16 bits.
+//! The work of a board's program in each period and with each byte, and a counter of 16 bits.
 #![allow(missing_docs, reason = "the tests' names say what holds")]
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
@@ -33,7 +33,7 @@ const CONFIGURE: Configure = Configure {
     hold_periods: 0,
 };
 
-/// What was done with the hardware, in its order.
+/// Actions on the hardware, in their order.
 #[derive(Debug, PartialEq)]
 enum Done {
     Sampled,

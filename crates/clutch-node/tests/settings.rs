@@ -234,7 +234,7 @@ fn a_choice_or_a_word_that_is_not_known_is_named() {
     }
 }
 
-/// What a host says of settings that a board refuses.
+/// The host's words on settings that a board refuses.
 fn refusal(settings: &Settings) -> String {
     let misfit = settings.build().unwrap_err();
     let lacks = !matches!(misfit, Misfit::Unfit { .. });

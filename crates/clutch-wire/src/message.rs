@@ -211,7 +211,7 @@ macro_rules! messages {
     };
 }
 
-/// What a message with a list has more.
+/// The code that only a message with a list has.
 macro_rules! listed {
     ($list:ident $($what:tt)+) => {
         $($what)+

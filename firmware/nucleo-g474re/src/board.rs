@@ -33,7 +33,7 @@ const COUNTS_PER_REV: u32 = 20_000;
 /// Enter the values that you measure at the brake's terminals, here and in the scenario.
 const DRIVER_MV: (i32, i32) = (0, 10_000);
 
-/// What the board is, but for what each has of its own: serial number, and number of the power-up.
+/// Parameters of the board, but for those that each has of its own: serial number, and number of the power-up.
 const PARAMS: BoardParams = BoardParams {
     board: 0,
     boot: 0,

@@ -17,8 +17,8 @@ const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "risc
 /// Checks that need the targets: two builds each, the two link tests, the example, two boards, the budgets.
 const SKIPPED_WITHOUT_TARGETS: u64 = 2 * TARGETS.len() as u64 + 6;
 
-/// What is built for this machine. Always the same selection: with another one cargo gives libraries other
-/// features, and compiles them once more. The wheel's module only links inside of Python.
+/// The packages that are built for this machine. Always the same selection: with another one cargo gives libraries
+/// other features, and compiles them once more. The wheel's module only links inside of Python.
 const WORKSPACE: [&str; 3] = ["--workspace", "--exclude", "clutch-py"];
 
 /// Runs everything, counts, and fails at the end if anything failed.
@@ -41,7 +41,7 @@ pub(crate) fn all() -> Result<()> {
     tally.end(sound)
 }
 
-/// What boards take, and what fuzzing finds, alone.
+/// The checks for boards, and the fuzzing, alone.
 pub(crate) fn boards() -> Result<()> {
     let mut tally = Tally::new();
     boards_of(&mut tally, targets()?)?;
@@ -84,7 +84,7 @@ pub(crate) fn targets() -> Result<&'static [&'static str]> {
     }
 }
 
-/// What runs on this machine, an emulated board included.
+/// The tests that run on this machine, an emulated board included.
 fn host(tally: &mut Tally) -> Result<bool> {
     tally.stage("build of the tests");
     let clutch = compared()?;
@@ -103,7 +103,7 @@ fn host(tally: &mut Tally) -> Result<bool> {
     Ok(sound & cargo(tests).args(core).lines(|l| tally.read(l))?)
 }
 
-/// What the tests of the wheel run beside it.
+/// The examples that the tests of the wheel run beside it.
 const EXAMPLES: [&str; 3] = ["write_demo", "bits", "intervals"];
 
 /// Builds what the wheel is compared with, and the command that tests run: with few optimisations, as the tests.
@@ -115,7 +115,7 @@ fn compared() -> Result<std::path::PathBuf> {
     Ok(root().join("target/debug/clutch"))
 }
 
-/// What boards take: builds for embedded targets, link tests, images, budgets.
+/// The checks for boards: builds for embedded targets, link tests, images, budgets.
 fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     if embedded.is_empty() {
         tally.skip(SKIPPED_WITHOUT_TARGETS);

@@ -7,7 +7,7 @@ use std::time::Instant;
 struct Stage {
     name: &'static str,
     begin: Instant,
-    /// What ended programs had taken of processors, s.
+    /// Processors' time that ended programs had taken, s.
     processor: f64,
 }
 
@@ -162,7 +162,7 @@ fn minutes(seconds: f64) -> String {
     format!("{}:{:02}", (whole / 60.0).floor(), whole % 60.0)
 }
 
-/// What ended programs of this one, and theirs, took of processors, s; 0 where the system does not say.
+/// Processors' time that ended programs of this one, and theirs, took, s; 0 where the system does not say.
 fn processor_s() -> f64 {
     /// Linux counts in these for programs, whatever it counts in for itself.
     const TICKS_PER_S: f64 = 100.0;

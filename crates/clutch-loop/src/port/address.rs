@@ -1,4 +1,4 @@
-//! Where a board is, as the user writes it.
+//! The address of a board, as the user writes it.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -8,7 +8,7 @@ use std::str::FromStr;
 /// Line rate unless told otherwise, baud: the cycle's frames at 1 kHz do not fit below 460 800.
 pub const DEFAULT_BAUD: u32 = 921_600;
 
-/// Where a board is: `/dev/ttyUSB0` or `tcp://127.0.0.1:5000`.
+/// The address of a board: `/dev/ttyUSB0` or `tcp://127.0.0.1:5000`.
 ///
 /// ```
 /// use clutch_loop::port::{Address, DEFAULT_BAUD};
@@ -51,7 +51,7 @@ impl fmt::Display for Address {
 pub struct AddressError {
     /// The text.
     pub value: String,
-    /// What it could have meant.
+    /// The address that it could have meant.
     pub suggestion: Option<String>,
 }
 

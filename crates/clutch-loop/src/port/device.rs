@@ -1,4 +1,4 @@
-//! What stands behind a device file, and what its line can carry.
+//! The device behind a device file, and the capacity of its line.
 
 use super::{Address, PortError};
 use crate::realtime::line;
@@ -19,7 +19,7 @@ pub const STANDARD_BAUDS: [u32; 18] = [
 /// Bits on the line for a byte: start bit, 8 data bits, stop bit.
 const BITS_PER_BYTE: u128 = 10;
 
-/// What a port leads to.
+/// The kind of device that a port leads to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeviceKind {
     /// A program on this machine.
@@ -101,7 +101,7 @@ pub(super) fn tight_line(baud: u32, bytes: (usize, usize), period: Duration) -> 
     })
 }
 
-/// What `/sys` tells of a device file.
+/// The facts that `/sys` tells of a device file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Found {
     pub(super) kind: DeviceKind,
@@ -111,7 +111,7 @@ pub(super) struct Found {
     folder: PathBuf,
 }
 
-/// Why a file is not taken for a serial device.
+/// The reason why a file is not taken for a serial device.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum NotSerial {
     /// The system did not let us look.
@@ -150,7 +150,7 @@ pub(super) fn classify_path(sys: &Path, path: &Path) -> Result<Found, NotSerial>
     Err(NotSerial::Is(format!("it is {what}")))
 }
 
-/// What the character device of these numbers is.
+/// The kind of the character device of these numbers.
 pub(super) fn classify(sys: &Path, major: u32, minor: u32) -> Result<Found, NotSerial> {
     let folder = sys.join(format!("dev/char/{major}:{minor}"));
     let found = |kind, driver| Ok(Found { kind, driver, folder: folder.clone() });
@@ -183,12 +183,12 @@ pub(super) fn classify(sys: &Path, major: u32, minor: u32) -> Result<Found, NotS
 }
 
 impl Found {
-    /// How long the adapter holds received bytes, ms, where its driver tells (FTDI).
+    /// Time for which the adapter holds received bytes, ms, where its driver tells (FTDI).
     pub(super) fn latency_timer_ms(&self) -> Option<u32> {
         line(&self.folder.join("device/latency_timer"))?.parse().ok()
     }
 
-    /// What low-latency mode came to, if there is something to say.
+    /// The result of low-latency mode, if there is something to say.
     pub(super) fn latency_note(
         &self,
         port: &str,

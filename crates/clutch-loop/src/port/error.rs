@@ -1,4 +1,4 @@
-//! What can be wrong with a port, and what to do about it.
+//! The errors of ports, and what to do about each.
 
 use super::Address;
 use rustix::io::Errno;
@@ -27,7 +27,7 @@ impl fmt::Display for Holder {
     }
 }
 
-/// Why a port cannot be used. Each message says what to do.
+/// The reason why a port cannot be used. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PortError {
@@ -44,7 +44,7 @@ pub enum PortError {
     PermissionDenied {
         /// The device file.
         path: PathBuf,
-        /// Whose it is, and how to be let in.
+        /// Its owner, and the way to be let in.
         advice: String,
     },
     /// The file is no serial device.
@@ -52,7 +52,7 @@ pub enum PortError {
     NotASerialDevice {
         /// The file.
         path: PathBuf,
-        /// What it is instead.
+        /// The thing that it is instead, in words.
         why: String,
     },
     /// Another program has the port.
@@ -74,7 +74,7 @@ pub enum PortError {
     Unreachable {
         /// The address.
         to: SocketAddr,
-        /// What the system says.
+        /// The system's answer.
         source: io::Error,
     },
     /// The TCP address cannot be listened on.
@@ -84,7 +84,7 @@ pub enum PortError {
     CannotListen {
         /// The address.
         to: SocketAddr,
-        /// What the system says.
+        /// The system's answer.
         source: io::Error,
     },
     /// The TCP address is open to other machines.
@@ -124,7 +124,7 @@ pub enum PortError {
         address: Address,
         /// The rate asked for, baud.
         baud: u32,
-        /// What the system says.
+        /// The system's answer.
         source: io::Error,
     },
     /// Anything else.
@@ -132,7 +132,7 @@ pub enum PortError {
     Io {
         /// The port.
         address: Address,
-        /// What the system says.
+        /// The system's answer.
         source: io::Error,
     },
 }
@@ -204,7 +204,7 @@ pub(super) fn serial_devices(dev: &Path) -> Vec<PathBuf> {
     all
 }
 
-/// Whose the file is, and how its group is joined.
+/// The owner of the file, and the way to join its group.
 pub(super) fn permission_advice(path: &Path, groups: &Path) -> String {
     let Ok(meta) = std::fs::metadata(path) else {
         return "one of its folders is closed to you; ask the administrator of this machine".to_owned();
@@ -232,7 +232,7 @@ pub(super) fn permission_advice(path: &Path, groups: &Path) -> String {
     }
 }
 
-/// Who holds the lock on the file.
+/// The program that holds the lock on the file.
 pub(super) fn lock_holder(path: &Path) -> Option<Holder> {
     /// The list is read in pieces; a lock given up elsewhere between two of them shifts the rest,
     /// and a line is missed.

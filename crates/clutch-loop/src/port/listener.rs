@@ -8,14 +8,14 @@ use rustix::net::SendFlags;
 use std::io;
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 
-/// What a second client reads before its connection is closed. It ends like a frame, so that a
+/// The line that a second client reads before its connection is closed. It ends like a frame, so that a
 /// decoder that does not know it drops it as one bad frame.
 pub const BUSY_LINE: &[u8] = b"clutch: busy: this board serves another client\n\0";
 
 /// Second clients that are being told so at a time. More are closed without a word.
 const REFUSED: usize = 4;
 
-/// How long a second client has for reading that it is one, ns.
+/// Time that a second client has for reading that it is one, ns.
 const LINGER: u64 = 1_000_000_000;
 
 /// The board's end of a TCP line: one client at a time.

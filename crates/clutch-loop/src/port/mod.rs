@@ -40,10 +40,10 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::time::Duration;
 
-/// How long opening a TCP connection may take, s.
+/// The longest time that opening a TCP connection may take, s.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How a serial device is set up. Ignored for TCP.
+/// The setup of a serial device. Ignored for TCP.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SerialOptions {
     /// Line rate, baud, in place of the address's.
@@ -58,12 +58,12 @@ impl Default for SerialOptions {
     }
 }
 
-/// What [`Port::open`] gives.
+/// The result of [`Port::open`].
 #[derive(Debug)]
 pub struct Opened {
     /// The open port.
     pub port: Port,
-    /// What the user should know, a sentence each: settings the driver refused and what that
+    /// The facts that the user should know, a sentence each: settings the driver refused and what that
     /// costs.
     pub notes: Vec<String>,
 }
@@ -128,13 +128,13 @@ impl Port {
         sent(rustix::io::write(&self.fd, bytes))
     }
 
-    /// What the other end is.
+    /// The kind of device at the other end.
     #[must_use]
     pub fn kind(&self) -> DeviceKind {
         self.kind
     }
 
-    /// Where it was opened.
+    /// The address at which it was opened.
     #[must_use]
     pub fn address(&self) -> &Address {
         &self.address
@@ -342,7 +342,7 @@ fn open_tcp(address: &Address, to: SocketAddr) -> Result<Opened, PortError> {
 /// A client's coming and going, as a board sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClientEvent {
-    /// Somebody opened the line. What a former client had not read is gone.
+    /// Somebody opened the line. Bytes that a former client had not read are gone.
     Connected,
     /// The client closed the line or died, and its last bytes have been read.
     Left,
@@ -376,7 +376,7 @@ pub trait Endpoint {
     /// instant. Never says `HungUp`.
     fn wait(&self, until_ns: u64, mode: WaitMode) -> Readiness;
 
-    /// Where clients reach it, as they write it.
+    /// The address at which clients reach it, as they write it.
     fn address(&self) -> Address;
 }
 

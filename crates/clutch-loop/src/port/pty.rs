@@ -17,9 +17,9 @@ use std::path::{Path, PathBuf};
 ///
 /// The slave is not kept open on this side: then the kernel tells exactly whether a client has it
 /// open, however it was opened and however it ended. The pseudo-terminal itself lives as long as
-/// this value. What a client wrote before it left can still be read, as on a cable: its last bytes
-/// may be the command to stop. Then the line is set to raw again, and what the client has not read
-/// is dropped.
+/// this value. Bytes that a client wrote before it left can still be read, as on a cable: the last of
+/// them may be the command to stop. Then the line is set to raw again, and what the client has not
+/// read is dropped.
 #[derive(Debug)]
 pub struct PseudoTerminal {
     master: OwnedFd,
@@ -45,7 +45,7 @@ impl PseudoTerminal {
         Ok((terminal, path))
     }
 
-    /// Where clients open it.
+    /// The path at which clients open it.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -126,7 +126,7 @@ impl Endpoint for PseudoTerminal {
 
 /// With no peer connected, poll returns immediately; sleep instead of busy-looping.
 pub(super) fn wait_or_sleep(fd: rustix::fd::BorrowedFd<'_>, until_ns: u64, mode: WaitMode) -> Readiness {
-    /// How soon a new client is noticed at the latest, ns.
+    /// The longest time until a new client is noticed, ns.
     const NAP: u64 = 10_000_000;
     loop {
         match wait_readable(fd, until_ns, mode) {

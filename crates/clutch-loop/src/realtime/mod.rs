@@ -5,8 +5,8 @@
 //! runs all the same. [`sleep_until`] and [`wait_readable`] wait against absolute deadlines, so
 //! that one late cycle does not shift those after it.
 //!
-//! What the settings mean and how to set a machine up is in `docs/realtime.md`. How late a thread
-//! wakes on the machine at hand is measured by `benches/latency/lateness.py`.
+//! The meaning of the settings and the setup of a machine are in `docs/realtime.md`. The lateness of
+//! a thread's wake-up on the machine at hand is measured by `benches/latency/lateness.py`.
 //!
 //! Nothing in [`monotonic_ns`], [`sleep_until`], [`wait_readable`] and [`CycleStats::record`]
 //! allocates or takes a lock.
@@ -42,7 +42,7 @@ pub const DEFAULT_PRIORITY: u8 = 49;
 /// that of a Rust thread is 2 MiB.
 pub const PREFAULTED_STACK: usize = 128 * 1024;
 
-/// How a thread waits for its deadline.
+/// The way in which a thread waits for its deadline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WaitMode {
     /// The kernel's timer alone: no processor time, but the wake-up is late by tens of
@@ -53,13 +53,13 @@ pub enum WaitMode {
     /// time: `spin_us` of each period. A SCHED_FIFO thread that spins more than 95 % of the time is
     /// stopped by the kernel's real-time throttling.
     SleepSpin {
-        /// How long before the deadline spinning begins, µs. Longer than nearly all wake-ups are
+        /// Time before the deadline at which spinning begins, µs. Longer than nearly all wake-ups are
         /// late: see `benches/latency/lateness.py`.
         spin_us: u32,
     },
 }
 
-/// What the control thread asks of the kernel. The names are those of ros2_control.
+/// The control thread's requests to the kernel. The names are those of ros2_control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RealtimeOptions {
     /// Priority under SCHED_FIFO, 1 to 99. 0 stays with the ordinary scheduler.
@@ -68,7 +68,7 @@ pub struct RealtimeOptions {
     pub lock_memory: bool,
     /// The core the thread stays on; `None` lets the kernel move it.
     pub cpu_affinity: Option<usize>,
-    /// How the thread waits.
+    /// The way in which the thread waits.
     pub wait: WaitMode,
 }
 
@@ -255,7 +255,7 @@ fn timespec(ns: u64) -> Timespec {
     Timespec { tv_sec: (ns / 1_000_000_000) as i64, tv_nsec: (ns % 1_000_000_000) as _ }
 }
 
-/// When sleeping ends and spinning begins, ns.
+/// The time at which sleeping ends and spinning begins, ns.
 fn sleep_end(until_ns: u64, mode: WaitMode) -> u64 {
     match mode {
         WaitMode::Sleep => until_ns,
@@ -286,7 +286,7 @@ pub fn sleep_until(ns: u64, mode: WaitMode) {
     }
 }
 
-/// What [`wait_readable`] saw.
+/// The result of [`wait_readable`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Readiness {
     /// A read will not come back empty: bytes, or the news that the other side is gone.

@@ -1,4 +1,4 @@
-//! How late the cycles were, and how long they took.
+//! The lateness of the cycles, and the time that they took.
 
 use hdrhistogram::Histogram;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! What kind of machine this is, in words.
+//! The kind of this machine, in words.
 
 use super::line;
 use std::path::Path;

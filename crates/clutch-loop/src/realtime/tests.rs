@@ -7,8 +7,8 @@ use std::time::Duration;
 
 const MS: u64 = 1_000_000;
 
-/// A deadline is never early, however the thread waits. How late it is depends on the machine:
-/// only the bench says.
+/// A deadline is never early, however the thread waits. Its lateness depends on the machine: only
+/// the bench says.
 #[test]
 fn a_deadline_is_never_early_in_either_mode() {
     for mode in

@@ -185,14 +185,14 @@ impl Settings {
         }
     }
 
-    /// Whether there is a setting of this key.
+    /// True if there is a setting of this key.
     #[must_use]
     pub fn knows(key: u16) -> bool {
         let knot = key.checked_sub(FIRST_KNOT).is_some_and(|n| usize::from(n / 2) < MAX_KNOTS);
         knot || usize::from(key) < SETTINGS
     }
 
-    /// Takes a setting; whether there is such a one. Whether it fits shows when a run is built.
+    /// Takes a setting; true if there is such a one. The build of a run shows whether it fits.
     pub fn set(&mut self, key: u16, value: u64) -> bool {
         if let Some(number) = key.checked_sub(FIRST_KNOT) {
             let Some(knot) = self.knots.get_mut(usize::from(number / 2)) else { return false };

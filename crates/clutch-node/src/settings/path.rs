@@ -45,7 +45,7 @@ impl Path {
         Ok(Path { first: FixedCounts::from_counts(first), ..path })
     }
 
-    /// Where the shaft shall be at a tick, from the count on which the run begins; `knots` are the settings'.
+    /// The target of the shaft at a tick, from the count on which the run begins; `knots` are the settings'.
     #[must_use]
     pub fn target(&self, knots: &[Knot; MAX_KNOTS], tick: u64) -> Target<f32> {
         let target = match &self.kind {

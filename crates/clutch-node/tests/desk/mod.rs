@@ -174,11 +174,11 @@ pub struct Desk {
     pub to_board: Outbox,
     pub outboxes: Outboxes,
     pub up: Outbox,
-    /// Whether the host looks at the clock.
+    /// True if the host looks at the clock.
     pub host_alive: bool,
-    /// What the host has been sent: bytes, and with what each read of it came.
+    /// The bytes that the host has been sent.
     pub sent: Vec<u8>,
-    /// What the host and the twin make of it.
+    /// The notices that the host and the twin make of it.
     pub notices: Vec<Heard>,
     pub expected: Vec<Heard>,
     /// Counts that the shaft goes in a period.
@@ -353,7 +353,7 @@ impl Desk {
         (cycles(&mut self.notices), cycles(&mut self.expected))
     }
 
-    /// Why control ended, as often as the host was told.
+    /// The cause of the end of control, as often as the host was told.
     pub fn ends(&self) -> Vec<clutch_core::supervisor::Cause> {
         self.notices
             .iter()
