@@ -442,8 +442,8 @@ class Ripple(_Params):
 class Rig(_mixins.Rig):
     """The shaft as it is, with its drive, brake, encoder and converter. The defaults are the paper's.
 
-    `J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇` (1). What law and certificate believe of it is another
-    thing: the model.
+    `J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇` (1). The plant that law and certificate believe in is
+    another thing: the model.
 
     Parameters
     ----------
@@ -468,7 +468,7 @@ class Rig(_mixins.Rig):
     friction : StribeckFriction
         Friction of pad on disc. By default `StribeckFriction()`.
     drive : WeightDrive, SpringDrive, TableDrive or HandDrive
-        What drives the shaft. By default `WeightDrive()`.
+        The drive of the shaft. By default `WeightDrive()`.
     encoder : Encoder
         The angle sensor. By default `Encoder()`.
     dac : Dac
@@ -775,9 +775,10 @@ class Observer(_Params):
     Parameters
     ----------
     disturbance_walk_nm_rt_s : float, default 0.1
-        How fast the disturbance torque wanders: by this much (standard deviation) in one second, and with the
-        root of the time. Larger follows friction faster and lets more of the encoder's steps through. `q_d`:
-        a finite number above 0 N m/√s; a number in N m/√s for which stable gains exist in this precision.
+        Rate at which the disturbance torque wanders: by this much (standard deviation) in one second, and
+        with the root of the time. Larger follows friction faster and lets more of the encoder's steps
+        through. `q_d`: a finite number above 0 N m/√s; a number in N m/√s for which stable gains exist in
+        this precision.
 
     Raises
     ------
@@ -1088,7 +1089,7 @@ class TablePath(_Params):
         point; times of at least 0 s that rise from point to point; positions below 7e13 counts of
         rig.encoder.counts_per_rev.
     interpolation : {"linear", "cubic"}, default "cubic"
-        How to go from point to point. `linear`: Straight lines: the velocity jumps at each point. `cubic`:
+        Curve from point to point. `linear`: Straight lines: the velocity jumps at each point. `cubic`:
         Monotone cubics (Fritsch and Butland 1984): the velocity is continuous and a rising table never runs
         backwards, which a brake could not follow.
 
@@ -1115,7 +1116,7 @@ Reference = Hold | Ramp | Trapezoid | JerkLimited | MinimumJerk | Sine | Chirp |
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Sampling(_Params):
-    """When the servo is asked, and the scalar that it computes in.
+    """Times at which the servo is asked, and the scalar that it computes in.
 
     Parameters
     ----------
@@ -1145,8 +1146,8 @@ class Sampling(_Params):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Bounds(_Params):
-    """How well the believed plant is known, (23), and the reaching rate that the certificate shall give: for
-    the certificate and the check of the path.
+    """Accuracy to which the believed plant is known, (23), and the reaching rate that the certificate shall
+    give: for the certificate and the check of the path.
 
     Parameters
     ----------
@@ -1204,17 +1205,17 @@ class RunSettings(_Params):
         more than the voltage that this takes.
     start_counts : float or None, default None
         Position at which shaft and path begin; absent: somewhere within the first count, drawn from the seed.
-        Where the path lies between the encoder's edges decides how often a slow shaft sticks, and nobody
+        The place of the path between the encoder's edges decides how often a slow shaft sticks, and nobody
         mounts an encoder to a fraction of a count. A number above -1 000 000 000 and below 1 000 000 000
         counts.
     seed : int, default 1
         Seed of everything random: start, ripple phases, noise, a hand. A whole number from 0 to
         9223372036854776000.
     engine : {"auto", "dormand_prince", "exact_flow"}, default "auto"
-        What integrates the motion. `auto`: The exact flow where the rig allows it, else Dormand–Prince.
-        `dormand_prince`: Dormand and Prince's 5(4) pair, the paper's solver, with events: takes every rig.
-        `exact_flow`: The closed form of the motion between samples: friction that falls exponentially with
-        the speed and is even along the disc, torque and voltage held between samples.
+        Engine that integrates the motion. `auto`: The exact flow where the rig allows it, else
+        Dormand–Prince. `dormand_prince`: Dormand and Prince's 5(4) pair, the paper's solver, with events:
+        takes every rig. `exact_flow`: The closed form of the motion between samples: friction that falls
+        exponentially with the speed and is even along the disc, torque and voltage held between samples.
 
     Raises
     ------
@@ -1346,8 +1347,8 @@ SafeState = HoldVoltage | RampVoltage | Release | HoldThenRelease
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Limits(_Params):
-    """What ends a run on a board: limits of the supervisor, and how long board and codes wait. docs/safety.md
-    says why each default is what it is.
+    """Limits that end a run on a board: those of the supervisor, and how long board and codes wait.
+    docs/safety.md says why each default is what it is.
 
     Parameters
     ----------
@@ -1364,14 +1365,14 @@ class Limits(_Params):
     following_error_deg : float, default 1.0
         Error at rest that ends control. A finite number above 0 °.
     following_time_s : float, default 0.02
-        How much `following_error_deg` grows with the target's speed. A finite number of at least 0 s.
+        Growth of `following_error_deg` with the target's speed. A finite number of at least 0 s.
     saturation_time_s : float, default 0.2
         Time at a limit of the voltage that ends control. A finite number above 0 s; a time of 1 to 4e9 times
         sampling.period_us.
     stand_still_counts : float, default 1.1
         Distance that the shaft must have gone without a count. A finite number of at least 1 counts.
     friction_margin : float, default 1.8
-        How many times the friction at the upper bound may be exceeded before a shaft under brake is expected
+        Factor by which the friction at the upper bound may be exceeded before a shaft under brake is expected
         to move. A finite number of at least 1.
     lost : int, default 26
         Lost samples within 128 periods that end control. A whole number from 1 to 128 within 128 periods.
@@ -1429,17 +1430,18 @@ class Limits(_Params):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Safety(_Params):
-    """How a run on a board ends, and what ends it. Only what drives a board needs it; there is no default
+    """The way a run on a board ends, and what ends it. Only what drives a board needs it; there is no default
     safe state.
 
     Parameters
     ----------
     reason : str
-        Why this safe state is the right one for this rig, in the operator's words; printed before each run.
+        The reason that this safe state is the right one for this rig, in the operator's words; printed before
+        each run.
     on_fault : HoldVoltage, RampVoltage, Release or HoldThenRelease
-        What the brake does when control has ended.
+        Safe state: what the brake does when control has ended.
     limits : Limits
-        What ends control. By default `Limits()`.
+        Limits that end control. By default `Limits()`.
 
     Raises
     ------
@@ -1483,11 +1485,11 @@ class _Scenario(_Params):
     sampling : Sampling
         Sampling period, scalar. By default `Sampling()`.
     bounds : Bounds
-        How well the believed plant is known. By default `Bounds()`.
+        Accuracy to which the believed plant is known. By default `Bounds()`.
     run : RunSettings
         Length, beginning, seed and engine. By default `RunSettings()`.
     safety : Safety or None, default None
-        How a run on a board ends, and what ends it: `clutch loop` and `clutch daq` need it.
+        The way a run on a board ends, and what ends it: `clutch loop` and `clutch daq` need it.
 
     Raises
     ------

@@ -13,7 +13,7 @@ use clutch_core::{
     StribeckParams,
 };
 
-/// What was measured of the brake and the shaft; the rest as in the paper.
+/// The measured values of the brake and the shaft; the rest as in the paper.
 fn model() -> PlantParams<f32> {
     let friction = StribeckParams {
         mu_static: 0.31,

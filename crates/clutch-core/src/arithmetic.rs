@@ -21,7 +21,7 @@ pub trait Arithmetic:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// What a comparison gives: true or false for each lane.
+    /// The result of a comparison: true or false for each lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
     /// A [`Limit`] for each lane.
     type Limit: Copy + Debug + Default + PartialEq;

@@ -1,4 +1,4 @@
-//! What is known of the plant: intervals instead of numbers, as (23) of the paper.
+//! Bounds on the plant: intervals instead of numbers, as (23) of the paper.
 
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
@@ -35,7 +35,7 @@ impl<T: Real> Interval<T> {
 }
 
 crate::params! {
-    /// How well each parameter of the model is known, as a share of its value: 20 % stands for ±20 %. The
+    /// Accuracy to which each parameter of the model is known, as a share of its value: 20 % stands for ±20 %. The
     /// defaults say exactly.
     pub struct Tolerances<T>: Default {
         /// ± on the inertia `J`, (23a).

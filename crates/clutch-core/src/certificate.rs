@@ -1,4 +1,4 @@
-//! What a set of gains guarantees over all plants within bounds.
+//! Guarantees of a set of gains over all plants within bounds.
 //!
 //! # The sound certificate
 //!
@@ -14,7 +14,7 @@
 //! * **shaft ahead** (`σ < 0`), the brake is on with `K_p + K_d |ė|` volts. At the worst corner
 //!   (`J_max`, `T_max`, weakest brake `μ_min K_min`) this suffices if
 //!   `K_p ≥ [T_max + J_max (a_d + γ)] / (μ_min K_min)` and `K_d ≥ J_max f / (μ_min K_min)`.
-//! * **shaft behind** (`σ > 0`), the brake can only let go. What is left is
+//! * **shaft behind** (`σ > 0`), the brake can only let go. All that is left is
 //!   `|ė| ≤ [T_min − C_max v_d − J_max (a_d + γ)] / (J_max f)`, and no gain buys more.
 //!
 //! Four additions. The saturation of (31) weakens the `K_d` term to `K_d ė²` where
@@ -43,7 +43,7 @@ use crate::params::{Range, Table};
 use crate::{ParamError, Real};
 
 crate::params! {
-    /// What the path and the start ask for, and the reaching rate wanted.
+    /// Requirements of the path and the start, and the reaching rate wanted.
     pub struct Demand<T>: Default {
         /// Highest velocity of the path (23g).
         velocity: T = 0.0, "velocity_rad_s" "v_d" RAD_S, Range::at_least(0.0);
@@ -58,7 +58,7 @@ crate::params! {
     }
 }
 
-/// Why gains are not certified.
+/// The reason that gains are not certified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Shortfall {
@@ -82,7 +82,7 @@ pub enum Shortfall {
     Surface,
 }
 
-/// What is guaranteed, with the worst corner and the margins.
+/// The guarantee, with the worst corner and the margins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certificate<T = f64> {
     /// `f`: slope of the law's sliding surface, 1/s.
@@ -117,7 +117,7 @@ pub struct Certificate<T = f64> {
     pub error_bound: T,
     /// `γ` certified, rad/s².
     pub reach_rate: T,
-    /// What is missing; none = certified.
+    /// The shortfall; none = certified.
     pub shortfall: Option<Shortfall>,
 }
 

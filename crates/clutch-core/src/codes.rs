@@ -86,7 +86,7 @@ impl Micros {
 }
 
 crate::params! {
-    /// When a servo is asked.
+    /// Times at which a servo is asked.
     pub struct SamplingParams<>: Default {
         /// Time from sample to sample, in (5).
         period: Micros = 1000, "period_us" "T" US, Range::within(1.0, 1e6);

@@ -30,7 +30,7 @@ pub struct SmoothedDerivative<T> {
     scale: T,
 }
 
-/// What (5) remembers.
+/// Memory of (5).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DerivativeState<T> {
     previous: FixedCounts,

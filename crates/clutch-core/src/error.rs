@@ -28,7 +28,7 @@ pub struct ParamError<T = f64> {
 }
 
 impl<T: Real> ParamError<T> {
-    /// What is known of its table; nothing on a board.
+    /// The declaration of its table; nothing on a board.
     #[must_use]
     pub fn table(&self) -> Option<&'static TableInfo> {
         self.table.info()

@@ -1,4 +1,4 @@
-//! Whether a path is one that a brake can follow.
+//! Feasibility: the check that a brake can follow a path.
 //!
 //! A brake only takes torque away. With the bounds of [`Bounds`] and a voltage between
 //! `u_min` and `u_max`, a shaft that is driven forwards follows `θ_d` only while
@@ -21,7 +21,7 @@ use core::fmt;
 /// Velocity below which a path counts as standing still: rounding of the path, rad/s.
 const STANDSTILL: f64 = 1e-6;
 
-/// What a path asks for.
+/// Requirements of a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Envelope<T> {
     /// Highest velocity, rad/s: `v_d` of (23g).
@@ -50,7 +50,7 @@ impl<T: Real> Envelope<T> {
     }
 }
 
-/// Why a brake cannot follow.
+/// The reason that a brake cannot follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Obstacle {
     /// The path runs backwards: velocity, rad/s.
@@ -63,18 +63,18 @@ pub enum Obstacle {
     NotFinite,
 }
 
-/// Where and why a brake cannot follow a path.
+/// The point at which a brake cannot follow a path, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Infeasible<T> {
     /// The first tick at which it cannot.
     pub tick: u64,
     /// Its time, s.
     pub time: T,
-    /// What is in the way.
+    /// The obstacle in the way.
     pub obstacle: Obstacle,
-    /// What the path asks for, in the unit of the obstacle.
+    /// The amount that the path asks for, in the unit of the obstacle.
     pub asked: T,
-    /// What can be had.
+    /// The amount that can be had.
     pub available: T,
 }
 
@@ -104,7 +104,7 @@ impl<T: Real> core::error::Error for Infeasible<T> {}
 /// `start_velocity` is the shaft's at tick 0, rad/s.
 ///
 /// # Errors
-/// Where and why a brake cannot follow it.
+/// The point at which a brake cannot follow it, and the reason.
 pub fn check_path<T: Real>(
     path: &Reference<'_, T>,
     ticks: u64,

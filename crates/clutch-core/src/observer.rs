@@ -35,7 +35,7 @@ crate::params! {
     /// A stationary Kalman filter for position, velocity and the torque that nobody measures. It predicts with the
     /// model.
     pub struct ObserverParams<T>: Default {
-        /// How fast the disturbance torque wanders: by this much (standard deviation) in one second, and with
+        /// Rate at which the disturbance torque wanders: by this much (standard deviation) in one second, and with
         /// the root of the time. Larger follows friction faster and lets more of the encoder's steps through.
         disturbance_walk: T = 0.1, "disturbance_walk_nm_rt_s" "q_d" NM_RT_S, Range::above(0.0);
     }
@@ -62,7 +62,7 @@ crate::params! {
     }
 }
 
-/// What the observer believes after a measurement.
+/// The observer's belief after a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate<T> {
     /// Angle above the lower edge of the measured count, rad; mostly within one count.
@@ -102,7 +102,7 @@ pub struct Observer<T> {
     half_count: T,
 }
 
-/// What the observer remembers.
+/// Memory of the observer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ObserverState<T> {
     /// The last measurement. The estimate is relative to it: in `f32` an angle from the
@@ -271,7 +271,7 @@ impl<T: Real> Observer<T> {
     }
 }
 
-/// Whether every root of the error's characteristic polynomial lies inside the unit circle.
+/// True if every root of the error's characteristic polynomial lies inside the unit circle.
 ///
 /// The error of the prediction goes with `(I − K C) Φ`. With `z = 1 + w` its polynomial is
 /// `w³ + b2 w² + b1 w + b0`, whose coefficients are sums of positive terms: nothing cancels,
@@ -360,7 +360,7 @@ mod tests {
         Observer::new(&ObserverParams::default(), &plant(), Encoder::PAPER, MS).unwrap()
     }
 
-    /// What the paper's encoder reads at an angle, rad.
+    /// Reading of the paper's encoder at an angle, rad.
     fn read(angle: f64) -> FixedCounts {
         FixedCounts::from_counts((angle * Encoder::PAPER.counts_per_radian::<f64>()).floor() as i64)
     }
@@ -592,7 +592,7 @@ mod tests {
         }
     }
 
-    /// Whether the error grows over 2²⁰ periods, by squaring the matrix that carries it.
+    /// True if the error grows over 2²⁰ periods, by squaring the matrix that carries it.
     fn grows(k: &ObserverGains<f64>, m: &Model<f64>) -> bool {
         let phi = Matrix3::new(1.0, m.phi12, m.phi13, 0.0, 1.0 - m.loss, m.phi23, 0.0, 0.0, 1.0);
         let k = Vector3::new(k.position, k.velocity, k.disturbance);

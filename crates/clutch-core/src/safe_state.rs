@@ -10,7 +10,7 @@
 //! There is no default, and "keep the last voltage" is not among them: the last voltage may be 0.
 //! A brake that a motor presses lets go when its power fails, whatever is chosen here.
 //!
-//! What runs is [`SafeCodes`], whole numbers only, so that controller and board go the same way.
+//! The part that runs is [`SafeCodes`], whole numbers only, so that controller and board go the same way.
 
 use crate::params::{Params, Range, Relation};
 use crate::{Dac, DacCode, Micros, ParamError, Real};
@@ -104,7 +104,7 @@ impl<T: Real> SafeState<T> {
     }
 }
 
-/// How the codes of a safe state follow each other.
+/// The sequence of the codes of a safe state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SafeKind {
     /// `hold` at once.
@@ -121,7 +121,7 @@ pub enum SafeKind {
 /// A checked safe state in the converter's codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SafeCodes {
-    /// How they follow each other.
+    /// Their sequence.
     pub kind: SafeKind,
     /// Code that holds.
     pub hold: DacCode,
@@ -208,7 +208,7 @@ impl SafeRun {
         code
     }
 
-    /// Whether the brake has been let go.
+    /// True if the brake has been let go.
     #[must_use]
     pub fn released(&self, codes: &SafeCodes) -> bool {
         match codes.kind {

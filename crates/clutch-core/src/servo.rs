@@ -24,9 +24,9 @@ pub struct ServoParams<T = f64> {
     pub encoder: Encoder,
     /// The converter.
     pub dac: DacParams<T>,
-    /// Where the error rate comes from.
+    /// Source of the error rate.
     pub velocity: VelocityParams<T>,
-    /// What the computed-torque law and an observer believe of the plant.
+    /// The plant as the computed-torque law and an observer believe it to be.
     pub model: PlantParams<T>,
     /// The law and its gains.
     pub law: LawParams<T>,
@@ -99,7 +99,7 @@ pub struct Servo<T, C = Law<T>> {
     radians_per_count: T,
 }
 
-/// What a servo remembers; a clone is a snapshot.
+/// Memory of a servo; a clone is a snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ServoState<T, S> {
     /// Unwrapped position.
@@ -112,16 +112,16 @@ pub struct ServoState<T, S> {
     applied: T,
 }
 
-/// What a tick gives.
+/// The output of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ServoOutput<T: Arithmetic, Terms> {
     /// The code for the converter.
     pub code: DacCode,
     /// The voltage that the code stands for, V.
     pub voltage: T,
-    /// What the law was given.
+    /// The law's input.
     pub tick: Tick<T>,
-    /// What the law answered.
+    /// The law's answer.
     pub command: Command<T, Terms>,
 }
 

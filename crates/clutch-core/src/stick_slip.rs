@@ -6,13 +6,13 @@
 //! [`StickSlipParams::ticks`], the shaft is called stuck; the next count ends it. Each entry is
 //! one stick-slip cycle, as in the paper's Table 3.
 //!
-//! How often it agrees with the simulator's ground truth is measured in `docs/theory.md`.
+//! `docs/theory.md` measures how often it agrees with the simulator's ground truth.
 
 use crate::params::{Range, Table};
 use crate::{Counts, Encoder, Micros, ParamError, Real};
 
 crate::params! {
-    /// When silence counts as sticking.
+    /// Conditions under which silence counts as sticking.
     pub struct StickSlipParams<T>: Default {
         /// Movement of the path during which the encoder shows none. Above 1 count, or a shaft in even motion
         /// would count as stuck.
@@ -41,7 +41,7 @@ pub struct StickSlip<T> {
     counts_per_tick_second: T,
 }
 
-/// What the detector remembers.
+/// Memory of the detector.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StickSlipState<T> {
     last: Counts,

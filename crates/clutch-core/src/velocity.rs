@@ -1,4 +1,4 @@
-//! Where a law gets its error rate from: the paper's difference (5), or an observer.
+//! Source of a law's error rate: the paper's difference (5), or an observer.
 
 use crate::derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeParams};
 #[cfg(feature = "linalg")]
@@ -27,7 +27,7 @@ pub enum VelocitySource<T> {
     Observer(Observer<T>),
 }
 
-/// What a velocity source remembers.
+/// Memory of a velocity source.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VelocityState<T> {
     derivative: DerivativeState<T>,

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 const FIT_SEEDS: std::ops::RangeInclusive<u64> = 101..=116;
 const OFFSPRING: usize = 12;
 
-/// What is searched, in the order of [`NAMES`].
+/// Parameters that are searched, in the order of [`NAMES`].
 type Point = [f64; 6];
 const NAMES: [&str; 6] = [
     "mu_static",
@@ -35,7 +35,7 @@ const NAMES: [&str; 6] = [
 ];
 const LOWEST: Point = [0.12, 0.08, 2e-4, 0.9, 0.0, 10.0];
 const HIGHEST: Point = [0.30, 0.25, 2e-2, 1.1, 0.19, 150.0];
-/// Where the search starts: a rig found by hand that behaves roughly like the experiment.
+/// Start of the search: a rig found by hand that behaves roughly like the experiment.
 const START: Point = [0.21, 0.104, 0.00105, 1.047, 0.145, 35.0];
 
 fn ripple(x: &Point) -> RippleParams {
@@ -65,7 +65,7 @@ fn measure(x: &Point, law: LawParams, rate_deg_s: f64, seed: u64) -> Option<Metr
     simulate::<f64>(&spec).ok().map(|r| r.metrics)
 }
 
-/// How far a rig is from what it shall match; the figures it gave.
+/// Distance of a rig from what it shall match; the figures it gave.
 struct Score {
     loss: f64,
     reductions: [f64; 3],

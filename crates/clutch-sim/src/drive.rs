@@ -1,4 +1,4 @@
-//! What drives the shaft: a weight, a spring, a table over time, or a hand.
+//! The drive of the shaft: a weight, a spring, a table over time, or a hand.
 
 use crate::tables::Points;
 use clutch_core::params::{Params, Range};
@@ -66,7 +66,7 @@ params! {
 }
 
 clutch_core::choice! {
-    /// What drives the shaft.
+    /// The drive of the shaft.
     pub enum DriveParams<f64>: Default {
         /// A weight on a pulley.
         Weight(WeightDrive) = "weight",

@@ -1,4 +1,4 @@
-//! How well a run went: one definition of each figure, for simulation, hardware and logs.
+//! Figures of merit of a run: one definition of each, for simulation, hardware and logs.
 //!
 //! A figure is a row of a table below and a line of [`MetricsBuilder::finish`]. From the row come its place in the
 //! summaries and JSON of the command, in Python's `Metrics`, among the columns of a sweep, on the axes of plots and
@@ -10,7 +10,7 @@
 use crate::engine::{Event, EventKind};
 use serde::Serialize;
 
-/// What is known of a figure without a run.
+/// Declaration of a figure: all that is known of it without a run.
 #[derive(Debug)]
 pub struct Figure<M: 'static> {
     /// Name, ending with the unit: a column of a sweep, an attribute in Python.
@@ -27,7 +27,7 @@ pub struct Figure<M: 'static> {
     pub factor: f64,
     /// One sentence, without the unit.
     pub meaning: &'static str,
-    /// Whether a run may have none.
+    /// True if a run may have none.
     pub optional: bool,
     value: fn(&M) -> Option<f64>,
 }
@@ -46,7 +46,7 @@ impl<M> Figure<M> {
     }
 }
 
-/// What a figure's field may be.
+/// Type that a figure's field may have.
 trait Value {
     const OPTIONAL: bool;
 }

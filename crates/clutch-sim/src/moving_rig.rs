@@ -24,7 +24,7 @@ pub struct MovingRig {
     rig: Rig,
     engine: Box<dyn Engine + Send + Sync>,
     shaft: Shaft,
-    /// Where the motion began, rad.
+    /// Position at which the motion began, rad.
     origin: f64,
     time: f64,
     /// At the pad, V.
@@ -88,14 +88,14 @@ impl MovingRig {
         self.time
     }
 
-    /// What an encoder that floors to whole counts shows.
+    /// Reading of an encoder that floors to whole counts.
     #[must_use]
     pub fn counts(&self) -> Counts {
         let per_radian: f64 = self.rig.encoder.counts_per_radian();
         Counts(floor(self.shaft.position * per_radian) as i32)
     }
 
-    /// What an ideal sensor shows.
+    /// Reading of an ideal sensor.
     #[must_use]
     pub fn fine_counts(&self) -> FixedCounts {
         FixedCounts::from_real(self.shaft.position * self.rig.encoder.counts_per_radian::<f64>())

@@ -1,4 +1,4 @@
-//! How far long work is, and whether it goes on.
+//! Progress of long work, and the decision whether it goes on.
 
 use std::ops::ControlFlow;
 
@@ -11,7 +11,7 @@ pub struct Progress {
     pub finished: u64,
 }
 
-/// What is told of progress; its answer `Break` ends the work with [`crate::RunError::Stopped`].
+/// The listener that is told of progress; its answer `Break` ends the work with [`crate::RunError::Stopped`].
 pub type Report<'a> = &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync);
 
 /// For work whose progress nobody watches.

@@ -1,10 +1,10 @@
-//! When a run reached its sliding surface, against what the certificate promises.
+//! Time in which a run reached its sliding surface, against what the certificate promises.
 
 use crate::run::Trace;
 use clutch_core::certificate::Certificate;
 use serde::Serialize;
 
-/// When the sliding surface was reached, against the bound (15).
+/// Time in which the sliding surface was reached, against the bound (15).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Reaching {
     /// Time until `σ = f e + ė`, with the true velocity, was first within the law's layer, s; none

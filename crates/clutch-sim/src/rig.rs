@@ -51,8 +51,8 @@ params! {
 params! {
     /// The shaft as it is, with its drive, brake, encoder and converter. The defaults are the paper's.
     ///
-    /// `J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇` (1). What law and certificate believe of it is another thing:
-    /// the model.
+    /// `J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇` (1). The plant that law and certificate believe in is another
+    /// thing: the model.
     pub struct RigParams<f64> {
         /// Rig whose values stand where the scenario has none.
         base: RigBase, "base" "" NONE, Range::ANY;
@@ -73,7 +73,7 @@ params! {
     nested {
         /// Friction of pad on disc.
         friction: FrictionParams, "friction";
-        /// What drives the shaft.
+        /// The drive of the shaft.
         drive: DriveParams, "drive";
         /// The angle sensor.
         encoder: RigEncoder, "encoder";
@@ -112,7 +112,7 @@ impl RigParams {
         crate::tables::read_known("rig", &table)
     }
 
-    /// What a base says, as a scenario would: the keys in which it differs from the paper's rig.
+    /// The table of a base, as a scenario would say it: the keys in which it differs from the paper's rig.
     pub(crate) fn base_table(base: RigBase) -> toml::Table {
         let text = BASES.iter().find(|(b, _)| *b == base).map_or("", |(_, text)| text);
         let mut table: toml::Table = text.parse().unwrap_or_default();
@@ -161,9 +161,9 @@ impl Default for RigParams {
 /// A checked rig.
 #[derive(Clone, Debug)]
 pub struct Rig {
-    /// What engines integrate; its driving torque is the one at the start.
+    /// The plant that engines integrate; its driving torque is the one at the start.
     pub model: Model,
-    /// What drives the shaft.
+    /// The drive of the shaft.
     pub drive: Drive,
     /// The encoder.
     pub encoder: Encoder,

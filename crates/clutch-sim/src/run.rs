@@ -37,12 +37,12 @@ params! {
         /// Motion of the shaft at the beginning.
         start: Start = "on_path", "start" "" NONE, Range::ANY;
         /// Position at which shaft and path begin; absent: somewhere within the first count, drawn from the seed.
-        /// Where the path lies between the encoder's edges decides how often a slow shaft sticks, and nobody mounts
+        /// The place of the path between the encoder's edges decides how often a slow shaft sticks, and nobody mounts
         /// an encoder to a fraction of a count.
         start_counts: Option<f64>, "start_counts" "" COUNTS, Range::above(-1e9).below(1e9);
         /// Seed of everything random: start, ripple phases, noise, a hand.
         seed: u64 = 1, "seed" "" NONE, Range::within(0.0, i64::MAX as f64);
-        /// What integrates the motion.
+        /// Engine that integrates the motion.
         engine: EngineKind = "auto", "engine" "" NONE, Range::ANY;
     }
     relations(p) {
@@ -65,7 +65,7 @@ impl RunParams {
         libm::rint(self.duration / period.seconds::<f64>()) as u64
     }
 
-    /// Where shaft and path begin.
+    /// Position at which shaft and path begin.
     #[must_use]
     pub fn start_position(&self) -> FixedCounts {
         match self.start_counts {
@@ -95,9 +95,9 @@ pub struct RunSpec<'a> {
     pub rig: RigParams,
     /// Sampling period.
     pub period: Micros,
-    /// Where the law's error rate comes from.
+    /// Source of the law's error rate.
     pub velocity: VelocityParams,
-    /// What law and observer believe of the plant.
+    /// The plant as law and observer believe it to be.
     pub model: PlantParams,
     /// The law.
     pub law: LawParams,
@@ -105,7 +105,7 @@ pub struct RunSpec<'a> {
     pub output: OutputParams,
     /// The path.
     pub reference: ReferenceParams<'a>,
-    /// When and how long.
+    /// Length, beginning, seed and engine.
     pub run: RunParams,
 }
 
@@ -215,7 +215,7 @@ pub enum RunError {
     Stopped,
 }
 
-/// What a run keeps besides its figures.
+/// Parts that a run keeps besides its figures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keep {
     /// Every sample and event.
@@ -280,11 +280,11 @@ pub struct Trace {
     pub voltage: Vec<f64>,
     /// Voltage that the law answered, before the converter, V.
     pub demand: Vec<f64>,
-    /// Whether a limit of the output decided it.
+    /// The limit of the output that decided it, if one did.
     pub limit: Vec<Limit>,
     /// Voltage on the brake before the first tick, V.
     pub start_voltage: f64,
-    /// Whether the shaft was stuck at the sample.
+    /// True if the shaft was stuck at the sample.
     pub stuck: Vec<bool>,
     /// The law's terms: names and columns.
     pub terms: Vec<(&'static str, Vec<f64>)>,

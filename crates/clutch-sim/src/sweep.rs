@@ -25,7 +25,7 @@ pub struct Sweep {
 /// A row that ran.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// Whether the gains are certified for the row's bounds.
+    /// True if the gains are certified for the row's bounds.
     pub certified: bool,
     /// Figures, and the trace if it was to be kept.
     pub run: Run,
@@ -70,7 +70,7 @@ impl Sweep {
     /// A row's scenario.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// A mistake in it.
     ///
     /// # Panics
     /// There is no such row.

@@ -1,4 +1,4 @@
-//! What follows from the declarations and is kept in the tree is what they give.
+//! Files that follow from the declarations and are kept in the tree are what they give.
 
 #[allow(dead_code, reason = "an example's `main`; here only its comparison is called")]
 #[path = "../examples/generate/main.rs"]

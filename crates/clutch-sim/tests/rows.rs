@@ -1,6 +1,6 @@
 //! Every parameter of a scenario, at its limits, below and above them, and as no number: in a file, by `--set` and in a
-//! row of a sweep. What is refused is named with its key, its value and what is expected, unit included; what is taken
-//! arrives in the parameters as it was given.
+//! row of a sweep. A parameter that is refused is named with its key, its value and what is expected, unit included;
+//! one that is taken arrives in the parameters as it was given.
 
 use clutch_core::params::{Choice, Conversion, Editor, Info, Kind, Params, Range, Row, Table as Parameters};
 use clutch_sim::scenario::ScenarioParams;
@@ -127,7 +127,7 @@ fn shown(value: &Value) -> String {
     }
 }
 
-/// What is outside of a range, and what is at its ends or just within.
+/// Values outside of a range, and values at its ends or just within.
 fn around(row: &Row) -> (Vec<Value>, Vec<Value>) {
     let Range { low, low_in, high, high_in, divides } = row.range;
     let (mut out, mut within) = (Vec::new(), Vec::new());
@@ -187,7 +187,7 @@ fn around(row: &Row) -> (Vec<Value>, Vec<Value>) {
     (out, within)
 }
 
-/// Whether a row's own range, or the kind of its value, is what a message speaks of.
+/// True if a message speaks of a row's own range, or of the kind of its value.
 fn speaks_of_the_range(row: &Row, message: &str) -> bool {
     match row.kind {
         // Of a base it says what the words are.
@@ -246,7 +246,7 @@ fn is_taken(place: &Place, value: &Value, outcome: Result<Scenario, ScenarioErro
     }
 }
 
-/// What each parameter is, by its key.
+/// The value of each parameter, by its key.
 #[derive(Default)]
 struct Values {
     path: Vec<&'static str>,
@@ -270,7 +270,7 @@ impl Values {
         self.found.insert(join(&key, P::ROWS[row].key), given);
     }
 
-    /// What a parameter should be.
+    /// The value that a parameter should have.
     fn of(row: &Row, value: &Value) -> Given {
         let number = |x: f64| match row.unit.conversion {
             Conversion::None => x,

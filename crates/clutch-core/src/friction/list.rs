@@ -1,4 +1,4 @@
-//! What follows from the list of friction models.
+//! Items that follow from the list of friction models.
 
 macro_rules! frictions {
     ($($module:ident $model:ident $params:ident $doc:literal;)+) => {

@@ -125,7 +125,7 @@ impl<T: Arithmetic> FrictionModel<T> for Stribeck<T> {
         })
     }
 
-    /// Where `δ = 1`, as for most pairs. A power takes five times as long as the rest.
+    /// The level where `δ = 1`, as for most pairs. A power takes five times as long as the rest.
     #[inline]
     fn quick_level(&self, velocity: T) -> Option<T> {
         self.exponent_is_one.then(|| self.falling(velocity.abs() * self.inverse_velocity))

@@ -1,4 +1,4 @@
-//! What follows from the list of laws.
+//! Items that follow from the list of laws.
 
 macro_rules! laws {
     ($($module:ident $law:ident $params:ident $doc:literal;)+) => {
@@ -55,7 +55,7 @@ macro_rules! laws {
             $(#[doc = $doc] $law($law<T>),)+
         }
 
-        /// What the law that runs remembers.
+        /// Memory of the law that runs.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum LawState<T: Arithmetic> {
             $(#[doc = $doc] $law(<$law<T> as ControlLaw<T>>::State),)+

@@ -23,7 +23,7 @@ list::laws! {
     pid Pid PidParams "Proportional–integral–derivative control with feed-forward.";
 }
 
-/// What a law is given each period.
+/// Input of a law in each period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tick<T> {
     /// `e = θ_d − θ`, rad.
@@ -45,12 +45,12 @@ impl<T: Arithmetic> Tick<T> {
     }
 }
 
-/// What a law answers.
+/// The answer of a law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command<T: Arithmetic, Terms> {
     /// Brake voltage within the limits, V.
     pub voltage: T,
-    /// Whether a limit or an invalid demand decided it.
+    /// The limit or the invalid demand that decided it, if one did.
     pub limit: T::Limit,
     /// Every intermediate term, for the log; never fed back.
     pub terms: Terms,
@@ -77,7 +77,7 @@ where
 
 /// A control law sampled at a fixed period.
 pub trait ControlLaw<T: Arithmetic> {
-    /// What the law remembers. `Default` = at rest; a clone is a snapshot.
+    /// The law's memory. `Default` = at rest; a clone is a snapshot.
     type State: Clone + Default;
     /// Its intermediate terms.
     type Terms: Terms<T>;
@@ -96,7 +96,7 @@ pub trait ControlLaw<T: Arithmetic> {
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms>;
 }
 
-/// What a law is built beside.
+/// The parts that a law is built beside.
 #[derive(Clone, Copy, Debug)]
 pub struct Beside<'a, T> {
     /// The plant that a law with a model believes in.
@@ -130,7 +130,7 @@ pub trait Listed<T: Real>: ControlLaw<T> + Sized {
     }
 }
 
-/// What a path asks of a law with a sliding surface.
+/// Requirements of a path on a law with a sliding surface.
 pub struct Asked<'a, T> {
     /// Highest velocity of the path, rad/s.
     pub velocity: T,

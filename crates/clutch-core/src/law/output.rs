@@ -38,7 +38,7 @@ impl<T: Real> OutputParams<T> {
     }
 }
 
-/// Whether and where the output stage changed the demand.
+/// The limit at which the output stage changed the demand, if it did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Limit {
@@ -73,7 +73,7 @@ pub struct Output<T> {
     decay: T,
 }
 
-/// What the output stage remembers: the offset of a bumpless start, V.
+/// Memory of the output stage: the offset of a bumpless start, V.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OutputState<T> {
     offset: T,

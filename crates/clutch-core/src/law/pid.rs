@@ -57,7 +57,7 @@ pub struct Pid<T> {
     output: Output<T>,
 }
 
-/// What the law remembers.
+/// Memory of the law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PidState<T> {
     /// `−K_i ∫ e dt` and what a start and limits have added, V.

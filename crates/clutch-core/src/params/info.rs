@@ -1,4 +1,4 @@
-//! What is known of parameters without a value: rows, tables, choices. Hosts read it: scenario files,
+//! Declarations of parameters, without values: rows, tables, choices. Hosts read them: scenario files,
 //! errors, documentation, Python. No function that a board runs does, so that no text is linked there.
 
 use super::{Range, Unit};
@@ -57,7 +57,7 @@ pub struct Row {
 pub struct RelationInfo {
     /// The parameter that errors name.
     pub row: u8,
-    /// What is expected of it, with the keys of the others.
+    /// Values expected of it, with the keys of the others.
     pub expected: &'static str,
 }
 
@@ -72,7 +72,7 @@ pub struct Nested {
     pub optional: bool,
     /// Its meaning there.
     pub doc: &'static str,
-    /// What it is.
+    /// The table or choice itself.
     pub info: &'static Info,
 }
 
@@ -98,7 +98,7 @@ pub struct TableInfo {
 pub struct OptionInfo {
     /// Key of the table.
     pub key: &'static str,
-    /// What it is, in a few words.
+    /// Its meaning, in a few words.
     pub doc: &'static str,
     /// The table; without rows for an option that needs none.
     pub table: &'static TableInfo,
@@ -113,7 +113,7 @@ pub struct ChoiceInfo {
     pub doc: &'static str,
     /// `true` if the first option is taken where a scenario says nothing.
     pub has_default: bool,
-    /// What can be chosen.
+    /// Options to choose from.
     pub options: &'static [OptionInfo],
 }
 

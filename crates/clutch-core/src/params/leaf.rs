@@ -9,7 +9,7 @@ pub trait Leaf<T: Real>: Clone {
     const KIND: Kind;
     /// `true` if it may be absent.
     const OPTIONAL: bool = false;
-    /// How the row writes its default.
+    /// The type in which the row writes its default.
     type Literal;
     /// The same for another scalar.
     type As<U: Real>: Leaf<U>;

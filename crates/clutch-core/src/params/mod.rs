@@ -25,7 +25,7 @@ use crate::{ParamError, Real};
 
 /// A table of parameters or a choice between several, with values.
 pub trait Params<T: Real>: Clone {
-    /// What is known without values.
+    /// The declaration, without values.
     const INFO: Info;
 
     /// Parameters with their defaults, and with NaN, 0 or nothing where there is none.
@@ -47,7 +47,7 @@ pub trait Table<T: Real>: Params<T> {
     const ROWS: &'static [Row];
     /// Names of its relations.
     const RELATIONS: &'static [&'static str];
-    /// What is known without values.
+    /// The declaration, without values.
     const TABLE: TableInfo;
 
     /// As [`Params::check`], without the tables below.
@@ -59,7 +59,7 @@ pub trait Table<T: Real>: Params<T> {
 
 /// A choice between tables, with the values of the chosen one.
 pub trait Choice<T: Real>: Params<T> {
-    /// What is known without values.
+    /// The declaration, without values.
     const CHOICE: ChoiceInfo;
 
     /// The place of what is chosen among [`ChoiceInfo::options`].
@@ -87,7 +87,7 @@ pub trait Editor<T: Real> {
     fn other<P: Table<T>>(&mut self, row: usize, value: Option<&mut dyn core::any::Any>) {
         let _ = (row, value);
     }
-    /// Whether a parameter that may be absent is there.
+    /// True if a parameter that may be absent is there.
     fn present<P: Table<T>>(&mut self, row: usize, present: bool) -> bool {
         let _ = row;
         present
@@ -101,7 +101,7 @@ pub trait Editor<T: Real> {
     fn leave<P: Table<T>>(&mut self, nested: usize) {
         let _ = nested;
     }
-    /// What is chosen from now on.
+    /// The option that is chosen from now on.
     fn choose<C: Choice<T>>(&mut self, chosen: usize) -> usize {
         chosen
     }

@@ -1,4 +1,4 @@
-//! What a parameter may be.
+//! Values that a parameter may have.
 
 use super::{Kind, Unit};
 use crate::Real;

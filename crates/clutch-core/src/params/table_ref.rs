@@ -31,7 +31,7 @@ impl TableRef {
         self.id
     }
 
-    /// What is known of it; nothing on a board.
+    /// Its declaration; nothing on a board.
     #[must_use]
     pub const fn info(self) -> Option<&'static TableInfo> {
         #[cfg(not(target_os = "none"))]

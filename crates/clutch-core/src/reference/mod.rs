@@ -31,7 +31,7 @@ use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 use profile::Profile;
 use wave::Wave;
 
-/// Where the shaft shall be now.
+/// The point of the path at which the shaft shall be now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Target<T> {
     /// `θ_d`, in 2⁻¹⁶ counts from the encoder's zero.
@@ -161,7 +161,7 @@ impl<'a, T: Real> Reference<'a, T> {
     }
 }
 
-/// What turns radians and seconds into counts and ticks.
+/// Factors that turn radians and seconds into counts and ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Scale<T> {
     counts_per_radian: T,

@@ -14,7 +14,7 @@ pub struct Knot {
 }
 
 crate::words! {
-    /// How to go from point to point.
+    /// Curve from point to point.
     pub enum Interpolation {
         /// Straight lines: the velocity jumps at each point.
         Linear = "linear",
@@ -29,7 +29,7 @@ crate::params! {
     pub struct Table<'a> {
         /// Points of time and angle, from the start; times rise. A brake follows only angles that do not fall.
         knots: &'a [Knot], "points_s_deg" "" S_DEG, Range::at_least(0.0).below(1e12);
-        /// How to go from point to point.
+        /// Curve from point to point.
         interpolation: Interpolation = "cubic", "interpolation" "" NONE, Range::ANY;
     }
     relations(p) {

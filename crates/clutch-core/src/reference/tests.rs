@@ -1,4 +1,4 @@
-//! What a path owes its shaft, checked from outside: through [`Reference`] only.
+//! Duties of a path to its shaft, checked from outside: through [`Reference`] only.
 
 use super::*;
 use proptest::prelude::*;

@@ -15,7 +15,7 @@
 //! followed by a new consent leads back to Running. A check may fail in Ready and Armed too.
 //!
 //! Every sample passes a gate before it touches the law: sequence, board's status, plausible
-//! counts, plausible target. What does not pass is not answered; the board keeps its code for at
+//! counts, plausible target. A sample that does not pass is not answered; the board keeps its code for at
 //! most its watchdog's three cycles, then goes to the safe state by itself. After a sample that
 //! was refused the law answers again once [`LimitParams::good_samples`] have passed in a row.
 //!
@@ -34,7 +34,7 @@
 //! | [`Cause::Silence`] | no sample for so many cycles |
 //! | [`Cause::Board`] | the board reports a fault, or is not driving although it should |
 //!
-//! The supervisor owns no clock. What it is told is what a log records, so a replay decides the
+//! The supervisor owns no clock. A log records all that it is told, so a replay decides the
 //! same at every tick.
 
 mod params;
@@ -106,8 +106,8 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// Consent: from Ready to Armed. `present` is the code that the converter has. Whether it
-    /// was possible. What was seen before is forgotten, so that a run depends on its own samples.
+    /// Consent: from Ready to Armed. `present` is the code that the converter has. True if it
+    /// was possible. All that was seen before is forgotten, so that a run depends on its own samples.
     pub fn arm<S: Default>(&self, s: &mut SupervisorState<T, S>, present: DacCode) -> bool {
         let ready = s.state == State::Ready;
         if ready {
@@ -348,7 +348,7 @@ impl<T: Real> Supervisor<T> {
         Some((moved, elapsed))
     }
 
-    /// Whether enough good samples have come since one that was refused.
+    /// True if enough good samples have come since one that was refused.
     #[inline]
     fn recovered<S>(s: &mut SupervisorState<T, S>) -> bool {
         if s.recovering > 0 {
@@ -368,7 +368,7 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// Whether a path can have this target; if not, [`Cause::Target`].
+    /// True if a path can have this target; if not, [`Cause::Target`].
     #[inline]
     fn plausible_target<S>(&self, s: &mut SupervisorState<T, S>, goal: &Target<T>) -> bool {
         let plausible =

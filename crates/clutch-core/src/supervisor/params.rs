@@ -5,7 +5,7 @@ use crate::safe_state::SafeState;
 use crate::{Bounds, Interval, Micros, ParamError, Real, ServoParams, Target};
 
 crate::params! {
-    /// What the supervisor watches. The defaults are for the paper's shaft at 1 kHz.
+    /// Limits that the supervisor watches. The defaults are for the paper's shaft at 1 kHz.
     pub struct LimitParams<T>: Default {
         /// Largest departure of a sample from where the last ones lead that a shaft can make in a period.
         jump: T = 0.15, "jump_deg" "" DEG, Range::above(0.0);
@@ -15,13 +15,13 @@ crate::params! {
         good_samples: u32 = 1, "good_samples" "" NONE, Range::within(1.0, 4294967295.0);
         /// Error at rest that ends control.
         following_error: T = 1.0, "following_error_deg" "" DEG, Range::above(0.0);
-        /// How much `following_error_deg` grows with the target's speed.
+        /// Growth of `following_error_deg` with the target's speed.
         following_time: T = 0.02, "following_time_s" "" S, Range::at_least(0.0);
         /// Time at a limit of the voltage that ends control.
         saturation_time: T = 0.2, "saturation_time_s" "" S, Range::above(0.0);
         /// Distance that the shaft must have gone without a count.
         stand_still: T = 1.1, "stand_still_counts" "" COUNTS, Range::at_least(1.0);
-        /// How many times the friction at the upper bound may be exceeded before a shaft under brake is expected
+        /// Factor by which the friction at the upper bound may be exceeded before a shaft under brake is expected
         /// to move.
         friction_margin: T = 1.8, "friction_margin" "" NONE, Range::at_least(1.0);
         /// Lost samples within 128 periods that end control.
@@ -53,11 +53,11 @@ crate::params! {
 /// [`SupervisorParams::new`] takes it and fills in the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SupervisorParams<T = f64> {
-    /// What the brake does when control ends.
+    /// Safe state: what the brake does when control ends.
     pub on_fault: SafeState<T>,
     /// Highest speed that a target may have.
     pub speed: SpeedLimit<T>,
-    /// What is watched.
+    /// Limits that are watched.
     pub limits: LimitParams<T>,
 }
 
@@ -169,7 +169,7 @@ impl<T: Real> Limits<T> {
         })
     }
 
-    /// Whether a path can have a target: numbers, within the speed limit, and near the last.
+    /// True if a path can have a target: numbers, within the speed limit, and near the last.
     pub(super) fn believes(
         &self,
         last: Option<&Target<T>>,

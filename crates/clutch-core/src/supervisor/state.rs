@@ -1,10 +1,10 @@
-//! What the supervisor is told, remembers and answers.
+//! Inputs, memory and answers of the supervisor.
 
 use crate::law::LawTerms;
 use crate::safe_state::SafeRun;
 use crate::{Arithmetic, Counts, DacCode, Micros, Real, ServoOutput, ServoState, Target};
 
-/// Where control stands; see the [module](super)'s diagram.
+/// The state of control; see the [module](super)'s diagram.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum State {
@@ -42,7 +42,7 @@ impl State {
     }
 }
 
-/// Why control ended.
+/// The cause of the end of control.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Cause {
@@ -127,7 +127,7 @@ impl Checks {
         Checks(self.0 & !Checks::bit(cause))
     }
 
-    /// Whether a check is on.
+    /// True if the check is on.
     #[must_use]
     pub fn has(self, cause: Cause) -> bool {
         self.0 & Checks::bit(cause) != 0
@@ -138,7 +138,7 @@ impl Checks {
     }
 }
 
-/// What the board says of itself with a sample.
+/// The board's report of itself with a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BoardMode {
     /// Configured, output as it was.
@@ -171,7 +171,7 @@ pub struct Sample {
     pub lateness: Micros,
 }
 
-/// What became of a sample.
+/// The fate of a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Arrival {
@@ -205,25 +205,25 @@ impl Arrival {
         ALL.get(usize::from(number)).copied()
     }
 
-    /// Whether a period of the board has passed with it.
+    /// True if a period of the board has passed with it.
     #[must_use]
     pub fn is_fresh(self) -> bool {
         matches!(self, Arrival::Fresh | Arrival::Late | Arrival::Implausible)
     }
 }
 
-/// What a sample led to.
+/// The outcome of a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cycle<T: Arithmetic, Terms = LawTerms<T>> {
     /// Period of the run, from 0 at the first answer.
     pub tick: u64,
-    /// What became of the sample.
+    /// The fate of the sample.
     pub arrival: Arrival,
     /// State before.
     pub from: State,
     /// State after.
     pub state: State,
-    /// Why control ended, if it has.
+    /// The cause of the end of control, if it has ended.
     pub cause: Cause,
     /// The quantity that the check saw, in its unit: a count of events, counts, µs, rad or V.
     pub value: T,
@@ -233,7 +233,7 @@ pub struct Cycle<T: Arithmetic, Terms = LawTerms<T>> {
     pub code: DacCode,
     /// The path's target, where the law was asked.
     pub target: Target<T>,
-    /// What the servo gave, where it was asked.
+    /// The servo's output, where it was asked.
     pub output: Option<ServoOutput<T, Terms>>,
 }
 
@@ -263,7 +263,7 @@ impl History {
     }
 }
 
-/// What the supervisor and its servo remember; a clone is a snapshot.
+/// Memory of the supervisor and its servo; a clone is a snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SupervisorState<T, S> {
     pub(super) state: State,
@@ -318,19 +318,19 @@ impl<T: Real, S> SupervisorState<T, S> {
         }
     }
 
-    /// Where control stands.
+    /// The state of control.
     #[must_use]
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// Why control ended, if it has.
+    /// The cause of the end of control, if it has ended.
     #[must_use]
     pub fn cause(&self) -> Cause {
         self.cause
     }
 
-    /// What the check that ended it saw; see [`Cycle::value`].
+    /// The quantity that the check that ended it saw; see [`Cycle::value`].
     #[must_use]
     pub fn value(&self) -> T {
         self.value

@@ -1058,7 +1058,7 @@ fn laws<T: Real>(which: usize) -> LawParams<T> {
     }
 }
 
-/// What became of a sample in a recorded run.
+/// The fate of a sample in a recorded run.
 #[derive(Clone, Copy)]
 enum Fate {
     Good,

@@ -3,8 +3,8 @@
 use super::places::Place;
 use clutch_core::params::{ChoiceInfo, TableInfo};
 
-/// What a class has that its declaration does not say. A class without a line here is named after its table, and its
-/// example shows its first parameter.
+/// Properties of a class of which its declaration says nothing. A class without a line here is named after its table,
+/// and its example shows its first parameter.
 struct Known {
     /// Name of the declared table.
     table: &'static str,
@@ -223,7 +223,7 @@ pub(crate) struct Class<'a> {
     pub(crate) mixin: bool,
     /// An example for its documentation; empty if there is none.
     pub(crate) example: &'static str,
-    /// Where a file has it; the first place of several.
+    /// The place at which a file has it; the first of several.
     pub(crate) place: &'a Place,
 }
 

@@ -3,7 +3,7 @@
 use clutch_sim::metrics::{Detected, Figure, Metrics};
 use std::fmt::Write;
 
-/// What both ask of a figure: its attribute in Python, its field in JSON.
+/// The properties of a figure that both ask for: its attribute in Python, its field in JSON.
 struct Row {
     name: &'static str,
     json: String,

@@ -1,4 +1,4 @@
-//! Where the tables of a scenario stand.
+//! Places at which the tables of a scenario stand.
 
 use clutch_core::params::{ChoiceInfo, Info, OptionInfo, Params, Row, TableInfo};
 use clutch_sim::scenario::describe::{Entry, entries};
@@ -9,7 +9,7 @@ use toml::{Table, Value};
 pub(crate) struct Place {
     /// The key, with those of the tables around it.
     pub(crate) key: String,
-    /// What stands there.
+    /// The table that stands there.
     pub(crate) table: &'static TableInfo,
     /// Its choice and its option, if it is one of several.
     pub(crate) option: Option<(&'static ChoiceInfo, &'static OptionInfo)>,
@@ -44,7 +44,7 @@ fn table_at(place: Place, all: &mut Vec<Place>) {
     }
 }
 
-/// What a file that says nothing of a parameter has: the row's default or, in a rig, what the paper's has; empty if it
+/// Value of a parameter of which a file says nothing: the row's default or, in a rig, what the paper's has; empty if it
 /// has none.
 pub(crate) fn default_at(key: &str, row: &Row) -> String {
     let rig = || {
@@ -64,7 +64,7 @@ pub(crate) fn join(path: &str, key: &str) -> String {
 }
 
 impl Place {
-    /// What it is, in the words of its declaration.
+    /// Its meaning, in the words of its declaration.
     pub(crate) fn doc(&self) -> &'static str {
         match self.option {
             Some((_, option)) if self.table.doc.is_empty() => option.doc,

@@ -26,7 +26,7 @@ use clutch_core::friction::FrictionModel;
 
 /// Terms of a power series.
 const TERMS: usize = 18;
-/// What a piece may leave out, as a share of what it is: of a quadrature the time, of a series the rate of speed.
+/// Part that a piece may leave out, as a share of what it is: of a quadrature the time, of a series the rate of speed.
 const TOLERANCE: f64 = 1e-10;
 /// Longest step of a series, in Stribeck velocities: beyond, `e^(−s)` would need more terms.
 const LONGEST: f64 = 6.0;
@@ -60,7 +60,7 @@ const PIECE_LIMIT: u32 = 10_000;
 pub struct ExactFlow;
 
 impl ExactFlow {
-    /// Why this engine cannot take a rig; `None` if it can.
+    /// The reason that this engine cannot take a rig; `None` if it can.
     #[must_use]
     pub fn refuses(model: &Model, drive_is_constant: bool, actuator_lags: bool) -> Option<&'static str> {
         if model.plant.friction().exponential().is_none() {
@@ -222,7 +222,7 @@ impl Flow {
         true
     }
 
-    /// The inside of the layer: `t = ∫ ds/φ` and `∫ s ds/φ` from the speed now to one that is guessed. What is left of
+    /// The inside of the layer: `t = ∫ ds/φ` and `∫ s ds/φ` from the speed now to one that is guessed. The rest of
     /// the time, a little before or behind the end, is a short series of known terms. None where the integrand is too
     /// steep for [`NODES`], as in a soft break-away.
     fn quadrature(&self, at: &mut State, now: f64, slip: f64, rest: f64) -> Option<bool> {
@@ -352,7 +352,8 @@ fn power(t: f64, n: usize) -> f64 {
     (0..n).fold(1.0, |power, _| power * t)
 }
 
-/// Where a falling speed is 0, within `(0, beyond]`: Newton's method, halving where it would leave the bracket.
+/// The instant at which a falling speed is 0, within `(0, beyond]`: Newton's method, halving where it would leave the
+/// bracket.
 fn instant(speed: impl Fn(f64) -> f64, rate: impl Fn(f64) -> f64, beyond: f64) -> f64 {
     let (mut before, mut after) = (0.0, beyond);
     let mut t = beyond;

@@ -21,7 +21,7 @@ use crate::drive::Drive;
 use crate::ripple::Ripple;
 use clutch_core::Plant;
 
-/// Whether the shaft is stuck, and which way it slips.
+/// Motion of the shaft: stuck, or the way in which it slips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// Held by friction: velocity exactly 0.
@@ -67,7 +67,7 @@ impl Shaft {
     }
 }
 
-/// What an engine integrates: the plant (1), with friction that may vary along the disc.
+/// The plant (1) that an engine integrates, with friction that may vary along the disc.
 #[derive(Clone, Debug)]
 pub struct Model {
     /// Inertia, damping, brake gain, friction law.
@@ -127,7 +127,7 @@ impl Volts {
     }
 }
 
-/// What acts on the shaft between two samples.
+/// Inputs that act on the shaft between two samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
     /// Time of the sample, s.
@@ -168,14 +168,14 @@ impl Input<'_> {
     }
 }
 
-/// What happened between two samples.
+/// An event between two samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
-    /// When, s.
+    /// Time of the event, s.
     pub time: f64,
-    /// What.
+    /// Its kind.
     pub kind: EventKind,
-    /// Where, rad.
+    /// Position of the shaft then, rad.
     pub position: f64,
     /// Driving torque then, N m.
     pub torque: f64,
@@ -207,7 +207,7 @@ pub enum EngineError {
     /// The engine cannot take the rig.
     #[error("the exact flow needs {0}")]
     Refused(
-        /// What it needs.
+        /// Its requirement.
         &'static str,
     ),
     /// The state is no longer a number.
@@ -299,7 +299,7 @@ fn break_away(model: &Model, input: &Input<'_>, position: f64, s: f64) -> Option
 struct Search<'a, F> {
     input: &'a Input<'a>,
     excess: F,
-    /// What friction holds for each volt, N m/V.
+    /// Torque that friction holds for each volt, N m/V.
     friction: f64,
 }
 

@@ -9,22 +9,22 @@ use serde::Serialize;
 pub struct Claim {
     /// Short name, stable from version to version.
     pub id: &'static str,
-    /// What the paper states, with its value.
+    /// The paper's statement, with its value.
     pub paper: &'static str,
-    /// What came out.
+    /// The value that came out.
     pub measured: f64,
     /// Unit of `measured` and `band`.
     pub unit: &'static str,
     /// Interval in which `measured` counts as agreeing with the statement; none = unbounded.
     pub band: [Option<f64>; 2],
-    /// Whether the statement holds.
+    /// True if the statement holds.
     pub holds: bool,
     /// Interval in which `measured` lies where the statement is known not to hold; the docs say
     /// why. None = the statement is expected to hold.
     pub deviation: Option<[f64; 2]>,
-    /// Whether the rig `bench` was fitted to this statement.
+    /// True if the rig `bench` was fitted to this statement.
     pub fitted: bool,
-    /// How it was measured; why it does not hold, if it does not.
+    /// The way it was measured; the reason, if it does not hold.
     pub note: &'static str,
 }
 

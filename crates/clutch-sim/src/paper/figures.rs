@@ -15,7 +15,7 @@ const FIGURES: [(u32, PaperLaw, &[f64]); 3] = [
 pub struct PanelData {
     /// Rate of the ramp, °/s.
     pub rate_deg_s: f64,
-    /// Whether it is the experiment's column.
+    /// True if it is the experiment's column.
     pub experiment: bool,
     /// Time, s.
     pub time_s: Vec<f64>,
@@ -40,7 +40,7 @@ fn panels(law: PaperLaw, rates: &'static [f64]) -> impl Iterator<Item = Case> {
     rates.iter().flat_map(move |rate| columns.map(|source| Case::new(source, law, *rate)))
 }
 
-/// What the figures ask to run.
+/// Cases that the figures ask to run.
 pub(super) fn cases() -> impl Iterator<Item = Case> {
     FIGURES.into_iter().flat_map(|(_, law, rates)| panels(law, rates))
 }

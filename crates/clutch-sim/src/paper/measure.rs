@@ -1,23 +1,23 @@
-//! What is measured of a statement, and what of it agrees.
+//! Measurements of a statement, and those that agree with it.
 
 use super::runs::{Case, Runs, Source};
 use super::{PaperLaw, table3};
 use crate::metrics::{Figure, Metrics};
 
-/// What a statement speaks of.
+/// The subject of a statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// How rigs and runs are set.
+    /// Settings of rigs and runs.
     Setting,
-    /// What is computed from numbers of the paper alone.
+    /// The outcome of a computation from numbers of the paper alone.
     Arithmetic,
-    /// What comes out on the paper's model, or where friction is known exactly.
+    /// The outcome on the paper's model, or where friction is known exactly.
     Simulation,
-    /// What comes out in the experiment, for which the rig `bench` stands.
+    /// The outcome in the experiment, for which the rig `bench` stands.
     Experiment,
 }
 
-/// What is measured. Rates are in °/s; figures are in the unit that people are shown.
+/// The quantity measured. Rates are in °/s; figures are in the unit that people are shown.
 #[derive(Clone, Copy, Debug)]
 pub enum Measure {
     /// A setting, and its unit.
@@ -35,7 +35,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// What the statement speaks of.
+    /// The subject of the statement.
     #[must_use]
     pub fn kind(&self) -> Kind {
         match self {
@@ -62,7 +62,7 @@ impl Measure {
         }
     }
 
-    /// What has to run for it.
+    /// Cases that have to run for it.
     pub(super) fn cases(&self) -> Vec<Case> {
         match *self {
             Measure::Setting(..) | Measure::Arithmetic(..) => Vec::new(),
@@ -78,7 +78,7 @@ impl Measure {
         }
     }
 
-    /// What came out; NaN of runs that were not made.
+    /// The value that came out; NaN of runs that were not made.
     pub(super) fn of(&self, runs: &Runs) -> f64 {
         let least = |values: &mut dyn Iterator<Item = f64>| values.reduce(f64::min).unwrap_or(f64::NAN);
         match *self {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
-/// Where a shaft runs: the two columns of each figure, and the check on what CTC could do if
+/// The rig on which a shaft runs: the two columns of each figure, and the check on what CTC could do if
 /// friction were known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Source {
@@ -23,7 +23,7 @@ pub enum Source {
     KnownFriction,
 }
 
-/// What runs once for each seed.
+/// A case: it runs once for each seed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Case {
     pub(super) source: Source,
@@ -77,7 +77,7 @@ pub(super) struct ErrorTrace {
     pub(super) error_deg: Vec<f64>,
 }
 
-/// What came out of a case.
+/// Results of a case.
 struct Done {
     /// One for each seed.
     metrics: Vec<Metrics>,
@@ -85,7 +85,7 @@ struct Done {
     first: ErrorTrace,
 }
 
-/// What came out of all cases.
+/// Results of all cases.
 pub(super) struct Runs(BTreeMap<Case, Done>);
 
 impl Runs {

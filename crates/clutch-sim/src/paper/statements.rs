@@ -10,10 +10,10 @@ use crate::metrics::{self, Metrics};
 use crate::rig::RigParams;
 use clutch_core::PlantParams;
 
-/// Where in section 4 a statement stands.
+/// The place of a statement in section 4.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// Where the experiment is described.
+    /// At the description of the experiment.
     Setup,
     /// At the figure of this number.
     Figure(u32),
@@ -28,20 +28,20 @@ pub enum Place {
 pub struct Statement {
     /// Short name, stable from version to version.
     pub id: &'static str,
-    /// Where it stands.
+    /// Its place.
     pub place: Place,
-    /// What it states, with its value.
+    /// The statement itself, with its value.
     pub says: &'static str,
-    /// What is measured of it.
+    /// The quantity measured of it.
     pub measured: Measure,
     /// Which measurements agree with it.
     pub agrees: Agrees,
     /// Interval in which the measurement lies where the statement is known not to hold; the docs
     /// say why. None = the statement is expected to hold.
     pub deviation: Option<[f64; 2]>,
-    /// Whether the rig `bench` was fitted to it.
+    /// True if the rig `bench` was fitted to it.
     pub fitted: bool,
-    /// How it is measured; why it does not hold, if it does not.
+    /// The way it is measured; the reason, if it does not hold.
     pub note: &'static str,
 }
 

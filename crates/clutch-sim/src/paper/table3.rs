@@ -31,7 +31,7 @@ pub fn reduction(smc_cycles: f64, pd_cycles: f64) -> f64 {
     if pd_cycles > 0.0 { 100.0 * (1.0 - smc_cycles / pd_cycles) } else { 0.0 }
 }
 
-/// What a reduction compares: SMC and PD.
+/// Cases that a reduction compares: SMC and PD.
 pub(super) fn compared(source: Source, rate: f64) -> [Case; 2] {
     [PaperLaw::Smc, PaperLaw::Pd].map(|law| Case::new(source, law, rate))
 }
@@ -42,7 +42,7 @@ pub(super) fn reduced(runs: &Runs, source: Source, rate: f64) -> f64 {
     reduction(smc, pd)
 }
 
-/// What the table asks to run.
+/// Cases that the table asks to run.
 pub(super) fn cases() -> impl Iterator<Item = Case> {
     TABLE3.into_iter().flat_map(|(rate, _)| compared(Source::Experiment, rate))
 }

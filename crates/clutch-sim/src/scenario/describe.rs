@@ -3,7 +3,7 @@
 use crate::tables::default_of;
 use clutch_core::params::{Info, Kind, Nested, Row, TableInfo};
 
-/// What stands at a key of a table.
+/// The entry at a key of a table.
 #[derive(Clone, Copy, Debug)]
 pub enum Entry {
     /// A parameter, and the table that declares it.
@@ -25,19 +25,19 @@ pub fn entries(table: &'static TableInfo) -> Vec<Entry> {
     rows.into_iter().chain(below).collect()
 }
 
-/// Whether a file has to say something of a parameter.
+/// True if a file has to say something of a parameter.
 #[must_use]
 pub fn row_is_required(row: &Row) -> bool {
     row.default.is_empty() && !row.optional
 }
 
-/// Whether a file has to say something of a table or a choice.
+/// True if a file has to say something of a table or a choice.
 #[must_use]
 pub fn table_is_required(nested: &Nested) -> bool {
     !nested.optional && default_of(nested.info).is_none()
 }
 
-/// What is taken where a file says nothing of a choice.
+/// The option that is taken where a file says nothing of a choice.
 #[must_use]
 pub fn default_option(info: &'static Info) -> Option<&'static str> {
     match info {
@@ -46,7 +46,7 @@ pub fn default_option(info: &'static Info) -> Option<&'static str> {
     }
 }
 
-/// What a parameter may be, in words and in the unit of its key: by itself, then together with others.
+/// Values that a parameter may have, in words and in the unit of its key: by itself, then together with others.
 #[must_use]
 pub fn expected(row: &Row, table: &TableInfo) -> String {
     let mut text = row.range.words(row.kind, &row.unit, false).to_string();

@@ -1,10 +1,10 @@
-//! What is wrong with a scenario: file, key, value, what is expected, what to do.
+//! Mistakes in a scenario: file, key, value, what is expected, what to do.
 
 use crate::tables::shown;
 use std::fmt;
 use toml::{Table, Value};
 
-/// What is wrong with a scenario.
+/// A mistake in a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScenarioError {
     /// The file, or the name of a built-in scenario.
@@ -13,7 +13,7 @@ pub struct ScenarioError {
     pub key: String,
     /// The value, as the file has it; empty if there is none.
     pub value: String,
-    /// What is wrong or expected.
+    /// Text of what is wrong or expected.
     pub message: String,
 }
 

@@ -70,7 +70,7 @@ built_in!(
 #[derive(Clone, Debug)]
 pub struct Scenario {
     origin: String,
-    /// What the file says, and defaults: made of the tables of `base`, with `changes` not yet in it.
+    /// Contents of the file, and defaults: made of the tables of `base`, with `changes` not yet in it.
     base: Arc<Table>,
     changes: Vec<(String, Value)>,
     /// Both together, made when it is asked for: a sweep has thousands of scenarios, of which few are shown.
@@ -89,10 +89,10 @@ pub enum LoadError {
     Io {
         /// The file.
         name: String,
-        /// What the system said; told in words, so not a source to be told again.
+        /// The system's error; told in words, so not a source to be told again.
         error: std::io::Error,
     },
-    /// What is in the file.
+    /// The contents of the file.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
 }
@@ -109,14 +109,14 @@ fn io_text(e: &std::io::Error) -> String {
     }
 }
 
-/// What can be said of a scenario before it runs.
+/// The plan of a scenario: all that can be said of it before it runs.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// What the path asks for.
+    /// Requirements of the path.
     pub envelope: Envelope<f64>,
-    /// What is known of the plant.
+    /// Bounds on the plant.
     pub bounds: Bounds,
-    /// What the gains guarantee.
+    /// Guarantee of the gains.
     pub certificate: Certificate,
     /// The paper's own conditions; for the sliding-mode laws, for which it states them.
     pub paper: Option<PaperConditions>,
@@ -129,7 +129,7 @@ impl Scenario {
     /// (`("law.smc.kp_v", "4")`) overrides a key.
     ///
     /// # Errors
-    /// What is wrong, where, and what is expected.
+    /// The mistake, its place, and what is expected.
     pub fn parse(origin: &str, text: &str, set: &[(String, String)]) -> Result<Scenario, ScenarioError> {
         let read = |(key, text): &(String, String)| Ok((key.clone(), error::read_value(origin, key, text)?));
         let values = set.iter().map(read).collect::<Result<Vec<_>, ScenarioError>>()?;
@@ -140,7 +140,7 @@ impl Scenario {
     /// override.
     ///
     /// # Errors
-    /// What is wrong, where, and what is expected.
+    /// The mistake, its place, and what is expected.
     pub fn from_table(
         origin: &str,
         mut table: Table,
@@ -324,7 +324,7 @@ impl Scenario {
         }
     }
 
-    /// What the supervisor of a run on a board watches.
+    /// Limits that the supervisor of a run on a board watches.
     #[must_use]
     pub fn supervisor(&self, safety: &Safety) -> SupervisorParams {
         SupervisorParams {
@@ -375,7 +375,7 @@ impl Scenario {
         &self.params
     }
 
-    /// How a run on a board ends.
+    /// The way a run on a board ends.
     ///
     /// # Errors
     /// The scenario has no table `[safety]`.
@@ -488,7 +488,7 @@ impl Scenario {
         Ok(Plan { envelope, bounds, certificate, paper, demand })
     }
 
-    /// What the path asks of drive and brake.
+    /// Requirements of the path on drive and brake.
     fn walk_path(&self, bounds: &Bounds, limits: &Output<f64>) -> Result<Envelope<f64>, ScenarioError> {
         let p = &self.params;
         let period = p.sampling.sampling.period;
@@ -557,7 +557,7 @@ impl Scenario {
         }
     }
 
-    /// Where the rig lies outside the bounds that the certificate was asked for: a line each.
+    /// Quantities of the rig that lie outside the bounds that the certificate was asked for: a line each.
     /// The certificate says nothing of such a rig.
     ///
     /// # Errors
@@ -598,7 +598,7 @@ impl Scenario {
 /// Puts values at the dotted keys of a scenario's table, in their order.
 ///
 /// # Errors
-/// What is no key, or lies below a value.
+/// A name that is no key, or lies below a value.
 pub fn override_keys(origin: &str, table: &mut Table, set: &[(String, Value)]) -> Result<(), ScenarioError> {
     set.iter().try_for_each(|(key, value)| error::set(origin, table, key, value.clone()))
 }

@@ -19,7 +19,7 @@ clutch_core::words! {
 }
 
 params! {
-    /// When the servo is asked, and the scalar that it computes in.
+    /// Times at which the servo is asked, and the scalar that it computes in.
     #[derive(Copy)]
     pub struct ScenarioSampling<f64>: Default {
         /// Scalar that path and servo compute in; a board has `f32`. The shaft is always in `f64`.
@@ -32,8 +32,8 @@ params! {
 }
 
 params! {
-    /// How well the believed plant is known, (23), and the reaching rate that the certificate shall give: for the
-    /// certificate and the check of the path.
+    /// Accuracy to which the believed plant is known, (23), and the reaching rate that the certificate shall give: for
+    /// the certificate and the check of the path.
     #[derive(Copy)]
     pub struct ScenarioBounds<f64>: Default {
         /// Rate of reaching the sliding surface that the certificate shall give, in (15); above 0 the reaching time gets
@@ -41,14 +41,14 @@ params! {
         reach_rate: f64 = 0.0, "reach_rate_rad_s2" "γ" RAD_S2, Range::at_least(0.0);
     }
     flat {
-        /// How well each parameter of the model is known.
+        /// Accuracy to which each parameter of the model is known.
         tolerances: Tolerances;
     }
 }
 
 params! {
-    /// What ends a run on a board: limits of the supervisor, and how long board and codes wait. docs/safety.md says why
-    /// each default is what it is.
+    /// Limits that end a run on a board: those of the supervisor, and how long board and codes wait. docs/safety.md
+    /// says why each default is what it is.
     #[derive(Copy)]
     pub struct ScenarioLimits<f64>: Default {
         /// Periods without a valid code after which the board goes to its safe state by itself. Keep it equal to
@@ -58,21 +58,23 @@ params! {
         valid_cycles: u32 = 2, "valid_cycles" "" CYCLES, Range::within(1.0, 1000.0);
     }
     flat {
-        /// What the supervisor watches.
+        /// Limits that the supervisor watches.
         supervisor: LimitParams;
     }
 }
 
 params! {
-    /// How a run on a board ends, and what ends it. Only what drives a board needs it; there is no default safe state.
+    /// The way a run on a board ends, and what ends it. Only what drives a board needs it; there is no default safe
+    /// state.
     pub struct Safety<f64> {
-        /// Why this safe state is the right one for this rig, in the operator's words; printed before each run.
+        /// The reason that this safe state is the right one for this rig, in the operator's words; printed before each
+        /// run.
         reason: Text, "reason" "" NONE, Range::ANY;
     }
     nested {
-        /// What the brake does when control has ended.
+        /// Safe state: what the brake does when control has ended.
         on_fault: SafeState, "on_fault";
-        /// What ends control.
+        /// Limits that end control.
         limits: ScenarioLimits, "limits";
     }
     relations(p) {
@@ -103,13 +105,13 @@ params! {
         reference: ReferenceParams<'static>, "reference";
         /// Sampling period, scalar.
         sampling: ScenarioSampling, "sampling";
-        /// How well the believed plant is known.
+        /// Accuracy to which the believed plant is known.
         bounds: ScenarioBounds, "bounds";
         /// Length, beginning, seed and engine.
         run: RunParams, "run";
     }
     optional {
-        /// How a run on a board ends, and what ends it: `clutch loop` and `clutch daq` need it.
+        /// The way a run on a board ends, and what ends it: `clutch loop` and `clutch daq` need it.
         safety: Safety, "safety";
     }
 }

@@ -8,8 +8,8 @@ use clutch_core::params::{Info, Params, TableInfo};
 use toml::{Table, Value};
 
 /// Checks the table at `key` (`law.smc`, `rig.friction.stribeck`, `reference.ramp`, `run` …) by itself, and gives it
-/// back with every default filled in. What depends on other tables (a path that the drive is too weak for, a time
-/// shorter than the period) is not looked at: [`Scenario::from_table`](super::Scenario::from_table) does that.
+/// back with every default filled in. Anything that depends on other tables (a path that the drive is too weak for, a
+/// time shorter than the period) is not looked at: [`Scenario::from_table`](super::Scenario::from_table) does that.
 ///
 /// # Errors
 /// As for a file; `origin` is what errors begin with, their key is the whole one.

@@ -1,4 +1,4 @@
-//! What relates parameters of one table, with the path of the table.
+//! Relations between parameters of one table, with the path of the table.
 
 use clutch_core::ParamError;
 use clutch_core::params::{Choice, Editor, Params, Table as Parameters};

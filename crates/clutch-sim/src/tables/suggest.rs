@@ -1,9 +1,9 @@
-//! What was probably meant by a key or a word that is none.
+//! The probable meaning of a key or a word that is none.
 
 use clutch_core::params::Unit;
 use toml::Value;
 
-/// What was probably meant: the same key in another unit, with the value in it, or the nearest name.
+/// The probable meaning: the same key in another unit, with the value in it, or the nearest name.
 pub(super) fn correction(unknown: &str, value: Option<&Value>, known: &[String]) -> String {
     let number = value.and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)));
     if let Some((stem, unit)) = unit_of(unknown) {
