@@ -1214,8 +1214,9 @@ class RunSettings(_Params):
     engine : {"auto", "dormand_prince", "exact_flow"}, default "auto"
         Engine that integrates the motion. `auto`: The exact flow where the rig allows it, else
         Dormand–Prince. `dormand_prince`: Dormand and Prince's 5(4) pair, the paper's solver, with events:
-        takes every rig. `exact_flow`: The closed form of the motion between samples: friction that falls
-        exponentially with the speed and is even along the disc, torque and voltage held between samples.
+        takes every rig. `exact_flow`: Closed forms, quadrature and series of the motion between samples: for
+        friction that falls exponentially with the speed and is even along the disc, torque and voltage held
+        between samples.
 
     Raises
     ------

@@ -232,7 +232,7 @@ pub struct Prepared<'a, T> {
     pub moving: MovingRig,
     /// Voltage on the brake before the first tick, V.
     pub volts: f64,
-    /// Which engine moves the rig.
+    /// Engine that moves the rig.
     pub engine: EngineKind,
 }
 
@@ -336,7 +336,7 @@ pub struct Run {
     pub detected: Detected,
     /// Ticks at which the [`StickSlip`] detector called the shaft stuck, in order.
     pub detections: Vec<u64>,
-    /// Which engine ran.
+    /// Engine that ran.
     pub engine: EngineKind,
 }
 

@@ -237,7 +237,7 @@ pub struct Cycle<T: Arithmetic, Terms = LawTerms<T>> {
     pub output: Option<ServoOutput<T, Terms>>,
 }
 
-/// Which of the last 128 periods something happened in.
+/// The periods, of the last 128, in which something happened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct History(u128);
 

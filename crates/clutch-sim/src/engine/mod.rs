@@ -264,8 +264,8 @@ clutch_core::words! {
         Auto = "auto" default,
         /// Dormand and Prince's 5(4) pair, the paper's solver, with events: takes every rig.
         DormandPrince = "dormand_prince",
-        /// The closed form of the motion between samples: friction that falls exponentially with the speed and is
-        /// even along the disc, torque and voltage held between samples.
+        /// Closed forms, quadrature and series of the motion between samples: for friction that falls exponentially with the
+        /// speed and is even along the disc, torque and voltage held between samples.
         ExactFlow = "exact_flow",
     }
 }

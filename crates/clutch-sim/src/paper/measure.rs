@@ -101,7 +101,7 @@ impl Measure {
     }
 }
 
-/// Which measurements agree with a statement.
+/// Measurements that agree with a statement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Agrees {
     /// Up to this.

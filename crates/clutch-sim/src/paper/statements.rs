@@ -34,7 +34,7 @@ pub struct Statement {
     pub says: &'static str,
     /// The quantity measured of it.
     pub measured: Measure,
-    /// Which measurements agree with it.
+    /// Measurements that agree with it.
     pub agrees: Agrees,
     /// Interval in which the measurement lies where the statement is known not to hold; the docs
     /// say why. None = the statement is expected to hold.
