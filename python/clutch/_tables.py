@@ -14,6 +14,7 @@ __all__ = [
     "Bounds",
     "BrakeGeometry",
     "Chirp",
+    "ChirpDrive",
     "Ctc",
     "Dac",
     "Encoder",
@@ -38,6 +39,7 @@ __all__ = [
     "Safety",
     "Sampling",
     "Sine",
+    "SineDrive",
     "Smc",
     "SmcSign",
     "SmoothedDerivative",
@@ -235,6 +237,69 @@ class TableDrive(_Params):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class SineDrive(_Params):
+    """A sine about a mean torque: `mean + amplitude sin 2π(frequency t + phase)`. It needs the engine
+    `dormand_prince`.
+
+    Parameters
+    ----------
+    mean_nm : float
+        Mean torque. A finite number, N m.
+    amplitude_nm : float
+        Amplitude. A finite number of at least 0 N m.
+    frequency_hz : float
+        Frequency. A number above 0 and at most 1000 Hz.
+    phase_turns : float, default 0.0
+        Phase at the start of the run. A number from -1 to 1 turns.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+    """
+
+    _key: ClassVar[str] = "rig.drive.sine"
+
+    mean_nm: float
+    amplitude_nm: float
+    frequency_hz: float
+    phase_turns: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ChirpDrive(_Params):
+    """A sine about a mean torque whose frequency rises, or falls, evenly with time, and then stays. It needs
+    the engine `dormand_prince`.
+
+    Parameters
+    ----------
+    mean_nm : float
+        Mean torque. A finite number, N m.
+    amplitude_nm : float
+        Amplitude. A finite number of at least 0 N m.
+    from_hz : float
+        Frequency at the start of the run. A number from 0 to 1000 Hz.
+    to_hz : float
+        Frequency at the end of `duration_s`, and after it. A number from 0 to 1000 Hz.
+    duration_s : float
+        Time from the one to the other. A finite number above 0 s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+    """
+
+    _key: ClassVar[str] = "rig.drive.chirp"
+
+    mean_nm: float
+    amplitude_nm: float
+    from_hz: float
+    to_hz: float
+    duration_s: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class HandDrive(_Params):
     """A hand: a mean torque and a random part in a band of frequencies.
 
@@ -273,7 +338,7 @@ class HandDrive(_Params):
     highest_frequency_hz: float
 
 
-Drive = WeightDrive | SpringDrive | TableDrive | HandDrive
+Drive = WeightDrive | SpringDrive | TableDrive | SineDrive | ChirpDrive | HandDrive
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -467,7 +532,7 @@ class Rig(_mixins.Rig):
         faster ends control. A finite number above 0 °/s.
     friction : StribeckFriction
         Friction of pad on disc. By default `StribeckFriction()`.
-    drive : WeightDrive, SpringDrive, TableDrive or HandDrive
+    drive : WeightDrive, SpringDrive, TableDrive, SineDrive, ChirpDrive or HandDrive
         The drive of the shaft. By default `WeightDrive()`.
     encoder : Encoder
         The angle sensor. By default `Encoder()`.

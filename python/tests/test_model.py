@@ -32,6 +32,7 @@ RIPPLE = {
     "highest_waves_per_turn": 400,
     "spacing_waves_per_turn": 50,
 }
+TORQUE = {"mean_nm": 0.04, "amplitude_nm": 0.01}
 HAND = {"mean_nm": 0.06, "rms_nm": 0.008, "lowest_frequency_hz": 0.2, "highest_frequency_hz": 4.0}
 MOVE = {"distance_deg": 90.0, "speed_deg_s": 20.0, "acceleration_deg_s2": 100.0}
 SINE = {"rate_deg_s": 10.0, "amplitude_deg": 0.5, "frequency_hz": 1.0}
@@ -45,6 +46,8 @@ REQUIRED = {
     clutch.WeightDrive: {},
     clutch.SpringDrive: {"stiffness_nm_rad": 0.02, "rest_deg": 180.0},
     clutch.TableDrive: {"points_s_nm": ((0.0, 0.045), (2.0, 0.055))},
+    clutch.SineDrive: TORQUE | {"frequency_hz": 2.0},
+    clutch.ChirpDrive: TORQUE | {"from_hz": 0.1, "to_hz": 3.0, "duration_s": 10.0},
     clutch.HandDrive: HAND,
     clutch.Encoder: {},
     clutch.Dac: {},
@@ -616,6 +619,16 @@ VALID = {
     clutch.WeightDrive: each(mass_kg=POSITIVE, gravity_m_s2=POSITIVE, pulley_radius_m=POSITIVE),
     clutch.SpringDrive: each(stiffness_nm_rad=POSITIVE, rest_deg=number(-1e4, 1e4)),
     clutch.TableDrive: each(points_s_nm=points(st.floats(-10, 10), 1)),
+    clutch.SineDrive: each(
+        mean_nm=number(-1, 1), amplitude_nm=number(0, 1), frequency_hz=st.floats(1e-3, 1000), phase_turns=number(-1, 1)
+    ),
+    clutch.ChirpDrive: each(
+        mean_nm=number(-1, 1),
+        amplitude_nm=number(0, 1),
+        from_hz=number(0, 1000),
+        to_hz=number(0, 1000),
+        duration_s=POSITIVE,
+    ),
     clutch.HandDrive: hands(),
     clutch.Encoder: each(counts_per_rev=st.integers(4, 2**24), quantised=st.booleans()),
     clutch.Dac: converters(),
@@ -696,7 +709,14 @@ VALID[clutch.Rig] = each(
     speed_limit_deg_s=POSITIVE,
     friction=objects(clutch.StribeckFriction),
     ripple=st.none() | objects(clutch.Ripple),
-    drive=objects(clutch.WeightDrive, clutch.SpringDrive, clutch.TableDrive, clutch.HandDrive),
+    drive=objects(
+        clutch.WeightDrive,
+        clutch.SpringDrive,
+        clutch.TableDrive,
+        clutch.SineDrive,
+        clutch.ChirpDrive,
+        clutch.HandDrive,
+    ),
     encoder=objects(clutch.Encoder),
     dac=objects(clutch.Dac),
 )

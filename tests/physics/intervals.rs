@@ -1,7 +1,7 @@
 //! Single intervals: reference numbers, hard break-aways, and an interval in parts.
 
 use clutch_core::{PlantParams, StribeckParams};
-use clutch_sim::drive::Drive;
+use clutch_sim::drive::{ChirpDrive, Drive};
 use clutch_sim::engine::{DormandPrince, Engine, Event, EventKind, ExactFlow, Input, Model, Shaft, Volts};
 use clutch_sim::ripple::{Ripple, RippleParams};
 use clutch_tests::{engines, model};
@@ -67,7 +67,7 @@ fn a_torque_that_rises_and_falls_within_an_interval_breaks_the_shaft_away() {
     let plant = PlantParams::default();
     let limit = 0.2 * plant.brake_gain * 2.0;
     let w = std::f64::consts::TAU * 40.0;
-    let drive = Drive::Hand { mean: 0.5 * limit, sines: vec![(0.6 * limit, w, 0.0)] };
+    let drive = Drive::Sines { mean: 0.5 * limit, sines: vec![(0.6 * limit, w, 0.0)] };
     let (_, events) = moved(&mut DormandPrince::default(), &model(&plant), &input(&drive, 2.0, 0.1), 0.0);
     assert_eq!(events[0].kind, EventKind::BreakAway);
     assert!((events[0].time - (0.5_f64 / 0.6).asin() / w).abs() < 1e-9, "{events:?}");
@@ -80,7 +80,7 @@ fn a_short_peak_above_the_limit_is_not_stepped_over() {
     let limit = 0.2 * plant.brake_gain * 2.0;
     let w = std::f64::consts::TAU * 33.0;
     for (share, events) in [(1.0 + 1e-6, 1), (1.0 - 1e-6, 0)] {
-        let drive = Drive::Hand { mean: 0.0, sines: vec![(share * limit, w, 0.3)] };
+        let drive = Drive::Sines { mean: 0.0, sines: vec![(share * limit, w, 0.3)] };
         let (shaft, seen) =
             moved(&mut DormandPrince::default(), &model(&plant), &input(&drive, 2.0, 8e-3), 0.0);
         assert_eq!(seen.iter().filter(|e| e.kind == EventKind::BreakAway).count(), events, "{shaft:?}");
@@ -129,7 +129,14 @@ fn drive(kind: u8, torque: f64) -> Drive {
         0 => Drive::Constant(torque),
         1 => Drive::Spring { stiffness: 0.5 * torque.abs(), rest: 1.5 * torque.signum() },
         2 => Drive::Table(vec![(0.0, torque), (2e-3, 0.2 * torque), (7e-3, 1.4 * torque)]),
-        _ => Drive::Hand {
+        3 => Drive::Chirp(ChirpDrive {
+            mean: torque,
+            amplitude: 0.7 * torque.abs(),
+            from: 30.0,
+            to: 400.0,
+            duration: 6e-3,
+        }),
+        _ => Drive::Sines {
             mean: torque,
             sines: vec![(0.5 * torque.abs(), 400.0, 0.1), (0.3 * torque.abs(), 3000.0, 2.0)],
         },
@@ -145,7 +152,7 @@ proptest! {
     fn an_interval_in_parts_is_the_interval_whole(
         velocity in prop_oneof![Just(0.0), -1.0_f64..1.0], volts in 0.0_f64..10.0, share in -2.0_f64..2.0,
         v_s in -4.0_f64..0.0, ratio in 1.0_f64..2.5, drag in 0.0_f64..0.3, parts in 2_u32..20,
-        kind in 0_u8..4, ripple in any::<bool>(), lag in any::<bool>(), exact in any::<bool>(),
+        kind in 0_u8..5, ripple in any::<bool>(), lag in any::<bool>(), exact in any::<bool>(),
     ) {
         let duration = 1e-2;
         let plant = PlantParams {

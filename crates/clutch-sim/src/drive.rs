@@ -1,4 +1,4 @@
-//! The drive of the shaft: a weight, a spring, a table over time, or a hand.
+//! The drive of the shaft: a weight, a spring, a torque over time, or a hand.
 
 use crate::tables::Points;
 use clutch_core::params::{Params, Range};
@@ -43,6 +43,39 @@ params! {
 }
 
 params! {
+    /// A sine about a mean torque: `mean + amplitude sin 2π(frequency t + phase)`. It needs the engine `dormand_prince`.
+    #[derive(Copy)]
+    pub struct SineDrive<f64> {
+        /// Mean torque.
+        mean: f64, "mean_nm" "" NM, Range::ANY;
+        /// Amplitude.
+        amplitude: f64, "amplitude_nm" "" NM, Range::at_least(0.0);
+        /// Frequency.
+        frequency: f64, "frequency_hz" "" HZ, Range::above(0.0).up_to(1000.0);
+        /// Phase at the start of the run.
+        phase_turns: f64 = 0.0, "phase_turns" "" TURNS, Range::within(-1.0, 1.0);
+    }
+}
+
+params! {
+    /// A sine about a mean torque whose frequency rises, or falls, evenly with time, and then stays. It needs the engine
+    /// `dormand_prince`.
+    #[derive(Copy)]
+    pub struct ChirpDrive<f64> {
+        /// Mean torque.
+        mean: f64, "mean_nm" "" NM, Range::ANY;
+        /// Amplitude.
+        amplitude: f64, "amplitude_nm" "" NM, Range::at_least(0.0);
+        /// Frequency at the start of the run.
+        from: f64, "from_hz" "" HZ, Range::within(0.0, 1000.0);
+        /// Frequency at the end of `duration_s`, and after it.
+        to: f64, "to_hz" "" HZ, Range::within(0.0, 1000.0);
+        /// Time from the one to the other.
+        duration: f64, "duration_s" "" S, Range::above(0.0);
+    }
+}
+
+params! {
     /// A hand: a mean torque and a random part in a band of frequencies.
     ///
     /// The random part is 48 sines, one at random in each slice of the band; the seed of the run decides them. It
@@ -74,6 +107,10 @@ clutch_core::choice! {
         Spring(SpringDrive) = "spring",
         /// A torque over time.
         Table(TableDrive) = "table",
+        /// A sine.
+        Sine(SineDrive) = "sine",
+        /// A sine of changing frequency.
+        Chirp(ChirpDrive) = "chirp",
         /// A hand.
         Hand(HandDrive) = "hand",
     }
@@ -97,12 +134,14 @@ pub enum Drive {
     /// (s, N m), straight lines between.
     Table(Vec<(f64, f64)>),
     /// Mean and sines.
-    Hand {
+    Sines {
         /// N m.
         mean: f64,
         /// Amplitude (N m), angular frequency (rad/s), phase (rad).
         sines: Vec<(f64, f64, f64)>,
     },
+    /// Mean and a sine of changing frequency.
+    Chirp(ChirpDrive),
 }
 
 impl Drive {
@@ -120,6 +159,14 @@ impl Drive {
                 Ok(Drive::Spring { stiffness: *stiffness, rest: *rest })
             }
             DriveParams::Table(TableDrive { points: Points(points) }) => Ok(Drive::Table(points.clone())),
+            DriveParams::Sine(SineDrive { mean, amplitude, frequency, phase_turns }) => {
+                let tau = core::f64::consts::TAU;
+                Ok(Drive::Sines {
+                    mean: *mean,
+                    sines: vec![(*amplitude, tau * frequency, tau * phase_turns)],
+                })
+            }
+            DriveParams::Chirp(chirp) => Ok(Drive::Chirp(*chirp)),
             DriveParams::Hand(HandDrive {
                 mean,
                 rms,
@@ -137,7 +184,7 @@ impl Drive {
                         (amplitude, tau * f, tau * rng.random::<f64>())
                     })
                     .collect();
-                Ok(Drive::Hand { mean: *mean, sines })
+                Ok(Drive::Sines { mean: *mean, sines })
             }
         }
     }
@@ -156,13 +203,18 @@ impl Drive {
                     (None, None) => 0.0,
                 }
             }
-            Drive::Hand { mean, sines } => {
+            Drive::Sines { mean, sines } => {
                 mean + sines.iter().map(|(a, w, phase)| a * libm::sin(w * t + phase)).sum::<f64>()
+            }
+            Drive::Chirp(ChirpDrive { mean, amplitude, from, to, duration }) => {
+                let (rising, after) = (t.min(*duration), (t - duration).max(0.0));
+                let turns = rising * (from + 0.5 * (to - from) * rising / duration) + to * after;
+                mean + amplitude * libm::sin(core::f64::consts::TAU * turns)
             }
         }
     }
 
-    /// Lowest and highest torque that can come, N m: of a spring all, of a hand the mean ± 4 rms.
+    /// Lowest and highest torque that can come, N m: of a spring all, of many sines the mean ± 4 rms.
     #[must_use]
     pub fn range(&self) -> (f64, f64) {
         match self {
@@ -171,28 +223,38 @@ impl Drive {
             Drive::Table(points) => points
                 .iter()
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), (_, x)| (lo.min(*x), hi.max(*x))),
-            Drive::Hand { mean, sines } => {
+            Drive::Sines { mean, sines } => {
                 let rms = libm::sqrt(sines.iter().map(|(a, _, _)| 0.5 * a * a).sum());
-                (mean - 4.0 * rms, mean + 4.0 * rms)
+                let most = sines.iter().map(|(a, _, _)| a.abs()).sum::<f64>().min(4.0 * rms);
+                (mean - most, mean + most)
             }
+            Drive::Chirp(ChirpDrive { mean, amplitude, .. }) => (mean - amplitude, mean + amplitude),
         }
     }
 
     /// Times strictly between two others at which the torque has a corner, s.
     pub(crate) fn corners(&self, from: f64, to: f64) -> impl Iterator<Item = f64> + '_ {
-        let points = match self {
-            Drive::Table(points) => points.as_slice(),
-            _ => &[],
+        let (points, end): (&[_], _) = match self {
+            Drive::Table(points) => (points, None),
+            // From there on the frequency stays.
+            Drive::Chirp(chirp) => (&[], Some(chirp.duration)),
+            _ => (&[], None),
         };
         let first = points.partition_point(|p| p.0 <= from);
-        points.iter().skip(first).map(|p| p.0).take_while(move |t| *t < to)
+        let end = end.filter(move |t| *t > from && *t < to);
+        points.iter().skip(first).map(|p| p.0).take_while(move |t| *t < to).chain(end)
     }
 
     /// The most that the torque of a shaft at rest bends between two corners, N m/s².
     pub(crate) fn curvature(&self) -> f64 {
         match self {
             Drive::Constant(_) | Drive::Spring { .. } | Drive::Table(_) => 0.0,
-            Drive::Hand { sines, .. } => sines.iter().map(|(a, w, _)| a.abs() * w * w).sum(),
+            Drive::Sines { sines, .. } => sines.iter().map(|(a, w, _)| a.abs() * w * w).sum(),
+            Drive::Chirp(ChirpDrive { amplitude, from, to, duration, .. }) => {
+                let tau = core::f64::consts::TAU;
+                let fastest = tau * from.max(*to);
+                amplitude * (fastest * fastest + tau * (to - from).abs() / duration)
+            }
         }
     }
 
@@ -206,6 +268,30 @@ impl Drive {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_chirp_rises_to_its_last_frequency_and_keeps_it() {
+        let (from, to, duration) = (2.0, 10.0, 4.0);
+        let p = ChirpDrive { mean: 0.1, amplitude: 0.05, from, to, duration };
+        let d = Drive::new(&DriveParams::Chirp(p), 0).unwrap();
+        assert_eq!(d.range(), (0.05, 0.15000000000000002));
+        // Turns until t: from t + (to − from) t²/2D; 24 by the end, and ten a second after.
+        for (t, turns) in [(0.0, 0.0), (1.0, 3.0), (4.0, 24.0), (4.25, 26.5), (5.025, 34.25)] {
+            let expected = 0.1 + 0.05 * libm::sin(core::f64::consts::TAU * turns);
+            assert!((d.torque(t, 0.0) - expected).abs() < 1e-12, "{t} s");
+        }
+        assert_eq!(d.corners(3.9, 4.1).collect::<Vec<_>>(), [4.0]);
+        assert_eq!(d.corners(4.0, 4.1).count() + d.corners(3.0, 4.0).count(), 0);
+    }
+
+    #[test]
+    fn a_sine_has_its_amplitude_frequency_and_phase() {
+        let p = SineDrive { mean: -0.02, amplitude: 0.06, frequency: 0.5, phase_turns: 0.25 };
+        let d = Drive::new(&DriveParams::Sine(p), 0).unwrap();
+        assert_eq!(d.range(), (-0.08, 0.039999999999999994));
+        assert!((d.torque(0.0, 0.0) - 0.04).abs() < 1e-15);
+        assert!((d.torque(1.0, 9.0) + 0.08).abs() < 1e-15);
+    }
 
     #[test]
     fn a_table_is_straight_between_its_points_and_constant_outside() {
