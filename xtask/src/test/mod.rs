@@ -8,6 +8,7 @@ use crate::python;
 use crate::run::{Program, beside, cargo, program, root};
 use crate::stubs;
 use anyhow::{Result, bail};
+use std::path::PathBuf;
 use tally::Tally;
 
 /// Targets for which the core must compile: a core without atomics, one with a floating-point unit,
@@ -30,11 +31,12 @@ pub(crate) fn all() -> Result<()> {
     }
     // Before the tests: some build images for an emulated board.
     targets()?;
-    let mut sound = host(&mut tally)?;
-    // Both are mostly builds that link for long on one core; nothing in them keeps a clock. Each has folders of its own.
+    let built = build(&mut tally)?;
+    // Mostly builds that link for long on one core, as the wheel's do, beside tests that wait; in folders of its own.
     let boards = beside("boards")?;
+    let mut sound = built && host(&mut tally)?;
     sound &= wheel_of(&mut tally)?;
-    tally.stage("boards, beside the wheel");
+    tally.stage("boards, beside all that");
     let (ended, text) = boards.output()?;
     print!("{text}");
     tally.add(ended, &text);
@@ -84,19 +86,21 @@ pub(crate) fn targets() -> Result<&'static [&'static str]> {
     }
 }
 
-/// The tests that run on this machine, an emulated board included.
-fn host(tally: &mut Tally) -> Result<bool> {
+/// Builds the tests that run on this machine; true if they build.
+fn build(tally: &mut Tally) -> Result<bool> {
     tally.stage("build of the tests");
-    let clutch = compared()?;
+    compared()?;
     let built = cargo(["test"]).args(WORKSPACE).arg("--no-run").lines(|_| ())?;
     tally.check("the tests build", built);
-    if !built {
-        return Ok(false);
-    }
+    Ok(built)
+}
+
+/// The tests that run on this machine, an emulated board included.
+fn host(tally: &mut Tally) -> Result<bool> {
     tally.stage("tests");
     let tests = ["test", "--no-fail-fast"];
     // Some run the command: the one that was built with them.
-    let sound = cargo(tests).args(WORKSPACE).env("CLUTCH_BIN", clutch).lines(|l| tally.read(l))?;
+    let sound = cargo(tests).args(WORKSPACE).env("CLUTCH_BIN", command()).lines(|l| tally.read(l))?;
     tally.stage("tests of the core as firmware takes it");
     // Without the features that the workspace turns on.
     let core = ["--package", "clutch-core", "--lib"];
@@ -108,11 +112,15 @@ const EXAMPLES: [&str; 3] = ["write_demo", "bits", "intervals"];
 
 /// Builds what the wheel is compared with, and the command that tests run: with few optimisations, as the tests.
 /// The wheel, with all of them, must give the same bits.
-fn compared() -> Result<std::path::PathBuf> {
+fn compared() -> Result<()> {
     let mut programs = vec!["--bin", "clutch"];
     EXAMPLES.iter().for_each(|name| programs.extend(["--example", name]));
-    cargo(["build"]).args(WORKSPACE).args(programs).run()?;
-    Ok(root().join("target/debug/clutch"))
+    cargo(["build"]).args(WORKSPACE).args(programs).run()
+}
+
+/// The command as [`compared`] builds it.
+fn command() -> PathBuf {
+    root().join("target/debug/clutch")
 }
 
 /// The checks for boards: builds for embedded targets, link tests, images, budgets.
@@ -200,14 +208,14 @@ fn wheel_of(tally: &mut Tally) -> Result<bool> {
     let stubtest = python(&["mypy.stubtest", "clutch._clutch", "--mypy-config-file"])?.arg(&settings);
     tally.check_quiet("the type stub agrees with the module at run time", stubtest.quietly()?);
     tally.stage("what the wheel is compared with");
-    let clutch = compared()?;
+    compared()?;
     let built = |name: &str| root().join("target/debug/examples").join(name);
     let bits = root().join("target/bits");
     program(built("bits")).arg(&bits).run()?;
     tally.stage("tests of the wheel");
     python(&["pytest", "--color=no", "-q"])?
         .arg(root().join("python/tests"))
-        .env("CLUTCH_BIN", clutch)
+        .env("CLUTCH_BIN", command())
         .env("CLUTCH_LOG_DEMO", built("write_demo"))
         .env("CLUTCH_BITS", bits)
         .env("CLUTCH_INTERVALS", built("intervals"))

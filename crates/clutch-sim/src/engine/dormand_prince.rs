@@ -1,6 +1,6 @@
 //! Dormand and Prince's 5(4) pair, the solver of the paper, with located events.
 //!
-//! Error per step is held to [`RELATIVE`] of the speed. A step that would carry the velocity
+//! Error per step is held to [`ABSOLUTE`] and, near rest, to [`RELATIVE`] of the speed. A step that would carry the velocity
 //! through zero is shortened, by root finding on the step itself, until it ends there.
 //!
 //! J. R. Dormand, P. J. Prince, A family of embedded Runge–Kutta formulae, J. Comp. Appl. Math.
@@ -9,9 +9,11 @@
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, break_away};
 use clutch_core::friction::FrictionModel;
 
-/// Error allowed per step, as a share of the larger speed of its ends, and of the way at that speed: relative also where
-/// the shaft just breaks away, because the layer blows an error up as it does the motion.
-const RELATIVE: f64 = 2e-8;
+/// Error allowed per step, in rad and rad/s, and as a share of both.
+const ABSOLUTE: f64 = 1e-11;
+/// Error allowed per step as a share of the larger speed of its ends, and of the way at that speed: where the shaft just
+/// breaks away, the layer blows an error up as it does the motion.
+const RELATIVE: f64 = 1e-7;
 /// Rounding of a position, rad and per rad.
 const ROUNDING: f64 = 1e-15;
 /// An instant of stopping is located to this, s: below the 1e-9 s that the tests ask for.
@@ -80,9 +82,11 @@ impl Slip<'_> {
             k[i + 1] = self.rate(s + C[i] * h, to);
         }
         let left_out = |n: usize| (h * E.iter().zip(&k).map(|(e, k)| e * k[n]).sum::<f64>()).abs();
-        let speed = from[1].abs().max(to[1].abs());
-        let way = RELATIVE * h * speed + ROUNDING * (1.0 + from[0].abs().max(to[0].abs()));
-        let error = (left_out(0) / way).max(left_out(1) / (RELATIVE * speed + f64::MIN_POSITIVE));
+        let largest = |n: usize| from[n].abs().max(to[n].abs());
+        let rounding = ROUNDING * (1.0 + largest(0));
+        let way = (ABSOLUTE * (1.0 + largest(0))).min(RELATIVE * h * largest(1) + rounding);
+        let speed = (ABSOLUTE * (1.0 + largest(1))).min(RELATIVE * largest(1) + f64::MIN_POSITIVE);
+        let error = (left_out(0) / way).max(left_out(1) / speed);
         (to, error, k[6])
     }
 }
