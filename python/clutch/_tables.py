@@ -256,6 +256,12 @@ class SineDrive(_Params):
     ------
     ParamError
         A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.SineDrive(mean_nm=0.047, amplitude_nm=0.01, frequency_hz=2)
+    SineDrive(mean_nm=0.047, amplitude_nm=0.01, frequency_hz=2.0, phase_turns=0.0)
     """
 
     _key: ClassVar[str] = "rig.drive.sine"
@@ -288,6 +294,12 @@ class ChirpDrive(_Params):
     ------
     ParamError
         A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.ChirpDrive(mean_nm=0.047, amplitude_nm=0.01, from_hz=0.1, to_hz=10, duration_s=20)
+    ChirpDrive(mean_nm=0.047, amplitude_nm=0.01, from_hz=0.1, to_hz=10.0, duration_s=20.0)
     """
 
     _key: ClassVar[str] = "rig.drive.chirp"

@@ -86,6 +86,20 @@ SpringDrive(stiffness_nm_rad=0.02, rest_deg=180.0)",
 TableDrive(points_s_nm=((0.0, 0.045), (2.0, 0.055)))",
     ),
     known(
+        "SineDrive",
+        "SineDrive",
+        false,
+        r">>> clutch.SineDrive(mean_nm=0.047, amplitude_nm=0.01, frequency_hz=2)
+SineDrive(mean_nm=0.047, amplitude_nm=0.01, frequency_hz=2.0, phase_turns=0.0)",
+    ),
+    known(
+        "ChirpDrive",
+        "ChirpDrive",
+        false,
+        r">>> clutch.ChirpDrive(mean_nm=0.047, amplitude_nm=0.01, from_hz=0.1, to_hz=10, duration_s=20)
+ChirpDrive(mean_nm=0.047, amplitude_nm=0.01, from_hz=0.1, to_hz=10.0, duration_s=20.0)",
+    ),
+    known(
         "HandDrive",
         "HandDrive",
         false,
