@@ -37,6 +37,11 @@ fn ends_with(name: &str, fault: &str, causes: &[(&str, &str)], latest: u64) {
             return Err(format!("it ended at tick {ticks}, before the fault: {}", report["cause_text"]));
         }
         let _ = board.end();
+        let cause = report["cause"].as_str().unwrap_or_default();
+        let held_up = ["Late", "Lost", "Deadline", "Silence"].contains(&cause);
+        if held_up && causes.iter().all(|(name, _)| *name != cause) {
+            return Err(format!("it ended at tick {ticks}: {}", report["cause_text"]));
+        }
         Ok((report, done.code))
     });
     println!("{fault}: {} at tick {}", report["cause_text"], report["ticks"]);

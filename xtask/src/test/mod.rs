@@ -31,12 +31,12 @@ pub(crate) fn all() -> Result<()> {
     }
     // Before the tests: some build images for an emulated board.
     targets()?;
-    let built = build(&mut tally)?;
-    // Mostly builds that link for long on one core, as the wheel's do, beside tests that wait; in folders of its own.
+    let mut sound = build(&mut tally)? && host(&mut tally)?;
+    // Both are mostly builds that link for long on one core, in folders of their own. Not beside the tests before: some of
+    // them keep a clock.
     let boards = beside("boards")?;
-    let mut sound = built && host(&mut tally)?;
     sound &= wheel_of(&mut tally)?;
-    tally.stage("boards, beside all that");
+    tally.stage("boards, beside the wheel");
     let (ended, text) = boards.output()?;
     print!("{text}");
     tally.add(ended, &text);
