@@ -64,7 +64,9 @@ def draw(rng: np.random.Generator, extreme: bool) -> Case:
         inertia, v_s, seconds = log(1e-4, 0.1), log(1e-4, 1), log(1e-4, 1e-2)
         ratio, drag = rng.uniform(1, 2.5), rng.uniform(0, 0.3)
     mu_dynamic, gain, volts = log(0.02, 0.5), log(0.01, 10), log(0.1, 10)
-    mu_static = mu_dynamic * ratio
+    # The borders that formulas treat by themselves.
+    mu_static = mu_dynamic * (1.0 if rng.random() < 0.05 else ratio)
+    drag = 0.0 if rng.random() < 0.05 else drag
     holds = mu_static * gain * volts
     if rng.random() < 1 / 3:
         torque, velocity = max(holds * (1 + log(1e-14, 1e-1)), np.nextafter(holds, 1e9)), 0.0
@@ -122,18 +124,22 @@ def reference(c: Case) -> tuple[float, float]:
 
 
 def compare(program: str | Path, engine: str, cases: list[Case], truths: list[tuple[float, float]]) -> dict:
-    """Errors by kind, as a share of the fastest speed and of the way at it; refusals; ends in a wrong state."""
+    """Errors by kind, as a share of the fastest speed at an end and of the way at it; refusals; wrong ends."""
     text = "".join(case.line() + "\n" for case in cases)
     done = subprocess.run([program, engine], input=text, capture_output=True, text=True, check=True)
-    found = {kind: {"errors": [], "refused": 0, "wrong": 0} for kind in KINDS}
+    found = {kind: {"errors": [], "refused": 0, "wrong": 0, "stuck": 0} for kind in KINDS}
     for case, truth, line in zip(cases, truths, done.stdout.splitlines(), strict=True):
         row = found[case.kind()]
         if line.startswith("error"):
             row["refused"] += 1
             continue
         position, velocity = (float(x) for x in line.split()[:2])
-        fastest = max(abs(truth[1]), abs(case.velocity), case.stribeck_velocity)
         row["wrong"] += (velocity == 0) != (truth[1] == 0)
+        if case.velocity == velocity == truth[1] == 0:
+            row["stuck"] += 1  # and says nothing of an error
+            continue
+        # What moves: of a break-away that has only begun, however little that is.
+        fastest = max(abs(truth[1]), abs(case.velocity), 1e-12 * case.stribeck_velocity)
         way = abs(position - truth[0]) / (fastest * case.seconds)
         row["errors"].append(max(way, abs(velocity - truth[1]) / fastest))
     return found
@@ -141,8 +147,9 @@ def compare(program: str | Path, engine: str, cases: list[Case], truths: list[tu
 
 def main() -> None:
     program, count = sys.argv[1], int(sys.argv[2])
-    print("| range | engine | kind | intervals | not followed | wrong state | error: median | 99 % | most |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("| range | engine | kind | intervals | not followed | stuck throughout | wrong state", end=" ")
+    print("| error: median | 99 % | most |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
     for extreme, name in ((False, "moderate"), (True, "extreme")):
         rng = np.random.default_rng(1)
         cases = [draw(rng, extreme) for _ in range(count // 2)]
@@ -151,8 +158,8 @@ def main() -> None:
             for kind, row in compare(program, engine, cases, truths).items():
                 median, most = (f"{np.quantile(row['errors'], q):.1e}" for q in (0.5, 1))
                 late = f"{np.quantile(row['errors'], 0.99):.1e}"
-                total = len(row["errors"]) + row["refused"]
-                cells = (name, engine, kind, total, row["refused"], row["wrong"], median, late, most)
+                total = len(row["errors"]) + row["refused"] + row["stuck"]
+                cells = (name, engine, kind, total, row["refused"], row["stuck"], row["wrong"], median, late, most)
                 print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
 
 

@@ -10,8 +10,8 @@ from intervals import ENGINES, KINDS, compare, draw, reference
 PROGRAM = os.environ.get("CLUTCH_INTERVALS")
 # What the whole campaign found, with room: docs/theory.md, section 10.
 MOST = {
-    "exact_flow": {"motion": 1e-9, "break-away": 1e-9, "soft break-away": 1e-9},
-    "dormand_prince": {"motion": 1e-7, "break-away": 1e-6, "soft break-away": 1e-2},
+    "exact_flow": {"motion": 1e-9, "break-away": 1e-9, "soft break-away": 1e-6},
+    "dormand_prince": {"motion": 1e-6, "break-away": 1e-6, "soft break-away": 3e-2},
 }
 
 
@@ -31,6 +31,6 @@ def test_an_engine_ends_where_scipy_does(engine, drawn):
         row = found[kind]
         assert row["wrong"] == 0, kind
         # A stiff layer takes Dormand–Prince more steps than it allows itself: it says so.
-        assert row["refused"] == 0 or (extreme and engine == "dormand_prince"), kind
-        assert max(row["errors"]) <= MOST[engine][kind], kind
+        assert row["refused"] <= (4 if extreme and engine == "dormand_prince" else 0), kind
+        assert np.all(np.array(row["errors"]) <= MOST[engine][kind]), kind
         assert len(row["errors"]) > 10, kind

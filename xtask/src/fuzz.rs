@@ -3,7 +3,7 @@
 use crate::run::{Program, program, root};
 use anyhow::{Result, bail};
 
-/// Targets in `fuzz/fuzz_targets`, each with the number of inputs that tests try: as many as took 20 s.
+/// Targets in `fuzz/fuzz_targets`, each with the number of inputs that tests try, those of the corpus among them: as many as took 20 s.
 pub(crate) const TARGETS: [(&str, u32); 3] =
     [("decoder", 700_000), ("log", 110_000), ("board_controller", 7000)];
 

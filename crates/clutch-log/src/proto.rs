@@ -94,7 +94,7 @@ impl Channel {
 /// A value of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
-    /// A whole number; one that is not negative has its 64 bits.
+    /// A whole number; an unsigned one above 2⁶³ − 1 shows as negative.
     Whole(i64),
     /// A real number.
     Real(f64),

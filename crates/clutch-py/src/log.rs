@@ -78,6 +78,8 @@ impl Growing {
 fn table<R: InChannel>(records: &[R], terms: &[String]) -> Table {
     let mut columns: Vec<(String, Growing)> =
         R::CHANNEL.columns(terms).into_iter().map(|(name, kind)| (name, Growing::of(kind))).collect();
+    // A law's term must not hide the time.
+    columns.iter_mut().filter(|(name, _)| name == TIME).for_each(|(name, _)| name.push_str("_term"));
     for record in records {
         let mut values = record.values();
         columns.iter_mut().for_each(|(_, column)| column.push(values.next()));

@@ -310,7 +310,8 @@ fn unit_of(name: &str) -> Option<&'static str> {
     let mut figures = run.chain(Detected::FIGURES.iter().map(|f| (f.name, f.unit)));
     match figures.find(|(figure, _)| *figure == name) {
         Some((_, unit)) => (unit != "1").then_some(unit),
-        None => Unit::of_key(name).map(|unit| unit.text),
+        // A name that is nothing but a unit, as `counts`, is a plain number's.
+        None => Unit::of_key(name).filter(|unit| name.len() > unit.suffix.len()).map(|unit| unit.text),
     }
 }
 

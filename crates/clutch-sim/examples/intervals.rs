@@ -1,5 +1,5 @@
 //! Moves a shaft over single intervals, read from the input line by line, by the engine that is named: what a referee
-//! outside of this project compares with its own solution. `crates/clutch-sim/examples/intervals.py` is one.
+//! outside of this project compares with its own solution. `python/tests/intervals.py` is one.
 //!
 //! A line is `J C mu_s mu_d v_s torque volts K_COF velocity seconds`, in SI; the answer is `position velocity` and the
 //! instants of the events, `+` for a break-away and `-` for a stick, or the error in words.

@@ -1,4 +1,4 @@
-//! The drive of the shaft: a weight, a spring, a torque over time, or a hand.
+//! The drive of the shaft: a weight, a spring, a torque over time (table, sine, chirp), or a hand.
 
 use crate::tables::Points;
 use clutch_core::params::{Params, Range};

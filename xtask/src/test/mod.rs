@@ -171,7 +171,7 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
     Ok(())
 }
 
-/// Each reader of bytes from outside, with as many inputs of chance as it read in 20 s when they were counted.
+/// Each reader of bytes from outside, with a number of inputs, those of the corpus among them, that took 20 s when counted.
 fn fuzzing(tally: &mut Tally) -> Result<()> {
     if std::env::var_os("CI").is_none() {
         println!(

@@ -51,6 +51,8 @@ struct Slip<'a> {
     input: &'a Input<'a>,
     sign: f64,
     inverse_inertia: f64,
+    /// Rounding of the acceleration, rad/s²: the torques that make it, of which next to nothing may be left.
+    rounding: f64,
 }
 
 impl Slip<'_> {
@@ -60,7 +62,10 @@ impl Slip<'_> {
         // Friction acts against the way the shaft slips, also in the stages of a step that looks
         // beyond the stop: there it keeps its value at rest.
         let speed = (self.sign * velocity).max(0.0);
-        let mu = self.model.plant.friction().level(speed) * self.model.friction_factor(position);
+        let friction = self.model.plant.friction();
+        // Rounding must not lift it above the number that the break-away was compared with.
+        let level = friction.level(speed).min(friction.at_rest().max(friction.sliding()));
+        let mu = level * self.model.friction_factor(position);
         let brake = self.sign * mu * p.brake_gain * self.input.volts.at(s).max(0.0);
         [
             velocity,
@@ -85,8 +90,8 @@ impl Slip<'_> {
         let largest = |n: usize| from[n].abs().max(to[n].abs());
         let rounding = ROUNDING * (1.0 + largest(0));
         let way = (ABSOLUTE * (1.0 + largest(0))).min(RELATIVE * h * largest(1) + rounding);
-        let speed = (ABSOLUTE * (1.0 + largest(1))).min(RELATIVE * largest(1) + f64::MIN_POSITIVE);
-        let error = (left_out(0) / way).max(left_out(1) / speed);
+        let speed = (ABSOLUTE * (1.0 + largest(1))).min(RELATIVE * largest(1) + self.rounding * h);
+        let error = (left_out(0) / way).max(left_out(1) / speed.max(f64::MIN_POSITIVE));
         (to, error, k[6])
     }
 }
@@ -116,7 +121,10 @@ impl Engine for DormandPrince {
                 events.push(event(EventKind::BreakAway, s, shaft.position));
             }
             let inverse_inertia = 1.0 / model.plant.params().inertia;
-            let slip = Slip { model, input, sign: shaft.motion.sign(), inverse_inertia };
+            let torques = input.torque(s, shaft.position).abs()
+                + model.break_away_torque(shaft.position, input.volts.at(s));
+            let rounding = 2.0 * f64::EPSILON * torques * inverse_inertia;
+            let slip = Slip { model, input, sign: shaft.motion.sign(), inverse_inertia, rounding };
             let mut state = [shaft.position, shaft.velocity];
             let mut rate = slip.rate(s, state);
             let mut at_rest = shaft.velocity == 0.0;
@@ -157,7 +165,7 @@ impl Engine for DormandPrince {
                     break;
                 }
                 if at_rest && (!last || grown > self.from_rest) {
-                    self.from_rest = length;
+                    self.from_rest = grown;
                 }
                 at_rest = false;
                 s = if last { end } else { s + length };
@@ -182,7 +190,8 @@ impl Engine for DormandPrince {
 /// trial is as accurate as the pair itself.
 fn stop(slip: &Slip<'_>, s: f64, length: f64, state: State, rate: State, beyond: f64) -> (f64, State) {
     let (mut before, mut after) = (0.0, length);
-    let mut h = length * state[1] / (state[1] - beyond);
+    // From rest, which is a root, too, the other one is looked for.
+    let mut h = if state[1] == 0.0 { 0.5 * length } else { length * state[1] / (state[1] - beyond) };
     loop {
         let (to, _, end_rate) = slip.step(s, h, state, rate);
         if slip.sign * to[1] > 0.0 {

@@ -18,8 +18,8 @@
 //!    of its own and not taken anew as a difference of large ones.
 //! 4. Stuck: nothing to integrate; break-away is a comparison.
 //!
-//! `φ` never changes its sign: in an interval the speed only rises or only falls. The shaft stops once at most, and
-//! there is no balance to step over. docs/theory.md has the derivation and the errors that were measured.
+//! `φ` never changes its sign: until it stops, if it does, the speed only rises or only falls. There is no balance to step
+//! over. docs/theory.md has the derivation and the errors that were measured.
 
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, Volts, break_away};
 use clutch_core::friction::FrictionModel;
@@ -36,21 +36,22 @@ const FRINGE: f64 = 1e-5;
 const REACH: f64 = 3.0;
 /// Time, in the motion's own, that five terms of a series bridge.
 const SHORT: f64 = 0.02;
-/// Gauss and Legendre's eight points on [0, 1]: place, weight, and the weight that gives the seventh coefficient of
-/// a series in Legendre's polynomials.
-const NODES: [[f64; 3]; 8] = [
-    [0.019855071751231912, 0.05061426814518853, -0.11769245644771334],
-    [0.10166676129318664, 0.11119051722668721, 0.37789693708459166],
-    [0.2372337950418355, 0.15685332293894344, -0.6317745531190041],
-    [0.4082826787521751, 0.18134189168918083, 0.7849065579218123],
-    [0.5917173212478248, 0.18134189168918083, -0.7849065579218123],
-    [0.7627662049581645, 0.15685332293894344, 0.6317745531190041],
-    [0.8983332387068134, 0.11119051722668721, -0.37789693708459166],
-    [0.9801449282487681, 0.05061426814518853, 0.11769245644771334],
+/// Gauss and Legendre's eight points on [0, 1]: place, weight, and the weights that give the sixth and the seventh
+/// coefficient of a series in Legendre's polynomials.
+const NODES: [[f64; 4]; 8] = [
+    [0.019855071751231912, 0.05061426814518853, 0.20989219106703316, -0.11769245644771334],
+    [0.10166676129318664, 0.11119051722668721, -0.5591073831433644, 0.37789693708459166],
+    [0.2372337950418355, 0.15685332293894344, 0.6166048635025351, -0.6317745531190041],
+    [0.4082826787521751, 0.18134189168918083, -0.2673896714262035, 0.7849065579218123],
+    [0.5917173212478248, 0.18134189168918083, -0.2673896714262035, -0.7849065579218123],
+    [0.7627662049581645, 0.15685332293894344, 0.6166048635025351, 0.6317745531190041],
+    [0.8983332387068134, 0.11119051722668721, -0.5591073831433644, -0.37789693708459166],
+    [0.9801449282487681, 0.05061426814518853, 0.20989219106703316, 0.11769245644771334],
 ];
 /// Distance from balance, as a share of the speed, that no double shows.
 const BALANCED: f64 = 1e-17;
-/// Speed, in Stribeck velocities, from which on `q` is lost in rounding where it would be below 20 at rest and by the end.
+/// Speed, in Stribeck velocities, above which `q` is lost in rounding if `K` times the time left is below 20; else the
+/// logarithm of that product comes on top.
 const LINEAR_ABOVE: f64 = 40.0;
 /// Pieces in one interval before the engine gives up.
 const PIECE_LIMIT: u32 = 10_000;
@@ -170,7 +171,7 @@ impl Flow {
         let (mean, second) = decay_means(self.drag * time);
         at.way += at.speed * time + rate * time * time * second;
         at.time += time;
-        at.speed = if reaches { to } else { at.speed + rate * time * mean };
+        at.speed = if reaches { to } else { (at.speed + rate * time * mean).max(0.0) };
         at.rate = None;
     }
 
@@ -243,16 +244,19 @@ impl Flow {
             let fall = if long { libm::exp(-way) - 1.0 } else { libm::expm1(-way) };
             now - self.drag * way - slip * fall
         };
-        let (mut time, mut moment, mut last) = (0.0, 0.0, 0.0);
-        for [node, weight, seventh] in NODES {
+        let (mut time, mut moment, mut even, mut odd) = (0.0, 0.0, 0.0, 0.0);
+        for [node, weight, sixth, seventh] in NODES {
             let inverse = 1.0 / rate(node * way);
             time += weight * inverse;
             moment += weight * node * inverse;
-            last += seventh * inverse;
+            even += sixth * inverse;
+            odd += seventh * inverse;
         }
         // The coefficients of a series in Legendre's polynomials fall like those of a power series: what eight nodes
-        // leave out is about the square of what the seventh coefficient is.
-        if !(time * way > 0.0 && (last / time) * (last / time) <= TOLERANCE) {
+        // leave out is about the square of what the seventh coefficient is. An even integrand has none; its sixth is then
+        // some three times as large.
+        let last = odd.abs().max(even.abs() / 3.0) / time;
+        if !(time * way > 0.0 && last * last <= TOLERANCE) {
             return None;
         }
         let (time, moment) = (time * way, moment * way * way);
@@ -398,8 +402,8 @@ impl Engine for ExactFlow {
         let stribeck = brake * (friction.at_rest - friction.sliding) / unit;
         let event = |kind, s: f64, position| Event { time: input.time + s, kind, position, torque };
         let mut s = 0.0;
-        // Stuck or not at first, it stops once at most, and then rises or stays.
-        loop {
+        // It stops once at most; then it stays, or rises the other way.
+        for _ in 0..3 {
             if shaft.motion == Motion::Stuck {
                 if s >= input.duration || break_away(model, input, shaft.position, s).is_none() {
                     return Ok(());
@@ -408,9 +412,15 @@ impl Engine for ExactFlow {
                 events.push(event(EventKind::BreakAway, s, shaft.position));
             }
             let (sign, left) = (shaft.motion.sign(), input.duration - s);
+            let excess = (sign * torque - holds) / unit;
             let flow = Flow {
-                drive: (sign * torque - brake * friction.sliding) / unit,
-                excess: (sign * torque - holds) / unit,
+                // Without a layer both are one number, rounded once: the break-away that was seen has to happen.
+                drive: if stribeck == 0.0 {
+                    excess
+                } else {
+                    (sign * torque - brake * friction.sliding) / unit
+                },
+                excess,
                 drag: p.viscous_damping / p.inertia,
                 stribeck,
                 edge: if stribeck.abs() * left < 20.0 {
@@ -439,5 +449,6 @@ impl Engine for ExactFlow {
             }
             shaft.motion = Motion::along(torque);
         }
+        Err(EngineError::TooManySteps { time: input.time, limit: 3 })
     }
 }

@@ -107,7 +107,7 @@ pub enum Volts {
 }
 
 impl Volts {
-    /// The most that the voltage bends downwards from `s` on, V/s².
+    /// The most that the voltage bends upwards from `s` on, and with it the excess of torque downwards, V/s².
     fn curvature(self, s: f64) -> f64 {
         match self {
             Volts::Held(_) => 0.0,
