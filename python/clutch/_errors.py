@@ -1,4 +1,4 @@
-"""What the package raises of its own."""
+"""Errors of the package's own."""
 
 
 class ParamError(ValueError):

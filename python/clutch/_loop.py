@@ -23,16 +23,16 @@ class LoopResult:
     Attributes
     ----------
     scenario : Scenario
-        What ran. For a board that closes the loop itself it is one in single precision.
+        The scenario that ran. For a board that closes the loop itself it is one in single precision.
     verdict : str
         ``"done"``: the path is done. ``"stopped"``: stopped from here. ``"fault"``: a fault ended the run, or the port
         was lost. ``"not_armed"``: the board did not take consent.
     state, cause, cause_text : str
         Where control ended, why, and why in words.
     value : float
-        What the check saw that ended it.
+        The value that the check saw that ended it.
     certified : bool
-        Whether the gains are certified for the scenario's bounds.
+        True if the gains are certified for the scenario's bounds.
     ticks : int
         Periods in which the law was asked.
     metrics : Metrics
@@ -49,17 +49,17 @@ class LoopResult:
     tick_clock_cycles : dict of str to float or None
         Clock cycles of a tick, of a board that counts them: ``clock_hz``, ``p50``, ``p99_9``, ``max``.
     board_safe : bool
-        Whether the board said that it is in its safe state.
+        True if the board said that it is in its safe state.
     board_waits : int or None
-        How often the simulated board's clock waited for this machine.
+        Number of times that the simulated board's clock waited for this machine.
     port_error : str or None
         The port's error, if it ended the run.
     notes : list of str
-        What the system refused (priority, memory), and what to do about it.
+        Refusals of the system (priority, memory), and what to do about them.
     log : Path or None
         The log's file.
     announcement : str
-        What the session said it would do, before anything moved.
+        The session's announcement, before anything moved.
     version : str
         Version and commit of the build.
 
@@ -161,11 +161,11 @@ def loop(
     fault_seed : int, default 1
         Seed of the faults that hit at random.
     pace : {"sample", "clock"}
-        What starts a cycle: the board's sample, or this machine's clock.
+        Start of a cycle: the board's sample, or this machine's clock.
     wait : {"sleep", "spin"}
-        How the loop waits: the kernel wakes it, or it wakes early and spins.
+        Way of waiting: the kernel wakes the loop, or it wakes early and spins.
     spin_us : int, default 150
-        How long before a sample it begins to spin, µs.
+        Time before a sample at which it begins to spin, µs.
     thread_priority : int
         Priority of the loop's thread under SCHED_FIFO, 1 to 99; 0 stays with the ordinary scheduler.
     lock_memory : bool, default False

@@ -1,4 +1,4 @@
-"""What the generated classes of a scenario's tables can do beyond holding values: bases of some of them."""
+"""Bases of some of the generated classes of a scenario's tables: abilities beyond holding values."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Self, overload

@@ -63,7 +63,7 @@ class Scenario(_tables._Scenario):
         Raises
         ------
         ParamError
-            What is wrong in it; `field` is the dotted key.
+            The first fault in it; `field` is the dotted key.
         OSError
             The file cannot be read; FileNotFoundError if there is none, and no built-in scenario either.
 
@@ -93,7 +93,7 @@ class Scenario(_tables._Scenario):
         Raises
         ------
         ParamError
-            What is wrong in it; `field` is the dotted key.
+            The first fault in it; `field` is the dotted key.
 
         Examples
         --------
@@ -169,7 +169,7 @@ class Scenario(_tables._Scenario):
         Returns
         -------
         Certificate
-            Whether they are certified, what they would have to be, and how far the shaft strays at most.
+            The verdict, the gains that the bounds would need, and the farthest that the shaft strays.
 
         Examples
         --------

@@ -21,6 +21,6 @@ def split(name: str) -> tuple[str, str]:
 
 
 def attributes(name: str) -> dict[str, str]:
-    """What xarray keeps beside a column, and writes on the axes of its plots."""
+    """Attributes that xarray keeps beside a column, and writes on the axes of its plots."""
     _, unit = split(name)
     return {"units": unit} if unit else {}

@@ -60,7 +60,7 @@ from typing import NamedTuple
 
 @dataclass(frozen=True, kw_only=True)
 class Metrics:
-    """How well a run went. All figures are taken after the settling time, with the true position.
+    """The quality of a run. All figures are taken after the settling time, with the true position.
 
     Attributes
     ----------
