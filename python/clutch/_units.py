@@ -21,6 +21,6 @@ def split(name: str) -> tuple[str, str]:
 
 
 def attributes(name: str) -> dict[str, str]:
-    """Attributes that xarray keeps beside a column, and writes on the axes of its plots."""
+    """Attributes of a column: xarray writes them on the axes of its plots, Arrow keeps them with the field."""
     _, unit = split(name)
     return {"units": unit} if unit else {}

@@ -35,25 +35,18 @@ pub(crate) fn beside(verb: &str) -> Result<Beside> {
     Ok(Beside { child, path })
 }
 
-/// A program in the background; stopped when this is dropped.
+/// A program in the background.
 pub(crate) struct Beside {
     child: Child,
     path: PathBuf,
 }
 
 impl Beside {
-    /// Its success, and its output on both streams.
+    /// Waits for its end; its success, and its output on both streams.
     pub(crate) fn output(mut self) -> Result<(bool, String)> {
         let done = self.child.wait()?;
         let text = std::fs::read(&self.path).with_context(|| self.path.display().to_string())?;
         Ok((done.success(), String::from_utf8_lossy(&text).into_owned()))
-    }
-}
-
-impl Drop for Beside {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

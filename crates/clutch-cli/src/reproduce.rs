@@ -162,7 +162,10 @@ fn settings() -> Vec<(String, String)> {
 
 /// The parameters of the bench's friction, by their keys.
 fn bench_friction() -> String {
-    let Some(Ok(scenario)) = Scenario::built_in("bench_pd_2") else { return "?".to_owned() };
+    // Its rig is the bench and nothing else.
+    let Some(Ok(scenario)) = Scenario::built_in("bench_pd_2") else {
+        unreachable!("a scenario that is built in")
+    };
     let of_friction = |(key, value): (String, String)| {
         let key = key.strip_prefix("rig.friction.")?.to_owned();
         Some(format!("{key} = {value}"))

@@ -75,94 +75,105 @@ pub trait Real:
     }
 }
 
+/// Marks a path that is seldom taken: on a board a jump past it is cheaper than to compute it and select.
+#[cold]
+#[inline]
+fn seldom() {}
+
+/// The arithmetic of a scalar, but for what its precision decides.
+macro_rules! scalar {
+    ($scalar:ident: $abs:ident $pow:ident $max:ident $min:ident) => {
+        type Mask = bool;
+        type Limit = Limit;
+        const ZERO: $scalar = 0.0;
+        const ONE: $scalar = 1.0;
+
+        #[inline]
+        fn less(self, other: $scalar) -> bool {
+            self < other
+        }
+        #[inline]
+        fn less_or_equal(self, other: $scalar) -> bool {
+            self <= other
+        }
+        #[inline]
+        fn select(mask: bool, a: $scalar, b: $scalar) -> $scalar {
+            if mask { a } else { b }
+        }
+        #[inline]
+        fn limit_of(limit: Limit) -> Limit {
+            limit
+        }
+        #[inline]
+        fn select_limit(mask: bool, a: Limit, b: Limit) -> Limit {
+            if mask { a } else { b }
+        }
+        #[inline]
+        fn all(mask: bool) -> bool {
+            mask
+        }
+        #[inline]
+        fn abs(self) -> $scalar {
+            libm::$abs(self)
+        }
+        #[inline]
+        fn powf(self, n: $scalar) -> $scalar {
+            libm::$pow(self, n)
+        }
+        #[inline]
+        fn max(self, other: $scalar) -> $scalar {
+            libm::$max(self, other)
+        }
+        #[inline]
+        fn min(self, other: $scalar) -> $scalar {
+            libm::$min(self, other)
+        }
+        #[inline]
+        fn is_finite(self) -> bool {
+            $scalar::is_finite(self)
+        }
+        #[inline]
+        fn limited(self, lowest: $scalar, highest: $scalar, invalid: $scalar) -> ($scalar, Limit) {
+            if self >= lowest {
+                if self <= highest { (self, Limit::None) } else { (highest, Limit::Highest) }
+            } else if self < lowest {
+                (lowest, Limit::Lowest)
+            } else {
+                (invalid, Limit::Invalid)
+            }
+        }
+        #[inline]
+        fn sgn(self) -> $scalar {
+            if self > 0.0 {
+                1.0
+            } else if self < 0.0 {
+                -1.0
+            } else {
+                0.0
+            }
+        }
+        #[inline]
+        fn sat(self) -> $scalar {
+            // Between the ends, where a law spends its time, two comparisons decide; NaN fails both.
+            if self < 1.0 {
+                return if self > -1.0 { self } else { -1.0 };
+            }
+            seldom();
+            if self >= 1.0 { 1.0 } else { 0.0 }
+        }
+    };
+}
+
 impl Arithmetic for f64 {
-    type Mask = bool;
-    type Limit = Limit;
-    const ZERO: f64 = 0.0;
-    const ONE: f64 = 1.0;
+    scalar!(f64: fabs pow fmax fmin);
 
     #[inline]
     fn splat(x: f64) -> f64 {
         x
     }
     #[inline]
-    fn less(self, other: f64) -> bool {
-        self < other
-    }
-    #[inline]
-    fn less_or_equal(self, other: f64) -> bool {
-        self <= other
-    }
-    #[inline]
-    fn select(mask: bool, a: f64, b: f64) -> f64 {
-        if mask { a } else { b }
-    }
-    #[inline]
-    fn limit_of(limit: Limit) -> Limit {
-        limit
-    }
-    #[inline]
-    fn select_limit(mask: bool, a: Limit, b: Limit) -> Limit {
-        if mask { a } else { b }
-    }
-    #[inline]
-    fn all(mask: bool) -> bool {
-        mask
-    }
-    #[inline]
-    fn abs(self) -> f64 {
-        libm::fabs(self)
-    }
-    #[inline]
     fn exp_neg(self) -> f64 {
         libm::exp(-self)
-    }
-    #[inline]
-    fn powf(self, n: f64) -> f64 {
-        libm::pow(self, n)
-    }
-    #[inline]
-    fn max(self, other: f64) -> f64 {
-        libm::fmax(self, other)
-    }
-    #[inline]
-    fn min(self, other: f64) -> f64 {
-        libm::fmin(self, other)
-    }
-    #[inline]
-    fn is_finite(self) -> bool {
-        f64::is_finite(self)
-    }
-    #[inline]
-    fn limited(self, lowest: f64, highest: f64, invalid: f64) -> (f64, Limit) {
-        if self >= lowest {
-            if self <= highest { (self, Limit::None) } else { (highest, Limit::Highest) }
-        } else if self < lowest {
-            (lowest, Limit::Lowest)
-        } else {
-            (invalid, Limit::Invalid)
-        }
-    }
-    #[inline]
-    fn sgn(self) -> f64 {
-        if self > 0.0 {
-            1.0
-        } else if self < 0.0 {
-            -1.0
-        } else {
-            0.0
-        }
-    }
-    #[inline]
-    fn sat(self) -> f64 {
-        // Between the ends, where a law spends its time, two comparisons decide; NaN fails all.
-        if self > -1.0 {
-            if self < 1.0 { self } else { 1.0 }
-        } else if self <= -1.0 {
-            -1.0
-        } else {
-            0.0
-        }
     }
 }
 
@@ -221,48 +232,12 @@ impl Real for f64 {
     }
 }
 
-/// Marks a path that is seldom taken: on a board a jump past it is cheaper than to compute it and select.
-#[cold]
-#[inline]
-fn seldom() {}
-
 impl Arithmetic for f32 {
-    type Mask = bool;
-    type Limit = Limit;
-    const ZERO: f32 = 0.0;
-    const ONE: f32 = 1.0;
+    scalar!(f32: fabsf powf fmaxf fminf);
 
     #[inline]
     fn splat(x: f64) -> f32 {
         x as f32
-    }
-    #[inline]
-    fn less(self, other: f32) -> bool {
-        self < other
-    }
-    #[inline]
-    fn less_or_equal(self, other: f32) -> bool {
-        self <= other
-    }
-    #[inline]
-    fn select(mask: bool, a: f32, b: f32) -> f32 {
-        if mask { a } else { b }
-    }
-    #[inline]
-    fn limit_of(limit: Limit) -> Limit {
-        limit
-    }
-    #[inline]
-    fn select_limit(mask: bool, a: Limit, b: Limit) -> Limit {
-        if mask { a } else { b }
-    }
-    #[inline]
-    fn all(mask: bool) -> bool {
-        mask
-    }
-    #[inline]
-    fn abs(self) -> f32 {
-        libm::fabsf(self)
     }
     /// 2⁻ⁿ 2⁻ᶠ with f in ±1/2: a polynomial, minimax to 1.1e-7 with the value and slope of 2⁻ᶠ at 0.
     /// On a Cortex-M4F these are 28 instructions; `libm::expf` takes up to 82.
@@ -277,51 +252,6 @@ impl Arithmetic for f32 {
         let power = f32::from_bits(rounded.to_bits() << 23);
         let tail = 0.240_222_83 + f * (-0.055_505_585 + f * (0.009_669_66 + f * -0.001_330_051_6));
         power * (1.0 + f * (-LN_2 + f * tail))
-    }
-    #[inline]
-    fn powf(self, n: f32) -> f32 {
-        libm::powf(self, n)
-    }
-    #[inline]
-    fn max(self, other: f32) -> f32 {
-        libm::fmaxf(self, other)
-    }
-    #[inline]
-    fn min(self, other: f32) -> f32 {
-        libm::fminf(self, other)
-    }
-    #[inline]
-    fn is_finite(self) -> bool {
-        f32::is_finite(self)
-    }
-    #[inline]
-    fn limited(self, lowest: f32, highest: f32, invalid: f32) -> (f32, Limit) {
-        if self >= lowest {
-            if self <= highest { (self, Limit::None) } else { (highest, Limit::Highest) }
-        } else if self < lowest {
-            (lowest, Limit::Lowest)
-        } else {
-            (invalid, Limit::Invalid)
-        }
-    }
-    #[inline]
-    fn sgn(self) -> f32 {
-        if self > 0.0 {
-            1.0
-        } else if self < 0.0 {
-            -1.0
-        } else {
-            0.0
-        }
-    }
-    #[inline]
-    fn sat(self) -> f32 {
-        // Between the ends, where a law spends its time, two comparisons decide; NaN fails both.
-        if self < 1.0 {
-            return if self > -1.0 { self } else { -1.0 };
-        }
-        seldom();
-        if self >= 1.0 { 1.0 } else { 0.0 }
     }
 }
 

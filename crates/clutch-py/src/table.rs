@@ -9,8 +9,6 @@ use arrow_array::{
 };
 use arrow_buffer::{Buffer, ScalarBuffer};
 use arrow_schema::{ArrowError, Field, Schema};
-use clutch_core::params::Unit;
-use clutch_sim::metrics::{Detected, Metrics};
 use numpy::ndarray::ArrayView1;
 use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyValueError};
@@ -290,28 +288,18 @@ impl Table {
         self.rows
     }
 
-    fn batch(&self) -> Result<RecordBatch, ArrowError> {
+    /// `attributes` gives what is kept beside each column: its unit, if it has one.
+    fn batch(&self, attributes: Vec<HashMap<String, String>>) -> Result<RecordBatch, ArrowError> {
         let arrays: Vec<ArrayRef> = self.columns.iter().map(Column::to_arrow).collect();
-        let field = |(name, a): (&String, &ArrayRef)| {
-            let units = unit_of(name).map(|unit| ("units".to_owned(), unit.to_owned()));
-            let units: HashMap<String, String> = units.into_iter().collect();
-            Field::new(name, a.data_type().clone(), false).with_metadata(units)
-        };
-        let fields: Vec<Field> = self.names.iter().zip(&arrays).map(field).collect();
+        let columns = self.names.iter().zip(&arrays).zip(attributes);
+        let fields: Vec<Field> = columns
+            .map(|((name, a), attributes)| {
+                Field::new(name, a.data_type().clone(), false).with_metadata(attributes)
+            })
+            .collect();
         // The number of rows for a table without columns, which is one, too.
         let options = RecordBatchOptions::new().with_row_count(Some(self.rows));
         RecordBatch::try_new_with_options(Arc::new(Schema::new(fields)), arrays, &options)
-    }
-}
-
-/// The unit of a column, which a figure's row gives, else the ending of the name; none for a plain number.
-fn unit_of(name: &str) -> Option<&'static str> {
-    let run = Metrics::FIGURES.iter().map(|f| (f.name, f.unit));
-    let mut figures = run.chain(Detected::FIGURES.iter().map(|f| (f.name, f.unit)));
-    match figures.find(|(figure, _)| *figure == name) {
-        Some((_, unit)) => (unit != "1").then_some(unit),
-        // A name that is nothing but a unit, as `counts`, is a plain number's.
-        None => Unit::of_key(name).filter(|unit| name.len() > unit.suffix.len()).map(|unit| unit.text),
     }
 }
 
@@ -419,7 +407,10 @@ impl Table {
     ) -> PyResult<Bound<'py, PyCapsule>> {
         let _ = requested_schema; // a hint, which a producer may ignore
         let wrong = |e: ArrowError| PyValueError::new_err(e.to_string());
-        let batch = self.batch().map_err(wrong)?;
+        let units = py.import("clutch._units")?;
+        let of = |name| units.call_method1("attributes", (name,))?.extract();
+        let attributes = self.names.iter().map(of).collect::<PyResult<_>>()?;
+        let batch = self.batch(attributes).map_err(wrong)?;
         let schema = batch.schema();
         let reader = RecordBatchIterator::new([Ok(batch)], schema);
         let stream = FFI_ArrowArrayStream::new(Box::new(reader));

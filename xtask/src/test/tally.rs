@@ -141,7 +141,7 @@ impl Tally {
             println!("{:>8} {:>10}  {name}", minutes(*time), minutes(*processor));
         }
         if !self.beside.is_empty() {
-            println!("of that beside the wheel:");
+            println!("of that beside tests and wheel:");
             self.beside.iter().for_each(|row| println!("{row}"));
         }
         println!();

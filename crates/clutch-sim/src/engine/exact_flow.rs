@@ -7,7 +7,7 @@
 //! φ̇ = (q − G) φ,   q̇ = −q φ                        K = b Δμ/(J v_s),  b = K_COF v_a,  Δμ = μ_s − μ_d
 //! ```
 //!
-//! An interval is cut into pieces, each taken by the cheapest way that is sure of its error:
+//! An interval is cut into pieces, each taken by the cheapest way whose estimate of its own error is small enough:
 //!
 //! 1. Where `q` is lost in rounding the motion is linear: velocity, position and the instant of leaving the range are in
 //!    closed form; at the fringe of the layer with what `q` does to first order.
@@ -175,7 +175,7 @@ impl Flow {
         at.rate = None;
     }
 
-    /// A piece in the layer, by the cheapest way that is sure of its error; true if it ends with a stop.
+    /// A piece in the layer, by the cheapest way whose estimate of its own error is small enough; true if it ends with a stop.
     fn layer(&self, at: &mut State, rest: f64) -> bool {
         let slip = self.stribeck * libm::exp(-at.speed);
         let rate = at.rate.unwrap_or_else(|| self.rate(at.speed, slip));
