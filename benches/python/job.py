@@ -66,7 +66,9 @@ name = "{job}"
 base = "paper"
 inertia_kg_m2 = {INERTIA}
 viscous_damping_nm_s_rad = {DAMPING}
-brake_gain_nm_v = {GAIN}
+
+[rig.actuator.brake]
+gain_nm_v = {GAIN}
 
 [rig.friction.stribeck]
 mu_static = {MU_S}

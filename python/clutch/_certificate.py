@@ -50,7 +50,7 @@ class Certificate(_Record):
 
     @dataclass(frozen=True, kw_only=True, repr=False)
     class Bounds(_Record):
-        """The plant as it is believed to be (23): pairs of lowest and highest value.
+        """The plant as it is believed to be (23): pairs of lowest and highest value, and what is known exactly.
 
         Parameters
         ----------
@@ -60,8 +60,16 @@ class Certificate(_Record):
             `T_u`, N m.
         viscous_damping_nm_s_rad : tuple of float
             `C_d`, N m s/rad.
+        actuator : str
+            Kind of the actuator: `brake`, `motor` or `both`.
         brake_gain_nm_v : tuple of float
-            `K_COF`, N m/V.
+            `K_COF`, N m/V; 0 of a motor.
+        motor_gain_nm_v : tuple of float
+            `k_t`, N m/V; 0 of a brake.
+        preload_nm : float
+            Normal force without a voltage, as torque per unit of μ, `N_0`, N m.
+        load_share : float
+            Share of a motor's torque that presses, too, `λ`, no unit.
         friction_at_rest : tuple of float
             Friction of a resting shaft, of `μ_s` (23e), no unit.
         friction_sliding : tuple of float
@@ -82,7 +90,11 @@ class Certificate(_Record):
         inertia_kg_m2: tuple[float, float]
         drive_torque_nm: tuple[float, float]
         viscous_damping_nm_s_rad: tuple[float, float]
+        actuator: str
         brake_gain_nm_v: tuple[float, float]
+        motor_gain_nm_v: tuple[float, float]
+        preload_nm: float
+        load_share: float
         friction_at_rest: tuple[float, float]
         friction_sliding: tuple[float, float]
         friction: tuple[float, float]

@@ -29,7 +29,7 @@ class Metrics:
     stair_height_rad : float
         Stair height: largest movement between one stick and the next, 0 with fewer than two, rad.
     break_away_torque_nm : float or None
-        Mean of the driving torque at which the shaft broke away, N m; None if there was none.
+        Mean magnitude of the torque of drive and motor at which the shaft broke away, N m; None if there was none.
     control_variation_v_s : float
         Total variation of the voltage, per time, V/s.
     jerk_rms_rad_s3 : float

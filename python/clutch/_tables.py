@@ -11,7 +11,10 @@ from clutch import _mixins
 from clutch._record import _Params
 
 __all__ = [
+    "BeltDrive",
+    "BothActuator",
     "Bounds",
+    "BrakeActuator",
     "BrakeGeometry",
     "Chirp",
     "ChirpDrive",
@@ -20,17 +23,20 @@ __all__ = [
     "Encoder",
     "HandDrive",
     "Hold",
+    "HoldLaw",
     "HoldThenRelease",
     "HoldVoltage",
     "JerkLimited",
     "Limits",
     "MinimumJerk",
     "Model",
+    "MotorActuator",
     "Observer",
     "Output",
     "Pd",
     "Pid",
     "Ramp",
+    "RampDrive",
     "RampVoltage",
     "Release",
     "Rig",
@@ -48,6 +54,7 @@ __all__ = [
     "TableDrive",
     "TablePath",
     "Trapezoid",
+    "Voltage",
     "WeightDrive",
 ]
 
@@ -57,6 +64,7 @@ UNITS = {
     "nm_s_rad": "N m s/rad",
     "nm_rt_s": "N m/√s",
     "nm_rad": "N m/rad",
+    "nm_s": "N m/s",
     "nm_v": "N m/V",
     "nm_a": "N m/A",
     "v_s2_rad": "V s²/rad",
@@ -100,6 +108,155 @@ UNITS = {
     "mnm": "mN m",
     "mm": "mm",
 }
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BrakeActuator(_Params):
+    """A brake: a voltage above 0 V presses a pad on a disc. It resists a motion and makes none.
+
+    Parameters
+    ----------
+    gain_nm_v : float, default 0.14
+        Brake torque per volt and unit of μ, (18). `K_COF`: a finite number above 0 N m/V.
+    preload_nm : float, default 0.0
+        Normal force without a voltage, as torque per unit of μ: a disc that drags. `N_0`: a finite number of
+        at least 0 N m.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Rig(actuator=clutch.BrakeActuator(preload_nm=0.01)).actuator
+    BrakeActuator(gain_nm_v=0.14, preload_nm=0.01)
+    """
+
+    _key: ClassVar[str] = "rig.actuator.brake"
+
+    gain_nm_v: float = 0.14
+    preload_nm: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BrakeGeometry(_mixins.BrakeGeometry):
+    """The linkage from motor voltage to friction torque, as Table 1 lists it: `K_COF = r_i K_t A/(A_lever R_a
+    r_c)` (18).
+
+    Parameters
+    ----------
+    inner_radius_m : float
+        Inner radius of the brake disc. `r_i`: a finite number above 0 m.
+    torque_constant_nm_a : float
+        Torque constant of the motor. Not printed in the paper. `K_t`: a finite number above 0 N m/A.
+    pad_area_m2 : float
+        Area of contact between pad and disc. `A`: a finite number above 0 m².
+    lever_area_m2 : float
+        Area of the tip of the lever. `A_lever`: a finite number above 0 m².
+    armature_resistance_ohm : float
+        Armature resistance. Not printed in the paper. `R_a`: a finite number above 0 Ω.
+    contact_radius_m : float
+        Distance from the motor's shaft to the contact on the disc. `r_c`: a finite number above 0 m; a
+        distance with which K_COF of (18) is a finite number above 0 N m/V.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    The paper's lengths and areas with an assumed motor:
+
+    >>> import clutch
+    >>> brake = clutch.BrakeGeometry(
+    ...     inner_radius_m=0.045, torque_constant_nm_a=0.0508, pad_area_m2=0.040,
+    ...     lever_area_m2=0.032, armature_resistance_ohm=0.6, contact_radius_m=0.034,
+    ... )
+    >>> rig = clutch.Rig(actuator=brake)
+    """
+
+    _key: ClassVar[str] = "rig.actuator.geometry"
+
+    inner_radius_m: float
+    torque_constant_nm_a: float
+    pad_area_m2: float
+    lever_area_m2: float
+    armature_resistance_ohm: float
+    contact_radius_m: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class MotorActuator(_Params):
+    """A motor, with the gear and the bearings behind it: a voltage of either sign drives the shaft that way.
+    Its friction is that of a constant normal force and of a share of the load.
+
+    Parameters
+    ----------
+    gain_nm_v : float
+        Torque per volt. `k_t`: a finite number above 0 N m/V.
+    preload_nm : float
+        Normal force, as torque per unit of μ. `N_0`: a finite number of at least 0 N m.
+    load_share : float, default 0.0
+        Share of the motor's torque that presses, too: friction that grows with the load, as a gear's. `λ`: a
+        finite number of at least 0; a share below 1/μ: at or above it the motor jams in its own friction.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> motor = clutch.MotorActuator(gain_nm_v=0.05, preload_nm=0.25)
+    >>> rig = clutch.Rig(actuator=motor)
+    >>> model = clutch.Model(actuator=motor, drive_torque_nm=0)
+    """
+
+    _key: ClassVar[str] = "rig.actuator.motor"
+
+    gain_nm_v: float
+    preload_nm: float
+    load_share: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BothActuator(_Params):
+    """A brake and a motor on one signal: a voltage above 0 V presses the pad, one below 0 V drives the shaft
+    forwards.
+
+    Parameters
+    ----------
+    brake_gain_nm_v : float
+        Brake torque per volt above 0 V and unit of μ. `K_COF`: a finite number above 0 N m/V.
+    motor_gain_nm_v : float
+        Torque per volt below 0 V. `k_t`: a finite number above 0 N m/V.
+    preload_nm : float, default 0.0
+        Normal force without a voltage, as torque per unit of μ. `N_0`: a finite number of at least 0 N m.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.BothActuator(brake_gain_nm_v=0.14, motor_gain_nm_v=0.02).preload_nm
+    0.0
+    """
+
+    _key: ClassVar[str] = "rig.actuator.both"
+
+    brake_gain_nm_v: float
+    motor_gain_nm_v: float
+    preload_nm: float = 0.0
+
+
+Actuator = BrakeActuator | BrakeGeometry | MotorActuator | BothActuator
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -159,6 +316,8 @@ class WeightDrive(_Params):
         Acceleration of gravity in (1), as the paper rounds it. `g`: a finite number above 0 m/s².
     pulley_radius_m : float, default 0.024
         Radius of the pulley, in (1). `R_p`: a finite number above 0 m.
+    side : {"forwards", "backwards"}, default "forwards"
+        Side on which it hangs. `forwards`: It drives forwards. `backwards`: It drives backwards.
 
     Raises
     ------
@@ -177,6 +336,7 @@ class WeightDrive(_Params):
     mass_kg: float = 0.2
     gravity_m_s2: float = 9.81
     pulley_radius_m: float = 0.024
+    side: Literal["forwards", "backwards"] = "forwards"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -209,6 +369,40 @@ class SpringDrive(_Params):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class BeltDrive(_Params):
+    """A belt: spring and damper between the shaft and an end that moves evenly, from where the spring is at
+    rest at the start. The torque is `stiffness · (speed t − θ) + damping · (speed − θ̇)`. It needs the engine
+    `dormand_prince`.
+
+    Parameters
+    ----------
+    stiffness_nm_rad : float
+        Stiffness. A finite number above 0 N m/rad.
+    damping_nm_s_rad : float, default 0.0
+        Damping. A finite number of at least 0 N m s/rad.
+    speed_deg_s : float
+        Speed of the moving end, as an angle of the shaft. A finite number, °/s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.BeltDrive(stiffness_nm_rad=0.5, speed_deg_s=2)
+    BeltDrive(stiffness_nm_rad=0.5, damping_nm_s_rad=0.0, speed_deg_s=2.0)
+    """
+
+    _key: ClassVar[str] = "rig.drive.belt"
+
+    stiffness_nm_rad: float
+    damping_nm_s_rad: float = 0.0
+    speed_deg_s: float
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class TableDrive(_Params):
     """A torque over time: straight lines between points, constant outside. It needs the engine
     `dormand_prince`.
@@ -234,6 +428,35 @@ class TableDrive(_Params):
     _key: ClassVar[str] = "rig.drive.table"
 
     points_s_nm: Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class RampDrive(_Params):
+    """A torque that rises, or falls, evenly with time and without end. It needs the engine `dormand_prince`.
+
+    Parameters
+    ----------
+    from_nm : float
+        Torque at the start of the run. A finite number, N m.
+    rate_nm_s : float
+        Rise. A finite number, N m/s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.RampDrive(from_nm=0, rate_nm_s=0.01)
+    RampDrive(from_nm=0.0, rate_nm_s=0.01)
+    """
+
+    _key: ClassVar[str] = "rig.drive.ramp"
+
+    from_nm: float
+    rate_nm_s: float
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -350,7 +573,7 @@ class HandDrive(_Params):
     highest_frequency_hz: float
 
 
-Drive = WeightDrive | SpringDrive | TableDrive | SineDrive | ChirpDrive | HandDrive
+Drive = WeightDrive | SpringDrive | BeltDrive | TableDrive | RampDrive | SineDrive | ChirpDrive | HandDrive
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -421,54 +644,6 @@ class Dac(_Params):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class BrakeGeometry(_mixins.BrakeGeometry):
-    """The linkage from motor voltage to friction torque, as Table 1 lists it: `K_COF = r_i K_t A/(A_lever R_a
-    r_c)` (18).
-
-    Parameters
-    ----------
-    inner_radius_m : float
-        Inner radius of the brake disc. `r_i`: a finite number above 0 m.
-    torque_constant_nm_a : float
-        Torque constant of the motor. Not printed in the paper. `K_t`: a finite number above 0 N m/A.
-    pad_area_m2 : float
-        Area of contact between pad and disc. `A`: a finite number above 0 m².
-    lever_area_m2 : float
-        Area of the tip of the lever. `A_lever`: a finite number above 0 m².
-    armature_resistance_ohm : float
-        Armature resistance. Not printed in the paper. `R_a`: a finite number above 0 Ω.
-    contact_radius_m : float
-        Distance from the motor's shaft to the contact on the disc. `r_c`: a finite number above 0 m; a
-        distance with which K_COF of (18) is a finite number above 0 N m/V.
-
-    Raises
-    ------
-    ParamError
-        A value out of range; its `field` and `value` say which.
-
-    Examples
-    --------
-    The paper's lengths and areas with an assumed motor:
-
-    >>> import clutch
-    >>> brake = clutch.BrakeGeometry(
-    ...     inner_radius_m=0.045, torque_constant_nm_a=0.0508, pad_area_m2=0.040,
-    ...     lever_area_m2=0.032, armature_resistance_ohm=0.6, contact_radius_m=0.034,
-    ... )
-    >>> rig = clutch.Rig(brake_gain_nm_v=brake)
-    """
-
-    _key: ClassVar[str] = "rig.brake_geometry"
-
-    inner_radius_m: float
-    torque_constant_nm_a: float
-    pad_area_m2: float
-    lever_area_m2: float
-    armature_resistance_ohm: float
-    contact_radius_m: float
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
 class Ripple(_Params):
     """Friction that varies along the disc: a band of waves with one amplitude and random phases.
 
@@ -519,8 +694,8 @@ class Ripple(_Params):
 class Rig(_mixins.Rig):
     """The shaft as it is, with its drive, brake, encoder and converter. The defaults are the paper's.
 
-    `J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇` (1). The plant that law and certificate believe in is
-    another thing: the model.
+    `J θ̈ = T_u + T(v_a) − μ(θ̇) N(v_a) − C_d θ̇`, which is (1) with the paper's brake, `T = 0` and `N = K_COF
+    max(v_a, 0)`. The plant that law and certificate believe in is another thing: the model.
 
     Parameters
     ----------
@@ -528,9 +703,6 @@ class Rig(_mixins.Rig):
         Total moment of inertia, in (1). `J`: a finite number above 0 kg m² whose inverse is finite, too.
     viscous_damping_nm_s_rad : float, default 0.001
         Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
-    brake_gain_nm_v : float or BrakeGeometry, default 0.14
-        Brake torque per volt and unit of μ, (18), 0.14 in each base: a number, or what the geometry of the
-        brake gives. `K_COF`: a finite number above 0 N m/V.
     torque_noise_nm : float, default 0.0
         Root mean square of a random torque, normally distributed, held from sample to sample. A finite number
         of at least 0 N m.
@@ -542,9 +714,11 @@ class Rig(_mixins.Rig):
     speed_limit_deg_s : float, default 360.0
         Highest speed that a path may ask for: a guard against a slip of units. On a board a target that moves
         faster ends control. A finite number above 0 °/s.
+    actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator
+        What a voltage does to the shaft. By default `BrakeActuator()`.
     friction : StribeckFriction
         Friction of pad on disc. By default `StribeckFriction()`.
-    drive : WeightDrive, SpringDrive, TableDrive, SineDrive, ChirpDrive or HandDrive
+    drive : WeightDrive, SpringDrive, BeltDrive, TableDrive, RampDrive, SineDrive, ChirpDrive or HandDrive
         The drive of the shaft. By default `WeightDrive()`.
     encoder : Encoder
         The angle sensor. By default `Encoder()`.
@@ -570,11 +744,11 @@ class Rig(_mixins.Rig):
 
     inertia_kg_m2: float = 0.0017
     viscous_damping_nm_s_rad: float = 0.001
-    brake_gain_nm_v: float | BrakeGeometry = 0.14
     torque_noise_nm: float = 0.0
     delay_ticks: int = 0
     actuator_time_constant_s: float | None = None
     speed_limit_deg_s: float = 360.0
+    actuator: Actuator = field(default_factory=BrakeActuator)
     friction: Friction = field(default_factory=StribeckFriction)
     drive: Drive = field(default_factory=WeightDrive)
     encoder: Encoder = field(default_factory=Encoder)
@@ -593,11 +767,11 @@ class Model(_Params):
         Total moment of inertia, in (1). `J`: a finite number above 0 kg m² whose inverse is finite, too.
     drive_torque_nm : float, default 0.047088000000000005
         Driving torque `T_u = M g R_p` in (1). Either sign for a plant alone. `T_u`: a finite number, N m; a
-        torque above 0 N m: without one a brake moves nothing.
+        torque above 0 N m: without one a brake, or a motor that drives forwards alone, moves nothing.
     viscous_damping_nm_s_rad : float, default 0.001
         Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
-    brake_gain_nm_v : float, default 0.14
-        Brake torque per volt and unit of μ, (18). `K_COF`: a finite number above 0 N m/V.
+    actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator
+        What a voltage does to the shaft. By default `BrakeActuator()`.
     friction : StribeckFriction
         Friction of pad on disc. By default `StribeckFriction()`.
 
@@ -618,7 +792,7 @@ class Model(_Params):
     inertia_kg_m2: float = 0.0017
     drive_torque_nm: float = 0.047088000000000005
     viscous_damping_nm_s_rad: float = 0.001
-    brake_gain_nm_v: float = 0.14
+    actuator: Actuator = field(default_factory=BrakeActuator)
     friction: Friction = field(default_factory=StribeckFriction)
 
 
@@ -762,9 +936,10 @@ class SmcSign(_Params):
 class Pid(_Params):
     """PID control with feed-forward, a filtered derivative, and an integral that does not wind up at a limit.
 
-    `u = u_0 − (K_p e + K_i ∫ e dt + K_d d + K_v θ̇_d + K_a θ̈_d)`, `τ ḋ = ė − d`. A start is bumpless where
-    there is an integral. The feed-forward of a believed plant is `u_0 = T_u/(μ K_COF)`, `K_v = C_d/(μ
-    K_COF)`, `K_a = J/(μ K_COF)`.
+    `u = u_0 − (K_p e + K_i ∫ e dt + K_d d + K_c sgn θ̇_d + K_v θ̇_d + K_a θ̈_d)` with a brake, `u_0 + (…)`
+    with a motor; `τ ḋ = ė − d`. A start is bumpless where there is an integral. The feed-forward of a
+    believed plant is `u_0 = T_u/(μ K_COF)`, `K_v = C_d/(μ K_COF)`, `K_a = J/(μ K_COF)` with a brake; `u_0 =
+    −T_u/k_t`, `K_c = μ N_0/k_t`, `K_v = C_d/k_t`, `K_a = J/k_t` with a motor.
 
     Parameters
     ----------
@@ -782,6 +957,9 @@ class Pid(_Params):
         at least sampling.period_us, s.
     bias_v : float, default 0.0
         Voltage without error, at rest. `u_0`: a finite number, V.
+    coulomb_v : float, default 0.0
+        Feed-forward of friction: this voltage the way that the path goes, none where it rests. `K_c`: a
+        finite number, V.
     velocity_v_s_rad : float, default 0.0
         Feed-forward of the path's velocity. `K_v`: a finite number, V s/rad.
     acceleration_v_s2_rad : float, default 0.0
@@ -807,11 +985,74 @@ class Pid(_Params):
     derivative_time_s: float = 0.0
     tracking_time_s: float = 0.05
     bias_v: float = 0.0
+    coulomb_v: float = 0.0
     velocity_v_s_rad: float = 0.0
     acceleration_v_s2_rad: float = 0.0
 
 
-Law = Pd | Ctc | Smc | SmcSign | Pid
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Voltage(_Params):
+    """An open-loop voltage, whatever the shaft does. It begins at `start_v` and goes to `end_v` at a rate.
+
+    Parameters
+    ----------
+    start_v : float, default 0.0
+        Voltage at the start. `u_0`: a finite number, V.
+    end_v : float, default 0.0
+        Voltage at the end of the way. `u_1`: a finite number, V.
+    rate_v_s : float, default 0.0
+        Rate from the one to the other; 0 stays at the start. `r`: a finite number of at least 0 V/s.
+    returns : bool, default False
+        `true` if it goes to and fro between them; else it stays at the end.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Voltage(end_v=2, rate_v_s=0.1)
+    Voltage(start_v=0.0, end_v=2.0, rate_v_s=0.1, returns=False)
+    """
+
+    _key: ClassVar[str] = "law.voltage"
+
+    start_v: float = 0.0
+    end_v: float = 0.0
+    rate_v_s: float = 0.0
+    returns: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class HoldLaw(_Params):
+    """A voltage that holds the resting shaft, whatever the encoder says: with a brake a multiple of the
+    lowest that does, with a motor the one that balances the drive.
+
+    Parameters
+    ----------
+    margin : float, default 1.25
+        Multiple of the driving torque that a brake holds. `m`: a finite number of at least 1.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.HoldLaw()
+    HoldLaw(margin=1.25)
+    """
+
+    _key: ClassVar[str] = "law.hold"
+
+    margin: float = 1.25
+
+
+Law = Pd | Ctc | Smc | SmcSign | Pid | Voltage | HoldLaw
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -879,20 +1120,23 @@ Velocity = SmoothedDerivative | Observer
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Output(_Params):
-    """Output stage of a law. The defaults are the paper's 0 to 10 V without bumpless start, and full braking
-    on an invalid demand.
+    """Output stage of a law. The defaults are for a brake: the paper's 0 to 10 V without bumpless start, and
+    full braking on an invalid demand.
 
     Parameters
     ----------
     lowest_v : float, default 0.0
-        Lowest voltage: a pad can only push. Above 0 the pad never lifts. A finite number of at least 0 V; a
-        voltage that the converter reaches: not below rig.dac.lowest_v.
+        Lowest voltage. With a brake at least 0, as a pad can only push; above 0 the pad never lifts. A finite
+        number, V; a voltage of at least 0 with a brake, whose pad can only push (rig.actuator,
+        model.actuator); a voltage below 0 with an actuator that drives (model.actuator); a voltage that the
+        converter reaches: not below rig.dac.lowest_v.
     highest_v : float, default 10.0
         Highest voltage. Lower `on_invalid_v` together with it. A finite number, V; a voltage above lowest_v;
         a voltage that the converter reaches: not above rig.dac.highest_v.
     on_invalid_v : float, default 10.0
-        Voltage for a demand that is not a number. A finite number, V; a voltage from lowest_v to highest_v
-        (it does not follow them).
+        Voltage for a demand that is not a number; with a motor 0. A finite number, V; a voltage from lowest_v
+        to highest_v (it does not follow them); 0 with a motor, which any other voltage drives
+        (model.actuator).
     bumpless_time_s : float, default 0.0
         Time constant of a bumpless start, with which the difference between the voltage found at start and
         the law's first demand decays; 0 starts with the law's own demand. A finite number of at least 0 s.
@@ -1236,6 +1480,8 @@ class Bounds(_Params):
         ± on the viscous damping `C_d`, (23c). A number of at least 0 and below 100 %.
     brake_gain_percent : float, default 0.0
         ± on the brake gain `K_COF`, (23h). A number of at least 0 and below 100 %.
+    motor_gain_percent : float, default 0.0
+        ± on a motor's gain `k_t`. A number of at least 0 and below 100 %.
     friction_percent : float, default 0.0
         ± on the friction, in motion (23d) and at rest (23e). A number of at least 0 and below 100 %.
     reach_rate_rad_s2 : float, default 0.0
@@ -1260,6 +1506,7 @@ class Bounds(_Params):
     drive_torque_percent: float = 0.0
     viscous_damping_percent: float = 0.0
     brake_gain_percent: float = 0.0
+    motor_gain_percent: float = 0.0
     friction_percent: float = 0.0
     reach_rate_rad_s2: float = 0.0
 
@@ -1324,8 +1571,9 @@ class HoldVoltage(_Params):
     Parameters
     ----------
     volts_v : float
-        Voltage, enough to stop the strongest drive with the weakest brake of the bounds. A finite number
-        above 0 V; a voltage that the converter reaches, at most rig.dac.highest_v.
+        Voltage, enough to stop the strongest drive with the weakest brake of the bounds. A finite number, V;
+        a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; a voltage above 0: a
+        brake holds with nothing else.
 
     Raises
     ------
@@ -1355,7 +1603,8 @@ class RampVoltage(_Params):
         that is a step of 2⁻¹⁶ to 60 000 codes of rig.dac per sampling.period_us.
     volts_v : float
         Voltage at the end, enough to stop the strongest drive with the weakest brake of the bounds. A finite
-        number above 0 V; a voltage that the converter reaches, at most rig.dac.highest_v.
+        number, V; a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; a voltage
+        above 0: a brake holds with nothing else.
 
     Raises
     ------
@@ -1396,8 +1645,9 @@ class HoldThenRelease(_Params):
     Parameters
     ----------
     volts_v : float
-        Voltage, enough to stop the strongest drive with the weakest brake of the bounds. A finite number
-        above 0 V; a voltage that the converter reaches, at most rig.dac.highest_v.
+        Voltage, enough to stop the strongest drive with the weakest brake of the bounds. A finite number, V;
+        a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; a voltage above 0: a
+        brake holds with nothing else.
     after_s : float
         Time of holding, after which it lets go. A finite number above 0 s; a time of 1 to 4e9 times
         sampling.period_us.
@@ -1552,7 +1802,7 @@ class _Scenario(_Params):
         The shaft as it is. By default `Rig()`.
     model : Model
         The shaft as law, observer and certificate believe it to be. By default `Model()`.
-    law : Pd, Ctc, Smc, SmcSign or Pid
+    law : Pd, Ctc, Smc, SmcSign, Pid, Voltage or HoldLaw
         The law and its gains.
     velocity : SmoothedDerivative or Observer
         Source of the velocity that the law is given. By default `SmoothedDerivative()`.

@@ -41,10 +41,15 @@ CHIRP = {"rate_deg_s": 10.0, "amplitude_deg": 0.5, "from_hz": 0.1, "to_hz": 3.0,
 # Required arguments; none where every field has a default.
 REQUIRED = {
     clutch.StribeckFriction: {},
+    clutch.BrakeActuator: {},
     clutch.BrakeGeometry: GEOMETRY,
+    clutch.MotorActuator: {"gain_nm_v": 0.05, "preload_nm": 0.25},
+    clutch.BothActuator: {"brake_gain_nm_v": 0.14, "motor_gain_nm_v": 0.02},
     clutch.Ripple: RIPPLE,
     clutch.WeightDrive: {},
     clutch.SpringDrive: {"stiffness_nm_rad": 0.02, "rest_deg": 180.0},
+    clutch.BeltDrive: {"stiffness_nm_rad": 0.5, "speed_deg_s": 2.0},
+    clutch.RampDrive: {"from_nm": 0.0, "rate_nm_s": 0.01},
     clutch.TableDrive: {"points_s_nm": ((0.0, 0.045), (2.0, 0.055))},
     clutch.SineDrive: TORQUE | {"frequency_hz": 2.0},
     clutch.ChirpDrive: TORQUE | {"from_hz": 0.1, "to_hz": 3.0, "duration_s": 10.0},
@@ -58,6 +63,8 @@ REQUIRED = {
     clutch.Smc: {},
     clutch.SmcSign: {},
     clutch.Pid: {},
+    clutch.Voltage: {},
+    clutch.HoldLaw: {},
     clutch.SmoothedDerivative: {},
     clutch.Observer: {},
     clutch.Output: {},
@@ -287,8 +294,8 @@ def test_a_part_of_the_wrong_class_is_named():
         (lambda v: clutch.Scenario(law=clutch.Pd(), reference=path, name=v), "name", clutch.Pd()),
         (lambda v: clutch.Rig(drive=v), "drive", clutch.HoldVoltage(volts_v=1)),
         (lambda v: clutch.Rig(ripple=v), "ripple", 0.1),
-        (lambda v: clutch.Rig(brake_gain_nm_v=v), "brake_gain_nm_v", clutch.Encoder()),
-        (lambda v: clutch.Rig(brake_gain_nm_v=v), "brake_gain_nm_v", GEOMETRY),
+        (lambda v: clutch.Rig(actuator=v), "actuator", clutch.Encoder()),
+        (lambda v: clutch.Model(actuator=v), "actuator", GEOMETRY),
         (lambda v: clutch.Safety(reason="r", on_fault=v), "on_fault", None),
     ]:
         with pytest.raises(clutch.ParamError, match=name) as caught:
@@ -379,8 +386,6 @@ def wrong_types(cls, name):
         return NOT_A_NUMBER
     if name in ("actuator_time_constant_s", "start_counts"):
         return [x for x in NOT_A_NUMBER if x is not None]
-    if name == "brake_gain_nm_v":
-        return [x for x in NOT_A_NUMBER if x != {}]
     return ["", None, object(), math.nan, "\ud800"]
 
 
@@ -441,8 +446,8 @@ def test_every_number_of_every_class_is_tried_out_of_its_range():
         ({"law": clutch.Pid(tracking_time_s=1e-4)}, "law.pid.tracking_time_s", 1e-4),
         ({"output": clutch.Output(highest_v=12)}, "output.highest_v", 12.0),
         (
-            {"rig": clutch.Rig(brake_gain_nm_v=clutch.BrakeGeometry(**GEOMETRY | {"contact_radius_m": 1e-312}))},
-            "rig.brake_geometry.contact_radius_m",
+            {"rig": clutch.Rig(actuator=clutch.BrakeGeometry(**GEOMETRY | {"contact_radius_m": 1e-312}))},
+            "rig.actuator.geometry.contact_radius_m",
             1e-312,
         ),
     ],
@@ -488,7 +493,7 @@ def test_a_scenarios_error_has_the_dotted_key():
             "safety.on_fault": {"hold_then_release": {"volts_v": 4.5, "after_s": 2e-4}},
         },
         {"rig.dac.bits": 8, "safety.on_fault": {"ramp": {"volts_v": 4.5, "rate_v_s": 4e6}}},
-        {"model.drive_torque_nm": 1.0, "model.brake_gain_nm_v": 2.0, "safety.on_fault.hold.volts_v": 4.5},
+        {"model.drive_torque_nm": 1.0, "model.actuator.brake.gain_nm_v": 2.0, "safety.on_fault.hold.volts_v": 4.5},
     ],
     ids=lambda overrides: ", ".join(overrides),
 )
@@ -614,10 +619,20 @@ FRICTION = each(
 ).map(lambda d: d | {"mu_static": max(d["mu_static"], d["mu_dynamic"])})
 VALID = {
     clutch.StribeckFriction: FRICTION,
+    clutch.BrakeActuator: each(gain_nm_v=POSITIVE, preload_nm=number(0, 10)),
     clutch.BrakeGeometry: each(**dict.fromkeys(GEOMETRY, POSITIVE)),
+    clutch.MotorActuator: each(gain_nm_v=POSITIVE, preload_nm=number(0, 10), load_share=number(0, 1)),
+    clutch.BothActuator: each(brake_gain_nm_v=POSITIVE, motor_gain_nm_v=POSITIVE, preload_nm=number(0, 10)),
     clutch.Ripple: ripples(),
-    clutch.WeightDrive: each(mass_kg=POSITIVE, gravity_m_s2=POSITIVE, pulley_radius_m=POSITIVE),
+    clutch.WeightDrive: each(
+        mass_kg=POSITIVE,
+        gravity_m_s2=POSITIVE,
+        pulley_radius_m=POSITIVE,
+        side=st.sampled_from(["forwards", "backwards"]),
+    ),
     clutch.SpringDrive: each(stiffness_nm_rad=POSITIVE, rest_deg=number(-1e4, 1e4)),
+    clutch.BeltDrive: each(stiffness_nm_rad=POSITIVE, damping_nm_s_rad=number(0, 10), speed_deg_s=number(-1e4, 1e4)),
+    clutch.RampDrive: each(from_nm=number(-10, 10), rate_nm_s=number(-10, 10)),
     clutch.TableDrive: each(points_s_nm=points(st.floats(-10, 10), 1)),
     clutch.SineDrive: each(
         mean_nm=number(-1, 1), amplitude_nm=number(0, 1), frequency_hz=st.floats(1e-3, 1000), phase_turns=number(-1, 1)
@@ -636,6 +651,10 @@ VALID = {
     clutch.Ctc: each(outer_gain=GAIN, kp_1_s2=GAIN, kd_1_s=GAIN),
     clutch.Smc: each(kp_v=GAIN, kd_v_s_rad=GAIN, slope_1_s=POSITIVE, boundary_rad_s=POSITIVE),
     clutch.SmcSign: each(kp_v=GAIN, kd_v_s_rad=GAIN, slope_1_s=POSITIVE),
+    clutch.Voltage: each(
+        start_v=number(-10, 10), end_v=number(-10, 10), rate_v_s=number(0, 100), returns=st.booleans()
+    ),
+    clutch.HoldLaw: each(margin=st.floats(1, 10)),
     clutch.Pid: each(
         kp_v_rad=GAIN,
         ki_v_rad_s=GAIN,
@@ -643,6 +662,7 @@ VALID = {
         derivative_time_s=number(0, 10),
         tracking_time_s=POSITIVE,
         bias_v=number(-10, 10),
+        coulomb_v=number(-10, 10),
         velocity_v_s_rad=number(-10, 10),
         acceleration_v_s2_rad=number(-10, 10),
     ),
@@ -682,6 +702,7 @@ VALID = {
         drive_torque_percent=PERCENT,
         viscous_damping_percent=PERCENT,
         brake_gain_percent=PERCENT,
+        motor_gain_percent=PERCENT,
         friction_percent=PERCENT,
         reach_rate_rad_s2=number(0, 100),
     ),
@@ -702,7 +723,7 @@ def objects(*classes):
 VALID[clutch.Rig] = each(
     inertia_kg_m2=POSITIVE,
     viscous_damping_nm_s_rad=number(0, 10),
-    brake_gain_nm_v=POSITIVE | objects(clutch.BrakeGeometry),
+    actuator=objects(clutch.BrakeActuator, clutch.BrakeGeometry, clutch.MotorActuator, clutch.BothActuator),
     torque_noise_nm=number(0, 1),
     delay_ticks=st.integers(0, 1000),
     actuator_time_constant_s=st.none() | POSITIVE,
@@ -712,7 +733,9 @@ VALID[clutch.Rig] = each(
     drive=objects(
         clutch.WeightDrive,
         clutch.SpringDrive,
+        clutch.BeltDrive,
         clutch.TableDrive,
+        clutch.RampDrive,
         clutch.SineDrive,
         clutch.ChirpDrive,
         clutch.HandDrive,
@@ -724,7 +747,7 @@ VALID[clutch.Model] = each(
     inertia_kg_m2=POSITIVE,
     drive_torque_nm=POSITIVE,
     viscous_damping_nm_s_rad=number(0, 10),
-    brake_gain_nm_v=POSITIVE,
+    actuator=objects(clutch.BrakeActuator, clutch.BrakeGeometry, clutch.MotorActuator, clutch.BothActuator),
     friction=objects(clutch.StribeckFriction),
 )
 VALID[clutch.Safety] = each(
@@ -941,12 +964,11 @@ def test_a_geometry_has_the_gain_of_18_and_a_rig_takes_it():
     gain = g["inner_radius_m"] * g["torque_constant_nm_a"] * g["pad_area_m2"]
     gain /= g["lever_area_m2"] * g["armature_resistance_ohm"] * g["contact_radius_m"]
     assert brake.brake_gain_nm_v == pytest.approx(gain, rel=1e-14)
-    rig = clutch.Rig(brake_gain_nm_v=brake)
-    assert rig.brake_gain_nm_v == brake
-    assert rig._tables()["brake_geometry"] == GEOMETRY
-    assert "brake_gain_nm_v" not in rig._tables()
+    rig = clutch.Rig(actuator=brake)
+    assert rig.actuator == brake
+    assert rig._tables()["actuator"] == {"geometry": GEOMETRY}
     scenario = clutch.Scenario(law=clutch.Pd(), reference=clutch.Ramp(rate_deg_s=20), rig=rig)
-    assert clutch.Scenario.from_toml(scenario.to_toml()).rig.brake_gain_nm_v == brake
+    assert clutch.Scenario.from_toml(scenario.to_toml()).rig.actuator == brake
 
 
 # --- Certificate and path ----------------------------------------------------------------------------

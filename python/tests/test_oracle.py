@@ -308,7 +308,7 @@ def released(volts, duration, rig, reference=None, start="rest"):
     return {
         "name": "constant voltage",
         "rig": {"base": "ideal", **rig},
-        "model": {"brake_gain_nm_v": 0.04},
+        "model": {"actuator": {"brake": {"gain_nm_v": 0.04}}},
         "law": {"pd": {"kp_v_rad": 0.0, "kd_v_s_rad": 0.0}},
         "output": {"lowest_v": volts},
         "reference": reference or {"hold": {}},

@@ -106,6 +106,26 @@ fn ten_seeds_of_the_papers_laws_on_the_board_are_the_simulation_bit_for_bit() {
     }
 }
 
+/// The built-in motor axes to and fro, and a brake with a motor, in single precision.
+#[test]
+fn motors_on_the_board_are_the_simulation_bit_for_bit() {
+    let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
+    let set = |key: &str, value: &str| (key.to_owned(), value.to_owned());
+    for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc"] {
+        let in_f32 = [set("sampling.scalar", "f32"), set("safety.limits.deadline_us", "1000000")];
+        let scenario = Scenario::load(name.as_ref(), &in_f32).expect("a scenario");
+        let simulated = simulate(&scenario);
+        // It does go both ways, and is driven both ways.
+        let (voltages, velocities) = (&simulated.trace.voltage, &simulated.trace.velocity);
+        for both_ways in [voltages, velocities] {
+            assert!(both_ways.iter().any(|x| *x > 0.0) && both_ways.iter().any(|x| *x < 0.0), "{name}");
+        }
+        let board = on(&scenario, QemuBoard::start(&image).expect("a board"), 3000);
+        equal(name, &board, &simulated);
+    }
+}
+
 #[test]
 fn over_its_serial_lines_too_the_board_is_the_simulation() {
     let Some(image) = image("mps2-controller") else { return };

@@ -2,7 +2,7 @@
 
 use clutch_core::law::{LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;
-use clutch_core::{Plant, PlantParams, StribeckParams};
+use clutch_core::{ActuatorParams, Plant, PlantParams, StribeckParams};
 use clutch_sim::drive::Drive;
 use clutch_sim::engine::{EventKind, Motion, Shaft};
 use clutch_sim::{RigParams, RunSpec, simulate};
@@ -97,7 +97,7 @@ fn coulomb(drive_torque: f64) -> PlantParams {
         inertia: 1.0,
         drive_torque,
         viscous_damping: 0.0,
-        brake_gain: 1.0,
+        actuator: ActuatorParams::brake(1.0),
         friction: StribeckParams { mu_static: 1.0, mu_dynamic: 1.0, ..StribeckParams::default() }.into(),
     }
 }
@@ -106,7 +106,7 @@ fn coulomb(drive_torque: f64) -> PlantParams {
 fn a9_a_coulomb_oscillator_loses_two_percent_of_a_unit_each_half_cycle_and_stops_after_five() {
     let (_, mut engine) = engines().into_iter().next().unwrap(); // a spring is not for the exact flow
     let mut shaft = Shaft::new(0.105, 0.0);
-    let spring = Drive::Spring { stiffness: 100.0, rest: 0.0 };
+    let spring = Drive::Spring { stiffness: 100.0, rest: 0.0, damping: 0.0, speed: 0.0 };
     let events = advance(engine.as_mut(), &model(&coulomb(0.0)), &spring, 1.0, &mut shaft, 3_000);
     assert_eq!(events.len(), 2, "it breaks away once and sticks once");
     assert_near("instant of the stop", events[1].time, core::f64::consts::FRAC_PI_2, 1e-9);

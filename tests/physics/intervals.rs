@@ -1,6 +1,6 @@
 //! Single intervals: reference numbers, hard break-aways, and an interval in parts.
 
-use clutch_core::{PlantParams, StribeckParams};
+use clutch_core::{ActuatorParams, PlantParams, StribeckParams};
 use clutch_sim::drive::{ChirpDrive, Drive};
 use clutch_sim::engine::{DormandPrince, Engine, Event, EventKind, ExactFlow, Input, Model, Shaft, Volts};
 use clutch_sim::ripple::{Ripple, RippleParams};
@@ -21,6 +21,9 @@ fn moved(engine: &mut dyn Engine, model: &Model, input: &Input<'_>, velocity: f6
     (shaft, events)
 }
 
+/// Of the paper's brake, N m/V per unit of μ.
+const GAIN: f64 = 0.14;
+
 /// The shaft of Table 1 at rest under a voltage whose static limit is a little below the torque: the time to 2.5 Stribeck
 /// velocities, by two independent quadratures.
 #[test]
@@ -33,7 +36,7 @@ fn a_soft_break_away_takes_the_time_that_quadrature_gives() {
     ] {
         let plant = PlantParams { viscous_damping: damping, ..PlantParams::default() };
         let torque = plant.drive_torque;
-        let volts = (torque - excess) / (0.2 * plant.brake_gain);
+        let volts = (torque - excess) / (0.2 * GAIN);
         let drive = Drive::Constant(torque);
         // The excess itself is a difference: its digits decide. 1e-9 s is 1e-5 of the speed here.
         for (name, mut engine) in engines() {
@@ -49,7 +52,7 @@ fn much_drag_in_the_layer_is_followed() {
     let plant = PlantParams {
         inertia: 1e-3,
         viscous_damping: 0.05,
-        brake_gain: 0.14,
+        actuator: ActuatorParams::brake(GAIN),
         friction: stribeck(0.2, 0.1, 0.1).into(),
         ..PlantParams::default()
     };
@@ -65,7 +68,7 @@ fn much_drag_in_the_layer_is_followed() {
 #[test]
 fn a_torque_that_rises_and_falls_within_an_interval_breaks_the_shaft_away() {
     let plant = PlantParams::default();
-    let limit = 0.2 * plant.brake_gain * 2.0;
+    let limit = 0.2 * GAIN * 2.0;
     let w = std::f64::consts::TAU * 40.0;
     let drive = Drive::Sines { mean: 0.5 * limit, sines: vec![(0.6 * limit, w, 0.0)] };
     let (_, events) = moved(&mut DormandPrince::default(), &model(&plant), &input(&drive, 2.0, 0.1), 0.0);
@@ -77,7 +80,7 @@ fn a_torque_that_rises_and_falls_within_an_interval_breaks_the_shaft_away() {
 #[test]
 fn a_short_peak_above_the_limit_is_not_stepped_over() {
     let plant = PlantParams::default();
-    let limit = 0.2 * plant.brake_gain * 2.0;
+    let limit = 0.2 * GAIN * 2.0;
     let w = std::f64::consts::TAU * 33.0;
     for (share, events) in [(1.0 + 1e-6, 1), (1.0 - 1e-6, 0)] {
         let drive = Drive::Sines { mean: 0.0, sines: vec![(share * limit, w, 0.3)] };
@@ -96,7 +99,7 @@ fn a_brake_that_opens_with_a_lag_lets_go_at_the_instant_of_its_curve() {
         let volts = Volts::Lag { from: 5.0, to: 1.0, time_constant: lag };
         let opening = Input { volts, ..input(&drive, 0.0, 5e-3) };
         let (_, events) = moved(&mut DormandPrince::default(), &model(&plant), &opening, 0.0);
-        let holding = plant.drive_torque / (0.2 * plant.brake_gain);
+        let holding = plant.drive_torque / (0.2 * GAIN);
         let expected = lag * ((5.0 - 1.0) / (holding - 1.0)).ln();
         assert!(
             (events[0].time - expected).abs() < 1e-9 * lag.max(1e-6),
@@ -110,7 +113,7 @@ fn noise_below_the_limit_moves_a_shaft_at_the_limit_by_nothing_in_an_hour() {
     let plant = PlantParams::default();
     let m = model(&plant);
     // The voltage holds 1e-6 N m more than the drive; the noise stays below that.
-    let volts = (plant.drive_torque + 1e-6) / (0.2 * plant.brake_gain);
+    let volts = (plant.drive_torque + 1e-6) / (0.2 * GAIN);
     let drive = Drive::Constant(plant.drive_torque);
     for (name, mut engine) in engines() {
         let (mut shaft, mut events) = (Shaft::new(0.3, 0.0), Vec::new());
@@ -131,7 +134,7 @@ fn a_shaft_that_breaks_away_under_a_closing_brake_stops_again() {
     for lag in [1e-3, 1e-4] {
         for share in [1e-3, 1e-4, 1e-5, 1e-8] {
             // At the sample the torque is above what 1.7 V hold, by so much.
-            let noise = 0.2 * plant.brake_gain * 1.7 * (1.0 + share) - plant.drive_torque;
+            let noise = 0.2 * GAIN * 1.7 * (1.0 + share) - plant.drive_torque;
             let volts = Volts::Lag { from: 1.7, to: 2.5, time_constant: lag };
             let closing = Input { volts, noise, ..input(&drive, 0.0, 1e-3) };
             let (shaft, events) = moved(&mut DormandPrince::default(), &model(&plant), &closing, 0.0);
@@ -149,7 +152,8 @@ fn a_torque_within_the_last_bit_of_friction_ends_the_interval() {
         for mu_s in [mu_d, 0.44, 0.46, 0.11] {
             for (gain, volts) in [(0.14, 3.61), (0.48, 5.1), (0.14, 5.0)] {
                 let friction = stribeck(mu_s, mu_d, 0.001).into();
-                let plant = PlantParams { brake_gain: gain, friction, ..PlantParams::default() };
+                let plant =
+                    PlantParams { actuator: ActuatorParams::brake(gain), friction, ..PlantParams::default() };
                 let m = model(&plant);
                 let holds = m.plant.break_away_torque(volts);
                 let mut torque = holds * (1.0 - 4.0 * f64::EPSILON);
@@ -182,7 +186,7 @@ fn a_motion_between_two_balances_takes_its_time() {
         inertia,
         drive_torque: drive * inertia * v_s + gain * volts * mu_d,
         viscous_damping: inertia,
-        brake_gain: gain,
+        actuator: ActuatorParams::brake(gain),
         friction: stribeck(mu_s, mu_d, v_s).into(),
     };
     let torque = Drive::Constant(plant.drive_torque);
@@ -200,7 +204,12 @@ fn a_motion_between_two_balances_takes_its_time() {
 fn drive(kind: u8, torque: f64) -> Drive {
     match kind {
         0 => Drive::Constant(torque),
-        1 => Drive::Spring { stiffness: 0.5 * torque.abs(), rest: 1.5 * torque.signum() },
+        1 => Drive::Spring {
+            stiffness: 0.5 * torque.abs(),
+            rest: 1.5 * torque.signum(),
+            damping: 0.0,
+            speed: 0.0,
+        },
         2 => Drive::Table(vec![(0.0, torque), (2e-3, 0.2 * torque), (7e-3, 1.4 * torque)]),
         3 => Drive::Chirp(ChirpDrive {
             mean: torque,

@@ -2,6 +2,7 @@
 
 mod metrics;
 
+use clutch_core::Actuator;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::BUILT_IN;
 use clutch_sim::{Keep, Scenario};
@@ -41,7 +42,8 @@ fn every_built_in_scenario_is_good_and_runs() {
         let run = s.run(Keep::Trace, UNWATCHED).unwrap_or_else(|e| panic!("{e}"));
         assert!(run.metrics.max_error_rad.to_degrees() < 0.5, "{}: {:?}", b.name, run.metrics);
         // CTC saturates too far off its surface, and PID has none: docs/theory.md.
-        let certified = !matches!(b.name, "ctc_2" | "pid_2");
+        let certified =
+            !matches!(b.name, "ctc_2" | "pid_2" | "motor_ctc" | "motor_pid" | "motor_pid_coulomb");
         assert_eq!(s.plan().unwrap().certificate.certified(), certified, "{}", b.name);
     }
 }
@@ -222,12 +224,75 @@ fn naming_another_drive_replaces_the_weight_of_the_base() {
 
 #[test]
 fn the_geometry_of_the_brake_stands_for_its_gain() {
-    let geometry = "[rig.brake_geometry]\ninner_radius_m = 0.045\ntorque_constant_nm_a = 0.05\npad_area_m2 = 0.04\nlever_area_m2 = 0.032\narmature_resistance_ohm = 0.6\ncontact_radius_m = 0.034\n";
+    let geometry = "[rig.actuator.geometry]\ninner_radius_m = 0.045\ntorque_constant_nm_a = 0.05\npad_area_m2 = 0.04\nlever_area_m2 = 0.032\narmature_resistance_ohm = 0.6\ncontact_radius_m = 0.034\n";
     let s = parse(&format!("{GOOD}\n{geometry}")).unwrap();
     let gain = 0.045 * 0.05 * 0.04 / (0.032 * 0.6 * 0.034);
-    assert!((s.spec().rig.gain().unwrap() - gain).abs() < 1e-15);
-    let both = GOOD.replace("base = \"paper\"", "base = \"paper\"\nbrake_gain_nm_v = 0.14");
-    refuses(parse(&format!("{both}\n{geometry}")), "my.toml: rig.brake_gain_nm_v = 0.14: ", &["not both"]);
+    let actuator = Actuator::new(&s.spec().rig.actuator).unwrap();
+    assert!((actuator.brake_gain() - gain).abs() < 1e-15);
+    let both = format!("{GOOD}\n{geometry}\n[rig.actuator.brake]\ngain_nm_v = 0.14");
+    refuses(parse(&both), "my.toml: rig.actuator: ", &["exactly one table"]);
+}
+
+#[test]
+fn keys_of_the_last_version_are_refused_with_their_new_names() {
+    let gain = GOOD.replace("base = \"paper\"", "base = \"paper\"\nbrake_gain_nm_v = 0.14");
+    refuses(parse(&gain), "my.toml: rig.brake_gain_nm_v = 0.14: ", &["rig.actuator.brake.gain_nm_v"]);
+    let model = format!("{GOOD}\n[model]\nbrake_gain_nm_v = 0.14");
+    refuses(parse(&model), "my.toml: model.brake_gain_nm_v = 0.14: ", &["model.actuator.brake.gain_nm_v"]);
+    let geometry = format!("{GOOD}\n[rig.brake_geometry]\ninner_radius_m = 0.045");
+    refuses(parse(&geometry), "my.toml: rig.brake_geometry: ", &["rig.actuator.geometry"]);
+}
+
+/// A geared motor without a load, and what goes with one.
+const MOTOR: &str = "
+[rig.actuator.motor]
+gain_nm_v = 0.05
+preload_nm = 0.25
+[model]
+drive_torque_nm = 0.0
+[model.actuator.motor]
+gain_nm_v = 0.05
+preload_nm = 0.25
+[rig.drive.sine]
+mean_nm = 0.0
+amplitude_nm = 0.0
+frequency_hz = 1.0
+[output]
+lowest_v = -10.0
+on_invalid_v = 0.0
+";
+
+#[test]
+fn a_motor_with_the_outputs_of_a_brake_is_refused_key_by_key() {
+    let motor = format!("{GOOD}\n{MOTOR}");
+    assert!(parse(&motor).is_ok(), "{:?}", parse(&motor).err());
+    let lowest = motor.replace("lowest_v = -10.0", "lowest_v = 0.0");
+    refuses(parse(&lowest), "my.toml: output.lowest_v = 0: ", &["below 0", "model.actuator"]);
+    let invalid = motor.replace("on_invalid_v = 0.0", "on_invalid_v = 3.0");
+    refuses(parse(&invalid), "my.toml: output.on_invalid_v = 3: ", &["0 with a motor"]);
+    let brake = format!("{GOOD}\n[output]\nlowest_v = -1.0");
+    refuses(parse(&brake), "my.toml: output.lowest_v = -1: ", &["at least 0 with a brake"]);
+    let mixed = motor.replace("[model.actuator.motor]\ngain_nm_v = 0.05\npreload_nm = 0.25\n", "");
+    refuses(parse(&mixed), "my.toml: model.actuator: ", &["believes in a brake", "a motor"]);
+    let jams = motor.replace("[model.actuator.motor]\n", "[model.actuator.motor]\nload_share = 5.0\n");
+    refuses(parse(&jams), "my.toml: model.actuator.motor.load_share = 5: ", &["below 1/μ"]);
+}
+
+#[test]
+fn a_path_that_is_too_much_for_a_motor_says_which_voltage_ends() {
+    // J a = 0.0017 · 175 rad/s² = 0.3 N m, with 0.25 · 0.2 N m of friction and 0.05 N m/V: 7 V at the most.
+    let fast = |limit: f64| {
+        let path =
+            "[reference.trapezoid]\ndistance_deg = -90.0\nspeed_deg_s = 300.0\nacceleration_deg_s2 = 10000.0";
+        let text = format!("{GOOD}\n{MOTOR}").replace("[reference.ramp]\nrate_deg_s = 2.0", path);
+        parse(&text.replace("lowest_v = -10.0", &format!("lowest_v = -{limit}")))
+    };
+    assert!(fast(7.1).is_ok(), "{:?}", fast(7.1).err());
+    refuses(
+        fast(6.0),
+        "my.toml: reference.trapezoid: ",
+        &["the motor cannot follow", "output.lowest_v = -6"],
+    );
 }
 
 /// Bytes that a file might hold: pieces of real scenarios, cut, repeated and peppered.
@@ -246,7 +311,7 @@ fn any_key() -> impl Strategy<Value = &'static str> {
     prop::sample::select(vec![
         "rig.inertia_kg_m2",
         "rig.viscous_damping_nm_s_rad",
-        "rig.brake_gain_nm_v",
+        "rig.actuator.brake.gain_nm_v",
         "rig.torque_noise_nm",
         "rig.delay_ticks",
         "rig.actuator_time_constant_s",
@@ -325,7 +390,7 @@ proptest! {
             "slope_1_s" => 70.0,
             "boundary_rad_s" => 0.1,
             "rate_deg_s" => 2.0,
-            "brake_gain_nm_v" => 0.14,
+            "gain_nm_v" => 0.14,
             "drive_torque_nm" => 0.047,
             "highest_v" => 10.0,
             _ => 0.2,

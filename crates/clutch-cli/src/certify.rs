@@ -5,7 +5,7 @@ use crate::output::{Exit, json, print};
 use crate::table::{number, quantities};
 use clap::Args;
 use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
-use clutch_core::{Bounds, Interval};
+use clutch_core::{ActuatorKind, Bounds, Interval};
 use clutch_sim::scenario::Plan;
 use clutch_sim::{Scenario, ScenarioError};
 use serde_json::{Value, json as value};
@@ -39,17 +39,19 @@ impl Certify {
 fn reason(s: Shortfall) -> &'static str {
     match s {
         Shortfall::Kp => {
-            "K_p is too small for the worst corner: the weakest brake against the strongest drive, at the path's \
-             acceleration and the reaching rate wanted"
+            "K_p is too small for the worst corner: the weakest brake, or motor, against the strongest load, at the \
+             path's acceleration and the reaching rate wanted"
         }
         Shortfall::Kd => "K_d is too small: it does not cover f |ė|",
-        Shortfall::Voltage => "output.highest_v is too small for the brake to stop the strongest drive",
-        Shortfall::Drive => "the drive is too weak for the path: a released shaft does not catch up",
+        Shortfall::Voltage => {
+            "the output's limits are too small for brake or motor against the strongest load"
+        }
+        Shortfall::Drive => "the drive is too weak for the path: a shaft that is behind does not catch up",
         Shortfall::Start => {
-            "the start's error rate is more than brake or drive can follow: start on the path, or slower"
+            "the start's error rate is more than brake, motor or drive can follow: start on the path, or slower"
         }
         Shortfall::Jump => {
-            "the path's velocity jumps on the way, which no brake follows at once: smooth it (a table: interpolation = \
+            "the path's velocity jumps on the way, which no shaft follows at once: smooth it (a table: interpolation = \
              \"cubic\")"
         }
         Shortfall::Layer => {
@@ -59,9 +61,38 @@ fn reason(s: Shortfall) -> &'static str {
         Shortfall::Slope => "the surface's slope f is below C_d/J: raise K_p against K_d",
         Shortfall::Surface => {
             "the law has no sliding surface, of which the certificate speaks: PD and CTC have one if K_p and K_d are above \
-             0, PID has none"
+             0, PID and open-loop laws have none"
         }
         _ => "not certified",
+    }
+}
+
+/// The words for an actuator.
+struct Words {
+    ahead: &'static str,
+    gain: &'static str,
+    behind: &'static str,
+}
+
+impl Words {
+    const fn of(kind: ActuatorKind) -> Words {
+        let brake = Words {
+            ahead: "\nShaft ahead: the brake stops it (worst corner: strongest drive, weakest brake)",
+            gain: "worst corner: brake mu K_COF",
+            behind: "\nShaft behind: the brake lets go (worst corner: weakest drive)",
+        };
+        match kind {
+            ActuatorKind::Brake => brake,
+            ActuatorKind::Both => Words {
+                behind: "\nShaft behind: the motor drives it on (worst corner: weakest drive, weakest motor)",
+                ..brake
+            },
+            ActuatorKind::Motor => Words {
+                ahead: "\nShaft ahead: the motor drives it back (worst corner: weakest motor, all against it)",
+                gain: "worst corner: motor k_t",
+                behind: "\nShaft behind: the motor drives it on (worst corner: weakest motor, all against it)",
+            },
+        }
     }
 }
 
@@ -74,7 +105,8 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
     let (c, b, d) = (&plan.certificate, &plan.bounds, &plan.demand);
     let deg = |x: f64| number(x.to_degrees());
     let law = scenario.spec().law;
-    let is_smc = plan.paper.is_some();
+    let is_smc = c.kd_required > 0.0;
+    let words = Words::of(b.actuator);
     let mut out = format!("{}\n{}\n\n", scenario.name(), law.title());
     out += &quantities(
         "Bounds",
@@ -82,20 +114,35 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
             ("inertia J", range(&b.inertia), "kg m²"),
             ("driving torque M g R_p", range(&b.drive_torque), "N m"),
             ("viscous damping C_d", range(&b.viscous_damping), "N m s/rad"),
-            ("brake gain K_COF", range(&b.brake_gain), "N m/V"),
-            ("friction at rest", range(&b.friction_at_rest), ""),
-            ("friction, fast", range(&b.friction_sliding), ""),
-            ("path: velocity v_d", deg(d.velocity), "°/s"),
-            ("path: acceleration a_d", deg(d.acceleration), "°/s²"),
-            ("reaching rate γ wanted", number(d.reach_rate), "rad/s²"),
         ],
     );
+    let mut rows = Vec::new();
+    if b.brake_gain.high > 0.0 {
+        rows.push(("brake gain K_COF", range(&b.brake_gain), "N m/V"));
+    }
+    if b.motor_gain.high > 0.0 {
+        rows.push(("motor gain k_t", range(&b.motor_gain), "N m/V"));
+    }
+    if b.preload > 0.0 {
+        rows.push(("normal force without a voltage N_0", number(b.preload), "N m"));
+    }
+    if b.load_share > 0.0 {
+        rows.push(("share of the load that presses λ", number(b.load_share), ""));
+    }
+    rows.extend([
+        ("friction at rest", range(&b.friction_at_rest), ""),
+        ("friction, fast", range(&b.friction_sliding), ""),
+        ("path: velocity v_d", deg(d.velocity), "°/s"),
+        ("path: acceleration a_d", deg(d.acceleration), "°/s²"),
+        ("reaching rate γ wanted", number(d.reach_rate), "rad/s²"),
+    ]);
+    out += quantities("", &rows).trim_start_matches('\n');
     out += &quantities(
-        "\nShaft ahead: the brake stops it (worst corner: strongest drive, weakest brake)",
+        words.ahead,
         &[
             ("worst corner: torque", number(c.worst_torque), "N m"),
             ("worst corner: inertia", number(c.worst_inertia), "kg m²"),
-            ("worst corner: brake mu K_COF", number(c.weakest_brake), "N m/V"),
+            (words.gain, number(c.weakest_brake), "N m/V"),
             (if is_smc { "K_p required" } else { "voltage required" }, number(c.kp_required), "V"),
             ("    of which for the boundary layer", number(c.kp_for_boundary), "V"),
             (if is_smc { "K_p given" } else { "voltage given (highest)" }, number(c.kp_given), "V"),
@@ -116,7 +163,7 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
         .trim_start_matches('\n');
     }
     out += &quantities(
-        "\nShaft behind: the brake lets go (worst corner: weakest drive)",
+        words.behind,
         &[
             ("worst corner: torque", number(c.least_torque), "N m"),
             ("holds up to an error rate of", deg(c.error_rate_behind), "°/s"),
@@ -218,7 +265,11 @@ fn bounds_json(b: &Bounds, pair: &dyn Fn(&Interval) -> Value) -> Value {
         "inertia_kg_m2": pair(&b.inertia),
         "drive_torque_nm": pair(&b.drive_torque),
         "viscous_damping_nm_s_rad": pair(&b.viscous_damping),
+        "actuator": b.actuator.name(),
         "brake_gain_nm_v": pair(&b.brake_gain),
+        "motor_gain_nm_v": pair(&b.motor_gain),
+        "preload_nm": b.preload,
+        "load_share": b.load_share,
         "friction_at_rest": pair(&b.friction_at_rest),
         "friction_sliding": pair(&b.friction_sliding),
         "friction": pair(&b.friction),

@@ -157,7 +157,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     text += &format!("gains: {certified}\n");
     if jump > 1e-9 {
         text += &format!(
-            "note: the path's velocity jumps by {} °/s, which no brake follows at once; the shaft catches up\n",
+            "note: the path's velocity jumps by {} °/s, which no shaft follows at once; the shaft catches up\n",
             number(jump.to_degrees())
         );
     }

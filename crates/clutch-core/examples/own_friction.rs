@@ -9,8 +9,8 @@
 use clutch_core::law::{ControlLaw, CtcParams, Law, LawParams, OutputParams};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
-    Counts, DacCode, Encoder, FixedCounts, ParamError, PlantParams, Servo, ServoParams, ServoState,
-    StribeckParams,
+    ActuatorParams, Counts, DacCode, Encoder, FixedCounts, ParamError, PlantParams, Servo, ServoParams,
+    ServoState, StribeckParams,
 };
 
 /// The measured values of the brake and the shaft; the rest as in the paper.
@@ -22,7 +22,13 @@ fn model() -> PlantParams<f32> {
         ..StribeckParams::default()
     }
     .into();
-    PlantParams { inertia: 0.0042, drive_torque: 0.11, brake_gain: 0.09, friction, ..PlantParams::default() }
+    PlantParams {
+        inertia: 0.0042,
+        drive_torque: 0.11,
+        actuator: ActuatorParams::brake(0.09),
+        friction,
+        ..PlantParams::default()
+    }
 }
 
 /// The control of one shaft, along a path of 2 °/s.

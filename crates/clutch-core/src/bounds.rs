@@ -1,5 +1,6 @@
 //! Bounds on the plant: intervals instead of numbers, as (23) of the paper.
 
+use crate::actuator::ActuatorKind;
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
 use crate::{ParamError, PlantParams, Real};
@@ -28,6 +29,11 @@ impl<T: Real> Interval<T> {
         Interval { low: a.min(b), high: a.max(b) }
     }
 
+    /// Largest magnitude.
+    fn magnitude(self) -> T {
+        self.low.abs().max(self.high.abs())
+    }
+
     /// `low (1 − share) … high (1 + share)` of an interval of positive numbers.
     fn widened(self, share: T) -> Self {
         Interval { low: self.low * (T::ONE - share), high: self.high * (T::ONE + share) }
@@ -46,6 +52,8 @@ crate::params! {
         viscous_damping: T = 0.0, "viscous_damping_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
         /// ± on the brake gain `K_COF`, (23h).
         brake_gain: T = 0.0, "brake_gain_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
+        /// ± on a motor's gain `k_t`.
+        motor_gain: T = 0.0, "motor_gain_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
         /// ± on the friction, in motion (23d) and at rest (23e).
         friction: T = 0.0, "friction_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
     }
@@ -53,7 +61,14 @@ crate::params! {
 
 crate::params! {
     /// The bounds (23) on the plant.
-    pub struct Bounds<T> {}
+    pub struct Bounds<T> {
+        /// Kind of the actuator.
+        actuator: ActuatorKind, "actuator" "" NONE, Range::ANY;
+        /// Normal force without a voltage, as torque per unit of μ.
+        preload: T, "preload_nm" "N_0" NM, Range::at_least(0.0);
+        /// Share of a motor's torque that presses, too.
+        load_share: T, "load_share" "λ" NONE, Range::at_least(0.0);
+    }
     nested {
         /// `J_0 … J_1` (23a), kg m².
         inertia: Interval<T>, "inertia_kg_m2";
@@ -61,8 +76,10 @@ crate::params! {
         drive_torque: Interval<T>, "drive_torque_nm";
         /// Up to `C_d1` (23c), N m s/rad.
         viscous_damping: Interval<T>, "viscous_damping_nm_s_rad";
-        /// `K_COF1 … K_COF2` (23h), N m/V.
+        /// `K_COF1 … K_COF2` (23h), N m/V; 0 … 0 of a motor.
         brake_gain: Interval<T>, "brake_gain_nm_v";
+        /// `k_t` of a motor, N m/V; 0 … 0 of a brake.
+        motor_gain: Interval<T>, "motor_gain_nm_v";
         /// `|μ|` at rest: of `μ_s` (23e).
         friction_at_rest: Interval<T>, "friction_at_rest";
         /// `|μ|` of a fast shaft: of `μ_d` (23d).
@@ -73,26 +90,34 @@ crate::params! {
 }
 
 impl<T: Real> Bounds<T> {
-    /// Bounds around a plant. The driving torque must be positive: turn the axis if it is not.
+    /// Bounds around a plant. With a brake the driving torque must be positive: turn the axis if it is not.
     ///
     /// # Errors
     /// A tolerance negative or so large that its parameter could reach 0; a parameter of the
-    /// plant out of range; a driving torque not above 0.
+    /// plant out of range; with a brake, a driving torque not above 0; a motor that friction of its own load could jam.
     pub fn around(plant: &PlantParams<T>, tolerance: &Tolerances<T>) -> Result<Self, ParamError<T>> {
-        let friction = crate::Plant::new(plant)?;
-        let friction = friction.friction();
+        let checked = crate::Plant::new(plant)?;
+        let (actuator, friction) = (checked.actuator(), checked.friction());
         tolerance.check_rows()?;
         let t = tolerance;
-        PlantParams::DRIVES.require(plant.drive_torque, plant.drive_torque > T::ZERO)?;
-        friction.check_divisor()?;
+        if actuator.kind() != ActuatorKind::Motor {
+            PlantParams::DRIVES.require(plant.drive_torque, plant.drive_torque > T::ZERO)?;
+            friction.check_divisor()?;
+        }
+        let envelope = friction.envelope().widened(t.friction);
+        actuator.check_share(envelope.high)?;
         Ok(Bounds {
+            actuator: actuator.kind(),
+            preload: actuator.preload(),
+            load_share: actuator.load_share(),
             inertia: Interval::around(plant.inertia, t.inertia),
             drive_torque: Interval::around(plant.drive_torque, t.drive_torque),
             viscous_damping: Interval::around(plant.viscous_damping, t.viscous_damping),
-            brake_gain: Interval::around(plant.brake_gain, t.brake_gain),
+            brake_gain: Interval::around(actuator.brake_gain(), t.brake_gain),
+            motor_gain: Interval::around(actuator.motor_gain(), t.motor_gain),
             friction_at_rest: Interval::around(friction.at_rest(), t.friction),
             friction_sliding: Interval::around(friction.sliding(), t.friction),
-            friction: friction.envelope().widened(t.friction),
+            friction: envelope,
         })
     }
 
@@ -106,5 +131,73 @@ impl<T: Real> Bounds<T> {
     #[must_use]
     pub fn strongest_brake(&self) -> T {
         self.friction.high * self.brake_gain.high
+    }
+
+    /// Torque that drives at a voltage, over all corners, N m.
+    fn driving(&self, volts: T) -> Interval<T> {
+        let k = &self.motor_gain;
+        match self.actuator {
+            ActuatorKind::Brake => Interval::default(),
+            ActuatorKind::Motor => {
+                let (a, b) = (k.low * volts, k.high * volts);
+                Interval { low: a.min(b), high: a.max(b) }
+            }
+            ActuatorKind::Both => {
+                let pulled = (-volts).max(T::ZERO);
+                Interval { low: k.low * pulled, high: k.high * pulled }
+            }
+        }
+    }
+
+    /// Torque of friction with coefficients in an interval, without its sign, at a voltage, over all corners, N m.
+    fn rubbing(&self, mu: &Interval<T>, volts: T) -> Interval<T> {
+        let (pressed, loaded) = (volts.max(T::ZERO), self.load_share * volts.abs());
+        let normal = |brake: T, motor: T| brake * pressed + (self.preload + motor * loaded);
+        Interval {
+            low: mu.low * normal(self.brake_gain.low, self.motor_gain.low),
+            high: mu.high * normal(self.brake_gain.high, self.motor_gain.high),
+        }
+    }
+
+    /// Torque that actuator and friction give a shaft that moves forwards or backwards, at a voltage, over all corners,
+    /// N m.
+    #[must_use]
+    pub fn torque(&self, forwards: bool, volts: T) -> Interval<T> {
+        let (drive, friction) = (self.driving(volts), self.rubbing(&self.friction, volts));
+        if forwards {
+            Interval { low: drive.low - friction.high, high: drive.high - friction.low }
+        } else {
+            Interval { low: drive.low + friction.low, high: drive.high + friction.high }
+        }
+    }
+
+    /// Authority: the torques that actuator and friction give a shaft that moves forwards or backwards at some voltage of
+    /// the output, whichever corner is the true one, N m. With a brake in forward motion `−μ N_max … −μ N_min`, with a
+    /// motor without friction `−k_t u_max … k_t u_max`.
+    #[must_use]
+    pub fn authority(&self, forwards: bool, lowest: T, highest: T) -> Interval<T> {
+        // Torque is straight in the voltage on either side of 0.
+        let [a, b, c] = [lowest, T::ZERO.max(lowest).min(highest), highest].map(|u| self.torque(forwards, u));
+        Interval { low: a.high.min(b.high).min(c.high), high: a.low.max(b.low).max(c.low) }
+    }
+
+    /// The same for a shaft at rest, which friction helps to hold, N m.
+    #[must_use]
+    pub fn authority_at_rest(&self, lowest: T, highest: T) -> Interval<T> {
+        let held = |u: T| {
+            let (drive, friction) = (self.driving(u), self.rubbing(&self.friction_at_rest, u));
+            Interval { low: drive.high - friction.low, high: drive.low + friction.low }
+        };
+        let [a, b, c] = [lowest, T::ZERO.max(lowest).min(highest), highest].map(held);
+        Interval { low: a.low.min(b.low).min(c.low), high: a.high.max(b.high).max(c.high) }
+    }
+
+    /// Torque that drive and motor leave at a voltage and that friction does not stop, at the worst corner and speed, N m;
+    /// at or below 0 the voltage stops and holds the shaft.
+    #[must_use]
+    pub fn left_over(&self, volts: T) -> T {
+        let (drive, motor) = (&self.drive_torque, self.driving(volts));
+        let torque = Interval { low: drive.low + motor.low, high: drive.high + motor.high };
+        torque.magnitude() - self.rubbing(&self.friction, volts).low
     }
 }

@@ -31,12 +31,18 @@
 //! The certificate speaks of continuous time and an exact sensor: sampling, encoder steps and
 //! delay come on top.
 //!
+//! A motor has two like sides: on each of them `K_p + K_d |ė|` volts drive against the error, with `k_t` in the place of
+//! `μ K`. Friction, which may be on the wrong side on either of them as the shaft may run either way, and the drag at the
+//! path's speed come to the load: `K_p ≥ [±T_u + μ_max N_0 + C_max v_d + J_max (a_d + γ)] / k_t,min`, the larger of both
+//! signs. A brake with a motor has the brake's side ahead and the motor's behind.
+//!
 //! # The paper's conditions
 //!
 //! [`paper_conditions`] gives (26)–(28) as printed. They divide by the strongest brake instead
 //! of the weakest and let the voltage be negative: (26) is negative for the paper's own plant,
 //! so that any `K_p` passes, and (28) overstates the reaching rate.
 
+use crate::actuator::ActuatorKind;
 use crate::bounds::Bounds;
 use crate::law::{Asked, Law, Surface};
 use crate::params::{Range, Table};
@@ -62,13 +68,13 @@ crate::params! {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Shortfall {
-    /// `K_p` is too small: the weakest brake does not stop the strongest drive.
+    /// `K_p` is too small: the weakest brake, or motor, does not stop the strongest drive.
     Kp,
     /// `K_d` is too small: it does not pay for `f |ė|`.
     Kd,
     /// The highest voltage is too small.
     Voltage,
-    /// The drive is too weak for the path: the released shaft does not catch up.
+    /// The drive is too weak for the path: the shaft that is behind does not catch up.
     Drive,
     /// The start's error rate is beyond what the two sides can follow.
     Start,
@@ -93,7 +99,7 @@ pub struct Certificate<T = f64> {
     pub worst_inertia: T,
     /// Worst corner of the ahead side: driving torque, N m.
     pub worst_torque: T,
-    /// Worst corner of the ahead side: weakest brake `μ_min K_min`, N m/V.
+    /// Worst corner of the ahead side: weakest brake `μ_min K_min`, or motor, N m/V.
     pub weakest_brake: T,
     /// Worst corner of the behind side: driving torque, N m.
     pub least_torque: T,
@@ -107,7 +113,8 @@ pub struct Certificate<T = f64> {
     pub kd_required: T,
     /// `K_d` given, V s/rad; 0 for PD and CTC.
     pub kd_given: T,
-    /// Largest `γ` that the ahead side allows at `ė = 0`, rad/s²; negative if even 0 is too much.
+    /// Largest `γ` that the ahead side, and the driven one behind, allow at `ė = 0`, rad/s²; negative if even 0 is too
+    /// much.
     pub reach_rate_possible: T,
     /// `|ė|` up to which the ahead side holds before the voltage ends, rad/s.
     pub error_rate_ahead: T,
@@ -145,10 +152,9 @@ pub fn certify<T: Real>(
     demand: &Demand<T>,
 ) -> Result<Certificate<T>, ParamError<T>> {
     demand.check_rows()?;
-    let (lowest, highest) = (law.output().lowest(), law.output().highest());
-    let brake = bounds.weakest_brake();
+    let Sides { ahead: Side { gain: brake, load: torque, highest }, behind } =
+        sides(bounds, demand, (law.output().lowest(), law.output().highest()));
     let inertia = bounds.inertia.high;
-    let torque = bounds.drive_torque.high;
     let base = (torque + inertia * (demand.acceleration + demand.reach_rate)) / brake;
     let per_rate = |left: T, slope: T| if slope > T::ZERO { left / slope } else { T::ZERO };
     let ahead = |slope: T| per_rate((highest - base) * brake / inertia, slope);
@@ -156,28 +162,37 @@ pub fn certify<T: Real>(
     let surface = law.surface(&asked);
     let missing = surface.is_none();
     let Surface { slope, layer, kp, kd, weakened, .. } =
-        surface.unwrap_or(Surface::affine(T::ZERO, T::ZERO, highest));
+        surface.unwrap_or(Surface::affine(T::ZERO, (T::ZERO, highest), T::ONE));
+    let weakest = if behind.gain > T::ZERO { brake.min(behind.gain) } else { brake };
 
     // Ahead: the brake against the strongest drive.
-    let kd_required = if kd.is_some() { inertia * slope / brake } else { T::ZERO };
+    let kd_required = if kd.is_some() { inertia * slope / weakest } else { T::ZERO };
     let kp_for_boundary = match kd {
         Some(kd) if weakened && kd > T::ZERO => kd_required * kd_required / (T::from_i32(4) * kd),
         _ => T::ZERO,
     };
-    let kp_required = base + kp_for_boundary;
+    let accelerates = inertia * (demand.acceleration + demand.reach_rate);
+    let pushes = if behind.gain > T::ZERO { (behind.load + accelerates) / behind.gain } else { T::ZERO };
+    let kp_required = base.max(pushes) + kp_for_boundary;
+    let reach_rate = |side: &Side<T>| {
+        ((kp.min(side.highest) - kp_for_boundary) * side.gain - side.load) / inertia - demand.acceleration
+    };
+    let ahead_rate = reach_rate(&Side { gain: brake, load: torque, highest });
+    // A brake has no gain that buys more behind.
     let reach_rate_possible =
-        ((kp.min(highest) - kp_for_boundary) * brake - torque) / inertia - demand.acceleration;
+        if behind.gain > T::ZERO { ahead_rate.min(reach_rate(&behind)) } else { ahead_rate };
     let error_rate_ahead = ahead(slope);
 
-    // Behind: the released shaft against the path.
-    let least_torque = bounds.drive_torque.low - bounds.strongest_brake() * lowest;
-    let left = (least_torque - bounds.viscous_damping.high * demand.velocity) / inertia;
+    // Behind: the released, or driven, shaft against the path.
+    let left = (behind.gain * behind.highest - behind.load) / inertia;
     let error_rate_behind = per_rate(left - demand.acceleration - demand.reach_rate, slope);
 
     // The region that is never left.
     let follows = |region: T| {
         let rate = region + region;
-        rate <= error_rate_ahead && rate.min(demand.velocity) <= error_rate_behind
+        // Nothing drives a brake's shaft backwards.
+        let caught = if bounds.actuator == ActuatorKind::Motor { rate } else { rate.min(demand.velocity) };
+        rate <= error_rate_ahead && caught <= error_rate_behind
     };
     let region = layer.max(demand.start_error_rate);
 
@@ -187,7 +202,7 @@ pub fn certify<T: Real>(
         Some(Shortfall::Kp)
     } else if kd.is_some_and(|kd| kd < kd_required) {
         Some(Shortfall::Kd)
-    } else if highest < kp_required {
+    } else if highest < kp_required || (behind.gain > T::ZERO && behind.highest < kp_required) {
         Some(Shortfall::Voltage)
     } else if error_rate_behind <= T::ZERO {
         Some(Shortfall::Drive)
@@ -208,7 +223,7 @@ pub fn certify<T: Real>(
         worst_inertia: inertia,
         worst_torque: torque,
         weakest_brake: brake,
-        least_torque,
+        least_torque: bounds.viscous_damping.high * demand.velocity - behind.load,
         kp_required,
         kp_for_boundary,
         kp_given: kp,
@@ -221,6 +236,43 @@ pub fn certify<T: Real>(
         reach_rate: demand.reach_rate,
         shortfall,
     })
+}
+
+/// A side of the surface.
+struct Side<T> {
+    /// Least torque against the error per volt, N m/V.
+    gain: T,
+    /// Most torque with the error, without inertia, N m; of the side behind negative where the drive catches up.
+    load: T,
+    /// Most volts against the error.
+    highest: T,
+}
+
+struct Sides<T> {
+    ahead: Side<T>,
+    behind: Side<T>,
+}
+
+fn sides<T: Real>(bounds: &Bounds<T>, demand: &Demand<T>, (lowest, highest): (T, T)) -> Sides<T> {
+    let drive = &bounds.drive_torque;
+    let drag = bounds.viscous_damping.high * demand.velocity;
+    let preload = bounds.friction.high * bounds.preload;
+    let motor = bounds.motor_gain.low * (T::ONE - bounds.friction.high * bounds.load_share);
+    let brake = Side { gain: bounds.weakest_brake(), load: drive.high, highest };
+    // What never lets go is against the shaft that is behind.
+    let released = drag - (drive.low - bounds.strongest_brake() * lowest.max(T::ZERO) - preload);
+    match bounds.actuator {
+        ActuatorKind::Brake => {
+            Sides { ahead: brake, behind: Side { gain: T::ZERO, load: released, highest: T::ZERO } }
+        }
+        ActuatorKind::Both => {
+            Sides { ahead: brake, behind: Side { gain: motor, load: released, highest: -lowest } }
+        }
+        ActuatorKind::Motor => Sides {
+            ahead: Side { gain: motor, load: drive.high + preload + drag, highest: -lowest },
+            behind: Side { gain: motor, load: drag + preload - drive.low, highest },
+        },
+    }
 }
 
 impl<T: Real> Certificate<T> {

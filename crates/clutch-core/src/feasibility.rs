@@ -1,7 +1,8 @@
-//! Feasibility: the check that a brake can follow a path.
+//! Feasibility: the check that an actuator can make the shaft follow a path.
 //!
-//! A brake only takes torque away. With the bounds of [`Bounds`] and a voltage between
-//! `u_min` and `u_max`, a shaft that is driven forwards follows `θ_d` only while
+//! A path asks the actuator for the torque `J θ̈_d + C_d θ̇_d − T_u`. It can be followed while that torque, at each corner
+//! of [`Bounds`], is within the authority of the actuator ([`Bounds::authority`]). For a brake between `u_min` and
+//! `u_max`, which only takes torque away, and a shaft that is driven forwards, this is
 //!
 //! ```text
 //! θ̇_d ≥ 0                                                       it cannot drive back
@@ -9,10 +10,11 @@
 //! [T_max − C_min θ̇_d − J θ̈_d] / (μK)_min ≤ u_max                 the brake must suffice
 //! ```
 //!
-//! each at its worst corner. A jump of the velocity is followed late, never at once; it is
+//! A jump of the velocity is followed late, never at once; it is
 //! reported and not refused, since the paper's own path begins with one.
 
-use crate::bounds::Bounds;
+use crate::actuator::ActuatorKind;
+use crate::bounds::{Bounds, Interval};
 use crate::law::Output;
 use crate::reference::Reference;
 use crate::{Micros, Real};
@@ -24,17 +26,19 @@ const STANDSTILL: f64 = 1e-6;
 /// Requirements of a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Envelope<T> {
-    /// Highest velocity, rad/s: `v_d` of (23g).
+    /// Highest speed, rad/s: `v_d` of (23g).
     pub velocity: T,
     /// Highest acceleration, rad/s².
     pub acceleration: T,
     /// Highest deceleration, rad/s².
     pub deceleration: T,
-    /// Highest acceleration that the drive grants at that moment, rad/s².
+    /// Highest acceleration that drive and actuator grant at that moment, rad/s².
     pub available_acceleration: T,
     /// Highest voltage that the path needs at the worst corner, V.
     pub highest_voltage: T,
-    /// Lowest voltage that holds the resting shaft at the worst corner, V.
+    /// Lowest voltage that the path needs at the worst corner, V; 0 with a brake.
+    pub lowest_voltage: T,
+    /// Lowest voltage that holds the resting shaft at the worst corner, V; with a motor, the one that balances the drive.
     pub holding_voltage: T,
     /// Jump from the shaft's velocity to the path's at the start, rad/s.
     pub start_jump: T,
@@ -50,20 +54,20 @@ impl<T: Real> Envelope<T> {
     }
 }
 
-/// The reason that a brake cannot follow.
+/// The reason that a path cannot be followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Obstacle {
-    /// The path runs backwards: velocity, rad/s.
+    /// The path runs backwards, which nothing drives: velocity, rad/s.
     Reverse,
     /// The drive does not suffice: acceleration, rad/s².
     Acceleration,
-    /// The brake does not suffice: voltage, V.
+    /// Brake or motor do not suffice: voltage, V.
     Voltage,
     /// The path is not a number: its value.
     NotFinite,
 }
 
-/// The point at which a brake cannot follow a path, and the reason.
+/// The point at which a path cannot be followed, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Infeasible<T> {
     /// The first tick at which it cannot.
@@ -81,7 +85,7 @@ pub struct Infeasible<T> {
 impl<T: Real> fmt::Display for Infeasible<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Infeasible { tick, time, asked, available, .. } = self;
-        write!(f, "a brake cannot follow the path from t = {time} s (tick {tick}) on: ")?;
+        write!(f, "the path cannot be followed from t = {time} s (tick {tick}) on: ")?;
         match self.obstacle {
             Obstacle::Reverse => {
                 write!(f, "it runs backwards at {asked} rad/s, and a brake drives nothing")
@@ -90,7 +94,7 @@ impl<T: Real> fmt::Display for Infeasible<T> {
                 write!(f, "it accelerates at {asked} rad/s², and the drive grants {available} rad/s²")
             }
             Obstacle::Voltage => {
-                write!(f, "it needs {asked} V of braking, and the output ends at {available} V")
+                write!(f, "it needs {asked} V, and the output ends at {available} V")
             }
             Obstacle::NotFinite => write!(f, "its velocity or acceleration is not a number there"),
         }
@@ -99,12 +103,12 @@ impl<T: Real> fmt::Display for Infeasible<T> {
 
 impl<T: Real> core::error::Error for Infeasible<T> {}
 
-/// Follows a path for `ticks` ticks and says what it asks of drive and brake.
+/// Follows a path for `ticks` ticks and says what it asks of drive and actuator.
 ///
 /// `start_velocity` is the shaft's at tick 0, rad/s.
 ///
 /// # Errors
-/// The point at which a brake cannot follow it, and the reason.
+/// The point at which it cannot be followed, and the reason.
 pub fn check_path<T: Real>(
     path: &Reference<'_, T>,
     ticks: u64,
@@ -115,12 +119,9 @@ pub fn check_path<T: Real>(
 ) -> Result<Envelope<T>, Infeasible<T>> {
     let period: T = period.seconds();
     let still = T::from_f64(STANDSTILL);
-    let weakest = bounds.weakest_brake();
-    let residual = bounds.strongest_brake() * output.lowest();
-    let mut envelope = Envelope {
-        holding_voltage: bounds.drive_torque.high / (bounds.friction_at_rest.low * bounds.brake_gain.low),
-        ..Envelope::default()
-    };
+    let reverses = bounds.actuator == ActuatorKind::Motor;
+    let limits = (output.lowest(), output.highest());
+    let mut envelope = Envelope { holding_voltage: holding_voltage(bounds), ..Envelope::default() };
     let (mut last_velocity, mut last_acceleration) = (start_velocity, T::ZERO);
     for tick in 0..ticks {
         let target = path.at(tick);
@@ -130,28 +131,40 @@ pub fn check_path<T: Real>(
         if !(v.is_finite() && a.is_finite()) {
             return Err(refuse(Obstacle::NotFinite, if v.is_finite() { a } else { v }, T::ZERO));
         }
-        if v < -still {
+        if v < -still && !reverses {
             return Err(refuse(Obstacle::Reverse, v, T::ZERO));
         }
-        let drive = bounds.drive_torque.low - bounds.viscous_damping.high * v - residual;
-        let granted = drive / bounds.inertia.high;
-        if a > granted {
+        let resting = v.abs() <= still && a.abs() <= still;
+        let needed = needed(bounds, v, a);
+        let forwards = v >= -still;
+        let authority = if resting {
+            bounds.authority_at_rest(limits.0, limits.1)
+        } else {
+            bounds.authority(forwards, limits.0, limits.1)
+        };
+        let volts = if resting {
+            Interval { low: envelope.holding_voltage, high: envelope.holding_voltage }
+        } else {
+            volts_for(bounds, &needed, forwards)
+        };
+        let granted = a + (authority.high - needed.high) / bounds.inertia.high;
+        if bounds.actuator == ActuatorKind::Brake && needed.high > authority.high {
             return Err(refuse(Obstacle::Acceleration, a, granted));
         }
-        let inertia = if a < T::ZERO { bounds.inertia.high } else { bounds.inertia.low };
-        let carried = bounds.drive_torque.high - bounds.viscous_damping.low * v - inertia * a;
-        let resting = v <= still && a.abs() <= still;
-        let volts = if resting { envelope.holding_voltage } else { carried / weakest };
-        if volts > output.highest() {
-            return Err(refuse(Obstacle::Voltage, volts, output.highest()));
+        if volts.high > limits.1 {
+            return Err(refuse(Obstacle::Voltage, volts.high, limits.1));
+        }
+        if volts.low.min(T::ZERO) < limits.0.min(T::ZERO) {
+            return Err(refuse(Obstacle::Voltage, volts.low, limits.0));
         }
         if a >= envelope.acceleration {
             envelope.acceleration = a;
             envelope.available_acceleration = granted;
         }
         envelope.deceleration = envelope.deceleration.max(-a);
-        envelope.velocity = envelope.velocity.max(v);
-        envelope.highest_voltage = envelope.highest_voltage.max(volts);
+        envelope.velocity = envelope.velocity.max(v.abs());
+        envelope.highest_voltage = envelope.highest_voltage.max(volts.high);
+        envelope.lowest_voltage = envelope.lowest_voltage.min(volts.low);
         let step = (v - last_velocity).abs();
         if tick == 0 {
             envelope.start_jump = step;
@@ -166,6 +179,62 @@ pub fn check_path<T: Real>(
         (last_velocity, last_acceleration) = (v, a);
     }
     Ok(envelope)
+}
+
+/// Torque that a path asks of actuator and friction, over all corners, N m.
+fn needed<T: Real>(bounds: &Bounds<T>, velocity: T, acceleration: T) -> Interval<T> {
+    let (j, c, drive) = (&bounds.inertia, &bounds.viscous_damping, &bounds.drive_torque);
+    let between = |x: &Interval<T>, by: T| {
+        let (a, b) = (x.low * by, x.high * by);
+        (a.min(b), a.max(b))
+    };
+    let ((j0, j1), (c0, c1)) = (between(j, acceleration), between(c, velocity));
+    Interval { low: j0 + c0 - drive.high, high: j1 + c1 - drive.low }
+}
+
+/// Lowest and highest voltage that give a moving shaft a torque of an interval at all corners, V.
+fn volts_for<T: Real>(bounds: &Bounds<T>, needed: &Interval<T>, forwards: bool) -> Interval<T> {
+    let (weakest, mu) = (bounds.weakest_brake(), &bounds.friction);
+    let drag = (mu.low * bounds.preload, mu.high * bounds.preload);
+    // Against the motion friction of the load takes a share of each volt; where it helps to slow down, no help is counted.
+    let taken = mu.high * bounds.load_share;
+    let driven = |torque: T, slows: bool| {
+        torque / (bounds.motor_gain.low * if slows { T::ONE } else { T::ONE - taken })
+    };
+    match bounds.actuator {
+        ActuatorKind::Brake => {
+            let volts = (-needed.low - drag.0) / weakest;
+            Interval { low: T::ZERO, high: volts.max(T::ZERO) }
+        }
+        ActuatorKind::Both => {
+            let (brake, motor) =
+                ((-needed.low - drag.0) / weakest, (needed.high + drag.1) / bounds.motor_gain.low);
+            Interval { low: -motor.max(T::ZERO), high: brake.max(T::ZERO) }
+        }
+        ActuatorKind::Motor => {
+            let (low, high) = if forwards {
+                (needed.low + drag.0, needed.high + drag.1)
+            } else {
+                (needed.low - drag.1, needed.high - drag.0)
+            };
+            Interval { low: driven(low.min(T::ZERO), forwards), high: driven(high.max(T::ZERO), !forwards) }
+        }
+    }
+}
+
+/// Voltage that holds the resting shaft at the worst corner, V.
+fn holding_voltage<T: Real>(bounds: &Bounds<T>) -> T {
+    let (drive, drag) = (&bounds.drive_torque, bounds.friction_at_rest.low * bounds.preload);
+    match bounds.actuator {
+        ActuatorKind::Brake | ActuatorKind::Both => {
+            let torque = (drive.high - drag).max(T::ZERO);
+            torque / (bounds.friction_at_rest.low * bounds.brake_gain.low)
+        }
+        ActuatorKind::Motor => {
+            let half = T::from_f64(0.5);
+            -(half * (drive.low + drive.high)) / (half * (bounds.motor_gain.low + bounds.motor_gain.high))
+        }
+    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | [`law`] | PD (4), CTC (11), SMC (29) and (31): parameters → law → state |
 //! | [`Servo`] | encoder counts and target in, DAC code and terms out |
-//! | [`Stribeck`], [`Plant`] | friction (2) and the shaft (1) |
+//! | [`Stribeck`], [`Actuator`], [`Plant`] | friction (2), brake or motor, and the shaft (1) |
 //! | [`SmoothedDerivative`], `Observer` | where the velocity comes from |
 //! | [`reference`](mod@reference) | planned paths in fixed-point counts |
 //! | [`check_path`] | whether a brake can follow a path |
@@ -33,6 +33,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod actuator;
 mod arithmetic;
 mod bounds;
 pub mod certificate;
@@ -55,6 +56,9 @@ mod stick_slip;
 pub mod supervisor;
 mod velocity;
 
+pub use actuator::{
+    Actuator, ActuatorKind, ActuatorParams, BothActuator, BrakeActuator, BrakeGeometry, MotorActuator,
+};
 pub use arithmetic::{Arithmetic, Each};
 pub use bounds::{Bounds, Interval, Tolerances};
 pub use codes::{
@@ -64,7 +68,7 @@ pub use derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativePara
 pub use error::ParamError;
 pub use feasibility::{Envelope, Infeasible, Obstacle, check_path};
 pub use fnv::{FNV_64, fnv1a_64};
-pub use friction::{BrakeGeometry, Friction, FrictionModel, FrictionParams, Stribeck, StribeckParams};
+pub use friction::{Friction, FrictionModel, FrictionParams, Stribeck, StribeckParams};
 #[cfg(feature = "linalg")]
 pub use observer::{Estimate, Observer, ObserverGains, ObserverParams, ObserverState};
 pub use plant::{GRAVITY, Plant, PlantParams};

@@ -1,11 +1,11 @@
 //! A Kalman observer of the shaft: position, velocity, and the torque that nobody measures.
 //!
 //! ```text
-//! θ̇ = ω,   J ω̇ = d − C_d ω − T_f,   |T_f| ≤ μ_d K_COF max(v_a, 0),   ḋ = q_d · white noise
+//! θ̇ = ω,   J ω̇ = d + T(v_a) − C_d ω − T_f,   |T_f| ≤ μ_d N(v_a),   ḋ = q_d · white noise
 //! ```
 //!
-//! `d` is the drive torque of (1) and whatever the model of friction gets wrong: both enter at
-//! one place. The encoder rounds down, so the angle measured lies half a count above the
+//! `T` and `N` are the [`Actuator`]'s; `d` is the drive torque of (1) and whatever the model of friction gets wrong: both
+//! enter at one place. The encoder rounds down, so the angle measured lies half a count above the
 //! counts, with the variance q²/12 of a uniform error.
 //!
 //! The brake acts against the *predicted* velocity: within a tick it can bring it to zero and
@@ -28,7 +28,7 @@
 
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
-use crate::{Encoder, FixedCounts, Micros, ParamError, Plant, Real};
+use crate::{Actuator, Encoder, FixedCounts, Micros, ParamError, Plant, Real};
 use nalgebra::{Matrix3, Vector3};
 
 crate::params! {
@@ -95,8 +95,9 @@ pub struct Estimate<T> {
 pub struct Observer<T> {
     model: Model<T>,
     gains: ObserverGains<T>,
-    /// Velocity that one volt of brake takes away in a tick, rad/s/V.
-    slowing_per_volt: T,
+    actuator: Actuator<T>,
+    /// Velocity that friction takes away in a tick for each N m of normal force as torque per unit of μ, rad/s/(N m).
+    slowing: T,
     drive_torque: T,
     radians_per_count: T,
     half_count: T,
@@ -212,7 +213,8 @@ impl<T: Real> Observer<T> {
         Ok(Observer {
             model,
             gains: *gains,
-            slowing_per_volt: model.phi23 * plant.friction().sliding() * p.brake_gain,
+            actuator: *plant.actuator(),
+            slowing: model.phi23 * plant.friction().sliding(),
             drive_torque: p.drive_torque,
             radians_per_count,
             half_count: radians_per_count / T::from_i32(2),
@@ -249,10 +251,11 @@ impl<T: Real> Observer<T> {
         let Estimate { position_offset, velocity, disturbance_torque } = state.estimate;
         let m = &self.model;
         // Prediction: how fast without the brake, and how much of that the brake takes away.
-        let free = velocity - m.loss * velocity + m.phi23 * disturbance_torque;
-        let most = self.slowing_per_volt * volts.max(T::ZERO);
+        let driving = disturbance_torque + self.actuator.torque(volts);
+        let free = velocity - m.loss * velocity + m.phi23 * driving;
+        let most = self.actuator.friction(self.slowing, volts);
         let slowed = free.limit(-most, most);
-        let travel = m.phi12 * velocity + m.phi13 * disturbance_torque - m.slowing_travel * slowed;
+        let travel = m.phi12 * velocity + m.phi13 * driving - m.slowing_travel * slowed;
         // Correction, relative to the new counts.
         let moved = position.minus::<T>(state.last) * self.radians_per_count;
         let predicted = position_offset + travel - moved;
@@ -369,7 +372,8 @@ mod tests {
     fn balance(rate: f64) -> f64 {
         let plant = plant::<f64>();
         let p = plant.params();
-        (p.drive_torque - p.viscous_damping * rate) / (plant.friction().sliding() * p.brake_gain)
+        (p.drive_torque - p.viscous_damping * rate)
+            / (plant.friction().sliding() * plant.actuator().brake_gain())
     }
 
     /// RMS errors of the velocity by the observer and by (5), °/s, over `rate + ripple
@@ -459,7 +463,7 @@ mod tests {
             }
             assert!((velocity - rate).abs() < 2e-4, "{degrees} °/s: {} °/s", velocity.to_degrees());
             let p = *plant::<f64>().params();
-            let needed = p.viscous_damping * rate + plant::<f64>().brake_torque(rate, volts);
+            let needed = p.viscous_damping * rate + plant::<f64>().friction_torque(rate, volts);
             assert!((torque - needed).abs() < 2e-4, "{degrees} °/s: {torque} N m, not {needed}");
         }
     }

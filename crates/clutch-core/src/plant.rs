@@ -1,11 +1,12 @@
 //! The shaft (1), as laws, certificates and simulators know it.
 //!
 //! ```text
-//! J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇,   T_u = M g R_p     (1)
+//! J θ̈ = T_u + T(v_a) − μ(θ̇) N(v_a) − C_d θ̇,   T_u = M g R_p       (1): T = 0, N = K_COF max(v_a, 0)
 //! ```
 //!
-//! At rest the shaft stays at rest while `|T_u| ≤ μ_s K_COF v_a`.
+//! At rest the shaft stays at rest while `|T_u + T| ≤ μ_s N`. What a voltage does is the [`Actuator`]'s.
 
+use crate::actuator::{Actuator, ActuatorKind, ActuatorParams};
 use crate::friction::{Friction, FrictionModel, FrictionParams};
 use crate::params::{Range, Table};
 use crate::{Arithmetic, Each, ParamError, Real};
@@ -23,16 +24,16 @@ crate::params! {
         drive_torque: T = 0.047088000000000005, "drive_torque_nm" "T_u" NM, Range::ANY;
         /// Viscous damping, in (1).
         viscous_damping: T = 0.001, "viscous_damping_nm_s_rad" "C_d" NM_S_RAD, Range::at_least(0.0);
-        /// Brake torque per volt and unit of μ, (18).
-        brake_gain: T = 0.14, "brake_gain_nm_v" "K_COF" NM_V, Range::above(0.0);
     }
     nested {
+        /// What a voltage does to the shaft.
+        actuator: ActuatorParams<T>, "actuator";
         /// Friction of pad on disc.
         friction: FrictionParams<T>, "friction";
     }
     relations(p) {
         /// Something moves the shaft.
-        DRIVES: drive_torque, "a torque above 0 N m: without one a brake moves nothing";
+        DRIVES: drive_torque, "a torque above 0 N m: without one a brake, or a motor that drives forwards alone, moves nothing";
     }
 }
 
@@ -48,6 +49,7 @@ crate::params! {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plant<T> {
     params: PlantParams<T>,
+    actuator: Actuator<T>,
     friction: Friction<T>,
     inverse_inertia: T,
 }
@@ -59,25 +61,29 @@ impl<T: Real> Plant<T> {
     /// The first parameter out of range.
     pub fn new(p: &PlantParams<T>) -> Result<Self, ParamError<T>> {
         p.check_rows()?;
+        let actuator = Actuator::new(&p.actuator)?;
         let friction = Friction::build(&p.friction)?;
+        actuator.check_share(friction.envelope().high)?;
         let inverse_inertia = T::ONE / p.inertia;
-        Ok(Plant { params: *p, friction, inverse_inertia })
+        Ok(Plant { params: *p, actuator, friction, inverse_inertia })
     }
 }
 
 impl<T: Arithmetic> Plant<T> {
-    /// The plants of several lanes as one; none if their frictions are not of one model.
+    /// The plants of several lanes as one; none if their actuators are not of one kind, or their frictions not of one
+    /// model.
     #[must_use]
     pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Option<Plant<L>> {
+        let actuator = Actuator::in_lanes(&|get| each(&|plant| get(&plant.actuator)))?;
         let friction = Friction::in_lanes(&|get| each(&|plant| get(&plant.friction)))?;
         let params = PlantParams {
             inertia: each(&|plant| plant.params.inertia),
             drive_torque: each(&|plant| plant.params.drive_torque),
             viscous_damping: each(&|plant| plant.params.viscous_damping),
-            brake_gain: each(&|plant| plant.params.brake_gain),
+            actuator: actuator.params(),
             friction: friction.params(),
         };
-        Some(Plant { params, friction, inverse_inertia: each(&|plant| plant.inverse_inertia) })
+        Some(Plant { params, actuator, friction, inverse_inertia: each(&|plant| plant.inverse_inertia) })
     }
 }
 
@@ -88,6 +94,13 @@ impl<T> Plant<T> {
         &self.params
     }
 
+    /// The actuator.
+    #[inline]
+    #[must_use]
+    pub fn actuator(&self) -> &Actuator<T> {
+        &self.actuator
+    }
+
     /// The friction.
     #[must_use]
     pub fn friction(&self) -> &Friction<T> {
@@ -96,18 +109,18 @@ impl<T> Plant<T> {
 }
 
 impl<T: Real> Plant<T> {
-    /// Friction torque of the brake at a velocity and a voltage, N m; 0 for a negative voltage.
+    /// Torque of friction at a velocity and a voltage, against the motion, N m.
     #[inline]
     #[must_use]
-    pub fn brake_torque(&self, velocity: T, volts: T) -> T {
-        self.friction.coefficient(velocity) * self.params.brake_gain * volts.max(T::ZERO)
+    pub fn friction_torque(&self, velocity: T, volts: T) -> T {
+        self.actuator.friction(self.friction.coefficient(velocity), volts)
     }
 
-    /// Largest torque that the brake holds at rest, N m; 0 for a negative voltage.
+    /// Largest torque that friction holds at rest, N m.
     #[inline]
     #[must_use]
     pub fn break_away_torque(&self, volts: T) -> T {
-        self.friction.at_rest() * self.params.brake_gain * volts.max(T::ZERO)
+        self.actuator.friction(self.friction.at_rest(), volts)
     }
 
     /// `θ̈` of (1) for a shaft in motion, rad/s².
@@ -115,21 +128,30 @@ impl<T: Real> Plant<T> {
     #[must_use]
     pub fn acceleration(&self, velocity: T, volts: T) -> T {
         let p = &self.params;
-        (p.drive_torque - self.brake_torque(velocity, volts) - p.viscous_damping * velocity)
-            * self.inverse_inertia
+        let torque = p.drive_torque + self.actuator.torque(volts);
+        (torque - self.friction_torque(velocity, volts) - p.viscous_damping * velocity) * self.inverse_inertia
     }
 
-    /// Lowest voltage that holds the resting shaft, V: `|T_u| / (μ_s K_COF)`.
+    /// Voltage at which friction at rest carries the driving torque, V: `|T_u| / (μ_s K_COF)` with a brake that does not
+    /// drag, the lowest that holds. With a motor, the voltage that balances the torque.
     #[must_use]
     pub fn holding_voltage_static(&self) -> T {
-        self.params.drive_torque.abs() / (self.friction.at_rest() * self.params.brake_gain)
+        self.volts_at(self.friction.at_rest())
     }
 
-    /// Voltage at which the sliding shaft neither gains nor loses speed, V, without viscous
-    /// damping: `|T_u| / (μ_d K_COF)`.
+    /// Voltage at which the sliding shaft neither gains nor loses speed, V, without viscous damping: `|T_u| / (μ_d K_COF)`
+    /// with a brake that does not drag. With a motor, the voltage that balances the torque.
     #[must_use]
     pub fn holding_voltage_sliding(&self) -> T {
-        self.params.drive_torque.abs() / (self.friction.sliding() * self.params.brake_gain)
+        self.volts_at(self.friction.sliding())
+    }
+
+    fn volts_at(&self, mu: T) -> T {
+        let torque = self.params.drive_torque;
+        match self.actuator.kind() {
+            ActuatorKind::Motor => self.actuator.volts_for(-torque, T::ZERO, T::ZERO),
+            _ => self.actuator.volts_for(-torque.abs(), mu, T::ONE),
+        }
     }
 }
 
@@ -140,7 +162,7 @@ mod tests {
     #[test]
     fn a_negative_voltage_pushes_no_pad() {
         let plant = Plant::<f64>::new(&PlantParams::default()).unwrap();
-        assert_eq!(plant.brake_torque(1.0, -3.0), 0.0);
+        assert_eq!(plant.friction_torque(1.0, -3.0), 0.0);
         assert_eq!(plant.break_away_torque(-3.0), 0.0);
         assert!((plant.acceleration(0.0, -3.0) - 27.69882).abs() < 1e-5);
     }
@@ -152,7 +174,7 @@ mod tests {
             (PlantParams { inertia: -0.0017, ..d }, "inertia"),
             (PlantParams { drive_torque: f64::NAN, ..d }, "drive_torque"),
             (PlantParams { viscous_damping: -1.0, ..d }, "viscous_damping"),
-            (PlantParams { brake_gain: 0.0, ..d }, "brake_gain"),
+            (PlantParams { actuator: ActuatorParams::brake(0.0), ..d }, "gain"),
         ] {
             assert_eq!(Plant::new(&bad).unwrap_err().field(), field);
         }

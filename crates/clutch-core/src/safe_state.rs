@@ -1,4 +1,4 @@
-//! The safe state: what the brake does when control has ended.
+//! The safe state: what brake or motor do when control has ended.
 //!
 //! | safe state | right when | converter |
 //! |---|---|---|
@@ -10,20 +10,26 @@
 //! There is no default, and "keep the last voltage" is not among them: the last voltage may be 0.
 //! A brake that a motor presses lets go when its power fails, whatever is chosen here.
 //!
+//! With a motor, [`SafeState::Release`] takes its torque away: right where friction holds the load, or nothing does harm by
+//! falling. To hold is to drive with one voltage, either sign or 0, with which friction stops the shaft and keeps it; there
+//! is no position control in a safe state.
+//!
 //! The part that runs is [`SafeCodes`], whole numbers only, so that controller and board go the same way.
 
 use crate::params::{Params, Range, Relation};
-use crate::{Dac, DacCode, Micros, ParamError, Real};
+use crate::{ActuatorKind, Dac, DacCode, Micros, ParamError, Real};
 
 crate::params! {
     /// Holds the shaft with a voltage, at once.
     pub struct SafeHold<T> {
         /// Voltage, enough to stop the strongest drive with the weakest brake of the bounds.
-        volts: T, "volts_v" "" V, Range::above(0.0);
+        volts: T, "volts_v" "" V, Range::ANY;
     }
     relations(p) {
         /// The converter reaches the voltage.
-        REACHED: volts, "a voltage that the converter reaches, at most rig.dac.highest_v";
+        REACHED: volts, "a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v";
+        /// A pad is pressed.
+        PRESSES: volts, "a voltage above 0: a brake holds with nothing else";
     }
 }
 
@@ -33,13 +39,15 @@ crate::params! {
         /// Rate at which the voltage goes up or down from the present one.
         rate: T, "rate_v_s" "" V_S, Range::above(0.0);
         /// Voltage at the end, enough to stop the strongest drive with the weakest brake of the bounds.
-        volts: T, "volts_v" "" V, Range::above(0.0);
+        volts: T, "volts_v" "" V, Range::ANY;
     }
     relations(p) {
         /// A period's step is a number of codes.
         RESOLVED: rate, "a rate that is a step of 2⁻¹⁶ to 60 000 codes of rig.dac per sampling.period_us";
         /// The converter reaches the voltage.
-        REACHED: volts, "a voltage that the converter reaches, at most rig.dac.highest_v";
+        REACHED: volts, "a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v";
+        /// A pad is pressed.
+        PRESSES: volts, "a voltage above 0: a brake holds with nothing else";
     }
 }
 
@@ -47,20 +55,22 @@ crate::params! {
     /// Holds the shaft with a voltage, at once, and after a time lets go.
     pub struct SafeHoldThenRelease<T> {
         /// Voltage, enough to stop the strongest drive with the weakest brake of the bounds.
-        volts: T, "volts_v" "" V, Range::above(0.0);
+        volts: T, "volts_v" "" V, Range::ANY;
         /// Time of holding, after which it lets go.
         after: T, "after_s" "" S, Range::above(0.0);
     }
     relations(p) {
         /// The converter reaches the voltage.
-        REACHED: volts, "a voltage that the converter reaches, at most rig.dac.highest_v";
+        REACHED: volts, "a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v";
+        /// A pad is pressed.
+        PRESSES: volts, "a voltage above 0: a brake holds with nothing else";
         /// The time is a number of periods.
         COUNTED: after, "a time of 1 to 4e9 times sampling.period_us";
     }
 }
 
 crate::choice! {
-    /// Safe state: what the brake does when control has ended.
+    /// Safe state: what brake or motor do when control has ended.
     pub enum SafeState<T> {
         /// Holds the shaft with a voltage, at once.
         Hold(SafeHold<T>) = "hold",
@@ -134,29 +144,37 @@ pub struct SafeCodes {
 }
 
 impl SafeCodes {
-    /// Checks a safe state against a converter and a sampling period.
+    /// Checks a safe state against a converter, a sampling period and an actuator.
     ///
     /// # Errors
-    /// A voltage that is not above 0 or that the converter does not reach; a rate or a time that is not above 0,
-    /// or so small or so large that a period or a code does not resolve it.
-    pub fn new<T: Real>(state: &SafeState<T>, dac: &Dac<T>, period: Micros) -> Result<Self, ParamError<T>> {
+    /// A voltage that the converter does not reach, or that is not above 0 where a brake is to hold; a rate or a time that
+    /// is not above 0, or so small or so large that a period or a code does not resolve it.
+    pub fn new<T: Real>(
+        state: &SafeState<T>,
+        dac: &Dac<T>,
+        period: Micros,
+        actuator: ActuatorKind,
+    ) -> Result<Self, ParamError<T>> {
         let seconds = period.period::<T>()?;
         state.check()?;
-        let hold = |volts: T, reached: Relation| {
-            let top = dac.volts(DacCode(u16::MAX));
-            reached.require(volts, volts <= top + dac.step())?;
+        let hold = |volts: T, presses: Relation, reached: Relation| {
+            presses.require(volts, actuator == ActuatorKind::Motor || volts > T::ZERO)?;
+            let (bottom, top) = (dac.volts(DacCode(0)), dac.volts(DacCode(u16::MAX)));
+            reached.require(volts, volts >= bottom && volts <= top + dac.step())?;
             Ok(dac.code(volts))
         };
         let codes = SafeCodes { release: dac.code(T::ZERO), ..SafeCodes::default() };
         Ok(match *state {
-            SafeState::Hold(SafeHold { volts }) => {
-                SafeCodes { kind: SafeKind::Hold, hold: hold(volts, SafeHold::REACHED)?, ..codes }
-            }
+            SafeState::Hold(SafeHold { volts }) => SafeCodes {
+                kind: SafeKind::Hold,
+                hold: hold(volts, SafeHold::PRESSES, SafeHold::REACHED)?,
+                ..codes
+            },
             SafeState::Ramp(SafeRamp { rate, volts }) => {
                 let step = rate * seconds / dac.step() * T::from_i32(1 << 16);
                 SafeRamp::RESOLVED.require(rate, step >= T::ONE && step < T::from_f64(4e9))?;
                 let ramp_step = step.floor().to_i64() as u32;
-                let hold = hold(volts, SafeRamp::REACHED)?;
+                let hold = hold(volts, SafeRamp::PRESSES, SafeRamp::REACHED)?;
                 SafeCodes { kind: SafeKind::Ramp, hold, ramp_step, ..codes }
             }
             SafeState::Release => SafeCodes { kind: SafeKind::Release, hold: codes.release, ..codes },
@@ -165,7 +183,7 @@ impl SafeCodes {
                 let fits = periods >= T::ONE && periods < T::from_f64(4e9);
                 SafeHoldThenRelease::COUNTED.require(after, fits)?;
                 let hold_periods = periods.floor().to_i64() as u32;
-                let hold = hold(volts, SafeHoldThenRelease::REACHED)?;
+                let hold = hold(volts, SafeHoldThenRelease::PRESSES, SafeHoldThenRelease::REACHED)?;
                 SafeCodes { kind: SafeKind::HoldThenRelease, hold, hold_periods, ..codes }
             }
         })
@@ -225,7 +243,7 @@ mod tests {
     use crate::DacParams;
 
     fn codes(state: SafeState) -> Result<SafeCodes, ParamError> {
-        SafeCodes::new(&state, &Dac::new(&DacParams::default()).unwrap(), Micros(1000))
+        SafeCodes::new(&state, &Dac::new(&DacParams::default()).unwrap(), Micros(1000), ActuatorKind::Brake)
     }
 
     fn first(state: SafeState, present: u16, n: usize) -> std::vec::Vec<u16> {

@@ -93,7 +93,7 @@ impl SimBoard {
                 return Err(SimBoardError::Stuck(volts));
             }
         }
-        let codes = SafeCodes::new(&safety.on_fault, &dac, spec.period)?;
+        let codes = SafeCodes::new(&safety.on_fault, &dac, spec.period, spec.model.actuator.kind())?;
         let params = BoardParams {
             board: if patient { PATIENT_BOARD } else { STRICT_BOARD },
             boot,

@@ -154,7 +154,7 @@ impl Summary {
     pub fn last_line(&self) -> String {
         let r = &self.report;
         let safe = match (r.state, r.board_safe) {
-            (State::Released, true) => "the brake is released",
+            (State::Released, true) => "the output is released",
             (_, true) => "the board is in its safe state",
             (_, false) if r.on_the_board => {
                 "the board did not confirm its safe state; it goes there by itself when it misses this machine"

@@ -131,7 +131,7 @@ fn each_law_follows_the_path_on_one_chip() {
     let new = Plan::new().limits;
     // A law that only switches is always at a limit.
     let limits = SupervisorParams { limits: LimitParams { saturation_time: 10.0, ..new.limits }, ..new };
-    for law in LawParams::<f32>::all() {
+    for law in LawParams::<f32>::all().into_iter().filter(LawParams::follows) {
         let mut bench = Bench::armed(Plan { servo: paper(law), limits, ..Plan::new() });
         let (mut largest, mut begun) = (0.0_f32, 0);
         for period in 0..5000 {

@@ -4,7 +4,7 @@
 //! A line is `J C mu_s mu_d v_s torque volts K_COF velocity seconds`, in SI; the answer is `position velocity` and the
 //! instants of the events, `+` for a break-away and `-` for a stick, or the error in words.
 
-use clutch_core::{Plant, PlantParams, StribeckParams};
+use clutch_core::{ActuatorParams, Plant, PlantParams, StribeckParams};
 use clutch_sim::drive::Drive;
 use clutch_sim::engine::{DormandPrince, Engine, EventKind, ExactFlow, Input, Model, Shaft, Volts};
 use std::io::{BufRead, Write};
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             inertia,
             drive_torque: torque,
             viscous_damping: damping,
-            brake_gain,
+            actuator: ActuatorParams::brake(brake_gain),
             friction: friction.into(),
         };
         let model = Model { plant: Plant::new(&plant)?, ripple: None };

@@ -1,10 +1,20 @@
-//! The drive of the shaft: a weight, a spring, a torque over time (table, sine, chirp), or a hand.
+//! The drive of the shaft: a weight, a spring, a belt, a torque over time (table, ramp, sine, chirp), or a hand.
 
 use crate::tables::Points;
 use clutch_core::params::{Params, Range};
 use clutch_core::{ParamError, params};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+
+clutch_core::words! {
+    /// Side of the pulley on which a weight hangs.
+    pub enum Side {
+        /// It drives forwards.
+        Forwards = "forwards" default,
+        /// It drives backwards.
+        Backwards = "backwards",
+    }
+}
 
 params! {
     /// A weight on a pulley, as in the paper: the torque is `T_u = M g R_p` in (1).
@@ -16,6 +26,8 @@ params! {
         gravity: f64 = 9.81, "gravity_m_s2" "g" M_S2, Range::above(0.0);
         /// Radius of the pulley, in (1).
         pulley_radius: f64 = 0.024, "pulley_radius_m" "R_p" M, Range::above(0.0);
+        /// Side on which it hangs.
+        side: Side = "forwards", "side" "" NONE, Range::ANY;
     }
 }
 
@@ -27,6 +39,31 @@ params! {
         stiffness: f64, "stiffness_nm_rad" "" NM_RAD, Range::above(0.0);
         /// Angle from the start at which it pulls no more.
         rest: f64, "rest_deg" "" DEG, Range::ANY;
+    }
+}
+
+params! {
+    /// A belt: spring and damper between the shaft and an end that moves evenly, from where the spring is at rest at the
+    /// start. The torque is `stiffness · (speed t − θ) + damping · (speed − θ̇)`. It needs the engine `dormand_prince`.
+    #[derive(Copy)]
+    pub struct BeltDrive<f64> {
+        /// Stiffness.
+        stiffness: f64, "stiffness_nm_rad" "" NM_RAD, Range::above(0.0);
+        /// Damping.
+        damping: f64 = 0.0, "damping_nm_s_rad" "" NM_S_RAD, Range::at_least(0.0);
+        /// Speed of the moving end, as an angle of the shaft.
+        speed: f64, "speed_deg_s" "" DEG_S, Range::ANY;
+    }
+}
+
+params! {
+    /// A torque that rises, or falls, evenly with time and without end. It needs the engine `dormand_prince`.
+    #[derive(Copy)]
+    pub struct RampDrive<f64> {
+        /// Torque at the start of the run.
+        from: f64, "from_nm" "" NM, Range::ANY;
+        /// Rise.
+        rate: f64, "rate_nm_s" "" NM_S, Range::ANY;
     }
 }
 
@@ -105,8 +142,12 @@ clutch_core::choice! {
         Weight(WeightDrive) = "weight",
         /// A spring.
         Spring(SpringDrive) = "spring",
+        /// A belt.
+        Belt(BeltDrive) = "belt",
         /// A torque over time.
         Table(TableDrive) = "table",
+        /// An even rise of torque.
+        Ramp(RampDrive) = "ramp",
         /// A sine.
         Sine(SineDrive) = "sine",
         /// A sine of changing frequency.
@@ -124,13 +165,20 @@ const HAND_SINES: u32 = 48;
 pub enum Drive {
     /// Constant, N m.
     Constant(f64),
-    /// `stiffness · (rest − θ)`, N m/rad and rad.
+    /// `stiffness · (rest + speed t − θ) + damping · (speed − θ̇)`. What the damping takes from the shaft's own velocity
+    /// is the plant's viscous damping: [`Drive::damping`].
     Spring {
         /// N m/rad.
         stiffness: f64,
         /// rad
         rest: f64,
+        /// N m s/rad.
+        damping: f64,
+        /// rad/s
+        speed: f64,
     },
+    /// `from + rate t`.
+    Ramp(RampDrive),
     /// (s, N m), straight lines between.
     Table(Vec<(f64, f64)>),
     /// Mean and sines.
@@ -152,12 +200,17 @@ impl Drive {
     pub fn new(p: &DriveParams, seed: u64) -> Result<Drive, ParamError> {
         p.check()?;
         match p {
-            DriveParams::Weight(WeightDrive { mass, gravity, pulley_radius }) => {
-                Ok(Drive::Constant(mass * gravity * pulley_radius))
+            DriveParams::Weight(WeightDrive { mass, gravity, pulley_radius, side }) => {
+                let torque = mass * gravity * pulley_radius;
+                Ok(Drive::Constant(if *side == Side::Forwards { torque } else { -torque }))
             }
             DriveParams::Spring(SpringDrive { stiffness, rest }) => {
-                Ok(Drive::Spring { stiffness: *stiffness, rest: *rest })
+                Ok(Drive::Spring { stiffness: *stiffness, rest: *rest, damping: 0.0, speed: 0.0 })
             }
+            DriveParams::Belt(BeltDrive { stiffness, damping, speed }) => {
+                Ok(Drive::Spring { stiffness: *stiffness, rest: 0.0, damping: *damping, speed: *speed })
+            }
+            DriveParams::Ramp(ramp) => Ok(Drive::Ramp(*ramp)),
             DriveParams::Table(TableDrive { points: Points(points) }) => Ok(Drive::Table(points.clone())),
             DriveParams::Sine(SineDrive { mean, amplitude, frequency, phase_turns }) => {
                 let tau = core::f64::consts::TAU;
@@ -189,12 +242,21 @@ impl Drive {
         }
     }
 
-    /// Torque at a time (s) and a position (rad from the start), N m.
+    /// Viscous damping that the drive adds to the shaft's own, N m s/rad.
+    #[must_use]
+    pub fn damping(&self) -> f64 {
+        if let Drive::Spring { damping, .. } = self { *damping } else { 0.0 }
+    }
+
+    /// Torque at a time (s) and a position (rad from the start), without [`Drive::damping`], N m.
     #[must_use]
     pub fn torque(&self, t: f64, position: f64) -> f64 {
         match self {
             Drive::Constant(torque) => *torque,
-            Drive::Spring { stiffness, rest } => stiffness * (rest - position),
+            Drive::Spring { stiffness, rest, damping, speed } => {
+                stiffness * (rest + speed * t - position) + damping * speed
+            }
+            Drive::Ramp(RampDrive { from, rate }) => from + rate * t,
             Drive::Table(points) => {
                 let after = points.partition_point(|p| p.0 <= t);
                 match (after.checked_sub(1).and_then(|i| points.get(i)), points.get(after)) {
@@ -220,6 +282,10 @@ impl Drive {
         match self {
             Drive::Constant(torque) => (*torque, *torque),
             Drive::Spring { .. } => (f64::NEG_INFINITY, f64::INFINITY),
+            Drive::Ramp(RampDrive { from, rate }) => {
+                let end = |sign: f64| if sign * rate > 0.0 { sign * f64::INFINITY } else { *from };
+                (end(-1.0), end(1.0))
+            }
             Drive::Table(points) => points
                 .iter()
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), (_, x)| (lo.min(*x), hi.max(*x))),
@@ -248,7 +314,7 @@ impl Drive {
     /// The most that the torque of a shaft at rest bends between two corners, N m/s².
     pub(crate) fn curvature(&self) -> f64 {
         match self {
-            Drive::Constant(_) | Drive::Spring { .. } | Drive::Table(_) => 0.0,
+            Drive::Constant(_) | Drive::Spring { .. } | Drive::Ramp(_) | Drive::Table(_) => 0.0,
             Drive::Sines { sines, .. } => sines.iter().map(|(a, w, _)| a.abs() * w * w).sum(),
             Drive::Chirp(ChirpDrive { amplitude, from, to, duration, .. }) => {
                 let tau = core::f64::consts::TAU;

@@ -123,7 +123,7 @@ figures! {
         STICK_TIME stick_time_fraction: f64, "time stuck", "1" shown as "%" PERCENT;
         /// Stair height: largest movement between one stick and the next, 0 with fewer than two.
         STAIR_HEIGHT stair_height_rad: f64, "stair height", "rad" shown as "°" DEGREES;
-        /// Mean of the driving torque at which the shaft broke away.
+        /// Mean magnitude of the torque of drive and motor at which the shaft broke away.
         BREAK_AWAY break_away_torque_nm: Option<f64>, "torque at break-away", "N m" shown as "mN m" MILLI;
         /// Total variation of the voltage, per time.
         VARIATION control_variation_v_s: f64, "voltage variation", "V/s" shown as "V/s" SAME;
@@ -244,7 +244,7 @@ impl MetricsBuilder {
             }
             EventKind::BreakAway => {
                 self.break_aways += 1;
-                self.break_away_sum += e.torque;
+                self.break_away_sum += e.torque.abs();
             }
         }
     }

@@ -6,7 +6,8 @@ use crate::ripple::{Ripple, RippleParams};
 use clutch_core::friction::{FrictionModel, FrictionParams};
 use clutch_core::params::{Params, Range};
 use clutch_core::{
-    BrakeGeometry, Dac, DacParams, Encoder, EncoderParams, ParamError, Plant, PlantParams, SpeedLimit, params,
+    ActuatorKind, ActuatorParams, Dac, DacParams, Encoder, EncoderParams, ParamError, Plant, PlantParams,
+    SpeedLimit, params,
 };
 
 clutch_core::words! {
@@ -51,8 +52,8 @@ params! {
 params! {
     /// The shaft as it is, with its drive, brake, encoder and converter. The defaults are the paper's.
     ///
-    /// `J θ̈ = T_u − μ(θ̇) K_COF max(v_a, 0) − C_d θ̇` (1). The plant that law and certificate believe in is another
-    /// thing: the model.
+    /// `J θ̈ = T_u + T(v_a) − μ(θ̇) N(v_a) − C_d θ̇`, which is (1) with the paper's brake, `T = 0` and
+    /// `N = K_COF max(v_a, 0)`. The plant that law and certificate believe in is another thing: the model.
     pub struct RigParams<f64> {
         /// Rig whose values stand where the scenario has none.
         base: RigBase, "base" "" NONE, Range::ANY;
@@ -60,8 +61,6 @@ params! {
         inertia: f64 = 0.0017, "inertia_kg_m2" "J" KG_M2, Range::divisor();
         /// Viscous damping, in (1).
         viscous_damping: f64 = 0.001, "viscous_damping_nm_s_rad" "C_d" NM_S_RAD, Range::at_least(0.0);
-        /// Brake torque per volt and unit of μ, (18), 0.14 in each base: a number, or what the geometry of the brake gives.
-        brake_gain: Option<f64>, "brake_gain_nm_v" "K_COF" NM_V, Range::above(0.0);
         /// Root mean square of a random torque, normally distributed, held from sample to sample.
         torque_noise: f64 = 0.0, "torque_noise_nm" "" NM, Range::at_least(0.0);
         /// Whole sampling periods from sample to voltage.
@@ -71,6 +70,8 @@ params! {
         actuator_time_constant: Option<f64>, "actuator_time_constant_s" "" S, Range::above(0.0);
     }
     nested {
+        /// What a voltage does to the shaft.
+        actuator: ActuatorParams, "actuator";
         /// Friction of pad on disc.
         friction: FrictionParams, "friction";
         /// The drive of the shaft.
@@ -81,19 +82,12 @@ params! {
         dac: RigDac, "dac";
     }
     optional {
-        /// Geometry of the brake, in the place of `brake_gain_nm_v`.
-        brake_geometry: BrakeGeometry, "brake_geometry";
         /// Friction along the disc; absent if it is even.
         ripple: RippleParams, "ripple";
     }
     flat {
         /// Highest speed that a path may ask for.
         speed: SpeedLimit;
-    }
-    relations(p) {
-        /// The gain is given once.
-        ONE_GAIN: brake_gain, "either brake_gain_nm_v or a table brake_geometry, not both" =>
-            p.brake_gain.is_some() != p.brake_geometry.is_some();
     }
 }
 
@@ -137,18 +131,6 @@ impl RigParams {
     pub fn bench() -> Self {
         RigParams::named(RigBase::Bench)
     }
-
-    /// `K_COF`, given or by the geometry, N m/V.
-    ///
-    /// # Errors
-    /// A geometry that gives none; both or none given.
-    pub fn gain(&self) -> Result<f64, ParamError> {
-        match (&self.brake_geometry, self.brake_gain) {
-            (Some(geometry), None) => geometry.brake_gain(),
-            (None, Some(gain)) => Ok(gain),
-            (_, gain) => Err(RigParams::ONE_GAIN.error(gain.unwrap_or(f64::NAN))),
-        }
-    }
 }
 
 impl Default for RigParams {
@@ -184,8 +166,8 @@ impl Rig {
         let plant = Plant::new(&PlantParams {
             inertia: p.inertia,
             drive_torque: drive.torque(0.0, 0.0),
-            viscous_damping: p.viscous_damping,
-            brake_gain: p.gain()?,
+            viscous_damping: p.viscous_damping + drive.damping(),
+            actuator: p.actuator,
             friction: p.friction,
         })?;
         let ripple = p.ripple.as_ref().map(|r| Ripple::new(r, seed)).transpose()?;
@@ -205,34 +187,47 @@ impl Rig {
     pub fn acceleration(&self, time: f64, position: f64, velocity: f64, volts: f64) -> f64 {
         let p = self.model.plant.params();
         let factor = self.model.friction_factor(position);
-        let torque = self.drive.torque(time, position);
+        let torque = self.drive.torque(time, position) + self.model.plant.actuator().torque(volts);
         let friction = if velocity == 0.0 {
             let holds = self.model.break_away_torque(position, volts);
             torque.max(-holds).min(holds)
         } else {
-            factor * self.model.plant.brake_torque(velocity, volts)
+            factor * self.model.plant.friction_torque(velocity, volts)
         };
         (torque - friction - p.viscous_damping * velocity) / p.inertia
     }
 
-    /// Voltage that holds the resting shaft wherever it is on the disc, V: a quarter more than the
-    /// static limit, within the converter's range.
+    /// Voltage that holds the resting shaft wherever it is on the disc, V: with a brake a quarter more than the
+    /// static limit, with a motor the voltage that balances the driving torque of the start; within the converter's range.
     #[must_use]
     pub fn resting_voltage(&self) -> f64 {
-        let swing = self.model.ripple.as_ref().map_or(0.0, Ripple::largest);
-        let volts = 1.25 * self.model.plant.holding_voltage_static() / (1.0 - swing);
-        if volts.is_finite() { volts.min(self.params.dac.converter.highest) } else { 0.0 }
+        let plant = &self.model.plant;
+        let volts = match plant.actuator().kind() {
+            ActuatorKind::Motor => plant.holding_voltage_static(),
+            ActuatorKind::Brake | ActuatorKind::Both => {
+                let swing = self.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+                (1.25 * plant.holding_voltage_static() / (1.0 - swing)).max(0.0)
+            }
+        };
+        self.reached(volts)
     }
 
-    /// Voltage that holds the sliding shaft at a velocity, V: friction and viscous drag carry
+    /// Voltage that holds the sliding shaft at a velocity, V: actuator, friction and viscous drag carry
     /// the driving torque of the start.
     #[must_use]
     pub fn sliding_voltage(&self, velocity: f64) -> f64 {
-        let p = self.model.plant.params();
-        let mu = self.model.plant.friction().level(velocity);
-        let volts = (p.drive_torque - p.viscous_damping * velocity) / (mu * p.brake_gain);
-        // Without friction there is no such voltage.
-        if volts.is_finite() { volts.max(0.0).min(self.params.dac.converter.highest) } else { 0.0 }
+        let plant = &self.model.plant;
+        let (p, actuator) = (plant.params(), plant.actuator());
+        let mu = plant.friction().level(velocity);
+        let way = if velocity < 0.0 { -1.0 } else { 1.0 };
+        let volts = actuator.volts_for(p.viscous_damping * velocity - p.drive_torque, mu, way);
+        self.reached(if actuator.kind().two_sided() { volts } else { volts.max(0.0) })
+    }
+
+    /// A voltage within the converter's range; 0 for none, as where there is no friction to divide by.
+    fn reached(&self, volts: f64) -> f64 {
+        let converter = &self.params.dac.converter;
+        if volts.is_finite() { volts.max(converter.lowest).min(converter.highest) } else { 0.0 }
     }
 }
 

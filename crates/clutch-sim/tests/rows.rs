@@ -17,6 +17,7 @@ const SAMPLES: &[(&str, &str)] = &[
     ("rig.base", "\"paper\""),
     ("rig.ripple.rms", "0.05"),
     ("amplitude_deg", "0.1"),
+    ("actuator.motor.preload_nm", "0.1"),
     ("volts_v", "4.5"),
     ("safety.reason", "\"a weight drives the shaft\""),
 ];
@@ -35,9 +36,28 @@ fn places() -> Vec<Place> {
     let place = |(key, row): (String, &'static Row)| {
         let mut base = Table::new();
         fill(&<ScenarioParams as Params<f64>>::INFO, "", &key, &mut base);
+        drive(&mut base);
         Place { key, row, base }
     };
     keys.into_iter().map(place).collect()
+}
+
+/// Rig and model get the same actuator, and what drives an output with two sides.
+fn drive(base: &mut Table) {
+    let there = ["rig", "model"].iter().find_map(|of| base.get(*of)?.get("actuator").cloned());
+    let Some(actuator) = there else { return };
+    let mut set = |table: &str, key: &str, value: Value| {
+        let table = base.entry(table).or_insert(Value::Table(Table::new()));
+        table.as_table_mut().unwrap().insert(key.to_owned(), value);
+    };
+    if actuator.get("motor").is_some() || actuator.get("both").is_some() {
+        set("output", "lowest_v", Value::Float(-10.0));
+    }
+    if actuator.get("motor").is_some() {
+        set("output", "on_invalid_v", Value::Float(0.0));
+    }
+    set("rig", "actuator", actuator.clone());
+    set("model", "actuator", actuator);
 }
 
 fn join(path: &str, key: &str) -> String {

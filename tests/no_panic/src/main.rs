@@ -34,7 +34,7 @@ use clutch_core::params::{self, Choice, Editor, Params};
 use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Checks, Sample, State, SupervisorState};
 use clutch_core::{
-    Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams, DerivativeState, Encoder, FixedCounts, Friction,
+    Actuator, ActuatorKind, ActuatorParams, Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams, DerivativeState, Encoder, FixedCounts, Friction,
     FrictionModel, FrictionParams, Interval, Micros, Observer, ObserverGains, ObserverParams, Plant,
     PlantParams, Real, SafeCodes, SafeKind, SafeRun, SafeState, Servo, ServoParams, SmoothedDerivative,
     SmoothedDerivativeParams, StickSlip, StickSlipParams, StickSlipState, Stribeck, StribeckParams,
@@ -158,6 +158,7 @@ fn all<T: Real, U: Real>() {
     scalar::<T>();
     codes::<T>();
     friction::<T>();
+    actuator::<T>();
     plant::<T>();
     velocity::<T>();
     observer::<T>();
@@ -210,16 +211,25 @@ fn friction<T: Real>() {
     sink(made(Stribeck::new(&any::<T, StribeckParams<T>>())));
     if let Some(f) = made(Friction::build(&any::<T, FrictionParams<T>>())) {
         sink([f.level(real()), f.coefficient(real()), f.at_rest(), f.sliding()]);
-        sink((f.quick_level(real()), f.envelope(), f.exponential(), made(f.check_divisor())));
+        sink((f.is_quick(), f.quick_level(real()), f.envelope(), f.exponential(), made(f.check_divisor())));
     }
+}
+
+fn actuator<T: Real>() {
+    let p = any::<T, ActuatorParams<T>>();
     let geometry = any::<T, BrakeGeometry<T>>();
-    sink(made(geometry.brake_gain()));
+    sink((made(geometry.brake_gain()), p.kind().two_sided(), ActuatorParams::brake(real::<T>())));
+    if let Some(a) = made(Actuator::new(&p)) {
+        sink((a.kind().drives_above_0(), a.params(), made(a.check_share(real()))));
+        sink([a.brake_gain(), a.motor_gain(), a.preload(), a.load_share()]);
+        sink([a.torque(real()), a.normal(real()), a.friction(real(), real()), a.volts_for(real(), real(), real())]);
+    }
 }
 
 fn plant<T: Real>() {
     if let Some(p) = made(Plant::new(&any::<T, PlantParams<T>>())) {
-        sink((*p.params(), *p.friction()));
-        sink([p.brake_torque(real(), real()), p.break_away_torque(real()), p.acceleration(real(), real())]);
+        sink((*p.params(), *p.friction(), *p.actuator()));
+        sink([p.friction_torque(real(), real()), p.break_away_torque(real()), p.acceleration(real(), real())]);
         sink([p.holding_voltage_static(), p.holding_voltage_sliding()]);
     }
 }
@@ -315,7 +325,8 @@ fn bounds<T: Real>() -> Option<Bounds<T>> {
 fn certificate<T: Real>() {
     sink(Demand::<T>::default());
     let Some(b) = bounds::<T>() else { return };
-    sink([b.weakest_brake(), b.strongest_brake()]);
+    sink([b.weakest_brake(), b.strongest_brake(), b.left_over(real())]);
+    sink([b.torque(flag(), real()), b.authority(flag(), real(), real()), b.authority_at_rest(real(), real())]);
     let demand = Demand {
         velocity: real::<T>(),
         acceleration: real(),
@@ -406,11 +417,15 @@ fn flag() -> bool {
     word() != 0
 }
 
+fn kind() -> ActuatorKind {
+    ActuatorKind::ALL.get(word() as usize).copied().unwrap_or_default()
+}
+
 fn safe_state<T: Real, U: Real>() {
     let state = any::<T, SafeState<T>>();
     sink((state.cast::<U>(), state.holding_voltage()));
     let Some(dac) = made(Dac::new(&any::<T, DacParams<T>>())) else { return };
-    sink(made(SafeCodes::new(&state, &dac, micros())));
+    sink(made(SafeCodes::new(&state, &dac, micros(), kind())));
     // Any numbers, also such as no constructor gives: a board takes them from the wire.
     let codes = SafeCodes {
         kind: match word() {

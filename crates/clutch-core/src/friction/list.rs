@@ -71,7 +71,13 @@ macro_rules! frictions {
                 }
             }
             #[inline]
-            fn quick_level(&self, velocity: T) -> Option<T> {
+            fn is_quick(&self) -> bool {
+                match self {
+                    $(Friction::$model(f) => f.is_quick(),)+
+                }
+            }
+            #[inline]
+            fn quick_level(&self, velocity: T) -> T {
                 match self {
                     $(Friction::$model(f) => f.quick_level(velocity),)+
                 }

@@ -1,7 +1,7 @@
 //! Dry friction of a pad on a disc.
 //!
 //! ```text
-//! T_f = μ(θ̇) K_COF max(v_a, 0)                                the friction term of (1)
+//! T_f = μ(θ̇) N,   N = K_COF max(v_a, 0) with the paper's brake  the friction term of (1)
 //! ```
 //!
 //! A friction model is a file of this folder and a line in the list below: its parameters, and what
@@ -9,10 +9,7 @@
 //! one model's parameters. Two readings are settled here: `sgn(0) = 0`, and a pad can only push, so that a
 //! negative voltage gives no normal force.
 
-mod geometry;
 mod list;
-
-pub use geometry::BrakeGeometry;
 
 use crate::{Arithmetic, Each, Interval, ParamError, Real};
 
@@ -36,10 +33,16 @@ pub trait FrictionModel<T: Arithmetic>: Sized {
     /// `|μ|` at a velocity (rad/s); towards rest, its limit.
     fn level(&self, velocity: T) -> T;
 
-    /// As [`FrictionModel::level`], where it is cheap; `None` where a board had better call a function of its own.
+    /// `true` if [`FrictionModel::quick_level`] is the level; else a board had better call a function of its own.
     #[inline]
-    fn quick_level(&self, velocity: T) -> Option<T> {
-        Some(self.level(velocity))
+    fn is_quick(&self) -> bool {
+        true
+    }
+
+    /// As [`FrictionModel::level`], where it is cheap; any number where [`FrictionModel::is_quick`] says so.
+    #[inline]
+    fn quick_level(&self, velocity: T) -> T {
+        self.level(velocity)
     }
 
     /// `|μ|` up to which a resting shaft stays at rest.

@@ -120,15 +120,21 @@ impl<T: Arithmetic> FrictionModel<T> for Stribeck<T> {
 
     #[inline]
     fn level(&self, velocity: T) -> T {
-        self.quick_level(velocity).unwrap_or_else(|| {
-            self.falling((velocity.abs() * self.inverse_velocity).powf(self.params.stribeck_exponent))
-        })
+        if self.exponent_is_one {
+            return self.quick_level(velocity);
+        }
+        self.falling((velocity.abs() * self.inverse_velocity).powf(self.params.stribeck_exponent))
     }
 
-    /// The level where `δ = 1`, as for most pairs. A power takes five times as long as the rest.
+    /// `δ = 1`, as for most pairs. A power takes five times as long as the rest.
     #[inline]
-    fn quick_level(&self, velocity: T) -> Option<T> {
-        self.exponent_is_one.then(|| self.falling(velocity.abs() * self.inverse_velocity))
+    fn is_quick(&self) -> bool {
+        self.exponent_is_one
+    }
+
+    #[inline]
+    fn quick_level(&self, velocity: T) -> T {
+        self.falling(velocity.abs() * self.inverse_velocity)
     }
 
     #[inline]

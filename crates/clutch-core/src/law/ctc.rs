@@ -6,12 +6,13 @@
 //! ```
 //!
 //! `θ̇` is the measured velocity, `θ̇_d − ė`, and `μ` is taken without its sign: a shaft at
-//! rest is about to move, so `μ = μ_s` there.
+//! rest is about to move, so `μ = μ_s` there. A brake that drags drags in (11), too. With a motor the torque
+//! `J (θ̈_d − τ) + C_d θ̇ − T_u`, and the friction of a shaft that goes the path's way, are what the motor gives.
 
 use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Each, Micros, ParamError, Plant, PlantParams, Real};
+use crate::{ActuatorKind, Arithmetic, Each, Micros, ParamError, Plant, PlantParams, Real};
 
 crate::params! {
     /// Computed-torque control (11): the plant that `Model` describes, solved for the voltage. The gains'
@@ -33,6 +34,10 @@ crate::params! {
 pub struct Ctc<T> {
     params: CtcParams<T>,
     model: Plant<T>,
+    /// (11) as it is printed will do: a brake that does not drag.
+    printed: bool,
+    /// `printed`, and the friction is quick to compute.
+    quick: bool,
     output: Output<T>,
 }
 
@@ -40,7 +45,7 @@ impl<T: Real> Ctc<T> {
     /// Checks gains, the plant that the law believes in, and output stage.
     ///
     /// # Errors
-    /// The first parameter out of range; a friction that can be 0, by which (11) divides.
+    /// The first parameter out of range; with a brake, a friction that can be 0, by which (11) divides.
     pub fn new(
         p: &CtcParams<T>,
         model: &PlantParams<T>,
@@ -49,8 +54,13 @@ impl<T: Real> Ctc<T> {
     ) -> Result<Self, ParamError<T>> {
         p.check_rows()?;
         let model = Plant::new(model)?;
-        model.friction().check_divisor()?;
-        Ok(Ctc { params: *p, model, output: Output::new(output, period)? })
+        let kind = model.actuator().kind();
+        if kind != ActuatorKind::Motor {
+            model.friction().check_divisor()?;
+        }
+        let printed = kind == ActuatorKind::Brake && model.actuator().preload() == T::ZERO;
+        let quick = printed && model.friction().is_quick();
+        Ok(Ctc { params: *p, model, printed, quick, output: Output::new(output, period)? })
     }
 
     /// The believed plant. It differs from the true one wherever friction is not known.
@@ -71,22 +81,50 @@ impl<T: Arithmetic> Ctc<T> {
         };
         let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
         let model = Plant::in_lanes(&|get| each(&|law| get(&law.model)))?;
-        Some(Ctc { params, model, output })
+        let all = |is: fn(&Self) -> bool| {
+            L::all(L::ONE.less_or_equal(each(&|law| if is(law) { T::ONE } else { T::ZERO })))
+        };
+        let (printed, quick) = (all(|law| law.printed), all(|law| law.quick));
+        Some(Ctc { params, model, printed, quick, output })
     }
 
     #[inline]
     fn terms(&self, tick: &Tick<T>, mu: T) -> (T, [T; 3]) {
+        let (friction_torque, terms) = self.demand(tick, mu);
+        (friction_torque / (mu * self.model.actuator().brake_gain()), terms)
+    }
+
+    /// As [`Ctc::terms`], with any friction and actuator.
+    fn terms_for_any(&self, tick: &Tick<T>) -> (T, [T; 3]) {
+        let mu = self.model.friction().level(tick.velocity());
+        if self.printed { self.terms(tick, mu) } else { self.terms_for_any_actuator(tick, mu) }
+    }
+
+    /// Apart: what is printed does not pay for it.
+    #[cold]
+    #[inline(never)]
+    fn terms_for_any_actuator(&self, tick: &Tick<T>, mu: T) -> (T, [T; 3]) {
+        let (friction_torque, terms) = self.demand(tick, mu);
+        let actuator = self.model.actuator();
+        let way = match actuator.kind() {
+            ActuatorKind::Motor => tick.target_velocity.sgn(),
+            ActuatorKind::Brake | ActuatorKind::Both => T::ONE,
+        };
+        (actuator.volts_for(-friction_torque, mu, way), terms)
+    }
+
+    #[inline]
+    fn demand(&self, tick: &Tick<T>, mu: T) -> (T, [T; 3]) {
         let (p, m) = (&self.params, self.model.params());
         let accel_demand = -(p.outer_gain * (p.kp * tick.error + p.kd * tick.error_rate));
         let friction_torque = m.drive_torque
             - m.inertia * (tick.target_acceleration - accel_demand)
             - m.viscous_damping * tick.velocity();
-        (friction_torque / (mu * m.brake_gain), [accel_demand, friction_torque, mu])
+        (friction_torque, [accel_demand, friction_torque, mu])
     }
 
     #[inline]
-    fn command(&self, state: &mut OutputState<T>, tick: &Tick<T>, mu: T) -> Command<T, [T; 3]> {
-        let (demand, terms) = self.terms(tick, mu);
+    fn command(&self, state: &mut OutputState<T>, (demand, terms): (T, [T; 3])) -> Command<T, [T; 3]> {
         let (voltage, limit) = self.output.apply(state, demand);
         Command { voltage, limit, terms }
     }
@@ -94,8 +132,8 @@ impl<T: Arithmetic> Ctc<T> {
     /// Apart: a call of the power among what a tick computes makes the others slower, too.
     #[cold]
     #[inline(never)]
-    fn command_for_any_friction(&self, state: &mut OutputState<T>, tick: &Tick<T>) -> Command<T, [T; 3]> {
-        self.command(state, tick, self.model.friction().level(tick.velocity()))
+    fn command_for_any(&self, state: &mut OutputState<T>, tick: &Tick<T>) -> Command<T, [T; 3]> {
+        self.command(state, self.terms_for_any(tick))
     }
 }
 
@@ -105,16 +143,17 @@ impl<T: Arithmetic> ControlLaw<T> for Ctc<T> {
     const TERMS: &'static [&'static str] = &["accel_demand_rad_s2", "friction_torque_demand_nm", "mu_model"];
 
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
-        self.output.start(self.terms(tick, self.model.friction().level(tick.velocity())).0, applied)
+        self.output.start(self.terms_for_any(tick).0, applied)
     }
 
     // Always: as a function of its own it would keep the registers of the call below for each tick.
     #[inline(always)]
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
-        match self.model.friction().quick_level(tick.velocity()) {
-            Some(mu) => self.command(state, tick, mu),
-            None => self.command_for_any_friction(state, tick),
+        if self.quick {
+            let mu = self.model.friction().quick_level(tick.velocity());
+            return self.command(state, self.terms(tick, mu));
         }
+        self.command_for_any(state, tick)
     }
 }
 
@@ -136,13 +175,26 @@ impl<T: Real> Listed<T> for Ctc<T> {
         let gain = m.inertia * p.outer_gain * p.kd;
         (gain > T::ZERO && p.kp > T::ZERO).then(|| {
             let mu = self.model.friction().envelope().high;
-            let highest = self.output.highest();
+            let (lowest, highest) = self.output.limits();
+            let actuator = self.model.actuator();
             let inertia = m.inertia * asked.acceleration;
             let slope = p.kp / p.kd;
             let drag = m.viscous_damping * (asked.velocity + (asked.fastest)(slope));
-            let upper = highest * mu * m.brake_gain - m.drive_torque + inertia + drag;
-            let lower = m.drive_torque + inertia;
-            Surface::affine(slope, upper.max(lower) / gain, highest)
+            let (torque, friction) = (m.drive_torque, mu * actuator.preload());
+            let per_volt = actuator.motor_gain();
+            // Torques at which the voltage reaches its ends.
+            let (upper, lower) = match actuator.kind() {
+                ActuatorKind::Motor => {
+                    let farther = highest.max(-lowest) * per_volt * (T::ONE + mu * actuator.load_share());
+                    (farther + torque.abs() + friction + inertia + drag, T::ZERO)
+                }
+                ActuatorKind::Brake | ActuatorKind::Both => {
+                    let braked = highest * mu * actuator.brake_gain() + friction;
+                    let driven = (-lowest).max(T::ZERO) * per_volt;
+                    (braked - torque + inertia + drag, torque + driven + inertia)
+                }
+            };
+            Surface { layer: upper.max(lower) / gain, ..Surface::affine(slope, (lowest, highest), T::ONE) }
         })
     }
 }

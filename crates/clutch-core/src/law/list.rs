@@ -29,6 +29,14 @@ macro_rules! laws {
                 [$(LawParams::$law($params::default())),+]
             }
 
+            /// `true` if the law follows a path; `false` for an open-loop law.
+            #[must_use]
+            pub fn follows(&self) -> bool {
+                match self {
+                    $(LawParams::$law(_) => <$law<T> as Listed<T>>::FOLLOWS,)+
+                }
+            }
+
             /// The law's name, as people read it.
             #[must_use]
             pub fn title(&self) -> &'static str {
@@ -106,6 +114,7 @@ macro_rules! laws {
                 output: &OutputParams<T>,
                 period: Micros,
             ) -> Result<Self, ParamError<T>> {
+                output.check_for(model.actuator.kind())?;
                 let beside = Beside { model, output, period };
                 Ok(match p {
                     $(LawParams::$law(p) => Law::$law(Listed::build(p, &beside)?),)+

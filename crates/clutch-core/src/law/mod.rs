@@ -1,4 +1,4 @@
-//! Control laws for a brake: PD (4), CTC (11), SMC (29) and (31), PID.
+//! Control laws: PD (4), CTC (11), SMC (29) and (31), PID; open-loop voltages.
 //!
 //! A law is a file of this folder and a line in the list below: its parameters (`Default` = Table 2), what it
 //! remembers, its terms, and what it has, as a sliding surface. Three tiers: parameters → `new`, the only step
@@ -6,7 +6,8 @@
 //! and a clone of the state is a snapshot.
 //!
 //! Sign convention everywhere: `e = θ_d − θ`; `e > 0` means the shaft lags and the brake has to
-//! let go. A positive voltage presses the pad.
+//! let go. A positive voltage presses the pad. With a motor, which a positive voltage drives forwards, the laws in volts
+//! turn their sign round: PD then is `u = K_p e + K_d ė`, as the paper prints it.
 
 mod list;
 mod output;
@@ -21,6 +22,8 @@ list::laws! {
     smc Smc SmcParams "Sliding mode with the boundary layer (31).";
     smc_sign SmcSign SmcSignParams "Sliding mode with the sign function (29).";
     pid Pid PidParams "Proportional–integral–derivative control with feed-forward.";
+    voltage Voltage VoltageParams "Open-loop voltage.";
+    hold Hold HoldParams "Open-loop voltage that holds the resting shaft.";
 }
 
 /// Input of a law in each period.
@@ -48,7 +51,7 @@ impl<T: Arithmetic> Tick<T> {
 /// The answer of a law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command<T: Arithmetic, Terms> {
-    /// Brake voltage within the limits, V.
+    /// Voltage within the limits, V.
     pub voltage: T,
     /// The limit or the invalid demand that decided it, if one did.
     pub limit: T::Limit,
@@ -96,6 +99,14 @@ pub trait ControlLaw<T: Arithmetic> {
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms>;
 }
 
+impl<T: Real> Beside<'_, T> {
+    /// −1 where a voltage above 0 drives the shaft forwards, 1 where it resists: laws count as a brake does.
+    #[must_use]
+    pub fn sign(&self) -> T {
+        if self.model.actuator.kind().drives_above_0() { -T::ONE } else { T::ONE }
+    }
+}
+
 /// The parts that a law is built beside.
 #[derive(Clone, Copy, Debug)]
 pub struct Beside<'a, T> {
@@ -113,6 +124,8 @@ pub trait Listed<T: Real>: ControlLaw<T> + Sized {
     type Params;
     /// Its name, as people read it.
     const TITLE: &'static str;
+    /// `true` if it follows a path; `false` for an open-loop law, whose path says nothing.
+    const FOLLOWS: bool = true;
 
     /// Checks the parameters.
     ///
@@ -158,9 +171,16 @@ pub struct Surface<T> {
 }
 
 impl<T> Surface<T> {
-    /// A law that is affine in `σ` and saturates at `highest` volts outside of the layer.
+    /// A law that gives `gain` volts per `σ`, within the limits of an output: outside of the layer it saturates, with
+    /// `highest` volts on a brake, with the nearer limit on what drives either way.
     #[must_use]
-    pub const fn affine(slope: T, layer: T, highest: T) -> Self {
-        Surface { slope, layer, kp: highest, kd: None, weakened: false, sliding: false }
+    pub fn affine(slope: T, (lowest, highest): (T, T), gain: T) -> Self
+    where
+        T: Real,
+    {
+        let below = -lowest;
+        let (nearer, farther) =
+            if below > T::ZERO { (highest.min(below), highest.max(below)) } else { (highest, highest) };
+        Surface { slope, layer: farther / gain, kp: nearer, kd: None, weakened: false, sliding: false }
     }
 }

@@ -1,17 +1,17 @@
 //! The end that all laws share: bumpless start, limits, and what a non-number becomes.
 
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Each, Micros, ParamError, Real};
+use crate::{ActuatorKind, Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
-    /// Output stage of a law. The defaults are the paper's 0 to 10 V without bumpless start, and full braking on
-    /// an invalid demand.
+    /// Output stage of a law. The defaults are for a brake: the paper's 0 to 10 V without bumpless start, and full braking
+    /// on an invalid demand.
     pub struct OutputParams<T>: Default {
-        /// Lowest voltage: a pad can only push. Above 0 the pad never lifts.
-        lowest: T = 0.0, "lowest_v" "" V, Range::at_least(0.0);
+        /// Lowest voltage. With a brake at least 0, as a pad can only push; above 0 the pad never lifts.
+        lowest: T = 0.0, "lowest_v" "" V, Range::ANY;
         /// Highest voltage. Lower `on_invalid_v` together with it.
         highest: T = 10.0, "highest_v" "" V, Range::ANY;
-        /// Voltage for a demand that is not a number.
+        /// Voltage for a demand that is not a number; with a motor 0.
         on_invalid: T = 10.0, "on_invalid_v" "" V, Range::ANY;
         /// Time constant of a bumpless start, with which the difference between the voltage found at start and the
         /// law's first demand decays; 0 starts with the law's own demand.
@@ -23,6 +23,12 @@ crate::params! {
         /// The voltage for an invalid demand is one of the range.
         WITHIN_LIMITS: on_invalid, "a voltage from lowest_v to highest_v (it does not follow them)" =>
             p.on_invalid >= p.lowest && p.on_invalid <= p.highest;
+        /// A pad can only push.
+        PUSHES: lowest, "a voltage of at least 0 with a brake, whose pad can only push (rig.actuator, model.actuator)";
+        /// What drives, drives.
+        DRIVES: lowest, "a voltage below 0 with an actuator that drives (model.actuator)";
+        /// An invalid demand moves nothing.
+        MOVES_NOTHING: on_invalid, "0 with a motor, which any other voltage drives (model.actuator)";
         /// The converter reaches the lowest voltage.
         LOWEST_REACHED: lowest, "a voltage that the converter reaches: not below rig.dac.lowest_v";
         /// The converter reaches the highest voltage.
@@ -31,6 +37,22 @@ crate::params! {
 }
 
 impl<T: Real> OutputParams<T> {
+    /// Checks the limits against an actuator.
+    ///
+    /// # Errors
+    /// A voltage below 0 with a brake, none below 0 with what drives, one for an invalid demand that drives.
+    pub fn check_for(&self, kind: ActuatorKind) -> Result<(), ParamError<T>> {
+        let below = self.lowest < T::ZERO;
+        if kind.two_sided() {
+            OutputParams::DRIVES.require(self.lowest, below)?;
+        } else {
+            OutputParams::PUSHES.require(self.lowest, !below)?;
+        }
+        let drives = kind == ActuatorKind::Motor;
+        OutputParams::MOVES_NOTHING.require(self.on_invalid, !drives || self.on_invalid == T::ZERO)?;
+        Ok(())
+    }
+
     /// The default output stage with these limits, V; an invalid demand brakes with the higher.
     #[must_use]
     pub fn within(lowest: T, highest: T) -> Self {
@@ -45,7 +67,7 @@ pub enum Limit {
     /// The demand went out as it was.
     #[default]
     None,
-    /// Raised to the lowest voltage: the law asks for a torque that a brake cannot give.
+    /// Raised to the lowest voltage: the law asks for a torque that the actuator cannot give, with a brake one that drives.
     Lowest,
     /// Lowered to the highest voltage.
     Highest,
@@ -117,6 +139,12 @@ impl<T: Arithmetic> Output<T> {
         self.highest
     }
 
+    /// Lowest and highest voltage, V.
+    #[must_use]
+    pub fn limits(&self) -> (T, T) {
+        (self.lowest, self.highest)
+    }
+
     /// Voltage for an invalid demand, V.
     #[must_use]
     pub fn on_invalid(&self) -> T {
@@ -174,7 +202,7 @@ mod tests {
     fn each_bad_parameter_is_named() {
         let d = OutputParams::<f64>::default();
         for (bad, field) in [
-            (OutputParams { lowest: -1.0, ..d }, "lowest"),
+            (OutputParams { lowest: f64::NAN, ..d }, "lowest"),
             (OutputParams { highest: 0.0, ..d }, "highest"),
             (OutputParams { on_invalid: 11.0, ..d }, "on_invalid"),
             (OutputParams { bumpless_time: f64::NAN, ..d }, "bumpless_time"),

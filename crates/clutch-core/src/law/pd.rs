@@ -24,6 +24,7 @@ crate::params! {
 /// The law (4), checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pd<T> {
+    /// With a motor, negative.
     params: PdParams<T>,
     output: Output<T>,
 }
@@ -77,7 +78,9 @@ impl<T: Real> Listed<T> for Pd<T> {
     const TITLE: &'static str = "PD (4)";
 
     fn build(p: &PdParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
-        Pd::new(p, beside.output, beside.period)
+        let mut law = Pd::new(p, beside.output, beside.period)?;
+        law.params = PdParams { kp: beside.sign() * p.kp, kd: beside.sign() * p.kd };
+        Ok(law)
     }
 
     fn output(&self) -> &Output<T> {
@@ -85,8 +88,7 @@ impl<T: Real> Listed<T> for Pd<T> {
     }
 
     fn surface(&self, _: &Asked<'_, T>) -> Option<Surface<T>> {
-        let PdParams { kp, kd } = self.params;
-        let highest = self.output.highest();
-        (kd > T::ZERO && kp > T::ZERO).then(|| Surface::affine(kp / kd, highest / kd, highest))
+        let (kp, kd) = (self.params.kp.abs(), self.params.kd.abs());
+        (kd > T::ZERO && kp > T::ZERO).then(|| Surface::affine(kp / kd, self.output.limits(), kd))
     }
 }

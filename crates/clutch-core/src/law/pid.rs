@@ -1,8 +1,10 @@
 //! Proportional–integral–derivative control with feed-forward.
 //!
 //! ```text
-//! u = u_0 − (K_p e + K_i ∫ e dt + K_d d + K_v θ̇_d + K_a θ̈_d),     τ ḋ = ė − d,   with a brake's sign
+//! u = u_0 − (K_p e + K_i ∫ e dt + K_d d + K_c sgn θ̇_d + K_v θ̇_d + K_a θ̈_d),     τ ḋ = ė − d
 //! ```
+//!
+//! This is the sign for a brake; with a motor it is `u_0 + (…)`.
 //!
 //! While a limit of the output decides, the integral follows it with the tracking time (back-calculation,
 //! Åström and Hägglund 2006): it holds what the actuator gives and not what it was asked for. A run begins with
@@ -15,9 +17,10 @@ use crate::{Arithmetic, Each, Micros, ParamError, Real};
 crate::params! {
     /// PID control with feed-forward, a filtered derivative, and an integral that does not wind up at a limit.
     ///
-    /// `u = u_0 − (K_p e + K_i ∫ e dt + K_d d + K_v θ̇_d + K_a θ̈_d)`, `τ ḋ = ė − d`. A start is bumpless where
-    /// there is an integral. The feed-forward of a believed plant is `u_0 = T_u/(μ K_COF)`, `K_v = C_d/(μ K_COF)`,
-    /// `K_a = J/(μ K_COF)`.
+    /// `u = u_0 − (K_p e + K_i ∫ e dt + K_d d + K_c sgn θ̇_d + K_v θ̇_d + K_a θ̈_d)` with a brake, `u_0 + (…)` with a motor;
+    /// `τ ḋ = ė − d`. A start is bumpless where there is an integral. The feed-forward of a believed plant is
+    /// `u_0 = T_u/(μ K_COF)`, `K_v = C_d/(μ K_COF)`, `K_a = J/(μ K_COF)` with a brake; `u_0 = −T_u/k_t`,
+    /// `K_c = μ N_0/k_t`, `K_v = C_d/k_t`, `K_a = J/k_t` with a motor.
     pub struct PidParams<T>: Default {
         /// Proportional gain.
         kp: T = 1000.0, "kp_v_rad" "K_p" V_RAD, Range::at_least(0.0);
@@ -31,6 +34,8 @@ crate::params! {
         tracking_time: T = 0.05, "tracking_time_s" "T_t" S, Range::above(0.0);
         /// Voltage without error, at rest.
         bias: T = 0.0, "bias_v" "u_0" V, Range::ANY;
+        /// Feed-forward of friction: this voltage the way that the path goes, none where it rests.
+        coulomb: T = 0.0, "coulomb_v" "K_c" V, Range::ANY;
         /// Feed-forward of the path's velocity.
         velocity: T = 0.0, "velocity_v_s_rad" "K_v" V_S_RAD, Range::ANY;
         /// Feed-forward of the path's acceleration.
@@ -46,7 +51,7 @@ crate::params! {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pid<T> {
     params: PidParams<T>,
-    /// Integral gain times the period, V/rad.
+    /// Integral gain times the period, V/rad; with a motor negative, as the gains in `params`.
     integral_step: T,
     /// Share of a new error rate in the filtered one.
     newest: T,
@@ -100,6 +105,7 @@ impl<T: Arithmetic> Pid<T> {
             derivative_time: p(|p| p.derivative_time),
             tracking_time: p(|p| p.tracking_time),
             bias: p(|p| p.bias),
+            coulomb: p(|p| p.coulomb),
             velocity: p(|p| p.velocity),
             acceleration: p(|p| p.acceleration),
         };
@@ -117,7 +123,9 @@ impl<T: Arithmetic> Pid<T> {
     #[inline]
     fn parts(&self, tick: &Tick<T>, rate: T) -> (T, T, T) {
         let p = &self.params;
-        let forward = p.bias - (p.velocity * tick.target_velocity + p.acceleration * tick.target_acceleration);
+        let way = tick.target_velocity.sgn();
+        let along = p.velocity * tick.target_velocity + p.acceleration * tick.target_acceleration;
+        let forward = p.bias - (p.coulomb * way + along);
         (-(p.kp * tick.error), -(p.kd * rate), forward)
     }
 }
@@ -133,7 +141,7 @@ impl<T: Arithmetic> ControlLaw<T> for Pid<T> {
         let without = proportional + derivative + forward;
         // The first tick adds a step of its own.
         let integral = applied - without + self.integral_step * tick.error;
-        let found = T::ZERO.less(self.integral_step) & integral.is_finite();
+        let found = T::ZERO.less(self.integral_step.abs()) & integral.is_finite();
         let integral = T::select(found, integral, T::ZERO);
         let output = self.output.start(without + integral - self.integral_step * tick.error, applied);
         PidState { integral, rate: tick.error_rate, output }
@@ -165,7 +173,16 @@ impl<T: Real> Listed<T> for Pid<T> {
     const TITLE: &'static str = "PID";
 
     fn build(p: &PidParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
-        Pid::new(p, beside.output, beside.period)
+        let sign = beside.sign();
+        let mut law = Pid::new(p, beside.output, beside.period)?;
+        let PidParams { kp, kd, coulomb, velocity, acceleration, .. } = p;
+        law.params.kp = sign * *kp;
+        law.params.kd = sign * *kd;
+        law.params.coulomb = sign * *coulomb;
+        law.params.velocity = sign * *velocity;
+        law.params.acceleration = sign * *acceleration;
+        law.integral_step = sign * law.integral_step;
+        Ok(law)
     }
 
     fn output(&self) -> &Output<T> {

@@ -30,6 +30,7 @@ crate::params! {
 /// The law (31), checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smc<T> {
+    /// With a motor, gains are negative.
     params: SmcParams<T>,
     inverse_boundary: T,
     output: Output<T>,
@@ -104,7 +105,10 @@ impl<T: Real> Listed<T> for Smc<T> {
     const TITLE: &'static str = "SMC (31), with boundary layer";
 
     fn build(p: &SmcParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
-        Smc::new(p, beside.output, beside.period)
+        let mut law = Smc::new(p, beside.output, beside.period)?;
+        law.params.kp = beside.sign() * p.kp;
+        law.params.kd = beside.sign() * p.kd;
+        Ok(law)
     }
 
     fn output(&self) -> &Output<T> {
@@ -113,6 +117,7 @@ impl<T: Real> Listed<T> for Smc<T> {
 
     fn surface(&self, _: &Asked<'_, T>) -> Option<Surface<T>> {
         let SmcParams { kp, kd, slope, .. } = self.params;
+        let (kp, kd) = (kp.abs(), kd.abs());
         // The layer as the law computes with it.
         let layer = T::ONE / self.inverse_boundary;
         Some(Surface { slope, layer, kp, kd: Some(kd), weakened: layer > T::ZERO, sliding: true })

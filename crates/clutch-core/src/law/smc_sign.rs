@@ -26,6 +26,7 @@ crate::params! {
 /// The law (29), checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmcSign<T> {
+    /// With a motor, gains are negative.
     params: SmcSignParams<T>,
     output: Output<T>,
 }
@@ -83,7 +84,10 @@ impl<T: Real> Listed<T> for SmcSign<T> {
     const TITLE: &'static str = "SMC (29), with the sign function";
 
     fn build(p: &SmcSignParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
-        SmcSign::new(p, beside.output, beside.period)
+        let mut law = SmcSign::new(p, beside.output, beside.period)?;
+        law.params.kp = beside.sign() * p.kp;
+        law.params.kd = beside.sign() * p.kd;
+        Ok(law)
     }
 
     fn output(&self) -> &Output<T> {
@@ -92,6 +96,7 @@ impl<T: Real> Listed<T> for SmcSign<T> {
 
     fn surface(&self, _: &Asked<'_, T>) -> Option<Surface<T>> {
         let SmcSignParams { kp, kd, slope } = self.params;
+        let (kp, kd) = (kp.abs(), kd.abs());
         Some(Surface { slope, layer: T::ZERO, kp, kd: Some(kd), weakened: false, sliding: true })
     }
 }

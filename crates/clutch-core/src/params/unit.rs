@@ -86,6 +86,7 @@ units! {
     NM_S_RAD "nm_s_rad" "N m s/rad" "N m s/rad" None "" 1.0;
     NM_RT_S "nm_rt_s" "N m/√s" "N m/√s" None "" 1.0;
     NM_RAD "nm_rad" "N m/rad" "N m/rad" None "" 1.0;
+    NM_S "nm_s" "N m/s" "N m/s" None "" 1.0;
     NM_V "nm_v" "N m/V" "N m/V" None "" 1.0;
     NM_A "nm_a" "N m/A" "N m/A" None "" 1.0;
     V_S2_RAD "v_s2_rad" "V s²/rad" "V s²/rad" None "" 1.0;

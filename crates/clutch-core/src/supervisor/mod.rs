@@ -25,7 +25,7 @@
 //! | [`Cause::Late`] | samples or answers come too late, more often than allowed |
 //! | [`Cause::Duplicated`], [`Cause::Reordered`] | samples repeat, or arrive out of order, more often than allowed |
 //! | [`Cause::Jump`] | counts depart from dead reckoning by more than a shaft can, more often than allowed |
-//! | [`Cause::StandStill`] | the brake is open, the drive must have moved the shaft, and no count came |
+//! | [`Cause::StandStill`] | drive or motor must have moved the shaft against all friction, and no count came |
 //! | [`Cause::FollowingError`] | the error exceeds its limit, which grows with the speed |
 //! | [`Cause::Saturation`] | the output is at a limit for too long |
 //! | [`Cause::NotFinite`] | the law's measurement, terms or demand are not numbers |
@@ -41,12 +41,13 @@ mod params;
 mod state;
 
 pub use params::{LimitParams, SpeedLimit, SupervisorParams};
+use state::Expected;
 pub use state::{Arrival, BoardMode, Cause, Checks, Cycle, Sample, State, SupervisorState};
 
 use crate::law::{ControlLaw, Limit, Terms};
 use crate::safe_state::{SafeCodes, SafeRun};
 use crate::{Bounds, Counts, Dac, DacCode, ParamError, Real, Servo, ServoOutput, ServoParams, Target};
-use params::Limits;
+use params::{Limits, Way};
 
 /// A checked supervisor; never changes in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +58,7 @@ pub struct Supervisor<T> {
 }
 
 impl<T: Real> Supervisor<T> {
-    /// Checks the parameters. `bounds` say how little the drive and how much the brake may do:
+    /// Checks the parameters. `bounds` say how little drive and motor and how much friction may do:
     /// a shaft that must have moved although no count came is what [`Cause::StandStill`] means.
     ///
     /// # Errors
@@ -69,7 +70,7 @@ impl<T: Real> Supervisor<T> {
     ) -> Result<Self, ParamError<T>> {
         let dac = Dac::new(&servo.dac)?;
         Ok(Supervisor {
-            safe: SafeCodes::new(&p.on_fault, &dac, servo.period)?,
+            safe: SafeCodes::new(&p.on_fault, &dac, servo.period, bounds.actuator)?,
             limits: Limits::new(p, servo, bounds)?,
             checks: Checks::ALL,
         })
@@ -429,7 +430,7 @@ impl<T: Real> Supervisor<T> {
         let saturated = match out.command.limit {
             Limit::None => false,
             // At the end of a path a shaft that has come too far rests there under full brake.
-            Limit::Highest => !resting,
+            Limit::Highest => !resting || l.drives_above_0(),
             Limit::Lowest | Limit::Invalid => true,
         };
         s.saturated = if saturated { s.saturated.saturating_add(since_served) } else { 0 };
@@ -442,14 +443,15 @@ impl<T: Real> Supervisor<T> {
     fn reckon_slowest<S>(&self, s: &mut SupervisorState<T, S>) {
         let l = &self.limits;
         // Over four periods it went one count less at least, and may have braked since their middle.
-        let counts = s.recent.iter().fold(0_i32, |sum, n| sum.saturating_add(*n)).saturating_sub(1);
-        let mean = T::from_i32(counts) * l.radians_per_count / (l.period * T::from_i32(4));
-        let [a, b, c, d] = s.voltages;
-        let highest = a.max(b).max(c).max(d);
-        let braking = l.brake * highest + l.drag * mean.abs() - l.drive;
-        let lost = braking.max(T::ZERO) * l.period * T::from_i32(2);
-        s.expected_velocity = (mean - lost).max(T::ZERO);
-        s.expected_travel = T::ZERO;
+        let counts = s.recent.iter().fold(0_i32, |sum, n| sum.saturating_add(*n));
+        for (way, expected) in l.ways().iter().zip(&mut s.expected) {
+            let counts =
+                if *way == Way::Forwards { counts } else { counts.saturating_neg() }.saturating_sub(1);
+            let mean = T::from_i32(counts) * l.radians_per_count / (l.period * T::from_i32(4));
+            let braking = l.drag * mean.abs() - l.least_acceleration(*way, s.voltages);
+            let lost = braking.max(T::ZERO) * l.period * T::from_i32(2);
+            *expected = Expected { velocity: (mean - lost).max(T::ZERO), travel: T::ZERO };
+        }
     }
 
     /// Moves a shaft that has the least drive and the most brake that the bounds allow, from the
@@ -461,15 +463,23 @@ impl<T: Real> Supervisor<T> {
         if moved != 0 {
             return self.reckon_slowest(s);
         }
-        // A code may be a cycle on its way, and one may have been lost: the highest of three counts.
-        let volts = s.voltages[0].max(s.voltages[1]).max(s.voltages[2]);
         let seconds = l.period * T::from_u64(u64::from(periods));
-        let acceleration = l.drive - l.brake * volts - l.drag * s.expected_velocity;
-        let before = s.expected_velocity;
-        s.expected_velocity = (before + acceleration * seconds).max(T::ZERO);
-        s.expected_travel += T::from_f64(0.5) * (before + s.expected_velocity) * seconds;
-        if s.expected_travel > l.stand_still {
-            self.check(s, Cause::StandStill, s.expected_travel);
+        let mut farthest = T::ZERO;
+        for (way, expected) in l.ways().iter().zip(&mut s.expected) {
+            // A code may be a cycle on its way, and one may have been lost: the worst of three counts.
+            let [a, b, c, _] = s.voltages;
+            let acceleration = l.least_acceleration(*way, [a, b, c, c]) - l.drag * expected.velocity;
+            let before = expected.velocity;
+            expected.velocity = (before + acceleration * seconds).max(T::ZERO);
+            expected.travel += T::from_f64(0.5) * (before + expected.velocity) * seconds;
+            if l.drives_above_0() && expected.velocity == T::ZERO {
+                // It may come back from here: no way of its own to count.
+                expected.travel = T::ZERO;
+            }
+            farthest = farthest.max(expected.travel);
+        }
+        if farthest > l.stand_still {
+            self.check(s, Cause::StandStill, farthest);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::params::{Range, Table};
 use crate::safe_state::SafeState;
-use crate::{Bounds, Interval, Micros, ParamError, Real, ServoParams, Target};
+use crate::{ActuatorKind, Bounds, Interval, Micros, ParamError, Real, ServoParams, Target};
 
 crate::params! {
     /// Limits that the supervisor watches. The defaults are for the paper's shaft at 1 kHz.
@@ -113,11 +113,26 @@ pub(super) struct Limits<T> {
     speed_limit: T,
     /// Counts per period at the speed limit, and one more for rounding.
     speed_counts: T,
-    /// Least acceleration by the drive, rad/s²; most deceleration by the brake, rad/s² per V, and
-    /// by viscous drag, 1/s.
-    pub(super) drive: T,
-    pub(super) brake: T,
+    actuator: ActuatorKind,
+    /// Least acceleration by the drive forwards, and most, rad/s².
+    drive: T,
+    most_drive: T,
+    /// Most deceleration by the brake, rad/s² per V, and by friction without a voltage, rad/s².
+    brake: T,
+    rubs: T,
+    /// Least and most acceleration by the motor, and most deceleration by friction of its load, rad/s² per V.
+    motor: T,
+    most_motor: T,
+    loads: T,
+    /// Most deceleration by viscous drag, 1/s.
     pub(super) drag: T,
+}
+
+/// A way that a shaft can go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    Forwards,
+    Backwards,
 }
 
 impl<T: Real> Limits<T> {
@@ -144,6 +159,11 @@ impl<T: Real> Limits<T> {
         Interval::HIGH_USABLE.require(drag, drag >= T::ZERO)?;
         let strongest = bounds.strongest_brake();
         Interval::HIGH_USABLE.require(strongest, strongest >= T::ZERO)?;
+        Interval::HIGH_USABLE.require(bounds.drive_torque.high, true)?;
+        let motor = &bounds.motor_gain;
+        Interval::LOW_USABLE.require(motor.low, motor.low >= T::ZERO)?;
+        Interval::HIGH_USABLE.require(motor.high, motor.high >= T::ZERO)?;
+        let most_friction = bounds.friction.high * p.friction_margin;
         Ok(Limits {
             period,
             radians_per_count: servo.encoder.radians_per_count(),
@@ -163,10 +183,49 @@ impl<T: Real> Limits<T> {
             still: T::from_f64(1e-6),
             speed_limit,
             speed_counts: speed_limit * per_radian * period + T::ONE,
+            actuator: bounds.actuator,
             drive: drive / inertia,
+            most_drive: bounds.drive_torque.high / inertia,
             brake: strongest * p.friction_margin / inertia,
+            rubs: most_friction * bounds.preload / inertia,
+            motor: motor.low / inertia,
+            most_motor: motor.high / inertia,
+            loads: most_friction * bounds.load_share * motor.high / inertia,
             drag: drag / inertia,
         })
+    }
+
+    /// `true` if a voltage above 0 drives the shaft.
+    pub(super) fn drives_above_0(&self) -> bool {
+        self.actuator.drives_above_0()
+    }
+
+    /// The ways that the shaft may be driven: a brake's goes forwards alone.
+    pub(super) fn ways(&self) -> &'static [Way] {
+        if self.drives_above_0() { &[Way::Forwards, Way::Backwards] } else { &[Way::Forwards] }
+    }
+
+    /// Least acceleration that way with the worst of some voltages, rad/s²; negative where friction may stop the shaft.
+    pub(super) fn least_acceleration(&self, way: Way, volts: [T; 4]) -> T {
+        let [a, b, c, d] = volts.map(|volts| {
+            let (weak, strong) = (self.motor, self.most_motor);
+            let (low, high) = match self.actuator {
+                ActuatorKind::Brake => (T::ZERO, T::ZERO),
+                ActuatorKind::Motor if volts > T::ZERO => (weak * volts, strong * volts),
+                ActuatorKind::Motor => (strong * volts, weak * volts),
+                ActuatorKind::Both => {
+                    let pulled = (-volts).max(T::ZERO);
+                    (weak * pulled, strong * pulled)
+                }
+            };
+            let friction = self.brake * volts.max(T::ZERO) + (self.rubs + self.loads * volts.abs());
+            let driven = match way {
+                Way::Forwards => self.drive + low,
+                Way::Backwards => -(self.most_drive + high),
+            };
+            driven - friction
+        });
+        a.min(b).min(c).min(d)
     }
 
     /// True if a path can have a target: numbers, within the speed limit, and near the last.

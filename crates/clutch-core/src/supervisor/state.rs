@@ -263,6 +263,15 @@ impl History {
     }
 }
 
+/// The slowest shaft that can be, since the last count.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Expected<T> {
+    /// rad/s
+    pub(super) velocity: T,
+    /// rad
+    pub(super) travel: T,
+}
+
 /// Memory of the supervisor and its servo; a clone is a snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SupervisorState<T, S> {
@@ -290,9 +299,8 @@ pub struct SupervisorState<T, S> {
     pub(super) voltages: [T; 4],
     /// Counts of the last four periods, the newest first.
     pub(super) recent: [i32; 4],
-    /// rad/s, rad
-    pub(super) expected_velocity: T,
-    pub(super) expected_travel: T,
+    /// The slowest shaft that can be, for each way that it may go.
+    pub(super) expected: [Expected<T>; 2],
     pub(super) lost: History,
     pub(super) late: History,
     pub(super) duplicated: History,

@@ -57,7 +57,29 @@ StribeckFriction(mu_static=0.25, mu_dynamic=0.15, stribeck_velocity_rad_s=0.001,
 ...     inner_radius_m=0.045, torque_constant_nm_a=0.0508, pad_area_m2=0.040,
 ...     lever_area_m2=0.032, armature_resistance_ohm=0.6, contact_radius_m=0.034,
 ... )
->>> rig = clutch.Rig(brake_gain_nm_v=brake)",
+>>> rig = clutch.Rig(actuator=brake)",
+    ),
+    known(
+        "BrakeActuator",
+        "BrakeActuator",
+        false,
+        r">>> clutch.Rig(actuator=clutch.BrakeActuator(preload_nm=0.01)).actuator
+BrakeActuator(gain_nm_v=0.14, preload_nm=0.01)",
+    ),
+    known(
+        "MotorActuator",
+        "MotorActuator",
+        false,
+        r">>> motor = clutch.MotorActuator(gain_nm_v=0.05, preload_nm=0.25)
+>>> rig = clutch.Rig(actuator=motor)
+>>> model = clutch.Model(actuator=motor, drive_torque_nm=0)",
+    ),
+    known(
+        "BothActuator",
+        "BothActuator",
+        false,
+        r">>> clutch.BothActuator(brake_gain_nm_v=0.14, motor_gain_nm_v=0.02).preload_nm
+0.0",
     ),
     known(
         "RippleParams",
@@ -84,6 +106,20 @@ SpringDrive(stiffness_nm_rad=0.02, rest_deg=180.0)",
         false,
         r">>> clutch.TableDrive(points_s_nm=[(0, 0.045), (2, 0.055)])
 TableDrive(points_s_nm=((0.0, 0.045), (2.0, 0.055)))",
+    ),
+    known(
+        "BeltDrive",
+        "BeltDrive",
+        false,
+        r">>> clutch.BeltDrive(stiffness_nm_rad=0.5, speed_deg_s=2)
+BeltDrive(stiffness_nm_rad=0.5, damping_nm_s_rad=0.0, speed_deg_s=2.0)",
+    ),
+    known(
+        "RampDrive",
+        "RampDrive",
+        false,
+        r">>> clutch.RampDrive(from_nm=0, rate_nm_s=0.01)
+RampDrive(from_nm=0.0, rate_nm_s=0.01)",
     ),
     known(
         "SineDrive",
@@ -119,6 +155,20 @@ HandDrive(mean_nm=0.06, rms_nm=0.008, lowest_frequency_hz=0.2, highest_frequency
         false,
         r">>> clutch.Smc(kp_v=4)
 Smc(kp_v=4.0, kd_v_s_rad=400.0, slope_1_s=70.0, boundary_rad_s=0.1)",
+    ),
+    known(
+        "VoltageParams",
+        "Voltage",
+        false,
+        r">>> clutch.Voltage(end_v=2, rate_v_s=0.1)
+Voltage(start_v=0.0, end_v=2.0, rate_v_s=0.1, returns=False)",
+    ),
+    known(
+        "HoldParams",
+        "HoldLaw",
+        false,
+        r">>> clutch.HoldLaw()
+HoldLaw(margin=1.25)",
     ),
     known(
         "OutputParams",

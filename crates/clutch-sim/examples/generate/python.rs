@@ -14,8 +14,6 @@ const TEXT: usize = 110;
 
 /// A parameter that no object has: an object of the rig has every value, so that its base says nothing.
 const HIDDEN: (&str, &str) = ("RigParams", "base");
-/// A parameter at which an object may have a table instead.
-const EITHER: (&str, &str, &str) = ("RigParams", "brake_gain_nm_v", "brake_geometry");
 /// A parameter that a file must have and an object makes up.
 const MADE_UP: (&str, &str, &str, &str) =
     ("ScenarioParams", "name", "\"\"", " By default the law's and the path's name.");
@@ -137,17 +135,9 @@ fn field(entry: Entry, place: &Place, classes: &[Class<'_>]) -> Option<Field> {
     let table = place.table.name;
     match entry {
         Entry::Row(row, _) if (table, row.key) == HIDDEN => None,
-        Entry::Below(nested) if (table, nested.key) == (EITHER.0, EITHER.2) => None,
         Entry::Row(row, of) => {
             let mut field = row_field(row, of, &default_at(&join(&place.key, row.key), row));
-            if (table, row.key) == (EITHER.0, EITHER.1) {
-                let other = place.table.nested.iter().find(|nested| nested.key == EITHER.2)?;
-                let other = &parts(other, classes).first()?.name;
-                field.kind = format!("float | {other}");
-                field.told = field.told.replacen("float", &format!("float or {other}"), 1);
-                // That a file has one of the two is no concern of an object's.
-                field.text = description(row, &TableInfo { relations: &[], ..*of });
-            } else if (table, row.key) == (MADE_UP.0, MADE_UP.1) {
+            if (table, row.key) == (MADE_UP.0, MADE_UP.1) {
                 field.default = Some(MADE_UP.2.to_owned());
                 field.text += MADE_UP.3;
             }

@@ -66,11 +66,9 @@ impl Slip<'_> {
         // Rounding must not lift it above the number that the break-away was compared with.
         let level = friction.level(speed).min(friction.at_rest().max(friction.sliding()));
         let mu = level * self.model.friction_factor(position);
-        let brake = self.sign * mu * p.brake_gain * self.input.volts.at(s).max(0.0);
-        [
-            velocity,
-            (self.input.torque(s, position) - brake - p.viscous_damping * velocity) * self.inverse_inertia,
-        ]
+        let rubs = self.model.plant.actuator().friction(self.sign * mu, self.input.volts.at(s));
+        let torque = self.input.torque(self.model, s, position);
+        [velocity, (torque - rubs - p.viscous_damping * velocity) * self.inverse_inertia]
     }
 
     /// One step of length `h`; the state at its end, its error over the tolerance, and the rate
@@ -111,17 +109,17 @@ impl Engine for DormandPrince {
             time: input.time + s,
             kind,
             position,
-            torque: input.torque(s, position),
+            torque: input.torque(model, s, position),
         };
         while s < end {
             if shaft.motion == Motion::Stuck {
                 let Some(instant) = break_away(model, input, shaft.position, s) else { return Ok(()) };
                 s = instant;
-                shaft.motion = Motion::along(input.torque(s, shaft.position));
+                shaft.motion = Motion::along(input.torque(model, s, shaft.position));
                 events.push(event(EventKind::BreakAway, s, shaft.position));
             }
             let inverse_inertia = 1.0 / model.plant.params().inertia;
-            let torques = input.torque(s, shaft.position).abs()
+            let torques = input.torque(model, s, shaft.position).abs()
                 + model.break_away_torque(shaft.position, input.volts.at(s));
             let rounding = 2.0 * f64::EPSILON * torques * inverse_inertia;
             let slip = Slip { model, input, sign: shaft.motion.sign(), inverse_inertia, rounding };
@@ -155,7 +153,7 @@ impl Engine for DormandPrince {
                     s += instant;
                     shaft.position = to[0];
                     shaft.velocity = 0.0;
-                    let torque = input.torque(s, to[0]);
+                    let torque = input.torque(model, s, to[0]);
                     if torque.abs() <= model.break_away_torque(to[0], input.volts.at(s)) {
                         shaft.motion = Motion::Stuck;
                         events.push(event(EventKind::Stick, s, shaft.position));

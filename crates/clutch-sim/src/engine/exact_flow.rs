@@ -3,8 +3,8 @@
 //! With voltage and torque held, and the speed `ω = v_s s ≥ 0` taken along the motion,
 //!
 //! ```text
-//! ṡ = φ,   φ = A − G s − q,   q = K e^(−s),        A = (T − b μ_d)/(J v_s),  G = C/J,
-//! φ̇ = (q − G) φ,   q̇ = −q φ                        K = b Δμ/(J v_s),  b = K_COF v_a,  Δμ = μ_s − μ_d
+//! ṡ = φ,   φ = A − G s − q,   q = K e^(−s),        A = (T − N μ_d)/(J v_s),  G = C/J,
+//! φ̇ = (q − G) φ,   q̇ = −q φ                        K = N Δμ/(J v_s),  Δμ = μ_s − μ_d
 //! ```
 //!
 //! An interval is cut into pieces, each taken by the cheapest way whose estimate of its own error is small enough:
@@ -396,10 +396,10 @@ impl Engine for ExactFlow {
         let Some(friction) = model.plant.friction().exponential() else {
             return Err(EngineError::Refused("friction that falls exponentially with the speed"));
         };
-        let (p, torque) = (model.plant.params(), input.torque(0.0, shaft.position));
-        let (brake, holds) = (p.brake_gain * volts.max(0.0), model.break_away_torque(0.0, volts));
+        let (p, torque) = (model.plant.params(), input.torque(model, 0.0, shaft.position));
+        let (normal, holds) = (model.plant.actuator().normal(volts), model.break_away_torque(0.0, volts));
         let (v_s, unit) = (friction.velocity, p.inertia * friction.velocity);
-        let stribeck = brake * (friction.at_rest - friction.sliding) / unit;
+        let stribeck = normal * (friction.at_rest - friction.sliding) / unit;
         let event = |kind, s: f64, position| Event { time: input.time + s, kind, position, torque };
         let mut s = 0.0;
         // It stops once at most; then it stays, or rises the other way.
@@ -418,7 +418,7 @@ impl Engine for ExactFlow {
                 drive: if stribeck == 0.0 {
                     excess
                 } else {
-                    (sign * torque - brake * friction.sliding) / unit
+                    (sign * torque - normal * friction.sliding) / unit
                 },
                 excess,
                 drag: p.viscous_damping / p.inertia,

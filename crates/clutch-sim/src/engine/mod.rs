@@ -1,13 +1,13 @@
 //! Engines: what moves the shaft from one sample to the next.
 //!
 //! ```text
-//!            |T| > μ_s K_COF v_a m(θ)                 ω reaches 0 and
-//!           ┌───── break-away ──────► Slip ±1 ──┐     |T| ≤ μ_s K_COF v_a m(θ)
+//!            |T| > μ_s N(v_a) m(θ)                    ω reaches 0 and
+//!           ┌───── break-away ──────► Slip ±1 ──┐     |T| ≤ μ_s N(v_a) m(θ)
 //!         Stuck                                 │
 //!           └◄──────────── stop ────────────────┘     (else Slip ∓1)
 //! ```
 //!
-//! A stuck shaft has velocity exactly 0 and does not move at all. Stop and break-away are found
+//! `T` is the torque of drive and actuator. A stuck shaft has velocity exactly 0 and does not move at all. Stop and break-away are found
 //! as roots, not as a threshold on a small velocity. All engines work from one [`Model`] and one
 //! [`Input`]; which one runs is chosen by [`EngineKind`].
 
@@ -20,6 +20,7 @@ pub use exact_flow::ExactFlow;
 use crate::drive::Drive;
 use crate::ripple::Ripple;
 use clutch_core::Plant;
+use clutch_core::friction::FrictionModel;
 
 /// Motion of the shaft: stuck, or the way in which it slips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +71,7 @@ impl Shaft {
 /// The plant (1) that an engine integrates, with friction that may vary along the disc.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// Inertia, damping, brake gain, friction law.
+    /// Inertia, damping, actuator, friction law.
     pub plant: Plant<f64>,
     /// Friction along the disc; none = even.
     pub ripple: Option<Ripple>,
@@ -90,7 +91,7 @@ impl Model {
     }
 }
 
-/// The brake's voltage between two samples.
+/// The voltage between two samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Volts {
     /// Held, V.
@@ -107,13 +108,25 @@ pub enum Volts {
 }
 
 impl Volts {
-    /// The most that the voltage bends upwards from `s` on, and with it the excess of torque downwards, V/s².
-    fn curvature(self, s: f64) -> f64 {
+    /// The most that the voltage bends upwards from `s` on, and downwards, V/s².
+    fn curvature(self, s: f64) -> (f64, f64) {
         match self {
-            Volts::Held(_) => 0.0,
+            Volts::Held(_) => (0.0, 0.0),
             Volts::Lag { from, to, time_constant } => {
-                (from - to).max(0.0) * libm::exp(-s / time_constant) / (time_constant * time_constant)
+                let bends = (from - to) * libm::exp(-s / time_constant) / (time_constant * time_constant);
+                (bends.max(0.0), (-bends).max(0.0))
             }
+        }
+    }
+
+    /// The instant at which the voltage passes 0, on its way for so long; s after the sample.
+    fn zero(self, duration: f64) -> Option<f64> {
+        match self {
+            Volts::Lag { from, to, time_constant } if from * to < 0.0 => {
+                let s = time_constant * libm::log1p(-from / to);
+                (s > 0.0 && s < duration).then_some(s)
+            }
+            _ => None,
         }
     }
 
@@ -136,7 +149,7 @@ pub struct Input<'a> {
     pub duration: f64,
     /// Position at which the run began, rad: what a spring's angle counts from.
     pub origin: f64,
-    /// Brake voltage.
+    /// Voltage of the actuator.
     pub volts: Volts,
     /// Driving torque.
     pub drive: &'a Drive,
@@ -145,10 +158,11 @@ pub struct Input<'a> {
 }
 
 impl Input<'_> {
-    /// Driving torque `s` seconds after the sample, N m.
+    /// Torque of drive and actuator `s` seconds after the sample, N m.
     #[inline]
-    pub(crate) fn torque(&self, s: f64, position: f64) -> f64 {
-        self.drive.torque(self.time + s, position - self.origin) + self.noise
+    pub(crate) fn torque(&self, model: &Model, s: f64, position: f64) -> f64 {
+        let drive = self.drive.torque(self.time + s, position - self.origin) + self.noise;
+        drive + model.plant.actuator().torque(self.volts.at(s))
     }
 
     /// The part from `from` to `to` seconds after the sample.
@@ -177,7 +191,7 @@ pub struct Event {
     pub kind: EventKind,
     /// Position of the shaft then, rad.
     pub position: f64,
-    /// Driving torque then, N m.
+    /// Torque of drive and actuator then, N m.
     pub torque: f64,
 }
 
@@ -244,7 +258,17 @@ pub trait Engine {
         shaft: &mut Shaft,
         events: &mut Vec<Event>,
     ) -> Result<(), EngineError> {
-        // No step goes over a corner of a torque table: neither the pair's error estimate nor the
+        // No step goes over the instant at which a pad begins to press, or a motor turns its torque round.
+        if let Some(s) = input.volts.zero(input.duration) {
+            self.advance(model, &input.part(0.0, s), shaft, events)?;
+            let after = match input.volts {
+                Volts::Lag { to, time_constant, .. } => Volts::Lag { from: 0.0, to, time_constant },
+                held @ Volts::Held(_) => held,
+            };
+            let after = Input { volts: after, ..input.part(s, input.duration) };
+            return self.advance(model, &after, shaft, events);
+        }
+        // Nor over a corner of a torque table: neither the pair's error estimate nor the
         // search for break-away would see a short pulse.
         let end = input.time + input.duration;
         let mut s = 0.0;
@@ -282,8 +306,9 @@ const EXCLUDED: u32 = 20;
 /// between two instants the excess of torque over friction rises above its ends by an eighth of the time squared times
 /// the bound of its curvature, at most; where that is not enough to exclude a root, the time is halved.
 fn break_away(model: &Model, input: &Input<'_>, position: f64, s: f64) -> Option<f64> {
-    let excess =
-        |s: f64| input.torque(s, position).abs() - model.break_away_torque(position, input.volts.at(s));
+    let excess = |s: f64| {
+        input.torque(model, s, position).abs() - model.break_away_torque(position, input.volts.at(s))
+    };
     let begin = excess(s);
     if begin > 0.0 {
         return Some(s);
@@ -291,7 +316,10 @@ fn break_away(model: &Model, input: &Input<'_>, position: f64, s: f64) -> Option
     if input.is_constant() {
         return None;
     }
-    let search = Search { input, excess, friction: model.break_away_torque(position, 1.0) };
+    let actuator = model.plant.actuator();
+    let friction = model.plant.friction().at_rest() * model.friction_factor(position);
+    let drives = actuator.motor_gain() * (1.0 + friction * actuator.load_share());
+    let search = Search { input, excess, presses: friction * actuator.brake_gain(), drives };
     search.first((s, begin), (input.duration, excess(input.duration)), 0)
 }
 
@@ -299,8 +327,10 @@ fn break_away(model: &Model, input: &Input<'_>, position: f64, s: f64) -> Option
 struct Search<'a, F> {
     input: &'a Input<'a>,
     excess: F,
-    /// Torque that friction holds for each volt, N m/V.
-    friction: f64,
+    /// Torque that friction holds for each volt on a brake, N m/V.
+    presses: f64,
+    /// Torque for each volt of a motor, and what its friction holds, N m/V.
+    drives: f64,
 }
 
 impl<F: Fn(f64) -> f64> Search<'_, F> {
@@ -310,7 +340,9 @@ impl<F: Fn(f64) -> f64> Search<'_, F> {
         if none_at_the_end {
             let length = b.0 - a.0;
             // |T| bends upwards where T changes its sign: that only lowers it between two ends.
-            let curvature = self.input.drive.curvature() + self.friction * self.input.volts.curvature(a.0);
+            let (up, down) = self.input.volts.curvature(a.0);
+            let bends = self.presses * up + self.drives * up.max(down);
+            let curvature = self.input.drive.curvature() + bends;
             if a.1.max(b.1) + 0.125 * curvature * length * length <= 0.0 || halvings >= EXCLUDED {
                 return None;
             }

@@ -65,7 +65,7 @@ fn known_model(bench: &RigParams) -> PlantParams {
         inertia: bench.inertia,
         drive_torque: drive,
         viscous_damping: bench.viscous_damping,
-        brake_gain: bench.gain().unwrap_or(f64::NAN),
+        actuator: bench.actuator,
         friction: bench.friction,
     }
 }

@@ -25,8 +25,8 @@ use clutch_core::law::{Asked, Law, Output};
 use clutch_core::params::{Choice, Kind, Params};
 use clutch_core::reference::{Knot, Reference, ReferenceParams, Table as PathTable};
 use clutch_core::{
-    Bounds, Dac, Encoder, Envelope, FixedCounts, Interval, Obstacle, ParamError, Plant, Real, Supervisor,
-    SupervisorParams, VelocitySource, check_path,
+    ActuatorKind, Bounds, Dac, Encoder, Envelope, FixedCounts, Interval, Obstacle, ParamError, Plant, Real,
+    Supervisor, SupervisorParams, VelocitySource, check_path,
 };
 use std::io::ErrorKind;
 use std::path::Path;
@@ -56,6 +56,10 @@ built_in!(
     "ctc_2",
     "smc_2",
     "pid_2",
+    "motor_pid",
+    "motor_pid_coulomb",
+    "motor_smc",
+    "motor_ctc",
     "bench_pd_2",
     "bench_smc_2",
     "observer_smc_2",
@@ -293,6 +297,8 @@ impl Scenario {
 
     fn check_parts(&self) -> Result<(), ScenarioError> {
         let spec = self.spec();
+        // First: limits that are right for the one are wrong for the other.
+        self.check_actuator(&spec)?;
         match self.scalar() {
             ScalarKind::F32 => self.check_servo::<f32>(&spec)?,
             ScalarKind::F64 => self.check_servo::<f64>(&spec)?,
@@ -308,20 +314,49 @@ impl Scenario {
         Ok(())
     }
 
+    /// A law for another actuator than the rig's would drive the shaft the wrong way.
+    fn check_actuator(&self, spec: &RunSpec<'_>) -> Result<(), ScenarioError> {
+        let (rig, model) = (spec.rig.actuator.kind(), spec.model.actuator.kind());
+        if rig == model {
+            return Ok(());
+        }
+        let name = |kind: ActuatorKind| match kind {
+            ActuatorKind::Brake => "a brake",
+            ActuatorKind::Motor => "a motor",
+            ActuatorKind::Both => "a brake with a motor",
+        };
+        Err(self.message(
+            "model.actuator",
+            format!(
+                "the law believes in {}, and the rig has {}: a voltage would go the wrong way; give [rig.actuator] and [model.actuator] the same kind",
+                name(model), name(rig)
+            ),
+        ))
+    }
+
     fn check_safety(&self, safety: &Safety, plan: &Plan) -> Result<(), ScenarioError> {
         let servo = self.spec().servo().map_err(|e| self.at("rig", &e))?;
         let supervisor = self.supervisor(safety);
         Supervisor::new(&supervisor, &servo, &plan.bounds).map_err(|e| self.at("safety", &e))?;
-        // A brake that is to hold must hold the strongest drive with the weakest brake.
+        // What is to hold must hold the strongest drive with the weakest actuator.
         let b = &plan.bounds;
-        let needed = b.drive_torque.high / b.weakest_brake();
-        match safety.on_fault.holding_voltage() {
-            Some(volts) if volts < needed => Err(self.message(
-                "safety.on_fault",
-                format!("holds with {volts} V, and the strongest drive against the weakest brake of [bounds] needs {needed:.4} V; twice as much is usual"),
-            )),
-            _ => Ok(()),
+        let Some(volts) = safety.on_fault.holding_voltage() else { return Ok(()) };
+        let left = b.left_over(volts);
+        if left <= 0.0 {
+            return Ok(());
         }
+        let message = match b.actuator {
+            ActuatorKind::Motor => format!(
+                "holds with {volts} V, and at the worst corner of [bounds] drive and motor exceed friction by {left:.4} N m: the shaft runs on; take a voltage that balances the drive, release, or a brake"
+            ),
+            ActuatorKind::Brake | ActuatorKind::Both => {
+                let needed = volts + left / b.weakest_brake();
+                format!(
+                    "holds with {volts} V, and the strongest drive against the weakest brake of [bounds] needs {needed:.4} V; twice as much is usual"
+                )
+            }
+        };
+        Err(self.message("safety.on_fault", message))
     }
 
     /// Limits that the supervisor of a run on a board watches.
@@ -484,6 +519,8 @@ impl Scenario {
         let certificate = certify(&law, &bounds, &demand).map_err(|e| self.at("bounds", &e))?;
         let asked = Asked { velocity: 0.0, acceleration: 0.0, fastest: &|_| 0.0 };
         let surface = law.surface(&asked).filter(|surface| surface.sliding);
+        // They are a brake's.
+        let surface = surface.filter(|_| bounds.actuator == ActuatorKind::Brake);
         let paper = surface.map(|s| paper_conditions(&bounds, &demand, s.kp, s.slope));
         Ok(Plan { envelope, bounds, certificate, paper, demand })
     }
@@ -497,11 +534,15 @@ impl Scenario {
         let start_velocity = if p.run.start == Start::OnPath { first } else { 0.0 };
         let envelope = check_path(&path, self.ticks(), period, start_velocity, bounds, limits)
             .map_err(|e| {
-                let at_time = format!("a brake cannot follow the path from t = {:.4} s on", e.time);
+                let at_time = format!("{} cannot follow the path from t = {:.4} s on", actor(bounds.actuator), e.time);
                 let (asked, available) = (e.asked, e.available);
                 self.path_message(match e.obstacle {
+                    Obstacle::Reverse if bounds.actuator == ActuatorKind::Both => format!(
+                        "{at_time}: it runs backwards at {:.4} °/s, and this motor drives forwards alone; keep the velocity at or above 0",
+                        -asked.to_degrees()
+                    ),
                     Obstacle::Reverse => format!(
-                        "{at_time}: it runs backwards at {:.4} °/s, and a brake drives nothing; keep the velocity at or above 0",
+                        "{at_time}: it runs backwards at {:.4} °/s, and a brake drives nothing; keep the velocity at or above 0, or give rig and model a motor",
                         -asked.to_degrees()
                     ),
                     Obstacle::Acceleration if available <= 0.0 && p.output.lowest > 0.0 => format!(
@@ -512,6 +553,13 @@ impl Scenario {
                         "{at_time}: it accelerates at {:.5} °/s², and the drive grants {:.5} °/s²; accelerate more slowly",
                         asked.to_degrees(),
                         available.to_degrees()
+                    ),
+                    Obstacle::Voltage if bounds.actuator == ActuatorKind::Motor => format!(
+                        "{at_time}: it needs {asked:.4} V, and output.{} = {available}; accelerate more slowly, or raise the limit",
+                        if asked < 0.0 { "lowest_v" } else { "highest_v" }
+                    ),
+                    Obstacle::Voltage if asked < 0.0 => format!(
+                        "{at_time}: it needs {asked:.4} V of the motor, and output.lowest_v = {available}; accelerate more slowly, or lower the limit"
                     ),
                     Obstacle::Voltage => format!(
                         "{at_time}: it needs {asked:.4} V of braking, and output.highest_v = {available}; decelerate more slowly, drive it with less torque, or raise the limit"
@@ -564,7 +612,7 @@ impl Scenario {
     /// None for a checked scenario.
     pub fn outside_bounds(&self, bounds: &Bounds) -> Result<Vec<String>, ScenarioError> {
         let rig = Rig::new(&self.params.rig, self.params.run.seed).map_err(|e| self.at("rig", &e))?;
-        let p = rig.model.plant.params();
+        let (p, actuator) = (rig.model.plant.params(), rig.model.plant.actuator());
         let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
         let (low, high) = rig.drive.range();
         let mut lines = Vec::new();
@@ -588,10 +636,24 @@ impl Scenario {
         check("inertia", p.inertia, p.inertia, &bounds.inertia);
         check("driving torque", low, high, &bounds.drive_torque);
         check("viscous damping", p.viscous_damping, p.viscous_damping, &bounds.viscous_damping);
-        check("brake gain", p.brake_gain, p.brake_gain, &bounds.brake_gain);
+        let (brake, motor) = (actuator.brake_gain(), actuator.motor_gain());
+        check("brake gain", brake, brake, &bounds.brake_gain);
+        check("motor gain", motor, motor, &bounds.motor_gain);
+        let exactly = |x: f64| Interval { low: x, high: x };
+        check("preload", actuator.preload(), actuator.preload(), &exactly(bounds.preload));
+        check("load share", actuator.load_share(), actuator.load_share(), &exactly(bounds.load_share));
         check("static friction", s.0, s.1, &bounds.friction_at_rest);
         check("dynamic friction", d.0, d.1, &bounds.friction_sliding);
         Ok(lines)
+    }
+}
+
+/// The part that a path asks too much of.
+fn actor(kind: ActuatorKind) -> &'static str {
+    match kind {
+        ActuatorKind::Brake => "a brake",
+        ActuatorKind::Motor => "the motor",
+        ActuatorKind::Both => "a brake with this motor",
     }
 }
 
@@ -619,15 +681,12 @@ fn merge_base(origin: &str, table: &mut Table) -> Result<(), ScenarioError> {
     let base = base.map_err(|value| ScenarioError::value(origin, "rig.base", &value, &expected))?;
     let mut merged = RigParams::base_table(base);
     // Alternatives: naming one drops the base's other.
-    for choice in ["drive", "friction"] {
+    for choice in ["actuator", "drive", "friction"] {
         if let (Some(Value::Table(own)), Some(Value::Table(base))) = (own.get(choice), merged.get(choice))
             && own.keys().any(|k| !base.contains_key(k))
         {
             merged.remove(choice);
         }
-    }
-    if own.contains_key("brake_geometry") {
-        merged.remove("brake_gain_nm_v");
     }
     overlay(&mut merged, std::mem::take(own));
     *own = merged;

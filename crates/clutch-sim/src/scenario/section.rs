@@ -111,7 +111,7 @@ mod tests {
                 "rms = 0.1\nlowest_waves_per_turn = 1\nhighest_waves_per_turn = 2\nspacing_waves_per_turn = 0",
                 "rig.ripple.spacing_waves_per_turn",
             ),
-            ("output", "lowest_v = -1.0", "output.lowest_v"),
+            ("output", "lowest_v = nan", "output.lowest_v"),
             ("output", "highest_v = 8.0", "output.on_invalid_v"),
             (
                 "reference.minimum_jerk",

@@ -161,6 +161,13 @@ fn missing(origin: &str, key: &str) -> ScenarioError {
     ScenarioError::new(origin, key, "", message)
 }
 
+/// Keys of versions before this one, and where their values stand now.
+const FORMER: [(&str, &str); 3] = [
+    ("rig.brake_gain_nm_v", "rig.actuator.brake.gain_nm_v"),
+    ("rig.brake_geometry", "rig.actuator.geometry"),
+    ("model.brake_gain_nm_v", "model.actuator.brake.gain_nm_v"),
+];
+
 fn unknown_key(
     origin: &str,
     path: &str,
@@ -177,10 +184,13 @@ fn unknown_key(
         }),
         _ => None,
     });
+    let whole = join(path, unknown);
+    let former = FORMER.iter().find(|(old, _)| *old == whole);
+    let moved = former.map(|(_, new)| format!(": did you mean {new}?")).or(moved);
     let hint = moved.unwrap_or_else(|| correction(unknown, value, &names));
     let shown = value.filter(|v| !v.is_table()).map(shown).unwrap_or_default();
     let message = format!("unknown key{hint}; expected one of: {}", names.join(", "));
-    ScenarioError::new(origin, &join(path, unknown), &shown, message)
+    ScenarioError::new(origin, &whole, &shown, message)
 }
 
 /// A whole number where a real one is expected is one.

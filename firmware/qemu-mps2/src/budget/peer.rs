@@ -6,7 +6,7 @@ use crate::meter::{Tally, instructions, line};
 use clutch_core::law::{
     ControlLaw, Ctc, CtcParams, OutputState, Pd, PdParams, Smc, SmcParams, SmcSign, SmcSignParams,
 };
-use clutch_core::{PlantParams, StribeckParams};
+use clutch_core::{Actuator, PlantParams, StribeckParams};
 
 /// `peer_tick`
 #[repr(C)]
@@ -79,7 +79,7 @@ pub fn measure() -> Option<()> {
         plant.inertia,
         plant.drive_torque,
         plant.viscous_damping,
-        plant.brake_gain,
+        Actuator::new(&plant.actuator).ok()?.brake_gain(),
         f.mu_static,
         f.mu_dynamic,
         1.0 / f.stribeck_velocity,

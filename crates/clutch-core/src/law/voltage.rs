@@ -1,0 +1,158 @@
+//! An open-loop voltage: constant, or on its way from one voltage to another, once or to and fro.
+//!
+//! ```text
+//! u(0) = u_0,   u̇ = ± r between u_0 and u_1
+//! ```
+//!
+//! For what is measured without control: the voltage at which a shaft breaks away, friction over speed, a motor's
+//! gain. A shaft under an open-loop voltage follows no path.
+
+use super::{Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Tick};
+use crate::params::{Range, Table};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
+
+crate::params! {
+    /// An open-loop voltage, whatever the shaft does. It begins at `start_v` and goes to `end_v` at a rate.
+    pub struct VoltageParams<T>: Default {
+        /// Voltage at the start.
+        start: T = 0.0, "start_v" "u_0" V, Range::ANY;
+        /// Voltage at the end of the way.
+        end: T = 0.0, "end_v" "u_1" V, Range::ANY;
+        /// Rate from the one to the other; 0 stays at the start.
+        rate: T = 0.0, "rate_v_s" "r" V_S, Range::at_least(0.0);
+        /// `true` if it goes to and fro between them; else it stays at the end.
+        returns: bool = false, "returns" "" NONE, Range::ANY;
+    }
+}
+
+/// The law, checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Voltage<T> {
+    start: T,
+    lowest: T,
+    highest: T,
+    /// Way of a period, V; towards the end.
+    step: T,
+    /// 1 if it goes to and fro, else 0.
+    returns: T,
+    output: Output<T>,
+}
+
+/// Memory of the law.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct VoltageState<T> {
+    /// V, from the start.
+    way: T,
+    /// 1 on the way back, else 0.
+    back: T,
+    output: OutputState<T>,
+}
+
+impl<T: Real> Voltage<T> {
+    /// Checks parameters and output stage.
+    ///
+    /// # Errors
+    /// The first parameter out of range.
+    pub fn new(p: &VoltageParams<T>, output: &OutputParams<T>, period: Micros) -> Result<Self, ParamError<T>> {
+        p.check_rows()?;
+        let towards = (p.end - p.start).sgn();
+        Ok(Voltage {
+            start: p.start,
+            lowest: p.start.min(p.end),
+            highest: p.start.max(p.end),
+            step: towards * p.rate * period.period::<T>()?,
+            returns: if p.returns { T::ONE } else { T::ZERO },
+            output: Output::new(output, period)?,
+        })
+    }
+}
+
+impl<T: Arithmetic> Voltage<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Voltage<L> {
+        Voltage {
+            start: each(&|law| law.start),
+            lowest: each(&|law| law.lowest),
+            highest: each(&|law| law.highest),
+            step: each(&|law| law.step),
+            returns: each(&|law| law.returns),
+            output: Output::in_lanes(&|get| each(&|law| get(&law.output))),
+        }
+    }
+}
+
+impl<T: Arithmetic> ControlLaw<T> for Voltage<T> {
+    type State = VoltageState<T>;
+    type Terms = [T; 1];
+    const TERMS: &'static [&'static str] = &["level_v"];
+
+    fn start(&self, _: &Tick<T>, applied: T) -> VoltageState<T> {
+        VoltageState { way: T::ZERO, back: T::ZERO, output: self.output.start(self.start, applied) }
+    }
+
+    #[inline]
+    fn update(&self, state: &mut VoltageState<T>, _: &Tick<T>) -> Command<T, [T; 1]> {
+        let level = (self.start + state.way).max(self.lowest).min(self.highest);
+        let back = T::ZERO.less(state.back);
+        // At its end it turns, or stays; back at its start it turns.
+        let next = state.way + T::select(back, -self.step, self.step);
+        let beyond = (self.highest - self.lowest).less(next.abs());
+        let before = back & (next * self.step).less_or_equal(T::ZERO);
+        let end = T::select(T::ZERO.less(self.step), self.highest, self.lowest) - self.start;
+        state.way = T::select(before, T::ZERO, T::select(beyond, end, next));
+        state.back = T::select(before, T::ZERO, T::select(beyond, self.returns, state.back));
+        let (voltage, limit) = self.output.apply(&mut state.output, level);
+        Command { voltage, limit, terms: [level] }
+    }
+}
+
+impl<T: Real> Listed<T> for Voltage<T> {
+    type Params = VoltageParams<T>;
+    const TITLE: &'static str = "voltage, open loop";
+    const FOLLOWS: bool = false;
+
+    fn build(p: &VoltageParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
+        Voltage::new(p, beside.output, beside.period)
+    }
+
+    fn output(&self) -> &Output<T> {
+        &self.output
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn levels(p: VoltageParams, n: usize) -> Vec<f64> {
+        let output = OutputParams { lowest: -10.0, ..OutputParams::default() };
+        let law = Voltage::new(&p, &output, Micros(1000)).unwrap();
+        let mut state = law.start(&Tick::default(), 0.0);
+        (0..n).map(|_| law.update(&mut state, &Tick::default()).voltage).collect()
+    }
+
+    #[test]
+    fn a_voltage_without_a_rate_stays() {
+        let p = VoltageParams { start: 2.5, end: 4.0, ..VoltageParams::default() };
+        assert_eq!(levels(p, 3), [2.5; 3]);
+    }
+
+    #[test]
+    fn a_ramp_ends_at_its_end_and_stays_or_comes_back() {
+        let p = VoltageParams { start: 1.0, end: -0.5, rate: 500.0, returns: false };
+        assert_eq!(levels(p, 6), [1.0, 0.5, 0.0, -0.5, -0.5, -0.5]);
+        let p = VoltageParams { returns: true, ..p };
+        assert_eq!(levels(p, 10), [1.0, 0.5, 0.0, -0.5, -0.5, 0.0, 0.5, 1.0, 0.5, 0.0]);
+    }
+
+    #[test]
+    fn a_rate_that_is_no_divisor_of_the_way_still_reaches_both_ends() {
+        let p = VoltageParams { start: 0.0, end: 1.0, rate: 300.0, returns: true };
+        let levels = levels(p, 100);
+        assert!(levels.iter().all(|u| (0.0..=1.0).contains(u)));
+        let at = |end: f64| levels.iter().filter(|u| **u == end).count();
+        assert!(at(1.0) >= 10 && at(0.0) >= 10, "{levels:?}");
+    }
+}
