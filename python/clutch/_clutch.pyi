@@ -15,10 +15,10 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import CapsuleType
 
-from clutch import _model
+from clutch import _model, _run
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "run_loop", "scenarios", "simulate", "stribeck"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "run_loop", "scenarios", "simulate", "stribeck"]
 
 BUILD: Final[str]
 """
@@ -59,9 +59,9 @@ class Log:
         """
         The log's description of itself, as texts.
         """
-    def replay(self, /, scenario: Scenario | None = None) -> tuple[Table, int, tuple[int, str, float, float] | None]:
+    def replay(self, /, scenario: Scenario | None = None, law: Callable[[Tick], float] | _run.SteppedLaw | None = None) -> tuple[Table, int, tuple[int, str, float, float] | None]:
         """
-        Feeds the recorded counts to the recorded law, or to another scenario's: commands of the
+        Feeds the recorded counts to the recorded law, to another scenario's, or to one written in Python: commands of the
         replay, ticks, and the first difference (tick, field, logged, replayed).
         """
     @property
@@ -141,8 +141,25 @@ class Plant:
     ...     counts = plant.step(0.0)
     >>> plant.velocity > start
     True
+
+    A copy goes its own way from where the plant is, and a plant can be pickled:
+
+    >>> import copy
+    >>> other = copy.copy(plant)
+    >>> other.step(2.0) == plant.step(2.0)
+    True
     """
+    def __copy__(self, /) -> Plant: ...
+    def __deepcopy__(self, /, _memo: object) -> Plant: ...
     def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Plant: ...
+    def __reduce__(self, /) -> tuple[Any, tuple[str, list[int]]]:
+        """
+        The scenario as TOML, the rig's state as bits, and the plant's own numbers.
+        """
+    def copy(self, /) -> Plant:
+        """
+        A plant in the same state, which goes its own way.
+        """
     @property
     def counts(self, /) -> int | float:
         """
@@ -156,6 +173,22 @@ class Plant:
     def fine_counts(self, /) -> float:
         """
         Position in counts to 2⁻¹⁶ of one, as an ideal sensor shows it.
+        """
+    def place(self, /, position_rad: SupportsFloat | SupportsIndex, velocity_rad_s: SupportsFloat | SupportsIndex = 0.0) -> None:
+        """
+        Puts the shaft somewhere else: its time, its voltages and what is random go on.
+
+        Parameters
+        ----------
+        position_rad : float
+            Position of the shaft, rad.
+        velocity_rad_s : float, optional
+            Its velocity, rad/s; 0 is at rest.
+
+        Raises
+        ------
+        ValueError
+            A number that is not finite, or a position beyond the encoder's counts.
         """
     @property
     def position(self, /) -> float:
@@ -596,6 +629,12 @@ class Tick:
         Velocity and acceleration of the path, rad/s and rad/s².
     time : float
         Time since the start of the run, s.
+    position : float
+        Position that the encoder shows, unwrapped, rad.
+    counts : float
+        The same in counts; whole, unless the sensor is ideal.
+    applied : float
+        Voltage since the last tick, as the converter gave it, V.
 
     Examples
     --------
@@ -605,8 +644,18 @@ class Tick:
     >>> clutch.simulate("smc_2", law=law).metrics.max_error_rad < 0.01
     True
     """
-    def __new__(cls, /, error: SupportsFloat | SupportsIndex, error_rate: SupportsFloat | SupportsIndex, target_velocity: SupportsFloat | SupportsIndex = 0.0, target_acceleration: SupportsFloat | SupportsIndex = 0.0, time: SupportsFloat | SupportsIndex = 0.0) -> Tick: ...
+    def __new__(cls, /, error: SupportsFloat | SupportsIndex, error_rate: SupportsFloat | SupportsIndex, target_velocity: SupportsFloat | SupportsIndex = 0.0, target_acceleration: SupportsFloat | SupportsIndex = 0.0, time: SupportsFloat | SupportsIndex = 0.0, position: SupportsFloat | SupportsIndex = 0.0, counts: SupportsFloat | SupportsIndex = 0.0, applied: SupportsFloat | SupportsIndex = 0.0) -> Tick: ...
     def __repr__(self, /) -> str: ...
+    @property
+    def applied(self, /) -> float:
+        """
+        Voltage since the last tick, as the converter gave it, V.
+        """
+    @property
+    def counts(self, /) -> float:
+        """
+        The same in counts; whole, unless the sensor is ideal.
+        """
     @property
     def error(self, /) -> float:
         """
@@ -616,6 +665,11 @@ class Tick:
     def error_rate(self, /) -> float:
         """
         Its rate, from the scenario's derivative (5) or observer, rad/s.
+        """
+    @property
+    def position(self, /) -> float:
+        """
+        Position that the encoder shows, unwrapped, rad.
         """
     @property
     def target_acceleration(self, /) -> float:
@@ -637,6 +691,11 @@ class Tick:
         """
         Measured velocity, rad/s.
         """
+
+def _plant(scenario: str, words: Sequence[int]) -> Plant:
+    """
+    A pickled plant.
+    """
 
 def brake_gain(table: dict[str, Any]) -> float:
     """
@@ -686,9 +745,9 @@ def scenarios() -> list[str]:
     True
     """
 
-def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] | None = None) -> Run:
+def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] | _run.SteppedLaw | None = None) -> Run:
     """
-    Runs a scenario; `law`, a callable of a `Tick`, takes the place of its law.
+    Runs a scenario; `law`, a function of a `Tick` or an object with such a method `step`, takes the place of its law.
     """
 
 def stribeck(table: dict[str, Any], velocity: NDArray[np.float64]) -> NDArray[np.float64]:

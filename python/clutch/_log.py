@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING
 from clutch import _clutch
 from clutch._clutch import Table
 from clutch._model import Scenario
+from clutch._run import as_law
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from clutch._run import Law
 
 
 class Log:
@@ -155,7 +158,9 @@ def read_log(path: str | os.PathLike[str]) -> Log:
     return Log(_clutch.read_log(os.fspath(path)))
 
 
-def replay(log: Log | str | os.PathLike[str], overrides: Mapping[str, object] | None = None) -> Replay:
+def replay(
+    log: Log | str | os.PathLike[str], overrides: Mapping[str, object] | None = None, *, law: Law | None = None
+) -> Replay:
     """Feed a log's encoder counts to its law again, and compare every output bit for bit.
 
     Parameters
@@ -165,6 +170,8 @@ def replay(log: Log | str | os.PathLike[str], overrides: Mapping[str, object] | 
     overrides : mapping, optional
         Values for dotted keys of its scenario. The law then gives the commands that it would have given on the same
         counts: an open loop, which does not predict the motion of the shaft.
+    law : callable or object, optional
+        The law of a simulation whose law was written in Python, as for :func:`clutch.simulate`.
 
     Returns
     -------
@@ -176,7 +183,8 @@ def replay(log: Log | str | os.PathLike[str], overrides: Mapping[str, object] | 
     OSError
         The file cannot be read.
     ValueError
-        The log cannot be replayed: it is damaged, or of a run with an ideal sensor.
+        The log cannot be replayed: it is damaged, or of a run with an ideal sensor, or of a law written in Python,
+        which was not given.
 
     Examples
     --------
@@ -192,7 +200,7 @@ def replay(log: Log | str | os.PathLike[str], overrides: Mapping[str, object] | 
     """
     opened = log if isinstance(log, Log) else read_log(log)
     changed = opened.scenario.override(overrides)._native if overrides else None
-    commands, ticks, first = opened._log.replay(changed)
+    commands, ticks, first = opened._log.replay(changed, as_law(law))
     difference = None
     if first is not None:
         tick, field, logged, replayed = first

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from clutch import _clutch
 from clutch._clutch import Table, Tick
@@ -141,8 +141,11 @@ class Result:
         OSError
             The file is there already, or cannot be written.
         RuntimeError
-            The law was written in Python: a log holds the law that ran, for its replay. Or the result comes from
-            another process.
+            The result comes from another process.
+
+        Notes
+        -----
+        A law that was written in Python is in the log by its name alone: give it to :func:`clutch.replay`.
 
         Examples
         --------
@@ -178,7 +181,7 @@ class Result:
 def simulate(
     scenario: ScenarioLike,
     *,
-    law: Callable[[Tick], float] | None = None,
+    law: Law | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> Result:
     """Simulate a scenario: the same run as ``clutch sim``, bit for bit.
@@ -187,10 +190,11 @@ def simulate(
     ----------
     scenario : Scenario, str or path
         A scenario, the name of a built-in one, or a TOML file.
-    law : callable, optional
-        A law of your own in place of the scenario's: called with a :class:`clutch.Tick` each period, it answers the
-        brake's voltage, V. The scenario's output stage (limits, bumpless start) follows it, and it runs in double
-        precision. It keeps its own state.
+    law : callable or object, optional
+        A law of your own in place of the scenario's: a function that is called with a :class:`clutch.Tick` each period
+        and answers the voltage, V; or an object with such a method ``step`` and, if it has one, a method ``start``,
+        which is called with the first tick before; or the class of such objects. The scenario's output stage (limits,
+        bumpless start) follows it, and it runs in double precision. It keeps its own state.
     overrides : mapping, optional
         Values for dotted keys of the scenario, as ``{"law.smc.kp_v": 4}``.
 
@@ -215,4 +219,35 @@ def simulate(
     True
     """
     checked = as_scenario(scenario, overrides)
-    return Result(checked, _clutch.simulate(checked, law))
+    return Result(checked, _clutch.simulate(checked, as_law(law)))
+
+
+class SteppedLaw(Protocol):
+    """A law as an object.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> class Integral:
+    ...     def start(self, tick):
+    ...         self.volts = tick.applied
+    ...
+    ...     def step(self, tick):
+    ...         self.volts -= 5.0 * tick.error
+    ...         return self.volts - 2000.0 * tick.error - 20.0 * tick.error_rate
+    >>> clutch.simulate("pd_2", law=Integral).metrics.max_error_rad < 0.003
+    True
+    """
+
+    def step(self, tick: Tick, /) -> float:
+        """Answer the voltage of the next period, V."""
+        ...
+
+
+#: A law of one's own: a function, an object with a method ``step``, or the class of one.
+Law = Callable[[Tick], float] | SteppedLaw | type[SteppedLaw]
+
+
+def as_law(law: Law | None) -> Callable[[Tick], float] | SteppedLaw | None:
+    """The law itself, or an object of it if it is a class."""
+    return law() if isinstance(law, type) else law

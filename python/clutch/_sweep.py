@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib
 import itertools
 import json
@@ -22,7 +23,7 @@ from clutch._metrics import FIGURES
 from clutch._model import Scenario
 from clutch._record import _Params
 from clutch._record import _plain as _python
-from clutch._run import ScenarioLike, as_scenario
+from clutch._run import Law, Result, ScenarioLike, as_law, as_scenario, simulate
 from clutch._units import attributes
 
 if TYPE_CHECKING:
@@ -299,6 +300,7 @@ def sweep(
     base: ScenarioLike,
     parameters: Any,
     *,
+    law: Law | None = None,
     metrics: str | Sequence[str] | None = None,
     seeds: int | Iterable[int] | None = None,
     traces: bool | Sequence[str] | None = None,
@@ -327,6 +329,9 @@ def sweep(
         fastest. Or `Samples` from `grid`, `sobol`, `latin_hypercube` or `samples`, or a table with a column
         for each key: `Table`, pandas or polars. Values may be numbers, choices (``"run.engine"``,
         ``"rig.base"``) and whole tables (``"law": [clutch.Pd(), clutch.Smc()]``, or as dicts).
+    law
+        A law of your own in place of the scenario's, as for `simulate`; each run begins with a copy of it. Python runs
+        one such run at a time in a process: an executor of processes runs several, and needs a law that can be pickled.
     metrics
         Names of fields of `Metrics`, and "certified": true if the gains are certified for the row's bounds.
         Default: all of them.
@@ -387,10 +392,11 @@ def sweep(
         tables=scenario._tables(),
         keys=chosen.keys,
         metrics=_known_metrics(metrics),
-        traces=_known_traces(traces, scenario, chosen),
+        traces=_known_traces(traces, scenario, chosen, law),
         every=every,
         keep=errors == "keep",
         name=uuid.uuid4().hex,
+        law=law,
     )
     finished = _Finished(chosen)
     importlib.import_module("numpy")  # now, and not when Ctrl-C waits for an answer
@@ -437,7 +443,9 @@ def _known_metrics(metrics: str | Sequence[str] | None) -> list[str]:
     return chosen
 
 
-def _known_traces(traces: bool | Sequence[str] | None, scenario: Scenario, chosen: Samples) -> list[str]:
+def _known_traces(
+    traces: bool | Sequence[str] | None, scenario: Scenario, chosen: Samples, own: Law | None
+) -> list[str]:
     names = _TRACES if traces is True else traces or ()
     wanted = [names] if isinstance(names, str) else list[str](names)
     if wanted:
@@ -447,7 +455,8 @@ def _known_traces(traces: bool | Sequence[str] | None, scenario: Scenario, chose
         laws = chosen._distinct("law") or [{}]
         known: dict[str, None] = {}
         for law in laws:
-            known |= dict.fromkeys(_clutch.simulate(scenario.override(short | law)).samples.columns)
+            one = simulate(scenario, law=copy.deepcopy(own), overrides=short | law)
+            known |= dict.fromkeys(one.samples.columns)
         unknown = [name for name in wanted if name not in known]
         if unknown:
             raise ValueError(f"unknown traces {', '.join(unknown)}; there are {', '.join(known)}")
@@ -467,13 +476,17 @@ class _Work:
     keep: bool
     #: Distinguishes this sweep from others.
     name: str
+    #: A law in place of the scenario's.
+    law: Law | None = None
     #: True in the sweep's own process; no longer once it has travelled.
     here: bool = True
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "here": False}
 
-    def job(self, rows: Sequence[Sequence[Any]], threads: int | None) -> _clutch.Sweep:
+    def job(self, rows: Sequence[Sequence[Any]], threads: int | None) -> _clutch.Sweep | _OwnLaw:
+        if self.law is not None:
+            return _OwnLaw(self, rows)
         keys, values = list(self.keys), [list(row) for row in rows]
         if "rig.base" in keys:
             # As `Scenario.override`: the tables have every key of the rig, which would hide the base; and
@@ -482,6 +495,64 @@ class _Work:
             keys = ["rig", *keys[:i], *keys[i + 1 :]]
             values = [[{"base": row[i]}, *row[:i], *row[i + 1 :]] for row in values]
         return _clutch.Sweep(self.tables, keys, values, self.metrics, self.traces, self.every, threads)
+
+
+class _OwnLaw:
+    """A job whose rows run here, one after the other, with a law written in Python."""
+
+    def __init__(self, work: _Work, rows: Sequence[Sequence[Any]]) -> None:
+        self._work, self._rows = work, rows
+        self._base = Scenario._build(work.tables)
+        self._done: list[Result | ParamError] = []
+        self._stopped = False
+
+    @property
+    def finished(self) -> int:
+        return len(self._done)
+
+    @property
+    def refused(self) -> int | None:
+        """The first row that the scenario refuses."""
+        return next((i for i, done in enumerate(self._done) if isinstance(done, ParamError)), None)
+
+    def start(self) -> None:
+        """Nothing: a row runs when it is waited for."""
+
+    def cancel(self) -> None:
+        self._stopped = True
+
+    def wait(self, seconds: float) -> bool:
+        """Run rows for a while; true if all are done."""
+        until = time.monotonic() + seconds
+        while not self._stopped and len(self._done) < len(self._rows):
+            if time.monotonic() > until:
+                return False
+            overrides = dict(zip(self._work.keys, self._rows[len(self._done)], strict=True))
+            try:
+                law = as_law(copy.deepcopy(self._work.law))
+                self._done.append(simulate(self._base, law=law, overrides=overrides))
+            except ParamError as error:
+                self._done.append(error)
+        return True
+
+    def result(self) -> _Result:
+        import numpy as np
+
+        runs = list(enumerate(self._done))
+        columns: dict[str, Any] = {"row": np.arange(len(runs), dtype=np.int64)}
+        for name in self._work.metrics:
+            # A certificate is of the scenario's law, which did not run.
+            kind, none = (bool, False) if name == "certified" else (float, math.nan)
+            values = [getattr(done.metrics, name, none) if isinstance(done, Result) else none for _, done in runs]
+            columns[name] = np.asarray([none if value is None else value for value in values], dtype=kind)
+        errors = [str(done) if isinstance(done, ParamError) else "" for _, done in runs]
+        columns["error"] = np.asarray(errors, dtype=object)
+        traces = {
+            i: Table({name: done.samples[name][:: self._work.every] for name in self._work.traces})
+            for i, done in runs
+            if isinstance(done, Result) and self._work.traces
+        }
+        return Table(columns), traces, [(i, done) for i, done in runs if isinstance(done, ParamError)]
 
 
 class _Finished:

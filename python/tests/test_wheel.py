@@ -289,8 +289,6 @@ def test_a_log_is_never_written_over(tmp_path):
         run.save(tmp_path / "run.mcap")
     with pytest.raises(OSError, match=r"nowhere"):
         run.save(tmp_path / "nowhere" / "run.mcap")
-    with pytest.raises(RuntimeError, match="written in Python"):
-        package.simulate("pd_2", law=lambda tick: 2.0).save(tmp_path / "own.mcap")
 
 
 def test_what_is_no_log_is_told(tmp_path):

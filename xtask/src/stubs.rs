@@ -21,9 +21,15 @@ const NAMED: &[(&str, &str)] = &[
         "from typing import Any, Final, SupportsFloat, SupportsIndex, final\n",
         "from typing import Any, Final, SupportsFloat, SupportsIndex, final\n\n\
          import numpy as np\nimport pandas as pd\nimport polars as pl\nimport pyarrow as pa\nimport xarray as xr\nfrom numpy.typing import ArrayLike, NDArray\n\
-         from typing_extensions import CapsuleType\n\nfrom clutch import _model\nfrom clutch._errors import ParamError\n",
+         from typing_extensions import CapsuleType\n\nfrom clutch import _model, _run\nfrom clutch._errors import ParamError\n",
     ),
     ("SupportsGetItem[int, str]", "Sequence[str]"),
+    ("SupportsGetItem[int, SupportsIndex]", "Sequence[int]"),
+    (
+        "scenario: Scenario | None = None, law: Any | None = None)",
+        "scenario: Scenario | None = None, law: Callable[[Tick], float] | _run.SteppedLaw | None = None)",
+    ),
+    ("def __deepcopy__(self, /, _memo: Any)", "def __deepcopy__(self, /, _memo: object)"),
     ("rows: list,", "rows: list[list[object]],"),
     (
         "-> tuple[Table, dict, list[tuple[int, Any]]]",
@@ -70,7 +76,7 @@ const NAMED: &[(&str, &str)] = &[
     ),
     (
         "def simulate(scenario: Any, law: Any | None = None)",
-        "def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] | None = None)",
+        "def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] | _run.SteppedLaw | None = None)",
     ),
     ("def run_loop(scenario: Any,", "def run_loop(scenario: _model.Scenario | Scenario,"),
     ("-> tuple[Any, str, str, str | None]:", "-> tuple[dict[str, Any], str, str, str | None]:"),

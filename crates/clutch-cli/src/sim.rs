@@ -84,7 +84,7 @@ impl Sim {
             csv(&run, file)?;
         }
         if let Some(file) = &self.log {
-            to_log::save_simulation(file, &scenario, &run, BUILD)?;
+            to_log::save_simulation(file, &scenario, &run, BUILD, None)?;
         }
         if let Some(file) = &self.plot {
             figure(&scenario, &run).save(file)?;

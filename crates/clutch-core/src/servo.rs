@@ -8,7 +8,7 @@
 //! The same type runs in the simulator, in the loop on Linux and on a board. It owns no clock
 //! and no I/O.
 
-use crate::law::{Command, ControlLaw, Law, LawParams, OutputParams, Tick};
+use crate::law::{Command, ControlLaw, Law, LawParams, OutputParams, Seen, Tick};
 use crate::velocity::{VelocityParams, VelocitySource, VelocityState};
 use crate::{
     Arithmetic, Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros, ParamError, Plant,
@@ -192,12 +192,14 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
     #[must_use]
     pub fn start_at(&self, position: FixedCounts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
         let tick = self.measure(position, target, T::ZERO);
+        let mut law = self.law.start(&tick, applied);
+        self.law.sees(&mut law, &Seen { position, applied });
         ServoState {
             position,
             last: Counts::default(),
             error: FixedCounts(target.position.0.wrapping_sub(position.0)),
             velocity: self.velocity.start(position, target),
-            law: self.law.start(&tick, applied),
+            law,
             applied,
         }
     }
@@ -228,6 +230,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         state.error = FixedCounts(target.position.0.wrapping_sub(position.0));
         let error_rate = self.velocity.update(&mut state.velocity, position, target, state.applied);
         let tick = self.measure(position, target, error_rate);
+        self.law.sees(&mut state.law, &Seen { position, applied: state.applied });
         let command = self.law.update(&mut state.law, &tick);
         let code = self.dac.code(command.voltage);
         state.applied = self.dac.volts(code);

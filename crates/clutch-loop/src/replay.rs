@@ -1,9 +1,10 @@
 //! Replay: the recorded counts to the recorded law, every output compared bit for bit.
 
 use crate::from_scenario::{self, BuildError, BuiltRun};
-use crate::to_log::{self, PRESENT_CODE, START_VOLTAGE};
+use crate::to_log::{self, FOREIGN_LAW, PRESENT_CODE, START_VOLTAGE};
+use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Cycle, Sample, State};
-use clutch_core::{Counts, DacCode, FixedCounts, Micros, Real, SupervisorState, Target};
+use clutch_core::{Counts, DacCode, FixedCounts, Micros, Real, Servo, SupervisorState, Target};
 use clutch_log::{CommandRecord, EventKind, EventRecord, InChannel, Kind, Log, SampleRecord, Source, Value};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::ScalarKind;
@@ -18,6 +19,15 @@ pub enum ReplayError {
     /// It does not say something that a replay needs.
     #[error("the log lacks {0}: it was not written by `clutch loop` or `clutch sim --log`")]
     Lacks(&'static str),
+    /// Its law is none of clutch's.
+    #[error("the law that ran was {0:?}, which is none of clutch's: give that law to the replay")]
+    Foreign(
+        /// Its name.
+        String,
+    ),
+    /// It is of no simulation.
+    #[error("the log is of a loop, which runs clutch's own laws: give no law to its replay")]
+    NoSimulation,
     /// Its samples do not determine the law's inputs.
     #[error(
         "the log is of a run with an ideal sensor (rig.encoder.quantised = false), and holds whole counts only; it cannot be replayed"
@@ -93,28 +103,58 @@ fn difference(
 /// # Errors
 /// The scenario is not one for a run like the log's.
 pub fn replay(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayError> {
+    if let Some(name) = extra(log, FOREIGN_LAW) {
+        return Err(ReplayError::Foreign(name.to_owned()));
+    }
     match scenario.scalar() {
         ScalarKind::F32 => replay_in::<f32>(log, scenario),
         ScalarKind::F64 => replay_in::<f64>(log, scenario),
     }
 }
 
+/// Replays a simulation's log with a law that is none of clutch's, in double precision; the scenario's own is not used.
+///
+/// # Errors
+/// The log is of no simulation; the scenario is not one for a run like it.
+pub fn replay_law<C: ControlLaw<f64>>(log: &Log, scenario: &Scenario, law: C) -> Result<Replay, ReplayError> {
+    if log.header.source != Source::Simulation {
+        return Err(ReplayError::NoSimulation);
+    }
+    let samples = paired(log)?;
+    let servo = Servo::with_law(&scenario.spec().servo().map_err(BuildError::from)?, law);
+    let servo = servo.map_err(BuildError::from)?;
+    Ok(compared(log, simulated(log, samples, scenario, &servo)?))
+}
+
 fn replay_in<T: Real>(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayError> {
+    let samples = paired(log)?;
+    let commands = match log.header.source {
+        Source::Simulation => {
+            let params = scenario.spec().servo().map_err(BuildError::from)?.cast::<T>();
+            let servo = Servo::<T>::new(&params).map_err(|e| BuildError::from(e.cast::<f64>()))?;
+            simulated(log, samples, scenario, &servo)?
+        }
+        Source::Loop | Source::Replay => looped::<T>(log, samples, scenario)?,
+    };
+    Ok(compared(log, commands))
+}
+
+/// Samples that have a command.
+fn paired(log: &Log) -> Result<&[SampleRecord], ReplayError> {
     if log.samples.len() != log.commands.len() && log.complete {
         let (samples, commands) = (log.samples.len(), log.commands.len());
         return Err(ReplayError::Unpaired { samples, commands });
     }
     let pairs = log.samples.len().min(log.commands.len());
-    let samples = log.samples.get(..pairs).unwrap_or(&[]);
-    let commands = match log.header.source {
-        Source::Simulation => simulated::<T>(log, samples, scenario)?,
-        Source::Loop | Source::Replay => looped::<T>(log, samples, scenario)?,
-    };
+    Ok(log.samples.get(..pairs).unwrap_or(&[]))
+}
+
+fn compared(log: &Log, commands: Vec<CommandRecord>) -> Replay {
     let columns = CommandRecord::CHANNEL.columns(&log.header.term_names);
     let mut ticks = log.commands.iter().zip(&commands);
     let first = ticks.find_map(|(logged, replayed)| difference(&columns, logged, replayed));
     let dropped = log.links.iter().map(|l| l.log_dropped).max().unwrap_or(0);
-    Ok(Replay { commands, first, dropped })
+    Replay { commands, first, dropped }
 }
 
 fn extra<'a>(log: &'a Log, key: &str) -> Option<&'a str> {
@@ -185,10 +225,11 @@ fn looped<T: Real>(
     Ok(commands)
 }
 
-fn simulated<T: Real>(
+fn simulated<T: Real, C: ControlLaw<T>>(
     log: &Log,
     samples: &[SampleRecord],
     scenario: &Scenario,
+    servo: &Servo<T, C>,
 ) -> Result<Vec<CommandRecord>, ReplayError> {
     let spec = scenario.spec();
     if !spec.rig.encoder.quantised {
@@ -196,8 +237,6 @@ fn simulated<T: Real>(
     }
     let volts = extra(log, START_VOLTAGE).and_then(|v| u64::from_str_radix(v, 16).ok());
     let volts = f64::from_bits(volts.ok_or(ReplayError::Lacks("the voltage at the start"))?);
-    let params = spec.servo().map_err(BuildError::from)?.cast::<T>();
-    let servo = clutch_core::Servo::<T>::new(&params).map_err(|e| BuildError::from(e.cast::<f64>()))?;
     let path = spec.path::<T>().map_err(BuildError::from)?;
     let radians = servo.encoder().radians_per_count::<f64>();
     let Some(first) = samples.first() else { return Ok(Vec::new()) };

@@ -18,6 +18,8 @@ use std::path::Path;
 pub const PRESENT_CODE: &str = "present_code";
 /// Key of the header under which a simulation's voltage at the start stands: its bits, in hex.
 pub const START_VOLTAGE: &str = "start_voltage_bits";
+/// Name of the law in a log's header, if it is none of clutch's: the scenario's own law then did not run.
+pub const FOREIGN_LAW: &str = "foreign_law";
 
 /// Of a sample: as it came.
 #[must_use]
@@ -153,7 +155,7 @@ fn of_simulation<T: Real>(
 }
 
 /// Writes a simulation as a log, with the channels that a loop writes and the shaft's true motion;
-/// `version` is the build's.
+/// `version` is the build's, `foreign_law` the name of the law that ran if it is none of clutch's.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -162,10 +164,12 @@ pub fn save_simulation(
     scenario: &Scenario,
     run: &clutch_sim::Run,
     version: &str,
+    foreign_law: Option<&str>,
 ) -> Result<(), SaveError> {
-    match scenario.scalar() {
-        ScalarKind::F32 => save_in::<f32>(path, scenario, run, version),
-        ScalarKind::F64 => save_in::<f64>(path, scenario, run, version),
+    match (scenario.scalar(), foreign_law) {
+        (ScalarKind::F32, None) => save_in::<f32>(path, scenario, run, version, foreign_law),
+        // A foreign law has double precision.
+        (ScalarKind::F64, _) | (_, Some(_)) => save_in::<f64>(path, scenario, run, version, foreign_law),
     }
 }
 
@@ -185,6 +189,7 @@ fn save_in<T: Real>(
     scenario: &Scenario,
     run: &clutch_sim::Run,
     version: &str,
+    foreign_law: Option<&str>,
 ) -> Result<(), SaveError> {
     let spec = scenario.spec();
     let params = spec.servo().map_err(BuildError::from)?;
@@ -192,6 +197,11 @@ fn save_in<T: Real>(
     let mut header = from_scenario::header(scenario, &servo, Source::Simulation, "", version);
     let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
     header.extra.push((START_VOLTAGE.to_owned(), bits));
+    if let Some(name) = foreign_law {
+        header.extra.push((FOREIGN_LAW.to_owned(), name.to_owned()));
+        header.term_names = run.trace.terms.iter().map(|(name, _)| (*name).to_owned()).collect();
+        (header.law_hash, header.scalar) = (0, "f64".to_owned());
+    }
     let mut log = LogWriter::create(path, &header)?;
     for tick in of_simulation(run, servo.dac(), spec.period) {
         for record in &tick {

@@ -39,7 +39,7 @@ mod _clutch {
     #[pymodule_export]
     use super::session::run_loop;
     #[pymodule_export]
-    use super::stepping::{Plant, Servo, StickSlip, Tick};
+    use super::stepping::{_plant, Plant, Servo, StickSlip, Tick};
     #[pymodule_export]
     use super::sweep::Sweep;
     #[pymodule_export]

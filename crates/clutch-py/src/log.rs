@@ -2,6 +2,7 @@
 
 use crate::convert::{log_error, scenario_error};
 use crate::scenario::Scenario;
+use crate::stepping::PythonLaw;
 use crate::table::{Column, Table, pairs};
 use clutch_log::names::{Names, name_of};
 use clutch_log::{InChannel, Kind, Limits, Value};
@@ -158,14 +159,15 @@ impl Log {
         self.log.damaged
     }
 
-    /// Feeds the recorded counts to the recorded law, or to another scenario's: commands of the
+    /// Feeds the recorded counts to the recorded law, to another scenario's, or to one written in Python: commands of the
     /// replay, ticks, and the first difference (tick, field, logged, replayed).
-    #[pyo3(signature = (scenario=None))]
+    #[pyo3(signature = (scenario=None, law=None))]
     #[allow(clippy::type_complexity, reason = "the parts of clutch.replay's object")]
     fn replay(
         &self,
         py: Python<'_>,
         scenario: Option<&Scenario>,
+        law: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(Table, usize, Option<(u64, String, f64, f64)>)> {
         let scenario = match scenario {
             Some(other) => other.clone(),
@@ -175,7 +177,17 @@ impl Log {
                 Scenario(Arc::new(read.map_err(|e| scenario_error(py, &e, None))?))
             }
         };
-        let replayed = py.detach(|| replay::replay(&self.log, &scenario.0));
+        let replayed = match law {
+            None => py.detach(|| replay::replay(&self.log, &scenario.0)),
+            Some(law) => {
+                let law = PythonLaw::new(law, &scenario)?;
+                let replayed = py.detach(|| replay::replay_law(&self.log, &scenario.0, &law));
+                if let Some(e) = law.failure() {
+                    return Err(e);
+                }
+                replayed
+            }
+        };
         let replayed = replayed.map_err(|e| PyValueError::new_err(format!("{}: {e}", self.origin)))?;
         let first = replayed.first.as_ref().map(|d| (d.tick, d.field.clone(), d.logged, d.replayed));
         let terms = &self.log.header.term_names;

@@ -2,7 +2,7 @@
 
 use crate::convert::{core_error, os_error};
 use crate::scenario::Scenario;
-use crate::stepping::{PythonLaw, event_table, native, output_stage};
+use crate::stepping::{PythonLaw, event_table, native};
 use crate::table::{Column, Table};
 use clutch_core::law::Limit;
 use clutch_core::{ParamError, Servo};
@@ -11,7 +11,7 @@ use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::columns;
 use clutch_sim::progress::Progress;
 use clutch_sim::{Keep, RunError, ScenarioError, simulate_servo};
-use pyo3::exceptions::{PyFileExistsError, PyRuntimeError};
+use pyo3::exceptions::PyFileExistsError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::ops::ControlFlow;
@@ -23,8 +23,8 @@ use std::sync::Arc;
 pub(crate) struct Run {
     scenario: Scenario,
     run: Arc<clutch_sim::Run>,
-    /// A log names the law that ran, which of Python's it cannot.
-    python_law: bool,
+    /// Name of the law that ran, if it was written in Python.
+    python_law: Option<String>,
 }
 
 /// Ends the work when a signal waits, as Ctrl-C.
@@ -38,12 +38,12 @@ fn unless_interrupted(_: Progress) -> ControlFlow<()> {
     }
 }
 
-/// Runs a scenario; `law`, a callable of a `Tick`, takes the place of its law.
+/// Runs a scenario; `law`, a function of a `Tick` or an object with such a method `step`, takes the place of its law.
 #[pyfunction]
 #[pyo3(signature = (scenario, law=None))]
 pub(crate) fn simulate(py: Python<'_>, scenario: &Bound<'_, PyAny>, law: Option<Py<PyAny>>) -> PyResult<Run> {
     let scenario = native(scenario)?;
-    let python_law = law.is_some();
+    let python_law = law.as_ref().map(|law| law_name(law.bind(py))).transpose()?;
     let run = match law {
         None => py.detach(|| scenario.0.run(Keep::Trace, &unless_interrupted)),
         Some(callable) => with_python_law(py, &scenario, callable)?,
@@ -56,6 +56,14 @@ pub(crate) fn simulate(py: Python<'_>, scenario: &Bound<'_, PyAny>, law: Option<
     Ok(Run { scenario, run, python_law })
 }
 
+/// Name of a law written in Python: of its function, or of its class.
+fn law_name(law: &Bound<'_, PyAny>) -> PyResult<String> {
+    let named = if law.hasattr("__qualname__")? { law.clone() } else { law.get_type().into_any() };
+    let module: String = named.getattr("__module__")?.extract().unwrap_or_default();
+    let name: String = named.getattr("__qualname__")?.extract()?;
+    Ok(if module.is_empty() { name } else { format!("{module}.{name}") })
+}
+
 fn with_python_law(
     py: Python<'_>,
     scenario: &Scenario,
@@ -63,7 +71,7 @@ fn with_python_law(
 ) -> PyResult<Result<clutch_sim::Run, ScenarioError>> {
     let spec = scenario.0.spec();
     let wrong = |e: &ParamError| core_error(py, e);
-    let law = PythonLaw::new(callable, output_stage(py, scenario)?, spec.period.seconds());
+    let law = PythonLaw::new(callable.bind(py), scenario)?;
     let params = spec.servo().map_err(|e| wrong(&e))?;
     let servo = Servo::with_law(&params, law).map_err(|e| wrong(&e))?;
     let watch =
@@ -146,16 +154,12 @@ impl Run {
 
     /// Writes the log that `clutch sim --log` writes.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        if self.python_law {
-            return Err(PyRuntimeError::new_err(
-                "a run with a law written in Python has no log: a log holds the law that ran, for its replay",
-            ));
-        }
         if path.exists() {
             let text = format!("{}: exists already; a log is never overwritten", path.display());
             return Err(PyFileExistsError::new_err(text));
         }
-        let written = py.detach(|| save_simulation(&path, &self.scenario.0, &self.run, clutch_cli::BUILD));
+        let (scenario, run, law) = (&self.scenario.0, &self.run, self.python_law.as_deref());
+        let written = py.detach(|| save_simulation(&path, scenario, run, clutch_cli::BUILD, law));
         written.map_err(|e| match e {
             SaveError::Log(e) => crate::convert::log_error(py, &e),
             SaveError::Build(e) => {

@@ -4,7 +4,9 @@ use crate::convert::core_error;
 use crate::path::{Target, fixed_to_counts};
 use crate::scenario::Scenario;
 use crate::table::{Column, Table};
-use clutch_core::law::{Command, ControlLaw, Law, LawState, LawTerms, Limit, Output, OutputState, Terms};
+use clutch_core::law::{
+    Command, ControlLaw, Law, LawState, LawTerms, Limit, Output, OutputState, Seen, Terms,
+};
 use clutch_core::{
     Counts, Dac, Encoder, FixedCounts, ParamError, Real, ServoOutput, ServoState, StickSlipParams,
     StickSlipState, law,
@@ -15,7 +17,7 @@ use clutch_sim::scenario::ScalarKind;
 use pyo3::exceptions::{PyAttributeError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 type State<T> = ServoState<T, LawState<T>>;
 
@@ -368,8 +370,18 @@ impl StickSlip {
 /// ...     counts = plant.step(0.0)
 /// >>> plant.velocity > start
 /// True
+///
+/// A copy goes its own way from where the plant is, and a plant can be pickled:
+///
+/// >>> import copy
+/// >>> other = copy.copy(plant)
+/// >>> other.step(2.0) == plant.step(2.0)
+/// True
+#[derive(Clone)]
 #[pyclass(module = "clutch")]
 pub(crate) struct Plant {
+    /// What it was made of.
+    scenario: Scenario,
     moving: MovingRig,
     /// After a motion that the engine could not follow.
     broken: bool,
@@ -396,6 +408,7 @@ impl Plant {
         let (mut moving, start_voltage) = begun.map_err(|e| scenario.error(py, &scenario.0.run_error(&e)))?;
         moving.begin_period();
         Ok(Plant {
+            scenario: scenario.clone(),
             moving,
             broken: false,
             period: spec.period.seconds(),
@@ -502,6 +515,98 @@ impl Plant {
     fn events(&self) -> Table {
         event_table(&self.events)
     }
+
+    /// Puts the shaft somewhere else: its time, its voltages and what is random go on.
+    ///
+    /// Parameters
+    /// ----------
+    /// position_rad : float
+    ///     Position of the shaft, rad.
+    /// velocity_rad_s : float, optional
+    ///     Its velocity, rad/s; 0 is at rest.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A number that is not finite, or a position beyond the encoder's counts.
+    #[pyo3(signature = (position_rad, velocity_rad_s=0.0))]
+    fn place(&mut self, position_rad: f64, velocity_rad_s: f64) -> PyResult<()> {
+        let per_radian: f64 = self.moving.rig().encoder.counts_per_radian();
+        let counted = (position_rad * per_radian).abs() < f64::from(i32::MAX);
+        for (name, value, good) in [
+            ("position_rad", position_rad, counted),
+            ("velocity_rad_s", velocity_rad_s, velocity_rad_s.is_finite()),
+        ] {
+            if !good {
+                let text =
+                    format!("{name} = {value}: expected a finite number, a position within ±2³¹ counts");
+                return Err(PyValueError::new_err(text));
+            }
+        }
+        self.moving.place(position_rad, velocity_rad_s);
+        self.broken = false;
+        Ok(())
+    }
+
+    /// A plant in the same state, which goes its own way.
+    fn copy(&self) -> Plant {
+        self.clone()
+    }
+
+    fn __copy__(&self) -> Plant {
+        self.clone()
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Plant {
+        self.clone()
+    }
+
+    /// The scenario as TOML, the rig's state as bits, and the plant's own numbers.
+    #[allow(clippy::type_complexity, reason = "pickle's form")]
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, Vec<u64>))> {
+        let plant = slf.borrow();
+        let mut words = vec![
+            u64::from(plant.broken),
+            plant.tick,
+            plant.voltage.to_bits(),
+            plant.start_voltage.to_bits(),
+            plant.sticks as u64,
+            plant.events.len() as u64,
+        ];
+        for e in &plant.events {
+            let kind = u64::from(e.kind == EventKind::Stick);
+            words.extend([e.time.to_bits(), kind, e.position.to_bits(), e.torque.to_bits()]);
+        }
+        words.extend(plant.moving.state());
+        let rebuild = slf.py().import("clutch._clutch")?.getattr("_plant")?;
+        Ok((rebuild, (plant.scenario.0.canonical(), words)))
+    }
+}
+
+/// A pickled plant.
+#[pyfunction]
+pub(crate) fn _plant(py: Python<'_>, scenario: &str, words: Vec<u64>) -> PyResult<Plant> {
+    let wrong = || PyValueError::new_err("this is no pickled plant of this version");
+    let read = clutch_sim::Scenario::parse("a pickled plant", scenario, &[]);
+    let scenario = Scenario(Arc::new(read.map_err(|e| crate::convert::scenario_error(py, &e, None))?));
+    let mut plant = Plant::new(py, Bound::new(py, scenario)?.as_any())?;
+    let mut words = words.into_iter();
+    let mut next = || words.next().ok_or_else(wrong);
+    plant.broken = next()? != 0;
+    plant.tick = next()?;
+    plant.voltage = f64::from_bits(next()?);
+    plant.start_voltage = f64::from_bits(next()?);
+    plant.sticks = next()? as usize;
+    for _ in 0..next()? {
+        let (time, kind) = (f64::from_bits(next()?), next()?);
+        let kind = if kind == 0 { EventKind::BreakAway } else { EventKind::Stick };
+        let (position, torque) = (f64::from_bits(next()?), f64::from_bits(next()?));
+        plant.events.push(Event { time, kind, position, torque });
+    }
+    let rest: Vec<u64> = words.collect();
+    // One period more has begun than has passed.
+    let begun = rest.first() == plant.tick.checked_add(1).as_ref();
+    if begun && plant.moving.restore(&rest) { Ok(plant) } else { Err(wrong()) }
 }
 
 /// Sticks and break-aways as a table.
@@ -544,6 +649,12 @@ pub(crate) fn native(scenario: &Bound<'_, PyAny>) -> PyResult<Scenario> {
 ///     Velocity and acceleration of the path, rad/s and rad/s².
 /// time : float
 ///     Time since the start of the run, s.
+/// position : float
+///     Position that the encoder shows, unwrapped, rad.
+/// counts : float
+///     The same in counts; whole, unless the sensor is ideal.
+/// applied : float
+///     Voltage since the last tick, as the converter gave it, V.
 ///
 /// Examples
 /// --------
@@ -556,14 +667,28 @@ pub(crate) fn native(scenario: &Bound<'_, PyAny>) -> PyResult<Scenario> {
 pub(crate) struct Tick {
     tick: law::Tick<f64>,
     time: f64,
+    position: f64,
+    counts: f64,
+    applied: f64,
 }
 
 #[pymethods]
 impl Tick {
     #[new]
-    #[pyo3(signature = (error, error_rate, target_velocity=0.0, target_acceleration=0.0, time=0.0))]
-    fn new(error: f64, error_rate: f64, target_velocity: f64, target_acceleration: f64, time: f64) -> Tick {
-        Tick { tick: law::Tick { error, error_rate, target_velocity, target_acceleration }, time }
+    #[pyo3(signature = (error, error_rate, target_velocity=0.0, target_acceleration=0.0, time=0.0, position=0.0, counts=0.0, applied=0.0))]
+    #[allow(clippy::too_many_arguments, reason = "Python names them")]
+    fn new(
+        error: f64,
+        error_rate: f64,
+        target_velocity: f64,
+        target_acceleration: f64,
+        time: f64,
+        position: f64,
+        counts: f64,
+        applied: f64,
+    ) -> Tick {
+        let tick = law::Tick { error, error_rate, target_velocity, target_acceleration };
+        Tick { tick, time, position, counts, applied }
     }
 
     /// Position error, target minus position, rad.
@@ -602,6 +727,24 @@ impl Tick {
         self.time
     }
 
+    /// Position that the encoder shows, unwrapped, rad.
+    #[getter]
+    fn position(&self) -> f64 {
+        self.position
+    }
+
+    /// The same in counts; whole, unless the sensor is ideal.
+    #[getter]
+    fn counts(&self) -> f64 {
+        self.counts
+    }
+
+    /// Voltage since the last tick, as the converter gave it, V.
+    #[getter]
+    fn applied(&self) -> f64 {
+        self.applied
+    }
+
     fn __repr__(&self) -> String {
         let t = &self.tick;
         format!("Tick(time={}, error={}, error_rate={})", self.time, t.error, t.error_rate)
@@ -610,25 +753,54 @@ impl Tick {
 
 /// A law written in Python, behind the scenario's output stage.
 pub(crate) struct PythonLaw {
-    callable: Py<PyAny>,
+    /// Answers a tick.
+    step: Py<PyAny>,
+    /// Told of the first tick, if the law has it.
+    start: Option<Py<PyAny>>,
     output: Output<f64>,
     period: f64,
+    radians_per_count: f64,
     failure: Mutex<Option<PyErr>>,
 }
 
-/// Its state: the callable keeps its own.
+/// Its state: the law keeps its own.
 #[derive(Clone, Default)]
 pub(crate) struct PythonState {
     output: OutputState<f64>,
     ticks: u64,
+    seen: Seen<f64>,
 }
 
 impl PythonLaw {
-    pub(crate) fn new(callable: Py<PyAny>, output: Output<f64>, period: f64) -> Self {
-        PythonLaw { callable, output, period, failure: Mutex::new(None) }
+    /// A function of a `Tick`, or an object with such a method `step` and, if it likes, one `start`.
+    pub(crate) fn new(law: &Bound<'_, PyAny>, scenario: &Scenario) -> PyResult<Self> {
+        let py = law.py();
+        let (step, start) = if law.hasattr("step")? {
+            let start = if law.hasattr("start")? { Some(law.getattr("start")?.unbind()) } else { None };
+            (law.getattr("step")?, start)
+        } else {
+            (law.clone(), None)
+        };
+        if !step.is_callable() {
+            let kind = law.get_type();
+            return Err(PyTypeError::new_err(format!(
+                "law is of type {kind}: expected a function of a clutch.Tick, or an object with a method step(tick)"
+            )));
+        }
+        let spec = scenario.0.spec();
+        let encoder =
+            Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev).map_err(|e| core_error(py, &e))?;
+        Ok(PythonLaw {
+            step: step.unbind(),
+            start,
+            output: output_stage(py, scenario)?,
+            period: spec.period.seconds(),
+            radians_per_count: encoder.radians_per_count(),
+            failure: Mutex::new(None),
+        })
     }
 
-    /// The exception that the callable raised first.
+    /// The exception that the law raised first.
     pub(crate) fn failure(&self) -> Option<PyErr> {
         self.failure.lock().ok()?.take()
     }
@@ -638,19 +810,25 @@ impl PythonLaw {
         self.failure.lock().map_or(true, |f| f.is_some())
     }
 
-    fn ask(&self, tick: &law::Tick<f64>, ticks: u64) -> f64 {
+    fn ask(&self, tick: &law::Tick<f64>, state: &PythonState) -> f64 {
         let Ok(mut failure) = self.failure.lock() else { return f64::NAN };
         if failure.is_some() {
             return f64::NAN; // until the run ends, at its next report
         }
-        let given = Tick { tick: *tick, time: ticks as f64 * self.period };
+        let time = state.ticks as f64 * self.period;
+        let counts = fixed_to_counts(state.seen.position);
+        let position = counts * self.radians_per_count;
+        let given = Tick { tick: *tick, time, position, counts, applied: state.seen.applied };
         let asked = Python::attach(|py| -> PyResult<f64> {
-            let answer = self.callable.bind(py).call1((Bound::new(py, given)?,))?;
+            let given = Bound::new(py, given)?;
+            if let Some(start) = self.start.as_ref().filter(|_| state.ticks == 0) {
+                start.bind(py).call1((&given,))?;
+            }
+            let answer = self.step.bind(py).call1((given,))?;
             answer.extract::<f64>().map_err(|e| {
                 if !e.is_instance_of::<PyTypeError>(py) {
                     return e; // the answer's own: it could not become a number
                 }
-                let time = ticks as f64 * self.period;
                 PyTypeError::new_err(format!(
                     "the law answered {answer} at t = {time} s: expected a voltage, V"
                 ))
@@ -673,8 +851,12 @@ impl ControlLaw<f64> for PythonLaw {
         PythonState::default()
     }
 
+    fn sees(&self, state: &mut PythonState, seen: &Seen<f64>) {
+        state.seen = *seen;
+    }
+
     fn update(&self, state: &mut PythonState, tick: &law::Tick<f64>) -> Command<f64, [f64; 1]> {
-        let demand = self.ask(tick, state.ticks);
+        let demand = self.ask(tick, state);
         state.ticks += 1;
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
         Command { voltage, limit, terms: [demand] }
@@ -682,7 +864,7 @@ impl ControlLaw<f64> for PythonLaw {
 }
 
 /// The output stage of a scenario.
-pub(crate) fn output_stage(py: Python<'_>, scenario: &Scenario) -> PyResult<Output<f64>> {
+fn output_stage(py: Python<'_>, scenario: &Scenario) -> PyResult<Output<f64>> {
     let spec = scenario.0.spec();
     let law = Law::new(&spec.law, &spec.model, &spec.output, spec.period).map_err(|e| core_error(py, &e))?;
     Ok(*law.output())

@@ -3,7 +3,9 @@
 //! [`crate::simulate`] steps it from sample to sample; the simulated board steps it by the real
 //! clock, with voltages that change between samples.
 
-use crate::engine::{DormandPrince, Engine, EngineError, EngineKind, Event, ExactFlow, Input, Shaft, Volts};
+use crate::engine::{
+    DormandPrince, Engine, EngineError, EngineKind, Event, ExactFlow, Input, Motion, Shaft, Volts,
+};
 use crate::rig::Rig;
 use clutch_core::{Counts, FixedCounts};
 use rand::SeedableRng;
@@ -19,10 +21,21 @@ fn floor(x: f64) -> i64 {
     towards_zero.saturating_sub(i64::from(towards_zero as f64 > x))
 }
 
-/// A rig in motion.
+/// The engine that moves it.
+#[derive(Clone)]
+enum Moves {
+    Exactly(ExactFlow),
+    InSteps(DormandPrince),
+}
+
+/// A rig in motion; a clone goes its own way.
+#[derive(Clone)]
 pub struct MovingRig {
     rig: Rig,
-    engine: Box<dyn Engine + Send + Sync>,
+    engine: Moves,
+    seed: u64,
+    /// Periods that have begun.
+    begun: u64,
     shaft: Shaft,
     /// Position at which the motion began, rad.
     origin: f64,
@@ -36,6 +49,10 @@ pub struct MovingRig {
     noise: Pcg64,
     torque_noise: f64,
     events: Vec<Event>,
+}
+
+fn noise(seed: u64) -> Pcg64 {
+    Pcg64::seed_from_u64(seed ^ 0x006e_6f69_7365)
 }
 
 impl MovingRig {
@@ -53,9 +70,11 @@ impl MovingRig {
         let delay = rig.params.delay_ticks as usize;
         MovingRig {
             engine: match engine {
-                EngineKind::ExactFlow => Box::new(ExactFlow),
-                EngineKind::DormandPrince | EngineKind::Auto => Box::new(DormandPrince::default()),
+                EngineKind::ExactFlow => Moves::Exactly(ExactFlow),
+                EngineKind::DormandPrince | EngineKind::Auto => Moves::InSteps(DormandPrince::default()),
             },
+            seed,
+            begun: 0,
             rig,
             shaft: Shaft::new(position, velocity),
             origin: position,
@@ -64,7 +83,7 @@ impl MovingRig {
             arriving: volts,
             commanded: volts,
             line: std::iter::repeat_n(volts, delay.saturating_sub(1)).collect(),
-            noise: Pcg64::seed_from_u64(seed ^ 0x006e_6f69_7365),
+            noise: noise(seed),
             torque_noise: 0.0,
             events: Vec::new(),
         }
@@ -108,6 +127,7 @@ impl MovingRig {
             self.line.push_back(self.commanded);
             self.arriving = self.line.pop_front().unwrap_or(self.commanded);
         }
+        self.begun += 1;
         if self.rig.params.torque_noise > 0.0 {
             let x: f64 = StandardNormal.sample(&mut self.noise);
             self.torque_noise = self.rig.params.torque_noise * x;
@@ -140,11 +160,87 @@ impl MovingRig {
                 drive: &self.rig.drive,
                 noise: self.torque_noise,
             };
-            self.engine.advance(&self.rig.model, &input, &mut self.shaft, &mut self.events)?;
+            let (model, shaft, events) = (&self.rig.model, &mut self.shaft, &mut self.events);
+            match &mut self.engine {
+                Moves::Exactly(engine) => engine.advance(model, &input, shaft, events)?,
+                Moves::InSteps(engine) => engine.advance(model, &input, shaft, events)?,
+            }
             self.volts = input.volts.at(duration);
             self.time += duration;
         }
         Ok(&self.events)
+    }
+
+    /// Puts the shaft at a position (rad) and a velocity (rad/s); all else goes on.
+    pub fn place(&mut self, position: f64, velocity: f64) {
+        self.shaft = Shaft::new(position, velocity);
+        if let Moves::InSteps(engine) = &mut self.engine {
+            *engine = DormandPrince::default();
+        }
+    }
+
+    /// The state as bits, for [`MovingRig::restore`]; what follows from rig and seed is not in it.
+    #[must_use]
+    pub fn state(&self) -> Vec<u64> {
+        let steps = match &self.engine {
+            Moves::Exactly(_) => [0.0; 2],
+            Moves::InSteps(engine) => engine.steps(),
+        };
+        let motion = match self.shaft.motion {
+            Motion::Stuck => 0,
+            Motion::Forward => 1,
+            Motion::Backward => 2,
+        };
+        let numbers = [
+            self.shaft.position,
+            self.shaft.velocity,
+            self.origin,
+            self.time,
+            self.volts,
+            self.arriving,
+            self.commanded,
+            steps[0],
+            steps[1],
+        ];
+        let numbers = numbers.iter().chain(&self.line).map(|x| x.to_bits());
+        [self.begun, motion].into_iter().chain(numbers).collect()
+    }
+
+    /// Takes a state that a rig of the same parameters and seed had; false, and nothing is changed, if it is none.
+    #[must_use]
+    pub fn restore(&mut self, state: &[u64]) -> bool {
+        let [begun, motion, numbers @ ..] = state else { return false };
+        let numbers: Vec<f64> = numbers.iter().map(|bits| f64::from_bits(*bits)).collect();
+        let [position, velocity, origin, time, volts, arriving, commanded, step, from_rest, line @ ..] =
+            &numbers[..]
+        else {
+            return false;
+        };
+        let motion = match motion {
+            0 => Motion::Stuck,
+            1 => Motion::Forward,
+            2 => Motion::Backward,
+            _ => return false,
+        };
+        if line.len() != self.line.len() || !numbers.iter().all(|x| x.is_finite()) {
+            return false;
+        }
+        self.shaft = Shaft { position: *position, velocity: *velocity, motion };
+        (self.origin, self.time) = (*origin, *time);
+        (self.volts, self.arriving, self.commanded) = (*volts, *arriving, *commanded);
+        self.line = line.iter().copied().collect();
+        if let Moves::InSteps(engine) = &mut self.engine {
+            *engine = DormandPrince::with_steps([*step, *from_rest]);
+        }
+        // What was drawn is drawn again.
+        (self.noise, self.torque_noise, self.begun) = (noise(self.seed), 0.0, *begun);
+        if self.rig.params.torque_noise > 0.0 {
+            for _ in 0..*begun {
+                let x: f64 = StandardNormal.sample(&mut self.noise);
+                self.torque_noise = self.rig.params.torque_noise * x;
+            }
+        }
+        true
     }
 
     /// Time is told anew, s: a sum of many periods drifts, a product does not.

@@ -14,7 +14,7 @@ mod output;
 
 pub use output::{Limit, Output, OutputParams, OutputState};
 
-use crate::{Arithmetic, Micros, ParamError, PlantParams, Real};
+use crate::{Arithmetic, FixedCounts, Micros, ParamError, PlantParams, Real};
 
 list::laws! {
     pd Pd PdParams "Proportional–derivative control (4).";
@@ -46,6 +46,15 @@ impl<T: Arithmetic> Tick<T> {
     pub fn velocity(&self) -> T {
         self.target_velocity - self.error_rate
     }
+}
+
+/// Measurements behind a law's input, for a law that wants more than errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen<T> {
+    /// Position of the shaft, unwrapped.
+    pub position: FixedCounts,
+    /// Voltage since the last tick, as the converter gave it, V.
+    pub applied: T,
 }
 
 /// The answer of a law.
@@ -95,15 +104,39 @@ pub trait ControlLaw<T: Arithmetic> {
     /// The state for a start at `tick` while the brake is at `applied` volts.
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State;
 
+    /// Told before each period, and once after [`ControlLaw::start`]: what lies behind the measurement. Most laws need none
+    /// of it.
+    #[inline]
+    fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
+        let _ = (state, seen);
+    }
+
     /// One period: the measurement in, the voltage out.
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms>;
 }
 
-impl<T: Real> Beside<'_, T> {
-    /// −1 where a voltage above 0 drives the shaft forwards, 1 where it resists: laws count as a brake does.
-    #[must_use]
-    pub fn sign(&self) -> T {
-        if self.model.actuator.kind().drives_above_0() { -T::ONE } else { T::ONE }
+/// A law that somebody else owns.
+impl<T: Arithmetic, C: ControlLaw<T>> ControlLaw<T> for &C {
+    type State = C::State;
+    type Terms = C::Terms;
+    const TERMS: &'static [&'static str] = C::TERMS;
+
+    fn term_names(&self) -> &'static [&'static str] {
+        (**self).term_names()
+    }
+
+    fn start(&self, tick: &Tick<T>, applied: T) -> Self::State {
+        (**self).start(tick, applied)
+    }
+
+    #[inline]
+    fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
+        (**self).sees(state, seen);
+    }
+
+    #[inline]
+    fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
+        (**self).update(state, tick)
     }
 }
 
@@ -116,6 +149,14 @@ pub struct Beside<'a, T> {
     pub output: &'a OutputParams<T>,
     /// Its sampling period.
     pub period: Micros,
+}
+
+impl<T: Real> Beside<'_, T> {
+    /// −1 where a voltage above 0 drives the shaft forwards, 1 where it resists: laws count as a brake does.
+    #[must_use]
+    pub fn sign(&self) -> T {
+        if self.model.actuator.kind().drives_above_0() { -T::ONE } else { T::ONE }
+    }
 }
 
 /// A law of the list: what building, certificate, logs and documentation ask of it.

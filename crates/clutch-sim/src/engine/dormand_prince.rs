@@ -43,6 +43,18 @@ pub struct DormandPrince {
     from_rest: f64,
 }
 
+impl DormandPrince {
+    /// Steps that it begins with, s: of the next interval, and of the next motion from rest.
+    pub(crate) fn steps(&self) -> [f64; 2] {
+        [self.step, self.from_rest]
+    }
+
+    /// An engine that begins with these steps.
+    pub(crate) fn with_steps([step, from_rest]: [f64; 2]) -> Self {
+        DormandPrince { step, from_rest }
+    }
+}
+
 type State = [f64; 2];
 
 /// The equation of motion while slipping one way.
