@@ -18,7 +18,7 @@ from typing_extensions import CapsuleType
 from clutch import _model, _run
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "brake_gain", "check", "main", "read_log", "reproduce", "rig", "run_loop", "scenarios", "simulate", "stribeck"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "brake_gain", "check", "friction_lab", "main", "read_log", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction"]
 
 BUILD: Final[str]
 """
@@ -708,6 +708,12 @@ def check(key: str, name: str, table: dict[str, Any]) -> dict[str, Any]:
     back with its defaults filled in.
     """
 
+def friction_lab(scenario: Scenario) -> dict[str, Any]:
+    """
+    The experiments of the friction laboratory with the friction of a scenario's rig: by name, what was set and what was
+    found.
+    """
+
 def main(args: Sequence[str]) -> int:
     """
     Runs the `clutch` command with these arguments, the program's name first; gives its exit code.
@@ -750,7 +756,7 @@ def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] 
     Runs a scenario; `law`, a function of a `Tick` or an object with such a method `step`, takes the place of its law.
     """
 
-def stribeck(table: dict[str, Any], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+def steady_friction(scenario: Scenario, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
     """
-    The friction coefficient (2) at velocities, rad/s; signed as the velocity.
+    Coefficients of the steady friction of a scenario's rig at some velocities, rad/s, with their signs.
     """

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Self, overload
 
 from clutch import _clutch
+from clutch._clutch import Table
 from clutch._errors import ParamError
 from clutch._record import _Params, _Tree
 
@@ -12,8 +13,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
-class StribeckFriction(_Params):
-    """Friction as a function of the velocity."""
+class _Friction(_Params):
+    """Friction as a function of the velocity, and under the laboratory's experiments."""
+
+    def _scenario(self) -> _clutch.Scenario:
+        """A scenario whose rig has this friction."""
+        table = {"name": "friction", "rig": {"base": "paper", "friction": {self._key.split(".")[-1]: self._tables()}}}
+        return _clutch.Scenario(table | {"law": {"pd": {}}, "reference": {"ramp": {"rate_deg_s": 2.0}}})
 
     @overload
     def coefficient(self, velocity_rad_s: float) -> "np.float64": ...
@@ -22,7 +28,7 @@ class StribeckFriction(_Params):
     def coefficient(self, velocity_rad_s: "Sequence[Any] | NDArray[Any]") -> "NDArray[np.float64]": ...
 
     def coefficient(self, velocity_rad_s: "ArrayLike") -> "np.float64 | NDArray[np.float64]":
-        """Coefficient of friction `μ(θ̇)` of (2), with its sign; 0 at rest.
+        """Coefficient of friction `μ(θ̇)` of steady sliding, with its sign; 0 at rest.
 
         Parameters
         ----------
@@ -50,10 +56,54 @@ class StribeckFriction(_Params):
         try:
             velocity = np.require(velocity_rad_s, np.float64, ["C", "A"])
         except (TypeError, ValueError, OverflowError) as error:
-            message = f"StribeckFriction.coefficient: velocity_rad_s: expected real numbers, rad/s ({error})"
+            message = f"{type(self).__name__}.coefficient: velocity_rad_s: expected real numbers, rad/s ({error})"
             raise ParamError(message, "velocity_rad_s", velocity_rad_s) from None
         # The empty tuple turns an array without dimensions into a number, and leaves others alone.
-        return _clutch.stribeck(self._tables(), velocity.reshape(-1)).reshape(velocity.shape)[()]
+        flat = np.ascontiguousarray(velocity.reshape(-1))
+        return _clutch.steady_friction(self._scenario(), flat).reshape(velocity.shape)[()]
+
+    def examine(self) -> "dict[str, Table]":
+        """Do the four experiments of the friction laboratory: ``clutch friction plot`` draws them, too.
+
+        Returns
+        -------
+        dict of str to Table
+            ``steady``: velocity, rad/s, and coefficient of steady sliding. ``pre_sliding``: angle, rad, and coefficient
+            of a slow motion to and fro. ``lag``: velocity and coefficient of a velocity that swings. ``break_away``:
+            rate at which a torque grows, N m/s, and coefficient at which the paper's shaft breaks away.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> table = clutch.LugreFriction().examine()["break_away"]
+        >>> bool(table["coefficient"][0] > table["coefficient"][-1])  # the faster, the sooner
+        True
+        """
+        first = {"steady": "velocity_rad_s", "pre_sliding": "angle_rad", "lag": "velocity_rad_s"}
+        found = _clutch.friction_lab(self._scenario())
+        return {
+            name: Table({first.get(name, "rate_nm_s"): set_, "coefficient": mu}) for name, (set_, mu) in found.items()
+        }
+
+
+class StribeckFriction(_Friction):
+    """Stribeck's curve."""
+
+
+class CoulombFriction(_Friction):
+    """Coulomb's friction."""
+
+
+class LugreFriction(_Friction):
+    """LuGre friction."""
+
+
+class DahlFriction(_Friction):
+    """Dahl's friction."""
+
+
+class ElastoPlasticFriction(_Friction):
+    """Elasto-plastic friction."""
 
 
 class BrakeGeometry(_Params):

@@ -18,8 +18,11 @@ __all__ = [
     "BrakeGeometry",
     "Chirp",
     "ChirpDrive",
+    "CoulombFriction",
     "Ctc",
     "Dac",
+    "DahlFriction",
+    "ElastoPlasticFriction",
     "Encoder",
     "HandDrive",
     "Hold",
@@ -28,6 +31,7 @@ __all__ = [
     "HoldVoltage",
     "JerkLimited",
     "Limits",
+    "LugreFriction",
     "MinimumJerk",
     "Model",
     "MotorActuator",
@@ -77,6 +81,8 @@ UNITS = {
     "deg_s2": "°/s²",
     "deg_s": "°/s",
     "deg": "°",
+    "1_rad": "1/rad",
+    "s_rad": "s/rad",
     "1_s2": "1/s²",
     "1_s": "1/s",
     "m_s2": "m/s²",
@@ -301,7 +307,162 @@ class StribeckFriction(_mixins.StribeckFriction):
     stribeck_exponent: float = 1.0
 
 
-Friction = StribeckFriction
+@dataclass(frozen=True, kw_only=True, repr=False)
+class CoulombFriction(_mixins.CoulombFriction):
+    """Coulomb's friction with a level at rest: `μ = μ_d sgn(θ̇)` in motion, up to `μ_s` at rest.
+
+    Parameters
+    ----------
+    mu_static : float, default 0.2
+        Coefficient of friction at rest. `μ_s`: a finite number of at least 0; a number of at least
+        mu_dynamic.
+    mu_dynamic : float, default 0.15
+        Coefficient of friction in motion. `μ_d`: a finite number of at least 0; a number above 0 where it is
+        the model's: computed torque and bounds divide by it.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.CoulombFriction(mu_static=0.3)
+    CoulombFriction(mu_static=0.3, mu_dynamic=0.15)
+    """
+
+    _key: ClassVar[str] = "rig.friction.coulomb"
+
+    mu_static: float = 0.2
+    mu_dynamic: float = 0.15
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LugreFriction(_mixins.LugreFriction):
+    """LuGre friction: `ż = θ̇ − σ_0 |θ̇| z/g(θ̇)`, `μ = σ_0 z + σ_1 ż`, with Stribeck's curve `g`. It needs
+    the engine `bristle`.
+
+    Parameters
+    ----------
+    mu_static : float, default 0.2
+        Coefficient of friction at which the bristles give way from rest. `μ_s`: a finite number above 0.
+    mu_dynamic : float, default 0.15
+        Coefficient of friction of a fast shaft. `μ_d`: a finite number above 0.
+    stribeck_velocity_rad_s : float, default 0.001
+        Stribeck velocity of steady sliding. `θ̇_s`: a finite number above 0 rad/s whose inverse is finite,
+        too.
+    stribeck_exponent : float, default 2.0
+        Stribeck exponent of steady sliding. `δ`: a finite number above 0.
+    stiffness_1_rad : float, default 2000.0
+        Stiffness of the bristles, as a coefficient of friction per angle. `σ_0`: a finite number above 0
+        1/rad whose inverse is finite, too.
+    damping_s_rad : float, default 5.0
+        Damping of the bristles, as a coefficient of friction per velocity of bending. `σ_1`: a finite number
+        of at least 0 s/rad.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Rig(friction=clutch.LugreFriction()).friction.stiffness_1_rad
+    2000.0
+    """
+
+    _key: ClassVar[str] = "rig.friction.lugre"
+
+    mu_static: float = 0.2
+    mu_dynamic: float = 0.15
+    stribeck_velocity_rad_s: float = 0.001
+    stribeck_exponent: float = 2.0
+    stiffness_1_rad: float = 2000.0
+    damping_s_rad: float = 5.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class DahlFriction(_mixins.DahlFriction):
+    """Dahl's friction: `ż = θ̇ (1 − σ_0 z sgn(θ̇)/μ_d)`, `μ = σ_0 z`. It needs the engine `bristle`.
+
+    Parameters
+    ----------
+    mu_dynamic : float, default 0.15
+        Coefficient of friction of steady sliding. `μ_d`: a finite number above 0.
+    stiffness_1_rad : float, default 2000.0
+        Stiffness of the bristles, as a coefficient of friction per angle. `σ_0`: a finite number above 0
+        1/rad whose inverse is finite, too.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.DahlFriction()
+    DahlFriction(mu_dynamic=0.15, stiffness_1_rad=2000.0)
+    """
+
+    _key: ClassVar[str] = "rig.friction.dahl"
+
+    mu_dynamic: float = 0.15
+    stiffness_1_rad: float = 2000.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ElastoPlasticFriction(_mixins.ElastoPlasticFriction):
+    """Elasto-plastic friction: LuGre's bristles, which only bend and do not slide below a coefficient `μ_e`.
+    It needs the engine `bristle`.
+
+    Parameters
+    ----------
+    mu_static : float, default 0.2
+        Coefficient of friction at which the bristles give way from rest. `μ_s`: a finite number above 0.
+    mu_dynamic : float, default 0.15
+        Coefficient of friction of a fast shaft. `μ_d`: a finite number above 0.
+    stribeck_velocity_rad_s : float, default 0.001
+        Stribeck velocity of steady sliding. `θ̇_s`: a finite number above 0 rad/s whose inverse is finite,
+        too.
+    stribeck_exponent : float, default 2.0
+        Stribeck exponent of steady sliding. `δ`: a finite number above 0.
+    stiffness_1_rad : float, default 2000.0
+        Stiffness of the bristles, as a coefficient of friction per angle. `σ_0`: a finite number above 0
+        1/rad whose inverse is finite, too.
+    damping_s_rad : float, default 5.0
+        Damping of the bristles, as a coefficient of friction per velocity of bending. `σ_1`: a finite number
+        of at least 0 s/rad.
+    mu_elastic : float, default 0.12
+        Coefficient up to which the bristles only bend. `μ_e`: a finite number above 0; a number below
+        mu_static and mu_dynamic.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.ElastoPlasticFriction(mu_elastic=0.1).mu_elastic
+    0.1
+    """
+
+    _key: ClassVar[str] = "rig.friction.elasto_plastic"
+
+    mu_static: float = 0.2
+    mu_dynamic: float = 0.15
+    stribeck_velocity_rad_s: float = 0.001
+    stribeck_exponent: float = 2.0
+    stiffness_1_rad: float = 2000.0
+    damping_s_rad: float = 5.0
+    mu_elastic: float = 0.12
+
+
+Friction = StribeckFriction | CoulombFriction | LugreFriction | DahlFriction | ElastoPlasticFriction
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -716,7 +877,7 @@ class Rig(_mixins.Rig):
         faster ends control. A finite number above 0 °/s.
     actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator
         What a voltage does to the shaft. By default `BrakeActuator()`.
-    friction : StribeckFriction
+    friction : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction or ElastoPlasticFriction
         Friction of pad on disc. By default `StribeckFriction()`.
     drive : WeightDrive, SpringDrive, BeltDrive, TableDrive, RampDrive, SineDrive, ChirpDrive or HandDrive
         The drive of the shaft. By default `WeightDrive()`.
@@ -772,7 +933,7 @@ class Model(_Params):
         Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
     actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator
         What a voltage does to the shaft. By default `BrakeActuator()`.
-    friction : StribeckFriction
+    friction : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction or ElastoPlasticFriction
         Friction of pad on disc. By default `StribeckFriction()`.
 
     Raises
@@ -1535,12 +1696,14 @@ class RunSettings(_Params):
     seed : int, default 1
         Seed of everything random: start, ripple phases, noise, a hand. A whole number from 0 to
         9223372036854776000.
-    engine : {"auto", "dormand_prince", "exact_flow"}, default "auto"
+    engine : {"auto", "dormand_prince", "exact_flow", "bristle"}, default "auto"
         Engine that integrates the motion. `auto`: The exact flow where the rig allows it, else
-        Dormand–Prince. `dormand_prince`: Dormand and Prince's 5(4) pair, the paper's solver, with events:
-        takes every rig. `exact_flow`: Closed forms, quadrature and series of the motion between samples: for
-        friction that falls exponentially with the speed and is even along the disc, torque and voltage held
-        between samples.
+        Dormand–Prince; the engine of bristles for a friction that has some. `dormand_prince`: Dormand and
+        Prince's 5(4) pair, the paper's solver, with events: takes every rig whose friction has no bristles.
+        `exact_flow`: Closed forms, quadrature and series of the motion between samples: for friction that
+        falls exponentially with the speed and is even along the disc, torque and voltage held between
+        samples. `bristle`: A Rosenbrock method for stiff motions: for friction with bristles (LuGre, Dahl,
+        elasto-plastic).
 
     Raises
     ------
@@ -1561,7 +1724,7 @@ class RunSettings(_Params):
     start: Literal["on_path", "rest"] = "on_path"
     start_counts: float | None = None
     seed: int = 1
-    engine: Literal["auto", "dormand_prince", "exact_flow"] = "auto"
+    engine: Literal["auto", "dormand_prince", "exact_flow", "bristle"] = "auto"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

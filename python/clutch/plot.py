@@ -18,6 +18,7 @@ in a column of 1/600 inch remain, so that no stick, spike or stair is lost.
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
     from clutch._clutch import Table
     from clutch._log import Log
+    from clutch._mixins import _Friction
     from clutch._model import Scenario, StribeckFriction
     from clutch._paper import PaperFigure
     from clutch._run import Result
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 __all__ = [
     "STYLE",
     "certificate_region",
+    "friction",
     "log_overview",
     "paper_figure",
     "phase_plane",
@@ -816,8 +819,56 @@ def _refined(
 
 
 @_styled
+def friction(*frictions: _Friction) -> Figure:
+    """Draw frictions under the four experiments of the laboratory: the same figure as ``clutch friction plot``.
+
+    Parameters
+    ----------
+    *frictions : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction or ElastoPlasticFriction
+        One curve each.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Steady sliding over the velocity in rad/s, pre-sliding over the angle in mrad, lag over the velocity in mrad/s,
+        break-away over the rate of torque in N m/s.
+
+    Raises
+    ------
+    ValueError
+        No friction.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> from clutch import plot
+    >>> figure = plot.friction(clutch.StribeckFriction(), clutch.LugreFriction())
+    >>> [ax.get_title() for ax in figure.axes]
+    ['Steady sliding', 'Pre-sliding', 'Lag behind the velocity', 'Break-away']
+    """
+    if not frictions:
+        raise ValueError("expected at least one friction, as clutch.LugreFriction()")
+    figure, axes = _panels(2, columns=2, width_mm=170, height_mm=110)
+    panels = {
+        "steady": ("Steady sliding", "velocity (rad/s)", "log", 1.0),
+        "pre_sliding": ("Pre-sliding", "angle (mrad)", "linear", 1e3),
+        "lag": ("Lag behind the velocity", "velocity (mrad/s)", "linear", 1e3),
+        "break_away": ("Break-away", "rate of torque (N m/s)", "log", 1.0),
+    }
+    flat = [ax for row in axes for ax in row]
+    for ax, (title, label, scale, _) in zip(flat, panels.values(), strict=True):
+        ax.set(title=title, xlabel=label, ylabel="coefficient", xscale=scale)
+    for colour, one in zip(itertools.cycle(_COLOURS), frictions, strict=False):
+        found = one.examine()
+        for ax, (name, (*_, factor)) in zip(flat, panels.items(), strict=True):
+            set_, mu = found[name].to_dict().values()
+            ax.plot(factor * set_, mu, color=colour, linewidth=0.8, label=one._key.split(".")[-1])
+    flat[0].legend()
+    return figure
+
+
 def run_overview(result: Result) -> Figure:
-    """Draw a run: its error, its velocity with the path's, and the brake's voltage.
+    """Draw a run: its error, its velocity with the path's, and the voltage.
 
     Times at which the shaft was stuck are shaded behind the voltage.
 
@@ -861,7 +912,7 @@ def run_overview(result: Result) -> Figure:
             "snap": False,
         }
         voltage.broken_barh(spans, (0, 1), transform=voltage.get_xaxis_transform(), **shade)
-    _line(voltage, time, samples["voltage_v"], color=_BLUE, label="brake")
+    _line(voltage, time, samples["voltage_v"], color=_BLUE, label="voltage")
     voltage.set(xlabel="time (s)", ylabel="voltage (V)", xlim=(0.0, _end([result])))
     if spans:
         _legend_above(voltage)

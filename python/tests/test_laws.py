@@ -1,4 +1,4 @@
-"""Laws written in Python: as functions, objects and classes, in sweeps, in logs; and plants that are copied and pickled."""
+"""Laws written in Python (functions, objects, classes) in sweeps and logs; plants that are copied and pickled."""
 
 import copy
 import math

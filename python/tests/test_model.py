@@ -41,6 +41,10 @@ CHIRP = {"rate_deg_s": 10.0, "amplitude_deg": 0.5, "from_hz": 0.1, "to_hz": 3.0,
 # Required arguments; none where every field has a default.
 REQUIRED = {
     clutch.StribeckFriction: {},
+    clutch.CoulombFriction: {},
+    clutch.LugreFriction: {},
+    clutch.DahlFriction: {},
+    clutch.ElastoPlasticFriction: {},
     clutch.BrakeActuator: {},
     clutch.BrakeGeometry: GEOMETRY,
     clutch.MotorActuator: {"gain_nm_v": 0.05, "preload_nm": 0.25},
@@ -611,6 +615,16 @@ def each(**fields):
     return st.fixed_dictionaries(fields)
 
 
+#: Of LuGre's and elasto-plastic bristles.
+BRISTLES = {
+    "mu_static": st.floats(0.1, 2),
+    "mu_dynamic": st.floats(0.1, 2),
+    "stribeck_velocity_rad_s": POSITIVE,
+    "stribeck_exponent": POSITIVE,
+    "stiffness_1_rad": POSITIVE,
+    "damping_s_rad": number(0, 100),
+}
+
 FRICTION = each(
     mu_static=number(0, 2),
     mu_dynamic=number(0, 2),
@@ -619,6 +633,10 @@ FRICTION = each(
 ).map(lambda d: d | {"mu_static": max(d["mu_static"], d["mu_dynamic"])})
 VALID = {
     clutch.StribeckFriction: FRICTION,
+    clutch.CoulombFriction: each(mu_static=st.floats(0.5, 2), mu_dynamic=st.floats(0, 0.5)),
+    clutch.LugreFriction: each(**BRISTLES),
+    clutch.DahlFriction: each(mu_dynamic=POSITIVE, stiffness_1_rad=POSITIVE),
+    clutch.ElastoPlasticFriction: each(**BRISTLES, mu_elastic=st.floats(0.01, 0.09)),
     clutch.BrakeActuator: each(gain_nm_v=POSITIVE, preload_nm=number(0, 10)),
     clutch.BrakeGeometry: each(**dict.fromkeys(GEOMETRY, POSITIVE)),
     clutch.MotorActuator: each(gain_nm_v=POSITIVE, preload_nm=number(0, 10), load_share=number(0, 1)),
@@ -720,6 +738,14 @@ def objects(*classes):
     return st.one_of(*(VALID[c].map(lambda values, c=c: c(**values)) for c in classes))
 
 
+FRICTIONS = [
+    clutch.StribeckFriction,
+    clutch.CoulombFriction,
+    clutch.LugreFriction,
+    clutch.DahlFriction,
+    clutch.ElastoPlasticFriction,
+]
+
 VALID[clutch.Rig] = each(
     inertia_kg_m2=POSITIVE,
     viscous_damping_nm_s_rad=number(0, 10),
@@ -728,7 +754,7 @@ VALID[clutch.Rig] = each(
     delay_ticks=st.integers(0, 1000),
     actuator_time_constant_s=st.none() | POSITIVE,
     speed_limit_deg_s=POSITIVE,
-    friction=objects(clutch.StribeckFriction),
+    friction=objects(*FRICTIONS),
     ripple=st.none() | objects(clutch.Ripple),
     drive=objects(
         clutch.WeightDrive,
@@ -748,7 +774,7 @@ VALID[clutch.Model] = each(
     drive_torque_nm=POSITIVE,
     viscous_damping_nm_s_rad=number(0, 10),
     actuator=objects(clutch.BrakeActuator, clutch.BrakeGeometry, clutch.MotorActuator, clutch.BothActuator),
-    friction=objects(clutch.StribeckFriction),
+    friction=objects(*FRICTIONS),
 )
 VALID[clutch.Safety] = each(
     reason=st.text(st.characters(exclude_categories=["Cs", "Cc", "Z"]), min_size=1),

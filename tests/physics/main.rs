@@ -2,6 +2,7 @@
 //! engine.
 
 mod acceptance;
+mod bristles;
 mod detector;
 mod engines;
 mod errata;

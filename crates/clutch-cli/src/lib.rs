@@ -5,6 +5,7 @@
 mod args;
 pub mod certify;
 mod daq;
+mod friction;
 mod hil;
 mod log;
 mod loop_verb;
@@ -57,6 +58,7 @@ enum Verb {
     Sim(sim::Sim),
     Scenario(scenario::ScenarioVerb),
     Certify(certify::Certify),
+    Friction(friction::FrictionVerb),
     Reproduce(reproduce::Reproduce),
 }
 
@@ -80,6 +82,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Sim(v) => v.run(),
         Verb::Scenario(v) => v.run(),
         Verb::Certify(v) => v.run(),
+        Verb::Friction(v) => v.run(),
         Verb::Reproduce(v) => v.run(),
     };
     match outcome {

@@ -138,7 +138,7 @@ fn figure(log: &Log, replayed: &[CommandRecord]) -> Figure {
         columns: 1,
         panels: vec![
             panel(
-                "Brake",
+                "Voltage",
                 "voltage (V)",
                 vec![
                     series("logged", &|i| log.commands[i].voltage),

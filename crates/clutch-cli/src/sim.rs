@@ -127,6 +127,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     let m = &s.metrics;
     let engine = match run.engine {
         EngineKind::ExactFlow => "exact flow",
+        EngineKind::Bristle => "bristles",
         EngineKind::DormandPrince | EngineKind::Auto => "Dormand–Prince",
     };
     let title = format!(
@@ -235,7 +236,7 @@ fn figure(scenario: &Scenario, run: &Run) -> Figure {
                 ],
                 false,
             ),
-            panel("Brake", "voltage (V)", vec![over_time("voltage", &t.voltage, 1.0)], true),
+            panel("Voltage", "voltage (V)", vec![over_time("voltage", &t.voltage, 1.0)], true),
         ],
     }
 }

@@ -68,7 +68,10 @@ pub use derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativePara
 pub use error::ParamError;
 pub use feasibility::{Envelope, Infeasible, Obstacle, check_path};
 pub use fnv::{FNV_64, fnv1a_64};
-pub use friction::{Friction, FrictionModel, FrictionParams, Stribeck, StribeckParams};
+pub use friction::{
+    Bristles, Coulomb, CoulombParams, Dahl, DahlParams, ElastoPlastic, ElastoPlasticParams, Friction,
+    FrictionModel, FrictionParams, Lugre, LugreParams, Stribeck, StribeckParams,
+};
 #[cfg(feature = "linalg")]
 pub use observer::{Estimate, Observer, ObserverGains, ObserverParams, ObserverState};
 pub use plant::{GRAVITY, Plant, PlantParams};

@@ -35,7 +35,7 @@ mod _clutch {
     #[pymodule_export]
     use super::run::{Run, simulate};
     #[pymodule_export]
-    use super::scenario::{Scenario, brake_gain, check, rig, scenarios, stribeck};
+    use super::scenario::{Scenario, brake_gain, check, friction_lab, rig, scenarios, steady_friction};
     #[pymodule_export]
     use super::session::run_loop;
     #[pymodule_export]

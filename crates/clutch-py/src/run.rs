@@ -148,6 +148,7 @@ impl Run {
     fn engine(&self) -> &'static str {
         match self.run.engine {
             EngineKind::ExactFlow => "exact_flow",
+            EngineKind::Bristle => "bristle",
             EngineKind::DormandPrince | EngineKind::Auto => "dormand_prince",
         }
     }

@@ -4,11 +4,13 @@ use crate::convert::{
     core_error, from_json, from_table, load_error, overrides, param_error, scenario_error, to_table,
 };
 use crate::path::Path;
-use clutch_core::{BrakeGeometry, FrictionModel, Stribeck};
+use clutch_core::{BrakeGeometry, Friction, FrictionModel};
 use clutch_sim::ScenarioError;
+use clutch_sim::friction_lab::examine;
 use clutch_sim::rig::Rig;
 use clutch_sim::scenario::{BUILT_IN, check_section, override_keys};
 use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use std::sync::Arc;
@@ -175,23 +177,36 @@ fn number(table: &Bound<'_, PyDict>, key: &str) -> PyResult<f64> {
     table.get_item(key)?.map_or(Ok(f64::NAN), |v| v.extract())
 }
 
-/// The friction coefficient (2) at velocities, rad/s; signed as the velocity.
+/// Coefficients of the steady friction of a scenario's rig at some velocities, rad/s, with their signs.
 #[pyfunction]
-pub(crate) fn stribeck<'py>(
+pub(crate) fn steady_friction<'py>(
     py: Python<'py>,
-    table: &Bound<'py, PyDict>,
+    scenario: &Scenario,
     velocity: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let number = |key| number(table, key);
-    let params = clutch_core::StribeckParams {
-        mu_static: number("mu_static")?,
-        mu_dynamic: number("mu_dynamic")?,
-        stribeck_velocity: number("stribeck_velocity_rad_s")?,
-        stribeck_exponent: number("stribeck_exponent")?,
-    };
-    let law = Stribeck::<f64>::new(&params).map_err(|e| core_error(py, &e))?;
-    let values = velocity.as_slice()?.iter().map(|v| law.coefficient(*v)).collect();
+    let friction = Friction::build(&scenario.0.params().rig.friction).map_err(|e| core_error(py, &e))?;
+    let values = velocity.as_slice()?.iter().map(|v| friction.coefficient(*v)).collect();
     Ok(PyArray1::from_vec(py, values))
+}
+
+/// The experiments of the friction laboratory with the friction of a scenario's rig: by name, what was set and what was
+/// found.
+#[pyfunction]
+pub(crate) fn friction_lab<'py>(py: Python<'py>, scenario: &Scenario) -> PyResult<Bound<'py, PyDict>> {
+    let lab = py.detach(|| examine(&scenario.0.params().rig.friction));
+    let lab = lab.map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let all = [
+        ("steady", lab.steady),
+        ("pre_sliding", lab.pre_sliding),
+        ("lag", lab.lag),
+        ("break_away", lab.break_away),
+    ];
+    let dict = PyDict::new(py);
+    for (name, points) in all {
+        let (set, found): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+        dict.set_item(name, (PyArray1::from_vec(py, set), PyArray1::from_vec(py, found)))?;
+    }
+    Ok(dict)
 }
 
 /// `K_COF` (18) of a brake's geometry, N m/V.

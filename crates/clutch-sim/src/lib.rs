@@ -2,6 +2,7 @@
 
 pub mod drive;
 pub mod engine;
+pub mod friction_lab;
 pub mod metrics;
 pub mod moving_rig;
 pub mod paper;

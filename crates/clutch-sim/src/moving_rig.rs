@@ -4,9 +4,10 @@
 //! clock, with voltages that change between samples.
 
 use crate::engine::{
-    DormandPrince, Engine, EngineError, EngineKind, Event, ExactFlow, Input, Motion, Shaft, Volts,
+    Bristle, DormandPrince, Engine, EngineError, EngineKind, Event, ExactFlow, Input, Motion, Shaft, Volts,
 };
 use crate::rig::Rig;
+use clutch_core::friction::FrictionModel;
 use clutch_core::{Counts, FixedCounts};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -26,6 +27,7 @@ fn floor(x: f64) -> i64 {
 enum Moves {
     Exactly(ExactFlow),
     InSteps(DormandPrince),
+    Bending(Bristle),
 }
 
 /// A rig in motion; a clone goes its own way.
@@ -51,6 +53,24 @@ pub struct MovingRig {
     events: Vec<Event>,
 }
 
+/// A shaft at a position and a velocity; bristles bend as in steady sliding, at rest as they have to.
+fn begin(rig: &Rig, position: f64, velocity: f64, volts: f64) -> Shaft {
+    let mut shaft = Shaft::new(position, velocity);
+    let plant = &rig.model.plant;
+    if let Some(bristles) = plant.friction().bristles() {
+        let torque = plant.params().drive_torque + plant.actuator().torque(volts);
+        let normal = plant.actuator().normal(volts);
+        shaft.deflection = if velocity != 0.0 {
+            bristles.steady(velocity)
+        } else if normal > 0.0 {
+            bristles.holding(torque / normal)
+        } else {
+            0.0
+        };
+    }
+    shaft
+}
+
 fn noise(seed: u64) -> Pcg64 {
     Pcg64::seed_from_u64(seed ^ 0x006e_6f69_7365)
 }
@@ -72,11 +92,12 @@ impl MovingRig {
             engine: match engine {
                 EngineKind::ExactFlow => Moves::Exactly(ExactFlow),
                 EngineKind::DormandPrince | EngineKind::Auto => Moves::InSteps(DormandPrince::default()),
+                EngineKind::Bristle => Moves::Bending(Bristle::default()),
             },
             seed,
             begun: 0,
+            shaft: begin(&rig, position, velocity, volts),
             rig,
-            shaft: Shaft::new(position, velocity),
             origin: position,
             time: 0.0,
             volts,
@@ -164,6 +185,7 @@ impl MovingRig {
             match &mut self.engine {
                 Moves::Exactly(engine) => engine.advance(model, &input, shaft, events)?,
                 Moves::InSteps(engine) => engine.advance(model, &input, shaft, events)?,
+                Moves::Bending(engine) => engine.advance(model, &input, shaft, events)?,
             }
             self.volts = input.volts.at(duration);
             self.time += duration;
@@ -173,9 +195,11 @@ impl MovingRig {
 
     /// Puts the shaft at a position (rad) and a velocity (rad/s); all else goes on.
     pub fn place(&mut self, position: f64, velocity: f64) {
-        self.shaft = Shaft::new(position, velocity);
-        if let Moves::InSteps(engine) = &mut self.engine {
-            *engine = DormandPrince::default();
+        self.shaft = begin(&self.rig, position, velocity, self.volts);
+        match &mut self.engine {
+            Moves::Exactly(_) => {}
+            Moves::InSteps(engine) => *engine = DormandPrince::default(),
+            Moves::Bending(engine) => *engine = Bristle::default(),
         }
     }
 
@@ -185,6 +209,7 @@ impl MovingRig {
         let steps = match &self.engine {
             Moves::Exactly(_) => [0.0; 2],
             Moves::InSteps(engine) => engine.steps(),
+            Moves::Bending(engine) => [engine.step(), 0.0],
         };
         let motion = match self.shaft.motion {
             Motion::Stuck => 0,
@@ -194,6 +219,7 @@ impl MovingRig {
         let numbers = [
             self.shaft.position,
             self.shaft.velocity,
+            self.shaft.deflection,
             self.origin,
             self.time,
             self.volts,
@@ -211,8 +237,19 @@ impl MovingRig {
     pub fn restore(&mut self, state: &[u64]) -> bool {
         let [begun, motion, numbers @ ..] = state else { return false };
         let numbers: Vec<f64> = numbers.iter().map(|bits| f64::from_bits(*bits)).collect();
-        let [position, velocity, origin, time, volts, arriving, commanded, step, from_rest, line @ ..] =
-            &numbers[..]
+        let [
+            position,
+            velocity,
+            deflection,
+            origin,
+            time,
+            volts,
+            arriving,
+            commanded,
+            step,
+            from_rest,
+            line @ ..,
+        ] = &numbers[..]
         else {
             return false;
         };
@@ -225,12 +262,14 @@ impl MovingRig {
         if line.len() != self.line.len() || !numbers.iter().all(|x| x.is_finite()) {
             return false;
         }
-        self.shaft = Shaft { position: *position, velocity: *velocity, motion };
+        self.shaft = Shaft { position: *position, velocity: *velocity, motion, deflection: *deflection };
         (self.origin, self.time) = (*origin, *time);
         (self.volts, self.arriving, self.commanded) = (*volts, *arriving, *commanded);
         self.line = line.iter().copied().collect();
-        if let Moves::InSteps(engine) = &mut self.engine {
-            *engine = DormandPrince::with_steps([*step, *from_rest]);
+        match &mut self.engine {
+            Moves::Exactly(_) => {}
+            Moves::InSteps(engine) => *engine = DormandPrince::with_steps([*step, *from_rest]),
+            Moves::Bending(engine) => *engine = Bristle::with_step(*step),
         }
         // What was drawn is drawn again.
         (self.noise, self.torque_noise, self.begun) = (noise(self.seed), 0.0, *begun);

@@ -5,6 +5,7 @@ use crate::metrics::{Detected, Metrics, MetricsBuilder, MetricsSample};
 use crate::moving_rig::MovingRig;
 use crate::progress::{Progress, Report, UNWATCHED};
 use crate::rig::{Rig, RigParams};
+use clutch_core::friction::FrictionModel;
 use clutch_core::law::{ControlLaw, LawParams, Limit, OutputParams, Terms};
 use clutch_core::params::{Range, Table};
 use clutch_core::reference::{Reference, ReferenceParams};
@@ -131,9 +132,18 @@ impl<'a> RunSpec<'a> {
     /// The exact flow is asked for and cannot take the rig.
     pub fn engine(&self, rig: &Rig) -> Result<EngineKind, RunError> {
         let lags = self.rig.actuator_time_constant.is_some();
+        let bends = rig.model.plant.friction().bristles().is_some();
+        match (self.run.engine, bends) {
+            (EngineKind::Auto | EngineKind::Bristle, true) => return Ok(EngineKind::Bristle),
+            (EngineKind::Bristle, false) => return Err(RunError::NoBristles),
+            (EngineKind::DormandPrince | EngineKind::ExactFlow, true) => return Err(RunError::Bristles),
+            _ => {}
+        }
         match (self.run.engine, ExactFlow::refuses(&rig.model, rig.drive.is_constant(), lags)) {
             (EngineKind::ExactFlow, Some(needs)) => Err(RunError::Engine(needs)),
-            (EngineKind::DormandPrince, _) | (EngineKind::Auto, Some(_)) => Ok(EngineKind::DormandPrince),
+            (EngineKind::DormandPrince | EngineKind::Bristle, _) | (EngineKind::Auto, Some(_)) => {
+                Ok(EngineKind::DormandPrince)
+            }
             (EngineKind::ExactFlow | EngineKind::Auto, None) => Ok(EngineKind::ExactFlow),
         }
     }
@@ -204,6 +214,14 @@ pub enum RunError {
     /// The engine cannot take the rig.
     #[error("engine = exact_flow needs {0}; use engine = dormand_prince or auto")]
     Engine(&'static str),
+    /// The friction has bristles, which the engine has not.
+    #[error("the rig's friction has bristles (lugre, dahl, elasto_plastic): use engine = bristle or auto")]
+    Bristles,
+    /// The friction has no bristles, which the engine needs.
+    #[error(
+        "engine = bristle is for friction with bristles (lugre, dahl, elasto_plastic): use engine = auto"
+    )]
+    NoBristles,
     /// The engine gave up.
     #[error(transparent)]
     Motion(#[from] EngineError),

@@ -104,6 +104,11 @@ macro_rules! frictions {
                     $(Friction::$model(f) => f.exponential(),)+
                 }
             }
+            fn bristles(&self) -> Option<Bristles<T>> where T: Real {
+                match self {
+                    $(Friction::$model(f) => f.bristles(),)+
+                }
+            }
             fn check_divisor(&self) -> Result<(), ParamError<T>> where T: Real {
                 match self {
                     $(Friction::$model(f) => f.check_divisor(),)+

@@ -9,15 +9,22 @@
 //! one model's parameters. Two readings are settled here: `sgn(0) = 0`, and a pad can only push, so that a
 //! negative voltage gives no normal force.
 
+mod bristles;
 mod list;
+
+pub use bristles::Bristles;
 
 use crate::{Arithmetic, Each, Interval, ParamError, Real};
 
 list::frictions! {
     stribeck Stribeck StribeckParams "Stribeck's curve (2).";
+    coulomb Coulomb CoulombParams "Coulomb's friction with a level at rest.";
+    lugre Lugre LugreParams "LuGre friction: bristles that bend, slide and damp.";
+    dahl Dahl DahlParams "Dahl's friction: bristles that bend and slide.";
+    elasto_plastic ElastoPlastic ElastoPlasticParams "Elasto-plastic friction: bristles that only bend below break-away.";
 }
 
-/// A friction that depends on the velocity alone.
+/// A friction, as one that depends on the velocity alone; what else it has are its [`FrictionModel::bristles`].
 pub trait FrictionModel<T: Arithmetic>: Sized {
     /// Its parameters.
     type Params;
@@ -58,6 +65,14 @@ pub trait FrictionModel<T: Arithmetic>: Sized {
 
     /// The curve, if it falls exponentially from rest to a fast shaft: a closed form exists for such.
     fn exponential(&self) -> Option<Exponential<T>>
+    where
+        T: Real,
+    {
+        None
+    }
+
+    /// The bristles of a friction that bends before it slides. All else that a friction is asked is of its steady sliding.
+    fn bristles(&self) -> Option<Bristles<T>>
     where
         T: Real,
     {

@@ -99,6 +99,8 @@ units! {
     DEG_S2 "deg_s2" "°/s²" "rad/s²" Degrees "acceleration" DEGREE;
     DEG_S "deg_s" "°/s" "rad/s" Degrees "velocity" DEGREE;
     DEG "deg" "°" "rad" Degrees "angle" DEGREE;
+    PER_RAD "1_rad" "1/rad" "1/rad" None "" 1.0;
+    S_RAD "s_rad" "s/rad" "s/rad" None "" 1.0;
     PER_S2 "1_s2" "1/s²" "1/s²" None "" 1.0;
     PER_S "1_s" "1/s" "1/s" None "" 1.0;
     M_S2 "m_s2" "m/s²" "m/s²" None "" 1.0;

@@ -48,6 +48,34 @@ reference.ramp"#,
 StribeckFriction(mu_static=0.25, mu_dynamic=0.15, stribeck_velocity_rad_s=0.001, stribeck_exponent=1.0)",
     ),
     known(
+        "CoulombParams",
+        "CoulombFriction",
+        true,
+        r">>> clutch.CoulombFriction(mu_static=0.3)
+CoulombFriction(mu_static=0.3, mu_dynamic=0.15)",
+    ),
+    known(
+        "LugreParams",
+        "LugreFriction",
+        true,
+        r">>> clutch.Rig(friction=clutch.LugreFriction()).friction.stiffness_1_rad
+2000.0",
+    ),
+    known(
+        "DahlParams",
+        "DahlFriction",
+        true,
+        r">>> clutch.DahlFriction()
+DahlFriction(mu_dynamic=0.15, stiffness_1_rad=2000.0)",
+    ),
+    known(
+        "ElastoPlasticParams",
+        "ElastoPlasticFriction",
+        true,
+        r">>> clutch.ElastoPlasticFriction(mu_elastic=0.1).mu_elastic
+0.1",
+    ),
+    known(
         "BrakeGeometry",
         "BrakeGeometry",
         true,

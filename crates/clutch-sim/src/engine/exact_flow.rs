@@ -65,7 +65,9 @@ impl ExactFlow {
     #[must_use]
     pub fn refuses(model: &Model, drive_is_constant: bool, actuator_lags: bool) -> Option<&'static str> {
         if model.plant.friction().exponential().is_none() {
-            Some("friction that falls exponentially with the speed (Stribeck's with an exponent of 1)")
+            Some(
+                "friction that falls exponentially with the speed (Coulomb's, or Stribeck's with an exponent of 1)",
+            )
         } else if model.ripple.is_some() {
             Some("friction that does not vary along the disc")
         } else if !drive_is_constant {
@@ -412,7 +414,10 @@ impl Engine for ExactFlow {
                 events.push(event(EventKind::BreakAway, s, shaft.position));
             }
             let (sign, left) = (shaft.motion.sign(), input.duration - s);
-            let excess = (sign * torque - holds) / unit;
+            // Coulomb's friction drops from rest to motion; Stribeck's does not, and is the number that was compared with.
+            let drops = friction.at_rest < model.plant.friction().at_rest();
+            let first = if drops { normal * friction.at_rest } else { holds };
+            let excess = (sign * torque - first) / unit;
             let flow = Flow {
                 // Without a layer both are one number, rounded once: the break-away that was seen has to happen.
                 drive: if stribeck == 0.0 {

@@ -11,9 +11,11 @@
 //! as roots, not as a threshold on a small velocity. All engines work from one [`Model`] and one
 //! [`Input`]; which one runs is chosen by [`EngineKind`].
 
+mod bristle;
 mod dormand_prince;
 mod exact_flow;
 
+pub use bristle::Bristle;
 pub use dormand_prince::DormandPrince;
 pub use exact_flow::ExactFlow;
 
@@ -57,6 +59,8 @@ pub struct Shaft {
     pub velocity: f64,
     /// Stuck or slipping.
     pub motion: Motion,
+    /// Deflection of the bristles of a friction that has some, rad; else 0.
+    pub deflection: f64,
 }
 
 impl Shaft {
@@ -64,7 +68,7 @@ impl Shaft {
     #[must_use]
     pub fn new(position: f64, velocity: f64) -> Self {
         let motion = if velocity == 0.0 { Motion::Stuck } else { Motion::along(velocity) };
-        Shaft { position, velocity, motion }
+        Shaft { position, velocity, motion, deflection: 0.0 }
     }
 }
 
@@ -284,13 +288,15 @@ pub trait Engine {
 clutch_core::words! {
     /// Engine that integrates the motion.
     pub enum EngineKind {
-        /// The exact flow where the rig allows it, else Dormand–Prince.
+        /// The exact flow where the rig allows it, else Dormand–Prince; the engine of bristles for a friction that has some.
         Auto = "auto" default,
-        /// Dormand and Prince's 5(4) pair, the paper's solver, with events: takes every rig.
+        /// Dormand and Prince's 5(4) pair, the paper's solver, with events: takes every rig whose friction has no bristles.
         DormandPrince = "dormand_prince",
         /// Closed forms, quadrature and series of the motion between samples: for friction that falls exponentially with the
         /// speed and is even along the disc, torque and voltage held between samples.
         ExactFlow = "exact_flow",
+        /// A Rosenbrock method for stiff motions: for friction with bristles (LuGre, Dahl, elasto-plastic).
+        Bristle = "bristle",
     }
 }
 

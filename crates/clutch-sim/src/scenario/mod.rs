@@ -596,7 +596,9 @@ impl Scenario {
     pub fn run_error(&self, e: &RunError) -> ScenarioError {
         match e {
             RunError::Param(e) => self.at("", e),
-            RunError::Engine(_) => self.message("run.engine", e.to_string()),
+            RunError::Engine(_) | RunError::Bristles | RunError::NoBristles => {
+                self.message("run.engine", e.to_string())
+            }
             RunError::Motion(_) => self.message("rig", e.to_string()),
             RunError::Begin(_) => self.path_message(e.to_string()),
             RunError::OtherServo => self.message("", e.to_string()),

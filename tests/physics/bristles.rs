@@ -1,0 +1,190 @@
+//! Friction with bristles: limits between the models, what each of them is for, and the engine that integrates them.
+//!
+//! The values are those of Canudas de Wit et al. (1995): 1 kg on 1 N of friction, 1.5 N at break-away, bristles of 10⁵ N/m
+//! with a damping of √10⁵ N s/m, a Stribeck velocity of 1 mm/s, 0.4 N s/m of viscous friction. A metre is a radian here.
+
+use clutch_core::friction::{DahlParams, ElastoPlasticParams, FrictionModel, FrictionParams, LugreParams};
+use clutch_core::{ActuatorParams, Friction, Plant, PlantParams};
+use clutch_sim::drive::{Drive, DriveParams, RampDrive, SineDrive};
+use clutch_sim::engine::{Bristle, Engine, Event, EventKind, Input, Model, Shaft, Volts};
+
+fn lugre() -> LugreParams {
+    LugreParams {
+        mu_static: 1.5,
+        mu_dynamic: 1.0,
+        stribeck_velocity: 0.001,
+        stribeck_exponent: 2.0,
+        stiffness: 1e5,
+        damping: 1e5_f64.sqrt(),
+    }
+}
+
+fn elasto_plastic() -> ElastoPlasticParams {
+    let LugreParams { mu_static, mu_dynamic, stribeck_velocity, stribeck_exponent, stiffness, damping } =
+        lugre();
+    let elastic = 0.9;
+    ElastoPlasticParams {
+        mu_static,
+        mu_dynamic,
+        stribeck_velocity,
+        stribeck_exponent,
+        stiffness,
+        damping,
+        elastic,
+    }
+}
+
+/// 1 kg, 0.4 N s/m, 1 N of normal force.
+fn model(friction: impl Into<FrictionParams>) -> Model {
+    let plant = PlantParams {
+        inertia: 1.0,
+        viscous_damping: 0.4,
+        drive_torque: 0.0,
+        actuator: ActuatorParams::brake(1.0),
+        friction: friction.into(),
+    };
+    Model { plant: Plant::new(&plant).unwrap(), ripple: None }
+}
+
+/// The motion from rest under a drive, sampled each `period` until `end`, and what happened.
+fn motion(model: &Model, drive: &Drive, period: f64, end: f64) -> (Vec<Shaft>, Vec<Event>) {
+    let (mut engine, mut shaft, mut events) = (Bristle::default(), Shaft::new(0.0, 0.0), Vec::new());
+    let steps = (end / period).round() as u32;
+    let shafts = (0..steps).map(|k| {
+        let time = f64::from(k) * period;
+        let input = Input { time, duration: period, origin: 0.0, volts: Volts::Held(1.0), drive, noise: 0.0 };
+        engine.advance(model, &input, &mut shaft, &mut events).unwrap();
+        shaft
+    });
+    (shafts.collect(), events)
+}
+
+fn sine(mean: f64, amplitude: f64, frequency: f64) -> Drive {
+    Drive::new(&DriveParams::Sine(SineDrive { mean, amplitude, frequency, phase_turns: 0.0 }), 0).unwrap()
+}
+
+fn ramp(rate: f64) -> Drive {
+    Drive::new(&DriveParams::Ramp(RampDrive { from: 0.0, rate }), 0).unwrap()
+}
+
+#[test]
+fn a_small_force_bends_the_bristles_and_lets_them_come_back() {
+    // Up to 0.7 N and back: the spring of the bristles, with a little hysteresis.
+    let (shafts, _) = motion(&model(lugre()), &sine(0.0, 0.7, 0.5), 1e-3, 2.0);
+    let most = shafts.iter().fold(0.0_f64, |most, s| most.max(s.position));
+    assert!((most / (0.7 / 1e5) - 1.0).abs() < 0.5, "{most} m instead of about {} m", 0.7 / 1e5);
+    let end = shafts[shafts.len() - 1];
+    assert!(end.position.abs() < 0.2 * most, "{} m after the force is gone", end.position);
+}
+
+#[test]
+fn the_force_of_break_away_falls_with_the_rate_at_which_it_grows() {
+    let mut last = f64::INFINITY;
+    for rate in [0.2, 1.0, 5.0, 20.0] {
+        let (_, events) = motion(&model(lugre()), &ramp(rate), 1e-3, 2.0 / rate);
+        let away = events.iter().find(|e| e.kind == EventKind::BreakAway).expect("it breaks away");
+        assert!(
+            away.torque < last && away.torque > 1.0 && away.torque < 1.55,
+            "{rate} N/s: {} N",
+            away.torque
+        );
+        last = away.torque;
+    }
+}
+
+#[test]
+fn friction_lags_behind_the_velocity() {
+    // Sliding between 0.3 and 1.7 mm/s: friction is higher on the way up than on the way down.
+    let friction = Friction::build(&lugre().into()).unwrap();
+    let bristles = friction.bristles().unwrap();
+    let (mut z, dt) = (bristles.steady(0.001), 1e-6);
+    let (mut rising, mut falling) = (0.0, 0.0);
+    for k in 0..300_000 {
+        let phase = f64::from(k) * dt * 10.0 * std::f64::consts::TAU;
+        let velocity = 0.001 + 0.0007 * phase.sin();
+        let rate = bristles.rate(z, velocity);
+        if k >= 200_000 && phase.sin().abs() < 1e-3 {
+            let mu = bristles.coefficient(z, rate);
+            *(if phase.cos() > 0.0 { &mut rising } else { &mut falling }) = mu;
+        }
+        z += dt * rate;
+    }
+    assert!(rising > falling + 0.01, "{rising} on the way up, {falling} on the way down");
+}
+
+#[test]
+fn without_damping_and_with_one_coefficient_lugre_is_dahl() {
+    let (mu, stiffness) = (1.0, 1e5);
+    let dahl = model(DahlParams { mu_dynamic: mu, stiffness });
+    let same = model(LugreParams { mu_static: mu, mu_dynamic: mu, damping: 0.0, stiffness, ..lugre() });
+    let drive = sine(0.2, 1.1, 3.0);
+    let (a, b) = (motion(&dahl, &drive, 1e-3, 1.0).0, motion(&same, &drive, 1e-3, 1.0).0);
+    for (a, b) in a.iter().zip(&b) {
+        assert!((a.position - b.position).abs() < 1e-9 && (a.velocity - b.velocity).abs() < 1e-7);
+    }
+    assert!(a[999].position.abs() > 1e-4, "it moved");
+}
+
+#[test]
+fn under_a_load_that_trembles_lugre_drifts_and_elasto_plastic_friction_holds() {
+    // 0.6 ± 0.2 N, below the 0.9 N up to which the elasto-plastic bristles only bend.
+    let drive = sine(0.6, 0.2, 20.0);
+    let drift = |model: &Model| {
+        let shafts = motion(model, &drive, 1e-3, 20.0).0;
+        shafts[19_999].position - shafts[9_999].position
+    };
+    let (lugre, held) = (drift(&model(lugre())), drift(&model(elasto_plastic())));
+    assert!(lugre > 1e-7, "{lugre} m");
+    assert!(held.abs() < 1e-12, "{held} m");
+}
+
+#[test]
+fn a_run_does_not_depend_on_the_periods_in_which_it_is_asked_for() {
+    for friction in [FrictionParams::from(lugre()), elasto_plastic().into()] {
+        let model = model(friction);
+        // Break-away, sliding, a reversal.
+        let drive = sine(0.0, 2.0, 1.0);
+        let at = |period: f64| {
+            let shafts = motion(&model, &drive, period, 1.0).0;
+            let last = shafts[shafts.len() - 1];
+            [last.position, last.velocity, shafts[shafts.len() / 2 - 1].position]
+        };
+        let finest = at(1e-5);
+        for period in [1e-3, 1e-4] {
+            for (a, b) in at(period).iter().zip(finest) {
+                assert!((a - b).abs() < 1e-6 * b.abs().max(0.01), "{a} and {b} with {period} s");
+            }
+        }
+    }
+}
+
+#[test]
+fn over_many_random_programs_of_velocity_friction_takes_energy_and_never_gives_it() {
+    let mut seed = 1_u64;
+    let mut random = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for params in [FrictionParams::from(lugre()), elasto_plastic().into(), DahlParams::default().into()] {
+        let bristles = Friction::build(&params).unwrap().bristles().unwrap();
+        // With the viscous friction that makes it passive.
+        let viscous = bristles.passive_from();
+        let mut least = f64::INFINITY;
+        for _ in 0..3_000 {
+            let (mut z, mut work) = (0.0, 0.0);
+            for _ in 0..20 {
+                let velocity = (random() - 0.5) * 10.0_f64.powf(-4.0 * random());
+                let dt = 0.02 / bristles.stiffness() / velocity.abs();
+                for _ in 0..40 {
+                    let rate = bristles.rate(z, velocity);
+                    let middle = z + 0.5 * dt * rate;
+                    let rate = bristles.rate(middle, velocity);
+                    work += dt * velocity * (bristles.coefficient(middle, rate) + viscous * velocity);
+                    z += dt * rate;
+                }
+                least = least.min(work);
+            }
+        }
+        assert!(least >= 0.0, "{params:?}: {least}");
+    }
+}
