@@ -843,8 +843,8 @@ def friction(*frictions: _Friction) -> Figure:
     >>> import clutch
     >>> from clutch import plot
     >>> figure = plot.friction(clutch.StribeckFriction(), clutch.LugreFriction())
-    >>> [ax.get_title() for ax in figure.axes]
-    ['Steady sliding', 'Pre-sliding', 'Lag behind the velocity', 'Break-away']
+    >>> [ax.get_xlabel() for ax in figure.axes]
+    ['velocity (rad/s)', 'angle (mrad)', 'velocity (mrad/s)', 'rate of torque (N m/s)']
     """
     if not frictions:
         raise ValueError("expected at least one friction, as clutch.LugreFriction()")

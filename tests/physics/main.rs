@@ -10,3 +10,4 @@ mod intervals;
 mod laws;
 mod pid;
 mod single_precision;
+mod systems;

@@ -222,7 +222,10 @@ fn figures() -> Result<()> {
     for name in ["fig8.svg", "fig9.svg", "fig10.svg"] {
         std::fs::copy(out.join(name), kept.join(name)).with_context(|| format!("copying {name}"))?;
     }
-    Ok(())
+    let clutch =
+        |args: &[&str], file: &str| cargo(["run", "--release", "--"]).args(args).arg(kept.join(file)).run();
+    clutch(&["sim", "motor_pid", "--plot"], "motor_pid.svg")?;
+    clutch(&["friction", "plot", "stribeck", "lugre", "elasto_plastic", "--out"], "friction.svg")
 }
 
 fn campaign(seeds: Option<u64>, first: u64) -> Result<()> {

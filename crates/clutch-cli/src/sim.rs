@@ -10,6 +10,7 @@ use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::Detected;
 use clutch_sim::reaching::Reaching;
+use clutch_sim::rig::Rig;
 use clutch_sim::{Keep, Metrics, Run, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -48,6 +49,9 @@ struct Summary<'a> {
     path: Path,
     certified: bool,
     rig_outside_bounds: Vec<String>,
+    /// Viscous damping that the rig's bristles lack to be passive, N m s/rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bristles_lack_nm_s_rad: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -107,6 +111,8 @@ impl Sim {
             },
             certified: plan.certificate.certified(),
             rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
+            bristles_lack_nm_s_rad: Rig::new(&scenario.spec().rig, scenario.spec().run.seed)?
+                .lacks_damping(run.trace.start_voltage),
         };
         print(&if self.json { json(&summary)? } else { text(&summary, &run) })?;
         Ok(Exit::Done)
@@ -160,6 +166,13 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         text += &format!(
             "note: the path's velocity jumps by {} °/s, which no shaft follows at once; the shaft catches up\n",
             number(jump.to_degrees())
+        );
+    }
+    if let Some(lacks) = s.bristles_lack_nm_s_rad {
+        text += &format!(
+            "note: the friction's bristles give energy in some motions: with the voltage of the start it takes \
+             {} N m s/rad more of rig.viscous_damping_nm_s_rad, or less of their damping, for none\n",
+            number(lacks)
         );
     }
     text

@@ -199,6 +199,36 @@ fn the_errors_that_the_docs_show_are_the_errors_that_come() {
     assert!(checked >= 10, "{checked}");
 }
 
+/// docs/axis.md: the evening with a geared motor.
+#[test]
+fn the_runs_of_the_motor_that_the_docs_show_are_the_runs_that_come() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/axis.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let mut checked = 0;
+    for example in page.split("$ clutch sim ").skip(1) {
+        let (name, shown) = example.split("```").next().unwrap().split_once('\n').unwrap();
+        assert_eq!(out(&clutch(&["sim", name])).trim(), shown.trim(), "$ clutch sim {name}");
+        checked += 1;
+    }
+    for row in page.lines().filter(|line| line.starts_with("| `motor_")) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let run: serde_json::Value =
+            serde_json::from_str(&out(&clutch(&["sim", cells[1].trim_matches('`'), "--json"]))).unwrap();
+        for (cell, metric, factor) in [
+            (cells[3], "max_error_rad", 1.0_f64.to_degrees()),
+            (cells[4], "rms_error_rad", 1.0_f64.to_degrees()),
+            (cells[5], "stick_slip_cycles_per_s", 1.0),
+        ] {
+            let shown = cell.trim_end_matches(" cycles/s").trim_end_matches('°');
+            let decimals = shown.split_once('.').map_or(0, |(_, d)| d.len());
+            let is = run["metrics"][metric].as_f64().unwrap() * factor;
+            assert_eq!(format!("{is:.decimals$}"), shown, "{row}: {metric}");
+        }
+        checked += 1;
+    }
+    assert_eq!(checked, 5);
+}
+
 #[test]
 fn no_file_is_written_over_another_of_the_same_command() {
     let file = folder("same").join("mine.toml");

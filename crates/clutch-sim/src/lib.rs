@@ -13,6 +13,7 @@ pub mod ripple;
 pub mod run;
 pub mod scenario;
 pub mod sweep;
+pub mod system;
 mod tables;
 
 pub use metrics::Metrics;

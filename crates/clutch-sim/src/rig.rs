@@ -224,6 +224,15 @@ impl Rig {
         self.reached(if actuator.kind().two_sided() { volts } else { volts.max(0.0) })
     }
 
+    /// Viscous damping that bristles lack, at a voltage, to take energy out of every motion, N m s/rad; none if they do not.
+    #[must_use]
+    pub fn lacks_damping(&self, volts: f64) -> Option<f64> {
+        let plant = &self.model.plant;
+        let needed = plant.friction().bristles()?.passive_from() * plant.actuator().normal(volts);
+        let lacks = needed - plant.params().viscous_damping;
+        (lacks > 0.0).then_some(lacks)
+    }
+
     /// A voltage within the converter's range; 0 for none, as where there is no friction to divide by.
     fn reached(&self, volts: f64) -> f64 {
         let converter = &self.params.dac.converter;

@@ -6,6 +6,7 @@
 //! J. R. Dormand, P. J. Prince, A family of embedded Runge–Kutta formulae, J. Comp. Appl. Math.
 //! 6 (1980) 19–26.
 
+use super::pair::{A, C, E};
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, break_away};
 use clutch_core::friction::FrictionModel;
 
@@ -20,19 +21,6 @@ const ROUNDING: f64 = 1e-15;
 const INSTANT: f64 = 1e-13;
 /// Steps in one interval before the engine gives up.
 const STEP_LIMIT: u32 = 100_000;
-
-const C: [f64; 6] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
-const A: [[f64; 6]; 6] = [
-    [0.2, 0.0, 0.0, 0.0, 0.0, 0.0],
-    [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
-    [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0, 0.0],
-    [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0, 0.0],
-    [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
-    [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
-];
-/// Fifth order minus fourth order.
-const E: [f64; 7] =
-    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
 
 /// The reference engine.
 #[derive(Clone, Debug, Default)]

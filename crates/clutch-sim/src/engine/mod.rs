@@ -14,6 +14,7 @@
 mod bristle;
 mod dormand_prince;
 mod exact_flow;
+pub(crate) mod pair;
 
 pub use bristle::Bristle;
 pub use dormand_prince::DormandPrince;

@@ -1,0 +1,362 @@
+//! The motion of a system from event to event.
+
+use super::System;
+use super::modes::hold;
+use crate::engine::pair::{A, C, E};
+use clutch_core::friction::FrictionModel;
+use nalgebra::{SMatrix, SVector};
+
+/// An event is located to this, s.
+pub const INSTANT: f64 = 1e-12;
+/// Error allowed per step, in rad and rad/s, and as a share of both.
+const TOLERANCE: f64 = 1e-11;
+/// Steps and events before the motion is given up.
+const LIMIT: u32 = 50_000_000;
+/// Slip rate below which a row counts as at rest after an event, as a share of the fastest, and rad/s.
+const AT_REST: f64 = 1e-9;
+/// Acceleration that a held row may have left, as a share of what load and friction make of it.
+const STILL: f64 = 1e-12;
+
+/// Motion of a row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// Held: its slip rate is 0.
+    #[default]
+    Stuck,
+    /// Slips with a rate at or above 0.
+    Forward,
+    /// Slips with a rate at or below 0.
+    Backward,
+}
+
+impl Mode {
+    fn sign(self) -> f64 {
+        match self {
+            Mode::Stuck => 0.0,
+            Mode::Forward => 1.0,
+            Mode::Backward => -1.0,
+        }
+    }
+}
+
+/// Positions and velocities at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State<const N: usize> {
+    /// s
+    pub time: f64,
+    /// rad
+    pub position: SVector<f64, N>,
+    /// rad/s
+    pub velocity: SVector<f64, N>,
+}
+
+/// A row that began to hold or to slip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SystemEvent {
+    /// Time, s.
+    pub time: f64,
+    /// The row.
+    pub row: usize,
+    /// Its motion from then on.
+    pub mode: Mode,
+}
+
+/// A motion could not be followed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SystemError {
+    /// Too many steps or events.
+    #[error("the motion after t = {0} s needs too many steps: a parameter is out of all proportion")]
+    TooManySteps(f64),
+    /// The state is no longer a number.
+    #[error("the motion after t = {0} s left the range of numbers")]
+    NotFinite(f64),
+    /// The inertia is none.
+    #[error("the inertia at t = {0} s is not symmetric and positive definite")]
+    Inertia(f64),
+    /// The friction of a row has bristles.
+    #[error(
+        "row {0} has a friction with bristles (lugre, dahl, elasto_plastic): expected one that sticks exactly"
+    )]
+    Bristles(usize),
+}
+
+/// A system in motion.
+#[derive(Clone, Debug)]
+pub struct Motion<'a, S, const N: usize, const B: usize> {
+    system: &'a S,
+    state: State<N>,
+    modes: [Mode; B],
+    /// Step that the last stretch ended with, s.
+    step: f64,
+}
+
+/// The equations at a state.
+struct Equations<const N: usize, const B: usize> {
+    inverse: SMatrix<f64, N, N>,
+    rows: SMatrix<f64, B, N>,
+    /// Acceleration without the friction of the rows that hold.
+    free: SVector<f64, N>,
+    /// `μ_s N` of each row.
+    bound: SVector<f64, B>,
+    /// Slip rates.
+    slip: SVector<f64, B>,
+}
+
+/// Directions that stuck rows span, orthonormal by `M⁻¹`, with the velocity that each has to have.
+struct Span<const N: usize> {
+    directions: Vec<(SVector<f64, N>, f64)>,
+}
+
+impl<const N: usize> Span<N> {
+    fn of<const B: usize>(
+        inverse: &SMatrix<f64, N, N>,
+        rows: &SMatrix<f64, B, N>,
+        base: &SVector<f64, B>,
+        stuck: &[bool; B],
+    ) -> Self {
+        let mut directions: Vec<(SVector<f64, N>, f64)> = Vec::new();
+        for i in (0..B).filter(|i| stuck[*i]) {
+            let (mut row, mut rate) = (rows.row(i).transpose(), base[i]);
+            let whole = (row.transpose() * inverse * row)[0].sqrt();
+            // Twice: once leaves what rounding puts in.
+            for _ in 0..2 {
+                for (d, r) in &directions {
+                    let share = (row.transpose() * inverse * d)[0];
+                    row -= d * share;
+                    rate -= r * share;
+                }
+            }
+            let left = (row.transpose() * inverse * row)[0].sqrt();
+            // A row in the span of the others holds nothing more.
+            if left > 1e-9 * whole {
+                directions.push((row / left, rate / left));
+            }
+        }
+        Span { directions }
+    }
+
+    /// A velocity with the rates that stuck rows have to have; `moves` is 0 for an acceleration.
+    fn project(&self, inverse: &SMatrix<f64, N, N>, x: &SVector<f64, N>, moves: f64) -> SVector<f64, N> {
+        if self.directions.len() == N
+            && moves * self.directions.iter().fold(0.0, |m, (_, r)| r.abs().max(m)) == 0.0
+        {
+            return SVector::zeros();
+        }
+        let mut y = *x;
+        for _ in 0..2 {
+            for (d, rate) in &self.directions {
+                y -= inverse * d * ((d.transpose() * y)[0] - moves * rate);
+            }
+        }
+        // What is rounding of a number that is gone is 0.
+        let least = 8.0 * f64::EPSILON * x.amax();
+        y.map(|v| if v.abs() <= least { 0.0 } else { v })
+    }
+}
+
+impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
+    /// A system at a state; rows without a slip rate hold if friction holds them.
+    ///
+    /// # Errors
+    /// A friction with bristles; an inertia that is none.
+    pub fn new(system: &'a S, state: State<N>) -> Result<Self, SystemError> {
+        if let Some(row) = (0..B).find(|row| system.friction(*row).bristles().is_some()) {
+            return Err(SystemError::Bristles(row));
+        }
+        let mut motion = Motion { system, state, modes: [Mode::Stuck; B], step: 1e-6 };
+        motion.choose([false; B])?;
+        Ok(motion)
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn state(&self) -> &State<N> {
+        &self.state
+    }
+
+    /// Motion of each row.
+    #[must_use]
+    pub fn modes(&self) -> &[Mode; B] {
+        &self.modes
+    }
+
+    fn equations(&self, state: &State<N>) -> Result<Equations<N, B>, SystemError> {
+        let State { time, position, velocity } = state;
+        let inertia = self.system.inertia(position);
+        let inverse = inertia.cholesky().ok_or(SystemError::Inertia(*time))?.inverse();
+        let rows = self.system.rows(position);
+        let slip = rows * velocity - self.system.base(*time);
+        let normal = self.system.normal(*time).map(|n| n.max(0.0));
+        let bound = SVector::<f64, B>::from_fn(|i, _| self.system.friction(i).at_rest() * normal[i]);
+        let rubs = SVector::<f64, B>::from_fn(|i, _| {
+            let sign = self.modes[i].sign();
+            sign * self.system.friction(i).level((sign * slip[i]).max(0.0)) * normal[i]
+        });
+        let free = inverse * (self.system.applied(*time, position, velocity) - rows.transpose() * rubs);
+        Ok(Equations { inverse, rows, free, bound, slip })
+    }
+
+    fn stuck(&self) -> [bool; B] {
+        self.modes.map(|mode| mode == Mode::Stuck)
+    }
+
+    /// Velocity and acceleration.
+    fn rate(&self, state: &State<N>) -> Result<[SVector<f64, N>; 2], SystemError> {
+        let e = self.equations(state)?;
+        let span = Span::of(&e.inverse, &e.rows, &SVector::zeros(), &self.stuck());
+        Ok([state.velocity, span.project(&e.inverse, &e.free, 0.0)])
+    }
+
+    /// Accelerations that friction leaves to stuck rows; each below [`STILL`] while they hold.
+    fn left(&self, e: &Equations<N, B>, stuck: &[bool; B]) -> (SVector<f64, B>, f64) {
+        let a = e.rows * e.inverse * e.rows.transpose();
+        let b = e.rows * e.free;
+        let both = |i: usize| b[i].abs() + a[(i, i)] * e.bound[i];
+        let largest = (0..B).filter(|i| stuck[*i]).fold(0.0_f64, |most, i| most.max(both(i)));
+        (hold(&a, &b, &e.bound, stuck).acceleration, STILL * largest)
+    }
+
+    /// A row that slipped has come to rest, or one that is stuck is no longer held.
+    fn happened(&self, state: &State<N>) -> Result<bool, SystemError> {
+        let e = self.equations(state)?;
+        let noise = 1e-14 * e.slip.amax();
+        if (0..B).any(|i| self.modes[i].sign() * e.slip[i] < -noise) {
+            return Ok(true);
+        }
+        let stuck = self.stuck();
+        let (left, still) = self.left(&e, &stuck);
+        Ok((0..B).any(|i| stuck[i] && left[i].abs() > still))
+    }
+
+    /// Chooses the modes of all rows at rest; `crossed` are those whose rate has just changed its sign.
+    fn choose(&mut self, crossed: [bool; B]) -> Result<[Mode; B], SystemError> {
+        let before = self.modes;
+        let e = self.equations(&self.state)?;
+        let fastest = e.slip.amax();
+        let mut rests: [bool; B] = std::array::from_fn(|i| {
+            before[i] == Mode::Stuck && e.slip[i].abs() <= AT_REST * fastest.max(1.0)
+                || crossed[i]
+                || e.slip[i].abs() <= f64::MIN_POSITIVE
+        });
+        // Rows in the span of those at rest are at rest, too.
+        let base = self.system.base(self.state.time);
+        let span = Span::of(&e.inverse, &e.rows, &base, &rests);
+        self.state.velocity = span.project(&e.inverse, &self.state.velocity, 1.0);
+        let slip = e.rows * self.state.velocity - base;
+        for i in 0..B {
+            rests[i] |= slip[i].abs() <= AT_REST * AT_REST * fastest.max(1.0);
+            if rests[i] {
+                self.modes[i] = Mode::Stuck;
+            } else {
+                self.modes[i] = if slip[i] > 0.0 { Mode::Forward } else { Mode::Backward };
+            }
+        }
+        // Rows that let go get the friction of motion; each lets go once.
+        for _ in 0..=B {
+            let e = self.equations(&self.state)?;
+            let stuck = self.stuck();
+            let (left, still) = self.left(&e, &stuck);
+            let goes: Vec<usize> = (0..B).filter(|i| stuck[*i] && left[*i].abs() > still).collect();
+            if goes.is_empty() {
+                break;
+            }
+            for i in goes {
+                self.modes[i] = if left[i] > 0.0 { Mode::Forward } else { Mode::Backward };
+            }
+        }
+        Ok(before)
+    }
+
+    /// A step of the pair: the end, and its error over the tolerance.
+    fn step(&self, h: f64) -> Result<(State<N>, f64), SystemError> {
+        let from = &self.state;
+        let first = self.rate(from)?;
+        let mut k = [first; 7];
+        let mut to = *from;
+        for i in 0..6 {
+            to = State { time: from.time + C[i] * h, ..*from };
+            for (a, k) in A[i].iter().zip(&k).take(i + 1) {
+                to.position += k[0] * (h * a);
+                to.velocity += k[1] * (h * a);
+            }
+            k[i + 1] = self.rate(&to)?;
+        }
+        let left_out =
+            |n: usize| E.iter().zip(&k).fold(SVector::<f64, N>::zeros(), |sum, (e, k)| sum + k[n] * (h * e));
+        let over = |wrong: SVector<f64, N>, x: &SVector<f64, N>| {
+            wrong
+                .iter()
+                .zip(x)
+                .fold(0.0_f64, |most, (e, x)| most.max(e.abs() / (TOLERANCE * (1.0 + x.abs()))))
+        };
+        Ok((to, over(left_out(0), &to.position).max(over(left_out(1), &to.velocity))))
+    }
+
+    /// Follows the motion to a time, s, and adds what happened to `events`.
+    ///
+    /// # Errors
+    /// A motion that cannot be followed; the state is then where it was last sure.
+    pub fn advance(&mut self, to: f64, events: &mut Vec<SystemEvent>) -> Result<(), SystemError> {
+        let begin = self.state.time;
+        for _ in 0..LIMIT {
+            let now = self.state.time;
+            if now >= to {
+                return Ok(());
+            }
+            let corner = self.system.corner(now).filter(|corner| *corner < to);
+            let end = corner.unwrap_or(to);
+            let most = self.step.min(self.system.longest_step());
+            let last = now + most >= end;
+            let h = if last { end - now } else { most };
+            let (mut reached, error) = self.step(h)?;
+            if !(error.is_finite() && reached.velocity.iter().all(|v| v.is_finite())) {
+                return Err(SystemError::NotFinite(begin));
+            }
+            let grown = h * (0.9 * libm::pow(error.max(1e-10), -0.2)).clamp(0.2, 5.0);
+            if error > 1.0 {
+                self.step = grown.min(0.9 * h);
+                continue;
+            }
+            if !last || grown > self.step {
+                self.step = grown;
+            }
+            if last {
+                reached.time = end;
+            }
+            let happened = self.happened(&reached)?;
+            if happened {
+                reached = self.locate(h)?;
+            }
+            let slipped = self.modes.map(Mode::sign);
+            self.state = reached;
+            if happened || corner == Some(reached.time) {
+                let slip = self.equations(&self.state)?.slip;
+                let crossed = std::array::from_fn(|i| slipped[i] * slip[i] < 0.0);
+                let before = self.choose(crossed)?;
+                for row in (0..B).filter(|row| before[*row] != self.modes[*row]) {
+                    events.push(SystemEvent { time: self.state.time, row, mode: self.modes[row] });
+                }
+                self.step = 1e-6;
+            } else {
+                let e = self.equations(&self.state)?;
+                let base = self.system.base(self.state.time);
+                let span = Span::of(&e.inverse, &e.rows, &base, &self.stuck());
+                self.state.velocity = span.project(&e.inverse, &self.state.velocity, 1.0);
+            }
+        }
+        Err(SystemError::TooManySteps(begin))
+    }
+
+    /// The end of the shortest step at whose end something has happened.
+    fn locate(&self, h: f64) -> Result<State<N>, SystemError> {
+        let (mut before, mut after) = (0.0, h);
+        while after - before > INSTANT {
+            let middle = 0.5 * (before + after);
+            if middle <= before || middle >= after {
+                break;
+            }
+            if self.happened(&self.step(middle)?.0)? { after = middle } else { before = middle }
+        }
+        Ok(self.step(after)?.0)
+    }
+}
