@@ -3,10 +3,14 @@
 
 use clutch_core::law::{LawParams, PdParams, SmcParams};
 use clutch_core::reference::ReferenceParams;
-use clutch_sim::engine::EngineKind;
+use clutch_core::{Friction, FrictionModel, Plant, PlantParams, StribeckParams};
+use clutch_sim::drive::{Drive, DriveParams, SineDrive};
+use clutch_sim::engine::{self, DormandPrince, Engine, EngineKind, Input, Model, Volts};
 use clutch_sim::rig::RigBase;
+use clutch_sim::system::{Motion, State, System};
 use clutch_sim::{RigParams, RunSpec, simulate};
 use criterion::{Criterion, criterion_group, criterion_main};
+use nalgebra::{SMatrix, SVector};
 
 fn ten_seconds(rig: RigParams, law: LawParams, rate_deg_s: f64) -> RunSpec<'static> {
     let mut spec = RunSpec::new(rig, law, ReferenceParams::ramp(rate_deg_s.to_radians()));
@@ -51,5 +55,59 @@ fn engines(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, rigs, engines);
+/// The paper's shaft, 2 V, under a torque that swings across break-away: as a shaft, and as a system of one inertia and one
+/// row.
+struct Shaft(Friction<f64>);
+
+impl System<1, 1> for Shaft {
+    fn inertia(&self, _: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
+        SMatrix::from([[0.0017]])
+    }
+    fn applied(&self, t: f64, _: &SVector<f64, 1>, v: &SVector<f64, 1>) -> SVector<f64, 1> {
+        SVector::from([0.03 + 0.05 * (6.0 * std::f64::consts::PI * t).sin() - 0.001 * v[0]])
+    }
+    fn rows(&self, _: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
+        SMatrix::from([[1.0]])
+    }
+    fn normal(&self, _: f64) -> SVector<f64, 1> {
+        SVector::from([0.28])
+    }
+    fn friction(&self, _: usize) -> &Friction<f64> {
+        &self.0
+    }
+}
+
+fn systems(c: &mut Criterion) {
+    let mut group = c.benchmark_group("shaft_1_s");
+    group.sample_size(10);
+    let params = StribeckParams { stribeck_velocity: 0.01, ..StribeckParams::default() };
+    let system = Shaft(Friction::build(&params.into()).expect("in range"));
+    group.bench_function("system", |b| {
+        b.iter(|| {
+            let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
+            let mut motion = Motion::new(&system, begin).expect("a system");
+            motion.advance(1.0, &mut Vec::new()).expect("it can be followed");
+            motion.state().position
+        });
+    });
+    let plant = PlantParams { friction: params.into(), ..PlantParams::default() };
+    let model = Model { plant: Plant::new(&plant).expect("in range"), ripple: None };
+    let sine = SineDrive { mean: 0.03, amplitude: 0.05, frequency: 3.0, phase_turns: 0.0 };
+    let drive = Drive::new(&DriveParams::Sine(sine), 0).expect("in range");
+    group.bench_function("dormand_prince", |b| {
+        b.iter(|| {
+            let (mut engine, mut shaft, mut events) =
+                (DormandPrince::default(), engine::Shaft::new(0.0, 0.0), Vec::new());
+            for k in 0..1000 {
+                let (time, volts) = (f64::from(k) * 1e-3, Volts::Held(2.0));
+                let input = Input { time, duration: 1e-3, origin: 0.0, volts, drive: &drive, noise: 0.0 };
+                engine.advance(&model, &input, &mut shaft, &mut events).expect("it can be followed");
+            }
+            shaft.position
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, rigs, engines, systems);
 criterion_main!(benches);

@@ -47,6 +47,7 @@ def main():
 
     scenario = clutch.Scenario.load("smc_2")
     keep(plot.stribeck(scenario.rig.friction), "stribeck")
+    keep(plot.friction(clutch.StribeckFriction(), clutch.LugreFriction(), clutch.ElastoPlasticFriction()), "friction")
     known = {
         "bounds.friction_percent": 20,
         "bounds.brake_gain_percent": 20,

@@ -44,7 +44,7 @@ class Result:
     metrics : Metrics
         Figures after the settling time.
     engine : str
-        ``"exact_flow"`` or ``"dormand_prince"``.
+        ``"exact_flow"``, ``"dormand_prince"`` or ``"bristle"``.
     samples : Table
         A row for each sample; SI units and radians, as docs/scenario.md says under CSV.
     events : Table
@@ -80,7 +80,7 @@ class Result:
 
     @property
     def inputs(self) -> NDArray[float64]:
-        """Brake voltage commanded, V, shape (1, N)."""
+        """Voltage commanded, V, shape (1, N)."""
         return self._stacked("voltage_v")
 
     @property

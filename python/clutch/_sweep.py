@@ -330,8 +330,11 @@ def sweep(
         for each key: `Table`, pandas or polars. Values may be numbers, choices (``"run.engine"``,
         ``"rig.base"``) and whole tables (``"law": [clutch.Pd(), clutch.Smc()]``, or as dicts).
     law
-        A law of your own in place of the scenario's, as for `simulate`; each run begins with a copy of it. Python runs
-        one such run at a time in a process: an executor of processes runs several, and needs a law that can be pickled.
+        A law of your own in place of the scenario's, as for `simulate`. An object is copied for each run, and a class
+        makes one. A function is not copied: what it remembers in a closure or a global goes on from run to run, so give a
+        law with memory as an object or a class. Python runs one such run at a time in a process: an executor of processes
+        runs several, and needs a law that can be pickled. An exception of the law ends the sweep, with ``errors="keep"``,
+        too.
     metrics
         Names of fields of `Metrics`, and "certified": true if the gains are certified for the row's bounds.
         Default: all of them.
@@ -638,7 +641,9 @@ def _run_there(work: _Work, finished: _Finished, executor: Any, chunk: int | Non
     size = chunk or (max(1, math.ceil(len(rows) / (4 * workers))) if workers else _CHUNK)
     numbers = [range(i, min(i + size, len(rows))) for i in range(0, len(rows), size)]
 
-    def done(chunk: int, result: _Result) -> None:
+    def done(chunk: int, result: _Result | Exception) -> None:
+        if isinstance(result, Exception):
+            raise result
         finished.add(numbers[chunk], result)
         show(len(finished))
         if not work.keep:
@@ -666,7 +671,7 @@ def _run_there(work: _Work, finished: _Finished, executor: Any, chunk: int | Non
 _abandoned: set[str] = set()
 
 
-def _run_chunk(work: _Work, rows: Sequence[Sequence[Any]], attempt: int) -> _Result:
+def _run_chunk(work: _Work, rows: Sequence[Sequence[Any]], attempt: int) -> _Result | Exception:
     """Run a chunk on one thread of a worker."""
     job = work.job(rows, 1)
     try:
@@ -679,6 +684,10 @@ def _run_chunk(work: _Work, rows: Sequence[Sequence[Any]], attempt: int) -> _Res
             raise
         # This worker alone was interrupted, or all: the caller decides which.
         raise RuntimeError("the worker was interrupted") from None
+    except Exception as error:
+        if work.law is None:
+            raise
+        return error  # the law's own: another attempt would end alike
     finally:
         job.cancel()
     return job.result()

@@ -870,13 +870,13 @@ class Rig(_mixins.Rig):
     delay_ticks : int, default 0
         Whole sampling periods from sample to voltage. A whole number from 0 to 1000 periods.
     actuator_time_constant_s : float or None, default None
-        First-order lag from voltage to normal force; absent if there is none. It needs the engine
+        First-order lag from the voltage to the actuator; absent if there is none. It needs the engine
         `dormand_prince`. A finite number above 0 s.
     speed_limit_deg_s : float, default 360.0
         Highest speed that a path may ask for: a guard against a slip of units. On a board a target that moves
         faster ends control. A finite number above 0 °/s.
     actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator
-        What a voltage does to the shaft. By default `BrakeActuator()`.
+        Effect of a voltage on the shaft. By default `BrakeActuator()`.
     friction : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction or ElastoPlasticFriction
         Friction of pad on disc. By default `StribeckFriction()`.
     drive : WeightDrive, SpringDrive, BeltDrive, TableDrive, RampDrive, SineDrive, ChirpDrive or HandDrive
@@ -928,11 +928,11 @@ class Model(_Params):
         Total moment of inertia, in (1). `J`: a finite number above 0 kg m² whose inverse is finite, too.
     drive_torque_nm : float, default 0.047088000000000005
         Driving torque `T_u = M g R_p` in (1). Either sign for a plant alone. `T_u`: a finite number, N m; a
-        torque above 0 N m: without one a brake, or a motor that drives forwards alone, moves nothing.
+        torque above 0 N m with a brake, which moves nothing itself, and at least 0 with a brake and a motor.
     viscous_damping_nm_s_rad : float, default 0.001
         Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
     actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator
-        What a voltage does to the shaft. By default `BrakeActuator()`.
+        Effect of a voltage on the shaft. By default `BrakeActuator()`.
     friction : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction or ElastoPlasticFriction
         Friction of pad on disc. By default `StribeckFriction()`.
 
@@ -1158,11 +1158,13 @@ class Voltage(_Params):
     Parameters
     ----------
     start_v : float, default 0.0
-        Voltage at the start. `u_0`: a finite number, V.
+        Voltage at the start. `u_0`: a finite number, V; a voltage from output.lowest_v to output.highest_v.
     end_v : float, default 0.0
-        Voltage at the end of the way. `u_1`: a finite number, V.
+        Voltage at the end of the way. `u_1`: a finite number, V; a voltage from output.lowest_v to
+        output.highest_v.
     rate_v_s : float, default 0.0
-        Rate from the one to the other; 0 stays at the start. `r`: a finite number of at least 0 V/s.
+        Rate from the one to the other. `r`: a finite number of at least 0 V/s; a rate above 0 where end_v is
+        not start_v.
     returns : bool, default False
         `true` if it goes to and fro between them; else it stays at the end.
 
@@ -1289,15 +1291,15 @@ class Output(_Params):
     lowest_v : float, default 0.0
         Lowest voltage. With a brake at least 0, as a pad can only push; above 0 the pad never lifts. A finite
         number, V; a voltage of at least 0 with a brake, whose pad can only push (rig.actuator,
-        model.actuator); a voltage below 0 with an actuator that drives (model.actuator); a voltage that the
-        converter reaches: not below rig.dac.lowest_v.
+        model.actuator); a voltage below 0, as -10.0, with an actuator that drives (model.actuator); a motor
+        needs on_invalid_v = 0, too; a voltage that the converter reaches: not below rig.dac.lowest_v.
     highest_v : float, default 10.0
         Highest voltage. Lower `on_invalid_v` together with it. A finite number, V; a voltage above lowest_v;
         a voltage that the converter reaches: not above rig.dac.highest_v.
     on_invalid_v : float, default 10.0
         Voltage for a demand that is not a number; with a motor 0. A finite number, V; a voltage from lowest_v
-        to highest_v (it does not follow them); 0 with a motor, which any other voltage drives
-        (model.actuator).
+        to highest_v (it does not follow them); 0 with a motor, which any other voltage drives, and at least 0
+        with a brake and a motor (model.actuator).
     bumpless_time_s : float, default 0.0
         Time constant of a bumpless start, with which the difference between the voltage found at start and
         the law's first demand decays; 0 starts with the law's own demand. A finite number of at least 0 s.
@@ -1686,8 +1688,9 @@ class RunSettings(_Params):
         at least sampling.period_us before run.duration_s does.
     start : {"on_path", "rest"}, default "on_path"
         Motion of the shaft at the beginning. `on_path`: On the path: at its velocity, the brake at the
-        voltage that keeps it. (12) and (13) assume a path without jumps. `rest`: Held at rest, with a quarter
-        more than the voltage that this takes.
+        voltage that keeps it. (12) and (13) assume a path without jumps. `rest`: Held at rest: by a brake
+        with a quarter more than the voltage that this takes, by a motor with the voltage that balances the
+        drive.
     start_counts : float or None, default None
         Position at which shaft and path begin; absent: somewhere within the first count, drawn from the seed.
         The place of the path between the encoder's edges decides how often a slow shaft sticks, and nobody
@@ -1734,9 +1737,9 @@ class HoldVoltage(_Params):
     Parameters
     ----------
     volts_v : float
-        Voltage, enough to stop the strongest drive with the weakest brake of the bounds. A finite number, V;
-        a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; a voltage above 0: a
-        brake holds with nothing else.
+        Voltage that stops and holds the shaft at the worst corner of the bounds. A finite number, V; a
+        voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; with a brake above 0,
+        which holds with nothing else.
 
     Raises
     ------
@@ -1765,9 +1768,9 @@ class RampVoltage(_Params):
         Rate at which the voltage goes up or down from the present one. A finite number above 0 V/s; a rate
         that is a step of 2⁻¹⁶ to 60 000 codes of rig.dac per sampling.period_us.
     volts_v : float
-        Voltage at the end, enough to stop the strongest drive with the weakest brake of the bounds. A finite
-        number, V; a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; a voltage
-        above 0: a brake holds with nothing else.
+        Voltage at the end, which stops and holds the shaft at the worst corner of the bounds. A finite
+        number, V; a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; with a
+        brake above 0, which holds with nothing else.
 
     Raises
     ------
@@ -1808,9 +1811,9 @@ class HoldThenRelease(_Params):
     Parameters
     ----------
     volts_v : float
-        Voltage, enough to stop the strongest drive with the weakest brake of the bounds. A finite number, V;
-        a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; a voltage above 0: a
-        brake holds with nothing else.
+        Voltage that stops and holds the shaft at the worst corner of the bounds. A finite number, V; a
+        voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v; with a brake above 0,
+        which holds with nothing else.
     after_s : float
         Time of holding, after which it lets go. A finite number above 0 s; a time of 1 to 4e9 times
         sampling.period_us.

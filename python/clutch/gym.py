@@ -30,7 +30,8 @@ _IDS = {
 class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
     """An agent in the place of the law: each sampling period it sees what a law sees and answers with a voltage.
 
-    Action: the brake's voltage in V, from 0 to ``output.highest_v``; the converter rounds it.
+    Action: the voltage in V, from 0, or with a motor from ``output.lowest_v``, to ``output.highest_v``; the converter
+    rounds it.
 
     Observation: measured error (rad), its rate (rad/s), the target's velocity (rad/s) and acceleration
     (rad/s²), and the voltage on its way to the brake (V). Errors and rates come from the encoder through the
@@ -108,7 +109,9 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
             raise ValueError("a scenario of one sample has no step: make run.duration_s longer")
         self._tick = self._steps  # no episode has begun
         self._count_rad = math.tau / self.scenario.rig.encoder.counts_per_rev
-        self.action_space = gymnasium.spaces.Box(0.0, self.scenario.output.highest_v, (1,), np.float32)
+        # A pad can only push; a motor pulls, too.
+        self._lowest = min(0.0, self.scenario.output.lowest_v)
+        self.action_space = gymnasium.spaces.Box(self._lowest, self.scenario.output.highest_v, (1,), np.float32)
         low = np.array([-np.inf, -np.inf, -np.inf, -np.inf, self.scenario.rig.dac.lowest_v])
         high = np.array([np.inf, np.inf, np.inf, np.inf, self.scenario.rig.dac.highest_v])
         self.observation_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
@@ -177,7 +180,7 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float32]]):
         if not self._tick < self._steps:
             raise gymnasium.error.ResetNeeded("call reset before the first step, and after an episode's last")
         before = self._plant.voltage
-        volts = min(max(float(action[0]), 0.0), self.scenario.output.highest_v)
+        volts = min(max(float(action[0]), self._lowest), self.scenario.output.highest_v)
         self._plant.step(volts)
         self._tick += 1
         observation, info = self._observe()

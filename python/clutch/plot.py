@@ -819,13 +819,15 @@ def _refined(
 
 
 @_styled
-def friction(*frictions: _Friction) -> Figure:
+def friction(*frictions: _Friction, labels: Sequence[str] | None = None) -> Figure:
     """Draw frictions under the four experiments of the laboratory: the same figure as ``clutch friction plot``.
 
     Parameters
     ----------
     *frictions : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction or ElastoPlasticFriction
         One curve each.
+    labels : sequence of str, optional
+        A name for each in the legend; by default those of the models.
 
     Returns
     -------
@@ -835,8 +837,10 @@ def friction(*frictions: _Friction) -> Figure:
 
     Raises
     ------
+    TypeError
+        Something else than a friction.
     ValueError
-        No friction.
+        No friction, or not a label for each.
 
     Examples
     --------
@@ -848,6 +852,12 @@ def friction(*frictions: _Friction) -> Figure:
     """
     if not frictions:
         raise ValueError("expected at least one friction, as clutch.LugreFriction()")
+    wrong = [one for one in frictions if not hasattr(one, "examine")]
+    if wrong:
+        raise TypeError(f"friction: {wrong[0]!r}: expected frictions, as clutch.LugreFriction()")
+    names = [one._key.split(".")[-1] for one in frictions] if labels is None else list(labels)
+    if len(names) != len(frictions):
+        raise ValueError(f"labels: {len(names)} for {len(frictions)} frictions")
     figure, axes = _panels(2, columns=2, width_mm=170, height_mm=110)
     panels = {
         "steady": ("Steady sliding", "velocity (rad/s)", "log", 1.0),
@@ -858,15 +868,16 @@ def friction(*frictions: _Friction) -> Figure:
     flat = [ax for row in axes for ax in row]
     for ax, (title, label, scale, _) in zip(flat, panels.values(), strict=True):
         ax.set(title=title, xlabel=label, ylabel="coefficient", xscale=scale)
-    for colour, one in zip(itertools.cycle(_COLOURS), frictions, strict=False):
+    for colour, one, label in zip(itertools.cycle(_COLOURS), frictions, names, strict=False):
         found = one.examine()
         for ax, (name, (*_, factor)) in zip(flat, panels.items(), strict=True):
             set_, mu = found[name].to_dict().values()
-            ax.plot(factor * set_, mu, color=colour, linewidth=0.8, label=one._key.split(".")[-1])
+            ax.plot(factor * set_, mu, color=colour, linewidth=0.8, label=label)
     flat[0].legend()
     return figure
 
 
+@_styled
 def run_overview(result: Result) -> Figure:
     """Draw a run: its error, its velocity with the path's, and the voltage.
 

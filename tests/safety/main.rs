@@ -3,6 +3,7 @@
 use clutch_core::supervisor::{Arrival, Cause, Checks, State};
 use clutch_log::names;
 use clutch_loop::campaign::{CASES, Expected, RunId, Table, runs};
+use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_loop::replay::replay;
 use clutch_loop::station::ControllerStation;
@@ -210,6 +211,54 @@ fn healthy_runs_of_every_law_and_path_are_never_ended() {
                 let report = world.run(&path).expect("a run");
                 assert_eq!(report.cause, None, "{law} at {rate} °/s on {rig}, seed {seed}: a nuisance trip");
             }
+        }
+    }
+}
+
+/// A motor axis in virtual time, with other friction, load and fault than its built-in scenario.
+fn motor(name: &str, set: &[(&str, String)], faults: Vec<Fault>) -> Option<Cause> {
+    let set: Vec<_> = set.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+    let scenario = Scenario::load(name.as_ref(), &set).unwrap_or_else(|e| panic!("{e}"));
+    let built = BuiltRun::<f32>::new(&scenario, 7).expect("a safe state");
+    let params = VirtualOptions { latency_ns: 80_000, duration: 10.0, faults, ..VirtualOptions::default() };
+    let path = from_scenario::path::<f32>(&scenario).expect("a path");
+    let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+    let mut world =
+        VirtualLoop::new(&scenario, params, ControllerStation { node, path: &path }).expect("a rig");
+    world.run(&path).expect("a run").cause
+}
+
+#[test]
+fn a_sound_motor_axis_with_any_friction_and_load_ends_without_a_fault() {
+    for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc"] {
+        for preload in [0.0, 0.01, 0.1, 0.25] {
+            for load in [0.0, 0.01, -0.01] {
+                for start in ["rest", "on_path"] {
+                    // The law knows the load: SMC and PID have no other way to carry it at the start.
+                    let set = [
+                        ("rig.actuator.motor.preload_nm", preload.to_string()),
+                        ("model.actuator.motor.preload_nm", preload.to_string()),
+                        ("rig.drive.table.points_s_nm", format!("[[0.0, {load:?}]]")),
+                        ("model.drive_torque_nm", format!("{load:?}")),
+                        ("run.start", format!("\"{start}\"")),
+                        ("safety.limits.following_error_deg", "3.0".to_owned()),
+                        ("safety.on_fault", "{release={}}".to_owned()),
+                    ];
+                    let cause = motor(name, &set, Vec::new());
+                    assert_eq!(cause, None, "{name}, preload {preload} N m, load {load} N m, start {start}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_frozen_encoder_of_a_motor_axis_ends_control_before_the_axis_has_gone_far() {
+    for name in ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc"] {
+        for at in [1.0, 3.0, 6.5] {
+            let cause = motor(name, &[], vec![Fault::new(FaultKind::EncoderFreeze, at)]);
+            let seen = matches!(cause, Some(Cause::StandStill | Cause::FollowingError));
+            assert!(seen, "{name}, frozen at {at} s: {cause:?}");
         }
     }
 }

@@ -72,6 +72,7 @@ struct Words {
     ahead: &'static str,
     gain: &'static str,
     behind: &'static str,
+    given: &'static str,
 }
 
 impl Words {
@@ -80,6 +81,7 @@ impl Words {
             ahead: "\nShaft ahead: the brake stops it (worst corner: strongest drive, weakest brake)",
             gain: "worst corner: brake mu K_COF",
             behind: "\nShaft behind: the brake lets go (worst corner: weakest drive)",
+            given: "voltage given (highest)",
         };
         match kind {
             ActuatorKind::Brake => brake,
@@ -88,8 +90,9 @@ impl Words {
                 ..brake
             },
             ActuatorKind::Motor => Words {
+                given: "voltage given (nearer limit)",
                 ahead: "\nShaft ahead: the motor drives it back (worst corner: weakest motor, all against it)",
-                gain: "worst corner: motor k_t",
+                gain: "worst corner: torque per volt",
                 behind: "\nShaft behind: the motor drives it on (worst corner: weakest motor, all against it)",
             },
         }
@@ -145,7 +148,7 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
             (words.gain, number(c.weakest_brake), "N m/V"),
             (if is_smc { "K_p required" } else { "voltage required" }, number(c.kp_required), "V"),
             ("    of which for the boundary layer", number(c.kp_for_boundary), "V"),
-            (if is_smc { "K_p given" } else { "voltage given (highest)" }, number(c.kp_given), "V"),
+            (if is_smc { "K_p given" } else { words.given }, number(c.kp_given), "V"),
             ("    margin", number(100.0 * (c.kp_given / c.kp_required - 1.0)), "%"),
             ("reaching rate γ possible", number(c.reach_rate_possible), "rad/s²"),
             ("holds up to an error rate of", deg(c.error_rate_ahead), "°/s"),

@@ -64,6 +64,10 @@ impl FrictionVerb {
             Verb::List => print(&list())?,
             Verb::Plot { names, set, out } => {
                 plot::figure_format(&out)?;
+                if let Some((_, name)) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name))
+                {
+                    anyhow::bail!("{name}: named twice");
+                }
                 if let Some((key, _)) =
                     set.iter().find(|(key, _)| !names.iter().any(|n| key.split('.').next() == Some(n)))
                 {
@@ -93,7 +97,7 @@ fn list() -> String {
             out += &format!("   {:26} {:8} {}{unit}\n", row.key, row.symbol, row.default);
         }
     }
-    out
+    out + "Write them below [rig.friction.NAME] or [model.friction.NAME]; the default is stribeck.\n"
 }
 
 /// The four experiments, a curve for each model.

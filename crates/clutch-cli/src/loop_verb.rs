@@ -52,7 +52,7 @@ enum WaitArg {
 #[command(
     after_help = "Examples:\n  clutch loop\n  clutch loop mine.toml --port /dev/ttyACM0 --log run.mcap\n  \
     clutch loop --fault freeze:at=2 --strict\n\n\
-    Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run, and the brake is in the \
+    Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run, and the output is in the \
     safe state; 4 stopped by Ctrl-C or SIGTERM, likewise. docs/loop.md is the guide, docs/safety.md lists the checks."
 )]
 pub(crate) struct Loop {

@@ -60,6 +60,7 @@ struct Path {
     highest_acceleration_rad_s2: f64,
     highest_deceleration_rad_s2: f64,
     highest_voltage_v: f64,
+    lowest_voltage_v: f64,
     velocity_jump_rad_s: f64,
 }
 
@@ -107,6 +108,7 @@ impl Sim {
                 highest_acceleration_rad_s2: plan.envelope.acceleration,
                 highest_deceleration_rad_s2: plan.envelope.deceleration,
                 highest_voltage_v: plan.envelope.highest_voltage,
+                lowest_voltage_v: plan.envelope.lowest_voltage,
                 velocity_jump_rad_s: plan.envelope.start_jump.max(plan.envelope.velocity_jump),
             },
             certified: plan.certificate.certified(),
@@ -170,8 +172,8 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     }
     if let Some(lacks) = s.bristles_lack_nm_s_rad {
         text += &format!(
-            "note: the friction's bristles give energy in some motions: with the voltage of the start it takes \
-             {} N m s/rad more of rig.viscous_damping_nm_s_rad, or less of their damping, for none\n",
+            "note: at the voltage of the start the bristles of the friction can give energy: they are passive with \
+             {} N m s/rad more of rig.viscous_damping_nm_s_rad, or with a lower damping_s_rad\n",
             number(lacks)
         );
     }

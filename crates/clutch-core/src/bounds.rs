@@ -101,7 +101,8 @@ impl<T: Real> Bounds<T> {
         tolerance.check_rows()?;
         let t = tolerance;
         if actuator.kind() != ActuatorKind::Motor {
-            PlantParams::DRIVES.require(plant.drive_torque, plant.drive_torque > T::ZERO)?;
+            let still = actuator.kind() == ActuatorKind::Both && plant.drive_torque == T::ZERO;
+            PlantParams::DRIVES.require(plant.drive_torque, plant.drive_torque > T::ZERO || still)?;
             friction.check_divisor()?;
         }
         let envelope = friction.envelope().widened(t.friction);

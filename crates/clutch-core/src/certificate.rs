@@ -152,8 +152,25 @@ pub fn certify<T: Real>(
     demand: &Demand<T>,
 ) -> Result<Certificate<T>, ParamError<T>> {
     demand.check_rows()?;
-    let Sides { ahead: Side { gain: brake, load: torque, highest }, behind } =
-        sides(bounds, demand, (law.output().lowest(), law.output().highest()));
+    let sides = sides(bounds, demand, (law.output().lowest(), law.output().highest()));
+    if bounds.actuator == ActuatorKind::Both {
+        // Where the drive catches the shaft up by itself, the motor need not.
+        let released = Side { gain: T::ZERO, highest: T::ZERO, ..sides.behind };
+        let alone = certify_sides(law, bounds, demand, Sides { behind: released, ..sides });
+        if alone.certified() {
+            return Ok(alone);
+        }
+    }
+    Ok(certify_sides(law, bounds, demand, sides))
+}
+
+fn certify_sides<T: Real>(
+    law: &Law<T>,
+    bounds: &Bounds<T>,
+    demand: &Demand<T>,
+    sides: Sides<T>,
+) -> Certificate<T> {
+    let Sides { ahead: Side { gain: brake, load: torque, highest }, behind } = sides;
     let inertia = bounds.inertia.high;
     let base = (torque + inertia * (demand.acceleration + demand.reach_rate)) / brake;
     let per_rate = |left: T, slope: T| if slope > T::ZERO { left / slope } else { T::ZERO };
@@ -217,7 +234,7 @@ pub fn certify<T: Real>(
     } else {
         None
     };
-    Ok(Certificate {
+    Certificate {
         slope,
         layer,
         worst_inertia: inertia,
@@ -235,10 +252,11 @@ pub fn certify<T: Real>(
         error_bound: per_rate(region, slope),
         reach_rate: demand.reach_rate,
         shortfall,
-    })
+    }
 }
 
 /// A side of the surface.
+#[derive(Clone, Copy)]
 struct Side<T> {
     /// Least torque against the error per volt, N m/V.
     gain: T,
@@ -248,6 +266,7 @@ struct Side<T> {
     highest: T,
 }
 
+#[derive(Clone, Copy)]
 struct Sides<T> {
     ahead: Side<T>,
     behind: Side<T>,
@@ -457,6 +476,32 @@ mod tests {
         assert_eq!(certified(LawParams::Pd(PdParams::default()), limit - 0.01), None);
         assert_eq!(certified(LawParams::Pd(PdParams::default()), limit + 0.01), Some(Shortfall::Layer));
         assert_eq!(certified(LawParams::Smc(SmcParams::default()), 100.0), None);
+    }
+
+    #[test]
+    fn a_motor_needs_its_gain_on_both_sides_and_a_brake_with_a_motor_no_more_than_the_brake() {
+        let actuator = crate::MotorActuator { gain: 0.05, preload: 0.25, load_share: 0.0 };
+        let motor = PlantParams { actuator: actuator.into(), drive_torque: 0.01, ..PlantParams::default() };
+        let both_ways = OutputParams { lowest: -10.0, on_invalid: 0.0, ..OutputParams::default() };
+        let certified = |plant: &PlantParams, output: &OutputParams, smc: SmcParams| {
+            let law = Law::new(&LawParams::Smc(smc), plant, output, Micros(1000)).unwrap();
+            certify(&law, &Bounds::around(plant, &Tolerances::default()).unwrap(), &at_2_deg_s()).unwrap()
+        };
+        let smc = SmcParams { kp: 1.5, kd: 4.0, slope: 40.0, boundary: 0.3 };
+        let c = certified(&motor, &both_ways, smc);
+        // Load and friction on one side, and the drag of the path, over k_t.
+        let needed = (0.01 + 0.2 * 0.25 + 0.001 * 2.0_f64.to_radians()) / 0.05;
+        assert!((c.kp_required - c.kp_for_boundary - needed).abs() < 1e-12);
+        assert!((c.kd_required - 0.0017 * 40.0 / 0.05).abs() < 1e-12);
+        assert!(c.certified());
+        let short = OutputParams { lowest: -1.2, ..both_ways };
+        assert_eq!(certified(&motor, &short, smc).shortfall, Some(Shortfall::Voltage));
+
+        let weak = crate::BothActuator { brake_gain: 0.14, motor_gain: 0.001, preload: 0.0 };
+        let both = PlantParams { actuator: weak.into(), ..PlantParams::default() };
+        let limits = OutputParams { lowest: -2.0, ..OutputParams::default() };
+        let c = certified(&both, &limits, SmcParams::default());
+        assert!(c.certified() && (c.kp_required - c.kp_for_boundary - 2.242286).abs() < 1e-6, "{c:?}");
     }
 
     #[test]

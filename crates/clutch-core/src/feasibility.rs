@@ -63,6 +63,8 @@ pub enum Obstacle {
     Acceleration,
     /// Brake or motor do not suffice: voltage, V.
     Voltage,
+    /// Motor and friction do not hold the resting shaft: torque, N m.
+    Hold,
     /// The path is not a number: its value.
     NotFinite,
 }
@@ -95,6 +97,9 @@ impl<T: Real> fmt::Display for Infeasible<T> {
             }
             Obstacle::Voltage => {
                 write!(f, "it needs {asked} V, and the output ends at {available} V")
+            }
+            Obstacle::Hold => {
+                write!(f, "at rest it needs {asked} N m, and motor and friction give {available} N m")
             }
             Obstacle::NotFinite => write!(f, "its velocity or acceleration is not a number there"),
         }
@@ -142,8 +147,19 @@ pub fn check_path<T: Real>(
         } else {
             bounds.authority(forwards, limits.0, limits.1)
         };
+        if resting && reverses {
+            if needed.high > authority.high {
+                return Err(refuse(Obstacle::Hold, needed.high, authority.high));
+            }
+            if needed.low < authority.low {
+                return Err(refuse(Obstacle::Hold, needed.low, authority.low));
+            }
+        }
         let volts = if resting {
-            Interval { low: envelope.holding_voltage, high: envelope.holding_voltage }
+            // What a motor need not give, friction does.
+            let holding = envelope.holding_voltage;
+            let holding = if reverses { holding.max(limits.0).min(limits.1) } else { holding };
+            Interval { low: holding, high: holding }
         } else {
             volts_for(bounds, &needed, forwards)
         };
@@ -311,6 +327,49 @@ mod tests {
         let slower =
             ReferenceParams::Sine(Sine { rate: 0.13, amplitude: 0.02, frequency: 1.0, phase: -0.25 });
         assert!(check(&slower, 0.13, Tolerances::default()).is_ok());
+    }
+
+    fn motor(preload: f64, drive_torque: f64) -> PlantParams {
+        let actuator = crate::MotorActuator { gain: 0.05, preload, load_share: 0.0 };
+        PlantParams { actuator: actuator.into(), drive_torque, ..PlantParams::default() }
+    }
+
+    fn check_motor(
+        plant: &PlantParams,
+        p: &ReferenceParams<'_>,
+        tolerance: Tolerances,
+        limits: (f64, f64),
+    ) -> Result<Envelope<f64>, Infeasible<f64>> {
+        let path = Reference::new(p, FixedCounts(0), Encoder::PAPER, PERIOD).unwrap();
+        let bounds = Bounds::around(plant, &tolerance).unwrap();
+        let output =
+            OutputParams { lowest: limits.0, highest: limits.1, on_invalid: 0.0, bumpless_time: 0.0 };
+        check_path(&path, 5000, PERIOD, 0.0, &bounds, &Output::new(&output, PERIOD).unwrap())
+    }
+
+    #[test]
+    fn a_motor_goes_both_ways_with_the_voltages_that_inertia_and_friction_take() {
+        let path = ReferenceParams::Trapezoid(Trapezoid { distance: -1.0, speed: 1.0, acceleration: 20.0 });
+        let e = check_motor(&motor(0.25, 0.0), &path, Tolerances::default(), (-10.0, 10.0)).unwrap();
+        // J a + μ_max N_0 to accelerate backwards, with the drag of 1 rad/s at the end of it.
+        let most = (0.0017 * 20.0 + 0.2 * 0.25 + 0.001) / 0.05;
+        assert!((e.lowest_voltage + most).abs() < 0.02, "{} V instead of {} V", e.lowest_voltage, -most);
+        assert!((e.velocity - 1.0).abs() < 1e-9);
+        let short = check_motor(&motor(0.25, 0.0), &path, Tolerances::default(), (-1.5, 10.0));
+        assert_eq!(short.unwrap_err().obstacle, Obstacle::Voltage);
+    }
+
+    #[test]
+    fn a_motor_at_rest_is_helped_by_friction_and_held_to_the_worst_corner() {
+        let hold = ReferenceParams::Hold;
+        // 0.4 N m on friction of 0.5 N m and 2 V of 0.05 N m/V.
+        let limits = (-2.0, 2.0);
+        assert!(check_motor(&motor(2.5, 0.4), &hold, Tolerances::default(), limits).is_ok());
+        // −0.09 N m ± 50 % on a motor that may give 0.07 N m only.
+        let loose = Tolerances { drive_torque: 0.5, motor_gain: 0.3, ..Tolerances::default() };
+        let error = check_motor(&motor(0.0, -0.09), &hold, loose, limits).unwrap_err();
+        assert_eq!(error.obstacle, Obstacle::Hold);
+        assert!((error.asked - 0.135).abs() < 1e-12 && (error.available - 0.07).abs() < 1e-12, "{error:?}");
     }
 
     #[test]

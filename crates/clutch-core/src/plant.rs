@@ -26,14 +26,14 @@ crate::params! {
         viscous_damping: T = 0.001, "viscous_damping_nm_s_rad" "C_d" NM_S_RAD, Range::at_least(0.0);
     }
     nested {
-        /// What a voltage does to the shaft.
+        /// Effect of a voltage on the shaft.
         actuator: ActuatorParams<T>, "actuator";
         /// Friction of pad on disc.
         friction: FrictionParams<T>, "friction";
     }
     relations(p) {
         /// Something moves the shaft.
-        DRIVES: drive_torque, "a torque above 0 N m: without one a brake, or a motor that drives forwards alone, moves nothing";
+        DRIVES: drive_torque, "a torque above 0 N m with a brake, which moves nothing itself, and at least 0 with a brake and a motor";
     }
 }
 

@@ -22,14 +22,14 @@ use crate::{ActuatorKind, Dac, DacCode, Micros, ParamError, Real};
 crate::params! {
     /// Holds the shaft with a voltage, at once.
     pub struct SafeHold<T> {
-        /// Voltage, enough to stop the strongest drive with the weakest brake of the bounds.
+        /// Voltage that stops and holds the shaft at the worst corner of the bounds.
         volts: T, "volts_v" "" V, Range::ANY;
     }
     relations(p) {
         /// The converter reaches the voltage.
         REACHED: volts, "a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v";
         /// A pad is pressed.
-        PRESSES: volts, "a voltage above 0: a brake holds with nothing else";
+        PRESSES: volts, "with a brake above 0, which holds with nothing else";
     }
 }
 
@@ -38,7 +38,7 @@ crate::params! {
     pub struct SafeRamp<T> {
         /// Rate at which the voltage goes up or down from the present one.
         rate: T, "rate_v_s" "" V_S, Range::above(0.0);
-        /// Voltage at the end, enough to stop the strongest drive with the weakest brake of the bounds.
+        /// Voltage at the end, which stops and holds the shaft at the worst corner of the bounds.
         volts: T, "volts_v" "" V, Range::ANY;
     }
     relations(p) {
@@ -47,14 +47,14 @@ crate::params! {
         /// The converter reaches the voltage.
         REACHED: volts, "a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v";
         /// A pad is pressed.
-        PRESSES: volts, "a voltage above 0: a brake holds with nothing else";
+        PRESSES: volts, "with a brake above 0, which holds with nothing else";
     }
 }
 
 crate::params! {
     /// Holds the shaft with a voltage, at once, and after a time lets go.
     pub struct SafeHoldThenRelease<T> {
-        /// Voltage, enough to stop the strongest drive with the weakest brake of the bounds.
+        /// Voltage that stops and holds the shaft at the worst corner of the bounds.
         volts: T, "volts_v" "" V, Range::ANY;
         /// Time of holding, after which it lets go.
         after: T, "after_s" "" S, Range::above(0.0);
@@ -63,7 +63,7 @@ crate::params! {
         /// The converter reaches the voltage.
         REACHED: volts, "a voltage that the converter reaches, from rig.dac.lowest_v to rig.dac.highest_v";
         /// A pad is pressed.
-        PRESSES: volts, "a voltage above 0: a brake holds with nothing else";
+        PRESSES: volts, "with a brake above 0, which holds with nothing else";
         /// The time is a number of periods.
         COUNTED: after, "a time of 1 to 4e9 times sampling.period_us";
     }

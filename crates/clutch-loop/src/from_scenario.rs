@@ -3,8 +3,8 @@
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::Checks;
 use clutch_core::{
-    DacCode, FixedCounts, Micros, ParamError, Real, Servo, ServoParams, StickSlip, StickSlipParams,
-    Supervisor, Target,
+    ActuatorKind, DacCode, FixedCounts, Micros, ParamError, Real, Servo, ServoParams, StickSlip,
+    StickSlipParams, Supervisor, Target,
 };
 use clutch_log::{Header, Source};
 use clutch_node::{ControllerParams, RunParams, RunTimes, Settings, Unsupported};
@@ -263,10 +263,15 @@ pub fn boot_output(scenario: &Scenario, hello: &Hello, plan: &Plan) -> (f64, boo
     let spec = scenario.spec();
     let volts =
         clutch_core::Dac::new(&spec.rig.dac.converter).map_or(0.0, |d| d.volts(DacCode(hello.boot_code)));
-    let holds = scenario.safety().is_ok_and(|s| match s.on_fault.holding_voltage() {
-        Some(_) => volts + 1e-9 >= plan.envelope.holding_voltage,
-        None => true,
-    });
+    let holds = if plan.bounds.actuator == ActuatorKind::Motor {
+        // Whatever its safe state: nothing watches it yet.
+        plan.bounds.left_over(volts) <= 0.0
+    } else {
+        scenario.safety().is_ok_and(|s| match s.on_fault.holding_voltage() {
+            Some(_) => volts + 1e-9 >= plan.envelope.holding_voltage,
+            None => true,
+        })
+    };
     (volts, holds)
 }
 

@@ -20,7 +20,9 @@ pub enum ReplayError {
     #[error("the log lacks {0}: it was not written by `clutch loop` or `clutch sim --log`")]
     Lacks(&'static str),
     /// Its law is none of clutch's.
-    #[error("the law that ran was {0:?}, which is none of clutch's: give that law to the replay")]
+    #[error(
+        "the law that ran was {0}, written in Python, and the log has its name only: replay it with clutch.replay(log, law=…)"
+    )]
     Foreign(
         /// Its name.
         String,

@@ -18,7 +18,7 @@ use crate::summary::{LogSummary, Summary, number};
 use crate::to_log::PRESENT_CODE;
 use crate::watch::Watch;
 use clutch_core::law::Law;
-use clutch_core::{DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState};
+use clutch_core::{ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState};
 use clutch_log::{LogError, Source};
 use clutch_node::{ControllerNode, HostNode, present_code};
 use clutch_sim::scenario::{Plan, ScalarKind};
@@ -496,9 +496,10 @@ impl Course<'_> {
         rows.extend(describe_system().first().map(|system| ("system", system.clone())));
         let mut remarks = Vec::new();
         if !holds {
-            remarks.push("note: the board powers up at a voltage that does not hold the shaft; set its power-up output to the safe state's".to_owned());
+            let does = if plan.bounds.actuator == ActuatorKind::Motor { "drives" } else { "does not hold" };
+            remarks.push(format!("note: the board powers up at a voltage that {does} the shaft; set its power-up output to the safe state's"));
         }
-        if !is_simulated(hello) {
+        if !is_simulated(hello) && plan.bounds.actuator != ActuatorKind::Motor {
             remarks.push(
                 "note: a brake that a motor presses lets go when its power fails; no software changes that"
                     .to_owned(),

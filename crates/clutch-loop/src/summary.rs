@@ -240,7 +240,7 @@ pub fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> St
             number(v.to_degrees())
         ),
         Cause::FollowingError => format!("following error of {} °", number(v.to_degrees())),
-        Cause::Saturation => "the brake's voltage was at its limit for too long".into(),
+        Cause::Saturation => "the voltage was at its limit for too long".into(),
         Cause::NotFinite => "the law's demand was not a number".into(),
         Cause::Deadline => format!("answers came too late, the last after {v} µs"),
         // The board's own supervisor tells for how many periods.

@@ -241,6 +241,10 @@ impl Servo {
     fn __copy__(&self) -> Servo {
         self.clone()
     }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Servo {
+        self.copy()
+    }
 }
 
 #[derive(Clone)]
@@ -431,7 +435,9 @@ impl Plant {
             return Err(PyValueError::new_err(format!("voltage = {voltage}: expected a finite voltage, V")));
         }
         if self.broken {
-            return Err(PyRuntimeError::new_err("the plant broke in an earlier step; make a new one"));
+            return Err(PyRuntimeError::new_err(
+                "the plant broke in an earlier step; place it, or make a new one",
+            ));
         }
         let (period, moving) = (self.period, &mut self.moving);
         let dac = moving.rig().dac;
@@ -781,6 +787,12 @@ impl PythonLaw {
         } else {
             (law.clone(), None)
         };
+        if let Some(start) = start.as_ref().map(|start| start.bind(py)).filter(|start| !start.is_callable()) {
+            let kind = start.get_type();
+            return Err(PyTypeError::new_err(format!(
+                "law.start is of type {kind}: expected a method start(tick), or another name"
+            )));
+        }
         if !step.is_callable() {
             let kind = law.get_type();
             return Err(PyTypeError::new_err(format!(

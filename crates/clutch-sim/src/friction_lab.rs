@@ -3,7 +3,7 @@
 //! | experiment | what is done | what shows |
 //! |---|---|---|
 //! | steady sliding | constant velocities | the curve `μ(θ̇)` |
-//! | pre-sliding | a slow motion to and fro over a fraction of the bristles' deflection | the spring before the break-away, its hysteresis |
+//! | pre-sliding | a slow motion to and fro over the deflection at which the bristles give way | the spring before the break-away, its hysteresis |
 //! | lag | a velocity that swings without a reversal | friction that is behind its steady value |
 //! | break-away | the paper's shaft at rest, a torque that grows at a rate | the coefficient at which it breaks away |
 //!

@@ -65,12 +65,12 @@ params! {
         torque_noise: f64 = 0.0, "torque_noise_nm" "" NM, Range::at_least(0.0);
         /// Whole sampling periods from sample to voltage.
         delay_ticks: u32 = 0, "delay_ticks" "" TICKS, Range::within(0.0, 1000.0);
-        /// First-order lag from voltage to normal force; absent if there is none. It needs the engine
+        /// First-order lag from the voltage to the actuator; absent if there is none. It needs the engine
         /// `dormand_prince`.
         actuator_time_constant: Option<f64>, "actuator_time_constant_s" "" S, Range::above(0.0);
     }
     nested {
-        /// What a voltage does to the shaft.
+        /// Effect of a voltage on the shaft.
         actuator: ActuatorParams, "actuator";
         /// Friction of pad on disc.
         friction: FrictionParams, "friction";
@@ -202,11 +202,14 @@ impl Rig {
     #[must_use]
     pub fn resting_voltage(&self) -> f64 {
         let plant = &self.model.plant;
-        let volts = match plant.actuator().kind() {
+        let actuator = plant.actuator();
+        let volts = match actuator.kind() {
             ActuatorKind::Motor => plant.holding_voltage_static(),
             ActuatorKind::Brake | ActuatorKind::Both => {
                 let swing = self.model.ripple.as_ref().map_or(0.0, Ripple::largest);
-                (1.25 * plant.holding_voltage_static() / (1.0 - swing)).max(0.0)
+                let (gain, torque) = (actuator.brake_gain(), plant.params().drive_torque.abs());
+                let held = torque / (plant.friction().at_rest() * gain);
+                (1.25 * held / (1.0 - swing) - actuator.preload() / gain).max(0.0)
             }
         };
         self.reached(volts)
@@ -219,6 +222,9 @@ impl Rig {
         let plant = &self.model.plant;
         let (p, actuator) = (plant.params(), plant.actuator());
         let mu = plant.friction().level(velocity);
+        if velocity == 0.0 && actuator.kind() == ActuatorKind::Motor {
+            return self.resting_voltage();
+        }
         let way = if velocity < 0.0 { -1.0 } else { 1.0 };
         let volts = actuator.volts_for(p.viscous_damping * velocity - p.drive_torque, mu, way);
         self.reached(if actuator.kind().two_sided() { volts } else { volts.max(0.0) })

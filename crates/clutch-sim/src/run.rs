@@ -22,7 +22,8 @@ clutch_core::words! {
         /// On the path: at its velocity, the brake at the voltage that keeps it. (12) and (13) assume a path without
         /// jumps.
         OnPath = "on_path" default,
-        /// Held at rest, with a quarter more than the voltage that this takes.
+        /// Held at rest: by a brake with a quarter more than the voltage that this takes, by a motor with the voltage that
+        /// balances the drive.
         Rest = "rest",
     }
 }

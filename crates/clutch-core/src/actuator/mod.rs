@@ -1,4 +1,4 @@
-//! Actuators: what a voltage does to the shaft.
+//! Actuators: the effect of a voltage on the shaft.
 //!
 //! ```text
 //! J θ̈ = T_drive + T(u) − μ(θ̇) N(u) − C_d θ̇,     at rest while |T_drive + T(u)| ≤ μ_s N(u)
@@ -12,7 +12,8 @@
 //!
 //! A voltage above 0 resists with a brake and with both, and drives forwards with a motor. “A brake can only resist” is
 //! not a rule of its own: it follows from the interval of torque that an actuator can give at a velocity, its authority
-//! ([`Bounds::authority`](crate::Bounds::authority)), which feasibility, certificate, supervisor and safe state ask.
+//! ([`Bounds::authority`](crate::Bounds::authority)). The check of a path asks for it; certificate, supervisor and safe
+//! state ask for its parts at the corner that is worst for each.
 
 mod geometry;
 
@@ -61,7 +62,7 @@ crate::params! {
 }
 
 crate::choice! {
-    /// Actuator: what a voltage does to the shaft.
+    /// Actuator: the effect of a voltage on the shaft.
     pub enum ActuatorParams<T>: Default {
         /// A brake.
         Brake(BrakeActuator<T>) = "brake",

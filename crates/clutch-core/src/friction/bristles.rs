@@ -51,6 +51,12 @@ impl<T: Real> Bristles<T> {
         T::from_f64(0.5) * (T::ONE + sine)
     }
 
+    /// `true` if bending is damped: friction then exceeds that of steady sliding at times.
+    #[must_use]
+    pub fn damps(&self) -> bool {
+        self.damping > T::ZERO
+    }
+
     /// Velocity at which steady sliding has lost all but 1/e of the drop from rest, rad/s.
     #[must_use]
     pub fn stribeck_velocity(&self) -> T {

@@ -26,9 +26,9 @@ crate::params! {
         /// A pad can only push.
         PUSHES: lowest, "a voltage of at least 0 with a brake, whose pad can only push (rig.actuator, model.actuator)";
         /// What drives, drives.
-        DRIVES: lowest, "a voltage below 0 with an actuator that drives (model.actuator)";
+        DRIVES: lowest, "a voltage below 0, as -10.0, with an actuator that drives (model.actuator); a motor needs on_invalid_v = 0, too";
         /// An invalid demand moves nothing.
-        MOVES_NOTHING: on_invalid, "0 with a motor, which any other voltage drives (model.actuator)";
+        MOVES_NOTHING: on_invalid, "0 with a motor, which any other voltage drives, and at least 0 with a brake and a motor (model.actuator)";
         /// The converter reaches the lowest voltage.
         LOWEST_REACHED: lowest, "a voltage that the converter reaches: not below rig.dac.lowest_v";
         /// The converter reaches the highest voltage.
@@ -48,8 +48,12 @@ impl<T: Real> OutputParams<T> {
         } else {
             OutputParams::PUSHES.require(self.lowest, !below)?;
         }
-        let drives = kind == ActuatorKind::Motor;
-        OutputParams::MOVES_NOTHING.require(self.on_invalid, !drives || self.on_invalid == T::ZERO)?;
+        let still = match kind {
+            ActuatorKind::Brake => true,
+            ActuatorKind::Motor => self.on_invalid == T::ZERO,
+            ActuatorKind::Both => self.on_invalid >= T::ZERO,
+        };
+        OutputParams::MOVES_NOTHING.require(self.on_invalid, still)?;
         Ok(())
     }
 

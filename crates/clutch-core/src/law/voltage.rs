@@ -18,10 +18,18 @@ crate::params! {
         start: T = 0.0, "start_v" "u_0" V, Range::ANY;
         /// Voltage at the end of the way.
         end: T = 0.0, "end_v" "u_1" V, Range::ANY;
-        /// Rate from the one to the other; 0 stays at the start.
+        /// Rate from the one to the other.
         rate: T = 0.0, "rate_v_s" "r" V_S, Range::at_least(0.0);
         /// `true` if it goes to and fro between them; else it stays at the end.
         returns: bool = false, "returns" "" NONE, Range::ANY;
+    }
+    relations(p) {
+        /// It gets where it is to go.
+        GOES: rate, "a rate above 0 where end_v is not start_v" => p.rate > T::ZERO || p.end == p.start;
+        /// The output gives the first voltage.
+        START_GIVEN: start, "a voltage from output.lowest_v to output.highest_v";
+        /// The output gives the last voltage.
+        END_GIVEN: end, "a voltage from output.lowest_v to output.highest_v";
     }
 }
 
@@ -55,6 +63,9 @@ impl<T: Real> Voltage<T> {
     /// The first parameter out of range.
     pub fn new(p: &VoltageParams<T>, output: &OutputParams<T>, period: Micros) -> Result<Self, ParamError<T>> {
         p.check_rows()?;
+        let given = |volts: T| volts >= output.lowest && volts <= output.highest;
+        VoltageParams::START_GIVEN.require(p.start, given(p.start))?;
+        VoltageParams::END_GIVEN.require(p.end, given(p.end))?;
         let towards = (p.end - p.start).sgn();
         Ok(Voltage {
             start: p.start,
@@ -135,8 +146,11 @@ mod tests {
 
     #[test]
     fn a_voltage_without_a_rate_stays() {
-        let p = VoltageParams { start: 2.5, end: 4.0, ..VoltageParams::default() };
+        let p = VoltageParams { start: 2.5, end: 2.5, ..VoltageParams::default() };
         assert_eq!(levels(p, 3), [2.5; 3]);
+        let nowhere = VoltageParams { end: 4.0, ..p };
+        let output = OutputParams::default();
+        assert_eq!(Voltage::<f64>::new(&nowhere, &output, Micros(1000)).unwrap_err().field(), "rate");
     }
 
     #[test]

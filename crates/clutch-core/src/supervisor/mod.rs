@@ -396,6 +396,10 @@ impl<T: Real> Supervisor<T> {
         let Some(served) = s.served else {
             let applied = servo.dac().volts(s.code);
             s.servo = servo.start(counts, goal, applied);
+            if self.limits.drives_above_0() {
+                // It may be on its way already, either way.
+                s.expected = [Expected { velocity: -goal.velocity.abs(), travel: T::ZERO }; 2];
+            }
             s.voltages = [applied; 4];
             return 1;
         };
@@ -448,9 +452,11 @@ impl<T: Real> Supervisor<T> {
             let counts =
                 if *way == Way::Forwards { counts } else { counts.saturating_neg() }.saturating_sub(1);
             let mean = T::from_i32(counts) * l.radians_per_count / (l.period * T::from_i32(4));
-            let braking = l.drag * mean.abs() - l.least_acceleration(*way, s.voltages);
+            let braking = l.drag * mean.abs() - l.least_acceleration(*way, s.voltages).0;
             let lost = braking.max(T::ZERO) * l.period * T::from_i32(2);
-            *expected = Expected { velocity: (mean - lost).max(T::ZERO), travel: T::ZERO };
+            // With a motor the shaft may go the other way still: it has to stop before it comes this way.
+            let least = if l.drives_above_0() { mean - lost } else { T::ZERO };
+            *expected = Expected { velocity: (mean - lost).max(least), travel: T::ZERO };
         }
     }
 
@@ -468,11 +474,28 @@ impl<T: Real> Supervisor<T> {
         for (way, expected) in l.ways().iter().zip(&mut s.expected) {
             // A code may be a cycle on its way, and one may have been lost: the worst of three counts.
             let [a, b, c, _] = s.voltages;
-            let acceleration = l.least_acceleration(*way, [a, b, c, c]) - l.drag * expected.velocity;
+            let (on, back) = l.least_acceleration(*way, [a, b, c, c]);
             let before = expected.velocity;
-            expected.velocity = (before + acceleration * seconds).max(T::ZERO);
-            expected.travel += T::from_f64(0.5) * (before + expected.velocity) * seconds;
-            if l.drives_above_0() && expected.velocity == T::ZERO {
+            // One that goes the other way turns; one that goes this way stops, and may be driven back by a motor.
+            let after = if before > T::ZERO || (before == T::ZERO && on > T::ZERO) {
+                let after = before + (on - l.drag * before) * seconds;
+                if l.drives_above_0() && back < T::ZERO { after } else { after.max(T::ZERO) }
+            } else if l.drives_above_0() {
+                let after = before + back * seconds;
+                if after > T::ZERO {
+                    after.min((on * seconds).max(T::ZERO))
+                } else if before < T::ZERO {
+                    after
+                } else {
+                    after.min(T::ZERO)
+                }
+            } else {
+                T::ZERO
+            };
+            expected.velocity = after;
+            let (from, to) = (before.max(T::ZERO), after.max(T::ZERO));
+            expected.travel += T::from_f64(0.5) * (from + to) * seconds;
+            if l.drives_above_0() && after <= T::ZERO {
                 // It may come back from here: no way of its own to count.
                 expected.travel = T::ZERO;
             }

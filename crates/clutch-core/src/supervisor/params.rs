@@ -124,6 +124,11 @@ pub(super) struct Limits<T> {
     motor: T,
     most_motor: T,
     loads: T,
+    /// Least deceleration by friction without a voltage, rad/s², and by that of a motor's load, rad/s² per V.
+    least_rubs: T,
+    least_loads: T,
+    /// Highest inertia over the lowest.
+    lighter: T,
     /// Most deceleration by viscous drag, 1/s.
     pub(super) drag: T,
 }
@@ -191,6 +196,9 @@ impl<T: Real> Limits<T> {
             motor: motor.low / inertia,
             most_motor: motor.high / inertia,
             loads: most_friction * bounds.load_share * motor.high / inertia,
+            least_rubs: bounds.friction.low * bounds.preload / inertia,
+            least_loads: bounds.friction.low * bounds.load_share * motor.low / inertia,
+            lighter: inertia / bounds.inertia.low,
             drag: drag / inertia,
         })
     }
@@ -205,8 +213,9 @@ impl<T: Real> Limits<T> {
         if self.drives_above_0() { &[Way::Forwards, Way::Backwards] } else { &[Way::Forwards] }
     }
 
-    /// Least acceleration that way with the worst of some voltages, rad/s²; negative where friction may stop the shaft.
-    pub(super) fn least_acceleration(&self, way: Way, volts: [T; 4]) -> T {
+    /// Least acceleration that way with the worst of some voltages, rad/s²: of a shaft that goes that way, negative where
+    /// friction may stop it; and of one that goes the other way, negative where a motor may drive it on.
+    pub(super) fn least_acceleration(&self, way: Way, volts: [T; 4]) -> (T, T) {
         let [a, b, c, d] = volts.map(|volts| {
             let (weak, strong) = (self.motor, self.most_motor);
             let (low, high) = match self.actuator {
@@ -223,9 +232,11 @@ impl<T: Real> Limits<T> {
                 Way::Forwards => self.drive + low,
                 Way::Backwards => -(self.most_drive + high),
             };
-            driven - friction
+            let helps = self.least_rubs + self.least_loads * volts.abs();
+            let back = driven + helps;
+            (driven - friction, if back < T::ZERO { back * self.lighter } else { back })
         });
-        a.min(b).min(c).min(d)
+        (a.0.min(b.0).min(c.0).min(d.0), a.1.min(b.1).min(c.1).min(d.1))
     }
 
     /// True if a path can have a target: numbers, within the speed limit, and near the last.

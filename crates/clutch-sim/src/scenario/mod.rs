@@ -328,7 +328,7 @@ impl Scenario {
         Err(self.message(
             "model.actuator",
             format!(
-                "the law believes in {}, and the rig has {}: a voltage would go the wrong way; give [rig.actuator] and [model.actuator] the same kind",
+                "the law believes in {}, and the rig has {}: voltages would do other things than it believes; give [rig.actuator] and [model.actuator] the same kind",
                 name(model), name(rig)
             ),
         ))
@@ -416,12 +416,19 @@ impl Scenario {
     /// The scenario has no table `[safety]`.
     pub fn safety(&self) -> Result<&Safety, ScenarioError> {
         self.params.safety.as_ref().ok_or_else(|| {
+            let example = if self.params.model.actuator.kind() == ActuatorKind::Motor {
+                "For a motor with nothing on its shaft:\n\n\
+                 [safety]\nreason = \"friction holds the axis, and nothing drives it\"\n\n[safety.on_fault.release]"
+            } else {
+                "For a shaft that a weight or a spring drives:\n\n\
+                 [safety]\nreason = \"a weight drives the shaft\"\n\n[safety.on_fault.hold]\nvolts_v = 4.5"
+            };
             self.message(
                 "safety",
-                "missing; a run on a board needs a safe state, and there is no default. For a shaft that a weight or a spring drives:\n\n\
-                 [safety]\nreason = \"a weight drives the shaft\"\n\n[safety.on_fault.hold]\nvolts_v = 4.5\n\n\
-                 docs/safety.md says how to choose"
-                    .to_owned(),
+                format!(
+                    "missing; a run on a board needs a safe state, and there is no default. {example}\n\n\
+                     docs/safety.md says how to choose"
+                ),
             )
         })
     }
@@ -564,6 +571,9 @@ impl Scenario {
                     Obstacle::Voltage => format!(
                         "{at_time}: it needs {asked:.4} V of braking, and output.highest_v = {available}; decelerate more slowly, drive it with less torque, or raise the limit"
                     ),
+                    Obstacle::Hold => format!(
+                        "{at_time}: at rest it needs {asked:.4} N m, and motor and friction hold {available:.4} N m at the worst corner of [bounds]; raise the limits of the output, or hang less on it"
+                    ),
                     Obstacle::NotFinite => format!("{at_time}: its velocity or acceleration is not a number"),
                 })
             })?;
@@ -646,6 +656,9 @@ impl Scenario {
         check("load share", actuator.load_share(), actuator.load_share(), &exactly(bounds.load_share));
         check("static friction", s.0, s.1, &bounds.friction_at_rest);
         check("dynamic friction", d.0, d.1, &bounds.friction_sliding);
+        if rig.model.plant.friction().bristles().is_some_and(|b| b.damps()) {
+            lines.push("friction has bristles with damping, bounds that of steady sliding".to_owned());
+        }
         Ok(lines)
     }
 }

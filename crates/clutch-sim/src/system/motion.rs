@@ -88,7 +88,12 @@ pub struct Motion<'a, S, const N: usize, const B: usize> {
     modes: [Mode; B],
     /// Step that the last stretch ended with, s.
     step: f64,
+    /// Rates at the state, if the last step left them.
+    known: Option<Rates<N>>,
 }
+
+/// Velocity and acceleration.
+type Rates<const N: usize> = [SVector<f64, N>; 2];
 
 /// The equations at a state.
 struct Equations<const N: usize, const B: usize> {
@@ -163,7 +168,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         if let Some(row) = (0..B).find(|row| system.friction(*row).bristles().is_some()) {
             return Err(SystemError::Bristles(row));
         }
-        let mut motion = Motion { system, state, modes: [Mode::Stuck; B], step: 1e-6 };
+        let mut motion = Motion { system, state, modes: [Mode::Stuck; B], step: 1e-6, known: None };
         motion.choose([false; B])?;
         Ok(motion)
     }
@@ -200,8 +205,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         self.modes.map(|mode| mode == Mode::Stuck)
     }
 
-    /// Velocity and acceleration.
-    fn rate(&self, state: &State<N>) -> Result<[SVector<f64, N>; 2], SystemError> {
+    fn rate(&self, state: &State<N>) -> Result<Rates<N>, SystemError> {
         let e = self.equations(state)?;
         let span = Span::of(&e.inverse, &e.rows, &SVector::zeros(), &self.stuck());
         Ok([state.velocity, span.project(&e.inverse, &e.free, 0.0)])
@@ -216,16 +220,18 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         (hold(&a, &b, &e.bound, stuck).acceleration, STILL * largest)
     }
 
-    /// A row that slipped has come to rest, or one that is stuck is no longer held.
-    fn happened(&self, state: &State<N>) -> Result<bool, SystemError> {
-        let e = self.equations(state)?;
+    /// Whether a row that slipped has come to rest, or one that is stuck is no longer held.
+    fn happened(&self, e: &Equations<N, B>) -> bool {
         let noise = 1e-14 * e.slip.amax();
         if (0..B).any(|i| self.modes[i].sign() * e.slip[i] < -noise) {
-            return Ok(true);
+            return true;
         }
         let stuck = self.stuck();
-        let (left, still) = self.left(&e, &stuck);
-        Ok((0..B).any(|i| stuck[i] && left[i].abs() > still))
+        if stuck.iter().all(|stuck| !stuck) {
+            return false;
+        }
+        let (left, still) = self.left(e, &stuck);
+        (0..B).any(|i| stuck[i] && left[i].abs() > still)
     }
 
     /// Chooses the modes of all rows at rest; `crossed` are those whose rate has just changed its sign.
@@ -267,10 +273,10 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         Ok(before)
     }
 
-    /// A step of the pair: the end, and its error over the tolerance.
-    fn step(&self, h: f64) -> Result<(State<N>, f64), SystemError> {
+    /// A step of the pair: the end, its error over the tolerance, and the rates there.
+    fn step(&self, h: f64) -> Result<(State<N>, f64, Rates<N>), SystemError> {
         let from = &self.state;
-        let first = self.rate(from)?;
+        let first = self.known.map_or_else(|| self.rate(from), Ok)?;
         let mut k = [first; 7];
         let mut to = *from;
         for i in 0..6 {
@@ -289,7 +295,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
                 .zip(x)
                 .fold(0.0_f64, |most, (e, x)| most.max(e.abs() / (TOLERANCE * (1.0 + x.abs()))))
         };
-        Ok((to, over(left_out(0), &to.position).max(over(left_out(1), &to.velocity))))
+        let error = over(left_out(0), &to.position).max(over(left_out(1), &to.velocity));
+        Ok((to, error, k[6]))
     }
 
     /// Follows the motion to a time, s, and adds what happened to `events`.
@@ -308,7 +315,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             let most = self.step.min(self.system.longest_step());
             let last = now + most >= end;
             let h = if last { end - now } else { most };
-            let (mut reached, error) = self.step(h)?;
+            let (mut reached, error, rates) = self.step(h)?;
             if !(error.is_finite() && reached.velocity.iter().all(|v| v.is_finite())) {
                 return Err(SystemError::NotFinite(begin));
             }
@@ -323,25 +330,29 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             if last {
                 reached.time = end;
             }
-            let happened = self.happened(&reached)?;
+            let mut e = self.equations(&reached)?;
+            let happened = self.happened(&e);
             if happened {
                 reached = self.locate(h)?;
+                e = self.equations(&reached)?;
             }
             let slipped = self.modes.map(Mode::sign);
-            self.state = reached;
+            (self.state, self.known) = (reached, None);
             if happened || corner == Some(reached.time) {
-                let slip = self.equations(&self.state)?.slip;
-                let crossed = std::array::from_fn(|i| slipped[i] * slip[i] < 0.0);
+                let crossed = std::array::from_fn(|i| slipped[i] * e.slip[i] < 0.0);
                 let before = self.choose(crossed)?;
                 for row in (0..B).filter(|row| before[*row] != self.modes[*row]) {
                     events.push(SystemEvent { time: self.state.time, row, mode: self.modes[row] });
                 }
                 self.step = 1e-6;
             } else {
-                let e = self.equations(&self.state)?;
-                let base = self.system.base(self.state.time);
-                let span = Span::of(&e.inverse, &e.rows, &base, &self.stuck());
-                self.state.velocity = span.project(&e.inverse, &self.state.velocity, 1.0);
+                self.known = Some(rates);
+                let stuck = self.stuck();
+                if stuck.contains(&true) {
+                    let base = self.system.base(self.state.time);
+                    let span = Span::of(&e.inverse, &e.rows, &base, &stuck);
+                    self.state.velocity = span.project(&e.inverse, &self.state.velocity, 1.0);
+                }
             }
         }
         Err(SystemError::TooManySteps(begin))
@@ -355,7 +366,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             if middle <= before || middle >= after {
                 break;
             }
-            if self.happened(&self.step(middle)?.0)? { after = middle } else { before = middle }
+            let e = self.equations(&self.step(middle)?.0)?;
+            if self.happened(&e) { after = middle } else { before = middle }
         }
         Ok(self.step(after)?.0)
     }
