@@ -28,7 +28,7 @@ from clutch._loop import LoopResult, loop
 from clutch._metrics import Metrics
 from clutch._model import Scenario
 from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
-from clutch._run import Law, Result, SteppedLaw, simulate
+from clutch._run import Result, SteppedLaw, simulate
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
 from clutch._tables import *  # noqa: F403
 
@@ -40,7 +40,6 @@ __version__ = _clutch.VERSION
 __all__ = [
     "Certificate",
     "Difference",
-    "Law",
     "Log",
     "LoopError",
     "LoopResult",

@@ -330,11 +330,11 @@ def sweep(
         for each key: `Table`, pandas or polars. Values may be numbers, choices (``"run.engine"``,
         ``"rig.base"``) and whole tables (``"law": [clutch.Pd(), clutch.Smc()]``, or as dicts).
     law
-        A law of your own in place of the scenario's, as for `simulate`. An object is copied for each run, and a class
-        makes one. A function is not copied: what it remembers in a closure or a global goes on from run to run, so give a
-        law with memory as an object or a class. Python runs one such run at a time in a process: an executor of processes
-        runs several, and needs a law that can be pickled. An exception of the law ends the sweep, with ``errors="keep"``,
-        too.
+        A law of your own in place of the scenario's, as for `simulate`. An object is copied for each run, and a
+        class makes one. A function is not copied: what it remembers in a closure or a global goes on from run to
+        run, so give a law with memory as an object or a class. Python runs one such run at a time in a process: an
+        executor of processes runs several, and needs a law that can be pickled. An exception of the law ends the
+        sweep, with ``errors="keep"``, too.
     metrics
         Names of fields of `Metrics`, and "certified": true if the gains are certified for the row's bounds.
         Default: all of them.

@@ -1,8 +1,8 @@
 """The shaft as functions ``(t, x, u, params)``, for python-control and for your own solvers.
 
-The state is ``x = [position rad, velocity rad/s]``, the input ``u = [voltage V]``. This is the rig alone: equation (1) with
-its friction and its actuator, without encoder, converter, delay and lag. Friction with bristles appears here as its steady
-sliding: the state has no deflection. For bristles use :class:`clutch.Plant`.
+The state is ``x = [position rad, velocity rad/s]``, the input ``u = [voltage V]``. This is the rig alone: equation
+(1) with its friction and its actuator, without encoder, converter, delay and lag. Friction with bristles appears here
+as its steady sliding: the state has no deflection. For bristles use :class:`clutch.Plant`.
 """
 
 from __future__ import annotations

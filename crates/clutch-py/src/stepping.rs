@@ -511,7 +511,7 @@ impl Plant {
         self.voltage
     }
 
-    /// Voltage on the brake at the start, V.
+    /// Voltage at the start, V.
     #[getter]
     fn start_voltage(&self) -> f64 {
         self.start_voltage

@@ -68,14 +68,11 @@ impl<T: Arithmetic> FrictionModel<T> for Dahl<T> {
         self.curve.level(velocity)
     }
 
-    #[inline]
-    fn is_quick(&self) -> bool {
-        self.curve.is_quick()
-    }
-
-    #[inline]
-    fn quick_level(&self, velocity: T) -> T {
-        self.curve.quick_level(velocity)
+    fn quick(&self) -> Option<Stribeck<T>>
+    where
+        T: Real,
+    {
+        self.curve.quick()
     }
 
     #[inline]

@@ -70,16 +70,9 @@ macro_rules! frictions {
                     $(Friction::$model(f) => f.level(velocity),)+
                 }
             }
-            #[inline]
-            fn is_quick(&self) -> bool {
+            fn quick(&self) -> Option<Stribeck<T>> where T: Real {
                 match self {
-                    $(Friction::$model(f) => f.is_quick(),)+
-                }
-            }
-            #[inline]
-            fn quick_level(&self, velocity: T) -> T {
-                match self {
-                    $(Friction::$model(f) => f.quick_level(velocity),)+
+                    $(Friction::$model(f) => f.quick(),)+
                 }
             }
             #[inline]

@@ -40,16 +40,12 @@ pub trait FrictionModel<T: Arithmetic>: Sized {
     /// `|μ|` at a velocity (rad/s); towards rest, its limit.
     fn level(&self, velocity: T) -> T;
 
-    /// `true` if [`FrictionModel::quick_level`] is the level; else a board had better call a function of its own.
-    #[inline]
-    fn is_quick(&self) -> bool {
-        true
-    }
-
-    /// As [`FrictionModel::level`], where it is cheap; any number where [`FrictionModel::is_quick`] says so.
-    #[inline]
-    fn quick_level(&self, velocity: T) -> T {
-        self.level(velocity)
+    /// The level as Stribeck's curve with `δ` = 1, which is quick to compute; none if it is no such curve.
+    fn quick(&self) -> Option<Stribeck<T>>
+    where
+        T: Real,
+    {
+        None
     }
 
     /// `|μ|` up to which a resting shaft stays at rest.

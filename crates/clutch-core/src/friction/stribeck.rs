@@ -100,6 +100,12 @@ impl<T: Arithmetic> Stribeck<T> {
         }
     }
 
+    /// The level if `δ` = 1, as for most pairs, and else another number. A power takes five times as long as the rest.
+    #[inline]
+    pub(crate) fn quick_level(&self, velocity: T) -> T {
+        self.falling(velocity.abs() * self.inverse_velocity)
+    }
+
     #[inline]
     fn falling(&self, exponent: T) -> T {
         let vanished = self.vanishes_at.less_or_equal(exponent);
@@ -126,15 +132,11 @@ impl<T: Arithmetic> FrictionModel<T> for Stribeck<T> {
         self.falling((velocity.abs() * self.inverse_velocity).powf(self.params.stribeck_exponent))
     }
 
-    /// `δ = 1`, as for most pairs. A power takes five times as long as the rest.
-    #[inline]
-    fn is_quick(&self) -> bool {
-        self.exponent_is_one
-    }
-
-    #[inline]
-    fn quick_level(&self, velocity: T) -> T {
-        self.falling(velocity.abs() * self.inverse_velocity)
+    fn quick(&self) -> Option<Stribeck<T>>
+    where
+        T: Real,
+    {
+        self.exponent_is_one.then_some(*self)
     }
 
     #[inline]

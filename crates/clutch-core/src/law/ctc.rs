@@ -10,7 +10,7 @@
 //! `J (θ̈_d − τ) + C_d θ̇ − T_u`, and the friction of a shaft that goes the path's way, are what the motor gives.
 
 use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
-use crate::friction::FrictionModel;
+use crate::friction::{FrictionModel, Stribeck, StribeckParams};
 use crate::params::{Range, Table};
 use crate::{ActuatorKind, Arithmetic, Each, Micros, ParamError, Plant, PlantParams, Real};
 
@@ -36,8 +36,9 @@ pub struct Ctc<T> {
     model: Plant<T>,
     /// (11) as it is printed will do: a brake that does not drag.
     printed: bool,
-    /// `printed`, and the friction is quick to compute.
+    /// `printed`, and the friction is the curve below.
     quick: bool,
+    curve: Stribeck<T>,
     output: Output<T>,
 }
 
@@ -59,8 +60,14 @@ impl<T: Real> Ctc<T> {
             model.friction().check_divisor()?;
         }
         let printed = kind == ActuatorKind::Brake && model.actuator().preload() == T::ZERO;
-        let quick = printed && model.friction().is_quick();
-        Ok(Ctc { params: *p, model, printed, quick, output: Output::new(output, period)? })
+        let curve = model.friction().quick();
+        let quick = printed && curve.is_some();
+        let curve = match curve {
+            Some(curve) => curve,
+            // Not asked.
+            None => Stribeck::new(&StribeckParams::default())?,
+        };
+        Ok(Ctc { params: *p, model, printed, quick, curve, output: Output::new(output, period)? })
     }
 
     /// The believed plant. It differs from the true one wherever friction is not known.
@@ -85,7 +92,8 @@ impl<T: Arithmetic> Ctc<T> {
             L::all(L::ONE.less_or_equal(each(&|law| if is(law) { T::ONE } else { T::ZERO })))
         };
         let (printed, quick) = (all(|law| law.printed), all(|law| law.quick));
-        Some(Ctc { params, model, printed, quick, output })
+        let curve = Stribeck::in_lanes(&|get| each(&|law| get(&law.curve)));
+        Some(Ctc { params, model, printed, quick, curve, output })
     }
 
     #[inline]
@@ -150,7 +158,7 @@ impl<T: Arithmetic> ControlLaw<T> for Ctc<T> {
     #[inline(always)]
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
         if self.quick {
-            let mu = self.model.friction().quick_level(tick.velocity());
+            let mu = self.curve.quick_level(tick.velocity());
             return self.command(state, self.terms(tick, mu));
         }
         self.command_for_any(state, tick)
