@@ -1163,8 +1163,8 @@ class Voltage(_Params):
         Voltage at the end of the way. `u_1`: a finite number, V; a voltage from output.lowest_v to
         output.highest_v.
     rate_v_s : float, default 0.0
-        Rate from the one to the other. `r`: a finite number of at least 0 V/s; a rate above 0 where end_v is
-        not start_v.
+        Rate from the one to the other; 0 stays at the start. `r`: a finite number of at least 0 V/s; a rate
+        above 0 where an end_v is given.
     returns : bool, default False
         `true` if it goes to and fro between them; else it stays at the end.
 

@@ -670,7 +670,7 @@ VALID = {
     clutch.Smc: each(kp_v=GAIN, kd_v_s_rad=GAIN, slope_1_s=POSITIVE, boundary_rad_s=POSITIVE),
     clutch.SmcSign: each(kp_v=GAIN, kd_v_s_rad=GAIN, slope_1_s=POSITIVE),
     clutch.Voltage: each(
-        start_v=number(-10, 10), end_v=number(-10, 10), rate_v_s=number(0, 100), returns=st.booleans()
+        start_v=number(-10, 10), end_v=number(-10, 10), rate_v_s=st.floats(0.1, 100), returns=st.booleans()
     ),
     clutch.HoldLaw: each(margin=st.floats(1, 10)),
     clutch.Pid: each(

@@ -506,7 +506,7 @@ def test_a_run_is_drawn_in_three_panels_with_the_sticks_behind_the_voltage(smc, 
     assert np.array_equal(error.lines[-1].get_ydata(), np.degrees(smc.samples["error_rad"]))
     assert np.array_equal(line(velocity, "shaft").get_ydata(), np.degrees(smc.samples["velocity_rad_s"]))
     assert line(velocity, "target").get_ydata() == pytest.approx(2.0)
-    assert np.array_equal(line(voltage, "brake").get_ydata(), smc.samples["voltage_v"])
+    assert np.array_equal(line(voltage, "voltage").get_ydata(), smc.samples["voltage_v"])
     assert len(voltage.collections[0].get_paths()) == len(plot._sticks(smc))
 
 

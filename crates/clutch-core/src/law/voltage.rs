@@ -18,14 +18,15 @@ crate::params! {
         start: T = 0.0, "start_v" "u_0" V, Range::ANY;
         /// Voltage at the end of the way.
         end: T = 0.0, "end_v" "u_1" V, Range::ANY;
-        /// Rate from the one to the other.
+        /// Rate from the one to the other; 0 stays at the start.
         rate: T = 0.0, "rate_v_s" "r" V_S, Range::at_least(0.0);
         /// `true` if it goes to and fro between them; else it stays at the end.
         returns: bool = false, "returns" "" NONE, Range::ANY;
     }
     relations(p) {
         /// It gets where it is to go.
-        GOES: rate, "a rate above 0 where end_v is not start_v" => p.rate > T::ZERO || p.end == p.start;
+        GOES: rate, "a rate above 0 where an end_v is given" =>
+            p.rate > T::ZERO || p.end == p.start || p.end == T::ZERO;
         /// The output gives the first voltage.
         START_GIVEN: start, "a voltage from output.lowest_v to output.highest_v";
         /// The output gives the last voltage.

@@ -6,7 +6,7 @@
 //!
 //! A row is a place where something rubs: its slip rate `w_i` is a combination of velocities, its normal force an input. The
 //! shaft of the rest of this crate is the system of one inertia and one row; here several rows may hold one joint, and be
-//! redundant. Which rows hold and which slip is one strictly convex problem ([`modes`]); between events the motion is
+//! redundant. Which rows hold and which slip is one strictly convex problem ([`hold`]); between events the motion is
 //! smooth and taken by Dormand and Prince's pair, events are located to [`INSTANT`]; what holds stands still exactly.
 //!
 //! Not here: normal forces that depend on reactions (as of a block on an incline that a lever presses), impacts, backlash,
