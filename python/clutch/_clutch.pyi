@@ -198,7 +198,7 @@ class Plant:
     @property
     def start_voltage(self, /) -> float:
         """
-        Voltage on the brake at the start, V.
+        Voltage at the start, V.
         """
     def step(self, /, voltage: SupportsFloat | SupportsIndex) -> int | float:
         """
@@ -337,6 +337,7 @@ class Servo:
     True
     """
     def __copy__(self, /) -> Servo: ...
+    def __deepcopy__(self, /, _memo: object) -> Servo: ...
     def __new__(cls, /, scenario: _model.Scenario | Scenario) -> Servo: ...
     @property
     def code(self, /) -> int:
