@@ -104,3 +104,82 @@ impl<T: Real> Bristles<T> {
         (self.damping * (rest - sliding) / sliding).max(T::ZERO)
     }
 }
+
+/// A friction with bristles, checked: its parameters, the curve that they give of steady sliding, and stiffness, damping
+/// and elastic coefficient of the bristles. All that a friction is asked besides is that curve's.
+macro_rules! bristled {
+    (
+        $(#[$doc:meta])*
+        $model:ident $params:ident { $($field:ident),+ }
+        $p:ident => $curve:expr, $bends:expr
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $model<T> {
+            params: $params<T>,
+            /// Steady sliding.
+            curve: $crate::Stribeck<T>,
+        }
+
+        impl<T: $crate::Arithmetic> $model<T> {
+            /// The parameters it was built from.
+            #[must_use]
+            pub fn params(&self) -> &$params<T> {
+                &self.params
+            }
+
+            /// The frictions of several lanes as one.
+            #[must_use]
+            pub fn in_lanes<L: $crate::Arithmetic>(each: $crate::Each<'_, Self, T, L>) -> $model<L> {
+                $model {
+                    params: $params { $($field: each(&|f| f.params.$field),)+ },
+                    curve: $crate::Stribeck::in_lanes(&|get| each(&|f| get(&f.curve))),
+                }
+            }
+        }
+
+        impl<T: $crate::Arithmetic> $crate::FrictionModel<T> for $model<T> {
+            type Params = $params<T>;
+
+            fn build($p: &$params<T>) -> Result<Self, $crate::ParamError<T>> where T: $crate::Real {
+                $crate::params::Table::check_rows($p)?;
+                Ok($model { params: *$p, curve: $crate::Stribeck::new(&$curve)? })
+            }
+
+            #[inline]
+            fn level(&self, velocity: T) -> T {
+                self.curve.level(velocity)
+            }
+
+            fn quick(&self) -> Option<$crate::Stribeck<T>> where T: $crate::Real {
+                self.curve.quick()
+            }
+
+            #[inline]
+            fn at_rest(&self) -> T {
+                self.curve.at_rest()
+            }
+
+            #[inline]
+            fn sliding(&self) -> T {
+                self.curve.sliding()
+            }
+
+            fn envelope(&self) -> $crate::Interval<T> where T: $crate::Real {
+                self.curve.envelope()
+            }
+
+            fn check_divisor(&self) -> Result<(), $crate::ParamError<T>> where T: $crate::Real {
+                // The rows above 0 see to it.
+                Ok(())
+            }
+
+            fn bristles(&self) -> Option<$crate::Bristles<T>> where T: $crate::Real {
+                let $p = &self.params;
+                let (stiffness, damping, elastic) = $bends;
+                Some($crate::Bristles { curve: self.curve, stiffness, damping, elastic })
+            }
+        }
+    };
+}
+pub(super) use bristled;

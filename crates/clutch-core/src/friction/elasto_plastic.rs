@@ -8,9 +8,8 @@
 //! P. Dupont, V. Hayward, B. Armstrong, F. Altpeter, Single state elastoplastic friction models, IEEE Trans. Automat. Control
 //! 47 (2002) 787–792. A load that trembles below `μ_e` is held for ever, where LuGre's model drifts; all else is LuGre's.
 
-use super::{Bristles, FrictionModel, Stribeck, StribeckParams};
-use crate::params::{Range, Table};
-use crate::{Arithmetic, Each, Interval, ParamError, Real};
+use super::StribeckParams;
+use crate::params::Range;
 
 crate::params! {
     /// Elasto-plastic friction: LuGre's bristles, which only bend and do not slide below a coefficient `μ_e`. It needs the
@@ -37,85 +36,14 @@ crate::params! {
     }
 }
 
-/// Elasto-plastic friction, checked.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ElastoPlastic<T> {
-    params: ElastoPlasticParams<T>,
-    /// Steady sliding.
-    curve: Stribeck<T>,
-}
-
-impl<T: Arithmetic> ElastoPlastic<T> {
-    /// The parameters it was built from.
-    #[must_use]
-    pub fn params(&self) -> &ElastoPlasticParams<T> {
-        &self.params
-    }
-
-    /// The frictions of several lanes as one.
-    #[must_use]
-    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> ElastoPlastic<L> {
-        let p = |get: fn(&ElastoPlasticParams<T>) -> T| each(&|f| get(&f.params));
-        let params = ElastoPlasticParams {
-            mu_static: p(|p| p.mu_static),
-            mu_dynamic: p(|p| p.mu_dynamic),
-            stribeck_velocity: p(|p| p.stribeck_velocity),
-            stribeck_exponent: p(|p| p.stribeck_exponent),
-            stiffness: p(|p| p.stiffness),
-            damping: p(|p| p.damping),
-            elastic: p(|p| p.elastic),
-        };
-        ElastoPlastic { params, curve: Stribeck::in_lanes(&|get| each(&|f| get(&f.curve))) }
-    }
-}
-
-impl<T: Arithmetic> FrictionModel<T> for ElastoPlastic<T> {
-    type Params = ElastoPlasticParams<T>;
-
-    fn build(p: &ElastoPlasticParams<T>) -> Result<Self, ParamError<T>> where T: Real {
-        p.check_rows()?;
-        let curve = Stribeck::new(&StribeckParams {
-            mu_static: p.mu_static,
-            mu_dynamic: p.mu_dynamic,
-            stribeck_velocity: p.stribeck_velocity,
-            stribeck_exponent: p.stribeck_exponent,
-        })?;
-        Ok(ElastoPlastic { params: *p, curve })
-    }
-
-    #[inline]
-    fn level(&self, velocity: T) -> T {
-        self.curve.level(velocity)
-    }
-
-    fn quick(&self) -> Option<Stribeck<T>>
-    where
-        T: Real,
-    {
-        self.curve.quick()
-    }
-
-    #[inline]
-    fn at_rest(&self) -> T {
-        self.curve.at_rest()
-    }
-
-    #[inline]
-    fn sliding(&self) -> T {
-        self.curve.sliding()
-    }
-
-    fn envelope(&self) -> Interval<T> where T: Real {
-        self.curve.envelope()
-    }
-
-    fn check_divisor(&self) -> Result<(), ParamError<T>> where T: Real {
-        // The rows above 0 see to it.
-        Ok(())
-    }
-
-    fn bristles(&self) -> Option<Bristles<T>> where T: Real {
-        let ElastoPlasticParams { stiffness, damping, elastic, .. } = self.params;
-        Some(Bristles { curve: self.curve, stiffness, damping, elastic })
-    }
+super::bristles::bristled! {
+    /// Elasto-plastic friction, checked.
+    ElastoPlastic ElastoPlasticParams { mu_static, mu_dynamic, stribeck_velocity, stribeck_exponent, stiffness, damping, elastic }
+    p => StribeckParams {
+        mu_static: p.mu_static,
+        mu_dynamic: p.mu_dynamic,
+        stribeck_velocity: p.stribeck_velocity,
+        stribeck_exponent: p.stribeck_exponent,
+    },
+    (p.stiffness, p.damping, p.elastic)
 }

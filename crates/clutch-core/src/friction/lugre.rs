@@ -11,9 +11,8 @@
 //! below break-away it drifts, and steady loads are held. Where a load has to be held, take the elasto-plastic model, or
 //! Stribeck's curve. It is stiff: a run takes some times as long as with Stribeck's curve.
 
-use super::{Bristles, FrictionModel, Stribeck, StribeckParams};
-use crate::params::{Range, Table};
-use crate::{Arithmetic, Each, Interval, ParamError, Real};
+use super::StribeckParams;
+use crate::params::Range;
 
 crate::params! {
     /// LuGre friction: `ż = θ̇ − σ_0 |θ̇| z/g(θ̇)`, `μ = σ_0 z + σ_1 ż`, with Stribeck's curve `g`. It needs the engine
@@ -34,84 +33,14 @@ crate::params! {
     }
 }
 
-/// LuGre friction, checked.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lugre<T> {
-    params: LugreParams<T>,
-    /// Steady sliding.
-    curve: Stribeck<T>,
-}
-
-impl<T: Arithmetic> Lugre<T> {
-    /// The parameters it was built from.
-    #[must_use]
-    pub fn params(&self) -> &LugreParams<T> {
-        &self.params
-    }
-
-    /// The frictions of several lanes as one.
-    #[must_use]
-    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Lugre<L> {
-        let p = |get: fn(&LugreParams<T>) -> T| each(&|f| get(&f.params));
-        let params = LugreParams {
-            mu_static: p(|p| p.mu_static),
-            mu_dynamic: p(|p| p.mu_dynamic),
-            stribeck_velocity: p(|p| p.stribeck_velocity),
-            stribeck_exponent: p(|p| p.stribeck_exponent),
-            stiffness: p(|p| p.stiffness),
-            damping: p(|p| p.damping),
-        };
-        Lugre { params, curve: Stribeck::in_lanes(&|get| each(&|f| get(&f.curve))) }
-    }
-}
-
-impl<T: Arithmetic> FrictionModel<T> for Lugre<T> {
-    type Params = LugreParams<T>;
-
-    fn build(p: &LugreParams<T>) -> Result<Self, ParamError<T>> where T: Real {
-        p.check_rows()?;
-        let curve = Stribeck::new(&StribeckParams {
-            mu_static: p.mu_static,
-            mu_dynamic: p.mu_dynamic,
-            stribeck_velocity: p.stribeck_velocity,
-            stribeck_exponent: p.stribeck_exponent,
-        })?;
-        Ok(Lugre { params: *p, curve })
-    }
-
-    #[inline]
-    fn level(&self, velocity: T) -> T {
-        self.curve.level(velocity)
-    }
-
-    fn quick(&self) -> Option<Stribeck<T>>
-    where
-        T: Real,
-    {
-        self.curve.quick()
-    }
-
-    #[inline]
-    fn at_rest(&self) -> T {
-        self.curve.at_rest()
-    }
-
-    #[inline]
-    fn sliding(&self) -> T {
-        self.curve.sliding()
-    }
-
-    fn envelope(&self) -> Interval<T> where T: Real {
-        self.curve.envelope()
-    }
-
-    fn check_divisor(&self) -> Result<(), ParamError<T>> where T: Real {
-        // The rows above 0 see to it.
-        Ok(())
-    }
-
-    fn bristles(&self) -> Option<Bristles<T>> where T: Real {
-        let LugreParams { stiffness, damping, .. } = self.params;
-        Some(Bristles { curve: self.curve, stiffness, damping, elastic: T::ZERO })
-    }
+super::bristles::bristled! {
+    /// LuGre friction, checked.
+    Lugre LugreParams { mu_static, mu_dynamic, stribeck_velocity, stribeck_exponent, stiffness, damping }
+    p => StribeckParams {
+        mu_static: p.mu_static,
+        mu_dynamic: p.mu_dynamic,
+        stribeck_velocity: p.stribeck_velocity,
+        stribeck_exponent: p.stribeck_exponent,
+    },
+    (p.stiffness, p.damping, T::ZERO)
 }
