@@ -33,7 +33,7 @@ from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, 
 from clutch._tables import *  # noqa: F403
 
 if TYPE_CHECKING:
-    from clutch import dynamics, executors, gym, plot
+    from clutch import dynamics, executors, gym, plot, referee
 
 __version__ = _clutch.VERSION
 
@@ -70,6 +70,7 @@ __all__ = [
     "loop",
     "plot",
     "read_log",
+    "referee",
     "replay",
     "reproduce",
     "samples",
@@ -81,7 +82,7 @@ __all__ = [
 __all__ += _tables.__all__
 
 # Each imports a large library, so it is imported on request.
-_LATER = {"dynamics", "executors", "gym", "plot"}
+_LATER = {"dynamics", "executors", "gym", "plot", "referee"}
 
 
 def __getattr__(name: str) -> ModuleType:

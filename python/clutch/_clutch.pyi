@@ -18,7 +18,7 @@ from typing_extensions import CapsuleType
 from clutch import _model, _run
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "brake_gain", "check", "friction_lab", "main", "read_log", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "brake_gain", "check", "friction_lab", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction"]
 
 BUILD: Final[str]
 """
@@ -231,6 +231,26 @@ class Plant:
     def voltage(self, /) -> float:
         """
         Voltage last commanded, as the converter gives it, V.
+        """
+
+@final
+class RefereeCase:
+    """
+    A case of the referee; `text` is the contents of its file, `origin` what errors begin with.
+    """
+    def __new__(cls, /, origin: str, text: str) -> RefereeCase: ...
+    def judge(self, /, position: NDArray[np.float64], velocity: NDArray[np.float64], torque: NDArray[np.float64] | None, events: Sequence[tuple[float, int, bool]] | None, metrics: dict[str, float]) -> list[tuple[str, float | None, float, float, str]]:
+        """
+        Holds a trajectory against the case: name, measured, expected, within, unit of each figure.
+        """
+    def run(self, /, engine: str, step: SupportsFloat | SupportsIndex | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None, list[tuple[float, int, bool]] | None, dict[str, float]]:
+        """
+        Runs it on an engine of this package: positions and velocities (joints × samples), torques (rows × samples), events
+        of time, row and "it holds", figures.
+        """
+    def told(self, /) -> dict[str, Any]:
+        """
+        All that the case says, as a dict.
         """
 
 @final
@@ -723,6 +743,11 @@ def main(args: Sequence[str]) -> int:
 def read_log(path: str | PathLike[str]) -> Log:
     """
     Reads a log, even one that was cut.
+    """
+
+def referee_cases() -> list[tuple[str, str]]:
+    """
+    Names and files of the built-in cases.
     """
 
 def reproduce(progress: Callable[[int, int], object] | None = None) -> Paper:

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", DOCS / "index.md", *sorted((DOCS / "python").glob("*.md"))]
+PAGES = [ROOT / "README.md", DOCS / "index.md", DOCS / "referee.md", *sorted((DOCS / "python").glob("*.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # A block that needs what a test machine has not: the comment names the file whose tests run it.
 ELSEWHERE = re.compile(r"<!-- not run here: (\S+) -->\n\Z")

@@ -170,7 +170,7 @@ fn over_many_random_programs_of_velocity_friction_takes_energy_and_never_gives_i
         // With the viscous friction that makes it passive.
         let viscous = bristles.passive_from();
         let mut least = f64::INFINITY;
-        for _ in 0..3_000 {
+        for _ in 0..10_000 {
             let (mut z, mut work) = (0.0, 0.0);
             for _ in 0..20 {
                 let velocity = (random() - 0.5) * 10.0_f64.powf(-4.0 * random());

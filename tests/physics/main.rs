@@ -9,5 +9,6 @@ mod errata;
 mod intervals;
 mod laws;
 mod pid;
+mod referee;
 mod single_precision;
 mod systems;

@@ -30,6 +30,19 @@ const NAMED: &[(&str, &str)] = &[
         "scenario: Scenario | None = None, law: Callable[[Tick], float] | _run.SteppedLaw | None = None)",
     ),
     ("def __deepcopy__(self, /, _memo: Any)", "def __deepcopy__(self, /, _memo: object)"),
+    (
+        "SupportsGetItem[int, tuple[SupportsFloat | SupportsIndex, SupportsIndex, bool]]",
+        "Sequence[tuple[float, int, bool]]",
+    ),
+    (
+        "position: Incomplete, velocity: Incomplete, torque: Incomplete | None",
+        "position: NDArray[np.float64], velocity: NDArray[np.float64], torque: NDArray[np.float64] | None",
+    ),
+    (
+        "tuple[Incomplete, Incomplete, Incomplete | None,",
+        "tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None,",
+    ),
+    ("metrics: dict[str, SupportsFloat | SupportsIndex])", "metrics: dict[str, float])"),
     ("rows: list,", "rows: list[list[object]],"),
     (
         "-> tuple[Table, dict, list[tuple[int, Any]]]",
@@ -56,6 +69,7 @@ const NAMED: &[(&str, &str)] = &[
         "def step(self, /, voltage: SupportsFloat | SupportsIndex) -> Any:",
         "def step(self, /, voltage: SupportsFloat | SupportsIndex) -> int | float:",
     ),
+    ("def told(self, /) -> Any:", "def told(self, /) -> dict[str, Any]:"),
     ("def claims(self, /) -> Any:", "def claims(self, /) -> list[dict[str, Any]]:"),
     ("def table3(self, /) -> Any:", "def table3(self, /) -> list[dict[str, float]]:"),
     ("def certificate(self, /) -> Any:", "def certificate(self, /) -> dict[str, Any]:"),

@@ -11,6 +11,7 @@ mod log;
 mod loop_verb;
 mod output;
 pub mod plot;
+mod referee;
 mod replay;
 pub mod report;
 mod reproduce;
@@ -59,6 +60,7 @@ enum Verb {
     Scenario(scenario::ScenarioVerb),
     Certify(certify::Certify),
     Friction(friction::FrictionVerb),
+    Referee(referee::Referee),
     Reproduce(reproduce::Reproduce),
 }
 
@@ -83,6 +85,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Scenario(v) => v.run(),
         Verb::Certify(v) => v.run(),
         Verb::Friction(v) => v.run(),
+        Verb::Referee(v) => v.run(),
         Verb::Reproduce(v) => v.run(),
     };
     match outcome {

@@ -39,6 +39,7 @@ fn the_help_of_every_verb_has_an_example() {
         &["replay", "--help"],
         &["log", "info", "--help"],
         &["log", "recover", "--help"],
+        &["referee", "--help"],
     ] {
         let o = clutch(verb);
         assert!(o.status.success());
@@ -246,4 +247,23 @@ fn no_file_is_written_over_another_of_the_same_command() {
     assert!(err(&o).contains("named twice"), "{}", err(&o));
     assert_eq!(std::fs::read(&file).unwrap(), before);
     assert!(err(&clutch(&["sim", "smc_2", "--csv", "x.svg", "--plot", "x.svg"])).contains("named twice"));
+}
+
+#[test]
+fn the_referee_prints_a_table_of_80_columns_and_fails_where_a_case_is_missed() {
+    let o = clutch(&["referee", "P3", "X1"]);
+    assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+    assert!(out(&o).contains("P3  A brake that closes at 0.1 s stops a sliding mass"), "{}", out(&o));
+    assert!(out(&o).lines().all(|line| line.chars().count() <= 80), "{}", out(&o));
+    let text = out(&clutch(&["referee", "--show", "P3"]));
+    let file = folder("referee").join("mine.toml");
+    std::fs::write(&file, text.replace("value = 1.1", "value = 1.2")).expect("the folder is there");
+    let o = clutch(&["referee", file.to_str().expect("UTF-8"), "--engine", "system"]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(out(&o).contains("-1e-1 !"), "{}", out(&o));
+    // No engine that was asked takes it.
+    assert_eq!(clutch(&["referee", "L1", "--engine", "system"]).status.code(), Some(1));
+    let o = clutch(&["referee", "P9"]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).starts_with("clutch: P9: no such file, and no built-in case"), "{}", err(&o));
 }

@@ -6,6 +6,7 @@ mod convert;
 mod log;
 mod paper;
 mod path;
+mod referee;
 mod run;
 mod scenario;
 mod session;
@@ -32,6 +33,8 @@ mod _clutch {
     use super::paper::{Paper, reproduce};
     #[pymodule_export]
     use super::path::{Path, Target};
+    #[pymodule_export]
+    use super::referee::{RefereeCase, referee_cases};
     #[pymodule_export]
     use super::run::{Run, simulate};
     #[pymodule_export]

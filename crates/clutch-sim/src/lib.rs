@@ -8,6 +8,7 @@ pub mod moving_rig;
 pub mod paper;
 pub mod progress;
 pub mod reaching;
+pub mod referee;
 pub mod rig;
 pub mod ripple;
 pub mod run;

@@ -4,19 +4,15 @@
 //! θ̇ = ω,   J ω̇ = T − μ(z, ż) N − C ω,   ż = ż(z, ω)
 //! ```
 //!
-//! A Rosenbrock method of order 4(3) with Shampine's coefficients, A-stable, its Jacobian from differences; each step holds
-//! the error that its embedded pair sees to [`RELATIVE`] of speed and deflection. Where the velocity changes its sign the
-//! model has a corner: there the steps become short by themselves.
+//! Each step of the Rosenbrock method holds the error that its embedded pair sees to [`RELATIVE`] of speed and deflection.
+//! Where the velocity changes its sign the model has a corner: there the steps become short by themselves.
 //!
 //! Bristles never hold a shaft still, so that sticking is a matter of words: a shaft counts as stuck from the step on at
 //! whose end its bristles bend less than [`STICKS_BELOW`] of steady sliding and it is slower than the Stribeck velocity,
 //! until they bend by [`SLIDES_FROM`].
-//!
-//! L. F. Shampine, Implementation of Rosenbrock methods, ACM Trans. Math. Software 8 (1982) 93–113.
 
-use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft};
+use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, rosenbrock};
 use clutch_core::friction::{Bristles, FrictionModel};
-use nalgebra::{Matrix3, Vector3};
 
 /// Error allowed per step as a share of speed and deflection.
 const RELATIVE: f64 = 1e-8;
@@ -27,16 +23,6 @@ const STICKS_BELOW: f64 = 0.9;
 const SLIDES_FROM: f64 = 0.99;
 /// Steps in one interval before the engine gives up.
 const STEP_LIMIT: u32 = 1_000_000;
-
-/// Shampine's coefficients: of the stages, of their times, of the result and of its error.
-const GAMMA: f64 = 0.5;
-const A: [[f64; 2]; 2] = [[2.0, 0.0], [48.0 / 25.0, 6.0 / 25.0]];
-const C: [[f64; 3]; 3] =
-    [[-8.0, 0.0, 0.0], [372.0 / 25.0, 12.0 / 5.0, 0.0], [-112.0 / 125.0, -54.0 / 125.0, -0.4]];
-const AT: [f64; 2] = [1.0, 0.6];
-const TIME: [f64; 4] = [0.5, -1.5, 121.0 / 50.0, 29.0 / 250.0];
-const RESULT: [f64; 4] = [19.0 / 9.0, 0.5, 25.0 / 108.0, 125.0 / 108.0];
-const ERROR: [f64; 4] = [17.0 / 54.0, 7.0 / 36.0, 0.0, 125.0 / 108.0];
 
 /// Position from the start of the interval, velocity, deflection.
 type State = [f64; 3];
@@ -78,53 +64,11 @@ impl Equations<'_> {
         [velocity, (torque - rubs - p.viscous_damping * velocity) / p.inertia, bends]
     }
 
-    /// The Jacobian, by columns, and the derivative by time; differences of the size of `scale`.
-    fn jacobian(&self, s: f64, at: State, rate: State, scale: State, h: f64) -> ([State; 3], State) {
-        let mut columns = [[0.0; 3]; 3];
-        for (j, column) in columns.iter_mut().enumerate() {
-            // Away from rest: across it the model has a corner.
-            let by = 1e-6 * scale[j].max(at[j].abs()).copysign(if j == 1 { at[1] } else { 1.0 });
-            let mut moved = at;
-            moved[j] += by;
-            let there = self.rate(s, moved);
-            for (slot, (a, b)) in column.iter_mut().zip(there.iter().zip(rate)) {
-                *slot = (a - b) / by;
-            }
-        }
-        let by = 1e-3 * h;
-        let later = self.rate(s + by, at);
-        (columns, [0, 1, 2].map(|i| (later[i] - rate[i]) / by))
-    }
-
     /// One step; the state at its end and its error over the tolerance.
     fn step(&self, s: f64, h: f64, from: State, scale: State) -> Option<(State, f64)> {
-        let first = self.rate(s, from);
-        let (jacobian, by_time) = self.jacobian(s, from, first, scale, h);
-        let diagonal = Matrix3::from_diagonal_element(1.0 / (GAMMA * h));
-        let factors = (diagonal - Matrix3::from(jacobian)).lu();
-        let mut stages = [[0.0; 3]; 4];
-        let mut rate = first;
-        for i in 0..4 {
-            // The last stage takes the rate of the third.
-            if i == 1 || i == 2 {
-                let mut at = from;
-                for (a, stage) in A[i - 1].iter().zip(&stages).take(i) {
-                    at = [0, 1, 2].map(|n| at[n] + a * stage[n]);
-                }
-                rate = self.rate(s + AT[i - 1] * h, at);
-            }
-            let mut right = [0, 1, 2].map(|n| rate[n] + h * TIME[i] * by_time[n]);
-            if i > 0 {
-                for (c, stage) in C[i - 1].iter().zip(&stages).take(i) {
-                    right = [0, 1, 2].map(|n| right[n] + c * stage[n] / h);
-                }
-            }
-            stages[i] = factors.solve(&Vector3::from(right))?.into();
-        }
-        let sum =
-            |weights: &[f64; 4], n: usize| weights.iter().zip(&stages).map(|(w, g)| w * g[n]).sum::<f64>();
-        let to = [0, 1, 2].map(|n| from[n] + sum(&RESULT, n));
-        let wrong = |n: usize, allowed: f64| (sum(&ERROR, n) / allowed).abs();
+        let rate = |s: f64, state: &State| self.rate(s, *state);
+        let (to, wrong) = rosenbrock::step(&rate, (s, &from, h), &scale, &[1.0, from[1], 1.0])?;
+        let wrong = |n: usize, allowed: f64| (wrong[n] / allowed).abs();
         let most = |n: usize| from[n].abs().max(to[n].abs());
         let speed = ABSOLUTE * scale[1] + RELATIVE * most(1);
         let bent = ABSOLUTE * scale[2] + RELATIVE * most(2);

@@ -15,6 +15,7 @@ mod bristle;
 mod dormand_prince;
 mod exact_flow;
 pub(crate) mod pair;
+pub(crate) mod rosenbrock;
 
 pub use bristle::Bristle;
 pub use dormand_prince::DormandPrince;

@@ -9,12 +9,16 @@
 //! redundant. Which rows hold and which slip is one strictly convex problem ([`hold`]); between events the motion is
 //! smooth and taken by Dormand and Prince's pair, events are located to [`INSTANT`]; what holds stands still exactly.
 //!
+//! Rows with bristles never hold exactly; a system of such has an engine of its own, [`BristledMotion`].
+//!
 //! Not here: normal forces that depend on reactions (as of a block on an incline that a lever presses), impacts, backlash,
-//! friction with bristles.
+//! rows with bristles beside rows without.
 
+mod bristled;
 mod modes;
 mod motion;
 
+pub use bristled::BristledMotion;
 pub use modes::{Held, hold};
 pub use motion::{INSTANT, Mode, Motion, State, SystemError, SystemEvent};
 
@@ -41,7 +45,7 @@ pub trait System<const N: usize, const B: usize> {
     /// `N_i`: normal forces, as torque per unit of μ; below 0 counts as 0.
     fn normal(&self, t: f64) -> SVector<f64, B>;
 
-    /// Friction of a row; one without bristles.
+    /// Friction of a row.
     fn friction(&self, row: usize) -> &Friction<f64>;
 
     /// Time within which no load or normal force goes to and fro, s: a row that lets go and holds again within a step of that

@@ -78,6 +78,9 @@ pub enum SystemError {
         "row {0} has a friction with bristles (lugre, dahl, elasto_plastic): expected one that sticks exactly"
     )]
     Bristles(usize),
+    /// The friction of a row has none.
+    #[error("row {0} has a friction without bristles: expected lugre, dahl or elasto_plastic in every row")]
+    NoBristles(usize),
 }
 
 /// A system in motion.
@@ -185,6 +188,25 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         &self.modes
     }
 
+    /// Friction of the rows, N m: of those that hold, what the least constraint asks.
+    ///
+    /// # Errors
+    /// An inertia that is none.
+    pub fn friction(&self) -> Result<SVector<f64, B>, SystemError> {
+        let e = self.equations(&self.state)?;
+        let a = e.rows * e.inverse * e.rows.transpose();
+        let held = hold(&a, &(e.rows * e.free), &e.bound, &self.stuck()).torque;
+        Ok(held + self.rubs(&e.slip, &self.system.normal(self.state.time).map(|n| n.max(0.0))))
+    }
+
+    /// Friction of the rows that slip.
+    fn rubs(&self, slip: &SVector<f64, B>, normal: &SVector<f64, B>) -> SVector<f64, B> {
+        SVector::from_fn(|i, _| {
+            let sign = self.modes[i].sign();
+            sign * self.system.friction(i).level((sign * slip[i]).max(0.0)) * normal[i]
+        })
+    }
+
     fn equations(&self, state: &State<N>) -> Result<Equations<N, B>, SystemError> {
         let State { time, position, velocity } = state;
         let inertia = self.system.inertia(position);
@@ -193,10 +215,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         let slip = rows * velocity - self.system.base(*time);
         let normal = self.system.normal(*time).map(|n| n.max(0.0));
         let bound = SVector::<f64, B>::from_fn(|i, _| self.system.friction(i).at_rest() * normal[i]);
-        let rubs = SVector::<f64, B>::from_fn(|i, _| {
-            let sign = self.modes[i].sign();
-            sign * self.system.friction(i).level((sign * slip[i]).max(0.0)) * normal[i]
-        });
+        let rubs = self.rubs(&slip, &normal);
         let free = inverse * (self.system.applied(*time, position, velocity) - rows.transpose() * rubs);
         Ok(Equations { inverse, rows, free, bound, slip })
     }

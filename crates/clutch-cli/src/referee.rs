@@ -1,0 +1,221 @@
+//! `clutch referee`.
+
+use crate::output::{Exit, json, print};
+use anyhow::Context;
+use clap::Args;
+use clutch_sim::referee::{BUILT_IN, Case, ENGINES, RefereeEngine, RefereeError, Verdict, run};
+use serde_json::json;
+use std::path::Path;
+use std::time::Instant;
+
+/// Holds the engines against cases whose answer is known from elsewhere.
+///
+/// Each engine runs the cases that it takes. A table for each case says how far it is off what is expected; a mark `!`
+/// stands where that is more than the case allows. Exit code 1 if there is such a mark, or no engine took a case.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  clutch referee\n  clutch referee A5 L1 --engine system\n  clutch referee mine.toml\n  clutch referee --show A5 > mine.toml\n\n`python -m clutch.referee` adds engines of other makes to the table."
+)]
+pub(crate) struct Referee {
+    /// Names of built-in cases, or case files; none for all built-in ones.
+    #[arg(value_name = "CASE")]
+    cases: Vec<String>,
+    /// Runs this engine only; may be given several times.
+    #[arg(long, value_name = "NAME", value_parser = engine)]
+    engine: Vec<RefereeEngine>,
+    /// Lists the built-in cases and ends.
+    #[arg(long, conflicts_with_all = ["cases", "engine", "json"])]
+    list: bool,
+    /// Prints a built-in case and ends.
+    #[arg(long, value_name = "CASE", conflicts_with_all = ["cases", "engine", "json", "list"])]
+    show: Option<String>,
+    /// Prints the results as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn engine(name: &str) -> Result<RefereeEngine, String> {
+    RefereeEngine::named(name).ok_or_else(|| {
+        let names: Vec<&str> = ENGINES.iter().map(|e| e.name()).collect();
+        format!("expected one of: {}", names.join(", "))
+    })
+}
+
+fn built_in(name: &str) -> Option<&'static str> {
+    BUILT_IN.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
+}
+
+fn load(name: &str) -> anyhow::Result<Case> {
+    let text = match (built_in(name), Path::new(name).exists()) {
+        (Some(text), false) => text.to_owned(),
+        (_, true) => std::fs::read_to_string(name).with_context(|| format!("{name}: cannot be read"))?,
+        (None, false) => {
+            anyhow::bail!("{name}: no such file, and no built-in case; `clutch referee --list` shows those")
+        }
+    };
+    Ok(Case::parse(name, &text)?)
+}
+
+/// What an engine made of a case.
+struct Outcome {
+    engine: RefereeEngine,
+    verdicts: Vec<Verdict>,
+    seconds: f64,
+    /// Why the engine gave up.
+    error: Option<String>,
+}
+
+impl Outcome {
+    fn missed(&self) -> usize {
+        self.verdicts.iter().filter(|v| !v.holds()).count() + usize::from(self.error.is_some())
+    }
+}
+
+/// The results of all engines that take the case.
+fn results(case: &Case, engines: &[RefereeEngine]) -> Vec<Outcome> {
+    let one = |engine: &RefereeEngine| {
+        let begin = Instant::now();
+        let (verdicts, error) = match run(case, *engine, None) {
+            Ok(trajectory) => (case.judge(&trajectory), None),
+            Err(RefereeError::NotForIt(_)) => return None,
+            Err(e) => (Vec::new(), Some(e.to_string())),
+        };
+        Some(Outcome { engine: *engine, verdicts, seconds: begin.elapsed().as_secs_f64(), error })
+    };
+    engines.iter().filter_map(one).collect()
+}
+
+impl Referee {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
+        if self.list {
+            for (name, text) in BUILT_IN {
+                let case = Case::parse(name, text)?;
+                print(&format!("{:18} {}\n", case.id, case.title))?;
+            }
+            return Ok(Exit::Done);
+        }
+        if let Some(name) = &self.show {
+            let text = built_in(name).with_context(|| {
+                format!("{name}: no built-in case of that name; `clutch referee --list` shows those")
+            })?;
+            print(text)?;
+            return Ok(Exit::Done);
+        }
+        let names = if self.cases.is_empty() {
+            BUILT_IN.iter().map(|(name, _)| (*name).to_owned()).collect()
+        } else {
+            self.cases
+        };
+        let engines = if self.engine.is_empty() { ENGINES.to_vec() } else { self.engine };
+        // All are read before the first runs.
+        let cases = names.iter().map(|name| load(name)).collect::<anyhow::Result<Vec<_>>>()?;
+        let mut all = Vec::new();
+        for case in &cases {
+            let results = results(case, &engines);
+            if !self.json {
+                print(&table(case, &results))?;
+            }
+            all.push(results);
+        }
+        if self.json {
+            print(&json(&as_json(&cases, &all))?)?;
+        } else {
+            print(&summary(&engines, &all))?;
+        }
+        let missed: usize = all.iter().flatten().map(Outcome::missed).sum();
+        // A comparison without a figure shows nothing.
+        let figures: usize = all.iter().flatten().map(|r| r.verdicts.len()).sum();
+        Ok(if missed > 0 || figures == 0 { Exit::Failed } else { Exit::Done })
+    }
+}
+
+fn as_json(cases: &[Case], all: &[Vec<Outcome>]) -> serde_json::Value {
+    let one = |(case, results): (&Case, &Vec<Outcome>)| {
+        let results = results.iter().map(|r| {
+            let figures = r.verdicts.iter().map(|v| {
+                json!({ "name": v.name, "unit": v.unit, "measured": v.measured, "expected": v.expected,
+                        "within": v.within, "holds": v.holds() })
+            });
+            json!({ "engine": r.engine.name(), "seconds": r.seconds, "error": r.error,
+                    "figures": figures.collect::<Vec<_>>() })
+        });
+        json!({ "id": case.id, "title": case.title, "source": case.source,
+                "results": results.collect::<Vec<_>>() })
+    };
+    cases.iter().zip(all).map(one).collect()
+}
+
+/// Columns of names and of numbers.
+const NAME: usize = 23;
+const NUMBER: usize = 14;
+const SIZE: usize = 7;
+const ENGINE: usize = 11;
+
+/// A case: a line for each figure, a column for each engine.
+fn table(case: &Case, results: &[Outcome]) -> String {
+    let mut out = format!("{}  {}\n", case.id, case.title);
+    if results.is_empty() {
+        return out + "  no engine that was asked takes it\n\n";
+    }
+    out += &format!("  {:NAME$}{:>NUMBER$}{:>SIZE$}", "", "expected", "within");
+    for r in results {
+        // Cut to its column; the last table has the whole name.
+        out += &format!("{:>ENGINE$}", r.engine.name().chars().take(ENGINE - 1).collect::<String>());
+    }
+    out.push('\n');
+    for (i, expect) in case.expect.iter().enumerate() {
+        let unit = if expect.unit.is_empty() { String::new() } else { format!(", {}", expect.unit) };
+        let name = format!("{}{unit}", expect.name);
+        let expected = digits(expect.value);
+        out += &format!("  {name:NAME$}{expected:>NUMBER$}{:>SIZE$}", size(expect.within));
+        for r in results {
+            let off = match r.verdicts.get(i) {
+                None => "gave up !".to_owned(),
+                Some(v) => match v.measured {
+                    None => "none !".to_owned(),
+                    Some(x) if x == v.expected => "exact".to_owned(),
+                    Some(x) => {
+                        let mark = if v.holds() { "" } else { " !" };
+                        format!(
+                            "{}{}{mark}",
+                            if x > v.expected { "+" } else { "-" },
+                            size((x - v.expected).abs())
+                        )
+                    }
+                },
+            };
+            out += &format!("{off:>ENGINE$}");
+        }
+        out.push('\n');
+    }
+    for r in results {
+        if let Some(e) = &r.error {
+            out += &format!("  {}: {e}\n", r.engine.name());
+        }
+    }
+    out + "\n"
+}
+
+/// A number with at most eleven digits.
+fn digits(x: f64) -> String {
+    let rounded = format!("{x:.10e}").parse().unwrap_or(x);
+    if x != 0.0 && x.abs() < 1e-3 { format!("{rounded:e}") } else { format!("{rounded}") }
+}
+
+/// A size with two digits.
+fn size(x: f64) -> String {
+    if x == 0.0 { "0".to_owned() } else { format!("{x:.0e}") }
+}
+
+fn summary(engines: &[RefereeEngine], all: &[Vec<Outcome>]) -> String {
+    let mut out =
+        format!("{:18}{:>7}{:>10}{:>10}{:>10}\n", "engine", "cases", "figures", "missed", "time, s");
+    for engine in engines {
+        let own: Vec<&Outcome> = all.iter().flatten().filter(|r| r.engine == *engine).collect();
+        let figures: usize = own.iter().map(|r| r.verdicts.len()).sum();
+        let missed: usize = own.iter().map(|r| r.missed()).sum();
+        let seconds = own.iter().map(|r| r.seconds).sum::<f64>() + 0.0; // an empty sum is −0
+        out += &format!("{:18}{:>7}{figures:>10}{missed:>10}{seconds:>10.2}\n", engine.name(), own.len());
+    }
+    out
+}

@@ -1,0 +1,54 @@
+"""What adapters of engines with a fixed step share."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clutch.referee._case import Case, Mechanism
+
+__all__ = ["LEVELS", "Level", "frame", "missing", "refuses_length", "substeps", "version"]
+
+#: The step that a run takes where a case's samples are not nearer to each other, s.
+STEP = 1e-3
+#: Which of the two levels of a case's friction the one of an engine is, and its words.
+Level = Literal["mu_static", "mu_dynamic"]
+LEVELS: dict[Level, str] = {"mu_static": "that of rest", "mu_dynamic": "that of sliding"}
+
+
+def missing(*packages: str) -> str | None:
+    """The first package that is not installed."""
+    absent = [name for name in packages if importlib.util.find_spec(name) is None]
+    return f"{absent[0]} is not installed" if absent else None
+
+
+def version(package: str) -> str:
+    """Version of a package, if it is installed."""
+    return importlib.metadata.version(package) if missing(package) is None else "(not installed)"
+
+
+def substeps(case: Case) -> int:
+    """Steps from one sample of a case to the next."""
+    return max(1, round(case.sample / STEP))
+
+
+def refuses_length(case: Case, most: int) -> str | None:
+    """Why a case is too long for so many steps."""
+    if case.mechanism is None:
+        return "a scenario has an encoder and a law"
+    steps = case.samples * substeps(case)
+    return f"would take {steps} steps of {1e3 * case.sample / substeps(case):g} ms" if steps > most else None
+
+
+def frame(m: Mechanism) -> NDArray[np.float64] | None:
+    """Velocities of the joints at which no row slips; None if there are none."""
+    joints = np.array([row.joints for row in m.rows]).reshape(len(m.rows), len(m.load))
+    base = np.array([row.base_velocity for row in m.rows])
+    if not base.any():
+        return np.zeros(len(m.load))
+    rest = np.linalg.lstsq(joints, base)[0]
+    return np.asarray(rest) if np.allclose(joints @ rest, base, rtol=1e-12, atol=0.0) else None

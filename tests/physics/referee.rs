@@ -1,0 +1,209 @@
+//! The referee's cases: every one within its tolerance, on every engine that takes it.
+
+use clutch_sim::referee::{BUILT_IN, Case, ENGINES, Model, RefereeEngine, RefereeError, run};
+
+fn cases() -> Vec<Case> {
+    BUILT_IN.iter().map(|(name, text)| Case::parse(name, text).unwrap_or_else(|e| panic!("{e}"))).collect()
+}
+
+/// Runs it on an engine, if that takes it.
+fn takes(case: &Case, engine: RefereeEngine) -> Option<clutch_sim::referee::Trajectory> {
+    match run(case, engine, None) {
+        Ok(trajectory) => Some(trajectory),
+        Err(RefereeError::NotForIt(_)) => None,
+        Err(e) => panic!("{} on {}: {e}", case.id, engine.name()),
+    }
+}
+
+#[test]
+fn every_case_holds_on_every_engine_that_takes_it() {
+    let mut missed = String::new();
+    let mut figures = [0; ENGINES.len()];
+    for case in cases() {
+        let before: usize = figures.iter().sum();
+        for (count, engine) in figures.iter_mut().zip(ENGINES) {
+            let Some(trajectory) = takes(&case, engine) else { continue };
+            trajectory.check(&case).unwrap();
+            for verdict in case.judge(&trajectory) {
+                *count += 1;
+                if !verdict.holds() {
+                    missed += &format!("{} on {}: {verdict:?}\n", case.id, engine.name());
+                }
+            }
+        }
+        assert!(figures.iter().sum::<usize>() > before, "no engine takes {}", case.id);
+    }
+    assert_eq!(missed, "");
+    // Each engine has been judged, not skipped.
+    for (engine, (count, least)) in ENGINES.iter().zip(figures.iter().zip([50, 25, 30, 20, 20])) {
+        assert!(*count >= least, "{}: {count} figures", engine.name());
+    }
+}
+
+#[test]
+fn a_case_that_expects_something_else_fails() {
+    for (name, text) in BUILT_IN {
+        let case = Case::parse(name, text).unwrap();
+        // Each expectation off by three times what it allows, or a millionth where it allows nothing.
+        let off = |e: &clutch_sim::referee::Expect| {
+            e.value + 3.0 * e.within + if e.within == 0.0 { 1e-6 } else { 0.0 }
+        };
+        let wrong = Case {
+            expect: case
+                .expect
+                .iter()
+                .cloned()
+                .map(|e| {
+                    let value = off(&e);
+                    clutch_sim::referee::Expect { value, ..e }
+                })
+                .collect(),
+            ..case
+        };
+        for engine in ENGINES {
+            if let Some(trajectory) = takes(&wrong, engine) {
+                assert!(wrong.judge(&trajectory).iter().all(|v| !v.holds()), "{name} on {}", engine.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn figures_of_bristles_do_not_depend_on_the_period_in_which_the_shaft_is_asked() {
+    // 1 ms, 0.1 ms and 10 µs, sampled each millisecond, so that like is compared with like.
+    let bristled = |case: &Case| takes(case, RefereeEngine::Bristle).is_some();
+    let mut compared = 0;
+    for mut case in cases().into_iter().filter(bristled) {
+        case.sample = case.sample.max(1e-3).min(case.duration / 20.0);
+        if case.duration > 40.0 {
+            continue; // tens of millions of steps
+        }
+        let figures = |share: f64| {
+            let trajectory = run(&case, RefereeEngine::Bristle, Some(case.sample * share)).unwrap();
+            case.judge(&trajectory)
+        };
+        let finest = figures(0.01);
+        for share in [1.0, 0.1] {
+            for (a, b) in figures(share).iter().zip(&finest) {
+                let (Some(x), Some(y)) = (a.measured, b.measured) else { continue };
+                assert!((x - y).abs() <= 1e-6 * y.abs().max(1e-9), "{} {}: {x} and {y}", case.id, a.name);
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 30, "{compared} figures");
+}
+
+#[test]
+fn numbers_out_of_all_proportion_are_refused_or_taken_and_nothing_panics() {
+    let (mut refused, mut taken) = (0, 0);
+    for (name, text) in BUILT_IN {
+        let numbers: Vec<(usize, &str)> = text
+            .match_indices(|c: char| c.is_ascii_digit() || c == '.' || c == '-')
+            .filter(|(i, _)| !text[..*i].ends_with(|c: char| c.is_ascii_alphanumeric() || "._-".contains(c)))
+            .collect();
+        for (begin, _) in numbers {
+            let end = text[begin..].find(|c: char| !(c.is_ascii_alphanumeric() || "._-+".contains(c)));
+            let end = end.map_or(text.len(), |n| begin + n);
+            for other in ["nan", "-inf", "-1.0", "0.0", "0", "1e308", "\"x\"", "9223372036854775807", "[]"] {
+                let changed = format!("{}{other}{}", &text[..begin], &text[end..]);
+                match Case::parse(name, &changed) {
+                    Ok(case) => {
+                        taken += 1;
+                        assert!(case.samples() <= 5_000_000);
+                        assert!(!matches!(&case.model, Model::Mechanism(m) if m.rows.is_empty()));
+                    }
+                    Err(e) => {
+                        refused += 1;
+                        assert!(e.to_string().starts_with(name), "{e}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(refused > 1000 && taken > 500, "{refused} refused, {taken} taken");
+}
+
+#[test]
+fn each_mistake_in_a_case_is_named() {
+    let good = BUILT_IN.iter().find(|(name, _)| *name == "A5").unwrap().1;
+    Case::parse("mine", good).unwrap();
+    for (from, to, said) in [
+        (
+            "inertia = [[1.0]]",
+            "inertia = [[-1.0]]",
+            "mechanism.inertia: expected a symmetric, positive definite matrix",
+        ),
+        ("inertia = [[1.0]]", "inertia = [[1.0, 0.0]]", "mechanism.inertia: expected 1 rows of 1 numbers"),
+        ("stiffness = [[2.0]]", "spring = [[2.0]]", "unknown field `spring`"),
+        ("velocity = [0.1]", "velocity = [0.1, 0.2]", "mechanism.velocity: 2 numbers; expected 1"),
+        ("joints = [1.0]", "joints = []", "mechanism.row[0].joints: expected 1 finite numbers"),
+        (
+            "constant = 1.0",
+            "constant = inf",
+            "mechanism.row[0].normal.constant = inf: expected a finite number",
+        ),
+        (
+            "constant = 1.0",
+            "from_s = -1",
+            "mechanism.row[0].normal.from_s = -1: expected a time of at least 0 s",
+        ),
+        (
+            "mu_static = 1.5",
+            "mu_static = -1.5",
+            "mechanism.row[0].friction.coulomb.mu_static = -1.5: expected",
+        ),
+        ("mu_static = 1.5", "mu_static = 0.5", "mechanism.row[0].friction.coulomb.mu_static"),
+        ("coulomb = {", "colomb = {", "mechanism.row[0].friction.colomb: unknown key: did you mean coulomb?"),
+        ("duration_s = 60", "duration_s = -60", "duration_s = -60: expected a number above 0"),
+        (
+            "sample_s = 0.001",
+            "sample_s = 0.7",
+            "sample_s = 0.7: expected duration_s = 60 divided by a whole number",
+        ),
+        ("sample_s = 0.001", "", "sample_s: missing"),
+        ("still = 0.001", "still = 0", "still = 0: expected a number above 0"),
+        ("within = 1e-09", "within = -1", "expect[0].within = -1: expected a number of at least 0"),
+        (
+            "kind = \"slip_time\", number = 3",
+            "kind = \"slip_time\", number = 0",
+            "expect[0].observe.number = 0: expected",
+        ),
+        ("kind = \"slip_time\", number = 3", "kind = \"slip_tim\"", "unknown variant `slip_tim`"),
+        (
+            "kind = \"slip_time\", number = 3",
+            "kind = \"slip_time\", row = 2",
+            "expect[0].observe.row = 2: expected the number of a row",
+        ),
+        (
+            "kind = \"slip_time\", number = 3",
+            "kind = \"slip_time\", at_s = 2",
+            "expect[0].observe.at_s: this kind takes none",
+        ),
+        (
+            "kind = \"slip_time\", number = 3",
+            "kind = \"at\", at_s = 2.0",
+            "expect[0].observe.expected position, velocity or torque",
+        ),
+        (
+            "kind = \"slip_time\", number = 3",
+            "kind = \"at\", position = [1.0]",
+            "expect[0].observe.at_s: missing",
+        ),
+        (
+            "kind = \"slip_time\", number = 3",
+            "kind = \"at\", position = [1.0], at_s = 61.0",
+            "at_s = 61: expected a time from 0 to duration_s = 60",
+        ),
+        (
+            "kind = \"slip_time\", number = 3",
+            "kind = \"at\", torque = [1.0, 1.0], at_s = 6.0",
+            "torque: 2 weights; expected 1",
+        ),
+        ("kind = \"slip_time\", number = 3", "kind = \"metric\", metric = \"x\"", "metrics are of scenarios"),
+    ] {
+        assert!(good.contains(from), "{from}");
+        let e = Case::parse("mine", &good.replacen(from, to, 1)).expect_err(to).to_string();
+        assert!(e.starts_with("mine: ") && e.contains(said), "{to}:\n{e}\ninstead of\n{said}");
+    }
+}
