@@ -61,8 +61,8 @@ fn supervisor<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl F
             supervisor.sample(&servo, &mut supervised, black_box(&sample), path)
         });
     });
-    // A run that had ended would be measured without its law.
-    assert_eq!(supervised.state(), State::Running);
+    // A run that had ended would be measured without its law; one that nobody asked for has not begun.
+    assert!(tick == 0 || supervised.state() == State::Running);
 }
 
 /// A sample on the wire.
@@ -108,7 +108,7 @@ fn frames<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u6
             out.clear();
         });
     });
-    assert_eq!(controller.state().state(), State::Running);
+    assert!(tick == 0 || controller.state().state() == State::Running);
 }
 
 /// The time that a log adds.
@@ -135,7 +135,7 @@ fn log<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) 
             out.clear();
         });
     });
-    assert_eq!(controller.state().state(), State::Running);
+    assert!(tick == 0 || controller.state().state() == State::Running);
 }
 
 fn cycle<T: Real>(c: &mut Criterion, scalar: &str) {

@@ -106,6 +106,10 @@ class ElastoPlasticFriction(_Friction):
     """Elasto-plastic friction."""
 
 
+class MaxwellFriction(_Friction):
+    """Generalised Maxwell slip."""
+
+
 class BrakeGeometry(_Params):
     """The gain that follows from a geometry."""
 

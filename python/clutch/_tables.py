@@ -32,6 +32,7 @@ __all__ = [
     "JerkLimited",
     "Limits",
     "LugreFriction",
+    "MaxwellFriction",
     "MinimumJerk",
     "Model",
     "MotorActuator",
@@ -462,7 +463,77 @@ class ElastoPlasticFriction(_mixins.ElastoPlasticFriction):
     mu_elastic: float = 0.12
 
 
-Friction = StribeckFriction | CoulombFriction | LugreFriction | DahlFriction | ElastoPlasticFriction
+@dataclass(frozen=True, kw_only=True, repr=False)
+class MaxwellFriction(_mixins.MaxwellFriction):
+    """Generalised Maxwell slip: four springs side by side that hold up to their shares of the friction and
+    then slide. It needs the engine `bristle`.
+
+    Parameters
+    ----------
+    mu_static : float, default 0.2
+        Coefficient of friction at which all elements have given way from rest. `μ_s`: a finite number above
+        0.
+    mu_dynamic : float, default 0.15
+        Coefficient of friction of a fast shaft. `μ_d`: a finite number above 0.
+    stribeck_velocity_rad_s : float, default 0.001
+        Stribeck velocity of steady sliding. `θ̇_s`: a finite number above 0 rad/s whose inverse is finite,
+        too.
+    stribeck_exponent : float, default 2.0
+        Stribeck exponent of steady sliding. `δ`: a finite number above 0.
+    stiffness_a_1_rad : float, default 1600.0
+        Stiffness of the first element, as a coefficient of friction per angle. `k_a`: a finite number above 0
+        1/rad whose inverse is finite, too.
+    stiffness_b_1_rad : float, default 800.0
+        Stiffness of the second element. `k_b`: a finite number above 0 1/rad whose inverse is finite, too.
+    stiffness_c_1_rad : float, default 400.0
+        Stiffness of the third element. `k_c`: a finite number above 0 1/rad whose inverse is finite, too.
+    stiffness_d_1_rad : float, default 200.0
+        Stiffness of the fourth element. `k_d`: a finite number above 0 1/rad whose inverse is finite, too.
+    share_a : float, default 0.25
+        Share of the friction that the first element bears. `α_a`: a number from 0 to 1.
+    share_b : float, default 0.25
+        Share of the second element. `α_b`: a number from 0 to 1.
+    share_c : float, default 0.25
+        Share of the third element; the fourth bears the rest. `α_c`: a number from 0 to 1; a share that
+        leaves share_a + share_b + share_c at 1 or below.
+    attraction_1_s : float, default 50.0
+        Rate at which a sliding element comes to its share. `C`: a finite number of at least 0 1/s.
+    damping_s_rad : float, default 1.0
+        Damping of held elements, as a coefficient of friction per velocity. `σ`: a finite number of at least
+        0 s/rad.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    Three elements, none in the third place; the fourth bears what the others leave:
+
+    >>> import clutch
+    >>> clutch.MaxwellFriction(share_a=0.5, share_b=0.3, share_c=0.0).attraction_1_s
+    50.0
+    """
+
+    _key: ClassVar[str] = "rig.friction.maxwell"
+
+    mu_static: float = 0.2
+    mu_dynamic: float = 0.15
+    stribeck_velocity_rad_s: float = 0.001
+    stribeck_exponent: float = 2.0
+    stiffness_a_1_rad: float = 1600.0
+    stiffness_b_1_rad: float = 800.0
+    stiffness_c_1_rad: float = 400.0
+    stiffness_d_1_rad: float = 200.0
+    share_a: float = 0.25
+    share_b: float = 0.25
+    share_c: float = 0.25
+    attraction_1_s: float = 50.0
+    damping_s_rad: float = 1.0
+
+
+Friction = StribeckFriction | CoulombFriction | LugreFriction | DahlFriction | ElastoPlasticFriction | MaxwellFriction
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -877,7 +948,7 @@ class Rig(_mixins.Rig):
         faster ends control. A finite number above 0 °/s.
     actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator
         Effect of a voltage on the shaft. By default `BrakeActuator()`.
-    friction : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction or ElastoPlasticFriction
+    friction : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction, ElastoPlasticFriction or MaxwellFriction
         Friction of pad on disc. By default `StribeckFriction()`.
     drive : WeightDrive, SpringDrive, BeltDrive, TableDrive, RampDrive, SineDrive, ChirpDrive or HandDrive
         The drive of the shaft. By default `WeightDrive()`.
@@ -933,7 +1004,7 @@ class Model(_Params):
         Viscous damping, in (1). `C_d`: a finite number of at least 0 N m s/rad.
     actuator : BrakeActuator, BrakeGeometry, MotorActuator or BothActuator
         Effect of a voltage on the shaft. By default `BrakeActuator()`.
-    friction : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction or ElastoPlasticFriction
+    friction : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction, ElastoPlasticFriction or MaxwellFriction
         Friction of pad on disc. By default `StribeckFriction()`.
 
     Raises
@@ -1706,7 +1777,7 @@ class RunSettings(_Params):
         `exact_flow`: Closed forms, quadrature and series of the motion between samples: for friction that
         falls exponentially with the speed and is even along the disc, torque and voltage held between
         samples. `bristle`: A Rosenbrock method for stiff motions: for friction with bristles (LuGre, Dahl,
-        elasto-plastic).
+        elasto-plastic, Maxwell).
 
     Raises
     ------

@@ -824,8 +824,8 @@ def friction(*frictions: _Friction, labels: Sequence[str] | None = None) -> Figu
 
     Parameters
     ----------
-    *frictions : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction or ElastoPlasticFriction
-        One curve each.
+    *frictions : StribeckFriction, CoulombFriction, LugreFriction, DahlFriction, …
+        Frictions, as a rig has one; one curve each.
     labels : sequence of str, optional
         A name for each in the legend; by default those of the models.
 

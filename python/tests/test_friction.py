@@ -14,6 +14,7 @@ MODELS = [
     clutch.LugreFriction(),
     clutch.DahlFriction(),
     clutch.ElastoPlasticFriction(),
+    clutch.MaxwellFriction(),
 ]
 INERTIA, DAMPING, NORMAL = 0.0017, 0.001, 0.14 * 2.0
 SINE = {"mean_nm": 0.03, "amplitude_nm": 0.05, "frequency_hz": 3.0}

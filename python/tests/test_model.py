@@ -45,6 +45,7 @@ REQUIRED = {
     clutch.LugreFriction: {},
     clutch.DahlFriction: {},
     clutch.ElastoPlasticFriction: {},
+    clutch.MaxwellFriction: {},
     clutch.BrakeActuator: {},
     clutch.BrakeGeometry: GEOMETRY,
     clutch.MotorActuator: {"gain_nm_v": 0.05, "preload_nm": 0.25},
@@ -637,6 +638,12 @@ VALID = {
     clutch.LugreFriction: each(**BRISTLES),
     clutch.DahlFriction: each(mu_dynamic=POSITIVE, stiffness_1_rad=POSITIVE),
     clutch.ElastoPlasticFriction: each(**BRISTLES, mu_elastic=st.floats(0.01, 0.09)),
+    clutch.MaxwellFriction: each(
+        **{key: strategy for key, strategy in BRISTLES.items() if key != "stiffness_1_rad"},
+        **{f"stiffness_{element}_1_rad": POSITIVE for element in "abcd"},
+        **{f"share_{element}": st.floats(0, 0.33) for element in "abc"},
+        attraction_1_s=number(0, 1000),
+    ),
     clutch.BrakeActuator: each(gain_nm_v=POSITIVE, preload_nm=number(0, 10)),
     clutch.BrakeGeometry: each(**dict.fromkeys(GEOMETRY, POSITIVE)),
     clutch.MotorActuator: each(gain_nm_v=POSITIVE, preload_nm=number(0, 10), load_share=number(0, 1)),
@@ -744,6 +751,7 @@ FRICTIONS = [
     clutch.LugreFriction,
     clutch.DahlFriction,
     clutch.ElastoPlasticFriction,
+    clutch.MaxwellFriction,
 ]
 
 VALID[clutch.Rig] = each(

@@ -3,8 +3,11 @@
 //! The values are those of Canudas de Wit et al. (1995): 1 kg on 1 N of friction, 1.5 N at break-away, bristles of 10⁵ N/m
 //! with a damping of √10⁵ N s/m, a Stribeck velocity of 1 mm/s, 0.4 N s/m of viscous friction. A metre is a radian here.
 
-use clutch_core::friction::{DahlParams, ElastoPlasticParams, FrictionModel, FrictionParams, LugreParams};
-use clutch_core::{ActuatorParams, Friction, Plant, PlantParams};
+use clutch_core::friction::{
+    Bend, DahlParams, ELEMENTS, ElastoPlasticParams, FrictionModel, FrictionParams, LugreParams,
+    MaxwellParams,
+};
+use clutch_core::{ActuatorParams, Bristles, Friction, Plant, PlantParams};
 use clutch_sim::drive::{Drive, DriveParams, RampDrive, SineDrive};
 use clutch_sim::engine::{Bristle, Engine, Event, EventKind, Input, Model, Shaft, Volts};
 
@@ -32,6 +35,35 @@ fn elasto_plastic() -> ElastoPlasticParams {
         damping,
         elastic,
     }
+}
+
+/// Four springs that give way after 6.25, 12.5, 25 and 50 µm at one coefficient.
+fn maxwell() -> MaxwellParams {
+    let LugreParams { mu_static, mu_dynamic, stribeck_velocity, stribeck_exponent, .. } = lugre();
+    let [stiffness_a, stiffness_b, stiffness_c, stiffness_d] = [4e4, 2e4, 1e4, 5e3];
+    let (share_a, share_b, share_c) = (0.25, 0.25, 0.25);
+    MaxwellParams {
+        mu_static,
+        mu_dynamic,
+        stribeck_velocity,
+        stribeck_exponent,
+        stiffness_a,
+        stiffness_b,
+        stiffness_c,
+        stiffness_d,
+        share_a,
+        share_b,
+        share_c,
+        attraction: 50.0,
+        damping: 100.0,
+    }
+}
+
+/// Bristles after a time at these rates.
+fn moved(bend: &Bend<f64>, rates: &[f64; ELEMENTS], dt: f64) -> Bend<f64> {
+    let mut moved = *bend;
+    moved.each.iter_mut().zip(rates).for_each(|(z, rate)| *z += dt * rate);
+    moved
 }
 
 /// 1 kg, 0.4 N s/m, 1 N of normal force.
@@ -97,17 +129,17 @@ fn friction_lags_behind_the_velocity() {
     // Sliding between 0.3 and 1.7 mm/s: friction is higher on the way up than on the way down.
     let friction = Friction::build(&lugre().into()).unwrap();
     let bristles = friction.bristles().unwrap();
-    let (mut z, dt) = (bristles.steady(0.001), 1e-6);
+    let (mut bend, dt) = (bristles.steady(0.001), 1e-6);
     let (mut rising, mut falling) = (0.0, 0.0);
     for k in 0..300_000 {
         let phase = f64::from(k) * dt * 10.0 * std::f64::consts::TAU;
         let velocity = 0.001 + 0.0007 * phase.sin();
-        let rate = bristles.rate(z, velocity);
+        let rate = bristles.rate(&bend, velocity);
         if k >= 200_000 && phase.sin().abs() < 1e-3 {
-            let mu = bristles.coefficient(z, rate);
+            let mu = bristles.coefficient(&bend, &rate);
             *(if phase.cos() > 0.0 { &mut rising } else { &mut falling }) = mu;
         }
-        z += dt * rate;
+        bend = moved(&bend, &rate, dt);
     }
     assert!(rising > falling + 0.01, "{rising} on the way up, {falling} on the way down");
 }
@@ -140,7 +172,7 @@ fn under_a_load_that_trembles_lugre_drifts_and_elasto_plastic_friction_holds() {
 
 #[test]
 fn a_run_does_not_depend_on_the_periods_in_which_it_is_asked_for() {
-    for friction in [FrictionParams::from(lugre()), elasto_plastic().into()] {
+    for friction in [FrictionParams::from(lugre()), elasto_plastic().into(), maxwell().into()] {
         let model = model(friction);
         // Break-away, sliding, a reversal.
         let drive = sine(0.0, 2.0, 1.0);
@@ -165,26 +197,110 @@ fn over_many_random_programs_of_velocity_friction_takes_energy_and_never_gives_i
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 11) as f64 / (1_u64 << 53) as f64
     };
-    for params in [FrictionParams::from(lugre()), elasto_plastic().into(), DahlParams::default().into()] {
+    let all = [
+        FrictionParams::from(lugre()),
+        elasto_plastic().into(),
+        DahlParams::default().into(),
+        maxwell().into(),
+    ];
+    for params in all {
         let bristles = Friction::build(&params).unwrap().bristles().unwrap();
         // With the viscous friction that makes it passive.
         let viscous = bristles.passive_from();
         let mut least = f64::INFINITY;
         for _ in 0..10_000 {
-            let (mut z, mut work) = (0.0, 0.0);
+            let (mut bend, mut work) = (Bend::none(), 0.0);
             for _ in 0..20 {
                 let velocity = (random() - 0.5) * 10.0_f64.powf(-4.0 * random());
-                let dt = 0.02 / bristles.stiffness() / velocity.abs();
+                // Short beside the bristles' bending, and beside the time in which elements come to their shares.
+                let dt = (0.02 / bristles.stiffness() / velocity.abs()).min(0.002);
                 for _ in 0..40 {
-                    let rate = bristles.rate(z, velocity);
-                    let middle = z + 0.5 * dt * rate;
-                    let rate = bristles.rate(middle, velocity);
-                    work += dt * velocity * (bristles.coefficient(middle, rate) + viscous * velocity);
-                    z += dt * rate;
+                    // An element turns round, or gives way, at the begin of a step.
+                    bend = bristles.settled(&bend, velocity);
+                    let middle = moved(&bend, &bristles.rate(&bend, velocity), 0.5 * dt);
+                    let rate = bristles.rate(&middle, velocity);
+                    work += dt * velocity * (bristles.coefficient(&middle, &rate) + viscous * velocity);
+                    bend = moved(&bend, &rate, dt);
                 }
                 least = least.min(work);
             }
         }
         assert!(least >= 0.0, "{params:?}: {least}");
     }
+}
+
+/// The coefficient after a way, each stretch to the next element that gives way.
+fn go(bristles: &Bristles<f64>, bend: &mut Bend<f64>, way: f64, limits: &[f64; ELEMENTS]) -> f64 {
+    // One coefficient: the velocity shows in nothing.
+    let (velocity, mut left) = (1e-3_f64.copysign(way), way.abs());
+    *bend = bristles.settled(bend, velocity);
+    while left > 0.0 {
+        // As far as the nearest element goes that holds.
+        let room = |i: usize| limits[i] - bend.each[i] * velocity.signum();
+        let next = (0..ELEMENTS).filter(|i| !bend.slides[*i]).map(room).fold(left, f64::min).max(0.0);
+        let rates = bristles.rate(bend, velocity);
+        // A hair further, so that it gives way.
+        let step = (next * (1.0 + 1e-15) + 1e-20).min(left);
+        *bend = bristles.settled(&moved(bend, &rates, step / velocity.abs()), velocity);
+        left -= step;
+    }
+    bristles.coefficient(bend, &bristles.rate(bend, velocity))
+}
+
+#[test]
+fn maxwell_slip_remembers_each_point_where_the_motion_turned_round() {
+    // One coefficient: the way alone decides.
+    let params = MaxwellParams { mu_static: 1.0, mu_dynamic: 1.0, damping: 0.0, ..maxwell() };
+    let bristles = Friction::build(&params.into()).unwrap().bristles().unwrap();
+    let limits = [6.25e-6, 12.5e-6, 25e-6, 50e-6];
+    let mut seed = 3_u64;
+    let mut random = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for _ in 0..1000 {
+        let mut bend = Bend::none();
+        go(&bristles, &mut bend, 40e-6 * random(), &limits);
+        // Loops in loops: back by less each time, and out again in the reverse order.
+        let mut ways = vec![];
+        let mut at = vec![];
+        let mut way = 60e-6;
+        for k in 0..6 {
+            way *= 0.2 + 0.75 * random();
+            at.push(bend);
+            ways.push(way);
+            go(&bristles, &mut bend, if k % 2 == 0 { -way } else { way }, &limits);
+        }
+        for k in (1..6).rev() {
+            // To where loop k began; then on with the larger loop, as if the small one had not been.
+            go(&bristles, &mut bend, if k % 2 == 0 { ways[k] } else { -ways[k] }, &limits);
+            let mu = |bend: &Bend<f64>| bristles.coefficient(bend, &[0.0; ELEMENTS]);
+            assert!((mu(&bend) - mu(&at[k])).abs() < 1e-12, "{} and {}", mu(&bend), mu(&at[k]));
+        }
+    }
+}
+
+#[test]
+fn one_element_of_maxwells_is_a_spring_and_then_coulombs_friction() {
+    let params = MaxwellParams {
+        mu_static: 1.0,
+        mu_dynamic: 1.0,
+        share_a: 1.0,
+        share_b: 0.0,
+        share_c: 0.0,
+        damping: 0.0,
+        ..maxwell()
+    };
+    // 0.9 N bend it by 22.5 µm and no more; 1.2 N accelerate the mass by 0.2 m/s² less what is viscous.
+    let m = model(params);
+    let (shafts, _) = motion(&m, &ramp_to(0.9, 10.0), 1e-2, 12.0);
+    assert!((shafts[1199].position / 22.5e-6 - 1.0).abs() < 1e-3, "{}", shafts[1199].position);
+    let (shafts, _) = motion(&m, &ramp_to(1.2, 0.01), 1e-3, 1.0);
+    let expected = 0.2 / 0.4 * (1.0 - (-0.4_f64).exp());
+    assert!((shafts[999].velocity / expected - 1.0).abs() < 0.02, "{} m/s", shafts[999].velocity);
+}
+
+/// A force that rises to a value within a time, and stays.
+fn ramp_to(force: f64, end: f64) -> Drive {
+    Drive::Table(vec![(0.0, 0.0), (end, force)])
 }

@@ -69,8 +69,8 @@ pub use error::ParamError;
 pub use feasibility::{Envelope, Infeasible, Obstacle, check_path};
 pub use fnv::{FNV_64, fnv1a_64};
 pub use friction::{
-    Bristles, Coulomb, CoulombParams, Dahl, DahlParams, ElastoPlastic, ElastoPlasticParams, Friction,
-    FrictionModel, FrictionParams, Lugre, LugreParams, Stribeck, StribeckParams,
+    Bend, Bristles, Coulomb, CoulombParams, Dahl, DahlParams, ElastoPlastic, ElastoPlasticParams, Friction,
+    FrictionModel, FrictionParams, Lugre, LugreParams, Maxwell, MaxwellParams, Stribeck, StribeckParams,
 };
 #[cfg(feature = "linalg")]
 pub use observer::{Estimate, Observer, ObserverGains, ObserverParams, ObserverState};

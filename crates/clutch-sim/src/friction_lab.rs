@@ -11,7 +11,7 @@
 
 use crate::drive::{Drive, DriveParams, RampDrive};
 use crate::engine::{Bristle, DormandPrince, Engine, EngineError, EventKind, Input, Model, Shaft, Volts};
-use clutch_core::friction::{Bristles, FrictionModel, FrictionParams};
+use clutch_core::friction::{Bend, Bristles, ELEMENTS, FrictionModel, FrictionParams};
 use clutch_core::{ActuatorParams, ParamError, Plant, PlantParams};
 
 /// Normal force of the break-away, as torque per unit of μ, N m: with it the paper's weight is just held.
@@ -63,14 +63,14 @@ pub fn examine(params: &FrictionParams) -> Result<Lab, LabError> {
         (None, Some(curve)) if drops => curve.velocity,
         _ => 0.001,
     };
-    let deflection = bristles.map_or(1e-4, |b| b.holding(f64::INFINITY));
+    let deflection = bristles.map_or(1e-4, |b| b.deflection());
     let steady = (0..POINTS)
         .map(|i| slow * libm::pow(10.0, -2.0 + 5.0 * i as f64 / (POINTS - 1) as f64))
         .map(|velocity| (velocity, friction.level(velocity)))
         .collect();
-    let mut probe = Probe { friction, bristles, deflection: 0.0 };
+    let mut probe = Probe { friction, bristles, bend: Bend::none() };
     let pre_sliding = probe.pre_sliding(deflection, slow);
-    probe.deflection = bristles.map_or(0.0, |b| b.steady(slow));
+    probe.bend = bristles.map_or(Bend::none(), |b| b.steady(slow));
     let lag = probe.lag(slow, deflection);
     // Faster ones tell more of the inertia than of the friction.
     let rates = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1];
@@ -83,8 +83,7 @@ pub fn examine(params: &FrictionParams) -> Result<Lab, LabError> {
 struct Probe<'a> {
     friction: &'a clutch_core::Friction<f64>,
     bristles: Option<Bristles<f64>>,
-    /// rad
-    deflection: f64,
+    bend: Bend<f64>,
 }
 
 impl Probe<'_> {
@@ -92,14 +91,20 @@ impl Probe<'_> {
     fn go(&mut self, velocity: f64, seconds: f64) -> f64 {
         let Some(bristles) = self.bristles else { return self.friction.coefficient(velocity) };
         // Steps that bend the bristles by a thousandth of what they bear.
-        let bend = 1e-3 * bristles.holding(f64::INFINITY);
-        let steps = (velocity.abs() * seconds / bend).clamp(4.0, 1e5) as u32;
+        let least = 1e-3 * bristles.deflection();
+        let steps = (velocity.abs() * seconds / least).clamp(4.0, 1e5) as u32;
         let dt = seconds / f64::from(steps);
         for _ in 0..steps {
-            let middle = self.deflection + 0.5 * dt * bristles.rate(self.deflection, velocity);
-            self.deflection += dt * bristles.rate(middle, velocity);
+            let on = |bend: &Bend<f64>, by: f64, rates: &[f64; ELEMENTS]| {
+                let mut moved = *bend;
+                moved.each.iter_mut().zip(rates).for_each(|(z, rate)| *z += by * rate);
+                moved
+            };
+            let middle = on(&self.bend, 0.5 * dt, &bristles.rate(&self.bend, velocity));
+            let moved = on(&self.bend, dt, &bristles.rate(&middle, velocity));
+            self.bend = bristles.settled(&moved, velocity);
         }
-        bristles.coefficient(self.deflection, bristles.rate(self.deflection, velocity))
+        bristles.coefficient(&self.bend, &bristles.rate(&self.bend, velocity))
     }
 
     /// From rest to one side, to the other, and again.

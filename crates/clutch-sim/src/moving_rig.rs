@@ -7,7 +7,7 @@ use crate::engine::{
     Bristle, DormandPrince, Engine, EngineError, EngineKind, Event, ExactFlow, Input, Motion, Shaft, Volts,
 };
 use crate::rig::Rig;
-use clutch_core::friction::FrictionModel;
+use clutch_core::friction::{Bend, ELEMENTS, FrictionModel};
 use clutch_core::{Counts, FixedCounts};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -60,12 +60,12 @@ fn begin(rig: &Rig, position: f64, velocity: f64, volts: f64) -> Shaft {
     if let Some(bristles) = plant.friction().bristles() {
         let torque = plant.params().drive_torque + plant.actuator().torque(volts);
         let normal = plant.actuator().normal(volts);
-        shaft.deflection = if velocity != 0.0 {
+        shaft.bend = if velocity != 0.0 {
             bristles.steady(velocity)
         } else if normal > 0.0 {
             bristles.holding(torque / normal)
         } else {
-            0.0
+            Bend::none()
         };
     }
     shaft
@@ -219,7 +219,6 @@ impl MovingRig {
         let numbers = [
             self.shaft.position,
             self.shaft.velocity,
-            self.shaft.deflection,
             self.origin,
             self.time,
             self.volts,
@@ -228,19 +227,20 @@ impl MovingRig {
             steps[0],
             steps[1],
         ];
-        let numbers = numbers.iter().chain(&self.line).map(|x| x.to_bits());
-        [self.begun, motion].into_iter().chain(numbers).collect()
+        let Bend { each, slides } = self.shaft.bend;
+        let slides = slides.iter().rev().fold(0, |bits, slides| 2 * bits + u64::from(*slides));
+        let numbers = numbers.iter().chain(&each).chain(&self.line).map(|x| x.to_bits());
+        [self.begun, motion, slides].into_iter().chain(numbers).collect()
     }
 
     /// Takes a state that a rig of the same parameters and seed had; false, and nothing is changed, if it is none.
     #[must_use]
     pub fn restore(&mut self, state: &[u64]) -> bool {
-        let [begun, motion, numbers @ ..] = state else { return false };
+        let [begun, motion, slides, numbers @ ..] = state else { return false };
         let numbers: Vec<f64> = numbers.iter().map(|bits| f64::from_bits(*bits)).collect();
         let [
             position,
             velocity,
-            deflection,
             origin,
             time,
             volts,
@@ -248,6 +248,10 @@ impl MovingRig {
             commanded,
             step,
             from_rest,
+            a,
+            b,
+            c,
+            d,
             line @ ..,
         ] = &numbers[..]
         else {
@@ -259,10 +263,12 @@ impl MovingRig {
             2 => Motion::Backward,
             _ => return false,
         };
-        if line.len() != self.line.len() || !numbers.iter().all(|x| x.is_finite()) {
+        if *slides >= 1 << ELEMENTS || line.len() != self.line.len() || !numbers.iter().all(|x| x.is_finite())
+        {
             return false;
         }
-        self.shaft = Shaft { position: *position, velocity: *velocity, motion, deflection: *deflection };
+        let bend = Bend { each: [*a, *b, *c, *d], slides: std::array::from_fn(|i| slides >> i & 1 == 1) };
+        self.shaft = Shaft { position: *position, velocity: *velocity, motion, bend };
         (self.origin, self.time) = (*origin, *time);
         (self.volts, self.arriving, self.commanded) = (*volts, *arriving, *commanded);
         self.line = line.iter().copied().collect();

@@ -56,7 +56,7 @@ class Row:
     @property
     def bristled(self) -> bool:
         """True if its friction has a state of its own."""
-        return "stiffness_1_rad" in self.parameters
+        return any(key.startswith("stiffness_") for key in self.parameters)
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,8 @@ class SciPy:
         """Why it does not take a case."""
         if case.mechanism is None:
             return "a scenario has an encoder and a law"
+        if any(row.friction == "maxwell" for row in case.mechanism.rows):
+            return "elements beside other rows" if len(case.mechanism.rows) > 1 else None
         kinds = {row.bristled for row in case.mechanism.rows}
         if len(kinds) > 1:
             return "rows with and without bristles"
@@ -67,6 +69,8 @@ class SciPy:
     def run(self, case: Case) -> Trajectory:
         """Solve the case."""
         assert case.mechanism is not None
+        if case.mechanism.rows[0].friction == "maxwell":
+            return _maxwell(case, case.mechanism)
         if case.mechanism.rows[0].bristled:
             return _bristled(case, case.mechanism)
         return _Rigid(case, case.mechanism).run()
@@ -126,6 +130,68 @@ def _bristled(case: Case, m: Mechanism) -> Trajectory:
         last = solve_ivp(rates, (times[inside][-1], end), done.y[:, -1], "LSODA", rtol=1e-10, atol=atol)
         y, begin = last.y[:, -1], end
     torque = np.array([friction(t, states[:, k])[1] for k, t in enumerate(times)]).T
+    return Trajectory(states[:n], states[n : 2 * n], torque)
+
+
+def _maxwell(case: Case, m: Mechanism) -> Trajectory:
+    """One row of elements, each of which holds or slides: an event ends each stretch."""
+    from scipy.integrate import solve_ivp
+
+    n, row, inverse = len(m.position), m.rows[0], np.linalg.inv(m.inertia)
+    p = row.parameters
+    stiff = np.array([p[f"stiffness_{e}_1_rad"] for e in "abcd"])
+    share = np.array([p["share_a"], p["share_b"], p["share_c"], 1 - p["share_a"] - p["share_b"] - p["share_c"]])
+    slides = np.zeros(4, dtype=bool)
+
+    def bristles(t: float, y: _Vector) -> tuple[_Vector, float]:
+        slip = float(row.joints @ y[n : 2 * n]) - row.base_velocity
+        way, g, z = np.sign(slip), level(row, abs(slip)), y[2 * n :]
+        sliding = way * np.minimum(p["attraction_1_s"] * (share - stiff * z * way / g) / stiff, abs(slip))
+        bends = np.where(slides, sliding, slip)
+        mu = float(stiff @ z) + p["damping_s_rad"] * float(share[~slides].sum()) * slip
+        return bends, mu * max(row.normal(t), 0.0)
+
+    def rates(t: float, y: _Vector) -> _Vector:
+        bends, torque = bristles(t, y)
+        force = m.applied(t, y[:n], y[n : 2 * n]) - row.joints * torque
+        return np.concatenate((y[n : 2 * n], inverse @ force, bends))
+
+    def spare(element: int, way: int) -> Callable[[float, _Vector], float]:
+        def watched(t: float, y: _Vector) -> float:
+            slip = float(row.joints @ y[n : 2 * n]) - row.base_velocity
+            return share[element] * level(row, abs(slip)) - way * stiff[element] * float(y[2 * n + element])
+
+        return _started(watched, begin)
+
+    def turns(way: int) -> Callable[[float, _Vector], float]:
+        return _started(lambda t, y: way * (float(row.joints @ y[n : 2 * n]) - row.base_velocity), begin)
+
+    times = np.linspace(0.0, case.duration, case.samples + 1)
+    y, begin, written = np.concatenate((m.position, m.velocity, np.zeros(4))), 0.0, 0
+    states, torque = np.empty((len(y), len(times))), np.empty((1, len(times)))
+    ends = [*(t for t in m.corners if t < case.duration), case.duration]
+    least = float(np.min(share * _at_rest(row) / stiff))
+    atol = np.concatenate((np.full(n, 1e-9 * least), np.full(n, 1e-9 * least), np.full(4, 1e-9 * least)))
+    while begin < case.duration:
+        end = next(t for t in ends if t > begin)
+        slip = float(row.joints @ y[n : 2 * n]) - row.base_velocity
+        # At rest the motion begins the way that the force goes.
+        way = int(np.sign(slip)) or int(np.sign(row.joints @ rates(begin, y)[n : 2 * n])) or 1
+        watch = [turns(way)] + [spare(e, way) for e in range(4) if not slides[e] and share[e] > 0]
+        elements = [e for e in range(4) if not slides[e] and share[e] > 0]
+        done = solve_ivp(rates, (begin, end), y, "LSODA", dense_output=True, events=watch, rtol=1e-10, atol=atol)
+        if not done.success:
+            raise ArithmeticError(f"LSODA gave up: {done.message}")
+        until = float(done.t[-1])
+        while written < len(times) and times[written] <= until:
+            states[:, written] = done.sol(times[written]) if times[written] < until else done.y[:, -1]
+            torque[0, written] = bristles(times[written], states[:, written])[1]
+            written += 1
+        y, begin = done.y[:, -1], until
+        happened = [i for i, at in enumerate(done.t_events) if len(at)]
+        if 0 in happened:
+            slides[:] = False
+        slides[[elements[i - 1] for i in happened if i]] = True
     return Trajectory(states[:n], states[n : 2 * n], torque)
 
 

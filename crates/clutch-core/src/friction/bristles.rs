@@ -1,60 +1,102 @@
 //! Bristles: friction that bends before it slides.
 //!
 //! ```text
-//! ż = θ̇ (1 − α(z, θ̇) σ_0 z sgn(θ̇)/g(θ̇)),     μ = σ_0 z + σ_1 ż
+//! one bristle:       ż = θ̇ (1 − α(z, θ̇) σ_0 z sgn(θ̇)/g(θ̇)),                        μ = σ_0 z + σ_1 ż
+//! several elements:  ż_i = θ̇ while an element holds, up to k_i |z_i| = α_i g(θ̇); then, until θ̇ turns round,
+//!                    k_i ż_i = sgn(θ̇) C (α_i − k_i |z_i|/g(θ̇)), at most k_i θ̇;      μ = Σ k_i z_i + σ Σ_held α_i θ̇
 //! ```
 //!
-//! `z` is the deflection of the bristles, `g` the curve of steady sliding, and `α` the share of the motion that slides: 1
-//! for LuGre's and Dahl's model, and for the elasto-plastic one 0 as long as the bristles bend less than at break-away.
+//! `z` is a deflection, `g` the curve of steady sliding, and `α` the share of the motion that slides: 1 for LuGre's and Dahl's
+//! model, and for the elasto-plastic one 0 as long as the bristles bend less than at break-away. Elements are those of
+//! generalised Maxwell slip, `α_i` their shares of the friction.
 
 use super::{FrictionModel, Stribeck};
 use crate::Real;
 
-/// Bristles of a friction, with one state: the deflection `z`, rad.
+/// Elements of a friction at most.
+pub const ELEMENTS: usize = 4;
+
+/// How the bristles of a friction are bent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bend<T> {
+    /// Deflection of each element, rad; one bristle is the first.
+    pub each: [T; ELEMENTS],
+    /// Elements that slide, of a friction whose elements either hold or slide.
+    pub slides: [bool; ELEMENTS],
+}
+
+impl<T: Real> Bend<T> {
+    /// Bristles that are not bent.
+    #[must_use]
+    pub fn none() -> Self {
+        Bend { each: [T::ZERO; ELEMENTS], slides: [false; ELEMENTS] }
+    }
+
+    fn one(z: T) -> Self {
+        let mut bend = Self::none();
+        bend.each[0] = z;
+        bend
+    }
+}
+
+/// The ways in which bristles bend.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Way<T> {
+    /// All as one.
+    One {
+        /// `σ_0`, 1/rad.
+        stiffness: T,
+        /// `σ_1`, s/rad.
+        damping: T,
+        /// Coefficient up to which the bristles only bend; 0 if they always slide a little.
+        elastic: T,
+    },
+    /// Each by itself.
+    Elements {
+        /// `k_i`, 1/rad.
+        stiffness: [T; ELEMENTS],
+        /// `α_i`.
+        share: [T; ELEMENTS],
+        /// `σ`, s/rad.
+        damping: T,
+        /// `C`, 1/s.
+        attraction: T,
+    },
+}
+
+/// Bristles of a friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bristles<T> {
     /// `g`.
     pub(super) curve: Stribeck<T>,
-    /// `σ_0`, 1/rad.
-    pub(super) stiffness: T,
-    /// `σ_1`, s/rad.
-    pub(super) damping: T,
-    /// Coefficient up to which the bristles only bend; 0 if they always slide a little.
-    pub(super) elastic: T,
+    pub(super) way: Way<T>,
 }
 
 impl<T: Real> Bristles<T> {
-    /// `σ_0`, 1/rad.
+    /// Elements that have a deflection, from the first on.
     #[must_use]
-    pub fn stiffness(&self) -> T {
-        self.stiffness
+    pub fn count(&self) -> usize {
+        match self.way {
+            Way::One { .. } => 1,
+            Way::Elements { .. } => ELEMENTS,
+        }
     }
 
-    /// `α`: share of a motion with which the bristles slide.
-    fn sliding_share(&self, z: T, curve: T, velocity: T) -> T {
-        if self.elastic <= T::ZERO {
-            return T::ONE;
+    /// Stiffness of all together, 1/rad.
+    #[must_use]
+    pub fn stiffness(&self) -> T {
+        match self.way {
+            Way::One { stiffness, .. } => stiffness,
+            Way::Elements { stiffness: [a, b, c, d], .. } => a + b + c + d,
         }
-        let bend = self.stiffness * z.abs();
-        // A bristle that unbends does not slide.
-        if z * velocity < T::ZERO || bend <= self.elastic {
-            return T::ZERO;
-        }
-        if bend >= curve {
-            return T::ONE;
-        }
-        // From 0 to 1 as a half wave of a sine does.
-        let share = (bend - self.elastic) / (curve - self.elastic);
-        // From −1 to 1 quarters of a turn, of which there are 2⁶² parts each.
-        let turn = (share + share - T::ONE) * T::from_f64((1_u64 << 62) as f64);
-        let (sine, _) = crate::sin_cos_turns::<T>(turn.to_i64() as u64);
-        T::from_f64(0.5) * (T::ONE + sine)
     }
 
     /// `true` if bending is damped: friction then exceeds that of steady sliding at times.
     #[must_use]
     pub fn damps(&self) -> bool {
-        self.damping > T::ZERO
+        match self.way {
+            Way::One { damping, .. } | Way::Elements { damping, .. } => damping > T::ZERO,
+        }
     }
 
     /// Velocity at which steady sliding has lost all but 1/e of the drop from rest, rad/s.
@@ -63,55 +105,174 @@ impl<T: Real> Bristles<T> {
         self.curve.params().stribeck_velocity
     }
 
-    /// `ż`, rad/s.
+    /// `ż` of each element, rad/s.
     #[must_use]
-    pub fn rate(&self, z: T, velocity: T) -> T {
+    pub fn rate(&self, bend: &Bend<T>, velocity: T) -> [T; ELEMENTS] {
         let curve = self.curve.level(velocity);
-        let share = self.sliding_share(z, curve, velocity);
-        velocity - share * (self.stiffness * velocity.abs() * z / curve)
+        let mut rates = [T::ZERO; ELEMENTS];
+        match &self.way {
+            Way::One { stiffness, elastic, .. } => {
+                let z = bend.each[0];
+                let share = sliding_share(*stiffness, *elastic, z, curve, velocity);
+                rates[0] = velocity - share * (*stiffness * velocity.abs() * z / curve);
+            }
+            Way::Elements { stiffness, share, attraction, .. } => {
+                let elements = stiffness.iter().zip(share).zip(bend.each.iter().zip(&bend.slides));
+                for (rate, ((k, share), (z, slides))) in rates.iter_mut().zip(elements) {
+                    *rate = if *slides {
+                        // No spring is bent by more than the motion: friction gives no energy then.
+                        let way = velocity.sgn();
+                        let bears = *k * *z * way;
+                        way * (*attraction * (*share - bears / curve) / *k).min(velocity.abs())
+                    } else {
+                        velocity
+                    };
+                }
+            }
+        }
+        rates
     }
 
     /// `μ`, with its sign.
     #[must_use]
-    pub fn coefficient(&self, z: T, rate: T) -> T {
-        self.stiffness * z + self.damping * rate
+    pub fn coefficient(&self, bend: &Bend<T>, rate: &[T; ELEMENTS]) -> T {
+        match &self.way {
+            Way::One { stiffness, damping, .. } => *stiffness * bend.each[0] + *damping * rate[0],
+            Way::Elements { stiffness, share, damping, .. } => {
+                let elements = stiffness.iter().zip(share).zip(bend.each.iter().zip(&bend.slides)).zip(rate);
+                elements.fold(T::ZERO, |sum, (((k, share), (z, slides)), rate)| {
+                    sum + *k * *z + if *slides { T::ZERO } else { *damping * *share * *rate }
+                })
+            }
+        }
     }
 
-    /// The deflection of steady sliding, rad; at rest 0.
+    /// The bend of steady sliding; at rest none.
     #[must_use]
-    pub fn steady(&self, velocity: T) -> T {
-        self.curve.coefficient(velocity) / self.stiffness
+    pub fn steady(&self, velocity: T) -> Bend<T> {
+        let mu = self.curve.coefficient(velocity);
+        match &self.way {
+            Way::One { stiffness, .. } => Bend::one(mu / *stiffness),
+            Way::Elements { stiffness, share, .. } => {
+                let mut bend = Bend::none();
+                for ((z, k), share) in bend.each.iter_mut().zip(stiffness).zip(share) {
+                    *z = *share * mu / *k;
+                }
+                bend.slides = [velocity.abs() > T::ZERO; ELEMENTS];
+                bend
+            }
+        }
     }
 
-    /// The deflection that carries a coefficient at rest, rad, at most that of break-away.
+    /// The bend that carries a coefficient at rest, at most that of break-away, on the first way from no bend.
     #[must_use]
-    pub fn holding(&self, mu: T) -> T {
+    pub fn holding(&self, mu: T) -> Bend<T> {
         let most = self.curve.at_rest();
-        mu.max(-most).min(most) / self.stiffness
+        let mu = mu.max(-most).min(most);
+        match &self.way {
+            Way::One { stiffness, .. } => Bend::one(mu / *stiffness),
+            Way::Elements { stiffness, share, .. } => {
+                let mut bend = Bend::none();
+                let way = mu.sgn();
+                // Each round finds the deflection of those that are not at their share yet.
+                let mut full = [false; ELEMENTS];
+                for _ in 0..=ELEMENTS {
+                    let (mut left, mut stiff) = (mu.abs(), T::ZERO);
+                    for ((k, share), full) in stiffness.iter().zip(share).zip(&full) {
+                        if *full {
+                            left -= *share * most;
+                        } else {
+                            stiff += *k;
+                        }
+                    }
+                    let deflection = if stiff > T::ZERO { left.max(T::ZERO) / stiff } else { T::ZERO };
+                    let elements = stiffness.iter().zip(share).zip(bend.each.iter_mut().zip(&mut full));
+                    for ((k, share), (z, full)) in elements {
+                        *full |= *k * deflection >= *share * most;
+                        *z = way * if *full { *share * most / *k } else { deflection };
+                    }
+                }
+                bend
+            }
+        }
     }
 
-    /// Deflection as a share of that of steady sliding: near 1 the shaft slides, below it the bristles hold it.
+    /// The deflection at which all of it has given way from rest, rad.
     #[must_use]
-    pub fn bent(&self, z: T, velocity: T) -> T {
-        self.stiffness * z.abs() / self.curve.level(velocity)
+    pub fn deflection(&self) -> T {
+        self.holding(T::from_f64(1e30)).each.iter().fold(T::ZERO, |most, z| most.max(*z))
+    }
+
+    /// Bend as a share of that of steady sliding: near 1 the shaft slides, below it the bristles hold it.
+    #[must_use]
+    pub fn bent(&self, bend: &Bend<T>, velocity: T) -> T {
+        let level = self.curve.level(velocity);
+        match &self.way {
+            Way::One { stiffness, .. } => *stiffness * bend.each[0].abs() / level,
+            Way::Elements { stiffness, .. } => {
+                let sum = stiffness.iter().zip(&bend.each).fold(T::ZERO, |sum, (k, z)| sum + *k * *z);
+                sum.abs() / level
+            }
+        }
+    }
+
+    /// Elements as they are from now on: one slides once it bears more than its share, and holds once the velocity has
+    /// turned round. The same as `bend` if nothing happened.
+    #[must_use]
+    pub fn settled(&self, bend: &Bend<T>, velocity: T) -> Bend<T> {
+        let mut settled = *bend;
+        if let Way::Elements { stiffness, share, .. } = &self.way {
+            let (level, way) = (self.curve.level(velocity), velocity.sgn());
+            let elements = stiffness.iter().zip(share).zip(settled.each.iter().zip(&mut settled.slides));
+            for ((k, share), (z, slides)) in elements {
+                *slides = if *slides { *z * way >= T::ZERO } else { *k * *z * way > *share * level };
+            }
+        }
+        settled
     }
 
     /// Viscous damping for each N m of normal force (as torque per unit of μ) from which on the friction takes energy out of
-    /// any motion, s/rad: `σ_1 (μ_s − μ_d)/μ_d`, after Barabanov and Ortega (IEEE Trans. Automat. Control 45, 2000).
+    /// any motion, s/rad. Of one bristle `σ_1 (μ_s − μ_d)/μ_d`, after Barabanov and Ortega (IEEE Trans. Automat. Control
+    /// 45, 2000). Elements need none: what a held one takes is in its spring, and a sliding one bends by no more than
+    /// the motion.
     #[must_use]
     pub fn passive_from(&self) -> T {
         let (rest, sliding) = (self.curve.at_rest(), self.curve.sliding());
-        (self.damping * (rest - sliding) / sliding).max(T::ZERO)
+        match self.way {
+            Way::One { damping, .. } => (damping * (rest - sliding) / sliding).max(T::ZERO),
+            Way::Elements { .. } => T::ZERO,
+        }
     }
 }
 
-/// A friction with bristles, checked: its parameters, the curve that they give of steady sliding, and stiffness, damping
-/// and elastic coefficient of the bristles. All that a friction is asked besides is that curve's.
+/// `α`: share of a motion with which bristles slide that are one.
+fn sliding_share<T: Real>(stiffness: T, elastic: T, z: T, curve: T, velocity: T) -> T {
+    if elastic <= T::ZERO {
+        return T::ONE;
+    }
+    let bend = stiffness * z.abs();
+    // A bristle that unbends does not slide.
+    if z * velocity < T::ZERO || bend <= elastic {
+        return T::ZERO;
+    }
+    if bend >= curve {
+        return T::ONE;
+    }
+    // From 0 to 1 as a half wave of a sine does.
+    let share = (bend - elastic) / (curve - elastic);
+    // From −1 to 1 quarters of a turn, of which there are 2⁶² parts each.
+    let turn = (share + share - T::ONE) * T::from_f64((1_u64 << 62) as f64);
+    let (sine, _) = crate::sin_cos_turns::<T>(turn.to_i64() as u64);
+    T::from_f64(0.5) * (T::ONE + sine)
+}
+
+/// A friction with bristles, checked: its parameters, the curve that they give of steady sliding, and the way in which its
+/// bristles bend. All that a friction is asked besides is that curve's.
 macro_rules! bristled {
     (
         $(#[$doc:meta])*
         $model:ident $params:ident { $($field:ident),+ }
-        $p:ident => $curve:expr, $bends:expr
+        $p:ident => $curve:expr, $way:expr
     ) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,8 +337,7 @@ macro_rules! bristled {
 
             fn bristles(&self) -> Option<$crate::Bristles<T>> where T: $crate::Real {
                 let $p = &self.params;
-                let (stiffness, damping, elastic) = $bends;
-                Some($crate::Bristles { curve: self.curve, stiffness, damping, elastic })
+                Some($crate::Bristles { curve: self.curve, way: $way })
             }
         }
     };

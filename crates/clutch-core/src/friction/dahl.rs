@@ -9,6 +9,7 @@
 //! there is no stick-slip. For bearings that roll, and for small motions.
 
 use super::StribeckParams;
+use super::bristles::Way;
 use crate::params::Range;
 
 crate::params! {
@@ -30,5 +31,5 @@ super::bristles::bristled! {
         stribeck_velocity: T::ONE,
         stribeck_exponent: T::ONE,
     },
-    (p.stiffness, T::ZERO, T::ZERO)
+    Way::One { stiffness: p.stiffness, damping: T::ZERO, elastic: T::ZERO }
 }

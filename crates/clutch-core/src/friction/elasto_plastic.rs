@@ -9,6 +9,7 @@
 //! 47 (2002) 787–792. A load that trembles below `μ_e` is held for ever, where LuGre's model drifts; all else is LuGre's.
 
 use super::StribeckParams;
+use super::bristles::Way;
 use crate::params::Range;
 
 crate::params! {
@@ -45,5 +46,5 @@ super::bristles::bristled! {
         stribeck_velocity: p.stribeck_velocity,
         stribeck_exponent: p.stribeck_exponent,
     },
-    (p.stiffness, p.damping, p.elastic)
+    Way::One { stiffness: p.stiffness, damping: p.damping, elastic: p.elastic }
 }

@@ -12,6 +12,7 @@
 //! Stribeck's curve. It is stiff: a run takes some times as long as with Stribeck's curve.
 
 use super::StribeckParams;
+use super::bristles::Way;
 use crate::params::Range;
 
 crate::params! {
@@ -42,5 +43,5 @@ super::bristles::bristled! {
         stribeck_velocity: p.stribeck_velocity,
         stribeck_exponent: p.stribeck_exponent,
     },
-    (p.stiffness, p.damping, T::ZERO)
+    Way::One { stiffness: p.stiffness, damping: p.damping, elastic: T::ZERO }
 }

@@ -76,6 +76,15 @@ DahlFriction(mu_dynamic=0.15, stiffness_1_rad=2000.0)",
 0.1",
     ),
     known(
+        "MaxwellParams",
+        "MaxwellFriction",
+        true,
+        r"Three elements, none in the third place; the fourth bears what the others leave:
+
+>>> clutch.MaxwellFriction(share_a=0.5, share_b=0.3, share_c=0.0).attraction_1_s
+50.0",
+    ),
+    known(
         "BrakeGeometry",
         "BrakeGeometry",
         true,

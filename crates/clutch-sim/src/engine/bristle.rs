@@ -1,4 +1,5 @@
-//! The motion of a shaft whose friction has bristles: three states, stiff, without events in the motion itself.
+//! The motion of a shaft whose friction has bristles: position, velocity, a deflection of each element; stiff. An element of
+//! Maxwell's that begins to slide or to hold is an event, and located; else there are none in the motion itself.
 //!
 //! ```text
 //! θ̇ = ω,   J ω̇ = T − μ(z, ż) N − C ω,   ż = ż(z, ω)
@@ -11,8 +12,9 @@
 //! whose end its bristles bend less than [`STICKS_BELOW`] of steady sliding and it is slower than the Stribeck velocity,
 //! until they bend by [`SLIDES_FROM`].
 
-use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, rosenbrock};
-use clutch_core::friction::{Bristles, FrictionModel};
+use super::rosenbrock::{self, Linear};
+use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft};
+use clutch_core::friction::{Bend, Bristles, ELEMENTS, FrictionModel};
 
 /// Error allowed per step as a share of speed and deflection.
 const RELATIVE: f64 = 1e-8;
@@ -24,8 +26,8 @@ const SLIDES_FROM: f64 = 0.99;
 /// Steps in one interval before the engine gives up.
 const STEP_LIMIT: u32 = 1_000_000;
 
-/// Position from the start of the interval, velocity, deflection.
-type State = [f64; 3];
+/// An event of an element is located to this, as a share of a step.
+const INSTANT: f64 = 1e-13;
 
 /// The engine of bristles.
 #[derive(Clone, Debug, Default)]
@@ -46,7 +48,8 @@ impl Bristle {
     }
 }
 
-/// The equations over an interval.
+/// The equations over an interval. A state is the position from the start of the interval, the velocity, and the deflection
+/// of each element: `D` is 2 more than there are.
 struct Equations<'a> {
     model: &'a Model,
     input: &'a Input<'a>,
@@ -54,26 +57,77 @@ struct Equations<'a> {
     origin: f64,
 }
 
+/// The bend that a state has, with the elements that slide.
+fn bend_of<const D: usize>(state: &[f64; D], slides: [bool; ELEMENTS]) -> Bend<f64> {
+    let mut bend = Bend { slides, ..Bend::none() };
+    for (z, x) in bend.each.iter_mut().zip(&state[2..]) {
+        *z = *x;
+    }
+    bend
+}
+
 impl Equations<'_> {
-    fn rate(&self, s: f64, [way, velocity, z]: State) -> State {
-        let (p, position) = (self.model.plant.params(), self.origin + way);
-        let bends = self.bristles.rate(z, velocity);
-        let mu = self.bristles.coefficient(z, bends) * self.model.friction_factor(position);
+    fn rate<const D: usize>(&self, s: f64, state: &[f64; D], slides: [bool; ELEMENTS]) -> [f64; D] {
+        let (p, velocity) = (self.model.plant.params(), state[1]);
+        let position = self.origin + state[0];
+        let bend = bend_of(state, slides);
+        let bends = self.bristles.rate(&bend, velocity);
+        let mu = self.bristles.coefficient(&bend, &bends) * self.model.friction_factor(position);
         let rubs = self.model.plant.actuator().friction(mu, self.input.volts.at(s));
         let torque = self.input.torque(self.model, s, position);
-        [velocity, (torque - rubs - p.viscous_damping * velocity) / p.inertia, bends]
+        let turns = (torque - rubs - p.viscous_damping * velocity) / p.inertia;
+        core::array::from_fn(|i| match i {
+            0 => velocity,
+            1 => turns,
+            _ => bends[i - 2],
+        })
     }
 
     /// One step; the state at its end and its error over the tolerance.
-    fn step(&self, s: f64, h: f64, from: State, scale: State) -> Option<(State, f64)> {
-        let rate = |s: f64, state: &State| self.rate(s, *state);
-        let (to, wrong) = rosenbrock::step(&rate, (s, &from, h), &scale, &[1.0, from[1], 1.0])?;
+    fn step<const D: usize>(
+        &self,
+        s: f64,
+        h: f64,
+        from: &[f64; D],
+        slides: [bool; ELEMENTS],
+        scale: &[f64; D],
+    ) -> Option<([f64; D], f64)>
+    where
+        [f64; D]: Linear,
+    {
+        let rate = |s: f64, state: &[f64; D]| self.rate(s, state, slides);
+        let away = core::array::from_fn(|i| if i == 1 { from[1] } else { 1.0 });
+        let (to, wrong) = rosenbrock::step(&rate, (s, from, h), scale, &away)?;
         let wrong = |n: usize, allowed: f64| (wrong[n] / allowed).abs();
         let most = |n: usize| from[n].abs().max(to[n].abs());
-        let speed = ABSOLUTE * scale[1] + RELATIVE * most(1);
-        let bent = ABSOLUTE * scale[2] + RELATIVE * most(2);
-        let error = wrong(0, h * speed + ABSOLUTE * scale[0]).max(wrong(1, speed)).max(wrong(2, bent));
-        Some((to, error))
+        let allowed = |n: usize| ABSOLUTE * scale[n] + RELATIVE * most(n);
+        let first = wrong(0, h * allowed(1) + ABSOLUTE * scale[0]);
+        Some((to, (1..D).fold(first, |worst, n| worst.max(wrong(n, allowed(n))))))
+    }
+
+    /// The end of the shortest step at whose end an element has begun to slide or to hold.
+    fn locate<const D: usize>(
+        &self,
+        s: f64,
+        h: f64,
+        from: &[f64; D],
+        slides: [bool; ELEMENTS],
+        scale: &[f64; D],
+    ) -> Option<(f64, [f64; D])>
+    where
+        [f64; D]: Linear,
+    {
+        let (mut before, mut after) = (0.0, h);
+        while after - before > INSTANT * h {
+            let middle = 0.5 * (before + after);
+            let (to, _) = self.step(s, middle, from, slides, scale)?;
+            if self.settled(&to, slides) == slides { before = middle } else { after = middle }
+        }
+        Some((after, self.step(s, after, from, slides, scale)?.0))
+    }
+
+    fn settled<const D: usize>(&self, state: &[f64; D], slides: [bool; ELEMENTS]) -> [bool; ELEMENTS] {
+        self.bristles.settled(&bend_of(state, slides), state[1]).slides
     }
 }
 
@@ -88,15 +142,39 @@ impl Engine for Bristle {
         let Some(bristles) = model.plant.friction().bristles() else {
             return Err(EngineError::Refused("friction with bristles"));
         };
-        let end = input.duration;
         let equations = Equations { model, input, bristles, origin: shaft.position };
-        let bent = bristles.holding(f64::INFINITY);
+        if bristles.count() == 1 {
+            self.advance_states::<3>(&equations, shaft, events)
+        } else {
+            self.advance_states::<6>(&equations, shaft, events)
+        }
+    }
+}
+
+impl Bristle {
+    fn advance_states<const D: usize>(
+        &mut self,
+        equations: &Equations<'_>,
+        shaft: &mut Shaft,
+        events: &mut Vec<Event>,
+    ) -> Result<(), EngineError>
+    where
+        [f64; D]: Linear,
+    {
+        let Equations { model, input, bristles, .. } = equations;
+        let end = input.duration;
+        let bent = bristles.deflection();
         let p = model.plant.params();
         // The speed to which break-away lets a shaft come while the bristles bend.
         let stiffness = bristles.stiffness() * model.plant.actuator().normal(input.volts.at(0.0));
         let speed = bent * libm::sqrt((stiffness / p.inertia).max(1e-12));
-        let scale = [bent, speed, bent];
-        let mut state = [0.0, shaft.velocity, shaft.deflection];
+        let scale: [f64; D] = core::array::from_fn(|i| if i == 1 { speed } else { bent });
+        let mut slides = shaft.bend.slides;
+        let mut state: [f64; D] = core::array::from_fn(|i| match i {
+            0 => 0.0,
+            1 => shaft.velocity,
+            _ => shaft.bend.each[i - 2],
+        });
         let (mut s, mut steps) = (0.0, 0);
         let mut h = if self.step > 0.0 { self.step } else { 1e-3 * end };
         while s < end {
@@ -106,7 +184,7 @@ impl Engine for Bristle {
             }
             let last = s + h >= end;
             let length = if last { end - s } else { h };
-            let tried = equations.step(s, length, state, scale);
+            let tried = equations.step(s, length, &state, slides, &scale);
             let Some((to, error)) = tried.filter(|(to, e)| e.is_finite() && to.iter().all(|x| x.is_finite()))
             else {
                 if length < 1e-15 {
@@ -120,20 +198,31 @@ impl Engine for Bristle {
                 h = grown.min(0.9 * length);
                 continue;
             }
-            s = if last { end } else { s + length };
-            state = to;
-            // A last step cut short says nothing about the step that would have done.
-            if !last || grown > self.step {
-                self.step = grown;
+            let happens = equations.settled(&to, slides) != slides;
+            let located = if happens { equations.locate(s, length, &state, slides, &scale) } else { None };
+            let before = s;
+            (s, state) = match located {
+                Some((part, to)) if part < length => (s + part, to),
+                _ => (if last { end } else { s + length }, to),
+            };
+            if happens {
+                slides = equations.settled(&state, slides);
+                h = (s - before).max(1e-3 * grown);
+            } else {
+                // A last step cut short says nothing about the step that would have done.
+                if !last || grown > self.step {
+                    self.step = grown;
+                }
+                h = grown;
             }
-            h = grown;
             shaft.position = equations.origin + state[0];
-            (shaft.velocity, shaft.deflection) = (state[1], state[2]);
-            let (slides, speed) =
-                (bristles.bent(state[2], state[1]), state[1].abs() / bristles.stribeck_velocity());
-            let motion = if slides >= SLIDES_FROM {
+            shaft.velocity = state[1];
+            shaft.bend = bend_of(&state, slides);
+            let (slide, speed) =
+                (bristles.bent(&shaft.bend, state[1]), state[1].abs() / bristles.stribeck_velocity());
+            let motion = if slide >= SLIDES_FROM {
                 if state[1] < 0.0 { Motion::Backward } else { Motion::Forward }
-            } else if slides < STICKS_BELOW && speed < 1.0 {
+            } else if slide < STICKS_BELOW && speed < 1.0 {
                 Motion::Stuck
             } else {
                 shaft.motion

@@ -23,8 +23,8 @@ pub use exact_flow::ExactFlow;
 
 use crate::drive::Drive;
 use crate::ripple::Ripple;
-use clutch_core::Plant;
 use clutch_core::friction::FrictionModel;
+use clutch_core::{Bend, Plant};
 
 /// Motion of the shaft: stuck, or the way in which it slips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,8 +61,8 @@ pub struct Shaft {
     pub velocity: f64,
     /// Stuck or slipping.
     pub motion: Motion,
-    /// Deflection of the bristles of a friction that has some, rad; else 0.
-    pub deflection: f64,
+    /// Bend of the bristles of a friction that has some.
+    pub bend: Bend<f64>,
 }
 
 impl Shaft {
@@ -70,7 +70,7 @@ impl Shaft {
     #[must_use]
     pub fn new(position: f64, velocity: f64) -> Self {
         let motion = if velocity == 0.0 { Motion::Stuck } else { Motion::along(velocity) };
-        Shaft { position, velocity, motion, deflection: 0.0 }
+        Shaft { position, velocity, motion, bend: Bend::none() }
     }
 }
 
@@ -297,7 +297,7 @@ clutch_core::words! {
         /// Closed forms, quadrature and series of the motion between samples: for friction that falls exponentially with the
         /// speed and is even along the disc, torque and voltage held between samples.
         ExactFlow = "exact_flow",
-        /// A Rosenbrock method for stiff motions: for friction with bristles (LuGre, Dahl, elasto-plastic).
+        /// A Rosenbrock method for stiff motions: for friction with bristles (LuGre, Dahl, elasto-plastic, Maxwell).
         Bristle = "bristle",
     }
 }

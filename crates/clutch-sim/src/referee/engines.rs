@@ -89,7 +89,11 @@ pub fn run(case: &Case, engine: RefereeEngine, step: Option<f64>) -> Result<Traj
     let bristled = mechanism.rows.iter().filter(|row| row.friction.bristles().is_some()).count();
     let needs_none = not_for_it("it needs friction without bristles");
     let needs_all = not_for_it("it needs friction with bristles in every row");
+    let elements = |row: &Row| row.friction.bristles().is_some_and(|b| b.count() > 1);
     match engine {
+        RefereeEngine::BristledSystem if mechanism.rows.iter().any(elements) => {
+            return Err(not_for_it("it needs friction with one bristle in each row"));
+        }
         RefereeEngine::System | RefereeEngine::DormandPrince | RefereeEngine::ExactFlow if bristled > 0 => {
             return Err(needs_none);
         }
@@ -195,7 +199,7 @@ struct AsShaft {
     volts: Vec<(f64, f64)>,
 }
 
-fn as_shaft(m: &Mechanism) -> Result<AsShaft, RefereeError> {
+fn as_shaft(m: &Mechanism, duration: f64) -> Result<AsShaft, RefereeError> {
     let needs = not_for_it;
     let [row] = m.rows.as_slice() else { return Err(needs("it needs one joint and one row")) };
     #[allow(clippy::float_cmp, reason = "a row of the joint itself is exactly that")]
@@ -215,7 +219,15 @@ fn as_shaft(m: &Mechanism) -> Result<AsShaft, RefereeError> {
         }
         Some(torque) => Drive::Constant(torque),
         None if stiffness > 0.0 => return Err(needs("a shaft has a spring, or a load that changes")),
-        None if load.0.iter().any(|t| t.from_s > 0.0) => return Err(needs("it needs a load without jumps")),
+        None if load.0.iter().any(|t| t.from_s > 0.0) => {
+            if load.0.iter().any(|t| t.amplitude != 0.0 || (t.constant != 0.0 && t.from_s > 0.0)) {
+                return Err(needs("it needs a load without jumps, of straight lines or of sines"));
+            }
+            let mut corners: Vec<f64> = load.0.iter().map(|t| t.from_s).chain([0.0, duration]).collect();
+            corners.sort_by(f64::total_cmp);
+            corners.dedup();
+            Drive::Table(corners.into_iter().map(|t| (t, load.at(t) - damping * base)).collect())
+        }
         None => {
             let sum = |of: fn(&super::Term) -> f64| load.0.iter().map(of).sum::<f64>();
             let (mean, rate) = (sum(|t| t.constant) - damping * base, sum(|t| t.rate));
@@ -258,7 +270,7 @@ fn shaft(
     step: Option<f64>,
     constant: bool,
 ) -> Result<Trajectory, RefereeError> {
-    let AsShaft { model, drive, base, volts } = as_shaft(m)?;
+    let AsShaft { model, drive, base, volts } = as_shaft(m, case.duration)?;
     if constant && !drive.is_constant() {
         return Err(not_for_it("it needs a load that never changes"));
     }
@@ -304,9 +316,7 @@ fn shaft(
 /// Friction of the row of a shaft, N m.
 fn friction_of(row: &Row, drive: &Drive, shaft: &Shaft, t: f64, normal: f64, model: &engine::Model) -> f64 {
     let mu = match row.friction.bristles() {
-        Some(bristles) => {
-            bristles.coefficient(shaft.deflection, bristles.rate(shaft.deflection, shaft.velocity))
-        }
+        Some(bristles) => bristles.coefficient(&shaft.bend, &bristles.rate(&shaft.bend, shaft.velocity)),
         None if shaft.motion == engine::Motion::Stuck => {
             let holds = model.break_away_torque(shaft.position, normal);
             return drive.torque(t, shaft.position).clamp(-holds, holds);

@@ -69,4 +69,6 @@ built_in!(
     "D2_elasto_plastic",
     "D2_coulomb",
     "P3",
+    "G1",
+    "G2",
 );

@@ -7,7 +7,7 @@
 use super::System;
 use super::motion::{State, SystemError};
 use crate::engine::rosenbrock::{self, Linear};
-use clutch_core::friction::{Bristles, FrictionModel};
+use clutch_core::friction::{Bend, Bristles, FrictionModel};
 use nalgebra::SVector;
 
 /// Error allowed per step as a share of speed and deflection.
@@ -44,6 +44,9 @@ where
             let without = (0..B).find(|row| system.friction(*row).bristles().is_none());
             return Err(SystemError::NoBristles(without.unwrap_or_default()));
         };
+        if let Some(row) = bristles.iter().position(|b| b.count() > 1) {
+            return Err(SystemError::Elements(row));
+        }
         if system.inertia(&state.position).cholesky().is_none() {
             return Err(SystemError::Inertia(state.time));
         }
@@ -81,9 +84,10 @@ where
         let (q, v) = Self::split(state);
         let slip = self.system.rows(&q) * v - self.system.base(t);
         let normal = self.system.normal(t);
-        let bends = SVector::from_fn(|i, _| self.bristles[i].rate(state[2 * N + i], slip[i]));
+        let one = |i: usize| Bend { each: [state[2 * N + i], 0.0, 0.0, 0.0], ..Bend::none() };
+        let bends = SVector::from_fn(|i, _| self.bristles[i].rate(&one(i), slip[i])[0]);
         let rubs = SVector::from_fn(|i, _| {
-            self.bristles[i].coefficient(state[2 * N + i], bends[i]) * normal[i].max(0.0)
+            self.bristles[i].coefficient(&one(i), &[bends[i], 0.0, 0.0, 0.0]) * normal[i].max(0.0)
         });
         (rubs, bends)
     }
@@ -110,7 +114,7 @@ where
         let (q, _) = Self::split(&self.state);
         let (rows, inertia) = (self.system.rows(&q), self.system.inertia(&q));
         let normal = self.system.normal(self.time);
-        let bent = |row: usize| self.bristles[row].holding(f64::INFINITY);
+        let bent = |row: usize| self.bristles[row].deflection();
         let way = |joint: usize| {
             (0..B)
                 .filter(|row| rows[(*row, joint)] != 0.0)

@@ -75,12 +75,17 @@ pub enum SystemError {
     Inertia(f64),
     /// The friction of a row has bristles.
     #[error(
-        "row {0} has a friction with bristles (lugre, dahl, elasto_plastic): expected one that sticks exactly"
+        "row {0} has a friction with bristles (lugre, dahl, elasto_plastic, maxwell): expected one that sticks exactly"
     )]
     Bristles(usize),
     /// The friction of a row has none.
     #[error("row {0} has a friction without bristles: expected lugre, dahl or elasto_plastic in every row")]
     NoBristles(usize),
+    /// The friction of a row has several elements.
+    #[error(
+        "row {0} has a friction of several elements (maxwell): expected lugre, dahl or elasto_plastic in every row"
+    )]
+    Elements(usize),
 }
 
 /// A system in motion.
@@ -108,6 +113,14 @@ struct Equations<const N: usize, const B: usize> {
     bound: SVector<f64, B>,
     /// Slip rates.
     slip: SVector<f64, B>,
+}
+
+/// A step: its end, its error over the tolerance, rates and equations at the end.
+struct Step<const N: usize, const B: usize> {
+    to: State<N>,
+    error: f64,
+    rates: Rates<N>,
+    equations: Equations<N, B>,
 }
 
 /// Directions that stuck rows span, orthonormal by `M⁻¹`, with the velocity that each has to have.
@@ -224,10 +237,9 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         self.modes.map(|mode| mode == Mode::Stuck)
     }
 
-    fn rate(&self, state: &State<N>) -> Result<Rates<N>, SystemError> {
-        let e = self.equations(state)?;
+    fn rate(&self, state: &State<N>, e: &Equations<N, B>) -> Rates<N> {
         let span = Span::of(&e.inverse, &e.rows, &SVector::zeros(), &self.stuck());
-        Ok([state.velocity, span.project(&e.inverse, &e.free, 0.0)])
+        [state.velocity, span.project(&e.inverse, &e.free, 0.0)]
     }
 
     /// Accelerations that friction leaves to stuck rows; each below [`STILL`] while they hold.
@@ -292,10 +304,14 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         Ok(before)
     }
 
-    /// A step of the pair: the end, its error over the tolerance, and the rates there.
-    fn step(&self, h: f64) -> Result<(State<N>, f64, Rates<N>), SystemError> {
+    /// A step of the pair.
+    fn step(&self, h: f64) -> Result<Step<N, B>, SystemError> {
         let from = &self.state;
-        let first = self.known.map_or_else(|| self.rate(from), Ok)?;
+        let first = match self.known {
+            Some(rates) => rates,
+            None => self.rate(from, &self.equations(from)?),
+        };
+        let mut end = None;
         let mut k = [first; 7];
         let mut to = *from;
         for i in 0..6 {
@@ -304,7 +320,9 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
                 to.position += k[0] * (h * a);
                 to.velocity += k[1] * (h * a);
             }
-            k[i + 1] = self.rate(&to)?;
+            let e = self.equations(&to)?;
+            k[i + 1] = self.rate(&to, &e);
+            end = Some(e);
         }
         let left_out =
             |n: usize| E.iter().zip(&k).fold(SVector::<f64, N>::zeros(), |sum, (e, k)| sum + k[n] * (h * e));
@@ -315,7 +333,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
                 .fold(0.0_f64, |most, (e, x)| most.max(e.abs() / (TOLERANCE * (1.0 + x.abs()))))
         };
         let error = over(left_out(0), &to.position).max(over(left_out(1), &to.velocity));
-        Ok((to, error, k[6]))
+        let equations = end.map_or_else(|| self.equations(&to), Ok)?;
+        Ok(Step { to, error, rates: k[6], equations })
     }
 
     /// Follows the motion to a time, s, and adds what happened to `events`.
@@ -334,7 +353,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             let most = self.step.min(self.system.longest_step());
             let last = now + most >= end;
             let h = if last { end - now } else { most };
-            let (mut reached, error, rates) = self.step(h)?;
+            let Step { to: mut reached, error, rates, equations: mut e } = self.step(h)?;
             if !(error.is_finite() && reached.velocity.iter().all(|v| v.is_finite())) {
                 return Err(SystemError::NotFinite(begin));
             }
@@ -349,7 +368,6 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             if last {
                 reached.time = end;
             }
-            let mut e = self.equations(&reached)?;
             let happened = self.happened(&e);
             if happened {
                 reached = self.locate(h)?;
@@ -385,9 +403,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             if middle <= before || middle >= after {
                 break;
             }
-            let e = self.equations(&self.step(middle)?.0)?;
-            if self.happened(&e) { after = middle } else { before = middle }
+            if self.happened(&self.step(middle)?.equations) { after = middle } else { before = middle }
         }
-        Ok(self.step(after)?.0)
+        Ok(self.step(after)?.to)
     }
 }
