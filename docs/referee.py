@@ -108,8 +108,8 @@ def motion():
 
 def main():
     results = referee.compare(CASES.values(), list(ENGINES.values()))
-    about = "\n".join(f"{name:17}{engine.about}" for name, engine in ENGINES.items())
-    (HERE / "referee.txt").write_text(f"{referee.table(CASES.values(), results)}\n\n{about}\n", encoding="utf-8")
+    text = f"{referee.table(CASES.values(), results)}\n\n{referee.about(list(ENGINES.values()))}\n"
+    (HERE / "referee.txt").write_text(text, encoding="utf-8")
     bristles()
     motion()
 

@@ -87,7 +87,16 @@ def test_an_engine_that_gives_up_does_not_end_the_comparison():
         def run(self, case):
             raise ArithmeticError("no step is short enough")
 
+    # Nor does one of this package, of a load that no number holds.
+    text = dict(_clutch.referee_cases())["C1"].replace("constant = 0.047088", "constant = 1e308")
+    beyond = referee.compare([referee.Case(text)], referee.own())
+    assert {r.engine for r in beyond if r.failed} >= {"system", "dormand_prince", "exact_flow"}
+
     case = CASES["P3"]
+    with pytest.raises(ValueError, match="case P3: given twice"):
+        referee.compare([case, case], referee.own())
+    with pytest.raises(ValueError, match="engine breaks: given twice"):
+        referee.compare([case], [Breaks(), Breaks()])
     results = referee.compare([case], [Breaks(), *referee.own()])
     assert results[0].failed == "no step is short enough"
     text = referee.table([case], results)
@@ -102,7 +111,14 @@ def test_an_engine_that_gives_up_does_not_end_the_comparison():
         ({"velocity": np.zeros((1, 2000))}, r"P3: trajectory.velocity\[0\]: 2000 samples; expected 2001"),
         ({"position": np.full((1, 2001), np.nan)}, r"P3: trajectory.position\[0\]\[0\] = NaN: expected a finite"),
         ({"torque": np.zeros((3, 2001))}, r"P3: trajectory.torque: 3 lists; expected 1"),
-        ({"events": [(0.5, 1, True)]}, r"P3: trajectory.events: no row 1 at 0.5 s"),
+        ({"events": [(0.5, 1, True)]}, r"P3: trajectory.events\[0\]: row 1: expected one from 0 to 0"),
+        ({"events": [(0.5, -1, True)]}, r"P3: trajectory.events\[0\]: row -1: expected a number from 0 on"),
+        (
+            {"events": [(0.5, 0, True), (0.4, 0, False)]},
+            r"P3: trajectory.events\[1\]: time 0.4 s: expected one from 0.5",
+        ),
+        ({"events": [(2.5, 0, True)]}, r"P3: trajectory.events\[0\]: time 2.5 s: expected one from 0 to 2 s"),
+        ({"position": np.zeros((1, 1, 2001))}, r"an array of 3 dimensions"),
     ],
 )
 def test_a_trajectory_that_does_not_fit_its_case_is_refused(change, said):
@@ -123,7 +139,7 @@ def test_a_case_of_ones_own_is_a_text():
         referee.Case(text.replace("[0.105]", "[0.1, 0.2]"), "mine")
     with pytest.raises(ValueError, match=r"engine = \"euler\": expected one of: system, bristled_system"):
         mine.run("euler")
-    with pytest.raises(ValueError, match=r"step = 0.3 s: expected a whole part"):
+    with pytest.raises(ValueError, match=r"step = 3e-1 s: expected a whole part"):
         mine.run("dormand_prince", step=0.3)
 
 
@@ -143,15 +159,23 @@ def test_the_page_has_every_case_what_the_engines_make_of_them_and_a_case_to_beg
     assert all(figure.holds for figure in mine.judge(mine.run("system")))
 
 
-def test_the_command_prints_a_table_that_fits_a_terminal():
+def test_the_command_prints_a_table_that_fits_a_terminal(tmp_path):
     asked = [sys.executable, "-m", "clutch.referee", "P3", "X1"]
     done = subprocess.run(asked, capture_output=True, encoding="utf-8", timeout=300)
     assert done.returncode == 0, done.stderr
-    assert all(len(line) <= 80 for line in done.stdout.splitlines()), done.stdout
+    figures, about = done.stdout.rstrip().rsplit("\n\n", 1)
+    assert all(len(line) <= 80 for line in figures.splitlines()), done.stdout
+    assert "SciPy " in about
     assert "P3  A brake that closes at 0.1 s stops a sliding mass" in done.stdout
     assert "exact_flow" in done.stdout and "karnopp" in done.stdout
     wrong = subprocess.run([*asked, "--engine", "eule"], capture_output=True, encoding="utf-8", timeout=60)
     assert wrong.returncode == 2 and "--engine eule: expected one of system, " in wrong.stderr
+    file = tmp_path / "mine.toml"
+    file.write_text(dict(_clutch.referee_cases())["P3"].replace("sample_s = 0.001", "sample_s = 0.3"), encoding="utf-8")
+    bad = subprocess.run([*asked[:3], str(file)], capture_output=True, encoding="utf-8", timeout=60)
+    assert bad.returncode == 2 and "mine.toml: sample_s = 0.3: expected" in bad.stderr, bad.stderr
+    none = subprocess.run([*asked[:3], "L1", "--engine", "system"], capture_output=True, encoding="utf-8", timeout=60)
+    assert none.returncode == 1, none.stdout
 
 
 def test_the_same_engine_twice_gives_the_same_bits():

@@ -30,7 +30,9 @@ pub(crate) fn cargo<const N: usize>(args: [&str; N]) -> Program {
 pub(crate) fn beside(verb: &str) -> Result<Beside> {
     let path = root().join("target").join(format!("{verb}.log"));
     let log = std::fs::File::create(&path).with_context(|| path.display().to_string())?;
-    let mut verb = program("nice").args(["-n", "5"]).arg(std::env::current_exe()?).arg(verb);
+    let this = std::env::current_exe()?;
+    let mut verb =
+        if cfg!(unix) { program("nice").args(["-n", "5"]).arg(this) } else { program(this) }.arg(verb);
     verb.announce();
     let child = verb.0.stdout(log.try_clone()?).stderr(log).spawn()?;
     Ok(Beside { child, path })

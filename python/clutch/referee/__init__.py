@@ -31,7 +31,7 @@ An engine of your own is any object with ``name``, ``about``, ``missing()``, ``r
 from __future__ import annotations
 
 from clutch.referee._case import Case, Engine, Figure, Mechanism, Row, Signal, Trajectory, cases
-from clutch.referee._compare import Own, Score, compare, others, own, table
+from clutch.referee._compare import Own, Score, about, compare, others, own, table
 
 __all__ = [
     "Case",
@@ -43,6 +43,7 @@ __all__ = [
     "Score",
     "Signal",
     "Trajectory",
+    "about",
     "cases",
     "compare",
     "others",

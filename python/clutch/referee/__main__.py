@@ -6,11 +6,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from clutch.referee import Case, cases, compare, others, own, table
+from clutch.referee import Case, about, cases, compare, others, own, table
 
 
 def main() -> int:
-    """Run cases on engines and print what they made of them; 1 if an engine of this package missed a figure."""
+    """Run cases on engines and print what they made of them; 1 if one of this package missed, or none took a case."""
     engines = [*own(), *others()]
     names = [engine.name for engine in engines]
     parser = argparse.ArgumentParser(
@@ -26,18 +26,25 @@ def main() -> int:
     known = cases()
     chosen = []
     for name in asked.cases or known:
-        if name in known:
+        if Path(name).is_file():
+            try:
+                chosen.append(Case(Path(name).read_text(encoding="utf-8"), name))
+            except (OSError, ValueError) as e:
+                parser.error(str(e) if str(e).startswith(name) else f"{name}: {e}")
+        elif name in known:
             chosen.append(known[name])
-        elif Path(name).is_file():
-            chosen.append(Case(Path(name).read_text(encoding="utf-8"), name))
         else:
             parser.error(f"{name}: no such file, and no built-in case; `clutch referee --list` shows those")
     engines = [engine for engine in engines if not asked.engine or engine.name in asked.engine]
-    results = compare(chosen, engines)
-    print(table(chosen, results))
+    try:
+        results = compare(chosen, engines)
+    except ValueError as e:
+        parser.error(str(e))
+    print(f"{table(chosen, results)}\n\n{about(engines)}")
     ours = {engine.name for engine in own()}
     missed = [r for r in results if r.engine in ours and (r.failed or r.held < len(r.figures))]
-    return 1 if missed else 0
+    # A comparison without a figure shows nothing.
+    return 1 if missed or not any(r.figures for r in results) else 0
 
 
 if __name__ == "__main__":

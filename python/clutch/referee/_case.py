@@ -147,6 +147,7 @@ class Case:
         self.duration: float = told["duration_s"]
         self.sample: float = told["sample_s"]
         self.still: float | None = told["still"]
+        self._samples: int = told["samples"] if told["mechanism"] is not None else 0
         self.mechanism: Mechanism | None = None
         if (m := told["mechanism"]) is not None:
             rows = tuple(
@@ -168,7 +169,7 @@ class Case:
     @property
     def samples(self) -> int:
         """Samples of a trajectory after the first."""
-        return round(self.duration / self.sample) if self.mechanism else 0
+        return self._samples
 
     def run(self, engine: str, *, step: float | None = None) -> Trajectory:
         """Run the case on an engine of this package.
@@ -178,7 +179,8 @@ class Case:
         engine
             ``system``, ``bristled_system``, ``dormand_prince``, ``exact_flow`` or ``bristle``.
         step
-            Period in which a shaft engine is asked for the motion, s; none is the time between samples.
+            Period in which a shaft engine is asked for the motion, s; none is the time between samples. Systems choose
+            their steps themselves, and a scenario has its period: for these it says nothing.
 
         Raises
         ------
@@ -198,6 +200,9 @@ class Case:
             A list that has not the length of the case, or a value that is no number.
         """
         t = trajectory
+        for i, event in enumerate(t.events or ()):
+            if event[1] < 0:
+                raise ValueError(f"{self.id}: trajectory.events[{i}]: row {event[1]}: expected a number from 0 on")
         events = None if t.events is None else [(float(a), int(b), bool(c)) for a, b, c in t.events]
         torque = None if t.torque is None else _lists(t.torque)
         figures = self._native.judge(_lists(t.position), _lists(t.velocity), torque, events, t.metrics)
@@ -205,7 +210,12 @@ class Case:
 
 
 def _lists(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.atleast_2d(np.asarray(values, dtype=np.float64))
+    array = np.atleast_2d(np.asarray(values, dtype=np.float64))
+    if array.ndim != 2:
+        raise ValueError(
+            f"an array of {array.ndim} dimensions: expected a row for each joint, a column for each sample"
+        )
+    return array
 
 
 def _signal(terms: list[dict[str, float]]) -> Signal:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from clutch.referee._case import Case, Engine, Figure, Trajectory
 
-__all__ = ["Own", "Score", "compare", "others", "own", "table"]
+__all__ = ["Own", "Score", "about", "compare", "others", "own", "table"]
 
 
 class Own:
@@ -80,9 +80,12 @@ def compare(cases: Iterable[Case], engines: Sequence[Engine]) -> list[Score]:
     Raises
     ------
     ValueError
-        A trajectory that has not the length of its case.
+        Two cases of one id, or two engines of one name; a trajectory that has not the length of its case.
     """
-    results = []
+    cases, results = list(cases), []
+    for what, names in (("case", [c.id for c in cases]), ("engine", [e.name for e in engines])):
+        if twice := next((name for i, name in enumerate(names) if name in names[:i]), None):
+            raise ValueError(f"{what} {twice}: given twice; a table tells them by their names")
     for case in cases:
         for engine in engines:
             if (why := engine.missing() or engine.refuses(case)) is not None:
@@ -94,7 +97,7 @@ def compare(cases: Iterable[Case], engines: Sequence[Engine]) -> list[Score]:
             except NotImplementedError as e:
                 results.append(Score(case.id, engine.name, refused=str(e).removeprefix("does not apply: ")))
                 continue
-            except ArithmeticError as e:
+            except (ArithmeticError, ValueError) as e:
                 results.append(Score(case.id, engine.name, failed=str(e), seconds=time.process_time() - begin))
                 continue
             seconds = time.process_time() - begin
@@ -148,3 +151,8 @@ def table(cases: Iterable[Case], results: Sequence[Score]) -> str:
         count, held = sum(len(r.figures) for r in ran), sum(r.held for r in ran)
         lines.append(f"{engine:17}{len(ran):>7}{count:>9}{held:>7}{sum(r.seconds for r in ran):>10.2f}")
     return "\n".join(lines)
+
+
+def about(engines: Sequence[Engine]) -> str:
+    """A line for each engine: its method and version."""
+    return "\n".join(f"{engine.name:17}{engine.about}" for engine in engines)

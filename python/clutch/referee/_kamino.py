@@ -21,7 +21,7 @@ Vector = NDArray[np.float64]
 
 
 class Kamino:
-    """Newton's SolverKamino with the settings it comes with (PADMM), on the CPU, in steps of 1 ms.
+    """Newton's SolverKamino with the settings it comes with (PADMM), on the CPU, in steps of at most 1 ms.
 
     Each joint of a mechanism is a body that slides along one axis. Kamino's friction belongs to a joint between two
     bodies or a body and the world, so a row has to be the rate of one joint or the difference of two, and those have to
@@ -31,15 +31,14 @@ class Kamino:
     in. Its numbers have 32 bit.
     """
 
-    name = "kamino"
-
     def __init__(self, level: Level = "mu_static") -> None:
         self.level = level
+        self.name = "kamino" if level == "mu_static" else "kamino_sliding"
 
     @property
     def about(self) -> str:
         """One line: which method, whose, which version."""
-        what = "joint friction, default PADMM, 32 bit, 1 ms"
+        what = "joint friction, default PADMM, 32 bit, at most 1 ms"
         return f"Newton {version('newton')}, Kamino: {what}; one coefficient: {LEVELS[self.level]}"
 
     def missing(self) -> str | None:

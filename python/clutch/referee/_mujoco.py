@@ -24,7 +24,7 @@ Vector = NDArray[np.float64]
 
 
 class MuJoCo:
-    """MuJoCo with the settings it comes with, in steps of 1 ms.
+    """MuJoCo with the settings it comes with, in steps of at most 1 ms.
 
     Each joint of a mechanism is a body on a slide, an inertia between two joints the armature of a tendon. A row of one
     joint is the ``frictionloss`` of that joint, any other that of a fixed tendon; it is written into the model before
@@ -33,15 +33,14 @@ class MuJoCo:
     forces are those at the beginning of a step. A base that moves is at rest in the frame that the run is in.
     """
 
-    name = "mujoco"
-
     def __init__(self, level: Level = "mu_static") -> None:
         self.level = level
+        self.name = "mujoco" if level == "mu_static" else "mujoco_sliding"
 
     @property
     def about(self) -> str:
         """One line: which method, whose, which version."""
-        what = "frictionloss, default solver and impedance, semi-implicit Euler of 1 ms"
+        what = "frictionloss, default solver and impedance, semi-implicit Euler of at most 1 ms"
         return f"MuJoCo {version('mujoco')}: {what}; one coefficient: {LEVELS[self.level]}"
 
     def missing(self) -> str | None:
@@ -90,7 +89,7 @@ class MuJoCoLuGre:
     @property
     def about(self) -> str:
         """One line: which method, whose, which version."""
-        return f"MuJoCo {version('mujoco')}: LuGre friction of its dcmotor, semi-implicit Euler of 1 ms"
+        return f"MuJoCo {version('mujoco')}: LuGre friction of its dcmotor, semi-implicit Euler of at most 1 ms"
 
     def missing(self) -> str | None:
         """The package that is not here."""

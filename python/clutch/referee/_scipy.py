@@ -121,14 +121,12 @@ def _bristled(case: Case, m: Mechanism) -> Trajectory:
     begin = 0.0
     for end in ends:
         inside = (times >= begin - 1e-12) & (times <= end + 1e-12)
-        done = solve_ivp(
-            rates, (begin, end), y, "LSODA", times[inside].clip(begin, end), rtol=1e-10, atol=atol, max_step=longest
-        )
+        wanted = np.unique(np.append(times[inside].clip(begin, end), end))
+        done = solve_ivp(rates, (begin, end), y, "LSODA", wanted, rtol=1e-10, atol=atol, max_step=longest)
         if not done.success:
             raise ArithmeticError(f"LSODA gave up: {done.message}")
-        states[:, inside] = done.y
-        last = solve_ivp(rates, (times[inside][-1], end), done.y[:, -1], "LSODA", rtol=1e-10, atol=atol)
-        y, begin = last.y[:, -1], end
+        states[:, inside] = done.y[:, : int(inside.sum())]
+        y, begin = done.y[:, -1], end
     torque = np.array([friction(t, states[:, k])[1] for k, t in enumerate(times)]).T
     return Trajectory(states[:n], states[n : 2 * n], torque)
 
@@ -343,7 +341,10 @@ class _Rigid:
             y = self.choose(t, y, crossed, _AHEAD if lets_go else 0.0)
             if written and times[written - 1] == t:
                 states[:, written - 1] = y
-            events += [(t, int(i), bool(self.modes[i] == 0)) for i in np.flatnonzero(before != self.modes)]
+            # A row that turns round slips on.
+            events += [
+                (t, int(i), bool(self.modes[i] == 0)) for i in np.flatnonzero((before == 0) != (self.modes == 0))
+            ]
         return Trajectory(states[:n], states[n:], None, events)
 
 

@@ -144,8 +144,9 @@ class _Modes:
         if (why := _of_sliding(case)) is not None:
             return why
         assert case.mechanism is not None
-        if len(case.mechanism.position) > 1:
-            return "more than one joint"
+        m = case.mechanism
+        if len(m.position) > 1 or len(m.rows) > 1 or m.rows[0].joints[0] != 1.0:
+            return "it needs one joint and one row of that joint"
         steps = case.duration / min(STEP, case.sample)
         return f"would take {steps:.0f} steps" if steps > STEPS else None
 

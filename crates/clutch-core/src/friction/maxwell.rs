@@ -7,11 +7,12 @@
 //! μ = Σ k_i z_i + σ Σ_held α_i θ̇,    α_a + α_b + α_c + α_d = 1
 //! ```
 //!
-//! F. Al-Bender, V. Lampaert, J. Swevers, IEEE Trans. Automat. Control 50 (2005) 1883–1887, with two additions: a held element is damped, and a sliding one bends by no more than the motion, without
-//! which the model can give energy. It has what one bristle lacks: it remembers where the motion turned round, so that a
-//! small loop inside a large one closes, and the large one goes on as if the small one had not been. With one coefficient
-//! it is Maxwell slip, which the way alone decides. For presliding that was measured: stiffnesses and shares are the
-//! slopes and the bends of the first loading curve. It is stiff, and takes some times as long as one bristle.
+//! F. Al-Bender, V. Lampaert, J. Swevers, IEEE Trans. Automat. Control 50 (2005) 1883–1887, with two additions: a held
+//! element is damped, and a sliding one bends by no more than the motion, without which the model can give energy. It has
+//! what one bristle lacks: it remembers where the motion turned round, so that a small loop inside a large one closes, and
+//! the large one goes on as if the small one had not been. With one coefficient it is Maxwell slip, which the way alone
+//! decides. It is for pre-sliding that was measured: stiffnesses and shares are the slopes and the bends of the first
+//! loading curve. It is stiff, and takes some times as long as one bristle.
 
 use super::StribeckParams;
 use super::bristles::Way;
@@ -50,7 +51,8 @@ crate::params! {
     }
     relations(p) {
         /// Elements share one friction.
-        WHOLE: share_c, "a share that leaves share_a + share_b + share_c at 1 or below" => p.share_a + p.share_b + p.share_c <= T::ONE;
+        WHOLE: share_c, "a share that leaves share_a + share_b + share_c at 1 or below" => // Decimal fractions round.
+            p.share_a + p.share_b + p.share_c <= T::from_f64(1.0 + 1e-6);
     }
 }
 

@@ -164,6 +164,8 @@ struct ExpectFile {
 
 /// Joints and rows at most.
 const MOST: usize = 4;
+/// Waves of a load or a normal force at most.
+const MOST_WAVES: f64 = 1e6;
 /// Samples of a trajectory at most.
 const MOST_SAMPLES: f64 = 5e6;
 
@@ -194,14 +196,22 @@ impl Case {
                 let duration = positive("duration_s", file.duration_s.ok_or_else(|| missing("duration_s"))?)?;
                 let sample = positive("sample_s", file.sample_s.ok_or_else(|| missing("sample_s"))?)?;
                 let count = duration / sample;
-                if (count - libm::round(count)).abs() > 1e-6 * count || !(0.5..=MOST_SAMPLES).contains(&count)
+                if (count - libm::round(count)).abs() > (1e-9 * count).clamp(1e-9, 1e-3)
+                    || !(0.5..=MOST_SAMPLES).contains(&count)
                 {
                     return Err(wrong(format!(
                         "sample_s = {sample}: expected duration_s = {duration} divided by a whole number of at most \
                          {MOST_SAMPLES}"
                     )));
                 }
-                (Model::Mechanism(mechanism(origin, m)?), duration, sample)
+                let m = mechanism(origin, m)?;
+                let fastest = m.signals().fold(0.0_f64, |most, s| most.max(s.fastest()));
+                if fastest * duration > MOST_WAVES {
+                    return Err(wrong(format!(
+                        "frequency_hz = {fastest:e}: expected at most {MOST_WAVES:e} waves in duration_s = {duration}"
+                    )));
+                }
+                (Model::Mechanism(m), duration, sample)
             }
             (None, Some(s)) => {
                 if let Some(key) = [("duration_s", file.duration_s), ("sample_s", file.sample_s)]
@@ -210,9 +220,12 @@ impl Case {
                 {
                     return Err(wrong(format!("{key}: a scenario has its own; write it into scenario.set")));
                 }
-                crate::scenario::BUILT_IN.iter().find(|b| b.name == s.name).ok_or_else(|| {
-                    wrong(format!("scenario.name = \"{}\": expected a built-in scenario", s.name))
-                })?;
+                let built_in =
+                    crate::scenario::BUILT_IN.iter().find(|b| b.name == s.name).ok_or_else(|| {
+                        wrong(format!("scenario.name = \"{}\": expected a built-in scenario", s.name))
+                    })?;
+                crate::Scenario::parse("scenario", built_in.toml, &s.set)
+                    .map_err(|e| wrong(format!("scenario.set: {e}")))?;
                 (Model::Scenario(s), 0.0, 0.0)
             }
             (None, None) => return Err(wrong("expected [mechanism] or [scenario]; found none".into())),
@@ -265,7 +278,7 @@ impl Case {
         };
         json!({
             "id": self.id, "title": self.title, "source": self.source, "duration_s": self.duration,
-            "sample_s": self.sample, "still": self.still, "mechanism": mechanism,
+            "sample_s": self.sample, "samples": self.samples(), "still": self.still, "mechanism": mechanism,
         })
     }
 

@@ -42,6 +42,9 @@ pub const ENGINES: [RefereeEngine; 5] = [
     RefereeEngine::Bristle,
 ];
 
+/// Periods in which a shaft engine is asked for a motion, at most.
+const MOST_STEPS: f64 = 1e8;
+
 /// A case could not be run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RefereeError {
@@ -52,7 +55,10 @@ pub enum RefereeError {
         String,
     ),
     /// Period of a shaft engine that does not divide the time between samples.
-    #[error("step = {step} s: expected a whole part of the time between samples, {sample} s")]
+    #[error(
+        "step = {step:e} s: expected a whole part of the time between samples, {sample} s, and no more than {MOST_STEPS:e} \
+         steps in all"
+    )]
     Step {
         /// Asked for, s.
         step: f64,
@@ -159,13 +165,19 @@ impl Trajectory {
 fn rigid<const N: usize, const B: usize>(case: &Case, m: &Mechanism) -> Result<Trajectory, RefereeError> {
     let system = Padded::<N, B>::new(m);
     let mut motion = Motion::new(&system, begin(m))?;
+    let mut held = motion.modes().map(|mode| mode == Mode::Stuck);
     let (mut out, mut events) = (empty(case, m), Vec::new());
     for k in 0..=case.samples() {
         motion.advance(k as f64 * case.sample, &mut events)?;
         let state = motion.state();
         out.push(state.position.as_slice(), state.velocity.as_slice(), motion.friction()?.as_slice());
     }
-    let known = events.iter().filter(|e| e.row < m.rows.len());
+    // A row that turns round slips on.
+    let changes = events.iter().filter(|e| {
+        let holds = e.mode == Mode::Stuck;
+        std::mem::replace(&mut held[e.row], holds) != holds
+    });
+    let known = changes.filter(|e| e.row < m.rows.len());
     out.events = Some(
         known.map(|e| TrajectoryEvent { time: e.time, row: e.row, holds: e.mode == Mode::Stuck }).collect(),
     );
@@ -276,7 +288,8 @@ fn shaft(
     }
     let step = step.unwrap_or(case.sample);
     let per_sample = libm::round(case.sample / step);
-    if !(step > 0.0 && (per_sample * step - case.sample).abs() <= 1e-9 * case.sample) {
+    let fits = (per_sample * step - case.sample).abs() <= 1e-9 * case.sample;
+    if !(step > 0.0 && fits && per_sample * case.samples() as f64 <= MOST_STEPS) {
         return Err(RefereeError::Step { step, sample: case.sample });
     }
     let mut shaft = Shaft::new(m.position[0], m.velocity[0] - base);

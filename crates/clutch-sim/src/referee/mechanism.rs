@@ -10,19 +10,19 @@ use nalgebra::{SMatrix, SVector};
 #[derive(Clone, Debug)]
 pub struct Mechanism {
     /// `M`.
-    pub inertia: Vec<Vec<f64>>,
+    pub(super) inertia: Vec<Vec<f64>>,
     /// `K`; it need not be symmetric, so that a law can be written as one.
-    pub stiffness: Vec<Vec<f64>>,
+    pub(super) stiffness: Vec<Vec<f64>>,
     /// `D`.
-    pub damping: Vec<Vec<f64>>,
+    pub(super) damping: Vec<Vec<f64>>,
     /// Positions at the start.
-    pub position: Vec<f64>,
+    pub(super) position: Vec<f64>,
     /// Velocities at the start.
-    pub velocity: Vec<f64>,
+    pub(super) velocity: Vec<f64>,
     /// Load of each joint over time.
-    pub load: Vec<Signal>,
+    pub(super) load: Vec<Signal>,
     /// Rows of friction.
-    pub rows: Vec<Row>,
+    pub(super) rows: Vec<Row>,
 }
 
 impl Mechanism {

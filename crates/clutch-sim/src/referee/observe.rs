@@ -2,6 +2,7 @@
 
 use super::case::{Case, Expect, Model};
 use super::trajectory::Trajectory;
+use crate::metrics::{Detected, Metrics};
 use serde::Deserialize;
 
 /// A way to observe.
@@ -142,7 +143,9 @@ impl Observe {
         }
         match (quantity, weighs) {
             (true, false) => {
-                return Err("expected position, velocity or torque: weights of what is summed".into());
+                return Err(
+                    "position, velocity, torque: none given; expected weights of what is summed".into()
+                );
             }
             (false, true) => return Err("position, velocity, torque: this kind takes none".into()),
             _ => {}
@@ -164,7 +167,16 @@ impl Observe {
             Model::Scenario(_) if self.kind != Kind::Metric => {
                 Err("kind: a scenario has metrics only".into())
             }
-            Model::Scenario(_) => Ok(()),
+            Model::Scenario(_) => {
+                let names =
+                    Metrics::FIGURES.iter().map(|f| f.name).chain(Detected::FIGURES.iter().map(|f| f.name));
+                let name = self.metric.as_deref().unwrap_or_default();
+                if names.clone().any(|known| known == name) {
+                    return Ok(());
+                }
+                let names: Vec<&str> = names.collect();
+                Err(format!("metric = \"{name}\": expected one of: {}", names.join(", ")))
+            }
             Model::Mechanism(_) if self.kind == Kind::Metric => Err("kind: metrics are of scenarios".into()),
             Model::Mechanism(m) => {
                 let (joints, rows) = (m.joints(), m.rows.len());
@@ -250,9 +262,9 @@ impl Observe {
             Kind::StickTime => phases(true).duration(number),
             Kind::SlipTime => phases(false).duration(number),
             Kind::StickCount => Some(phases(true).count() as f64),
-            Kind::AtStick => curve.after(phases(true).begin(number)?),
+            Kind::AtStick => curve.during(phases(true).span(number)?),
             Kind::StickRatio => {
-                let away = |n: usize| Some(curve.after(phases(true).begin(n)?)? - level);
+                let away = |n: usize| Some(curve.during(phases(true).span(n)?)? - level);
                 Some(away(number + 1)? / away(number)?)
             }
             Kind::Metric => None,
@@ -280,10 +292,16 @@ impl Phases {
         self.begins().nth(number).map(|i| self.events[i].0)
     }
 
-    fn duration(&self, number: usize) -> Option<f64> {
+    /// Begin and end; a phase that has no end lasts.
+    fn span(&self, number: usize) -> Option<(f64, f64)> {
         let begin = self.begins().nth(number)?;
-        let end = self.events[begin + 1..].iter().find(|e| e.1 != self.holds)?;
-        Some(end.0 - self.events[begin].0)
+        let end = self.events[begin + 1..].iter().find(|e| e.1 != self.holds);
+        Some((self.events[begin].0, end.map_or(f64::INFINITY, |e| e.0)))
+    }
+
+    fn duration(&self, number: usize) -> Option<f64> {
+        let (begin, end) = self.span(number)?;
+        end.is_finite().then_some(end - begin)
     }
 }
 
@@ -324,9 +342,10 @@ impl Curve {
         (k + 1 < self.values.len()).then(|| self.between(k, place - k as f64))
     }
 
-    /// The sample after a time: of something that holds from then on.
-    fn after(&self, t: f64) -> Option<f64> {
-        self.values.get(libm::ceil(t / self.sample) as usize).copied()
+    /// The first sample of a time in which something holds; none if that is over before.
+    fn during(&self, (begin, end): (f64, f64)) -> Option<f64> {
+        let k = libm::ceil(begin / self.sample);
+        (k * self.sample <= end).then(|| self.values.get(k as usize).copied())?
     }
 
     /// The largest, or with −1 the least: the top of the parabola through three samples.
@@ -334,8 +353,10 @@ impl Curve {
         let first = libm::ceil(from / self.sample - 1e-6) as usize;
         let last = to.map_or(self.values.len(), |t| libm::floor(t / self.sample + 1e-6) as usize + 1);
         let range = first..last.min(self.values.len());
-        let k = range.max_by(|a, b| (sign * self.values[*a]).total_cmp(&(sign * self.values[*b])))?;
-        Some(self.top(k))
+        let k = range.clone().max_by(|a, b| (sign * self.values[*a]).total_cmp(&(sign * self.values[*b])))?;
+        // At the edge of the window there is no top: the curve goes on.
+        let inside = k > range.start && k + 1 < range.end;
+        Some(if inside { self.top(k) } else { self.values[k] })
     }
 
     fn first_peak(&self, from: f64) -> Option<f64> {

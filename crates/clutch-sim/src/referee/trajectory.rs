@@ -59,29 +59,42 @@ impl Trajectory {
             .and_then(|()| lists("velocity", &self.velocity, mechanism.joints()))
             .and_then(|()| self.torque.as_ref().map_or(Ok(()), |t| lists("torque", t, mechanism.rows.len())));
         all.map_err(|message| CaseError::new(&case.id, message))?;
-        let events = self.events.iter().flatten();
-        match events.clone().find(|e| e.row >= mechanism.rows.len() || !e.time.is_finite()) {
-            Some(e) => {
-                Err(CaseError::new(&case.id, format!("trajectory.events: no row {} at {} s", e.row, e.time)))
+        let mut last = 0.0;
+        for (i, e) in self.events.iter().flatten().enumerate() {
+            let wrong =
+                |what: String| Err(CaseError::new(&case.id, format!("trajectory.events[{i}]: {what}")));
+            if e.row >= mechanism.rows.len() {
+                return wrong(format!("row {}: expected one from 0 to {}", e.row, mechanism.rows.len() - 1));
             }
-            None => Ok(()),
+            if !(last..=case.duration * (1.0 + 1e-9)).contains(&e.time) {
+                return wrong(format!(
+                    "time {} s: expected one from {last} to {} s, in order",
+                    e.time, case.duration
+                ));
+            }
+            last = e.time;
         }
+        Ok(())
     }
 
     /// What holds and slips, as the engine says or, if it has no such thing, as slip rates above and below `still` say.
     pub(super) fn events_of(&self, case: &Case, row: usize) -> Vec<(f64, bool)> {
-        if let Some(events) = &self.events {
-            // A row that turns round goes on slipping.
-            let mut own: Vec<_> = events.iter().filter(|e| e.row == row).map(|e| (e.time, e.holds)).collect();
-            own.dedup_by_key(|e| e.1);
-            return own;
-        }
-        let (Model::Mechanism(mechanism), Some(still)) = (&case.model, case.still) else { return Vec::new() };
+        let Model::Mechanism(mechanism) = &case.model else { return Vec::new() };
         let r = &mechanism.rows[row];
         let slip = |k: usize| {
             let along = r.joints.iter().zip(&self.velocity).map(|(j, v)| j * v[k]).sum::<f64>();
             (along - r.base_velocity).abs()
         };
+        if let Some(events) = &self.events {
+            // A row that turns round goes on slipping, and one that slips at the start has not begun to.
+            let mut own: Vec<_> = events.iter().filter(|e| e.row == row).map(|e| (e.time, e.holds)).collect();
+            if slip(0) > 0.0 && own.first().is_some_and(|e| !e.1) {
+                own.remove(0);
+            }
+            own.dedup_by_key(|e| e.1);
+            return own;
+        }
+        let Some(still) = case.still else { return Vec::new() };
         let mut holds = slip(0) < still;
         let mut events = Vec::new();
         for k in 1..self.velocity.first().map_or(0, Vec::len) {

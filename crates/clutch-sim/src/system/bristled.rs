@@ -155,6 +155,9 @@ where
             let most = self.step.min(self.system.longest_step());
             let last = self.time + most >= end;
             let h = if last { end - self.time } else { most };
+            if self.time + h == self.time {
+                return Err(SystemError::TooManySteps(self.time));
+            }
             let away = core::array::from_fn(|i| if (N..2 * N).contains(&i) { self.state[i] } else { 1.0 });
             let rate = |t: f64, state: &[f64; D]| self.rate(t, state);
             let tried = rosenbrock::step(&rate, (self.time, &self.state, h), &scale, &away);

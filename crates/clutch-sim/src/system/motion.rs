@@ -171,6 +171,9 @@ impl<const N: usize> Span<N> {
         }
         // What is rounding of a number that is gone is 0.
         let least = 8.0 * f64::EPSILON * x.amax();
+        if !least.is_finite() {
+            return y;
+        }
         y.map(|v| if v.abs() <= least { 0.0 } else { v })
     }
 }
@@ -230,6 +233,9 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         let bound = SVector::<f64, B>::from_fn(|i, _| self.system.friction(i).at_rest() * normal[i]);
         let rubs = self.rubs(&slip, &normal);
         let free = inverse * (self.system.applied(*time, position, velocity) - rows.transpose() * rubs);
+        if !free.iter().all(|a| a.is_finite()) {
+            return Err(SystemError::NotFinite(*time));
+        }
         Ok(Equations { inverse, rows, free, bound, slip })
     }
 
@@ -330,9 +336,15 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             wrong
                 .iter()
                 .zip(x)
-                .fold(0.0_f64, |most, (e, x)| most.max(e.abs() / (TOLERANCE * (1.0 + x.abs()))))
+                // A number that is none is worse than all.
+                .fold(0.0_f64, |most, (e, x)| {
+                    let share = e.abs() / (TOLERANCE * (1.0 + x.abs()));
+                    if share.is_nan() || most.is_nan() { f64::NAN } else { most.max(share) }
+                })
         };
-        let error = over(left_out(0), &to.position).max(over(left_out(1), &to.velocity));
+        let (of_way, of_speed) = (over(left_out(0), &to.position), over(left_out(1), &to.velocity));
+        // `max` would pass over a number that is none.
+        let error = if of_way.is_nan() || of_way > of_speed { of_way } else { of_speed };
         let equations = end.map_or_else(|| self.equations(&to), Ok)?;
         Ok(Step { to, error, rates: k[6], equations })
     }
@@ -353,6 +365,9 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             let most = self.step.min(self.system.longest_step());
             let last = now + most >= end;
             let h = if last { end - now } else { most };
+            if now + h == now {
+                return Err(SystemError::TooManySteps(now));
+            }
             let Step { to: mut reached, error, rates, equations: mut e } = self.step(h)?;
             if !(error.is_finite() && reached.velocity.iter().all(|v| v.is_finite())) {
                 return Err(SystemError::NotFinite(begin));
