@@ -157,7 +157,7 @@ def _maxwell(case: Case, m: Mechanism) -> Trajectory:
     def spare(element: int, way: int) -> Callable[[float, _Vector], float]:
         def watched(t: float, y: _Vector) -> float:
             slip = float(row.joints @ y[n : 2 * n]) - row.base_velocity
-            return share[element] * level(row, abs(slip)) - way * stiff[element] * float(y[2 * n + element])
+            return float(share[element] * level(row, abs(slip)) - way * stiff[element] * y[2 * n + element])
 
         return _started(watched, begin)
 
