@@ -33,6 +33,20 @@ class ParamError(ValueError):
         self.value = value
 
 
+class DoesNotApply(ValueError):
+    """An engine does not take a case of the referee: no fault of either.
+
+    Examples
+    --------
+    >>> from clutch import referee
+    >>> try:
+    ...     referee.cases()["P3"].run("bristle")
+    ... except referee.DoesNotApply as error:
+    ...     print(error)
+    it needs friction with bristles in every row
+    """
+
+
 class LoopError(RuntimeError):
     """The loop was refused, or could not be started: gains that are not certified, a port, a board.
 

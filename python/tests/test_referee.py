@@ -59,7 +59,7 @@ def test_an_engine_that_does_not_take_a_case_says_why():
     assert MuJoCoLuGre().refuses(CASES["L1"]) is None
     assert "tree" in Kamino().refuses(CASES["X2"]) or "inertia" in Kamino().refuses(CASES["X2"])
     assert "60000 steps" in Kamino().refuses(CASES["A5"])
-    with pytest.raises(NotImplementedError, match="does not apply: it needs friction with bristles"):
+    with pytest.raises(referee.DoesNotApply, match="it needs friction with bristles"):
         CASES["P3"].run("bristle")
 
 

@@ -23,16 +23,24 @@ pub(crate) fn param_error(py: Python<'_>, message: &str, field: &str, value: Bou
     }
 }
 
-/// A `clutch.LoopError`.
-pub(crate) fn loop_error(py: Python<'_>, message: &str) -> PyErr {
-    let made = py
-        .import("clutch._errors")
-        .and_then(|m| m.getattr("LoopError"))
-        .and_then(|class| class.call1((message,)));
+/// An exception of `clutch._errors` that has a message only.
+fn error_of_ours(py: Python<'_>, class: &str, message: &str) -> PyErr {
+    let made =
+        py.import("clutch._errors").and_then(|m| m.getattr(class)).and_then(|class| class.call1((message,)));
     match made {
         Ok(error) => PyErr::from_value(error),
         Err(e) => e,
     }
+}
+
+/// A `clutch.LoopError`.
+pub(crate) fn loop_error(py: Python<'_>, message: &str) -> PyErr {
+    error_of_ours(py, "LoopError", message)
+}
+
+/// A `clutch.referee.DoesNotApply`.
+pub(crate) fn does_not_apply(py: Python<'_>, message: &str) -> PyErr {
+    error_of_ours(py, "DoesNotApply", message)
 }
 
 /// A scenario's error; its value is looked up in the tables it came from.

@@ -1,11 +1,11 @@
 //! Cases of the referee, and trajectories of any make before it.
 
-use crate::convert::from_json;
+use crate::convert::{does_not_apply, from_json};
 use clutch_sim::referee::{
     BUILT_IN, Case, ENGINES, RefereeEngine, RefereeError, Trajectory, TrajectoryEvent, run,
 };
 use numpy::{PyArray2, PyReadonlyArray2};
-use pyo3::exceptions::{PyNotImplementedError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::collections::HashMap;
 
@@ -59,7 +59,7 @@ impl RefereeCase {
             PyValueError::new_err(format!("engine = \"{engine}\": expected one of: {}", names.join(", ")))
         })?;
         let t = py.detach(|| run(&self.case, engine, step)).map_err(|e| match e {
-            RefereeError::NotForIt(_) => PyNotImplementedError::new_err(e.to_string()),
+            RefereeError::NotForIt(needs) => does_not_apply(py, &needs),
             _ => PyValueError::new_err(format!("{}: {e}", self.case.id)),
         })?;
         let events = t.events.map(|all| all.iter().map(|e| (e.time, e.row, e.holds)).collect());

@@ -30,11 +30,13 @@ An engine of your own is any object with ``name``, ``about``, ``missing()``, ``r
 
 from __future__ import annotations
 
+from clutch._errors import DoesNotApply
 from clutch.referee._case import Case, Engine, Figure, Mechanism, Row, Signal, Trajectory, cases
 from clutch.referee._compare import Own, Score, about, compare, others, own, table
 
 __all__ = [
     "Case",
+    "DoesNotApply",
     "Engine",
     "Figure",
     "Mechanism",

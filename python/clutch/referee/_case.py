@@ -184,7 +184,7 @@ class Case:
 
         Raises
         ------
-        NotImplementedError
+        DoesNotApply
             The engine does not take such a case.
         ValueError
             No such engine, a step that does not divide the sample, or a motion that cannot be followed.

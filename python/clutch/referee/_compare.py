@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from clutch._errors import DoesNotApply
 from clutch.referee._case import Case, Engine, Figure, Trajectory
 
 __all__ = ["Own", "Score", "about", "compare", "others", "own", "table"]
@@ -94,8 +95,8 @@ def compare(cases: Iterable[Case], engines: Sequence[Engine]) -> list[Score]:
             begin = time.process_time()
             try:
                 trajectory = engine.run(case)
-            except NotImplementedError as e:
-                results.append(Score(case.id, engine.name, refused=str(e).removeprefix("does not apply: ")))
+            except DoesNotApply as e:
+                results.append(Score(case.id, engine.name, refused=str(e)))
                 continue
             except (ArithmeticError, ValueError) as e:
                 results.append(Score(case.id, engine.name, failed=str(e), seconds=time.process_time() - begin))

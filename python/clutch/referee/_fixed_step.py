@@ -11,13 +11,27 @@ from numpy.typing import NDArray
 
 from clutch.referee._case import Case, Mechanism
 
-__all__ = ["LEVELS", "Level", "frame", "missing", "refuses_length", "substeps", "version"]
+__all__ = ["Level", "OneLevel", "frame", "missing", "refuses_length", "substeps", "version"]
 
 #: The step that a run takes where a case's samples are not nearer to each other, s.
 STEP = 1e-3
 #: Which of the two levels of a case's friction the one of an engine is, and its words.
 Level = Literal["mu_static", "mu_dynamic"]
-LEVELS: dict[Level, str] = {"mu_static": "that of rest", "mu_dynamic": "that of sliding"}
+_LEVELS: dict[Level, str] = {"mu_static": "that of rest", "mu_dynamic": "that of sliding"}
+
+
+class OneLevel:
+    """An engine whose dry friction has one level: that of rest unless told otherwise."""
+
+    kind = ""
+
+    def __init__(self, level: Level = "mu_static") -> None:
+        self.level = level
+        self.name = self.kind if level == "mu_static" else f"{self.kind}_sliding"
+
+    def told(self) -> str:
+        """Its level, in words."""
+        return f"one coefficient: {_LEVELS[self.level]}"
 
 
 def missing(*packages: str) -> str | None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clutch.referee._case import Case, Mechanism, Trajectory
-from clutch.referee._fixed_step import LEVELS, Level, frame, missing, refuses_length, substeps, version
+from clutch.referee._fixed_step import Level, OneLevel, frame, missing, refuses_length, substeps, version
 
 __all__ = ["Kamino"]
 
@@ -20,7 +20,7 @@ MOST_STEPS = 20_000
 Vector = NDArray[np.float64]
 
 
-class Kamino:
+class Kamino(OneLevel):
     """Newton's SolverKamino with the settings it comes with (PADMM), on the CPU, in steps of at most 1 ms.
 
     Each joint of a mechanism is a body that slides along one axis. Kamino's friction belongs to a joint between two
@@ -31,15 +31,13 @@ class Kamino:
     in. Its numbers have 32 bit.
     """
 
-    def __init__(self, level: Level = "mu_static") -> None:
-        self.level = level
-        self.name = "kamino" if level == "mu_static" else "kamino_sliding"
+    kind = "kamino"
 
     @property
     def about(self) -> str:
         """One line: which method, whose, which version."""
         what = "joint friction, default PADMM, 32 bit, at most 1 ms"
-        return f"Newton {version('newton')}, Kamino: {what}; one coefficient: {LEVELS[self.level]}"
+        return f"Newton {version('newton')}, Kamino: {what}; {self.told()}"
 
     def missing(self) -> str | None:
         """The package that is not here."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clutch.referee._case import Case, Mechanism, Trajectory
-from clutch.referee._fixed_step import LEVELS, Level, frame, missing, refuses_length, substeps, version
+from clutch.referee._fixed_step import OneLevel, frame, missing, refuses_length, substeps, version
 
 __all__ = ["MuJoCo", "MuJoCoLuGre"]
 
@@ -23,7 +23,7 @@ LEAST_MASS = 1e-14
 Vector = NDArray[np.float64]
 
 
-class MuJoCo:
+class MuJoCo(OneLevel):
     """MuJoCo with the settings it comes with, in steps of at most 1 ms.
 
     Each joint of a mechanism is a body on a slide, an inertia between two joints the armature of a tendon. A row of one
@@ -33,15 +33,13 @@ class MuJoCo:
     forces are those at the beginning of a step. A base that moves is at rest in the frame that the run is in.
     """
 
-    def __init__(self, level: Level = "mu_static") -> None:
-        self.level = level
-        self.name = "mujoco" if level == "mu_static" else "mujoco_sliding"
+    kind = "mujoco"
 
     @property
     def about(self) -> str:
         """One line: which method, whose, which version."""
         what = "frictionloss, default solver and impedance, semi-implicit Euler of at most 1 ms"
-        return f"MuJoCo {version('mujoco')}: {what}; one coefficient: {LEVELS[self.level]}"
+        return f"MuJoCo {version('mujoco')}: {what}; {self.told()}"
 
     def missing(self) -> str | None:
         """The package that is not here."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from clutch.referee._case import Case, Mechanism, Row, Trajectory
 
-__all__ = ["SciPy", "level"]
+__all__ = ["SciPy", "level", "sampled"]
 
 _Vector = NDArray[np.float64]
 #: Slip rate that counts as none after an event, relative to the fastest.
@@ -77,8 +77,6 @@ class SciPy:
 
 
 def _bristled(case: Case, m: Mechanism) -> Trajectory:
-    from scipy.integrate import solve_ivp
-
     n, rows = len(m.position), m.rows
     inverse = np.linalg.inv(m.inertia)
 
@@ -110,25 +108,45 @@ def _bristled(case: Case, m: Mechanism) -> Trajectory:
         force = m.applied(t, y[:n], y[n : 2 * n]) - joints.T @ torque
         return np.concatenate((y[n : 2 * n], inverse @ force, bends))
 
-    times = np.linspace(0.0, case.duration, case.samples + 1)
     y = np.concatenate((m.position, m.velocity, np.zeros(len(rows))))
     scale = min(_at_rest(row) / row.parameters["stiffness_1_rad"] for row in rows)
     atol = np.concatenate((np.full(n, 1e-9 * scale), np.full(n, 1e-8 * scale), np.full(len(rows), 1e-10 * scale)))
+    states = sampled(case, rates, y, rtol=1e-10, atol=atol, longest=_longest(case, m, 50))
+    times = np.linspace(0.0, case.duration, case.samples + 1)
+    torque = np.array([friction(t, states[:, k])[1] for k, t in enumerate(times)]).T
+    return Trajectory(states[:n], states[n : 2 * n], torque)
+
+
+def _longest(case: Case, m: Mechanism, parts: int) -> float:
+    """A step that passes over nothing: of the fastest sine, and of the whole."""
     fastest = max((t["frequency_hz"] for s in m.load for t in s.terms if t["amplitude"]), default=0.0)
-    longest = min(0.02 / fastest if fastest else math.inf, case.duration / 50)
-    states = np.empty((len(y), len(times)))
-    ends = [*(t for t in m.corners if t < case.duration), case.duration]
-    begin = 0.0
-    for end in ends:
+    return min(0.02 / fastest if fastest else math.inf, case.duration / parts)
+
+
+def sampled(
+    case: Case,
+    rates: Callable[[float, _Vector], _Vector],
+    y: _Vector,
+    *,
+    rtol: float,
+    atol: _Vector,
+    longest: float,
+) -> _Vector:
+    """States at the samples of a case by LSODA, begun anew at each corner of a load."""
+    from scipy.integrate import solve_ivp
+
+    assert case.mechanism is not None
+    times = np.linspace(0.0, case.duration, case.samples + 1)
+    states, begin = np.empty((len(y), len(times))), 0.0
+    for end in [*(t for t in case.mechanism.corners if t < case.duration), case.duration]:
         inside = (times >= begin - 1e-12) & (times <= end + 1e-12)
         wanted = np.unique(np.append(times[inside].clip(begin, end), end))
-        done = solve_ivp(rates, (begin, end), y, "LSODA", wanted, rtol=1e-10, atol=atol, max_step=longest)
+        done = solve_ivp(rates, (begin, end), y, "LSODA", wanted, rtol=rtol, atol=atol, max_step=longest)
         if not done.success:
             raise ArithmeticError(f"LSODA gave up: {done.message}")
         states[:, inside] = done.y[:, : int(inside.sum())]
         y, begin = done.y[:, -1], end
-    torque = np.array([friction(t, states[:, k])[1] for k, t in enumerate(times)]).T
-    return Trajectory(states[:n], states[n : 2 * n], torque)
+    return states
 
 
 def _maxwell(case: Case, m: Mechanism) -> Trajectory:
@@ -306,8 +324,7 @@ class _Rigid:
         events: list[tuple[float, int, bool]] = []
         y, t, none = np.concatenate((m.position, m.velocity)), 0.0, np.zeros(len(m.rows), dtype=bool)
         y = self.choose(t, y, none)
-        fastest = max((s["frequency_hz"] for x in m.load for s in x.terms if s["amplitude"]), default=0.0)
-        longest = min(0.02 / fastest if fastest else math.inf, case.duration / 20)
+        longest = _longest(case, m, 20)
         ends = [*(x for x in m.corners if x < case.duration), case.duration]
         written = 0
         while t < case.duration:

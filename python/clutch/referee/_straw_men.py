@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from abc import ABC, abstractmethod
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clutch.referee._case import Case, Row, Trajectory
-from clutch.referee._scipy import level
+from clutch.referee._scipy import level, sampled
 
 __all__ = ["Armstrong", "Karnopp", "Makkar", "Tanh"]
 
@@ -36,7 +37,7 @@ def _rest(row: Row) -> float:
     return row.parameters["mu_static"]
 
 
-class _Smooth:
+class _Smooth(ABC):
     """Friction as a function of velocity, solved with LSODA."""
 
     name = ""
@@ -57,14 +58,12 @@ class _Smooth:
             return why
         return "an hour of a stiff model" if case.duration > 1000 else None
 
+    @abstractmethod
     def coefficient(self, row: Row, slip: float) -> float:
         """Friction over the normal force."""
-        raise NotImplementedError
 
     def run(self, case: Case) -> Trajectory:
         """Solve the case."""
-        from scipy.integrate import solve_ivp
-
         m = case.mechanism
         assert m is not None
         n, inverse, joints = len(m.position), np.linalg.inv(m.inertia), np.array([row.joints for row in m.rows])
@@ -78,20 +77,8 @@ class _Smooth:
             force = m.applied(t, y[:n], y[n:]) - joints.T @ np.array(rubs)
             return np.concatenate((y[n:], inverse @ force))
 
-        times = np.linspace(0.0, case.duration, case.samples + 1)
-        y, states = np.concatenate((m.position, m.velocity)), np.empty((2 * n, len(times)))
-        begin = 0.0
-        for end in [*(t for t in m.corners if t < case.duration), case.duration]:
-            inside = (times >= begin - 1e-12) & (times <= end + 1e-12)
-            wanted = np.append(times[inside].clip(begin, end), end)
-            longest = case.duration / 50
-            done = solve_ivp(
-                rates, (begin, end), y, "LSODA", t_eval=np.unique(wanted), rtol=1e-8, atol=1e-12, max_step=longest
-            )
-            if not done.success:
-                raise ArithmeticError(f"LSODA gave up: {done.message}")
-            states[:, inside] = done.y[:, : int(inside.sum())]
-            y, begin = done.y[:, -1], end
+        y = np.concatenate((m.position, m.velocity))
+        states = sampled(case, rates, y, rtol=1e-8, atol=np.full(2 * n, 1e-12), longest=case.duration / 50)
         return Trajectory(states[:n], states[n:])
 
 
@@ -124,7 +111,7 @@ class Makkar(_Smooth):
         return (high - low) / 0.78 * hump + low * math.tanh(slip / WIDTH)
 
 
-class _Modes:
+class _Modes(ABC):
     """A model with modes, for one joint with one row: fourth-order steps of 0.1 ms, as its users take them."""
 
     name = ""
@@ -150,9 +137,9 @@ class _Modes:
         steps = case.duration / min(STEP, case.sample)
         return f"would take {steps:.0f} steps" if steps > STEPS else None
 
+    @abstractmethod
     def friction(self, x: float, slip: float, normal: float, load: float) -> float:
         """Friction after a way `x` over the base; `load` is all other force."""
-        raise NotImplementedError
 
     def settled(self, x: float, slip: float, normal: float, load: float) -> float:
         """The slip rate after a step."""
@@ -163,10 +150,9 @@ class _Modes:
         m = case.mechanism
         assert m is not None
         row, inertia = m.rows[0], float(m.inertia[0, 0])
-        stiffness, damping, sign = float(m.stiffness[0, 0]), float(m.damping[0, 0]), float(row.joints[0])
-        self.row = row
+        stiffness, damping = float(m.stiffness[0, 0]), float(m.damping[0, 0])
         q0 = float(m.position[0])
-        self.begin(q0, m.load[0](0.0) - stiffness * q0, max(row.normal(0.0), 0.0))
+        self.begin(row, q0, m.load[0](0.0) - stiffness * q0, max(row.normal(0.0), 0.0))
         steps = max(round(case.sample / STEP), 1)
         h = case.sample / steps
         q, v, t = float(m.position[0]), float(m.velocity[0]), 0.0
@@ -176,9 +162,9 @@ class _Modes:
 
             def rate(t: float, q: float, v: float) -> float:
                 load = m.load[0](t) - stiffness * q - damping * v
-                x, slip = sign * q - row.base_velocity * t, sign * v - row.base_velocity
+                x, slip = q - row.base_velocity * t, v - row.base_velocity
                 rubs = self.friction(x, slip, max(row.normal(t), 0.0), load)
-                return (load - sign * rubs) / inertia
+                return (load - rubs) / inertia
 
             a1 = rate(t, q, v)
             a2 = rate(t + h / 2, q + h / 2 * v, v + h / 2 * a1)
@@ -187,16 +173,17 @@ class _Modes:
             q += h * v + h * h / 6 * (a1 + a2 + a3)
             v += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
             load = m.load[0](t + h) - stiffness * q - damping * v
-            x, slip = sign * q - row.base_velocity * (t + h), sign * v - row.base_velocity
+            x, slip = q - row.base_velocity * (t + h), v - row.base_velocity
             slip = self.settled(x, slip, max(row.normal(t + h), 0.0), load)
-            v = sign * (slip + row.base_velocity)
+            v = slip + row.base_velocity
             if (k + 1) % steps == 0:
                 positions.append(q)
                 velocities.append(v)
         return Trajectory(np.array([positions]), np.array([velocities]))
 
-    def begin(self, q: float, load: float, normal: float) -> None:
+    def begin(self, row: Row, q: float, load: float, normal: float) -> None:
         """Begin a run under a load."""
+        self.row = row
 
 
 class Karnopp(_Modes):
@@ -221,8 +208,9 @@ class Armstrong(_Modes):
 
     name, formula = "armstrong", f"a spring up to {DEFLECTION}, or sliding"
 
-    def begin(self, q: float, load: float, normal: float) -> None:
+    def begin(self, row: Row, q: float, load: float, normal: float) -> None:
         """Begin a run with the spring bent by the load that it bears."""
+        super().begin(row, q, load, normal)
         most = _rest(self.row) * normal
         self.anchor: float | None = q - DEFLECTION * load / most if abs(load) < most else None
         self.last = 0.0

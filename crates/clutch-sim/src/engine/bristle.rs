@@ -57,6 +57,17 @@ struct Equations<'a> {
     origin: f64,
 }
 
+/// The begin of a step.
+struct Begin<const D: usize> {
+    /// Seconds after the sample.
+    s: f64,
+    state: [f64; D],
+    /// Elements that slide.
+    slides: [bool; ELEMENTS],
+    /// Position, velocity and deflections that belong to break-away.
+    scale: [f64; D],
+}
+
 /// The bend that a state has, with the elements that slide.
 fn bend_of<const D: usize>(state: &[f64; D], slides: [bool; ELEMENTS]) -> Bend<f64> {
     let mut bend = Bend { slides, ..Bend::none() };
@@ -84,46 +95,33 @@ impl Equations<'_> {
     }
 
     /// One step; the state at its end and its error over the tolerance.
-    fn step<const D: usize>(
-        &self,
-        s: f64,
-        h: f64,
-        from: &[f64; D],
-        slides: [bool; ELEMENTS],
-        scale: &[f64; D],
-    ) -> Option<([f64; D], f64)>
+    fn step<const D: usize>(&self, from: &Begin<D>, h: f64) -> Option<([f64; D], f64)>
     where
         [f64; D]: Linear,
     {
-        let rate = |s: f64, state: &[f64; D]| self.rate(s, state, slides);
-        let away = core::array::from_fn(|i| if i == 1 { from[1] } else { 1.0 });
-        let (to, wrong) = rosenbrock::step(&rate, (s, from, h), scale, &away)?;
+        let Begin { s, state, slides, scale } = from;
+        let rate = |s: f64, state: &[f64; D]| self.rate(s, state, *slides);
+        let away = core::array::from_fn(|i| if i == 1 { state[1] } else { 1.0 });
+        let (to, wrong) = rosenbrock::step(&rate, (*s, state, h), scale, &away)?;
         let wrong = |n: usize, allowed: f64| (wrong[n] / allowed).abs();
-        let most = |n: usize| from[n].abs().max(to[n].abs());
+        let most = |n: usize| state[n].abs().max(to[n].abs());
         let allowed = |n: usize| ABSOLUTE * scale[n] + RELATIVE * most(n);
         let first = wrong(0, h * allowed(1) + ABSOLUTE * scale[0]);
         Some((to, (1..D).fold(first, |worst, n| worst.max(wrong(n, allowed(n))))))
     }
 
     /// The end of the shortest step at whose end an element has begun to slide or to hold.
-    fn locate<const D: usize>(
-        &self,
-        s: f64,
-        h: f64,
-        from: &[f64; D],
-        slides: [bool; ELEMENTS],
-        scale: &[f64; D],
-    ) -> Option<(f64, [f64; D])>
+    fn locate<const D: usize>(&self, from: &Begin<D>, h: f64) -> Option<(f64, [f64; D])>
     where
         [f64; D]: Linear,
     {
         let (mut before, mut after) = (0.0, h);
         while after - before > INSTANT * h {
             let middle = 0.5 * (before + after);
-            let (to, _) = self.step(s, middle, from, slides, scale)?;
-            if self.settled(&to, slides) == slides { before = middle } else { after = middle }
+            let (to, _) = self.step(from, middle)?;
+            if self.settled(&to, from.slides) == from.slides { before = middle } else { after = middle }
         }
-        Some((after, self.step(s, after, from, slides, scale)?.0))
+        Some((after, self.step(from, after)?.0))
     }
 
     fn settled<const D: usize>(&self, state: &[f64; D], slides: [bool; ELEMENTS]) -> [bool; ELEMENTS] {
@@ -168,23 +166,23 @@ impl Bristle {
         // The speed to which break-away lets a shaft come while the bristles bend.
         let stiffness = bristles.stiffness() * model.plant.actuator().normal(input.volts.at(0.0));
         let speed = bent * libm::sqrt((stiffness / p.inertia).max(1e-12));
-        let scale: [f64; D] = core::array::from_fn(|i| if i == 1 { speed } else { bent });
-        let mut slides = shaft.bend.slides;
-        let mut state: [f64; D] = core::array::from_fn(|i| match i {
+        let state = core::array::from_fn(|i| match i {
             0 => 0.0,
             1 => shaft.velocity,
             _ => shaft.bend.each[i - 2],
         });
-        let (mut s, mut steps) = (0.0, 0);
+        let scale = core::array::from_fn(|i| if i == 1 { speed } else { bent });
+        let mut at = Begin::<D> { s: 0.0, state, slides: shaft.bend.slides, scale };
+        let mut steps = 0;
         let mut h = if self.step > 0.0 { self.step } else { 1e-3 * end };
-        while s < end {
+        while at.s < end {
             steps += 1;
             if steps > STEP_LIMIT {
                 return Err(EngineError::TooManySteps { time: input.time, limit: STEP_LIMIT });
             }
-            let last = s + h >= end;
-            let length = if last { end - s } else { h };
-            let tried = equations.step(s, length, &state, slides, &scale);
+            let last = at.s + h >= end;
+            let length = if last { end - at.s } else { h };
+            let tried = equations.step(&at, length);
             let Some((to, error)) = tried.filter(|(to, e)| e.is_finite() && to.iter().all(|x| x.is_finite()))
             else {
                 if length < 1e-15 {
@@ -198,16 +196,16 @@ impl Bristle {
                 h = grown.min(0.9 * length);
                 continue;
             }
-            let happens = equations.settled(&to, slides) != slides;
-            let located = if happens { equations.locate(s, length, &state, slides, &scale) } else { None };
-            let before = s;
-            (s, state) = match located {
-                Some((part, to)) if part < length => (s + part, to),
-                _ => (if last { end } else { s + length }, to),
+            let happens = equations.settled(&to, at.slides) != at.slides;
+            let located = if happens { equations.locate(&at, length) } else { None };
+            let before = at.s;
+            (at.s, at.state) = match located {
+                Some((part, to)) if part < length => (at.s + part, to),
+                _ => (if last { end } else { at.s + length }, to),
             };
             if happens {
-                slides = equations.settled(&state, slides);
-                h = (s - before).max(1e-3 * grown);
+                at.slides = equations.settled(&at.state, at.slides);
+                h = (at.s - before).max(1e-3 * grown);
             } else {
                 // A last step cut short says nothing about the step that would have done.
                 if !last || grown > self.step {
@@ -215,13 +213,15 @@ impl Bristle {
                 }
                 h = grown;
             }
-            shaft.position = equations.origin + state[0];
-            shaft.velocity = state[1];
-            shaft.bend = bend_of(&state, slides);
-            let (slide, speed) =
-                (bristles.bent(&shaft.bend, state[1]), state[1].abs() / bristles.stribeck_velocity());
+            shaft.position = equations.origin + at.state[0];
+            shaft.velocity = at.state[1];
+            shaft.bend = bend_of(&at.state, at.slides);
+            let (slide, speed) = (
+                bristles.bent(&shaft.bend, shaft.velocity),
+                shaft.velocity.abs() / bristles.stribeck_velocity(),
+            );
             let motion = if slide >= SLIDES_FROM {
-                if state[1] < 0.0 { Motion::Backward } else { Motion::Forward }
+                if shaft.velocity < 0.0 { Motion::Backward } else { Motion::Forward }
             } else if slide < STICKS_BELOW && speed < 1.0 {
                 Motion::Stuck
             } else {
@@ -234,8 +234,8 @@ impl Bristle {
             };
             shaft.motion = motion;
             if let Some(kind) = kind {
-                let torque = input.torque(model, s, shaft.position);
-                events.push(Event { time: input.time + s, kind, position: shaft.position, torque });
+                let torque = input.torque(model, at.s, shaft.position);
+                events.push(Event { time: input.time + at.s, kind, position: shaft.position, torque });
             }
         }
         Ok(())
