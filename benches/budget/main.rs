@@ -89,7 +89,7 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
         Some(m) => gone(&path, &image, &plan, m)?,
         None => BTreeMap::new(),
     };
-    over.extend(table(&plan, &bounds, measured.as_ref(), &cycles));
+    over.extend(table(&plan, &image, &bounds, measured.as_ref(), &cycles));
     peers(&plan, &image, &bounds, measured.as_ref(), &cycles)?;
     Ok(over)
 }
@@ -169,9 +169,10 @@ fn gone(path: &Path, image: &Image, plan: &Plan, measured: &Measured) -> Result<
     Ok(most)
 }
 
-/// Prints the table; gives the values over budget.
+/// Prints the table; gives the values over budget, and those without one.
 fn table(
     plan: &Plan,
+    image: &Image,
     bounds: &[Cost],
     measured: Option<&Measured>,
     cycles: &BTreeMap<String, Cost>,
@@ -209,6 +210,15 @@ fn table(
         over.extend(exceeds(item, "measured cycles", along.unwrap_or(0), bound.cycles));
         if measured.is_some() && counts.is_none() {
             over.push(format!("{}: the image did not measure it", item.name));
+        }
+    }
+    let known = |name: &str| {
+        plan.items.iter().any(|i| i.measured == name) || plan.peers.iter().any(|p| p.symbol == name)
+    };
+    // Names that are no function's are those of a law over another friction: some laws have none.
+    for name in measured.iter().flat_map(|m| &m.names) {
+        if image.function(name).is_ok() && !known(name) {
+            over.push(format!("{name}: measured, but without a budget: expected an [[item]] for it"));
         }
     }
     over

@@ -17,6 +17,7 @@ in a column of 1/600 inch remain, so that no stick, spike or stair is lost.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 import re
@@ -101,12 +102,6 @@ _MM = 1 / 25.4
 # Letters of a legend that fit into 85 mm beside the axis' own.
 _ROW = 52
 
-# The keys of a law's two gains; the certificate of CTC depends on neither alone.
-_GAINS = {
-    "law.pd": ("kp_v_rad", "kd_v_s_rad"),
-    "law.smc": ("kp_v", "kd_v_s_rad"),
-    "law.smc_sign": ("kp_v", "kd_v_s_rad"),
-}
 _MOST_PAIRS = 3600
 _FINE = 256
 
@@ -438,8 +433,6 @@ def phase_plane(result: Result, ax: Axes | None = None) -> Axes:
     """
     import numpy as np
 
-    from clutch._model import Smc, SmcSign
-
     samples = result.samples
     error = _error_deg(result)
     rate = np.degrees(samples["target_velocity_rad_s"] - samples["velocity_rad_s"])
@@ -452,14 +445,15 @@ def phase_plane(result: Result, ax: Axes | None = None) -> Axes:
         dots: dict[str, Any] = {"marker": ".", "markersize": 2.5, "markeredgewidth": 0, "linestyle": "none"}
         ax.plot(error[stuck], rate[stuck], color=_RED, label="stuck", zorder=3, rasterized=many, **dots)
     law = result.scenario.law
-    if isinstance(law, Smc | SmcSign):
+    slope, boundary = (getattr(law, name, None) for name in ("slope_1_s", "boundary_rad_s"))
+    if slope is not None:
         x, y = np.array(ax.get_xlim()), ax.get_ylim()
-        surface = -law.slope_1_s * x
+        surface = -slope * x
         ax.plot(x, surface, color="0.2", linestyle=_LONG_DASHES, label="σ = 0", zorder=3)
-        if isinstance(law, Smc):
-            layer = np.degrees(law.boundary_rad_s)
+        if boundary is not None:
+            layer = np.degrees(boundary)
             edges = (surface - layer, surface + layer)
-            words = f"|σ| ≤ {law.boundary_rad_s:g} rad/s"
+            words = f"|σ| ≤ {boundary:g} rad/s"
             ax.fill_between(x, *edges, color="0.92", linewidth=0, label=words, zorder=0)
             for edge in edges:
                 ax.plot(x, edge, color=_GREY, zorder=1)
@@ -694,10 +688,10 @@ def certificate_region(
     Parameters
     ----------
     scenario : Scenario
-        With the law PD, SMC or SMC with the sign function.
+        With a law that has two gains, ``kp_…`` and ``kd_…``, and a sliding surface.
     kp, kd : array_like, optional
-        Gains to evaluate, rising, in the units of ``law.smc.kp_v`` and ``law.smc.kd_v_s_rad``, or of
-        ``law.pd.kp_v_rad`` and ``law.pd.kd_v_s_rad``; both or neither; at most 3600 pairs.
+        Gains to evaluate, rising, in the units of the law's keys, as ``law.smc.kp_v`` and ``law.smc.kd_v_s_rad``;
+        both or neither; at most 3600 pairs.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; by default a new figure.
 
@@ -710,7 +704,7 @@ def certificate_region(
     Raises
     ------
     ValueError
-        The law is none of these; or only one of `kp` and `kd` is given, they do not rise, or are too many.
+        The law is none such; or only one of `kp` and `kd` is given, they do not rise, or are too many.
     ParamError
         A gain is not allowed.
 
@@ -725,10 +719,14 @@ def certificate_region(
     from matplotlib.patches import Patch
 
     law = scenario.law
-    if law._key not in _GAINS:
-        raise ValueError(f"certificate_region: {law._key}: expected one of {', '.join(_GAINS)}")
-    keys = [f"{law._key}.{name}" for name in _GAINS[law._key]]
-    own = [float(getattr(law, name)) for name in _GAINS[law._key]]
+    names = [field.name for field in dataclasses.fields(law) if field.name.startswith(("kp_", "kd_"))]
+    keys = [f"{law._key}.{name}" for name in names]
+    own = [float(getattr(law, name)) for name in names]
+    typical = {key: gain or 1.0 for key, gain in zip(keys, own, strict=True)}
+    if len(keys) != 2 or scenario.override(typical).certificate().layer.slope_1_s == 0:
+        raise ValueError(
+            f"certificate_region: {law._key}: expected a law with two gains, kp_… and kd_…, and a sliding surface"
+        )
 
     def certified(p: float, d: float) -> bool:
         return scenario.override({keys[0]: p, keys[1]: d}).certificate().certified
@@ -781,10 +779,10 @@ def _around(scenario: Scenario, own: list[float]) -> tuple[NDArray[np.float64], 
     """Gains around the required ones and the scenario's own."""
     import numpy as np
 
-    if scenario.law._key == "law.pd":  # its certificate requires volts, not a gain
+    ahead = scenario.certificate().ahead
+    if ahead.kd_required_v_s_rad == 0:  # the certificate requires volts, not a gain
         kp, kd = (np.geomspace((gain or 1.0) / 20, (gain or 1.0) * 20, _FINE + 1) for gain in own)
         return kp, kd
-    ahead = scenario.certificate().ahead
     kp = np.linspace(0.0, max(2.5 * ahead.kp_required_v, 1.3 * own[0]), _FINE + 1)
     lowest = max(ahead.kd_required_v_s_rad, 1e-3) / 4
     return kp, np.geomspace(min(lowest, (own[1] or lowest) / 2), max(40 * lowest, 2.5 * own[1]), _FINE + 1)

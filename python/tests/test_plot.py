@@ -452,6 +452,20 @@ def test_the_region_of_pd_and_of_the_sign_law_and_of_gains_that_are_not_certifie
     assert region(sign, 2.3, 6.0) and not region(sign, 2.2, 6.0)
 
 
+def test_the_region_of_ctc_is_where_its_certificate_says_so(tmp_path):
+    scenario = Scenario.load("ctc_2")
+    ax = plot.certificate_region(scenario)
+    drawn(ax, tmp_path, "ctc")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("law.ctc.kp (1/s²)", "law.ctc.kd (1/s)")
+    seen = set()
+    for kp in (6.0, 30.0, 100.0, 1000.0, 1900.0):
+        for kd in (0.04, 0.3, 0.7, 3.0, 13.0):
+            asked = scenario.override({"law.ctc.kp_1_s2": kp, "law.ctc.kd_1_s": kd}).certificate()
+            assert region(ax, kp, kd) == asked.certified, (kp, kd)
+            seen.add(asked.certified)
+    assert seen == {True, False}
+
+
 def test_the_border_of_a_region_is_found_to_a_256th_of_an_axis_by_a_few_questions():
     grid = np.linspace(0.0, 1.0, 257)
     shapes = {
@@ -482,8 +496,10 @@ def test_gains_of_ones_own_are_the_axes():
 
 def test_what_has_no_region_is_named():
     smc = Scenario.load("smc_2")
-    with pytest.raises(ValueError, match=r"law\.ctc: expected one of law\.pd, law\.smc, law\.smc_sign"):
-        plot.certificate_region(Scenario.load("ctc_2"))
+    with pytest.raises(ValueError, match=r"law\.pid: expected a law with two gains, kp_… and kd_…, and a sliding"):
+        plot.certificate_region(smc.override({"law": {"pid": {}}}))
+    with pytest.raises(ValueError, match=r"law\.hold: expected a law with two gains"):
+        plot.certificate_region(Scenario.load("smc_2").override({"law": {"hold": {}}}))
     with pytest.raises(ValueError, match="both kp and kd"):
         plot.certificate_region(smc, kp=[1.0, 2.0])
     with pytest.raises(ValueError, match="kd: expected two or more gains that rise"):

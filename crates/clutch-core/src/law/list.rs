@@ -1,7 +1,16 @@
 //! Items that follow from the list of laws.
 
 macro_rules! laws {
-    ($($module:ident $law:ident $params:ident $doc:literal;)+) => {
+    (@with ($dollar:tt) $($module:ident $law:ident $params:ident $doc:literal;)+) => {
+        /// Calls a macro with the list of laws, for code that has an item for each: `name Law;` and so on.
+        #[doc(hidden)]
+        #[macro_export]
+        macro_rules! each_law {
+            ($dollar callback:ident) => {
+                $dollar callback! { $($module $law;)+ }
+            };
+        }
+
         $(
             mod $module;
             pub use $module::{$law, $params};
@@ -171,6 +180,17 @@ macro_rules! laws {
             }
 
             #[inline]
+            fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
+                match self {
+                    $(Law::$law(law) => {
+                        if let LawState::$law(own) = state {
+                            law.sees(own, seen);
+                        }
+                    })+
+                }
+            }
+
+            #[inline]
             fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
                 match self {
                     $(Law::$law(law) => {
@@ -187,6 +207,10 @@ macro_rules! laws {
                 }
             }
         }
+    };
+    ($($list:tt)+) => {
+        // A macro that makes a macro needs its dollar handed in.
+        $crate::law::list::laws! { @with ($) $($list)+ }
     };
 }
 pub(super) use laws;

@@ -162,11 +162,17 @@ impl<T: Real> Beside<'_, T> {
 /// A law of the list: what building, certificate, logs and documentation ask of it.
 pub trait Listed<T: Real>: ControlLaw<T> + Sized {
     /// Its parameters.
-    type Params;
+    type Params: Default;
     /// Its name, as people read it.
     const TITLE: &'static str;
     /// `true` if it follows a path; `false` for an open-loop law, whose path says nothing.
     const FOLLOWS: bool = true;
+
+    /// The parameters with which a period takes longest: what a measurement of its time uses.
+    #[must_use]
+    fn busiest() -> Self::Params {
+        Self::Params::default()
+    }
 
     /// Checks the parameters.
     ///

@@ -172,6 +172,18 @@ impl<T: Real> Listed<T> for Pid<T> {
     type Params = PidParams<T>;
     const TITLE: &'static str = "PID";
 
+    /// With all that it has.
+    fn busiest() -> PidParams<T> {
+        let part = |x: f64| T::from_f64(x);
+        PidParams {
+            derivative_time: part(0.002),
+            bias: part(2.0),
+            velocity: part(0.5),
+            acceleration: part(0.1),
+            ..PidParams::default()
+        }
+    }
+
     fn build(p: &PidParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
         let sign = beside.sign();
         let mut law = Pid::new(p, beside.output, beside.period)?;

@@ -122,6 +122,12 @@ impl<T: Arithmetic> ControlLaw<T> for Voltage<T> {
 impl<T: Real> Listed<T> for Voltage<T> {
     type Params = VoltageParams<T>;
     const TITLE: &'static str = "voltage, open loop";
+
+    /// To and fro.
+    fn busiest() -> VoltageParams<T> {
+        let [start, end, rate] = [1.0, 5.0, 100.0].map(T::from_f64);
+        VoltageParams { start, end, rate, returns: true }
+    }
     const FOLLOWS: bool = false;
 
     fn build(p: &VoltageParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {

@@ -1,7 +1,7 @@
 //! The functions that have a budget, each by itself and under its name: the calls of firmware that
 //! uses the crates.
 
-use clutch_core::law::{ControlLaw, Ctc, LawState, OutputState, Pd, Pid, Smc, SmcSign, Tick};
+use clutch_core::law::LawState;
 use clutch_core::{Counts, Servo, ServoState, Target};
 use clutch_node::{BoardController, Outboxes};
 use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
@@ -41,44 +41,25 @@ impl Bytes {
 #[unsafe(no_mangle)]
 pub extern "C" fn nothing() {}
 
-/// The law (4).
-#[inline(never)]
-#[unsafe(no_mangle)]
-pub extern "C" fn step_pd(law: &Pd<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
-    law.update(state, tick).voltage
-}
+macro_rules! steps {
+    ($($module:ident $law:ident;)+) => {$(
+        pub mod $module {
+            use clutch_core::law::{$law, ControlLaw, Tick};
 
-/// The law (11).
-#[inline(never)]
-#[unsafe(no_mangle)]
-pub extern "C" fn step_ctc(law: &Ctc<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
-    law.update(state, tick).voltage
+            /// A period of the law: an errors' pair in, volts out.
+            #[inline(never)]
+            #[unsafe(export_name = concat!("step_", stringify!($module)))]
+            pub extern "C" fn step(
+                law: &$law<f32>,
+                state: &mut <$law<f32> as ControlLaw<f32>>::State,
+                tick: &Tick<f32>,
+            ) -> f32 {
+                law.update(state, tick).voltage
+            }
+        }
+    )+};
 }
-
-/// The law (31).
-#[inline(never)]
-#[unsafe(no_mangle)]
-pub extern "C" fn step_smc(law: &Smc<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
-    law.update(state, tick).voltage
-}
-
-/// The law (29).
-#[inline(never)]
-#[unsafe(no_mangle)]
-pub extern "C" fn step_smc_sign(law: &SmcSign<f32>, state: &mut OutputState<f32>, tick: &Tick<f32>) -> f32 {
-    law.update(state, tick).voltage
-}
-
-/// PID.
-#[inline(never)]
-#[unsafe(no_mangle)]
-pub extern "C" fn step_pid(
-    law: &Pid<f32>,
-    state: &mut <Pid<f32> as ControlLaw<f32>>::State,
-    tick: &Tick<f32>,
-) -> f32 {
-    law.update(state, tick).voltage
-}
+clutch_core::each_law!(steps);
 
 /// A servo, its state, and its target.
 pub struct Axis {

@@ -1,15 +1,9 @@
 //! The laws, the servo and the codec over their sets.
 
 use crate::inputs::{CORNERS, Random, ticks};
-use crate::kernels::{
-    Axis, Bytes, decode_sample, encode_actuate, nothing, servo_tick, step_ctc, step_pd, step_pid, step_smc,
-    step_smc_sign,
-};
+use crate::kernels::{self, Axis, Bytes, decode_sample, encode_actuate, nothing, servo_tick};
 use crate::meter::{Tally, instructions, line};
-use clutch_core::law::{
-    ControlLaw, Ctc, CtcParams, LawParams, OutputParams, Pd, PdParams, Pid, PidParams, Smc, SmcParams,
-    SmcSign, SmcSignParams, Tick,
-};
+use clutch_core::law::{Beside, ControlLaw, LawParams, Listed, OutputParams, Tick};
 use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, StribeckParams, Target};
 use clutch_wire::{Actuate, Decoder, Message, Sample};
 
@@ -41,25 +35,29 @@ fn law<L: ControlLaw<f32>>(
     tally.print();
 }
 
-/// PID with all that it has.
-fn pid() -> PidParams<f32> {
-    PidParams { derivative_time: 0.002, bias: 2.0, velocity: 0.5, acceleration: 0.1, ..PidParams::default() }
-}
-
 /// Measures and prints.
 pub fn measure() -> Option<()> {
     // SAFETY: a function without arguments.
     line("nothing", unsafe { instructions(nothing as extern "C" fn() as usize, [0; 3]) });
 
-    let (plant, output) = (PlantParams::default(), output());
-    law("step_pd", step_pd, &Pd::new(&PdParams::default(), &output, PERIOD).ok()?);
-    law("step_ctc", step_ctc, &Ctc::new(&CtcParams::default(), &plant, &output, PERIOD).ok()?);
+    // Laws with a model: friction whose curve needs no power, and one that does.
     let friction = StribeckParams { stribeck_exponent: 2.0, ..StribeckParams::default() };
-    let curved = PlantParams { friction: friction.into(), ..plant };
-    law("step_ctc_powf", step_ctc, &Ctc::new(&CtcParams::default(), &curved, &output, PERIOD).ok()?);
-    law("step_smc", step_smc, &Smc::new(&SmcParams::default(), &output, PERIOD).ok()?);
-    law("step_smc_sign", step_smc_sign, &SmcSign::new(&SmcSignParams::default(), &output, PERIOD).ok()?);
-    law("step_pid", step_pid, &Pid::new(&pid(), &output, PERIOD).ok()?);
+    let (plain, output) = (PlantParams::default(), output());
+    let curved = PlantParams { friction: friction.into(), ..plain };
+    let beside = |model| Beside { model, output: &output, period: PERIOD };
+    macro_rules! laws {
+        ($($module:ident $law:ident;)+) => {$(
+            use clutch_core::law::$law;
+            let params = <$law<f32> as Listed<f32>>::busiest();
+            let name = concat!("step_", stringify!($module));
+            let curved_name = concat!("step_", stringify!($module), "_powf");
+            for (name, model) in [(name, &plain), (curved_name, &curved)] {
+                let built = <$law<f32> as Listed<f32>>::build(&params, &beside(model)).ok()?;
+                law(name, kernels::$module::step, &built);
+            }
+        )+};
+    }
+    clutch_core::each_law!(laws);
 
     servo()?;
     codec();
@@ -70,22 +68,24 @@ fn servo() -> Option<()> {
     let mut tally = Tally::new("servo_tick");
     let mut random = Random::new(3);
     let target = Target::<f32>::default();
-    let servo = Servo::<f32>::new(&ServoParams::paper(LawParams::Smc(SmcParams::default()))).ok()?;
-    let mut axis = Axis { servo, state: servo.start(Counts(0), &target, 0.0), target };
-    for call in 0..4 * OF_EACH {
-        // Near the target, and anywhere; a target that is not a number, now and then.
-        let near = call % 4 != 0;
-        let any = FixedCounts((u64::from(random.next()) << 32 | u64::from(random.next())) as i64);
-        axis.target = Target {
-            position: if near { FixedCounts::from_counts(i64::from(random.below(40))) } else { any },
-            velocity: if near { 0.35 } else { CORNERS.get(call as usize % CORNERS.len()).copied()? },
-            acceleration: random.around(10.0),
-        };
-        let counts = if near { random.below(40) } else { random.next() };
-        let arguments = [&raw mut axis as usize, counts as usize, 0];
-        let function = servo_tick as extern "C" fn(&mut Axis, i32) -> u16;
-        // SAFETY: the arguments are those of the function.
-        tally.add(unsafe { instructions(function as usize, arguments) });
+    for law in LawParams::all() {
+        let servo = Servo::<f32>::new(&ServoParams::paper(law)).ok()?;
+        let mut axis = Axis { servo, state: servo.start(Counts(0), &target, 0.0), target };
+        for call in 0..OF_EACH {
+            // Near the target, and anywhere; a target that is not a number, now and then.
+            let near = call % 4 != 0;
+            let any = FixedCounts((u64::from(random.next()) << 32 | u64::from(random.next())) as i64);
+            axis.target = Target {
+                position: if near { FixedCounts::from_counts(i64::from(random.below(40))) } else { any },
+                velocity: if near { 0.35 } else { CORNERS.get(call as usize % CORNERS.len()).copied()? },
+                acceleration: random.around(10.0),
+            };
+            let counts = if near { random.below(40) } else { random.next() };
+            let arguments = [&raw mut axis as usize, counts as usize, 0];
+            let function = servo_tick as extern "C" fn(&mut Axis, i32) -> u16;
+            // SAFETY: the arguments are those of the function.
+            tally.add(unsafe { instructions(function as usize, arguments) });
+        }
     }
     tally.print();
     Some(())

@@ -3,7 +3,7 @@
 use crate::inputs::Random;
 use crate::kernels::{Bytes, Session, whole_tick};
 use crate::meter::{Tally, instructions};
-use clutch_core::law::{LawParams, SmcParams};
+use clutch_core::law::LawParams;
 use clutch_core::reference::{Interpolation, Knot, MinimumJerk, ReferenceParams, Sine, Table};
 use clutch_core::{
     Bounds, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams, Supervisor, SupervisorParams,
@@ -26,8 +26,8 @@ const PERIODS: u32 = 60;
 
 /// A controller that has been configured by its host, up to the question to encoder and converter.
 fn session(kind: u32) -> Option<Session> {
-    let law = LawParams::Smc(SmcParams::default());
-    let servo = ServoParams::<f32>::paper(law);
+    let laws = LawParams::<f32>::all();
+    let servo = ServoParams::paper(*laws.get(kind as usize % laws.len())?);
     let bounds = Bounds::around(&PlantParams::default(), &Tolerances::default()).ok()?;
     let on_fault = match kind % 4 {
         0 => SafeState::hold(5.0),
