@@ -216,14 +216,10 @@ pub enum RunError {
     #[error("engine = exact_flow needs {0}; use engine = dormand_prince or auto")]
     Engine(&'static str),
     /// The friction has bristles, which the engine has not.
-    #[error(
-        "the rig's friction has bristles (lugre, dahl, elasto_plastic, maxwell): use engine = bristle or auto"
-    )]
+    #[error("the rig's friction has bristles, which bend before it slides: use engine = bristle or auto")]
     Bristles,
     /// The friction has no bristles, which the engine needs.
-    #[error(
-        "engine = bristle is for friction with bristles (lugre, dahl, elasto_plastic, maxwell): use engine = auto"
-    )]
+    #[error("engine = bristle is for friction with bristles, and the rig's has none: use engine = auto")]
     NoBristles,
     /// The engine gave up.
     #[error(transparent)]

@@ -75,15 +75,17 @@ pub enum SystemError {
     Inertia(f64),
     /// The friction of a row has bristles.
     #[error(
-        "row {0} has a friction with bristles (lugre, dahl, elasto_plastic, maxwell): expected one that sticks exactly"
+        "row {0} has a friction with bristles, which bend before it slides: expected one that sticks exactly"
     )]
     Bristles(usize),
     /// The friction of a row has none.
-    #[error("row {0} has a friction without bristles: expected lugre, dahl or elasto_plastic in every row")]
+    #[error(
+        "row {0} has a friction without bristles: expected one with bristles, of one element, in every row"
+    )]
     NoBristles(usize),
     /// The friction of a row has several elements.
     #[error(
-        "row {0} has a friction of several elements (maxwell): expected lugre, dahl or elasto_plastic in every row"
+        "row {0} has a friction of several elements: expected one with bristles, of one element, in every row"
     )]
     Elements(usize),
 }
