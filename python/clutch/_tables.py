@@ -47,6 +47,7 @@ __all__ = [
     "Rig",
     "Ripple",
     "RunSettings",
+    "Runout",
     "Safety",
     "Sampling",
     "Sine",
@@ -923,6 +924,42 @@ class Ripple(_Params):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class Runout(_Params):
+    """Friction that varies along the disc: one wave, as a pad makes that runs on a disc which wobbles.
+
+    It adds `A sin(n θ + φ)` to the factor on friction, beside a ripple. It needs the engine `dormand_prince`.
+
+    Parameters
+    ----------
+    amplitude : float
+        Amplitude of the variation, as a share of the friction. `A`: a number of at least 0 and below 1; a
+        share that, with the largest sum of the ripple's waves, stays below 1.
+    waves_per_turn : int, default 1
+        Waves in a turn: 1 for a disc that is not square to its shaft, 2 for one that is bent like a saddle.
+        `n`: a whole number from 1 to 1000 waves per turn.
+    phase_deg : float, default 0.0
+        Phase at the encoder's zero. `φ`: a finite number, °.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Rig(runout=clutch.Runout(amplitude=0.2, phase_deg=90)).runout
+    Runout(amplitude=0.2, waves_per_turn=1, phase_deg=90.0)
+    """
+
+    _key: ClassVar[str] = "rig.runout"
+
+    amplitude: float
+    waves_per_turn: int = 1
+    phase_deg: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Rig(_mixins.Rig):
     """The shaft as it is, with its drive, brake, encoder and converter. The defaults are the paper's.
 
@@ -958,6 +995,8 @@ class Rig(_mixins.Rig):
         The converter. By default `Dac()`.
     ripple : Ripple or None, default None
         Friction along the disc; absent if it is even.
+    runout : Runout or None, default None
+        Friction in waves along the disc, beside a ripple; absent if it has none.
 
     Raises
     ------
@@ -986,6 +1025,7 @@ class Rig(_mixins.Rig):
     encoder: Encoder = field(default_factory=Encoder)
     dac: Dac = field(default_factory=Dac)
     ripple: Ripple | None = None
+    runout: Runout | None = None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

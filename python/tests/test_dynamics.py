@@ -1,5 +1,6 @@
 """The shaft as a function: against (1) written out, against the simulator, and in python-control."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -52,6 +53,39 @@ def test_ripple_and_a_spring_depend_on_position_and_a_table_on_time():
     drive = {"table": {"points_s_nm": [[0.0, 0.045], [2.0, 0.055]]}}
     table = clutch.dynamics.derivative(clutch.Scenario.load("smc_2", {"rig.drive": drive}))
     assert table(1.0, [0.0, 0.0], [0.0], None)[1] == pytest.approx(0.05 / 0.0017)
+
+
+def test_a_run_out_adds_its_wave_to_a_ripple():
+    bench = clutch.Scenario.load("bench_smc_2")
+    runout = clutch.Runout(amplitude=0.2, waves_per_turn=3, phase_deg=30.0)
+
+    def on(**disc):
+        return clutch.dynamics.derivative(dataclasses.replace(bench, rig=dataclasses.replace(bench.rig, **disc)))
+
+    rippled, both = on(), on(runout=runout)
+    even, tilted = on(ripple=None), on(ripple=None, runout=runout)
+    drive, wave = even(0.0, [0.0, 0.1], [0.0], None)[1], 0.2 * np.sin(3 * 0.7 + math.pi / 6)
+    friction = even(0.0, [0.7, 0.1], [2.0], None)[1] - drive
+    assert tilted(0.0, [0.7, 0.1], [2.0], None)[1] == pytest.approx(drive + friction * (1 + wave), rel=1e-12)
+    assert both(0.0, [0.7, 0.1], [2.0], None)[1] - rippled(0.0, [0.7, 0.1], [2.0], None)[1] == pytest.approx(
+        friction * wave, rel=1e-10
+    )
+
+
+def test_a_run_with_a_run_out_presses_where_the_disc_is_smooth():
+    # At 20 °/s four turns of the wave take 4.5 s; the mean voltage over a slice of the disc goes as 1/(1 + wave).
+    runout = {"amplitude": 0.2, "waves_per_turn": 16}
+    changes = {"rig.runout": runout, "reference.ramp.rate_deg_s": 20.0, "run.duration_s": 5.5}
+    result = clutch.simulate("smc_2", overrides=changes)
+    time, position, volts = (result.samples[n] for n in ("time_s", "position_rad", "voltage_v"))
+    late = time > 1.0
+    assert np.ptp(position[late]) > 2 * 2 * math.pi / 16
+    phase = np.mod(16 * position[late], 2 * math.pi)
+    slices = np.digitize(phase, np.linspace(0, 2 * math.pi, 9)) - 1
+    mean = np.array([volts[late][slices == i].mean() for i in range(8)])
+    middle = (np.arange(8) + 0.5) * math.pi / 4
+    expected = 0.047088 / (0.15 * 0.14) / (1 + 0.2 * np.sin(middle))
+    assert mean == pytest.approx(expected, rel=0.06)
 
 
 def test_the_derivative_vanishes_where_drive_friction_and_drag_balance():

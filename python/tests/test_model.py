@@ -51,6 +51,7 @@ REQUIRED = {
     clutch.MotorActuator: {"gain_nm_v": 0.05, "preload_nm": 0.25},
     clutch.BothActuator: {"brake_gain_nm_v": 0.14, "motor_gain_nm_v": 0.02},
     clutch.Ripple: RIPPLE,
+    clutch.Runout: {"amplitude": 0.2},
     clutch.WeightDrive: {},
     clutch.SpringDrive: {"stiffness_nm_rad": 0.02, "rest_deg": 180.0},
     clutch.BeltDrive: {"stiffness_nm_rad": 0.5, "speed_deg_s": 2.0},
@@ -526,7 +527,7 @@ def ripples(draw):
     spacing = draw(st.integers(1, 50))
     lowest = draw(st.integers(1, 100))
     waves = draw(st.integers(1, 64))
-    rms = draw(st.floats(0, 0.999)) / math.sqrt(2 * waves)
+    rms = draw(st.floats(0, 0.6)) / math.sqrt(2 * waves)
     highest = spacing * (lowest + waves - 1)
     return {
         "rms": rms,
@@ -649,6 +650,9 @@ VALID = {
     clutch.MotorActuator: each(gain_nm_v=POSITIVE, preload_nm=number(0, 10), load_share=number(0, 1)),
     clutch.BothActuator: each(brake_gain_nm_v=POSITIVE, motor_gain_nm_v=POSITIVE, preload_nm=number(0, 10)),
     clutch.Ripple: ripples(),
+    clutch.Runout: each(
+        amplitude=st.floats(0, 0.39), waves_per_turn=st.integers(1, 1000), phase_deg=number(-720, 720)
+    ),
     clutch.WeightDrive: each(
         mass_kg=POSITIVE,
         gravity_m_s2=POSITIVE,
@@ -764,6 +768,7 @@ VALID[clutch.Rig] = each(
     speed_limit_deg_s=POSITIVE,
     friction=objects(*FRICTIONS),
     ripple=st.none() | objects(clutch.Ripple),
+    runout=st.none() | objects(clutch.Runout),
     drive=objects(
         clutch.WeightDrive,
         clutch.SpringDrive,

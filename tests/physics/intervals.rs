@@ -252,7 +252,7 @@ proptest! {
         };
         if ripple && !exact {
             let waves = RippleParams { rms: 0.05, lowest: 20, highest: 60, spacing: 20 };
-            m.ripple = Some(Ripple::new(&waves, 3).unwrap());
+            m.ripple = Ripple::new(Some(&waves), None, 3).unwrap();
         }
         let whole = Input { volts, ..input(&drive, 0.0, duration) };
         let engine = || -> Box<dyn Engine> {

@@ -2,7 +2,7 @@
 
 use crate::drive::{Drive, DriveParams};
 use crate::engine::Model;
-use crate::ripple::{Ripple, RippleParams};
+use crate::ripple::{Ripple, RippleParams, RunoutParams};
 use clutch_core::friction::{FrictionModel, FrictionParams};
 use clutch_core::params::{Params, Range};
 use clutch_core::{
@@ -84,6 +84,8 @@ params! {
     optional {
         /// Friction along the disc; absent if it is even.
         ripple: RippleParams, "ripple";
+        /// Friction in waves along the disc, beside a ripple; absent if it has none.
+        runout: RunoutParams, "runout";
     }
     flat {
         /// Highest speed that a path may ask for.
@@ -170,7 +172,7 @@ impl Rig {
             actuator: p.actuator,
             friction: p.friction,
         })?;
-        let ripple = p.ripple.as_ref().map(|r| Ripple::new(r, seed)).transpose()?;
+        let ripple = Ripple::new(p.ripple.as_ref(), p.runout.as_ref(), seed)?;
         Ok(Rig {
             model: Model { plant, ripple },
             drive,

@@ -47,9 +47,69 @@ impl RippleParams {
     }
 }
 
-/// The factor `1 + amplitude Σ_n sin(n θ + φ_n)` on friction, `n = lowest … highest`.
+params! {
+    /// Friction that varies along the disc: one wave, as a pad makes that runs on a disc which wobbles.
+    ///
+    /// It adds `A sin(n θ + φ)` to the factor on friction, beside a ripple. It needs the engine `dormand_prince`.
+    pub struct RunoutParams<f64> {
+        /// Amplitude of the variation, as a share of the friction.
+        amplitude: f64, "amplitude" "A" NONE, Range::at_least(0.0).below(1.0);
+        /// Waves in a turn: 1 for a disc that is not square to its shaft, 2 for one that is bent like a saddle.
+        waves: u32 = 1, "waves_per_turn" "n" WAVES_PER_TURN, Range::within(1.0, 1000.0);
+        /// Phase at the encoder's zero.
+        phase: f64 = 0.0, "phase_deg" "φ" DEG, Range::ANY;
+    }
+    relations(p) {
+        /// Friction does not reach 0.
+        POSITIVE: amplitude, "a share that, with the largest sum of the ripple's waves, stays below 1";
+    }
+}
+
+/// The factor on friction along a disc: 1, and what its patterns add.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ripple {
+    band: Option<Band>,
+    runout: Option<RunoutParams>,
+}
+
+impl Ripple {
+    /// Checks the patterns; `seed` decides the phases of the ripple. None if there is no pattern: the disc is even.
+    ///
+    /// # Errors
+    /// The first parameter out of range; the amplitude of a run-out with which friction would reach 0.
+    pub fn new(
+        ripple: Option<&RippleParams>,
+        runout: Option<&RunoutParams>,
+        seed: u64,
+    ) -> Result<Option<Ripple>, ParamError> {
+        let band = ripple.map(|p| Band::new(p, seed)).transpose()?;
+        runout.map_or(Ok(()), RunoutParams::check_rows)?;
+        let both = Ripple { band, runout: runout.cloned() };
+        if let Some(runout) = runout {
+            RunoutParams::POSITIVE.require(runout.amplitude, both.largest() < 1.0)?;
+        }
+        Ok((both.band.is_some() || both.runout.is_some()).then_some(both))
+    }
+
+    /// The factor at a position.
+    #[must_use]
+    pub fn factor(&self, position: f64) -> f64 {
+        let even = self.band.as_ref().map_or(1.0, |band| 1.0 + band.at(position));
+        self.runout
+            .as_ref()
+            .map_or(even, |r| even + r.amplitude * libm::sin(f64::from(r.waves) * position + r.phase))
+    }
+
+    /// Largest departure from 1 that the factor can have.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        self.band.as_ref().map_or(0.0, Band::largest) + self.runout.as_ref().map_or(0.0, |r| r.amplitude)
+    }
+}
+
+/// The waves `amplitude Σ_n sin(n θ + φ_n)`, `n = lowest … highest`.
+#[derive(Clone, Debug, PartialEq)]
+struct Band {
     amplitude: f64,
     spacing: f64,
     /// Multiples of the spacing before the first wave.
@@ -58,22 +118,16 @@ pub struct Ripple {
     phases: Vec<(f64, f64)>,
 }
 
-impl Ripple {
-    /// Checks the parameters; `seed` decides the phases.
-    ///
-    /// # Errors
-    /// The first parameter out of range.
-    pub fn new(p: &RippleParams, seed: u64) -> Result<Ripple, ParamError> {
+impl Band {
+    fn new(p: &RippleParams, seed: u64) -> Result<Band, ParamError> {
         p.check_rows()?;
         let (waves, amplitude) = (p.waves(), p.amplitude());
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x7269_7070_6c65);
         let phases = (0..waves).map(|_| libm::sincos(core::f64::consts::TAU * rng.random::<f64>())).collect();
-        Ok(Ripple { amplitude, spacing: f64::from(p.spacing), skipped: p.lowest / p.spacing - 1, phases })
+        Ok(Band { amplitude, spacing: f64::from(p.spacing), skipped: p.lowest / p.spacing - 1, phases })
     }
 
-    /// The factor at a position.
-    #[must_use]
-    pub fn factor(&self, position: f64) -> f64 {
+    fn at(&self, position: f64) -> f64 {
         // The sines of all multiples from one sine and cosine, by the addition theorem.
         let (s1, c1) = libm::sincos(self.spacing * position);
         let next = |(s, c): (f64, f64)| (s * c1 + c * s1, c * c1 - s * s1);
@@ -86,12 +140,10 @@ impl Ripple {
             sum += wave.0 * cp + wave.1 * sp;
             wave = next(wave);
         }
-        1.0 + self.amplitude * sum
+        self.amplitude * sum
     }
 
-    /// Largest departure from 1 that the factor can have.
-    #[must_use]
-    pub fn largest(&self) -> f64 {
+    fn largest(&self) -> f64 {
         self.amplitude * self.phases.len() as f64
     }
 }
@@ -100,24 +152,56 @@ impl Ripple {
 mod tests {
     use super::*;
 
+    fn band(p: &RippleParams, seed: u64) -> Ripple {
+        Ripple::new(Some(p), None, seed).unwrap().unwrap()
+    }
+
+    #[test]
+    fn patterns_add_up_and_a_disc_without_one_is_even() {
+        let p = RippleParams { rms: 0.1, lowest: 160, highest: 640, spacing: 40 };
+        let tilted = RunoutParams { amplitude: 0.2, waves: 1, phase: 0.5 };
+        let (fine, both) = (band(&p, 3), Ripple::new(Some(&p), Some(&tilted), 3).unwrap().unwrap());
+        let alone = Ripple::new(None, Some(&tilted), 3).unwrap().unwrap();
+        for i in 0..100 {
+            let x = f64::from(i) * 0.37;
+            let wave = 0.2 * libm::sin(x + 0.5);
+            assert!((alone.factor(x) - 1.0 - wave).abs() < 1e-14);
+            assert!((both.factor(x) - fine.factor(x) - wave).abs() < 1e-14);
+        }
+        assert!((alone.largest() - 0.2).abs() < 1e-15);
+        assert!((both.largest() - fine.largest() - 0.2).abs() < 1e-15);
+        assert_eq!(Ripple::new(None, None, 3).unwrap(), None);
+        let much = RunoutParams { amplitude: 1.0 - fine.largest(), ..tilted };
+        assert_eq!(Ripple::new(Some(&p), Some(&much), 3).unwrap_err().field(), "amplitude");
+        assert!(Ripple::new(None, Some(&much), 3).is_ok());
+        for (bad, field) in [
+            (RunoutParams { amplitude: 1.0, ..tilted.clone() }, "amplitude"),
+            (RunoutParams { amplitude: f64::NAN, ..tilted.clone() }, "amplitude"),
+            (RunoutParams { waves: 0, ..tilted.clone() }, "waves"),
+            (RunoutParams { phase: f64::INFINITY, ..tilted }, "phase"),
+        ] {
+            assert_eq!(Ripple::new(None, Some(&bad), 1).unwrap_err().field(), field);
+        }
+    }
+
     #[test]
     fn friction_along_the_disc_has_its_rms_closes_after_a_turn_and_repeats_with_its_seed() {
         let p = RippleParams { rms: 0.15, lowest: 160, highest: 640, spacing: 40 };
-        let r = Ripple::new(&p, 3).unwrap();
+        let r = band(&p, 3);
         let n = 100_000;
         let tau = core::f64::consts::TAU;
         let off = |i: i32| r.factor(tau * f64::from(i) / f64::from(n)) - 1.0;
         let square: f64 = (0..n).map(|i| off(i) * off(i)).sum();
         assert!((libm::sqrt(square / f64::from(n)) - 0.15).abs() < 1e-9);
         assert!((r.factor(0.3) - r.factor(0.3 + tau)).abs() < 1e-10);
-        assert_eq!(r, Ripple::new(&p, 3).unwrap());
-        assert_ne!(r, Ripple::new(&p, 4).unwrap());
+        assert_eq!(r, band(&p, 3));
+        assert_ne!(r, band(&p, 4));
     }
 
     #[test]
     fn the_recurrence_is_the_sum_of_sines() {
         let p = RippleParams { rms: 0.1, lowest: 82, highest: 246, spacing: 41 };
-        let r = Ripple::new(&p, 9).unwrap();
+        let r = Band::new(&p, 9).unwrap();
         for i in 0..100 {
             let x = f64::from(i) * 0.37;
             let direct: f64 = r
@@ -126,7 +210,7 @@ mod tests {
                 .enumerate()
                 .map(|(j, (sp, cp))| libm::sin(41.0 * (j + 2) as f64 * x + libm::atan2(*sp, *cp)))
                 .sum();
-            assert!((r.factor(x) - 1.0 - r.amplitude * direct).abs() < 1e-11);
+            assert!((r.at(x) - r.amplitude * direct).abs() < 1e-11);
         }
     }
 
@@ -140,7 +224,7 @@ mod tests {
             (RippleParams { highest: 120, ..good.clone() }, "highest"),
             (RippleParams { spacing: 0, ..good }, "spacing"),
         ] {
-            assert_eq!(Ripple::new(&bad, 1).unwrap_err().field(), field);
+            assert_eq!(Ripple::new(Some(&bad), None, 1).unwrap_err().field(), field);
         }
     }
 }

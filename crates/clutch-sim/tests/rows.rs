@@ -16,6 +16,7 @@ const SAMPLES: &[(&str, &str)] = &[
     ("name", "\"rows\""),
     ("rig.base", "\"paper\""),
     ("rig.ripple.rms", "0.05"),
+    ("rig.runout.amplitude", "0.2"),
     ("amplitude_deg", "0.1"),
     ("actuator.motor.preload_nm", "0.1"),
     ("volts_v", "4.5"),

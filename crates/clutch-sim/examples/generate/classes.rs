@@ -128,6 +128,13 @@ BrakeActuator(gain_nm_v=0.14, preload_nm=0.01)",
 >>> clutch.Rig(ripple=ripple).ripple.rms
 0.05",
     ),
+    known(
+        "RunoutParams",
+        "Runout",
+        false,
+        r">>> clutch.Rig(runout=clutch.Runout(amplitude=0.2, phase_deg=90)).runout
+Runout(amplitude=0.2, waves_per_turn=1, phase_deg=90.0)",
+    ),
     known("RigEncoder", "Encoder", false, ""),
     known("RigDac", "Dac", false, ""),
     known(
