@@ -100,6 +100,8 @@ pub struct Motion<'a, S, const N: usize, const B: usize> {
     step: f64,
     /// Rates at the state, if the last step left them.
     known: Option<Rates<N>>,
+    /// Nothing moves, and nothing can until a row lets go.
+    at_rest: bool,
 }
 
 /// Velocity and acceleration.
@@ -160,6 +162,9 @@ impl<const N: usize> Span<N> {
 
     /// A velocity with the rates that stuck rows have to have; `moves` is 0 for an acceleration.
     fn project(&self, inverse: &SMatrix<f64, N, N>, x: &SVector<f64, N>, moves: f64) -> SVector<f64, N> {
+        if self.directions.is_empty() {
+            return *x;
+        }
         if self.directions.len() == N
             && moves * self.directions.iter().fold(0.0, |m, (_, r)| r.abs().max(m)) == 0.0
         {
@@ -189,7 +194,8 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         if let Some(row) = (0..B).find(|row| system.friction(*row).bristles().is_some()) {
             return Err(SystemError::Bristles(row));
         }
-        let mut motion = Motion { system, state, modes: [Mode::Stuck; B], step: 1e-6, known: None };
+        let mut motion =
+            Motion { system, state, modes: [Mode::Stuck; B], step: 1e-6, known: None, at_rest: false };
         motion.choose([false; B])?;
         Ok(motion)
     }
@@ -246,6 +252,9 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
     }
 
     fn rate(&self, state: &State<N>, e: &Equations<N, B>) -> Rates<N> {
+        if !self.stuck().contains(&true) {
+            return [state.velocity, e.free];
+        }
         let span = Span::of(&e.inverse, &e.rows, &SVector::zeros(), &self.stuck());
         [state.velocity, span.project(&e.inverse, &e.free, 0.0)]
     }
@@ -261,8 +270,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
 
     /// Whether a row that slipped has come to rest, or one that is stuck is no longer held.
     fn happened(&self, e: &Equations<N, B>) -> bool {
-        let noise = 1e-14 * e.slip.amax();
-        if (0..B).any(|i| self.modes[i].sign() * e.slip[i] < -noise) {
+        if self.margin(&e.slip) < 0.0 {
             return true;
         }
         let stuck = self.stuck();
@@ -309,12 +317,20 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
                 self.modes[i] = if left[i] > 0.0 { Mode::Forward } else { Mode::Backward };
             }
         }
+        let e = self.equations(&self.state)?;
+        let span = Span::of(&e.inverse, &e.rows, &SVector::zeros(), &self.stuck());
+        self.at_rest = span.directions.len() == N && self.state.velocity.iter().all(|v| *v == 0.0);
         Ok(before)
     }
 
-    /// A step of the pair.
+    /// A step of the pair; of what rests, only its end.
     fn step(&self, h: f64) -> Result<Step<N, B>, SystemError> {
         let from = &self.state;
+        if self.at_rest {
+            let to = State { time: from.time + h, ..*from };
+            let equations = self.equations(&to)?;
+            return Ok(Step { to, error: 0.0, rates: [SVector::zeros(); 2], equations });
+        }
         let first = match self.known {
             Some(rates) => rates,
             None => self.rate(from, &self.equations(from)?),
@@ -387,7 +403,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
             }
             let happened = self.happened(&e);
             if happened {
-                reached = self.locate(h)?;
+                reached = self.locate(h, &e)?;
                 e = self.equations(&reached)?;
             }
             let slipped = self.modes.map(Mode::sign);
@@ -412,16 +428,48 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         Err(SystemError::TooManySteps(begin))
     }
 
-    /// The end of the shortest step at whose end something has happened.
-    fn locate(&self, h: f64) -> Result<State<N>, SystemError> {
-        let (mut before, mut after) = (0.0, h);
-        while after - before > INSTANT {
-            let middle = 0.5 * (before + after);
-            if middle <= before || middle >= after {
+    /// How far rows that slip are from a rate of 0, rad/s; below 0 once one of them has passed it.
+    fn margin(&self, slip: &SVector<f64, B>) -> f64 {
+        let noise = 1e-14 * slip.amax();
+        let rows = (0..B).filter(|i| self.modes[*i] != Mode::Stuck);
+        rows.fold(f64::INFINITY, |least, i| least.min(self.modes[i].sign() * slip[i] + noise))
+    }
+
+    /// The end of the shortest step at whose end something has happened; `beyond` are the equations at the end of `h`.
+    ///
+    /// A bracket: by false position (Illinois) on the rates of rows that slip, halved where a row that is stuck lets go.
+    fn locate(&self, h: f64, beyond: &Equations<N, B>) -> Result<State<N>, SystemError> {
+        let from = self.system.base(self.state.time);
+        let slip = self.system.rows(&self.state.position) * self.state.velocity - from;
+        let (mut before, mut after) = ((0.0, self.margin(&slip)), (h, self.margin(&beyond.slip)));
+        let mut moved_before = None;
+        while after.0 - before.0 > INSTANT {
+            let share = before.1 / (before.1 - after.1);
+            let false_position = before.1 > 0.0 && before.1.is_finite() && after.1 < 0.0;
+            let width = after.0 - before.0;
+            let guess = if false_position {
+                // Not nearer to an end than half of what is asked: there it is from the other side that the bracket closes.
+                (before.0 + share * width).clamp(before.0 + 0.5 * INSTANT, after.0 - 0.5 * INSTANT)
+            } else {
+                before.0 + 0.5 * width
+            };
+            if guess <= before.0 || guess >= after.0 {
                 break;
             }
-            if self.happened(&self.step(middle)?.equations) { after = middle } else { before = middle }
+            let e = self.step(guess)?.equations;
+            let passed = self.happened(&e);
+            let end = (guess, self.margin(&e.slip));
+            // The end that stays put for a second time weighs half.
+            let again = if moved_before == Some(!passed) { 0.5 } else { 1.0 };
+            if passed {
+                after = end;
+                before.1 *= again;
+            } else {
+                before = end;
+                after.1 *= again;
+            }
+            moved_before = Some(!passed);
         }
-        Ok(self.step(after)?.to)
+        Ok(self.step(after.0)?.to)
     }
 }
