@@ -1,0 +1,383 @@
+//! The checker of a certificate: multiplications with outward rounding, in one sweep.
+//!
+//! It derives the model from [`Setup`] by itself and shares no code with the search, only the plain data of
+//! [`crate::setup`]. For every row `c` of a cell's set and everything that can happen in a tick it holds the claim
+//!
+//! ```text
+//! c·x⁺ ≤ F·y + f₀ = Σ λ_j a_j·y + (F − Σ λ_j a_j)·y + f₀ ≤ Σ λ_j b_j + |F − Σ λ_j a_j|·|y| + f₀ ≤ r
+//! ```
+//!
+//! with the multipliers `λ ≥ 0` of the file, the constraints `a_j·y ≤ b_j` of the set and of the mode, and `|y|` from the set's
+//! own walls. Whoever made the multipliers, a certificate that passes bounds the error.
+
+mod interval;
+mod law;
+mod mode;
+mod shaft;
+
+use crate::setup::{Case, Cell, Certificate, Form, Gains, ModeId, Setup, VERSION};
+use interval::{Interval, at};
+use mode::{Mode, Possible};
+use shaft::Shaft;
+use std::collections::HashMap;
+
+/// What a certificate that holds says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Checked {
+    /// Bound on `|e|` of every run of every plant of the box, rad.
+    pub error_bound: f64,
+    /// `μ_d` of the cell that has it.
+    pub limiting: [f64; 2],
+    /// Programs whose bound was held against a radius.
+    pub programs: usize,
+}
+
+/// The reason that a certificate is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Refused {
+    /// The format is another.
+    #[error("version is {0}: expected {VERSION}")]
+    Version(u32),
+    /// A value that no certificate has.
+    #[error("{key} is {value}: expected {expected}")]
+    Value {
+        /// Its key.
+        key: String,
+        /// The value.
+        value: String,
+        /// The values that it may have.
+        expected: &'static str,
+    },
+    /// Part of the box is in no cell.
+    #[error("cells: no cell holds μ_d from {0} to {1}: expected cells that cover setup.sliding")]
+    Gap(f64, f64),
+    /// Something wrong with a cell.
+    #[error("cells[{cell}] (μ_d {} … {}): {flaw}", .sliding[0], .sliding[1])]
+    Cell {
+        /// Its number.
+        cell: usize,
+        /// Its `μ_d`.
+        sliding: [f64; 2],
+        /// What is wrong.
+        flaw: Flaw,
+    },
+}
+
+/// What is wrong with a cell.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Flaw {
+    /// A list is not what the others need.
+    #[error("{0}")]
+    Shape(String),
+    /// The pieces of the law leave something out, or a line is on the wrong side of the demand.
+    #[error("strips: {0}")]
+    Strips(String),
+    /// The set has no wall there.
+    #[error("rows: no row bounds coordinate {0} on both sides")]
+    Wall(usize),
+    /// A run may begin outside.
+    #[error("radii[{row}] is {radius}: a run may begin at {start}")]
+    Start {
+        /// The row.
+        row: usize,
+        /// Its radius.
+        radius: f64,
+        /// The largest at the start.
+        start: f64,
+    },
+    /// The shaft may be faster than assumed.
+    #[error("speed_cap is {cap}: the set lets the shaft reach {reached} counts per tick")]
+    Speed {
+        /// The speed assumed.
+        cap: f64,
+        /// The speed of the set.
+        reached: f64,
+    },
+    /// Nothing is said of something that can happen.
+    #[error("modes: piece {}, {:?}, {} counts is missing, and can happen", .0.piece, .0.case, .0.counts)]
+    Mode(ModeId),
+    /// No multipliers.
+    #[error("proofs: none for row {row} in mode {mode}")]
+    Proof {
+        /// The row.
+        row: usize,
+        /// The mode.
+        mode: usize,
+    },
+    /// The multipliers do not prove the row.
+    #[error("row {row}, mode {mode}: the multipliers prove {proven}, above the radius {radius}")]
+    Row {
+        /// The row.
+        row: usize,
+        /// The mode.
+        mode: usize,
+        /// The bound that they prove.
+        proven: f64,
+        /// The radius.
+        radius: f64,
+    },
+}
+
+/// Checks a certificate.
+///
+/// # Errors
+/// The first thing that is wrong.
+pub fn check(certificate: &Certificate) -> Result<Checked, Refused> {
+    if certificate.version != VERSION {
+        return Err(Refused::Version(certificate.version));
+    }
+    let setup = &certificate.setup;
+    values(setup)?;
+    covered(certificate)?;
+    let mut out = Checked { error_bound: 0.0, limiting: setup.sliding, programs: 0 };
+    for (k, cell) in certificate.cells.iter().enumerate() {
+        let flaw = |flaw| Refused::Cell { cell: k, sliding: cell.sliding, flaw };
+        let (error, programs) = check_cell(setup, cell).map_err(flaw)?;
+        out.programs += programs;
+        if error > out.error_bound {
+            (out.error_bound, out.limiting) = (error, cell.sliding);
+        }
+    }
+    Ok(out)
+}
+
+/// Values of a setup that the model can be made of.
+fn values(s: &Setup) -> Result<(), Refused> {
+    let refuse = |key: &str, value: String, expected| {
+        Err(Refused::Value { key: format!("setup.{key}"), value, expected })
+    };
+    let positive = [
+        ("period_s", s.period_s),
+        ("counts_per_rev", f64::from(s.counts_per_rev)),
+        ("rate", s.rate),
+        ("stribeck[0]", s.stribeck[0]),
+        ("stribeck[1]", s.stribeck[1]),
+        ("smoothing", s.smoothing),
+    ];
+    for (key, x) in positive {
+        if !(x > 0.0 && x.is_finite()) {
+            return refuse(key, x.to_string(), "a finite number above 0");
+        }
+    }
+    if s.smoothing > 1.0 {
+        return refuse("smoothing", s.smoothing.to_string(), "a number up to 1");
+    }
+    for (key, x) in [("converter_step", s.converter_step), ("torque_noise", s.torque_noise)] {
+        if !(x >= 0.0 && x.is_finite()) {
+            return refuse(key, x.to_string(), "a finite number of at least 0");
+        }
+    }
+    if !(s.ripple >= 0.0 && s.ripple < 1.0) {
+        return refuse("ripple", s.ripple.to_string(), "a number from 0 to below 1");
+    }
+    if s.delay_ticks > 3 {
+        return refuse("delay_ticks", s.delay_ticks.to_string(), "at most 3");
+    }
+    let ends = [
+        ("inertia", s.inertia, true),
+        ("drive_torque", s.drive_torque, true),
+        ("viscous_damping", s.viscous_damping, false),
+        ("brake_gain", s.brake_gain, true),
+        ("sliding", s.sliding, true),
+        ("at_rest", s.at_rest, true),
+        ("volts", s.volts, false),
+        ("start_volts", s.start_volts, false),
+    ];
+    for (key, [low, high], above_0) in ends {
+        let begins = if above_0 { low > 0.0 } else { low >= 0.0 };
+        if !(begins && low <= high && high.is_finite()) {
+            return refuse(
+                key,
+                format!("[{low}, {high}]"),
+                "two finite numbers, the lower first, not below 0, and above 0 but for damping and volts",
+            );
+        }
+    }
+    let gains = match s.law {
+        Gains::Pd { kp, kd } => [kp, kd, 1.0, 1.0],
+        Gains::Smc { kp, kd, slope, boundary } => [kp, kd, slope, boundary],
+    };
+    if gains.iter().any(|g| !(*g >= 0.0 && g.is_finite())) || gains[3] <= 0.0 {
+        return refuse("law", format!("{:?}", s.law), "finite gains of at least 0, and a boundary above 0");
+    }
+    Ok(())
+}
+
+/// The cells cover the box.
+fn covered(certificate: &Certificate) -> Result<(), Refused> {
+    let [low, high] = certificate.setup.sliding;
+    let mut cells: Vec<[f64; 2]> = certificate.cells.iter().map(|c| c.sliding).collect();
+    cells.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut reached = low;
+    let mut any = false;
+    for [from, to] in cells {
+        if !(from > 0.0 && from <= to && to.is_finite()) {
+            return Err(Refused::Value {
+                key: "cells.sliding".into(),
+                value: format!("[{from}, {to}]"),
+                expected: "two finite numbers above 0, the lower first",
+            });
+        }
+        if from > reached {
+            return Err(Refused::Gap(reached, from));
+        }
+        any |= from <= low && to >= low;
+        reached = reached.max(to);
+    }
+    if !any || reached < high { Err(Refused::Gap(reached, high)) } else { Ok(()) }
+}
+
+/// Bound on `|e|` of a cell, rad, and the programs it took.
+fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
+    let n = 4 + setup.delay_ticks as usize;
+    shape(cell, n)?;
+    let shaft = Shaft::new(setup, cell);
+    let walls = walls(cell, n)?;
+    starts_inside(setup, cell, &shaft)?;
+    let reached = (at(setup.rate) / shaft.speed + at(walls[1].0)).high;
+    if !(reached <= cell.speed_cap) {
+        return Err(Flaw::Speed { cap: cell.speed_cap, reached });
+    }
+
+    let pieces = law::pieces(setup, cell, &shaft).map_err(Flaw::Strips)?;
+    let mut numbers = HashMap::new();
+    for (k, id) in cell.modes.iter().enumerate() {
+        numbers.insert(*id, k);
+    }
+    let mut proofs = HashMap::new();
+    for proof in &cell.proofs {
+        proofs.insert((proof.row as usize, proof.mode as usize), proof.weights.as_slice());
+    }
+    let counts = if cell.form == Form::Exact { shaft.most_counts() } else { 0 };
+    let mut programs = 0;
+    for piece in &pieces {
+        for case in [Case::Slides, Case::LetGo, Case::TouchesAndLeaves, Case::TouchesAndStays] {
+            for gone in 0..=counts {
+                let id = ModeId { piece: piece.id, case, counts: gone };
+                let Possible::Yes(mode) = Mode::new(&shaft, piece, cell.form, id, n) else { continue };
+                let number = *numbers.get(&id).ok_or(Flaw::Mode(id))?;
+                for row in 0..cell.rows.len() {
+                    let weights =
+                        proofs.get(&(row, number)).ok_or(Flaw::Proof { row, mode: number })?;
+                    let proven = proven(&shaft, cell, &mode, row, weights, &walls)?;
+                    let radius = cell.radii[row];
+                    if !(proven <= radius) {
+                        return Err(Flaw::Row { row, mode: number, proven, radius });
+                    }
+                    programs += 1;
+                }
+            }
+        }
+    }
+    let error = at(walls[0].0.max(walls[0].1)) + at(shaft.bend);
+    Ok(((error * shaft.count).high, programs))
+}
+
+fn shape(cell: &Cell, n: usize) -> Result<(), Flaw> {
+    let no = |what: String| Err(Flaw::Shape(what));
+    if cell.radii.len() != cell.rows.len() {
+        return no(format!("radii: {} numbers: expected one for each of {} rows", cell.radii.len(), cell.rows.len()));
+    }
+    if let Some(row) = cell.rows.iter().position(|row| row.len() != n || row.iter().any(|x| !x.is_finite())) {
+        return no(format!("rows[{row}]: expected {n} finite numbers"));
+    }
+    if cell.form == Form::Noise
+        && let Some(row) = cell.rows.iter().position(|row| row[n - 1] != 0.0)
+    {
+        return no(format!("rows[{row}]: the last number of a row is 0 in the noise form"));
+    }
+    if let Some(row) = cell.radii.iter().position(|r| !r.is_finite()) {
+        return no(format!("radii[{row}]: expected a finite number"));
+    }
+    if !(cell.speed_cap > 0.0 && cell.speed_cap <= 1e4) {
+        return no(format!("speed_cap is {}: expected a number above 0, up to 10000", cell.speed_cap));
+    }
+    Ok(())
+}
+
+/// Bounds of each coordinate in the set, from its own walls: `y ≤ .0` and `−y ≤ .1`. In the noise form the last coordinate is the
+/// rounding, 0 to 1.
+///
+/// The rate stands as `(−s, s)`, so that the first is how far the shaft is faster than the path.
+fn walls(cell: &Cell, n: usize) -> Result<Vec<(f64, f64)>, Flaw> {
+    let mut walls = vec![(f64::INFINITY, f64::INFINITY); n];
+    for (row, r) in cell.rows.iter().zip(&cell.radii) {
+        let mut others = row.iter().enumerate().filter(|(_, c)| **c != 0.0);
+        let (Some((i, c)), None) = (others.next(), others.next()) else { continue };
+        let bound = (at(*r) / at(c.abs())).high;
+        let wall = if *c > 0.0 { &mut walls[i].0 } else { &mut walls[i].1 };
+        *wall = wall.min(bound);
+    }
+    if cell.form == Form::Noise {
+        walls[n - 1] = (1.0, 0.0);
+    }
+    walls[1] = (walls[1].1, walls[1].0);
+    match walls.iter().position(|(a, b)| !a.is_finite() || !b.is_finite()) {
+        Some(i) => Err(Flaw::Wall(i)),
+        None => Ok(walls),
+    }
+}
+
+/// Every state in which a run may begin lies in the set.
+fn starts_inside(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<(), Flaw> {
+    let path = shaft.path;
+    // What the shaft's velocity may differ from the path's by rounding, in either scalar.
+    let near = at(1e-6) * (at(1.0) + path);
+    let step = Interval { low: -shaft::TARGET_STEP, high: shaft::TARGET_STEP };
+    let rate = Interval { low: -near.high, high: if setup.from_rest { path.high } else { near.high } };
+    let rounding = Interval { low: 0.0, high: 1.0 };
+    let volts = Interval { low: setup.start_volts[0], high: setup.start_volts[1] };
+    for (k, (row, radius)) in cell.rows.iter().zip(&cell.radii).enumerate() {
+        let n = row.len();
+        let (ce, cs, cz, cm) = (at(row[0]), at(row[1]), at(row[2]), at(row[n - 1]));
+        // z = m₀, m₋ = m₀ − ω_d, m₀ = e + rounding.
+        let mut start = (ce + cz + cm) * step + cs * rate + (cz + cm) * rounding - cm * path;
+        for c in &row[3..n - 1] {
+            start = start + at(*c) * volts;
+        }
+        if !(start.high <= *radius) {
+            return Err(Flaw::Start { row: k, radius: *radius, start: start.high });
+        }
+    }
+    Ok(())
+}
+
+/// The bound that multipliers prove for a row after a tick in a mode.
+fn proven(
+    shaft: &Shaft,
+    cell: &Cell,
+    mode: &Mode,
+    row: usize,
+    weights: &[(u32, f64)],
+    walls: &[(f64, f64)],
+) -> Result<f64, Flaw> {
+    let next = mode.next(shaft, &cell.rows[row]);
+    let mut left = next.weights;
+    let mut bound = next.constant;
+    for (j, weight) in weights {
+        if !(*weight >= 0.0 && weight.is_finite()) {
+            return Err(Flaw::Shape(format!("proofs: the weight {weight} of row {row} is not a number of at least 0")));
+        }
+        let (j, weight) = (*j as usize, at(*weight));
+        let rows = cell.rows.len();
+        if j < rows {
+            for (left, c) in left.iter_mut().zip(&cell.rows[j]) {
+                *left = *left - weight * at(*c);
+            }
+            bound = bound + weight * at(cell.radii[j]);
+        } else {
+            let Some((a, b)) = mode.within.get(j - rows) else {
+                return Err(Flaw::Shape(format!("proofs: row {row} names constraint {j}, which there is not")));
+            };
+            for (left, c) in left.iter_mut().zip(a) {
+                *left = *left - weight * *c;
+            }
+            bound = bound + weight * at(b.high);
+        }
+    }
+    for (k, left) in left.iter().enumerate() {
+        let (above, below) = if k == 1 { (walls[1].1, walls[1].0) } else { walls[k] };
+        bound = bound + *left * Interval { low: -below, high: above.max(-below) };
+    }
+    Ok(bound.high)
+}

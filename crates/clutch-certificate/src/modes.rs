@@ -1,0 +1,215 @@
+//! Modes of a tick: a piece of the law, a case of the shaft, and counts that went by; all that can happen.
+//!
+//! A mode is a set of inequalities that hold in it, and what the next state can be at most along any direction. Variables are
+//! `(e, s, z, p₁ … p_d, w)`: the error, its rate, the filter's memory, voltages on the way, and last the encoder: in the exact
+//! form the last measured error `m₋`, in the noise form the rounding `φ` of this tick.
+
+use crate::pieces::{Line, Piece};
+use crate::setup::{Case, Form, ModeId};
+use crate::simplex::Constraints;
+use crate::units::{TARGET_STEP, Units};
+
+pub(crate) const E: usize = 0;
+pub(crate) const S: usize = 1;
+pub(crate) const Z: usize = 2;
+/// Voltages on the way begin here.
+pub(crate) const P: usize = 3;
+
+/// `weights·y + constant`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Affine<const N: usize> {
+    pub(crate) weights: [f64; N],
+    pub(crate) constant: f64,
+}
+
+impl<const N: usize> Affine<N> {
+    fn constant(constant: f64) -> Self {
+        Affine { weights: [0.0; N], constant }
+    }
+
+    fn of(i: usize, weight: f64) -> Self {
+        let mut a = Affine::constant(0.0);
+        a.weights[i] = weight;
+        a
+    }
+
+    fn add(&mut self, other: &Affine<N>, factor: f64) {
+        for (x, y) in self.weights.iter_mut().zip(&other.weights) {
+            *x += factor * y;
+        }
+        self.constant += factor * other.constant;
+    }
+
+    fn plus(mut self, other: &Affine<N>, factor: f64) -> Self {
+        self.add(other, factor);
+        self
+    }
+}
+
+/// A mode.
+#[derive(Clone, Debug)]
+pub(crate) struct Mode<const N: usize> {
+    pub(crate) id: ModeId,
+    /// Inequalities that hold in it.
+    pub(crate) within: Constraints<N>,
+    /// The measured error, and how far it may be off.
+    measured: Affine<N>,
+    measured_off: f64,
+    /// The law's answer is between these.
+    answer: [Affine<N>; 2],
+    /// The voltage on the brake is between these.
+    applied: [Affine<N>; 2],
+}
+
+/// Modes of a cell, in either form of the encoder's rounding; the exact form takes up to `most_counts` counts per tick.
+pub(crate) fn modes<const N: usize>(
+    u: &Units,
+    pieces: &[Piece],
+    form: Form,
+    most_counts: u32,
+) -> Vec<Mode<N>> {
+    let mut out = Vec::new();
+    let counts = if form == Form::Exact { most_counts } else { 0 };
+    for piece in pieces {
+        for case in [Case::Slides, Case::LetGo, Case::TouchesAndLeaves, Case::TouchesAndStays] {
+            out.extend((0..=counts).filter_map(|j| mode(u, piece, form, ModeId { piece: piece.id, case, counts: j })));
+        }
+    }
+    out
+}
+
+fn mode<const N: usize>(u: &Units, piece: &Piece, form: Form, id: ModeId) -> Option<Mode<N>> {
+    let w = N - 1;
+    let (measured, measured_off) = match form {
+        Form::Noise => (Affine::of(E, 1.0).plus(&Affine::of(w, 1.0), 1.0), 0.0),
+        Form::Exact => {
+            let gone = Affine::constant(u.path - f64::from(id.counts));
+            (Affine::of(w, 1.0).plus(&gone, 1.0), TARGET_STEP)
+        }
+    };
+    let line = |l: &Line, sign: f64| {
+        let mut a = Affine::of(Z, l.z).plus(&measured, l.m);
+        a.constant += l.constant + sign * l.m.abs() * measured_off;
+        a
+    };
+    let answer = [line(&piece.volts[0], -1.0), line(&piece.volts[1], 1.0)];
+    let applied = if u.delay == 0 { answer } else { [Affine::of(P, 1.0); 2] };
+    let mut within = Constraints::new();
+    let mut at_most = |a: &Affine<N>, limit: f64| within.push(&a.weights, limit - a.constant);
+
+    // Whatever the mode: the shaft never runs backwards, the encoder rounds down, and so the filter's rate is at most the path's.
+    at_most(&Affine::of(S, 1.0), u.path);
+    let rounding = measured.plus(&Affine::of(E, 1.0), -1.0);
+    at_most(&rounding, 1.0 + measured_off);
+    at_most(&Affine::constant(0.0).plus(&rounding, -1.0), measured_off);
+    let rate = measured.plus(&Affine::of(Z, 1.0), -1.0);
+    at_most(&Affine::constant(0.0).plus(&rate, u.kappa), u.path + (1.0 + u.kappa) * TARGET_STEP);
+
+    for l in &piece.within {
+        at_most(&line(l, -1.0), 0.0);
+    }
+    // A fixed voltage decides by itself.
+    let fixed = applied.iter().all(|a| a.weights.iter().all(|x| *x == 0.0));
+    let mut volts = |from: Option<f64>, to: Option<f64>| {
+        let [low, high] = &applied;
+        if let Some(from) = from {
+            if fixed && high.constant < from {
+                return false;
+            }
+            at_most(&Affine::constant(0.0).plus(high, -1.0), -from);
+        }
+        if let Some(to) = to {
+            if fixed && low.constant > to {
+                return false;
+            }
+            at_most(low, to);
+        }
+        true
+    };
+    let possible = match id.case {
+        Case::Slides => true,
+        Case::LetGo => volts(None, Some(u.lets_go)),
+        Case::TouchesAndLeaves => volts(Some(u.lets_go), Some(u.stays)),
+        Case::TouchesAndStays => volts(Some(u.lets_go.max(u.stays)), None),
+    };
+    // The speed before the tick, ω_d − s.
+    match id.case {
+        Case::Slides => at_most(&Affine::of(S, 1.0), u.path - u.slow),
+        Case::LetGo => at_most(&Affine::of(S, -1.0), u.slow - u.path),
+        Case::TouchesAndLeaves | Case::TouchesAndStays => {
+            let slack = u.drive[0].min(u.brake[1] * u.lets_go);
+            let slowed = Affine::of(S, -1.0).plus(&applied[1], -u.brake[1]);
+            at_most(&slowed, u.slow - slack - u.path);
+        }
+    }
+    possible.then_some(Mode { id, within, measured, measured_off, answer, applied })
+}
+
+impl<const N: usize> Mode<N> {
+    /// What `c·x` can be at most after the tick, before anything is known of the state.
+    pub(crate) fn next(&self, u: &Units, c: &[f64; N]) -> Affine<N> {
+        let (ce, cs) = (c[E], c[S]);
+        let mut out = Affine::constant(ce.abs() * TARGET_STEP);
+        let volts = |out: &mut Affine<N>, factor: f64, between: &[Affine<N>; 2]| {
+            out.add(&between[usize::from(factor >= 0.0)], factor);
+        };
+        out.weights[E] += ce;
+        match self.id.case {
+            Case::Slides | Case::LetGo => {
+                let b = if self.id.case == Case::Slides { u.brake } else { u.brake_any };
+                // ∫ (c_s + c_e (1 − τ)) ṡ dτ over the tick, ṡ between b₁ v − g₂ and b₂ v − g₁.
+                let (pro, contra) = parts(cs + ce, cs);
+                out.weights[S] += ce + cs;
+                out.constant += contra * u.drive[1] - pro * u.drive[0];
+                volts(&mut out, pro * b[1] - contra * b[0], &self.applied);
+            }
+            Case::TouchesAndLeaves | Case::TouchesAndStays => {
+                out.constant += (cs + ce) * u.path;
+                let leaves = self.id.case == Case::TouchesAndLeaves;
+                let mut up = 0.0;
+                if cs < 0.0 {
+                    out.constant -= cs * u.slow;
+                    up -= cs;
+                }
+                if ce < 0.0 {
+                    // The way is at most ω + ω₁ + up/2, with ω = ω_d − s.
+                    out.constant -= ce * (u.path + u.slow);
+                    out.weights[S] += ce;
+                    up -= 0.5 * ce;
+                }
+                if leaves {
+                    out.constant += up * u.drive[1];
+                    volts(&mut out, -up * u.brake_leaving, &self.applied);
+                }
+            }
+        }
+        let mut measured = u.kappa * c[Z];
+        out.weights[Z] += (1.0 - u.kappa) * c[Z];
+        if self.measured_off > 0.0 {
+            measured += c[N - 1];
+        }
+        out.add(&self.measured, measured);
+        out.constant += measured.abs() * self.measured_off;
+        for k in 0..u.delay {
+            if k + 1 < u.delay {
+                out.weights[P + k + 1] += c[P + k];
+            } else {
+                volts(&mut out, c[P + k], &self.answer);
+            }
+        }
+        out
+    }
+}
+
+/// Integrals of the positive and of the negative part of a line from `a` at 0 to `b` at 1.
+fn parts(a: f64, b: f64) -> (f64, f64) {
+    if a >= 0.0 && b >= 0.0 {
+        return (0.5 * (a + b), 0.0);
+    }
+    if a <= 0.0 && b <= 0.0 {
+        return (0.0, -0.5 * (a + b));
+    }
+    let (high, low) = (a.max(b), -a.min(b));
+    let sum = 2.0 * (high + low);
+    (high * high / sum, low * low / sum)
+}

@@ -1,0 +1,187 @@
+//! Plain data of a certificate: the box of plants, the law, the cells with their rows, radii and multipliers.
+//!
+//! Both the search and the [`crate::checker`] read these, and nothing else is common to them. A saved certificate is this
+//! data as JSON: [`crate::file`].
+
+use serde::{Deserialize, Serialize};
+
+/// Lower and upper end.
+pub type Ends = [f64; 2];
+
+/// The sampled loop and every plant it may meet: the box that a certificate speaks of. SI and radians.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Setup {
+    /// Sampling period, s.
+    pub period_s: f64,
+    /// Counts per turn of an encoder that rounds down.
+    pub counts_per_rev: u32,
+    /// Moment of inertia `J`, kg m².
+    pub inertia: Ends,
+    /// Driving torque `T_u`, N m.
+    pub drive_torque: Ends,
+    /// Viscous damping `C_d`, N m s/rad.
+    pub viscous_damping: Ends,
+    /// Brake gain `K_COF`, N m/V.
+    pub brake_gain: Ends,
+    /// `μ_d` of a fast shaft.
+    pub sliding: Ends,
+    /// `μ_s` of a resting shaft.
+    pub at_rest: Ends,
+    /// `true` if no plant of the box has `μ_s < μ_d`.
+    pub rest_not_below_sliding: bool,
+    /// Stribeck velocity, rad/s, and exponent of (2).
+    pub stribeck: [f64; 2],
+    /// Largest share by which friction departs from its curve, anywhere on the disc and at any time.
+    pub ripple: f64,
+    /// Largest magnitude of a further torque, any at any time, N m.
+    pub torque_noise: f64,
+    /// Whole periods from sample to voltage.
+    pub delay_ticks: u32,
+    /// One step of the converter, V; 0 if it rounds nothing.
+    pub converter_step: f64,
+    /// Lowest and highest voltage that go out, V.
+    pub volts: Ends,
+    /// Velocity of the path, which is a ramp, rad/s.
+    pub rate: f64,
+    /// `K_Kal` of the smoothed difference (5).
+    pub smoothing: f64,
+    /// The law.
+    pub law: Gains,
+    /// `true` if a run may begin at rest; else it begins with the path's velocity. Both begin on the path.
+    pub from_rest: bool,
+    /// Volts that the brake may have had before the first tick.
+    pub start_volts: Ends,
+}
+
+/// Laws that have a sampled certificate, with their gains.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Gains {
+    /// (4).
+    Pd {
+        /// `K_p`, V/rad.
+        kp: f64,
+        /// `K_d`, V s/rad.
+        kd: f64,
+    },
+    /// (31).
+    Smc {
+        /// `K_p`, V.
+        kp: f64,
+        /// `K_d`, V s/rad.
+        kd: f64,
+        /// `f`, 1/s.
+        slope: f64,
+        /// `ε`, rad/s.
+        boundary: f64,
+    },
+}
+
+/// Way in which the encoder's rounding is described.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Form {
+    /// An error of 0 to 1 count, free at each tick.
+    Noise,
+    /// The counts go on by whole numbers, and stay within a count of the angle.
+    Exact,
+}
+
+/// A piece of (31) ahead of its surface, `σ < 0`: a rectangle of `|σ|` and `|ė|`, and lines below and above the demand.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Strip {
+    /// `true` where `ė ≤ 0`.
+    pub leads: bool,
+    /// `|ė|` from, rad/s.
+    pub rate_from: f64,
+    /// `|ė|` to, rad/s; none: without end.
+    pub rate_to: Option<f64>,
+    /// `|σ|` from, rad/s.
+    pub surface_from: f64,
+    /// `|σ|` to, rad/s; none: without end.
+    pub surface_to: Option<f64>,
+    /// The demand within the output's limits is at least `[0] |σ| + [1]`, V.
+    pub least: [f64; 2],
+    /// The demand within the output's limits is at most `[0] |σ| + [1]`, V.
+    pub most: [f64; 2],
+}
+
+/// Behaviours of the shaft in one tick; there are no others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Case {
+    /// Above Stribeck's speeds throughout.
+    Slides,
+    /// At Stribeck's speeds, with a voltage that holds no shaft.
+    LetGo,
+    /// Touches Stribeck's speeds, and may speed up from there.
+    TouchesAndLeaves,
+    /// Touches Stribeck's speeds, and cannot speed up.
+    TouchesAndStays,
+}
+
+/// A behaviour of shaft, law and encoder in one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModeId {
+    /// Number of the law's piece: 0 lets go; of PD 1 is straight and 2 full; of SMC 1 is the first strip.
+    pub piece: u32,
+    /// The shaft.
+    pub case: Case,
+    /// Counts since the last sample, in the exact form; else 0.
+    pub counts: u32,
+}
+
+/// Multipliers of one row in one mode: number of the constraint, and its weight. Constraints are numbered from the rows of
+/// the set on to those of the mode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Proof {
+    /// Number of the row.
+    pub row: u32,
+    /// Number of the mode in [`Cell::modes`].
+    pub mode: u32,
+    /// Constraints and their weights.
+    pub weights: Vec<(u32, f64)>,
+}
+
+/// A proven part of the box.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// `μ_d` of this cell.
+    pub sliding: Ends,
+    /// Form of the encoder's rounding.
+    pub form: Form,
+    /// Speed that the shaft does not exceed at samples, counts per tick.
+    pub speed_cap: f64,
+    /// Pieces of (31) ahead of its surface; none of PD.
+    pub strips: Vec<Strip>,
+    /// Modes, in the order of their numbers.
+    pub modes: Vec<ModeId>,
+    /// Rows `c` of the set `c·x ≤ r`, of the state `(e, ė, z, p₁ … p_d, m₋)` in counts, ticks and volts.
+    pub rows: Vec<Vec<f64>>,
+    /// Radii `r`.
+    pub radii: Vec<f64>,
+    /// Multipliers of each row and mode.
+    pub proofs: Vec<Proof>,
+    /// Bound on `|e|`, rad.
+    pub error_bound: f64,
+}
+
+/// A sampled-data certificate: a bound on the error of every run of every plant of the box.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Certificate {
+    /// Version of the format.
+    pub version: u32,
+    /// The loop and the box.
+    pub setup: Setup,
+    /// Cells of `μ_d` that cover the box together.
+    pub cells: Vec<Cell>,
+}
+
+/// Version of the format that this crate writes and reads.
+pub const VERSION: u32 = 1;

@@ -1,0 +1,217 @@
+//! A dual simplex for many small programs that differ little.
+//!
+//! `max c·y` over `A y ≤ b`, `y` free, with 4 to 7 variables and hundreds of constraints. A basis is as many constraints as
+//! there are variables, met with equality; it is kept dual feasible (multipliers `λ ≥ 0`, `Σ λ_j A_j = c`), so that its value
+//! `Σ λ_j b_j` bounds the maximum from above whatever `b` is. As the set's radii change, a basis stays dual feasible: a program
+//! begins where it last ended, and ends as soon as its bound is good enough, mostly before the first pivot.
+//!
+//! A library's solver would set up and factorise each of these programs anew: the search asks 10⁵ to 10⁷ of them, nearly all of
+//! which a dozen multiplications answer, and it needs the multipliers of bounds that are not yet optimal.
+
+/// Constraints by column: their products with a vector are sums of few long columns.
+#[derive(Clone, Debug)]
+pub(crate) struct Constraints<const N: usize> {
+    columns: [Vec<f64>; N],
+    /// Right sides.
+    pub(crate) rhs: Vec<f64>,
+}
+
+impl<const N: usize> Constraints<N> {
+    pub(crate) fn new() -> Self {
+        Constraints { columns: std::array::from_fn(|_| Vec::new()), rhs: Vec::new() }
+    }
+
+    pub(crate) fn push(&mut self, row: &[f64; N], rhs: f64) {
+        for (column, x) in self.columns.iter_mut().zip(row) {
+            column.push(*x);
+        }
+        self.rhs.push(rhs);
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.rhs.len()
+    }
+
+    pub(crate) fn row(&self, j: usize) -> [f64; N] {
+        std::array::from_fn(|i| self.columns[i][j])
+    }
+
+    /// The constraint that `y` breaks most, and by how much.
+    fn most_broken(&self, y: &[f64; N], scratch: &mut Scratch) -> (usize, f64) {
+        scratch.work += self.len() as u64;
+        let scratch = &mut scratch.sums;
+        scratch.clear();
+        scratch.extend(self.rhs.iter().map(|b| -b));
+        for (column, y) in self.columns.iter().zip(y) {
+            for (sum, x) in scratch.iter_mut().zip(column) {
+                *sum += x * y;
+            }
+        }
+        let mut worst = (usize::MAX, f64::NEG_INFINITY);
+        for (j, by) in scratch.iter().enumerate() {
+            if *by > worst.1 {
+                worst = (j, *by);
+            }
+        }
+        worst
+    }
+}
+
+/// Room for sums, and the number of comparisons so far.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scratch {
+    sums: Vec<f64>,
+    pub(crate) work: u64,
+}
+
+/// A program: constraints of the set, which all share, and those of a mode.
+pub(crate) struct Program<'a, const N: usize> {
+    pub(crate) set: &'a Constraints<N>,
+    pub(crate) mode: &'a Constraints<N>,
+}
+
+/// A dual feasible point: constraints and their multipliers.
+#[derive(Clone, Debug)]
+pub(crate) struct Dual<const N: usize> {
+    pub(crate) basis: [u32; N],
+    pub(crate) weights: [f64; N],
+    /// The ray that proves the constraints contradictory: a constraint's number and weights of the basis.
+    pub(crate) ray: Option<(u32, [f64; N])>,
+}
+
+/// Violations below this are none, in units of the rows, whose norm is about 1.
+const FEASIBLE: f64 = 1e-9;
+const PIVOT: f64 = 1e-9;
+/// Weights below this share of a violation come from rounding: the check knows the box that the state lies in.
+const ROUNDING: f64 = 1e-11;
+const MOST_PIVOTS: usize = 60;
+
+impl<const N: usize> Program<'_, N> {
+    fn row(&self, j: u32) -> [f64; N] {
+        let j = j as usize;
+        if j < self.set.len() { self.set.row(j) } else { self.mode.row(j - self.set.len()) }
+    }
+
+    fn rhs(&self, j: u32) -> f64 {
+        let j = j as usize;
+        if j < self.set.len() { self.set.rhs[j] } else { self.mode.rhs[j - self.set.len()] }
+    }
+
+    /// The bound that a dual point gives; `-∞` with a ray that still proves a contradiction.
+    pub(crate) fn bound(&self, dual: &Dual<N>) -> f64 {
+        if let Some((q, weights)) = &dual.ray {
+            let mut sum = self.rhs(*q);
+            for (j, w) in dual.basis.iter().zip(weights) {
+                sum += w * self.rhs(*j);
+            }
+            if sum < -FEASIBLE {
+                return f64::NEG_INFINITY;
+            }
+        }
+        dual.basis.iter().zip(&dual.weights).map(|(j, w)| w * self.rhs(*j)).sum()
+    }
+
+    /// Improves a dual point until its bound is at most `enough`, or optimal; the bound.
+    pub(crate) fn improve(&self, c: &[f64; N], dual: &mut Dual<N>, enough: f64, scratch: &mut Scratch) -> f64 {
+        let bound = self.bound(dual);
+        if bound <= enough {
+            return bound;
+        }
+        dual.ray = None;
+        let Some(mut inverse) = self.inverse(&dual.basis) else { return bound };
+        let mut weights = times(c, &inverse);
+        for _ in 0..MOST_PIVOTS {
+            let mut y = [0.0; N];
+            for (k, j) in dual.basis.iter().enumerate() {
+                let b = self.rhs(*j);
+                for i in 0..N {
+                    y[i] += inverse[i][k] * b;
+                }
+            }
+            let value: f64 = y.iter().zip(c).map(|(y, c)| y * c).sum();
+            if value <= enough {
+                break;
+            }
+            let (a, by_a) = self.set.most_broken(&y, scratch);
+            let (b, by_b) = self.mode.most_broken(&y, scratch);
+            let (entering, by) = if by_a >= by_b { (a, by_a) } else { (self.set.len() + b, by_b) };
+            if by <= FEASIBLE {
+                break;
+            }
+            let w = times(&self.row(entering as u32), &inverse);
+            let mut leaving = None;
+            for k in 0..N {
+                if w[k] > PIVOT {
+                    let ratio = weights[k].max(0.0) / w[k];
+                    if leaving.is_none_or(|(_, least)| ratio < least) {
+                        leaving = Some((k, ratio));
+                    }
+                }
+            }
+            let Some((p, ratio)) = leaving else {
+                // Whatever y is, the entering constraint and the basis contradict each other, but for rounding.
+                if w.iter().any(|w| *w > ROUNDING * by) {
+                    break;
+                }
+                dual.ray = Some((entering as u32, w.map(|w| (-w).max(0.0))));
+                dual.weights = weights.map(|w| w.max(0.0));
+                return f64::NEG_INFINITY;
+            };
+            let pivot = w[p];
+            for row in &mut inverse {
+                let scaled = row[p] / pivot;
+                for k in 0..N {
+                    row[k] -= w[k] * scaled;
+                }
+                row[p] = scaled;
+            }
+            for k in 0..N {
+                weights[k] -= w[k] * ratio;
+            }
+            weights[p] = ratio;
+            dual.basis[p] = entering as u32;
+        }
+        dual.weights = weights.map(|w| w.max(0.0));
+        self.bound(dual)
+    }
+
+    /// The inverse of the basis' rows, by Gauss and Jordan; none if they are dependent.
+    fn inverse(&self, basis: &[u32; N]) -> Option<[[f64; N]; N]> {
+        let mut rows: [[f64; N]; N] = std::array::from_fn(|k| self.row(basis[k]));
+        let mut inverse: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|k| f64::from(i == k)));
+        for i in 0..N {
+            let best = (i..N).max_by(|a, b| rows[*a][i].abs().total_cmp(&rows[*b][i].abs()))?;
+            if rows[best][i].abs() < 1e-12 {
+                return None;
+            }
+            rows.swap(i, best);
+            inverse.swap(i, best);
+            let pivot = rows[i][i];
+            for k in 0..N {
+                rows[i][k] /= pivot;
+                inverse[i][k] /= pivot;
+            }
+            for j in 0..N {
+                let factor = rows[j][i];
+                if j != i && factor != 0.0 {
+                    for k in 0..N {
+                        rows[j][k] -= factor * rows[i][k];
+                        inverse[j][k] -= factor * inverse[i][k];
+                    }
+                }
+            }
+        }
+        Some(inverse)
+    }
+}
+
+/// `c M`.
+fn times<const N: usize>(c: &[f64; N], matrix: &[[f64; N]; N]) -> [f64; N] {
+    let mut out = [0.0; N];
+    for (c, row) in c.iter().zip(matrix) {
+        for (out, x) in out.iter_mut().zip(row) {
+            *out += c * x;
+        }
+    }
+    out
+}
