@@ -104,6 +104,14 @@ pub enum Flaw {
         /// The mode.
         mode: usize,
     },
+    /// The multipliers do not show the mode impossible.
+    #[error("impossible: mode {mode}: the multipliers prove {proven}: expected a number below 0")]
+    Possible {
+        /// The mode.
+        mode: usize,
+        /// The sum that they prove.
+        proven: f64,
+    },
     /// The multipliers do not prove the row.
     #[error("row {row}, mode {mode}: the multipliers prove {proven}, above the radius {radius}")]
     Row {
@@ -244,6 +252,10 @@ fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
     for (k, id) in cell.modes.iter().enumerate() {
         numbers.insert(*id, k);
     }
+    let mut impossible = HashMap::new();
+    for contradiction in &cell.impossible {
+        impossible.insert(contradiction.mode as usize, contradiction.weights.as_slice());
+    }
     let mut proofs = HashMap::new();
     for proof in &cell.proofs {
         proofs.insert((proof.row as usize, proof.mode as usize), proof.weights.as_slice());
@@ -256,10 +268,18 @@ fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
                 let id = ModeId { piece: piece.id, case, counts: gone };
                 let Possible::Yes(mode) = Mode::new(&shaft, piece, cell.form, id, n) else { continue };
                 let number = *numbers.get(&id).ok_or(Flaw::Mode(id))?;
+                if let Some(weights) = impossible.get(&number) {
+                    let proven = combined(cell, &mode, None, weights, &walls)?;
+                    if proven < 0.0 {
+                        programs += 1;
+                        continue;
+                    }
+                    return Err(Flaw::Possible { mode: number, proven });
+                }
                 for row in 0..cell.rows.len() {
-                    let weights =
-                        proofs.get(&(row, number)).ok_or(Flaw::Proof { row, mode: number })?;
-                    let proven = proven(&shaft, cell, &mode, row, weights, &walls)?;
+                    let weights = proofs.get(&(row, number)).ok_or(Flaw::Proof { row, mode: number })?;
+                    let next = mode.next(&shaft, &cell.rows[row]);
+                    let proven = combined(cell, &mode, Some(next), weights, &walls)?;
                     let radius = cell.radii[row];
                     if !(proven <= radius) {
                         return Err(Flaw::Row { row, mode: number, proven, radius });
@@ -276,7 +296,11 @@ fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
 fn shape(cell: &Cell, n: usize) -> Result<(), Flaw> {
     let no = |what: String| Err(Flaw::Shape(what));
     if cell.radii.len() != cell.rows.len() {
-        return no(format!("radii: {} numbers: expected one for each of {} rows", cell.radii.len(), cell.rows.len()));
+        return no(format!(
+            "radii: {} numbers: expected one for each of {} rows",
+            cell.radii.len(),
+            cell.rows.len()
+        ));
     }
     if let Some(row) = cell.rows.iter().position(|row| row.len() != n || row.iter().any(|x| !x.is_finite())) {
         return no(format!("rows[{row}]: expected {n} finite numbers"));
@@ -342,21 +366,22 @@ fn starts_inside(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<(), Flaw> 
     Ok(())
 }
 
-/// The bound that multipliers prove for a row after a tick in a mode.
-fn proven(
-    shaft: &Shaft,
+/// The bound that multipliers prove for a sum over the set in a mode; without a sum, for 0, so that a bound below 0 is a
+/// contradiction.
+fn combined(
     cell: &Cell,
     mode: &Mode,
-    row: usize,
+    sum: Option<mode::Sum>,
     weights: &[(u32, f64)],
     walls: &[(f64, f64)],
 ) -> Result<f64, Flaw> {
-    let next = mode.next(shaft, &cell.rows[row]);
-    let mut left = next.weights;
-    let mut bound = next.constant;
+    let mode::Sum { weights: mut left, constant: mut bound } =
+        sum.unwrap_or(mode::Sum { weights: vec![at(0.0); walls.len()], constant: at(0.0) });
     for (j, weight) in weights {
         if !(*weight >= 0.0 && weight.is_finite()) {
-            return Err(Flaw::Shape(format!("proofs: the weight {weight} of row {row} is not a number of at least 0")));
+            return Err(Flaw::Shape(format!(
+                "proofs: a weight is {weight}: expected a finite number of at least 0"
+            )));
         }
         let (j, weight) = (*j as usize, at(*weight));
         let rows = cell.rows.len();
@@ -367,7 +392,7 @@ fn proven(
             bound = bound + weight * at(cell.radii[j]);
         } else {
             let Some((a, b)) = mode.within.get(j - rows) else {
-                return Err(Flaw::Shape(format!("proofs: row {row} names constraint {j}, which there is not")));
+                return Err(Flaw::Shape(format!("proofs: constraint {j} is named, and there is none")));
             };
             for (left, c) in left.iter_mut().zip(a) {
                 *left = *left - weight * *c;

@@ -5,7 +5,7 @@
 //! monotone.
 
 use crate::modes::{Affine, E, Mode, S};
-use crate::setup::{Form, Proof};
+use crate::setup::{Contradiction, Form, Proof};
 use crate::simplex::{Constraints, Dual, Program, Scratch};
 use crate::units::Units;
 
@@ -45,7 +45,7 @@ pub(crate) struct Search<'a, const N: usize> {
     constants: Vec<f64>,
     scratch: Scratch,
     /// Sweeps so far.
-    pub(crate) swept: usize,
+    swept: usize,
 }
 
 /// Margin by which radii hold more than needed, for the rounding of the check.
@@ -137,7 +137,6 @@ impl<'a, const N: usize> Search<'a, N> {
     pub(crate) fn run(&mut self, effort: &Effort) -> Result<(), Open> {
         let mut closed = false;
         for _ in 0..effort.sweeps {
-            if std::env::var_os("CERT_TRACE2").is_some() { eprintln!("    {} {:.4} {:.4} {:.2e}", self.swept, self.radius(E, 0), self.radius(E, 1), self.scratch.work as f64); }
             let share = (1e-6 * 1.15_f64.powi(self.swept as i32)).min(1.0);
             closed = self.grow(effort.growth * share);
             if closed {
@@ -180,56 +179,53 @@ impl<'a, const N: usize> Search<'a, N> {
         self.units.path + self.radius(S, 1)
     }
 
-    pub(crate) fn work(&self) -> u64 {
-        self.scratch.work
-    }
-
     pub(crate) fn radii(&self) -> &[f64] {
         &self.set.rhs
     }
 
-    /// Multipliers for each row and mode: each bound at most its row's radius.
-    pub(crate) fn proofs(&mut self) -> Vec<Proof> {
-        let mut out = Vec::new();
+    /// Modes that cannot happen, with what shows it.
+    fn impossible(&self, mode: usize) -> Option<Contradiction> {
+        let program = Program { set: &self.set, mode: &self.modes[mode].within };
+        // Of the rows' rays the one that contradicts itself most, for its size.
+        let rays = (0..self.set.len())
+            .filter_map(|row| program.contradiction(&self.duals[row * self.modes.len() + mode]));
+        let (by, weights) = rays.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (by > 1e3 * MARGIN)
+            .then(|| Contradiction { mode: mode as u32, weights: weights.into_iter().map(short).collect() })
+    }
+
+    /// Modes that cannot happen, and multipliers of each row in each of the others: each bound at most its row's radius.
+    pub(crate) fn proofs(&mut self) -> (Vec<Contradiction>, Vec<Proof>) {
         for row in 0..self.set.len() {
             for mode in 0..self.modes.len() {
                 let radius = self.set.rhs[row];
-                let bound = self.bound(row, mode, radius - 0.5 * MARGIN);
+                self.bound(row, mode, radius - 0.5 * MARGIN);
+            }
+        }
+        let impossible: Vec<Option<Contradiction>> =
+            (0..self.modes.len()).map(|mode| self.impossible(mode)).collect();
+        let mut out = Vec::new();
+        for row in 0..self.set.len() {
+            for mode in (0..self.modes.len()).filter(|mode| impossible[*mode].is_none()) {
                 let at = row * self.modes.len() + mode;
                 let program = Program { set: &self.set, mode: &self.modes[mode].within };
+                let enough = self.set.rhs[row] - self.constants[at];
                 out.push(Proof {
                     row: row as u32,
                     mode: mode as u32,
-                    weights: weights(&program, &self.duals[at], bound, radius - self.constants[at]),
+                    weights: program
+                        .weights(&self.duals[at], enough - 0.5 * MARGIN)
+                        .into_iter()
+                        .map(short)
+                        .collect(),
                 });
             }
         }
-        out
+        (impossible.into_iter().flatten().collect(), out)
     }
 }
 
-/// Multipliers that give at most `enough`: those of the basis, and as much of the ray as it takes.
-fn weights<const N: usize>(
-    program: &Program<'_, N>,
-    dual: &Dual<N>,
-    bound: f64,
-    enough: f64,
-) -> Vec<(u32, f64)> {
-    let mut out: Vec<(u32, f64)> = dual.basis.iter().copied().zip(dual.weights).collect();
-    if let (Some((entering, ray)), f64::NEG_INFINITY) = (&dual.ray, bound) {
-        let plain = Dual { ray: None, ..dual.clone() };
-        let over = program.bound(&plain) - enough + 2.0 * MARGIN;
-        if over > 0.0 {
-            let contradiction = Dual { weights: *ray, ray: None, ..dual.clone() };
-            let q = Dual { basis: [*entering; N], weights: std::array::from_fn(|i| f64::from(i == 0)), ray: None };
-            let per = program.bound(&contradiction) + program.bound(&q);
-            let share = over / -per;
-            for (own, more) in out.iter_mut().zip(ray) {
-                own.1 += share * more;
-            }
-            out.push((*entering, share));
-        }
-    }
-    out.retain(|(_, weight)| *weight > 0.0);
-    out
+/// A weight with as many digits as a proof needs.
+fn short((j, weight): (u32, f64)) -> (u32, f64) {
+    (j, format!("{weight:.10e}").parse().unwrap_or(weight))
 }

@@ -72,7 +72,10 @@ pub(crate) fn modes<const N: usize>(
     let counts = if form == Form::Exact { most_counts } else { 0 };
     for piece in pieces {
         for case in [Case::Slides, Case::LetGo, Case::TouchesAndLeaves, Case::TouchesAndStays] {
-            out.extend((0..=counts).filter_map(|j| mode(u, piece, form, ModeId { piece: piece.id, case, counts: j })));
+            out.extend(
+                (0..=counts)
+                    .filter_map(|j| mode(u, piece, form, ModeId { piece: piece.id, case, counts: j })),
+            );
         }
     }
     out

@@ -89,8 +89,7 @@ fn smc(u: &Units, slope: f64, strips: &[Strip]) -> Vec<Piece> {
     let mut out = vec![constant(u, 0, u.volts[0], vec![sigma.times(-1.0)])];
     for (strip, id) in strips.iter().zip(1..) {
         let side = if strip.leads { -1.0 } else { 1.0 };
-        let mut within =
-            vec![sigma.plus(one, strip.surface_from), d.times(-side).plus(one, strip.rate_from)];
+        let mut within = vec![sigma.plus(one, strip.surface_from), d.times(-side).plus(one, strip.rate_from)];
         if let Some(to) = strip.surface_to {
             within.push(sigma.times(-1.0).plus(one, -to));
         }

@@ -23,9 +23,7 @@ pub(crate) struct Fineness {
 fn linear(u: &Units) -> (f64, f64) {
     match u.law {
         Gains::Pd { kp, kd } => (kp * u.count, kd * u.speed),
-        Gains::Smc { kp, slope, boundary, .. } => {
-            (kp * slope / boundary * u.count, kp / boundary * u.speed)
-        }
+        Gains::Smc { kp, slope, boundary, .. } => (kp * slope / boundary * u.count, kp / boundary * u.speed),
     }
 }
 
@@ -93,9 +91,11 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
             plain.push(row);
         }
     }
-    let shares: &[f64] = match u.law {
-        Gains::Pd { .. } => &[1.0, 0.5, 0.25],
-        Gains::Smc { .. } => &[1.0, 2.0, 4.0, 0.5],
+    // What a saturated loop, or a steeper part of the law, leaves of the gains.
+    let shares: &[f64] = match (u.law, form) {
+        (Gains::Pd { .. }, Form::Noise) => &[1.0, 0.8, 0.65, 0.5, 0.35, 0.25, 0.12],
+        (Gains::Pd { .. }, Form::Exact) => &[1.0, 0.7, 0.5, 0.35, 0.25],
+        (Gains::Smc { .. }, _) => &[1.0, 2.0, 4.0, 0.5],
     };
     let middle = (u.brake[0] * u.brake[1]).sqrt();
     let wide = u.brake[1] > 1.25 * u.brake[0];

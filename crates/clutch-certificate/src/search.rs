@@ -4,7 +4,7 @@ use crate::invariant::{Effort, Open, Search};
 use crate::modes::{E, Mode, P, S, Z, modes};
 use crate::pieces::{pieces, strips};
 use crate::rows::{Fineness, rows};
-use crate::setup::{Cell, Certificate, Ends, Form, Gains, Proof, Setup, VERSION};
+use crate::setup::{Cell, Certificate, Contradiction, Ends, Form, Gains, Proof, Setup, VERSION};
 use crate::units::{TARGET_STEP, Units};
 
 /// Effort of a certificate.
@@ -16,13 +16,21 @@ pub struct Options {
     pub narrowest: f64,
     /// Largest error worth proving, rad.
     pub error_limit: f64,
+    /// Times that the cell with the largest bound is split, in the hope of a smaller one.
+    pub refinements: usize,
     /// Most comparisons of a point with a constraint per attempt, about 1e9 a second.
     pub work: u64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { widest: 1.16, narrowest: 1.04, error_limit: 2.0_f64.to_radians(), work: 4_000_000_000 }
+        Options {
+            widest: 1.16,
+            narrowest: 1.06,
+            error_limit: 2.0_f64.to_radians(),
+            refinements: 2,
+            work: 1_000_000_000,
+        }
     }
 }
 
@@ -74,7 +82,37 @@ pub fn search(setup: &Setup, options: &Options, all: bool) -> Found {
             }
         }
     }
+    if open.is_empty() {
+        for _ in 0..options.refinements {
+            if !refine(&mut certificate, options) {
+                break;
+            }
+        }
+    }
     Found { certificate, open }
+}
+
+/// Halves the cell with the largest bound; `false` if that does not make it smaller.
+fn refine(certificate: &mut Certificate, options: &Options) -> bool {
+    let Certificate { setup, cells, .. } = certificate;
+    let Some(worst) = (0..cells.len()).max_by(|a, b| cells[*a].error_bound.total_cmp(&cells[*b].error_bound))
+    else {
+        return false;
+    };
+    let [low, high] = cells[worst].sliding;
+    if high / low <= options.narrowest {
+        return false;
+    }
+    let middle = (low * high).sqrt();
+    let (Ok(lower), Ok(upper)) = (cell(setup, [low, middle], options), cell(setup, [middle, high], options))
+    else {
+        return false;
+    };
+    let smaller = lower.error_bound.max(upper.error_bound) < 0.98 * cells[worst].error_bound;
+    if smaller {
+        cells.splice(worst..=worst, [lower, upper]);
+    }
+    smaller
 }
 
 /// Equal shares of an interval, none wider than asked.
@@ -89,34 +127,44 @@ fn split([low, high]: Ends, widest: f64) -> Vec<Ends> {
         .collect()
 }
 
-/// Forms and finenesses in the order in which they are tried.
-fn attempts(law: &Gains) -> Vec<(Form, Fineness, f64)> {
-    let (quick, fine) = (Fineness { steps: 16, apart: 0.05 }, Fineness { steps: 30, apart: 0.025 });
-    match law {
-        Gains::Pd { .. } => vec![
-            (Form::Noise, quick, 0.003),
-            (Form::Exact, quick, 0.003),
-            (Form::Exact, fine, 0.001),
-        ],
-        Gains::Smc { .. } => vec![(Form::Noise, quick, 0.003), (Form::Noise, fine, 0.001)],
-    }
-}
+/// Fineness of the directions, and share by which radii grow, from quick to patient.
+const QUICK: (Fineness, f64) = (Fineness { steps: 16, apart: 0.05 }, 0.001);
+const USUAL: (Fineness, f64) = (Fineness { steps: 30, apart: 0.03 }, 0.001);
+const LONG: (Fineness, f64) = (Fineness { steps: 60, apart: 0.02 }, 0.0003);
+const PATIENT: (Fineness, f64) = (Fineness { steps: 40, apart: 0.02 }, 0.0001);
 
+/// The best of the first attempts, or the first of the later ones that is proven.
 fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
-    let mut last = Open::Grows;
-    if let Ok(t) = std::env::var("CERT_TRY") {
-        let v: Vec<f64> = t.split(',').map(|x| x.parse().unwrap()).collect();
-        let form = if v[0] == 0.0 { Form::Noise } else { Form::Exact };
-        return attempt(setup, sliding, form, Fineness { steps: v[1] as usize, apart: v[2] }, v[3], options);
-    }
-    for (form, fineness, growth) in attempts(&setup.law) {
-        let tried = attempt(setup, sliding, form, fineness, growth, options);
-        match tried {
-            Ok(cell) => return Ok(cell),
-            Err(why) => last = why,
+    let (first, later): (&[_], &[_]) = match setup.law {
+        Gains::Pd { .. } => (&[(Form::Noise, LONG), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
+        // (31) has hundreds of modes, times the counts of the exact form.
+        Gains::Smc { .. } => (&[(Form::Noise, QUICK), (Form::Noise, USUAL)], &[(Form::Noise, PATIENT)]),
+    };
+    let tried = |(form, (fineness, growth)): &(Form, (Fineness, f64))| {
+        attempt(setup, sliding, *form, *fineness, *growth, options)
+    };
+    let found: Vec<Result<Cell, Open>> = first.iter().map(tried).collect();
+    let mut open = Open::Slow;
+    let mut best: Option<Cell> = None;
+    for result in found.into_iter() {
+        match result {
+            Ok(cell) if best.as_ref().is_none_or(|best| cell.error_bound < best.error_bound) => {
+                best = Some(cell)
+            }
+            Ok(_) => {}
+            Err(why) => open = why,
         }
     }
-    Err(last)
+    if let Some(best) = best {
+        return Ok(best);
+    }
+    for attempt in later {
+        match tried(attempt) {
+            Ok(cell) => return Ok(cell),
+            Err(why) => open = why,
+        }
+    }
+    Err(open)
 }
 
 /// One attempt, with one form and fineness.
@@ -182,6 +230,15 @@ fn initial<const N: usize>(setup: &Setup, u: &Units, form: Form) -> Vec<[f64; N]
     out
 }
 
+/// Error beyond which a set is no more looked for, counts: several times the steady one and what a few counts make.
+fn hopeless(u: &Units) -> f64 {
+    let volts_per_count = match u.law {
+        Gains::Pd { kp, .. } => kp * u.count,
+        Gains::Smc { kp, slope, boundary, .. } => kp * slope / boundary * u.count,
+    };
+    12.0 + 6.0 * u.drive[1] / u.brake[0] / volts_per_count.max(1e-6)
+}
+
 /// A set for shafts that are no faster than a speed; `Slow` with the speed found if they are.
 fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)> {
     let u = Units::new(p.setup, p.sliding, cap);
@@ -195,19 +252,12 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
     let mut search = Search::new(&u, &modes, p.form, &rows, &initial(p.setup, &u, p.form));
     let effort = Effort {
         growth: p.growth,
-        sweeps: 400,
+        sweeps: 300,
         shrinks: 40,
-        error_limit: p.options.error_limit / u.count,
+        error_limit: (p.options.error_limit / u.count).min(hopeless(&u)),
         work: p.options.work,
     };
     let result = search.run(&effort);
-    if std::env::var_os("CERT_TRACE").is_some() {
-        eprintln!(
-            "  {:?} {:?} rows {} modes {} sweeps {} work {:.2e} -> {:?} {:.4}",
-            p.sliding, p.form, rows.len(), modes.len(), search.swept, search.work() as f64, result,
-            (search.error() * u.count).to_degrees()
-        );
-    }
     result.map_err(|why| (why, 0.0))?;
     if search.speed() > cap {
         return Err((Open::Slow, search.speed()));
@@ -215,66 +265,82 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
     // Between samples a shaft departs from the line through its ends by at most an eighth of its acceleration.
     let bend = u.drive[1].max(u.brake_any[1] * (u.volts[1] + u.volts_off) - u.drive[0]) / 8.0;
     let error = search.error() + bend;
-    let proofs = search.proofs();
+    let (impossible, proofs) = search.proofs();
     let own = if p.form == Form::Exact { 2 * N } else { 2 * N - 2 };
-    let (rows, radii, proofs) = needed(&rows, search.radii(), proofs, own);
+    let kept = Kept::new(rows.len(), &impossible, &proofs, own);
     Ok(Cell {
         sliding: p.sliding,
         form: p.form,
         speed_cap: cap,
         strips,
         modes: modes.iter().map(|m| m.id).collect(),
-        rows,
-        radii,
-        proofs,
+        rows: kept.pick(&rows).map(|row| row.to_vec()).collect(),
+        radii: kept.pick(search.radii()).copied().collect(),
+        impossible: impossible
+            .into_iter()
+            .map(|c| Contradiction { weights: kept.renumbered(c.weights), ..c })
+            .collect(),
+        proofs: proofs
+            .into_iter()
+            .filter(|p| kept.wanted[p.row as usize])
+            .map(|p| Proof { row: kept.number[p.row as usize], weights: kept.renumbered(p.weights), ..p })
+            .collect(),
         error_bound: error * u.count,
     })
 }
 
-/// The rows that the proofs of the state's own rows need, and their proofs.
-fn needed<const N: usize>(
-    rows: &[[f64; N]],
-    radii: &[f64],
-    proofs: Vec<Proof>,
-    own: usize,
-) -> (Vec<Vec<f64>>, Vec<f64>, Vec<Proof>) {
-    let count = rows.len();
-    let mut wanted = vec![false; count];
-    wanted.iter_mut().take(own).for_each(|w| *w = true);
-    loop {
-        let mut more = false;
-        for proof in proofs.iter().filter(|p| wanted[p.row as usize]).collect::<Vec<_>>() {
-            for (j, _) in &proof.weights {
+/// The rows that the proofs of the state's own rows need, and their numbers among themselves.
+struct Kept {
+    wanted: Vec<bool>,
+    number: Vec<u32>,
+    count: u32,
+}
+
+impl Kept {
+    fn new(rows: usize, impossible: &[Contradiction], proofs: &[Proof], own: usize) -> Kept {
+        let mut wanted = vec![false; rows];
+        wanted.iter_mut().take(own).for_each(|w| *w = true);
+        let want = |wanted: &mut Vec<bool>, weights: &[(u32, f64)]| {
+            let mut more = false;
+            for (j, _) in weights {
                 if let Some(w) = wanted.get_mut(*j as usize) {
                     more |= !*w;
                     *w = true;
                 }
             }
+            more
+        };
+        for c in impossible {
+            want(&mut wanted, &c.weights);
         }
-        if !more {
-            break;
+        let mut more = true;
+        while more {
+            more = false;
+            for proof in proofs {
+                if wanted[proof.row as usize] {
+                    more |= want(&mut wanted, &proof.weights);
+                }
+            }
         }
+        let mut count = 0;
+        let number = wanted
+            .iter()
+            .map(|wanted| {
+                count += u32::from(*wanted);
+                count - u32::from(*wanted)
+            })
+            .collect();
+        Kept { wanted, number, count }
     }
-    let mut number = vec![0; count];
-    let mut next = 0;
-    for (n, wanted) in number.iter_mut().zip(&wanted) {
-        *n = next;
-        next += u32::from(*wanted);
+
+    fn pick<'a, T>(&'a self, all: &'a [T]) -> impl Iterator<Item = &'a T> {
+        all.iter().zip(&self.wanted).filter(|(_, wanted)| **wanted).map(|(x, _)| x)
     }
-    let kept = |j: u32| number.get(j as usize).map_or(j - count as u32 + next, |n| *n);
-    let pick = |k: &usize| wanted[*k];
-    let proofs = proofs
-        .into_iter()
-        .filter(|p| wanted[p.row as usize])
-        .map(|p| Proof {
-            row: kept(p.row),
-            mode: p.mode,
-            weights: p.weights.into_iter().map(|(j, w)| (kept(j), w)).collect(),
-        })
-        .collect();
-    (
-        (0..count).filter(pick).map(|k| rows[k].to_vec()).collect(),
-        (0..count).filter(pick).map(|k| radii[k]).collect(),
-        proofs,
-    )
+
+    /// The mode's constraints follow the rows.
+    fn renumbered(&self, weights: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
+        let rows = self.number.len() as u32;
+        let number = |j: u32| self.number.get(j as usize).map_or_else(|| j - rows + self.count, |n| *n);
+        weights.into_iter().map(|(j, w)| (number(j), w)).collect()
+    }
 }

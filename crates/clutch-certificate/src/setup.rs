@@ -54,6 +54,24 @@ pub struct Setup {
     pub start_volts: Ends,
 }
 
+impl Setup {
+    /// Keys in which two setups differ, with both values: `key: this, that`.
+    #[must_use]
+    pub fn differences(&self, other: &Setup) -> Vec<String> {
+        let table = |s: &Setup| match serde_json::to_value(s) {
+            Ok(serde_json::Value::Object(table)) => table,
+            _ => serde_json::Map::new(),
+        };
+        let (own, other) = (table(self), table(other));
+        own.iter()
+            .filter(|(key, value)| other.get(*key) != Some(value))
+            .map(|(key, value)| {
+                format!("{key}: {value}, {}", other.get(key).unwrap_or(&serde_json::Value::Null))
+            })
+            .collect()
+    }
+}
+
 /// Laws that have a sampled certificate, with their gains.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -147,6 +165,16 @@ pub struct Proof {
     pub weights: Vec<(u32, f64)>,
 }
 
+/// Multipliers that show a mode impossible: together its constraints contradict each other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contradiction {
+    /// Number of the mode in [`Cell::modes`].
+    pub mode: u32,
+    /// Constraints and their weights.
+    pub weights: Vec<(u32, f64)>,
+}
+
 /// A proven part of the box.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -165,7 +193,9 @@ pub struct Cell {
     pub rows: Vec<Vec<f64>>,
     /// Radii `r`.
     pub radii: Vec<f64>,
-    /// Multipliers of each row and mode.
+    /// Modes that cannot happen while the state is in the set.
+    pub impossible: Vec<Contradiction>,
+    /// Multipliers of each row in each of the other modes.
     pub proofs: Vec<Proof>,
     /// Bound on `|e|`, rad.
     pub error_bound: f64,

@@ -111,8 +111,38 @@ impl<const N: usize> Program<'_, N> {
         dual.basis.iter().zip(&dual.weights).map(|(j, w)| w * self.rhs(*j)).sum()
     }
 
+    /// The weights of a dual point's ray, and by how much they contradict themselves.
+    pub(crate) fn contradiction(&self, dual: &Dual<N>) -> Option<(f64, Vec<(u32, f64)>)> {
+        let (entering, ray) = dual.ray.as_ref()?;
+        let mut weights: Vec<(u32, f64)> = dual.basis.iter().copied().zip(*ray).collect();
+        weights.push((*entering, 1.0));
+        weights.retain(|(_, weight)| *weight > 0.0);
+        let sum: f64 = weights.iter().map(|(j, w)| w * self.rhs(*j)).sum();
+        let size: f64 = weights.iter().map(|(_, w)| w).sum();
+        Some((-sum / size, weights.into_iter().map(|(j, w)| (j, w / size)).collect()))
+    }
+
+    /// Multipliers that give at most `enough`, if these do: those of the basis, and as much of the ray as it takes.
+    pub(crate) fn weights(&self, dual: &Dual<N>, enough: f64) -> Vec<(u32, f64)> {
+        let mut out: Vec<(u32, f64)> = dual.basis.iter().copied().zip(dual.weights).collect();
+        let over = out.iter().map(|(j, w)| w * self.rhs(*j)).sum::<f64>() - enough;
+        if let (true, Some((by, ray))) = (over > 0.0, self.contradiction(dual))
+            && by > 0.0
+        {
+            out.extend(ray.into_iter().map(|(j, w)| (j, w * over / by)));
+        }
+        out.retain(|(_, weight)| *weight > 0.0);
+        out
+    }
+
     /// Improves a dual point until its bound is at most `enough`, or optimal; the bound.
-    pub(crate) fn improve(&self, c: &[f64; N], dual: &mut Dual<N>, enough: f64, scratch: &mut Scratch) -> f64 {
+    pub(crate) fn improve(
+        &self,
+        c: &[f64; N],
+        dual: &mut Dual<N>,
+        enough: f64,
+        scratch: &mut Scratch,
+    ) -> f64 {
         let bound = self.bound(dual);
         if bound <= enough {
             return bound;

@@ -60,9 +60,7 @@ fn spectral_radius(a: &[Vec<f64>]) -> f64 {
         for x in a.iter_mut().flatten() {
             *x /= norm;
         }
-        a = (0..n)
-            .map(|i| (0..n).map(|j| (0..n).map(|k| a[i][k] * a[k][j]).sum()).collect())
-            .collect();
+        a = (0..n).map(|i| (0..n).map(|j| (0..n).map(|k| a[i][k] * a[k][j]).sum()).collect()).collect();
         power *= 2.0;
     }
     libm::exp(log)

@@ -2,19 +2,24 @@
 
 use crate::args::ScenarioArgs;
 use crate::output::{Exit, json, print};
+use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
 use clap::Args;
 use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
 use clutch_core::{ActuatorKind, Bounds, Interval};
-use clutch_sim::scenario::Plan;
+use clutch_sim::scenario::{Plan, Sampled};
 use clutch_sim::{Scenario, ScenarioError};
 use serde_json::{Value, json as value};
+use std::path::PathBuf;
 
 /// Checks a scenario's gains against every plant within its bounds.
 ///
-/// Exit code 0: certified; 2: not certified.
+/// Prints three verdicts apart: on the error, in continuous time and as sampled; on the linear stability of the sampled
+/// loop; on sticks, which neither excludes. Exit code 0: certified in continuous time, with --sampled or --check as sampled and
+/// linearly stable; 2: not certified.
 #[derive(Args)]
-#[command(after_help = "Example:\n  clutch certify smc_2 --set bounds.friction_percent=20\n\n\
+#[command(after_help = "Example:\n  clutch certify smc_2 --set bounds.friction_percent=20\n  \
+    clutch certify pd_2 --set bounds.friction_percent=40 --sampled --save pd.json\n\n\
     docs/theory.md derives the conditions and gives their limits.")]
 pub(crate) struct Certify {
     #[command(flatten)]
@@ -22,6 +27,15 @@ pub(crate) struct Certify {
     /// Prints the certificate as JSON, and nothing else, on standard output.
     #[arg(long)]
     json: bool,
+    /// Looks for a proof that bounds the error of the sampled loop: seconds to minutes.
+    #[arg(long)]
+    sampled: bool,
+    /// Writes that proof to a file, which --check reads.
+    #[arg(long, value_name = "FILE.json", requires = "sampled")]
+    save: Option<PathBuf>,
+    /// Checks the proof in a file, and that it is this scenario's, instead of looking for one.
+    #[arg(long, value_name = "FILE.json", conflicts_with = "sampled")]
+    check: Option<PathBuf>,
 }
 
 impl Certify {
@@ -29,10 +43,23 @@ impl Certify {
         let scenario = self.scenario.load()?;
         let plan = scenario.plan()?;
         let outside = scenario.outside_bounds(&plan.bounds)?;
-        let shown =
-            if self.json { json(&certificate(&scenario)?)? } else { text(&scenario, &plan, &outside) };
+        let sampled = scenario.sampled(&plan.bounds);
+        let bound = match (&self.check, self.sampled) {
+            (Some(file), _) => Bound::of_file(&sampled, file)?,
+            (None, true) => Bound::search(&sampled, self.save.as_deref())?,
+            (None, false) => Bound::NotLookedFor,
+        };
+        let shown = if self.json {
+            json(&whole(&scenario, &sampled, &bound)?)?
+        } else {
+            text(&scenario, &plan, &outside) + &sampled::lines(&sampled, &bound)
+        };
         print(&shown)?;
-        Ok(if plan.certificate.certified() { Exit::Done } else { Exit::NotCertified })
+        let certified = match bound {
+            Bound::NotLookedFor => plan.certificate.certified(),
+            _ => bound.proven().is_some() && sampled.stable() == Some(true),
+        };
+        Ok(if certified { Exit::Done } else { Exit::NotCertified })
     }
 }
 
@@ -197,10 +224,10 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
     }
     out += &match c.shortfall {
         None => {
-            "\ncertified (continuous time, exact sensor: sampling, encoder steps and delay come on top)\n"
+            "\ncontinuous time: certified (exact sensor: sampling, encoder steps and delay come on top)\n"
                 .to_owned()
         }
-        Some(s) => format!("\nNOT certified: {}\n", reason(s)),
+        Some(s) => format!("\ncontinuous time: NOT certified: {}\n", reason(s)),
     };
     if !outside.is_empty() {
         out += "\nThe scenario's rig lies outside these bounds; the certificate does not cover it:\n";
@@ -216,6 +243,11 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
 /// # Errors
 /// A path that a brake cannot follow.
 pub fn certificate(scenario: &Scenario) -> Result<Value, ScenarioError> {
+    let plan = scenario.plan()?;
+    whole(scenario, &scenario.sampled(&plan.bounds), &Bound::NotLookedFor)
+}
+
+fn whole(scenario: &Scenario, sampled: &Sampled, bound: &Bound) -> Result<Value, ScenarioError> {
     let plan = scenario.plan()?;
     let outside = scenario.outside_bounds(&plan.bounds)?;
     let (b, d) = (&plan.bounds, &plan.demand);
@@ -260,6 +292,7 @@ pub fn certificate(scenario: &Scenario) -> Result<Value, ScenarioError> {
             "error_bound_rad": c.error_bound,
         },
         "paper": plan.paper.as_ref().map(paper),
+        "sampled": sampled::json(sampled, bound),
     }))
 }
 

@@ -15,6 +15,7 @@ mod referee;
 mod replay;
 pub mod report;
 mod reproduce;
+mod sampled;
 mod scenario;
 mod signals;
 mod sim;

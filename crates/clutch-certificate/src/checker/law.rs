@@ -58,11 +58,8 @@ pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Pi
             complete(&cell.strips)?;
             let law = [kp, kd, boundary].map(at);
             let sigma = sum(&rate, at(slope), &error);
-            let mut out = vec![Piece {
-                id: 0,
-                within: vec![sum(&fixed(at(0.0)), at(-1.0), &sigma)],
-                volts: let_go,
-            }];
+            let mut out =
+                vec![Piece { id: 0, within: vec![sum(&fixed(at(0.0)), at(-1.0), &sigma)], volts: let_go }];
             for (k, strip) in cell.strips.iter().enumerate() {
                 holds(&law, [low, high], strip).map_err(|what| format!("[{k}]: {what}"))?;
                 let number = u32::try_from(k + 1).map_err(|_| "too many".to_owned())?;
@@ -82,9 +79,7 @@ fn piece(id: u32, strip: &Strip, sigma: &Linear, rate: &Linear, off: Interval) -
     let mut within = vec![from(&surface, strip.surface_from), from(&speed, strip.rate_from)];
     within.extend(strip.surface_to.map(|most| to(&surface, most)));
     within.extend(strip.rate_to.map(|most| to(&speed, most)));
-    let line = |[per, constant]: [f64; 2], off: Interval| {
-        sum(&fixed(at(constant) + off), at(per), &surface)
-    };
+    let line = |[per, constant]: [f64; 2], off: Interval| sum(&fixed(at(constant) + off), at(per), &surface);
     Piece { id, within, volts: [line(strip.least, -off), line(strip.most, off)] }
 }
 
@@ -101,9 +96,8 @@ fn complete(strips: &[Strip]) -> Result<(), String> {
             let mut surface = 0.0;
             let mut end = f64::INFINITY;
             while surface < f64::INFINITY {
-                let beyond = |s: &&&&Strip| {
-                    s.surface_from <= surface && s.surface_to.is_none_or(|to| to > surface)
-                };
+                let beyond =
+                    |s: &&&&Strip| s.surface_from <= surface && s.surface_to.is_none_or(|to| to > surface);
                 let Some(strip) = column.iter().find(beyond) else {
                     return Err(format!("none holds |σ| {surface} and |ė| {rate} rad/s, ė ≤ 0: {leads}"));
                 };
@@ -124,7 +118,8 @@ fn complete(strips: &[Strip]) -> Result<(), String> {
 /// Ahead of the surface (31) is, for `S = |σ|` and `D = |ė|`, the least of four straight lines in `S`, the limit is a fifth, and it
 /// grows with `D`.
 fn holds(law: &[Interval; 3], [low, high]: [Interval; 2], strip: &Strip) -> Result<(), String> {
-    let numbers = [strip.rate_from, strip.surface_from, strip.least[0], strip.least[1], strip.most[0], strip.most[1]];
+    let numbers =
+        [strip.rate_from, strip.surface_from, strip.least[0], strip.least[1], strip.most[0], strip.most[1]];
     let ends = [strip.rate_to, strip.surface_to];
     if numbers.iter().chain(ends.iter().flatten()).any(|x| !x.is_finite())
         || strip.rate_from < 0.0

@@ -74,8 +74,7 @@ impl Mode {
             sum
         };
         let answer = [of(&piece.volts[0]), of(&piece.volts[1])];
-        let applied =
-            if shaft.delay == 0 { answer.clone() } else { [coordinate(P), coordinate(P)] };
+        let applied = if shaft.delay == 0 { answer.clone() } else { [coordinate(P), coordinate(P)] };
         let fixed = applied.iter().all(Sum::is_fixed);
         let (least, most) = (applied[0].constant.low, applied[1].constant.high);
         let impossible = fixed

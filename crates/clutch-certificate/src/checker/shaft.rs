@@ -44,7 +44,8 @@ pub(crate) struct Shaft {
 
 impl Shaft {
     pub(crate) fn new(s: &Setup, cell: &Cell) -> Shaft {
-        let tau = Interval { low: core::f64::consts::TAU.next_down(), high: core::f64::consts::TAU.next_up() };
+        let tau =
+            Interval { low: core::f64::consts::TAU.next_down(), high: core::f64::consts::TAU.next_up() };
         let count = tau / at(f64::from(s.counts_per_rev));
         let period = at(s.period_s);
         let speed = count / period;
@@ -73,7 +74,8 @@ impl Shaft {
         let most_held = (rest.1.max(sliding.1) * strong).most();
 
         let drag = at(s.viscous_damping[1]) / inertia.0 * period * (at(cell.speed_cap) + most_drive);
-        let brakes_anywhere = ((least_held / inertia.1 * scale).least(), (most_held / inertia.0 * scale).most());
+        let brakes_anywhere =
+            ((least_held / inertia.1 * scale).least(), (most_held / inertia.0 * scale).most());
         let least_drive = (weakest_drive / inertia.1 * scale - drag).least();
         let volts_off = (at(0.5) * at(s.converter_step) + at(LAW_ROUNDING)).most();
         let most_volts = at(s.volts[1]) + volts_off;

@@ -6,11 +6,13 @@
 pub mod describe;
 mod error;
 mod params;
+mod sampled;
 mod schema;
 mod section;
 
 pub use error::ScenarioError;
 pub use params::{Safety, ScalarKind, ScenarioBounds, ScenarioLimits, ScenarioParams, ScenarioSampling};
+pub use sampled::{NOISE_ROOTS, NotCovered, Sampled};
 pub use schema::schema;
 pub use section::check_section;
 

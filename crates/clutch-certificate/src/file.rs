@@ -1,0 +1,78 @@
+//! A saved certificate: JSON, one object.
+
+use crate::setup::{Certificate, VERSION};
+use std::io::{BufReader, BufWriter, Write};
+use std::path::Path;
+
+/// Largest file that is read, bytes: one of the widest box with the finest rows is a tenth of it.
+const LARGEST: u64 = 1 << 30;
+
+/// A certificate could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The system's answer.
+    #[error("{name}: {error}")]
+    Io {
+        /// The file.
+        name: String,
+        /// The error.
+        error: std::io::Error,
+    },
+    /// No certificate, or a damaged one.
+    #[error("{name}: no certificate: {error}")]
+    Format {
+        /// The file.
+        name: String,
+        /// Key or place, and what was expected.
+        error: serde_json::Error,
+    },
+    /// The file is too large.
+    #[error("{name}: {size} bytes: expected a certificate, of at most {LARGEST}")]
+    Size {
+        /// The file.
+        name: String,
+        /// Its size.
+        size: u64,
+    },
+    /// The format has another version.
+    #[error("{name}: version is {version}: expected {VERSION}")]
+    Version {
+        /// The file.
+        name: String,
+        /// Its version.
+        version: u32,
+    },
+}
+
+/// Writes a certificate.
+///
+/// # Errors
+/// The system's.
+pub fn write(path: &Path, certificate: &Certificate) -> Result<(), FileError> {
+    let name = || path.display().to_string();
+    let io = |error| FileError::Io { name: name(), error };
+    let mut out = BufWriter::new(std::fs::File::create(path).map_err(io)?);
+    serde_json::to_writer(&mut out, certificate)
+        .map_err(|error| FileError::Format { name: name(), error })?;
+    out.write_all(b"\n").and_then(|()| out.flush()).map_err(io)
+}
+
+/// Reads a certificate. It says nothing until [`crate::checker::check`] has passed it.
+///
+/// # Errors
+/// The file cannot be read, or holds no certificate of this version.
+pub fn read(path: &Path) -> Result<Certificate, FileError> {
+    let name = || path.display().to_string();
+    let io = |error| FileError::Io { name: name(), error };
+    let file = std::fs::File::open(path).map_err(io)?;
+    let about = file.metadata().map_err(io)?;
+    if !about.is_file() || about.len() > LARGEST {
+        return Err(FileError::Size { name: name(), size: about.len() });
+    }
+    let certificate: Certificate = serde_json::from_reader(BufReader::new(file))
+        .map_err(|error| FileError::Format { name: name(), error })?;
+    if certificate.version != VERSION {
+        return Err(FileError::Version { name: name(), version: certificate.version });
+    }
+    Ok(certificate)
+}

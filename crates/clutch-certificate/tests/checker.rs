@@ -1,0 +1,249 @@
+//! The checker passes what was found, and refuses each change that takes something from a proof.
+
+use clutch_certificate::checker::{Flaw, Refused, check};
+use clutch_certificate::{Case, Certificate, Form, Gains, Options, Setup, file, largest, search, stability};
+use std::sync::OnceLock;
+
+/// The paper's shaft on a ramp, known exactly.
+fn setup(law: Gains, smoothing: f64, delay_ticks: u32, rate_deg_s: f64) -> Setup {
+    Setup {
+        period_s: 0.001,
+        counts_per_rev: 20_000,
+        inertia: [0.0017; 2],
+        drive_torque: [0.047_088; 2],
+        viscous_damping: [0.001; 2],
+        brake_gain: [0.14; 2],
+        sliding: [0.15; 2],
+        at_rest: [0.2; 2],
+        rest_not_below_sliding: true,
+        stribeck: [0.001, 1.0],
+        ripple: 0.0,
+        torque_noise: 0.0,
+        delay_ticks,
+        converter_step: 20.0 / 4096.0,
+        volts: [0.0, 9.995],
+        rate: rate_deg_s.to_radians(),
+        smoothing,
+        law,
+        from_rest: false,
+        start_volts: [1.68, 2.25],
+    }
+}
+
+fn paper_pd() -> Setup {
+    setup(Gains::Pd { kp: 5000.0, kd: 50.0 }, 0.2, 0, 2.0)
+}
+
+fn found(setup: &Setup) -> Certificate {
+    let found = search(setup, &Options::default(), false);
+    assert!(found.complete(), "{:?}", found.open);
+    found.certificate
+}
+
+/// The paper's PD, looked for once.
+fn good() -> Certificate {
+    static FOUND: OnceLock<Certificate> = OnceLock::new();
+    FOUND.get_or_init(|| found(&paper_pd())).clone()
+}
+
+fn degrees(certificate: &Certificate) -> f64 {
+    check(certificate).unwrap_or_else(|e| panic!("{e}")).error_bound.to_degrees()
+}
+
+#[test]
+fn bounds_lie_between_the_worst_error_seen_and_three_times_it() {
+    // Seen in 200 runs each: docs/certified.md.
+    let pd = |kp, kd, kappa, delay, rate| setup(Gains::Pd { kp, kd }, kappa, delay, rate);
+    for (setup, seen) in [(pd(5000.0, 50.0, 1.0, 0, 2.0), 0.0518), (pd(1660.0, 12.9, 0.712, 1, 20.0), 0.1006)]
+    {
+        let bound = degrees(&found(&setup));
+        assert!((seen..3.0 * seen).contains(&bound), "{bound}° of {setup:?}");
+    }
+    let bound = degrees(&good());
+    assert!((0.0513..0.1).contains(&bound), "{bound}°");
+    let smc = Gains::Smc { kp: 3.0, kd: 400.0, slope: 70.0, boundary: 0.1 };
+    let bound = degrees(&found(&setup(smc, 0.2, 0, 2.0)));
+    assert!((0.0784..0.2).contains(&bound), "{bound}°");
+}
+
+#[test]
+fn a_wider_box_has_cells_that_cover_it_and_a_larger_bound() {
+    let narrow = paper_pd();
+    let wide = Setup { sliding: [0.12, 0.18], at_rest: [0.16, 0.24], ..narrow.clone() };
+    let (small, large) = (good(), found(&wide));
+    assert!(large.cells.len() > 1);
+    assert!(degrees(&small) < degrees(&large));
+}
+
+#[test]
+fn the_papers_pd_is_linearly_unstable_with_a_tick_of_delay() {
+    let radius = |s: &Setup| largest(&stability(s).unwrap());
+    let delayed = Setup { delay_ticks: 1, ..paper_pd() };
+    assert!((radius(&delayed) - 1.0565).abs() < 1e-4, "{}", radius(&delayed));
+    assert!(radius(&paper_pd()) < 1.0);
+}
+
+fn flaw(certificate: &Certificate) -> Flaw {
+    match check(certificate) {
+        Err(Refused::Cell { flaw, .. }) => flaw,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_radius_shrunk_by_a_thousandth_is_refused() {
+    let good = good();
+    let rows = good.cells[0].radii.len();
+    let (mut tried, mut refused) = (0, 0);
+    for row in (0..rows).step_by(5) {
+        let mut bad = good.clone();
+        bad.cells[0].radii[row] -= 1e-3 * bad.cells[0].radii[row].abs();
+        tried += 1;
+        refused += usize::from(check(&bad).is_err());
+    }
+    // Only a wall that the start alone needs may move.
+    assert!(refused > tried * 9 / 10, "{refused} of {tried}");
+    let mut bad = good;
+    bad.cells[0].radii[0] *= 0.99;
+    assert!(matches!(flaw(&bad), Flaw::Row { .. }), "{:?}", flaw(&bad));
+}
+
+#[test]
+fn a_multiplier_changed_missing_or_below_0_is_refused() {
+    let good = good();
+    let proofs = good.cells[0].proofs.len();
+    let (mut changed, mut refused) = (0, 0);
+    for k in (0..proofs).step_by(29).filter(|k| !good.cells[0].proofs[*k].weights.is_empty()) {
+        let mut bad = good.clone();
+        bad.cells[0].proofs[k].weights[0].1 *= 0.5;
+        changed += 1;
+        refused += usize::from(check(&bad).is_err());
+    }
+    assert!(changed > 50 && refused > changed / 4, "{refused} of {changed}");
+
+    let mut bad = good.clone();
+    bad.cells[0].proofs.remove(proofs / 2);
+    assert!(matches!(flaw(&bad), Flaw::Proof { .. }));
+    let mut bad = good;
+    bad.cells[0].proofs[0].weights.push((0, -0.1));
+    assert!(matches!(flaw(&bad), Flaw::Shape(_)));
+}
+
+#[test]
+fn a_row_or_a_mode_that_is_missing_is_refused() {
+    let good = good();
+    let mut bad = good.clone();
+    // The first rows are the state's own; another's proofs need each that is left.
+    let last = bad.cells[0].rows.len() - 1;
+    bad.cells[0].rows.remove(last);
+    bad.cells[0].radii.remove(last);
+    assert!(check(&bad).is_err());
+    let mut bad = good.clone();
+    bad.cells[0].rows.remove(0);
+    bad.cells[0].radii.remove(0);
+    assert!(check(&bad).is_err());
+    let mut bad = good;
+    let slides = bad.cells[0].modes.iter().position(|m| m.case == Case::Slides).unwrap();
+    bad.cells[0].modes.remove(slides);
+    assert!(matches!(flaw(&bad), Flaw::Mode(_)));
+}
+
+#[test]
+fn another_gain_period_brake_path_or_delay_is_refused() {
+    let good = good();
+    let change = |f: &dyn Fn(&mut Setup)| {
+        let mut bad = good.clone();
+        f(&mut bad.setup);
+        assert_ne!(bad.setup, good.setup);
+        assert!(!bad.setup.differences(&good.setup).is_empty());
+        assert!(check(&bad).is_err(), "{:?}", bad.setup.differences(&good.setup));
+    };
+    change(&|s| s.law = Gains::Pd { kp: 5050.0, kd: 50.0 });
+    change(&|s| s.law = Gains::Pd { kp: 5000.0, kd: 49.0 });
+    change(&|s| s.period_s = 0.00101);
+    change(&|s| s.inertia = [0.0016, 0.0017]);
+    change(&|s| s.drive_torque[1] *= 1.02);
+    change(&|s| s.sliding = [0.149, 0.15]);
+    change(&|s| s.sliding[1] = 0.151);
+    change(&|s| s.at_rest[1] = 0.22);
+    change(&|s| s.brake_gain[1] = 0.142);
+    change(&|s| s.rate *= 1.05);
+    change(&|s| s.smoothing = 0.21);
+    change(&|s| s.ripple = 0.01);
+    change(&|s| s.torque_noise = 0.001);
+    change(&|s| s.converter_step = 0.02);
+    change(&|s| s.counts_per_rev = 19_000);
+    change(&|s| s.delay_ticks = 1);
+    change(&|s| s.from_rest = true);
+    change(&|s| s.volts[1] = 12.0);
+}
+
+#[test]
+fn a_strip_of_smc_moved_or_missing_is_refused() {
+    let smc = Gains::Smc { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 };
+    let good = found(&setup(smc, 0.5, 0, 2.0));
+    let strips = good.cells[0].strips.len();
+    for k in (0..strips).step_by(11) {
+        for change in [0, 1, 2] {
+            let mut bad = good.clone();
+            let strip = &mut bad.cells[0].strips[k];
+            match change {
+                0 => strip.least[1] += 0.01,
+                1 => strip.most[1] -= 0.01,
+                _ => strip.surface_from += 0.01,
+            }
+            assert!(matches!(flaw(&bad), Flaw::Strips(_)), "{k} {change}");
+        }
+        let mut bad = good.clone();
+        bad.cells[0].strips.remove(k);
+        assert!(check(&bad).is_err());
+    }
+}
+
+#[test]
+fn a_file_gives_back_what_was_written_and_refuses_what_is_none() {
+    let folder = std::env::temp_dir().join(format!("clutch-certificate-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("pd.json");
+    let good = good();
+    file::write(&path, &good).unwrap();
+    let read = file::read(&path).unwrap();
+    assert_eq!(read, good);
+    assert_eq!(check(&read), check(&good));
+
+    let text = std::fs::read_to_string(&path).unwrap();
+    let refused = |text: &str, named: &str| {
+        let path = folder.join("bad.json");
+        std::fs::write(&path, text).unwrap();
+        let told = file::read(&path).unwrap_err().to_string();
+        assert!(told.contains(named) && told.contains("bad.json"), "{told}");
+    };
+    refused("", "EOF");
+    refused(&text[..text.len() / 2], "EOF");
+    refused(&text.replacen("\"version\":1", "\"version\":2", 1), "version is 2: expected 1");
+    refused(&text.replacen("\"inertia\"", "\"inertai\"", 1), "inertai");
+    refused(&text.replacen("\"kp\":5000.0", "\"kp\":\"much\"", 1), "f64");
+    assert!(file::read(&folder.join("none.json")).unwrap_err().to_string().contains("none.json"));
+    assert!(file::read(&folder).is_err());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn values_that_no_loop_has_are_refused_by_name() {
+    let good = good();
+    let told = |f: &dyn Fn(&mut Certificate)| {
+        let mut bad = good.clone();
+        f(&mut bad);
+        check(&bad).unwrap_err().to_string()
+    };
+    assert!(told(&|c| c.version = 7).contains("version is 7"));
+    assert!(told(&|c| c.setup.period_s = f64::NAN).contains("setup.period_s is NaN"));
+    assert!(told(&|c| c.setup.inertia = [0.0, 1.0]).contains("setup.inertia"));
+    assert!(told(&|c| c.setup.sliding = [0.2, 0.1]).contains("setup.sliding"));
+    assert!(told(&|c| c.setup.smoothing = 1.5).contains("setup.smoothing is 1.5"));
+    assert!(told(&|c| c.setup.delay_ticks = 9).contains("setup.delay_ticks is 9"));
+    assert!(told(&|c| c.cells.clear()).contains("no cell holds"));
+    assert!(told(&|c| c.cells[0].rows[3][0] = f64::INFINITY).contains("rows[3]"));
+    assert!(told(&|c| c.cells[0].speed_cap = 0.01).contains("speed_cap"));
+    assert!(told(&|c| c.cells[0].form = Form::Noise).contains("cells[0]"));
+}

@@ -1,0 +1,250 @@
+//! Certified bounds against the worst error seen: `cargo xtask certified`.
+//!
+//! ```sh
+//! cargo run --release --package clutch-sim --example certified -- table
+//! cargo run --release --package clutch-sim --example certified -- campaign 10000
+//! ```
+//!
+//! `table` looks for the certificate of each set of gains of a fixed grid, checks it, and simulates plants of its box. `campaign`
+//! draws the sets, too, with tolerances, ripple and noise, and counts broken bounds.
+
+use clutch_certificate::{Options, Setup, checker, largest, search, stability};
+use clutch_core::PlantParams;
+use clutch_core::friction::{FrictionParams, StribeckParams};
+use clutch_sim::drive::DriveParams;
+use clutch_sim::progress::UNWATCHED;
+use clutch_sim::{Keep, RigParams, Scenario};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use std::error::Error;
+use std::time::Instant;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// Gains with their filter.
+#[derive(Clone, Copy)]
+enum Gains {
+    Pd(f64, f64, f64),
+    Smc(f64, f64, f64, f64, f64),
+}
+
+/// PD: K_p, K_d, K_Kal. SMC: K_p, K_d, f, ε, K_Kal.
+const GRID: &[Gains] = &[
+    Gains::Pd(5000.0, 50.0, 0.2),
+    Gains::Pd(5000.0, 50.0, 0.5),
+    Gains::Pd(5000.0, 50.0, 1.0),
+    Gains::Pd(10000.0, 50.0, 1.0),
+    Gains::Pd(2500.0, 25.0, 0.5),
+    Gains::Pd(2500.0, 12.9, 0.7),
+    Gains::Pd(1250.0, 12.9, 0.5),
+    Gains::Pd(625.0, 12.9, 0.7),
+    Gains::Pd(1000.0, 6.0, 0.7),
+    Gains::Pd(1660.0, 25.0, 0.7),
+    Gains::Pd(1660.0, 12.9, 0.712),
+    Gains::Pd(2367.0, 14.5, 0.67),
+    Gains::Pd(1250.0, 12.9, 0.7),
+    Gains::Pd(1000.0, 12.9, 0.5),
+    Gains::Pd(2500.0, 25.0, 1.0),
+    Gains::Smc(5.0, 50.0, 70.0, 0.2, 0.5),
+    Gains::Smc(4.0, 100.0, 50.0, 0.2, 0.3),
+    Gains::Smc(5.0, 400.0, 70.0, 0.1, 0.5),
+];
+
+impl Gains {
+    fn title(self) -> String {
+        match self {
+            Gains::Pd(kp, kd, kappa) => format!("PD {kp}/{kd}/{kappa}"),
+            Gains::Smc(kp, kd, f, eps, kappa) => format!("SMC {kp}/{kd}/{f}/{eps}/{kappa}"),
+        }
+    }
+
+    fn keys(self) -> (&'static str, Vec<(String, String)>) {
+        let key = |key: &str, x: f64| (key.to_owned(), format!("{x:?}"));
+        let smoothing = |x| key("velocity.smoothed_derivative.smoothing", x);
+        match self {
+            Gains::Pd(kp, kd, kappa) => {
+                ("pd_2", vec![key("law.pd.kp_v_rad", kp), key("law.pd.kd_v_s_rad", kd), smoothing(kappa)])
+            }
+            Gains::Smc(kp, kd, f, eps, kappa) => (
+                "smc_2",
+                vec![
+                    key("law.smc.kp_v", kp),
+                    key("law.smc.kd_v_s_rad", kd),
+                    key("law.smc.slope_1_s", f),
+                    key("law.smc.boundary_rad_s", eps),
+                    smoothing(kappa),
+                ],
+            ),
+        }
+    }
+}
+
+/// A scenario of a set.
+fn scenario(gains: Gains, more: &[(&str, f64)]) -> Outcome<Scenario> {
+    let (name, mut keys) = gains.keys();
+    for (key, x) in more {
+        let text = if key.ends_with("_ticks") { format!("{x}") } else { format!("{x:?}") };
+        keys.push(((*key).to_owned(), text));
+    }
+    let built_in = clutch_sim::scenario::BUILT_IN.iter().find(|b| b.name == name);
+    Ok(Scenario::parse(name, built_in.map_or("", |b| b.toml), &keys)?)
+}
+
+/// A number of the box: an end one time in two, else any between.
+fn within(rng: &mut Pcg64, [low, high]: [f64; 2]) -> f64 {
+    match rng.random_range(0..4) {
+        0 => low,
+        1 => high,
+        _ => low + (high - low) * rng.random::<f64>(),
+    }
+}
+
+/// A rig of the box.
+fn plant(base: &RigParams, model: &PlantParams, setup: &Setup, rng: &mut Pcg64) -> RigParams {
+    let mut rig = base.clone();
+    rig.inertia = within(rng, setup.inertia);
+    rig.viscous_damping = within(rng, setup.viscous_damping);
+    if let DriveParams::Weight(weight) = &mut rig.drive {
+        weight.mass *= within(rng, setup.drive_torque) / model.drive_torque;
+    }
+    let (mut mu_s, mut mu_d) = (model_friction(model).mu_static, model_friction(model).mu_dynamic);
+    let scale = setup.sliding.map(|x| x / mu_d);
+    let gain = setup.brake_gain;
+    if rng.random::<bool>() {
+        // The whole curve by one factor.
+        let factor = within(rng, scale);
+        (mu_s, mu_d) = (mu_s * factor, mu_d * factor);
+    } else {
+        mu_d *= within(rng, scale);
+        mu_s = within(rng, setup.at_rest).max(mu_d);
+    }
+    rig.friction = FrictionParams::Stribeck(StribeckParams {
+        mu_static: mu_s,
+        mu_dynamic: mu_d,
+        ..model_friction(model)
+    });
+    let mut brake = clutch_core::BrakeActuator::default();
+    brake.gain = within(rng, gain);
+    rig.actuator = brake.into();
+    rig
+}
+
+fn model_friction(model: &PlantParams) -> StribeckParams {
+    match model.friction {
+        FrictionParams::Stribeck(f) => f,
+        _ => StribeckParams::default(),
+    }
+}
+
+/// The largest |e| of a run of a plant of the box, rad, and its sticks per second.
+fn run(scenario: &Scenario, setup: &Setup, seconds: f64, seed: u64) -> Outcome<(f64, f64)> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut spec = scenario.spec();
+    spec.rig = plant(&spec.rig, &spec.model, setup, &mut rng);
+    spec.run.seed = seed;
+    spec.run.duration = seconds;
+    spec.run.settle = 0.0;
+    let run = clutch_sim::run::simulate_watched::<f64>(&spec, Keep::Figures, UNWATCHED)?;
+    Ok((run.metrics.max_error_rad, run.metrics.stick_slip_cycles_per_s))
+}
+
+/// Certified and seen of a set; degrees.
+struct Row {
+    radius: f64,
+    certified: Option<f64>,
+    open: String,
+    seen: f64,
+    sticks: f64,
+    cells: usize,
+    seconds_per_cell: f64,
+}
+
+fn measure(scenario: &Scenario, runs: u64) -> Outcome<Row> {
+    let setup = scenario.sampled_setup(&scenario.plan()?.bounds)?;
+    let radius = stability(&setup).as_ref().map_or(f64::NAN, largest);
+    let began = Instant::now();
+    if radius >= 1.0 {
+        let open = "refused: unstable".to_owned();
+        return Ok(Row {
+            radius,
+            certified: None,
+            open,
+            seen: worst(scenario, &setup, runs)?.0,
+            sticks: 0.0,
+            cells: 0,
+            seconds_per_cell: 0.0,
+        });
+    }
+    let found = search(&setup, &Options::default(), false);
+    let cells = found.certificate.cells.len() + found.open.len();
+    let seconds_per_cell = began.elapsed().as_secs_f64() / cells.max(1) as f64;
+    let certified = if found.complete() {
+        Some(checker::check(&found.certificate)?.error_bound.to_degrees())
+    } else {
+        None
+    };
+    let open = found.open.first().map_or(String::new(), |c| {
+        let how = if c.grew { "grew" } else { "did not settle" };
+        format!("μ_d {:.4} … {:.4} {how}", c.sliding[0], c.sliding[1])
+    });
+    let (seen, sticks) = worst(scenario, &setup, runs)?;
+    Ok(Row { radius, certified, open, seen, sticks, cells, seconds_per_cell })
+}
+
+/// The largest error of runs, degrees, and the most sticks per second.
+fn worst(scenario: &Scenario, setup: &Setup, runs: u64) -> Outcome<(f64, f64)> {
+    let (mut seen, mut sticks) = (0.0_f64, 0.0_f64);
+    for seed in 0..runs {
+        let (error, cycles) = run(scenario, setup, 3.0, seed)?;
+        seen = seen.max(error.to_degrees());
+        sticks = sticks.max(cycles);
+    }
+    Ok((seen, sticks))
+}
+
+fn table() -> Outcome<()> {
+    println!("set | delay | °/s | ρ | certified ° | seen ° | ratio | sticks/s | cells | s per cell");
+    let mut ratios = Vec::new();
+    let mut tried = 0;
+    for gains in GRID {
+        for delay in [0.0, 1.0] {
+            for rate in [2.0, 20.0] {
+                let keys = [
+                    ("rig.delay_ticks", delay),
+                    ("reference.ramp.rate_deg_s", rate),
+                    ("bounds.friction_percent", 40.0),
+                ];
+                // What is unstable is refused by that.
+                let row = measure(&scenario(*gains, &keys)?, 200)?;
+                let certified = row.certified.map_or_else(|| row.open.clone(), |c| format!("{c:.4}"));
+                let ratio = row.certified.map(|c| c / row.seen);
+                println!(
+                    "{} | {delay} | {rate} | {:.3} | {certified} | {:.4} | {} | {:.1} | {} | {:.2}",
+                    gains.title(),
+                    row.radius,
+                    row.seen,
+                    ratio.map_or("–".to_owned(), |r| format!("{r:.2}")),
+                    row.sticks,
+                    row.cells,
+                    row.seconds_per_cell
+                );
+                if row.radius < 1.0 {
+                    tried += 1;
+                    ratios.extend(ratio);
+                }
+            }
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    println!(
+        "\nof {tried} sets with a spectral radius below 1, {} are certified; ratio: median {:.2}, largest {:.2}",
+        ratios.len(),
+        ratios.get(ratios.len() / 2).unwrap_or(&f64::NAN),
+        ratios.last().unwrap_or(&f64::NAN)
+    );
+    Ok(())
+}
+
+fn main() -> Outcome<()> {
+    table()
+}

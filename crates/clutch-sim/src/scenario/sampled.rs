@@ -1,0 +1,177 @@
+//! The sampled loop of a scenario, and the box of plants around it: what a sampled-data certificate speaks of.
+
+use super::Scenario;
+use crate::rig::Rig;
+use crate::ripple::Ripple;
+use crate::run::Start;
+use clutch_certificate::{Gains, Setup, Stability, largest, stability};
+use clutch_core::friction::{FrictionModel, FrictionParams};
+use clutch_core::law::LawParams;
+use clutch_core::reference::ReferenceParams;
+use clutch_core::{ActuatorKind, Bounds, Plant, VelocityParams};
+
+/// Torque noise of the rig is normal: a certificate covers this many times its root mean square.
+pub const NOISE_ROOTS: f64 = 4.0;
+
+/// Stribeck velocity of a friction that falls at once, rad/s.
+const AT_ONCE: f64 = 1e-6;
+
+/// The sampled-data certificate does not cover such a scenario.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the sampled-data certificate does not cover {what} ({key}); it covers {covered}")]
+pub struct NotCovered {
+    /// The scenario's key.
+    pub key: &'static str,
+    /// What it has there.
+    pub what: String,
+    /// What is covered.
+    pub covered: &'static str,
+}
+
+/// Verdicts on a sampled loop that cost nothing, and the box for the one that does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sampled {
+    /// The loop and the box of plants, or why there is none.
+    pub setup: Result<Setup, NotCovered>,
+    /// Spectral radii with the weakest, a middle and the strongest brake.
+    pub stability: Option<[Stability; 3]>,
+}
+
+impl Sampled {
+    /// Small deviations die out, whichever plant of the box it is; none where nothing is known.
+    #[must_use]
+    pub fn stable(&self) -> Option<bool> {
+        self.stability.as_ref().map(|radii| largest(radii) < 1.0)
+    }
+
+    /// The verdict on linear stability in a line.
+    #[must_use]
+    pub fn stability_line(&self) -> String {
+        match (&self.stability, &self.setup) {
+            (Some(radii), _) => {
+                let verdict = if largest(radii) < 1.0 { "linearly stable" } else { "linearly UNSTABLE" };
+                let [weak, middle, strong] = radii.map(|s| s.radius);
+                format!(
+                    "{verdict}: spectral radius {weak:.3}, {middle:.3}, {strong:.3} with the weakest, a middle and the strongest brake, while nothing saturates or sticks"
+                )
+            }
+            (None, Err(why)) => why.to_string(),
+            (None, Ok(_)) => "linear stability is not computed for so long a delay".to_owned(),
+        }
+    }
+}
+
+fn not(key: &'static str, what: impl Into<String>, covered: &'static str) -> NotCovered {
+    NotCovered { key, what: what.into(), covered }
+}
+
+impl Scenario {
+    /// The verdicts on the sampled loop that cost nothing.
+    #[must_use]
+    pub fn sampled(&self, bounds: &Bounds) -> Sampled {
+        let setup = self.sampled_setup(bounds);
+        let stability = setup.as_ref().ok().and_then(stability);
+        Sampled { setup, stability }
+    }
+
+    /// The sampled loop with every plant of the bounds: `[model]` within `[bounds]`, with encoder, converter, delay, ripple and
+    /// torque noise of `[rig]`.
+    ///
+    /// # Errors
+    /// What of the scenario the sampled-data certificate does not cover, by its key.
+    pub fn sampled_setup(&self, bounds: &Bounds) -> Result<Setup, NotCovered> {
+        let p = &self.params;
+        let law = match p.law {
+            LawParams::Pd(g) => Gains::Pd { kp: g.kp, kd: g.kd },
+            LawParams::Smc(g) => Gains::Smc { kp: g.kp, kd: g.kd, slope: g.slope, boundary: g.boundary },
+            other => return Err(not("law", other.title(), "PD (4) and SMC (31)")),
+        };
+        let VelocityParams::SmoothedDerivative(filter) = p.velocity else {
+            return Err(not("velocity", "an observer", "the smoothed difference (5)"));
+        };
+        let ReferenceParams::Ramp(ramp) = p.reference else {
+            return Err(not("reference", "a path that accelerates", "ramps"));
+        };
+        if ramp.rate <= 0.0 {
+            return Err(not("reference.ramp.rate_deg_s", "a path that rests", "ramps forwards"));
+        }
+        if bounds.actuator != ActuatorKind::Brake {
+            return Err(not("model.actuator", "an actuator that drives", "brakes"));
+        }
+        if bounds.preload > 0.0 {
+            return Err(not(
+                "model.actuator.brake.preload_nm",
+                "a disc that drags",
+                "brakes without preload",
+            ));
+        }
+        let stribeck = match p.model.friction {
+            FrictionParams::Stribeck(f) => [f.stribeck_velocity, f.stribeck_exponent],
+            FrictionParams::Coulomb(_) => [AT_ONCE, 1.0],
+            _ => return Err(not("model.friction", "bristles", "Stribeck's and Coulomb's friction")),
+        };
+        if p.rig.actuator_time_constant.is_some() {
+            return Err(not(
+                "rig.actuator_time_constant_s",
+                "a lag of the actuator",
+                "actuators without lag",
+            ));
+        }
+        if !p.rig.encoder.quantised {
+            return Err(not("rig.encoder.quantised", "an ideal sensor", "encoders that give whole counts"));
+        }
+        if p.output.bumpless_time > 0.0 {
+            return Err(not(
+                "output.bumpless_time_s",
+                "a bumpless start",
+                "starts with the law's own voltage",
+            ));
+        }
+        if p.rig.delay_ticks > 3 {
+            return Err(not(
+                "rig.delay_ticks",
+                format!("{} ticks of delay", p.rig.delay_ticks),
+                "up to 3 ticks of delay",
+            ));
+        }
+        let rig = Rig::new(&p.rig, p.run.seed)
+            .map_err(|_| not("rig", "a rig out of range", "rigs that can be built"))?;
+        let ripple = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+        let ends = |i: &clutch_core::Interval| [i.low, i.high];
+        let dac = &rig.dac;
+        let top = dac.volts(dac.code(f64::MAX));
+        let volts = [p.output.lowest.max(dac.volts(dac.code(f64::MIN))), p.output.highest.min(top)];
+        let plant = Plant::new(&p.model)
+            .map_err(|_| not("model", "a plant out of range", "plants that can be built"))?;
+        let friction = plant.friction();
+        let from_rest = p.run.start == Start::Rest;
+        let (torque, gain) = (ends(&bounds.drive_torque), ends(&bounds.brake_gain));
+        let drag = bounds.viscous_damping.high * ramp.rate;
+        let least = (torque[0] - drag).max(0.0) / (bounds.friction.high * gain[1]);
+        let most = torque[1] / (bounds.friction.low * gain[0]);
+        // As [`Rig::resting_voltage`] and [`Rig::sliding_voltage`], for each plant of the box.
+        let most = if from_rest { 1.25 * most / (1.0 - ripple) } else { most };
+        Ok(Setup {
+            period_s: p.sampling.sampling.period.seconds(),
+            counts_per_rev: p.rig.encoder.sensor.counts_per_rev,
+            inertia: ends(&bounds.inertia),
+            drive_torque: torque,
+            viscous_damping: ends(&bounds.viscous_damping),
+            brake_gain: gain,
+            sliding: ends(&bounds.friction_sliding),
+            at_rest: ends(&bounds.friction_at_rest),
+            rest_not_below_sliding: friction.at_rest() >= friction.sliding(),
+            stribeck,
+            ripple,
+            torque_noise: NOISE_ROOTS * p.rig.torque_noise,
+            delay_ticks: p.rig.delay_ticks,
+            converter_step: if p.rig.dac.quantised { dac.step() } else { 0.0 },
+            volts,
+            rate: ramp.rate,
+            smoothing: filter.smoothing,
+            law,
+            from_rest,
+            start_volts: [least.min(top), most.min(top)],
+        })
+    }
+}
