@@ -10,6 +10,7 @@ mod read;
 mod record;
 mod recover;
 mod scan;
+mod sync;
 mod write;
 
 pub use error::LogError;

@@ -4,6 +4,7 @@ use crate::error::{LogError, require_file};
 use crate::header::Header;
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
 use crate::record::{self, MAX_TERMS, Record};
+use crate::sync::Syncer;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use prost::Message;
@@ -14,7 +15,6 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 /// Longest span of log time in one chunk, ns: the highest cost of a crash.
 pub const CHUNK_NS: u64 = 100_000_000;
@@ -24,9 +24,6 @@ pub const CHUNK_BYTES: usize = 1 << 20;
 
 /// Most text in a header, bytes: far below the reader's limit.
 const HEADER_BYTES: u64 = 4 << 20;
-
-/// Least time between two `fdatasync`.
-const SYNC_EVERY: Duration = Duration::from_secs(1);
 
 /// Bytes of a message in a chunk beside its payload: opcode, length, channel, sequence, two times.
 pub(crate) const ENVELOPE: usize = 31;
@@ -40,7 +37,8 @@ pub(crate) const SCENARIO: &str = "scenario.toml";
 /// Version of the channel table and of the metadata.
 pub(crate) const FORMAT: u32 = 1;
 
-/// Writes a log. Belongs to the log thread: it calls the system and waits for the disk.
+/// Writes a log. Belongs to the log thread: it calls the system. It waits for the disk at the beginning and at the
+/// end; between them a thread of its own does, so that records reach the file however slow the disk is.
 ///
 /// A writer that is dropped closes its chunk but does not finish the file: a reader then reports
 /// that the log is not complete.
@@ -64,7 +62,7 @@ pub struct LogWriter {
     written: [u64; CHANNELS.len()],
     chunks: u64,
     span: Option<(u64, u64)>,
-    synced: Instant,
+    syncer: Syncer,
 }
 
 /// The contents of a finished log.
@@ -110,6 +108,8 @@ impl LogWriter {
         }
         let file = OpenOptions::new().write(true).create(true).truncate(true).open(path);
         let file = Arc::new(file.map_err(|e| LogError::io(path, "cannot create", e))?);
+        let syncer = Syncer::start(Arc::clone(&file));
+        let syncer = syncer.map_err(|e| LogError::io(path, "cannot start a thread that syncs", e))?;
         let (writer, channels) = begin(&file, header, &metadata, &extra).map_err(|e| failure(path, 0, e))?;
         let mut log = LogWriter {
             path: path.into(),
@@ -124,7 +124,7 @@ impl LogWriter {
             written: [0; CHANNELS.len()],
             chunks: 0,
             span: None,
-            synced: Instant::now(),
+            syncer,
         };
         log.sync()?;
         Ok(log)
@@ -168,10 +168,11 @@ impl LogWriter {
     }
 
     /// Closes the chunk and hands it to the system, so that a crash of this process leaves it in
-    /// the file. Call it at least every 100 ms. Once a second it also waits for the disk.
+    /// the file. Call it at least every 100 ms. Once a second it also asks for the file to be written to the disk, and
+    /// does not wait for it.
     ///
     /// # Errors
-    /// As for [`write`](LogWriter::write).
+    /// As for [`write`](LogWriter::write); what such a write to the disk met.
     pub fn flush(&mut self) -> Result<(), LogError> {
         let Some(writer) = &mut self.writer else { return Err(self.closed()) };
         if self.chunk_since.is_none() {
@@ -186,7 +187,7 @@ impl LogWriter {
         for (sum, chunk) in self.written.iter_mut().zip(&mut self.chunk_records) {
             *sum += std::mem::take(chunk);
         }
-        if self.synced.elapsed() >= SYNC_EVERY { self.sync() } else { Ok(()) }
+        self.syncer.nudge().map_err(|e| self.fail(e.into()))
     }
 
     /// Records in closed chunks: those that a crash of this process does not cost.
@@ -222,8 +223,7 @@ impl LogWriter {
     }
 
     fn sync(&mut self) -> Result<(), LogError> {
-        self.synced = Instant::now();
-        self.file.sync_data().map_err(|e| self.fail(e.into()))
+        self.syncer.wait().map_err(|e| self.fail(e.into()))
     }
 
     fn fail(&mut self, error: McapError) -> LogError {
