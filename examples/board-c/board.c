@@ -198,7 +198,8 @@ static void configure(const clutch_configure_t *m)
             return;
         }
         /* Halved, not doubled: twice a period may not fit 32 bits. */
-        if (m->watchdog_us / 2u < m->period_us || m->watchdog_us > b.params.watchdog_max_us) {
+        if (m->watchdog_us / 2u < m->period_us || m->watchdog_us > b.params.watchdog_max_us ||
+            m->watchdog_us > (uint64_t)m->period_us * CLUTCH_WATCHDOG_PERIODS) {
             refuse(CLUTCH_CONFIGURE_KIND, CLUTCH_REFUSAL_WATCHDOG, m->watchdog_us);
             return;
         }
@@ -235,6 +236,11 @@ static void arm(const clutch_arm_t *m, uint32_t now_us)
     }
     if (m->config != b.set.config) {
         refuse(CLUTCH_ARM_KIND, CLUTCH_REFUSAL_CONFIG, (uint32_t)(b.set.config & 0xffffffffu));
+        return;
+    }
+    if (m->boot != b.params.boot) {
+        /* Whoever has not heard Hello is not told either. */
+        refuse(CLUTCH_ARM_KIND, CLUTCH_REFUSAL_BOOT, 0);
         return;
     }
     if (b.state == CLUTCH_BOARD_STATE_READY) {

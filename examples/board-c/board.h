@@ -18,7 +18,7 @@ extern "C" {
 /* The board's properties. `Hello` reports them to the host. */
 typedef struct {
     uint32_t board;           /* its serial number; 0 and 1 are the simulated boards */
-    uint32_t boot;            /* a different number at each power-up */
+    uint32_t boot;            /* a different number at each power-up, which cannot be guessed */
     uint32_t counts_per_rev;  /* encoder counts per revolution, after quadrature */
     uint8_t dac_bits;         /* converter: bits, 1 to 16 */
     int32_t dac_lowest_mv;    /* at the brake's terminals: voltage of code 0, mV */

@@ -119,6 +119,7 @@ def loop(
     baud: int | None = None,
     log: str | os.PathLike[str] | None = None,
     uncertified: bool = False,
+    patient: bool = False,
     strict: bool = False,
     faults: Sequence[str] = (),
     fault_seed: int = 1,
@@ -154,6 +155,8 @@ def loop(
         Write an MCAP log to this new file.
     uncertified : bool, default False
         Run a law that is not certified for the scenario's bounds.
+    patient : bool, default False
+        The board at the port is a simulated one whose clock waits when this machine stalls, and so does the loop.
     strict : bool, default False
         Keep the simulated board's clock from waiting when this machine stalls: as on hardware.
     faults : sequence of str, optional
@@ -211,6 +214,7 @@ def loop(
         baud=baud,
         log=None if log is None else os.fspath(log),
         uncertified=uncertified,
+        patient=patient,
         faults=list(faults),
         fault_seed=fault_seed,
         strict=strict,

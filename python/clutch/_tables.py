@@ -1996,7 +1996,7 @@ class Limits(_Params):
         within 128 periods.
     watchdog_cycles : int, default 3
         Periods without a valid code after which the board goes to its safe state by itself. Keep it equal to
-        `silence_cycles`. A whole number from 2 to 1000 periods.
+        `silence_cycles`. A whole number from 2 to 100 periods.
     valid_cycles : int, default 2
         Periods after its sample during which a code is valid; at most 65.535 ms. A whole number from 1 to
         1000 periods.

@@ -152,7 +152,7 @@ def test_a_board_that_does_not_fit_is_refused_as_by_the_command(clutch):
 
 def test_the_loop_runs_on_a_board_in_another_process(clutch):
     with a_board(clutch, "--patient") as port:
-        result = package.loop("board_smc_2", port=port, duration=1.2)
+        result = package.loop("board_smc_2", port=port, patient=True, duration=1.2)
     assert result.verdict == "done" and result.board_waits is None
     assert port in result.announcement
 

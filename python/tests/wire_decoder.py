@@ -15,7 +15,7 @@ LAYOUTS = {
         "Configure",
         "run:H config:Q period_us:I watchdog_us:I safe_kind:B hold_code:H release_code:H ramp_step:I hold_periods:I",
     ),
-    0x03: ("Arm", "run:H config:Q"),
+    0x03: ("Arm", "run:H config:Q boot:I"),
     0x04: ("Actuate", "run:H sequence:H code:H valid_us:H"),
     0x05: ("Stop", "run:H reason:B"),
     0x06: ("Ping", "run:H nonce:I"),

@@ -223,6 +223,7 @@ impl Host {
             10 => m.period_us = u32::MAX,
             11 => m.run = random.next() as u16,
             12 => m.ramp_step = 0,
+            14 => m.watchdog_us = 100 * period_us + 1,
             13 => (m.period_us, m.watchdog_us) = (limit, p.watchdog_max_us),
             _ => {}
         }
@@ -246,7 +247,10 @@ impl Host {
                 schema: if random.chance(1, 8) { SCHEMA ^ (1 << random.below(64)) } else { SCHEMA },
             }),
             1 => Message::Configure(self.configure(random)),
-            2 => Message::Arm(Arm { run, config }),
+            2 => {
+                let boot = if random.chance(1, 20) { random.next() as u32 } else { self.params.boot };
+                Message::Arm(Arm { run, config, boot })
+            }
             4 if !driving || random.chance(1, 3) => {
                 Message::Stop(Stop { run, reason: random.range(0, 4) as u8 })
             }
@@ -422,7 +426,7 @@ fn long_run() -> Vec<(Event, Shown)> {
     };
     let start = u32::MAX - 30_000_000;
     let mut bytes = encode(&Message::Configure(configure)).as_bytes().to_vec();
-    bytes.extend(encode(&Message::Arm(Arm { run: 1, config: 2 })).as_bytes());
+    bytes.extend(encode(&Message::Arm(Arm { run: 1, config: 2, boot: 1 })).as_bytes());
     let mut events = vec![Event::Power(params), Event::Bytes { now: start, bytes }];
     for tick in 0..140_000_u32 {
         let now = start.wrapping_add(tick * 1000);

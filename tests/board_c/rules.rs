@@ -49,7 +49,7 @@ fn running(configure: Configure, code: u16) -> Vec<Event> {
     vec![
         Event::Power(BOARD),
         frame(0, Message::Configure(configure)),
-        frame(0, Message::Arm(Arm { run: 1, config: 5 })),
+        frame(0, Message::Arm(Arm { run: 1, config: 5, boot: 9 })),
         tick(0),
         actuate(300, 0, code),
     ]
@@ -119,7 +119,7 @@ fn a_new_run_starts_with_a_clean_slate() {
         frame(2100, late),
         frame(2200, Message::Stop(Stop { run: 1, reason: 0 })),
         frame(2300, Message::Configure(second)),
-        frame(2400, Message::Arm(Arm { run: 2, config: 5 })),
+        frame(2400, Message::Arm(Arm { run: 2, config: 5, boot: 9 })),
         tick(3000),
         frame(3100, answer),
     ];
@@ -158,7 +158,7 @@ fn the_safe_output_goes_on_in_ready_with_the_fields_of_the_run_that_ended() {
             frame(1100, Message::Configure(next)),
             tick(1200),
             tick(2200),
-            frame(2300, Message::Arm(Arm { run: 2, config: 5 })),
+            frame(2300, Message::Arm(Arm { run: 2, config: 5, boot: 9 })),
             tick(3200),
         ];
         let Some(s) = shown(running(RUN, 700), after) else { return };

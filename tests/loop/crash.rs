@@ -149,7 +149,11 @@ fn kills(count: usize, latest: f64, folder: &Path, prepare: impl Fn(&mut Command
     noticed.sort();
     let (middle, most) = (count / 2, missing[count - 1]);
     println!("missing of the log, s: median {:.4}, most {most:.4}, of {count}", missing[middle]);
-    println!("wall time from kill to the board's report: median {:?}, most {:?}", noticed[middle], noticed[count - 1]);
+    println!(
+        "wall time from kill to the board's report: median {:?}, most {:?}",
+        noticed[middle],
+        noticed[count - 1]
+    );
     assert!(most <= LOST_S, "seed {seed:#x}: {most} s of the log are missing: {missing:?}");
     assert!(noticed[middle] < Duration::from_millis(200), "{noticed:?}");
     let said = board.end();

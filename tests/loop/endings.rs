@@ -13,8 +13,15 @@ fn a_signal_ends_in_the_safe_state(name: &str, signal: Signal) {
     let _alone = alone();
     let log = logged(name);
     let board = Board::start(&["board_smc_2", "--patient"]);
-    let running =
-        start(clutch(&["loop", "board_smc_2", "--port", &board.port, "--log", log.to_str().unwrap()]));
+    let running = start(clutch(&[
+        "loop",
+        "board_smc_2",
+        "--patient",
+        "--port",
+        &board.port,
+        "--log",
+        log.to_str().unwrap(),
+    ]));
     let _ = board.wait_for(0, "Running");
     std::thread::sleep(Duration::from_millis(300));
     running.signal(signal);
@@ -46,8 +53,15 @@ fn an_unplugged_port_is_told(name: &str, listen: &[&str]) {
     let _alone = alone();
     let log = logged(name);
     let mut board = Board::start(&[&["board_smc_2", "--patient"], listen].concat());
-    let running =
-        start(clutch(&["loop", "board_smc_2", "--port", &board.port, "--log", log.to_str().unwrap()]));
+    let running = start(clutch(&[
+        "loop",
+        "board_smc_2",
+        "--patient",
+        "--port",
+        &board.port,
+        "--log",
+        log.to_str().unwrap(),
+    ]));
     let _ = board.wait_for(0, "Running");
     std::thread::sleep(Duration::from_millis(300));
     board.kill();

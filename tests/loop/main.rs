@@ -13,4 +13,5 @@ mod ports;
 mod refusals;
 mod same_as_simulation;
 mod start;
+mod strangers;
 mod system_calls;

@@ -5,9 +5,10 @@ use crate::harness::{Board, alone, clutch, run, start};
 fn a_second_loop_is_refused(listen: &[&str]) {
     let _alone = alone();
     let board = Board::start(&[&["board_smc_2", "--patient"], listen].concat());
-    let first = start(clutch(&["loop", "board_smc_2", "--duration", "3", "--port", &board.port]));
+    let first =
+        start(clutch(&["loop", "board_smc_2", "--duration", "3", "--patient", "--port", &board.port]));
     let _ = board.wait_for(0, "Running");
-    let second = run(&["loop", "board_smc_2", "--duration", "3", "--port", &board.port]);
+    let second = run(&["loop", "board_smc_2", "--duration", "3", "--patient", "--port", &board.port]);
     let whose = if board.port.starts_with('/') { "(clutch, process " } else { "" };
     let _ = second.expect(1).says(&[
         &board.port,
@@ -39,8 +40,16 @@ fn a_port_is_free_again_after_its_loop_has_ended() {
     let _alone = alone();
     let board = Board::start(&["board_smc_2", "--patient"]);
     for _ in 0..2 {
-        let args =
-            ["loop", "board_smc_2", "--duration", "0.3", "--set", "run.settle_s=0", "--port", &board.port];
+        let args = [
+            "loop",
+            "board_smc_2",
+            "--duration",
+            "0.3",
+            "--patient",
+            "--set=run.settle_s=0",
+            "--port",
+            &board.port,
+        ];
         let _ = run(&args).expect(0);
     }
     assert_eq!(board.end().matches("Stopped").count(), 2);

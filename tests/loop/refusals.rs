@@ -19,7 +19,7 @@ fn board_that_answers(mut answer: impl FnMut(&Message) -> Option<Message> + Send
     })
 }
 
-fn hello(asked: &Discover) -> Hello {
+pub(crate) fn hello(asked: &Discover) -> Hello {
     Hello {
         nonce: asked.nonce,
         version: VERSION,

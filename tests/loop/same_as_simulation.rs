@@ -70,6 +70,7 @@ fn ten_seconds_agree(name: &str, listen: &[&str]) {
             scenario,
             "--set",
             SMOOTHED,
+            "--patient",
             "--port",
             &board.port,
             "--duration",

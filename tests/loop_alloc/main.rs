@@ -114,6 +114,7 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let hello = Talk::new(&mut port, &mut station).discover(Duration::from_secs(5)).unwrap();
     assert_eq!(hello.board, PATIENT_BOARD);
     let mut built = BuiltRun::<f64>::new(&scenario, hello.run.wrapping_add(1).max(1)).unwrap();
+    built.controller.boot = hello.boot;
     built.controller.silence = clutch_core::Micros(400_000);
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
     let mut station = ControllerStation { node, path: &path };

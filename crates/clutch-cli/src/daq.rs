@@ -3,12 +3,12 @@
 use crate::args::ScenarioArgs;
 use crate::output::{Exit, print};
 use crate::signals::stop_flag;
-use anyhow::Context;
 use clap::Args;
 use clutch_loop::faults::Fault;
-use clutch_loop::port::{Address, ClientEvent, Endpoint, Listener, PseudoTerminal};
+use clutch_loop::port::{Address, AddressError, ClientEvent, Endpoint, Listener, PseudoTerminal};
 use clutch_loop::realtime::WaitMode;
 use clutch_loop::sim_board_server::{self, ServeNotice, ServeOptions};
+use std::path::PathBuf;
 
 /// Simulates a board in real time: a pseudo-terminal or a TCP address to drive with `clutch loop`.
 ///
@@ -23,8 +23,9 @@ use clutch_loop::sim_board_server::{self, ServeNotice, ServeOptions};
 pub(crate) struct Daq {
     #[command(flatten)]
     scenario: ScenarioArgs,
-    /// Listens on a TCP address of this machine instead of a pseudo-terminal.
-    #[arg(long, value_name = "tcp://HOST:PORT")]
+    /// Listens on a UNIX socket or a TCP address of this machine instead of a pseudo-terminal. `unix` alone makes a
+    /// socket that only this user may open.
+    #[arg(long, value_name = "unix|unix:///PATH|tcp://HOST:PORT", value_parser = listening)]
     listen: Option<Address>,
     /// Injects a fault; may be given several times.
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
@@ -39,6 +40,16 @@ pub(crate) struct Daq {
     patient: bool,
 }
 
+/// A socket's file of this process, in the user's own folder if the system has one.
+fn own_socket() -> PathBuf {
+    let folder = std::env::var_os("XDG_RUNTIME_DIR").map_or_else(std::env::temp_dir, PathBuf::from);
+    folder.join(format!("clutch-{}.sock", std::process::id()))
+}
+
+fn listening(text: &str) -> Result<Address, AddressError> {
+    if text == "unix" { Ok(Address::Unix(own_socket())) } else { text.parse() }
+}
+
 impl Daq {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let scenario = self.scenario.load()?;
@@ -50,19 +61,29 @@ impl Daq {
         }
         let stop = stop_flag()?;
         let mut endpoint: Box<dyn Endpoint> = match &self.listen {
-            None => Box::new(PseudoTerminal::open().context("a pseudo-terminal could not be opened")?.0),
+            None => match PseudoTerminal::open() {
+                Ok((terminal, _)) => Box::new(terminal),
+                // Where the system has none: what is open to this user alone, too.
+                Err(_) => Box::new(Listener::bind_unix(&own_socket())?),
+            },
             Some(Address::Tcp(address)) => Box::new(Listener::bind(*address)?),
-            Some(other) => anyhow::bail!("--listen {other}: expected a TCP address, as tcp://127.0.0.1:5000"),
+            Some(Address::Unix(path)) => Box::new(Listener::bind_unix(path)?),
+            Some(other) => {
+                anyhow::bail!(
+                    "--listen {other}: expected unix, unix:///PATH or an address as tcp://127.0.0.1:5000"
+                )
+            }
         };
         let address = endpoint.address();
         let path = match &address {
             Address::Serial { path, .. } => path.display().to_string(),
-            Address::Tcp(_) => address.to_string(),
+            Address::Tcp(_) | Address::Unix(_) => address.to_string(),
         };
         let mut text = format!(
-            "{path}\n{}: simulated board; connect with: clutch loop {} --port {path}\n",
+            "{path}\n{}: simulated board; connect with: clutch loop {} --port {path}{}\n",
             scenario.name(),
-            self.scenario.scenario.display()
+            self.scenario.scenario.display(),
+            if self.patient { " --patient" } else { "" }
         );
         for fault in &self.fault {
             text += &format!("fault: {fault} (seconds after arming; seed {})\n", self.fault_seed);
@@ -79,6 +100,7 @@ impl Daq {
             let _ = print(&match notice {
                 ServeNotice::Client(ClientEvent::Connected) => "client connected\n".to_owned(),
                 ServeNotice::Client(ClientEvent::Left) => "client left\n".to_owned(),
+                ServeNotice::Dismissed(reason) => format!("client sent away: {reason}\n"),
                 ServeNotice::State(state, time) => format!("{time:10.6} s  {state:?}\n"),
                 ServeNotice::Faulted(silent) => {
                     format!("              {:.3} ms after the last code that was applied\n", silent * 1e3)

@@ -63,12 +63,16 @@ pub(crate) struct Loop {
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
     /// The board's port; without it a board is simulated.
-    #[arg(long, value_name = "PATH|tcp://HOST:PORT")]
+    #[arg(long, value_name = "PATH|tcp://HOST:PORT|unix:///PATH")]
     port: Option<Address>,
     /// The port of a board that closes the loop itself (docs/firmware.md): it is set up, armed, and
     /// watched.
-    #[arg(long, value_name = "PATH|tcp://HOST:PORT", conflicts_with_all = ["port", "fault", "strict"])]
+    #[arg(long, value_name = "PATH|tcp://HOST:PORT|unix:///PATH", conflicts_with_all = ["port", "fault", "strict"])]
     board: Option<Address>,
+    /// The board at the port is a simulated one whose clock waits when this machine stalls (`clutch daq --patient`): so
+    /// does the loop, before it calls the board silent.
+    #[arg(long, conflicts_with_all = ["fault", "strict"])]
+    patient: bool,
     /// Line rate of the port, baud; no effect on USB, pseudo-terminals and TCP.
     #[arg(long)]
     baud: Option<u32>,
@@ -206,6 +210,7 @@ impl Loop {
                     strict: self.strict,
                 },
             },
+            patient: self.patient,
             baud: self.baud,
             log: self.log.clone(),
             uncertified: self.uncertified,

@@ -104,6 +104,7 @@ impl<T: Real> BuiltRun<T> {
             controller: ControllerParams {
                 run,
                 config: config_hash(scenario),
+                boot: 0, // until the board has said it
                 watchdog: cycles(safety.limits.watchdog_cycles),
                 valid: cycles(safety.limits.valid_cycles),
                 silence: cycles(safety.limits.supervisor.silence_cycles),

@@ -21,6 +21,7 @@ pub mod control_loop;
 pub mod faults;
 pub mod faulty_line;
 pub mod from_scenario;
+mod greeting;
 pub mod lockstep_board;
 pub mod lockstep_host;
 pub mod lockstep_session;

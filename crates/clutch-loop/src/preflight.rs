@@ -124,6 +124,16 @@ pub enum PreflightError {
         /// The board's hash.
         board: u64,
     },
+    /// The board is of another power-up than the one that said who it is.
+    #[error(
+        "{address}: the board was reset since it said who it is (its power-up is number {now:08x} now); start again"
+    )]
+    Reset {
+        /// The port.
+        address: String,
+        /// The number of its power-up, as `Configured` has it.
+        now: u32,
+    },
     /// The board stopped answering.
     #[error(
         "{address}: the board answered at first and then no more, when it was to be {what}. Unplugged, or reset?"
@@ -148,6 +158,7 @@ pub fn why(m: &Refused, settings: Option<&Settings>) -> String {
         Some(Refusal::Period) => format!("it cannot sample each {} µs", m.value),
         Some(Refusal::Watchdog) => format!("its watchdog cannot be set to {} µs", m.value),
         Some(Refusal::Safe) => "it does not know the safe state, or its converter has no such code".into(),
+        Some(Refusal::Boot) => "it was reset since it said who it is; start again".into(),
         Some(Refusal::Busy) => "it is busy".into(),
         Some(reason @ (Refusal::Setting | Refusal::Unfit)) => match settings {
             Some(settings) => {
@@ -294,15 +305,23 @@ impl<'a, S: Station> Talk<'a, S> {
     /// # Errors
     /// The board refuses, or is silent.
     pub fn configure(&mut self, present: clutch_core::DacCode) -> Result<(), PreflightError> {
+        let mut other = None;
         let said = self.exchange(
             Duration::from_secs(1),
             |station, out| station.configure(present, out),
             |n| match n {
                 Notice::Configured => Some(None),
+                Notice::OtherBoot(m) => {
+                    other = Some(m.boot);
+                    Some(None)
+                }
                 Notice::Refused(m) if m.request == clutch_wire::Configure::KIND => Some(Some(*m)),
                 _ => None,
             },
         )?;
+        if let Some(now) = other {
+            return Err(PreflightError::Reset { address: self.address(), now });
+        }
         self.verdict(said, "configured")
     }
 

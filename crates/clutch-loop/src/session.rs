@@ -67,6 +67,9 @@ pub struct SessionOptions {
     pub baud: Option<u32>,
     /// A new file for a log.
     pub log: Option<PathBuf>,
+    /// True if the board is one whose clock waits for this machine, and may be silent for as long: a simulated board of
+    /// another process. Of a session's own board it knows that itself.
+    pub patient: bool,
     /// True if gains may run that are not certified for the scenario's bounds.
     pub uncertified: bool,
     /// Priority, memory, core, wait.
@@ -84,6 +87,7 @@ impl Default for SessionOptions {
             board: Board::Simulated { faults: Vec::new(), seed: 1, strict: false },
             baud: None,
             log: None,
+            patient: false,
             uncertified: false,
             realtime: RealtimeOptions::default(),
             pace: Pace::default(),
@@ -243,6 +247,15 @@ impl Session {
         self.plan.certificate.certified()
     }
 
+    /// True if the board's clock waits for this machine. What the board says of itself decides nothing here: a real one
+    /// that says it would be allowed seconds of silence.
+    fn patient(&self) -> bool {
+        match &self.options.board {
+            Board::Simulated { faults, strict, .. } => !strict && !faults.iter().any(|f| f.kind.silences()),
+            Board::Daq(_) | Board::Controller(_) => self.options.patient,
+        }
+    }
+
     /// The scenario as it will run.
     #[must_use]
     pub fn scenario(&self) -> &Scenario {
@@ -257,10 +270,13 @@ impl Session {
     pub fn run(&self, stop: &Arc<AtomicBool>, event: &mut dyn FnMut(Event)) -> Result<Summary, SessionError> {
         let (simulated, address, faults) = match &self.options.board {
             Board::Daq(address) | Board::Controller(address) => (None, address.clone(), 0),
-            Board::Simulated { faults, seed, strict } => {
-                let patient = !strict && !faults.iter().any(|f| f.kind.silences());
-                let options =
-                    ServeOptions { faults: faults.clone(), seed: *seed, patient, wait: WaitMode::Sleep };
+            Board::Simulated { faults, seed, .. } => {
+                let options = ServeOptions {
+                    faults: faults.clone(),
+                    seed: *seed,
+                    patient: self.patient(),
+                    wait: WaitMode::Sleep,
+                };
                 let (board, address) = SimulatedBoard::start(&self.scenario, options)?;
                 (Some(board), address, faults.len())
             }
@@ -340,6 +356,7 @@ impl Course<'_> {
         let hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
         self.check_fit(&hello, &port)?;
         let built = self.built::<T>(&hello)?;
+        let patient = self.session.patient();
         let mut station = controller(&built, from_scenario::path(scenario)?);
         self.announce(&hello, &port, &notes, None)?;
         let present = present_code(&hello, built.supervisor.safe_codes().hold);
@@ -352,7 +369,7 @@ impl Course<'_> {
             port: &mut port,
             ring: log.ring,
             watch: &log.watch,
-            patient: hello.board == PATIENT_BOARD,
+            patient,
             ticks: built.ticks,
             clock,
             detector: built.detector,
@@ -367,14 +384,18 @@ impl Course<'_> {
         let (mut port, notes) = self.open((Telemetry::LENGTH, 0))?;
         let mut station = host(scenario, &BuiltRun::<f32>::new(scenario, 0)?, false)?;
         let hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
-        let clock_hz = station.node.controller().map_or(0, |c| c.clock_hz);
-        let board = station.node.controller().map_or_else(String::new, controller_text);
+        let met = station.node.controller().copied();
+        let clock_hz = met.map_or(0, |c| c.clock_hz);
+        let board = met.as_ref().map_or_else(String::new, controller_text);
         self.check_fit(&hello, &port)?;
-        let patient = hello.board == PATIENT_BOARD;
+        let patient = self.session.patient();
         let built = self.built::<f32>(&hello)?;
         let host_silence = if patient { built.controller.silence } else { HOST_SILENCE };
         let settings = from_scenario::settings(scenario, &built, host_silence, built.ticks)?;
         let mut station = host(scenario, &built, patient)?;
+        if let Some(met) = &met {
+            station.node.meet(met);
+        }
         self.announce(&hello, &port, &notes, Some(&board))?;
         let hold = built.supervisor.safe_codes().hold;
         let log = self.log(&built, present_code(&hello, hold), &board)?;
@@ -412,12 +433,18 @@ impl Course<'_> {
     /// Checks that encoder and converter are those of the scenario.
     fn check_fit(&self, hello: &Hello, port: &Port) -> Result<(), PreflightError> {
         let mut lines = from_scenario::misfits(&self.session.scenario, hello);
-        let real = !matches!(port.kind(), DeviceKind::PseudoTerminal | DeviceKind::Tcp);
+        let real = port.kind() != DeviceKind::PseudoTerminal && !port.kind().is_socket();
         let is_controller = matches!(self.session.options.board, Board::Controller(_));
         if is_simulated(hello) && real && !is_controller {
             lines.push(format!(
                 "board: its serial number {} is kept for simulated boards; give it another",
                 hello.board
+            ));
+        }
+        if self.session.patient() && hello.board != PATIENT_BOARD {
+            lines.push(format!(
+                "board: {}, and its clock waits for nobody; run without patience",
+                board_text(hello)
             ));
         }
         if lines.is_empty() {
@@ -429,7 +456,8 @@ impl Course<'_> {
     /// A new run on a board with this clock: when the clock waits, so does our patience.
     fn built<T: Real>(&self, hello: &Hello) -> Result<BuiltRun<T>, BuildError> {
         let mut built = BuiltRun::<T>::new(&self.session.scenario, hello.run.wrapping_add(1).max(1))?;
-        if hello.board == PATIENT_BOARD {
+        built.controller.boot = hello.boot;
+        if self.session.patient() {
             built.controller.silence = PATIENT_SILENCE;
         }
         Ok(built)

@@ -8,12 +8,14 @@
 
 use crate::faults::{Direction, Fault};
 use crate::faulty_line::FaultyLine;
+use crate::greeting::Greeting;
 use crate::port::{ClientEvent, Endpoint};
 use crate::realtime::{WaitMode, monotonic_ns};
 use crate::sim_board::{SimBoard, SimBoardError};
 use clutch_node::Outbox;
 use clutch_sim::Scenario;
 use clutch_wire::BoardState;
+use std::hash::{BuildHasher, Hasher};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -44,6 +46,8 @@ pub struct ServeOptions {
 pub enum ServeNotice {
     /// A client came or left.
     Client(ClientEvent),
+    /// A client was sent away, for this reason.
+    Dismissed(&'static str),
     /// The board's state changed, at a time of its own clock, s.
     State(BoardState, f64),
     /// The board went to its safe state on a fault, so long after the last code that it applied
@@ -87,7 +91,8 @@ pub fn serve(
     mut notice: impl FnMut(ServeNotice),
 ) -> Result<ServeReport, ServeError> {
     let patient = options.patient && !options.faults.iter().any(|f| f.kind.silences());
-    let boot = (monotonic_ns() / 1000) as u32;
+    // Keys of the system's random numbers: nobody can guess it.
+    let boot = std::hash::RandomState::new().build_hasher().finish() as u32;
     let mut board = SimBoard::new(scenario, &options.faults, boot, patient)?;
     let mut up = FaultyLine::new(Direction::Up, 0, &options.faults, options.seed);
     let mut down = FaultyLine::new(Direction::Down, 0, &options.faults, options.seed);
@@ -99,12 +104,14 @@ pub fn serve(
     let mut buffer = [0; 1024];
     let mut state = board.node().state();
     let mut present = false;
+    let mut greeting = Greeting::new();
     let mut waiting_since: Option<u64> = None;
     // Bytes that the line did not take at once.
     let mut unsent: Vec<u8> = Vec::new();
     while !stop.load(Ordering::Relaxed) {
         while let Some(event) = endpoint.service()? {
             present = event == ClientEvent::Connected;
+            greeting.client();
             notice(ServeNotice::Client(event));
             if event == ClientEvent::Left {
                 waiting_since = None;
@@ -118,7 +125,10 @@ pub fn serve(
         if until > now {
             let _ = endpoint.wait(until + slipped, options.wait);
         }
-        let count = endpoint.read(&mut buffer)?;
+        let (heard, dismissed) = greeting.read(endpoint, &mut buffer)?;
+        if let Some(reason) = dismissed {
+            notice(ServeNotice::Dismissed(reason));
+        }
         // Nothing happens to a board while its simulation is held up: when this thread woke late, the
         // clock of the board is where the next thing falls due.
         let woke = monotonic_ns().saturating_sub(slipped);
@@ -126,7 +136,7 @@ pub fn serve(
         if woke - now > SLIP_NS {
             slipped += woke - now;
         }
-        down.send(now, board.armed_for(now), buffer.get(..count).unwrap_or(&[]));
+        down.send(now, board.armed_for(now), &heard);
         while let Some(bytes) = down.arrived(now) {
             board.receive(now, &bytes, &mut out)?;
         }

@@ -17,7 +17,7 @@ use clutch_core::{Counts, DacCode, SafeCodes, SafeKind, SafeRun};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, Hello, Message,
     Pong, Refusal, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, StopReason,
-    Stopped, VERSION,
+    Stopped, VERSION, WATCHDOG_PERIODS,
 };
 
 /// Parameters of a board.
@@ -25,7 +25,7 @@ use clutch_wire::{
 pub struct BoardParams {
     /// Its serial number; 0 is the simulated board, whose clock may wait for the controller.
     pub board: u32,
-    /// A number that changes at each power-up.
+    /// A number that changes at each power-up, and cannot be guessed: `Arm` has to bring it back.
     pub boot: u32,
     /// Encoder counts per revolution.
     pub counts_per_rev: u32,
@@ -369,7 +369,9 @@ impl BoardNode {
             Some((Refusal::Run, u32::from(self.run)))
         } else if m.period_us < p.period_min_us || m.period_us > p.period_max_us {
             Some((Refusal::Period, m.period_us))
-        } else if m.watchdog_us / 2 < m.period_us || m.watchdog_us > p.watchdog_max_us {
+        } else if m.watchdog_us / 2 < m.period_us
+            || m.watchdog_us > m.period_us.saturating_mul(WATCHDOG_PERIODS).min(p.watchdog_max_us)
+        {
             Some((Refusal::Watchdog, m.watchdog_us))
         } else if safe_kind.is_none() || !codes_fit || never_arrives {
             Some((Refusal::Safe, u32::from(m.safe_kind)))
@@ -416,6 +418,9 @@ impl BoardNode {
             Some((Refusal::Run, u32::from(self.run)))
         } else if m.config != self.config {
             Some((Refusal::Config, self.config as u32))
+        } else if m.boot != self.params.boot {
+            // Without the number: whoever has not heard it is not told.
+            Some((Refusal::Boot, 0))
         } else {
             None
         };

@@ -211,7 +211,12 @@ impl BoardController {
                 host.push(&ended(number, &ending));
             }
             Notice::Hello(m) => hello = Some(m),
-            Notice::ControllerHello(_) | Notice::Taken(_) | Notice::BadFrame(_) | Notice::Echo => {}
+            // Another power-up of encoder and converter: the host hears nothing, asks again, and is told who is there.
+            Notice::OtherBoot(_)
+            | Notice::ControllerHello(_)
+            | Notice::Taken(_)
+            | Notice::BadFrame(_)
+            | Notice::Echo => {}
         });
         if let Some(m) = hello {
             self.hello = Some(m);
@@ -272,6 +277,7 @@ impl BoardController {
                 let state = self.state();
                 let refusal = match &mut self.run {
                     Some(run) if run.number == m.run && run.config == m.config => match state {
+                        _ if m.boot != self.params.boot => (Refusal::Boot, 0),
                         State::Ready | State::Armed | State::Running => {
                             run.control.arm(&mut out.daq);
                             return;
@@ -359,6 +365,7 @@ impl BoardController {
         let params = ControllerParams {
             run: m.run,
             config: m.config,
+            boot: hello.boot,
             watchdog: times.watchdog,
             valid: times.valid,
             silence: times.silence,

@@ -19,6 +19,8 @@ pub struct ControllerParams {
     pub run: u16,
     /// Hash of the scenario.
     pub config: u64,
+    /// The board's power-up, as its `Hello` has it. A `Hello` that comes before the run is configured sets it.
+    pub boot: u32,
     /// The board's watchdog.
     pub watchdog: Micros,
     /// Time after its sample for which a code is valid.
@@ -128,7 +130,11 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
 
     /// Consent.
     pub fn arm(&mut self, out: &mut Outbox) {
-        out.push(&Message::Arm(Arm { run: self.params.run, config: self.params.config }));
+        out.push(&Message::Arm(Arm {
+            run: self.params.run,
+            config: self.params.config,
+            boot: self.params.boot,
+        }));
     }
 
     /// Asks for the board's clock.
@@ -226,9 +232,18 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
     ) {
         let (run, config) = (self.params.run, self.params.config);
         match message {
-            Message::Hello(m) => notices(Notice::Hello(*m)),
+            Message::Hello(m) => {
+                if self.state.state() == State::Disconnected {
+                    self.params.boot = m.boot;
+                }
+                notices(Notice::Hello(*m));
+            }
             Message::ControllerHello(m) => notices(Notice::ControllerHello(*m)),
             Message::Configured(m) if m.run == run && m.config == config => {
+                if m.boot != self.params.boot {
+                    notices(Notice::OtherBoot(*m));
+                    return;
+                }
                 self.supervisor.connect(&mut self.state);
                 notices(Notice::Configured);
             }

@@ -82,6 +82,11 @@ impl HostNode {
         self.controller.as_ref()
     }
 
+    /// This board has answered, perhaps another node of this host.
+    pub fn meet(&mut self, controller: &ControllerHello) {
+        self.controller = Some(*controller);
+    }
+
     /// The servo.
     #[must_use]
     pub fn servo(&self) -> &Servo<f32> {
@@ -111,7 +116,11 @@ impl HostNode {
 
     /// Consent.
     pub fn arm(&mut self, out: &mut Outbox) {
-        out.push(&Message::Arm(Arm { run: self.configure.run, config: self.configure.config }));
+        out.push(&Message::Arm(Arm {
+            run: self.configure.run,
+            config: self.configure.config,
+            boot: self.controller.map_or(0, |c| c.boot),
+        }));
     }
 
     /// Asks for the clock of encoder and converter.
@@ -226,12 +235,18 @@ impl HostNode {
         let (run, config) = (self.configure.run, self.configure.config);
         match message {
             Message::ControllerHello(m) => {
-                self.controller = Some(*m);
+                if self.standing.state == State::Disconnected {
+                    self.meet(m);
+                }
                 notices(Notice::ControllerHello(*m));
             }
             Message::Hello(m) => notices(Notice::Hello(*m)),
             Message::Taken(m) if m.run == run => notices(Notice::Taken(*m)),
             Message::Configured(m) if m.run == run && m.config == config => {
+                if self.controller.is_none_or(|c| c.boot != m.boot) {
+                    notices(Notice::OtherBoot(*m));
+                    return;
+                }
                 if self.standing.state == State::Disconnected {
                     self.standing.state = State::Ready;
                     self.number = 0;

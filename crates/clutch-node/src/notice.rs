@@ -2,7 +2,7 @@
 
 use clutch_core::supervisor::{Cause, Cycle, State};
 use clutch_core::{Arithmetic, Micros};
-use clutch_wire::{ControllerHello, Fault, FrameError, Hello, Refused, Sample, Stopped, Taken};
+use clutch_wire::{Configured, ControllerHello, Fault, FrameError, Hello, Refused, Sample, Stopped, Taken};
 
 /// Counts of what the line has carried.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,6 +48,8 @@ pub enum Notice<T: Arithmetic, Terms> {
     Taken(Taken),
     /// The board is configured for this run; samples follow.
     Configured,
+    /// A board of another power-up than the one that said who it is: it was reset in between.
+    OtherBoot(Configured),
     /// The board takes codes.
     Armed,
     /// The board refused a request.

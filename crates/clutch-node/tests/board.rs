@@ -37,7 +37,7 @@ const CONFIGURE: Configure = Configure {
     ramp_step: 6_553_600,
     hold_periods: 2,
 };
-const ARM: Arm = Arm { run: 5, config: CONFIG };
+const ARM: Arm = Arm { run: 5, config: CONFIG, boot: 9 };
 
 /// A board on a desk: frames and times in, frames out.
 struct Bench {
@@ -235,6 +235,17 @@ fn the_edges_of_each_range_are_accepted() {
 }
 
 #[test]
+fn a_watchdog_of_more_than_a_hundred_periods_is_refused() {
+    let params = BoardParams { watchdog_max_us: 10_000_000, ..PARAMS };
+    let mut bench = Bench { board: BoardNode::new(&params).unwrap(), ..Bench::boot() };
+    let m = Configure { period_us: 1000, watchdog_us: 100_001, ..CONFIGURE };
+    let heard = bench.hears(Message::Configure(m));
+    assert_eq!(heard, refused(Configure::KIND, Refusal::Watchdog, 100_001));
+    let heard = bench.hears(Message::Configure(Configure { watchdog_us: 100_000, ..m }));
+    assert!(matches!(heard[..], [Message::Configured(_)]), "{heard:?}");
+}
+
+#[test]
 fn a_ramp_that_never_arrives_is_refused() {
     let m = Configure { safe_kind: SafeKind::Ramp as u8, ramp_step: 0, ..CONFIGURE };
     let heard = Bench::boot().hears(Message::Configure(m));
@@ -266,11 +277,16 @@ fn the_same_configure_again_is_an_answer_that_was_lost() {
 #[test]
 fn consent_needs_the_run_and_the_configuration_that_were_configured() {
     let mut bench = Bench::ready();
-    let heard = bench.hears(Message::Arm(Arm { run: 6, config: 0 }));
+    let heard = bench.hears(Message::Arm(Arm { run: 6, config: 0, boot: 9 }));
     assert_eq!(heard, refused(Arm::KIND, Refusal::Run, 5));
-    let heard = bench.hears(Message::Arm(Arm { run: 5, config: CONFIG ^ 1 }));
+    let heard = bench.hears(Message::Arm(Arm { run: 5, config: CONFIG ^ 1, boot: 9 }));
     assert_eq!(heard, refused(Arm::KIND, Refusal::Config, CONFIG as u32));
     assert_eq!(bench.state(), BoardState::Ready);
+    for boot in [0, 8, 10, u32::MAX] {
+        let heard = bench.hears(Message::Arm(Arm { boot, ..ARM }));
+        assert_eq!(heard, refused(Arm::KIND, Refusal::Boot, 0));
+        assert_eq!(bench.state(), BoardState::Ready);
+    }
     let bench = bench.arm();
     assert_eq!((bench.state(), bench.code()), (BoardState::Armed, PARAMS.boot_code), "the output stays");
 }
@@ -695,7 +711,7 @@ fn any_frame() -> impl Strategy<Value = Message> {
                     hold_periods,
                 })
             }),
-        (run(), config()).prop_map(|(run, config)| Message::Arm(Arm { run, config })),
+        (run(), config()).prop_map(|(run, config)| Message::Arm(Arm { run, config, boot: 9 })),
         (run(), near(), code(), any::<u16>()).prop_map(|(run, sequence, code, valid_us)| {
             Message::Actuate(Actuate { run, sequence, code, valid_us })
         }),

@@ -256,7 +256,7 @@ fn a_setting_while_consent_is_on_its_way_lets_the_boards_watchdog_bite() {
     let mut arm = Outboxes::default();
     desk.board_controller.host(
         desk.now_ns,
-        encode(&Message::Arm(Arm { run: 5, config: CONFIG })).as_bytes(),
+        encode(&Message::Arm(Arm { run: 5, config: CONFIG, boot: BOARD_CONTROLLER.boot })).as_bytes(),
         &mut arm,
     );
     let (key, value) = desk.plan.pairs()[0];
@@ -270,16 +270,21 @@ fn a_setting_while_consent_is_on_its_way_lets_the_boards_watchdog_bite() {
 #[test]
 fn consent_needs_the_run_and_the_configuration_that_were_configured() {
     let mut desk = Desk::new(Plan::new());
-    let heard = desk.says(Message::Arm(Arm { run: 5, config: CONFIG }));
+    let heard = desk.says(Message::Arm(Arm { run: 5, config: CONFIG, boot: BOARD_CONTROLLER.boot }));
     assert_eq!(heard, refused(Arm::KIND, Refusal::Run, 0));
     let mut desk = Desk::ready(Plan::new());
     for (run, config) in [(6, CONFIG), (5, CONFIG ^ 1)] {
-        let heard = desk.says(Message::Arm(Arm { run, config }));
+        let heard = desk.says(Message::Arm(Arm { run, config, boot: BOARD_CONTROLLER.boot }));
         assert_eq!(heard, refused(Arm::KIND, Refusal::Run, 5));
+    }
+    // That of encoder and converter, for one, is not the controller's.
+    for boot in [0, BOARD.boot] {
+        let heard = desk.says(Message::Arm(Arm { run: 5, config: CONFIG, boot }));
+        assert_eq!(heard, refused(Arm::KIND, Refusal::Boot, 0));
     }
     assert_eq!(desk.board.state(), BoardState::Ready);
     assert_eq!(
-        desk.says(Message::Arm(Arm { run: 5, config: CONFIG })),
+        desk.says(Message::Arm(Arm { run: 5, config: CONFIG, boot: BOARD_CONTROLLER.boot })),
         [Message::Armed(Armed { run: 5, config: CONFIG })]
     );
 }

@@ -23,6 +23,7 @@ const CONFIG: u64 = 0xfeed;
 const PARAMS: ControllerParams = ControllerParams {
     run: RUN,
     config: CONFIG,
+    boot: 1,
     watchdog: Micros(3000),
     valid: Micros(2000),
     silence: Micros(3000),
@@ -150,6 +151,16 @@ fn stop(reason: StopReason) -> [Message; 1] {
 }
 
 #[test]
+fn another_power_up_than_that_of_the_hello_is_not_believed() {
+    let mut desk = Desk::new();
+    desk.asks(|node, out| node.configure(DacCode(2048), out));
+    let other = Message::Configured(Configured { run: RUN, config: CONFIG, boot: 2 });
+    assert_eq!(desk.reads(&[other]), []);
+    assert_eq!(desk.state(), State::Disconnected);
+    assert!(matches!(desk.notices.last(), Some(Notice::OtherBoot(m)) if m.boot == 2));
+}
+
+#[test]
 fn the_handshake_leads_from_discover_to_the_first_answer() {
     let mut desk = Desk::new();
     let sent = desk.asks(|node, out| node.discover(9, out));
@@ -175,7 +186,7 @@ fn the_handshake_leads_from_discover_to_the_first_answer() {
         assert_eq!(desk.reads(&[Message::Sample(sample)]), [], "samples before consent are not answered");
     }
     let sent = desk.asks(|node, out| node.arm(out));
-    assert_eq!(sent, [Message::Arm(Arm { run: RUN, config: CONFIG })]);
+    assert_eq!(sent, [Message::Arm(Arm { run: RUN, config: CONFIG, boot: 1 })]);
     assert_eq!(desk.state(), State::Ready);
     assert_eq!(desk.reads(&[ARMED]), []);
     assert_eq!((desk.state(), desk.node.state().code()), (State::Armed, DacCode(2300)));

@@ -99,7 +99,7 @@ impl Desk {
 fn driving() -> (DaqBoard, Desk) {
     let (mut board, mut desk) = (DaqBoard::new(&PARAMS).unwrap(), Desk::default());
     desk.hears(&mut board, &Message::Configure(CONFIGURE));
-    desk.hears(&mut board, &Message::Arm(Arm { run: 5, config: 7 }));
+    desk.hears(&mut board, &Message::Arm(Arm { run: 5, config: 7, boot: 9 }));
     (board, desk)
 }
 
@@ -171,7 +171,7 @@ fn the_role_is_told_what_a_period_took_up_to_its_code_also_when_the_clocks_wrap(
     let mut desk = Desk { now_us: u64::from(u32::MAX) - 3, cycles: u32::MAX - 100, ..Desk::default() };
     let mut clerk = Clerk::default();
     desk.ticks(&mut clerk);
-    desk.hears(&mut clerk, &Message::Arm(Arm { run: 5, config: 7 }));
+    desk.hears(&mut clerk, &Message::Arm(Arm { run: 5, config: 7, boot: 9 }));
     assert_eq!(clerk.told, [(1190, Micros(7))]);
 }
 

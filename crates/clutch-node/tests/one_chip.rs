@@ -246,7 +246,9 @@ fn a_run_on_one_chip_ends_by_itself_and_another_may_follow() {
     let heard = bench.asks(|host, out| host.arm(out));
     assert!(matches!(heard[..], [Message::Refused(m)] if m.request == Arm::KIND), "{heard:?}");
     bench.plan = Plan { run: 6, ..Plan::new() };
+    let met = *bench.host.controller().unwrap();
     bench.host = bench.plan.host();
+    bench.host.meet(&met);
     for (key, value) in bench.plan.pairs() {
         bench.asks(|host, out| host.set(key, value, out));
     }

@@ -12,8 +12,9 @@
 #include <stdint.h>
 #include <string.h>
 
-#define CLUTCH_VERSION 2u
-#define CLUTCH_SCHEMA UINT64_C(0x4f527cdae8dd5a89)
+#define CLUTCH_VERSION 3u
+#define CLUTCH_WATCHDOG_PERIODS 100u
+#define CLUTCH_SCHEMA UINT64_C(0x22f2b95f25792755)
 #define CLUTCH_MAX_BODY 87u  /* longest frame before stuffing, bytes */
 #define CLUTCH_MAX_FRAME 89u /* longest frame on the wire, bytes */
 #define CLUTCH_MAX_LIST 8u  /* most numbers of a list */
@@ -49,7 +50,7 @@
 #define CLUTCH_REFUSAL_CONFIG 4u /* The configuration hash is not the configured one; value is the low 32 bits of the board's. */
 #define CLUTCH_REFUSAL_STATE 5u /* Not in this state; value is the BoardState, or a controller's own state of control. */
 #define CLUTCH_REFUSAL_PERIOD 6u /* The period is out of the board's range; value is the period asked for, us. */
-#define CLUTCH_REFUSAL_WATCHDOG 7u /* The watchdog time is below two periods or above the board's limit; value is the time asked for, us. */
+#define CLUTCH_REFUSAL_WATCHDOG 7u /* The watchdog time is below two periods, above a hundred, or above the board's limit; value is the time asked for, us. */
 #define CLUTCH_REFUSAL_SAFE 8u /* No such safe output: unknown kind, or a code above the converter's top; value is the kind. */
 #define CLUTCH_REFUSAL_LATE 9u /* Came too late. A board of version 1 shows this in Sample.status instead; value is the delay, us. */
 #define CLUTCH_REFUSAL_BUSY 10u /* Cannot be done just now: ask again; value is 0. */
@@ -58,6 +59,7 @@
 #define CLUTCH_REFUSAL_UNFIT 13u /* The settings make no run; value is the key of the offending one, and above its 16 bits the number of the condition between several that does not hold, or 0. */
 #define CLUTCH_REFUSAL_NO_BOARD 14u /* Nothing answers where the controller's encoder and converter should be; value is 0. */
 #define CLUTCH_REFUSAL_DIFFERS 15u /* Configure differs from the settings; value is 0. */
+#define CLUTCH_REFUSAL_BOOT 16u /* Arm does not bring back the number of the power-up that the hello had; value is 0. */
 
 /* Bits of the field status of Sample. */
 #define CLUTCH_STATUS_STATE 0x07u /* The bits that hold the BoardState. */
@@ -271,12 +273,14 @@ static inline void clutch_get_configure(const uint8_t *body, clutch_configure_t 
 
 /* Arm: Consent to the run that was configured. */
 #define CLUTCH_ARM_KIND 0x03u
-#define CLUTCH_ARM_LENGTH 15u
+#define CLUTCH_ARM_LENGTH 19u
 #define CLUTCH_ARM_RUN 1u
 #define CLUTCH_ARM_CONFIG 3u
+#define CLUTCH_ARM_BOOT 11u
 typedef struct {
     uint16_t run; /* The configured run. */
     uint64_t config; /* The configured hash. */
+    uint32_t boot; /* The number of the power-up that the board gave in its hello: who arms has heard the board. */
 } clutch_arm_t;
 
 /* The frame for the wire; its length, bytes. */
@@ -286,6 +290,7 @@ static inline size_t clutch_encode_arm(uint8_t wire[CLUTCH_MAX_FRAME], const clu
     body[0] = CLUTCH_ARM_KIND;
     clutch_put_u16(body + CLUTCH_ARM_RUN, m->run);
     clutch_put_u64(body + CLUTCH_ARM_CONFIG, m->config);
+    clutch_put_u32(body + CLUTCH_ARM_BOOT, m->boot);
     return clutch_frame(wire, body, CLUTCH_ARM_LENGTH);
 }
 
@@ -294,6 +299,7 @@ static inline void clutch_get_arm(const uint8_t *body, clutch_arm_t *m)
 {
     m->run = clutch_get_u16(body + CLUTCH_ARM_RUN);
     m->config = clutch_get_u64(body + CLUTCH_ARM_CONFIG);
+    m->boot = clutch_get_u32(body + CLUTCH_ARM_BOOT);
 }
 
 /* Actuate: A code for the converter, in answer to a sample. */
@@ -439,8 +445,8 @@ typedef struct {
     uint32_t nonce; /* The nonce of Discover. */
     uint8_t version; /* The board's version of the protocol. */
     uint64_t schema; /* The board's schema hash. */
-    uint32_t board; /* The board's own serial number; 0 and 1 are simulated boards. */
-    uint32_t boot; /* Another number at each power-up. */
+    uint32_t board; /* The board's own serial number; 0 and 1 are simulated boards, and 0 one whose clock may wait. */
+    uint32_t boot; /* Another number at each power-up, which cannot be guessed; Arm brings it back. */
     uint32_t counts_per_rev; /* Encoder counts per revolution, after quadrature. [counts per revolution] */
     uint8_t dac_bits; /* Resolution of the converter. [bits] */
     int32_t dac_lowest_mv; /* Output at code 0. [mV] */
@@ -748,7 +754,7 @@ typedef struct {
     uint64_t schema; /* The board's schema hash. */
     uint64_t settings; /* The board's hash of its table of settings. */
     uint32_t board; /* The board's own serial number; 0 and 1 are emulated boards. */
-    uint32_t boot; /* Another number at each power-up. */
+    uint32_t boot; /* Another number at each power-up, which cannot be guessed; Arm brings it back. */
     uint32_t clock_hz; /* Frequency of Telemetry.cycles; 0 if it counts nothing. [Hz] */
     uint16_t knots; /* Points that a path given as a table may have. */
     uint8_t state; /* State of control: the supervisor's state. */

@@ -124,8 +124,8 @@ codes! {
         State = 5,
         /// The period is out of the board's range; `value` is the period asked for, µs.
         Period = 6,
-        /// The watchdog time is below two periods or above the board's limit; `value` is the time asked
-        /// for, µs.
+        /// The watchdog time is below two periods, above a hundred, or above the board's limit; `value` is
+        /// the time asked for, µs.
         Watchdog = 7,
         /// No such safe output: unknown kind, or a code above the converter's top; `value` is the kind.
         Safe = 8,
@@ -145,6 +145,8 @@ codes! {
         NoBoard = 14,
         /// `Configure` differs from the settings; `value` is 0.
         Differs = 15,
+        /// `Arm` does not bring back the number of the power-up that the hello had; `value` is 0.
+        Boot = 16,
     }
 }
 

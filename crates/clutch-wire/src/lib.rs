@@ -25,7 +25,11 @@ pub use message::{
 
 /// Version of the protocol: of the rules, of the codes' meanings and of the framing. A change of
 /// the table alone shows in [`SCHEMA`].
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
+
+/// Most periods that a host may ask a board's watchdog to wait for: a host that has gone does not leave a code on for
+/// longer.
+pub const WATCHDOG_PERIODS: u32 = 100;
 
 #[cfg(test)]
 mod tests;

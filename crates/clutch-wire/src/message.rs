@@ -257,6 +257,8 @@ messages! {
         run: u16,
         /// The configured hash.
         config: u64,
+        /// The number of the power-up that the board gave in its hello: who arms has heard the board.
+        boot: u32,
     }
 
     /// A code for the converter, in answer to a sample.
@@ -305,9 +307,9 @@ messages! {
         version: u8,
         /// The board's schema hash.
         schema: u64,
-        /// The board's own serial number; 0 and 1 are simulated boards.
+        /// The board's own serial number; 0 and 1 are simulated boards, and 0 one whose clock may wait.
         board: u32,
-        /// Another number at each power-up.
+        /// Another number at each power-up, which cannot be guessed; `Arm` brings it back.
         boot: u32,
         /// Encoder counts per revolution, after quadrature.
         counts_per_rev: u32 ["counts per revolution"],
@@ -421,7 +423,7 @@ messages! {
         settings: u64,
         /// The board's own serial number; 0 and 1 are emulated boards.
         board: u32,
-        /// Another number at each power-up.
+        /// Another number at each power-up, which cannot be guessed; `Arm` brings it back.
         boot: u32,
         /// Frequency of `Telemetry.cycles`; 0 if it counts nothing.
         clock_hz: u32 ["Hz"],

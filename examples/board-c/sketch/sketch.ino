@@ -101,13 +101,19 @@ static void start_clock()
     TIM5->CR1 = TIM_CR1_CEN;
 }
 
-/* A different number at each power-up. */
+/* A different number at each power-up, which a host that has not heard it cannot guess: from a counter, and from the
+ * noise of a pin that is not connected. A chip with a generator of random numbers should ask that instead. */
 static uint32_t next_boot()
 {
-    uint32_t boot;
-    EEPROM.get(0, boot);
-    boot++;
-    EEPROM.put(0, boot);
+    uint32_t counter, boot;
+    EEPROM.get(0, counter);
+    counter++;
+    EEPROM.put(0, counter);
+    boot = counter;
+    for (int i = 0; i < 64; i++) {
+        boot = (boot ^ (uint32_t)analogRead(PB1) ^ micros()) * 0x9e3779b1u;
+        boot ^= boot >> 15;
+    }
     return boot;
 }
 

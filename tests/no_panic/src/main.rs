@@ -620,6 +620,7 @@ fn control_node<T: Real>() {
     let params = ControllerParams {
         run: word() as u16,
         config: word(),
+        boot: word() as u32,
         watchdog: micros(),
         valid: micros(),
         silence: micros(),

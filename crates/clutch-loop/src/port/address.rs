@@ -8,7 +8,7 @@ use std::str::FromStr;
 /// Line rate unless told otherwise, baud: the cycle's frames at 1 kHz do not fit below 460 800.
 pub const DEFAULT_BAUD: u32 = 921_600;
 
-/// The address of a board: `/dev/ttyUSB0` or `tcp://127.0.0.1:5000`.
+/// The address of a board: `/dev/ttyUSB0`, `tcp://127.0.0.1:5000` or `unix:///run/user/1000/board`.
 ///
 /// ```
 /// use clutch_loop::port::{Address, DEFAULT_BAUD};
@@ -35,6 +35,8 @@ pub enum Address {
     },
     /// A board that listens on TCP.
     Tcp(SocketAddr),
+    /// A board that listens on a UNIX socket: the file that it made.
+    Unix(PathBuf),
 }
 
 impl fmt::Display for Address {
@@ -42,6 +44,7 @@ impl fmt::Display for Address {
         match self {
             Address::Serial { path, .. } => write!(f, "{}", path.display()),
             Address::Tcp(to) => write!(f, "tcp://{to}"),
+            Address::Unix(path) => write!(f, "unix://{}", path.display()),
         }
     }
 }
@@ -94,6 +97,13 @@ impl FromStr for Address {
                 }
                 None => fail(None),
             };
+        }
+        if let Some(path) = text.strip_prefix("unix://")
+            && path.len() > 1
+            && path.starts_with('/')
+            && !path.contains('\0')
+        {
+            return Ok(Address::Unix(PathBuf::from(path)));
         }
         if text.contains("://") || text.contains('\0') {
             return fail(None);

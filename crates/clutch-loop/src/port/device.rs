@@ -32,6 +32,8 @@ pub enum DeviceKind {
     Uart,
     /// A TCP connection.
     Tcp,
+    /// A UNIX socket.
+    Unix,
 }
 
 impl DeviceKind {
@@ -39,6 +41,12 @@ impl DeviceKind {
     #[must_use]
     pub fn has_line_rate(self) -> bool {
         matches!(self, DeviceKind::UsbSerial | DeviceKind::Uart)
+    }
+
+    /// True for a connection, false for a device file.
+    #[must_use]
+    pub fn is_socket(self) -> bool {
+        matches!(self, DeviceKind::Tcp | DeviceKind::Unix)
     }
 
     /// In words, with an article.
@@ -50,6 +58,7 @@ impl DeviceKind {
             DeviceKind::UsbSerial => "a USB serial adapter",
             DeviceKind::Uart => "a serial line",
             DeviceKind::Tcp => "a TCP connection",
+            DeviceKind::Unix => "a UNIX socket",
         }
     }
 }

@@ -87,6 +87,14 @@ pub enum PortError {
         /// The system's answer.
         source: io::Error,
     },
+    /// The UNIX socket can be neither made nor opened.
+    #[error("unix://{}: {source}; start the board first, or name a file that does not exist, in a folder of yours", path.display())]
+    Socket {
+        /// Its file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
     /// The TCP address is open to other machines.
     #[error("tcp://{to}: other machines could reach this address, and whoever does moves the shaft; expected a loopback address, as tcp://127.0.0.1:{}", to.port())]
     NotLoopback {

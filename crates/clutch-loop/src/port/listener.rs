@@ -1,12 +1,19 @@
-//! A TCP address as the end of a simulated board.
+//! A TCP address or a UNIX socket as the end of a simulated board.
 
 use super::pty::wait_or_sleep;
 use super::{Address, ClientEvent, Endpoint, PortError, received, sent};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns};
-use rustix::fd::AsFd;
-use rustix::net::SendFlags;
+use rustix::fd::{AsFd, OwnedFd};
+use rustix::net::{
+    AddressFamily, RecvFlags, SendFlags, Shutdown, SocketAddrUnix, SocketFlags, SocketType, bind, recv,
+    shutdown, socket_with,
+};
+use std::fs::Permissions;
 use std::io;
-use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpListener};
+use std::os::unix::fs::{FileTypeExt, PermissionsExt};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
 
 /// The line that a second client reads before its connection is closed. It ends like a frame, so that a
 /// decoder that does not know it drops it as one bad frame.
@@ -18,19 +25,37 @@ const REFUSED: usize = 4;
 /// Time that a second client has for reading that it is one, ns.
 const LINGER: u64 = 1_000_000_000;
 
-/// The board's end of a TCP line: one client at a time.
+/// A client that has said nothing for so long makes room for one that wants its place, ns.
+const IDLE: u64 = 10_000_000_000;
+
+/// The socket that a board listens on.
+#[derive(Debug)]
+enum Socket {
+    Tcp(TcpListener, SocketAddr),
+    /// A file, which goes with it.
+    Unix(UnixListener, PathBuf),
+}
+
+/// The board's end of a TCP or UNIX line: one client at a time.
 #[derive(Debug)]
 pub struct Listener {
-    listener: TcpListener,
-    address: SocketAddr,
-    client: Option<TcpStream>,
+    socket: Socket,
+    client: Option<OwnedFd>,
+    /// The time at which it last said something, or came, ns.
+    heard_ns: u64,
+    /// The one that takes an idle client's place.
+    next: Option<OwnedFd>,
     /// The client's end was seen; not yet told by [`Endpoint::service`].
     ended: bool,
     /// Connections that are told "busy", and until when they are kept, ns.
-    refused: [Option<(TcpStream, u64)>; REFUSED],
+    refused: [Option<(OwnedFd, u64)>; REFUSED],
 }
 
 impl Listener {
+    fn on(socket: Socket) -> Self {
+        Listener { socket, client: None, heard_ns: 0, next: None, ended: false, refused: Default::default() }
+    }
+
     /// Listens on a loopback address: only programs on this machine can connect. Port 0 takes any
     /// free one; [`Endpoint::address`] tells which.
     ///
@@ -53,9 +78,49 @@ impl Listener {
             let listener = TcpListener::bind(address)?;
             listener.set_nonblocking(true)?;
             let address = listener.local_addr()?;
-            Ok(Listener { listener, address, client: None, ended: false, refused: Default::default() })
+            Ok(Listener::on(Socket::Tcp(listener, address)))
         };
         listen().map_err(|source| PortError::CannotListen { to: address, source })
+    }
+
+    /// Listens on a UNIX socket, a new file that only this user may open (mode 0600); it goes with the listener. A
+    /// socket on which nobody listens any more gives way.
+    ///
+    /// # Errors
+    /// [`PortError::Socket`].
+    pub fn bind_unix(path: &Path) -> Result<Self, PortError> {
+        let listen = || -> io::Result<Listener> {
+            let stale = std::fs::symlink_metadata(path).is_ok_and(|found| found.file_type().is_socket());
+            if stale && UnixStream::connect(path).is_err_and(|e| e.kind() == io::ErrorKind::ConnectionRefused)
+            {
+                std::fs::remove_file(path)?;
+            }
+            let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+            let socket = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;
+            bind(&socket, &SocketAddrUnix::new(path)?)?;
+            // Before it listens: until then nobody is let in.
+            std::fs::set_permissions(path, Permissions::from_mode(0o600))?;
+            rustix::net::listen(&socket, 16)?;
+            Ok(Listener::on(Socket::Unix(UnixListener::from(socket), path.to_owned())))
+        };
+        listen().map_err(|source| PortError::Socket { path: path.to_owned(), source })
+    }
+
+    /// The next connection that waits.
+    fn accept(&self) -> io::Result<OwnedFd> {
+        match &self.socket {
+            Socket::Tcp(listener, _) => {
+                let (stream, _) = listener.accept()?;
+                stream.set_nonblocking(true)?;
+                stream.set_nodelay(true)?;
+                Ok(stream.into())
+            }
+            Socket::Unix(listener, _) => {
+                let (stream, _) = listener.accept()?;
+                stream.set_nonblocking(true)?;
+                Ok(stream.into())
+            }
+        }
     }
 
     /// A client is connected, as the last [`Endpoint::service`] found.
@@ -64,14 +129,11 @@ impl Listener {
         self.client.is_some()
     }
 
-    fn refuse(&mut self, stream: TcpStream) {
+    fn refuse(&mut self, stream: OwnedFd) {
         let Some(free) = self.refused.iter_mut().find(|slot| slot.is_none()) else { return };
-        if stream.set_nonblocking(true).is_err() {
-            return;
-        }
         // It fits into an empty buffer; if not, the closing says enough.
         let _ = rustix::net::send(&stream, BUSY_LINE, SendFlags::NOSIGNAL);
-        let _ = stream.shutdown(Shutdown::Write);
+        let _ = shutdown(&stream, Shutdown::Write);
         // Closed now, with bytes of the client unread, the connection would be reset and the
         // message lost.
         *free = Some((stream, monotonic_ns().saturating_add(LINGER)));
@@ -98,16 +160,25 @@ impl Endpoint for Listener {
             self.client = None;
             return Ok(Some(ClientEvent::Left));
         }
+        if self.next.is_some() {
+            (self.client, self.heard_ns) = (self.next.take(), monotonic_ns());
+            return Ok(Some(ClientEvent::Connected));
+        }
         self.let_go();
         // A few at a time: somebody who connects without end must not hold the board up.
         for _ in 0..REFUSED {
-            match self.listener.accept() {
-                Ok((stream, _)) if self.client.is_some() => self.refuse(stream),
-                Ok((stream, _)) => {
-                    if stream.set_nonblocking(true).and_then(|()| stream.set_nodelay(true)).is_ok() {
-                        self.client = Some(stream);
-                        return Ok(Some(ClientEvent::Connected));
+            match self.accept() {
+                Ok(stream) if self.client.is_some() => {
+                    if monotonic_ns().saturating_sub(self.heard_ns) < IDLE {
+                        self.refuse(stream);
+                        continue;
                     }
+                    (self.client, self.next) = (None, Some(stream));
+                    return Ok(Some(ClientEvent::Left));
+                }
+                Ok(stream) => {
+                    (self.client, self.heard_ns) = (Some(stream), monotonic_ns());
+                    return Ok(Some(ClientEvent::Connected));
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
                 // The connection was gone before it was accepted, or a signal came.
@@ -123,7 +194,7 @@ impl Endpoint for Listener {
         }
         // A client that left is seen by reading, without taking bytes away.
         if let Some(client) = &self.client
-            && matches!(client.peek(&mut [0]), Ok(0))
+            && matches!(recv(client, &mut [0_u8], RecvFlags::PEEK), Ok((_, 0)))
         {
             self.ended = false;
             self.client = None;
@@ -140,6 +211,12 @@ impl Endpoint for Listener {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
                 self.ended = true;
                 Ok(0)
+            }
+            Ok(count) => {
+                if count > 0 {
+                    self.heard_ns = monotonic_ns();
+                }
+                Ok(count)
             }
             other => other,
         }
@@ -165,11 +242,30 @@ impl Endpoint for Listener {
                 Readiness::Timeout
             }
             // A connection request ends the wait: `service` takes it.
-            None => wait_or_sleep(self.listener.as_fd(), until_ns, mode),
+            None => match &self.socket {
+                Socket::Tcp(listener, _) => wait_or_sleep(listener.as_fd(), until_ns, mode),
+                Socket::Unix(listener, _) => wait_or_sleep(listener.as_fd(), until_ns, mode),
+            },
         }
     }
 
     fn address(&self) -> Address {
-        Address::Tcp(self.address)
+        match &self.socket {
+            Socket::Tcp(_, address) => Address::Tcp(*address),
+            Socket::Unix(_, path) => Address::Unix(path.clone()),
+        }
+    }
+
+    fn dismiss(&mut self) -> bool {
+        self.ended |= self.client.is_some();
+        true
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        if let Socket::Unix(_, path) = &self.socket {
+            let _ = std::fs::remove_file(path); // it may be gone already
+        }
     }
 }

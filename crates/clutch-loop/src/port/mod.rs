@@ -1,4 +1,5 @@
-//! The line to the board: a serial device, a pseudo-terminal or a TCP connection.
+//! The line to the board: a serial device, a pseudo-terminal, a TCP connection or a UNIX
+//! socket.
 //!
 //! [`Port`] is a station's end. It owns one non-blocking file descriptor; [`Port::read`] and
 //! [`Port::write`] make one system call each and never allocate. Waiting is the caller's, with
@@ -37,6 +38,7 @@ use rustix::termios::{
 };
 use std::io;
 use std::net::{SocketAddr, TcpStream};
+use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::Duration;
 
@@ -91,6 +93,7 @@ impl Port {
                 open_serial(address, path, options.baud.unwrap_or(*baud), options)
             }
             Address::Tcp(to) => open_tcp(address, *to),
+            Address::Unix(path) => open_unix(address, path),
         }
     }
 
@@ -122,7 +125,7 @@ impl Port {
     /// # Errors
     /// As for [`Port::read`].
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.kind == DeviceKind::Tcp {
+        if self.kind.is_socket() {
             return sent(rustix::net::send(&self.fd, bytes, SendFlags::NOSIGNAL));
         }
         sent(rustix::io::write(&self.fd, bytes))
@@ -163,12 +166,12 @@ impl Port {
         Ok(device::tight_line(self.baud, bytes, period))
     }
 
-    /// Drops all bytes that wait in either direction. No effect on TCP.
+    /// Drops all bytes that wait in either direction. No effect on sockets.
     ///
     /// # Errors
     /// As the system gives it.
     pub fn discard(&mut self) -> io::Result<()> {
-        if self.kind == DeviceKind::Tcp {
+        if self.kind.is_socket() {
             return Ok(());
         }
         Ok(tcflush(&self.fd, QueueSelector::IOFlush)?)
@@ -192,7 +195,7 @@ impl Drop for Port {
     fn drop(&mut self) {
         // Closing gives both up, unless a program being started at this instant still has a copy of
         // the descriptor: it keeps one until its own code is loaded.
-        if self.kind != DeviceKind::Tcp {
+        if !self.kind.is_socket() {
             let _ = flock(&self.fd, FlockOperation::NonBlockingUnlock);
         }
         if matches!(self.kind, DeviceKind::UsbCdc | DeviceKind::UsbSerial | DeviceKind::Uart) {
@@ -339,6 +342,18 @@ fn open_tcp(address: &Address, to: SocketAddr) -> Result<Opened, PortError> {
     Ok(Opened { port, notes })
 }
 
+fn open_unix(address: &Address, path: &Path) -> Result<Opened, PortError> {
+    let open = || -> io::Result<UnixStream> {
+        let stream = UnixStream::connect(path)?;
+        stream.set_nonblocking(true)?;
+        Ok(stream)
+    };
+    let stream = open().map_err(|source| PortError::Socket { path: path.to_owned(), source })?;
+    let port =
+        Port { fd: stream.into(), kind: DeviceKind::Unix, address: address.clone(), baud: 0, fresh: true };
+    Ok(Opened { port, notes: Vec::new() })
+}
+
 /// A client's coming and going, as a board sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClientEvent {
@@ -378,6 +393,12 @@ pub trait Endpoint {
 
     /// The address at which clients reach it, as they write it.
     fn address(&self) -> Address;
+
+    /// Closes the connection to the present client, which [`Endpoint::service`] then tells to have left. False where
+    /// there is no connection to close: on a pseudo-terminal, whose clients are programs of this user.
+    fn dismiss(&mut self) -> bool {
+        false
+    }
 }
 
 #[cfg(test)]

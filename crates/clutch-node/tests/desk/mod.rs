@@ -112,6 +112,7 @@ impl Plan {
         let params = ControllerParams {
             run: self.run,
             config: CONFIG,
+            boot: BOARD.boot,
             watchdog: self.watchdog,
             valid: Micros(2000),
             silence: self.silence,
@@ -339,7 +340,10 @@ impl Desk {
 
     /// Another run with the same boards.
     pub fn next(&mut self, plan: Plan) {
+        let met = self.host.controller().copied();
         (self.plan, self.host, self.twin) = (plan, plan.host(), plan.control());
+        // The host's next node knows of the same board.
+        met.iter().for_each(|met| self.host.meet(met));
         self.twin.configure(plan.supervisor().safe_codes().hold, &mut Outbox::default());
         (self.notices, self.expected, self.sent) = (Vec::new(), Vec::new(), Vec::new());
     }

@@ -53,7 +53,7 @@ params! {
     pub struct ScenarioLimits<f64>: Default {
         /// Periods without a valid code after which the board goes to its safe state by itself. Keep it equal to
         /// `silence_cycles`.
-        watchdog_cycles: u32 = 3, "watchdog_cycles" "" CYCLES, Range::within(2.0, 1000.0);
+        watchdog_cycles: u32 = 3, "watchdog_cycles" "" CYCLES, Range::within(2.0, 100.0);
         /// Periods after its sample during which a code is valid; at most 65.535 ms.
         valid_cycles: u32 = 2, "valid_cycles" "" CYCLES, Range::within(1.0, 1000.0);
     }

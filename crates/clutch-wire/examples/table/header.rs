@@ -2,6 +2,7 @@
 
 use clutch_wire::{
     CODES, FieldInfo, List, MAX_BODY, MAX_FRAME, MessageInfo, SCHEMA, STATUS, TABLE, TELEMETRY, VERSION,
+    WATCHDOG_PERIODS,
 };
 use std::fmt::Write as _;
 
@@ -42,6 +43,7 @@ pub(crate) fn text() -> String {
 fn write_all(out: &mut String) -> std::fmt::Result {
     out.push_str(HEAD);
     writeln!(out, "#define CLUTCH_VERSION {VERSION}u")?;
+    writeln!(out, "#define CLUTCH_WATCHDOG_PERIODS {WATCHDOG_PERIODS}u")?;
     writeln!(out, "#define CLUTCH_SCHEMA UINT64_C({SCHEMA:#018x})")?;
     writeln!(out, "#define CLUTCH_MAX_BODY {MAX_BODY}u  /* longest frame before stuffing, bytes */")?;
     writeln!(out, "#define CLUTCH_MAX_FRAME {MAX_FRAME}u /* longest frame on the wire, bytes */")?;

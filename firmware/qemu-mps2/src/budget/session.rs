@@ -21,6 +21,7 @@ use clutch_wire::{
 
 const RUN: u16 = 7;
 const CONFIG: u64 = 0xfeed_f00d;
+const BOOT: u32 = 0x5eed_b007;
 const RUNS: u32 = 600;
 const PERIODS: u32 = 60;
 
@@ -58,14 +59,14 @@ fn session(kind: u32) -> Option<Session> {
     })
     .ok()?;
     let mut session = Session {
-        node: BoardController::new(BoardControllerParams { board: 1, boot: 1, clock_hz: 0 }),
+        node: BoardController::new(BoardControllerParams { board: 1, boot: BOOT, clock_hz: 0 }),
         outboxes: Outboxes::default(),
         now_ns: 0,
     };
     session.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
     session.node.daq(0, encode(&hello(RUN)).as_bytes(), &mut session.outboxes);
     settings.each(|key, value| session.asks(&Message::Set(Set { run: RUN, key, value })));
-    let params = ControllerParams { run: RUN, config: CONFIG, watchdog, valid, silence };
+    let params = ControllerParams { run: RUN, config: CONFIG, boot: BOOT, watchdog, valid, silence };
     let supervisor = Supervisor::new(&supervisor, &servo, &bounds).ok()?;
     let node = ControllerNode::new(params, Servo::new(&servo).ok()?, supervisor);
     session.asks(&Message::Configure(node.configuration()));
@@ -96,7 +97,7 @@ fn hello(run: u16) -> Message {
         version: VERSION,
         schema: SCHEMA,
         board: 1,
-        boot: 1,
+        boot: BOOT,
         counts_per_rev: 20_000,
         dac_bits: 12,
         dac_lowest_mv: -10_000,
@@ -196,10 +197,10 @@ pub fn measure() -> Option<()> {
     let mut random = Random::new(5);
     for kind in 0..RUNS {
         let mut session = session(kind)?;
-        let configured = Configured { run: RUN, config: CONFIG, boot: 1 };
+        let configured = Configured { run: RUN, config: CONFIG, boot: BOOT };
         others.add(session.period(&Bytes::of(&Message::Configured(configured))));
         if kind % 16 != 15 {
-            session.asks(&Message::Arm(Arm { run: RUN, config: CONFIG }));
+            session.asks(&Message::Arm(Arm { run: RUN, config: CONFIG, boot: BOOT }));
             others.add(session.period(&Bytes::of(&Message::Armed(Armed { run: RUN, config: CONFIG }))));
         }
         // The frequency of faults differs from run to run: a run that ends early tries little.
