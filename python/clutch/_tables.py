@@ -1974,11 +1974,17 @@ class Limits(_Params):
     saturation_time_s : float, default 0.2
         Time at a limit of the voltage that ends control. A finite number above 0 s; a time of 1 to 4e9 times
         sampling.period_us.
-    stand_still_counts : float, default 1.1
-        Distance that the shaft must have gone without a count. A finite number of at least 1 counts.
+    edge_counts : float, default 0.2
+        Counts by which an edge of the encoder may lie off its place. A finite number of at least 0 counts.
     friction_margin : float, default 1.8
-        Factor by which the friction at the upper bound may be exceeded before a shaft under brake is expected
-        to move. A finite number of at least 1.
+        Factor by which friction may exceed its upper bound before the counts of a shaft that it would have
+        stopped sooner are not believed. A finite number of at least 1.
+    grip_margin : float, default 1.2
+        Factor by which friction may fall short of its lower bound before a shaft that is faster ends control.
+        A finite number of at least 1.
+    delay_cycles : int, default 0
+        Periods from a code to its effect, beyond the one in which it is sent; above 2 the effect may be that
+        of any voltage of the output. No less than `rig.delay_ticks`. A whole number from 0 to 1000 periods.
     lost : int, default 26
         Lost samples within 128 periods that end control. A whole number from 1 to 128 within 128 periods.
     late : int, default 26
@@ -2021,8 +2027,10 @@ class Limits(_Params):
     following_error_deg: float = 1.0
     following_time_s: float = 0.02
     saturation_time_s: float = 0.2
-    stand_still_counts: float = 1.1
+    edge_counts: float = 0.2
     friction_margin: float = 1.8
+    grip_margin: float = 1.2
+    delay_cycles: int = 0
     lost: int = 26
     late: int = 26
     disorder: int = 2

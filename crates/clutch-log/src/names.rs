@@ -124,6 +124,10 @@ pub const CAUSES: Names = &[
     (13, "Target"),
     (14, "Operator"),
     (15, "Done"),
+    (16, "Channel"),
+    (17, "Reversed"),
+    (18, "TooSlow"),
+    (19, "TooFast"),
 ];
 
 /// The limit at which the output stage changed the law's demand, if any.

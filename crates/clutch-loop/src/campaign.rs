@@ -5,7 +5,7 @@
 //! the table of `docs/safety.md`; the tests run it with fewer seeds, and show that it fails when
 //! any one of the supervisor's checks is taken out.
 
-use crate::faults::{Direction, Fault, FaultKind, StuckAt};
+use crate::faults::{Channel, Direction, Fault, FaultKind, StuckAt};
 use crate::from_scenario::{self, BuildError, BuiltRun};
 use crate::lockstep_board::LockstepBoard;
 use crate::lockstep_host::lockstep_host;
@@ -33,6 +33,8 @@ pub enum Broken {
     Once(FaultKind, Direction),
     /// Frames hit at random: probability.
     Random(FaultKind, Direction, f64),
+    /// The drive is stronger by this factor, and the output limited to little more than its old self needs.
+    Load(f64),
     /// The controller takes so long for an answer, s.
     Slow(f64),
     /// The law's memory is corrupted: its demand is not a number.
@@ -81,6 +83,8 @@ pub struct Case {
     pub watchdog_cycles: u32,
     /// Only the PD law, on the ramp, on the paper's rig.
     pub narrow: bool,
+    /// Only the paper's rig: what the bench's uneven friction can do hides the fault.
+    pub paper: bool,
 }
 
 const UP: Direction = Direction::Up;
@@ -100,9 +104,11 @@ pub const CASES: &[Case] = {
     use Broken::{Fault as F, Once, Periodic, Random};
     use Cause as C;
     const fn case(name: &'static str, hazards: &'static str, broken: Broken, expected: Expected) -> Case {
-        Case { name, hazards, broken, expected, watchdog_cycles: 3, narrow: false }
+        Case { name, hazards, broken, expected, watchdog_cycles: 3, narrow: false, paper: false }
     }
     const SILENT: &[C] = &[C::Silence, C::Board];
+    /// The first count back may be a dead channel's.
+    const BACK: &[C] = &[C::Reversed, C::Channel];
     &[
         case("all frames dropped, both ways", "H6", F(FaultKind::Drop, BOTH), safe(3.0, &[C::Silence])),
         case("all frames from the board dropped", "H6", F(FaultKind::Drop, UP), safe(3.0, &[C::Silence])),
@@ -133,32 +139,94 @@ pub const CASES: &[Case] = {
         case("encoder frozen", "H1", F(FaultKind::EncoderFreeze, BOTH), safe(10.0, &[C::StandStill])),
         case("encoder off by 500 counts", "H2", F(FaultKind::EncoderJump(500), BOTH), safe(3.0, &[C::Jump])),
         case("encoder off by −20 counts", "H2", F(FaultKind::EncoderJump(-20), BOTH), safe(3.0, &[C::Jump])),
+        Case {
+            paper: true,
+            ..case(
+                "encoder off by 3 counts",
+                "H2",
+                F(FaultKind::EncoderJump(3), BOTH),
+                safe(3.0, &[C::TooFast]),
+            )
+        },
+        Case {
+            paper: true,
+            ..case(
+                "encoder off by −3 counts",
+                "H2",
+                F(FaultKind::EncoderJump(-3), BOTH),
+                safe(12.0, &[C::Reversed, C::Channel, C::TooFast]),
+            )
+        },
+        case(
+            "encoder's channel A dead",
+            "H1",
+            F(FaultKind::EncoderChannel(Channel::A), BOTH),
+            safe(10.0, &[C::Channel]),
+        ),
+        case(
+            "encoder's channel B dead",
+            "H1",
+            F(FaultKind::EncoderChannel(Channel::B), BOTH),
+            safe(10.0, &[C::Channel]),
+        ),
+        case(
+            "encoder frozen in nine periods of ten",
+            "H1",
+            Random(FaultKind::EncoderFreeze, BOTH, 0.9),
+            safe(20.0, &[C::StandStill, C::TooSlow, C::TooFast, C::Jump]),
+        ),
+        case("counts doubled", "H2", F(FaultKind::EncoderScale(2.0), BOTH), safe(40.0, &[C::TooFast])),
+        case("counts reversed", "H3", F(FaultKind::EncoderScale(-1.0), BOTH), safe(10.0, BACK)),
         case("encoder lost", "H1", F(FaultKind::EncoderLoss, BOTH), safe(3.0, &[C::Board])),
         case(
             "DAC stuck at 0 V",
             "H5",
             F(FaultKind::DacStuck(StuckAt::Volts(0.0)), BOTH),
-            detected(80.0, &[C::FollowingError]),
+            detected(20.0, &[C::TooFast]),
         ),
         case(
             "DAC stuck at 10 V",
             "H5",
             F(FaultKind::DacStuck(StuckAt::Volts(10.0)), BOTH),
-            safe(25.0, &[C::StandStill]),
+            safe(25.0, &[C::StandStill, C::TooSlow]),
         ),
         case(
             "DAC stuck where it is",
             "H5",
             F(FaultKind::DacStuck(StuckAt::Last), BOTH),
-            detected(1200.0, &[C::Saturation, C::FollowingError, C::StandStill]),
+            detected(300.0, &[C::TooFast, C::TooSlow, C::StandStill, C::FollowingError]),
+        ),
+        Case {
+            paper: true,
+            ..case(
+                "DAC at half its voltage",
+                "H5",
+                F(FaultKind::DacScale(0.5), BOTH),
+                detected(40.0, &[C::TooFast]),
+            )
+        },
+        case(
+            "DAC the wrong way round",
+            "H5",
+            F(FaultKind::DacScale(-1.0), BOTH),
+            detected(20.0, &[C::TooFast]),
         ),
         Case {
             narrow: true,
             ..case(
-                "DAC stuck at 2.24 V",
-                "H5, H13",
-                F(FaultKind::DacStuck(StuckAt::Volts(2.24)), BOTH),
+                "load a little above what the output can brake",
+                "H12, H13",
+                Broken::Load(1.347),
                 detected(600.0, &[C::Saturation]),
+            )
+        },
+        Case {
+            narrow: true,
+            ..case(
+                "load twice as heavy, above what the output can brake",
+                "H12, H13",
+                Broken::Load(2.0),
+                detected(200.0, &[C::FollowingError]),
             )
         },
         case("board reset", "H16", F(FaultKind::Reset, BOTH), safe(3.0, &[C::Silence])),
@@ -183,7 +251,6 @@ pub const CASES: &[Case] = {
             Once(FaultKind::EncoderJump(500), BOTH),
             Expected::Tolerated,
         ),
-        case("encoder off by 3 counts", "H2", F(FaultKind::EncoderJump(3), BOTH), Expected::Tolerated),
         Case {
             watchdog_cycles: 8,
             ..case("2 % of frames dropped", "H6", Random(FaultKind::Drop, BOTH, 0.02), Expected::Tolerated)
@@ -278,11 +345,25 @@ impl RunId {
     fn scenario_in(&self, scalar: &str) -> Result<Scenario, ScenarioError> {
         let rig = if self.on_bench() { "bench" } else { "paper" };
         let cycles = self.case().watchdog_cycles;
+        let load = match self.case().broken {
+            Broken::Load(factor) => {
+                let (before, at) = (clutch_core::PlantParams::<f64>::default().drive_torque, self.onset());
+                let (after, rises) = (factor * before, at + 1e-3);
+                format!(
+                    "[rig.drive.table]\npoints_s_nm = [[{at:?}, {before:?}], [{rises:?}, {after:?}]]\n\
+                     [output]\nhighest_v = 3.0\non_invalid_v = 3.0\n"
+                )
+            }
+            _ => String::new(),
+        };
+        // A slow drift is to reach the limit of the voltage's time, not that of the error.
+        let (engine, error) =
+            if load.is_empty() { ("", "1.0") } else { ("engine = \"dormand_prince\"\n", "3.0") };
         let text = format!(
-            "name = \"campaign\"\n[rig]\nbase = \"{rig}\"\n[law.{}]\n{}[sampling]\nscalar = \"{scalar}\"\n\
-             [run]\nduration_s = 5.0\nstart = \"rest\"\nseed = {}\n\
+            "name = \"campaign\"\n[rig]\nbase = \"{rig}\"\n{load}[law.{}]\n{}[sampling]\nscalar = \"{scalar}\"\n\
+             [run]\n{engine}duration_s = 5.0\nstart = \"rest\"\nseed = {}\n\
              [safety]\nreason = \"a weight drives the shaft\"\n[safety.on_fault.hold]\nvolts_v = 9.99\n\
-             [safety.limits]\nwatchdog_cycles = {cycles}\nsilence_cycles = {cycles}\n",
+             [safety.limits]\nwatchdog_cycles = {cycles}\nsilence_cycles = {cycles}\nfollowing_error_deg = {error}\n",
             LAWS[self.law], PATHS[self.path].1, self.seed
         );
         Scenario::parse("campaign", &text, &[])
@@ -291,7 +372,7 @@ impl RunId {
     /// True if the rig is the bench, whose friction is a third weaker and uneven.
     #[must_use]
     pub fn on_bench(&self) -> bool {
-        self.seed.is_multiple_of(3) && !self.case().narrow
+        self.seed.is_multiple_of(3) && !self.case().narrow && !self.case().paper
     }
 
     /// Largest overrun where software can help, °: 0.25° at 20 °/s, and with the square of the speed, as
@@ -376,7 +457,7 @@ impl RunId {
             Broken::ControllerDies => {
                 params.stall = Some(Stall { at: onset, until: f64::INFINITY, answer: 1e4 });
             }
-            Broken::LawNotFinite | Broken::TargetNotFinite | Broken::TargetHuge => {}
+            Broken::Load(_) | Broken::LawNotFinite | Broken::TargetNotFinite | Broken::TargetHuge => {}
         }
         params
     }
@@ -438,8 +519,9 @@ impl RunId {
                 return Some("the safe output was never in force".to_owned());
             };
             let took = safe - hit;
-            // The bench has a period more of delay, and CTC there brakes hard before it lets go.
-            let within = if self.on_bench() { 2.0 * within } else { within };
+            // The bench has a period more of delay, and bounds several times as wide; CTC there brakes hard before it lets
+            // go.
+            let within = if self.on_bench() { 2.5 * within } else { within };
             // A microsecond for the clock's grain.
             (took > within + 1e-6)
                 .then(|| format!("safe output after {:.3} ms instead of {} ms", took * 1e3, within * 1e3))
@@ -541,9 +623,9 @@ impl std::fmt::Display for Table {
             "| fault | hazards | runs | limit | safe after, at most: paper rig, bench | overrun, at most | cause named (runs) |"
         )?;
         writeln!(f, "|---|---|---|---|---|---|---|")?;
-        let took = |row: &Row| {
+        let took = |case: &Case, row: &Row| {
             let [paper, bench] = row.longest.map(|s| format!("{:.2} ms", s * 1e3));
-            if row.runs < 20 { paper } else { format!("{paper}, {bench}") }
+            if row.runs < 20 || case.paper { paper } else { format!("{paper}, {bench}") }
         };
         for (case, row) in &self.rows {
             let case = &CASES[*case];
@@ -551,11 +633,11 @@ impl std::fmt::Display for Table {
                 Expected::Safe { within, avoidable, .. } => {
                     let overrun =
                         if avoidable { format!("{:.3}°", row.overrun) } else { "not avoidable".into() };
-                    (format!("{:.1} ms", within * 1e3), took(row), overrun)
+                    (format!("{:.1} ms", within * 1e3), took(case, row), overrun)
                 }
                 Expected::BoardSafe { within } => (
                     format!("{:.1} ms, by the board alone", within * 1e3),
-                    took(row),
+                    took(case, row),
                     format!("{:.3}°", row.overrun),
                 ),
                 Expected::Tolerated => ("goes on".into(), "–".into(), "–".into()),

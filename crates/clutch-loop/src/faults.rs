@@ -29,6 +29,36 @@ pub enum StuckAt {
     Volts(f64),
 }
 
+/// A channel of a quadrature encoder; A is ahead of B by a quarter of a line where counts rise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// The first.
+    A,
+    /// The second.
+    B,
+}
+
+impl Channel {
+    /// Its level at a count.
+    fn high(self, count: i32) -> bool {
+        match self {
+            Channel::A => matches!(count.rem_euclid(4), 1 | 2),
+            Channel::B => count.rem_euclid(4) >= 2,
+        }
+    }
+
+    /// Counts of a decoder that knew the true ones up to `from`, when this channel stayed as it was.
+    #[must_use]
+    pub fn dead(self, from: i32, count: i32) -> i32 {
+        // A edge of the other channel counts up or down by the level of this one.
+        let (other, way) = match self {
+            Channel::A => (Channel::B, if self.high(from) { 1 } else { -1 }),
+            Channel::B => (Channel::A, if self.high(from) { -1 } else { 1 }),
+        };
+        from.wrapping_add(way * (i32::from(other.high(count)) - i32::from(other.high(from))))
+    }
+}
+
 /// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultKind {
@@ -50,10 +80,16 @@ pub enum FaultKind {
     EncoderFreeze,
     /// The encoder's counts are off by this.
     EncoderJump(i32),
+    /// One channel of the encoder is dead: the counts go to and fro with the other.
+    EncoderChannel(Channel),
+    /// The encoder's counts since the onset are multiplied: another resolution, or, below 0, the wrong way.
+    EncoderScale(f64),
     /// The encoder's cable is off: counts 0, and the board sees it.
     EncoderLoss,
     /// The converter does not follow.
     DacStuck(StuckAt),
+    /// The converter's voltage is multiplied.
+    DacScale(f64),
     /// The board starts anew.
     Reset,
 }
@@ -74,8 +110,11 @@ impl FaultKind {
             | FaultKind::Reset => true,
             FaultKind::EncoderFreeze
             | FaultKind::EncoderJump(_)
+            | FaultKind::EncoderChannel(_)
+            | FaultKind::EncoderScale(_)
             | FaultKind::EncoderLoss
-            | FaultKind::DacStuck(_) => false,
+            | FaultKind::DacStuck(_)
+            | FaultKind::DacScale(_) => false,
         }
     }
 }
@@ -119,7 +158,7 @@ impl Fault {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "fault \"{text}\": {problem}\nexpected KIND:KEY=VALUE,…, as drop:p=0.05 or freeze:at=2 or delay:at=1,for=0.1,ms=5\n\
-         kinds: drop, duplicate, corrupt, reorder, silence, delay (ms), jitter (ms), freeze, jump (counts), loss, dac-stuck (volts = a number or last), reset\n\
+         kinds: drop, duplicate, corrupt, reorder, silence, delay (ms), jitter (ms), freeze, jump (counts), channel (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale (factor), reset\n\
          keys: at (s after arming), for (s), p (probability per frame or period), way (up = from the board, down = to it, both)"
 )]
 pub struct FaultError {
@@ -135,6 +174,7 @@ impl FromStr for Fault {
         let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
         let mut fault = Fault::new(FaultKind::Drop, 0.0);
         let (mut ms, mut counts, mut volts, mut when) = (None, None, None, false);
+        let (mut factor, mut dead) = (None, None);
         let mut seen = Vec::new();
         for pair in rest.split(',').filter(|p| !p.is_empty()) {
             let (key, value) = pair.split_once('=').ok_or_else(|| bad(format!("\"{pair}\" has no =")))?;
@@ -177,6 +217,14 @@ impl FromStr for Fault {
                 }
                 "volts" if value == "last" => volts = Some(StuckAt::Last),
                 "volts" => volts = Some(StuckAt::Volts(number()?)),
+                "factor" => factor = Some(number()?),
+                "dead" => {
+                    dead = Some(match value {
+                        "a" => Channel::A,
+                        "b" => Channel::B,
+                        _ => return Err(bad(format!("dead = {value}: expected a or b"))),
+                    });
+                }
                 _ => return Err(bad(format!("unknown key {key}"))),
             }
         }
@@ -191,12 +239,15 @@ impl FromStr for Fault {
             "jitter" => FaultKind::Jitter(ms.take().ok_or_else(|| needs("ms"))?),
             "freeze" => FaultKind::EncoderFreeze,
             "jump" => FaultKind::EncoderJump(counts.take().ok_or_else(|| needs("counts"))?),
+            "channel" => FaultKind::EncoderChannel(dead.take().ok_or_else(|| needs("dead"))?),
+            "scale" => FaultKind::EncoderScale(factor.take().ok_or_else(|| needs("factor"))?),
             "loss" => FaultKind::EncoderLoss,
             "dac-stuck" => FaultKind::DacStuck(volts.take().ok_or_else(|| needs("volts"))?),
+            "dac-scale" => FaultKind::DacScale(factor.take().ok_or_else(|| needs("factor"))?),
             "reset" => FaultKind::Reset,
             _ => return Err(bad(format!("unknown kind {kind}"))),
         };
-        if ms.is_some() || counts.is_some() || volts.is_some() {
+        if ms.is_some() || counts.is_some() || volts.is_some() || factor.is_some() || dead.is_some() {
             return Err(bad(format!("a key that {kind} does not have")));
         }
         if !when {
@@ -218,9 +269,12 @@ impl fmt::Display for Fault {
             FaultKind::Silence => write!(f, "silence")?,
             FaultKind::EncoderFreeze => write!(f, "encoder frozen")?,
             FaultKind::EncoderJump(n) => write!(f, "encoder jump of {n} counts")?,
+            FaultKind::EncoderChannel(channel) => write!(f, "encoder's channel {channel:?} dead")?,
+            FaultKind::EncoderScale(factor) => write!(f, "encoder's counts times {factor}")?,
             FaultKind::EncoderLoss => write!(f, "encoder lost")?,
             FaultKind::DacStuck(StuckAt::Last) => write!(f, "DAC stuck where it is")?,
             FaultKind::DacStuck(StuckAt::Volts(v)) => write!(f, "DAC stuck at {v} V")?,
+            FaultKind::DacScale(factor) => write!(f, "DAC times {factor}")?,
             FaultKind::Reset => write!(f, "board reset")?,
         }
         if self.probability < 1.0 {
@@ -253,6 +307,32 @@ mod tests {
         assert_eq!(stuck.kind, FaultKind::DacStuck(StuckAt::Last));
     }
 
+    /// Against a decoder that sees every edge, as a counter does.
+    #[test]
+    fn a_decoder_with_a_dead_channel_counts_so() {
+        let level = |channel: Channel, n: i32| i32::from(channel.high(n));
+        for dead in [Channel::A, Channel::B] {
+            for from in -5..5_i32 {
+                let seen = |n: i32| match dead {
+                    Channel::A => (level(Channel::A, from), level(Channel::B, n)),
+                    Channel::B => (level(Channel::A, n), level(Channel::B, from)),
+                };
+                let mut counts = from;
+                for n in from..from + 20 {
+                    const GRAY: [(i32, i32); 4] = [(0, 0), (1, 0), (1, 1), (0, 1)];
+                    let place = |pair| GRAY.iter().position(|p| *p == pair).unwrap() as i32;
+                    counts += match (place(seen(n)) - place(seen((n - 1).max(from)))).rem_euclid(4) {
+                        0 => 0,
+                        1 => 1,
+                        3 => -1,
+                        _ => unreachable!("one channel never makes two steps"),
+                    };
+                    assert_eq!(dead.dead(from, n), counts, "{dead:?} dead from {from}, at {n}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_bad_fault_says_what_is_wrong() {
         for (text, problem) in [
@@ -265,6 +345,9 @@ mod tests {
             ("drop:at=1,ms=3", "a key that drop does not have"),
             ("delay:at=1", "delay needs ms"),
             ("jump:at=1,counts=1.5", "not a whole number"),
+            ("channel:at=1,dead=c", "dead = c: expected a or b"),
+            ("scale:at=1", "scale needs factor"),
+            ("dac-scale:at=1,factor=1,dead=a", "a key that dac-scale does not have"),
             ("drop:at", "has no ="),
             ("drop:at=1,where=up", "unknown key where"),
             ("drop:at=nan", "not a number"),

@@ -93,7 +93,7 @@ impl<T: Real> BuiltRun<T> {
         let plan = scenario.plan()?;
         let servo_params = spec.servo()?.cast::<T>();
         let limits = scenario.supervisor(safety).cast::<T>();
-        let bounds = plan.bounds.cast::<T>();
+        let bounds = scenario.supervised_bounds(&plan.bounds)?.cast::<T>();
         let cycles = |n: u32| Micros(spec.period.0.saturating_mul(n));
         Ok(BuiltRun {
             params: servo_params,
@@ -133,7 +133,7 @@ pub fn settings(
     Ok(Settings::new(&RunParams {
         servo: &built.params,
         supervisor: &scenario.supervisor(scenario.safety()?).cast(),
-        bounds: &scenario.plan()?.bounds.cast(),
+        bounds: &scenario.supervised_bounds(&scenario.plan()?.bounds)?.cast(),
         reference: &spec.reference.cast(),
         start: FixedCounts(within),
         times: RunTimes {

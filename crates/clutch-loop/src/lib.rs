@@ -12,6 +12,7 @@
 //! | `virtual_time` | the same run with a computed clock |
 //! | `sim_board`, `sim_board_server` | a board on a rig, both simulated; the same in real time behind a port |
 //! | `faults`, `faulty_line`, `campaign` | what breaks, a line on which it breaks, and the campaign over all of it |
+//! | `healthy` | runs in which nothing breaks |
 //! | `lockstep_board`, `lockstep_host`, `lockstep_session` | a board controller that is asked instead of keeping time, its host, and a session with it |
 //! | `qemu_board` | such a board, emulated |
 //! | `to_log`, `replay` | what a log gets; a log's counts to the law again |
@@ -22,6 +23,7 @@ pub mod faults;
 pub mod faulty_line;
 pub mod from_scenario;
 mod greeting;
+pub mod healthy;
 pub mod lockstep_board;
 pub mod lockstep_host;
 pub mod lockstep_session;

@@ -55,7 +55,10 @@ pub struct SimBoard {
     samples: u64,
     armed_ns: Option<u64>,
     frozen: Option<Counts>,
+    /// The counts when one channel died, or the scale changed.
+    since: Option<Counts>,
     stuck_at: Option<f64>,
+    scaled: Option<f64>,
     reset_done: bool,
     first_hit_ns: Option<u64>,
     events: Vec<Event>,
@@ -123,7 +126,9 @@ impl SimBoard {
             samples: 0,
             armed_ns: None,
             frozen: None,
+            since: None,
             stuck_at: None,
+            scaled: None,
             reset_done: false,
             first_hit_ns: None,
             events: Vec::new(),
@@ -156,7 +161,7 @@ impl SimBoard {
     /// The voltage at the converter's output now, V; a stuck converter's own.
     #[must_use]
     pub fn volts(&self) -> f64 {
-        self.stuck_at.unwrap_or_else(|| self.dac.volts(self.node.code()))
+        self.stuck_at.unwrap_or_else(|| self.dac.volts(self.node.code()) * self.scaled.unwrap_or(1.0))
     }
 
     /// Seconds since the controller's consent; none before.
@@ -236,6 +241,7 @@ impl SimBoard {
         let time = self.armed_for(now_ns);
         let mut counts = self.rig.counts();
         let (mut loss, mut freeze, mut stick, mut reset) = (false, false, None, false);
+        self.scaled = None;
         for i in 0..self.faults.len() {
             let fault = self.faults[i];
             let active = time.is_some_and(|t| fault.active(t));
@@ -246,8 +252,18 @@ impl SimBoard {
             match fault.kind {
                 FaultKind::EncoderFreeze => freeze = true,
                 FaultKind::EncoderJump(n) => counts = Counts(counts.0.wrapping_add(n)),
+                FaultKind::EncoderChannel(channel) => {
+                    let since = *self.since.get_or_insert(counts);
+                    counts = Counts(channel.dead(since.0, counts.0));
+                }
+                FaultKind::EncoderScale(factor) => {
+                    let since = *self.since.get_or_insert(counts);
+                    let moved = (f64::from(counts.since(since)) * factor).floor() as i32;
+                    counts = Counts(since.0.wrapping_add(moved));
+                }
                 FaultKind::EncoderLoss => loss = true,
                 FaultKind::DacStuck(at) => stick = Some(at),
+                FaultKind::DacScale(factor) => self.scaled = Some(factor),
                 FaultKind::Reset => reset = true,
                 _ => continue,
             }

@@ -224,6 +224,8 @@ impl Summary {
 /// stopped it.
 #[must_use]
 pub fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> String {
+    let envelope =
+        |what: &str| format!("{what} ({} ° outside of what a shaft can do)", number(v.to_degrees()));
     match cause {
         Cause::Done => "the path is done".into(),
         Cause::Operator if on_the_board && !stopped => {
@@ -235,9 +237,16 @@ pub fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> St
         Cause::Duplicated => format!("{v} samples came twice within 128 cycles"),
         Cause::Reordered => format!("{v} samples came out of order within 128 cycles"),
         Cause::Jump => format!("the encoder jumped, by {v} counts at last"),
-        Cause::StandStill => format!(
-            "the encoder shows no movement, though the shaft must have gone {} °: encoder frozen, or shaft blocked",
-            number(v.to_degrees())
+        Cause::StandStill => envelope("the encoder shows no movement: encoder frozen, or shaft blocked"),
+        Cause::Channel => envelope("the counts go to and fro: a channel of the encoder is dead, or loose"),
+        Cause::Reversed => {
+            envelope("the counts go backwards, where no shaft goes: encoder or converter the wrong way round")
+        }
+        Cause::TooSlow => envelope(
+            "the counts are behind the slowest shaft of [bounds]: counts missing, a brake that drags, or bounds too narrow",
+        ),
+        Cause::TooFast => envelope(
+            "the counts are ahead of the fastest shaft of [bounds]: brake open, converter, lever or pad broken, or bounds too narrow",
         ),
         Cause::FollowingError => format!("following error of {} °", number(v.to_degrees())),
         Cause::Saturation => "the voltage was at its limit for too long".into(),

@@ -25,7 +25,10 @@
 //! | [`Cause::Late`] | samples or answers come too late, more often than allowed |
 //! | [`Cause::Duplicated`], [`Cause::Reordered`] | samples repeat, or arrive out of order, more often than allowed |
 //! | [`Cause::Jump`] | counts depart from dead reckoning by more than a shaft can, more often than allowed |
-//! | [`Cause::StandStill`] | drive or motor must have moved the shaft against all friction, and no count came |
+//! | [`Cause::StandStill`] | no count came, and no shaft of the bounds can have stood still |
+//! | [`Cause::Channel`] | the same, and counts went to and fro |
+//! | [`Cause::Reversed`] | counts went backwards, where no shaft of the bounds goes |
+//! | [`Cause::TooSlow`], [`Cause::TooFast`] | counts are behind the slowest shaft of the bounds, or ahead of the fastest |
 //! | [`Cause::FollowingError`] | the error exceeds its limit, which grows with the speed |
 //! | [`Cause::Saturation`] | the output is at a limit for too long |
 //! | [`Cause::NotFinite`] | the law's measurement, terms or demand are not numbers |
@@ -37,17 +40,17 @@
 //! The supervisor owns no clock. A log records all that it is told, so a replay decides the
 //! same at every tick.
 
+mod envelope;
 mod params;
 mod state;
 
 pub use params::{LimitParams, SpeedLimit, SupervisorParams};
-use state::Expected;
 pub use state::{Arrival, BoardMode, Cause, Checks, Cycle, Sample, State, SupervisorState};
 
 use crate::law::{ControlLaw, Limit, Terms};
 use crate::safe_state::{SafeCodes, SafeRun};
 use crate::{Bounds, Counts, Dac, DacCode, ParamError, Real, Servo, ServoOutput, ServoParams, Target};
-use params::{Limits, Way};
+use params::Limits;
 
 /// A checked supervisor; never changes in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -195,7 +198,7 @@ impl<T: Real> Supervisor<T> {
         self.check_board(s, sample);
         let Some((moved, elapsed)) = self.plausible_counts(s, sample, periods, cycle) else { return };
         if s.state == State::Running {
-            self.stand_still(s, moved, elapsed);
+            self.within_envelope(s, moved, elapsed);
         }
         if !Self::recovered(s) {
             return;
@@ -396,10 +399,7 @@ impl<T: Real> Supervisor<T> {
         let Some(served) = s.served else {
             let applied = servo.dac().volts(s.code);
             s.servo = servo.start(counts, goal, applied);
-            if self.limits.drives_above_0() {
-                // It may be on its way already, either way.
-                s.expected = [Expected { velocity: -goal.velocity.abs(), travel: T::ZERO }; 2];
-            }
+            s.envelope = self.limits.envelope.start();
             s.voltages = [applied; 4];
             return 1;
         };
@@ -443,66 +443,12 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// A count has come: the slowest shaft that can have made the last counts.
-    fn reckon_slowest<S>(&self, s: &mut SupervisorState<T, S>) {
+    /// What the counts say of a shaft that no shaft of the bounds can be, under the volts that were sent.
+    fn within_envelope<S>(&self, s: &mut SupervisorState<T, S>, moved: i32, periods: u32) {
         let l = &self.limits;
-        // Over four periods it went one count less at least, and may have braked since their middle.
-        let counts = s.recent.iter().fold(0_i32, |sum, n| sum.saturating_add(*n));
-        for (way, expected) in l.ways().iter().zip(&mut s.expected) {
-            let counts =
-                if *way == Way::Forwards { counts } else { counts.saturating_neg() }.saturating_sub(1);
-            let mean = T::from_i32(counts) * l.radians_per_count / (l.period * T::from_i32(4));
-            let braking = l.drag * mean.abs() - l.least_acceleration(*way, s.voltages).0;
-            let lost = braking.max(T::ZERO) * l.period * T::from_i32(2);
-            // With a motor the shaft may go the other way still: it has to stop before it comes this way.
-            let least = if l.drives_above_0() { mean - lost } else { T::ZERO };
-            *expected = Expected { velocity: (mean - lost).max(least), travel: T::ZERO };
-        }
-    }
-
-    /// Moves a shaft that has the least drive and the most brake that the bounds allow, from the
-    /// last count on. When even that one has gone some counts, an encoder that shows none
-    /// is not telling the truth, or something blocks the shaft.
-    fn stand_still<S>(&self, s: &mut SupervisorState<T, S>, moved: i32, periods: u32) {
-        let l = &self.limits;
-        s.recent = if periods == 1 { [moved, s.recent[0], s.recent[1], s.recent[2]] } else { [0; 4] };
-        if moved != 0 {
-            return self.reckon_slowest(s);
-        }
-        let seconds = l.period * T::from_u64(u64::from(periods));
-        let mut farthest = T::ZERO;
-        for (way, expected) in l.ways().iter().zip(&mut s.expected) {
-            // A code may be a cycle on its way, and one may have been lost: the worst of three counts.
-            let [a, b, c, _] = s.voltages;
-            let (on, back) = l.least_acceleration(*way, [a, b, c, c]);
-            let before = expected.velocity;
-            // One that goes the other way turns; one that goes this way stops, and may be driven back by a motor.
-            let after = if before > T::ZERO || (before == T::ZERO && on > T::ZERO) {
-                let after = before + (on - l.drag * before) * seconds;
-                if l.drives_above_0() && back < T::ZERO { after } else { after.max(T::ZERO) }
-            } else if l.drives_above_0() {
-                let after = before + back * seconds;
-                if after > T::ZERO {
-                    after.min((on * seconds).max(T::ZERO))
-                } else if before < T::ZERO {
-                    after
-                } else {
-                    after.min(T::ZERO)
-                }
-            } else {
-                T::ZERO
-            };
-            expected.velocity = after;
-            let (from, to) = (before.max(T::ZERO), after.max(T::ZERO));
-            expected.travel += T::from_f64(0.5) * (from + to) * seconds;
-            if l.drives_above_0() && after <= T::ZERO {
-                // It may come back from here: no way of its own to count.
-                expected.travel = T::ZERO;
-            }
-            farthest = farthest.max(expected.travel);
-        }
-        if farthest > l.stand_still {
-            self.check(s, Cause::StandStill, farthest);
+        let volts = l.envelope.in_force(&s.voltages, s.lost.count() > 0 || s.late.count() > 0);
+        if let Some((cause, counts)) = l.envelope.judge(&mut s.envelope, volts, moved, periods) {
+            self.check(s, cause, counts * l.radians_per_count);
         }
     }
 

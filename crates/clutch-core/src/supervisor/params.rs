@@ -1,5 +1,6 @@
 //! The supervisor's parameters and what they become in ticks and counts.
 
+use super::envelope::Envelope;
 use crate::params::{Range, Table};
 use crate::safe_state::SafeState;
 use crate::{ActuatorKind, Bounds, Interval, Micros, ParamError, Real, ServoParams, Target};
@@ -19,11 +20,16 @@ crate::params! {
         following_time: T = 0.02, "following_time_s" "" S, Range::at_least(0.0);
         /// Time at a limit of the voltage that ends control.
         saturation_time: T = 0.2, "saturation_time_s" "" S, Range::above(0.0);
-        /// Distance that the shaft must have gone without a count.
-        stand_still: T = 1.1, "stand_still_counts" "" COUNTS, Range::at_least(1.0);
-        /// Factor by which the friction at the upper bound may be exceeded before a shaft under brake is expected
-        /// to move.
+        /// Counts by which an edge of the encoder may lie off its place.
+        edge_counts: T = 0.2, "edge_counts" "" COUNTS, Range::at_least(0.0);
+        /// Factor by which friction may exceed its upper bound before the counts of a shaft that it would have stopped
+        /// sooner are not believed.
         friction_margin: T = 1.8, "friction_margin" "" NONE, Range::at_least(1.0);
+        /// Factor by which friction may fall short of its lower bound before a shaft that is faster ends control.
+        grip_margin: T = 1.2, "grip_margin" "" NONE, Range::at_least(1.0);
+        /// Periods from a code to its effect, beyond the one in which it is sent; above 2 the effect may be that of any
+        /// voltage of the output. No less than `rig.delay_ticks`.
+        delay_cycles: u32 = 0, "delay_cycles" "" CYCLES, Range::within(0.0, 1000.0);
         /// Lost samples within 128 periods that end control.
         lost: u32 = 26, "lost" "" IN_128, Range::within(1.0, 128.0);
         /// Late samples, and codes that the board refuses as late, within 128 periods that end control.
@@ -88,7 +94,7 @@ impl<T: Real> SupervisorParams<T> {
     }
 }
 
-/// The parameters in ticks, counts and SI, and what the shaft must do at least.
+/// The parameters in ticks, counts and SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Limits<T> {
     pub(super) period: T,
@@ -100,8 +106,6 @@ pub(super) struct Limits<T> {
     pub(super) following_error: T,
     pub(super) following_time: T,
     pub(super) saturation_cycles: u32,
-    /// rad
-    pub(super) stand_still: T,
     pub(super) lost: u32,
     pub(super) late: u32,
     pub(super) disorder: u32,
@@ -114,30 +118,7 @@ pub(super) struct Limits<T> {
     /// Counts per period at the speed limit, and one more for rounding.
     speed_counts: T,
     actuator: ActuatorKind,
-    /// Least acceleration by the drive forwards, and most, rad/s².
-    drive: T,
-    most_drive: T,
-    /// Most deceleration by the brake, rad/s² per V, and by friction without a voltage, rad/s².
-    brake: T,
-    rubs: T,
-    /// Least and most acceleration by the motor, and most deceleration by friction of its load, rad/s² per V.
-    motor: T,
-    most_motor: T,
-    loads: T,
-    /// Least deceleration by friction without a voltage, rad/s², and by that of a motor's load, rad/s² per V.
-    least_rubs: T,
-    least_loads: T,
-    /// Highest inertia over the lowest.
-    lighter: T,
-    /// Most deceleration by viscous drag, 1/s.
-    pub(super) drag: T,
-}
-
-/// A way that a shaft can go.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Way {
-    Forwards,
-    Backwards,
+    pub(super) envelope: Envelope<T>,
 }
 
 impl<T: Real> Limits<T> {
@@ -159,7 +140,8 @@ impl<T: Real> Limits<T> {
         LimitParams::SATURATION_COUNTED.require(p.saturation_time, fits)?;
         let inertia = bounds.inertia.high;
         Interval::HIGH_USABLE.require(inertia, inertia > T::ZERO)?;
-        let drive = Interval::LOW_USABLE.require(bounds.drive_torque.low, true)?;
+        Interval::LOW_USABLE.require(bounds.inertia.low, bounds.inertia.low > T::ZERO)?;
+        Interval::LOW_USABLE.require(bounds.drive_torque.low, true)?;
         let drag = bounds.viscous_damping.high;
         Interval::HIGH_USABLE.require(drag, drag >= T::ZERO)?;
         let strongest = bounds.strongest_brake();
@@ -168,7 +150,8 @@ impl<T: Real> Limits<T> {
         let motor = &bounds.motor_gain;
         Interval::LOW_USABLE.require(motor.low, motor.low >= T::ZERO)?;
         Interval::HIGH_USABLE.require(motor.high, motor.high >= T::ZERO)?;
-        let most_friction = bounds.friction.high * p.friction_margin;
+        let weakest = bounds.weakest_brake();
+        Interval::LOW_USABLE.require(weakest, weakest >= T::ZERO)?;
         Ok(Limits {
             period,
             radians_per_count: servo.encoder.radians_per_count(),
@@ -178,7 +161,6 @@ impl<T: Real> Limits<T> {
             following_error: p.following_error,
             following_time: p.following_time,
             saturation_cycles: saturation.floor().to_i64() as u32,
-            stand_still: p.stand_still / per_radian,
             lost: p.lost,
             late: p.late,
             disorder: p.disorder,
@@ -189,54 +171,13 @@ impl<T: Real> Limits<T> {
             speed_limit,
             speed_counts: speed_limit * per_radian * period + T::ONE,
             actuator: bounds.actuator,
-            drive: drive / inertia,
-            most_drive: bounds.drive_torque.high / inertia,
-            brake: strongest * p.friction_margin / inertia,
-            rubs: most_friction * bounds.preload / inertia,
-            motor: motor.low / inertia,
-            most_motor: motor.high / inertia,
-            loads: most_friction * bounds.load_share * motor.high / inertia,
-            least_rubs: bounds.friction.low * bounds.preload / inertia,
-            least_loads: bounds.friction.low * bounds.load_share * motor.low / inertia,
-            lighter: inertia / bounds.inertia.low,
-            drag: drag / inertia,
+            envelope: Envelope::new(p, &servo.output, bounds, per_radian * period * period, period),
         })
     }
 
     /// `true` if a voltage above 0 drives the shaft.
     pub(super) fn drives_above_0(&self) -> bool {
         self.actuator.drives_above_0()
-    }
-
-    /// The ways that the shaft may be driven: a brake's goes forwards alone.
-    pub(super) fn ways(&self) -> &'static [Way] {
-        if self.drives_above_0() { &[Way::Forwards, Way::Backwards] } else { &[Way::Forwards] }
-    }
-
-    /// Least acceleration that way with the worst of some voltages, rad/s²: of a shaft that goes that way, negative where
-    /// friction may stop it; and of one that goes the other way, negative where a motor may drive it on.
-    pub(super) fn least_acceleration(&self, way: Way, volts: [T; 4]) -> (T, T) {
-        let [a, b, c, d] = volts.map(|volts| {
-            let (weak, strong) = (self.motor, self.most_motor);
-            let (low, high) = match self.actuator {
-                ActuatorKind::Brake => (T::ZERO, T::ZERO),
-                ActuatorKind::Motor if volts > T::ZERO => (weak * volts, strong * volts),
-                ActuatorKind::Motor => (strong * volts, weak * volts),
-                ActuatorKind::Both => {
-                    let pulled = (-volts).max(T::ZERO);
-                    (weak * pulled, strong * pulled)
-                }
-            };
-            let friction = self.brake * volts.max(T::ZERO) + (self.rubs + self.loads * volts.abs());
-            let driven = match way {
-                Way::Forwards => self.drive + low,
-                Way::Backwards => -(self.most_drive + high),
-            };
-            let helps = self.least_rubs + self.least_loads * volts.abs();
-            let back = driven + helps;
-            (driven - friction, if back < T::ZERO { back * self.lighter } else { back })
-        });
-        (a.0.min(b.0).min(c.0).min(d.0), a.1.min(b.1).min(c.1).min(d.1))
     }
 
     /// True if a path can have a target: numbers, within the speed limit, and near the last.

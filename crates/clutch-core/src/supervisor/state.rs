@@ -1,5 +1,6 @@
 //! Inputs, memory and answers of the supervisor.
 
+use super::envelope::EnvelopeState;
 use crate::law::LawTerms;
 use crate::safe_state::SafeRun;
 use crate::{Arithmetic, Counts, DacCode, Micros, Real, ServoOutput, ServoState, Target};
@@ -79,11 +80,19 @@ pub enum Cause {
     Operator = 14,
     /// The path is done.
     Done = 15,
+    /// Counts to and fro, although the shaft must have moved on.
+    Channel = 16,
+    /// Counts backwards, where no shaft goes.
+    Reversed = 17,
+    /// Counts behind the slowest shaft.
+    TooSlow = 18,
+    /// Counts ahead of the fastest shaft.
+    TooFast = 19,
 }
 
 impl Cause {
     /// Every cause that is a check's.
-    pub const CHECKS: [Cause; 13] = [
+    pub const CHECKS: [Cause; 17] = [
         Cause::Lost,
         Cause::Late,
         Cause::Duplicated,
@@ -97,12 +106,16 @@ impl Cause {
         Cause::Silence,
         Cause::Board,
         Cause::Target,
+        Cause::Channel,
+        Cause::Reversed,
+        Cause::TooSlow,
+        Cause::TooFast,
     ];
 }
 
 /// A set of checks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Checks(u16);
+pub struct Checks(u32);
 
 impl Cause {
     /// The one of this number; none if there is none.
@@ -112,19 +125,25 @@ impl Cause {
             0 => Some(Cause::None),
             14 => Some(Cause::Operator),
             15 => Some(Cause::Done),
-            check => Cause::CHECKS.get(usize::from(check).wrapping_sub(1)).copied(),
+            check => Cause::CHECKS.iter().find(|c| **c as u8 == check).copied(),
         }
     }
 }
 
 impl Checks {
     /// All of them.
-    pub const ALL: Checks = Checks(u16::MAX);
+    pub const ALL: Checks = Checks(u32::MAX);
 
     /// All but one.
     #[must_use]
     pub fn without(self, cause: Cause) -> Checks {
         Checks(self.0 & !Checks::bit(cause))
+    }
+
+    /// Those that are in both sets.
+    #[must_use]
+    pub fn both(a: Checks, b: Checks) -> Checks {
+        Checks(a.0 & b.0)
     }
 
     /// True if the check is on.
@@ -133,8 +152,8 @@ impl Checks {
         self.0 & Checks::bit(cause) != 0
     }
 
-    fn bit(cause: Cause) -> u16 {
-        1_u16.wrapping_shl(cause as u32)
+    fn bit(cause: Cause) -> u32 {
+        1_u32.wrapping_shl(cause as u32)
     }
 }
 
@@ -263,15 +282,6 @@ impl History {
     }
 }
 
-/// The slowest shaft that can be, since the last count.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Expected<T> {
-    /// rad/s
-    pub(super) velocity: T,
-    /// rad
-    pub(super) travel: T,
-}
-
 /// Memory of the supervisor and its servo; a clone is a snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SupervisorState<T, S> {
@@ -297,10 +307,7 @@ pub struct SupervisorState<T, S> {
     pub(super) saturated: u32,
     /// V, the newest first.
     pub(super) voltages: [T; 4],
-    /// Counts of the last four periods, the newest first.
-    pub(super) recent: [i32; 4],
-    /// The slowest shaft that can be, for each way that it may go.
-    pub(super) expected: [Expected<T>; 2],
+    pub(super) envelope: EnvelopeState<T>,
     pub(super) lost: History,
     pub(super) late: History,
     pub(super) duplicated: History,
@@ -383,7 +390,7 @@ mod tests {
     fn a_number_of_the_wire_names_what_it_was_made_of() {
         for n in 0..=u8::MAX {
             assert_eq!(State::from_u8(n).map(|s| s as u8), (n <= 6).then_some(n));
-            assert_eq!(Cause::from_u8(n).map(|c| c as u8), (n <= 15).then_some(n));
+            assert_eq!(Cause::from_u8(n).map(|c| c as u8), (n <= 19).then_some(n));
             assert_eq!(Arrival::from_u8(n).map(|a| a as u8), (n <= 5).then_some(n));
         }
     }

@@ -59,6 +59,12 @@ pub struct Plan {
     pub ticks: u64,
 }
 
+/// Bounds of a shaft that may do nearly anything: a desk's has no physics.
+fn any_shaft() -> Bounds<f32> {
+    let paper = Bounds::around(&PlantParams::default(), &Tolerances::default()).unwrap();
+    Bounds { drive_torque: clutch_core::Interval { low: 0.001, high: 10.0 }, ..paper }
+}
+
 impl Plan {
     /// Three counts each millisecond, without an end.
     pub fn new() -> Plan {
@@ -66,7 +72,7 @@ impl Plan {
             run: 5,
             servo: paper(LawParams::Pd(PdParams::default())),
             limits: SupervisorParams::new(SafeState::hold(5.0)),
-            bounds: Bounds::around(&PlantParams::default(), &Tolerances::default()).unwrap(),
+            bounds: any_shaft(),
             reference: ReferenceParams::ramp(54.0_f32.to_radians()),
             start: FixedCounts(0),
             watchdog: Micros(3000),

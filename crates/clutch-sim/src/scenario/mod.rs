@@ -339,7 +339,8 @@ impl Scenario {
     fn check_safety(&self, safety: &Safety, plan: &Plan) -> Result<(), ScenarioError> {
         let servo = self.spec().servo().map_err(|e| self.at("rig", &e))?;
         let supervisor = self.supervisor(safety);
-        Supervisor::new(&supervisor, &servo, &plan.bounds).map_err(|e| self.at("safety", &e))?;
+        let bounds = self.supervised_bounds(&plan.bounds)?;
+        Supervisor::new(&supervisor, &servo, &bounds).map_err(|e| self.at("safety", &e))?;
         // What is to hold must hold the strongest drive with the weakest actuator.
         let b = &plan.bounds;
         let Some(volts) = safety.on_fault.holding_voltage() else { return Ok(()) };
@@ -364,11 +365,44 @@ impl Scenario {
     /// Limits that the supervisor of a run on a board watches.
     #[must_use]
     pub fn supervisor(&self, safety: &Safety) -> SupervisorParams {
-        SupervisorParams {
-            on_fault: safety.on_fault,
-            speed: self.params.rig.speed,
-            limits: safety.limits.supervisor,
-        }
+        let rig = &self.params.rig;
+        let mut limits = safety.limits.supervisor;
+        // A lag has no end: as a delay of which nobody knows the length.
+        let delay = if rig.actuator_time_constant.is_some() { 1000 } else { rig.delay_ticks };
+        limits.delay_cycles = limits.delay_cycles.max(delay);
+        SupervisorParams { on_fault: safety.on_fault, speed: rig.speed, limits }
+    }
+
+    /// Bounds that the supervisor's envelope has to hold: those of the scenario, and beyond them what its rig is said to
+    /// be. Six times the root mean square of its torque noise counts as drive, and of bristles, which give back what
+    /// bends them, no least friction is expected.
+    ///
+    /// # Errors
+    /// None for a checked scenario.
+    pub fn supervised_bounds(&self, bounds: &Bounds) -> Result<Bounds, ScenarioError> {
+        /// N m; no shaft of such a rig has as much, and a supervisor can calculate with it.
+        const ANY_TORQUE: f64 = 1e3;
+        let rig = Rig::new(&self.params.rig, self.params.run.seed).map_err(|e| self.at("rig", &e))?;
+        let (p, actuator) = (rig.model.plant.params(), rig.model.plant.actuator());
+        let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+        let noise = 6.0 * rig.params.torque_noise;
+        let (weakest, strongest) = rig.drive.range();
+        let friction = rig.model.plant.friction();
+        let (envelope, bristles) = (friction.envelope(), friction.bristles().is_some());
+        let grip = if bristles { 0.0 } else { envelope.low * (1.0 - swing).max(0.0) };
+        let hold =
+            |b: Interval, low: f64, high: f64| Interval { low: b.low.min(low), high: b.high.max(high) };
+        let exactly = |b: Interval, x: f64| hold(b, x, x);
+        let (weakest, strongest) = ((weakest - noise).max(-ANY_TORQUE), (strongest + noise).min(ANY_TORQUE));
+        Ok(Bounds {
+            inertia: exactly(bounds.inertia, p.inertia),
+            drive_torque: hold(bounds.drive_torque, weakest, strongest),
+            viscous_damping: exactly(bounds.viscous_damping, p.viscous_damping),
+            brake_gain: exactly(bounds.brake_gain, actuator.brake_gain()),
+            motor_gain: exactly(bounds.motor_gain, actuator.motor_gain()),
+            friction: hold(bounds.friction, grip, envelope.high * (1.0 + swing)),
+            ..*bounds
+        })
     }
 
     /// The servo part by part, in the scalar that it runs in.

@@ -1,0 +1,327 @@
+//! Shafts that are integrated here, in small steps and by other means than anywhere else, inside bounds and outside of
+//! them.
+
+use super::*;
+use crate::law::{LawParams, PdParams};
+use crate::supervisor::{LimitParams, SpeedLimit, SupervisorParams, params::Limits};
+use crate::{ActuatorParams, BothActuator, BrakeActuator, MotorActuator, PlantParams, SafeState, Tolerances};
+use crate::{Encoder, ServoParams};
+use proptest::prelude::*;
+use std::vec::Vec;
+
+const PERIOD: f64 = 1e-3;
+
+/// A shaft with friction that falls from rest to motion, in steps of a fiftieth of a period.
+#[derive(Clone, Copy, Debug)]
+struct Shaft {
+    inertia: f64,
+    drive: f64,
+    damping: f64,
+    rest: f64,
+    sliding: f64,
+    actuator: ActuatorParams,
+    x: f64,
+    v: f64,
+}
+
+impl Shaft {
+    fn torques(&self, volts: f64) -> (f64, f64) {
+        match self.actuator {
+            ActuatorParams::Brake(b) => (0.0, b.preload + b.gain * volts.max(0.0)),
+            ActuatorParams::Motor(m) => (m.gain * volts, m.preload + m.load_share * (m.gain * volts).abs()),
+            ActuatorParams::Both(b) => {
+                (b.motor_gain * (-volts).max(0.0), b.preload + b.brake_gain * volts.max(0.0))
+            }
+            ActuatorParams::Geometry(_) => unreachable!("none is drawn"),
+        }
+    }
+
+    fn step(&mut self, volts: f64, seconds: f64) {
+        let (torque, normal) = self.torques(volts);
+        let driving = self.drive + torque;
+        let way = if self.v != 0.0 {
+            self.v.signum()
+        } else if driving.abs() <= self.rest * normal {
+            return;
+        } else {
+            driving.signum()
+        };
+        let mu = self.sliding + (self.rest - self.sliding) * (-self.v.abs() / 0.02).exp();
+        let a = (driving - way * mu * normal - self.damping * self.v) / self.inertia;
+        let after = self.v + a * seconds;
+        // It stops where it would turn.
+        let after = if after * way < 0.0 { 0.0 } else { after };
+        self.x += 0.5 * (self.v + after) * seconds;
+        self.v = after;
+    }
+
+    fn counts(&self) -> i32 {
+        (self.x * 20_000.0 / core::f64::consts::TAU).floor() as i32
+    }
+}
+
+/// Where each value of a shaft lies between its bounds, from 0 to 1; the volts of each period, and when in the period
+/// they come.
+#[derive(Clone, Debug)]
+struct Drawn {
+    kind: u8,
+    at: [f64; 6],
+    speed: f64,
+    volts: Vec<(f64, f64)>,
+    lost: u64,
+}
+
+fn drawn() -> impl Strategy<Value = Drawn> {
+    // Volts that a law could send: levels that stay for a while.
+    let level = (-1.0..1.0_f64, 1..40_usize, 0.02..0.9_f64);
+    let volts = prop::collection::vec(level, 4..24).prop_map(|levels| {
+        levels.into_iter().flat_map(|(u, n, late)| (0..n).map(move |_| (u, late))).collect()
+    });
+    (0..3_u8, prop::array::uniform6(0.0..=1.0_f64), -1.0..1.0_f64, volts, any::<u64>())
+        .prop_map(|(kind, at, speed, volts, lost)| Drawn { kind, at, speed, volts, lost })
+}
+
+fn model(kind: u8) -> PlantParams<f64> {
+    let actuator = match kind {
+        0 => ActuatorParams::Brake(BrakeActuator { gain: 0.14, preload: 0.02 }),
+        1 => ActuatorParams::Motor(MotorActuator { gain: 0.05, preload: 0.1, load_share: 0.3 }),
+        _ => ActuatorParams::Both(BothActuator { brake_gain: 0.14, motor_gain: 0.02, preload: 0.02 }),
+    };
+    let drive_torque = if kind == 1 { 0.01 } else { 0.047 };
+    PlantParams { actuator, drive_torque, ..PlantParams::default() }
+}
+
+/// Tolerances of the bounds, each of a parameter of [`shaft`].
+fn tolerances() -> Tolerances<f64> {
+    Tolerances {
+        inertia: 0.2,
+        drive_torque: 0.5,
+        viscous_damping: 0.5,
+        brake_gain: 0.1,
+        motor_gain: 0.1,
+        friction: 0.4,
+    }
+}
+
+/// The shaft of a draw, inside the bounds.
+fn shaft(d: &Drawn) -> Shaft {
+    let (t, m) = (tolerances(), model(d.kind));
+    let around = |x: f64, share: f64, at: f64| x * (1.0 + share * (2.0 * at - 1.0));
+    let [inertia, drive, damping, brake, motor, friction] = d.at;
+    let gains = (t.brake_gain, t.motor_gain);
+    let actuator = match m.actuator {
+        ActuatorParams::Brake(b) => BrakeActuator { gain: around(b.gain, gains.0, brake), ..b }.into(),
+        ActuatorParams::Motor(b) => MotorActuator { gain: around(b.gain, gains.1, motor), ..b }.into(),
+        ActuatorParams::Both(b) => BothActuator {
+            brake_gain: around(b.brake_gain, gains.0, brake),
+            motor_gain: around(b.motor_gain, gains.1, motor),
+            ..b
+        }
+        .into(),
+        other @ ActuatorParams::Geometry(_) => other,
+    };
+    Shaft {
+        inertia: around(m.inertia, t.inertia, inertia),
+        drive: around(m.drive_torque, t.drive_torque, drive),
+        damping: around(m.viscous_damping, t.viscous_damping, damping),
+        rest: around(0.2, t.friction, friction),
+        sliding: around(0.15, t.friction, friction),
+        actuator,
+        x: 3.0 * d.at[0],
+        v: if d.kind == 1 { d.speed } else { d.speed.abs() },
+    }
+}
+
+fn envelope<T: Real>(kind: u8, limits: &LimitParams<T>) -> Envelope<T> {
+    let bounds = Bounds::around(&model(kind), &tolerances()).unwrap();
+    limits_of(&bounds.cast(), limits).envelope
+}
+
+fn limits_of<T: Real>(bounds: &Bounds<T>, limits: &LimitParams<T>) -> Limits<T> {
+    let p = SupervisorParams {
+        on_fault: SafeState::hold(T::from_i32(5)),
+        speed: SpeedLimit::default(),
+        limits: *limits,
+    };
+    Limits::new(&p, &ServoParams::paper(LawParams::Pd(PdParams::default())), bounds).unwrap()
+}
+
+/// No margins: the bounds alone.
+fn bare<T: Real>() -> LimitParams<T> {
+    LimitParams {
+        friction_margin: T::ONE,
+        grip_margin: T::ONE,
+        // What single precision and small steps round.
+        edge_counts: T::from_f64(0.01),
+        ..LimitParams::default()
+    }
+}
+
+/// The volts of a period: `late` of it is the code before still in force. What the envelope says at its end.
+fn follow<T: Real>(
+    envelope: &Envelope<T>,
+    shaft: &mut Shaft,
+    d: &Drawn,
+    mut see: impl FnMut(usize, i32) -> i32,
+) -> Option<(usize, Cause)> {
+    let highest = if d.kind == 0 { 10.0 } else { 6.0 };
+    let volts = |u: f64| if d.kind == 0 { highest * u.abs() } else { highest * u };
+    let first = volts(d.volts[0].0);
+    let (mut sent, mut s) = ([first; 4], envelope.start());
+    let (mut seen, mut elapsed) = (see(0, shaft.counts()), 0);
+    for (k, (u, late)) in d.volts.iter().enumerate() {
+        let before = sent[0];
+        sent = [volts(*u), sent[0], sent[1], sent[2]];
+        for part in 0..50 {
+            let now = if f64::from(part) < late * 50.0 { before } else { sent[0] };
+            shaft.step(now, PERIOD / 50.0);
+        }
+        elapsed += 1;
+        // Some samples are lost; what their answers would have been is sent all the same.
+        if elapsed < 3 && (d.lost >> (k % 64)) & 7 == 7 {
+            continue;
+        }
+        let counts = see(k + 1, shaft.counts());
+        let in_force = envelope.in_force(&sent.map(T::from_f64), elapsed > 1);
+        if let Some((cause, off)) = envelope.judge(&mut s, in_force, counts.wrapping_sub(seen), elapsed) {
+            assert!(off > T::ZERO);
+            return Some((k, cause));
+        }
+        (seen, elapsed) = (counts, 0);
+    }
+    None
+}
+
+fn stays_inside<T: Real>(d: &Drawn) -> Result<(), TestCaseError> {
+    let ended = follow(&envelope::<T>(d.kind, &bare()), &mut shaft(d), d, |_, counts| counts);
+    prop_assert!(ended.is_none(), "{:?}: {:?}", shaft(d), ended);
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_shaft_of_the_bounds_leaves_the_envelope(d in drawn()) {
+        stays_inside::<f64>(&d)?;
+        stays_inside::<f32>(&d)?;
+    }
+}
+
+/// Periods after which a lie about the paper's shaft at 20 °/s is seen, where the brake balances the weight until then;
+/// from then on the law sends the first of two volts, and the pad has the second.
+fn seen_after<T: Real>(then: (f64, f64), lie: impl Fn(i32, i32) -> i32) -> Option<(usize, Cause)> {
+    let bounds = Bounds::around(&PlantParams::<f64>::default(), &Tolerances::default()).unwrap().cast();
+    let envelope = limits_of::<T>(&bounds, &LimitParams::default()).envelope;
+    let p = PlantParams::<f64>::default();
+    let brake = BrakeActuator { gain: 0.14, preload: 0.0 };
+    let mut shaft = Shaft {
+        inertia: p.inertia,
+        drive: p.drive_torque,
+        damping: p.viscous_damping,
+        rest: 0.2,
+        sliding: 0.15,
+        actuator: brake.into(),
+        x: 0.0,
+        v: 20.0_f64.to_radians(),
+    };
+    let (mut s, mut seen, mut since) = (envelope.start(), 0, 0);
+    for k in 0..200_usize {
+        let broken = k >= 60;
+        let (volts, at_pad) = if broken { then } else { (BALANCES, BALANCES) };
+        (0..50).for_each(|_| shaft.step(at_pad, PERIOD / 50.0));
+        let true_counts = shaft.counts();
+        if !broken {
+            since = true_counts;
+        }
+        let counts = if broken { since + lie(true_counts - since, k as i32) } else { true_counts };
+        let sent = [T::from_f64(volts); 4];
+        if let Some((cause, _)) = envelope.judge(&mut s, envelope.in_force(&sent, false), counts - seen, 1) {
+            return Some((k + 1 - 60, cause));
+        }
+        seen = counts;
+    }
+    None
+}
+
+/// What the sliding shaft balances, less the drag at 20 °/s, V.
+const BALANCES: f64 = 2.2257;
+
+fn each_lie_is_seen_in_time<T: Real>() {
+    let same = (BALANCES, BALANCES);
+    // A law lets go where counts stay behind; until it does the brake may have stopped the shaft.
+    let lets_go = (0.0, 0.0);
+    let within = |what: &str, seen: Option<(usize, Cause)>, ms: usize, causes: &[Cause]| {
+        let (after, named) = seen.unwrap_or_else(|| panic!("{what}: not seen"));
+        assert!(
+            after <= ms && causes.contains(&named),
+            "{what}: {named:?} after {after} ms, not {causes:?} within {ms} ms"
+        );
+    };
+    assert_eq!(seen_after::<T>(same, |n, _| n), None);
+    within("frozen", seen_after::<T>(lets_go, |_, _| 0), 5, &[Cause::StandStill]);
+    // Channel A dead at a count where B is low: edges of B count to and fro.
+    within("channel", seen_after::<T>(lets_go, |n, _| (n >> 1) & 1), 5, &[Cause::Channel]);
+    within("dither", seen_after::<T>(lets_go, |_, k| k & 1), 5, &[Cause::Channel]);
+    // The first count back may be a channel's as well.
+    let back = [Cause::Channel, Cause::Reversed];
+    within("reversed", seen_after::<T>(same, |n, _| -n), 3, &back);
+    within("doubled", seen_after::<T>(same, |n, _| 2 * n), 5, &[Cause::TooFast]);
+    within("brake open", seen_after::<T>((BALANCES, 0.0), |n, _| n), 12, &[Cause::TooFast]);
+    within("brake open, law brakes", seen_after::<T>((4.0, 0.0), |n, _| n), 8, &[Cause::TooFast]);
+    within("brake stuck, law lets go", seen_after::<T>((0.0, 10.0), |n, _| n), 6, &[Cause::StandStill]);
+}
+
+#[test]
+fn each_lie_is_seen_in_time_and_named() {
+    each_lie_is_seen_in_time::<f32>();
+    each_lie_is_seen_in_time::<f64>();
+}
+
+/// From rest, with the brake open, the drive alone has moved the shaft by ½ T/J t²: two edges of a count must have passed.
+#[test]
+fn a_frozen_encoder_of_a_resting_shaft_is_found_as_soon_as_the_brake_has_been_open_for_long_enough() {
+    let bounds = Bounds::around(&PlantParams::<f64>::default(), &Tolerances::default()).unwrap();
+    for edge in [0.0, 0.2, 1.0, 3.0] {
+        let limits = LimitParams { edge_counts: edge, ..LimitParams::default() };
+        let envelope = limits_of::<f64>(&bounds, &limits).envelope;
+        let mut s = envelope.start();
+        let seen = (1..).find(|_| envelope.judge(&mut s, [0.0; 2], 0, 1).is_some()).unwrap();
+        let count = Encoder::PAPER.radians_per_count::<f64>();
+        let p = PlantParams::<f64>::default();
+        let must = (2.0 * (1.0 + 2.0 * edge) * count * p.inertia / p.drive_torque).sqrt() / PERIOD;
+        // Of the first sample's velocity nothing is known, so that drag may take all of it.
+        let seen = f64::from(seen);
+        assert!(seen <= must + 2.0 && seen > 0.6 * must, "edge {edge}: {seen} ms, {must:.2} ms computed");
+    }
+}
+
+#[test]
+fn a_shaft_that_nothing_drives_may_stand_for_ever() {
+    let envelope = envelope::<f32>(1, &LimitParams::default());
+    let mut s = envelope.start();
+    for _ in 0..100_000 {
+        assert_eq!(envelope.judge(&mut s, [0.0; 2], 0, 1), None);
+    }
+}
+
+#[test]
+fn counts_that_dither_about_an_edge_at_rest_are_an_edge() {
+    let envelope = envelope::<f32>(0, &LimitParams::default());
+    let mut s = envelope.start();
+    for k in 0..10_000 {
+        assert_eq!(envelope.judge(&mut s, [9.0; 2], if k % 2 == 0 { 1 } else { -1 }, 1), None);
+    }
+}
+
+#[test]
+fn volts_in_force_are_the_last_two_and_more_with_a_delay_or_losses() {
+    let of = |delay_cycles| envelope::<f64>(0, &LimitParams { delay_cycles, ..LimitParams::default() });
+    let sent = [2.0, 3.0, 4.0, 1.0];
+    assert_eq!(of(0).in_force(&sent, false), [2.0, 3.0]);
+    assert_eq!(of(1).in_force(&sent, false), [2.0, 4.0]);
+    assert_eq!(of(2).in_force(&sent, false), [1.0, 4.0]);
+    assert_eq!(of(0).in_force(&sent, true), [1.0, 4.0]);
+    assert_eq!(of(3).in_force(&sent, false), [0.0, 10.0]);
+    assert_eq!(of(1000).in_force(&sent, true), [0.0, 10.0]);
+}

@@ -1,0 +1,118 @@
+//! Healthy runs: shafts drawn from anywhere inside wide bounds, under every law, with lines that lose, delay and jitter.
+//! Nothing is broken, so that the supervisor's envelope may end none of them.
+
+use crate::campaign::CampaignError;
+use crate::faults::{Direction, Fault, FaultKind};
+use crate::from_scenario::{self, BuiltRun};
+use crate::station::ControllerStation;
+use crate::virtual_time::{VirtualLoop, VirtualOptions, VirtualReport};
+use clutch_core::Real;
+use clutch_core::supervisor::Cause;
+use clutch_node::ControllerNode;
+use clutch_sim::scenario::ScalarKind;
+use clutch_sim::{Scenario, ScenarioError};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// Causes by which the envelope ends control.
+pub const ENVELOPE: [Cause; 5] =
+    [Cause::StandStill, Cause::Channel, Cause::Reversed, Cause::TooSlow, Cause::TooFast];
+
+/// A healthy run; everything follows from its seed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Healthy {
+    /// Seed.
+    pub seed: u64,
+    /// Length, s.
+    pub seconds: u32,
+}
+
+impl Healthy {
+    /// A shaft with friction of ±40 %, a load of half to twice the paper's, and ±10 % of inertia and gain, inside
+    /// bounds that say so.
+    ///
+    /// # Errors
+    /// None, unless a row of the tables is wrong.
+    pub fn scenario(&self) -> Result<Scenario, ScenarioError> {
+        let mut rng = Pcg64::seed_from_u64(self.seed ^ 0x6865_616c_7468);
+        let mut within = |percent: f64| 1.0 + percent / 100.0 * rng.random_range(-1.0..=1.0_f64);
+        let (friction, gain, inertia) = (within(40.0), within(10.0), within(10.0));
+        // About 1.25 times the paper's mass: 60 % either way are a half and twice.
+        let mass = 0.25 * within(60.0);
+        let damping = 0.001 * within(50.0);
+        let law = ["pd", "ctc", "smc", "smc", "pid"][rng.random_range(0..5)];
+        let law = match law {
+            "pid" => "[law.pid]\nkp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n".to_owned(),
+            _ => format!("[law.{law}]\n"),
+        };
+        let rate = [2.0, 5.0, 10.0, 20.0, 40.0, 60.0][rng.random_range(0..6)];
+        let path = match rng.random_range(0..3) {
+            0 => format!("[reference.ramp]\nrate_deg_s = {rate:?}\n"),
+            1 => format!(
+                "[reference.minimum_jerk]\ndistance_deg = {:?}\nduration_s = {:?}\n",
+                0.5 * rate * f64::from(self.seconds),
+                f64::from(self.seconds)
+            ),
+            _ => format!(
+                "[reference.sine]\nrate_deg_s = {rate:?}\namplitude_deg = {:?}\nfrequency_hz = 2.0\n",
+                0.06 * rate
+            ),
+        };
+        let scalar = if rng.random_bool(0.5) { "f32" } else { "f64" };
+        let observer = if rng.random_bool(0.25) { "[velocity.observer]\n" } else { "" };
+        let delay = rng.random_range(0..=1);
+        let start = if rng.random_bool(0.5) { "rest" } else { "on_path" };
+        let text = format!(
+            "name = \"healthy\"\n[rig]\nbase = \"paper\"\ndelay_ticks = {delay}\n\
+             inertia_kg_m2 = {:?}\nviscous_damping_nm_s_rad = {damping:?}\n\
+             [rig.actuator.brake]\ngain_nm_v = {:?}\n\
+             [rig.friction.stribeck]\nmu_static = {:?}\nmu_dynamic = {:?}\n[rig.drive.weight]\nmass_kg = {mass:?}\n\
+             [model]\ndrive_torque_nm = 0.05886\n\
+             {law}{path}{observer}[sampling]\nscalar = \"{scalar}\"\n\
+             [bounds]\nfriction_percent = 40.0\ndrive_torque_percent = 60.0\ninertia_percent = 10.0\n\
+             brake_gain_percent = 10.0\nviscous_damping_percent = 50.0\n\
+             [run]\nduration_s = {:?}\nstart = \"{start}\"\nseed = {}\n\
+             [safety]\nreason = \"a weight drives the shaft\"\n[safety.on_fault.hold]\nvolts_v = 9.99\n\
+             [safety.limits]\nwatchdog_cycles = 8\nsilence_cycles = 8\nfollowing_error_deg = 20.0\nsaturation_time_s = 5.0\n",
+            0.0017 * inertia,
+            0.14 * gain,
+            0.2 * friction,
+            0.15 * friction,
+            f64::from(self.seconds),
+            self.seed,
+        );
+        Scenario::parse("healthy", &text, &[])
+    }
+
+    /// Runs it.
+    ///
+    /// # Errors
+    /// None, unless a row of the tables is wrong.
+    pub fn run(&self) -> Result<VirtualReport, CampaignError> {
+        let scenario = self.scenario()?;
+        match scenario.scalar() {
+            ScalarKind::F32 => self.run_in::<f32>(&scenario),
+            ScalarKind::F64 => self.run_in::<f64>(&scenario),
+        }
+    }
+
+    fn run_in<T: Real>(&self, scenario: &Scenario) -> Result<VirtualReport, CampaignError> {
+        let mut rng = Pcg64::seed_from_u64(self.seed ^ 0x6c69_6e65);
+        let built = BuiltRun::<T>::new(scenario, 7)?;
+        let path = from_scenario::path::<T>(scenario)?;
+        let mut options = VirtualOptions {
+            latency_ns: rng.random_range(20_000..300_000),
+            seed: self.seed,
+            duration: f64::from(self.seconds),
+            ..VirtualOptions::default()
+        };
+        if rng.random_bool(0.5) {
+            let lost = Fault { probability: 0.003, ..Fault::new(FaultKind::Drop, 0.0) };
+            let jitter = Fault { direction: Direction::Both, ..Fault::new(FaultKind::Jitter(0.0003), 0.0) };
+            options.faults = vec![lost, jitter];
+        }
+        let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+        let mut world = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })?;
+        Ok(world.run(&path)?)
+    }
+}
