@@ -46,7 +46,7 @@ def test_a_run_to_the_paths_end_is_done_and_its_log_replays(tmp_path):
     assert written.complete and written.metadata["certified"] == "true"
     text = str(result).splitlines()
     assert text[0] == result.scenario.name and text[-1] == "the path is done; the board is in its safe state"
-    assert "  gains       certified for the bounds given" in result.announcement.splitlines()
+    assert "  gains       certified in continuous time for the bounds given" in result.announcement.splitlines()
     assert repr(result).startswith("<LoopResult 'SMC at 2 °/s on a board': done, 1500 ticks, ")
 
 

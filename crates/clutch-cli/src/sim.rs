@@ -3,6 +3,7 @@
 use crate::args::ScenarioArgs;
 use crate::output::{BUILD, Exit, json, new_log, print, with_progress};
 use crate::plot::{self, Figure, Panel, Series};
+use crate::sampled;
 use crate::table::{number, quantities, row};
 use anyhow::Context;
 use clap::Args;
@@ -48,6 +49,10 @@ struct Summary<'a> {
     reaching: Reaching,
     path: Path,
     certified: bool,
+    /// Linear stability of the sampled loop, in a line.
+    #[serde(skip)]
+    as_sampled: String,
+    sampled: serde_json::Value,
     rig_outside_bounds: Vec<String>,
     /// Viscous damping that the rig's bristles lack to be passive, N m s/rad.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -94,6 +99,7 @@ impl Sim {
         if let Some(file) = &self.plot {
             figure(&scenario, &run).save(file)?;
         }
+        let as_sampled = scenario.sampled(&plan.bounds);
         let summary = Summary {
             scenario: scenario.name(),
             version: env!("CARGO_PKG_VERSION"),
@@ -112,6 +118,8 @@ impl Sim {
                 velocity_jump_rad_s: plan.envelope.start_jump.max(plan.envelope.velocity_jump),
             },
             certified: plan.certificate.certified(),
+            as_sampled: as_sampled.stability_line(),
+            sampled: sampled::json(&as_sampled, &sampled::Bound::NotLookedFor),
             rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
             bristles_lack_nm_s_rad: Rig::new(&scenario.spec().rig, scenario.spec().run.seed)?
                 .lacks_damping(run.trace.start_voltage),
@@ -157,13 +165,13 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         }
     }
     let certified = match (s.certified, s.rig_outside_bounds.is_empty()) {
-        (true, true) => "certified",
+        (true, true) => "certified (exact sensor)",
         (true, false) => "certified for the model, not for this rig: see `clutch certify`",
         (false, _) => "not certified: see `clutch certify`",
     };
     let jump = s.path.velocity_jump_rad_s;
     let mut text = quantities(&title, &rows);
-    text += &format!("gains: {certified}\n");
+    text += &format!("gains, continuous time: {certified}\ngains, as sampled: {}\n", s.as_sampled);
     if jump > 1e-9 {
         text += &format!(
             "note: the path's velocity jumps by {} °/s, which no shaft follows at once; the shaft catches up\n",

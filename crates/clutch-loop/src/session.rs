@@ -107,7 +107,7 @@ pub enum SessionError {
     Build(#[from] BuildError),
     /// The gains are not certified, and were not asked for all the same.
     #[error(
-        "{scenario}: the gains are not certified for these bounds and this path, so nothing was started."
+        "{scenario}: the gains are not certified, in continuous time, for these bounds and this path, so nothing was started."
     )]
     NotCertified {
         /// The scenario's name.
@@ -502,9 +502,9 @@ impl Course<'_> {
         );
         let fastest = number(plan.envelope.velocity.to_degrees());
         let gains = if self.session.certified() {
-            "certified for the bounds given"
+            "certified in continuous time for the bounds given"
         } else {
-            "NOT certified; run all the same, as asked"
+            "NOT certified in continuous time; run all the same, as asked"
         };
         let mut rows = vec![
             ("port", format!("{}, {}", self.address, kind.describe())),
@@ -518,6 +518,7 @@ impl Course<'_> {
             ),
             ("path", format!("{} s, up to {fastest} °/s", number(spec.run.duration))),
             ("gains", gains.to_owned()),
+            ("as sampled", scenario.sampled(&plan.bounds).stability_line()),
             ("safe state", format!("{safe}: {}", safety.reason.0)),
             ("watchdog", format!("{} cycles on the board", safety.limits.watchdog_cycles)),
         ];
