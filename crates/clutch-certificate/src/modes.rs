@@ -216,3 +216,114 @@ fn parts(a: f64, b: f64) -> (f64, f64) {
     let sum = 2.0 * (high + low);
     (high * high / sum, low * low / sum)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pieces::tests::answer;
+    use crate::pieces::{pieces, strips};
+    use crate::setup::{Gains, Setup};
+    use crate::tests::{setup, uniform};
+
+    /// A tick of a shaft whose friction and drive vary as they may, in 4000 steps: way and speed, in counts and ticks.
+    fn tick(
+        s: &Setup,
+        mu: (f64, f64),
+        start: f64,
+        volts: f64,
+        next: &mut dyn FnMut(f64, f64) -> f64,
+    ) -> (f64, f64) {
+        let steps = 4000;
+        let (speed, per) = {
+            let count = core::f64::consts::TAU / f64::from(s.counts_per_rev);
+            (count / s.period_s, s.period_s * s.period_s / count / s.inertia[0])
+        };
+        let (mut way, mut omega) = (0.0, start);
+        // Both change once, at any instant.
+        let changes = next(0.0, f64::from(steps)) as i32;
+        let mut push = [next(-1.0, 1.0), next(-1.0, 1.0)].map(|x| s.torque_noise * x);
+        let mut factor = [next(-1.0, 1.0), next(-1.0, 1.0)].map(|x| 1.0 + s.ripple * x);
+        for step in 0..steps {
+            if step == changes {
+                push.swap(0, 1);
+                factor.swap(0, 1);
+            }
+            let level = mu.1 + (mu.0 - mu.1) * (-(omega * speed) / s.stribeck[0]).exp();
+            let brake = factor[0] * s.brake_gain[0] * volts.max(0.0);
+            let drive = s.drive_torque[0] + push[0];
+            let torque = if omega == 0.0 {
+                (drive - mu.0 * brake).max(0.0)
+            } else {
+                drive - level * brake - s.viscous_damping[0] * omega * speed
+            };
+            let dt = 1.0 / f64::from(steps);
+            way += omega * dt;
+            omega = (omega + torque * per * dt).max(0.0);
+        }
+        (way, omega)
+    }
+
+    #[test]
+    fn a_simulated_tick_goes_no_further_than_its_mode_allows() {
+        let laws = [
+            Gains::Pd { kp: 5000.0, kd: 50.0 },
+            Gains::Smc { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 },
+        ];
+        let mut next = uniform(11);
+        let mut seen = [0; 4];
+        for (law, form) in laws.into_iter().flat_map(|law| [(law, Form::Noise), (law, Form::Exact)]) {
+            let setup = Setup {
+                sliding: [0.13, 0.17],
+                at_rest: [0.17, 0.25],
+                ripple: 0.05,
+                torque_noise: 0.002,
+                ..setup(law)
+            };
+            let u = Units::new(&setup, setup.sliding, 3.0);
+            let modes: Vec<Mode<4>> = modes(&u, &pieces(&u, &strips(&law, u.volts)), form, 6);
+            for _ in 0..400 {
+                let omega = if next(0.0, 1.0) < 0.3 { next(0.0, 0.03) } else { next(0.0, 1.0) };
+                let (e, rounding) = (next(-8.0, 4.0), next(0.0, 1.0));
+                let m = e + rounding;
+                // A filter that has seen no rate above the path's.
+                let z = m - next(-1.5, u.path) / u.kappa;
+                let mu_d = next(0.13, 0.17);
+                let mu_s = next(0.17, 0.25);
+                let volts = answer(&u, m, z) + next(-1.0, 1.0) * 0.5 * setup.converter_step;
+                let (way, after) = tick(&setup, (mu_s, mu_d), omega, volts, &mut next);
+                let gone = next(0.0, 3.0).floor();
+                let last = if form == Form::Exact { m - u.path + gone } else { rounding };
+                let y = [e, u.path - omega, z, last];
+                let x = [e + u.path - way, u.path - after, z + u.kappa * (m - z), m];
+                let fits = |mode: &&Mode<4>| {
+                    (form == Form::Noise || f64::from(mode.id.counts) == gone)
+                        && (0..mode.within.len()).all(|j| {
+                            let at: f64 = mode.within.row(j).iter().zip(y).map(|(a, y)| a * y).sum();
+                            at <= mode.within.rhs[j] + 1e-9
+                        })
+                };
+                let fitting: Vec<&Mode<4>> = modes.iter().filter(fits).collect();
+                assert!(!fitting.is_empty(), "{law:?} {form:?} {y:?}");
+                for _ in 0..20 {
+                    let mut c: [f64; 4] = std::array::from_fn(|_| next(-1.0, 1.0));
+                    if form == Form::Noise {
+                        c[3] = 0.0;
+                    }
+                    let reached: f64 = c.iter().zip(x).map(|(c, x)| c * x).sum();
+                    let most = fitting
+                        .iter()
+                        .map(|mode| {
+                            let bound = mode.next(&u, &c);
+                            bound.constant + bound.weights.iter().zip(y).map(|(w, y)| w * y).sum::<f64>()
+                        })
+                        .fold(f64::NEG_INFINITY, f64::max);
+                    assert!(reached <= most + 5e-4, "{law:?} {form:?} {y:?}: {reached} above {most}");
+                }
+                for mode in fitting {
+                    seen[mode.id.case as usize] += 1;
+                }
+            }
+        }
+        assert!(seen.iter().all(|n| *n > 20), "{seen:?}");
+    }
+}

@@ -173,12 +173,12 @@ fn kinks(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::tests::{setup, uniform};
 
     /// (4) and (31) as the paper writes them, with the limits.
-    fn answer(u: &Units, m: f64, z: f64) -> f64 {
+    pub(crate) fn answer(u: &Units, m: f64, z: f64) -> f64 {
         let (e, d) = (m * u.count, u.kappa * (m - z) * u.speed);
         let sat = |x: f64| x.clamp(-1.0, 1.0);
         let demand = match u.law {

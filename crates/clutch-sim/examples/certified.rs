@@ -292,7 +292,7 @@ fn draw(rng: &mut Pcg64) -> Outcome<Scenario> {
     // A band of five waves, of which the largest departure is √10 times the root mean square.
     let mut table = scenario.table().clone();
     let waves = format!(
-        "rms = {:?}\nlowest_waves_per_turn = 160\nhighest_waves_per_turn = 640\nspacing_waves_per_turn = 120\n",
+        "rms = {:?}\nlowest_waves_per_turn = 120\nhighest_waves_per_turn = 600\nspacing_waves_per_turn = 120\n",
         ripple / 10.0_f64.sqrt()
     );
     if let Some(toml::Value::Table(rig)) = table.get_mut("rig") {
