@@ -12,7 +12,7 @@ import sys
 import time
 import uuid
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -140,6 +140,7 @@ def grid(parameters: Mapping[str, Iterable[Any]]) -> Samples:
     axes = {key: _values(key, values) for key, values in parameters.items()}
     if not axes:
         raise ValueError("a sweep needs at least one key, as {'law.smc.kp_v': [3.0, 4.0]}")
+    _room("grid", math.prod(map(len, axes.values())))
     return Samples(tuple(axes), tuple(itertools.product(*axes.values())), tuple(axes.values()))
 
 
@@ -246,6 +247,7 @@ def latin_hypercube(ranges: Mapping[str, Range], n: int, *, seed: int = 1) -> Sa
 def _spread(name: str, ranges: Mapping[str, Range], n: int, seed: int) -> Samples:
     qmc = importlib.import_module("scipy.stats.qmc")
     scales = [_scale(key, limits) for key, limits in ranges.items()]
+    _room("n", n)
     points = getattr(qmc, name)(d=len(ranges), rng=seed).random(n).tolist()
     rows = (tuple(scale(x) for scale, x in zip(scales, point, strict=True)) for point in points)
     return Samples(tuple(ranges), tuple(rows))
@@ -270,10 +272,22 @@ def _scale(key: str, limits: Range) -> Callable[[float], float]:
     return lambda x: low * (high / low) ** x
 
 
+# Refused before memory is taken: at 20 µs a row these take minutes, and some GB.
+_MOST_ROWS = 10_000_000
+
+
+def _room(what: str, rows: int) -> None:
+    if rows > _MOST_ROWS:
+        raise ValueError(f"{what}: {rows} rows, expected at most {_MOST_ROWS}")
+
+
 def _values(key: str, values: Any) -> tuple[Any, ...]:
     if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
         raise TypeError(f"{key}: expected a sequence of values, got {values!r}")
-    plain = tuple(_plain(key, v) for v in values)
+    if isinstance(values, Sized):
+        _room(key, len(values))
+    plain = tuple(_plain(key, v) for v in itertools.islice(values, _MOST_ROWS + 1))
+    _room(key, len(plain))
     if not plain:
         raise ValueError(f"{key}: no values")
     return plain

@@ -38,7 +38,8 @@ pub use output::BUILD;
 /// and replays its logs.
 ///
 /// Exit codes: 0 done; 1 an error, which is printed; 2 not certified; 3 from `loop`: ended by a
-/// fault, from `replay`: the outputs differ; 4 from `loop`: stopped by a signal; 64 the command
+/// fault, from `replay`: the outputs differ; 4 from `loop`: stopped by a signal;
+/// 5 the log ended early, or has a gap; 64 the command
 /// line could not be understood.
 #[derive(Parser)]
 #[command(name = "clutch", version, max_term_width = 100)]
@@ -95,6 +96,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Exit::NotCertified) => 2,
         Ok(Exit::Fault) => 3,
         Ok(Exit::Stopped) => 4,
+        Ok(Exit::Incomplete) => 5,
         Err(e) => {
             // Some errors contain their source themselves.
             let mut text = e.to_string();
@@ -103,7 +105,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
                     text += &format!(": {source}");
                 }
             }
-            let _ = writeln!(std::io::stderr(), "clutch: {text}");
+            let _ = writeln!(std::io::stderr(), "clutch: {}", output::shown(&text));
             1
         }
     }

@@ -15,6 +15,8 @@ pub(crate) struct Log {
 #[derive(Subcommand)]
 enum Verb {
     /// Reports the contents of a log: channels, time, scenario, and its completeness.
+    ///
+    /// Exit code 0: complete; 5: it ended early, or is damaged.
     #[command(after_help = "Example:\n  clutch log info run.mcap")]
     Info {
         /// The log.
@@ -36,7 +38,11 @@ enum Verb {
 impl Log {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
         let text = match self.verb {
-            Verb::Info { log } => clutch_log::info(&log, &Limits::default())?.to_string(),
+            Verb::Info { log } => {
+                let info = clutch_log::info(&log, &Limits::default())?;
+                print(&format!("{info}\n"))?;
+                return Ok(if info.complete { Exit::Done } else { Exit::Incomplete });
+            }
             Verb::Recover { from, to } => {
                 if to.exists() {
                     anyhow::bail!("{}: exists already; name a new file", to.display());

@@ -1,7 +1,7 @@
 //! `clutch loop`.
 
 use crate::args::{ScenarioArgs, key_value};
-use crate::output::{BUILD, Exit, json, not_certified, print};
+use crate::output::{BUILD, Exit, json, not_certified, print, shown};
 use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
@@ -169,6 +169,7 @@ impl Loop {
         said?;
         print(&if self.json { json(&ran.to_json())? } else { summary(&ran) })?;
         Ok(match ran.verdict() {
+            Verdict::Done if ran.log.as_ref().is_some_and(|log| log.records.is_err()) => Exit::Incomplete,
             Verdict::Done => Exit::Done,
             Verdict::Stopped => Exit::Stopped,
             Verdict::Fault => Exit::Fault,
@@ -234,7 +235,7 @@ impl Loop {
     fn say(&self, text: &str) -> anyhow::Result<()> {
         // With --json standard output is for the summary.
         if self.json {
-            let _ = std::io::stderr().write_all(text.as_bytes());
+            let _ = std::io::stderr().write_all(shown(text).as_bytes());
             return Ok(());
         }
         print(text)
@@ -263,6 +264,8 @@ pub fn summary(s: &Summary) -> String {
     let latency = |s: &CycleSummary| {
         format!("{} / {} / {} / {}", us(s.p50_ns), us(s.p99_ns), us(s.p99_9_ns), us(s.max_ns))
     };
+    // A board whose clock waits for this machine says nothing of it.
+    let late = if r.wake.count > 0 { latency(&r.wake) } else { "not told".to_owned() };
     let title = format!(
         "{}\n{} ticks; figures over {} s after settling, from the encoder",
         s.scenario,
@@ -289,6 +292,7 @@ pub fn summary(s: &Summary) -> String {
             ("deadline misses", r.deadline_misses.to_string(), ""),
             ("answer after p50 / p99 / p99.9 / max", latency(&r.response), "µs"),
             ("cycle time p50 / p99 / p99.9 / max", latency(&r.interval), "µs"),
+            ("wake-up late by p50 / p99 / p99.9 / max", late, "µs"),
         ],
     );
     for line in s.remarks() {

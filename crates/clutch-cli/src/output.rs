@@ -1,9 +1,11 @@
 //! The results of verbs: text, files, an exit code.
 
 use anyhow::Context;
+use clutch_log::printable;
 use clutch_loop::session::SessionError;
 use clutch_sim::progress::Report;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -20,6 +22,8 @@ pub(crate) enum Exit {
     Fault,
     /// Exit code 4.
     Stopped,
+    /// Exit code 5: done, but the log is not whole.
+    Incomplete,
 }
 
 /// Version and commit, as logs tell it.
@@ -53,10 +57,15 @@ pub(crate) fn with_progress<T>(unit: &str, work: impl FnOnce(Report<'_>) -> T) -
     result
 }
 
+/// Text for a terminal: names from files of others may hold what it would obey.
+pub(crate) fn shown(text: &str) -> Cow<'_, str> {
+    printable(text, &['\n', '\t'])
+}
+
 /// Prints to standard output. A reader that has gone away (`| head`) is not an error.
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(shown(text).as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
         other => other.context("standard output"),
     }

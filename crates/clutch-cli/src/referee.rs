@@ -48,7 +48,8 @@ fn built_in(name: &str) -> Option<&'static str> {
 fn load(name: &str) -> anyhow::Result<Case> {
     let text = match (built_in(name), Path::new(name).exists()) {
         (Some(text), false) => text.to_owned(),
-        (_, true) => std::fs::read_to_string(name).with_context(|| format!("{name}: cannot be read"))?,
+        (_, true) => clutch_sim::scenario::read_text(Path::new(name))
+            .with_context(|| format!("{name}: cannot be read"))?,
         (None, false) => {
             anyhow::bail!("{name}: no such file, and no built-in case; `clutch referee --list` shows those")
         }

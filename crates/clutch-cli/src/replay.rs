@@ -5,7 +5,7 @@ use crate::output::{BUILD, Exit, print};
 use crate::plot::{self, Figure, Panel, Series};
 use crate::table::{number, quantities};
 use clap::Args;
-use clutch_log::{CommandRecord, Limits, Log};
+use clutch_log::{CommandRecord, Limits, Log, Tail};
 use clutch_loop::replay::replay;
 use clutch_sim::Scenario;
 use std::path::PathBuf;
@@ -15,7 +15,8 @@ use std::path::PathBuf;
 /// With --set the law gets other parameters: an open-loop replay, which gives the commands that
 /// those would have caused on the same counts, and does not predict the motion of the shaft.
 ///
-/// Exit code 0: identical, or replayed with --set; 3: the outputs differ.
+/// Exit code 0: identical, or replayed with --set; 3: the outputs differ; 5: the same, as far as they can be compared: the
+/// log ended early, or has a gap, behind which nothing is.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  clutch replay run.mcap\n  clutch replay run.mcap --set law.smc.kp_v=4 --plot compare.svg"
@@ -46,24 +47,29 @@ impl Replay {
         }
         let n = replayed.commands.len();
         let mut text = String::new();
-        if !log.complete {
-            text += "the log was cut; its readable part is replayed\n";
+        if log.tail != Tail::Finished {
+            text += &format!("the log ended early ({}); its readable part is replayed\n", log.tail);
+        }
+        if let Some(damage) = &log.damage {
+            text += &format!("{} damaged places in the log; the first: {damage}\n", log.damaged);
         }
         if replayed.dropped > 0 {
-            text += &format!(
-                "the log dropped {} records; a difference after the first gap proves nothing about the law\n",
-                replayed.dropped
-            );
+            text += &format!("the log dropped {} records\n", replayed.dropped);
         }
+        if replayed.behind_gap > 0 {
+            text += &format!("a gap: {} ticks behind it are not comparable\n", replayed.behind_gap);
+        }
+        let whole = log.complete && replayed.behind_gap == 0 && replayed.dropped == 0;
+        let done = if whole { Exit::Done } else { Exit::Incomplete };
         if !self.set.is_empty() {
             text += &compare(&log.commands, &replayed.commands);
             print(&text)?;
-            return Ok(Exit::Done);
+            return Ok(done);
         }
         let outcome = match &replayed.first {
             None => {
                 text += &format!("identical over {n} ticks\n");
-                Exit::Done
+                done
             }
             Some(d) => {
                 text += &format!(

@@ -41,6 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             age_us: 120,
             lateness_us: (tick % 7) as u32,
             superseded: false,
+            wake_us: 0,
         }))?;
         log.write(&Record::Command(CommandRecord {
             tick,

@@ -1,6 +1,7 @@
 //! The contents of a log, without holding them.
 
 use crate::error::LogError;
+use crate::printable::printable;
 use crate::proto::{CHANNELS, PARAMETER_CHANNEL};
 use crate::record;
 use crate::scan::{Limits, Scanned, scan_file};
@@ -57,17 +58,17 @@ impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (s, h) = (&self.scanned, &self.scanned.header);
         writeln!(f, "{}: {}", self.path.display(), s.tail)?;
-        writeln!(f, "  {} of {} by clutch {}", h.source, Quoted(&h.scenario_name), h.version)?;
+        writeln!(f, "  {} of {} by clutch {}", h.source, Quoted(&h.scenario_name), Quoted(&h.version))?;
         writeln!(
             f,
             "  law hash {:016x}, {}, period {} µs, port {}",
             h.law_hash,
-            h.scalar,
+            Quoted(&h.scalar),
             h.period_us,
             Quoted(&h.port)
         )?;
         for (key, value) in &h.extra {
-            writeln!(f, "  {key}: {value}")?;
+            writeln!(f, "  {}: {}", Quoted(key), Quoted(value))?;
         }
         writeln!(
             f,
@@ -92,6 +93,9 @@ impl fmt::Display for Info {
         if let Some(damage) = &s.damage {
             write!(f, "\n  {} damaged places; the first: {damage}", s.damaged)?;
         }
+        if !s.checked && s.damaged == 0 {
+            write!(f, "\n  the header has no checksum: an older version wrote it")?;
+        }
         if s.other_messages > 0 {
             write!(f, "\n  {} messages on topics unknown to this version", s.other_messages)?;
         }
@@ -103,7 +107,7 @@ struct Quoted<'a>(&'a str);
 
 impl fmt::Display for Quoted<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_empty() { f.write_str("none") } else { f.write_str(self.0) }
+        if self.0.is_empty() { f.write_str("none") } else { f.write_str(&printable(self.0, &[])) }
     }
 }
 

@@ -5,6 +5,7 @@ mod error;
 mod header;
 mod info;
 pub mod names;
+mod printable;
 mod proto;
 mod read;
 mod record;
@@ -17,6 +18,7 @@ pub use error::LogError;
 pub use header::{Header, Source};
 pub use info::{ChannelInfo, Info, info};
 pub use names::{Arrival, CommandSource, EventKind};
+pub use printable::printable;
 pub use proto::{CHANNELS, Channel, Field, Kind, Value, channel_table};
 pub use read::{Log, read, read_bytes};
 pub use record::{

@@ -29,6 +29,8 @@ pub struct Log {
     pub damage: Option<Damage>,
     /// Number of damaged places that were skipped.
     pub damaged: u64,
+    /// Time of the run from which on records follow a gap, ns: something between them was damaged.
+    pub gap_from_ns: Option<u64>,
     /// Size of the file, bytes.
     pub file_bytes: u64,
     /// Bytes of it that gave nothing.
@@ -85,7 +87,7 @@ fn collect(
         Ok(())
     })?;
     let complete = seen.complete();
-    let Scanned { header, tail, damage, damaged, file_bytes, left_out_bytes, .. } = seen;
+    let Scanned { header, tail, damage, damaged, gap_from_ns, file_bytes, left_out_bytes, .. } = seen;
     Ok(Log {
         header,
         samples,
@@ -97,6 +99,7 @@ fn collect(
         tail,
         damage,
         damaged,
+        gap_from_ns,
         file_bytes,
         left_out_bytes,
     })

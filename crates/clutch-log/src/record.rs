@@ -294,6 +294,8 @@ records! {
         8 lateness_us = lateness_us: u32, uint32;
         /// A newer sample had come with it; not answered.
         9 superseded = superseded: bool, bool;
+        /// Lateness of the wake-up that brought it, µs; 0 where it is not known.
+        10 wake_us = wake_us: u32, uint32;
     }
     /// A command, with the values that led the law to it.
     Command = CommandRecord, "/command", "The command of a tick, with every term of the law." {

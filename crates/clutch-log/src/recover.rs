@@ -2,6 +2,8 @@
 
 use crate::error::LogError;
 use crate::header::Header;
+use crate::names::EventKind;
+use crate::record::{EventRecord, Record};
 use crate::scan::{Limits, Scanned, scan_file};
 use crate::write::{LogWriter, Summary};
 use std::fmt;
@@ -40,7 +42,8 @@ impl fmt::Display for Recovered {
 
 /// Writes every record of `from` that can be read to a new, finished log `to`, which is
 /// overwritten. Damaged chunks in the middle are skipped and reported. The records are the same bit
-/// for bit; the header gets the extra key `recovered`.
+/// for bit; the header gets the extra key `recovered`, and the first record behind a damaged place an event `LogDropped`
+/// before it, with the value 0: their number is not known.
 ///
 /// # Errors
 /// As for [`read`](crate::read) and [`LogWriter`]; `from` and `to` are one file. The number of
@@ -59,12 +62,24 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>, limits: &Limits) ->
     header.extra.push((
         RECOVERED.into(),
         format!(
-            "original {}; {} of {} bytes left out",
-            scanned.tail, scanned.left_out_bytes, scanned.file_bytes
+            "original {}; {} of {} bytes left out{}",
+            scanned.tail,
+            scanned.left_out_bytes,
+            scanned.file_bytes,
+            scanned.damage.as_ref().map_or(String::new(), |damage| format!("; damaged at {damage}")),
         ),
     ));
     let mut log = LogWriter::create(to, &header)?;
-    scan_file(from, limits, true, &mut |_, record| log.write(&record))?;
+    let mut gap = scanned.gap_from_ns;
+    scan_file(from, limits, true, &mut |_, record| {
+        if gap.is_some_and(|from| record.time_ns() >= from) {
+            gap = None;
+            let kind = EventKind::LogDropped as u8;
+            let (tick, time_ns) = (record.tick(), record.time_ns());
+            log.write(&Record::Event(EventRecord { tick, time_ns, kind, ..EventRecord::default() }))?;
+        }
+        log.write(&record)
+    })?;
     let summary = log.finish()?;
     Ok(Recovered {
         records: summary.records,

@@ -11,7 +11,7 @@ use crate::error::{LogError, require_file};
 use crate::header::{Header, Source};
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
 use crate::record::{self, Record};
-use crate::write::{ENVELOPE, FORMAT, METADATA, METADATA_EXTRA, SCENARIO};
+use crate::write::{CHECKSUM, ENVELOPE, FORMAT, METADATA, METADATA_EXTRA, SCENARIO, checksum};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use mcap::records::op;
 use prost::Message;
@@ -22,7 +22,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
+pub(crate) static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
 /// The bounds of a reader. The defaults hold for hours of logging at 1 kHz. They let a hostile file
 /// take 2.3 GB at most for records (20 million of 112 bytes) and five minutes.
@@ -124,6 +124,10 @@ pub struct Scanned {
     pub uncompressed_bytes: u64,
     /// Compression of the chunks: `zstd`, `none`, or both.
     pub compression: String,
+    /// True if the header's records had checksums, and they held.
+    pub checked: bool,
+    /// Time of the run from which on records follow a gap, ns: something between them was damaged. None without a gap.
+    pub gap_from_ns: Option<u64>,
     /// Messages on topics that are not in the channel table.
     pub other_messages: u64,
 }
@@ -202,6 +206,8 @@ struct Scan<'a, R> {
     held: BTreeMap<u16, Held>,
     parameter_bytes: u64,
     chunk: Vec<u8>,
+    /// Just after the latest record so far, in the time of the run, ns.
+    reached_ns: u64,
     unpack: Option<zstd::bulk::Decompressor<'static>>,
     seen: Scanned,
 }
@@ -230,6 +236,7 @@ impl<'a, R: Read> Scan<'a, R> {
             held: BTreeMap::new(),
             parameter_bytes: 0,
             chunk: Vec::new(),
+            reached_ns: 0,
             unpack: None,
             seen: Scanned {
                 header: Header::default(),
@@ -242,6 +249,8 @@ impl<'a, R: Read> Scan<'a, R> {
                 compressed_bytes: 0,
                 uncompressed_bytes: 0,
                 compression: String::new(),
+                checked: true,
+                gap_from_ns: None,
                 other_messages: 0,
             },
         }
@@ -286,6 +295,7 @@ impl<'a, R: Read> Scan<'a, R> {
                 }
                 std::io::copy(&mut (&mut self.input).take(length), &mut std::io::sink())
                     .map_err(|e| LogError::io(self.path, "cannot read", e))?;
+                self.gap();
                 self.skip(length, format!("a record of {length} bytes, over the limit"));
                 self.at += 9 + length;
                 continue;
@@ -356,6 +366,7 @@ impl<'a, R: Read> Scan<'a, R> {
             op::CHUNK => self.chunk(body, each)?,
             op::CHANNEL | op::MESSAGE => {
                 if let Err(what) = self.data_record(opcode, body, each)? {
+                    self.gap();
                     self.skip(9 + body.len() as u64, what);
                 }
             }
@@ -373,19 +384,37 @@ impl<'a, R: Read> Scan<'a, R> {
             // Only the first counts: a later one cannot take the log's name from it.
             METADATA if !self.named => match fields.map() {
                 Some(map) => {
+                    self.verify(METADATA, &map);
                     self.header(map)?;
                     self.named = true;
                 }
                 None => return Err(self.corrupt("metadata \"clutch\": expected pairs of texts".into())),
             },
             METADATA_EXTRA if !self.attached => match fields.map() {
-                Some(map) => self.seen.header.extra = map.into_iter().collect(),
+                Some(mut map) => {
+                    self.verify(METADATA_EXTRA, &map);
+                    map.remove(CHECKSUM);
+                    self.seen.header.extra = map.into_iter().collect();
+                }
                 None => self
                     .skip(9 + body.len() as u64, "metadata \"clutch.extra\": expected pairs of texts".into()),
             },
             _ => {}
         }
         Ok(())
+    }
+
+    /// Holds a metadata record against its checksum; one that an older version wrote has none.
+    fn verify(&mut self, name: &str, map: &BTreeMap<String, String>) {
+        let Some(saved) = map.get(CHECKSUM) else {
+            self.seen.checked = false;
+            return;
+        };
+        let computed = format!("{:08x}", checksum(name, map));
+        if *saved != computed {
+            self.seen.checked = false;
+            self.damage(format!("metadata \"{name}\": checksum {computed}, expected {saved:?}"));
+        }
     }
 
     fn header(&mut self, mut map: BTreeMap<String, String>) -> Result<(), LogError> {
@@ -453,7 +482,10 @@ impl<'a, R: Read> Scan<'a, R> {
         let result = self.unpack(body, &mut chunk);
         let whole = 9 + body.len() as u64;
         match result? {
-            Err(what) => self.skip(whole, what),
+            Err(what) => {
+                self.gap();
+                self.skip(whole, what);
+            }
             Ok(compressed) => {
                 self.seen.chunks += 1;
                 self.seen.compressed_bytes += compressed;
@@ -463,10 +495,12 @@ impl<'a, R: Read> Scan<'a, R> {
                     let record =
                         rest.u8().zip(rest.u64()).and_then(|(o, length)| Some((o, rest.take(length)?)));
                     let Some((opcode, body)) = record else {
+                        self.gap();
                         self.damage("a chunk that ends inside a record".into());
                         break;
                     };
                     if let Err(what) = self.data_record(opcode, body, each)? {
+                        self.gap();
                         self.damage(what);
                     }
                     if self.seen.damaged > 0 {
@@ -573,7 +607,10 @@ impl<'a, R: Read> Scan<'a, R> {
                     Some(Held::Row(row)) => {
                         let time_ns = log_time.wrapping_sub(self.seen.header.started_unix_ns);
                         match record::decode(*row, time_ns, fields.0) {
-                            Ok(record) => each(&self.seen.header, record)?,
+                            Ok(record) => {
+                                self.reached_ns = self.reached_ns.max(time_ns.saturating_add(1));
+                                each(&self.seen.header, record)?;
+                            }
                             Err(what) => {
                                 return Ok(Err(format!("a message on {}: {what}", CHANNELS[*row].topic)));
                             }
@@ -628,6 +665,11 @@ impl<'a, R: Read> Scan<'a, R> {
             return Ok(());
         }
         Err(LogError::Limit { path: self.path.into(), what, value, limit })
+    }
+
+    /// Records are missing here.
+    fn gap(&mut self) {
+        self.seen.gap_from_ns.get_or_insert(self.reached_ns);
     }
 
     fn damage(&mut self, what: String) {

@@ -4,6 +4,7 @@ use crate::error::{LogError, require_file};
 use crate::header::Header;
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
 use crate::record::{self, MAX_TERMS, Record};
+use crate::scan::CRC;
 use crate::sync::Syncer;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
@@ -34,6 +35,8 @@ pub(crate) const METADATA: &str = "clutch";
 pub(crate) const METADATA_EXTRA: &str = "clutch.extra";
 /// Name of the attachment with the scenario.
 pub(crate) const SCENARIO: &str = "scenario.toml";
+/// Key of the checksum of a metadata record, which MCAP has for chunks and attachments only.
+pub(crate) const CHECKSUM: &str = "crc32";
 /// Version of the channel table and of the metadata.
 pub(crate) const FORMAT: u32 = 1;
 
@@ -352,6 +355,18 @@ fn begin(
     }
 }
 
+/// CRC-32/ISO-HDLC of a metadata record: of its name and of its pairs but the checksum, in the order of the keys' bytes,
+/// each text behind its length in four bytes, little-endian.
+pub(crate) fn checksum(name: &str, pairs: &BTreeMap<String, String>) -> u32 {
+    let mut crc = CRC.digest();
+    let pairs = pairs.iter().filter(|(key, _)| *key != CHECKSUM).flat_map(|(key, value)| [key, value]);
+    for text in [name].into_iter().chain(pairs.map(String::as_str)) {
+        crc.update(&(text.len() as u32).to_le_bytes());
+        crc.update(text.as_bytes());
+    }
+    crc.finalize()
+}
+
 /// The two metadata records of a header.
 fn metadata(path: &Path, h: &Header) -> Result<(Metadata, Metadata), LogError> {
     let value = [&h.scenario_name, &h.scenario_toml, &h.version, &h.port, &h.scalar]
@@ -384,19 +399,21 @@ fn metadata(path: &Path, h: &Header) -> Result<(Metadata, Metadata), LogError> {
     }
     let mut extra = BTreeMap::new();
     for (key, value) in &h.extra {
-        if extra.insert(key.clone(), value.clone()).is_some() {
+        if key == CHECKSUM || extra.insert(key.clone(), value.clone()).is_some() {
             return Err(LogError::Header {
                 path: path.into(),
                 key: key.clone(),
                 value: value.clone(),
-                expected: "each extra key once",
+                expected: "each extra key once, and not crc32",
             });
         }
     }
-    Ok((
-        Metadata { name: METADATA.into(), metadata: clutch },
-        Metadata { name: METADATA_EXTRA.into(), metadata: extra },
-    ))
+    let checked = |name: &str, mut metadata: BTreeMap<String, String>| {
+        let crc = checksum(name, &metadata);
+        metadata.insert(CHECKSUM.to_owned(), format!("{crc:08x}"));
+        Metadata { name: name.to_owned(), metadata }
+    };
+    Ok((checked(METADATA, clutch), checked(METADATA_EXTRA, extra)))
 }
 
 fn failure(path: &Path, written: u64, error: McapError) -> LogError {

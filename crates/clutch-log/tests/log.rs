@@ -283,7 +283,8 @@ fn a_damaged_chunk_is_skipped_and_told() {
     let recovered = recover(&path, folder.file("recovered.mcap"), &Limits::default()).unwrap();
     assert_eq!(
         recovered.records as usize,
-        log.samples.len() + log.commands.len() + log.events.len() + log.links.len() + log.truths.len()
+        log.samples.len() + log.commands.len() + log.events.len() + log.links.len() + log.truths.len() + 1,
+        "and the event that tells of the gap"
     );
 }
 
@@ -313,7 +314,8 @@ fn a_bit_changed_outside_the_chunks_is_told() {
     bytes[at] = b'e'; // the law's hash is another one now
     let log = read_bytes(&bytes, &Limits::default()).unwrap();
     assert!(!log.complete);
-    assert!(log.damage.unwrap().what.contains("data section"));
+    assert!(log.damage.unwrap().what.contains("metadata"));
+    assert_eq!(log.damaged, 2, "the record's checksum and the data's");
 }
 
 #[test]
@@ -638,4 +640,40 @@ fn info_counts_without_reading_into_memory() {
     ] {
         assert!(shown.contains(part), "no \"{part}\" in\n{shown}");
     }
+}
+
+/// The bytes of a log whose header is `header`, with `from` in its metadata replaced by `to` of the same length.
+fn edited(name: &str, from: &[u8], to: &[u8]) -> Vec<u8> {
+    let folder = Folder::new(name);
+    let path = folder.file("log.mcap");
+    let _ = LogWriter::create(&path, &header()).unwrap().finish().unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    let places: Vec<usize> =
+        (0..bytes.len() - from.len()).filter(|i| bytes[*i..].starts_with(from)).collect();
+    assert!(!places.is_empty());
+    for at in places {
+        bytes[at..at + to.len()].copy_from_slice(to);
+    }
+    bytes
+}
+
+#[test]
+fn a_changed_byte_of_the_metadata_is_found_by_its_checksum() {
+    let bytes = edited("checksum", b"0.1.0+abc", b"0.1.0+abd");
+    let log = read_bytes(&bytes, &Limits::default()).unwrap();
+    assert!(!log.complete);
+    let damage = log.damage.unwrap();
+    assert!(damage.what.starts_with("metadata \"clutch\": checksum "), "{damage}");
+    assert_eq!(log.gap_from_ns, None, "no record is missing");
+}
+
+#[test]
+fn a_log_of_before_the_checksum_is_read_and_told() {
+    // Under another name the checksum is a pair like any other, as an older reader takes it.
+    let bytes = edited("unchecked", b"crc32", b"other");
+    let folder = Folder::new("unchecked-too");
+    let path = folder.file("log.mcap");
+    std::fs::write(&path, &bytes).unwrap();
+    let info = info(&path, &Limits::default()).unwrap();
+    assert!(!info.scanned.checked && info.scanned.header.scenario_name == header().scenario_name);
 }

@@ -15,15 +15,15 @@ use crate::log_thread::Ring;
 use crate::port::Port;
 use crate::preflight::ClockOffset;
 use crate::realtime::{
-    CycleStats, CycleSummary, Readiness, RealtimeOptions, WaitMode, enter, monotonic_ns, sleep_until,
-    wait_readable,
+    CycleStats, CycleSummary, Readiness, RealtimeOptions, SampleWake, WaitMode, enter, monotonic_ns,
+    sleep_until, wait_readable,
 };
 use crate::station::{Station, StationNotice};
 use crate::to_log;
 use crate::watch::Watch;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Arithmetic, Micros, Real, StickSlip, StickSlipState};
-use clutch_log::{EventKind, EventRecord, Record};
+use clutch_log::{EventKind, EventRecord, Record, SampleRecord};
 use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Standing};
 use clutch_sim::Metrics;
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
@@ -80,6 +80,10 @@ pub struct LoopReport {
     pub response: CycleSummary,
     /// Time between two answers, ns.
     pub interval: CycleSummary,
+    /// Lateness of the wake-ups, ns: after the deadline of a cycle that this machine's clock starts, as `cyclictest` has
+    /// it; of one that a sample starts, by how much longer the sample took to wake this thread than the quickest one.
+    /// None of a board whose clock waits for this machine, or that closes the loop itself.
+    pub wake: CycleSummary,
     /// Frequency of the clock whose cycles the board counts, Hz; 0 if it counts none.
     pub clock_hz: u32,
     /// Clock cycles of a tick, where the board counts them.
@@ -195,6 +199,10 @@ struct Control<'a, S: Station> {
     answers: u64,
     response: CycleStats,
     interval: CycleStats,
+    wake: CycleStats,
+    sample_wake: SampleWake,
+    /// Lateness of the wake-up under way, if this machine's clock caused it, ns.
+    clock_wake: Option<u64>,
     last_answer_ns: Option<u64>,
     last_arrival_ns: Option<u64>,
     last_sample_us: Option<u32>,
@@ -245,6 +253,9 @@ impl<'a, S: Station> Control<'a, S> {
             answers: 0,
             response: CycleStats::new(),
             interval: CycleStats::new(),
+            wake: CycleStats::new(),
+            sample_wake: SampleWake::default(),
+            clock_wake: None,
             last_answer_ns: None,
             last_arrival_ns: None,
             last_sample_us: None,
@@ -356,7 +367,7 @@ impl<'a, S: Station> Control<'a, S> {
                 self.last_arrival_ns = Some(arrived_ns);
             }
         }
-        self.after(now, &batch);
+        self.after((arrived_ns, now), &batch);
         Ok(())
     }
 
@@ -373,14 +384,17 @@ impl<'a, S: Station> Control<'a, S> {
     }
 
     /// The work that need not be done before the answer is on its way: log, figures, watcher.
-    fn after(&mut self, now: u64, batch: &Batch<S::Scalar, S::Terms>) {
+    fn after(&mut self, (woke, now): (u64, u64), batch: &Batch<S::Scalar, S::Terms>) {
         let time_ns = now.saturating_sub(self.start_ns);
         self.refused = self.refused.or(batch.refused);
         // What came before consent is not of the run.
         let of_run = |n: &&CycleNotice<S::Scalar, S::Terms>| n.cycle.from != State::Ready;
+        let late = self.wake_lateness(woke, batch.cycles.iter().take(batch.used).flatten().find(of_run));
         for n in batch.cycles.iter().take(batch.used).flatten().filter(of_run) {
             let age = self.clock.age_us(n.sample.time_us, now);
-            let mut records = [Record::Sample(to_log::sample(time_ns, age, n)); 3];
+            let wake_us = u32::try_from(late / 1000).unwrap_or(u32::MAX);
+            let sample = SampleRecord { wake_us, ..to_log::sample(time_ns, age, n) };
+            let mut records = [Record::Sample(sample); 3];
             records[1] = Record::Command(to_log::command(time_ns, &n.cycle, &self.dac, self.radians));
             let change = to_log::change(time_ns, &n.cycle);
             let used = if let Some(change) = change {
@@ -430,6 +444,20 @@ impl<'a, S: Station> Control<'a, S> {
         w.tick.store(state.tick, Ordering::Relaxed);
         w.lost.store(state.lost, Ordering::Relaxed);
         w.late_answers.store(state.deadline_misses, Ordering::Relaxed);
+    }
+
+    /// The lateness of the wake-up, ns, with the oldest sample that it found; 0 where it is not known.
+    fn wake_lateness(&mut self, woke: u64, oldest: Option<&CycleNotice<S::Scalar, S::Terms>>) -> u64 {
+        let by_sample = if S::LOOKS_ON || self.patient { None } else { oldest };
+        let late = match (self.clock_wake.take(), by_sample) {
+            (Some(late), _) => Some(late),
+            (None, Some(n)) => self.sample_wake.woke(n.sample.time_us, woke),
+            (None, None) => None,
+        };
+        if let Some(late) = late {
+            self.wake.record(late);
+        }
+        late.unwrap_or(0)
     }
 
     /// Records the times that the board reports of its own: those of its answers, its samples, its ticks.
@@ -536,9 +564,10 @@ impl<'a, S: Station> Control<'a, S> {
     }
 
     /// Waits for this machine's next cycle. Cycles that were missed stay missed.
-    fn wait_for_clock(&self, due: &mut Due, mode: WaitMode) -> u64 {
+    fn wait_for_clock(&mut self, due: &mut Due, mode: WaitMode) -> u64 {
         sleep_until(due.cycle, mode);
         let (woke, meant) = (monotonic_ns(), due.cycle);
+        self.clock_wake = Some(woke.saturating_sub(meant));
         while due.cycle <= woke {
             due.cycle += self.period_ns;
         }
@@ -611,6 +640,7 @@ impl<'a, S: Station> Control<'a, S> {
             deadline_misses: standing.deadline_misses,
             response: self.response.summary(),
             interval: self.interval.summary(),
+            wake: self.wake.summary(),
             clock_hz: 0,
             tick_cycles: self.tick_cycles.summary(),
             untold: standing.untold,

@@ -63,12 +63,14 @@ pub struct Difference {
 /// A replay.
 #[derive(Clone, Debug)]
 pub struct Replay {
-    /// The commands of the replay, one for each that was logged.
+    /// The commands of the replay, one for each that was logged before the first gap.
     pub commands: Vec<CommandRecord>,
     /// The first difference, if there is one.
     pub first: Option<Difference>,
     /// Records that the log dropped.
     pub dropped: u64,
+    /// Commands in the log behind its first gap: they are not comparable.
+    pub behind_gap: usize,
 }
 
 /// The first field in which two commands differ, in its bits; times may.
@@ -141,13 +143,18 @@ fn replay_in<T: Real>(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayEr
     Ok(compared(log, commands))
 }
 
-/// Samples that have a command.
+/// Samples that have a command, up to the first gap.
 fn paired(log: &Log) -> Result<&[SampleRecord], ReplayError> {
-    if log.samples.len() != log.commands.len() && log.complete {
+    let dropped = log.events.iter().find(|e| e.kind == EventKind::LogDropped as u8).map(|e| e.time_ns);
+    let gap = [log.gap_from_ns, dropped].into_iter().flatten().min();
+    if log.samples.len() != log.commands.len() && log.complete && gap.is_none() {
         let (samples, commands) = (log.samples.len(), log.commands.len());
         return Err(ReplayError::Unpaired { samples, commands });
     }
-    let pairs = log.samples.len().min(log.commands.len());
+    // What the law has behind a gap, in its filters and integrals, is not known.
+    let before = |time_ns: u64| gap.is_none_or(|from| time_ns < from);
+    let pairs = log.samples.iter().zip(&log.commands);
+    let pairs = pairs.take_while(|(s, c)| before(s.time_ns) && before(c.time_ns)).count();
     Ok(log.samples.get(..pairs).unwrap_or(&[]))
 }
 
@@ -156,7 +163,9 @@ fn compared(log: &Log, commands: Vec<CommandRecord>) -> Replay {
     let mut ticks = log.commands.iter().zip(&commands);
     let first = ticks.find_map(|(logged, replayed)| difference(&columns, logged, replayed));
     let dropped = log.links.iter().map(|l| l.log_dropped).max().unwrap_or(0);
-    Replay { commands, first, dropped }
+    // A log that was cut may have one sample more than it has commands, or the other way round.
+    let behind_gap = log.samples.len().min(log.commands.len()).saturating_sub(commands.len());
+    Replay { commands, first, dropped, behind_gap }
 }
 
 fn extra<'a>(log: &'a Log, key: &str) -> Option<&'a str> {

@@ -205,6 +205,7 @@ impl Summary {
             "deadline_misses": r.deadline_misses,
             "response": latency(&r.response),
             "cycle": latency(&r.interval),
+            "wake": latency(&r.wake),
             "tick_clock_cycles": (r.clock_hz > 0).then(|| json!({
                 "clock_hz": r.clock_hz, "p50": r.tick_cycles.p50_ns, "p99_9": r.tick_cycles.p99_9_ns,
                 "max": r.tick_cycles.max_ns,

@@ -35,6 +35,7 @@ pub fn sample<T: Real, X>(time_ns: u64, age_us: u32, n: &CycleNotice<T, X>) -> S
         age_us,
         lateness_us: n.lateness.0,
         superseded: n.superseded,
+        wake_us: 0,
     }
 }
 

@@ -100,6 +100,7 @@ pub fn record(n: &mut Numbers, tick: u64, time_ns: u64) -> Record {
             age_us: whole(n) as u32,
             lateness_us: whole(n) as u32,
             superseded: n.below(2) == 0,
+            wake_us: whole(n) as u32,
         }),
         1 => Record::Command(CommandRecord {
             tick,
@@ -165,6 +166,7 @@ pub fn bits(record: &Record) -> Vec<u64> {
             r.age_us.into(),
             r.lateness_us.into(),
             r.superseded.into(),
+            r.wake_us.into(),
         ],
         Record::Command(r) => vec![
             1,

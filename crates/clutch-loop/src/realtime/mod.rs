@@ -13,9 +13,11 @@
 
 mod stats;
 mod system;
+mod wake;
 
 pub use stats::{CycleStats, CycleSummary};
 pub use system::describe_system;
+pub use wake::SampleWake;
 
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::fd::BorrowedFd;

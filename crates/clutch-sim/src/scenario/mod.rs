@@ -230,7 +230,7 @@ impl Scenario {
         if let (Some(b), false) = (built_in, name.exists()) {
             return Ok((origin, b.toml.to_owned()));
         }
-        match std::fs::read_to_string(name) {
+        match read_text(name) {
             Ok(text) => Ok((origin, text)),
             Err(error) => Err(LoadError::Io { name: origin, error }),
         }
@@ -773,4 +773,22 @@ fn overlay(base: &mut Table, over: Table) {
             }
         }
     }
+}
+
+/// Most text of a file that is read whole, bytes.
+const MOST_TEXT: u64 = 16 << 20;
+
+/// The text of a file that people write, which is no longer than 16 MiB.
+///
+/// # Errors
+/// It cannot be read, is longer, or is no text.
+pub fn read_text(path: &Path) -> std::io::Result<String> {
+    use std::io::{ErrorKind, Read as _};
+    let mut text = String::new();
+    let read = std::fs::File::open(path)?.take(MOST_TEXT + 1).read_to_string(&mut text)?;
+    if read as u64 > MOST_TEXT {
+        let message = format!("more than {} MiB: expected a file that somebody wrote", MOST_TEXT >> 20);
+        return Err(std::io::Error::new(ErrorKind::FileTooLarge, message));
+    }
+    Ok(text)
 }
