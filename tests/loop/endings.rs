@@ -94,8 +94,8 @@ fn every_stall_of_the_loop_is_counted_and_harmless() {
     let _alone = alone();
     // A strict board; limits so loose that a stall of 15 ms ends nothing.
     let limits = [
-        "--set=safety.limits.silence_cycles=400",
-        "--set=safety.limits.watchdog_cycles=400",
+        "--set=safety.limits.silence_cycles=100",
+        "--set=safety.limits.watchdog_cycles=100",
         "--set=safety.limits.valid_cycles=60",
         "--set=safety.limits.late=128",
         "--set=safety.limits.overruns=128",

@@ -175,6 +175,23 @@ fn names_from_elsewhere_do_not_reach_the_terminal_as_commands() {
 }
 
 #[test]
+fn summary_and_log_tell_how_late_wake_ups_were() {
+    let _alone = alone();
+    let log = folder("wake").join("run.mcap");
+    let path = log.to_str().unwrap();
+    let args = ["loop", "--pace=clock", "--duration=0.5", "--set=run.settle_s=0", "--json", "--log", path];
+    let told = run(&args).expect(0).json();
+    let (count, most) = (told["wake"]["count"].as_u64().unwrap(), told["wake"]["max_us"].as_f64().unwrap());
+    let late: Vec<u32> = read_log(&log).samples.iter().map(|sample| sample.wake_us).collect();
+    // No clock wakes a thread before its time, and none in less than no time.
+    assert!(count >= 400 && late.iter().filter(|us| **us > 0).count() > late.len() / 2, "{count}: {late:?}");
+    assert!(late.iter().all(|us| f64::from(*us) <= most), "{most}: {late:?}");
+    // With the board's samples, and a board whose clock waits for this machine, nothing can be told.
+    let args = ["loop", "--duration=0.5", "--set=run.settle_s=0"];
+    let _ = run(&args).expect(0).prints(&["wake-up late by p50 / p99 / p99.9 / max", "not told"]);
+}
+
+#[test]
 fn a_scenario_without_end_is_refused() {
     let _guard = beside_others();
     let _ = run(&["sim", "/dev/zero"]).expect(1).says(&["/dev/zero", "more than 16 MiB"]);
