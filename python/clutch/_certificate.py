@@ -11,7 +11,8 @@ class Certificate(_Record):
     """The check that gains hold every plant within the bounds to the sliding surface, and the largest distance from it.
 
     A certificate is true as a condition: ``if scenario.certificate(): …``. In it, time is continuous and the sensor
-    exact; sampling, encoder steps and delay come on top. docs/theory.md, section 8, derives it.
+    exact; sampling, encoder steps and delay come on top: `sampled` has what is said of them. docs/theory.md, section 8,
+    derives both.
 
     Parameters
     ----------
@@ -39,6 +40,8 @@ class Certificate(_Record):
         The layer around the sliding surface, and the bound of the error.
     paper : Certificate.Paper or None
         The paper's own conditions, as printed; None for PD and CTC.
+    sampled : Certificate.Sampled
+        The verdicts on the loop as it is sampled.
 
     Examples
     --------
@@ -253,6 +256,52 @@ class Certificate(_Record):
         kd_27_v_s_rad: float
         gamma_28_rad_s2: float
 
+    @dataclass(frozen=True, kw_only=True, repr=False)
+    class Sampled(_Record):
+        """The verdicts on the loop as it is sampled, kept apart: error bound, linear stability, sticks.
+
+        The bound is looked for by ``clutch certify --sampled``, not here.
+
+        Parameters
+        ----------
+        not_covered : str or None
+            What of the scenario these verdicts do not cover; None if they cover it.
+        scope : str or None
+            The loop and the plants that they speak of.
+        error_bound_rad : float or None
+            Proven bound of the error, rad; None if there is none, or none was looked for.
+        limiting_friction_sliding : tuple of float or None
+            The part of `μ_d` that has this bound.
+        cells : int or None
+            Number of parts of `μ_d` that were proven.
+        reason : str or None
+            Why there is no bound.
+        spectral_radius : tuple of float or None
+            Spectral radius with the weakest, a middle and the strongest brake.
+        stable : bool or None
+            True if small deviations die out while nothing saturates or sticks.
+        sticks_excluded : bool
+            False: neither verdict excludes sticks.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.Scenario.load("pd_2").certificate().sampled.stable
+        True
+        """
+
+        _key: ClassVar[str] = "sampled"
+
+        not_covered: str | None
+        scope: str | None
+        error_bound_rad: float | None
+        limiting_friction_sliding: tuple[float, ...] | None
+        cells: int | None
+        reason: str | None
+        spectral_radius: tuple[float, ...] | None
+        stable: bool | None
+        sticks_excluded: bool
+
     scenario: str
     version: str
     law: str
@@ -265,6 +314,7 @@ class Certificate(_Record):
     behind: Behind
     layer: Layer
     paper: Paper | None
+    sampled: Sampled
 
     def __bool__(self) -> bool:
         """True if the gains are certified."""

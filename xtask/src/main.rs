@@ -77,6 +77,13 @@ enum Verb {
         #[arg(default_value_t = 1)]
         first: u64,
     },
+    /// Holds sampled-data certificates against simulations, an hour on two cores: the table of docs/certified.md, and a
+    /// campaign over random sets of gains.
+    Certified {
+        /// Runs of the campaign.
+        #[arg(default_value_t = 10_000)]
+        runs: u64,
+    },
     /// Compares the engines with SciPy over random single intervals: the table of docs/theory.md, section 10.
     Intervals {
         /// Intervals, half of them of extreme parameters.
@@ -142,6 +149,7 @@ fn main() -> Result<()> {
             cargo(example).args(rest).run()
         }
         Verb::Fuzz { seconds } => fuzz::all(seconds),
+        Verb::Certified { runs } => certified(runs),
         Verb::Campaign { seeds, first } => campaign(seeds, first),
         Verb::Intervals { count } => {
             cargo(["build", "--release", "--package", "clutch-sim", "--example", "intervals"]).run()?;
@@ -226,6 +234,29 @@ fn figures() -> Result<()> {
         |args: &[&str], file: &str| cargo(["run", "--release", "--"]).args(args).arg(kept.join(file)).run();
     clutch(&["sim", "motor_pid", "--plot"], "motor_pid.svg")?;
     clutch(&["friction", "plot", "stribeck", "lugre", "elasto_plastic", "--out"], "friction.svg")
+}
+
+fn certified(runs: u64) -> Result<()> {
+    let example = ["run", "--release", "--package", "clutch-sim", "--example", "certified", "--"];
+    let measured = |args: &[&str]| -> Result<String> {
+        let (done, text) = cargo(example).args(args).quietly()?;
+        anyhow::ensure!(done, "the comparison failed:\n{text}");
+        let table: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
+        Ok(table.join("\n"))
+    };
+    write_between("docs/certified.md", "campaign", &measured(&["campaign", &runs.to_string()])?)?;
+    write_between("docs/certified.md", "table", &measured(&["table"])?)
+}
+
+/// Puts a text between the markers of that name.
+fn write_between(page: &str, name: &str, text: &str) -> Result<()> {
+    let file = root().join(page);
+    let old = std::fs::read_to_string(&file)?;
+    let (begin, end) = (format!("<!-- {name}:begin -->"), format!("<!-- {name}:end -->"));
+    let split = old.split_once(&begin).and_then(|(head, rest)| Some((head, rest.split_once(&end)?.1)));
+    let (head, tail) = split.with_context(|| format!("{page} has lost the markers of its {name}"))?;
+    std::fs::write(file, format!("{head}{begin}\n{text}\n{end}{tail}"))?;
+    Ok(())
 }
 
 fn campaign(seeds: Option<u64>, first: u64) -> Result<()> {

@@ -17,7 +17,7 @@ mod shaft;
 
 use crate::setup::{Case, Cell, Certificate, Form, Gains, ModeId, Setup, VERSION};
 use interval::{Interval, at};
-use mode::{Mode, Possible};
+use mode::Mode;
 use shaft::Shaft;
 use std::collections::HashMap;
 
@@ -211,6 +211,11 @@ fn values(s: &Setup) -> Result<(), Refused> {
     Ok(())
 }
 
+/// A number is above a limit, or none.
+fn above(x: f64, limit: f64) -> bool {
+    x > limit || x.is_nan() || limit.is_nan()
+}
+
 /// The cells cover the box.
 fn covered(certificate: &Certificate) -> Result<(), Refused> {
     let [low, high] = certificate.setup.sliding;
@@ -243,7 +248,7 @@ fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
     let walls = walls(cell, n)?;
     starts_inside(setup, cell, &shaft)?;
     let reached = (at(setup.rate) / shaft.speed + at(walls[1].0)).high;
-    if !(reached <= cell.speed_cap) {
+    if above(reached, cell.speed_cap) {
         return Err(Flaw::Speed { cap: cell.speed_cap, reached });
     }
 
@@ -266,7 +271,7 @@ fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
         for case in [Case::Slides, Case::LetGo, Case::TouchesAndLeaves, Case::TouchesAndStays] {
             for gone in 0..=counts {
                 let id = ModeId { piece: piece.id, case, counts: gone };
-                let Possible::Yes(mode) = Mode::new(&shaft, piece, cell.form, id, n) else { continue };
+                let Some(mode) = Mode::possible(&shaft, piece, cell.form, id, n) else { continue };
                 let number = *numbers.get(&id).ok_or(Flaw::Mode(id))?;
                 if let Some(weights) = impossible.get(&number) {
                     let proven = combined(cell, &mode, None, weights, &walls)?;
@@ -281,7 +286,7 @@ fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
                     let next = mode.next(&shaft, &cell.rows[row]);
                     let proven = combined(cell, &mode, Some(next), weights, &walls)?;
                     let radius = cell.radii[row];
-                    if !(proven <= radius) {
+                    if above(proven, radius) {
                         return Err(Flaw::Row { row, mode: number, proven, radius });
                     }
                     programs += 1;
@@ -359,7 +364,7 @@ fn starts_inside(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<(), Flaw> 
         for c in &row[3..n - 1] {
             start = start + at(*c) * volts;
         }
-        if !(start.high <= *radius) {
+        if above(start.high, *radius) {
             return Err(Flaw::Start { row: k, radius: *radius, start: start.high });
         }
     }

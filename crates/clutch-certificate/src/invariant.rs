@@ -49,7 +49,7 @@ pub(crate) struct Search<'a, const N: usize> {
 }
 
 /// Margin by which radii hold more than needed, for the rounding of the check.
-const MARGIN: f64 = 1e-7;
+const MARGIN: f64 = 1e-6;
 
 impl<'a, const N: usize> Search<'a, N> {
     /// `rows` begin with plus and minus each coordinate; `initial` are states whose hull runs begin in.
@@ -75,14 +75,14 @@ impl<'a, const N: usize> Search<'a, N> {
             for mode in modes {
                 let next: Affine<N> = mode.next(units, row);
                 let mut dual = Dual { basis: [0; N], weights: [0.0; N], ray: None };
-                for i in 0..N {
-                    let minus = u32::from(next.weights[i] < 0.0);
+                for (i, weight) in next.weights.iter().enumerate() {
+                    let minus = u32::from(*weight < 0.0);
                     // The encoder's rounding is bounded by the mode's second and third inequality.
                     let noise = form == Form::Noise && i == N - 1;
                     let j = if noise { count + 1 + minus } else { 2 * i as u32 + minus };
                     let unit = if noise { 1.0 } else { rows[j as usize][i].abs() };
                     dual.basis[i] = j;
-                    dual.weights[i] = next.weights[i].abs() / unit;
+                    dual.weights[i] = weight.abs() / unit;
                 }
                 duals.push(dual);
                 constants.push(next.constant);
@@ -190,7 +190,7 @@ impl<'a, const N: usize> Search<'a, N> {
         let rays = (0..self.set.len())
             .filter_map(|row| program.contradiction(&self.duals[row * self.modes.len() + mode]));
         let (by, weights) = rays.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (by > 1e3 * MARGIN)
+        (by > 1e2 * MARGIN)
             .then(|| Contradiction { mode: mode as u32, weights: weights.into_iter().map(short).collect() })
     }
 

@@ -64,7 +64,7 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
     let mut add = |row: [f64; N], apart: f64| {
         let sizes = sizes::<N>();
         let norm = row.iter().zip(sizes).map(|(x, size)| (x * size) * (x * size)).sum::<f64>().sqrt();
-        if !(norm > 0.0) || !norm.is_finite() {
+        if norm <= 0.0 || !norm.is_finite() {
             return;
         }
         let row = row.map(|x| x / norm);

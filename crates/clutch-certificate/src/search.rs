@@ -1,5 +1,6 @@
 //! A certificate for a box: cells of `μ_d`, and for each a set that no tick leaves.
 
+use crate::checker;
 use crate::invariant::{Effort, Open, Search};
 use crate::modes::{E, Mode, P, S, Z, modes};
 use crate::pieces::{pieces, strips};
@@ -141,7 +142,14 @@ fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
         Gains::Smc { .. } => (&[(Form::Noise, QUICK), (Form::Noise, USUAL)], &[(Form::Noise, PATIENT)]),
     };
     let tried = |(form, (fineness, growth)): &(Form, (Fineness, f64))| {
-        attempt(setup, sliding, *form, *fineness, *growth, options)
+        let cell = attempt(setup, sliding, *form, *fineness, *growth, options)?;
+        // What rounding has spoilt is no proof.
+        let alone =
+            Certificate { version: VERSION, setup: Setup { sliding, ..setup.clone() }, cells: vec![cell] };
+        if checker::check(&alone).is_err() {
+            return Err(Open::Slow);
+        }
+        alone.cells.into_iter().next().ok_or(Open::Slow)
     };
     let found: Vec<Result<Cell, Open>> = first.iter().map(tried).collect();
     let mut open = Open::Slow;

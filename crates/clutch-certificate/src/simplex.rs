@@ -201,6 +201,10 @@ impl<const N: usize> Program<'_, N> {
             weights[p] = ratio;
             dual.basis[p] = entering as u32;
         }
+        // Pivots leave rounding behind, which the check would find.
+        if let Some(inverse) = self.inverse(&dual.basis) {
+            weights = times(c, &inverse);
+        }
         dual.weights = weights.map(|w| w.max(0.0));
         self.bound(dual)
     }

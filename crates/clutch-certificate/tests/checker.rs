@@ -69,7 +69,7 @@ fn bounds_lie_between_the_worst_error_seen_and_three_times_it() {
 #[test]
 fn a_wider_box_has_cells_that_cover_it_and_a_larger_bound() {
     let narrow = paper_pd();
-    let wide = Setup { sliding: [0.12, 0.18], at_rest: [0.16, 0.24], ..narrow.clone() };
+    let wide = Setup { sliding: [0.12, 0.18], at_rest: [0.16, 0.24], ..narrow };
     let (small, large) = (good(), found(&wide));
     assert!(large.cells.len() > 1);
     assert!(degrees(&small) < degrees(&large));

@@ -122,8 +122,7 @@ fn plant(base: &RigParams, model: &PlantParams, setup: &Setup, rng: &mut Pcg64) 
         mu_dynamic: mu_d,
         ..model_friction(model)
     });
-    let mut brake = clutch_core::BrakeActuator::default();
-    brake.gain = within(rng, gain);
+    let brake = clutch_core::BrakeActuator { gain: within(rng, gain), ..Default::default() };
     rig.actuator = brake.into();
     rig
 }
@@ -208,7 +207,10 @@ fn worst(scenario: &Scenario, setup: &Setup, runs: u64) -> Outcome<(f64, f64)> {
 }
 
 fn table() -> Outcome<()> {
-    println!("set | delay | °/s | ρ | certified ° | seen ° | ratio | sticks/s | cells | CPU s per cell");
+    println!(
+        "| set | delay | °/s | ρ | certified, ° | seen, ° | ratio | most sticks/s | cells | CPU s per cell |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     let mut ratios = Vec::new();
     let mut tried = 0;
     for (k, gains) in GRID.iter().enumerate() {
@@ -227,7 +229,7 @@ fn table() -> Outcome<()> {
                 let certified = row.certified.map_or_else(|| row.open.clone(), |c| format!("{c:.4}"));
                 let ratio = row.certified.map(|c| c / row.seen);
                 println!(
-                    "{} | {delay} | {rate} | {:.3} | {certified} | {:.4} | {} | {:.1} | {} | {:.2}",
+                    "| {} | {delay} | {rate} | {:.3} | {certified} | {:.4} | {} | {:.1} | {} | {:.2} |",
                     gains.title(),
                     row.radius,
                     row.seen,
@@ -245,7 +247,7 @@ fn table() -> Outcome<()> {
     }
     ratios.sort_by(f64::total_cmp);
     println!(
-        "\nof {tried} sets with a spectral radius below 1, {} are certified; ratio: median {:.2}, largest {:.2}",
+        "| of {tried} with ρ < 1 | | | | {} certified | | median {:.2}, largest {:.2} | | | |",
         ratios.len(),
         ratios.get(ratios.len() / 2).unwrap_or(&f64::NAN),
         ratios.last().unwrap_or(&f64::NAN)
@@ -255,7 +257,7 @@ fn table() -> Outcome<()> {
 
 /// Gains, loop and box at random.
 fn draw(rng: &mut Pcg64) -> Outcome<Scenario> {
-    let mut between = |low: f64, high: f64| low * (high / low).powf(rng.random::<f64>());
+    let mut between = |low: f64, high: f64| low * libm::pow(high / low, rng.random::<f64>());
     let gains = if between(1.0, 4.0) < 3.4 {
         let kp = between(800.0, 8000.0);
         Gains::Pd(kp, kp * between(0.005, 0.015), between(0.2, 1.0))
@@ -272,7 +274,7 @@ fn draw(rng: &mut Pcg64) -> Outcome<Scenario> {
     let (friction, inertia, torque, gain) = (percent(15.0), percent(5.0), percent(5.0), percent(5.0));
     let (noise, ripple) = (percent(0.001), percent(0.05));
     let damping = percent(50.0);
-    let rate = 2.0 * 15.0_f64.powf(rng.random::<f64>());
+    let rate = 2.0 * libm::pow(15.0, rng.random::<f64>());
     let scenario = scenario(
         gains,
         &[
@@ -293,7 +295,7 @@ fn draw(rng: &mut Pcg64) -> Outcome<Scenario> {
     let mut table = scenario.table().clone();
     let waves = format!(
         "rms = {:?}\nlowest_waves_per_turn = 120\nhighest_waves_per_turn = 600\nspacing_waves_per_turn = 120\n",
-        ripple / 10.0_f64.sqrt()
+        ripple / libm::sqrt(10.0)
     );
     if let Some(toml::Value::Table(rig)) = table.get_mut("rig") {
         rig.insert("ripple".into(), toml::Value::Table(waves.parse()?));
@@ -340,10 +342,11 @@ fn campaign(wanted: u64, first: u64) -> Outcome<()> {
         }
     }
     println!(
-        "sets drawn | refused as unstable | not closed | certified | runs | with sticks | broken bounds | nearest to its bound"
+        "| sets drawn | refused as unstable | not closed | certified | runs | with sticks | broken bounds | nearest to its bound |"
     );
+    println!("|---|---|---|---|---|---|---|---|");
     println!(
-        "{sets} | {unstable} | {} | {certified} | {runs} | {stuck} | {broken} | {:.1} %",
+        "| {sets} | {unstable} | {} | {certified} | {runs} | {stuck} | {broken} | {:.1} % |",
         sets - unstable - certified,
         100.0 * nearest
     );

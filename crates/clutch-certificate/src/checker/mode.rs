@@ -41,11 +41,6 @@ pub(crate) struct Mode {
     applied: [Sum; 2],
 }
 
-pub(crate) enum Possible {
-    Yes(Mode),
-    No,
-}
-
 /// `(e, s, z, p …, last)`: the last is `m₋` in the exact form and the rounding in the noise form.
 const E: usize = 0;
 const S: usize = 1;
@@ -53,7 +48,8 @@ const Z: usize = 2;
 const P: usize = 3;
 
 impl Mode {
-    pub(crate) fn new(shaft: &Shaft, piece: &Piece, form: Form, id: ModeId, n: usize) -> Possible {
+    /// The mode; none if its voltage, known beforehand, is not one of its case.
+    pub(crate) fn possible(shaft: &Shaft, piece: &Piece, form: Form, id: ModeId, n: usize) -> Option<Mode> {
         let coordinate = |i: usize| {
             let mut sum = Sum::zero(n);
             sum.weights[i] = at(1.0);
@@ -85,7 +81,7 @@ impl Mode {
                 Case::TouchesAndStays => most < shaft.lets_go.max(shaft.stays),
             };
         if impossible {
-            return Possible::No;
+            return None;
         }
 
         let mut within = Vec::new();
@@ -130,7 +126,7 @@ impl Mode {
                 at_most(1.0, &slowed, shaft.slow - spared - shaft.path);
             }
         }
-        Possible::Yes(Mode { case: id.case, form, within, measured, answer, applied })
+        Some(Mode { case: id.case, form, within, measured, answer, applied })
     }
 
     /// What `c·x` can be at most after the tick.
