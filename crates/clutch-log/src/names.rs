@@ -128,6 +128,7 @@ pub const CAUSES: Names = &[
     (17, "Reversed"),
     (18, "TooSlow"),
     (19, "TooFast"),
+    (20, "Clock"),
 ];
 
 /// The limit at which the output stage changed the law's demand, if any.

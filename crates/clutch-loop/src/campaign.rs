@@ -177,6 +177,25 @@ pub const CASES: &[Case] = {
         ),
         case("counts doubled", "H2", F(FaultKind::EncoderScale(2.0), BOTH), safe(40.0, &[C::TooFast])),
         case("counts reversed", "H3", F(FaultKind::EncoderScale(-1.0), BOTH), safe(10.0, BACK)),
+        Case {
+            paper: true,
+            // A shaft that seems faster by a fifth, or half as fast, may be none of the bounds.
+            ..case(
+                "periods 1.2 times as long",
+                "H10",
+                F(FaultKind::Prescaler(1.2), BOTH),
+                safe(1400.0, &[C::Clock, C::TooFast]),
+            )
+        },
+        Case {
+            paper: true,
+            ..case(
+                "periods half as long",
+                "H10",
+                F(FaultKind::Prescaler(0.5), BOTH),
+                safe(500.0, &[C::Clock, C::TooSlow, C::StandStill]),
+            )
+        },
         case("encoder lost", "H1", F(FaultKind::EncoderLoss, BOTH), safe(3.0, &[C::Board])),
         case(
             "DAC stuck at 0 V",

@@ -90,6 +90,12 @@ pub enum FaultKind {
     DacStuck(StuckAt),
     /// The converter's voltage is multiplied.
     DacScale(f64),
+    /// The board's time passes this much faster than its periods.
+    Clock(f64),
+    /// The board's periods are longer by this factor, and its time tells.
+    Prescaler(f64),
+    /// The board's whole clock is slower by this factor: periods, and the time that it tells.
+    Crystal(f64),
     /// The board starts anew.
     Reset,
 }
@@ -114,7 +120,10 @@ impl FaultKind {
             | FaultKind::EncoderScale(_)
             | FaultKind::EncoderLoss
             | FaultKind::DacStuck(_)
-            | FaultKind::DacScale(_) => false,
+            | FaultKind::DacScale(_)
+            | FaultKind::Clock(_)
+            | FaultKind::Prescaler(_)
+            | FaultKind::Crystal(_) => false,
         }
     }
 }
@@ -158,7 +167,7 @@ impl Fault {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "fault \"{text}\": {problem}\nexpected KIND:KEY=VALUE,…, as drop:p=0.05 or freeze:at=2 or delay:at=1,for=0.1,ms=5\n\
-         kinds: drop, duplicate, corrupt, reorder, silence, delay (ms), jitter (ms), freeze, jump (counts), channel (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale (factor), reset\n\
+         kinds: drop, duplicate, corrupt, reorder, silence, delay (ms), jitter (ms), freeze, jump (counts), channel (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale (factor), clock (factor), prescaler (factor), crystal (factor), reset\n\
          keys: at (s after arming), for (s), p (probability per frame or period), way (up = from the board, down = to it, both)"
 )]
 pub struct FaultError {
@@ -229,6 +238,11 @@ impl FromStr for Fault {
             }
         }
         let needs = |key: &str| bad(format!("{kind} needs {key}"));
+        let period = |factor: Option<f64>| match factor {
+            Some(x) if (0.01..=1000.0).contains(&x) => Ok(x),
+            Some(x) => Err(bad(format!("factor = {x}: expected 0.01 to 1000"))),
+            None => Err(needs("factor")),
+        };
         fault.kind = match kind {
             "drop" => FaultKind::Drop,
             "duplicate" => FaultKind::Duplicate,
@@ -244,6 +258,9 @@ impl FromStr for Fault {
             "loss" => FaultKind::EncoderLoss,
             "dac-stuck" => FaultKind::DacStuck(volts.take().ok_or_else(|| needs("volts"))?),
             "dac-scale" => FaultKind::DacScale(factor.take().ok_or_else(|| needs("factor"))?),
+            "clock" => FaultKind::Clock(factor.take().ok_or_else(|| needs("factor"))?),
+            "prescaler" => FaultKind::Prescaler(period(factor.take())?),
+            "crystal" => FaultKind::Crystal(period(factor.take())?),
             "reset" => FaultKind::Reset,
             _ => return Err(bad(format!("unknown kind {kind}"))),
         };
@@ -275,6 +292,9 @@ impl fmt::Display for Fault {
             FaultKind::DacStuck(StuckAt::Last) => write!(f, "DAC stuck where it is")?,
             FaultKind::DacStuck(StuckAt::Volts(v)) => write!(f, "DAC stuck at {v} V")?,
             FaultKind::DacScale(factor) => write!(f, "DAC times {factor}")?,
+            FaultKind::Clock(factor) => write!(f, "board's time times {factor}")?,
+            FaultKind::Prescaler(factor) => write!(f, "board's periods times {factor}")?,
+            FaultKind::Crystal(factor) => write!(f, "board's clock slower by {factor}")?,
             FaultKind::Reset => write!(f, "board reset")?,
         }
         if self.probability < 1.0 {
@@ -347,6 +367,7 @@ mod tests {
             ("jump:at=1,counts=1.5", "not a whole number"),
             ("channel:at=1,dead=c", "dead = c: expected a or b"),
             ("scale:at=1", "scale needs factor"),
+            ("prescaler:at=1,factor=0", "factor = 0: expected 0.01 to 1000"),
             ("dac-scale:at=1,factor=1,dead=a", "a key that dac-scale does not have"),
             ("drop:at", "has no ="),
             ("drop:at=1,where=up", "unknown key where"),

@@ -175,6 +175,7 @@ fn extra<'a>(log: &'a Log, key: &str) -> Option<&'a str> {
 fn seen(s: &SampleRecord) -> Sample {
     Sample {
         sequence: s.sequence,
+        time: Micros(s.board_time_us),
         counts: Counts(s.counts),
         board: match BoardState::from_u8(s.status & 0x07) {
             Some(BoardState::Ready) => BoardMode::Ready,
@@ -218,6 +219,7 @@ fn looped<T: Real>(
         while let Some(end) = ends.next_if(before) {
             match end.cause {
                 c if c == Cause::Silence as u8 => supervisor.silence(&mut state, u32::MAX),
+                c if c == Cause::Clock as u8 => supervisor.off_pace(&mut state, end.value as i32),
                 c if c == Cause::Done as u8 => supervisor.stop(&mut state, Cause::Done),
                 c if c == Cause::Operator as u8 => supervisor.stop(&mut state, Cause::Operator),
                 _ => supervisor.board_fault(&mut state, T::from_f64(end.value)),

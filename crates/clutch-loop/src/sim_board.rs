@@ -59,6 +59,8 @@ pub struct SimBoard {
     since: Option<Counts>,
     stuck_at: Option<f64>,
     scaled: Option<f64>,
+    /// Time by which the board's clock is behind, ns.
+    behind_ns: i64,
     reset_done: bool,
     first_hit_ns: Option<u64>,
     events: Vec<Event>,
@@ -129,6 +131,7 @@ impl SimBoard {
             since: None,
             stuck_at: None,
             scaled: None,
+            behind_ns: 0,
             reset_done: false,
             first_hit_ns: None,
             events: Vec::new(),
@@ -194,9 +197,14 @@ impl SimBoard {
 
     /// The board's clock of 32 bits, near the time up to which the rig has moved.
     fn unwrap_us(&self, at_us: u32) -> u64 {
-        let now_us = self.moved_ns.unwrap_or(0) / 1000;
-        let ahead = at_us.wrapping_sub(now_us as u32) as i32;
-        (now_us as i64 + i64::from(ahead)).max(0) as u64 * 1000
+        let now_ns = self.moved_ns.unwrap_or(0);
+        let ahead = at_us.wrapping_sub(self.clock_us(now_ns)) as i32;
+        (now_ns as i64 / 1000 + i64::from(ahead)).max(0) as u64 * 1000
+    }
+
+    /// The board's clock.
+    fn clock_us(&self, now_ns: u64) -> u32 {
+        ((now_ns as i64).wrapping_sub(self.behind_ns) / 1000) as u32
     }
 
     /// Bytes from the controller arrive.
@@ -206,7 +214,7 @@ impl SimBoard {
     pub fn receive(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outbox) -> Result<(), SimBoardError> {
         self.move_to(now_ns)?;
         let before = self.node.state();
-        self.node.receive((now_ns / 1000) as u32, bytes, out);
+        self.node.receive(self.clock_us(now_ns), bytes, out);
         if self.node.state() == BoardState::Armed && before != BoardState::Armed {
             self.armed_ns = Some(now_ns);
         }
@@ -226,8 +234,7 @@ impl SimBoard {
     /// The engine gave up.
     pub fn step(&mut self, now_ns: u64, out: &mut Outbox) -> Result<(), SimBoardError> {
         self.move_to(now_ns)?;
-        let now_us = (now_ns / 1000) as u32;
-        self.node.poll(now_us, out);
+        self.node.poll(self.clock_us(now_ns), out);
         let Some(due) = self.next_sample_ns.filter(|t| *t <= now_ns) else { return Ok(()) };
         let Some(period_us) = self.node.period_us() else {
             self.next_sample_ns = None;
@@ -235,11 +242,14 @@ impl SimBoard {
         };
         // Periods that a slow machine has left out stay out: a board does not catch up.
         self.samples += 1;
-        self.next_sample_ns = Some(due + u64::from(period_us) * 1000);
+        let period_ns = f64::from(period_us) * 1000.0;
+        // Of periods, and of the time that is told.
+        let (mut longer, mut behind) = (1.0, 0.0);
         self.rig.set_time((due - self.started_ns) as f64 / 1e9);
         self.rig.begin_period();
         let time = self.armed_for(now_ns);
         let mut counts = self.rig.counts();
+        let now_us = self.clock_us(now_ns);
         let (mut loss, mut freeze, mut stick, mut reset) = (false, false, None, false);
         self.scaled = None;
         for i in 0..self.faults.len() {
@@ -264,11 +274,18 @@ impl SimBoard {
                 FaultKind::EncoderLoss => loss = true,
                 FaultKind::DacStuck(at) => stick = Some(at),
                 FaultKind::DacScale(factor) => self.scaled = Some(factor),
+                FaultKind::Clock(factor) => behind += 1.0 - factor,
+                FaultKind::Prescaler(factor) => longer *= factor,
+                FaultKind::Crystal(factor) => {
+                    longer *= factor;
+                    behind += factor - 1.0;
+                }
                 FaultKind::Reset => reset = true,
                 _ => continue,
             }
             self.first_hit_ns.get_or_insert(now_ns);
         }
+        self.next_sample_ns = Some(due + (period_ns * longer) as u64);
         self.stuck_at = match (stick, self.stuck_at) {
             (Some(StuckAt::Volts(v)), _) => Some(v),
             (Some(StuckAt::Last), None) => Some(self.dac.volts(self.node.code())),
@@ -286,6 +303,7 @@ impl SimBoard {
         }
         let counts = if loss { Counts(0) } else { self.frozen.unwrap_or(counts) };
         self.node.sample(now_us, counts, loss, false, out);
+        self.behind_ns += (period_ns * behind) as i64;
         self.apply();
         Ok(())
     }

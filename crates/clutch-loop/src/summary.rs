@@ -254,6 +254,10 @@ pub fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> St
         Cause::NotFinite => "the law's demand was not a number".into(),
         Cause::Deadline => format!("answers came too late, the last after {v} µs"),
         // The board's own supervisor tells for how many periods.
+        Cause::Clock => format!(
+            "the board's clock and its periods, or this machine's clock, are apart by {} ms: a wrong prescaler or crystal",
+            number(v / 1000.0)
+        ),
         Cause::Silence if on_the_board && v > 0.0 => "the board's encoder and converter fell silent".into(),
         Cause::Silence => "the board fell silent".into(),
         Cause::Board => match v as u8 {

@@ -2,6 +2,7 @@
 
 use crate::notice::{CycleNotice, Ending, LinkCounts, Notice};
 use crate::outbox::Outbox;
+use crate::pace::HostPace;
 use clutch_core::law::{ControlLaw, Law};
 use clutch_core::supervisor::{BoardMode, Cause, Sample as Seen, State};
 use clutch_core::{
@@ -49,6 +50,7 @@ pub struct ControllerNode<T: Real, C: ControlLaw<T> = Law<T>> {
     silence_told: bool,
     lateness: Micros,
     stopping: Option<StopReason>,
+    pace: HostPace,
 }
 
 impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
@@ -68,6 +70,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             silence_told: false,
             lateness: Micros(0),
             stopping: None,
+            pace: HostPace::default(),
         }
     }
 
@@ -173,6 +176,12 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
 
     /// Looks at the clock: silence.
     pub fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
+        // Between samples, so that a replay knows which of them came before.
+        if let Some(micros) = self.pace.off.take() {
+            let from = self.state.state();
+            self.supervisor.off_pace(&mut self.state, micros);
+            self.after_fault(from, out, notices);
+        }
         if self.poll_at().is_some_and(|at| now_ns >= at) {
             self.silence_told = true;
             let from = self.state.state();
@@ -289,10 +298,12 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         }
         self.counts.received = self.counts.received.wrapping_add(1);
         self.last_sample_ns = Some(now_ns);
+        self.pace.sample(now_ns, sample.sequence, self.servo.period(), self.params.silence);
         self.silence_told = false;
         let board = BoardState::from_u8(sample.status & 0x07);
         let seen = Seen {
             sequence: sample.sequence,
+            time: Micros(sample.time_us),
             counts: Counts(sample.counts),
             board: match board {
                 Some(BoardState::Ready) => BoardMode::Ready,

@@ -2,10 +2,11 @@
 
 use crate::notice::{Ending, LinkCounts, Notice, Standing};
 use crate::outbox::Outbox;
+use crate::pace::HostPace;
 use crate::telemetry::{both_states, notice};
 use clutch_core::law::LawTerms;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{FixedCounts, Servo, Target};
+use clutch_core::{FixedCounts, Micros, Servo, Target};
 use clutch_wire::{
     Arm, Configure, ControllerHello, Decoder, Discover, Message, Ping, SCHEMA, Set, Stop, StopReason,
     TELEMETRY_ASKED, Telemetry, VERSION,
@@ -36,6 +37,7 @@ pub struct HostNode {
     stopped: bool,
     /// It has been silent for too long: what it tells later does not bring the run back.
     given_up: bool,
+    pace: HostPace,
 }
 
 impl HostNode {
@@ -61,6 +63,7 @@ impl HostNode {
             stopping: None,
             stopped: false,
             given_up: false,
+            pace: HostPace::default(),
         }
     }
 
@@ -180,6 +183,14 @@ impl HostNode {
             self.stopping.get_or_insert(StopReason::Operator);
             self.due_ns = now_ns;
         }
+        if let Some(micros) = self.pace.off.take()
+            && self.driving()
+        {
+            self.given_up = true;
+            self.end(State::Faulted, Cause::Clock, micros as f32, notices);
+            self.stopping.get_or_insert(StopReason::Operator);
+            self.due_ns = now_ns;
+        }
         if now_ns >= self.due_ns {
             self.due_ns = now_ns.saturating_add(self.alive_ns);
             self.pings = self.pings.wrapping_add(1);
@@ -189,6 +200,12 @@ impl HostNode {
                 self.send_stop(reason, out);
             }
         }
+    }
+
+    /// The silence that is borne where it is long: of a simulated board whose clock may wait.
+    fn patience(&self) -> Micros {
+        let long = self.silent_ns > 2_000_000_000;
+        Micros(if long { u32::try_from(self.silent_ns / 1000).unwrap_or(u32::MAX) } else { 0 })
     }
 
     /// The board has been asked to stop, and has not said that it has.
@@ -327,6 +344,7 @@ impl HostNode {
             return;
         }
         self.heard_ns = Some(now_ns);
+        self.pace.sample(now_ns, m.sequence, self.servo.period(), self.patience());
         let gap = m.number.wrapping_sub(self.number).wrapping_sub(1);
         // Half the range back is a frame that came twice.
         if gap < 0x8000 {

@@ -27,7 +27,7 @@
 //! | `wide_counter` | board | a counter of 16 bits as one of 32 |
 //! | `lockstep` | both | a board controller that is asked instead of keeping time |
 //! | `settings`, `telemetry` | both | a run on its way to a board controller, and its cycles on their way back |
-//! | `notice`, `outbox` | both | what a node reports, and its frames on their way out |
+//! | `notice`, `outbox`, `pace` | both | what a node reports, its frames on their way out, and the pace of the samples |
 #![no_std]
 
 mod board;
@@ -39,6 +39,7 @@ pub mod lockstep;
 mod notice;
 mod one_chip;
 mod outbox;
+mod pace;
 mod settings;
 mod telemetry;
 mod wide_counter;

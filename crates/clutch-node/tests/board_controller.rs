@@ -310,7 +310,9 @@ fn told_the_same(desk: &mut Desk) -> usize {
 fn the_host_is_told_of_each_sample_all_that_a_controller_of_its_own_would_know() {
     for law in LawParams::<f32>::all() {
         let start = FixedCounts((1000 << 16) + 777);
-        let plan = Plan { servo: paper(law), start, ..Plan::new() };
+        let mut plan = Plan { servo: paper(law), start, ..Plan::new() };
+        // Under a law that never brakes the desk's uneven shaft is none that drag alone slows down.
+        plan.bounds.drive_torque.low = -10.0;
         let mut desk = Desk::ready(plan);
         desk.follows(4);
         desk.arms();
@@ -337,7 +339,7 @@ fn the_host_is_told_of_each_sample_all_that_a_controller_of_its_own_would_know()
         desk.up.clear();
         desk.follows(3);
         assert_eq!(told_the_same(&mut desk), 5);
-        assert_eq!(desk.board_controller.state(), State::Running);
+        assert_eq!(desk.board_controller.state(), State::Running, "{law:?}: {:?}", desk.host.standing());
         // And one that ends it.
         desk.faulty(true, false);
         desk.settle();
@@ -362,7 +364,10 @@ fn each_check_that_ends_control_is_told_with_what_it_saw() {
             Cause::Saturation,
             SupervisorParams { limits: LimitParams { saturation_time: 0.01, ..new.limits }, ..new },
         ),
-        (Cause::StandStill, new),
+        (
+            Cause::StandStill,
+            SupervisorParams { limits: LimitParams { following_error: 0.2, ..new.limits }, ..new },
+        ),
         (Cause::Jump, new),
     ] {
         let mut desk = Desk::ready(Plan { limits, watchdog: Micros(10_000), ..Plan::new() });
@@ -789,4 +794,22 @@ fn a_sample_that_was_overtaken_is_told_with_what_the_law_made_of_it() {
     let output = first.cycle.output.unwrap();
     assert_eq!(output.code, desk.host.servo().dac().code(output.command.voltage));
     assert_ne!((output.code, output.command.limit), (first.cycle.code, Limit::Invalid));
+}
+
+/// Telemetry that comes by the host's clock more slowly, or faster, than the periods that it tells of.
+#[test]
+fn a_board_whose_periods_are_not_those_of_the_hosts_clock_is_given_up() {
+    // ns that pass beside each period of 1 ms.
+    for (more, most) in [(0, None), (40_000, None), (100_000, Some(700)), (11_000_000, Some(10))] {
+        let mut desk = Desk::ready(Plan::new());
+        desk.arms();
+        let seen = (0..1500).find(|_| {
+            desk.follows(1);
+            // Only the host's clock goes on: the board's periods are as they were.
+            desk.host_later_ns += more;
+            desk.host.standing().cause == Cause::Clock
+        });
+        assert_eq!(seen.is_some(), most.is_some(), "{more} ns: {seen:?}, {:?}", desk.host.standing());
+        assert!(seen <= most, "{more} ns: {seen:?}");
+    }
 }

@@ -60,7 +60,7 @@ impl Desk {
         let servo = ServoParams::paper(LawParams::Pd(PdParams::default()));
         let paper = Bounds::around(&PlantParams::default(), &Tolerances::default()).unwrap();
         // The shaft of these tests has no physics.
-        let bounds = Bounds { drive_torque: clutch_core::Interval { low: 0.001, high: 10.0 }, ..paper };
+        let bounds = Bounds { drive_torque: clutch_core::Interval { low: 0.0005, high: 10.0 }, ..paper };
         let supervisor = Supervisor::new(&SupervisorParams::new(on_fault), &servo, &bounds).unwrap();
         let node = ControllerNode::new(params, Servo::new(&servo).unwrap(), supervisor);
         Desk { node, now: 1_000_000_000, sequence: 0, origin: 700, notices: Vec::new() }
@@ -655,4 +655,59 @@ proptest! {
         }
         prop_assert!(answers <= desk.node.counts().received);
     }
+}
+
+/// Periods of a running board until its clock is found out; `told` is the time of a sequence number (µs), `every` the time
+/// from one sample to the next by the host's clock (ns).
+fn clock_seen(told: impl Fn(u32) -> u32, every: u64) -> Option<u32> {
+    let mut desk = Desk::running();
+    (0..2000).find(|_| {
+        desk.now += every;
+        let mut sample = desk.fresh(BoardState::Running);
+        sample.time_us = told(u32::from(sample.sequence));
+        desk.reads(&[Message::Sample(sample)]);
+        let sent = desk.polls();
+        let ended = desk.state() == State::Faulted;
+        if ended {
+            assert_eq!(desk.node.state().cause(), Cause::Clock);
+            let told = desk.notices.iter().any(|n| matches!(n, Notice::Ended(e) if e.cause == Cause::Clock));
+            assert!(
+                !told || sent == stop(StopReason::Fault),
+                "the board hears of what the host's clock shows"
+            );
+        }
+        ended
+    })
+}
+
+#[test]
+fn a_board_whose_time_does_not_pass_with_its_periods_is_found_out_and_a_sound_one_is_not() {
+    const PERIOD: u64 = 1_000_000;
+    assert_eq!(clock_seen(|k| k * 1000, PERIOD), None);
+    // From anywhere, beyond the end of its counter, and with jitter.
+    assert_eq!(clock_seen(|k| (k * 1000).wrapping_sub(5000), PERIOD), None);
+    assert_eq!(clock_seen(|k| k * 1000 + (k * 7919) % 300, PERIOD), None);
+    let lies: [(&str, fn(u32) -> u32); 6] = [
+        ("frozen", |_| 4000),
+        ("half as fast", |k| 500 * k),
+        ("twice as fast", |k| 2000 * k),
+        ("12 times as fast", |k| 12_000 * k),
+        ("backwards", |k| 0_u32.wrapping_sub(1000 * k)),
+        ("random", |k| k.wrapping_mul(2_654_435_761)),
+    ];
+    for (name, lie) in lies {
+        let seen = clock_seen(lie, PERIOD);
+        assert!(seen.is_some_and(|k| k < 60), "{name}: {seen:?}");
+    }
+}
+
+#[test]
+fn a_board_whose_periods_are_not_those_of_the_hosts_clock_is_found_out() {
+    // 83 µs for 1 ms are 12 times as fast; 10 % and 50 % more.
+    for (every, most) in [(83_000, 40), (500_000, 80), (900_000, 700), (1_100_000, 700), (1_500_000, 80)] {
+        let seen = clock_seen(|k| k * 1000, every);
+        assert!(seen.is_some_and(|k| k < most), "{every} ns: {seen:?}");
+    }
+    assert_eq!(clock_seen(|k| k * 1000, 1_040_000), None);
+    assert_eq!(clock_seen(|k| k * 1000, 960_000), None);
 }

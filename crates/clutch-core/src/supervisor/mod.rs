@@ -35,21 +35,26 @@
 //! | [`Cause::Target`] | the target is not a number, or moves faster than the speed limit |
 //! | [`Cause::Deadline`] | the answer was late, more often than allowed |
 //! | [`Cause::Silence`] | no sample for so many cycles |
+//! | [`Cause::Clock`] | the board's time does not pass as its periods do, or its periods not as its host's time |
 //! | [`Cause::Board`] | the board reports a fault, or is not driving although it should |
 //!
 //! The supervisor owns no clock. A log records all that it is told, so a replay decides the
 //! same at every tick.
 
 mod envelope;
+mod pace;
 mod params;
 mod state;
 
+pub use pace::Pace;
 pub use params::{LimitParams, SpeedLimit, SupervisorParams};
 pub use state::{Arrival, BoardMode, Cause, Checks, Cycle, Sample, State, SupervisorState};
 
 use crate::law::{ControlLaw, Limit, Terms};
 use crate::safe_state::{SafeCodes, SafeRun};
-use crate::{Bounds, Counts, Dac, DacCode, ParamError, Real, Servo, ServoOutput, ServoParams, Target};
+use crate::{
+    Bounds, Counts, Dac, DacCode, Micros, ParamError, Real, Servo, ServoOutput, ServoParams, Target,
+};
 use params::Limits;
 
 /// A checked supervisor; never changes in a tick.
@@ -155,6 +160,11 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
+    /// The board's periods and the host's clock are apart by so many µs: [`Pace`].
+    pub fn off_pace<S>(&self, s: &mut SupervisorState<T, S>, micros: i32) {
+        self.check(s, Cause::Clock, T::from_i32(micros));
+    }
+
     /// One sample: judged, and if it may pass, given to the servo. `target` is the path.
     ///
     /// The answer, if there is one, belongs on the wire at once.
@@ -193,6 +203,7 @@ impl<T: Real> Supervisor<T> {
         cycle: &mut Cycle<T, C::Terms>,
     ) {
         let Some(periods) = self.in_sequence(s, sample, cycle) else { return };
+        self.check_clock(s, sample.time, periods);
         self.count_lost(s, periods);
         self.count_late(s, sample);
         self.check_board(s, sample);
@@ -249,6 +260,9 @@ impl<T: Real> Supervisor<T> {
             return None;
         }
         let periods = ahead.unsigned_abs();
+        if !s.started {
+            s.time = Micros(sample.time.0.wrapping_sub(self.limits.period_us));
+        }
         s.started = true;
         s.sequence = sample.sequence;
         s.pass_time(periods);
@@ -258,6 +272,17 @@ impl<T: Real> Supervisor<T> {
         }
         cycle.arrival = if sample.superseded { Arrival::Late } else { Arrival::Fresh };
         Some(periods)
+    }
+
+    /// [`Cause::Clock`]: the board's time against its periods.
+    #[inline]
+    fn check_clock<S>(&self, s: &mut SupervisorState<T, S>, time: Micros, periods: u16) {
+        let passed = time.0.wrapping_sub(s.time.0).cast_signed();
+        s.time = time;
+        let expected = self.limits.period_us.saturating_mul(u32::from(periods));
+        if let Some(off) = s.pace.pass(expected, passed, self.limits.clock_slack_us) {
+            self.check(s, Cause::Clock, T::from_i32(off));
+        }
     }
 
     /// [`Cause::Silence`] and [`Cause::Lost`]: samples that are missing before this one.

@@ -98,6 +98,9 @@ impl<T: Real> SupervisorParams<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Limits<T> {
     pub(super) period: T,
+    pub(super) period_us: u32,
+    /// What the time of a single sample may be off, µs: a simulated board's machine may stall.
+    pub(super) clock_slack_us: u32,
     pub(super) radians_per_count: T,
     /// Counts per period of dead reckoning.
     pub(super) jump: u32,
@@ -154,6 +157,8 @@ impl<T: Real> Limits<T> {
         Interval::LOW_USABLE.require(weakest, weakest >= T::ZERO)?;
         Ok(Limits {
             period,
+            period_us: servo.period.0,
+            clock_slack_us: servo.period.0.saturating_mul(4).max(20_000),
             radians_per_count: servo.encoder.radians_per_count(),
             jump: counts.floor().to_i64() as u32,
             jumps: p.jumps,

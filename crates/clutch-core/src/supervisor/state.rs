@@ -1,6 +1,7 @@
 //! Inputs, memory and answers of the supervisor.
 
 use super::envelope::EnvelopeState;
+use super::pace::Pace;
 use crate::law::LawTerms;
 use crate::safe_state::SafeRun;
 use crate::{Arithmetic, Counts, DacCode, Micros, Real, ServoOutput, ServoState, Target};
@@ -88,11 +89,13 @@ pub enum Cause {
     TooSlow = 18,
     /// Counts ahead of the fastest shaft.
     TooFast = 19,
+    /// A clock of the board that does not agree with its periods, or with its host's clock.
+    Clock = 20,
 }
 
 impl Cause {
     /// Every cause that is a check's.
-    pub const CHECKS: [Cause; 17] = [
+    pub const CHECKS: [Cause; 18] = [
         Cause::Lost,
         Cause::Late,
         Cause::Duplicated,
@@ -110,6 +113,7 @@ impl Cause {
         Cause::Reversed,
         Cause::TooSlow,
         Cause::TooFast,
+        Cause::Clock,
     ];
 }
 
@@ -174,6 +178,8 @@ pub enum BoardMode {
 pub struct Sample {
     /// Running number of the board's periods; wraps.
     pub sequence: u16,
+    /// Time of the measurement by the board's clock; wraps.
+    pub time: Micros,
     /// Encoder counts.
     pub counts: Counts,
     /// The board's state.
@@ -297,6 +303,8 @@ pub struct SupervisorState<T, S> {
     pub(super) last_target: Option<Target<T>>,
     pub(super) started: bool,
     pub(super) sequence: u16,
+    pub(super) time: Micros,
+    pub(super) pace: Pace,
     pub(super) counts: Counts,
     pub(super) reckoned: bool,
     /// Counts per period between the last two samples that passed.
@@ -390,7 +398,7 @@ mod tests {
     fn a_number_of_the_wire_names_what_it_was_made_of() {
         for n in 0..=u8::MAX {
             assert_eq!(State::from_u8(n).map(|s| s as u8), (n <= 6).then_some(n));
-            assert_eq!(Cause::from_u8(n).map(|c| c as u8), (n <= 19).then_some(n));
+            assert_eq!(Cause::from_u8(n).map(|c| c as u8), (n <= 20).then_some(n));
             assert_eq!(Arrival::from_u8(n).map(|a| a as u8), (n <= 5).then_some(n));
         }
     }

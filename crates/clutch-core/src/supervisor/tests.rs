@@ -52,7 +52,7 @@ fn line<T: Real>(origin: i64, rate: i64) -> impl Fn(u64) -> Target<T> + Copy {
 
 /// All checks but the envelope's: most tests' shaft knows no physics. Those of the envelope are in `envelope/tests.rs`.
 fn kinematic() -> Checks {
-    ENVELOPE.into_iter().fold(Checks::ALL, Checks::without)
+    ENVELOPE.into_iter().fold(Checks::ALL.without(Cause::Clock), Checks::without)
 }
 
 const ENVELOPE: [Cause; 5] =
@@ -113,6 +113,7 @@ impl<T: Real, C: ControlLaw<T>> Rig<T, C> {
         let counts = self.path.0 + self.path.1 * self.sent + i64::from(self.ahead);
         Sample {
             sequence: self.sequence,
+            time: Micros((self.sent as u32).wrapping_mul(1000)),
             counts: Counts(counts as i32),
             board: BoardMode::Driving,
             ..Sample::default()
@@ -504,10 +505,10 @@ fn provoke<T: Real>(cause: Cause, checks: Checks) -> (State, Cause) {
         return (rig.state.state(), rig.state.cause());
     }
     let mut rig = Rig::<T>::armed();
-    let others = if ENVELOPE.contains(&cause) { Checks::ALL } else { kinematic() };
+    let others = if ENVELOPE.contains(&cause) || cause == Cause::Clock { Checks::ALL } else { kinematic() };
     rig.supervisor = rig.supervisor.with_checks(Checks::both(checks, others));
     rig.path.1 = match cause {
-        Cause::StandStill | Cause::Channel | Cause::TooFast => 0,
+        Cause::StandStill | Cause::Channel | Cause::TooFast | Cause::Clock => 0,
         Cause::Reversed => -1,
         Cause::TooSlow => 8,
         _ => 1,
@@ -520,6 +521,10 @@ fn provoke<T: Real>(cause: Cause, checks: Checks) -> (State, Cause) {
     }
     if cause == Cause::Channel {
         rig.ahead = -20;
+    }
+    if cause == Cause::Clock {
+        // Under full brake the shaft may stand.
+        rig.ahead = 20;
     }
     rig.good();
     for k in 1..=210 {
@@ -548,6 +553,11 @@ fn provoke<T: Real>(cause: Cause, checks: Checks) -> (State, Cause) {
             // Behind its path, so that the brake is open.
             Cause::Channel => rig.ahead = -20 - (k & 1),
             Cause::TooFast => rig.ahead += k,
+            // Half as fast as it should.
+            Cause::Clock => {
+                rig.send(Sample { time: Micros(500 * k as u32), ..rig.fresh() });
+                continue;
+            }
             Cause::TooSlow if k > 8 => rig.ahead -= 4,
             Cause::Target => {
                 rig.aimed(|t| Target { acceleration: T::ONE / T::ZERO, ..t });
@@ -1146,6 +1156,7 @@ fn whatever_comes<T: Real>(law: usize, ops: &[Op]) -> Result<u32, TestCaseError>
                 rig.sequence = rig.sequence.wrapping_add(sequence as u16);
                 cycle = Some(rig.again(Sample {
                     sequence: rig.sequence,
+                    time: Micros(counts as u32),
                     counts: Counts(counts),
                     board: [BoardMode::Driving, BoardMode::Driving, BoardMode::Ready, BoardMode::Safe]
                         [usize::from(flags & 3)],

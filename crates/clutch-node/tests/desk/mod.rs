@@ -62,7 +62,7 @@ pub struct Plan {
 /// Bounds of a shaft that may do nearly anything: a desk's has no physics.
 fn any_shaft() -> Bounds<f32> {
     let paper = Bounds::around(&PlantParams::default(), &Tolerances::default()).unwrap();
-    Bounds { drive_torque: clutch_core::Interval { low: 0.001, high: 10.0 }, ..paper }
+    Bounds { drive_torque: clutch_core::Interval { low: 0.0005, high: 10.0 }, ..paper }
 }
 
 impl Plan {
@@ -178,6 +178,8 @@ pub struct Desk {
     pub board: BoardNode,
     pub twin: ControllerNode<f32>,
     pub now_ns: u64,
+    /// Time by which the host's clock is ahead of the board's, ns.
+    pub host_later_ns: u64,
     pub to_board: Outbox,
     pub outboxes: Outboxes,
     pub up: Outbox,
@@ -203,6 +205,7 @@ impl Desk {
             board: BoardNode::new(&BOARD).unwrap(),
             twin: plan.control(),
             now_ns: 1000 * MS,
+            host_later_ns: 0,
             to_board: Outbox::default(),
             outboxes: Outboxes::default(),
             up: Outbox::default(),
@@ -247,7 +250,9 @@ impl Desk {
             heard.extend(frames(&host));
             self.sent.extend_from_slice(&host);
             let notices = &mut self.notices;
-            self.host.receive(self.now_ns, &host, &self.plan.path(), &mut |n| notices.push(n));
+            self.host.receive(self.now_ns + self.host_later_ns, &host, &self.plan.path(), &mut |n| {
+                notices.push(n)
+            });
         }
         panic!("they never come to an end: {heard:?}");
     }
@@ -324,7 +329,7 @@ impl Desk {
         self.board_controller.poll(self.now_ns, &mut self.outboxes);
         if self.host_alive {
             let notices = &mut self.notices;
-            self.host.poll(self.now_ns, &mut self.to_board, &mut |n| notices.push(n));
+            self.host.poll(self.now_ns + self.host_later_ns, &mut self.to_board, &mut |n| notices.push(n));
         }
         self.settle()
     }
