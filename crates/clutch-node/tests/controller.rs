@@ -687,7 +687,8 @@ fn a_board_whose_time_does_not_pass_with_its_periods_is_found_out_and_a_sound_on
     // From anywhere, beyond the end of its counter, and with jitter.
     assert_eq!(clock_seen(|k| (k * 1000).wrapping_sub(5000), PERIOD), None);
     assert_eq!(clock_seen(|k| k * 1000 + (k * 7919) % 300, PERIOD), None);
-    let lies: [(&str, fn(u32) -> u32); 6] = [
+    type Lie = fn(u32) -> u32;
+    let lies: [(&str, Lie); 6] = [
         ("frozen", |_| 4000),
         ("half as fast", |k| 500 * k),
         ("twice as fast", |k| 2000 * k),

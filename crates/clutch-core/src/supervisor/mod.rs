@@ -277,7 +277,7 @@ impl<T: Real> Supervisor<T> {
     /// [`Cause::Clock`]: the board's time against its periods.
     #[inline]
     fn check_clock<S>(&self, s: &mut SupervisorState<T, S>, time: Micros, periods: u16) {
-        let passed = time.0.wrapping_sub(s.time.0).cast_signed();
+        let passed = time.0.wrapping_sub(s.time.0) as i32;
         s.time = time;
         let expected = self.limits.period_us.saturating_mul(u32::from(periods));
         if let Some(off) = s.pace.pass(expected, passed, self.limits.clock_slack_us) {
