@@ -10,5 +10,6 @@ mod intervals;
 mod laws;
 mod pid;
 mod referee;
+mod sampled;
 mod single_precision;
 mod systems;

@@ -1,0 +1,124 @@
+//! Certified bounds of the sampled loop against simulations, which share no code with them; `cargo xtask certified` is the large one.
+
+use clutch_certificate::{Options, Setup, checker, largest, search, stability};
+use clutch_core::BrakeActuator;
+use clutch_core::friction::StribeckParams;
+use clutch_sim::progress::UNWATCHED;
+use clutch_sim::run::simulate_watched;
+use clutch_sim::{Keep, Scenario};
+use clutch_tests::command;
+use std::process::Command;
+
+/// A built-in scenario with other values.
+fn scenario(name: &str, set: &[(&str, &str)]) -> Scenario {
+    let set: Vec<_> = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    let (origin, text) = Scenario::text(name.as_ref()).unwrap();
+    Scenario::parse(&origin, &text, &set).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn setup(scenario: &Scenario) -> Setup {
+    scenario.sampled_setup(&scenario.plan().unwrap().bounds).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The largest |e| of a plant of the box: the seed's lowest digits say which corner of `μ_d`, `μ_s` and `K_COF`.
+fn error(scenario: &Scenario, setup: &Setup, seed: u64) -> f64 {
+    let share = |place: u32| (seed / 3_u64.pow(place) % 3) as f64 / 2.0;
+    let of = |[low, high]: [f64; 2], place: u32| low + (high - low) * share(place);
+    let mut spec = scenario.spec();
+    let sliding = of(setup.sliding, 0);
+    spec.rig.friction = StribeckParams {
+        mu_dynamic: sliding,
+        mu_static: of(setup.at_rest, 1).max(sliding),
+        ..StribeckParams::default()
+    }
+    .into();
+    spec.rig.actuator = BrakeActuator { gain: of(setup.brake_gain, 2), ..BrakeActuator::default() }.into();
+    spec.run.seed = seed;
+    spec.run.duration = 2.0;
+    spec.run.settle = 0.0;
+    simulate_watched::<f64>(&spec, Keep::Figures, UNWATCHED).unwrap().metrics.max_error_rad
+}
+
+#[test]
+fn no_plant_of_a_box_breaks_its_certified_bound() {
+    let options = Options { refinements: 0, ..Options::default() };
+    for (name, set) in [
+        ("pd_2", &[("bounds.friction_percent", "10.0"), ("bounds.brake_gain_percent", "5.0")][..]),
+        (
+            "pd_2",
+            &[
+                ("law.pd.kp_v_rad", "1660.0"),
+                ("law.pd.kd_v_s_rad", "12.9"),
+                ("velocity.smoothed_derivative.smoothing", "0.712"),
+                ("rig.delay_ticks", "1"),
+                ("reference.ramp.rate_deg_s", "20.0"),
+                ("bounds.friction_percent", "5.0"),
+            ],
+        ),
+        (
+            "smc_2",
+            &[
+                ("law.smc.kp_v", "5.0"),
+                ("law.smc.kd_v_s_rad", "50.0"),
+                ("law.smc.boundary_rad_s", "0.2"),
+                ("velocity.smoothed_derivative.smoothing", "0.5"),
+                ("bounds.friction_percent", "5.0"),
+            ],
+        ),
+    ] {
+        let scenario = scenario(name, set);
+        let setup = setup(&scenario);
+        assert!(largest(&stability(&setup).unwrap()) < 1.0);
+        let found = search(&setup, &options, false);
+        assert!(found.complete(), "{name}: {:?}", found.open);
+        let bound = checker::check(&found.certificate).unwrap_or_else(|e| panic!("{e}")).error_bound;
+        let seen = (0..54).map(|seed| error(&scenario, &setup, seed)).fold(0.0, f64::max);
+        assert!(seen <= bound && bound < 3.0 * seen, "{name}: {seen} rad seen, {bound} certified");
+    }
+}
+
+#[test]
+fn what_the_sampled_certificate_does_not_cover_is_said_by_name() {
+    for (name, key) in [
+        ("ctc_2", "(law)"),
+        ("pid_2", "(law)"),
+        ("observer_smc_2", "(velocity)"),
+        ("minimum_jerk", "(reference)"),
+    ] {
+        let scenario = scenario(name, &[]);
+        let why = scenario.sampled_setup(&scenario.plan().unwrap().bounds).unwrap_err().to_string();
+        assert!(why.contains(key), "{name}: {why}");
+    }
+    let delayed = scenario("pd_2", &[("rig.delay_ticks", "4")]);
+    assert!(
+        delayed.sampled_setup(&delayed.plan().unwrap().bounds).unwrap_err().to_string().contains("4 ticks")
+    );
+}
+
+#[test]
+fn certify_saves_a_certificate_checks_it_and_refuses_it_for_another_loop() {
+    let file = std::env::temp_dir().join(format!("clutch-sampled-{}.json", std::process::id()));
+    let run = |args: &[&str]| {
+        let output = Command::new(command()).args(["certify", "pd_2"]).args(args).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        (output.status.code(), text, String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let path = file.to_str().unwrap();
+    let (code, text, _) = run(&["--sampled", "--save", path]);
+    assert_eq!(code, Some(0), "{text}");
+    for said in [
+        "continuous time: certified",
+        "as sampled: |e| stays below 0.0",
+        "linearly stable",
+        "sticks: not excluded",
+    ] {
+        assert!(text.contains(said), "{text}");
+    }
+    let (code, again, _) = run(&["--check", path]);
+    assert_eq!((code, &again), (Some(0), &text));
+    let (code, _, told) = run(&["--check", path, "--set", "law.pd.kp_v_rad=4999"]);
+    assert!(code == Some(1) && told.contains("law: ") && told.contains("4999"), "{told}");
+    let (_, text, _) = run(&["--set", "rig.delay_ticks=1"]);
+    assert!(text.contains("UNSTABLE: spectral radius 1.057"), "{text}");
+    std::fs::remove_file(file).unwrap();
+}
