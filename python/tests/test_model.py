@@ -652,9 +652,7 @@ VALID = {
     clutch.MotorActuator: each(gain_nm_v=POSITIVE, preload_nm=number(0, 10), load_share=number(0, 1)),
     clutch.BothActuator: each(brake_gain_nm_v=POSITIVE, motor_gain_nm_v=POSITIVE, preload_nm=number(0, 10)),
     clutch.Ripple: ripples(),
-    clutch.Runout: each(
-        amplitude=st.floats(0, 0.39), waves_per_turn=st.integers(1, 1000), phase_deg=number(-720, 720)
-    ),
+    clutch.Runout: each(amplitude=st.floats(0, 0.39), waves_per_turn=st.integers(1, 1000), phase_deg=number(-720, 720)),
     clutch.WeightDrive: each(
         mass_kg=POSITIVE,
         gravity_m_s2=POSITIVE,
