@@ -659,7 +659,7 @@ fn edited(name: &str, from: &[u8], to: &[u8]) -> Vec<u8> {
 
 #[test]
 fn a_changed_byte_of_the_metadata_is_found_by_its_checksum() {
-    let bytes = edited("checksum", b"0.1.0+abc", b"0.1.0+abd");
+    let bytes = edited("checksum", b"0.1.0+abc", b"0.1.0+abx");
     let log = read_bytes(&bytes, &Limits::default()).unwrap();
     assert!(!log.complete);
     let damage = log.damage.unwrap();
