@@ -118,7 +118,9 @@ fn certify_saves_a_certificate_checks_it_and_refuses_it_for_another_loop() {
     assert_eq!((code, &again), (Some(0), &text));
     let (code, _, told) = run(&["--check", path, "--set", "law.pd.kp_v_rad=4999"]);
     assert!(code == Some(1) && told.contains("law: ") && told.contains("4999"), "{told}");
-    let (_, text, _) = run(&["--set", "rig.delay_ticks=1"]);
+    let (code, text, _) = run(&["--sampled", "--set", "rig.delay_ticks=1"]);
+    assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("UNSTABLE: spectral radius 1.057"), "{text}");
+    assert!(text.contains("no bound is looked"), "{text}");
     std::fs::remove_file(file).unwrap();
 }

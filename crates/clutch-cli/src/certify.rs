@@ -1,7 +1,7 @@
 //! `clutch certify`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{Exit, json, print};
+use crate::output::{Exit, json, paragraph, print};
 use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
 use clap::Args;
@@ -83,12 +83,12 @@ fn reason(s: Shortfall) -> &'static str {
         }
         Shortfall::Layer => {
             "the law saturates so far off its surface that the error rate there may exceed what brake or drive can \
-             follow: raise K_d (PD, CTC), or thin the boundary (SMC), or follow a slower path"
+             follow: raise the gain on the error rate, or thin the law's boundary, or follow a slower path"
         }
         Shortfall::Slope => "the surface's slope f is below C_d/J: raise K_p against K_d",
         Shortfall::Surface => {
-            "the law has no sliding surface, of which the certificate speaks: PD and CTC have one if K_p and K_d are above \
-             0, PID and open-loop laws have none"
+            "the law has no sliding surface, of which the certificate speaks: one has a law with gains above 0 on the error \
+             and on its rate, and no integral"
         }
         _ => "not certified",
     }
@@ -222,12 +222,12 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
             ],
         );
     }
+    out.push('\n');
     out += &match c.shortfall {
-        None => {
-            "\ncontinuous time: certified (exact sensor: sampling, encoder steps and delay come on top)\n"
-                .to_owned()
-        }
-        Some(s) => format!("\ncontinuous time: NOT certified: {}\n", reason(s)),
+        None => paragraph(
+            "continuous time: certified (exact sensor: sampling, encoder steps and delay come on top)",
+        ),
+        Some(s) => paragraph(&format!("continuous time: NOT certified: {}", reason(s))),
     };
     if !outside.is_empty() {
         out += "\nThe scenario's rig lies outside these bounds; the certificate does not cover it:\n";

@@ -42,6 +42,27 @@ pub(crate) fn new_log(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// A verdict as a paragraph of at most 80 columns, its further lines indented.
+pub(crate) fn paragraph(text: &str) -> String {
+    let mut out = String::new();
+    let mut column = 0;
+    for word in text.split_whitespace() {
+        let length = word.chars().count();
+        if column > 0 && column + 1 + length > 80 {
+            out += "\n   ";
+            column = 3;
+        }
+        if column > 0 {
+            out.push(' ');
+            column += 1;
+        }
+        out += word;
+        column += length;
+    }
+    out.push('\n');
+    out
+}
+
 /// Runs long work under a progress bar; the bar shows on a terminal only.
 pub(crate) fn with_progress<T>(unit: &str, work: impl FnOnce(Report<'_>) -> T) -> T {
     let style = ProgressStyle::with_template(&format!(

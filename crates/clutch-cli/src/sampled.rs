@@ -1,5 +1,6 @@
 //! Verdicts on the sampled loop: the error bound, linear stability, sticks; each with its scope.
 
+use crate::output::paragraph;
 use crate::table::number;
 use anyhow::Context;
 use clutch_certificate::{Options, Setup, checker, file, search};
@@ -17,6 +18,8 @@ pub(crate) enum Bound {
     Proven { checked: checker::Checked, cells: usize },
     /// Not proven, which does not mean unsafe.
     Open(String),
+    /// Not looked for: the loop is linearly unstable.
+    Unstable,
 }
 
 impl Bound {
@@ -26,6 +29,9 @@ impl Bound {
             Ok(setup) => setup,
             Err(why) => return Ok(Bound::NotCovered(why.to_string())),
         };
+        if sampled.stable() == Some(false) {
+            return Ok(Bound::Unstable);
+        }
         let found = search(setup, &Options::default(), false);
         if let Some(open) = found.open.first() {
             let how = if open.grew {
@@ -78,6 +84,7 @@ impl Bound {
             Bound::NotLookedFor => Some("not looked for".to_owned()),
             Bound::NotCovered(why) => Some(why.clone()),
             Bound::Open(cell) => Some(format!("not certified (not shown unsafe): {cell}")),
+            Bound::Unstable => Some("not looked for: the sampled loop is linearly unstable".to_owned()),
         }
     }
 }
@@ -111,7 +118,7 @@ fn scope(s: &Setup) -> String {
     out
 }
 
-/// The verdicts, a line each.
+/// The verdicts, a paragraph each.
 pub(crate) fn lines(sampled: &Sampled, bound: &Bound) -> String {
     let scope = sampled.setup.as_ref().map(scope).unwrap_or_default();
     let error = match bound {
@@ -122,6 +129,9 @@ pub(crate) fn lines(sampled: &Sampled, bound: &Bound) -> String {
             checked.limiting[1]
         ),
         Bound::Open(cell) => format!("NOT certified (not shown unsafe): {cell} [{scope}]"),
+        Bound::Unstable => {
+            format!("NOT certified: the loop is linearly unstable, no bound is looked for [{scope}]")
+        }
         Bound::NotCovered(why) => why.clone(),
         Bound::NotLookedFor => match &sampled.setup {
             Ok(_) => format!("error bound not looked for: --sampled does [{scope}]"),
@@ -132,9 +142,13 @@ pub(crate) fn lines(sampled: &Sampled, bound: &Bound) -> String {
         Ok(_) => sampled.stability_line(),
         Err(_) => "nothing is said of linear stability either".to_owned(),
     };
-    format!(
-        "as sampled: {error}\nas sampled: {stability}\nsticks: not excluded, neither by a bound nor by stability\n"
-    )
+    [
+        format!("as sampled: {error}"),
+        format!("as sampled: {stability}"),
+        "sticks: not excluded, neither by a bound nor by stability".to_owned(),
+    ]
+    .map(|verdict| paragraph(&verdict))
+    .concat()
 }
 
 /// The same as an object.

@@ -1,7 +1,7 @@
 //! `clutch sim`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{BUILD, Exit, json, new_log, print, with_progress};
+use crate::output::{BUILD, Exit, json, new_log, paragraph, print, with_progress};
 use crate::plot::{self, Figure, Panel, Series};
 use crate::sampled;
 use crate::table::{number, quantities, row};
@@ -171,7 +171,8 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     };
     let jump = s.path.velocity_jump_rad_s;
     let mut text = quantities(&title, &rows);
-    text += &format!("gains, continuous time: {certified}\ngains, as sampled: {}\n", s.as_sampled);
+    text += &format!("gains, continuous time: {certified}\n");
+    text += &paragraph(&format!("gains, as sampled: {}", s.as_sampled));
     if jump > 1e-9 {
         text += &format!(
             "note: the path's velocity jumps by {} °/s, which no shaft follows at once; the shaft catches up\n",
