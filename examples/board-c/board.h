@@ -1,4 +1,4 @@
-/* A board for the wire protocol of docs/wire.md, version 2: the state machine, in portable C99.
+/* A board for the wire protocol of docs/wire.md, version 3: the state machine, in portable C99.
  *
  * No malloc, no floating point, no library but <stdint.h>, <stddef.h> and <string.h>. It has one board, in
  * static memory, below 300 bytes. It reads no clock: all times are a counter of microseconds that wraps.

@@ -169,6 +169,16 @@ static void listen(const char *path, uint64_t until)
         board_byte(bytes[i], micros(now));
 }
 
+/* The number of this power-up: nobody who cannot hear the board shall know it. */
+static int unguessable(uint32_t *number) {
+    FILE *source = fopen("/dev/urandom", "rb");
+    size_t got = source != NULL ? fread(number, sizeof *number, 1, source) : 0;
+    if (source != NULL) {
+        (void)fclose(source);
+    }
+    return got == 1;
+}
+
 int main(int argc, char **argv)
 {
     const uint64_t idle_ns = 10000000;
@@ -191,7 +201,10 @@ int main(int argc, char **argv)
         return 1;
     }
     params.board = 99; /* 0 and 1 are the simulated boards of `clutch daq` */
-    params.boot = (uint32_t)time(NULL) ^ ((uint32_t)getpid() << 16);
+    if (!unguessable(&params.boot)) {
+        perror("/dev/urandom");
+        return 1;
+    }
     params.counts_per_rev = COUNTS_PER_REV;
     params.dac_bits = DAC_BITS;
     params.dac_lowest_mv = -10000;

@@ -44,8 +44,8 @@ class LoopResult:
         Frames with errors; answers that came too late; cycles of a board controller that did not reach this machine;
         records that the log dropped; frames that the line took only in part.
     response, cycle, wake : dict of str to float
-        From a sample to its answer, from answer to answer, and by how much a wake-up was late (``count`` is 0 of a board
-        whose clock waits for this machine, or that closes the loop itself): ``p50_us``, ``p99_us``, ``p99_9_us``,
+        From a sample to its answer, from answer to answer, and by how much a wake-up was late (``count`` is 0 of a
+        board whose clock waits for this machine, or that closes the loop itself): ``p50_us``, ``p99_us``, ``p99_9_us``,
         ``max_us``, ``count``.
     tick_clock_cycles : dict of str to float or None
         Clock cycles of a tick, of a board that counts them: ``clock_hz``, ``p50``, ``p99_9``, ``max``.

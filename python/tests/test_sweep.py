@@ -529,7 +529,7 @@ def test_waiting_takes_times_and_no_other_numbers(short):
 
 
 def test_more_rows_than_fit_are_refused_before_memory_is_taken():
-    with pytest.raises(ValueError, match="law.smc.kp_v: 1000000000000 rows, expected at most 10000000"):
+    with pytest.raises(ValueError, match=r"law\.smc\.kp_v: 1000000000000 rows, expected at most 10000000"):
         clutch.grid({"law.smc.kp_v": range(10**12)})
     axes = {f"law.smc.{key}": range(10**4) for key in ("kp_v", "kd_v_s_rad", "slope_1_s")}
     with pytest.raises(ValueError, match="grid: 1000000000000 rows, expected at most 10000000"):

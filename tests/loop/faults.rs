@@ -86,6 +86,6 @@ fn a_line_that_corrupts_every_frame_is_found() {
 
 #[test]
 fn a_converter_that_lets_go_is_found() {
-    let causes = [("FollowingError", "following error"), ("Saturation", "at its limit"), ("Jump", "jumped")];
+    let causes = [("TooFast", "ahead of the fastest shaft"), ("Jump", "jumped")];
     ends_with("dac-stuck", "dac-stuck:at=0.5,volts=0", &causes, 600);
 }

@@ -12,7 +12,8 @@ use clutch_wire::{Armed, BoardState, Configured, Message, Sample, encode};
 fn samples_that_pile_up_before_consent_do_not_end_the_run() {
     let built_in = BUILT_IN.iter().find(|b| b.name == "board_smc_2").expect("a built-in scenario");
     let scenario = Scenario::parse(built_in.name, built_in.toml, &[]).unwrap();
-    let built = BuiltRun::<f64>::new(&scenario, 1).unwrap();
+    let mut built = BuiltRun::<f64>::new(&scenario, 1).unwrap();
+    built.controller.boot = 1;
     let (run, config) = (1, built.controller.config);
     let mut node = ControllerNode::new(built.controller, built.servo, built.supervisor);
     let path = from_scenario::path::<f64>(&scenario).unwrap();

@@ -96,6 +96,19 @@ fn what_the_sampled_certificate_does_not_cover_is_said_by_name() {
 }
 
 #[test]
+fn a_converter_that_rounds_nothing_gives_all_of_the_output_and_a_noise_beyond_the_drive_is_not_covered() {
+    let setup = |set: &[(&str, &str)]| {
+        let scenario = scenario("pd_2", set);
+        scenario.sampled_setup(&scenario.plan().unwrap().bounds)
+    };
+    assert!((setup(&[]).unwrap().volts[1] - 10.0 * 2047.0 / 2048.0).abs() < 1e-12);
+    assert_eq!(setup(&[("rig.dac.quantised", "false")]).unwrap().volts, [0.0, 10.0]);
+    // Four times the root mean square: 0.046 and 0.048 N m against a drive of 0.047.
+    assert!(setup(&[("rig.torque_noise_nm", "0.0115")]).is_ok());
+    assert_eq!(setup(&[("rig.torque_noise_nm", "0.012")]).unwrap_err().key, "rig.torque_noise_nm");
+}
+
+#[test]
 fn certify_saves_a_certificate_checks_it_and_refuses_it_for_another_loop() {
     let file = std::env::temp_dir().join(format!("clutch-sampled-{}.json", std::process::id()));
     let run = |args: &[&str]| {

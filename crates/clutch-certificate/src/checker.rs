@@ -175,6 +175,10 @@ fn values(s: &Setup) -> Result<(), Refused> {
             return refuse(key, x.to_string(), "a finite number of at least 0");
         }
     }
+    // A shaft that is never driven backwards never runs back: all that follows rests on that.
+    if s.torque_noise >= s.drive_torque[0] {
+        return refuse("torque_noise", s.torque_noise.to_string(), "a number below setup.drive_torque[0]");
+    }
     if !(s.ripple >= 0.0 && s.ripple < 1.0) {
         return refuse("ripple", s.ripple.to_string(), "a number from 0 to below 1");
     }
@@ -265,7 +269,12 @@ fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
     for proof in &cell.proofs {
         proofs.insert((proof.row as usize, proof.mode as usize), proof.weights.as_slice());
     }
-    let counts = if cell.form == Form::Exact { shaft.most_counts() } else { 0 };
+    let counts = if cell.form == Form::Exact {
+        let too_fast = || Flaw::Shape("more than a million counts may go by in a tick".to_owned());
+        shaft.most_counts().ok_or_else(too_fast)?
+    } else {
+        0
+    };
     let mut programs = 0;
     for piece in &pieces {
         for case in [Case::Slides, Case::LetGo, Case::TouchesAndLeaves, Case::TouchesAndStays] {

@@ -26,6 +26,12 @@ pub enum FileError {
         /// Key or place, and what was expected.
         error: serde_json::Error,
     },
+    /// A folder, a pipe, a device.
+    #[error("{name}: expected a file")]
+    NoFile {
+        /// Its name.
+        name: String,
+    },
     /// The file is too large.
     #[error("{name}: {size} bytes: expected a certificate, of at most {LARGEST}")]
     Size {
@@ -64,11 +70,15 @@ pub fn write(path: &Path, certificate: &Certificate) -> Result<(), FileError> {
 pub fn read(path: &Path) -> Result<Certificate, FileError> {
     let name = || path.display().to_string();
     let io = |error| FileError::Io { name: name(), error };
-    let file = std::fs::File::open(path).map_err(io)?;
-    let about = file.metadata().map_err(io)?;
-    if !about.is_file() || about.len() > LARGEST {
+    // Before it is opened: a pipe would wait for somebody who writes.
+    let about = std::fs::metadata(path).map_err(io)?;
+    if !about.is_file() {
+        return Err(FileError::NoFile { name: name() });
+    }
+    if about.len() > LARGEST {
         return Err(FileError::Size { name: name(), size: about.len() });
     }
+    let file = std::fs::File::open(path).map_err(io)?;
     let certificate: Certificate = serde_json::from_reader(BufReader::new(file))
         .map_err(|error| FileError::Format { name: name(), error })?;
     if certificate.version != VERSION {

@@ -38,7 +38,8 @@ pub fn stability(setup: &Setup) -> Option<[Stability; 3]> {
 /// The largest of them.
 #[must_use]
 pub fn largest(radii: &[Stability; 3]) -> f64 {
-    radii.iter().map(|s| s.radius).fold(0.0, f64::max)
+    // A radius that is no number is no stable loop.
+    radii.iter().map(|s| if s.radius.is_nan() { f64::INFINITY } else { s.radius }).fold(0.0, f64::max)
 }
 
 fn closed_loop(u: &Units, b: f64) -> Vec<Vec<f64>> {
@@ -52,6 +53,9 @@ fn spectral_radius(a: &[Vec<f64>]) -> f64 {
     let n = a.len();
     let (mut a, mut log, mut power) = (a.to_vec(), 0.0, 1.0);
     for _ in 0..30 {
+        if !a.iter().flatten().all(|x| x.is_finite()) {
+            return f64::INFINITY;
+        }
         let norm = a.iter().flatten().map(|x| x.abs()).fold(0.0, f64::max);
         if norm == 0.0 {
             return 0.0;

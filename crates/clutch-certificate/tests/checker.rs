@@ -247,3 +247,19 @@ fn values_that_no_loop_has_are_refused_by_name() {
     assert!(told(&|c| c.cells[0].speed_cap = 0.01).contains("speed_cap"));
     assert!(told(&|c| c.cells[0].form = Form::Noise).contains("cells[0]"));
 }
+
+#[test]
+fn a_noise_that_turns_the_drive_round_is_refused_whatever_the_proofs_say() {
+    let mut turned = good();
+    turned.setup.torque_noise = turned.setup.drive_torque[0];
+    let refusal = check(&turned).unwrap_err().to_string();
+    assert!(refusal.contains("setup.torque_noise is 0.047"), "{refusal}");
+}
+
+#[test]
+fn a_start_with_more_volts_than_the_set_holds_is_refused() {
+    let proven = found(&setup(Gains::Pd { kp: 1660.0, kd: 12.9 }, 0.712, 1, 2.0));
+    let mut higher = proven.clone();
+    higher.setup.start_volts[1] = 2.0 * higher.setup.volts[1];
+    assert!(check(&proven).is_ok() && check(&higher).is_err());
+}

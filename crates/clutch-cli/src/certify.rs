@@ -55,6 +55,9 @@ impl Certify {
             text(&scenario, &plan, &outside) + &sampled::lines(&sampled, &bound)
         };
         print(&shown)?;
+        if let (Some(file), None) = (&self.save, bound.proven()) {
+            eprintln!("{}: not written: nothing is proven", file.display());
+        }
         let certified = match bound {
             Bound::NotLookedFor => plan.certificate.certified(),
             _ => bound.proven().is_some() && sampled.stable() == Some(true),

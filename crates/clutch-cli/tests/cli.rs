@@ -94,7 +94,15 @@ fn certify_exits_with_0_for_certified_and_2_for_not() {
     let o = clutch(&["certify", "smc_2"]);
     assert_eq!(o.status.code(), Some(0));
     let text = out(&o);
-    for words in ["K_p required", "2.2624", "worst corner", "margin", "(26)", "-0.96027", "\ncertified"] {
+    for words in [
+        "K_p required",
+        "2.2624",
+        "worst corner",
+        "margin",
+        "(26)",
+        "-0.96027",
+        "\ncontinuous time: certified",
+    ] {
         assert!(text.contains(words), "lacks {words}:\n{text}");
     }
     let bounds = [
@@ -107,7 +115,7 @@ fn certify_exits_with_0_for_certified_and_2_for_not() {
     ];
     let o = clutch(&[&["certify", "smc_2"][..], &bounds].concat());
     assert_eq!(o.status.code(), Some(2));
-    assert!(out(&o).contains("NOT certified: K_p is too small"), "{}", out(&o));
+    assert!(out(&o).contains("continuous time: NOT certified: K_p is too small"), "{}", out(&o));
 }
 
 #[test]

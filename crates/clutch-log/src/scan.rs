@@ -372,7 +372,11 @@ impl<'a, R: Read> Scan<'a, R> {
             }
             op::HEADER | op::SCHEMA | op::MESSAGE_INDEX => {}
             0x80.. => {} // private records are other people's, and allowed
-            _ => self.skip(9 + body.len() as u64, format!("a record of unknown kind {opcode:#04x}")),
+            _ => {
+                // It may have been a chunk.
+                self.gap();
+                self.skip(9 + body.len() as u64, format!("a record of unknown kind {opcode:#04x}"));
+            }
         }
         Ok(Next::More)
     }

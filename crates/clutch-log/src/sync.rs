@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
 /// Least time between two syncs beside the writing.
@@ -50,7 +50,10 @@ impl Syncer {
                     self.pending = false;
                     answer?;
                 }
-                Err(_) => return Ok(()),
+                Err(TryRecvError::Empty) => return Ok(()),
+                Err(TryRecvError::Disconnected) => {
+                    return Err(io::Error::other("the thread that syncs has ended"));
+                }
             }
         }
         if self.asked.elapsed() >= SYNC_EVERY {

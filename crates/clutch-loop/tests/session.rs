@@ -86,7 +86,7 @@ fn the_path_is_announced_run_to_its_end_and_done() {
     let [Event::Announced(announcement)] = &events[..] else { panic!("{events:?}") };
     assert_eq!(announcement.title, session.scenario().name());
     let gains = announcement.rows.iter().find(|(name, _)| *name == "gains").unwrap();
-    assert_eq!(gains.1, "certified for the bounds given");
+    assert_eq!(gains.1, "certified in continuous time for the bounds given");
     assert_eq!(
         (summary.verdict(), summary.report.cause, summary.report.ticks),
         (Verdict::Done, Cause::Done, 1200)

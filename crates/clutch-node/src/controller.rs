@@ -258,6 +258,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             }
             Message::Armed(m) if m.run == run && m.config == config => {
                 self.supervisor.arm(&mut self.state, self.present);
+                self.pace.consent();
                 notices(Notice::Armed);
             }
             Message::Refused(m) => notices(Notice::Refused(*m)),

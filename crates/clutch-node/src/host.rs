@@ -273,6 +273,7 @@ impl HostNode {
             Message::Armed(m) if m.run == run && m.config == config => {
                 if self.standing.state == State::Ready {
                     self.standing = Standing { state: State::Armed, ..Standing::default() };
+                    self.pace.consent();
                     self.origin = None;
                     (self.heard_ns, self.due_ns) = (Some(now_ns), now_ns);
                 }

@@ -22,12 +22,15 @@ fn outward(low: f64, high: f64) -> Interval {
 /// Sums and products with 0 are exact.
 const ZERO: Interval = Interval { low: 0.0, high: 0.0 };
 
+/// All that there is: of what is no number.
+const ALL: Interval = Interval { low: f64::NEG_INFINITY, high: f64::INFINITY };
+
 impl Interval {
     /// Without knowing which of some numbers is the least and which the greatest.
     fn hull(ends: [f64; 4]) -> Interval {
         // A number that is none makes the interval all there is.
         if ends.iter().any(|x| x.is_nan()) {
-            return Interval { low: f64::NEG_INFINITY, high: f64::INFINITY };
+            return ALL;
         }
         outward(
             ends.into_iter().fold(f64::INFINITY, f64::min),
@@ -51,11 +54,22 @@ impl Interval {
         at(self.high)
     }
 
+    /// An end is no number.
+    fn is_none(self) -> bool {
+        self.low.is_nan() || self.high.is_nan()
+    }
+
     pub(crate) fn min(self, other: Interval) -> Interval {
+        if self.is_none() || other.is_none() {
+            return ALL;
+        }
         Interval { low: self.low.min(other.low), high: self.high.min(other.high) }
     }
 
     pub(crate) fn max(self, other: Interval) -> Interval {
+        if self.is_none() || other.is_none() {
+            return ALL;
+        }
         Interval { low: self.low.max(other.low), high: self.high.max(other.high) }
     }
 
@@ -110,7 +124,7 @@ impl Div for Interval {
     /// All there is if the divisor may be 0.
     fn div(self, o: Interval) -> Interval {
         if o.low <= 0.0 && o.high >= 0.0 {
-            return Interval { low: f64::NEG_INFINITY, high: f64::INFINITY };
+            return ALL;
         }
         if self == ZERO {
             return ZERO;

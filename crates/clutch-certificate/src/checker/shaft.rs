@@ -78,7 +78,9 @@ impl Shaft {
             ((least_held / inertia.1 * scale).least(), (most_held / inertia.0 * scale).most());
         let least_drive = (weakest_drive / inertia.1 * scale - drag).least();
         let volts_off = (at(0.5) * at(s.converter_step) + at(LAW_ROUNDING)).most();
-        let most_volts = at(s.volts[1]) + volts_off;
+        // With a delay the first ticks have what the brake had before.
+        let before = if s.delay_ticks > 0 { s.start_volts[1] } else { 0.0 };
+        let most_volts = (at(s.volts[1]) + volts_off).max(at(before));
         let most_slowing = brakes_anywhere.1 * most_volts - least_drive;
         Shaft {
             count,
@@ -103,7 +105,8 @@ impl Shaft {
     }
 
     /// Most counts that go by from one sample to the next.
-    pub(crate) fn most_counts(&self) -> u32 {
-        (at(self.cap) + self.drives.1 + self.slow).high.ceil().min(1e6) as u32
+    pub(crate) fn most_counts(&self) -> Option<u32> {
+        let most = (at(self.cap) + self.drives.1 + self.slow).high.ceil();
+        (most <= 1e6).then_some(most as u32)
     }
 }

@@ -28,7 +28,7 @@ use crate::{Bounds, Real};
 const BLUR: f64 = 0.4;
 /// Periods after which a younger window takes its place at the latest.
 const LONGEST: f64 = 16.0;
-/// Counts per period that no shaft has: of a velocity that nobody knows yet.
+/// Counts per period of a velocity that nobody knows yet, at least.
 const FASTEST: f64 = 1000.0;
 
 /// What the bounds say of accelerations; in counts, periods and, where a side of it is meant, `[least, most]`.
@@ -53,18 +53,21 @@ pub(super) struct Envelope<T> {
     delay: usize,
     /// Volts that can be sent.
     output: [T; 2],
+    /// Counts per period of a velocity that nobody knows yet.
+    fastest: T,
     /// The shaft does not go backwards: a brake only resists, and its drive is forwards.
     one_way: bool,
 }
 
 impl<T: Real> Envelope<T> {
-    /// `scale` is counts per radian times period².
+    /// `scale` is counts per radian times period²; `speed` are counts per period of the fastest path.
     pub(super) fn new(
         p: &LimitParams<T>,
         output: &OutputParams<T>,
         b: &Bounds<T>,
         scale: T,
         period: T,
+        speed: T,
     ) -> Self {
         let scale = scale / b.inertia.high;
         let friction = [b.friction.low / p.grip_margin, b.friction.high * p.friction_margin];
@@ -86,13 +89,14 @@ impl<T: Real> Envelope<T> {
             edge: p.edge_counts,
             delay: usize::try_from(p.delay_cycles).unwrap_or(usize::MAX),
             output: [output.lowest, output.highest],
+            fastest: T::from_f64(FASTEST).max(speed + speed),
             one_way: !b.actuator.drives_above_0() && b.drive_torque.low > T::ZERO,
         }
     }
 
-    /// The envelope of a shaft of which nothing is known but a count.
-    pub(super) fn start(&self) -> EnvelopeState<T> {
-        let (fastest, edge) = (T::from_f64(FASTEST), self.edge);
+    /// The envelope of a shaft of which nothing is known but a count, and the voltage `applied`.
+    pub(super) fn start(&self, applied: T) -> EnvelopeState<T> {
+        let (fastest, edge) = (self.fastest, self.edge);
         let from = |position, other: T, velocity| {
             let window = Window { from: -other, age: T::ZERO, moment: T::ZERO };
             Side { position, velocity, old: window, young: window }
@@ -100,6 +104,7 @@ impl<T: Real> Envelope<T> {
         let back = if self.one_way { T::ZERO } else { fastest };
         EnvelopeState {
             sides: [from(T::ONE + edge, edge, fastest), from(edge, T::ONE + edge, back)],
+            applied,
             turns: 0,
             still: 0,
             run: 0,
@@ -137,10 +142,11 @@ impl<T: Real> Envelope<T> {
 
     /// Lowest and highest voltage that may have been in force since the sample before: of those that were sent, the newest
     /// first. The last two, and more where an actuator is slow or a line that has lost samples may have lost codes.
-    pub(super) fn in_force(&self, sent: &[T; 4], losses: bool) -> [T; 2] {
+    pub(super) fn in_force(&self, s: &EnvelopeState<T>, sent: &[T; 4], losses: bool) -> [T; 2] {
         let [mut low, mut high] = [sent[0]; 2];
-        if self.delay > 2 {
-            return self.output;
+        // Older than the four that are kept: any of the output, or what was there before the first.
+        if self.delay > 2 || losses && self.delay > 0 {
+            return [self.output[0].min(s.applied), self.output[1].max(s.applied)];
         }
         let reach = if losses { 4 } else { 2 + self.delay };
         for volts in sent.iter().take(reach) {
@@ -263,6 +269,8 @@ impl<T: Real> Side<T> {
 pub(super) struct EnvelopeState<T> {
     /// The fastest shaft, and the slowest with the axis turned round.
     sides: [Side<T>; 2],
+    /// Voltage before the first that was sent, V.
+    applied: T,
     /// Whether the counts turned round, a bit each of the last periods.
     turns: u16,
     /// Periods without a count.

@@ -424,7 +424,7 @@ impl<T: Real> Supervisor<T> {
         let Some(served) = s.served else {
             let applied = servo.dac().volts(s.code);
             s.servo = servo.start(counts, goal, applied);
-            s.envelope = self.limits.envelope.start();
+            s.envelope = self.limits.envelope.start(applied);
             s.voltages = [applied; 4];
             return 1;
         };
@@ -471,7 +471,7 @@ impl<T: Real> Supervisor<T> {
     /// What the counts say of a shaft that no shaft of the bounds can be, under the volts that were sent.
     fn within_envelope<S>(&self, s: &mut SupervisorState<T, S>, moved: i32, periods: u32) {
         let l = &self.limits;
-        let volts = l.envelope.in_force(&s.voltages, s.lost.count() > 0 || s.late.count() > 0);
+        let volts = l.envelope.in_force(&s.envelope, &s.voltages, s.lost.count() > 0 || s.late.count() > 0);
         if let Some((cause, counts)) = l.envelope.judge(&mut s.envelope, volts, moved, periods) {
             self.check(s, cause, counts * l.radians_per_count);
         }

@@ -155,6 +155,7 @@ impl<T: Real> Limits<T> {
         Interval::HIGH_USABLE.require(motor.high, motor.high >= T::ZERO)?;
         let weakest = bounds.weakest_brake();
         Interval::LOW_USABLE.require(weakest, weakest >= T::ZERO)?;
+        let speed_counts = speed_limit * per_radian * period + T::ONE;
         Ok(Limits {
             period,
             period_us: servo.period.0,
@@ -174,9 +175,16 @@ impl<T: Real> Limits<T> {
             overruns: p.overruns,
             still: T::from_f64(1e-6),
             speed_limit,
-            speed_counts: speed_limit * per_radian * period + T::ONE,
+            speed_counts,
             actuator: bounds.actuator,
-            envelope: Envelope::new(p, &servo.output, bounds, per_radian * period * period, period),
+            envelope: Envelope::new(
+                p,
+                &servo.output,
+                bounds,
+                per_radian * period * period,
+                period,
+                speed_counts + counts,
+            ),
         })
     }
 

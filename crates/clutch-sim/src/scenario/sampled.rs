@@ -38,7 +38,7 @@ pub struct Sampled {
 }
 
 impl Sampled {
-    /// Small deviations die out, whichever plant of the box it is; none where nothing is known.
+    /// Small deviations die out, with the weakest, a middle and the strongest brake; none where nothing is known.
     #[must_use]
     pub fn stable(&self) -> Option<bool> {
         self.stability.as_ref().map(|radii| largest(radii) < 1.0)
@@ -136,11 +136,28 @@ impl Scenario {
         }
         let rig = Rig::new(&p.rig, p.run.seed)
             .map_err(|_| not("rig", "a rig out of range", "rigs that can be built"))?;
+        let noise = NOISE_ROOTS * p.rig.torque_noise;
+        if noise >= bounds.drive_torque.low {
+            return Err(not(
+                "rig.torque_noise_nm",
+                format!(
+                    "a torque noise that turns the drive round ({NOISE_ROOTS} times its root mean square)"
+                ),
+                "noise below the weakest drive",
+            ));
+        }
         let ripple = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
         let ends = |i: &clutch_core::Interval| [i.low, i.high];
         let dac = &rig.dac;
-        let top = dac.volts(dac.code(f64::MAX));
-        let volts = [p.output.lowest.max(dac.volts(dac.code(f64::MIN))), p.output.highest.min(top)];
+        // A converter that rounds nothing gives all that it is asked for.
+        let (bottom, top) = if p.rig.dac.quantised {
+            (dac.volts(dac.code(f64::MIN)), dac.volts(dac.code(f64::MAX)))
+        } else {
+            (f64::NEG_INFINITY, f64::INFINITY)
+        };
+        let volts = [p.output.lowest.max(bottom), p.output.highest.min(top)];
+        // Before the first tick the brake has what the rig gives it, beyond the output's limits, too.
+        let reached = p.rig.dac.converter.highest;
         let plant = Plant::new(&p.model)
             .map_err(|_| not("model", "a plant out of range", "plants that can be built"))?;
         let friction = plant.friction();
@@ -163,7 +180,7 @@ impl Scenario {
             rest_not_below_sliding: friction.at_rest() >= friction.sliding(),
             stribeck,
             ripple,
-            torque_noise: NOISE_ROOTS * p.rig.torque_noise,
+            torque_noise: noise,
             delay_ticks: p.rig.delay_ticks,
             converter_step: if p.rig.dac.quantised { dac.step() } else { 0.0 },
             volts,
@@ -171,7 +188,7 @@ impl Scenario {
             smoothing: filter.smoothing,
             law,
             from_rest,
-            start_volts: [least.min(top), most.min(top)],
+            start_volts: [least.min(reached), most.min(reached)],
         })
     }
 }

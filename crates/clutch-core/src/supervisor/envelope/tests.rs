@@ -167,7 +167,7 @@ fn follow<T: Real>(
     let highest = if d.kind == 0 { 10.0 } else { 6.0 };
     let volts = |u: f64| if d.kind == 0 { highest * u.abs() } else { highest * u };
     let first = volts(d.volts[0].0);
-    let (mut sent, mut s) = ([first; 4], envelope.start());
+    let (mut sent, mut s) = ([first; 4], envelope.start(T::from_f64(first)));
     let (mut seen, mut elapsed) = (see(0, shaft.counts()), 0);
     for (k, (u, late)) in d.volts.iter().enumerate() {
         let before = sent[0];
@@ -182,7 +182,7 @@ fn follow<T: Real>(
             continue;
         }
         let counts = see(k + 1, shaft.counts());
-        let in_force = envelope.in_force(&sent.map(T::from_f64), elapsed > 1);
+        let in_force = envelope.in_force(&s, &sent.map(T::from_f64), elapsed > 1);
         if let Some((cause, off)) = envelope.judge(&mut s, in_force, counts.wrapping_sub(seen), elapsed) {
             assert!(off > T::ZERO);
             return Some((k, cause));
@@ -225,7 +225,7 @@ fn seen_after<T: Real>(then: (f64, f64), lie: impl Fn(i32, i32) -> i32) -> Optio
         x: 0.0,
         v: 20.0_f64.to_radians(),
     };
-    let (mut s, mut seen, mut since) = (envelope.start(), 0, 0);
+    let (mut s, mut seen, mut since) = (envelope.start(T::from_f64(BALANCES)), 0, 0);
     for k in 0..200_usize {
         let broken = k >= 60;
         let (volts, at_pad) = if broken { then } else { (BALANCES, BALANCES) };
@@ -236,7 +236,8 @@ fn seen_after<T: Real>(then: (f64, f64), lie: impl Fn(i32, i32) -> i32) -> Optio
         }
         let counts = if broken { since + lie(true_counts - since, k as i32) } else { true_counts };
         let sent = [T::from_f64(volts); 4];
-        if let Some((cause, _)) = envelope.judge(&mut s, envelope.in_force(&sent, false), counts - seen, 1) {
+        let in_force = envelope.in_force(&s, &sent, false);
+        if let Some((cause, _)) = envelope.judge(&mut s, in_force, counts - seen, 1) {
             return Some((k + 1 - 60, cause));
         }
         seen = counts;
@@ -285,7 +286,7 @@ fn a_frozen_encoder_of_a_resting_shaft_is_found_as_soon_as_the_brake_has_been_op
     for edge in [0.0, 0.2, 1.0, 3.0] {
         let limits = LimitParams { edge_counts: edge, ..LimitParams::default() };
         let envelope = limits_of::<f64>(&bounds, &limits).envelope;
-        let mut s = envelope.start();
+        let mut s = envelope.start(0.0);
         let seen = (1..).find(|_| envelope.judge(&mut s, [0.0; 2], 0, 1).is_some()).unwrap();
         let count = Encoder::PAPER.radians_per_count::<f64>();
         let p = PlantParams::<f64>::default();
@@ -299,7 +300,7 @@ fn a_frozen_encoder_of_a_resting_shaft_is_found_as_soon_as_the_brake_has_been_op
 #[test]
 fn a_shaft_that_nothing_drives_may_stand_for_ever() {
     let envelope = envelope::<f32>(1, &LimitParams::default());
-    let mut s = envelope.start();
+    let mut s = envelope.start(0.0);
     for _ in 0..100_000 {
         assert_eq!(envelope.judge(&mut s, [0.0; 2], 0, 1), None);
     }
@@ -308,7 +309,7 @@ fn a_shaft_that_nothing_drives_may_stand_for_ever() {
 #[test]
 fn counts_that_dither_about_an_edge_at_rest_are_an_edge() {
     let envelope = envelope::<f32>(0, &LimitParams::default());
-    let mut s = envelope.start();
+    let mut s = envelope.start(0.0);
     for k in 0..10_000 {
         assert_eq!(envelope.judge(&mut s, [9.0; 2], if k % 2 == 0 { 1 } else { -1 }, 1), None);
     }
@@ -316,12 +317,16 @@ fn counts_that_dither_about_an_edge_at_rest_are_an_edge() {
 
 #[test]
 fn volts_in_force_are_the_last_two_and_more_with_a_delay_or_losses() {
-    let of = |delay_cycles| envelope::<f64>(0, &LimitParams { delay_cycles, ..LimitParams::default() });
-    let sent = [2.0, 3.0, 4.0, 1.0];
-    assert_eq!(of(0).in_force(&sent, false), [2.0, 3.0]);
-    assert_eq!(of(1).in_force(&sent, false), [2.0, 4.0]);
-    assert_eq!(of(2).in_force(&sent, false), [1.0, 4.0]);
-    assert_eq!(of(0).in_force(&sent, true), [1.0, 4.0]);
-    assert_eq!(of(3).in_force(&sent, false), [0.0, 10.0]);
-    assert_eq!(of(1000).in_force(&sent, true), [0.0, 10.0]);
+    let in_force = |delay_cycles, applied: f64, losses| {
+        let envelope = envelope::<f64>(0, &LimitParams { delay_cycles, ..LimitParams::default() });
+        envelope.in_force(&envelope.start(applied), &[2.0, 3.0, 4.0, 1.0], losses)
+    };
+    assert_eq!(in_force(0, 5.0, false), [2.0, 3.0]);
+    assert_eq!(in_force(1, 5.0, false), [2.0, 4.0]);
+    assert_eq!(in_force(2, 5.0, false), [1.0, 4.0]);
+    assert_eq!(in_force(0, 5.0, true), [1.0, 4.0]);
+    // Older than what is kept: any of the output, or what was there before.
+    assert_eq!(in_force(1, 5.0, true), [0.0, 10.0]);
+    assert_eq!(in_force(3, 5.0, false), [0.0, 10.0]);
+    assert_eq!(in_force(1000, 12.0, true), [0.0, 12.0]);
 }
