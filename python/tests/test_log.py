@@ -7,6 +7,7 @@ The log is written by the example `write_demo` of clutch-log: ``CLUTCH_LOG_DEMO`
 import math
 import os
 import subprocess
+import zlib
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,12 @@ def test_the_summary_counts_every_channel_and_names_the_run(log):
     assert (run["law_hash"], run["source"], run["port"]) == ("0123456789abcdef", "simulation", "/dev/ttyUSB0")
     assert (run["scalar"], run["period_us"], run["scenario_name"]) == ("f64", "1000", "demo")
     assert int(run["started_unix_ns"]) == START_NS
+    # Each record has a checksum over its name and its other pairs in order, each text behind its length.
+    for name, pairs in metadata.items():
+        saved = pairs.pop("crc32")
+        texts = [name, *(text for pair in sorted(pairs.items()) for text in pair)]
+        packed = b"".join(len(t.encode()).to_bytes(4, "little") + t.encode() for t in texts)
+        assert int(saved, 16) == zlib.crc32(packed), name
     assert metadata["clutch.extra"] == {"operator": "nobody"}
     assert (scenario.name, scenario.data) == ("scenario.toml", b'name = "demo"\n')
     # A chunk each 100 ms, and one with schemas and parameters.
