@@ -175,6 +175,7 @@ impl Bench {
         let params = ControllerParams {
             run: 5,
             config: 7,
+            boot: BOARD.boot,
             watchdog: times.watchdog,
             valid: times.valid,
             silence: times.silence,

@@ -479,6 +479,7 @@ fn supervisor<T: Real, U: Real>() {
     let mut state = opaque(state);
     let sample = Sample {
         sequence: word() as u16,
+        time: micros(),
         counts: Counts(word() as i32),
         board: match word() {
             0 => BoardMode::Ready,
