@@ -42,7 +42,7 @@ class Case:
         return self.mu_static * self.brake_gain * self.volts
 
     def kind(self) -> str:
-        """What the case tries: a shaft that moves, one that breaks away, one that just does."""
+        """Purpose of the case: a shaft that moves, one that breaks away, one that just does."""
         if self.velocity != 0 or abs(self.torque) <= self.holds:
             return "motion"
         return "break-away" if abs(self.torque) > self.holds * (1 + 1e-6) else "soft break-away"

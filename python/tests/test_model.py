@@ -318,7 +318,7 @@ SCHEMA = json.loads((ROOT / "docs/scenario.schema.json").read_text(encoding="utf
 
 
 def declared(cls):
-    """What the schema says of the fields of a class; of parts nothing."""
+    """The schema's entries for the fields of a class; none for parts."""
     schema = SCHEMA
     for part in cls._key.split("."):
         schema = schema["properties"][part]

@@ -1,29 +1,29 @@
 //! Runs that end before their time.
 
-use crate::harness::{Board, alone, clutch, folder, read_log, replays_identically, start};
+use crate::harness::{Board, Running, alone, clutch, folder, read_log, replays_identically, start};
 use rustix::process::Signal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 fn logged(name: &str) -> PathBuf {
     folder(name).join("run.mcap")
 }
 
+/// A loop with a log on a board, 0.3 s after control began.
+fn runs_for_a_while(board: &Board, log: &Path) -> Running {
+    let log = log.to_str().unwrap();
+    let arguments = ["loop", "board_smc_2", "--patient", "--port", &board.port, "--log", log];
+    let running = start(clutch(&arguments));
+    let _ = board.wait_for(0, "Running");
+    std::thread::sleep(Duration::from_millis(300));
+    running
+}
+
 fn a_signal_ends_in_the_safe_state(name: &str, signal: Signal) {
     let _alone = alone();
     let log = logged(name);
     let board = Board::start(&["board_smc_2", "--patient"]);
-    let running = start(clutch(&[
-        "loop",
-        "board_smc_2",
-        "--patient",
-        "--port",
-        &board.port,
-        "--log",
-        log.to_str().unwrap(),
-    ]));
-    let _ = board.wait_for(0, "Running");
-    std::thread::sleep(Duration::from_millis(300));
+    let running = runs_for_a_while(&board, &log);
     running.signal(signal);
     let _ = running.done().expect(4).prints(&[
         "stopped by the operator",
@@ -53,17 +53,7 @@ fn an_unplugged_port_is_told(name: &str, listen: &[&str]) {
     let _alone = alone();
     let log = logged(name);
     let mut board = Board::start(&[&["board_smc_2", "--patient"], listen].concat());
-    let running = start(clutch(&[
-        "loop",
-        "board_smc_2",
-        "--patient",
-        "--port",
-        &board.port,
-        "--log",
-        log.to_str().unwrap(),
-    ]));
-    let _ = board.wait_for(0, "Running");
-    std::thread::sleep(Duration::from_millis(300));
+    let running = runs_for_a_while(&board, &log);
     board.kill();
     let _ = running.done().expect(3).prints(&[
         &board.port,

@@ -1,4 +1,4 @@
-//! What the paper's shaft needs to be held, known independently of this code. All else that is known so is data: the
+//! Needs of the paper's shaft to be held, known independently of this code. All else that is known so is data: the
 //! referee's cases.
 
 use clutch_core::{Plant, PlantParams};

@@ -21,7 +21,7 @@ fn moved(engine: &mut dyn Engine, model: &Model, input: &Input<'_>, velocity: f6
     (shaft, events)
 }
 
-/// Of the paper's brake, N m/V per unit of μ.
+/// Gain of the paper's brake, N m/V per unit of μ.
 const GAIN: f64 = 0.14;
 
 /// The shaft of Table 1 at rest under a voltage whose static limit is a little below the torque: the time to 2.5 Stribeck

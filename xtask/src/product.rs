@@ -13,7 +13,7 @@ const PRODUCT: &[(&str, &[&str])] = &[
     ("python/clutch/", &["py"]),
 ];
 
-/// Of that, what tests and measures only.
+/// The part of it that tests and measures only.
 const TESTS: &[&str] = &[
     "/tests.rs",
     "/tests/",

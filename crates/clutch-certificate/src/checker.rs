@@ -21,7 +21,7 @@ use mode::Mode;
 use shaft::Shaft;
 use std::collections::HashMap;
 
-/// What a certificate that holds says.
+/// The statement of a certificate that holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Checked {
     /// Bound on `|e|` of every run of every plant of the box, rad.
@@ -58,12 +58,12 @@ pub enum Refused {
         cell: usize,
         /// Its `μ_d`.
         sliding: [f64; 2],
-        /// What is wrong.
+        /// Its flaw.
         flaw: Flaw,
     },
 }
 
-/// What is wrong with a cell.
+/// A flaw of a cell.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Flaw {
     /// A list is not what the others need.

@@ -149,7 +149,7 @@ fn mode<const N: usize>(u: &Units, piece: &Piece, form: Form, id: ModeId) -> Opt
 }
 
 impl<const N: usize> Mode<N> {
-    /// What `c·x` can be at most after the tick, before anything is known of the state.
+    /// The most that `c·x` can be after the tick, before anything is known of the state.
     pub(crate) fn next(&self, u: &Units, c: &[f64; N]) -> Affine<N> {
         let (ce, cs) = (c[E], c[S]);
         let mut out = Affine::constant(ce.abs() * TARGET_STEP);
@@ -223,7 +223,7 @@ mod tests {
     use crate::pieces::tests::answer;
     use crate::pieces::{pieces, strips};
     use crate::setup::{Gains, Setup};
-    use crate::tests::{setup, uniform};
+    use crate::tests::uniform;
 
     /// A tick of a shaft whose friction and drive vary as they may, in 4000 steps: way and speed, in counts and ticks.
     fn tick(
@@ -277,7 +277,7 @@ mod tests {
                 at_rest: [0.17, 0.25],
                 ripple: 0.05,
                 torque_noise: 0.002,
-                ..setup(law)
+                ..Setup::paper(law)
             };
             let u = Units::new(&setup, setup.sliding, 3.0);
             let modes: Vec<Mode<4>> = modes(&u, &pieces(&u, &strips(&law, u.volts)), form, 6);

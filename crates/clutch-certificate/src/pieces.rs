@@ -175,7 +175,8 @@ fn kinks(
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::tests::{setup, uniform};
+    use crate::setup::Setup;
+    use crate::tests::uniform;
 
     /// (4) and (31) as the paper writes them, with the limits.
     pub(crate) fn answer(u: &Units, m: f64, z: f64) -> f64 {
@@ -201,7 +202,7 @@ pub(crate) mod tests {
             Gains::Smc { kp: 2.0, kd: 0.0, slope: 50.0, boundary: 0.3 },
         ];
         for law in laws {
-            let u = Units::new(&setup(law), [0.15; 2], 2.0);
+            let u = Units::new(&Setup::paper(law), [0.15; 2], 2.0);
             let pieces = pieces(&u, &strips(&law, u.volts));
             let mut next = uniform(7);
             for _ in 0..20_000 {

@@ -55,6 +55,33 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// The paper's shaft, known exactly, with its converter and `K_Kal` of 0.2, on a ramp of 2 °/s that begins at its speed.
+    #[must_use]
+    pub fn paper(law: Gains) -> Setup {
+        Setup {
+            period_s: 0.001,
+            counts_per_rev: 20_000,
+            inertia: [0.0017; 2],
+            drive_torque: [0.047_088; 2],
+            viscous_damping: [0.001; 2],
+            brake_gain: [0.14; 2],
+            sliding: [0.15; 2],
+            at_rest: [0.2; 2],
+            rest_not_below_sliding: true,
+            stribeck: [0.001, 1.0],
+            ripple: 0.0,
+            torque_noise: 0.0,
+            delay_ticks: 0,
+            converter_step: 20.0 / 4096.0,
+            volts: [0.0, 9.995],
+            rate: 2.0_f64.to_radians(),
+            smoothing: 0.2,
+            law,
+            from_rest: false,
+            start_volts: [1.68, 2.25],
+        }
+    }
+
     /// Keys in which two setups differ, with both values: `key: this, that`.
     #[must_use]
     pub fn differences(&self, other: &Setup) -> Vec<String> {

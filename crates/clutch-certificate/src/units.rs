@@ -7,7 +7,7 @@ use core::f64::consts::TAU;
 const LEFT: f64 = 7.0;
 /// Target positions are whole numbers of 2⁻¹⁶ counts, and their steps those of the path to one such number.
 pub(crate) const TARGET_STEP: f64 = 1.001 / 65536.0;
-/// What a law's arithmetic, in either scalar, adds to a voltage, V.
+/// Share of a law's rounding, in either scalar, in a voltage, V.
 pub(crate) const LAW_ROUNDING: f64 = 1e-4;
 
 /// Accelerations in counts per tick², speeds in counts per tick, voltages in V.
@@ -43,7 +43,7 @@ pub(crate) struct Units {
 }
 
 impl Units {
-    /// Of the part of a box with these `μ_d`, for a shaft that is no faster than `speed_cap` at samples.
+    /// The part of a box with these `μ_d`, for a shaft that is no faster than `speed_cap` at samples.
     pub(crate) fn new(s: &Setup, sliding: Ends, speed_cap: f64) -> Units {
         let count = TAU / f64::from(s.counts_per_rev);
         let speed = count / s.period_s;

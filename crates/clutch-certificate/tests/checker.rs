@@ -6,28 +6,8 @@ use std::sync::OnceLock;
 
 /// The paper's shaft on a ramp, known exactly.
 fn setup(law: Gains, smoothing: f64, delay_ticks: u32, rate_deg_s: f64) -> Setup {
-    Setup {
-        period_s: 0.001,
-        counts_per_rev: 20_000,
-        inertia: [0.0017; 2],
-        drive_torque: [0.047_088; 2],
-        viscous_damping: [0.001; 2],
-        brake_gain: [0.14; 2],
-        sliding: [0.15; 2],
-        at_rest: [0.2; 2],
-        rest_not_below_sliding: true,
-        stribeck: [0.001, 1.0],
-        ripple: 0.0,
-        torque_noise: 0.0,
-        delay_ticks,
-        converter_step: 20.0 / 4096.0,
-        volts: [0.0, 9.995],
-        rate: rate_deg_s.to_radians(),
-        smoothing,
-        law,
-        from_rest: false,
-        start_volts: [1.68, 2.25],
-    }
+    let rate = rate_deg_s.to_radians();
+    Setup { smoothing, delay_ticks, rate, ..Setup::paper(law) }
 }
 
 fn paper_pd() -> Setup {

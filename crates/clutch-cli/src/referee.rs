@@ -57,7 +57,7 @@ fn load(name: &str) -> anyhow::Result<Case> {
     Ok(Case::parse(name, &text)?)
 }
 
-/// What an engine made of a case.
+/// An engine's result of a case.
 struct Outcome {
     engine: RefereeEngine,
     verdicts: Vec<Verdict>,

@@ -42,7 +42,7 @@ impl Syncer {
     /// Asks for a sync if the last one has ended and a second has passed since it was asked for. Never waits.
     ///
     /// # Errors
-    /// What the last sync met.
+    /// The error of the last sync.
     pub(crate) fn nudge(&mut self) -> io::Result<()> {
         if self.pending {
             match self.answers.try_recv() {
@@ -65,7 +65,7 @@ impl Syncer {
     /// Waits until everything that was written before this call is on the disk.
     ///
     /// # Errors
-    /// What a sync met.
+    /// The error of a sync.
     pub(crate) fn wait(&mut self) -> io::Result<()> {
         if self.pending {
             // It may have begun before the last write.

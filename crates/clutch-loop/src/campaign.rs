@@ -87,6 +87,18 @@ pub struct Case {
     pub paper: bool,
 }
 
+impl Case {
+    /// Only on the paper's rig.
+    const fn on_the_paper(self) -> Self {
+        Case { paper: true, ..self }
+    }
+
+    /// Only with the PD law, on the ramp, on the paper's rig.
+    const fn on_the_paper_with_pd(self) -> Self {
+        Case { narrow: true, ..self }
+    }
+}
+
 const UP: Direction = Direction::Up;
 const DOWN: Direction = Direction::Down;
 const BOTH: Direction = Direction::Both;
@@ -139,24 +151,15 @@ pub const CASES: &[Case] = {
         case("encoder frozen", "H1", F(FaultKind::EncoderFreeze, BOTH), safe(10.0, &[C::StandStill])),
         case("encoder off by 500 counts", "H2", F(FaultKind::EncoderJump(500), BOTH), safe(3.0, &[C::Jump])),
         case("encoder off by −20 counts", "H2", F(FaultKind::EncoderJump(-20), BOTH), safe(3.0, &[C::Jump])),
-        Case {
-            paper: true,
-            ..case(
-                "encoder off by 3 counts",
-                "H2",
-                F(FaultKind::EncoderJump(3), BOTH),
-                safe(3.0, &[C::TooFast]),
-            )
-        },
-        Case {
-            paper: true,
-            ..case(
-                "encoder off by −3 counts",
-                "H2",
-                F(FaultKind::EncoderJump(-3), BOTH),
-                safe(12.0, &[C::Reversed, C::Channel, C::TooFast]),
-            )
-        },
+        case("encoder off by 3 counts", "H2", F(FaultKind::EncoderJump(3), BOTH), safe(3.0, &[C::TooFast]))
+            .on_the_paper(),
+        case(
+            "encoder off by −3 counts",
+            "H2",
+            F(FaultKind::EncoderJump(-3), BOTH),
+            safe(12.0, &[C::Reversed, C::Channel, C::TooFast]),
+        )
+        .on_the_paper(),
         case(
             "encoder's channel A dead",
             "H1",
@@ -177,25 +180,21 @@ pub const CASES: &[Case] = {
         ),
         case("counts doubled", "H2", F(FaultKind::EncoderScale(2.0), BOTH), safe(40.0, &[C::TooFast])),
         case("counts reversed", "H3", F(FaultKind::EncoderScale(-1.0), BOTH), safe(10.0, BACK)),
-        Case {
-            paper: true,
-            // A shaft that seems faster by a fifth, or half as fast, may be none of the bounds.
-            ..case(
-                "periods 1.2 times as long",
-                "H10",
-                F(FaultKind::Prescaler(1.2), BOTH),
-                safe(1400.0, &[C::Clock, C::TooFast]),
-            )
-        },
-        Case {
-            paper: true,
-            ..case(
-                "periods half as long",
-                "H10",
-                F(FaultKind::Prescaler(0.5), BOTH),
-                safe(500.0, &[C::Clock, C::TooSlow, C::StandStill]),
-            )
-        },
+        // A shaft that seems faster by a fifth, or half as fast, may be none of the bounds.
+        case(
+            "periods 1.2 times as long",
+            "H10",
+            F(FaultKind::Prescaler(1.2), BOTH),
+            safe(1400.0, &[C::Clock, C::TooFast]),
+        )
+        .on_the_paper(),
+        case(
+            "periods half as long",
+            "H10",
+            F(FaultKind::Prescaler(0.5), BOTH),
+            safe(500.0, &[C::Clock, C::TooSlow, C::StandStill]),
+        )
+        .on_the_paper(),
         case("encoder lost", "H1", F(FaultKind::EncoderLoss, BOTH), safe(3.0, &[C::Board])),
         case(
             "DAC stuck at 0 V",
@@ -215,39 +214,33 @@ pub const CASES: &[Case] = {
             F(FaultKind::DacStuck(StuckAt::Last), BOTH),
             detected(300.0, &[C::TooFast, C::TooSlow, C::StandStill, C::FollowingError]),
         ),
-        Case {
-            paper: true,
-            ..case(
-                "DAC at half its voltage",
-                "H5",
-                F(FaultKind::DacScale(0.5), BOTH),
-                detected(40.0, &[C::TooFast]),
-            )
-        },
+        case(
+            "DAC at half its voltage",
+            "H5",
+            F(FaultKind::DacScale(0.5), BOTH),
+            detected(40.0, &[C::TooFast]),
+        )
+        .on_the_paper(),
         case(
             "DAC the wrong way round",
             "H5",
             F(FaultKind::DacScale(-1.0), BOTH),
             detected(20.0, &[C::TooFast]),
         ),
-        Case {
-            narrow: true,
-            ..case(
-                "load a little above what the output can brake",
-                "H12, H13",
-                Broken::Load(1.347),
-                detected(600.0, &[C::Saturation]),
-            )
-        },
-        Case {
-            narrow: true,
-            ..case(
-                "load twice as heavy, above what the output can brake",
-                "H12, H13",
-                Broken::Load(2.0),
-                detected(200.0, &[C::FollowingError]),
-            )
-        },
+        case(
+            "load a little above what the output can brake",
+            "H12, H13",
+            Broken::Load(1.347),
+            detected(600.0, &[C::Saturation]),
+        )
+        .on_the_paper_with_pd(),
+        case(
+            "load twice as heavy, above what the output can brake",
+            "H12, H13",
+            Broken::Load(2.0),
+            detected(200.0, &[C::FollowingError]),
+        )
+        .on_the_paper_with_pd(),
         case("board reset", "H16", F(FaultKind::Reset, BOTH), safe(3.0, &[C::Silence])),
         case("law's demand not a number", "H4, H25", Broken::LawNotFinite, safe(3.0, &[C::NotFinite])),
         case("target not a number", "H4, H9", Broken::TargetNotFinite, safe(3.0, &[C::Target])),

@@ -74,7 +74,7 @@ pub struct BuiltRun<T: Real> {
 }
 
 impl<T: Real> BuiltRun<T> {
-    /// Of a scenario; `run` is the run's number on the wire.
+    /// Builds a scenario's run; `run` is the run's number on the wire.
     ///
     /// # Errors
     /// The scenario has no safe state.

@@ -10,7 +10,7 @@ use std::io;
 /// Most bytes before the end of a first frame: zeros alone are none.
 const MOST_HELD: usize = 4 * MAX_FRAME;
 
-/// What is known of the present client.
+/// Knowledge of the present client.
 #[derive(Debug)]
 enum Known {
     /// Nothing; the bytes so far are no whole frame yet.

@@ -518,7 +518,7 @@ impl Course<'_> {
             ),
             ("path", format!("{} s, up to {fastest} °/s", number(spec.run.duration))),
             ("gains", gains.to_owned()),
-            ("as sampled", scenario.sampled(&plan.bounds).stability_line()),
+            ("as sampled", scenario.sampled(&plan.bounds).short_line()),
             ("safe state", format!("{safe}: {}", safety.reason.0)),
             ("watchdog", format!("{} cycles on the board", safety.limits.watchdog_cycles)),
         ];

@@ -21,7 +21,7 @@ pub const START_VOLTAGE: &str = "start_voltage_bits";
 /// Name of the law in a log's header, if it is none of clutch's: the scenario's own law then did not run.
 pub const FOREIGN_LAW: &str = "foreign_law";
 
-/// Of a sample: as it came.
+/// A sample as it came.
 #[must_use]
 pub fn sample<T: Real, X>(time_ns: u64, age_us: u32, n: &CycleNotice<T, X>) -> SampleRecord {
     SampleRecord {
@@ -39,7 +39,7 @@ pub fn sample<T: Real, X>(time_ns: u64, age_us: u32, n: &CycleNotice<T, X>) -> S
     }
 }
 
-/// Of a sample: what it led to. Every real is a double; a number in single precision is one
+/// The command that a sample led to. Every real is a double; a number in single precision is one
 /// exactly.
 #[must_use]
 pub fn command<T: Real, X: Terms<T>>(
@@ -104,7 +104,7 @@ fn event<T: Real>(kind: EventKind, time_ns: u64, e: &Ending<T>) -> Record {
     })
 }
 
-/// Of a simulation: every sample with its command and the shaft's true state.
+/// Records of a simulation: every sample with its command and the shaft's true state.
 fn of_simulation<T: Real>(
     run: &clutch_sim::Run,
     dac: &Dac<T>,

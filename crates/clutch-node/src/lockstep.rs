@@ -21,7 +21,7 @@ pub const LONGEST: usize = HEAD + 2 * 1024;
 pub struct Exchange<'a> {
     /// In a request: current time, ns. In an answer: latest time for the next request, ns.
     pub time_ns: u64,
-    /// Of a request: how long the answer before took until it was on its way, µs.
+    /// In a request: time that the answer before took until it was on its way, µs.
     pub lateness_us: u32,
     /// From or to the host.
     pub host: &'a [u8],

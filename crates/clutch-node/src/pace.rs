@@ -3,7 +3,7 @@
 use clutch_core::Micros;
 use clutch_core::supervisor::Pace;
 
-/// What the arrival of a sample may be off, µs: a host's machine may stall.
+/// Slack of a sample's arrival, µs: a host's machine may stall.
 const SLACK_US: u32 = 25_000;
 /// The same before consent, µs: samples wait in the line while a host sets itself up.
 const UNCONSENTED_US: u32 = 1_000_000;

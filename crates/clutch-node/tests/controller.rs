@@ -42,7 +42,7 @@ struct Desk {
     node: ControllerNode<f64>,
     /// ns
     now: u64,
-    /// Of the next sample, and the counts of the first one.
+    /// Number of the next sample, and the counts of the first one.
     sequence: u16,
     origin: i32,
     notices: Vec<Notice<f64, LawTerms<f64>>>,

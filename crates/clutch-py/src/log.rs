@@ -49,7 +49,7 @@ impl Growing {
         }
     }
 
-    /// Of a term that the record does not have: NaN.
+    /// Appends a value; NaN for a term that the record does not have.
     fn push(&mut self, value: Option<Value>) {
         match (self, value) {
             (Growing::Name(names, all), Some(Value::Whole(x))) => {

@@ -384,7 +384,7 @@ impl StickSlip {
 #[derive(Clone)]
 #[pyclass(module = "clutch")]
 pub(crate) struct Plant {
-    /// What it was made of.
+    /// The scenario it was made of.
     scenario: Scenario,
     moving: MovingRig,
     /// After a motion that the engine could not follow.

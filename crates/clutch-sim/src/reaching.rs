@@ -15,7 +15,7 @@ pub struct Reaching {
 }
 
 impl Reaching {
-    /// Of a run, by the surface and the layer of the law's certificate.
+    /// Reaching of a run, by the surface and the layer of the law's certificate.
     #[must_use]
     pub fn new(trace: &Trace, c: &Certificate) -> Reaching {
         let surface = |i: usize| c.slope * trace.error[i] + trace.target_velocity[i] - trace.velocity[i];

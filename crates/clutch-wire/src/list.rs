@@ -15,7 +15,7 @@ impl List {
     /// Most numbers.
     pub const MOST: usize = clutch_core::law::MAX_TERMS;
 
-    /// Of numbers; what is too much is left out.
+    /// Collects numbers; those beyond the most are left out.
     #[must_use]
     pub fn new(numbers: impl IntoIterator<Item = u32>) -> List {
         let mut list = List::default();

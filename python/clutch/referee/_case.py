@@ -85,7 +85,7 @@ class Mechanism:
 
 @dataclass
 class Trajectory:
-    """What an engine made of a case, sampled evenly from t = 0.
+    """An engine's result of a case, sampled evenly from t = 0.
 
     ``position`` and ``velocity`` have a row for each joint; ``torque``, if the engine says it, one for each row of
     friction. ``events`` are ``(time in s, row from 0, holds from then on)``; None for an engine that has no such thing:
@@ -245,4 +245,4 @@ class Engine(Protocol):
         """Why it does not take a case; None if it does."""
 
     def run(self, case: Case) -> Trajectory:
-        """What it makes of one that it takes."""
+        """The result of a case that it takes."""

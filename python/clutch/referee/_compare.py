@@ -49,7 +49,7 @@ def others() -> list[Engine]:
 
 @dataclass(frozen=True)
 class Score:
-    """What an engine made of a case."""
+    """An engine's result of a case."""
 
     case: str
     engine: str

@@ -1,4 +1,4 @@
-"""What adapters of engines with a fixed step share."""
+"""Common parts of adapters for engines with a fixed step."""
 
 from __future__ import annotations
 

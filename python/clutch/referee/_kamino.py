@@ -60,7 +60,7 @@ class Kamino(OneLevel):
         return refuses_length(case, MOST_STEPS)
 
     def run(self, case: Case) -> Trajectory:
-        """What it makes of a case that it takes."""
+        """The result of a case that it takes."""
         m = case.mechanism
         base, tree = (frame(m), _tree(m)) if m else (None, None)
         if m is None or base is None or tree is None:

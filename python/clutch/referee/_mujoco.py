@@ -60,7 +60,7 @@ class MuJoCo(OneLevel):
         return None
 
     def run(self, case: Case) -> Trajectory:
-        """What it makes of a case that it takes."""
+        """The result of a case that it takes."""
         m, base = case.mechanism, frame(case.mechanism) if case.mechanism else None
         if m is None or base is None:
             raise ValueError(f"{case.id}: {self.refuses(case)}")
@@ -110,7 +110,7 @@ class MuJoCoLuGre:
         return None
 
     def run(self, case: Case) -> Trajectory:
-        """What it makes of a case that it takes."""
+        """The result of a case that it takes."""
         m, base = case.mechanism, frame(case.mechanism) if case.mechanism else None
         if m is None or base is None:
             raise ValueError(f"{case.id}: {self.refuses(case)}")

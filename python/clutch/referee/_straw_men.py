@@ -45,7 +45,7 @@ class _Smooth(ABC):
 
     @property
     def about(self) -> str:
-        """What it is."""
+        """Its description."""
         return f"straw man: {self.formula}, v_t = {WIDTH} /s; SciPy's LSODA at 1e-8"
 
     def missing(self) -> str | None:
@@ -119,7 +119,7 @@ class _Modes(ABC):
 
     @property
     def about(self) -> str:
-        """What it is."""
+        """Its description."""
         return f"straw man: {self.formula}; Runge and Kutta's steps of {STEP} s"
 
     def missing(self) -> str | None:

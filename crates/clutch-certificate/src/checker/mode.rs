@@ -1,4 +1,4 @@
-//! What can happen in a tick, and how far it takes a direction.
+//! Events of a tick, and how far they take a direction.
 
 use super::interval::{Interval, at};
 use super::law::{Linear, Piece};
@@ -129,7 +129,7 @@ impl Mode {
         Some(Mode { case: id.case, form, within, measured, answer, applied })
     }
 
-    /// What `c·x` can be at most after the tick.
+    /// The most that `c·x` can be after the tick.
     pub(crate) fn next(&self, shaft: &Shaft, c: &[f64]) -> Sum {
         let n = c.len();
         let (ce, cs, cz) = (at(c[E]), at(c[S]), at(c[Z]));

@@ -16,7 +16,7 @@ use crate::Real;
 /// Elements of a friction at most.
 pub const ELEMENTS: usize = 4;
 
-/// How the bristles of a friction are bent.
+/// State of a friction's bristles: how far they are bent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bend<T> {
     /// Deflection of each element, rad; one bristle is the first.

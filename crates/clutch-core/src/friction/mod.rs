@@ -96,7 +96,7 @@ pub trait FrictionModel<T: Arithmetic>: Sized {
 pub struct Exponential<T> {
     /// At rest.
     pub at_rest: T,
-    /// Of a fast shaft.
+    /// Level of a fast shaft.
     pub sliding: T,
     /// Velocity at which all but 1/e of the fall is done, rad/s.
     pub velocity: T,

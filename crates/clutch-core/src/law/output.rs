@@ -25,7 +25,7 @@ crate::params! {
             p.on_invalid >= p.lowest && p.on_invalid <= p.highest;
         /// A pad can only push.
         PUSHES: lowest, "a voltage of at least 0 with a brake, whose pad can only push (rig.actuator, model.actuator)";
-        /// What drives, drives.
+        /// A motor drives both ways.
         DRIVES: lowest, "a voltage below 0, as -10.0, with an actuator that drives (model.actuator); a motor needs on_invalid_v = 0, too";
         /// An invalid demand moves nothing.
         MOVES_NOTHING: on_invalid, "0 with a motor, which any other voltage drives, and at least 0 with a brake and a motor (model.actuator)";

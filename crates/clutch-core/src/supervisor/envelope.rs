@@ -31,7 +31,7 @@ const LONGEST: f64 = 16.0;
 /// Counts per period of a velocity that nobody knows yet, at least.
 const FASTEST: f64 = 1000.0;
 
-/// What the bounds say of accelerations; in counts, periods and, where a side of it is meant, `[least, most]`.
+/// Accelerations within the bounds; in counts, periods and, where a side of it is meant, `[least, most]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Envelope<T> {
     kind: ActuatorKind,
@@ -208,7 +208,7 @@ struct Rates<T> {
 /// A window over which the way is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Window<T> {
-    /// Where the shaft was at its begin at least.
+    /// Least position of the shaft at its begin.
     from: T,
     /// Periods since.
     age: T,
@@ -271,7 +271,7 @@ pub(super) struct EnvelopeState<T> {
     sides: [Side<T>; 2],
     /// Voltage before the first that was sent, V.
     applied: T,
-    /// Whether the counts turned round, a bit each of the last periods.
+    /// A bit for each of the last periods: the counts turned round in it.
     turns: u16,
     /// Periods without a count.
     still: u32,
@@ -280,7 +280,7 @@ pub(super) struct EnvelopeState<T> {
 }
 
 impl<T> EnvelopeState<T> {
-    /// What the counts do: for the name of a suspect.
+    /// Remembers the way of the counts, for the name of a suspect.
     fn note(&mut self, moved: i32, periods: u32) {
         self.turns = self.turns.checked_shl(periods).unwrap_or(0);
         if moved == 0 {

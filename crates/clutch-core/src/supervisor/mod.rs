@@ -468,7 +468,7 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// What the counts say of a shaft that no shaft of the bounds can be, under the volts that were sent.
+    /// Causes of the envelope: counts that no shaft of the bounds can have given under the volts that were sent.
     fn within_envelope<S>(&self, s: &mut SupervisorState<T, S>, moved: i32, periods: u32) {
         let l = &self.limits;
         let volts = l.envelope.in_force(&s.envelope, &s.voltages, s.lost.count() > 0 || s.late.count() > 0);

@@ -99,7 +99,7 @@ impl<T: Real> SupervisorParams<T> {
 pub(super) struct Limits<T> {
     pub(super) period: T,
     pub(super) period_us: u32,
-    /// What the time of a single sample may be off, µs: a simulated board's machine may stall.
+    /// Slack of the time of a single sample, µs: a simulated board's machine may stall.
     pub(super) clock_slack_us: u32,
     pub(super) radians_per_count: T,
     /// Counts per period of dead reckoning.

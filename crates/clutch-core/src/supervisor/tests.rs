@@ -63,7 +63,7 @@ struct Rig<T: Real, C: ControlLaw<T> = Law<T>> {
     servo: Servo<T, C>,
     supervisor: Supervisor<T>,
     state: SupervisorState<T, C::State>,
-    /// Of the next sample.
+    /// Number of the next sample.
     sequence: u16,
     /// Counts of the path at tick 0, and per period.
     path: (i64, i64),

@@ -1,4 +1,4 @@
-//! How late a sample woke the control thread.
+//! Lateness of the control thread's wake-ups.
 
 /// Rate at which two crystals may part, as a share of the time: the quickest way seen may have become longer by this.
 const DRIFT: i64 = 10_000; // 100 ppm

@@ -81,7 +81,7 @@ pub(super) struct ErrorTrace {
 struct Done {
     /// One for each seed.
     metrics: Vec<Metrics>,
-    /// Of the first seed.
+    /// Trace of the first seed.
     first: ErrorTrace,
 }
 

@@ -43,7 +43,7 @@ pub struct Case {
     pub title: String,
     /// Where the expected values come from.
     pub source: String,
-    /// What moves.
+    /// The moving part.
     pub model: Model,
     /// Duration, s.
     pub duration: f64,
@@ -51,11 +51,11 @@ pub struct Case {
     pub sample: f64,
     /// Slip rate below which a row counts as holding for engines without events, rad/s or m/s.
     pub still: Option<f64>,
-    /// What is expected.
+    /// The expectations.
     pub expect: Vec<Expect>,
 }
 
-/// What moves in a case.
+/// The moving part of a case.
 #[derive(Clone, Debug)]
 pub enum Model {
     /// A linear mechanism with rows of friction.
@@ -93,13 +93,13 @@ pub struct Row {
 /// One expectation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expect {
-    /// What is observed.
+    /// The observation.
     pub observe: Observe,
     /// Its words in a table.
     pub name: String,
     /// Expected value.
     pub value: f64,
-    /// How far from it a measured one may be.
+    /// Largest distance of a measured one from it.
     pub within: f64,
     /// Unit of both.
     pub unit: String,

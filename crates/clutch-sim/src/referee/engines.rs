@@ -51,7 +51,7 @@ pub enum RefereeError {
     /// The engine does not take such a case: no fault of either.
     #[error("does not apply: {0}")]
     NotForIt(
-        /// What the engine would need.
+        /// The need of the engine.
         String,
     ),
     /// Period of a shaft engine that does not divide the time between samples.

@@ -1,4 +1,4 @@
-//! What is observed of a trajectory.
+//! Observations of a trajectory.
 
 use super::case::{Case, Expect, Model};
 use super::trajectory::Trajectory;
@@ -61,7 +61,7 @@ impl Kind {
     }
 }
 
-/// What is observed.
+/// An observation.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Observe {
@@ -88,7 +88,7 @@ pub struct Verdict {
     pub measured: Option<f64>,
     /// Expected.
     pub expected: f64,
-    /// How far off it may be.
+    /// Largest distance that passes.
     pub within: f64,
     /// Unit of all three.
     pub unit: String,
@@ -120,7 +120,7 @@ impl Case {
 }
 
 impl Observe {
-    /// What is wrong with it, for a model of that duration, s.
+    /// Its flaw, for a model of that duration, s.
     pub(super) fn check(&self, model: &Model, duration: f64) -> Result<(), String> {
         let (quantity, keys, needed) = self.kind.keys();
         let weighs = self.position.is_some() || self.velocity.is_some() || self.torque.is_some();

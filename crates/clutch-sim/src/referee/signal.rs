@@ -65,7 +65,7 @@ impl Signal {
         serde_json::to_value(&self.0).unwrap_or_default()
     }
 
-    /// What is wrong with it.
+    /// Its flaw.
     pub(super) fn wrong(&self) -> Option<(&'static str, f64, &'static str)> {
         self.0.iter().find_map(|t| {
             let all = [

@@ -24,7 +24,7 @@ pub struct Trajectory {
     pub velocity: Vec<Vec<f64>>,
     /// Torques of friction, a list for each row, N m or N; none for an engine that does not say.
     pub torque: Option<Vec<Vec<f64>>>,
-    /// What began to hold or to slip; none for an engine that has no such thing.
+    /// Rows that began to hold or to slip; none for an engine that has no such thing.
     pub events: Option<Vec<TrajectoryEvent>>,
     /// Figures of a run of a scenario, by name.
     pub metrics: Vec<(String, f64)>,
@@ -77,7 +77,7 @@ impl Trajectory {
         Ok(())
     }
 
-    /// What holds and slips, as the engine says or, if it has no such thing, as slip rates above and below `still` say.
+    /// Rows that hold and slip, as the engine says or, if it has no such thing, as slip rates above and below `still` say.
     pub(super) fn events_of(&self, case: &Case, row: usize) -> Vec<(f64, bool)> {
         let Model::Mechanism(mechanism) = &case.model else { return Vec::new() };
         let r = &mechanism.rows[row];

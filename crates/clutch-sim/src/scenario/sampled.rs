@@ -22,9 +22,9 @@ const AT_ONCE: f64 = 1e-6;
 pub struct NotCovered {
     /// The scenario's key.
     pub key: &'static str,
-    /// What it has there.
+    /// Its value there.
     pub what: String,
-    /// What is covered.
+    /// The values that are covered.
     pub covered: &'static str,
 }
 
@@ -44,7 +44,19 @@ impl Sampled {
         self.stability.as_ref().map(|radii| largest(radii) < 1.0)
     }
 
-    /// The verdict on linear stability in a line.
+    /// The verdict on linear stability in a line of a table.
+    #[must_use]
+    pub fn short_line(&self) -> String {
+        match &self.stability {
+            Some(radii) => {
+                let verdict = if largest(radii) < 1.0 { "linearly stable" } else { "linearly UNSTABLE" };
+                format!("{verdict}, spectral radius up to {:.3}; no error bound sought", largest(radii))
+            }
+            None => self.stability_line(),
+        }
+    }
+
+    /// The verdict on linear stability with its scope.
     #[must_use]
     pub fn stability_line(&self) -> String {
         match (&self.stability, &self.setup) {
@@ -78,7 +90,7 @@ impl Scenario {
     /// torque noise of `[rig]`.
     ///
     /// # Errors
-    /// What of the scenario the sampled-data certificate does not cover, by its key.
+    /// A part of the scenario that the sampled-data certificate does not cover, by its key.
     pub fn sampled_setup(&self, bounds: &Bounds) -> Result<Setup, NotCovered> {
         let p = &self.params;
         let law = match p.law {

@@ -428,7 +428,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         Err(SystemError::TooManySteps(begin))
     }
 
-    /// How far rows that slip are from a rate of 0, rad/s; below 0 once one of them has passed it.
+    /// Distance of rows that slip from a rate of 0, rad/s; below 0 once one of them has passed it.
     fn margin(&self, slip: &SVector<f64, B>) -> f64 {
         let noise = 1e-14 * slip.amax();
         let rows = (0..B).filter(|i| self.modes[*i] != Mode::Stuck);

@@ -245,7 +245,7 @@ fn seen_after<T: Real>(then: (f64, f64), lie: impl Fn(i32, i32) -> i32) -> Optio
     None
 }
 
-/// What the sliding shaft balances, less the drag at 20 °/s, V.
+/// Voltage that balances the sliding shaft, less the drag at 20 °/s, V.
 const BALANCES: f64 = 2.2257;
 
 fn each_lie_is_seen_in_time<T: Real>() {
