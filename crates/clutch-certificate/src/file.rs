@@ -1,7 +1,8 @@
 //! A saved certificate: JSON, one object.
 
 use crate::setup::{Certificate, VERSION};
-use std::io::{BufReader, BufWriter, Write};
+use serde::Deserialize;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// Largest file that is read, bytes: one of the widest box with the finest rows is a tenth of it.
@@ -50,17 +51,26 @@ pub enum FileError {
     },
 }
 
-/// Writes a certificate.
+/// The field that every version has.
+#[derive(Deserialize)]
+struct Versioned {
+    version: u32,
+}
+
+/// Writes a certificate; a file of that name is replaced once the new one is whole.
 ///
 /// # Errors
 /// The system's.
 pub fn write(path: &Path, certificate: &Certificate) -> Result<(), FileError> {
     let name = || path.display().to_string();
     let io = |error| FileError::Io { name: name(), error };
-    let mut out = BufWriter::new(std::fs::File::create(path).map_err(io)?);
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let mut out = BufWriter::new(std::fs::File::create(&part).map_err(io)?);
     serde_json::to_writer(&mut out, certificate)
         .map_err(|error| FileError::Format { name: name(), error })?;
-    out.write_all(b"\n").and_then(|()| out.flush()).map_err(io)
+    out.write_all(b"\n").and_then(|()| out.flush()).map_err(io)?;
+    std::fs::rename(&part, path).map_err(io)
 }
 
 /// Reads a certificate. It says nothing until [`crate::checker::check`] has passed it.
@@ -78,11 +88,12 @@ pub fn read(path: &Path) -> Result<Certificate, FileError> {
     if about.len() > LARGEST {
         return Err(FileError::Size { name: name(), size: about.len() });
     }
-    let file = std::fs::File::open(path).map_err(io)?;
-    let certificate: Certificate = serde_json::from_reader(BufReader::new(file))
-        .map_err(|error| FileError::Format { name: name(), error })?;
-    if certificate.version != VERSION {
-        return Err(FileError::Version { name: name(), version: certificate.version });
+    let bytes = std::fs::read(path).map_err(io)?;
+    let format = |error| FileError::Format { name: name(), error };
+    // First: another version has other fields.
+    let Versioned { version } = serde_json::from_slice(&bytes).map_err(format)?;
+    if version != VERSION {
+        return Err(FileError::Version { name: name(), version });
     }
-    Ok(certificate)
+    serde_json::from_slice(&bytes).map_err(format)
 }

@@ -612,7 +612,10 @@ impl<'a, R: Read> Scan<'a, R> {
                         let time_ns = log_time.wrapping_sub(self.seen.header.started_unix_ns);
                         match record::decode(*row, time_ns, fields.0) {
                             Ok(record) => {
-                                self.reached_ns = self.reached_ns.max(time_ns.saturating_add(1));
+                                // A time before the start is a foreign one, and says nothing of where a gap lies.
+                                if log_time >= self.seen.header.started_unix_ns {
+                                    self.reached_ns = self.reached_ns.max(time_ns.saturating_add(1));
+                                }
                                 each(&self.seen.header, record)?;
                             }
                             Err(what) => {

@@ -5,6 +5,7 @@
 
 use crate::port::Endpoint;
 use clutch_wire::{Decoder, MAX_FRAME};
+use std::borrow::Cow;
 use std::io;
 
 /// Most bytes before the end of a first frame: zeros alone are none.
@@ -40,29 +41,30 @@ impl Greeting {
 
     /// Reads into `buffer`; the bytes that the board may hear, and the reason for which a client was sent away just now.
     /// A client of a pseudo-terminal cannot be sent away: there the board drops what is no frame, as on a serial line.
-    pub(crate) fn read(
+    pub(crate) fn read<'b>(
         &mut self,
         endpoint: &mut dyn Endpoint,
-        buffer: &mut [u8],
-    ) -> io::Result<(Vec<u8>, Option<&'static str>)> {
+        buffer: &'b mut [u8],
+    ) -> io::Result<(Cow<'b, [u8]>, Option<&'static str>)> {
+        const NOTHING: Cow<'_, [u8]> = Cow::Borrowed(&[]);
         let count = endpoint.read(buffer)?;
         let bytes = buffer.get(..count).unwrap_or(&[]);
         let held = match &mut self.known {
-            Known::Heard => return Ok((bytes.to_vec(), None)),
-            Known::Dismissed => return Ok((Vec::new(), None)),
+            Known::Heard => return Ok((Cow::Borrowed(bytes), None)),
+            Known::Dismissed => return Ok((NOTHING, None)),
             Known::Unheard(held) => held,
         };
         held.extend_from_slice(bytes);
         let whole = match bytes.iter().find_map(|byte| self.decoder.push(*byte)) {
-            None if held.len() <= MOST_HELD => return Ok((Vec::new(), None)),
+            None if held.len() <= MOST_HELD => return Ok((NOTHING, None)),
             first => matches!(first, Some(Ok(_))),
         };
         let held = std::mem::take(held);
         if !whole && endpoint.dismiss() {
             self.known = Known::Dismissed;
-            return Ok((Vec::new(), Some("its first bytes were no frame")));
+            return Ok((NOTHING, Some("its first bytes were no frame")));
         }
         self.known = Known::Heard;
-        Ok((held, None))
+        Ok((Cow::Owned(held), None))
     }
 }

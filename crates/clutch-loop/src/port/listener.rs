@@ -98,10 +98,13 @@ impl Listener {
             let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
             let socket = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;
             bind(&socket, &SocketAddrUnix::new(path)?)?;
+            // From here on the file goes with the listener, whatever fails.
+            let socket = UnixListener::from(socket);
+            let listener = Listener::on(Socket::Unix(socket.try_clone()?, path.to_owned()));
             // Before it listens: until then nobody is let in.
             std::fs::set_permissions(path, Permissions::from_mode(0o600))?;
             rustix::net::listen(&socket, 16)?;
-            Ok(Listener::on(Socket::Unix(UnixListener::from(socket), path.to_owned())))
+            Ok(listener)
         };
         listen().map_err(|source| PortError::Socket { path: path.to_owned(), source })
     }
