@@ -2,11 +2,11 @@
 //! `f64`.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
-use clutch_core::law::{ControlLaw, Law, LawParams, OutputParams, Tick};
+use clutch_core::law::{Beside, ControlLaw, Law, LawParams, OutputParams, Tick};
 use clutch_core::params::Choice;
 use clutch_core::{
-    Counts, FixedCounts, Micros, ObserverParams, PlantParams, Real, Servo, ServoParams,
-    SmoothedDerivativeParams, Target, VelocityParams,
+    Counts, FixedCounts, ObserverParams, PlantParams, Real, Servo, ServoParams, SmoothedDerivativeParams,
+    Target, VelocityParams,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -30,7 +30,7 @@ fn law_step<T: Real>(c: &mut Criterion, scalar: &str) {
     let mut group = c.benchmark_group(format!("law/{scalar}"));
     for params in LawParams::<T>::all() {
         let name = params.name();
-        let law = Law::new(&params, &PlantParams::default(), &OutputParams::default(), Micros(1000))
+        let law = Law::new(&params, &Beside::paper(&PlantParams::default(), &OutputParams::default()))
             .expect("Table 2 is in range");
         let (ticks, mut state, mut i) = (ticks::<T>(), Default::default(), 0);
         group.bench_function(name, |b| {

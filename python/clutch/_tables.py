@@ -22,8 +22,10 @@ __all__ = [
     "Ctc",
     "Dac",
     "DahlFriction",
+    "EdgeTimed",
     "ElastoPlasticFriction",
     "Encoder",
+    "Glide",
     "HandDrive",
     "Hold",
     "HoldLaw",
@@ -78,6 +80,7 @@ UNITS = {
     "v_rad_s": "V/(rad s)",
     "v_rad": "V/rad",
     "rad_s2": "rad/s²",
+    "rad_s_rt_s": "rad/s/√s",
     "rad_s": "rad/s",
     "deg_s3": "°/s³",
     "deg_s2": "°/s²",
@@ -1263,6 +1266,113 @@ class Pid(_Params):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class EdgeTimed(_Params):
+    """A Kalman filter that is corrected where an edge of the encoder is crossed, and by silence between
+    edges. It knows the voltage and, from the model, drive torque over inertia; friction it learns.
+
+    Parameters
+    ----------
+    delay_ticks : int, default 0
+        Periods from a voltage to its effect, beyond the one in which it is given: `rig.delay_ticks` as
+        believed. A whole number from 0 to 3 periods.
+    lag_s : float, default 0.0
+        Time constant of the actuator, as believed; 0 for one without a lag. `τ`: a finite number of at least
+        0 s; a time below 1000 times sampling.period_us.
+    friction_doubt : float, default 0.5
+        Standard deviation of friction at the start, as a share of the model's. A number above 0 and at most
+        10.
+    ripple_share : float, default 0.15
+        Root mean square of the ripple along the disc, as a share of friction. A number above 0 and at most 1.
+    ripple_waves_per_turn : float, default 340.0
+        Waves of the ripple per turn. `k`: a number above 0 and at most 1 000 000 waves per turn; a number
+        below a twentieth of rig.encoder.counts_per_rev: an encoder sees no shorter wave.
+    ripple_damping : float, default 0.2
+        Damping of the ripple's waves: small for a ripple of one wavelength. `ζ`: a number above 0 and at most
+        1.
+    walk_rad_s_rt_s : float, default 0.015
+        Wander of the velocity that no friction explains: by this much (standard deviation) in one second, and
+        with the root of the time. A finite number above 0 rad/s/√s.
+    gain_doubt : float, default 0.3
+        Share of an acceleration that may be wrong, as drive torque and inertia are not known better. A number
+        from 0 to 2.
+    silence_counts : float, default 3.0
+        Counts that the path may go on without an edge before the shaft is taken to rest. A number above 1 and
+        at most 1000 counts.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.EdgeTimed().delay_ticks
+    0
+    """
+
+    _key: ClassVar[str] = "velocity.edge_timed"
+
+    delay_ticks: int = 0
+    lag_s: float = 0.0
+    friction_doubt: float = 0.5
+    ripple_share: float = 0.15
+    ripple_waves_per_turn: float = 340.0
+    ripple_damping: float = 0.2
+    walk_rad_s_rt_s: float = 0.015
+    gain_doubt: float = 0.3
+    silence_counts: float = 3.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Glide(_Params):
+    """Glide: smooth motion far below the rates at which laws on a difference of counts stick. Friction is
+    inverted where an edge-timed filter believes it to be, which learns it on the way; one set of gains for
+    all rates.
+
+    `ω_c = θ̇_d + K_p ẽ` between `floor` and `cap` times `θ̇_d`; the voltage gives `θ̈ = K_d (ω_c − ω̂) +
+    θ̈_d` with the friction of the filter, and drive torque, inertia, damping and actuator of `Model`.
+
+    Parameters
+    ----------
+    kp_1_s : float, default 40.0
+        Gain from position to velocity. `K_p`: a finite number of at least 0 1/s.
+    kd_1_s : float, default 150.0
+        Gain from velocity to acceleration. `K_d`: a finite number above 0 1/s.
+    floor : float, default 0.5
+        Least velocity that the law asks for, as a share of the path's. A number from 0 to 1; a share above
+        1/filter.silence_counts, so that a shaft at the floor is not taken to rest.
+    cap : float, default 3.0
+        Highest velocity that the law asks for, as a multiple of the path's. A finite number of at least 1.
+    optimism : float, default 1.0
+        Standard deviations by which friction is taken to be higher than believed, from a rest to the first
+        edge. A number from 0 to 10.
+    filter : EdgeTimed
+        Filter of velocity and friction. By default `EdgeTimed()`.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Glide().kp_1_s
+    40.0
+    """
+
+    _key: ClassVar[str] = "law.glide"
+
+    kp_1_s: float = 40.0
+    kd_1_s: float = 150.0
+    floor: float = 0.5
+    cap: float = 3.0
+    optimism: float = 1.0
+    filter: EdgeTimed = field(default_factory=EdgeTimed)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Voltage(_Params):
     """An open-loop voltage, whatever the shaft does. It begins at `start_v` and goes to `end_v` at a rate.
 
@@ -1326,7 +1436,7 @@ class HoldLaw(_Params):
     margin: float = 1.25
 
 
-Law = Pd | Ctc | Smc | SmcSign | Pid | Voltage | HoldLaw
+Law = Pd | Ctc | Smc | SmcSign | Pid | Glide | Voltage | HoldLaw
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -1389,7 +1499,7 @@ class Observer(_Params):
     disturbance_walk_nm_rt_s: float = 0.1
 
 
-Velocity = SmoothedDerivative | Observer
+Velocity = SmoothedDerivative | EdgeTimed | Observer
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -2087,9 +2197,9 @@ class _Scenario(_Params):
         The shaft as it is. By default `Rig()`.
     model : Model
         The shaft as law, observer and certificate believe it to be. By default `Model()`.
-    law : Pd, Ctc, Smc, SmcSign, Pid, Voltage or HoldLaw
+    law : Pd, Ctc, Smc, SmcSign, Pid, Glide, Voltage or HoldLaw
         The law and its gains.
-    velocity : SmoothedDerivative or Observer
+    velocity : SmoothedDerivative, EdgeTimed or Observer
         Source of the velocity that the law is given. By default `SmoothedDerivative()`.
     output : Output
         Limits of the voltage, bumpless start. By default `Output()`.

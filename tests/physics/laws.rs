@@ -1,11 +1,12 @@
 //! The duties of every law of the core, with any gains.
 
+use clutch_core::edge_timed::EdgeTimedParams;
 use clutch_core::law::{
-    ControlLaw, CtcParams, Law, LawParams, Limit, OutputParams, PdParams, PidParams, SmcParams,
-    SmcSignParams, Terms, Tick,
+    Beside, ControlLaw, CtcParams, GlideParams, Law, LawParams, Limit, OutputParams, PdParams, PidParams,
+    SmcParams, SmcSignParams, Terms, Tick,
 };
 use clutch_core::reference::ReferenceParams;
-use clutch_core::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, Target};
+use clutch_core::{Counts, FixedCounts, PlantParams, Servo, ServoParams, Target};
 use clutch_core::{ObserverParams, SmoothedDerivativeParams, VelocityParams};
 use clutch_sim::{RigParams, RunSpec, simulate};
 use proptest::prelude::*;
@@ -20,6 +21,9 @@ fn laws() -> impl Strategy<Value = LawParams> {
             .prop_map(|(kp, kd, slope, boundary)| LawParams::Smc(SmcParams { kp, kd, slope, boundary })),
         (gain.clone(), gain.clone(), 1.0..500.0_f64)
             .prop_map(|(kp, kd, slope)| LawParams::SmcSign(SmcSignParams { kp, kd, slope })),
+        (0.0..500.0_f64, 1.0..500.0_f64, 0.4..1.0_f64, 1.0..10.0_f64).prop_map(|(kp, kd, floor, cap)| {
+            GlideParams { kp, kd, floor, cap, ..GlideParams::default() }.into()
+        }),
         (gain.clone(), gain.clone(), gain, 0.0..1.0_f64, 0.001..1.0_f64).prop_map(
             |(kp, ki, kd, derivative_time, tracking_time)| {
                 LawParams::Pid(PidParams {
@@ -36,7 +40,7 @@ fn laws() -> impl Strategy<Value = LawParams> {
 }
 
 fn law(p: &LawParams) -> Law<f64> {
-    Law::new(p, &PlantParams::default(), &OutputParams::default(), Micros(1000)).unwrap()
+    Law::new(p, &Beside::paper(&PlantParams::default(), &OutputParams::default())).unwrap()
 }
 
 fn any_tick() -> impl Strategy<Value = Tick<f64>> {
@@ -58,10 +62,11 @@ fn small_tick() -> impl Strategy<Value = Tick<f64>> {
 }
 
 #[test]
-fn every_law_follows_with_either_velocity_source_in_either_scalar() {
+fn every_law_follows_with_each_velocity_source_in_either_scalar() {
     for law in LawParams::all().into_iter().filter(LawParams::follows) {
         for velocity in [
             VelocityParams::SmoothedDerivative(SmoothedDerivativeParams::default()),
+            VelocityParams::EdgeTimed(EdgeTimedParams::default()),
             VelocityParams::Observer(ObserverParams::default()),
         ] {
             let path = ReferenceParams::ramp(20.0_f64.to_radians());
@@ -98,6 +103,10 @@ proptest! {
             prop_assert!(after.limit != Limit::Invalid && (0.0..=10.0).contains(&after.voltage));
             let integral = Terms::values(&after.terms)[1];
             prop_assert!(integral.abs() <= 10.0 + 1e3, "{} V", integral);
+        } else if matches!(p, LawParams::Glide(_)) {
+            // It remembers a period that has passed; none of its terms is beyond measure.
+            prop_assert!(after.limit != Limit::Invalid && (0.0..=10.0).contains(&after.voltage));
+            prop_assert!(Terms::values(&after.terms).iter().all(|x| x.abs() < 1e6), "{:?}", after.terms);
         } else {
             prop_assert_eq!(after, law.update(&mut Default::default(), &tick));
         }
@@ -133,7 +142,7 @@ proptest! {
     #[test]
     fn a_bumpless_start_begins_at_the_voltage_it_finds(p in laws(), tick in small_tick(), applied in 0.0_f64..10.0) {
         let out = OutputParams { bumpless_time: 0.05, ..OutputParams::default() };
-        let law = Law::new(&p, &PlantParams::default(), &out, Micros(1000)).unwrap();
+        let law = Law::new(&p, &Beside::paper(&PlantParams::default(), &out)).unwrap();
         let mut state = law.start(&tick, applied);
         let first = law.update(&mut state, &tick).voltage;
         // A demand of 1e6 V loses ten digits of the volts added to it.

@@ -84,6 +84,9 @@ enum Verb {
         #[arg(default_value_t = 10_000)]
         runs: u64,
     },
+    /// Runs laws on the rig `bench` from 0.5 to 100 °/s, and glide on rigs that are not as it believes, two minutes: the tables
+    /// of docs/smooth.md.
+    Smooth,
     /// Compares the engines with SciPy over random single intervals: the table of docs/theory.md, section 10.
     Intervals {
         /// Intervals, half of them of extreme parameters.
@@ -150,6 +153,7 @@ fn main() -> Result<()> {
         }
         Verb::Fuzz { seconds } => fuzz::all(seconds),
         Verb::Certified { runs } => certified(runs),
+        Verb::Smooth => smooth(),
         Verb::Campaign { seeds, first } => campaign(seeds, first),
         Verb::Intervals { count } => {
             cargo(["build", "--release", "--package", "clutch-sim", "--example", "intervals"]).run()?;
@@ -237,15 +241,25 @@ fn figures() -> Result<()> {
 }
 
 fn certified(runs: u64) -> Result<()> {
-    let example = ["run", "--release", "--package", "clutch-sim", "--example", "certified", "--"];
-    let measured = |args: &[&str]| -> Result<String> {
-        let (done, text) = cargo(example).args(args).quietly()?;
-        anyhow::ensure!(done, "the comparison failed:\n{text}");
-        let table: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
-        Ok(table.join("\n"))
-    };
-    write_between("docs/certified.md", "campaign", &measured(&["campaign", &runs.to_string()])?)?;
-    write_between("docs/certified.md", "table", &measured(&["table"])?)
+    let campaign = table_of("certified", &["campaign", &runs.to_string()])?;
+    write_between("docs/certified.md", "campaign", &campaign)?;
+    write_between("docs/certified.md", "table", &table_of("certified", &["table"])?)
+}
+
+fn smooth() -> Result<()> {
+    for table in ["laws", "plants", "rest"] {
+        write_between("docs/smooth.md", table, &table_of("smooth", &[table])?)?;
+    }
+    Ok(())
+}
+
+/// The table that an example of the simulator prints.
+fn table_of(example: &str, args: &[&str]) -> Result<String> {
+    let run = ["run", "--release", "--package", "clutch-sim", "--example", example, "--"];
+    let (done, text) = cargo(run).args(args).quietly()?;
+    anyhow::ensure!(done, "the example {example} failed:\n{text}");
+    let table: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
+    Ok(table.join("\n"))
 }
 
 /// Puts a text between the markers of that name.

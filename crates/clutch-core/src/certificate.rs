@@ -132,11 +132,11 @@ pub struct Certificate<T = f64> {
 ///
 /// ```
 /// use clutch_core::certificate::{Demand, certify};
-/// use clutch_core::law::{Law, LawParams, SmcSignParams};
-/// use clutch_core::{Bounds, Micros, PlantParams, Tolerances};
+/// use clutch_core::law::{Beside, Law, LawParams, SmcSignParams};
+/// use clutch_core::{Bounds, PlantParams, Tolerances};
 /// let plant = PlantParams::<f64>::default();
 /// let params = LawParams::SmcSign(SmcSignParams::default());
-/// let law = Law::new(&params, &plant, &Default::default(), Micros(1000))?;
+/// let law = Law::new(&params, &Beside::paper(&plant, &Default::default()))?;
 /// let bounds = Bounds::around(&plant, &Tolerances::default())?;
 /// let c = certify(&law, &bounds, &Demand::default())?;
 /// assert!((c.kp_required - 2.242286).abs() < 1e-6);
@@ -342,11 +342,11 @@ pub fn paper_conditions<T: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{CtcParams, LawParams, OutputParams, PdParams, SmcParams, SmcSignParams};
-    use crate::{Micros, PlantParams, Tolerances};
+    use crate::law::{Beside, CtcParams, LawParams, OutputParams, PdParams, SmcParams, SmcSignParams};
+    use crate::{PlantParams, Tolerances};
 
     fn law(p: LawParams) -> Law<f64> {
-        Law::new(&p, &PlantParams::default(), &OutputParams::default(), Micros(1000)).unwrap()
+        Law::new(&p, &Beside::paper(&PlantParams::default(), &OutputParams::default())).unwrap()
     }
 
     fn bounds(t: Tolerances) -> Bounds {
@@ -484,7 +484,7 @@ mod tests {
         let motor = PlantParams { actuator: actuator.into(), drive_torque: 0.01, ..PlantParams::default() };
         let both_ways = OutputParams { lowest: -10.0, on_invalid: 0.0, ..OutputParams::default() };
         let certified = |plant: &PlantParams, output: &OutputParams, smc: SmcParams| {
-            let law = Law::new(&LawParams::Smc(smc), plant, output, Micros(1000)).unwrap();
+            let law = Law::new(&LawParams::Smc(smc), &Beside::paper(plant, output)).unwrap();
             certify(&law, &Bounds::around(plant, &Tolerances::default()).unwrap(), &at_2_deg_s()).unwrap()
         };
         let smc = SmcParams { kp: 1.5, kd: 4.0, slope: 40.0, boundary: 0.3 };

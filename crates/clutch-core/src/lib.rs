@@ -7,7 +7,7 @@
 //! | [`law`] | PD (4), CTC (11), SMC (29) and (31): parameters → law → state |
 //! | [`Servo`] | encoder counts and target in, DAC code and terms out |
 //! | [`Stribeck`], [`Actuator`], [`Plant`] | friction (2), brake or motor, and the shaft (1) |
-//! | [`SmoothedDerivative`], `Observer` | where the velocity comes from |
+//! | [`SmoothedDerivative`], [`edge_timed`], `Observer` | where the velocity comes from |
 //! | [`reference`](mod@reference) | planned paths in fixed-point counts |
 //! | [`check_path`] | whether a brake can follow a path |
 //! | [`certificate`] | what gains guarantee over all plants within [`Bounds`] |
@@ -39,6 +39,7 @@ mod bounds;
 pub mod certificate;
 mod codes;
 mod derivative;
+pub mod edge_timed;
 mod error;
 mod feasibility;
 mod fnv;

@@ -8,7 +8,7 @@
 //! The same type runs in the simulator, in the loop on Linux and on a board. It owns no clock
 //! and no I/O.
 
-use crate::law::{Command, ControlLaw, Law, LawParams, OutputParams, Seen, Tick};
+use crate::law::{Beside, Command, ControlLaw, Law, LawParams, OutputParams, Seen, Tick};
 use crate::velocity::{VelocityParams, VelocitySource, VelocityState};
 use crate::{
     Arithmetic, Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros, ParamError, Plant,
@@ -63,6 +63,12 @@ impl<T: Real> ServoParams<T> {
             law: self.law.cast(),
             output: self.output.cast(),
         }
+    }
+
+    /// What its law is built beside.
+    #[must_use]
+    pub fn beside(&self) -> Beside<'_, T> {
+        Beside { model: &self.model, output: &self.output, encoder: self.encoder, period: self.period }
     }
 
     /// Checks that reaches the output's limits.
@@ -132,7 +138,7 @@ impl<T: Real> Servo<T> {
     /// The first parameter out of range, by name; also output limits (`lowest`, `highest`) beyond
     /// the converter's range, at which it would clip unseen.
     pub fn new(p: &ServoParams<T>) -> Result<Self, ParamError<T>> {
-        let servo = Servo::with_law(p, Law::new(&p.law, &p.model, &p.output, p.period)?)?;
+        let servo = Servo::with_law(p, Law::new(&p.law, &p.beside())?)?;
         // Of numbers that output and converter have taken by themselves.
         p.check_output()?;
         Ok(servo)
@@ -198,7 +204,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
             position,
             last: Counts::default(),
             error: FixedCounts(target.position.0.wrapping_sub(position.0)),
-            velocity: self.velocity.start(position, target),
+            velocity: self.velocity.start(position, target, applied),
             law,
             applied,
         }

@@ -1,6 +1,7 @@
-//! Source of a law's error rate: the paper's difference (5), or an observer.
+//! Source of a law's error rate: the paper's difference (5), an edge-timed filter, or an observer.
 
 use crate::derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeParams};
+use crate::edge_timed::{EdgeTimed, EdgeTimedParams, EdgeTimedState};
 #[cfg(feature = "linalg")]
 use crate::observer::{Observer, ObserverParams, ObserverState};
 use crate::{Encoder, FixedCounts, Micros, ParamError, Plant, Real, Target};
@@ -10,6 +11,8 @@ crate::choice! {
     pub enum VelocityParams<T>: Default {
         /// The smoothed backward difference of the error (5).
         SmoothedDerivative(SmoothedDerivativeParams<T>) = "smoothed_derivative",
+        /// A Kalman filter that is corrected where an edge of the encoder is crossed.
+        EdgeTimed(EdgeTimedParams<T>) = "edge_timed",
         /// A Kalman observer of position, velocity and disturbance torque.
         #[cfg(feature = "linalg")]
         Observer(ObserverParams<T>) = "observer",
@@ -22,6 +25,8 @@ crate::choice! {
 pub enum VelocitySource<T> {
     /// The smoothed backward difference of the error (5).
     SmoothedDerivative(SmoothedDerivative<T>),
+    /// The edge-timed filter.
+    EdgeTimed(EdgeTimed<T>),
     /// The Kalman observer.
     #[cfg(feature = "linalg")]
     Observer(Observer<T>),
@@ -31,12 +36,13 @@ pub enum VelocitySource<T> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VelocityState<T> {
     derivative: DerivativeState<T>,
+    edge_timed: EdgeTimedState<T>,
     #[cfg(feature = "linalg")]
     observer: ObserverState<T>,
 }
 
 impl<T: Real> VelocitySource<T> {
-    /// Checks the parameters. `plant` is what an observer believes of the shaft; (5) needs none.
+    /// Checks the parameters. `plant` is what a filter or an observer believes of the shaft; (5) needs none.
     ///
     /// # Errors
     /// As the chosen source's constructor.
@@ -46,10 +52,12 @@ impl<T: Real> VelocitySource<T> {
         encoder: Encoder,
         period: Micros,
     ) -> Result<Self, ParamError<T>> {
-        let _ = plant; // the only user is behind the feature `linalg`
         Ok(match p {
             VelocityParams::SmoothedDerivative(p) => {
                 VelocitySource::SmoothedDerivative(SmoothedDerivative::new(p, encoder, period)?)
+            }
+            VelocityParams::EdgeTimed(p) => {
+                VelocitySource::EdgeTimed(EdgeTimed::new(p, plant, encoder, period)?)
             }
             #[cfg(feature = "linalg")]
             VelocityParams::Observer(p) => {
@@ -58,15 +66,19 @@ impl<T: Real> VelocitySource<T> {
         })
     }
 
-    /// On the path: the shaft moves at the target's velocity.
+    /// On the path: the shaft moves at the target's velocity, with `applied` volts on the actuator since long.
     #[must_use]
-    pub fn start(&self, position: FixedCounts, target: &Target<T>) -> VelocityState<T> {
+    pub fn start(&self, position: FixedCounts, target: &Target<T>, applied: T) -> VelocityState<T> {
         VelocityState {
             derivative: DerivativeState::at(FixedCounts(target.position.0.wrapping_sub(position.0))),
+            edge_timed: match self {
+                VelocitySource::EdgeTimed(f) => f.start(position, applied, target.velocity),
+                _ => EdgeTimedState::default(),
+            },
             #[cfg(feature = "linalg")]
             observer: match self {
                 VelocitySource::Observer(o) => o.start(position, target.velocity),
-                VelocitySource::SmoothedDerivative(_) => ObserverState::default(),
+                _ => ObserverState::default(),
             },
         }
     }
@@ -81,10 +93,13 @@ impl<T: Real> VelocitySource<T> {
         target: &Target<T>,
         volts: T,
     ) -> T {
-        let _ = volts;
         match self {
             VelocitySource::SmoothedDerivative(d) => {
                 d.update(&mut state.derivative, FixedCounts(target.position.0.wrapping_sub(position.0)))
+            }
+            VelocitySource::EdgeTimed(f) => {
+                f.update(&mut state.edge_timed, position, volts, target.velocity);
+                target.velocity - f.rad_per_s(state.edge_timed.velocity())
             }
             #[cfg(feature = "linalg")]
             VelocitySource::Observer(o) => {

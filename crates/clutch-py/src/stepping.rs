@@ -878,6 +878,7 @@ impl ControlLaw<f64> for PythonLaw {
 /// The output stage of a scenario.
 fn output_stage(py: Python<'_>, scenario: &Scenario) -> PyResult<Output<f64>> {
     let spec = scenario.0.spec();
-    let law = Law::new(&spec.law, &spec.model, &spec.output, spec.period).map_err(|e| core_error(py, &e))?;
+    let servo = spec.servo().map_err(|e| core_error(py, &e))?;
+    let law = Law::new(&servo.law, &servo.beside()).map_err(|e| core_error(py, &e))?;
     Ok(*law.output())
 }

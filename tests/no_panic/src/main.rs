@@ -27,7 +27,7 @@
 
 use clutch_core::certificate::{Demand, certify, paper_conditions};
 use clutch_core::law::{
-    Command, ControlLaw, Ctc, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid, Smc, SmcSign, Terms,
+    Beside, Command, ControlLaw, Ctc, Glide, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid, Smc, SmcSign, Terms,
     Tick,
 };
 use clutch_core::params::{self, Choice, Editor, Params};
@@ -249,7 +249,7 @@ fn velocity<T: Real>() {
     if let Some(v) =
         made(VelocitySource::new(&any::<T, VelocityParams<T>>(), &plant, encoder::<T>(), micros()))
     {
-        let mut state = opaque(v.start(fixed(), &target()));
+        let mut state = opaque(v.start(fixed(), &target(), real()));
         sink(v.update(&mut state, fixed(), &target(), real()));
         sink(state);
     }
@@ -288,7 +288,8 @@ fn laws<T: Real>() {
         sink((o.lowest(), o.highest(), o.apply(&mut state, real())));
         sink(state);
     }
-    let law = made(Law::new(&any::<T, LawParams<T>>(), &model, &out, micros()));
+    let beside = Beside { model: &model, output: &out, encoder: opaque(Encoder::PAPER), period: micros() };
+    let law = made(Law::new(&any::<T, LawParams<T>>(), &beside));
     sink(law.as_ref().map(|l| *l.output()));
     runs(law);
     sink(law.as_ref().map(|l| l.terms_of(&opaque([real(); 9]))));
@@ -298,6 +299,7 @@ fn laws<T: Real>() {
     runs(made(Smc::new(&any(), &out, micros())));
     runs(made(SmcSign::new(&any(), &out, micros())));
     runs(made(Pid::new(&any(), &out, micros())));
+    runs(made(Glide::new(&any(), &beside)));
 }
 
 fn reference_params<T: Real>(knots: &[Knot]) -> ReferenceParams<'_, T> {
@@ -335,12 +337,9 @@ fn certificate<T: Real>() {
         velocity_jump: real(),
     };
     sink(paper_conditions(&b, &demand, real(), real()));
-    let Some(law) = made(Law::new(
-        &any::<T, LawParams<T>>(),
-        &any::<T, PlantParams<T>>(),
-        &any::<T, OutputParams<T>>(),
-        micros(),
-    )) else {
+    let (model, output) = (any::<T, PlantParams<T>>(), any::<T, OutputParams<T>>());
+    let beside = Beside { encoder: opaque(Encoder::PAPER), period: micros(), ..Beside::paper(&model, &output) };
+    let Some(law) = made(Law::new(&any::<T, LawParams<T>>(), &beside)) else {
         return;
     };
     if let Some(c) = made(certify(&law, &b, &demand)) {

@@ -58,9 +58,10 @@ macro_rules! laws {
         /// The closed set of laws: what a configuration file, the wire and a log can name.
         ///
         /// ```
-        /// use clutch_core::{Micros, law::{ControlLaw, Law, LawParams, SmcParams, Tick}};
+        /// use clutch_core::law::{Beside, ControlLaw, Law, LawParams, SmcParams, Tick};
         /// let params = LawParams::Smc(SmcParams::default());
-        /// let law = Law::<f64>::new(&params, &Default::default(), &Default::default(), Micros(1000))?;
+        /// let (model, output) = Default::default();
+        /// let law = Law::<f64>::new(&params, &Beside::paper(&model, &output))?;
         /// let mut state = Default::default();
         /// // The shaft is 0.1° ahead: the surface is beyond the layer, the brake gets K_p = 3 V.
         /// let tick = Tick { error: -0.1_f64.to_radians(), ..Tick::default() };
@@ -74,11 +75,11 @@ macro_rules! laws {
 
         /// Memory of the law that runs.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub enum LawState<T: Arithmetic> {
+        pub enum LawState<T: Real> {
             $(#[doc = $doc] $law(<$law<T> as ControlLaw<T>>::State),)+
         }
 
-        impl<T: Arithmetic> Default for LawState<T> {
+        impl<T: Real> Default for LawState<T> {
             /// The first law's, at rest; another law takes it for its own at rest.
             #[allow(unreachable_code, reason = "the first of the list is taken")]
             fn default() -> Self {
@@ -88,18 +89,18 @@ macro_rules! laws {
 
         /// The terms of whichever law ran.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub enum LawTerms<T: Arithmetic> {
+        pub enum LawTerms<T: Real> {
             $(#[doc = $doc] $law(<$law<T> as ControlLaw<T>>::Terms),)+
         }
 
-        impl<T: Arithmetic> Default for LawTerms<T> {
+        impl<T: Real> Default for LawTerms<T> {
             #[allow(unreachable_code, reason = "the first of the list is taken")]
             fn default() -> Self {
                 $(return LawTerms::$law(Default::default());)+
             }
         }
 
-        impl<T: Arithmetic> Terms<T> for LawTerms<T> {
+        impl<T: Real> Terms<T> for LawTerms<T> {
             #[inline]
             fn values(&self) -> &[T] {
                 match self {
@@ -117,16 +118,10 @@ macro_rules! laws {
             ///
             /// # Errors
             /// As the chosen law's constructor.
-            pub fn new(
-                p: &LawParams<T>,
-                model: &PlantParams<T>,
-                output: &OutputParams<T>,
-                period: Micros,
-            ) -> Result<Self, ParamError<T>> {
-                output.check_for(model.actuator.kind())?;
-                let beside = Beside { model, output, period };
+            pub fn new(p: &LawParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
+                beside.output.check_for(beside.model.actuator.kind())?;
                 Ok(match p {
-                    $(LawParams::$law(p) => Law::$law(Listed::build(p, &beside)?),)+
+                    $(LawParams::$law(p) => Law::$law(Listed::build(p, beside)?),)+
                 })
             }
 
@@ -161,7 +156,7 @@ macro_rules! laws {
             }
         }
 
-        impl<T: Arithmetic> ControlLaw<T> for Law<T> {
+        impl<T: Real> ControlLaw<T> for Law<T> {
             type State = LawState<T>;
             type Terms = LawTerms<T>;
             /// None: which law was chosen is not known here.

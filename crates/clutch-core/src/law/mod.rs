@@ -1,4 +1,4 @@
-//! Control laws: PD (4), CTC (11), SMC (29) and (31), PID; open-loop voltages.
+//! Control laws: PD (4), CTC (11), SMC (29) and (31), PID, glide; open-loop voltages.
 //!
 //! A law is a file of this folder and a line in the list below: its parameters (`Default` = Table 2), what it
 //! remembers, its terms, and what it has, as a sliding surface. Three tiers: parameters → `new`, the only step
@@ -14,7 +14,7 @@ mod output;
 
 pub use output::{Limit, Output, OutputParams, OutputState};
 
-use crate::{Arithmetic, FixedCounts, Micros, ParamError, PlantParams, Real};
+use crate::{Arithmetic, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real};
 
 list::laws! {
     pd Pd PdParams "Proportional–derivative control (4).";
@@ -22,6 +22,7 @@ list::laws! {
     smc Smc SmcParams "Sliding mode with the boundary layer (31).";
     smc_sign SmcSign SmcSignParams "Sliding mode with the sign function (29).";
     pid Pid PidParams "Proportional–integral–derivative control with feed-forward.";
+    glide Glide GlideParams "Friction inverted by an edge-timed filter: smooth at low rates.";
     voltage Voltage VoltageParams "Open-loop voltage.";
     hold Hold HoldParams "Open-loop voltage that holds the resting shaft.";
 }
@@ -147,11 +148,19 @@ pub struct Beside<'a, T> {
     pub model: &'a PlantParams<T>,
     /// Its output stage.
     pub output: &'a OutputParams<T>,
+    /// The encoder behind its measurement.
+    pub encoder: Encoder,
     /// Its sampling period.
     pub period: Micros,
 }
 
-impl<T: Real> Beside<'_, T> {
+impl<'a, T: Real> Beside<'a, T> {
+    /// The paper's encoder and sampling period.
+    #[must_use]
+    pub fn paper(model: &'a PlantParams<T>, output: &'a OutputParams<T>) -> Self {
+        Beside { model, output, encoder: Encoder::PAPER, period: Micros(1000) }
+    }
+
     /// −1 where a voltage above 0 drives the shaft forwards, 1 where it resists: laws count as a brake does.
     #[must_use]
     pub fn sign(&self) -> T {

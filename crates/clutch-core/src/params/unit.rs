@@ -94,6 +94,7 @@ units! {
     V_RAD_S "v_rad_s" "V/(rad s)" "V/(rad s)" None "" 1.0;
     V_RAD "v_rad" "V/rad" "V/rad" None "" 1.0;
     RAD_S2 "rad_s2" "rad/s²" "rad/s²" None "acceleration" 1.0;
+    RAD_S_RT_S "rad_s_rt_s" "rad/s/√s" "rad/s/√s" None "" 1.0;
     RAD_S "rad_s" "rad/s" "rad/s" None "velocity" 1.0;
     DEG_S3 "deg_s3" "°/s³" "rad/s³" Degrees "jerk" DEGREE;
     DEG_S2 "deg_s2" "°/s²" "rad/s²" Degrees "acceleration" DEGREE;

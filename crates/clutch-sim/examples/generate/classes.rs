@@ -343,9 +343,13 @@ pub(crate) fn classes(places: &[Place]) -> Result<Vec<Class<'_>>, String> {
     let mut all: Vec<Class<'_>> = Vec::new();
     for place in places {
         let name = name(place);
-        match all.iter().find(|class| class.name == name) {
+        match all.iter_mut().find(|class| class.name == name) {
             None => {}
-            Some(class) if same(class.place, place) => continue,
+            Some(class) if same(class.place, place) => {
+                // Where it is an option, the class has its key.
+                class.place = if class.place.option.is_some() { class.place } else { place };
+                continue;
+            }
             Some(class) => {
                 return Err(format!("two tables are {name}, {} and {}", class.place.key, place.key));
             }
@@ -364,10 +368,11 @@ pub(crate) fn classes(places: &[Place]) -> Result<Vec<Class<'_>>, String> {
     }
 }
 
-/// The same table, under the same name where it is an option.
+/// The same table, under the same name wherever it is an option.
 fn same(a: &Place, b: &Place) -> bool {
     let option = |place: &Place| place.option.map(|(choice, option)| (choice.name, option.key));
-    a.table.id == b.table.id && option(a) == option(b)
+    let (one, other) = (option(a), option(b));
+    a.table.id == b.table.id && (one == other || one.is_none() || other.is_none())
 }
 
 /// Name of the class of a table.

@@ -64,6 +64,7 @@ built_in!(
     "motor_ctc",
     "bench_pd_2",
     "bench_smc_2",
+    "bench_glide_2",
     "observer_smc_2",
     "minimum_jerk",
     "hand_guided",
@@ -413,7 +414,7 @@ impl Scenario {
         Output::new(&servo.output, servo.period).map_err(at("output"))?;
         servo.check_output().map_err(at("output"))?;
         // A law with a model divides by its friction.
-        Law::new(&servo.law, &servo.model, &servo.output, servo.period).map_err(at(""))?;
+        Law::new(&servo.law, &servo.beside()).map_err(at(""))?;
         VelocitySource::new(&servo.velocity, &model, servo.encoder, servo.period).map_err(at("velocity"))?;
         Dac::new(&servo.dac).map_err(at("rig"))?;
         Ok(())
@@ -548,9 +549,9 @@ impl Scenario {
 
     fn make_plan(&self, envelope: Option<Envelope<f64>>) -> Result<Plan, ScenarioError> {
         let p = &self.params;
-        let period = p.sampling.sampling.period;
         let bounds = Bounds::around(&p.model, &p.bounds.tolerances).map_err(|e| self.at("", &e))?;
-        let law = Law::new(&p.law, &p.model, &p.output, period).map_err(|e| self.at("", &e))?;
+        let servo = self.spec().servo().map_err(|e| self.at("rig", &e))?;
+        let law = Law::new(&servo.law, &servo.beside()).map_err(|e| self.at("", &e))?;
         let envelope = envelope.map_or_else(|| self.walk_path(&bounds, law.output()), Ok)?;
         let demand = Demand {
             velocity: envelope.velocity,

@@ -44,7 +44,7 @@ pub fn measure() -> Option<()> {
     let friction = StribeckParams { stribeck_exponent: 2.0, ..StribeckParams::default() };
     let (plain, output) = (PlantParams::default(), output());
     let curved = PlantParams { friction: friction.into(), ..plain };
-    let beside = |model| Beside { model, output: &output, period: PERIOD };
+    let beside = |model| Beside { period: PERIOD, ..Beside::paper(model, &output) };
     macro_rules! laws {
         ($($module:ident $law:ident;)+) => {$(
             use clutch_core::law::$law;

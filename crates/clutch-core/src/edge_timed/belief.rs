@@ -1,0 +1,267 @@
+//! Means and covariance of what the filter believes, in counts and periods.
+//!
+//! Positions are in counts above the lower edge of the count that was read last, velocities in counts per period, friction
+//! in multiples of the model's sliding friction. One period of the shaft under the pull `D` of drive and motor and the
+//! load `w` of the pad (both in counts per period²):
+//!
+//! ```text
+//! a = D − w (h + r) sgn ω − c ω,    ω' = ω + a,    Δ = ω + a/2
+//! s' = s − Δ (k² r + 2 ζ k s),      r' = r + Δ s'                    ripple: a damped wave along the way
+//! ```
+
+use crate::Real;
+
+/// Numbers that stay.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shaft<T> {
+    /// `c`: damping, per period.
+    pub(super) damping: T,
+    /// `k²`, per count².
+    pub(super) stiffness: T,
+    /// `2 ζ k`, per count.
+    pub(super) decay: T,
+    /// Variance that the velocity gains in a period.
+    pub(super) walk: T,
+    /// Share of an acceleration that may be wrong.
+    pub(super) gain_doubt: T,
+    /// Variance that the ripple's slope gains per count, with friction as the model has it.
+    pub(super) roughness: T,
+}
+
+/// Means and covariance of position `t`, velocity `w`, mean friction `h`, ripple `r` and its slope `s`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Belief<T> {
+    pub(super) position: T,
+    pub(super) velocity: T,
+    pub(super) mean: T,
+    pub(super) ripple: T,
+    pub(super) slope: T,
+    pub(super) tt: T,
+    pub(super) tw: T,
+    pub(super) th: T,
+    pub(super) tr: T,
+    pub(super) ts: T,
+    pub(super) ww: T,
+    pub(super) wh: T,
+    pub(super) wr: T,
+    pub(super) ws: T,
+    pub(super) hh: T,
+    pub(super) hr: T,
+    pub(super) hs: T,
+    pub(super) rr: T,
+    pub(super) rs: T,
+    pub(super) ss: T,
+}
+
+impl<T: Real> Belief<T> {
+    /// Friction at the pad: `h + r`, never so small that a voltage for a torque is without bounds.
+    #[inline]
+    pub(super) fn friction(&self) -> T {
+        (self.mean + self.ripple).max(T::splat(0.05))
+    }
+
+    /// Its variance.
+    #[inline]
+    pub(super) fn friction_variance(&self) -> T {
+        (self.hh + (self.hr + self.hr) + self.rr).max(T::ZERO)
+    }
+
+    /// One period without covariances: the way, counts, the acceleration, and the velocity that the shaft lacks to have
+    /// gone on, 0 if it goes on.
+    #[inline(never)]
+    pub(super) fn glide(&mut self, shaft: &Shaft<T>, pull: T, load: T) -> (T, T, T) {
+        let half = T::splat(0.5);
+        let sign = self.direction(pull);
+        let acceleration = pull - shaft.damping * self.velocity - sign * load * self.friction();
+        let next = self.velocity + acceleration;
+        let lacks = (-(next * sign)).max(T::ZERO);
+        let way = if lacks > T::ZERO {
+            // It comes to rest; what may push it the other way is seen in the next period.
+            let slowing = acceleration.abs();
+            self.velocity = T::ZERO;
+            half * (next - acceleration) * (next - acceleration).abs() / slowing
+        } else {
+            self.velocity = next;
+            next - half * acceleration
+        };
+        self.position += way;
+        (way, acceleration, lacks)
+    }
+
+    /// The way that it goes, or would go.
+    fn direction(&self, pull: T) -> T {
+        if self.velocity == T::ZERO { pull.sgn() } else { self.velocity.sgn() }
+    }
+
+    /// One period: the way, counts. `fall`: what the load loses per count per period, with friction as the model has it.
+    /// `moves`: the shaft is known to move.
+    #[inline(never)]
+    pub(super) fn advance(&mut self, shaft: &Shaft<T>, pull: T, (load, fall): (T, T), moves: bool) -> T {
+        let sign = self.direction(pull);
+        let fall = fall * self.friction();
+        let (way, acceleration, lacks) = self.glide(shaft, pull, load);
+        self.spread(shaft, -(sign * load), acceleration, fall);
+        if moves && lacks > T::ZERO {
+            self.keep_moving(sign, lacks);
+        }
+        self.turn(shaft, way);
+        way
+    }
+
+    /// The shaft goes on: friction is not as high as to stop it. `lacks`: the velocity
+    /// below 0 that was believed.
+    fn keep_moving(&mut self, sign: T, lacks: T) {
+        let deviation = self.ww.sqrt();
+        if deviation > T::ZERO {
+            let (lambda, share) = cut_off(-lacks / deviation);
+            self.velocity = -(sign * lacks);
+            let column = [self.tw, self.ww, self.wh, self.wr, self.ws];
+            self.take(column, self.ww, sign * deviation * lambda, share);
+        }
+    }
+
+    /// Covariance of a period in which friction acted on the velocity with the factor `b`, and fell with it by `fall`.
+    fn spread(&mut self, shaft: &Shaft<T>, b: T, acceleration: T, fall: T) {
+        let half_b = T::splat(0.5) * b;
+        let keep = T::ONE - shaft.damping + fall;
+        // Covariances with the friction h + r.
+        let (nt, nw) = (self.th + self.tr, self.wh + self.wr);
+        let (nh, nr, ns) = (self.hh + self.hr, self.hr + self.rr, self.hs + self.rs);
+        let nf = nh + nr;
+        let off = shaft.gain_doubt * acceleration;
+        let tt = self.tt + (self.tw + self.tw) + self.ww + b * (nt + nw) + half_b * half_b * nf;
+        let tw = keep * (self.tw + self.ww + half_b * nw) + b * (nt + nw + half_b * nf);
+        let ww = keep * keep * self.ww + (keep + keep) * b * nw + b * b * nf;
+        self.tt = tt;
+        self.tw = tw;
+        self.th = self.th + self.wh + half_b * nh;
+        self.tr = self.tr + self.wr + half_b * nr;
+        self.ts = self.ts + self.ws + half_b * ns;
+        self.ww = ww + shaft.walk + off * off;
+        self.wh = keep * self.wh + b * nh;
+        self.wr = keep * self.wr + b * nr;
+        self.ws = keep * self.ws + b * ns;
+    }
+
+    /// The disc has turned by a way, counts: another place of it is at the pad.
+    fn turn(&mut self, shaft: &Shaft<T>, way: T) {
+        let far = way.abs();
+        let b = -(way * shaft.stiffness);
+        let d = T::ONE - far * shaft.decay;
+        self.slope = b * self.ripple + d * self.slope;
+        self.ripple += way * self.slope;
+        self.ts = b * self.tr + d * self.ts;
+        self.tr += way * self.ts;
+        self.ws = b * self.wr + d * self.ws;
+        self.wr += way * self.ws;
+        self.hs = b * self.hr + d * self.hs;
+        self.hr += way * self.hs;
+        let (sr, s) = (b * self.rr + d * self.rs, b * self.rs + d * self.ss);
+        let ss = b * sr + d * s;
+        let rs = sr + way * ss;
+        self.rr += way * (sr + rs);
+        self.rs = rs;
+        // Ripple is a share of friction: what is believed of the one goes for the other.
+        self.ss = ss + shaft.roughness * far * (self.mean * self.mean);
+    }
+
+    /// Takes a measurement of one of the means, whose covariances with all are `column`: innovation `y`, its variance `s`, and
+    /// the share of the covariance that goes.
+    #[inline(never)]
+    fn take(&mut self, column: [T; 5], s: T, y: T, share: T) {
+        let gain = T::ONE / s;
+        let [t, w, h, r, slope] = column;
+        let step = gain * y;
+        self.position += t * step;
+        self.velocity += w * step;
+        self.mean = (self.mean + h * step).limit(T::splat(0.1), T::splat(10.0));
+        let most = T::splat(0.6) * self.mean;
+        self.ripple = (self.ripple + r * step).limit(-most, most);
+        self.slope += slope * step;
+        let gone = gain * share;
+        let (kt, kw, kh, kr, ks) = (t * gone, w * gone, h * gone, r * gone, slope * gone);
+        self.tt -= kt * t;
+        self.tw -= kt * w;
+        self.th -= kt * h;
+        self.tr -= kt * r;
+        self.ts -= kt * slope;
+        self.ww -= kw * w;
+        self.wh -= kw * h;
+        self.wr -= kw * r;
+        self.ws -= kw * slope;
+        self.hh -= kh * h;
+        self.hr -= kh * r;
+        self.hs -= kh * slope;
+        self.rr -= kr * r;
+        self.rs -= kr * slope;
+        self.ss -= ks * slope;
+    }
+
+    fn at_position(&self) -> [T; 5] {
+        [self.tt, self.tw, self.th, self.tr, self.ts]
+    }
+
+    /// The position was measured, with a variance. A measurement far beyond what is believed widens the belief first.
+    #[inline(never)]
+    pub(super) fn correct(&mut self, measured: T, variance: T) {
+        let y = measured - self.position;
+        if y * y > T::splat(25.0) * (self.tt + variance) {
+            self.tt += y * y;
+            self.ww += T::splat(0.25) * (y * y);
+        }
+        self.take(self.at_position(), self.tt + variance, y, T::ONE);
+    }
+
+    /// No edge has come: the position is below `end` (`side` 1) or above it (`side` −1). The belief becomes the normal
+    /// distribution with mean and variance of the one that is cut off there, its edge blurred by the variance `blur`.
+    #[inline(never)]
+    pub(super) fn keep_within(&mut self, end: T, side: T, blur: T) {
+        let s = self.tt + blur;
+        let deviation = s.sqrt();
+        let alpha = side * (end - self.position) / deviation;
+        if alpha > T::splat(3.5) {
+            return;
+        }
+        let (lambda, share) = cut_off(alpha);
+        self.take(self.at_position(), s, -(side * deviation * lambda), share);
+    }
+
+    /// The shaft rests somewhere in its count.
+    pub(super) fn rest(&mut self) {
+        self.position = T::splat(0.5);
+        self.velocity = T::ZERO;
+        (self.th, self.tr, self.ts) = (T::ZERO, T::ZERO, T::ZERO);
+        (self.tw, self.ww, self.wh, self.wr, self.ws) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO, T::ZERO);
+        self.tt = T::ONE / T::from_i32(12);
+    }
+
+    /// Friction here is `friction`, with a standard deviation; the mean stays.
+    pub(super) fn know_friction(&mut self, friction: T, deviation: T) {
+        self.ripple = friction - self.mean;
+        self.slope = T::ZERO;
+        (self.tr, self.wr, self.hr, self.rs) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
+        self.rr = deviation * deviation;
+    }
+
+    /// `true` while every mean, and the variance that divides, is a number.
+    pub(super) fn is_finite(&self) -> bool {
+        let means = self.position + self.velocity + (self.mean + self.ripple + self.slope);
+        let variances = self.tt + self.ww + (self.hh + self.rr + self.ss);
+        means.is_finite() && variances.is_finite() && self.tt >= T::ZERO
+    }
+}
+
+/// A standard normal distribution that is cut off above `alpha`, below 3.5: how far its mean falls, and the share of its variance
+/// that goes.
+fn cut_off<T: Real>(alpha: T) -> (T, T) {
+    // λ = φ(α)/Φ(α), with Boyd's bound of Mills' ratio (1959), which is right to 0.6 %.
+    let t = alpha.abs();
+    let mills = T::PI / ((T::PI - T::ONE) * t + (t * t + (T::PI + T::PI)).sqrt());
+    let lambda = if alpha < T::ZERO {
+        T::ONE / mills
+    } else {
+        let density = (T::splat(0.5) * (t * t)).exp_neg() * T::splat(0.398_942_280_401_432_7);
+        density / (T::ONE - density * mills)
+    };
+    (lambda, (lambda * (lambda + alpha)).limit(T::ZERO, T::splat(0.99)))
+}

@@ -1,0 +1,475 @@
+//! The edge-timed filter: position, velocity and friction from the edges of an encoder, and from the silence between them.
+//!
+//! At 2 °/s a count of the paper's encoder takes 9 ms. A difference of counts knows the velocity only as a mean over
+//! several of them; but a crossed edge is a position that is known to a fraction of a count, at a time known to a period, and a
+//! count that does not come says that the shaft has not got there. A Kalman filter that takes both, and knows the voltage,
+//! tells velocity and friction within a count. It has five states: position, velocity, the mean
+//! friction as a multiple of the model's (whose curve over the velocity stays), and its ripple along the disc as a damped wave of random phase with its slope
+//! ([`EdgeTimedParams`] has the wave's numbers). Friction is smooth along the way, not in time: that is why it can be told ahead.
+//!
+//! An edge that was crossed in the last period lies at most the way of that period behind, with the variance of a uniform
+//! distribution. Silence cuts the belief off at the edges of the count. A shaft without an edge for longer than the path may take
+//! for `silence_counts` is taken to rest: friction learnt since the last edge is forgotten, as it is that of a shaft at rest,
+//! and the filter says so ([`EdgeTimed::starts`]), so that a law can let the brake go for some periods. If then no edge comes in
+//! 25 ms, friction is above what the voltage would have carried.
+
+mod belief;
+
+use crate::friction::{Friction, FrictionModel};
+use crate::params::{Range, Table};
+use crate::{Actuator, Encoder, FixedCounts, Micros, ParamError, Plant, Real};
+use belief::{Belief, Shaft};
+
+crate::params! {
+    /// A Kalman filter that is corrected where an edge of the encoder is crossed, and by silence between edges. It knows
+    /// the voltage and, from the model, drive torque over inertia; friction it learns.
+    pub struct EdgeTimedParams<T>: Default {
+        /// Periods from a voltage to its effect, beyond the one in which it is given: `rig.delay_ticks` as believed.
+        delay: u32 = 0, "delay_ticks" "" TICKS, Range::within(0.0, 3.0);
+        /// Time constant of the actuator, as believed; 0 for one without a lag.
+        lag: T = 0.0, "lag_s" "τ" S, Range::at_least(0.0);
+        /// Standard deviation of friction at the start, as a share of the model's.
+        friction_doubt: T = 0.5, "friction_doubt" "" NONE, Range::above(0.0).up_to(10.0);
+        /// Root mean square of the ripple along the disc, as a share of friction.
+        ripple: T = 0.15, "ripple_share" "" NONE, Range::above(0.0).up_to(1.0);
+        /// Waves of the ripple per turn.
+        waves: T = 340.0, "ripple_waves_per_turn" "k" WAVES_PER_TURN, Range::above(0.0).up_to(1e6);
+        /// Damping of the ripple's waves: small for a ripple of one wavelength.
+        ripple_damping: T = 0.2, "ripple_damping" "ζ" NONE, Range::above(0.0).up_to(1.0);
+        /// Wander of the velocity that no friction explains: by this much (standard deviation) in one second, and with the root
+        /// of the time.
+        walk: T = 0.015, "walk_rad_s_rt_s" "" RAD_S_RT_S, Range::above(0.0);
+        /// Share of an acceleration that may be wrong, as drive torque and inertia are not known better.
+        gain_doubt: T = 0.3, "gain_doubt" "" NONE, Range::at_least(0.0).up_to(2.0);
+        /// Counts that the path may go on without an edge before the shaft is taken to rest.
+        silence: T = 3.0, "silence_counts" "" COUNTS, Range::above(1.0).up_to(1000.0);
+    }
+    relations(p) {
+        /// The waves are resolved.
+        RESOLVED: waves, "a number below a twentieth of rig.encoder.counts_per_rev: an encoder sees no shorter wave";
+        /// Periods count the lag.
+        LAG_COUNTED: lag, "a time below 1000 times sampling.period_us";
+    }
+}
+
+/// Standard deviation by which the end of a count is blurred where silence cuts the belief off, counts.
+const BLUR: f64 = 0.15;
+/// Time in which an edge has to come once the shaft was let go, s.
+const PATIENCE: f64 = 0.025;
+/// Most of the velocity that a falling friction adds to an error of the velocity in a period.
+const FASTEST_FALL: f64 = 0.3;
+/// Friction of a shaft that stays at rest, as a multiple of what the voltage carried.
+const ABOVE: f64 = 1.134;
+
+/// The filter, checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeTimed<T> {
+    shaft: Shaft<T>,
+    actuator: Actuator<T>,
+    /// The model's.
+    friction: Friction<T>,
+    drive_torque: T,
+    /// Acceleration of a torque, counts per period² and N m.
+    per_torque: T,
+    /// Its sliding level.
+    mu: T,
+    counts_per_radian: T,
+    period: T,
+    delay: u32,
+    /// Share of a step of the voltage that a lagging actuator has not made after a period; 0 without a lag.
+    lagging: T,
+    /// Periods of the lag.
+    lag_periods: T,
+    silence: T,
+    patience: T,
+    doubt: T,
+    ripple: T,
+    wave: T,
+}
+
+/// Motion, as far as the filter knows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Phase {
+    /// At rest, or never seen to move.
+    #[default]
+    Resting,
+    /// Let go from rest; no edge has come yet.
+    Starting,
+    /// Edges come.
+    Sliding,
+}
+
+/// Memory of the filter.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EdgeTimedState<T> {
+    belief: Belief<T>,
+    /// The belief at the last edge.
+    at_edge: Belief<T>,
+    /// Whole counts of the last sample.
+    counts: i64,
+    /// Position above them, for a sensor finer than a count.
+    fraction: T,
+    /// Voltages on their way, the newest first, V.
+    line: [T; 3],
+    /// Voltage at the pad, V.
+    pad: T,
+    /// Periods since the last edge, or since the shaft was let go.
+    silent: T,
+    /// Periods for which the shaft has still to be let go.
+    release: T,
+    /// Rests, of which each four edges make up for one.
+    rests: T,
+    phase: Phase,
+}
+
+impl<T: Real> EdgeTimedState<T> {
+    /// `true` if the shaft is taken to rest.
+    #[must_use]
+    pub fn rests(&self) -> bool {
+        self.phase == Phase::Resting
+    }
+
+    /// `true` until the first edge after a rest: friction is that of a place where it is not known.
+    #[must_use]
+    pub fn starts(&self) -> bool {
+        self.phase != Phase::Sliding
+    }
+
+    /// `true` in a period in which the shaft has to be let go.
+    #[must_use]
+    pub fn lets_go(&self) -> bool {
+        self.release > T::ZERO
+    }
+
+    /// Velocity, counts per period.
+    #[must_use]
+    pub fn velocity(&self) -> T {
+        self.belief.velocity
+    }
+
+    /// Position of the sensor above the lower edge of its count, counts: 0 for an encoder.
+    #[must_use]
+    pub fn fraction(&self) -> T {
+        self.fraction
+    }
+}
+
+/// The shaft at the time at which a voltage given now takes effect.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ahead<T> {
+    /// Position above the lower edge of the last count, counts.
+    pub position: T,
+    /// Velocity, counts per period.
+    pub velocity: T,
+    /// Friction, as a multiple of the model's.
+    pub friction: T,
+    /// Its standard deviation.
+    pub deviation: T,
+    /// Voltage at the pad, V.
+    pub pad: T,
+}
+
+impl<T: Real> EdgeTimed<T> {
+    /// Checks the parameters. Drive torque, inertia, damping and actuator are those of `plant`, its friction the first
+    /// guess.
+    ///
+    /// # Errors
+    /// The first parameter out of range; waves that the encoder does not resolve; `period` out of range.
+    #[inline(never)]
+    pub fn new(
+        p: &EdgeTimedParams<T>,
+        plant: &Plant<T>,
+        encoder: Encoder,
+        period: Micros,
+    ) -> Result<Self, ParamError<T>> {
+        p.check_rows()?;
+        let seconds = period.period::<T>()?;
+        let twentieth = T::from_u64(u64::from(encoder.counts_per_rev())) / T::from_i32(20);
+        EdgeTimedParams::RESOLVED.require(p.waves, p.waves < twentieth)?;
+        EdgeTimedParams::LAG_COUNTED.require(p.lag, p.lag < T::from_i32(1000) * seconds)?;
+        let model = plant.params();
+        let radians_per_count = encoder.radians_per_count::<T>();
+        let wave = p.waves * radians_per_count;
+        let decay = (p.ripple_damping + p.ripple_damping) * wave;
+        let walk = p.walk * seconds.sqrt() * seconds / radians_per_count;
+        Ok(EdgeTimed {
+            shaft: Shaft {
+                damping: model.viscous_damping * seconds / model.inertia,
+                stiffness: wave * wave,
+                decay,
+                walk: walk * walk,
+                gain_doubt: p.gain_doubt,
+                // With it the wave's variance stays what it is.
+                roughness: (decay + decay) * (wave * wave) * (p.ripple * p.ripple),
+            },
+            actuator: *plant.actuator(),
+            friction: *plant.friction(),
+            drive_torque: model.drive_torque,
+            per_torque: seconds * seconds / (model.inertia * radians_per_count),
+            mu: plant.friction().sliding(),
+            counts_per_radian: encoder.counts_per_radian(),
+            period: seconds,
+            delay: p.delay,
+            lagging: if p.lag > T::ZERO { (-(seconds / p.lag)).exp() } else { T::ZERO },
+            lag_periods: p.lag / seconds,
+            silence: p.silence,
+            patience: T::from_f64(PATIENCE) / seconds
+                + (p.lag + p.lag) / seconds
+                + T::from_u64(u64::from(p.delay)),
+            doubt: p.friction_doubt,
+            ripple: p.ripple,
+            wave,
+        })
+    }
+
+    /// Counts per period of a velocity in rad/s.
+    #[inline]
+    #[must_use]
+    pub fn per_period(&self, velocity: T) -> T {
+        velocity * self.period * self.counts_per_radian
+    }
+
+    /// The velocity in rad/s of one in counts per period.
+    #[inline]
+    #[must_use]
+    pub fn rad_per_s(&self, velocity: T) -> T {
+        velocity / (self.period * self.counts_per_radian)
+    }
+
+    /// Counts per radian.
+    #[must_use]
+    pub fn counts_per_radian(&self) -> T {
+        self.counts_per_radian
+    }
+
+    /// The model's sliding friction, of which friction is told as a multiple.
+    #[must_use]
+    pub fn mu(&self) -> T {
+        self.mu
+    }
+
+    /// The state for a shaft at `position`, with `applied` volts on the actuator since long. Nobody knows whether it
+    /// rests or moves with the path, at `target_velocity`, rad/s.
+    #[must_use]
+    #[inline(never)]
+    pub fn start(&self, position: FixedCounts, applied: T, target_velocity: T) -> EdgeTimedState<T> {
+        let mut belief = Belief { mean: T::ONE, ..Belief::default() };
+        belief.rest();
+        let pace = self.per_period(target_velocity);
+        // A target that is not a number, or beyond measure, is none that it moves with.
+        belief.ww = if pace.abs() < T::splat(1e6) { pace * pace } else { T::ZERO };
+        belief.hh = self.doubt * self.doubt;
+        belief.rr = self.ripple * self.ripple;
+        belief.ss = belief.rr * self.wave * self.wave;
+        let mut state = EdgeTimedState { belief, at_edge: belief, ..EdgeTimedState::default() };
+        state.line = [applied; 3];
+        state.pad = applied;
+        self.place(&mut state, position);
+        state
+    }
+
+    /// Lets a resting shaft go: for as many periods as the drive takes to bring it to the path's velocity, rad/s, and an
+    /// actuator to give way. A law then releases the actuator while [`EdgeTimedState::lets_go`].
+    pub fn let_go(&self, state: &mut EdgeTimedState<T>, target_velocity: T) {
+        let (pull, _) = self.forces(T::ZERO);
+        let needed = self.per_period(target_velocity).abs() / pull.abs().max(T::splat(1e-6));
+        let periods = needed.min(T::from_i32(1000)) + T::splat(0.7) * self.lag_periods;
+        // To the nearest whole number; one at least.
+        state.release = (periods + T::splat(0.5)).floor().max(T::ONE);
+        state.silent = T::ZERO;
+        state.phase = Phase::Starting;
+    }
+
+    /// The shaft when a voltage given now takes effect.
+    #[must_use]
+    #[inline(never)]
+    pub fn ahead(&self, state: &EdgeTimedState<T>) -> Ahead<T> {
+        let mut belief = state.belief;
+        let mut pad = state.pad;
+        let [newest, middle, oldest] = state.line;
+        // What is on its way, the oldest first.
+        for (left, arrived) in [(3, oldest), (2, middle), (1, newest)] {
+            if left <= self.delay {
+                let (volts, end) = self.at_pad(pad, arrived);
+                pad = end;
+                let (pull, load) = self.forces(volts);
+                let load = load * self.shape(belief.velocity);
+                let (way, ..) = belief.glide(&self.shaft, pull, load);
+                belief.ripple += way * belief.slope;
+            }
+        }
+        // In the middle of the period.
+        belief.ripple += T::splat(0.5) * belief.velocity * belief.slope;
+        Ahead {
+            position: belief.position,
+            velocity: belief.velocity,
+            friction: belief.friction(),
+            deviation: belief.friction_variance().sqrt(),
+            pad,
+        }
+    }
+
+    /// The voltage to give so that one of `volts` is at the pad at the end of the period in which it takes effect.
+    #[inline]
+    #[must_use]
+    pub fn through_lag(&self, volts: T, pad: T) -> T {
+        if self.lagging > T::ZERO { pad + (volts - pad) / (T::ONE - self.lagging) } else { volts }
+    }
+
+    /// Periods from a voltage to its effect, beyond the one in which it is given.
+    #[must_use]
+    pub fn delay(&self) -> T {
+        T::from_u64(u64::from(self.delay))
+    }
+
+    /// Periods in which an edge has to come after a start.
+    #[must_use]
+    pub fn patience(&self) -> T {
+        self.patience
+    }
+
+    fn place(&self, state: &mut EdgeTimedState<T>, position: FixedCounts) -> T {
+        let counts = position.0 >> FixedCounts::FRACTION_BITS;
+        let moved = counts.wrapping_sub(state.counts);
+        state.counts = counts;
+        state.fraction = position.minus(FixedCounts::from_counts(counts));
+        T::from_i64(moved)
+    }
+
+    /// Pull of drive and motor, and load of the pad, at a voltage there, counts per period².
+    #[inline(never)]
+    fn forces(&self, volts: T) -> (T, T) {
+        let pull = (self.drive_torque + self.actuator.torque(volts)) * self.per_torque;
+        (pull, self.actuator.friction(self.mu * self.per_torque, volts))
+    }
+
+    /// Friction at a velocity, counts per period, as a multiple of that of a fast shaft.
+    #[must_use]
+    pub fn shape(&self, velocity: T) -> T {
+        self.friction.level(self.rad_per_s(velocity)) / self.mu
+    }
+
+    /// The shape, and what it loses per count per period: a shaft that gains speed loses friction. One that is believed
+    /// to have stopped loses none.
+    fn shape_and_fall(&self, velocity: T) -> (T, T) {
+        let shape = self.shape(velocity);
+        if velocity == T::ZERO {
+            return (shape, T::ZERO);
+        }
+        let step = T::splat(0.01);
+        (shape, (shape - self.shape(velocity.abs() + step)) / step)
+    }
+
+    /// The pad a period later, when `arrived` has come out of the line: its mean voltage and its last.
+    fn at_pad(&self, pad: T, arrived: T) -> (T, T) {
+        let end = arrived + (pad - arrived) * self.lagging;
+        let mean = if self.lagging > T::ZERO { T::splat(0.5) * (pad + end) } else { arrived };
+        (mean, end)
+    }
+
+    /// One sample: the position now, the voltage that the converter gave since the last sample, and the path's
+    /// velocity, rad/s.
+    #[inline(never)]
+    pub fn update(
+        &self,
+        state: &mut EdgeTimedState<T>,
+        position: FixedCounts,
+        applied: T,
+        target_velocity: T,
+    ) {
+        let moved = self.place(state, position);
+        let [newest, middle, oldest] = state.line;
+        state.line = [applied, newest, middle];
+        let arrived = match self.delay {
+            0 => applied,
+            1 => newest,
+            2 => middle,
+            _ => oldest,
+        };
+        let (volts, end) = self.at_pad(state.pad, arrived);
+        state.pad = end;
+        let (pull, load) = self.forces(volts);
+        let way = match state.phase {
+            Phase::Resting => T::ZERO,
+            Phase::Starting | Phase::Sliding => {
+                let (shape, fall) = self.shape_and_fall(state.belief.velocity);
+                let fall = (load * fall).min(T::splat(FASTEST_FALL));
+                let moves = state.phase == Phase::Sliding;
+                state.belief.advance(&self.shaft, pull, (load * shape, fall), moves)
+            }
+        };
+        if moved != T::ZERO {
+            self.crossed(state, moved, way);
+        } else {
+            state.silent += T::ONE;
+            let blur = T::splat(BLUR * BLUR);
+            if state.belief.velocity < T::ZERO {
+                state.belief.keep_within(T::ZERO, -T::ONE, blur);
+            } else {
+                state.belief.keep_within(T::ONE, T::ONE, blur);
+            }
+        }
+        // What only resists turns no shaft round.
+        if !self.actuator.kind().two_sided() {
+            state.belief.velocity = state.belief.velocity.max(T::ZERO);
+        }
+        self.look_for_rest(state, self.per_period(target_velocity));
+        if !state.belief.is_finite() {
+            *state = self.start(position, applied, target_velocity);
+        }
+    }
+
+    /// An edge was crossed in the period that has passed, at most its way ago.
+    fn crossed(&self, state: &mut EdgeTimedState<T>, moved: T, way: T) {
+        let belief = &mut state.belief;
+        belief.position -= moved;
+        if state.phase == Phase::Resting {
+            // It moves after all, nobody knows how fast.
+            belief.ww += moved * moved;
+        }
+        let span = way.abs().limit(T::splat(0.02), T::ONE);
+        let inside = T::splat(0.5) * span;
+        let measured = if moved > T::ZERO { inside } else { T::ONE - inside };
+        belief.correct(measured, span * span / T::from_i32(12));
+        state.at_edge = *belief;
+        state.silent = T::ZERO;
+        state.release = T::ZERO;
+        state.rests = (state.rests - T::splat(0.25)).max(T::ZERO);
+        state.phase = Phase::Sliding;
+    }
+
+    /// A shaft that is silent for too long rests. `pace`: the path's velocity, counts per period.
+    fn look_for_rest(&self, state: &mut EdgeTimedState<T>, pace: T) {
+        match state.phase {
+            Phase::Resting => {}
+            Phase::Sliding if state.silent * pace.abs() > self.silence => {
+                // What was learnt since the last edge is the friction of a shaft at rest.
+                state.belief = state.at_edge;
+                state.belief.rest();
+                // The more so, the less the last ones have helped.
+                state.rests += T::ONE;
+                let more = T::splat(0.1) * state.belief.mean * state.rests;
+                state.belief.hh += more * more;
+                state.phase = Phase::Resting;
+            }
+            Phase::Sliding => {}
+            Phase::Starting if state.release > T::ZERO => {
+                state.release -= T::ONE;
+                state.silent = T::ZERO;
+            }
+            Phase::Starting if state.silent > self.patience => {
+                // The voltage has stopped it before the next edge: it would have carried no more friction than this.
+                let (pull, load) = self.forces(state.pad);
+                let carried = T::splat(ABOVE) * pull.abs() / load.max(T::splat(1e-6));
+                let friction = state.belief.friction().max(carried.min(T::splat(10.0)));
+                state.belief.rest();
+                state.belief.know_friction(friction, T::splat(0.15) * state.belief.mean);
+                state.phase = Phase::Resting;
+            }
+            Phase::Starting => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,302 @@
+//! Glide: friction inverted where an edge-timed filter believes it to be, around a cascade of position and velocity.
+//!
+//! ```text
+//! ω_c = θ̇_d + K_p ẽ, not below the share `floor` of θ̇_d and not above `cap` times it
+//! T_a = J (K_d (ω_c − ω̂) + θ̈_d) + C_d ω̂ − T_u,     u: T(u) − μ̂ N(u) sgn θ̇_d = T_a
+//! ```
+//!
+//! `ẽ`, `ω̂` and `μ̂` are those of the [`EdgeTimed`] filter, told ahead to the time at which the voltage takes effect. The floor is
+//! what keeps a slow shaft smooth: a law that brakes a shaft below it to let the path catch up has it stick, and a stuck
+//! shaft says nothing. A shaft that rests is let go, which needs no knowledge of friction; up to
+//! the first edge it is then held with less than the believed friction asks for, `optimism` standard deviations: too
+//! little voltage costs an overshoot of parts of a count, too much a stick.
+
+use super::{Beside, Command, ControlLaw, Listed, Output, OutputState, Seen, Tick};
+use crate::edge_timed::{EdgeTimed, EdgeTimedParams, EdgeTimedState};
+use crate::friction::FrictionModel;
+use crate::params::{Range, Table};
+use crate::{ActuatorKind, FixedCounts, ParamError, Plant, Real};
+
+crate::params! {
+    /// Glide: smooth motion far below the rates at which laws on a difference of counts stick. Friction is inverted where
+    /// an edge-timed filter believes it to be, which learns it on the way; one set of gains for all rates.
+    ///
+    /// `ω_c = θ̇_d + K_p ẽ` between `floor` and `cap` times `θ̇_d`; the voltage gives `θ̈ = K_d (ω_c − ω̂) + θ̈_d` with the
+    /// friction of the filter, and drive torque, inertia, damping and actuator of `Model`.
+    pub struct GlideParams<T>: Default {
+        /// Gain from position to velocity.
+        kp: T = 40.0, "kp_1_s" "K_p" PER_S, Range::at_least(0.0);
+        /// Gain from velocity to acceleration.
+        kd: T = 150.0, "kd_1_s" "K_d" PER_S, Range::above(0.0);
+        /// Least velocity that the law asks for, as a share of the path's.
+        floor: T = 0.5, "floor" "" NONE, Range::within(0.0, 1.0);
+        /// Highest velocity that the law asks for, as a multiple of the path's.
+        cap: T = 3.0, "cap" "" NONE, Range::at_least(1.0);
+        /// Standard deviations by which friction is taken to be higher than believed, from a rest to the first edge.
+        optimism: T = 1.0, "optimism" "" NONE, Range::at_least(0.0).up_to(10.0);
+    }
+    nested {
+        /// Filter of velocity and friction.
+        filter: EdgeTimedParams<T>, "filter";
+    }
+    relations(p) {
+        /// A shaft at the floor is not taken to rest.
+        SEEN_AT_FLOOR: floor, "a share above 1/filter.silence_counts, so that a shaft at the floor is not taken to rest" =>
+            p.floor * p.filter.silence > T::ONE;
+    }
+}
+
+/// The law, checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Glide<T> {
+    params: GlideParams<T>,
+    /// Gains per period.
+    kp: T,
+    kd: T,
+    estimator: EdgeTimed<T>,
+    plant: Plant<T>,
+    /// Torque for an acceleration, N m per count per period².
+    torque: T,
+    /// Counts per period² of an acceleration in rad/s².
+    acceleration: T,
+    output: Output<T>,
+}
+
+/// Memory of the law.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GlideState<T> {
+    estimator: EdgeTimedState<T>,
+    /// The sample that the filter sees in the next period.
+    seen: Seen<T>,
+    /// The filter has begun.
+    begun: bool,
+    output: OutputState<T>,
+}
+
+/// Share of the believed friction with which a resting shaft is held.
+const HELD: f64 = 0.5;
+/// Multiple of the believed friction at rest with which a motor starts.
+const PUSHED: f64 = 1.1;
+
+impl<T: Real> Glide<T> {
+    /// Checks gains, filter, the plant that the law believes in, and output stage.
+    ///
+    /// # Errors
+    /// The first parameter out of range; with a brake, a friction that can be 0, by which the law divides.
+    #[inline(never)]
+    pub fn new(p: &GlideParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
+        p.check_rows()?;
+        let seconds = beside.period.period::<T>()?;
+        let plant = Plant::new(beside.model)?;
+        if plant.actuator().kind() != ActuatorKind::Motor {
+            plant.friction().check_divisor()?;
+        }
+        let estimator = EdgeTimed::new(&p.filter, &plant, beside.encoder, beside.period)?;
+        let acceleration = seconds * seconds * estimator.counts_per_radian();
+        Ok(Glide {
+            params: *p,
+            kp: p.kp * seconds,
+            kd: p.kd * seconds,
+            estimator,
+            torque: beside.model.inertia / acceleration,
+            acceleration,
+            plant,
+            output: Output::new(beside.output, beside.period)?,
+        })
+    }
+
+    /// Voltage for a torque on a shaft that goes a way, with a multiple of the model's friction, V.
+    fn volts(&self, torque: T, friction: T, way: T) -> T {
+        let mu = self.estimator.mu() * friction;
+        self.plant.actuator().volts_for(torque - self.plant.params().drive_torque, mu, way)
+    }
+
+    /// Voltage that lets a shaft at rest go, V.
+    fn letting_go(&self, pace: T, friction: T, way: T) -> T {
+        if self.plant.actuator().kind() == ActuatorKind::Brake {
+            return self.output.lowest();
+        }
+        let at_rest = T::splat(PUSHED) * friction * self.plant.friction().at_rest() / self.estimator.mu();
+        let still = way * self.volts(T::ZERO, at_rest, way);
+        let moved = way * self.volts(self.torque * pace, friction, way);
+        // What resists above 0 V drives below it.
+        let drives = if self.plant.actuator().kind().drives_above_0() { still.max(moved) } else { still.min(moved) };
+        way * drives
+    }
+
+    /// Voltage that holds a shaft at rest, V.
+    fn holding(&self, friction: T) -> T {
+        match self.plant.actuator().kind() {
+            ActuatorKind::Motor => self.volts(T::ZERO, T::ZERO, T::ZERO),
+            ActuatorKind::Brake | ActuatorKind::Both => self.volts(T::ZERO, T::splat(HELD) * friction, T::ONE),
+        }
+    }
+
+    /// Demand of a period, V, and terms.
+    #[inline(never)]
+    fn demand(&self, belief: &mut EdgeTimedState<T>, tick: &Tick<T>) -> (T, [T; 6]) {
+        let filter = &self.estimator;
+        let ahead = filter.ahead(belief);
+        let pace = filter.per_period(tick.target_velocity);
+        let (way, fast) = (pace.sgn(), pace.abs());
+        let from_edge = tick.error * filter.counts_per_radian() + belief.fraction();
+        let error = from_edge + filter.delay() * pace - ahead.position;
+        // A shaft at rest waits until the path is about to leave its count.
+        let half = T::splat(0.5);
+        if belief.rests() && fast > T::ZERO && way * error + filter.patience() * fast > half {
+            filter.let_go(belief, tick.target_velocity);
+        }
+        let p = &self.params;
+        let wanted = way * (fast + self.kp * way * error).limit(p.floor * fast, p.cap * fast);
+        let friction = if belief.starts() {
+            ahead.friction + p.optimism * ahead.deviation
+        } else {
+            ahead.friction
+        };
+        let demand = if belief.lets_go() {
+            self.letting_go(pace, ahead.friction, way)
+        } else if belief.rests() || (way == T::ZERO && ahead.velocity == T::ZERO) {
+            self.holding(ahead.friction)
+        } else {
+            let acceleration = self.kd * (wanted - ahead.velocity) + self.acceleration * tick.target_acceleration;
+            let damping = self.plant.params().viscous_damping * filter.rad_per_s(ahead.velocity);
+            let going = if way == T::ZERO { ahead.velocity.sgn() } else { way };
+            let shape = filter.shape(T::splat(0.5) * (ahead.velocity + wanted));
+            let volts = self.volts(self.torque * acceleration + damping, friction * shape, going);
+            filter.through_lag(volts, ahead.pad)
+        };
+        let mu = filter.mu();
+        let phase = T::from_i32(i32::from(belief.starts()) + i32::from(belief.rests()));
+        let terms = [
+            filter.rad_per_s(belief.velocity()),
+            mu * ahead.friction,
+            mu * ahead.deviation,
+            error / filter.counts_per_radian(),
+            filter.rad_per_s(wanted),
+            phase,
+        ];
+        (demand, terms)
+    }
+}
+
+impl<T: Real> ControlLaw<T> for Glide<T> {
+    type State = GlideState<T>;
+    type Terms = [T; 6];
+    const TERMS: &'static [&'static str] =
+        &["velocity_rad_s", "mu", "mu_deviation", "error_ahead_rad", "wanted_velocity_rad_s", "phase"];
+
+    fn start(&self, tick: &Tick<T>, applied: T) -> GlideState<T> {
+        // The first period's demand does not depend on where the shaft is.
+        let mut belief = self.estimator.start(FixedCounts(0), applied, tick.target_velocity);
+        let (demand, _) = self.demand(&mut belief, tick);
+        let seen = Seen { applied, ..Seen::default() };
+        GlideState { seen, output: self.output.start(demand, applied), ..GlideState::default() }
+    }
+
+    fn sees(&self, state: &mut GlideState<T>, seen: &Seen<T>) {
+        state.seen = *seen;
+    }
+
+    fn update(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> Command<T, [T; 6]> {
+        let filter = &self.estimator;
+        let Seen { position, applied } = state.seen;
+        let belief = &mut state.estimator;
+        if state.begun {
+            filter.update(belief, position, applied, tick.target_velocity);
+        } else {
+            *belief = filter.start(position, applied, tick.target_velocity);
+            state.begun = true;
+        }
+        let (demand, terms) = self.demand(belief, tick);
+        let (voltage, limit) = self.output.apply(&mut state.output, demand);
+        Command { voltage, limit, terms }
+    }
+}
+
+impl<T: Real> Listed<T> for Glide<T> {
+    type Params = GlideParams<T>;
+    const TITLE: &'static str = "glide";
+
+    /// Through the longest line.
+    fn busiest() -> GlideParams<T> {
+        let filter =
+            EdgeTimedParams { delay: 3, lag: T::from_f64(0.002), ..EdgeTimedParams::default() };
+        GlideParams { filter, ..GlideParams::default() }
+    }
+
+    fn build(p: &GlideParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
+        Glide::new(p, beside)
+    }
+
+    fn output(&self) -> &Output<T> {
+        &self.output
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::OutputParams;
+    use crate::{MotorActuator, PlantParams};
+
+    fn glide(p: GlideParams, model: &PlantParams) -> Glide<f64> {
+        let two_sided = model.actuator.kind().two_sided();
+        let lowest = if two_sided { -10.0 } else { 0.0 };
+        let output = OutputParams { lowest, on_invalid: if two_sided { 0.0 } else { 10.0 }, ..OutputParams::default() };
+        Glide::new(&p, &Beside::paper(model, &output)).unwrap()
+    }
+
+    fn at(rate: f64) -> Tick<f64> {
+        Tick { target_velocity: rate.to_radians(), ..Tick::default() }
+    }
+
+    #[test]
+    fn a_shaft_at_rest_is_let_go_and_then_held_by_less_than_the_friction_believed() {
+        let law = glide(GlideParams::default(), &PlantParams::default());
+        let tick = at(2.0);
+        let mut state = law.start(&tick, 5.0);
+        // One period brings it to 1.6 °/s.
+        assert_eq!(law.update(&mut state, &tick).voltage, 0.0);
+        let after = law.update(&mut state, &tick);
+        // 2.24 V with the model's friction, a standard deviation of 52 % fewer.
+        assert!(after.voltage > 1.2 && after.voltage < 1.9, "{} V", after.voltage);
+        assert_eq!(after.terms[5], 1.0, "started");
+    }
+
+    #[test]
+    fn a_path_that_rests_is_held_with_twice_the_voltage_that_carries_the_load() {
+        let law = glide(GlideParams::default(), &PlantParams::default());
+        let mut state = law.start(&at(0.0), 5.0);
+        for _ in 0..100 {
+            let volts = law.update(&mut state, &at(0.0)).voltage;
+            assert!((volts - 2.0 * 2.242286).abs() < 1e-5, "{volts} V");
+        }
+    }
+
+    #[test]
+    fn a_motor_starts_against_its_friction_at_rest_either_way() {
+        let actuator = MotorActuator { gain: 0.05, preload: 0.25, load_share: 0.0 };
+        let model = PlantParams { actuator: actuator.into(), drive_torque: 0.0, ..PlantParams::default() };
+        let law = glide(GlideParams::default(), &model);
+        // The path has left the count.
+        let count = core::f64::consts::TAU / 20_000.0;
+        let volts = |rate: f64| {
+            let tick = Tick { error: 2.0 * rate.signum() * count, ..at(rate) };
+            law.update(&mut law.start(&tick, 0.0), &tick).voltage
+        };
+        let (forwards, backwards) = (volts(0.5), volts(-0.5));
+        // 1.1 · 0.2 · 0.25 N m / 0.05 N m/V
+        assert!((forwards - 1.1).abs() < 0.2, "{forwards} V");
+        assert_eq!(backwards, -forwards);
+        // Faster than that takes more: 87 rad/s² for 5 °/s in a period.
+        assert!((volts(5.0) - (0.0375 + 0.0017 * 87.27) / 0.05).abs() < 0.05, "{} V", volts(5.0));
+    }
+
+    #[test]
+    fn a_floor_at_which_a_shaft_would_seem_to_rest_is_refused() {
+        let (model, output) = (PlantParams::default(), OutputParams::default());
+        let p = GlideParams { floor: 0.3, ..GlideParams::default() };
+        let e = Glide::<f64>::new(&p, &Beside::paper(&model, &output)).unwrap_err();
+        assert_eq!(e.field(), "floor");
+    }
+}

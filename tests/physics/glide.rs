@@ -1,0 +1,118 @@
+//! Glide on the rig `bench`: smooth where the paper's laws stick, with one belief and one set of gains. The whole table is in
+//! docs/smooth.md; these are its first rows, with fewer discs.
+
+use clutch_sim::{Metrics, Scenario};
+use toml::Value;
+
+/// Runs of the built-in scenario with keys changed, one for each disc from `first` on.
+fn discs(first: i64, n: i64, keys: &[(&str, Value)]) -> Vec<Metrics> {
+    let base = clutch_sim::scenario::BUILT_IN.iter().find(|b| b.name == "bench_glide_2").unwrap();
+    let run = |seed| {
+        let mut set = vec![("run.seed".to_owned(), Value::Integer(seed))];
+        set.extend(keys.iter().map(|(key, value)| ((*key).to_owned(), value.clone())));
+        let scenario = Scenario::from_table("glide", base.toml.parse().unwrap(), &set).unwrap();
+        scenario.run(clutch_sim::Keep::Figures, clutch_sim::progress::UNWATCHED).unwrap().metrics
+    };
+    (first..first + n).map(run).collect()
+}
+
+fn most(runs: &[Metrics], of: fn(&Metrics) -> f64) -> f64 {
+    runs.iter().map(of).fold(0.0, f64::max)
+}
+
+fn never_sticks(runs: &[Metrics], degrees: f64, about: &str) {
+    assert_eq!(most(runs, |m| m.stick_time_fraction), 0.0, "{about}");
+    let error = most(runs, |m| m.max_error_rad).to_degrees();
+    assert!(error <= degrees, "{about}: {error}°");
+}
+
+const RATE: &str = "reference.ramp.rate_deg_s";
+
+#[test]
+fn at_2_deg_s_it_never_sticks_in_either_scalar_and_wears_nothing_out() {
+    for scalar in ["f64", "f32"] {
+        let runs = discs(1, 40, &[("sampling.scalar", scalar.into())]);
+        never_sticks(&runs, 0.03, scalar);
+        let travel = runs.iter().map(|m| m.control_variation_v_s).sum::<f64>() / 40.0;
+        assert!(travel <= 30.0, "{travel} V/s in {scalar}");
+    }
+}
+
+#[test]
+fn the_same_gains_serve_every_rate() {
+    for (rate, degrees) in [(1.5, 0.03), (4.0, 0.06), (6.0, 0.055), (10.0, 0.08), (20.0, 0.1), (100.0, 0.1)] {
+        never_sticks(&discs(1, 10, &[(RATE, rate.into())]), degrees, &format!("{rate} °/s"));
+    }
+    // Hardly ever at 1 °/s, where a count takes 18 ms.
+    let runs = discs(1, 40, &[(RATE, 1.0.into())]);
+    let cycles = runs.iter().map(|m| m.stick_slip_cycles_per_s).sum::<f64>() / 40.0;
+    assert!(cycles <= 0.08, "{cycles} cycles/s at 1 °/s");
+}
+
+#[test]
+fn a_rig_that_is_not_as_believed_changes_nothing() {
+    let friction = |times: f64| {
+        vec![
+            ("rig.friction.stribeck.mu_static", (0.203 * times).into()),
+            ("rig.friction.stribeck.mu_dynamic", (0.104 * times).into()),
+        ]
+    };
+    let one = |key: &'static str, value: f64| vec![(key, Value::Float(value))];
+    for keys in [
+        friction(0.8),
+        friction(1.2),
+        one("rig.drive.weight.mass_kg", 0.23034),
+        one("rig.inertia_kg_m2", 0.00204),
+        one("rig.viscous_damping_nm_s_rad", 0.003),
+        one("rig.friction.stribeck.stribeck_velocity_rad_s", 0.00288),
+        one("rig.friction.stribeck.mu_static", 0.26),
+        vec![("rig.actuator_time_constant_s", 0.003.into()), ("law.glide.filter.lag_s", 0.003.into())],
+    ] {
+        never_sticks(&discs(1, 8, &keys), 0.03, &format!("{keys:?}"));
+    }
+}
+
+#[test]
+fn from_rest_it_is_smooth_within_150_ms_whatever_friction_it_believes() {
+    let start = |settle: f64, times: f64| {
+        let keys = [
+            ("run.start", "rest".into()),
+            ("run.duration_s", 1.0.into()),
+            ("run.settle_s", settle.into()),
+            ("model.friction.stribeck.mu_static", (0.2 * times).into()),
+            ("model.friction.stribeck.mu_dynamic", (0.15 * times).into()),
+        ];
+        discs(1, 50, &keys)
+    };
+    for times in [1.0, 0.614] {
+        let all = start(0.0, times);
+        assert!(most(&all, |m| m.stick_slip_cycles_per_s) <= 4.0);
+        let mean = all.iter().map(|m| m.stick_slip_cycles_per_s).sum::<f64>() / 50.0;
+        assert!(mean <= 1.0, "{mean} sticks");
+        assert!(most(&all, |m| m.max_error_rad).to_degrees() <= 0.14);
+        assert_eq!(most(&start(0.15, times), |m| m.stick_time_fraction), 0.0);
+    }
+}
+
+#[test]
+fn a_path_that_comes_to_rest_is_held_and_left_again() {
+    let base = clutch_sim::scenario::BUILT_IN.iter().find(|b| b.name == "bench_glide_2").unwrap();
+    let mut table: toml::Table = base.toml.parse().unwrap();
+    let path = "[minimum_jerk]\ndistance_deg = 20.0\nduration_s = 6.0\n";
+    table.insert("reference".into(), Value::Table(path.parse().unwrap()));
+    for seed in 1..9 {
+        let set = [
+            ("run.seed".to_owned(), Value::Integer(seed)),
+            ("run.start".to_owned(), "rest".into()),
+            ("run.duration_s".to_owned(), 8.0.into()),
+            ("run.settle_s".to_owned(), 0.0.into()),
+        ];
+        let scenario = Scenario::from_table("glide", table.clone(), &set).unwrap();
+        let run = scenario.run(clutch_sim::Keep::Trace, clutch_sim::progress::UNWATCHED).unwrap();
+        let error = run.metrics.max_error_rad.to_degrees();
+        assert!(error < 0.4, "disc {seed}: {error}°");
+        // The last second and a half at rest, to the bit.
+        let held = &run.trace.position[6500..];
+        assert!(held.iter().all(|p| *p == held[0]), "disc {seed} creeps");
+    }
+}
