@@ -101,3 +101,6 @@ pub struct Exponential<T> {
     /// Velocity at which all but 1/e of the fall is done, rad/s.
     pub velocity: T,
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,213 @@
+//! What is asked of every model, and how bristles bend.
+
+use super::*;
+use crate::params::{Choice, Params};
+use std::vec::Vec;
+
+fn all() -> Vec<FrictionParams<f64>> {
+    let mut all: Vec<FrictionParams<f64>> = Vec::new();
+    all.push(StribeckParams::default().into());
+    all.push(CoulombParams::default().into());
+    all.push(LugreParams::default().into());
+    all.push(DahlParams::default().into());
+    all.push(ElastoPlasticParams::default().into());
+    all.push(MaxwellParams::default().into());
+    assert_eq!(all.len(), FrictionParams::<f64>::CHOICE.options.len(), "a model is missing here");
+    all
+}
+
+/// The four frictions with bristles.
+fn bristled() -> Vec<Bristles<f64>> {
+    all().iter().filter_map(|p| Friction::build(p).unwrap().bristles()).collect()
+}
+
+#[test]
+fn every_model_lies_in_its_envelope_and_ends_at_its_sliding_level() {
+    for (place, p) in all().iter().enumerate() {
+        let f = Friction::<f64>::build(p).unwrap();
+        assert_eq!((&f.params(), p.chosen()), (p, place));
+        assert_eq!((f.sliding(), f.level(100.0)), (0.15, 0.15), "{}", p.name());
+        let at_rest = if p.name() == "dahl" { 0.15 } else { 0.2 };
+        assert_eq!(f.at_rest(), at_rest, "{}", p.name());
+        let Interval { low, high } = f.envelope();
+        assert_eq!((low, high), (0.15, at_rest), "{}", p.name());
+        for n in -40..=40 {
+            let v = 1e-3 * f64::from(n) / 8.0;
+            let level = f.level(v);
+            assert!(low <= level && level <= high, "{}: {level} at {v} rad/s", p.name());
+            assert_eq!(f.coefficient(v), level * v.sgn(), "{}", p.name());
+            // What a model says of its curve is its curve.
+            if let Some(quick) = f.quick() {
+                assert_eq!(quick.level(v), level, "{}", p.name());
+            }
+            if let Some(e) = f.exponential() {
+                let curve = e.sliding + (e.at_rest - e.sliding) * (-v.abs() / e.velocity).exp();
+                assert!((curve - level).abs() < 1e-15, "{}", p.name());
+            }
+        }
+        assert!(f.check_divisor().is_ok());
+        assert_eq!(p.cast::<f32>().cast::<f32>(), p.cast::<f32>());
+    }
+    let named = |p: fn(&Friction<f64>) -> bool| -> Vec<&str> {
+        all().iter().filter(|q| p(&Friction::build(q).unwrap())).map(Choice::name).collect()
+    };
+    assert_eq!(named(|f| f.quick().is_some()), ["stribeck", "dahl"]);
+    assert_eq!(named(|f| f.exponential().is_some()), ["stribeck", "coulomb"]);
+    assert_eq!(named(|f| f.bristles().is_some()), ["lugre", "dahl", "elasto_plastic", "maxwell"]);
+}
+
+#[test]
+fn a_level_of_zero_is_a_friction_and_no_divisor() {
+    let coulomb = CoulombParams { mu_static: 0.1, mu_dynamic: 0.0 };
+    let e = Coulomb::<f64>::build(&coulomb).unwrap().check_divisor().unwrap_err();
+    assert_eq!(e.field(), "mu_dynamic");
+    for (mu_static, mu_dynamic, field) in [(0.0, 0.1, "mu_static"), (0.1, 0.0, "mu_dynamic")] {
+        let p = StribeckParams { mu_static, mu_dynamic, ..StribeckParams::default() };
+        assert_eq!(Stribeck::<f64>::build(&p).unwrap().check_divisor().unwrap_err().field(), field);
+    }
+}
+
+#[test]
+fn frictions_of_different_models_are_not_one() {
+    let [one, other] = [0, 1].map(|i| Friction::<f64>::build(all().get(i).unwrap()).unwrap());
+    assert!(Friction::<f64>::in_lanes::<f64>(&|get| get(&one)).is_some_and(|f| f == one));
+    for p in all() {
+        let f = Friction::<f64>::build(&p).unwrap();
+        assert_eq!(Friction::<f64>::in_lanes::<f64>(&|get| get(&f)), Some(f), "{}", p.name());
+    }
+    // Half of it is the one and half the other.
+    let mixed = Friction::<f64>::in_lanes::<f64>(&|get| 0.5 * (get(&one) + get(&other)));
+    assert_eq!(mixed, None);
+}
+
+#[test]
+fn each_bad_parameter_of_bristles_is_named() {
+    let elastic = ElastoPlasticParams { elastic: 0.15, ..ElastoPlasticParams::default() };
+    assert_eq!(ElastoPlastic::<f64>::build(&elastic).unwrap_err().field(), "elastic");
+    let shares = MaxwellParams { share_a: 0.6, ..MaxwellParams::default() };
+    assert_eq!(Maxwell::<f64>::build(&shares).unwrap_err().field(), "share_c");
+    let whole = MaxwellParams { share_a: 0.5, ..MaxwellParams::default() };
+    assert!(Maxwell::<f64>::build(&whole).is_ok(), "the fourth may bear nothing");
+    let stiff = DahlParams { stiffness: 0.0, ..DahlParams::default() };
+    assert_eq!(Params::check(&FrictionParams::<f64>::from(stiff)).unwrap_err().field(), "stiffness");
+}
+
+#[test]
+fn bristles_begin_as_a_spring_that_bends_with_the_shaft() {
+    let names = [(1, 2000.0, true), (1, 2000.0, false), (1, 2000.0, true), (ELEMENTS, 3000.0, true)];
+    for (bristles, (count, stiffness, damps)) in bristled().iter().zip(names) {
+        assert_eq!((bristles.count(), bristles.stiffness(), bristles.damps()), (count, stiffness, damps));
+        let none = Bend::none();
+        let rate = bristles.rate(&none, 0.01);
+        assert!(rate.iter().take(count).all(|r| *r == 0.01), "{rate:?}");
+        // A µrad on the way it bears the stiffness times that, and the damping of the way.
+        let mut bend = none;
+        bend.each = bend.each.map(|_| 1e-6);
+        let still = [0.0; ELEMENTS];
+        let mu = bristles.coefficient(&bend, &still);
+        assert!((mu - 1e-6 * stiffness).abs() < 1e-15, "{mu}");
+        let damped = bristles.coefficient(&bend, &rate) - mu;
+        assert!((damped > 0.0) == damps, "{damped}");
+    }
+}
+
+#[test]
+fn damping_is_that_of_bending_and_of_held_elements_by_their_shares() {
+    let four = bristled();
+    let (lugre, maxwell) = (four.first().unwrap(), four.last().unwrap());
+    let none = Bend::none();
+    assert!((lugre.coefficient(&none, &[0.01, 0.0, 0.0, 0.0]) - 5.0 * 0.01).abs() < 1e-15);
+    let mut bend = none;
+    assert!((maxwell.coefficient(&bend, &[0.01; ELEMENTS]) - 0.01).abs() < 1e-15);
+    // One that slides is not damped.
+    bend.slides[1] = true;
+    assert!((maxwell.coefficient(&bend, &[0.01; ELEMENTS]) - 0.0075).abs() < 1e-15);
+}
+
+#[test]
+fn in_steady_sliding_bristles_bend_no_more_and_carry_the_curve() {
+    for bristles in bristled() {
+        for v in [-0.02, -1e-4, 3e-4, 0.5] {
+            let bend = bristles.steady(v);
+            let rate = bristles.rate(&bend, v);
+            assert!(rate.iter().all(|r| r.abs() < 1e-12 * v.abs().max(1e-3)), "{rate:?} at {v} rad/s");
+            let mu = bristles.coefficient(&bend, &[0.0; ELEMENTS]);
+            assert!((mu - bristles.curve.coefficient(v)).abs() < 1e-12, "{mu} at {v} rad/s");
+            assert!((bristles.bent(&bend, v) - 1.0).abs() < 1e-12);
+            assert_eq!(bristles.settled(&bend, v), bend, "it goes on");
+        }
+        let rest = bristles.steady(0.0);
+        assert_eq!(rest, Bend::none());
+        assert_eq!(bristles.bent(&rest, 0.0), 0.0);
+        assert!(bristles.stribeck_velocity() > 0.0);
+    }
+}
+
+#[test]
+fn a_held_load_is_carried_up_to_break_away_and_no_farther() {
+    for bristles in bristled() {
+        let most = bristles.curve.at_rest();
+        for n in -12..=12 {
+            let mu = f64::from(n) / 50.0;
+            let carried = bristles.coefficient(&bristles.holding(mu), &[0.0; ELEMENTS]);
+            assert!((carried - mu.clamp(-most, most)).abs() < 1e-12, "{carried} of {mu}");
+        }
+        let bend = bristles.holding(most);
+        let farthest = bend.each.iter().fold(0.0_f64, |a, z| a.max(*z));
+        assert!((bristles.deflection() - farthest).abs() < 1e-15 && farthest > 0.0);
+    }
+    // The stiffest element gives way first: 0.05/1600 rad, the softest last: 0.05/200 rad.
+    let maxwell = bristled().pop().unwrap();
+    let first = maxwell.holding(0.05).each;
+    assert!((first[0] - 0.05 / 3000.0).abs() < 1e-15 && first[0] == first[3], "all as one: {first:?}");
+    let later = maxwell.holding(0.15).each;
+    assert!((later[0] - 0.05 / 1600.0).abs() < 1e-15 && later[3] > later[0], "{later:?}");
+    assert!((maxwell.deflection() - 0.05 / 200.0).abs() < 1e-15);
+}
+
+#[test]
+fn elements_slide_beyond_their_share_and_hold_once_the_shaft_turns_round() {
+    let maxwell = bristled().pop().unwrap();
+    let (v, mut bend) = (1e-9, Bend::none());
+    bend.each = [0.06 / 1600.0, 0.04 / 800.0, 0.0, -0.06 / 200.0];
+    let slides = maxwell.settled(&bend, v).slides;
+    assert_eq!(slides, [true, false, false, false], "the last is bent the other way");
+    bend.slides = [true; ELEMENTS];
+    assert_eq!(maxwell.settled(&bend, v).slides, [true, true, true, false]);
+    assert_eq!(maxwell.settled(&bend, -v).slides, [false, false, true, true]);
+    // A sliding element comes to its share at the rate C, and not faster than the shaft.
+    bend.each = [0.0, 0.045 / 800.0, 0.0, 0.0];
+    let rate = maxwell.rate(&bend, 1e-3);
+    assert_eq!(rate[0], 1e-3, "as fast as the shaft");
+    let share = 0.25 - 0.045 / maxwell.curve.level(1e-3);
+    assert!((rate[1] - 50.0 * share / 800.0).abs() < 1e-12, "{rate:?}");
+}
+
+#[test]
+fn elasto_plastic_bristles_slide_only_beyond_their_elastic_part_and_when_they_bend_on() {
+    let bristles = bristled().remove(2);
+    let at = |mu: f64, v: f64| {
+        let mut bend = Bend::none();
+        bend.each[0] = mu / 2000.0;
+        bristles.rate(&bend, v)[0] / v
+    };
+    let (v, level) = (1e-3, bristles.curve.level(1e-3));
+    // The share of the motion that bends: all of it up to 0.12, none at steady sliding, half of the way between a half.
+    assert_eq!((at(0.119, v), at(-0.119, -v)), (1.0, 1.0));
+    assert_eq!(at(0.15, -v), 1.0, "it unbends");
+    let half = (0.12 + level) / 2.0;
+    assert!((at(half, v) - (1.0 - 0.5 * half / level)).abs() < 1e-9);
+    assert!(at(level, v).abs() < 1e-12 && at(1.01 * level, v) < 0.0);
+    // A quarter of the way: half a wave of a sine from 0 to 1.
+    let quarter = 0.12 + 0.25 * (level - 0.12);
+    let share = 0.5 - 0.5 * core::f64::consts::FRAC_PI_4.sin();
+    assert!((at(quarter, v) - (1.0 - share * quarter / level)).abs() < 1e-9);
+}
+
+#[test]
+fn damped_bristles_with_a_falling_curve_need_viscous_damping_to_be_passive() {
+    let from: Vec<f64> = bristled().iter().map(Bristles::passive_from).collect();
+    // σ_1 (μ_s − μ_d)/μ_d = 5 · 0.05/0.15 s/rad.
+    assert!((from[0] - 5.0 / 3.0).abs() < 1e-12 && from[0] == from[2], "{from:?}");
+    assert_eq!((from[1], from[3]), (0.0, 0.0));
+}
