@@ -202,3 +202,86 @@ impl<T: Real> Bounds<T> {
         torque.magnitude() - self.rubbing(&self.friction, volts).low
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ActuatorParams, BothActuator, MotorActuator};
+
+    fn near(a: Interval<f64>, low: f64, high: f64) {
+        assert!((a.low - low).abs() < 1e-12 && (a.high - high).abs() < 1e-12, "{a:?}: {low} … {high}");
+    }
+
+    /// 10 % on the friction, 20 % on the gains, 30 % on the drive.
+    fn bounds(actuator: impl Into<ActuatorParams>, drive_torque: f64) -> Bounds<f64> {
+        let plant = PlantParams { actuator: actuator.into(), drive_torque, ..PlantParams::default() };
+        let t = Tolerances {
+            friction: 0.1,
+            brake_gain: 0.2,
+            motor_gain: 0.2,
+            drive_torque: 0.3,
+            ..Tolerances::default()
+        };
+        Bounds::around(&plant, &t).unwrap()
+    }
+
+    const MOTOR: MotorActuator = MotorActuator { gain: 0.05, preload: 0.3, load_share: 0.5 };
+    const BOTH: BothActuator = BothActuator { brake_gain: 0.14, motor_gain: 0.05, preload: 0.3 };
+
+    #[test]
+    fn a_brake_gives_torques_against_the_motion_only() {
+        let b = bounds(ActuatorParams::brake(0.14), 0.05);
+        // μ 0.135 … 0.22, K 0.112 … 0.168 N m/V.
+        near(Interval { low: b.weakest_brake(), high: b.strongest_brake() }, 0.135 * 0.112, 0.22 * 0.168);
+        near(b.torque(true, 3.0), -3.0 * b.strongest_brake(), -3.0 * b.weakest_brake());
+        near(b.torque(false, 3.0), 3.0 * b.weakest_brake(), 3.0 * b.strongest_brake());
+        near(b.torque(true, -3.0), 0.0, 0.0);
+        near(b.authority(true, 0.0, 10.0), -10.0 * b.weakest_brake(), 0.0);
+        // At rest with 10 V the friction holds either way: 0.18 … 0.22 of it.
+        let held = 10.0 * 0.18 * 0.112;
+        near(b.authority_at_rest(0.0, 10.0), -held, held);
+        // 0.05 N m + 30 % on 4 V of the weakest brake.
+        assert!((b.left_over(4.0) - (0.065 - 4.0 * b.weakest_brake())).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_motor_drives_either_way_against_the_friction_of_its_own_load() {
+        let b = bounds(MOTOR, -0.1);
+        near(b.drive_torque, -0.13, -0.07);
+        // Normal force 0.3 + 0.5 k |u|, k 0.04 … 0.06 N m/V.
+        let (low, high) = (0.135 * (0.3 + 0.5 * 0.04 * 2.0), 0.22 * (0.3 + 0.5 * 0.06 * 2.0));
+        near(b.torque(true, 2.0), 0.08 - high, 0.12 - low);
+        near(b.torque(false, 2.0), 0.08 + low, 0.12 + high);
+        near(b.torque(true, -2.0), -0.12 - high, -0.08 - low);
+        // What drive and motor leave: −0.13 − 0.12 N m on the least friction.
+        assert!((b.left_over(-2.0) - (0.25 - low)).abs() < 1e-12);
+        assert!((b.left_over(2.0) - (0.05 - low)).abs() < 1e-12);
+        near(b.authority(true, -2.0, 2.0), -0.08 - low, 0.08 - high);
+        let rest = 0.18 * (0.3 + 0.5 * 0.04 * 2.0);
+        near(b.authority_at_rest(-2.0, 2.0), -0.08 - rest, 0.08 + rest);
+    }
+
+    #[test]
+    fn a_brake_with_a_motor_brakes_above_0_volts_and_drives_below() {
+        let b = bounds(BOTH, 0.05);
+        let (low, high) = (0.135 * 0.3, 0.22 * 0.3);
+        near(b.torque(true, -2.0), 0.08 - high, 0.12 - low);
+        near(b.torque(true, 2.0), -0.22 * (0.3 + 0.168 * 2.0), -0.135 * (0.3 + 0.112 * 2.0));
+        assert!((b.left_over(-2.0) - (0.065 + 0.12 - low)).abs() < 1e-12);
+        // It may stand without a drive, and a brake alone may not.
+        assert_eq!(bounds(BOTH, 0.0).drive_torque, Interval { low: 0.0, high: 0.0 });
+        for (actuator, drive_torque) in [(ActuatorParams::brake(0.14), 0.0), (BOTH.into(), -0.1)] {
+            let plant = PlantParams { actuator, drive_torque, ..PlantParams::default() };
+            let error = Bounds::around(&plant, &Tolerances::default()).unwrap_err();
+            assert_eq!(error.field(), "drive_torque");
+        }
+    }
+
+    #[test]
+    fn an_interval_around_a_negative_value_has_its_ends_in_order() {
+        near(Interval::around(-2.0, 0.25), -2.5, -1.5);
+        near(Interval::around(2.0, 0.25), 1.5, 2.5);
+        assert_eq!(Interval { low: -3.0, high: 2.0 }.magnitude(), 3.0);
+        assert_eq!(Interval { low: -1.0, high: 2.0 }.magnitude(), 2.0);
+    }
+}

@@ -388,4 +388,51 @@ mod tests {
         let loose = Tolerances { friction: 0.5, brake_gain: 0.5, ..Tolerances::default() };
         assert_eq!(check(&path(10.0), 0.0, loose).unwrap_err().obstacle, Obstacle::Voltage);
     }
+
+    #[test]
+    fn each_obstacle_says_where_and_by_how_much() {
+        let told = |obstacle| {
+            let text = Infeasible { tick: 7, time: 0.007, obstacle, asked: -2.0, available: 1.5 };
+            let text = std::format!("{text}");
+            let at = "the path cannot be followed from t = 0.007 s (tick 7) on: ";
+            text.strip_prefix(at).map(std::string::ToString::to_string).unwrap()
+        };
+        assert_eq!(told(Obstacle::Reverse), "it runs backwards at -2 rad/s, and a brake drives nothing");
+        let acceleration = "it accelerates at -2 rad/s², and the drive grants 1.5 rad/s²";
+        assert_eq!(told(Obstacle::Acceleration), acceleration);
+        assert_eq!(told(Obstacle::Voltage), "it needs -2 V, and the output ends at 1.5 V");
+        let hold = "at rest it needs -2 N m, and motor and friction give 1.5 N m";
+        assert_eq!(told(Obstacle::Hold), hold);
+        assert_eq!(told(Obstacle::NotFinite), "its velocity or acceleration is not a number there");
+    }
+
+    #[test]
+    fn a_load_that_a_motor_cannot_hold_is_refused_from_either_side() {
+        // 0.2 N m forwards on 2 V of 0.05 N m/V without friction.
+        let error = check_motor(&motor(0.0, 0.2), &ReferenceParams::Hold, Tolerances::default(), (-2.0, 2.0));
+        let error = error.unwrap_err();
+        assert_eq!(error.obstacle, Obstacle::Hold);
+        assert!((error.asked + 0.2).abs() < 1e-12 && (error.available + 0.1).abs() < 1e-12, "{error:?}");
+    }
+
+    #[test]
+    fn the_largest_acceleration_is_that_of_either_sign() {
+        for (acceleration, deceleration) in [(3.0, 2.0), (1.0, 3.0)] {
+            let e = Envelope { acceleration, deceleration, ..Envelope::<f64>::default() };
+            assert_eq!(e.largest_acceleration(), 3.0);
+        }
+    }
+
+    #[test]
+    fn a_brake_with_a_motor_is_asked_for_volts_of_both_signs() {
+        let actuator = crate::BothActuator { brake_gain: 0.14, motor_gain: 0.05, preload: 0.0 };
+        let plant = PlantParams { actuator: actuator.into(), drive_torque: 0.0, ..PlantParams::default() };
+        let path = ReferenceParams::Trapezoid(Trapezoid { distance: 1.0, speed: 1.0, acceleration: 10.0 });
+        let e = check_motor(&plant, &path, Tolerances::default(), (-10.0, 10.0)).unwrap();
+        // J a + C_d θ̇ of the motor to accelerate, and J a of the brake to stop.
+        assert!((e.lowest_voltage + (0.0017 * 10.0 + 0.001) / 0.05).abs() < 0.02, "{} V", e.lowest_voltage);
+        assert!((e.highest_voltage - 0.0017 * 10.0 / 0.021).abs() < 0.02, "{} V", e.highest_voltage);
+        let brake = check_motor(&plant, &path, Tolerances::default(), (-0.2, 10.0)).unwrap_err();
+        assert_eq!(brake.obstacle, Obstacle::Voltage);
+    }
 }

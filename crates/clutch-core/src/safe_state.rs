@@ -289,4 +289,34 @@ mod tests {
             assert_eq!(codes(bad).unwrap_err().field(), field, "{bad:?}");
         }
     }
+
+    #[test]
+    fn what_holds_has_a_voltage_and_what_lets_go_has_none() {
+        for state in
+            [SafeState::hold(5.0), SafeState::ramp(100.0, 5.0), SafeState::hold_then_release(5.0, 1.0)]
+        {
+            assert_eq!(state.holding_voltage(), Some(5.0));
+        }
+        assert_eq!(SafeState::<f64>::Release.holding_voltage(), None);
+    }
+
+    #[test]
+    fn a_motor_may_hold_with_either_sign_and_within_its_converter_only() {
+        let dac = Dac::new(&DacParams::default()).unwrap();
+        let codes = |volts| SafeCodes::new(&SafeState::hold(volts), &dac, Micros(1000), ActuatorKind::Motor);
+        assert_eq!(codes(-5.0).unwrap().hold, DacCode(1024));
+        assert_eq!(codes(0.0).unwrap().hold, DacCode(2048));
+        for beyond in [-10.01, 10.01] {
+            assert_eq!(codes(beyond).unwrap_err().field(), "volts");
+        }
+    }
+
+    #[test]
+    fn a_ramp_has_steps_that_a_code_of_16_bits_and_16_more_can_tell() {
+        // One code is 20 V/4096: the least step is 2⁻¹⁶ of it in a period.
+        let least = 20.0 / 4096.0 / 65_536.0 / 1e-3;
+        assert_eq!(codes(SafeState::ramp(1.001 * least, 5.0)).unwrap().ramp_step, 1);
+        assert_eq!(codes(SafeState::ramp(0.999 * least, 5.0)).unwrap_err().field(), "rate");
+        assert_eq!(codes(SafeState::hold_then_release(5.0, 5e6)).unwrap_err().field(), "after");
+    }
 }

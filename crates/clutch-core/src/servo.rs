@@ -417,4 +417,12 @@ mod tests {
             proptest::prop_assert!(out.command.voltage >= 0.0 && out.command.voltage <= 10.0);
         }
     }
+
+    #[test]
+    fn parameters_that_single_precision_holds_come_back_from_it() {
+        let p = ServoParams::<f32>::paper(LawParams::Pd(PdParams { kp: 5000.0, kd: 50.0 }));
+        assert_eq!(p.cast::<f64>().cast::<f32>(), p);
+        let double = ServoParams::<f64>::paper(LawParams::Pd(PdParams::default()));
+        assert_eq!(double.cast::<f64>(), double);
+    }
 }

@@ -172,4 +172,28 @@ mod tests {
         }
         assert_eq!(s.cycles(), 0);
     }
+
+    #[test]
+    fn a_shaft_that_stands_is_stuck_until_it_moves_and_each_period_is_counted() {
+        let (d, mut s) = (detector(), StickSlipState::default());
+        for k in 0..1000 {
+            d.update(&mut s, Counts(5), 10.0_f64.to_radians());
+            assert_eq!(s.ticks(), k + 1);
+        }
+        assert!(s.stuck());
+        for k in 0..100 {
+            d.update(&mut s, Counts(5 + k), 10.0_f64.to_radians());
+        }
+        assert!(!s.stuck());
+    }
+
+    #[test]
+    fn a_velocity_that_is_no_number_moves_no_path() {
+        let (d, mut s) = (detector(), StickSlipState::default());
+        for _ in 0..1000 {
+            d.update(&mut s, Counts(5), f64::NAN);
+        }
+        assert!(!s.stuck());
+        assert_eq!((s.cycles(), s.ticks()), (0, 1000));
+    }
 }

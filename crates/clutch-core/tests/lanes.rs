@@ -8,8 +8,8 @@
 )]
 
 use clutch_core::law::{
-    ControlLaw, Ctc, CtcParams, Limit, OutputParams, Pd, PdParams, Pid, PidParams, Smc, SmcParams, SmcSign,
-    SmcSignParams, Terms, Tick,
+    ControlLaw, Ctc, CtcParams, Hold, HoldParams, Limit, OutputParams, Pd, PdParams, Pid, PidParams, Smc,
+    SmcParams, SmcSign, SmcSignParams, Terms, Tick, Voltage, VoltageParams,
 };
 use clutch_core::{Arithmetic, Each, Micros, PlantParams, StribeckParams};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -126,8 +126,18 @@ fn tick(k: u32, lane: usize) -> Tick<f64> {
     Tick { error, error_rate, target_velocity: 0.035, target_acceleration: 0.1 * x }
 }
 
-/// Runs a law of each lane by itself and all of them as one, and compares bits.
+/// As [`open_loop`], of a law that meets every way out of its output stage.
 fn same_bits<S, V>(laws: [S; N], as_one: impl Fn(Each<'_, S, f64, Lanes>) -> V)
+where
+    S: ControlLaw<f64>,
+    V: ControlLaw<Lanes>,
+{
+    let limits = open_loop(laws, as_one);
+    assert!(limits.iter().all(|n| *n > 0), "each way out of the output stage is met: {limits:?}");
+}
+
+/// Runs a law of each lane by itself and all of them as one, and compares bits; how often each limit decided.
+fn open_loop<S, V>(laws: [S; N], as_one: impl Fn(Each<'_, S, f64, Lanes>) -> V) -> [u32; 4]
 where
     S: ControlLaw<f64>,
     V: ControlLaw<Lanes>,
@@ -162,7 +172,7 @@ where
             }
         }
     }
-    assert!(limits.iter().all(|n| *n > 0), "each way out of the output stage is met: {limits:?}");
+    limits
 }
 
 const PERIOD: Micros = Micros(1000);
@@ -209,6 +219,21 @@ fn each_law_has_in_each_lane_the_bits_of_the_scalar() {
             Pid::new(&p, &output(), PERIOD).unwrap()
         }),
         |each| Pid::in_lanes(each),
+    );
+    // Open-loop laws, which meet no limit.
+    open_loop(
+        std::array::from_fn(|i| {
+            let p = HoldParams { margin: scaled(i) };
+            Hold::new(&p, &PlantParams::default(), &output(), PERIOD).unwrap()
+        }),
+        |each| Hold::in_lanes(each),
+    );
+    open_loop(
+        std::array::from_fn(|i| {
+            let p = VoltageParams { start: scaled(i), end: 8.0, rate: 2.0 * scaled(i), returns: i < 2 };
+            Voltage::new(&p, &output(), PERIOD).unwrap()
+        }),
+        |each| Voltage::in_lanes(each),
     );
     // Each lane believes in another friction; a power in one of them takes it in all.
     for exponent in [1.0, 1.5] {

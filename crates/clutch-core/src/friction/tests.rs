@@ -5,13 +5,14 @@ use crate::params::{Choice, Params};
 use std::vec::Vec;
 
 fn all() -> Vec<FrictionParams<f64>> {
-    let mut all: Vec<FrictionParams<f64>> = Vec::new();
-    all.push(StribeckParams::default().into());
-    all.push(CoulombParams::default().into());
-    all.push(LugreParams::default().into());
-    all.push(DahlParams::default().into());
-    all.push(ElastoPlasticParams::default().into());
-    all.push(MaxwellParams::default().into());
+    let all: Vec<FrictionParams<f64>> = std::vec![
+        StribeckParams::default().into(),
+        CoulombParams::default().into(),
+        LugreParams::default().into(),
+        DahlParams::default().into(),
+        ElastoPlasticParams::default().into(),
+        MaxwellParams::default().into(),
+    ];
     assert_eq!(all.len(), FrictionParams::<f64>::CHOICE.options.len(), "a model is missing here");
     all
 }

@@ -240,3 +240,102 @@ impl<T> Surface<T> {
         Surface { slope, layer: farther / gain, kp: nearer, kd: None, weakened: false, sliding: false }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FixedCounts, MotorActuator};
+
+    const OUTPUT: OutputParams<f64> =
+        OutputParams { lowest: 0.0, highest: 9.0, on_invalid: 4.0, bumpless_time: 0.0 };
+    const PERIOD: Micros = Micros(1000);
+
+    fn built(p: &LawParams<f64>) -> Law<f64> {
+        Law::new(p, &PlantParams::default(), &OUTPUT, PERIOD).unwrap()
+    }
+
+    fn behind(error: f64) -> Tick<f64> {
+        Tick { error, error_rate: 0.0, target_velocity: 0.035, target_acceleration: 0.0 }
+    }
+
+    #[test]
+    fn a_law_by_reference_is_the_law() {
+        let law = built(&LawParams::all()[0]);
+        let by = &law;
+        assert_eq!(ControlLaw::<f64>::term_names(&by), ControlLaw::<f64>::term_names(&law));
+        let tick = behind(-1e-3);
+        let (mut one, mut other) = (law.start(&tick, 2.0), ControlLaw::start(&by, &tick, 2.0));
+        let seen = Seen { position: FixedCounts::from_counts(3), applied: 2.0 };
+        law.sees(&mut one, &seen);
+        ControlLaw::sees(&by, &mut other, &seen);
+        assert_eq!(one, other);
+        assert_eq!(law.update(&mut one, &tick), ControlLaw::update(&by, &mut other, &tick));
+    }
+
+    #[test]
+    fn a_state_of_another_law_is_begun_anew() {
+        let laws = LawParams::<f64>::all().map(|p| built(&p));
+        let tick = behind(-1e-4);
+        for law in &laws {
+            for other in &laws {
+                let mut foreign = other.start(&tick, 3.0);
+                law.sees(&mut foreign, &Seen { position: FixedCounts(0), applied: 1.0 });
+                let command = law.update(&mut foreign, &tick);
+                assert!((0.0..=9.0).contains(&command.voltage), "{command:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_law_has_a_title_its_limits_and_a_busiest_period_that_is_valid() {
+        for p in LawParams::<f64>::all() {
+            assert!(!p.title().is_empty());
+            let law = built(&p);
+            assert_eq!(law.output().limits(), (0.0, 9.0), "{}", p.title());
+            assert_eq!(law.output().on_invalid(), 4.0);
+        }
+        macro_rules! busiest {
+            ($($module:ident $law:ident;)+) => {
+                [$(LawParams::$law(<$law<f64> as Listed<f64>>::busiest())),+]
+            };
+        }
+        let busiest = each_law!(busiest);
+        assert!(busiest.iter().all(|p| built(p).output().limits() == (0.0, 9.0)));
+    }
+
+    #[test]
+    fn laws_turn_their_sign_round_for_a_motor() {
+        let motor = MotorActuator { gain: 0.05, preload: 0.3, load_share: 0.0 };
+        let model = PlantParams { actuator: motor.into(), ..PlantParams::default() };
+        let output = OutputParams { lowest: -9.0, highest: 9.0, on_invalid: 0.0, bumpless_time: 0.0 };
+        let beside = |model| Beside { model, output: &output, period: PERIOD };
+        assert_eq!((beside(&PlantParams::default()).sign(), beside(&model).sign()), (1.0, -1.0));
+        for p in LawParams::<f64>::all().into_iter().filter(LawParams::follows) {
+            let law = Law::new(&p, &model, &output, PERIOD).unwrap();
+            let asked = |error| law.update(&mut law.start(&behind(0.0), 0.0), &behind(error)).voltage;
+            // A shaft that lags is driven on, one that leads is held back.
+            assert!(asked(2e-3) > 0.0 && asked(-2e-3) < 0.0, "{}: {} V", p.title(), asked(2e-3));
+        }
+    }
+
+    #[cfg(feature = "linalg")]
+    #[test]
+    fn a_servo_with_an_observer_sees_the_rate_of_a_shaft_that_lags() {
+        use crate::{Counts, ObserverParams, Servo, ServoParams, Target, VelocityParams};
+        let p = ServoParams {
+            velocity: VelocityParams::Observer(ObserverParams::default()),
+            ..ServoParams::<f64>::paper(LawParams::all()[0])
+        };
+        let servo = Servo::new(&p).unwrap();
+        // The target goes on by five counts a period, the shaft by four: 0.314 rad/s behind.
+        let target = |k: i32| Target {
+            position: FixedCounts::from_counts(5 * i64::from(k)),
+            velocity: 5000.0 * servo.encoder().radians_per_count::<f64>(),
+            acceleration: 0.0,
+        };
+        let mut state = servo.start(Counts(0), &target(0), 2.0);
+        let rates = (1..400).map(|k| servo.tick(&mut state, Counts(4 * k), &target(k)).tick.error_rate);
+        let last = rates.last().unwrap();
+        assert!((last - 1000.0 * servo.encoder().radians_per_count::<f64>()).abs() < 0.05, "{last} rad/s");
+    }
+}

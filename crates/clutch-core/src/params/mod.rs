@@ -114,3 +114,6 @@ pub trait Editor<T: Real> {
         let _ = table;
     }
 }
+
+#[cfg(test)]
+mod tests;
