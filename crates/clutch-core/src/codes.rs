@@ -267,4 +267,11 @@ mod tests {
             prop_assert!(dac.code(f64::from_bits(bits)).0 <= 4095);
         }
     }
+
+    #[test]
+    fn a_range_that_has_no_step_is_refused() {
+        let dac = |lowest, highest| Dac::<f32>::new(&DacParams { bits: 12, lowest, highest });
+        assert_eq!(dac(0.0, 1e-44).unwrap_err().field(), "highest", "a step of 0 V");
+        assert_eq!(dac(-3e38, 3e38).unwrap_err().field(), "highest", "an infinite one");
+    }
 }

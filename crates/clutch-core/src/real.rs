@@ -384,4 +384,17 @@ mod tests {
         assert_eq!((-3.0_f32).sat(), -1.0);
         assert_eq!(f32::NAN.sat(), 0.0);
     }
+
+    #[test]
+    fn a_scalar_is_one_lane() {
+        fn one_lane<T: Real>() {
+            assert_eq!(T::splat(0.25).to_f64(), 0.25);
+            assert_eq!(T::limit_of(Limit::Highest), Limit::Highest);
+            assert_eq!(T::select_limit(true, Limit::Lowest, Limit::None), Limit::Lowest);
+            assert_eq!(T::select_limit(false, Limit::Lowest, Limit::None), Limit::None);
+            assert!(T::all(T::ZERO.less(T::ONE)) && !T::all(T::ONE.less_or_equal(T::ZERO)));
+        }
+        one_lane::<f32>();
+        one_lane::<f64>();
+    }
 }

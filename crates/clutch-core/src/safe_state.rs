@@ -285,6 +285,7 @@ mod tests {
             (SafeState::ramp(0.0, 5.0), "rate"),
             (SafeState::ramp(1e12, 5.0), "rate"),
             (SafeState::hold_then_release(5.0, 0.0), "after"),
+            (SafeState::hold_then_release(5.0, 0.000_4), "after"),
         ] {
             assert_eq!(codes(bad).unwrap_err().field(), field, "{bad:?}");
         }

@@ -120,6 +120,7 @@ fn the_table_has_no_gaps_and_its_kinds_tell_the_direction() {
 fn a_list_has_the_numbers_that_it_was_given_and_no_more_than_it_may() {
     assert_eq!(List::new([7, 0, 9]).numbers(), [7, 0, 9]);
     assert_eq!(List::default().numbers(), [0; 0]);
+    assert_eq!(format!("{:?}", List::new([7, 0, 9])), "[7, 0, 9]");
     assert_eq!(List::new(1..100).numbers(), [1, 2, 3, 4, 5, 6, 7, 8]);
 }
 
@@ -210,6 +211,8 @@ fn each_flaw_has_its_error() {
     for error in [Cobs, TooLong, TooShort, UnknownKind(3), Length { kind: 4, expected: 13, got: 12 }] {
         assert!(format!("{error}").contains(':'), "{error}");
     }
+    let text = format!("{}", Crc { expected: 0x0504_0302, computed: 7 });
+    assert_eq!(text, "CRC = 0x05040302: expected 0x00000007, which the bytes give");
     let text = format!("{}", Length { kind: 4, expected: 13, got: 12 });
     assert_eq!(text, "length = 12 bytes: expected 13 for kind 0x04");
 }
@@ -265,7 +268,7 @@ proptest! {
         bytes in proptest::collection::vec(prop_oneof![3 => any::<u8>(), 1 => 0..4_u8], 0..400),
         message in any_message(),
     ) {
-        let mut decoder = Decoder::new();
+        let mut decoder = Decoder::default();
         for &byte in &bytes {
             // A decoder accepts only what an encoder would have sent.
             if let Some(Ok(found)) = decoder.push(byte) {

@@ -378,4 +378,24 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_brake_by_its_geometry_is_the_brake_of_its_gain() {
+        let ratio = 0.14 * 0.032 * 0.034 / (0.045 * 0.040);
+        let geometry = BrakeGeometry {
+            inner_radius: 0.045,
+            torque_constant: ratio,
+            pad_area: 0.040,
+            lever_area: 0.032,
+            armature_resistance: 1.0,
+            contact_radius: 0.034,
+        };
+        let of = |p| Actuator::<f64>::new(&ActuatorParams::Geometry(p));
+        let brake = of(geometry).unwrap();
+        assert!((brake.brake_gain() - 0.14).abs() < 1e-15 && brake.kind() == ActuatorKind::Brake);
+        assert_eq!((brake.torque(3.0), brake.motor_gain(), brake.preload()), (0.0, 0.0, 0.0));
+        // Lengths that are numbers, of a gain that is none.
+        let pointed = BrakeGeometry { contact_radius: 1e-300, lever_area: 1e-300, ..geometry };
+        assert_eq!(of(pointed).unwrap_err().field(), "contact_radius");
+    }
 }

@@ -244,6 +244,7 @@ impl<T> Surface<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::params::Choice;
     use crate::{FixedCounts, MotorActuator};
 
     const OUTPUT: OutputParams<f64> =
@@ -337,5 +338,61 @@ mod tests {
         let rates = (1..400).map(|k| servo.tick(&mut state, Counts(4 * k), &target(k)).tick.error_rate);
         let last = rates.last().unwrap();
         assert!((last - 1000.0 * servo.encoder().radians_per_count::<f64>()).abs() < 0.05, "{last} rad/s");
+    }
+
+    #[test]
+    fn laws_without_a_surface_have_none_and_computed_torque_knows_its_plant() {
+        let asked = Asked { velocity: 0.1, acceleration: 0.5, fastest: &|_| 1.0 };
+        let surfaces = LawParams::<f64>::all().map(|p| (p.name(), built(&p).surface(&asked).is_some()));
+        for (name, has) in surfaces {
+            assert_eq!(has, ["pd", "ctc", "smc", "smc_sign"].contains(&name), "{name}");
+        }
+        let p = CtcParams::<f64>::default();
+        let none = CtcParams { kp: 0.0, ..p };
+        assert!(built(&none.into()).surface(&asked).is_none(), "no slope, no surface");
+        let law = Ctc::new(&p, &PlantParams::default(), &OUTPUT, PERIOD).unwrap();
+        assert_eq!(law.model().params(), &PlantParams::default());
+        assert_eq!(ControlLaw::<f64>::term_names(&law), <Ctc<f64> as ControlLaw<f64>>::TERMS);
+    }
+
+    #[test]
+    fn computed_torque_of_a_motor_saturates_where_its_torque_ends() {
+        let motor = MotorActuator { gain: 0.05, preload: 0.3, load_share: 0.5 };
+        let model = PlantParams { actuator: motor.into(), drive_torque: -0.01, ..PlantParams::default() };
+        let output = OutputParams { lowest: -4.0, highest: 9.0, on_invalid: 0.0, bumpless_time: 0.0 };
+        let p = CtcParams::<f64>::default();
+        let law = Law::new(&p.into(), &model, &output, PERIOD).unwrap();
+        let asked = Asked { velocity: 0.1, acceleration: 0.5, fastest: &|_| 1.0 };
+        let surface = law.surface(&asked).unwrap();
+        assert!((surface.slope - p.kp / p.kd).abs() < 1e-12);
+        // 9 V with the friction of their own load, the drive, friction, inertia and drag, over J K K_d.
+        let (mu, m) = (0.2, &model);
+        let farther = 9.0 * 0.05 * (1.0 + mu * 0.5);
+        let torque = farther + 0.01 + mu * 0.3 + m.inertia * 0.5 + m.viscous_damping * 1.1;
+        let layer = torque / (m.inertia * p.outer_gain * p.kd);
+        assert!((surface.layer - layer).abs() < 1e-9 * layer, "{} instead of {layer}", surface.layer);
+    }
+
+    #[test]
+    fn computed_torque_of_a_brake_that_presses_by_itself_asks_for_less() {
+        let brake = |preload| crate::BrakeActuator { gain: 0.14, preload };
+        let volts = |preload: f64| {
+            let actuator = crate::ActuatorParams::Brake(brake(preload));
+            let model = PlantParams { actuator, ..PlantParams::default() };
+            let law = Law::new(&CtcParams::default().into(), &model, &OUTPUT, PERIOD).unwrap();
+            law.update(&mut law.start(&behind(0.0), 0.0), &behind(-1e-5)).voltage
+        };
+        // The same normal force: N_0 + K_COF u.
+        assert!((volts(0.0) - volts(0.07) - 0.5).abs() < 1e-9, "{} V, {} V", volts(0.0), volts(0.07));
+    }
+
+    #[test]
+    fn a_surface_of_a_two_sided_output_ends_at_the_nearer_limit() {
+        let one = Surface::affine(5.0, (0.0, 9.0), 3.0);
+        assert_eq!((one.kp, one.layer), (9.0, 3.0));
+        for limits in [(-6.0, 9.0), (-9.0, 6.0)] {
+            let two = Surface::affine(5.0, limits, 3.0);
+            assert_eq!((two.kp, two.layer, two.slope), (6.0, 3.0, 5.0));
+        }
     }
 }

@@ -176,4 +176,13 @@ mod tests {
         let at = |end: f64| levels.iter().filter(|u| **u == end).count();
         assert!(at(1.0) >= 10 && at(0.0) >= 10, "{levels:?}");
     }
+
+    #[test]
+    fn a_voltage_that_the_output_does_not_give_is_named() {
+        let output = OutputParams { lowest: 1.0, ..OutputParams::<f64>::default() };
+        for (start, end, field) in [(0.9, 5.0, "start"), (10.1, 5.0, "start"), (2.0, 0.9, "end"), (2.0, 10.1, "end")] {
+            let p = VoltageParams { start, end, rate: 1.0, ..VoltageParams::default() };
+            assert_eq!(Voltage::new(&p, &output, Micros(1000)).unwrap_err().field(), field, "{start} V, {end} V");
+        }
+    }
 }

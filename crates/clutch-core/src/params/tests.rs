@@ -70,6 +70,7 @@ fn who_only_looks_changes_nothing() {
         unchanged(&law);
     }
     unchanged(&PlantParams::<f64>::default());
+    unchanged(&Kinds::<f64>::default());
     unchanged(&VelocityParams::<f64>::default());
     unchanged(&LimitParams::<f64>::default());
     unchanged(&SafeState::<f64>::hold_then_release(5.0, 0.5));
@@ -103,6 +104,8 @@ crate::params! {
         share: T = 25.0, "share_percent" "x" PERCENT, Range::within(0.0, 100.0);
         /// It may be absent.
         absent: Option<T>, "absent_v" "" V, Range::at_least(-2e6).below(1e7);
+        /// It may be absent, and is 3 V by default.
+        given: Option<T> = 3.0, "given_mv" "" MV, Range::ANY;
         /// On or off.
         on: bool = true, "on" "" NONE, Range::ANY;
         /// A word.
@@ -116,9 +119,10 @@ crate::params! {
 fn a_parameter_that_may_be_absent_is_there_when_it_is_asked_for() {
     let mut kinds = Kinds::<f64>::default();
     assert_eq!((kinds.absent, kinds.share, kinds.on, kinds.kind), (None, 0.25, true, ActuatorKind::Motor));
+    assert_eq!(kinds.given, Some(3.0), "the struct's unit is the key's");
     let mut seen = Seen::default();
     kinds.edit(&mut seen);
-    assert_eq!((kinds.absent, seen.reals.len(), seen.words, seen.others), (None, 1, 1, 2));
+    assert_eq!((kinds.absent, seen.reals.len(), seen.words, seen.others), (None, 2, 1, 2));
     kinds.edit(&mut Seen { present: Some(true), ..Seen::default() });
     assert!(kinds.absent.is_some_and(f64::is_nan), "there, and not a number yet");
     assert_eq!(kinds.check().unwrap_err().field(), "absent");
@@ -170,7 +174,7 @@ fn each_kind_of_value_has_its_words() {
     let words = |kind, range: Range, unit: &Unit, si| range.words(kind, unit, si).to_string();
     assert_eq!(words(Kind::Switch, Range::ANY, &NONE, false), "true or false");
     assert_eq!(words(Kind::Text, Range::ANY, &NONE, false), "a text in quotes");
-    let row = Kinds::<f64>::TABLE.rows.get(3).unwrap();
+    let row = Kinds::<f64>::TABLE.rows.get(4).unwrap();
     assert_eq!(words(row.kind, row.range, &row.unit, false), "one of: brake, motor, both");
     let points = "a list of at least one pair [s, °] of finite numbers, with times that rise";
     assert_eq!(words(Kind::Points, Range::ANY, &S_DEG, false), points);
@@ -183,6 +187,8 @@ fn each_kind_of_value_has_its_words() {
         words(Kind::Real, Range::ANY.up_to(180.0), &DEG, true),
         format!("a finite number at most {} rad", core::f64::consts::PI)
     );
+    let halves = words(Kind::Real, Range::within(-10_000.5, 10_000.0), &NONE, false);
+    assert_eq!(halves, "a number from -10000.5 to 10 000");
     assert_eq!(words(Kind::Real, Range::within(0.0, 1.5e-3), &NONE, false), "a number from 0 to 0.0015");
     assert_eq!(
         words(Kind::Whole, Range::within(1.0, 1_002_003.0), &NONE, false),
@@ -292,6 +298,8 @@ fn an_error_tells_field_value_and_range_in_either_scalar() {
     assert_eq!(format!("{:?}", error.table), "DacParams");
     assert_eq!(error.table, cast.table);
     assert_eq!(error.table().map(|t| t.name), Some("DacParams"));
+    assert_eq!(TableRef::of::<f64, DacParams<f64>>(), error.table);
+    assert_ne!(TableRef::of::<f64, Kinds<f64>>(), error.table);
     // A row that a table does not have, as a foreign board might report it.
     let foreign = ParamError { row: 99, ..error };
     assert_eq!(foreign.to_string(), "row 99 of DacParams = 17: out of range");
@@ -308,4 +316,23 @@ fn actuators_of_each_kind_have_the_places_of_their_words() {
     }
     assert_eq!(ActuatorKind::named("break"), None);
     assert_eq!(ActuatorParams::<f64>::default().kind(), ActuatorKind::Brake);
+}
+
+#[test]
+fn points_are_counted_and_no_range_refuses_them() {
+    let knots =
+        [Knot { time_us: 0, position: FixedCounts(0) }, Knot { time_us: 1, position: FixedCounts(9) }];
+    let points: &[Knot] = &knots;
+    assert_eq!(Leaf::<f64>::number(&points), 2.0);
+    assert_eq!(Leaf::<f64>::outside(&points, &Range::above(5.0), &S_DEG), None);
+    assert_eq!(Leaf::<f64>::cast::<f32>(&points), points);
+    assert!(<&[Knot] as Leaf<f64>>::of((), &S_DEG).is_empty());
+}
+
+#[test]
+fn what_is_nested_is_checked_too() {
+    let mut bounds = Bounds::<f64>::around(&PlantParams::default(), &Tolerances::default()).unwrap();
+    assert!(Params::check(&bounds).is_ok());
+    bounds.friction.low = f64::NAN;
+    assert_eq!(Params::check(&bounds).unwrap_err().field(), "low");
 }
