@@ -527,4 +527,43 @@ mod tests {
         let t = Tolerances { friction: 1.0, ..Tolerances::default() };
         assert_eq!(Bounds::around(&PlantParams::default(), &t).unwrap_err().field(), "friction");
     }
+
+    #[test]
+    fn a_derivative_gain_below_its_need_and_a_path_faster_than_the_drive_are_told_apart() {
+        let sign = |kp, kd| {
+            let p = SmcSignParams { kp, kd, ..SmcSignParams::default() };
+            law(LawParams::SmcSign(p))
+        };
+        let exact = bounds(Tolerances::default());
+        // J f/(μ_d K_COF) = 0.119/0.021 = 5.67 V s/rad.
+        let needed = certify(&sign(3.0, 5.7), &exact, &at_2_deg_s()).unwrap();
+        assert!(needed.certified() && (needed.kd_required - 0.119 / 0.021).abs() < 1e-9);
+        let few = certify(&sign(3.0, 5.6), &exact, &at_2_deg_s()).unwrap();
+        assert_eq!(few.shortfall, Some(Shortfall::Kd));
+        assert_eq!(few.reaching_time(0.2), None, "what is not certified has no time");
+        // The weight gives 27.7 rad/s² and no more, however strong the brake.
+        for (acceleration, shortfall) in [(20.0, None), (28.0, Some(Shortfall::Drive))] {
+            let demand = Demand { acceleration, ..at_2_deg_s() };
+            let c = certify(&sign(9.0, 50.0), &exact, &demand).unwrap();
+            assert_eq!(c.shortfall, shortfall, "{acceleration} rad/s²");
+        }
+    }
+
+    #[test]
+    fn where_the_drive_does_not_catch_up_the_motor_beside_the_brake_does() {
+        let actuator = crate::BothActuator { brake_gain: 0.14, motor_gain: 0.05, preload: 0.0 };
+        let plant = PlantParams { actuator: actuator.into(), ..PlantParams::default() };
+        let output = OutputParams { lowest: -10.0, ..OutputParams::default() };
+        let p = LawParams::SmcSign(SmcSignParams { kp: 9.0, kd: 50.0, ..SmcSignParams::default() });
+        let law = Law::new(&p, &plant, &output, Micros(1000)).unwrap();
+        let bounds = Bounds::around(&plant, &Tolerances::default()).unwrap();
+        let at = |acceleration| {
+            let c = certify(&law, &bounds, &Demand { acceleration, ..at_2_deg_s() }).unwrap();
+            assert!(c.certified(), "{:?} at {acceleration} rad/s²", c.shortfall);
+            c.error_rate_behind
+        };
+        // The weight alone catches up with (27.7 − 20)/70 rad/s; beyond 27.7 rad/s² the motor helps with 9 V.
+        assert!((at(20.0) - (0.047088 / 0.0017 - 20.0) / 70.0).abs() < 0.01);
+        assert!(at(40.0) > 0.0);
+    }
 }

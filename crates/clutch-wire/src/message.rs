@@ -559,3 +559,11 @@ pub const SCHEMA: u64 = {
     }
     hash
 };
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_schema_writes_kinds_in_hexadecimal() {
+        assert_eq!([0, 9, 10, 15].map(super::digit), *b"09af");
+    }
+}

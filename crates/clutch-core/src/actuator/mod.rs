@@ -395,7 +395,9 @@ mod tests {
         assert!((brake.brake_gain() - 0.14).abs() < 1e-15 && brake.kind() == ActuatorKind::Brake);
         assert_eq!((brake.torque(3.0), brake.motor_gain(), brake.preload()), (0.0, 0.0, 0.0));
         // Lengths that are numbers, of a gain that is none.
-        let pointed = BrakeGeometry { contact_radius: 1e-300, lever_area: 1e-300, ..geometry };
-        assert_eq!(of(pointed).unwrap_err().field(), "contact_radius");
+        for size in [1e-300, 1e200] {
+            let extreme = BrakeGeometry { contact_radius: size, lever_area: size, ..geometry };
+            assert_eq!(of(extreme).unwrap_err().field(), "contact_radius", "{size}");
+        }
     }
 }

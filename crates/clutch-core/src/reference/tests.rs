@@ -389,6 +389,7 @@ fn each_bad_parameter_is_named() {
     }
     assert_eq!(field(minimum_jerk(1e6, 1e-3)), "duration"); // 1.9e9 rad/s at its middle
     assert_eq!(field(ReferenceParams::Chirp(Chirp { duration: 0.0, ..CHIRP })), "duration");
+    assert_eq!(field(ReferenceParams::Chirp(Chirp { duration: 4e-4, ..CHIRP })), "duration"); // no period
     for nyquist in [-0.1, 500.0] {
         assert_eq!(field(ReferenceParams::Sine(Sine { frequency: nyquist, ..SINE })), "frequency");
         assert_eq!(field(ReferenceParams::Chirp(Chirp { from: nyquist, ..CHIRP })), "from");
