@@ -1,21 +1,43 @@
 //! Fuzzing, with cargo-fuzz.
 
+use crate::proof::add_row;
 use crate::run::{Program, program, root};
 use anyhow::{Result, bail};
+use std::time::Instant;
 
 /// Targets in `fuzz/fuzz_targets`, each with the number of inputs that tests try, those of the corpus among them: as many as took 20 s.
 pub(crate) const TARGETS: [(&str, u32); 3] =
     [("decoder", 700_000), ("log", 110_000), ("board_controller", 7000)];
 
-/// Fuzzes every target for `seconds` each.
-pub(crate) fn all(seconds: u32) -> Result<()> {
+/// Fuzzes every target, or only one, for `seconds` each; or for so many executions, told in docs/proof.md.
+pub(crate) fn all(seconds: u32, executions: Option<u64>, only: Option<&str>) -> Result<()> {
     install()?;
-    for (target, _) in TARGETS {
-        if !one(target, &[&format!("-max_total_time={seconds}")])? {
-            bail!("fuzzing {target} found something: see above");
+    for (target, _) in TARGETS.iter().filter(|(t, _)| only.is_none_or(|o| o == *t)) {
+        match executions {
+            None if one(target, &[&format!("-max_total_time={seconds}")])? => {}
+            Some(executions) => counted(target, executions)?,
+            None => bail!("fuzzing {target} found something: see above"),
         }
     }
     Ok(())
+}
+
+/// Fuzzes one target in steps, so that a run that is ended early has told what it did.
+fn counted(target: &str, executions: u64) -> Result<()> {
+    const STEP: u64 = 10_000_000;
+    let (begun, mut done) = (Instant::now(), 0);
+    let mut held = true;
+    while held && done < executions {
+        let step = STEP.min(executions - done);
+        held = one(target, &[&format!("-runs={step}")])?;
+        done += step;
+        println!("{target}: {done} executions, {} s", begun.elapsed().as_secs());
+    }
+    let corpus = std::fs::read_dir(root().join("target/corpus").join(target))?.count();
+    let found = if held { "nothing" } else { "an input: see target/" };
+    let seconds = begun.elapsed().as_secs();
+    add_row("fuzz", &format!("| `{target}` | {done} | {seconds} s | {corpus} | {found} |"))?;
+    if held { Ok(()) } else { bail!("fuzzing {target} found something: see above") }
 }
 
 /// Fuzzes one target until `end`, options of libFuzzer; true if it held.

@@ -1,8 +1,12 @@
 //! The developer's verbs: `cargo xtask --help`. CI calls the same ones.
 
+mod coverage;
 mod firmware;
 mod fuzz;
+mod miri;
+mod mutants;
 mod product;
+mod proof;
 mod python;
 mod release;
 mod run;
@@ -68,7 +72,30 @@ enum Verb {
         /// Seconds for each target.
         #[arg(default_value_t = 60)]
         seconds: u32,
+        /// Executions for each target instead, in steps of 10 million; adds a row for each to docs/proof.md.
+        #[arg(long)]
+        executions: Option<u64>,
+        /// Only this target.
+        #[arg(long)]
+        target: Option<String>,
     },
+    /// Measures the coverage of core and wire by the tests of core, wire and node, and holds it against its floors; writes
+    /// the table of docs/proof.md. Installs cargo-llvm-cov.
+    Coverage,
+    /// Proves properties with a model checker and by trying every value, and sees the control of each fail; writes the table
+    /// of docs/proof.md. Needs wasm2c; unpacks CBMC of Debian 13 in target where there is none.
+    Prove {
+        /// Only these.
+        names: Vec<String>,
+    },
+    /// Tests the mutants of one shard of core, wire and node, and adds a row to docs/proof.md. Installs cargo-mutants.
+    Mutants {
+        /// Shard k of n, from 0/n on.
+        #[arg(long, default_value = "0/20")]
+        shard: String,
+    },
+    /// Runs the tests of core, wire and node in Miri, as on a machine of the other byte order; adds a row to docs/proof.md.
+    Miri,
     /// Runs the fault campaign. With the default seeds it rewrites the table of docs/safety.md.
     Campaign {
         /// Seeds; each gives about 180 runs.
@@ -151,7 +178,11 @@ fn main() -> Result<()> {
             let example = ["run", "--release", "--package", "clutch-sim", "--example", "calibrate", "--"];
             cargo(example).args(rest).run()
         }
-        Verb::Fuzz { seconds } => fuzz::all(seconds),
+        Verb::Fuzz { seconds, executions, target } => fuzz::all(seconds, executions, target.as_deref()),
+        Verb::Coverage => coverage::run(),
+        Verb::Prove { names } => proof::prove(&names),
+        Verb::Mutants { shard } => mutants::run(&shard),
+        Verb::Miri => miri::run(),
         Verb::Certified { runs } => certified(runs),
         Verb::Smooth => smooth(),
         Verb::Campaign { seeds, first } => campaign(seeds, first),
