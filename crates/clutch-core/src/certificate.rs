@@ -566,4 +566,26 @@ mod tests {
         assert!((at(20.0) - (0.047088 / 0.0017 - 20.0) / 70.0).abs() < 0.01);
         assert!(at(40.0) > 0.0);
     }
+
+    #[test]
+    fn a_layer_without_a_derivative_gain_weakens_nothing_and_lacks_it() {
+        let p = SmcParams { kd: 0.0, ..SmcParams::default() };
+        let c = certify(&law(LawParams::Smc(p)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
+        assert_eq!((c.kp_for_boundary, c.shortfall), (0.0, Some(Shortfall::Kd)));
+    }
+
+    #[test]
+    fn a_motor_whose_lower_limit_ends_too_soon_lacks_voltage() {
+        let motor = crate::MotorActuator { gain: 0.05, preload: 0.1, load_share: 0.0 };
+        let plant = PlantParams { actuator: motor.into(), ..PlantParams::default() };
+        let bounds = Bounds::around(&plant, &Tolerances::default()).unwrap();
+        let shortfall = |lowest| {
+            let output = OutputParams { lowest, on_invalid: 0.0, ..OutputParams::default() };
+            let p = LawParams::Smc(SmcParams { kp: 5.0, ..SmcParams::default() });
+            let law = Law::new(&p, &plant, &output, Micros(1000)).unwrap();
+            certify(&law, &bounds, &at_2_deg_s()).unwrap().shortfall
+        };
+        // The weight and friction take 0.047 + 0.02 N m of 0.05 N m/V.
+        assert_eq!((shortfall(-10.0), shortfall(-1.2)), (None, Some(Shortfall::Voltage)));
+    }
 }

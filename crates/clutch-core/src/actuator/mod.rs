@@ -400,4 +400,11 @@ mod tests {
             assert_eq!(of(extreme).unwrap_err().field(), "contact_radius", "{size}");
         }
     }
+
+    #[test]
+    fn actuators_of_different_kinds_are_not_one() {
+        let (one, other) = (motor(0.4), both());
+        assert_eq!(Actuator::in_lanes::<f64>(&|get| get(&one)), Some(one));
+        assert_eq!(Actuator::in_lanes::<f64>(&|get| 0.5 * (get(&one) + get(&other))), None);
+    }
 }

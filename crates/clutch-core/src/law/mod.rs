@@ -348,8 +348,9 @@ mod tests {
             assert_eq!(has, ["pd", "ctc", "smc", "smc_sign"].contains(&name), "{name}");
         }
         let p = CtcParams::<f64>::default();
-        let none = CtcParams { kp: 0.0, ..p };
-        assert!(built(&none.into()).surface(&asked).is_none(), "no slope, no surface");
+        for none in [CtcParams { kp: 0.0, ..p }, CtcParams { outer_gain: 0.0, ..p }] {
+            assert!(built(&none.into()).surface(&asked).is_none(), "no slope or no gain, no surface");
+        }
         let law = Ctc::new(&p, &PlantParams::default(), &OUTPUT, PERIOD).unwrap();
         assert_eq!(law.model().params(), &PlantParams::default());
         assert_eq!(ControlLaw::<f64>::term_names(&law), <Ctc<f64> as ControlLaw<f64>>::TERMS);
