@@ -435,4 +435,15 @@ mod tests {
         let brake = check_motor(&plant, &path, Tolerances::default(), (-0.2, 10.0)).unwrap_err();
         assert_eq!(brake.obstacle, Obstacle::Voltage);
     }
+
+    #[test]
+    fn friction_helps_a_motor_to_slow_the_shaft_down() {
+        let path = ReferenceParams::Trapezoid(Trapezoid { distance: 1.0, speed: 1.0, acceleration: 20.0 });
+        let e = check_motor(&motor(0.1, 0.0), &path, Tolerances::default(), (-10.0, 10.0)).unwrap();
+        // J a less the least friction μ_d N_0; the drag of 1 rad/s is gone at the end.
+        let least = (0.0017 * 20.0 - 0.15 * 0.1) / 0.05;
+        assert!((e.lowest_voltage + least).abs() < 0.03, "{} V instead of {} V", e.lowest_voltage, -least);
+        let most = (0.0017 * 20.0 + 0.2 * 0.1 + 0.001) / 0.05;
+        assert!((e.highest_voltage - most).abs() < 0.03, "{} V instead of {most} V", e.highest_voltage);
+    }
 }
