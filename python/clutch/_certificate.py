@@ -268,6 +268,8 @@ class Certificate(_Record):
             What of the scenario these verdicts do not cover; None if they cover it.
         scope : str or None
             The loop and the plants that they speak of.
+        any_law : bool
+            True if the bound is one with any inner law, by a shell.
         error_bound_rad : float or None
             Proven bound of the error, rad; None if there is none, or none was looked for.
         limiting_friction_sliding : tuple of float or None
@@ -294,6 +296,7 @@ class Certificate(_Record):
 
         not_covered: str | None
         scope: str | None
+        any_law: bool
         error_bound_rad: float | None
         limiting_friction_sliding: tuple[float, ...] | None
         cells: int | None

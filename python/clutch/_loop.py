@@ -32,7 +32,10 @@ class LoopResult:
     value : float
         The value that the check saw that ended it.
     certified : bool
-        True if the gains are certified for the scenario's bounds.
+        True if the gains are certified, in continuous time, for the scenario's bounds.
+    sampled : dict
+        The verdict on the error of the sampled loop: ``error_bound_rad``, ``verdict`` in words, with its scope, and
+        ``certificate``, the file. Without one file and bound are None.
     ticks : int
         Periods in which the law was asked.
     metrics : Metrics
@@ -79,6 +82,7 @@ class LoopResult:
     cause_text: str
     value: float
     certified: bool
+    sampled: dict[str, Any]
     ticks: int
     metrics: Metrics
     samples: dict[str, int]
@@ -121,6 +125,7 @@ def loop(
     baud: int | None = None,
     log: str | os.PathLike[str] | None = None,
     uncertified: bool = False,
+    certificate: str | os.PathLike[str] | None = None,
     patient: bool = False,
     strict: bool = False,
     faults: Sequence[str] = (),
@@ -157,6 +162,9 @@ def loop(
         Write an MCAP log to this new file.
     uncertified : bool, default False
         Run a law that is not certified for the scenario's bounds.
+    certificate : str or path, optional
+        Certificate of the sampled loop, as ``clutch certify --sampled --save`` writes it: it is checked, and that it is
+        this scenario's, before anything starts.
     patient : bool, default False
         The board at the port is a simulated one whose clock waits when this machine stalls, and so does the loop.
     strict : bool, default False
@@ -216,6 +224,7 @@ def loop(
         baud=baud,
         log=None if log is None else os.fspath(log),
         uncertified=uncertified,
+        certificate=_text(certificate),
         patient=patient,
         faults=list(faults),
         fault_seed=fault_seed,
@@ -245,5 +254,5 @@ def loop(
     )
 
 
-def _text(port: str | os.PathLike[str] | None) -> str | None:
-    return None if port is None else os.fspath(port)
+def _text(path: str | os.PathLike[str] | None) -> str | None:
+    return None if path is None else os.fspath(path)

@@ -52,6 +52,7 @@ __all__ = [
     "Runout",
     "Safety",
     "Sampling",
+    "Shell",
     "Sine",
     "SineDrive",
     "Smc",
@@ -1546,6 +1547,38 @@ class Output(_Params):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class Shell(_Params):
+    """A shell around the law, which gives the error a bound whatever the law is: with `σ = f e + ė` the brake
+    is full where `σ ≤ −S` and off where `σ ≥ S`; with a motor either drives back. Off by default.
+
+    Parameters
+    ----------
+    slope_1_s : float, default 100.0
+        Slope `f` of the shell's surface. The error stays within about `S/f` and a few counts. `f`: a finite
+        number above 0 1/s.
+    boundary_rad_s : float, default 0.0
+        Distance from the surface at which the shell acts; 0 switches the shell off. `S`: a finite number of
+        at least 0 rad/s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Shell().slope_1_s
+    100.0
+    """
+
+    _key: ClassVar[str] = "shell"
+
+    slope_1_s: float = 100.0
+    boundary_rad_s: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Hold(_Params):
     """Stays at the start.
 
@@ -2203,6 +2236,8 @@ class _Scenario(_Params):
         Source of the velocity that the law is given. By default `SmoothedDerivative()`.
     output : Output
         Limits of the voltage, bumpless start. By default `Output()`.
+    shell : Shell
+        The shell around the law. By default `Shell()`.
     reference : Hold, Ramp, Trapezoid, JerkLimited, MinimumJerk, Sine, Chirp or TablePath
         The path.
     sampling : Sampling
@@ -2237,6 +2272,7 @@ class _Scenario(_Params):
     law: Law
     velocity: Velocity = field(default_factory=SmoothedDerivative)
     output: Output = field(default_factory=Output)
+    shell: Shell = field(default_factory=Shell)
     reference: Reference
     sampling: Sampling = field(default_factory=Sampling)
     bounds: Bounds = field(default_factory=Bounds)

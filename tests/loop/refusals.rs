@@ -185,6 +185,47 @@ fn a_law_that_is_not_certified_is_not_run_unasked() {
 }
 
 #[test]
+fn a_loop_arms_on_its_own_certificate_and_not_on_anothers() {
+    let _guard = beside_others();
+    let folder = folder("certificate");
+    let file = folder.join("shell.json");
+    let file = file.to_str().unwrap();
+    // In continuous time these gains are refused above 15.8 °/s; as sampled they have a bound.
+    let gains = "law={pd={kp_v_rad=1660.0,kd_v_s_rad=12.9}}";
+    let sets = ["velocity.smoothed_derivative.smoothing=0.712", "reference.ramp.rate_deg_s=20.0"];
+    let with = |verb: &str, gains: &str, more: &[&str]| {
+        let mut args = vec![verb, "board_smc_2", "--set", gains, "--set", sets[0], "--set", sets[1]];
+        args.extend(more);
+        run(&args)
+    };
+    let said = ["as sampled: |e| stays below 0.17", "from rest", "NOT certified"];
+    let _ = with("certify", gains, &["--sampled", "--save", file]).expect(0).prints(&said);
+    let _ = with("loop", gains, &[]).expect(2).prints(&["not certified", "nothing was started"]);
+    let log = folder.join("run.mcap");
+    let more = ["--certificate", file, "--duration", "1.2", "--log", log.to_str().unwrap()];
+    let _ = with("loop", gains, &more).expect(0).prints(&[
+        "not certified in continuous time; certified as sampled",
+        "|e| below 0.17",
+        "as sampled: |e| stays below 0.17",
+        "ramp at 20 °/s, from rest",
+    ]);
+    let _ =
+        run(&["log", "info", log.to_str().unwrap()]).expect(0).prints(&["as_sampled: |e| stays below 0.17"]);
+    let done = with("loop", gains, &["--certificate", file, "--duration", "1.2", "--json"]).expect(0);
+    assert!(done.json()["sampled"]["error_bound_rad"].as_f64().is_some_and(|bound| bound < 0.003));
+
+    // Another gain, another certificate; and a file that is none.
+    let others = "law={pd={kp_v_rad=1661.0,kd_v_s_rad=12.9}}";
+    let told = ["the certificate is another loop's", "law: ", "1661", "1660", "Nothing was started"];
+    let _ = with("loop", others, &["--certificate", file]).expect(1).says(&told);
+    let broken = std::fs::read_to_string(file).unwrap().replacen("\"radii\":[", "\"radii\":[0.1,", 1);
+    std::fs::write(file, broken).unwrap();
+    let _ =
+        with("loop", gains, &["--certificate", file]).expect(1).says(&["the proof does not hold", "radii"]);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn a_scenario_without_a_safe_state_is_not_run() {
     let _guard = beside_others();
     let _ = run(&["loop", "smc_2"]).expect(1).says(&["safety"]);

@@ -1,8 +1,14 @@
 //! The paper's statements and the truth: each erratum with the run that shows it.
 
-use clutch_core::law::{Command, ControlLaw, LawParams, Limit, PdParams, SmcParams, SmcSignParams, Tick};
+use clutch_core::certificate::{Demand, certify};
+use clutch_core::law::{
+    Command, ControlLaw, Law, LawParams, Limit, PdParams, SmcParams, SmcSignParams, Tick,
+};
 use clutch_core::reference::ReferenceParams;
-use clutch_core::{Servo, StribeckParams};
+use clutch_core::{
+    Bounds, Micros, PlantParams, Servo, SmoothedDerivativeParams, StribeckParams, Tolerances, VelocityParams,
+};
+use clutch_sim::drive::{DriveParams, WeightDrive};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::{Keep, RigParams, RunSpec, Start, simulate, simulate_servo};
 
@@ -77,13 +83,68 @@ fn the_boundary_layer_weakens_the_damping_term_where_the_certificate_says_so() {
     let at_the_edge = Tick { error: (-boundary - rate) / slope, error_rate: rate, ..Tick::default() };
     let law = |kp| {
         let p = SmcParams { kp, ..SmcParams::<f64>::default() };
-        clutch_core::law::Smc::new(&p, &Default::default(), clutch_core::Micros(1000)).unwrap()
+        clutch_core::law::Smc::new(&p, &Default::default(), Micros(1000)).unwrap()
     };
     let volts = law(2.25).update(&mut Default::default(), &at_the_edge).voltage;
     let needed = 0.047088 / brake + c * rate.abs();
     assert!(volts < needed, "{volts} V against {needed} V: K_p = 2.25 V is not enough with the layer");
     let volts = law(2.2625).update(&mut Default::default(), &at_the_edge).voltage;
     assert!(volts >= needed, "{volts} V against {needed} V: the certificate's K_p is");
+}
+
+#[test]
+fn no_plant_leaves_a_layer_that_has_grown() {
+    let mut seed = 1_u64;
+    let mut between = |low: f64, high: f64| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * ((seed >> 11) as f64 / (1_u64 << 53) as f64)
+    };
+    let (mut certified, mut grown, mut nearest) = (0, 0, 0.0_f64);
+    for _ in 0..150 {
+        let model = PlantParams {
+            inertia: between(0.001, 0.003),
+            drive_torque: between(0.03, 0.06),
+            friction: StribeckParams {
+                mu_dynamic: 0.15,
+                mu_static: between(0.15, 0.25),
+                ..Default::default()
+            }
+            .into(),
+            ..PlantParams::default()
+        };
+        let slope = between(30.0, 90.0);
+        let kd = model.inertia * slope / 0.021 * between(1.0, 8.0);
+        // Between what the sign function needs and what the layer as given takes.
+        let share = (model.inertia * slope / 0.021).powi(2) / (4.0 * kd);
+        let kp = model.drive_torque / 0.021 + share * between(0.05, 1.0);
+        let p = SmcParams { kp, kd, slope, boundary: between(0.03, 0.15) };
+        let law = Law::new(&p.into(), &model, &Default::default(), Micros(100)).unwrap();
+        let bounds = Bounds::around(&model, &Tolerances::default()).unwrap();
+        let demand = Demand { velocity: 2.0_f64.to_radians(), ..Demand::default() };
+        let c = certify(&law, &Default::default(), &bounds, &demand).unwrap();
+        certified += usize::from(c.certified());
+        if !c.certified() || c.layer <= p.boundary {
+            continue;
+        }
+        grown += 1;
+        let rig = RigParams {
+            inertia: model.inertia,
+            friction: model.friction,
+            drive: DriveParams::Weight(WeightDrive {
+                mass: model.drive_torque / (9.81 * 0.024),
+                ..Default::default()
+            }),
+            ..RigParams::ideal()
+        };
+        let mut spec = RunSpec { model, period: Micros(100), ..ramp(rig, p.into()) };
+        spec.run.duration = 1.0;
+        spec.run.settle = 0.0;
+        spec.velocity = VelocityParams::SmoothedDerivative(SmoothedDerivativeParams { smoothing: 1.0 });
+        let seen = simulate::<f64>(&spec).unwrap().metrics.max_error_rad;
+        nearest = nearest.max(seen / c.error_bound);
+    }
+    assert!(certified > 100 && grown > 80, "{certified} certified, {grown} with a layer that has grown");
+    assert!((0.2..1.0).contains(&nearest), "the nearest is at {nearest} of its bound");
 }
 
 #[test]

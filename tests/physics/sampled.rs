@@ -1,11 +1,15 @@
 //! Certified bounds of the sampled loop against simulations, which share no code with them; `cargo xtask certified` is the large one.
 
+#[path = "../../crates/clutch-sim/examples/certified/adversary.rs"]
+mod adversary;
+
+use adversary::{Adversary, Way};
 use clutch_certificate::{Options, Setup, checker, largest, search, stability};
-use clutch_core::BrakeActuator;
 use clutch_core::friction::StribeckParams;
+use clutch_core::{BrakeActuator, Servo};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::run::simulate_watched;
-use clutch_sim::{Keep, Scenario};
+use clutch_sim::{Keep, RunSpec, Scenario, simulate_servo};
 use clutch_tests::command;
 use std::process::Command;
 
@@ -22,6 +26,11 @@ fn setup(scenario: &Scenario) -> Setup {
 
 /// The largest |e| of a plant of the box: the seed's lowest digits say which corner of `μ_d`, `μ_s` and `K_COF`.
 fn error(scenario: &Scenario, setup: &Setup, seed: u64) -> f64 {
+    let spec = spec(scenario, setup, seed);
+    simulate_watched::<f64>(&spec, Keep::Figures, UNWATCHED).unwrap().metrics.max_error_rad
+}
+
+fn spec<'a>(scenario: &'a Scenario, setup: &Setup, seed: u64) -> RunSpec<'a> {
     let share = |place: u32| (seed / 3_u64.pow(place) % 3) as f64 / 2.0;
     let of = |[low, high]: [f64; 2], place: u32| low + (high - low) * share(place);
     let mut spec = scenario.spec();
@@ -36,7 +45,7 @@ fn error(scenario: &Scenario, setup: &Setup, seed: u64) -> f64 {
     spec.run.seed = seed;
     spec.run.duration = 2.0;
     spec.run.settle = 0.0;
-    simulate_watched::<f64>(&spec, Keep::Figures, UNWATCHED).unwrap().metrics.max_error_rad
+    spec
 }
 
 #[test]
@@ -74,6 +83,51 @@ fn no_plant_of_a_box_breaks_its_certified_bound() {
         let bound = checker::check(&found.certificate).unwrap_or_else(|e| panic!("{e}")).error_bound;
         let seen = (0..54).map(|seed| error(&scenario, &setup, seed)).fold(0.0, f64::max);
         assert!(seen <= bound && bound < 3.0 * seen, "{name}: {seen} rad seen, {bound} certified");
+    }
+}
+
+#[test]
+fn whatever_law_is_within_a_shell_does_not_break_its_bound() {
+    for (slope, delay, friction, bar) in
+        [("100.0", "0", "0.0", 0.115), ("100.0", "0", "10.0", 0.13), ("50.0", "1", "0.0", 0.5)]
+    {
+        let scenario = scenario(
+            "pid_2",
+            &[
+                ("rig.base", "paper"),
+                ("rig.delay_ticks", delay),
+                ("bounds.friction_percent", friction),
+                ("velocity.smoothed_derivative.smoothing", "1.0"),
+                ("shell.slope_1_s", slope),
+                ("shell.boundary_rad_s", "0.1"),
+            ],
+        );
+        let sampled = scenario.sampled(&scenario.plan().unwrap().bounds);
+        assert!(sampled.any_law() && sampled.bound_suffices() && sampled.stability.is_none());
+        let setup = setup(&scenario);
+        let found = search(&setup, &Options { refinements: 0, ..Options::default() }, false);
+        assert!(found.complete(), "{slope}: {:?}", found.open);
+        let bound = checker::check(&found.certificate).unwrap_or_else(|e| panic!("{e}")).error_bound;
+        assert!(bound.to_degrees() <= bar, "{slope} 1/s: {}°", bound.to_degrees());
+        let mut worst = 0.0_f64;
+        for seed in 0..63 {
+            let mut spec = spec(&scenario, &setup, seed);
+            spec.run.duration = 1.5;
+            let way = Way::ALL[(seed % 7) as usize];
+            let law = Adversary { way, seed, highest: spec.output.highest, slope: spec.shell.slope };
+            let servo = Servo::with_law(&spec.servo().unwrap(), law).unwrap();
+            let seen = simulate_servo(&spec, &servo, Keep::Figures, UNWATCHED).unwrap().metrics.max_error_rad;
+            assert!(seen <= bound, "{slope} 1/s, {way:?}, seed {seed}: {seen} rad seen, {bound} certified");
+            worst = worst.max(seen);
+        }
+        assert!(bound < 2.0 * worst, "{slope} 1/s: {worst} rad seen, {bound} certified");
+        // Without the shell the worst law does not stay near.
+        let mut spec = spec(&scenario, &setup, 0);
+        spec.shell.boundary = 0.0;
+        let law = Adversary { way: Way::Nothing, seed: 0, highest: 10.0, slope: 100.0 };
+        let servo = Servo::with_law(&spec.servo().unwrap(), law).unwrap();
+        let run = simulate_servo(&spec, &servo, Keep::Figures, UNWATCHED).unwrap();
+        assert!(run.metrics.max_error_rad > 100.0 * bound);
     }
 }
 

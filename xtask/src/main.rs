@@ -274,6 +274,7 @@ fn figures() -> Result<()> {
 fn certified(runs: u64) -> Result<()> {
     let campaign = table_of("certified", &["campaign", &runs.to_string()])?;
     write_between("docs/certified.md", "campaign", &campaign)?;
+    write_between("docs/certified.md", "shell", &table_of("certified", &["shell"])?)?;
     write_between("docs/certified.md", "table", &table_of("certified", &["table"])?)
 }
 

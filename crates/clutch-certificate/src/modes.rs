@@ -268,6 +268,7 @@ mod tests {
         let laws = [
             Gains::Pd { kp: 5000.0, kd: 50.0 },
             Gains::Smc { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 },
+            Gains::Shell { slope: 100.0, boundary: 0.1 },
         ];
         let mut next = uniform(11);
         let mut seen = [0; 4];

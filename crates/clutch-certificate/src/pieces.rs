@@ -4,7 +4,7 @@
 //! inequalities in `m` and `z`, and two straight lines below and above the voltage.
 
 use crate::setup::{Gains, Strip};
-use crate::units::Units;
+use crate::units::{SURFACE_ROUNDING, Units};
 
 /// `m·m_weight + z·z_weight + constant`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,6 +57,7 @@ pub(crate) fn pieces(u: &Units, strips: &[Strip]) -> Vec<Piece> {
     match u.law {
         Gains::Pd { kp, kd } => pd(u, kp, kd),
         Gains::Smc { slope, .. } => smc(u, slope, strips),
+        Gains::Shell { slope, boundary } => shell(u, slope, boundary),
     }
 }
 
@@ -79,6 +80,23 @@ fn pd(u: &Units, kp: f64, kd: f64) -> Vec<Piece> {
             volts: [demand.plus(off, -1.0), demand.plus(off, 1.0)],
         },
         constant(u, 2, high, vec![above(high)]),
+    ]
+}
+
+fn shell(u: &Units, slope: f64, boundary: f64) -> Vec<Piece> {
+    let sigma = error(u).times(slope).plus(rate(u), 1.0);
+    let one = Line::constant(1.0);
+    let [low, high] = u.volts;
+    // Where the law rounds `σ` to the other side of an edge, either piece holds.
+    let (least, most) = (boundary - SURFACE_ROUNDING, boundary + SURFACE_ROUNDING);
+    let behind = sigma.times(-1.0).plus(one, least);
+    let ahead = sigma.plus(one, least);
+    let any = [Line::constant((low - u.volts_off).max(0.0)), Line::constant(high + u.volts_off)];
+    let inside = vec![sigma.plus(one, -most), sigma.times(-1.0).plus(one, -most)];
+    vec![
+        constant(u, 0, low, vec![behind]),
+        Piece { id: 1, within: inside, volts: any },
+        constant(u, 2, high, vec![ahead]),
     ]
 }
 
@@ -188,6 +206,12 @@ pub(crate) mod tests {
                 let sigma = slope * e + d;
                 -(kp * sat(sigma / boundary) + kd * sat(sigma * d / boundary) * d)
             }
+            Gains::Shell { slope, boundary } => {
+                let sigma = slope * e + d;
+                // Inside any law: one that jumps about.
+                let any = (1e4 * (m + 7.0 * z)).sin() * 6.0 + 5.0;
+                if sigma.abs() < boundary { any } else { -sigma * f64::INFINITY }
+            }
         };
         demand.clamp(u.volts[0], u.volts[1])
     }
@@ -200,6 +224,7 @@ pub(crate) mod tests {
             Gains::Smc { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 },
             Gains::Smc { kp: 12.0, kd: 3.0, slope: 50.0, boundary: 0.3 },
             Gains::Smc { kp: 2.0, kd: 0.0, slope: 50.0, boundary: 0.3 },
+            Gains::Shell { slope: 100.0, boundary: 0.1 },
         ];
         for law in laws {
             let u = Units::new(&Setup::paper(law), [0.15; 2], 2.0);

@@ -24,6 +24,11 @@ fn linear(u: &Units) -> (f64, f64) {
     match u.law {
         Gains::Pd { kp, kd } => (kp * u.count, kd * u.speed),
         Gains::Smc { kp, slope, boundary, .. } => (kp * slope / boundary * u.count, kp / boundary * u.speed),
+        // As if it went in a straight line from one end to the other.
+        Gains::Shell { slope, boundary } => {
+            let per = (u.volts[1] - u.volts[0]) / (2.0 * boundary);
+            (per * slope * u.count, per * u.speed)
+        }
     }
 }
 
@@ -93,8 +98,8 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
     }
     // What a saturated loop, or a steeper part of the law, leaves of the gains.
     let shares: &[f64] = match (u.law, form) {
-        (Gains::Pd { .. }, Form::Noise) => &[1.0, 0.8, 0.65, 0.5, 0.35, 0.25, 0.12],
-        (Gains::Pd { .. }, Form::Exact) => &[1.0, 0.7, 0.5, 0.35, 0.25],
+        (Gains::Pd { .. } | Gains::Shell { .. }, Form::Noise) => &[1.0, 0.8, 0.65, 0.5, 0.35, 0.25, 0.12],
+        (Gains::Pd { .. } | Gains::Shell { .. }, Form::Exact) => &[1.0, 0.7, 0.5, 0.35, 0.25],
         (Gains::Smc { .. }, _) => &[1.0, 2.0, 4.0, 0.5],
     };
     let middle = (u.brake[0] * u.brake[1]).sqrt();

@@ -137,6 +137,7 @@ const PATIENT: (Fineness, f64) = (Fineness { steps: 40, apart: 0.02 }, 0.0001);
 /// The best of the first attempts, or the first of the later ones that is proven.
 fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
     let (first, later): (&[_], &[_]) = match setup.law {
+        Gains::Shell { .. } => (&[(Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
         Gains::Pd { .. } => (&[(Form::Noise, LONG), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
         // (31) has hundreds of modes, times the counts of the exact form.
         Gains::Smc { .. } => (&[(Form::Noise, QUICK), (Form::Noise, USUAL)], &[(Form::Noise, PATIENT)]),
@@ -243,6 +244,7 @@ fn hopeless(u: &Units) -> f64 {
     let volts_per_count = match u.law {
         Gains::Pd { kp, .. } => kp * u.count,
         Gains::Smc { kp, slope, boundary, .. } => kp * slope / boundary * u.count,
+        Gains::Shell { slope, boundary } => u.volts[1] * slope / (2.0 * boundary) * u.count,
     };
     12.0 + 6.0 * u.drive[1] / u.brake[0] / volts_per_count.max(1e-6)
 }

@@ -121,6 +121,14 @@ pub enum Gains {
         /// `ε`, rad/s.
         boundary: f64,
     },
+    /// Whatever law within a shell: any voltage of the output's range while `|σ| < S`, the highest from `σ = −S` on, the
+    /// lowest from `σ = S` on.
+    Shell {
+        /// `f`, 1/s.
+        slope: f64,
+        /// `S`, rad/s.
+        boundary: f64,
+    },
 }
 
 /// Way in which the encoder's rounding is described.
@@ -171,7 +179,8 @@ pub enum Case {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModeId {
-    /// Number of the law's piece: 0 lets go; of PD 1 is straight and 2 full; of SMC 1 is the first strip.
+    /// Number of the law's piece: 0 lets go; of PD 1 is straight and 2 full, of a shell 1 is any and 2 full; of SMC 1 is
+    /// the first strip.
     pub piece: u32,
     /// The shaft.
     pub case: Case,

@@ -9,6 +9,8 @@ const LEFT: f64 = 7.0;
 pub(crate) const TARGET_STEP: f64 = 1.001 / 65536.0;
 /// Share of a law's rounding, in either scalar, in a voltage, V.
 pub(crate) const LAW_ROUNDING: f64 = 1e-4;
+/// Share of a shell's rounding, in either scalar, in `σ`, rad/s.
+pub(crate) const SURFACE_ROUNDING: f64 = 2e-5;
 
 /// Accelerations in counts per tick², speeds in counts per tick, voltages in V.
 #[derive(Clone, Debug)]

@@ -85,6 +85,10 @@ pub(crate) struct Loop {
     /// Runs a law that is not certified for the scenario's bounds.
     #[arg(long)]
     uncertified: bool,
+    /// Certificate of the sampled loop, as `clutch certify --sampled --save` writes it: it is checked, and that it is this
+    /// scenario's, before anything starts.
+    #[arg(long, value_name = "FILE.json")]
+    certificate: Option<PathBuf>,
     /// Cycles per second instead of sampling.period_us, Hz.
     #[arg(long, alias = "update_rate", value_name = "HZ")]
     update_rate: Option<f64>,
@@ -215,6 +219,7 @@ impl Loop {
             baud: self.baud,
             log: self.log.clone(),
             uncertified: self.uncertified,
+            certificate: self.certificate.clone(),
             realtime: RealtimeOptions {
                 thread_priority: self.thread_priority,
                 lock_memory: self.lock_memory,

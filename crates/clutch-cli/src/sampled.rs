@@ -1,10 +1,9 @@
 //! Verdicts on the sampled loop: the error bound, linear stability, sticks; each with its scope.
 
 use crate::output::paragraph;
-use crate::table::number;
 use anyhow::Context;
-use clutch_certificate::{Options, Setup, checker, file, search};
-use clutch_sim::scenario::Sampled;
+use clutch_certificate::{Options, checker, file, search};
+use clutch_sim::scenario::{CertificateError, Proven, Sampled};
 use serde_json::{Value, json as value};
 use std::path::Path;
 
@@ -15,7 +14,7 @@ pub(crate) enum Bound {
     /// The scenario has none.
     NotCovered(String),
     /// Proven and checked.
-    Proven { checked: checker::Checked, cells: usize },
+    Proven(Proven),
     /// Not proven, which does not mean unsafe.
     Open(String),
     /// Not looked for: the loop is linearly unstable.
@@ -29,7 +28,8 @@ impl Bound {
             Ok(setup) => setup,
             Err(why) => return Ok(Bound::NotCovered(why.to_string())),
         };
-        if sampled.stable() == Some(false) {
+        // A shell holds whatever law is within, stable or not.
+        if sampled.stable() == Some(false) && !sampled.any_law() {
             return Ok(Bound::Unstable);
         }
         let found = search(setup, &Options::default(), false);
@@ -48,39 +48,29 @@ impl Bound {
         if let Some(path) = save {
             file::write(path, &found.certificate)?;
         }
-        Ok(Bound::Proven { checked, cells: found.certificate.cells.len() })
+        Ok(Bound::Proven(Proven { checked, cells: found.certificate.cells.len() }))
     }
 
     /// Checks the proof of a file, and that it is this scenario's.
     pub(crate) fn of_file(sampled: &Sampled, path: &Path) -> anyhow::Result<Bound> {
-        let certificate = file::read(path)?;
-        let setup = match &sampled.setup {
-            Ok(setup) => setup,
-            Err(why) => return Ok(Bound::NotCovered(why.to_string())),
-        };
-        let others = setup.differences(&certificate.setup);
-        if !others.is_empty() {
-            anyhow::bail!(
-                "{}: the certificate is another loop's; scenario and file differ in\n  {}",
-                path.display(),
-                others.join("\n  ")
-            );
+        match sampled.proven_by(path) {
+            Ok(proven) => Ok(Bound::Proven(proven)),
+            Err(CertificateError::NotCovered(why)) => Ok(Bound::NotCovered(why.to_string())),
+            Err(refusal) => Err(refusal.into()),
         }
-        let checked = checker::check(&certificate).with_context(|| path.display().to_string())?;
-        Ok(Bound::Proven { checked, cells: certificate.cells.len() })
     }
 
     /// The bound on `|e|`, rad.
     pub(crate) fn proven(&self) -> Option<f64> {
         match self {
-            Bound::Proven { checked, .. } => Some(checked.error_bound),
+            Bound::Proven(proven) => Some(proven.checked.error_bound),
             _ => None,
         }
     }
 
     fn reason(&self) -> Option<String> {
         match self {
-            Bound::Proven { .. } => None,
+            Bound::Proven(_) => None,
             Bound::NotLookedFor => Some("not looked for".to_owned()),
             Bound::NotCovered(why) => Some(why.clone()),
             Bound::Open(cell) => Some(format!("not certified (not shown unsafe): {cell}")),
@@ -89,45 +79,11 @@ impl Bound {
     }
 }
 
-/// The plants and the loop that a bound speaks of.
-fn scope(s: &Setup) -> String {
-    let range = |[low, high]: [f64; 2]| {
-        if high - low <= 1e-12 * high { number(low) } else { format!("{} … {}", number(low), number(high)) }
-    };
-    let ticks = if s.delay_ticks == 1 { "tick" } else { "ticks" };
-    let mut out = format!(
-        "every {} µs, {} {ticks} of delay, {} counts/rev; ramp at {} °/s, {}; mu_d {}, mu_s {}{}; J {} kg m², T_u {} N m, K_COF {} N m/V",
-        number(1e6 * s.period_s),
-        s.delay_ticks,
-        s.counts_per_rev,
-        number(s.rate.to_degrees()),
-        if s.from_rest { "from rest" } else { "begun at its speed" },
-        range(s.sliding),
-        range(s.at_rest),
-        if s.rest_not_below_sliding { ", never below mu_d" } else { "" },
-        range(s.inertia),
-        range(s.drive_torque),
-        range(s.brake_gain),
-    );
-    if s.ripple > 0.0 {
-        out += &format!("; ±{} % along the disc and in time", number(100.0 * s.ripple));
-    }
-    if s.torque_noise > 0.0 {
-        out += &format!("; torque noise up to {} N m", number(s.torque_noise));
-    }
-    out
-}
-
 /// The verdicts, a paragraph each.
 pub(crate) fn lines(sampled: &Sampled, bound: &Bound) -> String {
-    let scope = sampled.setup.as_ref().map(scope).unwrap_or_default();
+    let scope = sampled.scope();
     let error = match bound {
-        Bound::Proven { checked, cells } => format!(
-            "|e| stays below {} °, proven in {cells} cells of mu_d, the weakest {:.4} … {:.4} [{scope}]",
-            number(checked.error_bound.to_degrees()),
-            checked.limiting[0],
-            checked.limiting[1]
-        ),
+        Bound::Proven(proven) => sampled.bound_line(proven),
         Bound::Open(cell) => format!("NOT certified (not shown unsafe): {cell} [{scope}]"),
         Bound::Unstable => {
             format!("NOT certified: the loop is linearly unstable, no bound is looked for [{scope}]")
@@ -153,16 +109,17 @@ pub(crate) fn lines(sampled: &Sampled, bound: &Bound) -> String {
 
 /// The same as an object.
 pub(crate) fn json(sampled: &Sampled, bound: &Bound) -> Value {
-    let checked = match bound {
-        Bound::Proven { checked, cells } => Some((checked, cells)),
+    let proven = match bound {
+        Bound::Proven(proven) => Some(proven),
         _ => None,
     };
     value!({
         "not_covered": sampled.setup.as_ref().err().map(ToString::to_string),
-        "scope": sampled.setup.as_ref().ok().map(scope),
+        "scope": sampled.setup.as_ref().ok().map(|_| sampled.scope()),
         "error_bound_rad": bound.proven(),
-        "limiting_friction_sliding": checked.map(|(c, _)| c.limiting),
-        "cells": checked.map(|(_, cells)| cells),
+        "limiting_friction_sliding": proven.map(|p| p.checked.limiting),
+        "any_law": sampled.any_law(),
+        "cells": proven.map(|p| p.cells),
         "reason": bound.reason(),
         "spectral_radius": sampled.stability.map(|radii| radii.map(|s| s.radius)),
         "stable": sampled.stable(),

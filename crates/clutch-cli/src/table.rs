@@ -1,7 +1,7 @@
 //! Plain tables for a terminal.
 
-pub(crate) use clutch_loop::summary::number;
 use clutch_sim::metrics::Figure;
+pub(crate) use clutch_sim::number;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
 
 /// Rows of name, value and unit, under a title.

@@ -19,7 +19,8 @@
 //!
 //! Four additions. The saturation of (31) weakens the `K_d` term to `K_d ė²` where
 //! `|ė| < 1 rad/s`, so that up to `(J_max f / μ_min K_min)² / (4 K_d)` volts of `f |ė|` fall to
-//! `K_p`. The voltage ends at `u_max`, which bounds `|ė|` on the ahead side too. A law that is
+//! `K_p`; where `K_p` has less to spare, the layer within which nothing is claimed is as many times thicker as it has too
+//! little. The voltage ends at `u_max`, which bounds `|ė|` on the ahead side too. A law that is
 //! affine in `σ` and saturates, as PD with `f = K_p/K_d` is and as CTC is, obeys the same two
 //! conditions outside the layer in which it does not saturate: with `u_max` in place of `K_p`.
 //! And the bounds on `|ė|` must keep holding: with `S` the larger of the layer and the start's
@@ -44,7 +45,7 @@
 
 use crate::actuator::ActuatorKind;
 use crate::bounds::Bounds;
-use crate::law::{Asked, Law, Surface};
+use crate::law::{Asked, Law, Shell, Surface};
 use crate::params::{Range, Table};
 use crate::{ParamError, Real};
 
@@ -93,7 +94,8 @@ pub enum Shortfall {
 pub struct Certificate<T = f64> {
     /// `f`: slope of the law's sliding surface, 1/s.
     pub slope: T,
-    /// Thickness of the layer around the surface in which nothing is claimed, rad/s.
+    /// Thickness of the layer around the surface in which nothing is claimed, rad/s: the law's, or more where `K_p` is short
+    /// of what (31) needs at the law's own.
     pub layer: T,
     /// Worst corner of the ahead side: inertia, kg m².
     pub worst_inertia: T,
@@ -128,7 +130,7 @@ pub struct Certificate<T = f64> {
     pub shortfall: Option<Shortfall>,
 }
 
-/// The sound certificate of a law over all plants within bounds.
+/// The sound certificate of a law over all plants within bounds; with a shell that of any law within it.
 ///
 /// ```
 /// use clutch_core::certificate::{Demand, certify};
@@ -138,7 +140,7 @@ pub struct Certificate<T = f64> {
 /// let params = LawParams::SmcSign(SmcSignParams::default());
 /// let law = Law::new(&params, &Beside::paper(&plant, &Default::default()))?;
 /// let bounds = Bounds::around(&plant, &Tolerances::default())?;
-/// let c = certify(&law, &bounds, &Demand::default())?;
+/// let c = certify(&law, &Default::default(), &bounds, &Demand::default())?;
 /// assert!((c.kp_required - 2.242286).abs() < 1e-6);
 /// assert!(c.shortfall.is_none()); // the paper's K_p is 3
 /// # Ok::<(), clutch_core::ParamError>(())
@@ -148,24 +150,26 @@ pub struct Certificate<T = f64> {
 /// A demand negative or not finite, by name.
 pub fn certify<T: Real>(
     law: &Law<T>,
+    shell: &Shell<T>,
     bounds: &Bounds<T>,
     demand: &Demand<T>,
 ) -> Result<Certificate<T>, ParamError<T>> {
     demand.check_rows()?;
     let sides = sides(bounds, demand, (law.output().lowest(), law.output().highest()));
+    let surface = |asked: &Asked<'_, T>| shell.surface().or_else(|| law.surface(asked));
     if bounds.actuator == ActuatorKind::Both {
         // Where the drive catches the shaft up by itself, the motor need not.
         let released = Side { gain: T::ZERO, highest: T::ZERO, ..sides.behind };
-        let alone = certify_sides(law, bounds, demand, Sides { behind: released, ..sides });
+        let alone = certify_sides(&surface, bounds, demand, Sides { behind: released, ..sides });
         if alone.certified() {
             return Ok(alone);
         }
     }
-    Ok(certify_sides(law, bounds, demand, sides))
+    Ok(certify_sides(&surface, bounds, demand, sides))
 }
 
 fn certify_sides<T: Real>(
-    law: &Law<T>,
+    surface: &dyn Fn(&Asked<'_, T>) -> Option<Surface<T>>,
     bounds: &Bounds<T>,
     demand: &Demand<T>,
     sides: Sides<T>,
@@ -176,7 +180,7 @@ fn certify_sides<T: Real>(
     let per_rate = |left: T, slope: T| if slope > T::ZERO { left / slope } else { T::ZERO };
     let ahead = |slope: T| per_rate((highest - base) * brake / inertia, slope);
     let asked = Asked { velocity: demand.velocity, acceleration: demand.acceleration, fastest: &ahead };
-    let surface = law.surface(&asked);
+    let surface = surface(&asked);
     let missing = surface.is_none();
     let Surface { slope, layer, kp, kd, weakened, .. } =
         surface.unwrap_or(Surface::affine(T::ZERO, (T::ZERO, highest), T::ONE));
@@ -184,13 +188,19 @@ fn certify_sides<T: Real>(
 
     // Ahead: the brake against the strongest drive.
     let kd_required = if kd.is_some() { inertia * slope / weakest } else { T::ZERO };
-    let kp_for_boundary = match kd {
+    let share = match kd {
         Some(kd) if weakened && kd > T::ZERO => kd_required * kd_required / (T::from_i32(4) * kd),
         _ => T::ZERO,
     };
     let accelerates = inertia * (demand.acceleration + demand.reach_rate);
     let pushes = if behind.gain > T::ZERO { (behind.load + accelerates) / behind.gain } else { T::ZERO };
-    let kp_required = base.max(pushes) + kp_for_boundary;
+    let needed = base.max(pushes);
+    let reached = if behind.gain > T::ZERO { highest.min(behind.highest) } else { highest };
+    // `L/ε` times as far off the surface the damping term is as many times as large, and its share as many times as small.
+    let spare = kp.min(reached) - needed;
+    let grows = spare > T::ZERO && spare < share;
+    let (layer, kp_for_boundary) = if grows { (layer * (share / spare), spare) } else { (layer, share) };
+    let kp_required = needed + kp_for_boundary;
     let reach_rate = |side: &Side<T>| {
         ((kp.min(side.highest) - kp_for_boundary) * side.gain - side.load) / inertia - demand.acceleration
     };
@@ -215,11 +225,11 @@ fn certify_sides<T: Real>(
 
     let shortfall = if missing {
         Some(Shortfall::Surface)
-    } else if kp < kp_required {
+    } else if !grows && kp < kp_required {
         Some(Shortfall::Kp)
     } else if kd.is_some_and(|kd| kd < kd_required) {
         Some(Shortfall::Kd)
-    } else if highest < kp_required || (behind.gain > T::ZERO && behind.highest < kp_required) {
+    } else if !grows && reached < kp_required {
         Some(Shortfall::Voltage)
     } else if error_rate_behind <= T::ZERO {
         Some(Shortfall::Drive)
@@ -353,13 +363,18 @@ mod tests {
         Bounds::around(&PlantParams::default(), &t).unwrap()
     }
 
+    /// Without a shell.
+    fn certify_alone(law: &Law<f64>, bounds: &Bounds, demand: &Demand) -> Result<Certificate, ParamError> {
+        certify(law, &Shell::default(), bounds, demand)
+    }
+
     fn at_2_deg_s() -> Demand {
         Demand { velocity: 2.0_f64.to_radians(), ..Demand::default() }
     }
 
     #[test]
     fn table_2_needs_2_2423_volts_and_follows_22_65_degrees_per_second_when_behind() {
-        let c = certify(
+        let c = certify_alone(
             &law(LawParams::SmcSign(SmcSignParams::default())),
             &bounds(Tolerances::default()),
             &at_2_deg_s(),
@@ -373,7 +388,7 @@ mod tests {
 
     #[test]
     fn the_boundary_layer_takes_another_fiftieth_of_a_volt() {
-        let c = certify(
+        let c = certify_alone(
             &law(LawParams::Smc(SmcParams::default())),
             &bounds(Tolerances::default()),
             &at_2_deg_s(),
@@ -385,11 +400,71 @@ mod tests {
         assert!((c.error_bound.to_degrees() - (0.1_f64 / 70.0).to_degrees()).abs() < 1e-12);
     }
 
+    /// `K_p` against the layer, the bound and the verdict, from 2.2 to 2.3 V.
+    #[test]
+    fn between_2_2423_and_2_2624_volts_the_layer_grows_without_a_cliff() {
+        let at = |kp: f64| {
+            let law = law(LawParams::Smc(SmcParams { kp, ..SmcParams::default() }));
+            certify_alone(&law, &bounds(Tolerances::default()), &at_2_deg_s()).unwrap()
+        };
+        let plain = at(2.3);
+        let edge = plain.kp_required;
+        let base = edge - plain.kp_for_boundary;
+        assert!((edge - 2.262356).abs() < 1e-5 && plain.layer == 0.1);
+        // `L = ε c²/(4 K_d (K_p − base))`, and both ends of the range.
+        for kp in [2.2500, 2.2550, 2.2600, 2.2622] {
+            let c = at(kp);
+            let layer = 0.1 * plain.kp_for_boundary / (kp - base);
+            assert!(c.certified() && (c.layer / layer - 1.0).abs() < 1e-9, "{kp} V: {c:?}");
+            assert!((c.error_bound - c.layer / 70.0).abs() < 1e-15);
+            assert!(c.kp_required <= kp + 1e-12 && c.reach_rate_possible.abs() < 1e-9);
+        }
+        // Continuous at the edge, and never larger with more volts.
+        assert!((at(edge - 1e-9).layer - at(edge + 1e-9).layer).abs() < 1e-7);
+        let mut last = f64::INFINITY;
+        let mut certified = false;
+        for k in 0..=10_000 {
+            let c = at(2.2 + 1e-5 * f64::from(k));
+            assert!(c.certified() || !certified, "lost again at {} V", c.kp_given);
+            if c.certified() {
+                // Between neighbours at most by their share of what is left.
+                let step = if last.is_finite() { last / c.error_bound } else { 1.0 };
+                assert!((1.0..1.004).contains(&step), "{} V: {step}", c.kp_given);
+                last = c.error_bound;
+            }
+            certified = c.certified();
+        }
+        assert!(certified);
+        // The largest layer that (D) lets pass is half the error rate that the brake follows.
+        assert_eq!(at(2.2440).shortfall, Some(Shortfall::Layer));
+        assert!(at(2.2455).certified() && at(2.2455).layer > 0.62);
+        assert_eq!(at(base).shortfall, Some(Shortfall::Kp));
+    }
+
+    #[test]
+    fn a_shell_has_the_certificate_of_whatever_law_is_within() {
+        use crate::ActuatorKind;
+        use crate::law::{HoldParams, ShellParams};
+        let output = OutputParams::default();
+        let around = |boundary: f64, p: LawParams| {
+            let p = (law(p), ShellParams { slope: 100.0, boundary });
+            let shell = Shell::new(&p.1, &output, ActuatorKind::Brake).unwrap();
+            certify(&p.0, &shell, &bounds(Tolerances::default()), &at_2_deg_s()).unwrap()
+        };
+        for inner in [LawParams::Ctc(CtcParams::default()), LawParams::Hold(HoldParams::default())] {
+            assert!(!around(0.0, inner).certified());
+            let c = around(0.1, inner);
+            assert!(c.certified() && (c.slope, c.layer, c.kp_given) == (100.0, 0.1, 10.0));
+        }
+        // 2 S must be below what the released shaft follows, 15.86 °/s, and the brake, 54.91 °/s.
+        assert_eq!(around(0.5, LawParams::Pd(PdParams::default())).shortfall, Some(Shortfall::Layer));
+    }
+
     #[test]
     fn twenty_per_cent_of_friction_and_brake_gain_ask_for_more_than_the_papers_kp() {
         let t = Tolerances { friction: 0.2, brake_gain: 0.2, drive_torque: 0.1, ..Tolerances::default() };
-        let c =
-            certify(&law(LawParams::SmcSign(SmcSignParams::default())), &bounds(t), &at_2_deg_s()).unwrap();
+        let c = certify_alone(&law(LawParams::SmcSign(SmcSignParams::default())), &bounds(t), &at_2_deg_s())
+            .unwrap();
         assert!((c.kp_required - 3.854).abs() < 5e-4);
         assert_eq!(c.shortfall, Some(Shortfall::Kp));
     }
@@ -407,26 +482,31 @@ mod tests {
         let weak = SmcParams { kp: 1.0, kd: 3.0, ..SmcParams::default() };
         let p = paper_conditions(&bounds(Tolerances::default()), &at_2_deg_s(), weak.kp, weak.slope);
         assert!(weak.kp > p.kp && weak.kd > p.kd);
-        let c = certify(&law(LawParams::Smc(weak)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
+        let c =
+            certify_alone(&law(LawParams::Smc(weak)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
         assert_eq!(c.shortfall, Some(Shortfall::Kp));
     }
 
     #[test]
     fn pd_saturates_0_2_rad_per_s_off_its_surface_which_bounds_its_error_to_0_115_degrees() {
-        let c =
-            certify(&law(LawParams::Pd(PdParams::default())), &bounds(Tolerances::default()), &at_2_deg_s())
-                .unwrap();
+        let c = certify_alone(
+            &law(LawParams::Pd(PdParams::default())),
+            &bounds(Tolerances::default()),
+            &at_2_deg_s(),
+        )
+        .unwrap();
         assert_eq!((c.slope, c.layer), (100.0, 0.2));
         assert!((c.error_bound.to_degrees() - 0.1146).abs() < 1e-4);
         assert!(c.certified());
         let no_kd = PdParams { kd: 0.0, ..PdParams::default() };
-        let c = certify(&law(LawParams::Pd(no_kd)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
+        let c =
+            certify_alone(&law(LawParams::Pd(no_kd)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
         assert_eq!(c.shortfall, Some(Shortfall::Surface));
     }
 
     #[test]
     fn ctc_saturates_too_far_off_its_surface_to_be_certified() {
-        let c = certify(
+        let c = certify_alone(
             &law(LawParams::Ctc(CtcParams::default())),
             &bounds(Tolerances::default()),
             &at_2_deg_s(),
@@ -443,11 +523,11 @@ mod tests {
     #[test]
     fn the_reaching_time_is_the_distance_over_the_rate() {
         let d = Demand { reach_rate: 5.0, ..at_2_deg_s() };
-        let c =
-            certify(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d).unwrap();
+        let c = certify_alone(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d)
+            .unwrap();
         assert!(c.certified());
         assert!((c.reaching_time(-1.1).unwrap() - 0.2).abs() < 1e-12);
-        let c = certify(
+        let c = certify_alone(
             &law(LawParams::Smc(SmcParams::default())),
             &bounds(Tolerances::default()),
             &at_2_deg_s(),
@@ -460,8 +540,8 @@ mod tests {
     fn a_start_from_rest_at_100_degrees_per_second_is_beyond_what_letting_go_can_follow() {
         let v = 100.0_f64.to_radians();
         let d = Demand { velocity: v, start_error_rate: v, ..Demand::default() };
-        let c =
-            certify(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d).unwrap();
+        let c = certify_alone(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d)
+            .unwrap();
         assert_eq!(c.shortfall, Some(Shortfall::Start));
     }
 
@@ -469,7 +549,7 @@ mod tests {
     fn pd_is_certified_up_to_15_8_degrees_per_second_and_smc_to_100() {
         let certified = |p: LawParams, rate: f64| {
             let d = Demand { velocity: rate.to_radians(), ..Demand::default() };
-            certify(&law(p), &bounds(Tolerances::default()), &d).unwrap().shortfall
+            certify_alone(&law(p), &bounds(Tolerances::default()), &d).unwrap().shortfall
         };
         // T − C v = J f v for the released shaft: v = T/(J f + C) = 0.2754 rad/s.
         let limit = (0.047088_f64 / (0.0017 * 100.0 + 0.001)).to_degrees();
@@ -485,7 +565,8 @@ mod tests {
         let both_ways = OutputParams { lowest: -10.0, on_invalid: 0.0, ..OutputParams::default() };
         let certified = |plant: &PlantParams, output: &OutputParams, smc: SmcParams| {
             let law = Law::new(&LawParams::Smc(smc), &Beside::paper(plant, output)).unwrap();
-            certify(&law, &Bounds::around(plant, &Tolerances::default()).unwrap(), &at_2_deg_s()).unwrap()
+            certify_alone(&law, &Bounds::around(plant, &Tolerances::default()).unwrap(), &at_2_deg_s())
+                .unwrap()
         };
         let smc = SmcParams { kp: 1.5, kd: 4.0, slope: 40.0, boundary: 0.3 };
         let c = certified(&motor, &both_ways, smc);
@@ -507,15 +588,16 @@ mod tests {
     #[test]
     fn a_slope_below_the_viscous_rate_is_not_certified() {
         let slow = SmcParams { slope: 0.5, ..SmcParams::default() };
-        let c = certify(&law(LawParams::Smc(slow)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
+        let c =
+            certify_alone(&law(LawParams::Smc(slow)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
         assert_eq!(c.shortfall, Some(Shortfall::Slope));
     }
 
     #[test]
     fn a_path_whose_velocity_jumps_on_the_way_is_not_certified() {
         let d = Demand { velocity_jump: 0.01, ..at_2_deg_s() };
-        let c =
-            certify(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d).unwrap();
+        let c = certify_alone(&law(LawParams::Smc(SmcParams::default())), &bounds(Tolerances::default()), &d)
+            .unwrap();
         assert_eq!(c.shortfall, Some(Shortfall::Jump));
     }
 
@@ -523,7 +605,10 @@ mod tests {
     fn bad_demands_and_tolerances_are_named() {
         let l = law(LawParams::Smc(SmcParams::default()));
         let bad = Demand { reach_rate: f64::NAN, ..Demand::default() };
-        assert_eq!(certify(&l, &bounds(Tolerances::default()), &bad).unwrap_err().field(), "reach_rate");
+        assert_eq!(
+            certify_alone(&l, &bounds(Tolerances::default()), &bad).unwrap_err().field(),
+            "reach_rate"
+        );
         let t = Tolerances { friction: 1.0, ..Tolerances::default() };
         assert_eq!(Bounds::around(&PlantParams::default(), &t).unwrap_err().field(), "friction");
     }
@@ -555,7 +640,7 @@ mod tests {
         let plant = PlantParams { actuator: actuator.into(), ..PlantParams::default() };
         let output = OutputParams { lowest: -10.0, ..OutputParams::default() };
         let p = LawParams::SmcSign(SmcSignParams { kp: 9.0, kd: 50.0, ..SmcSignParams::default() });
-        let law = Law::new(&p, &plant, &output, Micros(1000)).unwrap();
+        let law = Law::new(&p, &Beside::paper(&plant, &output)).unwrap();
         let bounds = Bounds::around(&plant, &Tolerances::default()).unwrap();
         let at = |acceleration| {
             let c = certify(&law, &bounds, &Demand { acceleration, ..at_2_deg_s() }).unwrap();
@@ -582,7 +667,7 @@ mod tests {
         let shortfall = |lowest| {
             let output = OutputParams { lowest, on_invalid: 0.0, ..OutputParams::default() };
             let p = LawParams::Smc(SmcParams { kp: 5.0, ..SmcParams::default() });
-            let law = Law::new(&p, &plant, &output, Micros(1000)).unwrap();
+            let law = Law::new(&p, &Beside::paper(&plant, &output)).unwrap();
             certify(&law, &bounds, &at_2_deg_s()).unwrap().shortfall
         };
         // The weight and friction take 0.047 + 0.02 N m of 0.05 N m/V.

@@ -1,14 +1,14 @@
 //! The servo: encoder counts and target in, DAC code and terms out.
 //!
 //! ```text
-//! counts ─► unwrap ─► e ─┬──────────► law ─► limits ─► DAC code
+//! counts ─► unwrap ─► e ─┬──────────► law ─► limits ─► shell ─► DAC code
 //! target ───────────────┴─► ė (5) ──┘
 //! ```
 //!
 //! The same type runs in the simulator, in the loop on Linux and on a board. It owns no clock
 //! and no I/O.
 
-use crate::law::{Beside, Command, ControlLaw, Law, LawParams, OutputParams, Seen, Tick};
+use crate::law::{Beside, Command, ControlLaw, Law, LawParams, OutputParams, Seen, Shell, ShellParams, Tick};
 use crate::velocity::{VelocityParams, VelocitySource, VelocityState};
 use crate::{
     Arithmetic, Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros, ParamError, Plant,
@@ -32,6 +32,8 @@ pub struct ServoParams<T = f64> {
     pub law: LawParams<T>,
     /// Output limits and bumpless start.
     pub output: OutputParams<T>,
+    /// The shell around the law.
+    pub shell: ShellParams<T>,
 }
 
 impl<T: Real> ServoParams<T> {
@@ -46,6 +48,7 @@ impl<T: Real> ServoParams<T> {
             model: PlantParams::default(),
             law,
             output: OutputParams::default(),
+            shell: ShellParams::default(),
         }
     }
 }
@@ -62,6 +65,7 @@ impl<T: Real> ServoParams<T> {
             model: self.model.cast(),
             law: self.law.cast(),
             output: self.output.cast(),
+            shell: self.shell.cast(),
         }
     }
 
@@ -98,6 +102,7 @@ impl<T: Real> ServoParams<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Servo<T, C = Law<T>> {
     law: C,
+    shell: Shell<T>,
     velocity: VelocitySource<T>,
     encoder: Encoder,
     dac: Dac<T>,
@@ -146,7 +151,7 @@ impl<T: Real> Servo<T> {
 }
 
 impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
-    /// A servo around a law of your own; `p.law` and `p.output` are not used.
+    /// A servo around a law of your own; `p.law` is not used, and `p.output` by the shell alone.
     ///
     /// # Errors
     /// The first parameter out of range, by name.
@@ -154,6 +159,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         let model = Plant::new(&p.model)?;
         Ok(Servo {
             law,
+            shell: Shell::new(&p.shell, &p.output, p.model.actuator.kind())?,
             velocity: VelocitySource::new(&p.velocity, &model, p.encoder, p.period)?,
             encoder: p.encoder,
             dac: Dac::new(&p.dac)?,
@@ -237,7 +243,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         let error_rate = self.velocity.update(&mut state.velocity, position, target, state.applied);
         let tick = self.measure(position, target, error_rate);
         self.law.sees(&mut state.law, &Seen { position, applied: state.applied });
-        let command = self.law.update(&mut state.law, &tick);
+        let command = self.shell.around(self.law.update(&mut state.law, &tick), &tick);
         let code = self.dac.code(command.voltage);
         state.applied = self.dac.volts(code);
         ServoOutput { code, voltage: state.applied, tick, command }

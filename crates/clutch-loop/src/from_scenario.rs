@@ -25,11 +25,12 @@ pub fn config_hash(scenario: &Scenario) -> u64 {
     fnv1a(&scenario.canonical())
 }
 
-/// Hash of what decides the law's answers: law, model, velocity, output, sampling, encoder,
+/// Hash of what decides the law's answers: law, model, velocity, output, shell, sampling, encoder,
 /// converter. Two logs with the same hash come from the same law.
 #[must_use]
 pub fn law_hash(scenario: &Scenario) -> u64 {
-    let tables = ["law.", "model.", "velocity.", "output.", "sampling.", "rig.encoder.", "rig.dac."];
+    let tables =
+        ["law.", "model.", "velocity.", "output.", "shell.", "sampling.", "rig.encoder.", "rig.dac."];
     let mut text = String::new();
     for (key, value) in scenario.parameters() {
         if tables.iter().any(|t| key.starts_with(t)) {

@@ -65,8 +65,8 @@ impl LockstepSession {
         let single = from_scenario::in_single_precision(&scenario)?;
         let changed = single.is_some();
         let scenario = single.unwrap_or(scenario);
-        let plan = session::check(&scenario, options.uncertified, options.log.as_deref())?;
-        let certified = plan.certificate.certified();
+        let cleared = session::check(&scenario, None, options.uncertified, options.log.as_deref())?;
+        let certified = cleared.plan.certificate.certified();
         Ok(LockstepSession { scenario, options, certified, changed })
     }
 

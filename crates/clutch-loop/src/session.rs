@@ -14,15 +14,15 @@ use crate::realtime::{RealtimeOptions, WaitMode, describe_system};
 use crate::sim_board::{PATIENT_BOARD, STRICT_BOARD};
 use crate::sim_board_server::{ServeError, ServeOptions, ServeReport, serve};
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, ControllerStation, HOST_SILENCE, HostStation, Station};
-use crate::summary::{LogSummary, Summary, number};
+use crate::summary::{LogSummary, SampledSummary, Summary};
 use crate::to_log::PRESENT_CODE;
 use crate::watch::Watch;
 use clutch_core::law::Law;
 use clutch_core::{ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState};
 use clutch_log::{LogError, Source};
 use clutch_node::{ControllerNode, HostNode, present_code};
-use clutch_sim::scenario::{Plan, ScalarKind};
-use clutch_sim::{Scenario, ScenarioError};
+use clutch_sim::scenario::{CertificateError, Plan, Proven, Sampled, ScalarKind};
+use clutch_sim::{Scenario, ScenarioError, number};
 use clutch_wire::{Actuate, ControllerHello, Hello, Sample, Telemetry};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -72,6 +72,8 @@ pub struct SessionOptions {
     pub patient: bool,
     /// True if gains may run that are not certified for the scenario's bounds.
     pub uncertified: bool,
+    /// A saved certificate of the sampled loop, which is checked before anything else.
+    pub certificate: Option<PathBuf>,
     /// Priority, memory, core, wait.
     pub realtime: RealtimeOptions,
     /// The event that starts a cycle.
@@ -89,6 +91,7 @@ impl Default for SessionOptions {
             log: None,
             patient: false,
             uncertified: false,
+            certificate: None,
             realtime: RealtimeOptions::default(),
             pace: Pace::default(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -107,12 +110,20 @@ pub enum SessionError {
     Build(#[from] BuildError),
     /// The gains are not certified, and were not asked for all the same.
     #[error(
-        "{scenario}: the gains are not certified, in continuous time, for these bounds and this path, so nothing was started."
+        "{scenario}: the gains are not certified, in continuous time{}, for these bounds and this path, so nothing was started.",
+        if *.unstable { ", and the sampled loop is linearly unstable" } else { "" }
     )]
     NotCertified {
         /// The scenario's name.
         scenario: String,
+        /// True if there is a bound of the sampled loop, which is linearly unstable.
+        unstable: bool,
     },
+    /// The sampled loop's certificate is none of this scenario's.
+    #[error(
+        "{0}\nNothing was started; `clutch certify SCENARIO --sampled --save FILE.json` makes a certificate"
+    )]
+    Certificate(#[from] CertificateError),
     /// A log is never written over: it may be the only record of a run.
     #[error("{}: exists already; name a new file for the log", path.display())]
     LogExists {
@@ -148,20 +159,52 @@ fn system(what: &'static str) -> impl Fn(std::io::Error) -> SessionError {
     move |error| SessionError::System { what, error }
 }
 
-/// The plan of a scenario for a run on a board: there is a safe state, a brake can follow the path, the gains are
-/// certified or uncertified ones were asked for, and the log is a new file.
+/// A scenario that may run on a board.
+#[derive(Clone, Debug)]
+pub struct Cleared {
+    /// Path and gains against the bounds.
+    pub plan: Plan,
+    /// Verdicts on the sampled loop.
+    pub sampled: Sampled,
+    /// The bound of its error, if a certificate was given.
+    pub proven: Option<Proven>,
+}
+
+impl Cleared {
+    /// The verdict on the error of the sampled loop with its scope, for log and summary.
+    #[must_use]
+    pub fn bound_line(&self) -> String {
+        match &self.proven {
+            Some(proven) => self.sampled.bound_line(proven),
+            None => "the bound of the error is uncertified: no certificate was given".to_owned(),
+        }
+    }
+}
+
+/// Checks a scenario for a run on a board: there is a safe state, a brake can follow the path, a certificate that is given
+/// holds and is the scenario's, the gains are certified, by it or in continuous time, or uncertified ones were asked for, and
+/// the log is a new file.
 ///
 /// # Errors
 /// The first of these that does not hold.
-pub fn check(scenario: &Scenario, uncertified: bool, log: Option<&Path>) -> Result<Plan, SessionError> {
+pub fn check(
+    scenario: &Scenario,
+    certificate: Option<&Path>,
+    uncertified: bool,
+    log: Option<&Path>,
+) -> Result<Cleared, SessionError> {
     scenario.safety()?;
     let plan = scenario.plan()?;
-    if !plan.certificate.certified() && !uncertified {
-        return Err(SessionError::NotCertified { scenario: scenario.name().to_owned() });
+    let sampled = scenario.sampled(&plan.bounds);
+    let proven = certificate.map(|path| sampled.proven_by(path)).transpose()?;
+    let certified = plan.certificate.certified() || (proven.is_some() && sampled.bound_suffices());
+    if !certified && !uncertified {
+        let unstable = proven.is_some();
+        return Err(SessionError::NotCertified { scenario: scenario.name().to_owned(), unstable });
     }
     match log {
         Some(path) if path.exists() => Err(SessionError::LogExists { path: path.to_owned() }),
-        _ => Ok(plan),
+        _ => Ok(Cleared { plan, sampled, proven }),
     }
 }
 
@@ -219,7 +262,7 @@ pub enum Event {
 pub struct Session {
     scenario: Scenario,
     options: SessionOptions,
-    plan: Plan,
+    cleared: Cleared,
     /// The change made in the scenario for the board's sake.
     note: Option<String>,
 }
@@ -237,14 +280,15 @@ impl Session {
         };
         let note = single.as_ref().map(|_| from_scenario::SINGLE_PRECISION.to_owned());
         let scenario = single.unwrap_or(scenario);
-        let plan = check(&scenario, options.uncertified, options.log.as_deref())?;
-        Ok(Session { scenario, options, plan, note })
+        let (certificate, log) = (options.certificate.as_deref(), options.log.as_deref());
+        let cleared = check(&scenario, certificate, options.uncertified, log)?;
+        Ok(Session { scenario, options, cleared, note })
     }
 
-    /// True if the gains are certified for the scenario's bounds.
+    /// True if the gains are certified, in continuous time, for the scenario's bounds.
     #[must_use]
     pub fn certified(&self) -> bool {
-        self.plan.certificate.certified()
+        self.cleared.plan.certificate.certified()
     }
 
     /// True if the board's clock waits for this machine. What the board says of itself decides nothing here: a real one
@@ -293,6 +337,7 @@ impl Session {
             scenario: self.scenario.name().to_owned(),
             version: self.options.version.clone(),
             certified: self.certified(),
+            sampled: SampledSummary::new(&self.cleared, self.options.certificate.as_deref()),
             stopped: stop.load(Ordering::Relaxed),
             faults,
             report,
@@ -480,7 +525,8 @@ impl Course<'_> {
     }
 
     fn announcement(&self, hello: &Hello, kind: DeviceKind) -> Result<Announcement, SessionError> {
-        let Session { scenario, plan, .. } = self.session;
+        let Session { scenario, cleared, .. } = self.session;
+        let plan = &cleared.plan;
         let (spec, safety) = (scenario.spec(), scenario.safety()?);
         let safe = match safety.on_fault {
             SafeState::Hold(SafeHold { volts }) => format!("hold with {} V", number(volts)),
@@ -503,6 +549,8 @@ impl Course<'_> {
         let fastest = number(plan.envelope.velocity.to_degrees());
         let gains = if self.session.certified() {
             "certified in continuous time for the bounds given"
+        } else if cleared.proven.is_some() && cleared.sampled.bound_suffices() {
+            "not certified in continuous time; certified as sampled"
         } else {
             "NOT certified in continuous time; run all the same, as asked"
         };
@@ -518,7 +566,7 @@ impl Course<'_> {
             ),
             ("path", format!("{} s, up to {fastest} °/s", number(spec.run.duration))),
             ("gains", gains.to_owned()),
-            ("as sampled", scenario.sampled(&plan.bounds).short_line()),
+            ("as sampled", cleared.sampled.short_line(cleared.proven.as_ref())),
             ("safe state", format!("{safe}: {}", safety.reason.0)),
             ("watchdog", format!("{} cycles on the board", safety.limits.watchdog_cycles)),
         ];
@@ -552,6 +600,7 @@ impl Course<'_> {
         header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
         header.extra.push(("board".to_owned(), board.to_owned()));
         header.extra.push(("certified".to_owned(), self.session.certified().to_string()));
+        header.extra.push(("as_sampled".to_owned(), self.session.cleared.bound_line()));
         let (thread, ring) = LogThread::start(path, &header, watch.clone())?;
         Ok(Logging { thread: Some(thread), ring: Some(ring), watch })
     }

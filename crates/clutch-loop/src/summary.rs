@@ -3,21 +3,12 @@
 use crate::control_loop::LoopReport;
 use crate::preflight;
 use crate::realtime::CycleSummary;
+use crate::session::Cleared;
 use crate::sim_board_server::ServeReport;
 use clutch_core::supervisor::{Cause, State};
+use clutch_sim::number;
 use serde_json::{Value, json};
-use std::path::PathBuf;
-
-/// A number with about five significant digits.
-#[must_use]
-pub fn number(x: f64) -> String {
-    if x == 0.0 {
-        return "0".into();
-    }
-    let digits = (4.0 - x.abs().log10().floor()).clamp(0.0, 12.0) as usize;
-    let text = format!("{x:.digits$}");
-    if digits == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
-}
+use std::path::{Path, PathBuf};
 
 /// The verdict on the end of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +36,29 @@ impl Verdict {
     }
 }
 
+/// The verdict on the error of the sampled loop.
+#[derive(Clone, Debug)]
+pub struct SampledSummary {
+    /// Bound on `|e|`, if a certificate was given, rad.
+    pub error_bound: Option<f64>,
+    /// The verdict in words, with its scope.
+    pub verdict: String,
+    /// The certificate's file.
+    pub certificate: Option<PathBuf>,
+}
+
+impl SampledSummary {
+    /// The verdict of what was checked before the run.
+    #[must_use]
+    pub fn new(cleared: &Cleared, certificate: Option<&Path>) -> Self {
+        SampledSummary {
+            error_bound: cleared.proven.as_ref().map(|proven| proven.checked.error_bound),
+            verdict: cleared.bound_line(),
+            certificate: certificate.map(Path::to_owned),
+        }
+    }
+}
+
 /// The fate of a session's log.
 #[derive(Clone, Debug)]
 pub struct LogSummary {
@@ -61,8 +75,10 @@ pub struct Summary {
     pub scenario: String,
     /// Version and commit of the build.
     pub version: String,
-    /// True if the gains are certified for the scenario's bounds.
+    /// True if the gains are certified, in continuous time, for the scenario's bounds.
     pub certified: bool,
+    /// The verdict on the error of the sampled loop.
+    pub sampled: SampledSummary,
     /// True if somebody here has stopped it.
     pub stopped: bool,
     /// Faults that were asked for.
@@ -104,7 +120,7 @@ impl Summary {
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let r = &self.report;
-        let mut lines = Vec::new();
+        let mut lines = vec![format!("as sampled: {}", self.sampled.verdict)];
         if r.clock_hz > 0 {
             let us = |cycles: u64| number(cycles as f64 * 1e6 / f64::from(r.clock_hz));
             let c = &r.tick_cycles;
@@ -195,6 +211,11 @@ impl Summary {
             "cause_text": self.cause_text(),
             "value": r.value,
             "certified": self.certified,
+            "sampled": {
+                "error_bound_rad": self.sampled.error_bound,
+                "verdict": self.sampled.verdict,
+                "certificate": self.sampled.certificate,
+            },
             "ticks": r.ticks,
             "metrics": r.metrics,
             "samples": {

@@ -44,7 +44,7 @@ fn what_can_be_refused_without_a_board_is_refused_before_one_is_looked_for() {
     let refused = |scenario, options| Session::new(scenario, options).unwrap_err();
     let weak = scenario("board_smc_2", &[("law.smc.kp_v", "0.1")]);
     let refusal = refused(weak.clone(), options.clone());
-    assert!(matches!(&refusal, SessionError::NotCertified { scenario } if *scenario == weak.name()));
+    assert!(matches!(&refusal, SessionError::NotCertified { scenario, .. } if *scenario == weak.name()));
     let asked_for = Session::new(weak, SessionOptions { uncertified: true, ..options.clone() }).unwrap();
     assert!(!asked_for.certified());
 

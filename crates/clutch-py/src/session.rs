@@ -53,7 +53,7 @@ fn error(py: Python<'_>, scenario: &Scenario, e: &SessionError) -> PyErr {
 /// changed for the board's sake.
 #[pyfunction]
 #[pyo3(signature = (
-    scenario, *, port, board, baud, log, uncertified, patient, faults, fault_seed, strict, pace, wait, spin_us, thread_priority,
+    scenario, *, port, board, baud, log, uncertified, certificate, patient, faults, fault_seed, strict, pace, wait, spin_us, thread_priority,
     lock_memory, cpu_affinity
 ))]
 #[allow(
@@ -68,6 +68,7 @@ pub(crate) fn run_loop<'py>(
     baud: Option<u32>,
     log: Option<PathBuf>,
     uncertified: bool,
+    certificate: Option<PathBuf>,
     patient: bool,
     faults: Vec<String>,
     fault_seed: u64,
@@ -100,6 +101,7 @@ pub(crate) fn run_loop<'py>(
         log,
         patient,
         uncertified,
+        certificate,
         realtime: RealtimeOptions {
             thread_priority,
             lock_memory,

@@ -5,6 +5,7 @@ pub mod engine;
 pub mod friction_lab;
 pub mod metrics;
 pub mod moving_rig;
+mod number;
 pub mod paper;
 pub mod progress;
 pub mod reaching;
@@ -19,6 +20,7 @@ mod tables;
 
 pub use metrics::Metrics;
 pub use moving_rig::MovingRig;
+pub use number::number;
 pub use rig::RigParams;
 pub use run::{Keep, Run, RunError, RunParams, RunSpec, Start, simulate, simulate_servo};
 pub use scenario::{Scenario, ScenarioError};

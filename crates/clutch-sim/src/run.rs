@@ -6,7 +6,7 @@ use crate::moving_rig::MovingRig;
 use crate::progress::{Progress, Report, UNWATCHED};
 use crate::rig::{Rig, RigParams};
 use clutch_core::friction::FrictionModel;
-use clutch_core::law::{ControlLaw, LawParams, Limit, OutputParams, Terms};
+use clutch_core::law::{ControlLaw, LawParams, Limit, OutputParams, ShellParams, Terms};
 use clutch_core::params::{Range, Table};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
@@ -105,6 +105,8 @@ pub struct RunSpec<'a> {
     pub law: LawParams,
     /// Output limits and bumpless start.
     pub output: OutputParams,
+    /// The shell around the law.
+    pub shell: ShellParams,
     /// The path.
     pub reference: ReferenceParams<'a>,
     /// Length, beginning, seed and engine.
@@ -122,6 +124,7 @@ impl<'a> RunSpec<'a> {
             model: PlantParams::default(),
             law,
             output: OutputParams::default(),
+            shell: ShellParams::default(),
             reference,
             run: RunParams::default(),
         }
@@ -196,6 +199,7 @@ impl<'a> RunSpec<'a> {
             model: self.model,
             law: self.law,
             output: self.output,
+            shell: self.shell,
         })
     }
 }

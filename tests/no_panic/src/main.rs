@@ -27,8 +27,8 @@
 
 use clutch_core::certificate::{Demand, certify, paper_conditions};
 use clutch_core::law::{
-    Beside, Command, ControlLaw, Ctc, Glide, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid, Smc, SmcSign, Terms,
-    Tick,
+    Beside, Command, ControlLaw, Ctc, Glide, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid, Shell, ShellParams,
+    Smc, SmcSign, Terms, Tick,
 };
 use clutch_core::params::{self, Choice, Editor, Params};
 use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
@@ -342,7 +342,10 @@ fn certificate<T: Real>() {
     let Some(law) = made(Law::new(&any::<T, LawParams<T>>(), &beside)) else {
         return;
     };
-    if let Some(c) = made(certify(&law, &b, &demand)) {
+    let Some(shell) = made(Shell::new(&any::<T, ShellParams<T>>(), &any::<T, OutputParams<T>>(), kind())) else {
+        return;
+    };
+    if let Some(c) = made(certify(&law, &shell, &b, &demand)) {
         sink((c.certified(), c.reaching_time(real())));
     }
 }
@@ -402,6 +405,7 @@ fn casts<T: Real, U: Real>() {
         velocity: any::<T, _>(),
         model: any::<T, _>(),
         output: any::<T, _>(),
+        shell: any::<T, _>(),
         ..ServoParams::paper(any::<T, _>())
     };
     sink(p.cast::<U>());
@@ -452,6 +456,7 @@ fn servo_params<T: Real>() -> ServoParams<T> {
         model: any::<T, _>(),
         law: any::<T, _>(),
         output: any::<T, _>(),
+        shell: any::<T, _>(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Pieces of a law, and whether they leave anything out.
 
 use super::interval::{Interval, at};
-use super::shaft::Shaft;
+use super::shaft::{SURFACE_ROUNDING, Shaft};
 use crate::setup::{Cell, Gains, Setup, Strip};
 
 /// `m`·[0] + `z`·[1] + [2], of the measured error and the filter's memory in counts.
@@ -52,6 +52,27 @@ pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Pi
                     within: vec![above(high)],
                     volts: [fixed((high - off).positive()), fixed(high + off)],
                 },
+            ])
+        }
+        Gains::Shell { slope, boundary } => {
+            if !cell.strips.is_empty() {
+                return Err("a shell has none".into());
+            }
+            let sigma = sum(&rate, at(slope), &error);
+            let minus = sum(&fixed(at(0.0)), at(-1.0), &sigma);
+            // Where the law's σ is rounded to the other side of an edge, either piece holds.
+            let (least, most) =
+                (fixed(at(boundary) - at(SURFACE_ROUNDING)), fixed(at(boundary) + at(SURFACE_ROUNDING)));
+            let full = [fixed((high - off).positive()), fixed(high + off)];
+            let any = [let_go[0], full[1]];
+            Ok(vec![
+                Piece { id: 0, within: vec![sum(&least, at(1.0), &minus)], volts: let_go },
+                Piece {
+                    id: 1,
+                    within: vec![sum(&sigma, at(-1.0), &most), sum(&minus, at(-1.0), &most)],
+                    volts: any,
+                },
+                Piece { id: 2, within: vec![sum(&least, at(1.0), &sigma)], volts: full },
             ])
         }
         Gains::Smc { kp, kd, slope, boundary } => {

@@ -7,6 +7,8 @@ use crate::setup::{Cell, Setup};
 pub(crate) const TARGET_STEP: f64 = 1.001 / 65536.0;
 /// A law's own rounding, in single precision too, V.
 const LAW_ROUNDING: f64 = 1e-4;
+/// A shell's own rounding of `σ`, in single precision too, rad/s.
+pub(crate) const SURFACE_ROUNDING: f64 = 2e-5;
 /// Share by which a function of the library may be off: its authors promise a hundredth of it.
 const LIBRARY: f64 = 1e-13;
 

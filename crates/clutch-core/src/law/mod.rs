@@ -11,8 +11,10 @@
 
 mod list;
 mod output;
+mod shell;
 
 pub use output::{Limit, Output, OutputParams, OutputState};
+pub use shell::{Shell, ShellParams};
 
 use crate::{Arithmetic, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real};
 
@@ -252,7 +254,7 @@ mod tests {
     const PERIOD: Micros = Micros(1000);
 
     fn built(p: &LawParams<f64>) -> Law<f64> {
-        Law::new(p, &PlantParams::default(), &OUTPUT, PERIOD).unwrap()
+        Law::new(p, &Beside::paper(&PlantParams::default(), &OUTPUT)).unwrap()
     }
 
     fn behind(error: f64) -> Tick<f64> {
@@ -309,10 +311,10 @@ mod tests {
         let motor = MotorActuator { gain: 0.05, preload: 0.3, load_share: 0.0 };
         let model = PlantParams { actuator: motor.into(), ..PlantParams::default() };
         let output = OutputParams { lowest: -9.0, highest: 9.0, on_invalid: 0.0, bumpless_time: 0.0 };
-        let beside = |model| Beside { model, output: &output, period: PERIOD };
+        let beside = |model| Beside::paper(model, &output);
         assert_eq!((beside(&PlantParams::default()).sign(), beside(&model).sign()), (1.0, -1.0));
         for p in LawParams::<f64>::all().into_iter().filter(LawParams::follows) {
-            let law = Law::new(&p, &model, &output, PERIOD).unwrap();
+            let law = Law::new(&p, &Beside::paper(&model, &output)).unwrap();
             let asked = |error| law.update(&mut law.start(&behind(0.0), 0.0), &behind(error)).voltage;
             // A shaft that lags is driven on, one that leads is held back.
             assert!(asked(2e-3) > 0.0 && asked(-2e-3) < 0.0, "{}: {} V", p.title(), asked(2e-3));

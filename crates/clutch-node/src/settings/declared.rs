@@ -1,6 +1,6 @@
 //! The settings of a run: one tree of parameters, each declared once, and the keys that follow.
 
-use clutch_core::law::{LawParams, OutputParams};
+use clutch_core::law::{LawParams, OutputParams, ShellParams};
 use clutch_core::params::{ChoiceInfo, Info, Kind, Range, Row, TableInfo};
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{
@@ -48,6 +48,8 @@ clutch_core::params! {
         law: LawParams<f32>, "law";
         /// Output stage.
         output: OutputParams<f32>, "output";
+        /// The shell around the law.
+        shell: ShellParams<f32>, "shell";
         /// The brake's voltage when control has ended.
         on_fault: SafeState<f32>, "safety.on_fault";
         /// Limits of the supervisor.

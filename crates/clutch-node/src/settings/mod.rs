@@ -160,6 +160,7 @@ impl Settings {
             model: servo.model,
             law: servo.law,
             output: servo.output,
+            shell: servo.shell,
             on_fault: supervisor.on_fault,
             limits: supervisor.limits,
             speed: supervisor.speed,
@@ -266,6 +267,7 @@ impl Settings {
             model: run.model,
             law: run.law,
             output: run.output,
+            shell: run.shell,
         };
         let limits = SupervisorParams { on_fault: run.on_fault, speed: run.speed, limits: run.limits };
         let (start, knots) = (FixedCounts(run.start.into()), (&self.knots, points.into()));

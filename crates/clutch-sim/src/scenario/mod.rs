@@ -9,12 +9,14 @@ mod params;
 mod sampled;
 mod schema;
 mod section;
+mod verdict;
 
 pub use error::ScenarioError;
 pub use params::{Safety, ScalarKind, ScenarioBounds, ScenarioLimits, ScenarioParams, ScenarioSampling};
-pub use sampled::{NOISE_ROOTS, NotCovered, Sampled};
+pub use sampled::{NOISE_ROOTS, NotCovered};
 pub use schema::schema;
 pub use section::check_section;
+pub use verdict::{CertificateError, Proven, Sampled};
 
 use crate::progress::Report;
 use crate::rig::{Rig, RigBase, RigParams};
@@ -23,7 +25,7 @@ use crate::run::{Keep, Run, RunError, RunSpec, Start, simulate_watched};
 use crate::tables::{self, check, checked, complete, find, lookup, read, row_at, shown};
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::friction::FrictionModel;
-use clutch_core::law::{Asked, Law, Output};
+use clutch_core::law::{Asked, Law, Output, Shell};
 use clutch_core::params::{Choice, Kind, Params};
 use clutch_core::reference::{Knot, Reference, ReferenceParams, Table as PathTable};
 use clutch_core::{
@@ -413,6 +415,7 @@ impl Scenario {
         let model = Plant::new(&servo.model).map_err(at("model"))?;
         Output::new(&servo.output, servo.period).map_err(at("output"))?;
         servo.check_output().map_err(at("output"))?;
+        Shell::new(&servo.shell, &servo.output, servo.model.actuator.kind()).map_err(at("shell"))?;
         // A law with a model divides by its friction.
         Law::new(&servo.law, &servo.beside()).map_err(at(""))?;
         VelocitySource::new(&servo.velocity, &model, servo.encoder, servo.period).map_err(at("velocity"))?;
@@ -516,6 +519,7 @@ impl Scenario {
             model: p.model,
             law: p.law,
             output: p.output,
+            shell: p.shell,
             reference: self.reference(),
             run: p.run,
         }
@@ -560,7 +564,9 @@ impl Scenario {
             start_error_rate: envelope.start_jump,
             velocity_jump: envelope.velocity_jump,
         };
-        let certificate = certify(&law, &bounds, &demand).map_err(|e| self.at("bounds", &e))?;
+        let shell =
+            Shell::new(&p.shell, &p.output, p.model.actuator.kind()).map_err(|e| self.at("shell", &e))?;
+        let certificate = certify(&law, &shell, &bounds, &demand).map_err(|e| self.at("bounds", &e))?;
         let asked = Asked { velocity: 0.0, acceleration: 0.0, fastest: &|_| 0.0 };
         let surface = law.surface(&asked).filter(|surface| surface.sliding);
         // They are a brake's.

@@ -3,7 +3,7 @@
 use crate::rig::RigParams;
 use crate::run::RunParams;
 use crate::tables::Text;
-use clutch_core::law::{LawParams, OutputParams};
+use clutch_core::law::{LawParams, OutputParams, ShellParams};
 use clutch_core::params::Range;
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{LimitParams, PlantParams, SafeState, SamplingParams, Tolerances, VelocityParams, params};
@@ -101,6 +101,8 @@ params! {
         velocity: VelocityParams, "velocity";
         /// Limits of the voltage, bumpless start.
         output: OutputParams, "output";
+        /// The shell around the law.
+        shell: ShellParams, "shell";
         /// The path.
         reference: ReferenceParams<'static>, "reference";
         /// Sampling period, scalar.

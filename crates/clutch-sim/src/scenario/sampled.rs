@@ -4,7 +4,7 @@ use super::Scenario;
 use crate::rig::Rig;
 use crate::ripple::Ripple;
 use crate::run::Start;
-use clutch_certificate::{Gains, Setup, Stability, largest, stability};
+use clutch_certificate::{Gains, Setup};
 use clutch_core::friction::{FrictionModel, FrictionParams};
 use clutch_core::law::LawParams;
 use clutch_core::reference::ReferenceParams;
@@ -28,64 +28,20 @@ pub struct NotCovered {
     pub covered: &'static str,
 }
 
-/// Verdicts on a sampled loop that cost nothing, and the box for the one that does.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sampled {
-    /// The loop and the box of plants, or why there is none.
-    pub setup: Result<Setup, NotCovered>,
-    /// Spectral radii with the weakest, a middle and the strongest brake.
-    pub stability: Option<[Stability; 3]>,
-}
-
-impl Sampled {
-    /// Small deviations die out, with the weakest, a middle and the strongest brake; none where nothing is known.
-    #[must_use]
-    pub fn stable(&self) -> Option<bool> {
-        self.stability.as_ref().map(|radii| largest(radii) < 1.0)
-    }
-
-    /// The verdict on linear stability in a line of a table.
-    #[must_use]
-    pub fn short_line(&self) -> String {
-        match &self.stability {
-            Some(radii) => {
-                let verdict = if largest(radii) < 1.0 { "linearly stable" } else { "linearly UNSTABLE" };
-                format!("{verdict}, spectral radius up to {:.3}; no error bound sought", largest(radii))
-            }
-            None => self.stability_line(),
-        }
-    }
-
-    /// The verdict on linear stability with its scope.
-    #[must_use]
-    pub fn stability_line(&self) -> String {
-        match (&self.stability, &self.setup) {
-            (Some(radii), _) => {
-                let verdict = if largest(radii) < 1.0 { "linearly stable" } else { "linearly UNSTABLE" };
-                let [weak, middle, strong] = radii.map(|s| s.radius);
-                format!(
-                    "{verdict}: spectral radius {weak:.3}, {middle:.3}, {strong:.3} with the weakest, a middle and the strongest brake, while nothing saturates or sticks"
-                )
-            }
-            (None, Err(why)) => why.to_string(),
-            (None, Ok(_)) => "linear stability is not computed for so long a delay".to_owned(),
-        }
-    }
-}
-
 fn not(key: &'static str, what: impl Into<String>, covered: &'static str) -> NotCovered {
     NotCovered { key, what: what.into(), covered }
 }
 
-impl Scenario {
-    /// The verdicts on the sampled loop that cost nothing.
-    #[must_use]
-    pub fn sampled(&self, bounds: &Bounds) -> Sampled {
-        let setup = self.sampled_setup(bounds);
-        let stability = setup.as_ref().ok().and_then(stability);
-        Sampled { setup, stability }
+/// Gains of a law that has a sampled certificate of its own.
+pub(super) fn gains(law: &LawParams) -> Option<Gains> {
+    match *law {
+        LawParams::Pd(g) => Some(Gains::Pd { kp: g.kp, kd: g.kd }),
+        LawParams::Smc(g) => Some(Gains::Smc { kp: g.kp, kd: g.kd, slope: g.slope, boundary: g.boundary }),
+        _ => None,
     }
+}
 
+impl Scenario {
     /// The sampled loop with every plant of the bounds: `[model]` within `[bounds]`, with encoder, converter, delay, ripple and
     /// torque noise of `[rig]`.
     ///
@@ -93,10 +49,12 @@ impl Scenario {
     /// A part of the scenario that the sampled-data certificate does not cover, by its key.
     pub fn sampled_setup(&self, bounds: &Bounds) -> Result<Setup, NotCovered> {
         let p = &self.params;
-        let law = match p.law {
-            LawParams::Pd(g) => Gains::Pd { kp: g.kp, kd: g.kd },
-            LawParams::Smc(g) => Gains::Smc { kp: g.kp, kd: g.kd, slope: g.slope, boundary: g.boundary },
-            other => return Err(not("law", other.title(), "PD (4) and SMC (31)")),
+        let shell = p.shell;
+        let law = if shell.boundary > 0.0 {
+            Gains::Shell { slope: shell.slope, boundary: shell.boundary }
+        } else {
+            gains(&p.law)
+                .ok_or_else(|| not("law", p.law.title(), "PD (4), SMC (31), and any law in a [shell]"))?
         };
         let VelocityParams::SmoothedDerivative(filter) = p.velocity else {
             return Err(not("velocity", "an observer", "the smoothed difference (5)"));
@@ -132,7 +90,8 @@ impl Scenario {
         if !p.rig.encoder.quantised {
             return Err(not("rig.encoder.quantised", "an ideal sensor", "encoders that give whole counts"));
         }
-        if p.output.bumpless_time > 0.0 {
+        // A shell asks nothing of the law's beginning.
+        if p.output.bumpless_time > 0.0 && shell.boundary <= 0.0 {
             return Err(not(
                 "output.bumpless_time_s",
                 "a bumpless start",

@@ -1,0 +1,198 @@
+//! Verdicts on the sampled loop, each with its scope: the error bound, linear stability.
+
+use super::Scenario;
+use super::sampled::{NotCovered, gains};
+use crate::number;
+use clutch_certificate::checker::{self, Checked, Refused};
+use clutch_certificate::file::{self, FileError};
+use clutch_certificate::{Gains, Setup, Stability, largest, stability};
+use clutch_core::Bounds;
+use std::path::Path;
+
+/// Verdicts on a sampled loop that cost nothing, and the box for the one that does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sampled {
+    /// The loop and the box of plants, or why there is none.
+    pub setup: Result<Setup, NotCovered>,
+    /// Spectral radii with the weakest, a middle and the strongest brake.
+    pub stability: Option<[Stability; 3]>,
+}
+
+/// A bound on the error that the checker has passed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proven {
+    /// The checker's statement.
+    pub checked: Checked,
+    /// Cells of `μ_d` that it took.
+    pub cells: usize,
+}
+
+/// A saved certificate proves nothing for a scenario.
+#[derive(Debug, thiserror::Error)]
+pub enum CertificateError {
+    /// The file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The scenario has no sampled certificate.
+    #[error(transparent)]
+    NotCovered(#[from] NotCovered),
+    /// The certificate is another loop's.
+    #[error("{name}: the certificate is another loop's; scenario and file differ in\n  {}", .differences.join("\n  "))]
+    Other {
+        /// The file.
+        name: String,
+        /// Keys with both values, the scenario's first.
+        differences: Vec<String>,
+    },
+    /// The proof does not hold.
+    #[error("{name}: the proof does not hold: {refused}")]
+    Refused {
+        /// The file.
+        name: String,
+        /// The first flaw.
+        refused: Refused,
+    },
+}
+
+impl Sampled {
+    /// Small deviations die out, with the weakest, a middle and the strongest brake; none where nothing is known.
+    #[must_use]
+    pub fn stable(&self) -> Option<bool> {
+        self.stability.as_ref().map(|radii| largest(radii) < 1.0)
+    }
+
+    /// True if any law stands within a shell.
+    #[must_use]
+    pub fn any_law(&self) -> bool {
+        matches!(&self.setup, Ok(Setup { law: Gains::Shell { .. }, .. }))
+    }
+
+    /// True if a proven bound is all that is asked of the loop as sampled: it is linearly stable, or a shell holds whatever
+    /// law is within.
+    #[must_use]
+    pub fn bound_suffices(&self) -> bool {
+        self.any_law() || self.stable() == Some(true)
+    }
+
+    /// The proof of a file, checked in one sweep, if it is this loop's.
+    ///
+    /// # Errors
+    /// The file is none, is another loop's, or its proof does not hold.
+    pub fn proven_by(&self, path: &Path) -> Result<Proven, CertificateError> {
+        let certificate = file::read(path)?;
+        let setup = self.setup.as_ref().map_err(NotCovered::clone)?;
+        let name = path.display().to_string();
+        let differences = setup.differences(&certificate.setup);
+        if !differences.is_empty() {
+            return Err(CertificateError::Other { name, differences });
+        }
+        match checker::check(&certificate) {
+            Ok(checked) => Ok(Proven { checked, cells: certificate.cells.len() }),
+            Err(refused) => Err(CertificateError::Refused { name, refused }),
+        }
+    }
+
+    /// The plants and the loop that a bound speaks of; empty where there is none.
+    #[must_use]
+    pub fn scope(&self) -> String {
+        self.setup.as_ref().map(scope).unwrap_or_default()
+    }
+
+    /// The verdict on the error with its scope.
+    #[must_use]
+    pub fn bound_line(&self, proven: &Proven) -> String {
+        let Proven { checked, cells } = proven;
+        let law = if self.any_law() { " with any inner law" } else { "" };
+        format!(
+            "|e| stays below {} °{law}, proven in {cells} {} of mu_d, the weakest {:.4} … {:.4} [{}]",
+            number(checked.error_bound.to_degrees()),
+            if *cells == 1 { "cell" } else { "cells" },
+            checked.limiting[0],
+            checked.limiting[1],
+            self.scope()
+        )
+    }
+
+    /// Both verdicts in a line of a table.
+    #[must_use]
+    pub fn short_line(&self, proven: Option<&Proven>) -> String {
+        let error = match proven {
+            Some(proven) => {
+                let law = if self.any_law() { " with any inner law" } else { "" };
+                format!("|e| below {} °{law}, certified", number(proven.checked.error_bound.to_degrees()))
+            }
+            None => "error bound UNCERTIFIED".to_owned(),
+        };
+        match &self.stability {
+            Some(radii) => {
+                let verdict = if largest(radii) < 1.0 { "linearly stable" } else { "linearly UNSTABLE" };
+                format!("{error}; {verdict}, spectral radius up to {:.3}", largest(radii))
+            }
+            None => format!("{error}; linear stability not known"),
+        }
+    }
+
+    /// The verdict on linear stability with its scope.
+    #[must_use]
+    pub fn stability_line(&self) -> String {
+        match (&self.stability, &self.setup) {
+            (Some(radii), _) => {
+                let verdict = if largest(radii) < 1.0 { "linearly stable" } else { "linearly UNSTABLE" };
+                let [weak, middle, strong] = radii.map(|s| s.radius);
+                let law = if self.any_law() { "the law within the shell is " } else { "" };
+                format!(
+                    "{law}{verdict}: spectral radius {weak:.3}, {middle:.3}, {strong:.3} with the weakest, a middle and the strongest brake, while nothing saturates or sticks"
+                )
+            }
+            (None, Err(why)) => why.to_string(),
+            (None, Ok(_)) => {
+                "linear stability is not known: it is computed for PD (4) and SMC (31)".to_owned()
+            }
+        }
+    }
+}
+
+/// The plants and the loop that a bound speaks of.
+fn scope(s: &Setup) -> String {
+    let range = |[low, high]: [f64; 2]| {
+        if high - low <= 1e-12 * high { number(low) } else { format!("{} … {}", number(low), number(high)) }
+    };
+    let ticks = if s.delay_ticks == 1 { "tick" } else { "ticks" };
+    let mut out = format!(
+        "every {} µs, {} {ticks} of delay, {} counts/rev; ramp at {} °/s, {}; mu_d {}, mu_s {}{}; J {} kg m², T_u {} N m, K_COF {} N m/V",
+        number(1e6 * s.period_s),
+        s.delay_ticks,
+        s.counts_per_rev,
+        number(s.rate.to_degrees()),
+        if s.from_rest { "from rest" } else { "begun at its speed" },
+        range(s.sliding),
+        range(s.at_rest),
+        if s.rest_not_below_sliding { ", never below mu_d" } else { "" },
+        range(s.inertia),
+        range(s.drive_torque),
+        range(s.brake_gain),
+    );
+    if let Gains::Shell { slope, boundary } = s.law {
+        out += &format!("; shell f {} 1/s, S {} rad/s", number(slope), number(boundary));
+    }
+    if s.ripple > 0.0 {
+        out += &format!("; ±{} % along the disc and in time", number(100.0 * s.ripple));
+    }
+    if s.torque_noise > 0.0 {
+        out += &format!("; torque noise up to {} N m", number(s.torque_noise));
+    }
+    out
+}
+
+impl Scenario {
+    /// The verdicts on the sampled loop that cost nothing.
+    #[must_use]
+    pub fn sampled(&self, bounds: &Bounds) -> Sampled {
+        let setup = self.sampled_setup(bounds);
+        // A shell has no gains: the law within has, where it is one of these.
+        let law = gains(&self.params.law);
+        let within = |s: &Setup| law.and_then(|law| stability(&Setup { law, ..s.clone() }));
+        let stability = setup.as_ref().ok().and_then(within);
+        Sampled { setup, stability }
+    }
+}
