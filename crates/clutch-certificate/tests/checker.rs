@@ -181,6 +181,24 @@ fn a_strip_of_smc_moved_or_missing_is_refused() {
 }
 
 #[test]
+fn a_shell_with_another_slope_or_a_wider_boundary_is_refused() {
+    let shell = |slope, boundary| Gains::Shell { slope, boundary };
+    let good = found(&setup(shell(100.0, 0.1), 1.0, 0, 2.0));
+    let bound = degrees(&good);
+    // Of the laws that do their worst, in 210 runs: docs/certified.md.
+    assert!((0.0971..=0.115).contains(&bound), "{bound}°");
+    for law in [shell(95.0, 0.1), shell(105.0, 0.1), shell(100.0, 0.105), shell(100.0, 0.0)] {
+        let mut bad = good.clone();
+        bad.setup.law = law;
+        assert!(check(&bad).is_err(), "{law:?}");
+    }
+    // A bound for any voltage within is none for a piece that has gone.
+    let mut bad = good;
+    bad.cells[0].modes.retain(|mode| mode.piece != 1);
+    assert!(check(&bad).is_err());
+}
+
+#[test]
 fn a_file_gives_back_what_was_written_and_refuses_what_is_none() {
     let folder = std::env::temp_dir().join(format!("clutch-certificate-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
