@@ -185,7 +185,7 @@ fn a_law_that_is_not_certified_is_not_run_unasked() {
 }
 
 #[test]
-fn a_loop_arms_on_its_own_certificate_and_not_on_anothers() {
+fn a_loop_arms_on_its_own_certificate_and_on_no_other() {
     let _guard = beside_others();
     let folder = folder("certificate");
     let file = folder.join("shell.json");
