@@ -1,5 +1,6 @@
 //! The developer's verbs: `cargo xtask --help`. CI calls the same ones.
 
+mod ablate;
 mod coverage;
 mod firmware;
 mod fuzz;
@@ -18,6 +19,7 @@ mod touch;
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use run::{cargo, root};
+use std::path::PathBuf;
 
 /// The developer's verbs.
 #[derive(Parser)]
@@ -96,13 +98,33 @@ enum Verb {
     },
     /// Runs the tests of core, wire and node in Miri, as on a machine of the other byte order; adds a row to docs/proof.md.
     Miri,
-    /// Runs the fault campaign. With the default seeds it rewrites the table of docs/safety.md.
+    /// Runs the fault campaign on all cores, and rewrites its table in docs/safety.md: a million runs, half an hour.
     Campaign {
-        /// Seeds; each gives about 180 runs.
-        seeds: Option<u64>,
-        /// The first seed.
-        #[arg(default_value_t = 1)]
-        first: u64,
+        /// Runs.
+        #[arg(long, default_value_t = 1_000_000)]
+        runs: u64,
+        /// Seed of the first.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// File in which it keeps how far it is; it goes on from there.
+        #[arg(long, value_name = "FILE")]
+        resume: Option<PathBuf>,
+        /// Only these runs, by the names that a failure has, and tells about them.
+        #[arg(long, value_name = "RUN", num_args = 1.., conflicts_with_all = ["runs", "seed", "resume"])]
+        only: Vec<String>,
+    },
+    /// Takes each check out of the code in turn: the campaign has to fail. Rewrites the table in docs/safety.md.
+    Ablate {
+        /// Runs after which a check counts as not missed.
+        #[arg(default_value_t = 20_000)]
+        runs: u64,
+    },
+    /// Runs `clutch loop` against a board in Python that lies and shares no code with it; rewrites the table in
+    /// docs/safety.md: some minutes.
+    Lies {
+        /// Trials.
+        #[arg(default_value_t = 2100)]
+        trials: u32,
     },
     /// Holds sampled-data certificates against simulations, an hour on two cores: the table of docs/certified.md, and a
     /// campaign over random sets of gains.
@@ -185,7 +207,9 @@ fn main() -> Result<()> {
         Verb::Miri => miri::run(),
         Verb::Certified { runs } => certified(runs),
         Verb::Smooth => smooth(),
-        Verb::Campaign { seeds, first } => campaign(seeds, first),
+        Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
+        Verb::Ablate { runs } => ablate::all(runs),
+        Verb::Lies { trials } => lies(trials),
         Verb::Intervals { count } => {
             cargo(["build", "--release", "--package", "clutch-sim", "--example", "intervals"]).run()?;
             let script =
@@ -305,21 +329,25 @@ fn write_between(page: &str, name: &str, text: &str) -> Result<()> {
     Ok(())
 }
 
-fn campaign(seeds: Option<u64>, first: u64) -> Result<()> {
+fn campaign(runs: u64, seed: u64, resume: Option<PathBuf>, only: &[String]) -> Result<()> {
     let example = ["run", "--release", "--package", "clutch-loop", "--example", "campaign", "--"];
-    if let Some(seeds) = seeds {
-        return cargo(example).args([seeds.to_string(), first.to_string()]).run();
+    if !only.is_empty() {
+        return cargo(example).arg("only").args(only).run();
     }
-    let (done, text) = cargo(example).quietly()?;
-    let table: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
+    let kept = resume.map(std::path::absolute).transpose()?;
+    let (done, text) = cargo(example).args([runs.to_string(), seed.to_string()]).args(kept).quietly()?;
     if !done {
         anyhow::bail!("the campaign failed:\n{text}");
     }
-    let page = root().join("docs/safety.md");
-    let old = std::fs::read_to_string(&page)?;
-    let (begin, end) = ("<!-- campaign:begin -->", "<!-- campaign:end -->");
-    let split = old.split_once(begin).and_then(|(head, rest)| Some((head, rest.split_once(end)?.1)));
-    let (head, tail) = split.context("docs/safety.md has lost the markers of its table")?;
-    std::fs::write(&page, format!("{head}{begin}\n{}\n{end}{tail}", table.join("\n")))?;
-    Ok(())
+    let table: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
+    let last = seed + runs - 1;
+    write_between("docs/safety.md", "campaign", &format!("Seeds {seed} to {last}:\n\n{}", table.join("\n")))
+}
+
+fn lies(trials: u32) -> Result<()> {
+    cargo(["build", "--release", "--package", "clutch-cli"]).run()?;
+    let script = ["python/tests/lying_board.py", "target/release/clutch", &trials.to_string()];
+    let (done, text) = run::program("python3").args(script).quietly()?;
+    anyhow::ensure!(done, "the loop believed a lie:\n{text}");
+    write_between("docs/safety.md", "lies", text.trim())
 }

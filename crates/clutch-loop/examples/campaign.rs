@@ -1,32 +1,172 @@
-//! The fault campaign, with as many seeds as you like; prints the table of `docs/safety.md`. With an image of the
-//! emulated board the controller is that board, and what breaks the controller from within is left out.
+//! The fault campaign on all cores. Prints the table of `docs/safety.md`, and a line for each run that failed, in its minimal
+//! form; fails if there is one.
 //!
-//! `cargo run --release -p clutch-loop --example campaign -- [SEEDS [FIRST [IMAGE]]]`
+//! `cargo run --release -p clutch-loop --example campaign -- RUNS [SEED [FILE]]` makes runs from a seed on; with a file it
+//! goes on where it was ended. `… -- only RUN…` makes single runs, by name, and tells about them; `… -- until RUNS` makes so
+//! many, and ends with the first that fails.
 
 use clutch_core::supervisor::Checks;
-use clutch_loop::campaign::{Table, runs};
-use clutch_loop::qemu_board::QemuBoard;
-use std::path::PathBuf;
+use clutch_loop::campaign::table::Table;
+use clutch_loop::campaign::{RunId, oracle};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut args = std::env::args().skip(1);
-    let seeds = args.next().map_or(Ok(12), |s| s.parse())?;
-    let first = args.next().map_or(Ok(1), |s| s.parse())?;
-    let image = args.next().map(PathBuf::from);
-    let (mut table, mut count, mut failures) = (Table::default(), 0, 0);
-    for run in runs(first, seeds).filter(|run| image.is_none() || run.is_outside()) {
-        let outcome = match &image {
-            None => run.run(Checks::ALL, false)?,
-            Some(image) => run.run_on(QemuBoard::start(image)?)?,
-        };
-        table.add(&run, &outcome);
-        count += 1;
-        if let Some(what) = run.judge(&outcome) {
-            failures += 1;
-            eprintln!("FAILED: {}: {what}", run.name());
+type Failure = Result<(), Box<dyn std::error::Error>>;
+
+/// Runs of a chunk; a campaign that is ended loses those of one chunk on each core.
+const CHUNK: u64 = 500;
+
+fn main() -> Failure {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    if let [verb, runs @ ..] = &args[..]
+        && verb == "only"
+    {
+        return only(runs);
+    }
+    if let [verb, runs] = &args[..]
+        && verb == "until"
+    {
+        return until(runs.parse()?);
+    }
+    let number = |i: usize, otherwise| args.get(i).map_or(Ok(otherwise), |s: &String| s.parse::<u64>());
+    let (runs, first) = (number(0, 10_000)?, number(1, 1)?);
+    let file = args.get(2).map(PathBuf::from);
+    let mut so_far = Progress { next: first, ..Progress::default() };
+    if let Some(text) = file.as_ref().and_then(|f| std::fs::read_to_string(f).ok()) {
+        so_far = Progress::read(&text).ok_or("the file is none of a campaign that was ended")?;
+        eprintln!("goes on at seed {}", so_far.next);
+    }
+    let cores = std::thread::available_parallelism()?.get() as u64;
+    while so_far.next < first + runs {
+        let end = (so_far.next + CHUNK * cores).min(first + runs);
+        so_far.advance(end, cores);
+        if let Some(file) = &file {
+            so_far.write(file)?;
         }
     }
+    let Progress { table, failed, .. } = so_far;
     print!("{table}");
-    eprintln!("seeds {first} to {}: {count} runs, {failures} failures", first + seeds - 1);
-    if failures > 0 { Err("the campaign failed".into()) } else { Ok(()) }
+    for run in &failed {
+        let minimal = run.minimal(|run| outcome(run).is_some());
+        println!("{minimal}: {}", outcome(&minimal).unwrap_or_default());
+    }
+    eprintln!("seeds {first} to {}: {} runs, {} failures", first + runs - 1, table.runs(), failed.len());
+    if failed.is_empty() { Ok(()) } else { Err("the campaign failed".into()) }
+}
+
+/// What is wrong with a run, if something is.
+fn outcome(run: &RunId) -> Option<String> {
+    let draw = run.draw();
+    match draw.run(run.seed, Checks::ALL, false) {
+        Ok(report) => oracle::judge(&draw, &report),
+        Err(error) => Some(error.to_string()),
+    }
+}
+
+fn until(runs: u64) -> Failure {
+    let wrong = |seed| {
+        let run = RunId::from(seed);
+        outcome(&run).map(|what| (run, what))
+    };
+    match (1..=runs).find_map(wrong) {
+        None => Ok(()),
+        Some((run, what)) => {
+            println!("{run}: {what}");
+            Err("the campaign failed".into())
+        }
+    }
+}
+
+fn only(runs: &[String]) -> Failure {
+    let mut failures = 0;
+    for name in runs {
+        let run: RunId = name.parse()?;
+        let draw = run.draw();
+        let report = draw.run(run.seed, Checks::ALL, false)?;
+        println!("{run}: {:?}", draw.setting);
+        for trouble in &draw.troubles {
+            println!("  {trouble:?}: {:?}", oracle::Promise::of(&draw.setting, trouble));
+        }
+        println!(
+            "  {:?} hit {:?} tripped {:?} safe {:?} board {:?} error {:.3}° beyond {:.3}° (allowed {:?}) unanswered {}",
+            report.cause,
+            report.hit,
+            report.tripped,
+            report.safe,
+            report.board,
+            report.largest_error.to_degrees(),
+            report.overrun.to_degrees(),
+            oracle::beyond_deg(&draw.setting, 0.01),
+            report.unanswered,
+        );
+        let wrong = oracle::judge(&draw, &report);
+        failures += u32::from(wrong.is_some());
+        println!("  {}", wrong.unwrap_or_else(|| "as promised".to_owned()));
+    }
+    if failures == 0 { Ok(()) } else { Err("the campaign failed".into()) }
+}
+
+/// A campaign on its way.
+#[derive(Default)]
+struct Progress {
+    next: u64,
+    table: Table,
+    failed: Vec<RunId>,
+}
+
+impl Progress {
+    /// Makes the runs up to a seed, a share of them on each core.
+    fn advance(&mut self, end: u64, cores: u64) {
+        let share = (end - self.next).div_ceil(cores);
+        let from = self.next;
+        let parts = std::thread::scope(|scope| {
+            let part = |core: u64| {
+                let seeds = (from + core * share).min(end)..(from + (core + 1) * share).min(end);
+                scope.spawn(move || made(seeds))
+            };
+            let threads: Vec<_> = (0..cores).map(part).collect();
+            threads.into_iter().map(std::thread::ScopedJoinHandle::join).collect::<Vec<_>>()
+        });
+        for (table, failed) in parts.into_iter().flatten() {
+            self.table.merge(&table);
+            self.failed.extend(failed);
+        }
+        self.next = end;
+    }
+
+    fn write(&self, file: &Path) -> Failure {
+        let failed: Vec<String> = self.failed.iter().map(ToString::to_string).collect();
+        let mut text = String::new();
+        writeln!(text, "{} {}", self.next, failed.join(" "))?;
+        text += &self.table.written();
+        let beside = file.with_extension("new");
+        std::fs::write(&beside, text)?;
+        Ok(std::fs::rename(beside, file)?)
+    }
+
+    fn read(text: &str) -> Option<Progress> {
+        let (head, table) = text.split_once('\n')?;
+        let mut words = head.split_whitespace();
+        let next = words.next()?.parse().ok()?;
+        let failed = words.map(|w| w.parse().ok()).collect::<Option<_>>()?;
+        Some(Progress { next, table: Table::read(table)?, failed })
+    }
+}
+
+fn made(seeds: std::ops::Range<u64>) -> (Table, Vec<RunId>) {
+    let (mut table, mut failed) = (Table::default(), Vec::new());
+    for seed in seeds {
+        let run = RunId::from(seed);
+        let draw = run.draw();
+        match draw.run(seed, Checks::ALL, false) {
+            Ok(report) => {
+                table.add(&draw, &report);
+                if oracle::judge(&draw, &report).is_some() {
+                    failed.push(run);
+                }
+            }
+            Err(_) => failed.push(run),
+        }
+    }
+    (table, failed)
 }

@@ -59,6 +59,30 @@ impl Channel {
     }
 }
 
+/// A report of a board that is not so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lie {
+    /// Its samples say that it does not drive.
+    Idle,
+    /// Its samples say that the encoder is broken.
+    Encoder,
+    /// Its samples say that the converter is broken.
+    Converter,
+    /// Its samples bear the number of another run.
+    OtherRun,
+}
+
+/// A frame that nobody at the two ends of the line has sent, beside each sample or code that passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Forgery {
+    /// The same once more in each of so many periods.
+    Echo(u32),
+    /// The next so many, of another run: codes that let go, samples from far away.
+    OtherRun(u32),
+    /// In front of it: a code that the converter has not.
+    AboveTop,
+}
+
 /// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultKind {
@@ -76,6 +100,10 @@ pub enum FaultKind {
     Reorder,
     /// Nothing comes through.
     Silence,
+    /// Samples say what is not so.
+    Lie(Lie),
+    /// Frames come that nobody has sent.
+    Forged(Forgery),
     /// The encoder's counts stay.
     EncoderFreeze,
     /// The encoder's counts are off by this.
@@ -113,6 +141,8 @@ impl FaultKind {
             | FaultKind::Jitter(_)
             | FaultKind::Reorder
             | FaultKind::Silence
+            | FaultKind::Lie(_)
+            | FaultKind::Forged(_)
             | FaultKind::Reset => true,
             FaultKind::EncoderFreeze
             | FaultKind::EncoderJump(_)
@@ -167,7 +197,7 @@ impl Fault {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "fault \"{text}\": {problem}\nexpected KIND:KEY=VALUE,…, as drop:p=0.05 or freeze:at=2 or delay:at=1,for=0.1,ms=5\n\
-         kinds: drop, duplicate, corrupt, reorder, silence, delay (ms), jitter (ms), freeze, jump (counts), channel (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale (factor), clock (factor), prescaler (factor), crystal (factor), reset\n\
+         kinds: drop, duplicate, corrupt, reorder, silence, lie (says = idle, encoder, converter or run), echo (periods), foreign (periods), above-top, delay (ms), jitter (ms), freeze, jump (counts), channel (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale (factor), clock (factor), prescaler (factor), crystal (factor), reset\n\
          keys: at (s after arming), for (s), p (probability per frame or period), way (up = from the board, down = to it, both)"
 )]
 pub struct FaultError {
@@ -183,7 +213,7 @@ impl FromStr for Fault {
         let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
         let mut fault = Fault::new(FaultKind::Drop, 0.0);
         let (mut ms, mut counts, mut volts, mut when) = (None, None, None, false);
-        let (mut factor, mut dead) = (None, None);
+        let (mut factor, mut dead, mut says, mut periods) = (None, None, None, None);
         let mut seen = Vec::new();
         for pair in rest.split(',').filter(|p| !p.is_empty()) {
             let (key, value) = pair.split_once('=').ok_or_else(|| bad(format!("\"{pair}\" has no =")))?;
@@ -227,6 +257,23 @@ impl FromStr for Fault {
                 "volts" if value == "last" => volts = Some(StuckAt::Last),
                 "volts" => volts = Some(StuckAt::Volts(number()?)),
                 "factor" => factor = Some(number()?),
+                "periods" => {
+                    let n = value.parse::<u32>().ok().filter(|n| (1..=100).contains(n));
+                    periods = Some(n.ok_or_else(|| bad(format!("periods = {value}: expected 1 to 100")))?);
+                }
+                "says" => {
+                    says = Some(match value {
+                        "idle" => Lie::Idle,
+                        "encoder" => Lie::Encoder,
+                        "converter" => Lie::Converter,
+                        "run" => Lie::OtherRun,
+                        _ => {
+                            return Err(bad(format!(
+                                "says = {value}: expected idle, encoder, converter or run"
+                            )));
+                        }
+                    });
+                }
                 "dead" => {
                     dead = Some(match value {
                         "a" => Channel::A,
@@ -249,6 +296,12 @@ impl FromStr for Fault {
             "corrupt" => FaultKind::Corrupt,
             "reorder" => FaultKind::Reorder,
             "silence" => FaultKind::Silence,
+            "lie" => FaultKind::Lie(says.take().ok_or_else(|| needs("says"))?),
+            "echo" => FaultKind::Forged(Forgery::Echo(periods.take().ok_or_else(|| needs("periods"))?)),
+            "foreign" => {
+                FaultKind::Forged(Forgery::OtherRun(periods.take().ok_or_else(|| needs("periods"))?))
+            }
+            "above-top" => FaultKind::Forged(Forgery::AboveTop),
             "delay" => FaultKind::Delay(ms.take().ok_or_else(|| needs("ms"))?),
             "jitter" => FaultKind::Jitter(ms.take().ok_or_else(|| needs("ms"))?),
             "freeze" => FaultKind::EncoderFreeze,
@@ -264,7 +317,8 @@ impl FromStr for Fault {
             "reset" => FaultKind::Reset,
             _ => return Err(bad(format!("unknown kind {kind}"))),
         };
-        if ms.is_some() || counts.is_some() || volts.is_some() || factor.is_some() || dead.is_some() {
+        let left = [ms.is_some(), counts.is_some(), volts.is_some(), factor.is_some(), dead.is_some()];
+        if left.contains(&true) || says.is_some() || periods.is_some() {
             return Err(bad(format!("a key that {kind} does not have")));
         }
         if !when {
@@ -274,29 +328,42 @@ impl FromStr for Fault {
     }
 }
 
+impl fmt::Display for FaultKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            FaultKind::Drop => write!(f, "drop"),
+            FaultKind::Duplicate => write!(f, "duplicate"),
+            FaultKind::Corrupt => write!(f, "corrupt"),
+            FaultKind::Delay(s) => write!(f, "delay of {} ms", s * 1000.0),
+            FaultKind::Jitter(s) => write!(f, "jitter up to {} ms", s * 1000.0),
+            FaultKind::Reorder => write!(f, "reorder"),
+            FaultKind::Silence => write!(f, "silence"),
+            FaultKind::Lie(Lie::Idle) => write!(f, "board says that it does not drive"),
+            FaultKind::Lie(Lie::Encoder) => write!(f, "board says that its encoder is broken"),
+            FaultKind::Lie(Lie::Converter) => write!(f, "board says that its converter is broken"),
+            FaultKind::Lie(Lie::OtherRun) => write!(f, "board says another run"),
+            FaultKind::Forged(Forgery::Echo(n)) => write!(f, "echo for {n} periods"),
+            FaultKind::Forged(Forgery::OtherRun(n)) => write!(f, "frames of another run, {n} each"),
+            FaultKind::Forged(Forgery::AboveTop) => write!(f, "codes above the top"),
+            FaultKind::EncoderFreeze => write!(f, "encoder frozen"),
+            FaultKind::EncoderJump(n) => write!(f, "encoder jump of {n} counts"),
+            FaultKind::EncoderChannel(channel) => write!(f, "encoder's channel {channel:?} dead"),
+            FaultKind::EncoderScale(factor) => write!(f, "encoder's counts times {factor}"),
+            FaultKind::EncoderLoss => write!(f, "encoder lost"),
+            FaultKind::DacStuck(StuckAt::Last) => write!(f, "DAC stuck where it is"),
+            FaultKind::DacStuck(StuckAt::Volts(v)) => write!(f, "DAC stuck at {v} V"),
+            FaultKind::DacScale(factor) => write!(f, "DAC times {factor}"),
+            FaultKind::Clock(factor) => write!(f, "board's time times {factor}"),
+            FaultKind::Prescaler(factor) => write!(f, "board's periods times {factor}"),
+            FaultKind::Crystal(factor) => write!(f, "board's clock slower by {factor}"),
+            FaultKind::Reset => write!(f, "board reset"),
+        }
+    }
+}
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.kind {
-            FaultKind::Drop => write!(f, "drop")?,
-            FaultKind::Duplicate => write!(f, "duplicate")?,
-            FaultKind::Corrupt => write!(f, "corrupt")?,
-            FaultKind::Delay(s) => write!(f, "delay of {} ms", s * 1000.0)?,
-            FaultKind::Jitter(s) => write!(f, "jitter up to {} ms", s * 1000.0)?,
-            FaultKind::Reorder => write!(f, "reorder")?,
-            FaultKind::Silence => write!(f, "silence")?,
-            FaultKind::EncoderFreeze => write!(f, "encoder frozen")?,
-            FaultKind::EncoderJump(n) => write!(f, "encoder jump of {n} counts")?,
-            FaultKind::EncoderChannel(channel) => write!(f, "encoder's channel {channel:?} dead")?,
-            FaultKind::EncoderScale(factor) => write!(f, "encoder's counts times {factor}")?,
-            FaultKind::EncoderLoss => write!(f, "encoder lost")?,
-            FaultKind::DacStuck(StuckAt::Last) => write!(f, "DAC stuck where it is")?,
-            FaultKind::DacStuck(StuckAt::Volts(v)) => write!(f, "DAC stuck at {v} V")?,
-            FaultKind::DacScale(factor) => write!(f, "DAC times {factor}")?,
-            FaultKind::Clock(factor) => write!(f, "board's time times {factor}")?,
-            FaultKind::Prescaler(factor) => write!(f, "board's periods times {factor}")?,
-            FaultKind::Crystal(factor) => write!(f, "board's clock slower by {factor}")?,
-            FaultKind::Reset => write!(f, "board reset")?,
-        }
+        write!(f, "{}", self.kind)?;
         if self.probability < 1.0 {
             write!(f, ", p = {}", self.probability)?;
         }
@@ -369,6 +436,10 @@ mod tests {
             ("scale:at=1", "scale needs factor"),
             ("prescaler:at=1,factor=0", "factor = 0: expected 0.01 to 1000"),
             ("dac-scale:at=1,factor=1,dead=a", "a key that dac-scale does not have"),
+            ("lie:at=1", "lie needs says"),
+            ("lie:at=1,says=nothing", "says = nothing: expected idle, encoder, converter or run"),
+            ("echo:at=1,periods=0", "periods = 0: expected 1 to 100"),
+            ("above-top:at=1,periods=2", "a key that above-top does not have"),
             ("drop:at", "has no ="),
             ("drop:at=1,where=up", "unknown key where"),
             ("drop:at=nan", "not a number"),

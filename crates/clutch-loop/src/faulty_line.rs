@@ -1,6 +1,9 @@
 //! One direction of a serial line, with what can go wrong on it.
 
-use crate::faults::{Direction, Fault, FaultKind};
+use crate::faults::{Direction, Fault, FaultKind, Forgery, Lie};
+use clutch_wire::{
+    Actuate, BoardState, Decoder, Message, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, Sample, encode,
+};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::collections::VecDeque;
@@ -58,6 +61,7 @@ impl FaultyLine {
 
     fn frame(&mut self, now_ns: u64, armed: Option<f64>, mut frame: Vec<u8>) {
         let (mut copies, mut late, mut swap, mut hit) = (1, 0.0, false, false);
+        let (mut before, mut after) = (Vec::new(), Vec::new());
         for i in 0..self.faults.len() {
             let fault = self.faults[i];
             let active = armed.is_some_and(|t| fault.active(t));
@@ -68,14 +72,31 @@ impl FaultyLine {
                 FaultKind::Drop | FaultKind::Silence => copies = 0,
                 FaultKind::Duplicate => copies *= 2,
                 FaultKind::Corrupt => {
+                    let was = frame.clone();
                     for _ in 0..self.rng.random_range(1..=8) {
                         let at = self.rng.random_range(0..frame.len());
                         frame[at] ^= 1 << self.rng.random_range(0..8);
+                    }
+                    // A bit that was hit twice is right again.
+                    if frame == was {
+                        frame[0] ^= 1;
                     }
                 }
                 FaultKind::Delay(s) => late += s,
                 FaultKind::Jitter(s) => late += s * self.rng.random::<f64>(),
                 FaultKind::Reorder => swap = true,
+                FaultKind::Lie(lie) => match said(lie, &frame) {
+                    Some(other) => frame = other,
+                    None => continue,
+                },
+                FaultKind::Forged(forgery) => {
+                    let forged = forged(forgery, &frame);
+                    if forged.is_empty() {
+                        continue;
+                    }
+                    let to = if forgery == Forgery::AboveTop { &mut before } else { &mut after };
+                    to.extend(forged);
+                }
                 _ => continue, // the board's, not the line's
             }
             hit = true;
@@ -84,6 +105,10 @@ impl FaultyLine {
             self.hits += 1;
             self.first_hit_ns.get_or_insert(now_ns);
         }
+        if copies == 0 {
+            before.clear();
+            after.clear();
+        }
         let due = now_ns + self.latency_ns + (late * 1e9) as u64;
         if swap && self.held_back.is_none() && copies > 0 {
             self.held_back = Some(frame);
@@ -91,12 +116,20 @@ impl FaultyLine {
         }
         // A line does not overtake itself.
         self.last_ns = self.last_ns.max(due);
-        for _ in 0..copies {
-            self.under_way.push_back((self.last_ns, frame.clone()));
+        let held_back = self.held_back.take();
+        let sent = std::iter::repeat_n(frame, copies).chain(held_back);
+        for frame in before.into_iter().chain(sent) {
+            self.enqueue(self.last_ns, frame);
         }
-        if let Some(frame) = self.held_back.take() {
-            self.under_way.push_back((self.last_ns, frame));
+        for (frame, period) in after.into_iter().zip(1_u64..) {
+            self.enqueue(self.last_ns + period * FORGED_EACH_NS, frame);
         }
+    }
+
+    /// Puts a frame behind those that are due no later; what is forged for later does not hold up what is sent meanwhile.
+    fn enqueue(&mut self, due: u64, frame: Vec<u8>) {
+        let place = self.under_way.partition_point(|(t, _)| *t <= due);
+        self.under_way.insert(place, (due, frame));
     }
 
     /// The time at which the next bytes arrive.
@@ -116,5 +149,53 @@ impl FaultyLine {
             all.extend(self.under_way.pop_front().into_iter().flat_map(|(_, bytes)| bytes));
         }
         Some(all)
+    }
+}
+
+/// Time between forged frames, ns.
+const FORGED_EACH_NS: u64 = 1_000_000;
+
+/// The message in a frame, if it is a whole one.
+fn message(frame: &[u8]) -> Option<Message> {
+    let mut decoder = Decoder::new();
+    frame.iter().find_map(|byte| decoder.push(*byte))?.ok()
+}
+
+/// A sample that says what is not so; none for another frame.
+fn said(lie: Lie, frame: &[u8]) -> Option<Vec<u8>> {
+    let Message::Sample(sample) = message(frame)? else { return None };
+    let sample = match lie {
+        Lie::Idle => Sample { status: (sample.status & !0x07) | BoardState::Ready as u8, ..sample },
+        Lie::Encoder => Sample { status: sample.status | STATUS_ENCODER_FAULT, ..sample },
+        Lie::Converter => Sample { status: sample.status | STATUS_DAC_FAULT, ..sample },
+        Lie::OtherRun => Sample { run: sample.run.wrapping_add(1), ..sample },
+    };
+    Some(encode(&Message::Sample(sample)).as_bytes().to_vec())
+}
+
+/// The frames that are forged beside a sample or a code; none beside another frame.
+fn forged(forgery: Forgery, frame: &[u8]) -> Vec<Vec<u8>> {
+    let made = |message: Message| encode(&message).as_bytes().to_vec();
+    match (forgery, message(frame)) {
+        (Forgery::Echo(n), Some(Message::Actuate(_) | Message::Sample(_))) => {
+            vec![frame.to_vec(); usize::try_from(n).unwrap_or(0)]
+        }
+        (Forgery::OtherRun(n), Some(Message::Actuate(m))) => (1..=n)
+            .map(|k| {
+                let sequence = m.sequence.wrapping_add(k as u16);
+                made(Message::Actuate(Actuate { run: m.run.wrapping_add(1), sequence, code: 0, ..m }))
+            })
+            .collect(),
+        (Forgery::OtherRun(n), Some(Message::Sample(m))) => (1..=n)
+            .map(|k| {
+                let (run, sequence) = (m.run.wrapping_add(1), m.sequence.wrapping_add(k as u16));
+                let counts = m.counts.wrapping_add(10_000);
+                made(Message::Sample(Sample { run, sequence, counts, ..m }))
+            })
+            .collect(),
+        (Forgery::AboveTop, Some(Message::Actuate(m))) => {
+            vec![made(Message::Actuate(Actuate { code: u16::MAX, ..m }))]
+        }
+        _ => Vec::new(),
     }
 }

@@ -98,6 +98,7 @@ impl LockstepSession {
         // The last period is the one in which the run ends.
         let ticks = built.ticks + 1;
         let params = VirtualOptions {
+            watched: f64::INFINITY,
             latency_ns: o.latency_ns,
             faults: o.faults.clone(),
             stall: None,

@@ -44,6 +44,8 @@ pub struct VirtualOptions {
     pub record: bool,
     /// Time after arming at which the run ends, s; the safe state is watched until then.
     pub duration: f64,
+    /// Time for which the safe state is watched, s: the run ends no later.
+    pub watched: f64,
     /// Ticks after which the run is over and an orderly stop follows.
     pub ticks: u64,
     /// Time left out of the figures, s.
@@ -61,6 +63,7 @@ impl Default for VirtualOptions {
             seed: 1,
             record: false,
             duration: 0.0,
+            watched: f64::INFINITY,
             ticks: u64::MAX,
             settle: 0.0,
         }
@@ -88,6 +91,14 @@ pub struct VirtualReport {
     pub volts: (f64, f64),
     /// Ticks in which the law answered.
     pub answers: u64,
+    /// Samples, from the first answer to the end or the safe output, that were left without one.
+    pub unanswered: u64,
+    /// Highest code that the board has put out.
+    pub highest_code: u16,
+    /// The code that it puts out when its safe output is first in force.
+    pub safe_code: u16,
+    /// The code that it puts out at the end.
+    pub last_code: u16,
     /// The records that a log would hold.
     pub records: Vec<Record>,
     /// The code that the converter had when the controller was armed.
@@ -309,13 +320,20 @@ impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
         if armed_for.is_some() && safe && self.safe_at.is_none() {
             self.safe_at = Some(now);
             self.report.safe = armed_for;
+            self.report.safe_code = self.on.board.code().0;
+            self.end_ns = self.end_ns.min(now.saturating_add((self.on.params.watched * 1e9) as u64));
         }
+        self.report.highest_code = self.report.highest_code.max(self.on.board.code().0);
         Ok(armed_for)
     }
 
     /// The board has taken a sample: the period before it goes into the figures.
     fn sample_taken(&mut self) {
         let events = self.on.board.take_events();
+        let ignored = self.waiting.as_ref().is_some_and(|s| s.tick.is_none());
+        if ignored && self.first_sample.is_some() && self.safe_at.is_none() {
+            self.report.unanswered += 1;
+        }
         if let Some(Sampled { shaft, rig_time, tick: Some(tick) }) = self.waiting.take()
             && tick + 1 < self.on.params.ticks
         {
@@ -440,6 +458,7 @@ impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
         let v = &self.on;
         self.report.standing = v.station.standing().map(Real::to_f64);
         self.report.board = Some(v.board.node().state());
+        self.report.last_code = v.board.code().0;
         let hits = [v.up.hits().1, v.down.hits().1, v.board.first_hit_ns()];
         let first = hits.into_iter().flatten().min();
         self.report.hit = first.map(|t| t.saturating_sub(self.origin_ns) as f64 / 1e9);

@@ -1,0 +1,418 @@
+//! The grammar of the campaign: a setting, and in it one trouble or two, drawn from a seed.
+//!
+//! A trouble is where × what × from when × how long × how often. The tables below say which there are.
+
+use crate::faults::{Channel, Direction, Fault, FaultKind, Forgery, Lie, StuckAt};
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// The rig of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RigName {
+    /// The paper's.
+    Paper,
+    /// The stand-in for the experiment: friction a third weaker and uneven, a period of delay.
+    Bench,
+    /// A geared motor axis with friction.
+    Motor,
+}
+
+/// The safe state of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Safe {
+    /// Holds, V.
+    Hold(f64),
+    /// Ramps at a rate (V/s) to a voltage (V).
+    Ramp(f64, f64),
+    /// Lets go.
+    Release,
+    /// Holds (V) and lets go after a time (s).
+    HoldThenRelease(f64, f64),
+}
+
+/// A path from rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PathKind {
+    /// A ramp, °/s.
+    Ramp(f64),
+    /// From rest to rest in two seconds, with this as its top speed, °/s.
+    MinimumJerk(f64),
+    /// A ramp with a sine of 2 Hz on it, °/s.
+    Sine(f64),
+}
+
+impl PathKind {
+    /// Its highest speed, °/s.
+    #[must_use]
+    pub fn top_deg_s(self) -> f64 {
+        match self {
+            PathKind::Ramp(v) | PathKind::MinimumJerk(v) => v,
+            PathKind::Sine(v) => v * (1.0 + SINE_DEG_PER_DEG_S * std::f64::consts::TAU * 2.0),
+        }
+    }
+}
+
+impl PathKind {
+    /// Its lowest speed where troubles begin, °/s.
+    #[must_use]
+    pub fn slowest_deg_s(self) -> f64 {
+        match self {
+            PathKind::Ramp(v) => v,
+            // At a quarter of its time.
+            PathKind::MinimumJerk(v) => 0.56 * v,
+            PathKind::Sine(v) => v * (1.0 - SINE_DEG_PER_DEG_S * std::f64::consts::TAU * 2.0),
+        }
+    }
+}
+
+/// Amplitude of a path's sine, ° per °/s of its ramp.
+pub(super) const SINE_DEG_PER_DEG_S: f64 = 0.03;
+
+/// A healthy run, but for its troubles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// Its rig.
+    pub rig: RigName,
+    /// Its law, by the name in scenarios.
+    pub law: &'static str,
+    /// Its path.
+    pub path: PathKind,
+    /// True if `[bounds]` know the plant to 10 % (friction to 20 %) only.
+    pub wide: bool,
+    /// Its safe state.
+    pub safe: Safe,
+    /// True if the velocity is the observer's.
+    pub observer: bool,
+    /// True in single precision.
+    pub single: bool,
+    /// Periods of delay of the rig.
+    pub delay: u32,
+    /// The line, one way, ns.
+    pub latency_ns: u64,
+    /// Periods without an answer that board and supervisor wait.
+    pub cycles: u32,
+    /// Good samples after one that was refused.
+    pub good_samples: u32,
+}
+
+/// Trouble's place and kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum What {
+    /// A fault of line or board.
+    Fault(FaultKind, Direction),
+    /// The drive is stronger by this factor, and the output limited to little more than its old self needs.
+    Load(f64),
+    /// The controller takes so long for an answer, s.
+    Slow(f64),
+    /// The controller ends without a word.
+    ControllerDies,
+    /// The law's memory is corrupted: its demand is not a number.
+    LawNotFinite,
+    /// The path's velocity is not a number.
+    TargetNotFinite,
+    /// The path's position jumps by a finite but huge distance.
+    TargetHuge,
+}
+
+/// A trouble and when it is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trouble {
+    /// Place and kind.
+    pub what: What,
+    /// Its onset, s after arming.
+    pub at: f64,
+    /// Its length in periods; none if it stays.
+    pub periods: Option<u32>,
+    /// Probability with which each frame or period within that time is hit.
+    pub often: f64,
+}
+
+impl Trouble {
+    /// The fault of line or board that it is, if it is one, with periods of so many seconds.
+    pub(super) fn fault(&self, period: f64) -> Option<Fault> {
+        let What::Fault(kind, direction) = self.what else { return None };
+        let lasting = self.periods.map_or(f64::INFINITY, |n| f64::from(n) * period);
+        Some(Fault { kind, at: self.at, lasting, probability: self.often, direction })
+    }
+
+    /// True if it shows over a time only.
+    pub(super) fn needs_time(&self) -> bool {
+        needs_time(self.what)
+    }
+
+    /// The kind of it, for tables.
+    #[must_use]
+    pub fn kind(&self) -> String {
+        let kind = match self.what {
+            What::Fault(FaultKind::Delay(_), _) => "frames late".to_owned(),
+            What::Fault(FaultKind::Jitter(_), _) => "jitter".to_owned(),
+            What::Fault(FaultKind::Forged(Forgery::Echo(_)), _) => "echo".to_owned(),
+            What::Fault(FaultKind::Forged(Forgery::OtherRun(_)), _) => {
+                "frames of another run as well".to_owned()
+            }
+            What::Fault(FaultKind::EncoderJump(by), _) if by.abs() < 20 => {
+                "encoder off by 3 to 9 counts".to_owned()
+            }
+            What::Fault(FaultKind::EncoderJump(_), _) => "encoder off by 20 counts or more".to_owned(),
+            What::Fault(FaultKind::EncoderScale(by), _) if by > 1.0 => "counts more than they are".to_owned(),
+            What::Fault(FaultKind::EncoderScale(by), _) if by > 0.0 => {
+                "counts fewer than they are".to_owned()
+            }
+            What::Fault(FaultKind::EncoderScale(_), _) => "counts reversed".to_owned(),
+            What::Fault(FaultKind::DacStuck(StuckAt::Volts(v)), _) if v != 0.0 && v != 9.99 => {
+                "DAC stuck at any voltage".to_owned()
+            }
+            What::Fault(FaultKind::DacScale(by), _) if by > 1.0 => "DAC too high".to_owned(),
+            What::Fault(FaultKind::DacScale(by), _) if by >= 0.0 => "DAC too low".to_owned(),
+            What::Fault(FaultKind::DacScale(_), _) => "DAC the wrong way round".to_owned(),
+            What::Fault(FaultKind::Clock(_), _) => "board's time wrong".to_owned(),
+            What::Fault(FaultKind::Prescaler(_), _) => "board's periods wrong".to_owned(),
+            What::Fault(FaultKind::Crystal(_), _) => "board's whole clock wrong".to_owned(),
+            What::Fault(kind, _) => kind.to_string(),
+            What::Load(by) => format!("load times {by}, above what the output can brake"),
+            What::Slow(s) => format!("each answer takes {} ms", s * 1e3),
+            What::ControllerDies => "controller dies".to_owned(),
+            What::LawNotFinite => "law's demand not a number".to_owned(),
+            What::TargetNotFinite => "target not a number".to_owned(),
+            What::TargetHuge => "target jumps by 2³⁰ counts".to_owned(),
+        };
+        let stays = self.periods.is_none() && self.often >= 1.0;
+        let kind = if stays { kind } else { format!("{kind}, now and then") };
+        match self.what {
+            What::Fault(_, Direction::Up) => format!("{kind}, from the board"),
+            What::Fault(_, Direction::Down) => format!("{kind}, to the board"),
+            _ => kind,
+        }
+    }
+}
+
+/// Parts of a draw that its minimal form may leave out, by the names that they have in the name of a run.
+pub const PLAIN: [&str; 10] =
+    ["second", "first", "bench", "wide", "observer", "single", "delay", "latency", "cycles", "path"];
+
+/// A run before it is run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Draw {
+    /// Everything but the troubles.
+    pub setting: Setting,
+    /// None, one or two.
+    pub troubles: Vec<Trouble>,
+}
+
+impl Draw {
+    /// The draw of a seed, without those parts of it that are named.
+    #[must_use]
+    pub fn new(seed: u64, without: &[&str]) -> Self {
+        let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let mut setting = setting(&mut rng);
+        let mut troubles = Vec::new();
+        if rng.random_bool(0.95) {
+            troubles.push(trouble(&mut rng, &setting));
+            if rng.random_bool(0.2) {
+                troubles.push(trouble(&mut rng, &setting));
+            }
+        }
+        // A controller is slow in one way.
+        if troubles.iter().all(|t| matches!(t.what, What::Slow(_) | What::ControllerDies)) {
+            troubles.truncate(1);
+        }
+        for part in without {
+            match *part {
+                "second" => troubles.truncate(1),
+                "first" if troubles.len() > 1 => drop(troubles.remove(0)),
+                "bench" if setting.rig == RigName::Bench => setting.rig = RigName::Paper,
+                "wide" => setting.wide = false,
+                "observer" => setting.observer = false,
+                "single" => setting.single = false,
+                "delay" if setting.rig == RigName::Paper => setting.delay = 0,
+                "latency" => setting.latency_ns = 50_000,
+                "cycles" => setting.cycles = 3,
+                "path" => setting.path = PathKind::Ramp(setting.path.top_deg_s()),
+                _ => {}
+            }
+        }
+        // A load that is to be told by the voltage's limit: the law that goes there, and no other trouble.
+        if let Some(load) = troubles.iter().find(|t| matches!(t.what, What::Load(_))).copied() {
+            setting.rig = RigName::Paper;
+            setting.law = "pd";
+            setting.path = PathKind::Ramp(20.0);
+            setting.safe = Safe::Hold(9.99);
+            (setting.wide, setting.observer, setting.delay) = (false, false, 0);
+            troubles = vec![load];
+        }
+        Draw { setting, troubles }
+    }
+}
+
+fn pick<T: Copy>(rng: &mut Pcg64, from: &[T], otherwise: T) -> T {
+    from.choose(rng).copied().unwrap_or(otherwise)
+}
+
+fn setting(rng: &mut Pcg64) -> Setting {
+    let rig = [RigName::Paper, RigName::Paper, RigName::Paper, RigName::Bench, RigName::Motor];
+    let rig = pick(rng, &rig, RigName::Paper);
+    let laws: &[&str] = match rig {
+        RigName::Motor => &["pid", "smc", "ctc"],
+        RigName::Paper => &["pd", "ctc", "smc", "smc_sign", "pid", "hold"],
+        RigName::Bench => &["pd", "ctc", "smc"],
+    };
+    let law = pick(rng, laws, "pd");
+    let speed = match rig {
+        RigName::Motor => pick(rng, &[1.0, 2.0, 4.0], 2.0),
+        _ if law == "hold" => 0.2,
+        _ => pick(rng, &[2.0, 5.0, 10.0, 20.0, 20.0, 28.0, 40.0], 20.0),
+    };
+    let path = match rng.random_range(0..4) {
+        0 if law != "hold" => PathKind::MinimumJerk(speed),
+        1 if law != "hold" => PathKind::Sine(speed),
+        _ => PathKind::Ramp(speed),
+    };
+    let weakest = if rig == RigName::Bench { 6.7 } else { 4.5 };
+    let volts = pick(rng, &[weakest, 6.7, 9.99], 9.99);
+    let safe = match rng.random_range(0..8) {
+        _ if rig == RigName::Motor => Safe::Release,
+        0 => Safe::Ramp(pick(rng, &[200.0, 500.0, 2000.0], 500.0), volts),
+        // A board lets go from power-up on, and to hold does not catch a shaft.
+        1 if law != "hold" => Safe::Release,
+        2 => Safe::HoldThenRelease(volts, rng.random_range(0.3..0.6)),
+        _ => Safe::Hold(volts),
+    };
+    let delay = match rig {
+        RigName::Bench => 1,
+        // PD with a period of delay is unstable on the paper's rig, and the switching laws swing.
+        RigName::Paper if matches!(law, "ctc" | "smc" | "hold") => rng.random_range(0..=1),
+        _ => 0,
+    };
+    Setting {
+        rig,
+        law,
+        path,
+        wide: rng.random_bool(0.25),
+        safe,
+        observer: rig != RigName::Motor && rng.random_bool(0.2),
+        single: rng.random_bool(0.5),
+        delay,
+        latency_ns: rng.random_range(20_000..300_000),
+        cycles: pick(rng, &[3, 3, 3, 8, 20], 3),
+        good_samples: pick(rng, &[1, 1, 2], 1),
+    }
+}
+
+/// Where trouble may be.
+const PLACES: usize = 6;
+
+fn trouble(rng: &mut Pcg64, setting: &Setting) -> Trouble {
+    let (from, to) = match setting.path {
+        PathKind::MinimumJerk(_) => (0.5, 1.2),
+        PathKind::Ramp(_) | PathKind::Sine(_) => (0.15, 0.5),
+    };
+    let mut at = rng.random_range(from..to);
+    let what = match rng.random_range(0..PLACES) {
+        0 | 1 => line(rng),
+        2 => What::Fault(encoder(rng), Direction::Both),
+        3 => What::Fault(converter(rng, setting), Direction::Both),
+        4 => What::Fault(board(rng), Direction::Both),
+        _ => inside(rng),
+    };
+    let faults = matches!(what, What::Fault(..));
+    // Armed, and not running yet.
+    if faults && rng.random_bool(0.1) {
+        at = 0.0;
+    }
+    let periods = match rng.random_range(0..10) {
+        _ if !faults || needs_time(what) => None,
+        0 | 1 => Some(1),
+        2 => Some(rng.random_range(2..=8)),
+        3 => Some(rng.random_range(9..=100)),
+        _ => None,
+    };
+    let often = match rng.random_range(0..10) {
+        _ if !faults || needs_time(what) || periods == Some(1) => 1.0,
+        0 => 0.02,
+        1 => 0.3,
+        2 => 0.9,
+        _ => 1.0,
+    };
+    Trouble { what, at, periods, often }
+}
+
+/// True of what shows over a time only.
+fn needs_time(what: What) -> bool {
+    matches!(
+        what,
+        What::Fault(
+            FaultKind::Clock(_) | FaultKind::Prescaler(_) | FaultKind::Crystal(_) | FaultKind::Reset,
+            _
+        )
+    )
+}
+
+/// The line: one way or both.
+fn line(rng: &mut Pcg64) -> What {
+    let ways = [Direction::Up, Direction::Down, Direction::Both];
+    let way = pick(rng, &ways, Direction::Both);
+    let kind = match rng.random_range(0..12) {
+        0 | 1 => FaultKind::Drop,
+        2 => FaultKind::Duplicate,
+        3 => FaultKind::Corrupt,
+        4 => FaultKind::Delay(pick(rng, &[0.0003, 0.00195, 0.005], 0.005)),
+        5 => FaultKind::Jitter(pick(rng, &[0.0003, 0.002, 0.008], 0.008)),
+        6 => FaultKind::Reorder,
+        7 => FaultKind::Silence,
+        8 => FaultKind::Forged(Forgery::Echo(rng.random_range(1..=20))),
+        9 => FaultKind::Forged(Forgery::OtherRun(rng.random_range(1..=20))),
+        10 => return What::Fault(FaultKind::Forged(Forgery::AboveTop), Direction::Down),
+        _ => {
+            let lies = [Lie::Idle, Lie::Encoder, Lie::Converter, Lie::OtherRun];
+            return What::Fault(FaultKind::Lie(pick(rng, &lies, Lie::Idle)), Direction::Up);
+        }
+    };
+    What::Fault(kind, way)
+}
+
+fn encoder(rng: &mut Pcg64) -> FaultKind {
+    match rng.random_range(0..8) {
+        0 | 1 => FaultKind::EncoderFreeze,
+        2 => FaultKind::EncoderJump(pick(rng, &[-500, -20, -3, 3, 9, 500, 100_000], 500)),
+        3 => FaultKind::EncoderChannel(Channel::A),
+        4 => FaultKind::EncoderChannel(Channel::B),
+        5 => FaultKind::EncoderScale(pick(rng, &[0.5, 0.9, 1.2, 2.0, 10.0], 2.0)),
+        6 => FaultKind::EncoderScale(-1.0),
+        _ => FaultKind::EncoderLoss,
+    }
+}
+
+fn converter(rng: &mut Pcg64, setting: &Setting) -> FaultKind {
+    let low = if setting.rig == RigName::Motor { -9.99 } else { 0.0 };
+    match rng.random_range(0..6) {
+        0 => FaultKind::DacStuck(StuckAt::Volts(0.0)),
+        1 => FaultKind::DacStuck(StuckAt::Last),
+        2 => FaultKind::DacStuck(StuckAt::Volts(9.99)),
+        3 => FaultKind::DacStuck(StuckAt::Volts(rng.random_range(low..9.99))),
+        4 => FaultKind::DacScale(-1.0),
+        _ => FaultKind::DacScale(pick(rng, &[0.0, 0.5, 0.8, 1.5, 2.0], 0.5)),
+    }
+}
+
+fn board(rng: &mut Pcg64) -> FaultKind {
+    match rng.random_range(0..6) {
+        0 => FaultKind::Clock(pick(rng, &[-1.0, 0.0, 0.5, 2.0, 12.0], 0.5)),
+        1 => FaultKind::Prescaler(pick(rng, &[0.5, 1.2, 2.0, 12.0], 2.0)),
+        2 => FaultKind::Crystal(pick(rng, &[0.5, 1.2, 2.0], 2.0)),
+        _ => FaultKind::Reset,
+    }
+}
+
+/// The controller itself, and its load.
+fn inside(rng: &mut Pcg64) -> What {
+    match rng.random_range(0..8) {
+        0 => What::Load(1.347),
+        1 => What::Load(2.0),
+        2 => What::Slow(pick(rng, &[0.0002, 0.0007], 0.0007)),
+        3 | 4 => What::ControllerDies,
+        5 => What::LawNotFinite,
+        6 => What::TargetNotFinite,
+        _ => What::TargetHuge,
+    }
+}

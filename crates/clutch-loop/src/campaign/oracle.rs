@@ -1,0 +1,419 @@
+//! The oracle: what a shaft may do, and what has to be found in which time, from the draw alone.
+//!
+//! It shares nothing with the supervisor: the rig's physics are a few lines of its own, and the times are the promises of
+//! `docs/safety.md`.
+
+use super::grammar::{Draw, PathKind, RigName, Safe, Setting, Trouble, What};
+use crate::faults::{Direction, FaultKind, Forgery, Lie, StuckAt};
+use crate::virtual_time::VirtualReport;
+use clutch_core::supervisor::Cause;
+use clutch_wire::BoardState;
+
+/// A sampling period, s.
+const PERIOD: f64 = 0.001;
+
+/// The fate of control.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fate {
+    /// The safe output is in force so long (s) after the trouble first showed.
+    Ends(f64),
+    /// Control goes on.
+    GoesOn,
+    /// Either: too little for the one, too much for the other.
+    Either,
+}
+
+/// The promise for a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Promise {
+    /// The fate of control.
+    pub fate: Fate,
+    /// Causes that may be named where it ends; any, if there is none.
+    pub causes: &'static [Cause],
+    /// The longest time for which the brake may be open unseen, s; none where nobody can close it.
+    pub blind: Option<f64>,
+    /// True if encoder, converter and load are sound, so that the following error is what it seems.
+    pub truthful: bool,
+}
+
+/// Error at rest that ends control in a run, °: an integrator is slow to let go at the start.
+#[must_use]
+pub fn following_deg(s: &Setting) -> f64 {
+    if s.law == "pid" { 6.0 } else { 1.0 }
+}
+
+/// Periods in which frames may be lost without an end; both ways they are another period's. A law that is steady on a ramp
+/// leaves its brake where it is right for longer.
+fn borne(s: &Setting, way: Direction) -> u32 {
+    let ramp = matches!(s.path, PathKind::Ramp(_)) && matches!(s.law, "pd" | "ctc" | "smc");
+    let steady = ramp && s.rig == RigName::Paper && s.delay == 0 && !s.observer;
+    let patient = (s.cycles - 2).min(if steady { 8 } else { 3 });
+    match way {
+        Direction::Up => patient,
+        // The controller does not hear of codes that are lost: of more than one the shaft tells, and that may be too much.
+        Direction::Down => 1_u32.min(patient),
+        Direction::Both => u32::from(patient > 1),
+    }
+}
+
+/// A trouble of an encoder that is found by the way of the shaft: time for which it may be open.
+fn by_the_way(s: &Setting) -> f64 {
+    let bounds = if s.wide || s.rig == RigName::Bench { 2.0 } else { 1.0 };
+    (0.012 + 0.001 * f64::from(s.delay)) * bounds
+}
+
+impl Promise {
+    /// What one trouble in a setting may come to.
+    #[must_use]
+    pub fn of(s: &Setting, t: &Trouble) -> Promise {
+        let watchdog = f64::from(s.cycles) * PERIOD;
+        let base = Promise {
+            fate: Fate::Either,
+            causes: &[],
+            blind: Some(watchdog + PERIOD * f64::from(1 + s.delay)),
+            truthful: true,
+        };
+        let ends =
+            |within: f64, causes: &'static [Cause]| Promise { fate: Fate::Ends(within), causes, ..base };
+        let goes_on = Promise { fate: Fate::GoesOn, ..base };
+        match t.what {
+            What::Fault(kind, way) if kind.silences() && kind != FaultKind::Reset => {
+                // The board's consent to its own arming is a frame, too.
+                if t.at == 0.0 && way != Direction::Down { base } else { line(s, t, kind, way, &base) }
+            }
+            What::Fault(FaultKind::Reset, _) => ends(watchdog + 1.5 * PERIOD, &[Cause::Silence]),
+            What::Fault(kind, _) => hardware(s, t, kind, &base),
+            What::Load(factor) if factor < 1.5 => {
+                Promise { blind: None, truthful: false, ..ends(0.6, &[Cause::Saturation]) }
+            }
+            What::Load(_) => Promise { blind: None, truthful: false, ..ends(0.3, &[Cause::FollowingError]) },
+            What::Slow(answer) if answer < 0.0005 => goes_on,
+            What::Slow(_) => ends(0.045, &[Cause::Deadline]),
+            What::ControllerDies => ends(watchdog + s.latency_ns as f64 / 1e9 + 1e-5, &[]),
+            What::LawNotFinite if s.law == "hold" => base,
+            What::LawNotFinite => ends(3.0 * PERIOD, &[Cause::NotFinite]),
+            // The error is that of the broken path.
+            What::TargetNotFinite | What::TargetHuge => {
+                Promise { truthful: false, ..ends(3.0 * PERIOD, &[Cause::Target]) }
+            }
+        }
+    }
+}
+
+/// Frames that are lost, late, twice, altered or forged.
+fn line(s: &Setting, t: &Trouble, kind: FaultKind, way: Direction, base: &Promise) -> Promise {
+    let watchdog = f64::from(s.cycles) * PERIOD;
+    let ends = |within: f64, causes: &'static [Cause]| Promise { fate: Fate::Ends(within), causes, ..*base };
+    let goes_on = Promise { fate: Fate::GoesOn, ..*base };
+    let (stays, always) = (t.periods.is_none(), t.often >= 1.0);
+    let at_most = |n: u32| t.periods.is_some_and(|p| p <= n);
+    let at_least = |n: u32| t.periods.is_none_or(|p| p >= n);
+    let up = way != Direction::Down;
+    match kind {
+        FaultKind::Drop | FaultKind::Corrupt | FaultKind::Silence | FaultKind::Lie(Lie::OtherRun) => {
+            // A frame whose end is hit takes the next one with it.
+            let also = u32::from(kind == FaultKind::Corrupt);
+            if t.periods.is_some_and(|n| n + also <= borne(s, way))
+                || t.often < 0.1 && s.cycles >= 8 && way == Direction::Up
+            {
+                goes_on
+            } else if always && at_least(s.cycles + 1) {
+                // A shaft does not do what codes ask that never come.
+                let causes: &[Cause] = if up { &[Cause::Silence, Cause::Board] } else { &[] };
+                ends(watchdog + 0.6 * PERIOD, causes)
+            } else if stays && up && t.often > 0.1 {
+                ends(0.5, &[Cause::Silence, Cause::Board, Cause::Lost])
+            } else {
+                *base
+            }
+        }
+        FaultKind::Lie(Lie::Idle | Lie::Encoder | Lie::Converter) => ends(1.5 * PERIOD, &[Cause::Board]),
+        FaultKind::Duplicate if !up => goes_on,
+        FaultKind::Duplicate if at_most(1) => goes_on,
+        FaultKind::Duplicate if stays && t.often > 0.1 || always && at_least(3) => {
+            ends(if always { 4.0 * PERIOD } else { 0.15 }, &[Cause::Duplicated])
+        }
+        FaultKind::Forged(Forgery::OtherRun(_) | Forgery::AboveTop) => goes_on,
+        FaultKind::Forged(Forgery::Echo(_)) if !up => goes_on,
+        FaultKind::Forged(Forgery::Echo(_)) if always && stays => {
+            ends(6.0 * PERIOD, &[Cause::Duplicated, Cause::Reordered])
+        }
+        FaultKind::Reorder if up && always && stays => {
+            ends(8.0 * PERIOD, &[Cause::Reordered, Cause::Board, Cause::Late])
+        }
+        FaultKind::Delay(by) | FaultKind::Jitter(by) if by < 0.0005 => goes_on,
+        FaultKind::Delay(by) if always && stays && by > watchdog + PERIOD => {
+            ends(watchdog + 0.6 * PERIOD, &[Cause::Silence, Cause::Board, Cause::Late])
+        }
+        FaultKind::Delay(by) if by < 0.002 && !up && stays && (0.1..0.5).contains(&t.often) => {
+            ends(0.5, &[Cause::Late, Cause::Board])
+        }
+        FaultKind::Jitter(by) if always && stays && by > 2.0 * watchdog => {
+            ends(0.03, &[Cause::Silence, Cause::Board, Cause::Late])
+        }
+        _ => *base,
+    }
+}
+
+/// Encoder, converter and clock of the board.
+fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promise {
+    let ends = |within: f64, causes: &'static [Cause]| Promise { fate: Fate::Ends(within), causes, ..*base };
+    let (stays, always) = (t.periods.is_none() && t.often >= 1.0, t.often >= 1.0);
+    // A shaft that a brake controls, and that moves.
+    let waits = s.law == "pid" && (s.path.top_deg_s() < 10.0 || t.at == 0.0);
+    let moves = s.rig != RigName::Motor && s.law != "hold" && !waits;
+    // A law lets go so little of a shaft that is slow, computed torque most of all, that friction of the bounds might still
+    // hold it.
+    let ctc = s.law == "ctc";
+    let hidden = ctc && t.at == 0.0 || s.path.slowest_deg_s() < if ctc { 10.0 } else { 3.0 };
+    let exact = s.rig == RigName::Paper && !s.wide && s.delay == 0 && s.law != "pid";
+    let way = Promise { blind: (!hidden).then(|| by_the_way(s)), truthful: false, ..*base };
+    let blind = Promise { blind: None, truthful: false, ..*base };
+    let found = |causes| Promise { fate: Fate::Ends(0.5), causes, ..way };
+    match kind {
+        // The board sees it, and does not ask.
+        FaultKind::EncoderLoss => ends(0.1 * PERIOD, &[Cause::Board]),
+        FaultKind::EncoderFreeze if stays && moves => found(&[Cause::StandStill, Cause::TooSlow]),
+        FaultKind::EncoderChannel(_) if stays && moves => {
+            found(&[Cause::Channel, Cause::StandStill, Cause::TooSlow, Cause::Reversed])
+        }
+        FaultKind::EncoderScale(by) if by < 0.0 && stays && moves => {
+            found(&[Cause::Reversed, Cause::Channel, Cause::StandStill, Cause::TooSlow])
+        }
+        // From the first sample on it is another zero, and nothing else.
+        FaultKind::EncoderJump(_) if t.at == 0.0 => blind,
+        FaultKind::EncoderJump(by) if by.abs() >= 20 => jump(s, t, &way),
+        FaultKind::EncoderFreeze | FaultKind::EncoderChannel(_) | FaultKind::EncoderJump(_) => way,
+        FaultKind::EncoderScale(_) => blind,
+        FaultKind::DacStuck(StuckAt::Volts(v)) if stays && s.rig != RigName::Motor && v < 0.01 => {
+            // A path that begins with a jump asks for an open brake, until a shaft that falls is as fast.
+            let start = if t.at == 0.0 { 0.02 + s.path.top_deg_s() / 1587.0 } else { 0.0 };
+            Promise { fate: Fate::Ends(2.0 * by_the_way(s) + start), causes: &[Cause::TooFast], ..blind }
+        }
+        FaultKind::DacStuck(StuckAt::Volts(v)) if stays && moves && v > 9.0 => {
+            Promise { fate: Fate::Ends(0.5), ..blind }
+        }
+        FaultKind::DacStuck(_) | FaultKind::DacScale(_) => Promise { truthful: always, ..blind },
+        FaultKind::Clock(by) => clock(s, t, by, 1.0, &blind),
+        // Half the way in a period: no shaft of exact bounds is so slow, long before the clocks are apart by enough.
+        FaultKind::Prescaler(by)
+            if by < 1.0 && exact && moves && t.at > 0.0 && s.path.slowest_deg_s() >= 15.0 =>
+        {
+            let causes = &[Cause::TooSlow, Cause::StandStill, Cause::TooFast, Cause::Clock];
+            Promise { fate: Fate::Ends(0.04), causes, ..blind }
+        }
+        FaultKind::Prescaler(by) | FaultKind::Crystal(by) => clock(s, t, by, by, &blind),
+        _ => *base,
+    }
+}
+
+/// Counts that are off by more than a shaft can be.
+fn jump(s: &Setting, t: &Trouble, way: &Promise) -> Promise {
+    let ends = |within: f64| Promise { fate: Fate::Ends(within), causes: &[Cause::Jump], ..*way };
+    let refused = t.periods.unwrap_or(u32::MAX);
+    if refused <= 2 && refused + s.good_samples < s.cycles {
+        Promise { fate: Fate::GoesOn, ..*way }
+    } else if t.often >= 1.0 && refused > 3 {
+        ends(3.0 * PERIOD)
+    } else if t.periods.is_none() && t.often > 0.1 {
+        Promise { causes: &[], ..ends(0.3) }
+    } else {
+        *way
+    }
+}
+
+/// A clock that is fast or slow by a factor, its periods so many times as long: 5 % of the time so far and a slack, which is
+/// four times the patience with a silent line.
+fn clock(s: &Setting, t: &Trouble, factor: f64, longer: f64, blind: &Promise) -> Promise {
+    let share = (factor - 1.0).abs() - 0.05;
+    let slack = (4.0 * PERIOD * f64::from(s.cycles)).max(0.03);
+    let within = (0.05 * (t.at + 0.1) + slack) / share * longer.max(1.0);
+    Promise { fate: Fate::Ends(1.2 * within + 0.01), ..*blind }
+}
+
+/// The way of a shaft beyond its path, °: open for a time, then in the safe state; none where that stops nothing.
+///
+/// A few lines of Euler's method, with a brake that grips a tenth less and a weight that pulls a tenth more than the rig's.
+#[must_use]
+pub fn beyond_deg(s: &Setting, blind: f64) -> Option<f64> {
+    const STEP: f64 = 1e-4;
+    let (grip, pull) = match s.rig {
+        RigName::Paper => (0.14 * 0.15, 0.0471),
+        RigName::Bench => (0.14 * 0.104 * 0.7, 0.0493),
+        RigName::Motor => return None,
+    };
+    let (grip, pull, inertia) = (0.9 * grip, 1.1 * pull, 0.0017);
+    let ahead = f64::from(1 + s.delay) * PERIOD;
+    let (mut speed, mut way) = (s.path.top_deg_s().to_radians() + 0.1, 0.0);
+    let path = s.path.top_deg_s().to_radians();
+    let mut time = 0.0;
+    while time < blind {
+        speed += pull / inertia * STEP;
+        way += (speed - path).max(0.0) * STEP;
+        time += STEP;
+    }
+    let mut since = 0.0;
+    while speed > 0.0 {
+        let volts = match s.safe {
+            _ if since < ahead => 0.0,
+            Safe::Hold(v) | Safe::HoldThenRelease(v, _) => v,
+            Safe::Ramp(rate, v) => v.min(rate * (since - ahead)),
+            Safe::Release => return None,
+        };
+        speed += (pull - grip * volts) / inertia * STEP;
+        way += speed.max(0.0) * STEP;
+        since += STEP;
+        if since > 0.2 {
+            return None;
+        }
+    }
+    Some(way.to_degrees())
+}
+
+/// Healthy error of a run, °: what its law and its path leave.
+fn healthy_deg(s: &Setting) -> f64 {
+    let law = if s.law == "pid" { 3.0 } else { 0.15 };
+    let uneven = if s.rig == RigName::Bench { 0.3 } else { 0.0 };
+    law + uneven + 0.012 * s.path.top_deg_s()
+}
+
+/// Checks that a report keeps the promises of its draw; says what is wrong if not.
+#[must_use]
+pub fn judge(draw: &Draw, o: &VirtualReport) -> Option<String> {
+    let s = &draw.setting;
+    let promises: Vec<Promise> = draw.troubles.iter().map(|t| Promise::of(s, t)).collect();
+    output(draw, o)
+        .or_else(|| fate(draw, &promises, o))
+        .or_else(|| if lossy(draw) { None } else { degrees(s, &promises, o) })
+}
+
+/// The output: within its limits, and in the end that of the safe state.
+fn output(draw: &Draw, o: &VirtualReport) -> Option<String> {
+    let s = &draw.setting;
+    let (low, high) = if s.rig == RigName::Motor { (-10.0, 10.0) } else { (0.0, 10.0) };
+    if o.answers > 0 && (o.volts.0 < low - 1e-9 || o.volts.1 > high) {
+        return Some(format!("commanded {} to {} V, outside of {low} to {high} V", o.volts.0, o.volts.1));
+    }
+    if o.highest_code > 4095 {
+        return Some(format!("the converter was given the code {}", o.highest_code));
+    }
+    let ended = matches!(o.board, Some(BoardState::Faulted | BoardState::Stopped));
+    let volts = |code: u16| f64::from(code) * 20.0 / 4096.0 - 10.0;
+    let (first, last) = match s.safe {
+        Safe::Hold(v) => (Some(v), Some(v)),
+        Safe::Release => (Some(0.0), Some(0.0)),
+        Safe::HoldThenRelease(v, _) => (Some(v), None),
+        Safe::Ramp(..) => (None, None),
+    };
+    let wrong = |code, v: Option<f64>| v.is_some_and(|v| (v - volts(code)).abs() > 0.006);
+    let (at_once, in_the_end) = (volts(o.safe_code), volts(o.last_code));
+    (ended && (wrong(o.safe_code, first) || wrong(o.last_code, last)))
+        .then(|| format!("{at_once} V at once and {in_the_end} V in the end instead of {:?}", s.safe))
+}
+
+/// The fate of control, and its cause.
+fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> {
+    let (s, alone) = (&draw.setting, promises.len() <= 1);
+    if promises.iter().all(|p| p.fate == Fate::GoesOn) && alone {
+        if let Some(cause) = o.cause {
+            return Some(format!("ended by {cause:?} although it can be borne"));
+        }
+        if o.board != Some(BoardState::Running) {
+            return Some(format!("the board is in {:?}", o.board));
+        }
+    }
+    // A sample that is refused is not answered, nor are those of its proof; the next one is.
+    if let [trouble] = &draw.troubles[..]
+        && let What::Fault(FaultKind::EncoderJump(by), _) = trouble.what
+        && by.abs() >= 20
+        && trouble.periods == Some(1)
+        && trouble.at > 0.0
+        && s.cycles >= 8
+        && o.unanswered != u64::from(s.good_samples)
+    {
+        return Some(format!("{} samples unanswered instead of {}", o.unanswered, s.good_samples));
+    }
+    for (trouble, promise) in draw.troubles.iter().zip(promises) {
+        let Fate::Ends(within) = promise.fate else { continue };
+        // Beside another it has to be there at once.
+        // A clock that is longer moves all that comes after it.
+        if !alone && (trouble.often < 1.0 || draw.troubles.iter().any(Trouble::needs_time)) {
+            continue;
+        }
+        // What a board refuses aloud stands between its samples, and changes places with them.
+        let swapped = matches!(trouble.what, What::Fault(FaultKind::Reorder, _));
+        if !alone && (swapped || lossy(draw) && !promise.truthful) {
+            continue;
+        }
+        // A shaft that a broken converter moves, seen by a broken encoder, may be any.
+        let others = promises.iter().filter(|p| !p.truthful || p.blind.is_none()).count();
+        if !alone && !promise.truthful && others > 1 {
+            continue;
+        }
+        let begun = if alone && hits(trouble) { o.hit } else { Some(trouble.at) };
+        // It was never there.
+        let Some(begun) = begun else { continue };
+        // Beside another, a whole period until it is there, and what a line that is broken as well takes to be found.
+        let line = draw.troubles.iter().any(|t| match t.what {
+            What::Fault(kind, _) => kind.silences(),
+            What::Slow(_) | What::ControllerDies => true,
+            _ => false,
+        });
+        let patient = if line { f64::from(s.cycles) } else { 0.0 };
+        let within = if alone { within } else { within + (2.0 + patient) * PERIOD };
+        let Some(safe) = o.safe else {
+            return Some(format!("the safe output was never in force; cause {:?}", o.cause));
+        };
+        // A microsecond for the clock's grain.
+        if safe - begun > within + 1e-6 {
+            let took = (safe - begun) * 1e3;
+            return Some(format!(
+                "safe output after {took:.3} ms instead of {:.3} ms; cause {:?}",
+                within * 1e3,
+                o.cause
+            ));
+        }
+        let named = o.cause.is_none_or(|c| promise.causes.is_empty() || promise.causes.contains(&c));
+        if alone && !named {
+            return Some(format!("named {:?} instead of one of {:?}", o.cause, promise.causes));
+        }
+        if alone && o.cause.is_none() && !promise.causes.is_empty() && !promise.causes.contains(&Cause::Board)
+        {
+            return Some("ended by the board alone".to_owned());
+        }
+    }
+    None
+}
+
+/// True if a line that loses and a delay leave it open which voltage is in force: then the envelope believes any of the output.
+fn lossy(draw: &Draw) -> bool {
+    let line = |t: &Trouble| matches!(t.what, What::Fault(kind, _) if kind.silences());
+    draw.setting.delay > 0 && draw.troubles.len() > 1 && draw.troubles.iter().any(line)
+}
+
+/// True if line or board tell when it first showed.
+fn hits(t: &Trouble) -> bool {
+    matches!(t.what, What::Fault(..))
+}
+
+/// The way of the shaft.
+fn degrees(s: &Setting, promises: &[Promise], o: &VirtualReport) -> Option<String> {
+    if s.rig == RigName::Motor || promises.iter().any(|p| p.blind.is_none() && !p.truthful) {
+        return None;
+    }
+    let healthy = healthy_deg(s);
+    let largest = o.largest_error.to_degrees();
+    if promises.iter().all(|p| p.truthful) {
+        let goes_on = promises.iter().all(|p| p.fate == Fate::GoesOn);
+        let allowed =
+            if goes_on { healthy + 0.3 } else { following_deg(s) + 0.03 * s.path.top_deg_s() + 0.3 };
+        if largest > allowed {
+            return Some(format!("error {largest:.3}° instead of {allowed:.3}°"));
+        }
+    }
+    let blind = promises.iter().map(|p| p.blind).try_fold(0.0, |sum, b| Some(sum + b?))?;
+    let allowed = beyond_deg(s, blind)? + healthy;
+    let beyond = o.overrun.to_degrees();
+    (o.safe.is_some() && beyond > allowed)
+        .then(|| format!("{beyond:.3}° beyond the path instead of {allowed:.3}°"))
+}
