@@ -237,12 +237,12 @@ impl Draw {
         }
     }
 
-    /// True if a board that closes the loop can be broken so from outside, and can take the run: in single precision, with
-    /// its law and its path sound.
+    /// True if a board that closes the loop can be broken so from outside, and can take the run: in single precision, without
+    /// an observer, with its law and its path sound.
     #[must_use]
     pub fn is_outside(&self) -> bool {
         let inside = |what| matches!(what, What::LawNotFinite | What::TargetNotFinite | What::TargetHuge);
-        self.setting.single && !self.troubles.iter().any(|t| inside(t.what))
+        self.setting.single && !self.setting.observer && !self.troubles.iter().any(|t| inside(t.what))
     }
 
     /// Runs it against a board that closes the loop.
