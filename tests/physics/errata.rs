@@ -2,7 +2,7 @@
 
 use clutch_core::certificate::{Demand, certify};
 use clutch_core::law::{
-    Command, ControlLaw, Law, LawParams, Limit, PdParams, SmcParams, SmcSignParams, Tick,
+    Beside, Command, ControlLaw, Law, LawParams, Limit, PdParams, SmcParams, SmcSignParams, Tick,
 };
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{
@@ -118,7 +118,9 @@ fn no_plant_leaves_a_layer_that_has_grown() {
         let share = (model.inertia * slope / 0.021).powi(2) / (4.0 * kd);
         let kp = model.drive_torque / 0.021 + share * between(0.05, 1.0);
         let p = SmcParams { kp, kd, slope, boundary: between(0.03, 0.15) };
-        let law = Law::new(&p.into(), &model, &Default::default(), Micros(100)).unwrap();
+        let output = Default::default();
+        let law =
+            Law::new(&p.into(), &Beside { period: Micros(100), ..Beside::paper(&model, &output) }).unwrap();
         let bounds = Bounds::around(&model, &Tolerances::default()).unwrap();
         let demand = Demand { velocity: 2.0_f64.to_radians(), ..Demand::default() };
         let c = certify(&law, &Default::default(), &bounds, &demand).unwrap();

@@ -621,15 +621,15 @@ mod tests {
         };
         let exact = bounds(Tolerances::default());
         // J f/(μ_d K_COF) = 0.119/0.021 = 5.67 V s/rad.
-        let needed = certify(&sign(3.0, 5.7), &exact, &at_2_deg_s()).unwrap();
+        let needed = certify_alone(&sign(3.0, 5.7), &exact, &at_2_deg_s()).unwrap();
         assert!(needed.certified() && (needed.kd_required - 0.119 / 0.021).abs() < 1e-9);
-        let few = certify(&sign(3.0, 5.6), &exact, &at_2_deg_s()).unwrap();
+        let few = certify_alone(&sign(3.0, 5.6), &exact, &at_2_deg_s()).unwrap();
         assert_eq!(few.shortfall, Some(Shortfall::Kd));
         assert_eq!(few.reaching_time(0.2), None, "what is not certified has no time");
         // The weight gives 27.7 rad/s² and no more, however strong the brake.
         for (acceleration, shortfall) in [(20.0, None), (28.0, Some(Shortfall::Drive))] {
             let demand = Demand { acceleration, ..at_2_deg_s() };
-            let c = certify(&sign(9.0, 50.0), &exact, &demand).unwrap();
+            let c = certify_alone(&sign(9.0, 50.0), &exact, &demand).unwrap();
             assert_eq!(c.shortfall, shortfall, "{acceleration} rad/s²");
         }
     }
@@ -643,7 +643,7 @@ mod tests {
         let law = Law::new(&p, &Beside::paper(&plant, &output)).unwrap();
         let bounds = Bounds::around(&plant, &Tolerances::default()).unwrap();
         let at = |acceleration| {
-            let c = certify(&law, &bounds, &Demand { acceleration, ..at_2_deg_s() }).unwrap();
+            let c = certify_alone(&law, &bounds, &Demand { acceleration, ..at_2_deg_s() }).unwrap();
             assert!(c.certified(), "{:?} at {acceleration} rad/s²", c.shortfall);
             c.error_rate_behind
         };
@@ -655,7 +655,8 @@ mod tests {
     #[test]
     fn a_layer_without_a_derivative_gain_weakens_nothing_and_lacks_it() {
         let p = SmcParams { kd: 0.0, ..SmcParams::default() };
-        let c = certify(&law(LawParams::Smc(p)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
+        let c =
+            certify_alone(&law(LawParams::Smc(p)), &bounds(Tolerances::default()), &at_2_deg_s()).unwrap();
         assert_eq!((c.kp_for_boundary, c.shortfall), (0.0, Some(Shortfall::Kd)));
     }
 
@@ -668,7 +669,7 @@ mod tests {
             let output = OutputParams { lowest, on_invalid: 0.0, ..OutputParams::default() };
             let p = LawParams::Smc(SmcParams { kp: 5.0, ..SmcParams::default() });
             let law = Law::new(&p, &Beside::paper(&plant, &output)).unwrap();
-            certify(&law, &bounds, &at_2_deg_s()).unwrap().shortfall
+            certify_alone(&law, &bounds, &at_2_deg_s()).unwrap().shortfall
         };
         // The weight and friction take 0.047 + 0.02 N m of 0.05 N m/V.
         assert_eq!((shortfall(-10.0), shortfall(-1.2)), (None, Some(Shortfall::Voltage)));

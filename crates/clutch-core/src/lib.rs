@@ -15,7 +15,8 @@
 //! | [`supervisor`] | what may reach the law, and when control ends in the [`SafeState`] |
 //!
 //! No allocation, no `unsafe`, no reachable panic (a link test shows it), and the same bits on
-//! every target for one scalar type. Features: `linalg` (the observer, on nalgebra).
+//! every target for one scalar type. Features: `linalg` (velocity sources that
+//! no board has: the observer, on nalgebra, and the edge-timed filter for any law).
 //! Formatting of errors is outside of the no-panic promise: `core` formats floats.
 #![no_std]
 #![cfg_attr(

@@ -1,6 +1,7 @@
 //! Source of a law's error rate: the paper's difference (5), an edge-timed filter, or an observer.
 
 use crate::derivative::{DerivativeState, SmoothedDerivative, SmoothedDerivativeParams};
+#[cfg(feature = "linalg")]
 use crate::edge_timed::{EdgeTimed, EdgeTimedParams, EdgeTimedState};
 #[cfg(feature = "linalg")]
 use crate::observer::{Observer, ObserverParams, ObserverState};
@@ -12,6 +13,7 @@ crate::choice! {
         /// The smoothed backward difference of the error (5).
         SmoothedDerivative(SmoothedDerivativeParams<T>) = "smoothed_derivative",
         /// A Kalman filter that is corrected where an edge of the encoder is crossed.
+        #[cfg(feature = "linalg")]
         EdgeTimed(EdgeTimedParams<T>) = "edge_timed",
         /// A Kalman observer of position, velocity and disturbance torque.
         #[cfg(feature = "linalg")]
@@ -26,6 +28,7 @@ pub enum VelocitySource<T> {
     /// The smoothed backward difference of the error (5).
     SmoothedDerivative(SmoothedDerivative<T>),
     /// The edge-timed filter.
+    #[cfg(feature = "linalg")]
     EdgeTimed(EdgeTimed<T>),
     /// The Kalman observer.
     #[cfg(feature = "linalg")]
@@ -36,6 +39,7 @@ pub enum VelocitySource<T> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VelocityState<T> {
     derivative: DerivativeState<T>,
+    #[cfg(feature = "linalg")]
     edge_timed: EdgeTimedState<T>,
     #[cfg(feature = "linalg")]
     observer: ObserverState<T>,
@@ -52,10 +56,12 @@ impl<T: Real> VelocitySource<T> {
         encoder: Encoder,
         period: Micros,
     ) -> Result<Self, ParamError<T>> {
+        let _ = plant; // its users are behind the feature `linalg`
         Ok(match p {
             VelocityParams::SmoothedDerivative(p) => {
                 VelocitySource::SmoothedDerivative(SmoothedDerivative::new(p, encoder, period)?)
             }
+            #[cfg(feature = "linalg")]
             VelocityParams::EdgeTimed(p) => {
                 VelocitySource::EdgeTimed(EdgeTimed::new(p, plant, encoder, period)?)
             }
@@ -69,8 +75,10 @@ impl<T: Real> VelocitySource<T> {
     /// On the path: the shaft moves at the target's velocity, with `applied` volts on the actuator since long.
     #[must_use]
     pub fn start(&self, position: FixedCounts, target: &Target<T>, applied: T) -> VelocityState<T> {
+        let _ = applied;
         VelocityState {
             derivative: DerivativeState::at(FixedCounts(target.position.0.wrapping_sub(position.0))),
+            #[cfg(feature = "linalg")]
             edge_timed: match self {
                 VelocitySource::EdgeTimed(f) => f.start(position, applied, target.velocity),
                 _ => EdgeTimedState::default(),
@@ -93,10 +101,12 @@ impl<T: Real> VelocitySource<T> {
         target: &Target<T>,
         volts: T,
     ) -> T {
+        let _ = volts;
         match self {
             VelocitySource::SmoothedDerivative(d) => {
                 d.update(&mut state.derivative, FixedCounts(target.position.0.wrapping_sub(position.0)))
             }
+            #[cfg(feature = "linalg")]
             VelocitySource::EdgeTimed(f) => {
                 f.update(&mut state.edge_timed, position, volts, target.velocity);
                 target.velocity - f.rad_per_s(state.edge_timed.velocity())

@@ -217,11 +217,13 @@ impl<T: Real> Belief<T> {
     #[inline(never)]
     pub(super) fn keep_within(&mut self, end: T, side: T, blur: T) {
         let s = self.tt + blur;
-        let deviation = s.sqrt();
-        let alpha = side * (end - self.position) / deviation;
-        if alpha > T::splat(3.5) {
+        let away = side * (end - self.position);
+        // So far away that nothing is cut off.
+        if away > T::ZERO && away * away > T::splat(3.5 * 3.5) * s {
             return;
         }
+        let deviation = s.sqrt();
+        let alpha = away / deviation;
         let (lambda, share) = cut_off(alpha);
         self.take(self.at_position(), s, -(side * deviation * lambda), share);
     }

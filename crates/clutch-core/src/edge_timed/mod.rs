@@ -4,7 +4,7 @@
 //! several of them; but a crossed edge is a position that is known to a fraction of a count, at a time known to a period, and a
 //! count that does not come says that the shaft has not got there. A Kalman filter that takes both, and knows the voltage,
 //! tells velocity and friction within a count. It has five states: position, velocity, the mean
-//! friction as a multiple of the model's (whose curve over the velocity stays), and its ripple along the disc as a damped wave of random phase with its slope
+//! friction as a multiple of the model's (whose curve over the velocity stays, if it is Stribeck's with the exponent 1), and its ripple along the disc as a damped wave of random phase with its slope
 //! ([`EdgeTimedParams`] has the wave's numbers). Friction is smooth along the way, not in time: that is why it can be told ahead.
 //!
 //! An edge that was crossed in the last period lies at most the way of that period behind, with the variance of a uniform
@@ -15,7 +15,7 @@
 
 mod belief;
 
-use crate::friction::{Friction, FrictionModel};
+use crate::friction::{FrictionModel, Stribeck};
 use crate::params::{Range, Table};
 use crate::{Actuator, Encoder, FixedCounts, Micros, ParamError, Plant, Real};
 use belief::{Belief, Shaft};
@@ -66,15 +66,19 @@ const ABOVE: f64 = 1.134;
 pub struct EdgeTimed<T> {
     shaft: Shaft<T>,
     actuator: Actuator<T>,
-    /// The model's.
-    friction: Friction<T>,
+    /// The model's curve over the velocity, where it is Stribeck's with the exponent 1.
+    curve: Option<Stribeck<T>>,
     drive_torque: T,
     /// Acceleration of a torque, counts per period² and N m.
     per_torque: T,
-    /// Its sliding level.
+    /// Its sliding level, and one over it.
     mu: T,
+    per_mu: T,
     counts_per_radian: T,
-    period: T,
+    radians_per_count: T,
+    /// Counts per period of 1 rad/s, and one over it.
+    per_rad_per_s: T,
+    rad_per_s: T,
     delay: u32,
     /// Share of a step of the voltage that a lagging actuator has not made after a period; 0 without a lag.
     lagging: T,
@@ -163,8 +167,8 @@ pub struct Ahead<T> {
     pub velocity: T,
     /// Friction, as a multiple of the model's.
     pub friction: T,
-    /// Its standard deviation.
-    pub deviation: T,
+    /// Its variance.
+    pub variance: T,
     /// Voltage at the pad, V.
     pub pad: T,
 }
@@ -203,12 +207,15 @@ impl<T: Real> EdgeTimed<T> {
                 roughness: (decay + decay) * (wave * wave) * (p.ripple * p.ripple),
             },
             actuator: *plant.actuator(),
-            friction: *plant.friction(),
+            curve: plant.friction().quick(),
             drive_torque: model.drive_torque,
             per_torque: seconds * seconds / (model.inertia * radians_per_count),
             mu: plant.friction().sliding(),
+            per_mu: T::ONE / plant.friction().sliding(),
             counts_per_radian: encoder.counts_per_radian(),
-            period: seconds,
+            radians_per_count,
+            per_rad_per_s: seconds / radians_per_count,
+            rad_per_s: radians_per_count / seconds,
             delay: p.delay,
             lagging: if p.lag > T::ZERO { (-(seconds / p.lag)).exp() } else { T::ZERO },
             lag_periods: p.lag / seconds,
@@ -226,20 +233,26 @@ impl<T: Real> EdgeTimed<T> {
     #[inline]
     #[must_use]
     pub fn per_period(&self, velocity: T) -> T {
-        velocity * self.period * self.counts_per_radian
+        velocity * self.per_rad_per_s
     }
 
     /// The velocity in rad/s of one in counts per period.
     #[inline]
     #[must_use]
     pub fn rad_per_s(&self, velocity: T) -> T {
-        velocity / (self.period * self.counts_per_radian)
+        velocity * self.rad_per_s
     }
 
     /// Counts per radian.
     #[must_use]
     pub fn counts_per_radian(&self) -> T {
         self.counts_per_radian
+    }
+
+    /// One count, rad.
+    #[must_use]
+    pub fn radians_per_count(&self) -> T {
+        self.radians_per_count
     }
 
     /// The model's sliding friction, of which friction is told as a multiple.
@@ -304,7 +317,7 @@ impl<T: Real> EdgeTimed<T> {
             position: belief.position,
             velocity: belief.velocity,
             friction: belief.friction(),
-            deviation: belief.friction_variance().sqrt(),
+            variance: belief.friction_variance(),
             pad,
         }
     }
@@ -332,8 +345,10 @@ impl<T: Real> EdgeTimed<T> {
         let counts = position.0 >> FixedCounts::FRACTION_BITS;
         let moved = counts.wrapping_sub(state.counts);
         state.counts = counts;
-        state.fraction = position.minus(FixedCounts::from_counts(counts));
-        T::from_i64(moved)
+        // Both fit: a board converts 32 bits in one instruction.
+        let fraction = position.0.wrapping_sub(FixedCounts::from_counts(counts).0);
+        state.fraction = T::from_i32(fraction as i32) * (T::ONE / T::from_i32(1 << FixedCounts::FRACTION_BITS));
+        T::from_i32(i32::try_from(moved).unwrap_or(if moved < 0 { i32::MIN } else { i32::MAX }))
     }
 
     /// Pull of drive and motor, and load of the pad, at a voltage there, counts per period².
@@ -343,17 +358,23 @@ impl<T: Real> EdgeTimed<T> {
         (pull, self.actuator.friction(self.mu * self.per_torque, volts))
     }
 
-    /// Friction at a velocity, counts per period, as a multiple of that of a fast shaft.
+    /// Friction at a velocity, counts per period, as a multiple of that of a fast shaft, where the model's curve is
+    /// Stribeck's with the exponent 1; else 1.
     #[must_use]
+    #[inline(never)] // asked for in several places: a board needs the code once
     pub fn shape(&self, velocity: T) -> T {
-        self.friction.level(self.rad_per_s(velocity)) / self.mu
+        match &self.curve {
+            Some(curve) => curve.quick_level(self.rad_per_s(velocity)) * self.per_mu,
+            None => T::ONE,
+        }
     }
 
     /// The shape, and what it loses per count per period: a shaft that gains speed loses friction. One that is believed
     /// to have stopped loses none.
     fn shape_and_fall(&self, velocity: T) -> (T, T) {
         let shape = self.shape(velocity);
-        if velocity == T::ZERO {
+        // Where the curve has ended, it falls no more.
+        if velocity == T::ZERO || shape == T::ONE {
             return (shape, T::ZERO);
         }
         let step = T::splat(0.01);

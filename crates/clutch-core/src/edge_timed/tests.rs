@@ -63,7 +63,7 @@ fn friction_is_learnt_from_the_voltage_that_keeps_a_velocity() {
     }
     let ahead = f.ahead(&state);
     assert!((ahead.friction - 1.0 / 1.5).abs() < 0.01, "{} times the model's", ahead.friction);
-    assert!(ahead.deviation < 0.02, "{}", ahead.deviation);
+    assert!(ahead.variance < 4e-4, "{}", ahead.variance);
 }
 
 #[test]

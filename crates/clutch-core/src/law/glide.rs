@@ -149,7 +149,7 @@ impl<T: Real> Glide<T> {
         let p = &self.params;
         let wanted = way * (fast + self.kp * way * error).limit(p.floor * fast, p.cap * fast);
         let friction = if belief.starts() {
-            ahead.friction + p.optimism * ahead.deviation
+            ahead.friction + p.optimism * ahead.variance.sqrt()
         } else {
             ahead.friction
         };
@@ -170,8 +170,8 @@ impl<T: Real> Glide<T> {
         let terms = [
             filter.rad_per_s(belief.velocity()),
             mu * ahead.friction,
-            mu * ahead.deviation,
-            error / filter.counts_per_radian(),
+            mu * mu * ahead.variance,
+            error * filter.radians_per_count(),
             filter.rad_per_s(wanted),
             phase,
         ];
@@ -183,7 +183,7 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
     type State = GlideState<T>;
     type Terms = [T; 6];
     const TERMS: &'static [&'static str] =
-        &["velocity_rad_s", "mu", "mu_deviation", "error_ahead_rad", "wanted_velocity_rad_s", "phase"];
+        &["velocity_rad_s", "mu", "mu_variance", "error_ahead_rad", "wanted_velocity_rad_s", "phase"];
 
     fn start(&self, tick: &Tick<T>, applied: T) -> GlideState<T> {
         // The first period's demand does not depend on where the shaft is.

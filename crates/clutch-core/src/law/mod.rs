@@ -364,7 +364,7 @@ mod tests {
         let model = PlantParams { actuator: motor.into(), drive_torque: -0.01, ..PlantParams::default() };
         let output = OutputParams { lowest: -4.0, highest: 9.0, on_invalid: 0.0, bumpless_time: 0.0 };
         let p = CtcParams::<f64>::default();
-        let law = Law::new(&p.into(), &model, &output, PERIOD).unwrap();
+        let law = Law::new(&p.into(), &Beside::paper(&model, &output)).unwrap();
         let asked = Asked { velocity: 0.1, acceleration: 0.5, fastest: &|_| 1.0 };
         let surface = law.surface(&asked).unwrap();
         assert!((surface.slope - p.kp / p.kd).abs() < 1e-12);
@@ -382,7 +382,7 @@ mod tests {
         let volts = |preload: f64| {
             let actuator = crate::ActuatorParams::Brake(brake(preload));
             let model = PlantParams { actuator, ..PlantParams::default() };
-            let law = Law::new(&CtcParams::default().into(), &model, &OUTPUT, PERIOD).unwrap();
+            let law = Law::new(&CtcParams::default().into(), &Beside::paper(&model, &OUTPUT)).unwrap();
             law.update(&mut law.start(&behind(0.0), 0.0), &behind(-1e-5)).voltage
         };
         // The same normal force: N_0 + K_COF u.

@@ -85,8 +85,8 @@ impl<T: Real> Shell<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{ControlLaw, Law, LawParams, PdParams};
-    use crate::{Counts, FixedCounts, Micros, PlantParams, Servo, ServoParams, Target};
+    use crate::law::{Beside, ControlLaw, Law, LawParams, PdParams};
+    use crate::{Counts, FixedCounts, PlantParams, Servo, ServoParams, Target};
 
     fn shell(boundary: f64, output: &OutputParams, kind: ActuatorKind) -> Shell<f64> {
         Shell::new(&ShellParams { slope: 100.0, boundary }, output, kind).unwrap()
@@ -128,7 +128,7 @@ mod tests {
     fn a_servo_without_a_shell_has_the_bits_of_its_law_and_one_with_it_differs_outside_alone() {
         let paper = ServoParams::<f64>::paper(LawParams::Pd(PdParams { kp: 1000.0, kd: 3.0 }));
         let (law, plant) = (paper.law, PlantParams::default());
-        let law = Law::<f64>::new(&law, &plant, &paper.output, Micros(1000)).unwrap();
+        let law = Law::<f64>::new(&law, &Beside::paper(&plant, &paper.output)).unwrap();
         let shelled = ServoParams { shell: ShellParams { slope: 100.0, boundary: 0.1 }, ..paper };
         let (plain, shelled) = (Servo::new(&paper).unwrap(), Servo::new(&shelled).unwrap());
         let goal = Target { position: FixedCounts::from_counts(0), velocity: 0.0, acceleration: 0.0 };
