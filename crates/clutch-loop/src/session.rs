@@ -21,6 +21,7 @@ use clutch_core::law::Law;
 use clutch_core::{ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState};
 use clutch_log::{LogError, Source};
 use clutch_node::{ControllerNode, HostNode, present_code};
+use clutch_sim::Start;
 use clutch_sim::scenario::{CertificateError, Plan, Proven, Sampled, ScalarKind};
 use clutch_sim::{Scenario, ScenarioError, number};
 use clutch_wire::{Actuate, ControllerHello, Hello, Sample, Telemetry};
@@ -124,6 +125,12 @@ pub enum SessionError {
         "{0}\nNothing was started; `clutch certify SCENARIO --sampled --save FILE.json` makes a certificate"
     )]
     Certificate(#[from] CertificateError),
+    /// The certificate is one of a run that begins in motion.
+    #[error(
+        "run.start = \"on_path\": expected \"rest\" with a certificate, as a shaft on a board begins at rest; save one of that \
+         start with --set run.start=rest"
+    )]
+    CertifiedInMotion,
     /// A log is never written over: it may be the only record of a run.
     #[error("{}: exists already; name a new file for the log", path.display())]
     LogExists {
@@ -197,6 +204,9 @@ pub fn check(
     let plan = scenario.plan()?;
     let sampled = scenario.sampled(&plan.bounds);
     let proven = certificate.map(|path| sampled.proven_by(path)).transpose()?;
+    if proven.is_some() && scenario.spec().run.start != Start::Rest {
+        return Err(SessionError::CertifiedInMotion);
+    }
     let certified = plan.certificate.certified() || (proven.is_some() && sampled.bound_suffices());
     if !certified && !uncertified {
         let unstable = proven.is_some();

@@ -1,8 +1,8 @@
 //! Means and covariance of what the filter believes, in counts and periods.
 //!
-//! Positions are in counts above the lower edge of the count that was read last, velocities in counts per period, friction
-//! in multiples of the model's sliding friction. One period of the shaft under the pull `D` of drive and motor and the
-//! load `w` of the pad (both in counts per period²):
+//! Positions are in counts above the lower edge of the count that was read last, velocities in counts per period,
+//! friction in multiples of the model's sliding friction. One period of the shaft under the pull `D` of drive and
+//! motor and the load `w` of the pad (both in counts per period²):
 //!
 //! ```text
 //! a = D − w (h + r) sgn ω − c ω,    ω' = ω + a,    Δ = ω + a/2
@@ -66,8 +66,8 @@ impl<T: Real> Belief<T> {
         (self.hh + (self.hr + self.hr) + self.rr).max(T::ZERO)
     }
 
-    /// One period without covariances: the way, counts, the acceleration, and the velocity that the shaft lacks to have
-    /// gone on, 0 if it goes on.
+    /// One period without covariances: the way, counts, the acceleration, and the velocity that the shaft lacks to
+    /// have gone on, 0 if it goes on.
     #[inline(never)]
     pub(super) fn glide(&mut self, shaft: &Shaft<T>, pull: T, load: T) -> (T, T, T) {
         let half = T::splat(0.5);
@@ -93,8 +93,8 @@ impl<T: Real> Belief<T> {
         if self.velocity == T::ZERO { pull.sgn() } else { self.velocity.sgn() }
     }
 
-    /// One period: the way, counts. `fall`: what the load loses per count per period, with friction as the model has it.
-    /// `moves`: the shaft is known to move.
+    /// One period: the way, counts. `fall`: what the load loses per count per period, with friction as the model has
+    /// it. `moves`: the shaft is known to move.
     #[inline(never)]
     pub(super) fn advance(&mut self, shaft: &Shaft<T>, pull: T, (load, fall): (T, T), moves: bool) -> T {
         let sign = self.direction(pull);
@@ -113,10 +113,12 @@ impl<T: Real> Belief<T> {
     fn keep_moving(&mut self, sign: T, lacks: T) {
         let deviation = self.ww.sqrt();
         if deviation > T::ZERO {
-            let (lambda, share) = cut_off(-lacks / deviation);
+            let (lambda, _) = cut_off(-lacks / deviation);
             self.velocity = -(sign * lacks);
             let column = [self.tw, self.ww, self.wh, self.wr, self.ws];
-            self.take(column, self.ww, sign * deviation * lambda, share);
+            // Of the means alone: a period in which it went on is no measurement, and a thousand of them are not a
+            // thousand.
+            self.take(column, self.ww, sign * deviation * lambda, T::ZERO);
         }
     }
 
@@ -165,8 +167,8 @@ impl<T: Real> Belief<T> {
         self.ss = ss + shaft.roughness * far * (self.mean * self.mean);
     }
 
-    /// Takes a measurement of one of the means, whose covariances with all are `column`: innovation `y`, its variance `s`, and
-    /// the share of the covariance that goes.
+    /// Takes a measurement of one of the means, whose covariances with all are `column`: innovation `y`, its variance
+    /// `s`, and the share of the covariance that goes.
     #[inline(never)]
     fn take(&mut self, column: [T; 5], s: T, y: T, share: T) {
         let gain = T::ONE / s;
@@ -195,6 +197,10 @@ impl<T: Real> Belief<T> {
         self.rr -= kr * r;
         self.rs -= kr * slope;
         self.ss -= ks * slope;
+        // What rounding would make of a variance that is all but gone.
+        for variance in [&mut self.tt, &mut self.ww, &mut self.hh, &mut self.rr, &mut self.ss] {
+            *variance = variance.max(T::ZERO);
+        }
     }
 
     fn at_position(&self) -> [T; 5] {
@@ -253,10 +259,10 @@ impl<T: Real> Belief<T> {
     }
 }
 
-/// A standard normal distribution that is cut off above `alpha`, below 3.5: how far its mean falls, and the share of its variance
-/// that goes.
+/// A standard normal distribution that is cut off above `alpha`, below 3.5: how far its mean falls, and the share of
+/// its variance that goes.
 fn cut_off<T: Real>(alpha: T) -> (T, T) {
-    // λ = φ(α)/Φ(α), with Boyd's bound of Mills' ratio (1959), which is right to 0.6 %.
+    // λ = φ(α)/Φ(α), with Boyd's bound of Mills' ratio (1959), which is right to 1.2 %.
     let t = alpha.abs();
     let mills = T::PI / ((T::PI - T::ONE) * t + (t * t + (T::PI + T::PI)).sqrt());
     let lambda = if alpha < T::ZERO {

@@ -1,17 +1,20 @@
-//! The edge-timed filter: position, velocity and friction from the edges of an encoder, and from the silence between them.
+//! The edge-timed filter: position, velocity and friction from the edges of an encoder, and from the silence between
+//! them.
 //!
 //! At 2 °/s a count of the paper's encoder takes 9 ms. A difference of counts knows the velocity only as a mean over
-//! several of them; but a crossed edge is a position that is known to a fraction of a count, at a time known to a period, and a
-//! count that does not come says that the shaft has not got there. A Kalman filter that takes both, and knows the voltage,
-//! tells velocity and friction within a count. It has five states: position, velocity, the mean
-//! friction as a multiple of the model's (whose curve over the velocity stays, if it is Stribeck's with the exponent 1), and its ripple along the disc as a damped wave of random phase with its slope
-//! ([`EdgeTimedParams`] has the wave's numbers). Friction is smooth along the way, not in time: that is why it can be told ahead.
+//! several of them; but a crossed edge is a position that is known to a fraction of a count, at a time known to a
+//! period, and a count that does not come says that the shaft has not got there. A Kalman filter that takes both, and
+//! knows the voltage, tells velocity and friction within a count. It has five states: position, velocity, the mean
+//! friction as a multiple of the model's (whose curve over the velocity stays, if it is Stribeck's with the exponent
+//! 1), and its ripple along the disc as a damped wave of random phase with its slope ([`EdgeTimedParams`] has the
+//! wave's numbers). Friction is smooth along the way, not in time: that is why it can be told ahead.
 //!
-//! An edge that was crossed in the last period lies at most the way of that period behind, with the variance of a uniform
-//! distribution. Silence cuts the belief off at the edges of the count. A shaft without an edge for longer than the path may take
-//! for `silence_counts` is taken to rest: friction learnt since the last edge is forgotten, as it is that of a shaft at rest,
-//! and the filter says so ([`EdgeTimed::starts`]), so that a law can let the brake go for some periods. If then no edge comes in
-//! 25 ms, friction is above what the voltage would have carried.
+//! An edge that was crossed in the last period lies at most the way of that period behind, with the variance of a
+//! uniform distribution. Silence cuts the belief off at the edges of the count. A shaft without an edge for longer
+//! than the path may take for `silence_counts` is taken to rest: friction learnt since the last edge is forgotten, as
+//! it is that of a shaft at rest, and the filter says so ([`EdgeTimedState::starts`]), so that a law can let the brake go
+//! for some periods. If then no edge comes in 25 ms (and twice the lag, and the delay), friction is above what the
+//! voltage would have carried.
 
 mod belief;
 
@@ -21,8 +24,8 @@ use crate::{Actuator, Encoder, FixedCounts, Micros, ParamError, Plant, Real};
 use belief::{Belief, Shaft};
 
 crate::params! {
-    /// A Kalman filter that is corrected where an edge of the encoder is crossed, and by silence between edges. It knows
-    /// the voltage and, from the model, drive torque over inertia; friction it learns.
+    /// A Kalman filter that is corrected where an edge of the encoder is crossed, and by silence between edges. It
+    /// knows the voltage and, from the model, drive torque over inertia; friction it learns.
     pub struct EdgeTimedParams<T>: Default {
         /// Periods from a voltage to its effect, beyond the one in which it is given: `rig.delay_ticks` as believed.
         delay: u32 = 0, "delay_ticks" "" TICKS, Range::within(0.0, 3.0);
@@ -36,8 +39,8 @@ crate::params! {
         waves: T = 340.0, "ripple_waves_per_turn" "k" WAVES_PER_TURN, Range::above(0.0).up_to(1e6);
         /// Damping of the ripple's waves: small for a ripple of one wavelength.
         ripple_damping: T = 0.2, "ripple_damping" "ζ" NONE, Range::above(0.0).up_to(1.0);
-        /// Wander of the velocity that no friction explains: by this much (standard deviation) in one second, and with the root
-        /// of the time.
+        /// Wander of the velocity that no friction explains: by this much (standard deviation) in one second, and with
+        /// the root of the time.
         walk: T = 0.015, "walk_rad_s_rt_s" "" RAD_S_RT_S, Range::above(0.0);
         /// Share of an acceleration that may be wrong, as drive torque and inertia are not known better.
         gain_doubt: T = 0.3, "gain_doubt" "" NONE, Range::at_least(0.0).up_to(2.0);
@@ -56,6 +59,8 @@ crate::params! {
 const BLUR: f64 = 0.15;
 /// Time in which an edge has to come once the shaft was let go, s.
 const PATIENCE: f64 = 0.025;
+/// Longest time for which a shaft is let go at once, s: the paper's weight reaches 400 °/s in it.
+const LONGEST_RELEASE: f64 = 0.25;
 /// Most of the velocity that a falling friction adds to an error of the velocity in a period.
 const FASTEST_FALL: f64 = 0.3;
 /// Friction of a shaft that stays at rest, as a multiple of what the voltage carried.
@@ -86,6 +91,8 @@ pub struct EdgeTimed<T> {
     lag_periods: T,
     silence: T,
     patience: T,
+    /// Most periods for which a shaft is let go at once.
+    longest_release: T,
     doubt: T,
     ripple: T,
     wave: T,
@@ -220,6 +227,7 @@ impl<T: Real> EdgeTimed<T> {
             lagging: if p.lag > T::ZERO { (-(seconds / p.lag)).exp() } else { T::ZERO },
             lag_periods: p.lag / seconds,
             silence: p.silence,
+            longest_release: T::from_f64(LONGEST_RELEASE) / seconds,
             patience: T::from_f64(PATIENCE) / seconds
                 + (p.lag + p.lag) / seconds
                 + T::from_u64(u64::from(p.delay)),
@@ -281,12 +289,13 @@ impl<T: Real> EdgeTimed<T> {
         state
     }
 
-    /// Lets a resting shaft go: for as many periods as the drive takes to bring it to the path's velocity, rad/s, and an
-    /// actuator to give way. A law then releases the actuator while [`EdgeTimedState::lets_go`].
+    /// Lets a resting shaft go: for as many periods as the drive takes to bring it to the path's velocity, rad/s, and
+    /// an actuator to give way, a quarter of a second at most. A law then releases the actuator while
+    /// [`EdgeTimedState::lets_go`].
     pub fn let_go(&self, state: &mut EdgeTimedState<T>, target_velocity: T) {
         let (pull, _) = self.forces(T::ZERO);
         let needed = self.per_period(target_velocity).abs() / pull.abs().max(T::splat(1e-6));
-        let periods = needed.min(T::from_i32(1000)) + T::splat(0.7) * self.lag_periods;
+        let periods = needed.min(self.longest_release) + T::splat(0.7) * self.lag_periods;
         // To the nearest whole number; one at least.
         state.release = (periods + T::splat(0.5)).floor().max(T::ONE);
         state.silent = T::ZERO;
@@ -347,7 +356,8 @@ impl<T: Real> EdgeTimed<T> {
         state.counts = counts;
         // Both fit: a board converts 32 bits in one instruction.
         let fraction = position.0.wrapping_sub(FixedCounts::from_counts(counts).0);
-        state.fraction = T::from_i32(fraction as i32) * (T::ONE / T::from_i32(1 << FixedCounts::FRACTION_BITS));
+        state.fraction =
+            T::from_i32(fraction as i32) * (T::ONE / T::from_i32(1 << FixedCounts::FRACTION_BITS));
         T::from_i32(i32::try_from(moved).unwrap_or(if moved < 0 { i32::MIN } else { i32::MAX }))
     }
 
@@ -369,8 +379,8 @@ impl<T: Real> EdgeTimed<T> {
         }
     }
 
-    /// The shape, and what it loses per count per period: a shaft that gains speed loses friction. One that is believed
-    /// to have stopped loses none.
+    /// The shape, and what it loses per count per period: a shaft that gains speed loses friction. One that is
+    /// believed to have stopped loses none.
     fn shape_and_fall(&self, velocity: T) -> (T, T) {
         let shape = self.shape(velocity);
         // Where the curve has ended, it falls no more.
@@ -421,6 +431,9 @@ impl<T: Real> EdgeTimed<T> {
         };
         if moved != T::ZERO {
             self.crossed(state, moved, way);
+        } else if state.phase == Phase::Resting {
+            // Silence says nothing about where it rests.
+            state.silent += T::ONE;
         } else {
             state.silent += T::ONE;
             let blur = T::splat(BLUR * BLUR);
@@ -444,11 +457,13 @@ impl<T: Real> EdgeTimed<T> {
     fn crossed(&self, state: &mut EdgeTimedState<T>, moved: T, way: T) {
         let belief = &mut state.belief;
         belief.position -= moved;
-        if state.phase == Phase::Resting {
-            // It moves after all, nobody knows how fast.
+        let span = if state.phase == Phase::Resting {
+            // It moves after all, nobody knows how fast, nor how far beyond the edge.
             belief.ww += moved * moved;
-        }
-        let span = way.abs().limit(T::splat(0.02), T::ONE);
+            T::ONE
+        } else {
+            way.abs().limit(T::splat(0.02), T::ONE)
+        };
         let inside = T::splat(0.5) * span;
         let measured = if moved > T::ZERO { inside } else { T::ONE - inside };
         belief.correct(measured, span * span / T::from_i32(12));
@@ -459,11 +474,17 @@ impl<T: Real> EdgeTimed<T> {
         state.phase = Phase::Sliding;
     }
 
+    /// `true` if a shaft would have crossed an edge by now: one that follows the path, or, where that rests, one that
+    /// has not yet stopped.
+    fn too_long(&self, silent: T, pace: T) -> bool {
+        if pace.abs() > T::ZERO { silent * pace.abs() > self.silence } else { silent > self.patience }
+    }
+
     /// A shaft that is silent for too long rests. `pace`: the path's velocity, counts per period.
     fn look_for_rest(&self, state: &mut EdgeTimedState<T>, pace: T) {
         match state.phase {
             Phase::Resting => {}
-            Phase::Sliding if state.silent * pace.abs() > self.silence => {
+            Phase::Sliding if self.too_long(state.silent, pace) => {
                 // What was learnt since the last edge is the friction of a shaft at rest.
                 state.belief = state.at_edge;
                 state.belief.rest();
@@ -474,10 +495,12 @@ impl<T: Real> EdgeTimed<T> {
                 state.phase = Phase::Resting;
             }
             Phase::Sliding => {}
-            Phase::Starting if state.release > T::ZERO => {
+            Phase::Starting if state.release > T::ZERO && pace.abs() > T::ZERO => {
                 state.release -= T::ONE;
                 state.silent = T::ZERO;
             }
+            // A path that has come to rest leaves nothing to be let go for.
+            Phase::Starting if state.release > T::ZERO => state.release = T::ZERO,
             Phase::Starting if state.silent > self.patience => {
                 // The voltage has stopped it before the next edge: it would have carried no more friction than this.
                 let (pull, load) = self.forces(state.pad);

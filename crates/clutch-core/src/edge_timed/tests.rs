@@ -100,11 +100,36 @@ fn a_shaft_that_is_silent_for_three_counts_rests_and_its_friction_is_that_before
 }
 
 #[test]
+fn a_shaft_that_stays_at_rest_with_the_path_teaches_nothing() {
+    let rate = 2.0_f64.to_radians();
+    for scalar_is_single in [false, true] {
+        let (friction, moved, periods) =
+            if scalar_is_single { stays::<f32>(rate) } else { stays::<f64>(rate) };
+        assert!((friction - 1.0).abs() < 0.1, "{friction} times the model's friction");
+        assert!(moved.abs() < 1e-9 && periods <= 30, "{moved} counts/period, rests after {periods}");
+    }
+}
+
+/// Friction, velocity and the time to be taken to rest of a shaft that has stopped with its path for a million periods.
+fn stays<T: Real>(rate: f64) -> (f64, f64, i32) {
+    let (mut state, _) = steady::<T>(rate, 2000);
+    let f = filter::<T>();
+    let at = FixedCounts::from_counts(state.counts);
+    let mut periods = 0;
+    for k in 0..1_000_000 {
+        f.update(&mut state, at, T::from_f64(6.0), T::ZERO);
+        periods = if state.rests() { periods } else { k + 1 };
+        assert!(state.belief.is_finite());
+    }
+    (f.ahead(&state).friction.to_f64(), state.velocity().to_f64(), periods)
+}
+
+#[test]
 fn a_shaft_is_let_go_for_the_time_that_the_drive_takes_and_until_an_edge_comes() {
     let f = filter::<f64>();
     let mut state = f.start(FixedCounts(0), 5.0, 0.0);
     // 27.7 rad/s²: 1.59 °/s in a period.
-    for (rate, periods) in [(0.01_f64, 1), (2.0, 1), (4.0, 3), (20.0, 13)] {
+    for (rate, periods) in [(0.01_f64, 1), (2.0, 1), (4.0, 3), (20.0, 13), (1e6, 250)] {
         f.let_go(&mut state, rate.to_radians());
         let mut n = 0;
         while state.lets_go() {
@@ -131,7 +156,7 @@ fn friction_that_stops_a_shaft_before_its_first_edge_is_above_what_the_voltage_c
         n += 1;
         assert!(n < 100, "never");
     }
-    // 1.9 V carry 2.2423/1.9 times the model's friction.
+    // It carries 2.2423/0.9 times the model's friction.
     let carried = 2.242286 / volts;
     assert!(state.belief.friction() > 1.13 * carried, "{}", state.belief.friction());
 }

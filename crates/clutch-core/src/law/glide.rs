@@ -264,6 +264,20 @@ mod tests {
     }
 
     #[test]
+    fn a_path_that_stops_while_a_shaft_is_let_go_lets_it_go_no_longer() {
+        let law = glide(GlideParams::default(), &PlantParams::default());
+        let mut state = law.start(&at(100.0), 5.0);
+        for _ in 0..10 {
+            assert_eq!(law.update(&mut state, &at(100.0)).voltage, 0.0);
+        }
+        for tick in [at(0.0), Tick { target_velocity: f64::NAN, ..Tick::default() }] {
+            let mut state = state;
+            law.update(&mut state, &tick);
+            assert!(law.update(&mut state, &tick).voltage > 0.0, "{tick:?}");
+        }
+    }
+
+    #[test]
     fn a_path_that_rests_is_held_with_twice_the_voltage_that_carries_the_load() {
         let law = glide(GlideParams::default(), &PlantParams::default());
         let mut state = law.start(&at(0.0), 5.0);

@@ -7,6 +7,7 @@ use crate::run::Start;
 use clutch_certificate::{Gains, Setup};
 use clutch_core::friction::{FrictionModel, FrictionParams};
 use clutch_core::law::LawParams;
+use clutch_core::params::Choice;
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{ActuatorKind, Bounds, Plant, VelocityParams};
 
@@ -57,7 +58,8 @@ impl Scenario {
                 .ok_or_else(|| not("law", p.law.title(), "PD (4), SMC (31), and any law in a [shell]"))?
         };
         let VelocityParams::SmoothedDerivative(filter) = p.velocity else {
-            return Err(not("velocity", "an observer", "the smoothed difference (5)"));
+            let source = Choice::<f64>::name(&p.velocity);
+            return Err(not("velocity", source, "smoothed_derivative, the difference (5)"));
         };
         let ReferenceParams::Ramp(ramp) = p.reference else {
             return Err(not("reference", "a path that accelerates", "ramps"));
