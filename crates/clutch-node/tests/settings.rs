@@ -274,8 +274,8 @@ fn a_number_that_a_constructor_refuses_is_told_with_key_value_and_expectation() 
         ),
         (
             "law",
-            7,
-            "7: the board lacks it, or knows no such value: expected one of: pd, ctc, smc, smc_sign, pid, voltage, hold",
+            8,
+            "8: the board lacks it, or knows no such value: expected one of: pd, ctc, smc, smc_sign, pid, glide, voltage, hold",
         ),
         ("bounds.brake_gain_nm_v.high", real(f32::INFINITY), "inf: expected a finite number"),
     ] {
@@ -339,7 +339,7 @@ fn the_hash_is_that_of_names_types_and_units() {
     let text: String = Setting::all().map(|s| format!("{}:{}:{}\n", s.name, s.kind(), s.unit())).collect();
     assert_eq!(SETTINGS_HASH, fnv1a_64(FNV_64, text.as_bytes()), "{text}");
     assert!(
-        text.contains("\nlaw:pd/ctc/smc/smc_sign/pid/voltage/hold:\nlaw.pd.kp_v_rad:f32:V/rad\n"),
+        text.contains("\nlaw:pd/ctc/smc/smc_sign/pid/glide/voltage/hold:\nlaw.pd.kp_v_rad:f32:V/rad\n"),
         "{text}"
     );
 }
