@@ -91,7 +91,7 @@ class _Record:
     def _way(cls, name: str) -> list[str]:
         """The tables from one with a field of that name to this: ``["drive", "weight"]`` for WeightDrive."""
         *_, outer, last = ["", *cls._key.split(".")]
-        return [outer, last] if outer == name else [last]
+        return [outer, last] if outer == name else [name]
 
     @classmethod
     def _build(cls, table: _Tree) -> Self:
