@@ -176,8 +176,16 @@ fn debian_cbmc() -> Result<Vec<PathBuf>> {
         for part in ["lists/partial", "cache/archives/partial", "files"] {
             std::fs::create_dir_all(folder.join(part))?;
         }
+        // From where this machine has its own packages of Debian.
         let key = "/usr/share/keyrings/debian-archive-keyring.gpg";
-        let source = format!("deb [signed-by={key}] http://deb.debian.org/debian trixie main\n");
+        let filters = ["Origin: Debian", "Label: Debian", "Created-By: Packages"];
+        let (_, sites) =
+            program("apt-get").args(["indextargets", "--format", "$(REPO_URI)"]).args(filters).silently()?;
+        let site = sites
+            .lines()
+            .find(|l| l.contains("://"))
+            .context("apt knows no mirror of Debian: run apt-get update")?;
+        let source = format!("deb [signed-by={key}] {} trixie main\n", site.trim());
         std::fs::write(folder.join("sources.list"), source)?;
         let apt = || -> Program {
             let set = |name: &str, value: &Path| format!("{name}={}", value.display());

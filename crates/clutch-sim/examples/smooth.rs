@@ -177,31 +177,22 @@ fn plants() -> Outcome<()> {
     println!("|---|---|---|---|---|---|");
     let glide = LAWS[0].1;
     for (title, keys) in PLANTS {
-        let s = Summary::of(&runs(glide, keys, 3001..3041)?);
-        println!(
-            "| {title} | {} | {} | {:.3}° | {:.4}° | {:.0} |",
-            shown(s.cycles),
-            s.discs,
-            s.error,
-            s.rms,
-            s.travel
-        );
+        print_row(title, &runs(glide, keys, 3001..3041)?);
     }
     let minute = [("run.duration_s", 61.0)];
     for (title, scalar) in
         [("a minute each", ""), ("a minute each, `f32`", "\n\n[sampling]\nscalar = \"f32\"")]
     {
-        let s = Summary::of(&runs(&format!("{glide}{scalar}"), &minute, 3001..3041)?);
-        println!(
-            "| {title} | {} | {} | {:.3}° | {:.4}° | {:.0} |",
-            shown(s.cycles),
-            s.discs,
-            s.error,
-            s.rms,
-            s.travel
-        );
+        print_row(title, &runs(&format!("{glide}{scalar}"), &minute, 3001..3041)?);
     }
     Ok(())
+}
+
+/// A row of the table of rigs.
+fn print_row(title: &str, of: &[Metrics]) {
+    let s = Summary::of(of);
+    let (cycles, discs) = (shown(s.cycles), s.discs);
+    println!("| {title} | {cycles} | {discs} | {:.3}° | {:.4}° | {:.0} |", s.error, s.rms, s.travel);
 }
 
 fn rest() -> Outcome<()> {

@@ -45,21 +45,24 @@ impl<T: Real> BrakeGeometry<T> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    #[test]
-    fn the_geometry_gives_the_gain_of_18() {
-        // Table 1's lengths and areas, with K_t/R_a chosen so that K_COF = 0.14.
-        let ratio = 0.14 * 0.032 * 0.034 / (0.045 * 0.040);
-        let g = BrakeGeometry::<f64> {
+    /// Table 1's lengths and areas, with K_t/R_a chosen so that K_COF = 0.14.
+    pub(in crate::actuator) fn of_table_1() -> BrakeGeometry {
+        BrakeGeometry {
             inner_radius: 0.045,
-            torque_constant: ratio,
+            torque_constant: 0.14 * 0.032 * 0.034 / (0.045 * 0.040),
             pad_area: 0.040,
             lever_area: 0.032,
             armature_resistance: 1.0,
             contact_radius: 0.034,
-        };
+        }
+    }
+
+    #[test]
+    fn the_geometry_gives_the_gain_of_18() {
+        let g = of_table_1();
         assert!((g.brake_gain().unwrap() - 0.14).abs() < 1e-15);
         let bad = BrakeGeometry { armature_resistance: 0.0, ..g };
         assert_eq!(bad.brake_gain().unwrap_err().field(), "armature_resistance");

@@ -381,15 +381,7 @@ mod tests {
 
     #[test]
     fn a_brake_by_its_geometry_is_the_brake_of_its_gain() {
-        let ratio = 0.14 * 0.032 * 0.034 / (0.045 * 0.040);
-        let geometry = BrakeGeometry {
-            inner_radius: 0.045,
-            torque_constant: ratio,
-            pad_area: 0.040,
-            lever_area: 0.032,
-            armature_resistance: 1.0,
-            contact_radius: 0.034,
-        };
+        let geometry = geometry::tests::of_table_1();
         let of = |p| Actuator::<f64>::new(&ActuatorParams::Geometry(p));
         let brake = of(geometry).unwrap();
         assert!((brake.brake_gain() - 0.14).abs() < 1e-15 && brake.kind() == ActuatorKind::Brake);
