@@ -182,6 +182,12 @@ fn values(s: &Setup) -> Result<(), Refused> {
     if !(s.ripple >= 0.0 && s.ripple < 1.0) {
         return refuse("ripple", s.ripple.to_string(), "a number from 0 to below 1");
     }
+    // Beyond it a single-precision loop rounds σ by more than the edges of the shell overlap.
+    if let Gains::Shell { boundary, .. } = s.law
+        && boundary > 50.0
+    {
+        return refuse("law.boundary", boundary.to_string(), "at most 50 rad/s");
+    }
     if s.delay_ticks > 3 {
         return refuse("delay_ticks", s.delay_ticks.to_string(), "at most 3");
     }

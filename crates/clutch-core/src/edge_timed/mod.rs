@@ -71,14 +71,14 @@ const ABOVE: f64 = 1.134;
 pub struct EdgeTimed<T> {
     shaft: Shaft<T>,
     actuator: Actuator<T>,
-    /// The model's curve over the velocity, where it is Stribeck's with the exponent 1.
+    /// The model's friction: its curve over the velocity, where it is Stribeck's with the exponent 1; its sliding
+    /// level, and one over that.
     curve: Option<Stribeck<T>>,
+    mu: T,
+    per_mu: T,
     drive_torque: T,
     /// Acceleration of a torque, counts per period² and N m.
     per_torque: T,
-    /// Its sliding level, and one over it.
-    mu: T,
-    per_mu: T,
     counts_per_radian: T,
     radians_per_count: T,
     /// Counts per period of 1 rad/s, and one over it.
@@ -431,16 +431,13 @@ impl<T: Real> EdgeTimed<T> {
         };
         if moved != T::ZERO {
             self.crossed(state, moved, way);
-        } else if state.phase == Phase::Resting {
-            // Silence says nothing about where it rests.
-            state.silent += T::ONE;
         } else {
             state.silent += T::ONE;
-            let blur = T::splat(BLUR * BLUR);
-            if state.belief.velocity < T::ZERO {
-                state.belief.keep_within(T::ZERO, -T::ONE, blur);
-            } else {
-                state.belief.keep_within(T::ONE, T::ONE, blur);
+            // It says nothing about where a shaft rests.
+            if state.phase != Phase::Resting {
+                let backward = state.belief.velocity < T::ZERO;
+                let (end, side) = if backward { (T::ZERO, -T::ONE) } else { (T::ONE, T::ONE) };
+                state.belief.keep_within(end, side, T::splat(BLUR * BLUR));
             }
         }
         // What only resists turns no shaft round.

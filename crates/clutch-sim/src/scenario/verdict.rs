@@ -119,7 +119,9 @@ impl Sampled {
         let error = match proven {
             Some(proven) => {
                 let law = if self.any_law() { " with any inner law" } else { "" };
-                format!("|e| below {} °{law}, certified", number(proven.checked.error_bound.to_degrees()))
+                let bound = number(proven.checked.error_bound.to_degrees());
+                let delay = self.setup.as_ref().map_or(0, |setup| setup.delay_ticks);
+                format!("|e| below {bound} °{law}, certified for a delay of {delay} ticks")
             }
             None => "error bound UNCERTIFIED".to_owned(),
         };
