@@ -21,7 +21,7 @@ from clutch._clutch import Table
 from clutch._errors import ParamError
 from clutch._metrics import FIGURES
 from clutch._model import Scenario
-from clutch._record import _Params
+from clutch._record import _Params, _slots
 from clutch._record import _plain as _python
 from clutch._run import Law, Result, ScenarioLike, as_law, as_scenario, simulate
 from clutch._units import attributes
@@ -298,9 +298,11 @@ def _plain(key: str, value: Any) -> Any:
     if isinstance(value, _Params):
         table = value._tables()
         *_, name = key.split(".")
-        first, *way = value._way(name)
-        if first != name:
+        *_, own = value._key.split(".")
+        homes = (slot for cls in (Scenario, *_Params.__subclasses__()) for slot in _slots(cls) if slot.name == name)
+        if name != own and not any(type(value) in slot.classes for slot in homes):
             raise TypeError(f"{key}: a {type(value).__name__} stands at {value._key}")
+        _, *way = value._way(name)
         for step in reversed(way):
             table = {step: table}
         return table

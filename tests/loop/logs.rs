@@ -102,7 +102,8 @@ fn one_changed_count_is_found_with_its_tick_and_field() {
     let found = found.prints(&[&format!("differs: tick {tick}, "), "logged ", "replayed "]);
     let field = found.out.split(&format!("tick {tick}, ")).nth(1).and_then(|t| t.split(':').next());
     assert!(
-        ["limit", "code", "voltage_v", "demand_v", "error_rad"].contains(&field.unwrap()),
+        // The state, where the envelope knows that the shaft cannot be a count further.
+        ["state", "limit", "code", "voltage_v", "demand_v", "error_rad"].contains(&field.unwrap()),
         "the first field that a count reaches: {}",
         found.out
     );

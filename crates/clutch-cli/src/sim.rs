@@ -207,7 +207,8 @@ fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
         "voltage_v",
         "stuck",
     ];
-    header.extend(t.terms.iter().map(|(name, _)| *name));
+    let names: Vec<String> = t.term_columns().map(|(name, _)| name).collect();
+    header.extend(names.iter().map(String::as_str));
     out.write_record(&header).with_context(wrong)?;
     for i in 0..t.time.len() {
         let floats = |xs: &[f64]| xs.iter().map(f64::to_string).collect::<Vec<_>>();

@@ -118,3 +118,33 @@ impl<T: Real> VelocitySource<T> {
         }
     }
 }
+
+#[cfg(all(test, feature = "linalg"))]
+mod tests {
+    use super::*;
+    use crate::PlantParams;
+
+    #[test]
+    fn the_edge_timed_source_tells_the_error_rate_of_a_shaft_that_lags() {
+        let plant = Plant::<f64>::new(&PlantParams::default()).unwrap();
+        let p = VelocityParams::EdgeTimed(EdgeTimedParams::default());
+        let source = VelocitySource::new(&p, &plant, Encoder::PAPER, Micros(1000)).unwrap();
+        // The path goes at 3 °/s, the shaft at 2 °/s under the voltage that keeps it.
+        let (path, shaft) = (3.0_f64.to_radians(), 2.0_f64.to_radians());
+        let volts = (0.047088 - 0.001 * shaft) / (0.15 * 0.14);
+        let counts =
+            |rate: f64, k: i32| rate * 1e-3 * f64::from(k) * Encoder::PAPER.counts_per_radian::<f64>();
+        let target = |k| Target {
+            position: FixedCounts::from_real(counts(path, k)),
+            velocity: path,
+            acceleration: 0.0,
+        };
+        let mut state = source.start(FixedCounts(0), &target(0), volts);
+        let mut rate = 0.0;
+        for k in 1..3000 {
+            let read = FixedCounts::from_counts(counts(shaft, k).floor() as i64);
+            rate = source.update(&mut state, read, &target(k), volts);
+        }
+        assert!((rate - (path - shaft)).to_degrees().abs() < 0.2, "{} °/s", rate.to_degrees());
+    }
+}

@@ -109,13 +109,10 @@ pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)
         ("limit".into(), limit),
         ("stuck".into(), Column::part(run, |r| &r.trace.stuck)),
     ];
-    for i in 0..run.trace.terms.len() {
-        let name = run.trace.terms[i].0;
-        // A law may call a term like a column.
-        let name =
-            if columns.iter().any(|(n, _)| n == name) { format!("law_{name}") } else { name.to_owned() };
+    for (i, (name, _)) in run.trace.term_columns().enumerate() {
         columns.push((name, Column::part(run, |r| r.trace.terms[i].1.as_slice())));
     }
+    debug_assert!(columns.iter().zip(clutch_sim::SAMPLE_COLUMNS).all(|((ours, _), name)| ours == name));
     columns
 }
 

@@ -22,6 +22,6 @@ pub use metrics::Metrics;
 pub use moving_rig::MovingRig;
 pub use number::number;
 pub use rig::RigParams;
-pub use run::{Keep, Run, RunError, RunParams, RunSpec, Start, simulate, simulate_servo};
+pub use run::{Keep, Run, RunError, RunParams, RunSpec, SAMPLE_COLUMNS, Start, simulate, simulate_servo};
 pub use scenario::{Scenario, ScenarioError};
 pub use tables::{Points, Text};

@@ -311,7 +311,34 @@ pub struct Trace {
     pub terms: Vec<(&'static str, Vec<f64>)>,
 }
 
+/// Columns of a table of samples, beside those of the law's terms.
+pub const SAMPLE_COLUMNS: [&str; 15] = [
+    "time_s",
+    "target_position_rad",
+    "target_velocity_rad_s",
+    "target_acceleration_rad_s2",
+    "position_rad",
+    "velocity_rad_s",
+    "error_rad",
+    "counts",
+    "measured_error_rad",
+    "error_rate_rad_s",
+    "code",
+    "voltage_v",
+    "demand_v",
+    "limit",
+    "stuck",
+];
+
 impl Trace {
+    /// The law's terms as columns of a table of samples; a name that a sample has already gets `law_` before it.
+    pub fn term_columns(&self) -> impl Iterator<Item = (String, &[f64])> {
+        self.terms.iter().map(|(name, values)| {
+            let taken = SAMPLE_COLUMNS.contains(name);
+            (if taken { format!("law_{name}") } else { (*name).to_owned() }, values.as_slice())
+        })
+    }
+
     /// Without samples, and with room for so many: growing copies everything, again and again.
     fn with_room(n: u64) -> Result<Self, RunError> {
         Ok(Trace {
