@@ -21,7 +21,7 @@ from clutch._clutch import Table
 from clutch._errors import ParamError
 from clutch._metrics import FIGURES
 from clutch._model import Scenario
-from clutch._record import _Params, _slots
+from clutch._record import _Params, _Record, _slots
 from clutch._record import _plain as _python
 from clutch._run import Law, Result, ScenarioLike, as_law, as_scenario, simulate
 from clutch._units import attributes
@@ -299,7 +299,8 @@ def _plain(key: str, value: Any) -> Any:
         table = value._tables()
         *_, name = key.split(".")
         *_, own = value._key.split(".")
-        homes = (slot for cls in (Scenario, *_Params.__subclasses__()) for slot in _slots(cls) if slot.name == name)
+        tables: tuple[type[_Record], ...] = (Scenario, *_Params.__subclasses__())
+        homes = (slot for cls in tables for slot in _slots(cls) if slot.name == name)
         if name != own and not any(type(value) in slot.classes for slot in homes):
             raise TypeError(f"{key}: a {type(value).__name__} stands at {value._key}")
         _, *way = value._way(name)
