@@ -601,7 +601,7 @@ def limits(draw):
         "friction_margin": draw(number(1, 10)),
         **{name: draw(IN_128) for name in ["jumps", "lost", "late", "disorder", "overruns"]},
         "silence_cycles": silence,
-        "watchdog_cycles": draw(st.integers(2, 100)),
+        "watchdog_cycles": draw(st.integers(2, min(silence, 100))),
         "valid_cycles": draw(st.integers(1, 60)),
         "deadline_us": draw(st.integers(1, 10**6)),
     }

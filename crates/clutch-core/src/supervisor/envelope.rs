@@ -30,6 +30,8 @@ const BLUR: f64 = 0.4;
 const LONGEST: f64 = 16.0;
 /// Counts per period of a velocity that nobody knows yet, at least.
 const FASTEST: f64 = 1000.0;
+/// Voltages that are kept; a power of two.
+const SENT: usize = 16;
 
 /// Accelerations within the bounds; in counts, periods and, where a side of it is meant, `[least, most]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,8 +51,8 @@ pub(super) struct Envelope<T> {
     drag: T,
     /// Counts by which an edge of the encoder may be off.
     edge: T,
-    /// Periods from a code to its effect.
-    delay: usize,
+    /// Codes of which any may be in force in a period: on a line that loses nothing, and on one that has lost samples.
+    reach: [usize; 2],
     /// Volts that can be sent.
     output: [T; 2],
     /// Counts per period of a velocity that nobody knows yet.
@@ -87,7 +89,14 @@ impl<T: Real> Envelope<T> {
             lighter: b.inertia.high / b.inertia.low,
             drag: b.viscous_damping.high / b.inertia.low * period,
             edge: p.edge_counts,
-            delay: usize::try_from(p.delay_cycles).unwrap_or(usize::MAX),
+            reach: {
+                let delay = usize::try_from(p.delay_cycles).unwrap_or(usize::MAX);
+                let patience = usize::try_from(p.silence_cycles).unwrap_or(usize::MAX);
+                // The newest may come late in its period.
+                let sound = delay.saturating_add(2);
+                // A board that hears nothing keeps the last that it took, until its watchdog bites.
+                [sound, delay.saturating_add(patience).saturating_add(1).min(SENT).max(sound)]
+            },
             output: [output.lowest, output.highest],
             fastest: T::from_f64(FASTEST).max(speed + speed),
             one_way: !b.actuator.drives_above_0() && b.drive_torque.low > T::ZERO,
@@ -105,6 +114,8 @@ impl<T: Real> Envelope<T> {
         EnvelopeState {
             sides: [from(T::ONE + edge, edge, fastest), from(edge, T::ONE + edge, back)],
             applied,
+            sent: [applied; SENT],
+            last: 0,
             turns: 0,
             still: 0,
             run: 0,
@@ -140,24 +151,26 @@ impl<T: Real> Envelope<T> {
         ]
     }
 
-    /// Lowest and highest voltage that may have been in force since the sample before: of those that were sent, the newest
-    /// first. The last two, and more where an actuator is slow or a line that has lost samples may have lost codes.
-    pub(super) fn in_force(&self, s: &EnvelopeState<T>, sent: &[T; 4], losses: bool) -> [T; 2] {
-        let [mut low, mut high] = [sent[0]; 2];
-        // Older than the four that are kept: any of the output, or what was there before the first.
-        if self.delay > 2 || losses && self.delay > 0 {
+    /// Lowest and highest voltage that may have been in force since the sample before: of those that were sent, the last
+    /// two, and more where an actuator is slow or a line that has lost samples may have lost codes.
+    pub(super) fn in_force(&self, s: &EnvelopeState<T>, losses: bool) -> [T; 2] {
+        let reach = self.reach[usize::from(losses)];
+        if reach > SENT {
+            // Older than those that are kept: any of the output, or what was there before the first.
             return [self.output[0].min(s.applied), self.output[1].max(s.applied)];
         }
-        let reach = if losses { 4 } else { 2 + self.delay };
-        for volts in sent.iter().take(reach) {
-            if *volts < low {
-                low = *volts;
+        let mut range = [s.newest(0); 2];
+        for back in 1..reach {
+            let volts = s.newest(back);
+            // Not `min`, `max`: these are numbers, and a comparison is cheaper.
+            if volts < range[0] {
+                range[0] = volts;
             }
-            if *volts > high {
-                high = *volts;
+            if volts > range[1] {
+                range[1] = volts;
             }
         }
-        [low, high]
+        range
     }
 
     /// A sample that has passed the gate: `moved` counts in so many periods. What no shaft of the bounds can have done, and
@@ -271,6 +284,10 @@ pub(super) struct EnvelopeState<T> {
     sides: [Side<T>; 2],
     /// Voltage before the first that was sent, V.
     applied: T,
+    /// Voltages that were sent, V, in a ring.
+    sent: [T; SENT],
+    /// Place of the newest in it.
+    last: usize,
     /// A bit for each of the last periods: the counts turned round in it.
     turns: u16,
     /// Periods without a count.
@@ -279,7 +296,18 @@ pub(super) struct EnvelopeState<T> {
     run: i32,
 }
 
-impl<T> EnvelopeState<T> {
+impl<T: Real> EnvelopeState<T> {
+    /// A voltage is sent.
+    pub(super) fn sends(&mut self, volts: T) {
+        self.last = (self.last + 1) % SENT;
+        self.sent[self.last % SENT] = volts;
+    }
+
+    /// The voltage that was sent so many codes ago; before the first, the one that was there.
+    fn newest(&self, back: usize) -> T {
+        self.sent[self.last.wrapping_sub(back) % SENT]
+    }
+
     /// Remembers the way of the counts, for the name of a suspect.
     fn note(&mut self, moved: i32, periods: u32) {
         self.turns = self.turns.checked_shl(periods).unwrap_or(0);

@@ -230,7 +230,7 @@ impl<T: Real> Supervisor<T> {
         self.check_output(s, &out, &goal, since_served);
         if s.state == State::Running && !sample.superseded {
             s.code = out.code;
-            s.voltages = [out.voltage, s.voltages[0], s.voltages[1], s.voltages[2]];
+            s.envelope.sends(out.voltage);
             cycle.answer = Some(out.code);
         }
     }
@@ -425,7 +425,6 @@ impl<T: Real> Supervisor<T> {
             let applied = servo.dac().volts(s.code);
             s.servo = servo.start(counts, goal, applied);
             s.envelope = self.limits.envelope.start(applied);
-            s.voltages = [applied; 4];
             return 1;
         };
         let steps = s.tick.saturating_sub(served);
@@ -471,7 +470,7 @@ impl<T: Real> Supervisor<T> {
     /// Causes of the envelope: counts that no shaft of the bounds can have given under the volts that were sent.
     fn within_envelope<S>(&self, s: &mut SupervisorState<T, S>, moved: i32, periods: u32) {
         let l = &self.limits;
-        let volts = l.envelope.in_force(&s.envelope, &s.voltages, s.lost.count() > 0 || s.late.count() > 0);
+        let volts = l.envelope.in_force(&s.envelope, s.lost.count() > 0 || s.late.count() > 0);
         if let Some((cause, counts)) = l.envelope.judge(&mut s.envelope, volts, moved, periods) {
             self.check(s, cause, counts * l.radians_per_count);
         }

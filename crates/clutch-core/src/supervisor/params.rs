@@ -27,7 +27,7 @@ crate::params! {
         friction_margin: T = 1.8, "friction_margin" "" NONE, Range::at_least(1.0);
         /// Factor by which friction may fall short of its lower bound before a shaft that is faster ends control.
         grip_margin: T = 1.2, "grip_margin" "" NONE, Range::at_least(1.0);
-        /// Periods from a code to its effect, beyond the one in which it is sent; above 2 the effect may be that of any
+        /// Periods from a code to its effect, beyond the one in which it is sent; above 14 the effect may be that of any
         /// voltage of the output. No less than `rig.delay_ticks`.
         delay_cycles: u32 = 0, "delay_cycles" "" CYCLES, Range::within(0.0, 1000.0);
         /// Lost samples within 128 periods that end control.

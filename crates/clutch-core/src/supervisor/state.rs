@@ -313,8 +313,6 @@ pub struct SupervisorState<T, S> {
     pub(super) unpassed: u32,
     pub(super) recovering: u32,
     pub(super) saturated: u32,
-    /// V, the newest first.
-    pub(super) voltages: [T; 4],
     pub(super) envelope: EnvelopeState<T>,
     pub(super) lost: History,
     pub(super) late: History,

@@ -51,7 +51,7 @@ params! {
     /// says why each default is what it is.
     #[derive(Copy)]
     pub struct ScenarioLimits<f64>: Default {
-        /// Periods without a valid code after which the board goes to its safe state by itself. Keep it equal to
+        /// Periods without a valid code after which the board goes to its safe state by itself; at most
         /// `silence_cycles`.
         watchdog_cycles: u32 = 3, "watchdog_cycles" "" CYCLES, Range::within(2.0, 100.0);
         /// Periods after its sample during which a code is valid; at most 65.535 ms.
@@ -60,6 +60,11 @@ params! {
     flat {
         /// Limits that the supervisor watches.
         supervisor: LimitParams;
+    }
+    relations(p) {
+        /// The board keeps no code longer than its host believes.
+        WATCHED: watchdog_cycles, "at most silence_cycles: no code stays on longer than a host without samples goes on" =>
+            p.watchdog_cycles <= p.supervisor.silence_cycles;
     }
 }
 

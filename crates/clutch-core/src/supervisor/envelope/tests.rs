@@ -68,7 +68,10 @@ struct Drawn {
     at: [f64; 6],
     speed: f64,
     volts: Vec<(f64, f64)>,
-    lost: u64,
+    /// Periods from a code to its effect.
+    delay: u8,
+    /// Bits of the periods whose sample is lost, and of those whose code is, on a line that loses some.
+    lost: [u64; 2],
 }
 
 fn drawn() -> impl Strategy<Value = Drawn> {
@@ -77,8 +80,9 @@ fn drawn() -> impl Strategy<Value = Drawn> {
     let volts = prop::collection::vec(level, 4..24).prop_map(|levels| {
         levels.into_iter().flat_map(|(u, n, late)| (0..n).map(move |_| (u, late))).collect()
     });
-    (0..3_u8, prop::array::uniform6(0.0..=1.0_f64), -1.0..1.0_f64, volts, any::<u64>())
-        .prop_map(|(kind, at, speed, volts, lost)| Drawn { kind, at, speed, volts, lost })
+    let losses = prop_oneof![Just([0; 2]), any::<[u64; 2]>()];
+    (0..3_u8, prop::array::uniform6(0.0..=1.0_f64), -1.0..1.0_f64, volts, 0..5_u8, losses)
+        .prop_map(|(kind, at, speed, volts, delay, lost)| Drawn { kind, at, speed, volts, delay, lost })
 }
 
 fn model(kind: u8) -> PlantParams<f64> {
@@ -167,22 +171,33 @@ fn follow<T: Real>(
     let highest = if d.kind == 0 { 10.0 } else { 6.0 };
     let volts = |u: f64| if d.kind == 0 { highest * u.abs() } else { highest * u };
     let first = volts(d.volts[0].0);
-    let (mut sent, mut s) = ([first; 4], envelope.start(T::from_f64(first)));
+    let mut s = envelope.start(T::from_f64(first));
+    let lossy = d.lost != [0; 2];
+    let lost = |k: usize, which: usize, one_in: u64| lossy && (d.lost[which] >> (k % 61)) & one_in == one_in;
+    // What the board took of late, and what is on its way to the pad.
+    let (mut taken, mut missed, mut way) = (first, 0, std::collections::VecDeque::new());
+    way.resize(usize::from(d.delay) + 1, first);
     let (mut seen, mut elapsed) = (see(0, shaft.counts()), 0);
     for (k, (u, late)) in d.volts.iter().enumerate() {
-        let before = sent[0];
-        sent = [volts(*u), sent[0], sent[1], sent[2]];
+        // A sample that is lost is not answered; a code may be lost as well, as long as the watchdog waits.
+        let answered = elapsed == 0;
+        if answered {
+            s.sends(T::from_f64(volts(*u)));
+        }
+        (taken, missed) =
+            if !answered || missed < 2 && lost(k, 1, 3) { (taken, missed + 1) } else { (volts(*u), 0) };
+        way.push_front(taken);
+        let (now, before) = (way[usize::from(d.delay)], way[usize::from(d.delay) + 1]);
+        way.truncate(usize::from(d.delay) + 1);
         for part in 0..50 {
-            let now = if f64::from(part) < late * 50.0 { before } else { sent[0] };
-            shaft.step(now, PERIOD / 50.0);
+            shaft.step(if f64::from(part) < late * 50.0 { before } else { now }, PERIOD / 50.0);
         }
         elapsed += 1;
-        // Some samples are lost; what their answers would have been is sent all the same.
-        if elapsed < 3 && (d.lost >> (k % 64)) & 7 == 7 {
+        if missed < 2 && lost(k, 0, 7) {
             continue;
         }
         let counts = see(k + 1, shaft.counts());
-        let in_force = envelope.in_force(&s, &sent.map(T::from_f64), elapsed > 1);
+        let in_force = envelope.in_force(&s, lossy);
         if let Some((cause, off)) = envelope.judge(&mut s, in_force, counts.wrapping_sub(seen), elapsed) {
             assert!(off > T::ZERO);
             return Some((k, cause));
@@ -193,7 +208,8 @@ fn follow<T: Real>(
 }
 
 fn stays_inside<T: Real>(d: &Drawn) -> Result<(), TestCaseError> {
-    let ended = follow(&envelope::<T>(d.kind, &bare()), &mut shaft(d), d, |_, counts| counts);
+    let limits = LimitParams { delay_cycles: d.delay.into(), ..bare() };
+    let ended = follow(&envelope::<T>(d.kind, &limits), &mut shaft(d), d, |_, counts| counts);
     prop_assert!(ended.is_none(), "{:?}: {:?}", shaft(d), ended);
     Ok(())
 }
@@ -235,8 +251,8 @@ fn seen_after<T: Real>(then: (f64, f64), lie: impl Fn(i32, i32) -> i32) -> Optio
             since = true_counts;
         }
         let counts = if broken { since + lie(true_counts - since, k as i32) } else { true_counts };
-        let sent = [T::from_f64(volts); 4];
-        let in_force = envelope.in_force(&s, &sent, false);
+        s.sends(T::from_f64(volts));
+        let in_force = envelope.in_force(&s, false);
         if let Some((cause, _)) = envelope.judge(&mut s, in_force, counts - seen, 1) {
             return Some((k + 1 - 60, cause));
         }
@@ -317,16 +333,39 @@ fn counts_that_dither_about_an_edge_at_rest_are_an_edge() {
 
 #[test]
 fn volts_in_force_are_the_last_two_and_more_with_a_delay_or_losses() {
+    let in_force = |delay_cycles, silence_cycles, losses| {
+        let limits = LimitParams { delay_cycles, silence_cycles, ..LimitParams::default() };
+        let envelope = envelope::<f64>(0, &limits);
+        let mut s = envelope.start(9.5);
+        // Ever lower, so that the highest is the oldest.
+        (0..20).for_each(|k| s.sends(9.0 - 0.25 * f64::from(k)));
+        let [low, high] = envelope.in_force(&s, losses);
+        assert_eq!(low, 4.25, "the newest");
+        high
+    };
+    let back = |codes: u32| 4.25 + 0.25 * f64::from(codes);
+    for silence in [2, 3, 8] {
+        for delay in [0, 1, 2, 5] {
+            assert_eq!(in_force(delay, silence, false), back(1 + delay));
+            assert_eq!(in_force(delay, silence, true), back(silence + delay));
+        }
+    }
+    assert_eq!((in_force(14, 3, false), in_force(12, 3, true)), (back(15), back(15)));
+    // A line that loses more codes in a row than are kept.
+    assert_eq!((in_force(13, 3, true), in_force(0, 1000, true)), (back(15), back(15)));
+}
+
+#[test]
+fn volts_older_than_those_kept_may_be_any_of_the_output_or_what_was_there() {
     let in_force = |delay_cycles, applied: f64, losses| {
         let envelope = envelope::<f64>(0, &LimitParams { delay_cycles, ..LimitParams::default() });
-        envelope.in_force(&envelope.start(applied), &[2.0, 3.0, 4.0, 1.0], losses)
+        let mut s = envelope.start(applied);
+        s.sends(3.0);
+        envelope.in_force(&s, losses)
     };
-    assert_eq!(in_force(0, 5.0, false), [2.0, 3.0]);
-    assert_eq!(in_force(1, 5.0, false), [2.0, 4.0]);
-    assert_eq!(in_force(2, 5.0, false), [1.0, 4.0]);
-    assert_eq!(in_force(0, 5.0, true), [1.0, 4.0]);
-    // Older than what is kept: any of the output, or what was there before.
-    assert_eq!(in_force(1, 5.0, true), [0.0, 10.0]);
-    assert_eq!(in_force(3, 5.0, false), [0.0, 10.0]);
+    // Before the first that was sent was what is there.
+    assert_eq!(in_force(14, 5.0, false), [3.0, 5.0]);
+    assert_eq!(in_force(15, 5.0, false), [0.0, 10.0]);
+    assert_eq!(in_force(15, 5.0, true), [0.0, 10.0]);
     assert_eq!(in_force(1000, 12.0, true), [0.0, 12.0]);
 }
