@@ -1375,7 +1375,8 @@ class Glide(_Params):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Voltage(_Params):
-    """An open-loop voltage, whatever the shaft does. It begins at `start_v` and goes to `end_v` at a rate.
+    """An open-loop voltage, whatever the shaft does. It begins at `start_v`, and after a wait goes to `end_v`
+    at a rate.
 
     Parameters
     ----------
@@ -1387,6 +1388,9 @@ class Voltage(_Params):
     rate_v_s : float, default 0.0
         Rate from the one to the other; 0 stays at the start. `r`: a finite number of at least 0 V/s; a rate
         above 0 where an end_v is given.
+    wait_s : float, default 0.0
+        Time at the start before it goes, in whole periods. `t_w`: a finite number of at least 0 s; a time of
+        at most 1e7 times sampling.period_us.
     returns : bool, default False
         `true` if it goes to and fro between them; else it stays at the end.
 
@@ -1399,7 +1403,7 @@ class Voltage(_Params):
     --------
     >>> import clutch
     >>> clutch.Voltage(end_v=2, rate_v_s=0.1)
-    Voltage(start_v=0.0, end_v=2.0, rate_v_s=0.1, returns=False)
+    Voltage(start_v=0.0, end_v=2.0, rate_v_s=0.1, wait_s=0.0, returns=False)
     """
 
     _key: ClassVar[str] = "law.voltage"
@@ -1407,6 +1411,7 @@ class Voltage(_Params):
     start_v: float = 0.0
     end_v: float = 0.0
     rate_v_s: float = 0.0
+    wait_s: float = 0.0
     returns: bool = False
 
 
@@ -2126,7 +2131,7 @@ class Limits(_Params):
         Factor by which friction may fall short of its lower bound before a shaft that is faster ends control.
         A finite number of at least 1.
     delay_cycles : int, default 0
-        Periods from a code to its effect, beyond the one in which it is sent; above 2 the effect may be that
+        Periods from a code to its effect, beyond the one in which it is sent; above 14 the effect may be that
         of any voltage of the output. No less than `rig.delay_ticks`. A whole number from 0 to 1000 periods.
     lost : int, default 26
         Lost samples within 128 periods that end control. A whole number from 1 to 128 within 128 periods.
@@ -2144,8 +2149,9 @@ class Limits(_Params):
         Answers later than `deadline_us`, within 128 periods, that end control. A whole number from 1 to 128
         within 128 periods.
     watchdog_cycles : int, default 3
-        Periods without a valid code after which the board goes to its safe state by itself. Keep it equal to
-        `silence_cycles`. A whole number from 2 to 100 periods.
+        Periods without a valid code after which the board goes to its safe state by itself; at most
+        `silence_cycles`. A whole number from 2 to 100 periods; at most silence_cycles: no code stays on
+        longer than a host without samples goes on.
     valid_cycles : int, default 2
         Periods after its sample during which a code is valid; at most 65.535 ms. A whole number from 1 to
         1000 periods.

@@ -230,7 +230,13 @@ fn each_law_has_in_each_lane_the_bits_of_the_scalar() {
     );
     open_loop(
         std::array::from_fn(|i| {
-            let p = VoltageParams { start: scaled(i), end: 8.0, rate: 2.0 * scaled(i), returns: i < 2 };
+            let p = VoltageParams {
+                start: scaled(i),
+                end: 8.0,
+                rate: 2.0 * scaled(i),
+                wait: 1e-3 * scaled(i),
+                returns: i < 2,
+            };
             Voltage::new(&p, &output(), PERIOD).unwrap()
         }),
         |each| Voltage::in_lanes(each),

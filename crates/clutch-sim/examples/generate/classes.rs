@@ -205,7 +205,7 @@ Smc(kp_v=4.0, kd_v_s_rad=400.0, slope_1_s=70.0, boundary_rad_s=0.1)",
         "Voltage",
         false,
         r">>> clutch.Voltage(end_v=2, rate_v_s=0.1)
-Voltage(start_v=0.0, end_v=2.0, rate_v_s=0.1, returns=False)",
+Voltage(start_v=0.0, end_v=2.0, rate_v_s=0.1, wait_s=0.0, returns=False)",
     ),
     known(
         "HoldParams",
