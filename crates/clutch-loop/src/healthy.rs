@@ -40,9 +40,11 @@ impl Healthy {
         // About 1.25 times the paper's mass: 60 % either way are a half and twice.
         let mass = 0.25 * within(60.0);
         let damping = 0.001 * within(50.0);
-        let law = ["pd", "ctc", "smc", "smc", "pid"][rng.random_range(0..5)];
+        let law = ["pd", "ctc", "smc", "smc", "pid", "glide"][rng.random_range(0..6)];
+        let delay = rng.random_range(0..=1);
         let law = match law {
             "pid" => "[law.pid]\nkp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n".to_owned(),
+            "glide" => format!("[law.glide]\nfilter.delay_ticks = {delay}\n"),
             _ => format!("[law.{law}]\n"),
         };
         let rate = [2.0, 5.0, 10.0, 20.0, 40.0, 60.0][rng.random_range(0..6)];
@@ -60,7 +62,6 @@ impl Healthy {
         };
         let scalar = if rng.random_bool(0.5) { "f32" } else { "f64" };
         let observer = if rng.random_bool(0.25) { "[velocity.observer]\n" } else { "" };
-        let delay = rng.random_range(0..=1);
         let start = if rng.random_bool(0.5) { "rest" } else { "on_path" };
         let text = format!(
             "name = \"healthy\"\n[rig]\nbase = \"paper\"\ndelay_ticks = {delay}\n\

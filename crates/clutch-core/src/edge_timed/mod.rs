@@ -14,13 +14,14 @@
 //! than the path may take for `silence_counts` is taken to rest: friction learnt since the last edge is forgotten, as
 //! it is that of a shaft at rest, and the filter says so ([`EdgeTimedState::starts`]), so that a law can let the brake go
 //! for some periods. If then no edge comes in 25 ms (and twice the lag, and the delay), friction is above what the
-//! voltage would have carried.
+//! voltage would have carried; and if that has failed twice, a brake is let go until an edge comes. A single count back
+//! of a shaft that only a brake holds is none: a channel that is dead counts to and fro.
 
 mod belief;
 
 use crate::friction::{FrictionModel, Stribeck};
 use crate::params::{Range, Table};
-use crate::{Actuator, Encoder, FixedCounts, Micros, ParamError, Plant, Real};
+use crate::{Actuator, ActuatorKind, Encoder, FixedCounts, Micros, ParamError, Plant, Real};
 use belief::{Belief, Shaft};
 
 crate::params! {
@@ -61,6 +62,8 @@ const BLUR: f64 = 0.15;
 const PATIENCE: f64 = 0.025;
 /// Longest time for which a shaft is let go at once, s: the paper's weight reaches 400 °/s in it.
 const LONGEST_RELEASE: f64 = 0.25;
+/// Twice the way of a fall in which an edge has to come, counts: one, and half of it for a drive that is weaker.
+const FALL: f64 = 3.0;
 /// Most of the velocity that a falling friction adds to an error of the velocity in a period.
 const FASTEST_FALL: f64 = 0.3;
 /// Friction of a shaft that stays at rest, as a multiple of what the voltage carried.
@@ -116,7 +119,7 @@ pub struct EdgeTimedState<T> {
     belief: Belief<T>,
     /// The belief at the last edge.
     at_edge: Belief<T>,
-    /// Whole counts of the last sample.
+    /// Whole counts of the last sample; of a brake's shaft, before a single count back.
     counts: i64,
     /// Position above them, for a sensor finer than a count.
     fraction: T,
@@ -131,6 +134,8 @@ pub struct EdgeTimedState<T> {
     /// Rests, of which each four edges make up for one.
     rests: T,
     phase: Phase,
+    /// Starts in a row that brought no edge.
+    unmoved: T,
 }
 
 impl<T: Real> EdgeTimedState<T> {
@@ -158,7 +163,8 @@ impl<T: Real> EdgeTimedState<T> {
         self.belief.velocity
     }
 
-    /// Position of the sensor above the lower edge of its count, counts: 0 for an encoder.
+    /// Position of the sensor above the lower edge of its count, counts: 0 for an encoder, and −1 where that has come
+    /// back by a count, as no shaft with a brake does.
     #[must_use]
     pub fn fraction(&self) -> T {
         self.fraction
@@ -282,7 +288,8 @@ impl<T: Real> EdgeTimed<T> {
         belief.hh = self.doubt * self.doubt;
         belief.rr = self.ripple * self.ripple;
         belief.ss = belief.rr * self.wave * self.wave;
-        let mut state = EdgeTimedState { belief, at_edge: belief, ..EdgeTimedState::default() };
+        let counts = position.0 >> FixedCounts::FRACTION_BITS;
+        let mut state = EdgeTimedState { belief, at_edge: belief, counts, ..EdgeTimedState::default() };
         state.line = [applied; 3];
         state.pad = applied;
         self.place(&mut state, position);
@@ -292,9 +299,16 @@ impl<T: Real> EdgeTimed<T> {
     /// Lets a resting shaft go: for as many periods as the drive takes to bring it to the path's velocity, rad/s, and
     /// an actuator to give way, a quarter of a second at most. A law then releases the actuator while
     /// [`EdgeTimedState::lets_go`].
+    ///
+    /// Where two starts in a row brought no edge, a brake lets go until one comes: no shaft falls for longer than a count, so
+    /// that one of which nothing comes is a broken encoder, which a supervisor then sees.
     pub fn let_go(&self, state: &mut EdgeTimedState<T>, target_velocity: T) {
-        let (pull, _) = self.forces(T::ZERO);
-        let needed = self.per_period(target_velocity).abs() / pull.abs().max(T::splat(1e-6));
+        let pull = self.forces(T::ZERO).0.abs().max(T::splat(1e-6));
+        let needed = if state.unmoved >= T::splat(2.0) && self.actuator.kind() == ActuatorKind::Brake {
+            (T::splat(FALL) / pull).sqrt() + T::ONE
+        } else {
+            self.per_period(target_velocity).abs() / pull
+        };
         let periods = needed.min(self.longest_release) + T::splat(0.7) * self.lag_periods;
         // To the nearest whole number; one at least.
         state.release = (periods + T::splat(0.5)).floor().max(T::ONE);
@@ -351,7 +365,10 @@ impl<T: Real> EdgeTimed<T> {
     }
 
     fn place(&self, state: &mut EdgeTimedState<T>, position: FixedCounts) -> T {
-        let counts = position.0 >> FixedCounts::FRACTION_BITS;
+        let read = position.0 >> FixedCounts::FRACTION_BITS;
+        // What only resists turns no shaft round: a single count back is the edge's own, or a broken channel's.
+        let back = !self.actuator.kind().two_sided() && read == state.counts.wrapping_sub(1);
+        let counts = if back { state.counts } else { read };
         let moved = counts.wrapping_sub(state.counts);
         state.counts = counts;
         // Both fit: a board converts 32 bits in one instruction.
@@ -469,6 +486,7 @@ impl<T: Real> EdgeTimed<T> {
         state.release = T::ZERO;
         state.rests = (state.rests - T::splat(0.25)).max(T::ZERO);
         state.phase = Phase::Sliding;
+        state.unmoved = T::ZERO;
     }
 
     /// `true` if a shaft would have crossed an edge by now: one that follows the path, or, where that rests, one that
@@ -506,6 +524,7 @@ impl<T: Real> EdgeTimed<T> {
                 state.belief.rest();
                 state.belief.know_friction(friction, T::splat(0.15) * state.belief.mean);
                 state.phase = Phase::Resting;
+                state.unmoved += T::ONE;
             }
             Phase::Starting => {}
         }

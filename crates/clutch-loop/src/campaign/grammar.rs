@@ -254,8 +254,8 @@ fn setting(rng: &mut Pcg64) -> Setting {
     let rig = pick(rng, &rig, RigName::Paper);
     let laws: &[&str] = match rig {
         RigName::Motor => &["pid", "smc", "ctc"],
-        RigName::Paper => &["pd", "ctc", "smc", "smc_sign", "pid", "hold"],
-        RigName::Bench => &["pd", "ctc", "smc"],
+        RigName::Paper => &["pd", "ctc", "smc", "smc_sign", "pid", "hold", "glide"],
+        RigName::Bench => &["pd", "ctc", "smc", "glide"],
     };
     let law = pick(rng, laws, "pd");
     let speed = match rig {
@@ -281,7 +281,7 @@ fn setting(rng: &mut Pcg64) -> Setting {
     let delay = match rig {
         RigName::Bench => 1,
         // PD with a period of delay is unstable on the paper's rig, and the switching laws swing.
-        RigName::Paper if matches!(law, "ctc" | "smc" | "hold") => rng.random_range(0..=1),
+        RigName::Paper if matches!(law, "ctc" | "smc" | "hold" | "glide") => rng.random_range(0..=1),
         _ => 0,
     };
     Setting {
@@ -290,7 +290,8 @@ fn setting(rng: &mut Pcg64) -> Setting {
         path,
         wide: rng.random_bool(0.25),
         safe,
-        observer: rig != RigName::Motor && rng.random_bool(0.2),
+        // Glide has a filter of its own.
+        observer: rig != RigName::Motor && law != "glide" && rng.random_bool(0.2),
         single: rng.random_bool(0.5),
         delay,
         latency_ns: rng.random_range(20_000..300_000),

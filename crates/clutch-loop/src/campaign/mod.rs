@@ -14,7 +14,7 @@ use crate::lockstep_host::lockstep_host;
 use crate::sim_board::SimBoardError;
 use crate::station::ControllerStation;
 use crate::virtual_time::{Stall, VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
-use clutch_core::law::{Command, ControlLaw, Law, Tick};
+use clutch_core::law::{Command, ControlLaw, Law, Seen, Tick};
 use clutch_core::supervisor::Checks;
 use clutch_core::{Real, Servo};
 use clutch_node::ControllerNode;
@@ -169,8 +169,9 @@ impl Draw {
             );
         }
         let gains = match s.law {
-            "pid" => "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n",
-            _ => "",
+            "pid" => "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n".to_owned(),
+            "glide" => format!("filter.delay_ticks = {}\n", s.delay),
+            _ => String::new(),
         };
         let _ = writeln!(text, "[law.{}]\n{gains}", s.law);
         let _ = match s.path {
@@ -343,11 +344,16 @@ impl<T: Real> ControlLaw<T> for BrokenLaw<T> {
         (self.law.start(tick, applied), 0)
     }
 
+    fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
+        self.law.sees(&mut state.0, seen);
+    }
+
     fn update(&self, state: &mut Self::State, tick: &Tick<T>) -> Command<T, Self::Terms> {
         let broken = state.1 >= self.from;
         state.1 += 1;
         let nan = T::from_f64(f64::NAN);
-        self.law
-            .update(&mut state.0, &if broken { Tick { error_rate: nan, error: nan, ..*tick } } else { *tick })
+        // Glide has errors of its own, and takes the path's velocity only.
+        let corrupt = Tick { error_rate: nan, error: nan, target_velocity: nan, ..*tick };
+        self.law.update(&mut state.0, if broken { &corrupt } else { tick })
     }
 }

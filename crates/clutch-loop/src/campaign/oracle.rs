@@ -165,11 +165,16 @@ fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promis
     // A law lets go so little of a shaft that is slow, computed torque most of all, that friction of the bounds might still
     // hold it.
     let ctc = s.law == "ctc";
-    let hidden = ctc && t.at == 0.0 || s.path.slowest_deg_s() < if ctc { 10.0 } else { 3.0 };
+    // Glide waits for the edges of a slow shaft, and for that of a first start; then it lets go for good.
+    let glide = s.law == "glide";
+    let hidden = (ctc || glide) && t.at == 0.0 || s.path.slowest_deg_s() < if ctc { 10.0 } else { 3.0 };
     let exact = s.rig == RigName::Paper && !s.wide && s.delay == 0 && s.law != "pid";
-    let way = Promise { blind: (!hidden).then(|| by_the_way(s)), truthful: false, ..*base };
+    let open = by_the_way(s) + if glide { 0.08 } else { 0.0 };
+    let way = Promise { blind: (!hidden).then_some(open), truthful: false, ..*base };
     let blind = Promise { blind: None, truthful: false, ..*base };
-    let found = |causes| Promise { fate: Fate::Ends(0.5), causes, ..way };
+    // Glide lets go for good after silence and two starts of 25 ms that brought no edge.
+    let within = if glide { 0.3 } else { 0.5 };
+    let found = |causes| Promise { fate: Fate::Ends(within), causes, ..way };
     match kind {
         // The board sees it, and does not ask.
         FaultKind::EncoderLoss => ends(0.1 * PERIOD, &[Cause::Board]),
@@ -282,9 +287,7 @@ fn healthy_deg(s: &Setting) -> f64 {
 pub fn judge(draw: &Draw, o: &VirtualReport) -> Option<String> {
     let s = &draw.setting;
     let promises: Vec<Promise> = draw.troubles.iter().map(|t| Promise::of(s, t)).collect();
-    output(draw, o)
-        .or_else(|| fate(draw, &promises, o))
-        .or_else(|| if lossy(draw) { None } else { degrees(s, &promises, o) })
+    output(draw, o).or_else(|| fate(draw, &promises, o)).or_else(|| degrees(s, &promises, o))
 }
 
 /// The output: within its limits, and in the end that of the safe state.
@@ -342,7 +345,7 @@ fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> 
         }
         // What a board refuses aloud stands between its samples, and changes places with them.
         let swapped = matches!(trouble.what, What::Fault(FaultKind::Reorder, _));
-        if !alone && (swapped || lossy(draw) && !promise.truthful) {
+        if !alone && swapped {
             continue;
         }
         // A shaft that a broken converter moves, seen by a broken encoder, may be any.
@@ -383,12 +386,6 @@ fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> 
         }
     }
     None
-}
-
-/// True if a line that loses and a delay leave it open which voltage is in force: then the envelope believes any of the output.
-fn lossy(draw: &Draw) -> bool {
-    let line = |t: &Trouble| matches!(t.what, What::Fault(kind, _) if kind.silences());
-    draw.setting.delay > 0 && draw.troubles.len() > 1 && draw.troubles.iter().any(line)
 }
 
 /// True if line or board tell when it first showed.
