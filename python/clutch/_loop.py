@@ -126,6 +126,8 @@ def loop(
     log: str | os.PathLike[str] | None = None,
     uncertified: bool = False,
     certificate: str | os.PathLike[str] | None = None,
+    release_test: Literal["auto", "always", "never"] = "auto",
+    release_deg: float = 0.1,
     patient: bool = False,
     strict: bool = False,
     faults: Sequence[str] = (),
@@ -165,6 +167,11 @@ def loop(
     certificate : str or path, optional
         Certificate of the sampled loop, as ``clutch certify --sampled --save`` writes it: it is checked, and that it is
         this scenario's, before anything starts.
+    release_test : {"auto", "always", "never"}
+        Before the run, let the brake go for some milliseconds and grip again: the way tells wrong signs and scales of
+        encoder and converter. "auto" does so on a serial device, where the scenario allows it.
+    release_deg : float, default 0.1
+        The longest way in that test of any shaft within the bounds, above 0 and up to 10°: a longer one tells more.
     patient : bool, default False
         The board at the port is a simulated one whose clock waits when this machine stalls, and so does the loop.
     strict : bool, default False
@@ -197,7 +204,8 @@ def loop(
     ParamError
         A value that the scenario refuses; its ``field`` is the key.
     LoopError
-        Gains that are not certified, a port, a board: with the text of the command. Nothing has moved.
+        Gains that are not certified, a port, a board: with the text of the command. Nothing has moved. Or a release
+        test that did not end as that of a sound shaft would: the output is in the safe state.
     OSError
         The scenario cannot be read, or the log not be written.
 
@@ -225,6 +233,8 @@ def loop(
         log=None if log is None else os.fspath(log),
         uncertified=uncertified,
         certificate=_text(certificate),
+        release_test=release_test,
+        release_deg=release_deg,
         patient=patient,
         faults=list(faults),
         fault_seed=fault_seed,

@@ -86,9 +86,10 @@ fn a_board_that_closes_the_loop_is_set_up_armed_logged_and_stopped_over_a_line()
     assert_eq!(replayed.status.code(), Some(0), "{}", shown(&replayed));
     // One more if the board's safe state was still reported.
     assert!(shown(&replayed).contains("identical over 75"), "{}", shown(&replayed));
-    // The same board again: a second run after the first.
-    let done = looped(&["--duration", "2"]);
+    // The same board again: a second run after the first, and a release test before it.
+    let done = looped(&["--duration", "2", "--release-test", "always", "--release-deg", "0.5"]);
     assert_eq!(done.status.code(), Some(0), "a second run: {}", shown(&done));
+    assert!(shown(&done).contains("0 V for 3 periods"), "{}", shown(&done));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use clutch_loop::control_loop::Pace;
 use clutch_loop::faults::Fault;
 use clutch_loop::port::Address;
 use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode};
-use clutch_loop::session::{Board, Event, Progress, Session, SessionError, SessionOptions};
+use clutch_loop::session::{Board, Event, Progress, Release, Session, SessionError, SessionOptions};
 use clutch_loop::summary::{Summary, Verdict};
 use clutch_sim::Metrics;
 use clutch_sim::metrics::Detected;
@@ -33,6 +33,16 @@ enum OverrunsArg {
     Manage,
     /// The first late answer ends control.
     Fault,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ReleaseArg {
+    /// On a serial device, where the scenario allows it.
+    Auto,
+    /// In any case.
+    Always,
+    /// Never.
+    Never,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -89,6 +99,13 @@ pub(crate) struct Loop {
     /// scenario's, before anything starts.
     #[arg(long, value_name = "FILE.json")]
     certificate: Option<PathBuf>,
+    /// Release test before the run: the brake lets go for some milliseconds and grips again; the way tells wrong signs and
+    /// scales of encoder and converter.
+    #[arg(long, value_enum, value_name = "WHEN", default_value = "auto")]
+    release_test: ReleaseArg,
+    /// The longest way in that test of any shaft within the bounds, °, up to 10: a longer one tells more.
+    #[arg(long, value_name = "DEG", default_value_t = 0.1)]
+    release_deg: f64,
     /// Cycles per second instead of sampling.period_us, Hz.
     #[arg(long, alias = "update_rate", value_name = "HZ")]
     update_rate: Option<f64>,
@@ -169,7 +186,15 @@ impl Loop {
         if show {
             let _ = write!(std::io::stderr(), "\r\x1b[K");
         }
-        let ran = ran?;
+        let ran = match ran {
+            Ok(ran) => ran,
+            Err(ended @ SessionError::Released { .. }) => {
+                said?;
+                self.say(&format!("{ended}\n"))?;
+                return Ok(Exit::Fault);
+            }
+            Err(obstacle) => return Err(obstacle.into()),
+        };
         said?;
         print(&if self.json { json(&ran.to_json())? } else { summary(&ran) })?;
         Ok(match ran.verdict() {
@@ -220,6 +245,12 @@ impl Loop {
             log: self.log.clone(),
             uncertified: self.uncertified,
             certificate: self.certificate.clone(),
+            release: match self.release_test {
+                ReleaseArg::Auto => Release::Auto,
+                ReleaseArg::Always => Release::Always,
+                ReleaseArg::Never => Release::Never,
+            },
+            release_way: self.release_deg.to_radians(),
             realtime: RealtimeOptions {
                 thread_priority: self.thread_priority,
                 lock_memory: self.lock_memory,

@@ -7,6 +7,7 @@
 //! | `port`, `realtime` | the line's device; the machine's clock, priorities and memory |
 //! | `preflight` | what station and board say to each other before consent |
 //! | `session`, `summary` | a scenario and options in; refusals, events and a summary out |
+//! | `release` | the test of encoder and brake that comes before a run |
 //! | `control_loop` | the run on its control thread |
 //! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
 //! | `virtual_time` | the same run with a computed clock |
@@ -32,6 +33,7 @@ pub mod port;
 pub mod preflight;
 pub mod qemu_board;
 pub mod realtime;
+pub mod release;
 pub mod replay;
 pub mod session;
 pub mod sim_board;

@@ -1,9 +1,10 @@
 //! A session of the loop: a scenario and options in; refusals, events and a summary out.
 //!
 //! [`Session::new`] refuses what can be refused before a port is opened. [`Session::run`] opens it, asks the board
-//! who it is, says what it will do, configures and arms the board, runs to the path's end, and leaves the board in
-//! its safe state. Starting it is the consent.
+//! who it is, says what it will do, makes a release test where that is asked for, configures and arms the board, runs to
+//! the path's end, and leaves the board in its safe state. Starting it is the consent.
 
+use crate::campaign::CampaignError;
 use crate::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, Pace};
 use crate::faults::Fault;
 use crate::from_scenario::{self, BuildError, BuiltRun};
@@ -11,13 +12,15 @@ use crate::log_thread::{LogThread, Ring};
 use crate::port::{Address, DeviceKind, Endpoint, Port, PortError, PseudoTerminal, SerialOptions};
 use crate::preflight::{PreflightError, Talk};
 use crate::realtime::{RealtimeOptions, WaitMode, describe_system};
+use crate::release::{self, NoRelease, ReleaseTest};
 use crate::sim_board::{PATIENT_BOARD, STRICT_BOARD};
 use crate::sim_board_server::{ServeError, ServeOptions, ServeReport, serve};
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, ControllerStation, HOST_SILENCE, HostStation, Station};
-use crate::summary::{LogSummary, SampledSummary, Summary};
+use crate::summary::{LogSummary, SampledSummary, Summary, cause_text};
 use crate::to_log::PRESENT_CODE;
 use crate::watch::Watch;
 use clutch_core::law::Law;
+use clutch_core::supervisor::Cause;
 use clutch_core::{ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState};
 use clutch_log::{LogError, Source};
 use clutch_node::{ControllerNode, HostNode, present_code};
@@ -59,6 +62,18 @@ pub enum Board {
     Controller(Address),
 }
 
+/// Whether a release test comes before the run: see [`crate::release`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Release {
+    /// On a serial device, where the scenario allows one; a simulated board is wired as it says.
+    #[default]
+    Auto,
+    /// In any case; a scenario that allows none is refused.
+    Always,
+    /// Never.
+    Never,
+}
+
 /// Options of a session.
 #[derive(Clone, Debug)]
 pub struct SessionOptions {
@@ -75,6 +90,10 @@ pub struct SessionOptions {
     pub uncertified: bool,
     /// A saved certificate of the sampled loop, which is checked before anything else.
     pub certificate: Option<PathBuf>,
+    /// The test of encoder and brake before the run.
+    pub release: Release,
+    /// The longest way of a shaft within the bounds in that test, rad.
+    pub release_way: f64,
     /// Priority, memory, core, wait.
     pub realtime: RealtimeOptions,
     /// The event that starts a cycle.
@@ -93,6 +112,8 @@ impl Default for SessionOptions {
             patient: false,
             uncertified: false,
             certificate: None,
+            release: Release::default(),
+            release_way: release::WAY,
             realtime: RealtimeOptions::default(),
             pace: Pace::default(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -131,6 +152,31 @@ pub enum SessionError {
          start with --set run.start=rest"
     )]
     CertifiedInMotion,
+    /// The way of the release test.
+    #[error("way of the release test = {}°: expected above 0 and at most {}", number(.0.to_degrees()), number(release::LONGEST_WAY.to_degrees()))]
+    ReleaseWay(f64),
+    /// What a release test would tell could not be found.
+    #[error(transparent)]
+    Tells(#[from] CampaignError),
+    /// There is no release test for the scenario, and one was asked for.
+    #[error("{scenario}: no release test: {why}")]
+    NoRelease {
+        /// The scenario's name.
+        scenario: String,
+        /// The reason.
+        why: NoRelease,
+    },
+    /// The release test did not end as that of any shaft within the bounds would.
+    #[error(
+        "the release test ended it: {text}.\nThe run was not started, and the output is in the safe state. Check sign and \
+         resolution of the encoder, sign and scale of the converter, and [bounds]"
+    )]
+    Released {
+        /// The cause.
+        cause: Cause,
+        /// The cause in words.
+        text: String,
+    },
     /// A log is never written over: it may be the only record of a run.
     #[error("{}: exists already; name a new file for the log", path.display())]
     LogExists {
@@ -273,6 +319,8 @@ pub struct Session {
     scenario: Scenario,
     options: SessionOptions,
     cleared: Cleared,
+    /// The test that comes first where it is wanted; the reason why there is none otherwise.
+    release: Result<ReleaseTest, NoRelease>,
     /// The change made in the scenario for the board's sake.
     note: Option<String>,
 }
@@ -292,7 +340,14 @@ impl Session {
         let scenario = single.unwrap_or(scenario);
         let (certificate, log) = (options.certificate.as_deref(), options.log.as_deref());
         let cleared = check(&scenario, certificate, options.uncertified, log)?;
-        Ok(Session { scenario, options, cleared, note })
+        if !(options.release_way > 0.0 && options.release_way <= release::LONGEST_WAY) {
+            return Err(SessionError::ReleaseWay(options.release_way));
+        }
+        let release = ReleaseTest::new(&scenario, &cleared.plan, options.release_way)?;
+        if let (Release::Always, Err(why)) = (options.release, &release) {
+            return Err(SessionError::NoRelease { scenario: scenario.name().to_owned(), why: *why });
+        }
+        Ok(Session { scenario, options, cleared, release, note })
     }
 
     /// True if the gains are certified, in continuous time, for the scenario's bounds.
@@ -308,6 +363,16 @@ impl Session {
             Board::Simulated { faults, strict, .. } => !strict && !faults.iter().any(|f| f.kind.silences()),
             Board::Daq(_) | Board::Controller(_) => self.options.patient,
         }
+    }
+
+    /// The release test that comes first, if one does.
+    fn first(&self, port: &Port) -> Option<&ReleaseTest> {
+        let wanted = match self.options.release {
+            Release::Always => true,
+            Release::Auto => is_real(port),
+            Release::Never => false,
+        };
+        self.release.as_ref().ok().filter(|_| wanted)
     }
 
     /// The scenario as it will run.
@@ -408,28 +473,44 @@ impl Course<'_> {
         let scenario = &self.session.scenario;
         let (mut port, notes) = self.open((Sample::LENGTH, Actuate::LENGTH))?;
         let mut station = controller(&BuiltRun::<T>::new(scenario, 0)?, from_scenario::path(scenario)?);
-        let hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
+        let mut hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
         self.check_fit(&hello, &port)?;
-        let built = self.built::<T>(&hello)?;
-        let patient = self.session.patient();
-        let mut station = controller(&built, from_scenario::path(scenario)?);
+        let first = self.session.first(&port);
         self.announce(&hello, &port, &notes, None)?;
-        let present = present_code(&hello, built.supervisor.safe_codes().hold);
-        let log = self.log(&built, present, &board_text(&hello))?;
-        let mut talk = Talk::new(&mut port, &mut station);
+        if let Some(test) = first {
+            let (report, _) = self.daq_run::<T>(&test.scenario, &mut port, &hello, None)?;
+            self.passed(&report)?;
+            hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
+        }
+        self.daq_run::<T>(scenario, &mut port, &hello, self.session.options.log.as_deref())
+    }
+
+    /// A run on a board that has said who it is.
+    fn daq_run<T: Real>(
+        &mut self,
+        scenario: &Scenario,
+        port: &mut Port,
+        hello: &Hello,
+        log: Option<&Path>,
+    ) -> Result<Ran, SessionError> {
+        let built = self.built::<T>(scenario, hello)?;
+        let mut station = controller(&built, from_scenario::path(scenario)?);
+        let present = present_code(hello, built.supervisor.safe_codes().hold);
+        let log = self.log(&built, present, &board_text(hello), log)?;
+        let mut talk = Talk::new(port, &mut station);
         talk.configure(present)?;
         let clock = talk.clock()?;
         let configured = ConfiguredRun {
             station: &mut station,
-            port: &mut port,
+            port,
             ring: log.ring,
             watch: &log.watch,
-            patient,
+            patient: self.session.patient(),
             ticks: built.ticks,
             clock,
             detector: built.detector,
         };
-        self.drive(configured, log.thread)
+        self.drive(scenario, configured, log.thread)
     }
 
     /// The loop is closed on the board.
@@ -438,29 +519,47 @@ impl Course<'_> {
         // Telemetry each cycle; now and then a word to it.
         let (mut port, notes) = self.open((Telemetry::LENGTH, 0))?;
         let mut station = host(scenario, &BuiltRun::<f32>::new(scenario, 0)?, false)?;
-        let hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
+        let mut hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
         let met = station.node.controller().copied();
-        let clock_hz = met.map_or(0, |c| c.clock_hz);
         let board = met.as_ref().map_or_else(String::new, controller_text);
         self.check_fit(&hello, &port)?;
+        let first = self.session.first(&port);
+        self.announce(&hello, &port, &notes, Some(&board))?;
+        if let Some(test) = first {
+            let (report, _) = self.controller_run(&test.scenario, &mut port, &hello, met.as_ref(), None)?;
+            self.passed(&report)?;
+            hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
+        }
+        self.controller_run(scenario, &mut port, &hello, met.as_ref(), self.session.options.log.as_deref())
+    }
+
+    /// A run on a board that closes the loop, and that has said who it is.
+    fn controller_run(
+        &mut self,
+        scenario: &Scenario,
+        port: &mut Port,
+        hello: &Hello,
+        met: Option<&ControllerHello>,
+        log: Option<&Path>,
+    ) -> Result<Ran, SessionError> {
         let patient = self.session.patient();
-        let built = self.built::<f32>(&hello)?;
+        let built = self.built::<f32>(scenario, hello)?;
         let host_silence = if patient { built.controller.silence } else { HOST_SILENCE };
         let settings = from_scenario::settings(scenario, &built, host_silence, built.ticks)?;
         let mut station = host(scenario, &built, patient)?;
-        if let Some(met) = &met {
+        if let Some(met) = met {
             station.node.meet(met);
         }
-        self.announce(&hello, &port, &notes, Some(&board))?;
         let hold = built.supervisor.safe_codes().hold;
-        let log = self.log(&built, present_code(&hello, hold), &board)?;
-        let mut talk = Talk::new(&mut port, &mut station);
+        let board = met.map_or_else(String::new, controller_text);
+        let log = self.log(&built, present_code(hello, hold), &board, log)?;
+        let mut talk = Talk::new(port, &mut station);
         talk.upload(&settings)?;
         talk.configure(hold)?;
         let clock = talk.clock()?;
         let configured = ConfiguredRun {
             station: &mut station,
-            port: &mut port,
+            port,
             ring: log.ring,
             watch: &log.watch,
             patient,
@@ -468,8 +567,18 @@ impl Course<'_> {
             clock,
             detector: built.detector,
         };
-        let (report, log) = self.drive(configured, log.thread)?;
-        Ok((LoopReport { clock_hz, ..report }, log))
+        let (report, log) = self.drive(scenario, configured, log.thread)?;
+        Ok((LoopReport { clock_hz: met.map_or(0, |c| c.clock_hz), ..report }, log))
+    }
+
+    /// The verdict of a release test.
+    fn passed(&self, report: &LoopReport) -> Result<(), SessionError> {
+        // Whoever stops it, stops the run as well.
+        if report.cause == Cause::Done || self.stop.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        let text = cause_text(report.cause, report.value, report.on_the_board, false);
+        Err(SessionError::Released { cause: report.cause, text })
     }
 
     /// Opens the port, whose line carries frames with bodies of these lengths each cycle, from the board and to it.
@@ -488,9 +597,8 @@ impl Course<'_> {
     /// Checks that encoder and converter are those of the scenario.
     fn check_fit(&self, hello: &Hello, port: &Port) -> Result<(), PreflightError> {
         let mut lines = from_scenario::misfits(&self.session.scenario, hello);
-        let real = port.kind() != DeviceKind::PseudoTerminal && !port.kind().is_socket();
         let is_controller = matches!(self.session.options.board, Board::Controller(_));
-        if is_simulated(hello) && real && !is_controller {
+        if is_simulated(hello) && is_real(port) && !is_controller {
             lines.push(format!(
                 "board: its serial number {} is kept for simulated boards; give it another",
                 hello.board
@@ -509,8 +617,8 @@ impl Course<'_> {
     }
 
     /// A new run on a board with this clock: when the clock waits, so does our patience.
-    fn built<T: Real>(&self, hello: &Hello) -> Result<BuiltRun<T>, BuildError> {
-        let mut built = BuiltRun::<T>::new(&self.session.scenario, hello.run.wrapping_add(1).max(1))?;
+    fn built<T: Real>(&self, scenario: &Scenario, hello: &Hello) -> Result<BuiltRun<T>, BuildError> {
+        let mut built = BuiltRun::<T>::new(scenario, hello.run.wrapping_add(1).max(1))?;
         built.controller.boot = hello.boot;
         if self.session.patient() {
             built.controller.silence = PATIENT_SILENCE;
@@ -527,6 +635,13 @@ impl Course<'_> {
         controller: Option<&str>,
     ) -> Result<(), SessionError> {
         let mut announcement = self.announcement(hello, port.kind())?;
+        let auto = self.session.options.release == Release::Auto && is_real(port);
+        let test = match (self.session.first(port), &self.session.release) {
+            (Some(test), _) => Some(test.describe()?),
+            (None, Err(why)) if auto => Some(format!("no test: {why}")),
+            _ => None,
+        };
+        announcement.rows.extend(test.map(|test| ("release", test)));
         let remarks = &mut announcement.remarks;
         remarks.extend(self.session.note.iter().chain(notes).map(|note| format!("note: {note}")));
         remarks.extend(controller.map(|board| format!("the loop is closed on the board: {board}")));
@@ -601,10 +716,11 @@ impl Course<'_> {
         built: &BuiltRun<T>,
         present: DacCode,
         board: &str,
+        path: Option<&Path>,
     ) -> Result<Logging, SessionError> {
         let Session { scenario, options, .. } = self.session;
         let watch = Arc::new(Watch { stop: self.stop.clone(), ..Watch::default() });
-        let Some(path) = &options.log else { return Ok(Logging { thread: None, ring: None, watch }) };
+        let Some(path) = path else { return Ok(Logging { thread: None, ring: None, watch }) };
         let port = self.address.to_string();
         let mut header = from_scenario::header(scenario, &built.servo, Source::Loop, &port, &options.version);
         header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
@@ -618,12 +734,13 @@ impl Course<'_> {
     /// Runs it on a thread of its own, and looks at it from this one.
     fn drive<S: Station + Send>(
         &mut self,
+        scenario: &Scenario,
         configured: ConfiguredRun<'_, S>,
         log: Option<LogThread>,
     ) -> Result<Ran, SessionError> {
         let (watch, ticks) = (configured.watch, configured.ticks);
         let SessionOptions { realtime, pace, log: path, .. } = &self.session.options;
-        let settle = self.session.scenario.spec().run.settle;
+        let settle = scenario.spec().run.settle;
         let options = LoopOptions { realtime: *realtime, pace: *pace, settle, hooks: (|| (), || ()) };
         let report = std::thread::scope(|scope| {
             let control = std::thread::Builder::new()
@@ -675,6 +792,11 @@ fn host<'a>(
     let silence = if patient { u64::from(PATIENT_SILENCE.0) * 1000 } else { BOARD_SILENCE_NS };
     let node = HostNode::new(built.servo, configure, ALIVE_NS, silence);
     Ok(HostStation { node, path: from_scenario::path::<f32>(scenario)? })
+}
+
+/// True for a device, of which nobody knows how it is wired.
+fn is_real(port: &Port) -> bool {
+    port.kind() != DeviceKind::PseudoTerminal && !port.kind().is_socket()
 }
 
 fn is_simulated(hello: &Hello) -> bool {

@@ -5,7 +5,7 @@ use clutch_core::supervisor::Cause;
 use clutch_loop::faults::Fault;
 use clutch_loop::port::Address;
 use clutch_loop::realtime::RealtimeOptions;
-use clutch_loop::session::{Board, Event, Session, SessionError, SessionOptions};
+use clutch_loop::session::{Board, Event, Release, Session, SessionError, SessionOptions};
 use clutch_loop::summary::{Summary, Verdict};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::ScalarKind;
@@ -116,4 +116,48 @@ fn what_is_stopped_before_consent_moves_nothing() {
     let summary = session.run(&stop, &mut |_| ()).unwrap();
     assert_eq!((summary.verdict(), summary.report.begun), (Verdict::Stopped, false));
     assert_eq!(summary.last_line(), "stopped before the board was armed; its output is as it was");
+}
+
+#[test]
+fn a_release_test_comes_first_and_what_fails_it_is_not_started() {
+    let short = || scenario("board_smc_2", &[("run.duration_s", "1.1")]);
+    let tested = SessionOptions { release: Release::Always, release_way: 0.3_f64.to_radians(), ..options() };
+    let sound = Session::new(short(), tested.clone()).unwrap();
+    let (summary, events) = run(&sound, &Arc::default(), f64::INFINITY);
+    assert_eq!((summary.verdict(), summary.report.ticks), (Verdict::Done, 1100));
+    let [Event::Announced(announcement)] = &events[..] else { panic!("{events:?}") };
+    let (_, says) = announcement.rows.iter().find(|(name, _)| *name == "release").unwrap();
+    assert!(says.contains("counts halved") && says.contains("at most 0.27°"), "{says}");
+
+    for (fault, cause) in [
+        ("scale:at=0,factor=2", Cause::TooFast),
+        ("scale:at=0,factor=0.5", Cause::TooSlow),
+        ("dac-scale:at=0,factor=-1", Cause::TooFast),
+    ] {
+        let wired = Session::new(short(), SessionOptions { board: faults(fault), ..tested.clone() }).unwrap();
+        let mut announced = 0;
+        let ended = wired.run(&Arc::default(), &mut |event| {
+            announced += u32::from(matches!(event, Event::Announced(_)));
+        });
+        assert!(
+            matches!(&ended, Err(SessionError::Released { cause: c, .. }) if *c == cause),
+            "{fault}: {ended:?}"
+        );
+        assert_eq!(announced, 1);
+    }
+}
+
+#[test]
+fn a_release_test_that_cannot_be_is_refused_only_if_it_was_asked_for() {
+    let always = SessionOptions { release: Release::Always, ..options() };
+    let motion = scenario("board_smc_2", &[("run.start", "on_path")]);
+    let refusal = Session::new(motion.clone(), always.clone()).unwrap_err();
+    assert_eq!(refusal.to_string(), "SMC at 2 °/s on a board: no release test: the run begins in motion");
+    assert!(Session::new(motion, options()).is_ok());
+    for way in [0.0, -1.0, f64::NAN, 0.2] {
+        let refusal =
+            Session::new(scenario("board_smc_2", &[]), SessionOptions { release_way: way, ..options() });
+        let text = refusal.unwrap_err().to_string();
+        assert!(text.contains("expected above 0 and at most 10"), "{way}: {text}");
+    }
 }

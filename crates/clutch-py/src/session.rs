@@ -9,7 +9,7 @@ use clutch_loop::from_scenario::BuildError;
 use clutch_loop::port::Address;
 use clutch_loop::preflight::PreflightError;
 use clutch_loop::realtime::{RealtimeOptions, WaitMode};
-use clutch_loop::session::{Board, Event, Session, SessionError, SessionOptions};
+use clutch_loop::session::{Board, Event, Release, Session, SessionError, SessionOptions};
 use pyo3::exceptions::{PyFileExistsError, PyValueError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -23,8 +23,8 @@ fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> PyResult<
     text.parse().map_err(|e: T::Err| PyValueError::new_err(e.to_string()))
 }
 
-/// One of two words.
-fn chosen<T>(name: &str, word: &str, choices: [(&str, T); 2]) -> PyResult<T> {
+/// One of some words.
+fn chosen<T, const N: usize>(name: &str, word: &str, choices: [(&str, T); N]) -> PyResult<T> {
     let expected = choices.each_ref().map(|(w, _)| format!("{w:?}")).join(" or ");
     let found = choices.into_iter().find(|(w, _)| *w == word);
     found
@@ -53,7 +53,8 @@ fn error(py: Python<'_>, scenario: &Scenario, e: &SessionError) -> PyErr {
 /// changed for the board's sake.
 #[pyfunction]
 #[pyo3(signature = (
-    scenario, *, port, board, baud, log, uncertified, certificate, patient, faults, fault_seed, strict, pace, wait, spin_us, thread_priority,
+    scenario, *, port, board, baud, log, uncertified, certificate, release_test, release_deg,
+    patient, faults, fault_seed, strict, pace, wait, spin_us, thread_priority,
     lock_memory, cpu_affinity
 ))]
 #[allow(
@@ -69,6 +70,8 @@ pub(crate) fn run_loop<'py>(
     log: Option<PathBuf>,
     uncertified: bool,
     certificate: Option<PathBuf>,
+    release_test: &str,
+    release_deg: f64,
     patient: bool,
     faults: Vec<String>,
     fault_seed: u64,
@@ -102,6 +105,12 @@ pub(crate) fn run_loop<'py>(
         patient,
         uncertified,
         certificate,
+        release: chosen(
+            "release_test",
+            release_test,
+            [("auto", Release::Auto), ("always", Release::Always), ("never", Release::Never)],
+        )?,
+        release_way: release_deg.to_radians(),
         realtime: RealtimeOptions {
             thread_priority,
             lock_memory,

@@ -35,7 +35,7 @@ use clutch_core::{
 use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
-use toml::{Table, Value};
+pub use toml::{Table, Value};
 
 /// A built-in scenario.
 #[derive(Clone, Copy, Debug)]
