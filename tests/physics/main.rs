@@ -13,4 +13,5 @@ mod pid;
 mod referee;
 mod sampled;
 mod single_precision;
+mod smooth_speed;
 mod systems;

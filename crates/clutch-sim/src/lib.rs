@@ -14,6 +14,7 @@ pub mod rig;
 pub mod ripple;
 pub mod run;
 pub mod scenario;
+pub mod smooth_speed;
 pub mod sweep;
 pub mod system;
 mod tables;

@@ -105,6 +105,14 @@ impl Ripple {
     pub fn largest(&self) -> f64 {
         self.band.as_ref().map_or(0.0, Band::largest) + self.runout.as_ref().map_or(0.0, |r| r.amplitude)
     }
+
+    /// Root mean square of the factor's slope along the disc, 1/rad.
+    #[must_use]
+    pub fn slope(&self) -> f64 {
+        let band = self.band.as_ref().map_or(0.0, Band::slope);
+        let runout = self.runout.as_ref().map_or(0.0, |r| r.amplitude * f64::from(r.waves));
+        libm::sqrt(band * band + 0.5 * runout * runout)
+    }
 }
 
 /// The waves `amplitude Σ_n sin(n θ + φ_n)`, `n = lowest … highest`.
@@ -145,6 +153,12 @@ impl Band {
 
     fn largest(&self) -> f64 {
         self.amplitude * self.phases.len() as f64
+    }
+
+    /// Root mean square of the slope, 1/rad.
+    fn slope(&self) -> f64 {
+        let waves = (1..=self.phases.len() as u32).map(|i| self.spacing * f64::from(self.skipped + i));
+        self.amplitude * libm::sqrt(0.5 * waves.map(|n| n * n).sum::<f64>())
     }
 }
 
@@ -196,6 +210,20 @@ mod tests {
         assert!((r.factor(0.3) - r.factor(0.3 + tau)).abs() < 1e-10);
         assert_eq!(r, band(&p, 3));
         assert_ne!(r, band(&p, 4));
+    }
+
+    #[test]
+    fn the_slope_is_that_of_the_factor() {
+        let p = RippleParams { rms: 0.1, lowest: 160, highest: 640, spacing: 40 };
+        let tilted = RunoutParams { amplitude: 0.2, waves: 100, phase: 0.5 };
+        let (n, tau) = (200_000, core::f64::consts::TAU);
+        for r in [band(&p, 3), Ripple::new(Some(&p), Some(&tilted), 3).unwrap().unwrap()] {
+            let step = tau / f64::from(n);
+            let slope = |i: i32| (r.factor(step * f64::from(i + 1)) - r.factor(step * f64::from(i))) / step;
+            let square: f64 = (0..n).map(|i| slope(i) * slope(i)).sum();
+            let rms = libm::sqrt(square / f64::from(n));
+            assert!((r.slope() / rms - 1.0).abs() < 1e-4, "{} {rms}", r.slope());
+        }
     }
 
     #[test]

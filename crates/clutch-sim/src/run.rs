@@ -1,6 +1,6 @@
 //! One run: rig, servo and path in closed loop.
 
-use crate::engine::{EngineError, EngineKind, Event, ExactFlow, Motion};
+use crate::engine::{EngineError, EngineKind, Event, ExactFlow, Motion, Shaft};
 use crate::metrics::{Detected, Metrics, MetricsBuilder, MetricsSample};
 use crate::moving_rig::MovingRig;
 use crate::progress::{Progress, Report, UNWATCHED};
@@ -10,8 +10,8 @@ use clutch_core::law::{ControlLaw, LawParams, Limit, OutputParams, ShellParams, 
 use clutch_core::params::{Range, Table};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
-    Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoParams, ServoState, StickSlip,
-    StickSlipParams, StickSlipState, VelocityParams, params,
+    Counts, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoOutput, ServoParams,
+    ServoState, StickSlip, StickSlipParams, StickSlipState, Target, VelocityParams, params,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -58,7 +58,7 @@ params! {
 /// Samples that a run may have: it keeps each of them, about a hundred bytes.
 const LONGEST: u64 = 10_000_000;
 /// Samples between two reports of progress: some milliseconds, so that whoever stops a run waits no longer.
-const REPORT_EVERY: u64 = 16_384;
+pub(crate) const REPORT_EVERY: u64 = 16_384;
 
 impl RunParams {
     /// The number of ticks.
@@ -419,17 +419,10 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
     keep: Keep,
     progress: Report<'_>,
 ) -> Result<Run, RunError> {
-    let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev)?;
-    if servo.period() != spec.period || servo.encoder() != encoder {
-        return Err(RunError::OtherServo);
-    }
-    let prepared = spec.prepare::<T>()?;
-    let mut state = prepared.servo_state(servo);
-    let Prepared { reference, mut moving, volts, engine } = prepared;
+    let (mut run, volts, engine) = ClosedLoop::begin(spec, servo)?;
     let p = &spec.run;
     let period: f64 = spec.period.seconds();
     let ticks = p.ticks(spec.period);
-    let to_radians = |p: FixedCounts| p.minus::<f64>(FixedCounts(0)) * encoder.radians_per_count::<f64>();
 
     let kept = if keep == Keep::Trace { ticks } else { 0 };
     let mut trace = Trace { start_voltage: volts, ..Trace::with_room(kept)? };
@@ -438,7 +431,7 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
     }
     let mut events = Vec::new();
     let mut figures = MetricsBuilder::new(period, p.settle);
-    let detector = StickSlip::<f64>::new(&StickSlipParams::default(), encoder, spec.period)?;
+    let detector = StickSlip::<f64>::new(&StickSlipParams::default(), servo.encoder(), spec.period)?;
     let mut seen_by_encoder = StickSlipState::default();
     let mut before_settling = (0, 0);
     let mut detections = Vec::new();
@@ -449,23 +442,7 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
                 return Err(RunError::Stopped);
             }
         }
-        let time = k as f64 * period;
-        let target = reference.at(k);
-        moving.set_time(time);
-        moving.begin_period();
-        let shaft = *moving.shaft();
-        let counts = moving.counts();
-        let out = if spec.rig.encoder.quantised {
-            servo.tick(&mut state, counts, &target)
-        } else {
-            servo.tick_at(&mut state, moving.fine_counts(), &target)
-        };
-        let commanded = if spec.rig.dac.quantised {
-            moving.rig().dac.volts(out.code)
-        } else {
-            out.command.voltage.to_f64()
-        };
-        let target_position = to_radians(target.position);
+        let Sample { time, target, target_position, shaft, counts, out, commanded } = run.sample(k);
         let error = target_position - shaft.position;
         figures.sample(time, MetricsSample { error, velocity: shaft.velocity, voltage: commanded });
         if keep == Keep::Trace {
@@ -496,8 +473,7 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
         if time < p.settle {
             before_settling = (seen_by_encoder.cycles(), seen_by_encoder.stuck_ticks());
         }
-        moving.command(commanded);
-        let seen = moving.advance(period)?;
+        let seen = run.advance()?;
         figures.period(time, shaft.motion == Motion::Stuck, seen);
         if keep == Keep::Trace {
             events.extend_from_slice(seen);
@@ -510,4 +486,74 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
         stick_time_fraction: (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured,
     };
     Ok(Run { trace, events, metrics, detected, detections, engine })
+}
+
+/// Rig, servo and path, tick by tick: the one order of a simulated period.
+pub(crate) struct ClosedLoop<'a, 's, T: Real, C: ControlLaw<T>> {
+    servo: &'s Servo<T, C>,
+    state: ServoState<T, C::State>,
+    reference: Reference<'a, T>,
+    moving: MovingRig,
+    period: f64,
+}
+
+/// A sample of a closed loop, and the answer to it.
+pub(crate) struct Sample<T: Real, Terms> {
+    pub(crate) time: f64,
+    pub(crate) target: Target<T>,
+    /// `θ_d`, rad.
+    pub(crate) target_position: f64,
+    pub(crate) shaft: Shaft,
+    pub(crate) counts: Counts,
+    pub(crate) out: ServoOutput<T, Terms>,
+    /// Voltage that goes out, V.
+    pub(crate) commanded: f64,
+}
+
+impl<'a, 's, T: Real, C: ControlLaw<T>> ClosedLoop<'a, 's, T, C> {
+    /// The start of a run, the voltage on the brake before it (V), and the engine.
+    pub(crate) fn begin(
+        spec: &RunSpec<'a>,
+        servo: &'s Servo<T, C>,
+    ) -> Result<(Self, f64, EngineKind), RunError> {
+        let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev)?;
+        if servo.period() != spec.period || servo.encoder() != encoder {
+            return Err(RunError::OtherServo);
+        }
+        let prepared = spec.prepare::<T>()?;
+        let state = prepared.servo_state(servo);
+        let Prepared { reference, moving, volts, engine } = prepared;
+        let period = spec.period.seconds();
+        Ok((ClosedLoop { servo, state, reference, moving, period }, volts, engine))
+    }
+
+    /// Tick `k` begins: sensor, law, converter.
+    #[inline]
+    pub(crate) fn sample(&mut self, k: u64) -> Sample<T, C::Terms> {
+        let moving = &mut self.moving;
+        let time = k as f64 * self.period;
+        let target = self.reference.at(k);
+        moving.set_time(time);
+        moving.begin_period();
+        let shaft = *moving.shaft();
+        let counts = moving.counts();
+        let rig = moving.rig();
+        let out = if rig.params.encoder.quantised {
+            self.servo.tick(&mut self.state, counts, &target)
+        } else {
+            self.servo.tick_at(&mut self.state, moving.fine_counts(), &target)
+        };
+        let commanded =
+            if rig.params.dac.quantised { rig.dac.volts(out.code) } else { out.command.voltage.to_f64() };
+        let radians: f64 = rig.encoder.radians_per_count();
+        let target_position = target.position.minus::<f64>(FixedCounts(0)) * radians;
+        moving.command(commanded);
+        Sample { time, target, target_position, shaft, counts, out, commanded }
+    }
+
+    /// The period passes; what happened in it.
+    #[inline]
+    pub(crate) fn advance(&mut self) -> Result<&[Event], EngineError> {
+        self.moving.advance(self.period)
+    }
 }

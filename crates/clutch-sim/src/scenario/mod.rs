@@ -26,7 +26,7 @@ use crate::tables::{self, check, checked, complete, find, lookup, read, row_at, 
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::friction::FrictionModel;
 use clutch_core::law::{Asked, Law, Output, Shell};
-use clutch_core::params::{Choice, Kind, Params};
+use clutch_core::params::{Choice, Kind, Params, Row};
 use clutch_core::reference::{Knot, Reference, ReferenceParams, Table as PathTable};
 use clutch_core::{
     ActuatorKind, Bounds, Dac, Encoder, Envelope, FixedCounts, Interval, Obstacle, ParamError, Plant, Real,
@@ -205,6 +205,22 @@ impl Scenario {
         }
         let envelope = self.plan.as_ref().filter(|_| keeps_path).map(|plan| plan.envelope);
         Some(scenario.make(envelope).map(|()| scenario))
+    }
+
+    /// This scenario with other values, checked.
+    pub(crate) fn changed(&self, set: &[(String, Value)]) -> Result<Scenario, ScenarioError> {
+        let anew = || Scenario::from_table(&self.origin, self.table().clone(), set);
+        self.with(set).unwrap_or_else(anew)
+    }
+
+    /// The declaration of a parameter.
+    pub(crate) fn row(&self, key: &str) -> Option<&'static Row> {
+        row_at(&self.params, key)
+    }
+
+    /// An error about a key that is there.
+    pub(crate) fn refuse(&self, key: &str, message: &str) -> ScenarioError {
+        self.message(key, message.to_owned())
     }
 
     /// The built-in scenario of that name.

@@ -9,7 +9,7 @@ use clutch_core::friction::{FrictionModel, FrictionParams};
 use clutch_core::law::LawParams;
 use clutch_core::params::Choice;
 use clutch_core::reference::ReferenceParams;
-use clutch_core::{ActuatorKind, Bounds, Plant, VelocityParams};
+use clutch_core::{ActuatorKind, Bounds, Plant, Tolerances, VelocityParams};
 
 /// Torque noise of the rig is normal: a certificate covers this many times its root mean square.
 pub const NOISE_ROOTS: f64 = 4.0;
@@ -43,6 +43,24 @@ pub(super) fn gains(law: &LawParams) -> Option<Gains> {
 }
 
 impl Scenario {
+    /// The sampled loop around the rig as it is, its mean friction and nothing else, believed in exactly: the loop whose
+    /// linear stability decides whether a motion along the path is smooth.
+    ///
+    /// # Errors
+    /// As [`Scenario::sampled_setup`]. Of a sensor without steps, torque noise, and a bumpless start, which a linear loop
+    /// knows nothing of, and of a shell, within which the law stands, none.
+    pub fn setup_as_it_is(&self) -> Result<Setup, NotCovered> {
+        let mut own = self.clone();
+        let p = &mut own.params;
+        let plant = Rig::new(&p.rig, p.run.seed).map(|rig| *rig.model.plant.params());
+        p.model = plant.map_err(|_| not("rig", "a rig out of range", "rigs that can be built"))?;
+        (p.rig.ripple, p.rig.runout, p.rig.torque_noise) = (None, None, 0.0);
+        (p.rig.encoder.quantised, p.output.bumpless_time, p.shell.boundary) = (true, 0.0, 0.0);
+        let bounds = Bounds::around(&p.model, &Tolerances::default())
+            .map_err(|_| not("rig", "a rig out of range", "rigs that can be built"))?;
+        own.sampled_setup(&bounds)
+    }
+
     /// The sampled loop with every plant of the bounds: `[model]` within `[bounds]`, with encoder, converter, delay, ripple and
     /// torque noise of `[rig]`.
     ///
