@@ -9,6 +9,7 @@ mod friction;
 mod hil;
 mod log;
 mod loop_verb;
+mod map;
 mod output;
 pub mod plot;
 mod referee;
@@ -61,6 +62,7 @@ enum Verb {
     Sim(sim::Sim),
     Scenario(scenario::ScenarioVerb),
     Certify(certify::Certify),
+    Map(map::Map),
     Friction(friction::FrictionVerb),
     Referee(referee::Referee),
     Reproduce(reproduce::Reproduce),
@@ -86,6 +88,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Sim(v) => v.run(),
         Verb::Scenario(v) => v.run(),
         Verb::Certify(v) => v.run(),
+        Verb::Map(v) => v.run(),
         Verb::Friction(v) => v.run(),
         Verb::Referee(v) => v.run(),
         Verb::Reproduce(v) => v.run(),

@@ -1,6 +1,6 @@
 //! Drawings of curves, as SVG and PNG.
 //!
-//! A [`Figure`] is a grid of [`Panel`]s, each with its own axes. One layout serves both
+//! A [`Figure`] is a grid of [`Panel`]s, each with its own axes, and curves or shaded cells. One layout serves both
 //! formats. It uses nothing of the machine – no font, no clock, no random number – so the same data
 //! give the same bytes.
 //!
@@ -45,6 +45,28 @@ pub struct Panel {
     pub step: bool,
     /// Heights of dashed horizontal guide lines.
     pub lines: Vec<f64>,
+    /// A table of shaded cells, in place of the curves.
+    pub cells: Option<Cells>,
+}
+
+/// A table of shaded cells.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cells {
+    /// Names of the columns.
+    pub columns: Vec<String>,
+    /// Names of the rows, from below.
+    pub rows: Vec<String>,
+    /// Cells, row by row from below.
+    pub cells: Vec<Cell>,
+}
+
+/// A cell: its shade from 0, light, to 1, dark, and a short text.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cell {
+    /// The shade.
+    pub shade: f64,
+    /// The text.
+    pub text: String,
 }
 
 /// Panels in rows, under a title.
@@ -159,6 +181,10 @@ pub fn figure_format(path: &Path) -> anyhow::Result<FigureFormat> {
 
 /// Size of a panel, px.
 const PANEL: (f64, f64) = (600.0, 350.0);
+/// Least height of a row of cells, px.
+const CELL: f64 = 22.0;
+/// Ends of the scale of shades: of one hue, so that it is read without colours, too.
+const SHADES: [RGBColor; 2] = [RGBColor(0xee, 0xf4, 0xfb), RGBColor(0x08, 0x30, 0x6b)];
 /// Largest drawing, px: some 100 panels, 250 MB of pixels.
 const LARGEST: f64 = 21e6;
 /// 192 dpi.
@@ -450,8 +476,10 @@ impl Layout {
         let named = figure.panels.iter().any(|p| !p.y_label.is_empty());
         let left = labels + if named { 19.0 + LABEL } else { 10.0 };
         let width = PANEL.0 - left - space::RIGHT;
-        for (x, _) in &mut axes {
-            x.thin_out(width)?;
+        for ((x, _), panel) in axes.iter_mut().zip(&figure.panels) {
+            if panel.cells.is_none() {
+                x.thin_out(width)?;
+            }
         }
 
         let mut panels = Vec::new();
@@ -467,7 +495,9 @@ impl Layout {
             let divided = axes[these.clone()].iter().any(|(_, y)| y.exponent != 0);
             let legend_top = top + if titled { space::PANEL_TITLE } else { 10.0 };
             let area_top = legend_top + space::LINE * (lines + if divided { 1.0 } else { 0.0 });
-            let bottom = area_top + PANEL.1 - space::PANEL_TITLE - space::BELOW;
+            let cells = figure.panels[these.clone()].iter().filter_map(|p| p.cells.as_ref());
+            let cells = cells.map(|c| CELL * c.rows.len() as f64).fold(0.0, f64::max);
+            let bottom = area_top + (PANEL.1 - space::PANEL_TITLE - space::BELOW).max(cells);
             for (column, (index, entries)) in these.zip(legends).enumerate() {
                 let from = space::EDGE + column as f64 * PANEL.0 + left;
                 let (x, y) = axes[index].clone();
@@ -497,6 +527,13 @@ impl Layout {
 
 /// The axes of a panel.
 fn axes(panel: &Panel) -> (Axis, Axis) {
+    if let Some(cells) = &panel.cells {
+        let axis = |names: &[String]| {
+            let ticks = names.iter().enumerate().map(|(i, name)| (i as f64 + 0.5, name.clone()));
+            Axis { lo: 0.0, hi: names.len().max(1) as f64, ticks: ticks.collect(), exponent: 0 }
+        };
+        return (axis(&cells.columns), axis(&cells.rows));
+    }
     let points = || panel.series.iter().flat_map(|s| &s.points).copied().filter(drawable);
     let (lo, hi) = widen(extent(points().map(|p| p.0)));
     let x = Axis::over_data(lo, hi, 6.0, 0.02);
@@ -815,6 +852,31 @@ impl<DB: DrawingBackend> Canvas<DB> {
         Ok(())
     }
 
+    fn cells(&self, cells: &Cells, area: Area) -> anyhow::Result<()>
+    where
+        DB::ErrorType: 'static,
+    {
+        let (columns, rows) = (cells.columns.len().max(1), cells.rows.len().max(1));
+        let (width, height) =
+            ((area.right - area.left) / columns as f64, (area.bottom - area.top) / rows as f64);
+        for (i, cell) in cells.cells.iter().enumerate() {
+            let left = area.left + (i % columns) as f64 * width;
+            let bottom = area.bottom - (i / columns) as f64 * height;
+            let shade = cell.shade.clamp(0.0, 1.0);
+            let mix = |of: fn(&RGBColor) -> u8| {
+                let [light, dark] = SHADES.map(|colour| f64::from(of(&colour)));
+                (light + (dark - light) * shade).round() as u8
+            };
+            let color = RGBColor(mix(|c| c.0), mix(|c| c.1), mix(|c| c.2));
+            let corners = [self.place((left, bottom - height)), self.place((left + width, bottom))];
+            self.area.draw(&Rectangle::new(corners, color.filled()))?;
+            let (text, size) = fit(&cell.text, TICK.min(0.75 * height), width - 2.0)?;
+            let at = (left + 0.5 * width, bottom - 0.5 * height + 0.365 * size);
+            self.text(&text, at, HPos::Center, (size, if shade > 0.5 { WHITE } else { INK }), false)?;
+        }
+        Ok(())
+    }
+
     fn panel(&self, panel: &Panel, placed: &Placed) -> anyhow::Result<()>
     where
         DB::ErrorType: 'static,
@@ -826,11 +888,15 @@ impl<DB: DrawingBackend> Canvas<DB> {
         let (low, high) = (middle(bottom), middle(top));
         let (near, far) = (middle(left), middle(right));
 
-        let empty = !panel.series.iter().any(|s| s.points.iter().any(drawable));
-        for (x, _) in placed.x.ticks.iter().filter(|_| !empty) {
+        if let Some(cells) = &panel.cells {
+            self.cells(cells, area)?;
+        }
+        let empty = panel.cells.is_none() && !panel.series.iter().any(|s| s.points.iter().any(drawable));
+        let grid = !empty && panel.cells.is_none();
+        for (x, _) in placed.x.ticks.iter().filter(|_| grid) {
             self.straight((column(*x), high), (column(*x), low), GRID, 1.0)?;
         }
-        for (y, _) in placed.y.ticks.iter().filter(|_| !empty) {
+        for (y, _) in placed.y.ticks.iter().filter(|_| grid) {
             let zero = y.abs() < 1e-9 * (placed.y.hi - placed.y.lo);
             self.straight((near, row(*y)), (far, row(*y)), if zero { ZERO } else { GRID }, 1.0)?;
         }
@@ -985,6 +1051,35 @@ mod tests {
             let area = 800.0 + 4.0 * std::f64::consts::PI;
             assert!((ink / area - 1.0).abs() < 0.02, "{dx} {dy}: {ink} of {area}");
         }
+    }
+
+    #[test]
+    fn cells_have_their_shade_their_text_and_room_for_it() {
+        let names = |n: u32| (0..n).map(|i| i.to_string()).collect::<Vec<_>>();
+        let cells = |columns: u32, rows: u32| Cells {
+            columns: names(columns),
+            rows: names(rows),
+            cells: (0..columns * rows)
+                .map(|i| Cell { shade: f64::from(i % 2), text: format!("c{i}") })
+                .collect(),
+        };
+        let map = |c| figure(vec![Panel { cells: Some(c), ..panel(vec![]) }]);
+        let svg = map(cells(14, 24)).svg().unwrap();
+        let seen = texts(&svg);
+        assert!(["c0", "c335", "23"].iter().all(|t| seen.iter().any(|s| s == t)), "{seen:?}");
+        assert!(!seen.iter().any(|t| t == "no data"));
+        // The rows are as high as a text.
+        let layout = Layout::new(&map(cells(14, 24))).unwrap();
+        assert!(layout.panels[0].area.bottom - layout.panels[0].area.top >= 24.0 * CELL);
+        let png = map(cells(2, 1)).png().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        for shade in SHADES {
+            let n = pixels.chunks(3).filter(|p| *p == [shade.0, shade.1, shade.2]).count();
+            assert!(n > 100_000, "{n}");
+        }
+        map(Cells::default()).svg().unwrap();
     }
 
     #[test]

@@ -135,9 +135,8 @@ fn figure(log: &Log, replayed: &[CommandRecord]) -> Figure {
         x_label: "time (s)".to_owned(),
         y_label: y_label.to_owned(),
         series,
-        y_range: None,
         step: true,
-        lines: Vec::new(),
+        ..Panel::default()
     };
     Figure {
         title: format!("Replay of {}", log.header.scenario_name),

@@ -103,9 +103,8 @@ fn draw(f: &FigureData) -> Figure {
                 label: "error".to_owned(),
                 points: p.time_s.iter().copied().zip(p.error_deg.iter().copied()).collect(),
             }],
-            y_range: None,
-            step: false,
             lines: vec![0.0],
+            ..Panel::default()
         })
         .collect();
     Figure {

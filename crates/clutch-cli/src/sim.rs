@@ -243,9 +243,8 @@ fn figure(scenario: &Scenario, run: &Run) -> Figure {
         x_label: "time (s)".to_owned(),
         y_label: y_label.to_owned(),
         series,
-        y_range: None,
         step,
-        lines: Vec::new(),
+        ..Panel::default()
     };
     Figure {
         title: scenario.name().to_owned(),

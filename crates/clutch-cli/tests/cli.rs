@@ -33,6 +33,7 @@ fn the_help_of_every_verb_has_an_example() {
         &["scenario", "show", "--help"],
         &["scenario", "new", "--help"],
         &["certify", "--help"],
+        &["map", "--help"],
         &["reproduce", "--help"],
         &["loop", "--help"],
         &["daq", "--help"],
@@ -274,4 +275,79 @@ fn the_referee_prints_a_table_of_80_columns_and_fails_where_a_case_is_missed() {
     let o = clutch(&["referee", "P9"]);
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).starts_with("clutch: P9: no such file, and no built-in case"), "{}", err(&o));
+}
+
+#[test]
+fn the_map_has_80_columns_a_legend_and_the_cause_of_each_cell() {
+    let dir = folder("map");
+    let (svg, html) = (dir.join("map.svg"), dir.join("map.html"));
+    let files = ["--plot", svg.to_str().unwrap(), "--html", html.to_str().unwrap()];
+    let gains = ["--x", "law.pd.kp_v_rad=500:20000:14", "--y", "law.pd.kd_v_s_rad=25,50"];
+    let few = ["--rates", "2,6,20", "--discs", "2"];
+    let o = clutch(&[&["map", "bench_pd_2"][..], &gains, &few, &files].concat());
+    let text = out(&o);
+    assert!(o.status.success(), "{}", err(&o));
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[0], "PD at 2 °/s, bench: lowest rate without a stick, °/s");
+    let row = lines.iter().find(|line| line.starts_with("     50 ")).expect(&text);
+    // Fourteen cells of five columns, the last but for its end.
+    assert_eq!(row.chars().count(), 8 + 14 * 5, "{row}");
+    assert!(row.ends_with("█ --U"), "{row}");
+    for words in [
+        "   2.0  lowest rate",
+        "    --  sticks",
+        "     U  Unstable:",
+        "     J  Jolt:",
+        "runs on discs 1 to 2",
+    ] {
+        assert!(text.contains(words), "lacks {words}:\n{text}");
+    }
+    let svg = std::fs::read_to_string(svg).unwrap();
+    assert!(svg.starts_with("<svg") && svg.contains("--U") && svg.contains("law.pd.kd_v_s_rad"));
+    let page = std::fs::read_to_string(html).unwrap();
+    assert!(page.contains("<svg") && page.contains("U Unstable") && page.contains("rig.delay_ticks"));
+}
+
+#[test]
+fn a_map_as_json_has_the_evidence_and_with_one_key_it_is_against_rates() {
+    let few = ["--rates", "2,20", "--discs", "2", "--json"];
+    let gains = ["--x", "law.pd.kp_v_rad=5000", "--y", "law.pd.kd_v_s_rad=50"];
+    let o = clutch(&[&["map", "bench_pd_2"][..], &gains, &few].concat());
+    let whole: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON alone");
+    let cell = &whole["map"]["cells"][0][0];
+    assert_eq!((&cell["rate_deg_s"], &cell["cause"]), (&20.0.into(), &"sampled_loop".into()), "{whole}");
+    assert_eq!((&cell["below"]["rate_deg_s"], &cell["below"]["failing"]), (&2.0.into(), &"sticks".into()));
+    let radius = cell["evidence"]["spectral_radius"].as_f64().unwrap();
+    assert!((radius - 1.0227).abs() < 1e-4, "{radius}");
+    let o = clutch(&[&["map", "bench_pd_2", "--x", "law.pd.kd_v_s_rad=50,100"][..], &few].concat());
+    let whole: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON alone");
+    let column = &whole["map"]["columns"][0]["rates"];
+    let discs = |rate: usize| column[rate]["failures"].as_array().map(Vec::len);
+    assert_eq!((discs(0), discs(1)), (Some(2), Some(0)), "{whole}");
+    assert_eq!(column[0]["evidence"]["causes"][0], "sampled_loop");
+}
+
+#[test]
+fn a_map_that_cannot_be_is_refused_by_key_value_and_expectation() {
+    for (args, code, said) in [
+        (&["--x", "kp"][..], 64, "expected KEY=VALUES"),
+        (&["--x", "law.pd.kp_v_rad=1:2"], 64, "1:2: expected LOW:HIGH:NUMBER"),
+        (&["--x", "law.pd.kp_v_rad=2:1:3"], 64, "2:1:3: expected 0 < LOW < HIGH and 2 to 1000 values"),
+        (&["--x", "law.pd.kp_v_rad=a,b"], 64, "a,b: expected LOW:HIGH:NUMBER"),
+        (&["--y", "law.pd.kp_v_rad=1,2"], 64, "--x"),
+        (&["--discs", "-1"], 64, "-1"),
+        (&["--discs", "0"], 1, "bench_pd_2: discs = 0: expected a whole number from 1 to 10000"),
+        (&["--rates", "0,1"], 1, "bench_pd_2: rates = 0: expected finite numbers above 0 °/s"),
+        (&["--x", "law.pd.kp_v_rad=-5"], 1, "bench_pd_2: law.pd.kp_v_rad = -5: expected"),
+        (&["--x", "law.pd.kp=5"], 1, "kp_v_rad"),
+        (&["--plot", "map.pdf"], 1, "map.pdf: the name of a figure must end in .svg or .png"),
+    ] {
+        let o = clutch(&[&["map", "bench_pd_2"][..], args].concat());
+        assert_eq!(o.status.code(), Some(code), "{args:?}: {}", err(&o));
+        assert!(err(&o).contains(said), "{args:?}: {}", err(&o));
+        assert!(out(&o).is_empty(), "{args:?}");
+    }
+    let o = clutch(&["map", "minimum_jerk"]);
+    assert!(err(&o).contains("minimum_jerk: reference: expected a ramp"), "{}", err(&o));
 }
