@@ -29,6 +29,7 @@ from clutch._metrics import Metrics
 from clutch._model import Scenario
 from clutch._paper import PaperFigure, PaperPanel, Reproduction, reproduce
 from clutch._run import Result, SteppedLaw, simulate
+from clutch._smooth import SmoothSpeed, lowest_smooth_speed
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
 from clutch._tables import *  # noqa: F403
 
@@ -55,6 +56,7 @@ __all__ = [
     "Samples",
     "Scenario",
     "Servo",
+    "SmoothSpeed",
     "SteppedLaw",
     "StickSlip",
     "SweepResult",
@@ -68,6 +70,7 @@ __all__ = [
     "gym",
     "latin_hypercube",
     "loop",
+    "lowest_smooth_speed",
     "plot",
     "read_log",
     "referee",

@@ -18,7 +18,7 @@ from typing_extensions import CapsuleType
 from clutch import _model, _run
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "brake_gain", "check", "friction_lab", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "brake_gain", "check", "friction_lab", "lowest_smooth_speed", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction"]
 
 BUILD: Final[str]
 """
@@ -733,6 +733,12 @@ def friction_lab(scenario: Scenario) -> dict[str, Any]:
     """
     The experiments of the friction laboratory with the friction of a scenario's rig: by name, what was set and what was
     found.
+    """
+
+def lowest_smooth_speed(scenario: _model.Scenario | Scenario, rates: Sequence[float] | None, discs: SupportsIndex) -> dict[str, Any]:
+    """
+    The lowest smooth rate of a scenario, of these rates or the usual ones: the object that `clutch map --json` has in a
+    cell.
     """
 
 def main(args: Sequence[str]) -> int:

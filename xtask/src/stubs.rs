@@ -92,6 +92,10 @@ const NAMED: &[(&str, &str)] = &[
         "def simulate(scenario: Any, law: Any | None = None)",
         "def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] | _run.SteppedLaw | None = None)",
     ),
+    (
+        "def lowest_smooth_speed(scenario: Any, rates: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None, discs: SupportsIndex) -> Any",
+        "def lowest_smooth_speed(scenario: _model.Scenario | Scenario, rates: Sequence[float] | None, discs: SupportsIndex) -> dict[str, Any]",
+    ),
     ("def run_loop(scenario: Any,", "def run_loop(scenario: _model.Scenario | Scenario,"),
     ("-> tuple[Any, str, str, str | None]:", "-> tuple[dict[str, Any], str, str, str | None]:"),
     ("velocity: Incomplete) -> Incomplete", "velocity: NDArray[np.float64]) -> NDArray[np.float64]"),

@@ -1,6 +1,6 @@
 //! Simulation: one run, its samples, events and figures.
 
-use crate::convert::{core_error, os_error};
+use crate::convert::{core_error, from_json, os_error};
 use crate::scenario::Scenario;
 use crate::stepping::{PythonLaw, event_table, native};
 use crate::table::{Column, Table};
@@ -10,8 +10,9 @@ use clutch_loop::to_log::{SaveError, save_simulation};
 use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::columns;
 use clutch_sim::progress::Progress;
+use clutch_sim::smooth_speed::{self, Trials};
 use clutch_sim::{Keep, RunError, ScenarioError, simulate_servo};
-use pyo3::exceptions::PyFileExistsError;
+use pyo3::exceptions::{PyFileExistsError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::ops::ControlFlow;
@@ -81,6 +82,29 @@ fn with_python_law(
         Some(e) => Err(e),
         None => Ok(run.map_err(|e: RunError| scenario.0.run_error(&e))),
     }
+}
+
+/// The lowest smooth rate of a scenario, of these rates or the usual ones: the object that `clutch map --json` has in a
+/// cell.
+#[pyfunction]
+#[pyo3(signature = (scenario, rates, discs))]
+pub(crate) fn lowest_smooth_speed<'py>(
+    py: Python<'py>,
+    scenario: &Bound<'py, PyAny>,
+    rates: Option<Vec<f64>>,
+    discs: i64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let scenario = native(scenario)?;
+    let rates = rates.as_deref().unwrap_or(&smooth_speed::RATES_DEG_S);
+    let wrong = |e: ScenarioError| scenario.error(py, &e);
+    let trials = Trials::new("lowest_smooth_speed", rates, discs).map_err(wrong)?;
+    let found = py.detach(|| smooth_speed::lowest_smooth_speed(&scenario.0, &trials, &unless_interrupted));
+    // The signal's exception is set already.
+    if let Some(e) = PyErr::take(py) {
+        return Err(e);
+    }
+    let found = serde_json::to_value(found.map_err(wrong)?);
+    from_json(py, &found.map_err(|e| PyRuntimeError::new_err(e.to_string()))?)
 }
 
 /// Samples as columns, the memory shared with the run.
