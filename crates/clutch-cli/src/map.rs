@@ -233,7 +233,7 @@ fn gains(scenario: &Scenario, trials: &Trials, map: &GainMap) -> Grid {
             legend.push((sign.to_owned(), text.to_owned()));
         }
     };
-    also(any(&|c| c.text == "--"), "--", "sticks on a disc at every rate tried");
+    also(any(&|c| c.text == "--"), "--", "at every rate tried a disc sticks, or leaves its path");
     also(any(&|c| c.mark == '<'), "<", "smooth at the lowest rate tried");
     also(any(&|c| c.hole), "!", "a hole: a higher rate sticks again");
     also(any(&|c| "USEJ.".contains(c.mark)), "", "then why the next lower rate sticks:");
@@ -260,12 +260,16 @@ fn gains(scenario: &Scenario, trials: &Trials, map: &GainMap) -> Grid {
         }
     }
     let tried = map.cells.iter().flatten().next().map_or(0, |cell| cell.discs_above);
+    let found = match holes.len() {
+        _ if tried == 0 => "Rates above a cell's were not tried.".to_owned(),
+        0 => format!("Rates above a cell's were tried on {tried} of the discs: no hole."),
+        n => format!("Rates above a cell's were tried on {tried} of the discs. Cells with a hole: {n}, as"),
+    };
     let mut notes = vec![format!(
-        "{runs} runs on discs 1 to {}, {}; rates tried: {} °/s. Higher rates than a cell's were tried on {tried} of the discs: {}.",
+        "{runs} runs on discs 1 to {}, {}; rates tried: {} °/s. {found}",
         trials.discs(),
         length(scenario),
         rates.iter().map(|r| number(*r)).collect::<Vec<_>>().join(", "),
-        if holes.is_empty() { "no hole".to_owned() } else { format!("{} with a hole", holes.len()) }
     )];
     notes.extend(holes.into_iter().take(5));
     Grid {
@@ -294,7 +298,8 @@ fn against_rates(scenario: &Scenario, trials: &Trials, map: &RateMap) -> Grid {
     let row = |i: usize| map.columns.iter().map(|column| shown(&column.rates[i])).collect();
     let cells: Vec<Vec<Shown>> = (0..map.rates_deg_s.len()).rev().map(row).collect();
     let any = |mark| cells.iter().flatten().any(|c| c.mark == mark);
-    let mut legend = vec![("1".to_owned(), format!("of {} discs sticks at this rate", map.discs))];
+    let mut legend =
+        vec![("1".to_owned(), format!("of {} discs sticks at this rate, or leaves its path", map.discs))];
     if "USEJ.".chars().any(any) {
         legend.push((String::new(), "then why:".to_owned()));
     }
@@ -325,7 +330,7 @@ fn narrow(x: f64, width: usize) -> String {
     let close = |text: &String| text.parse::<f64>().is_ok_and(|y| (y - x).abs() <= 0.05 * x.abs());
     let thousands = || format!("{}k", narrow(x / 1000.0, width - 1));
     let plain = (0..6).rev().map(plain).find(|text| fits(text) && close(text));
-    plain.unwrap_or_else(|| if x >= 1000.0 && x < 1e6 { thousands() } else { format!("{x:.0e}") })
+    plain.unwrap_or_else(|| if (1e3..1e6).contains(&x) { thousands() } else { format!("{x:.0e}") })
 }
 
 /// Columns of a terminal, of the rows' names, and of a cell.

@@ -296,7 +296,7 @@ fn the_map_has_80_columns_a_legend_and_the_cause_of_each_cell() {
     assert!(row.ends_with("█ --U"), "{row}");
     for words in [
         "   2.0  lowest rate",
-        "    --  sticks",
+        "    --  at every rate",
         "     U  Unstable:",
         "     J  Jolt:",
         "runs on discs 1 to 2",

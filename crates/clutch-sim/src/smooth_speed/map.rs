@@ -61,7 +61,7 @@ pub struct RateMap {
 #[must_use]
 pub fn law_keys(scenario: &Scenario) -> Vec<(String, f64)> {
     let law = format!("law.{}.", Choice::<f64>::name(&scenario.params().law));
-    let number = |(key, value): (String, String)| Some((key.clone(), value.parse().ok()?));
+    let number = |(key, value): (String, String)| Some((key, value.parse().ok()?));
     let own = |(key, _): &(String, String)| key.starts_with(&law);
     let real = |key: &str| scenario.row(key).is_some_and(|row| matches!(row.kind, Kind::Real));
     scenario.parameters().into_iter().filter(own).filter_map(number).filter(|(key, _)| real(key)).collect()
