@@ -151,7 +151,7 @@ fn a_release_test_comes_first_and_what_fails_it_is_not_started() {
 fn a_release_test_that_cannot_be_is_refused_only_if_it_was_asked_for() {
     let always = SessionOptions { release: Release::Always, ..options() };
     let motion = scenario("board_smc_2", &[("run.start", "on_path")]);
-    let refusal = Session::new(motion.clone(), always.clone()).unwrap_err();
+    let refusal = Session::new(motion.clone(), always).unwrap_err();
     assert_eq!(refusal.to_string(), "SMC at 2 °/s on a board: no release test: the run begins in motion");
     assert!(Session::new(motion, options()).is_ok());
     for way in [0.0, -1.0, f64::NAN, 0.2] {

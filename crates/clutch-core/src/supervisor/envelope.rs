@@ -154,7 +154,8 @@ impl<T: Real> Envelope<T> {
     /// Lowest and highest voltage that may have been in force since the sample before: of those that were sent, the last
     /// two, and more where an actuator is slow or a line that has lost samples may have lost codes.
     pub(super) fn in_force(&self, s: &EnvelopeState<T>, losses: bool) -> [T; 2] {
-        let reach = self.reach[usize::from(losses)];
+        let [sound, lossy] = self.reach;
+        let reach = if losses { lossy } else { sound };
         if reach > SENT {
             // Older than those that are kept: any of the output, or what was there before the first.
             return [self.output[0].min(s.applied), self.output[1].max(s.applied)];
@@ -300,12 +301,14 @@ impl<T: Real> EnvelopeState<T> {
     /// A voltage is sent.
     pub(super) fn sends(&mut self, volts: T) {
         self.last = (self.last + 1) % SENT;
-        self.sent[self.last % SENT] = volts;
+        if let Some(place) = self.sent.get_mut(self.last) {
+            *place = volts;
+        }
     }
 
     /// The voltage that was sent so many codes ago; before the first, the one that was there.
     fn newest(&self, back: usize) -> T {
-        self.sent[self.last.wrapping_sub(back) % SENT]
+        self.sent.get(self.last.wrapping_sub(back) % SENT).copied().unwrap_or(self.applied)
     }
 
     /// Remembers the way of the counts, for the name of a suspect.
