@@ -136,6 +136,16 @@ enum Verb {
     /// Runs laws on the rig `bench` from 0.5 to 100 °/s, and glide on rigs that are not as it believes, two minutes: the tables
     /// of docs/smooth.md.
     Smooth,
+    /// Identifies random rigs, each from less than a minute of experiment on the simulated board: the table of
+    /// docs/identify.md, some minutes.
+    Identify {
+        /// Rigs.
+        #[arg(default_value_t = 200)]
+        rigs: u64,
+        /// Seed of the first.
+        #[arg(default_value_t = 10_001)]
+        seed: u64,
+    },
     /// Compares the engines with SciPy over random single intervals: the table of docs/theory.md, section 10.
     Intervals {
         /// Intervals, half of them of extreme parameters.
@@ -207,6 +217,7 @@ fn main() -> Result<()> {
         Verb::Miri => miri::run(),
         Verb::Certified { runs } => certified(runs),
         Verb::Smooth => smooth(),
+        Verb::Identify { rigs, seed } => identify(rigs, seed),
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
         Verb::Ablate { runs } => ablate::all(runs),
         Verb::Lies { trials } => lies(trials),
@@ -307,6 +318,15 @@ fn smooth() -> Result<()> {
         write_between("docs/smooth.md", table, &table_of("smooth", &[table])?)?;
     }
     Ok(())
+}
+
+fn identify(rigs: u64, seed: u64) -> Result<()> {
+    let example = ["run", "--release", "--package", "clutch-identify", "--example", "campaign", "--"];
+    let (done, text) = cargo(example).args([rigs.to_string(), seed.to_string()]).quietly()?;
+    anyhow::ensure!(done, "the campaign failed:\n{text}");
+    let (table, last): (Vec<&str>, Vec<&str>) =
+        text.lines().filter(|l| l.starts_with('|') || l.contains("rigs from seed")).partition(|l| l.starts_with('|'));
+    write_between("docs/identify.md", "campaign", &format!("{}\n\n{}", table.join("\n"), last.join("\n")))
 }
 
 /// The table that an example of the simulator prints.

@@ -7,6 +7,7 @@ pub mod certify;
 mod daq;
 mod friction;
 mod hil;
+mod identify;
 mod log;
 mod loop_verb;
 mod map;
@@ -57,6 +58,7 @@ enum Verb {
     Loop(loop_verb::Loop),
     Daq(daq::Daq),
     Hil(hil::Hil),
+    Identify(identify::Identify),
     Replay(replay::Replay),
     Log(log::Log),
     Sim(sim::Sim),
@@ -83,6 +85,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Loop(v) => v.run(),
         Verb::Daq(v) => v.run(),
         Verb::Hil(v) => v.run(),
+        Verb::Identify(v) => v.run(),
         Verb::Replay(v) => v.run(),
         Verb::Log(v) => v.run(),
         Verb::Sim(v) => v.run(),

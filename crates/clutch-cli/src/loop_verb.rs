@@ -72,6 +72,9 @@ pub(crate) struct Loop {
     /// Overrides a key of the scenario; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
+    /// Takes the model and its bounds from a file that `clutch identify --out` has written.
+    #[arg(long, value_name = "FILE.toml")]
+    identified: Option<PathBuf>,
     /// The board's port; without it a board is simulated.
     #[arg(long, value_name = "PATH|tcp://HOST:PORT|unix:///PATH")]
     port: Option<Address>,
@@ -148,7 +151,8 @@ pub(crate) struct Loop {
 impl Loop {
     pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
         self.set_shortcuts()?;
-        let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone() };
+        let (scenario, set, identified) = (self.scenario.clone(), self.set.clone(), self.identified.clone());
+        let args = ScenarioArgs { scenario, set, identified };
         let scenario = args.load()?;
         if let Some(log) = &self.log
             && log.canonicalize().is_ok_and(|l| self.scenario.canonicalize().is_ok_and(|s| s == l))

@@ -15,7 +15,7 @@ use clutch_log::Record;
 use clutch_node::{Ending, Notice, Outbox, Standing};
 use clutch_sim::engine::{Event, Motion, Shaft};
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
-use clutch_sim::{Metrics, Scenario};
+use clutch_sim::{Metrics, MovingRig, Scenario};
 use clutch_wire::{BoardState, Refused, StopReason};
 
 /// Time that a controller takes for an answer, over a part of a run.
@@ -185,6 +185,12 @@ impl<S: Station> VirtualLoop<S> {
             }
         }
         course.report()
+    }
+
+    /// The rig on the board, as the run has left it.
+    #[must_use]
+    pub fn rig(&self) -> &MovingRig {
+        self.board.rig()
     }
 
     /// An error if the station cannot go on.

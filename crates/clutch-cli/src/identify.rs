@@ -1,0 +1,215 @@
+//! `clutch identify`.
+
+use crate::args::{ScenarioArgs, key_value};
+use crate::output::{BUILD, Exit, json, paragraph, print, shown, write};
+use crate::signals::stop_flag;
+use crate::table::number;
+use anyhow::{Context, bail};
+use clap::Args;
+use clutch_identify::experiment::{ExperimentError, Programme, REMEDY, VirtualBoard, experiment};
+use clutch_identify::rig_file::{rig_file, rows};
+use clutch_identify::{Finding, Recording, Report, identify};
+use clutch_log::Limits;
+use clutch_loop::port::Address;
+use clutch_loop::session::{Board, Session, SessionOptions};
+use clutch_loop::summary::Verdict;
+use clutch_sim::Scenario;
+use serde_json::{Value, json as value};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Finds out what a rig is: T/J, delay, friction, ripple, damping, each with an interval.
+///
+/// Runs an experiment of less than a minute through the loop, with all its checks: on the scenario's simulated board, in
+/// virtual time, or with --port on a real one. With --from it reads logs instead. What cannot be told is refused, with the
+/// experiment that would tell it.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  clutch identify board_smc_2\n  \
+    clutch identify mine.toml --port /dev/ttyACM0 --log logs --uncertified --out rig.toml\n  \
+    clutch identify --from logs/releases.mcap logs/crawl.mcap logs/ride_5.mcap\n  \
+    clutch certify mine.toml --identified rig.toml\n\n\
+    docs/identify.md tells what is measured, how well, and what cannot be."
+)]
+pub(crate) struct Identify {
+    /// Scenario of the rig, with [safety]: file, or name of a built-in one.
+    #[arg(value_name = "SCENARIO.toml", default_value = "board_smc_2")]
+    scenario: PathBuf,
+    /// Overrides a key of the scenario; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    set: Vec<(String, String)>,
+    /// The board's port; without it the scenario's board is simulated, in virtual time.
+    #[arg(long, value_name = "PATH|tcp://HOST:PORT|unix:///PATH", requires = "log")]
+    port: Option<Address>,
+    /// Consent to laws without a certificate on a board at --port: the experiment's have none.
+    #[arg(long)]
+    uncertified: bool,
+    /// The board at the port is a simulated one whose clock waits (`clutch daq --patient`).
+    #[arg(long, requires = "port")]
+    patient: bool,
+    /// Folder for a log of each part; it may not hold them yet.
+    #[arg(long, value_name = "FOLDER")]
+    log: Option<PathBuf>,
+    /// Reads these logs instead: MCAP, or CSV with --columns.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["port", "log"])]
+    from: Vec<PathBuf>,
+    /// Columns of a CSV that hold counts and volts, one sample a row.
+    #[arg(long, value_name = "COUNTS,VOLTS", value_delimiter = ',', num_args = 1, default_value = "counts,volts")]
+    columns: Vec<String>,
+    /// Writes [model] and [bounds] for scenarios, with the intervals.
+    #[arg(long, value_name = "FILE.toml")]
+    out: Option<PathBuf>,
+    /// Writes friction along the disc: angle in rad, and friction over its mean.
+    #[arg(long, value_name = "FILE.csv")]
+    map: Option<PathBuf>,
+    /// Prints the result as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Identify {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
+        let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone(), identified: None };
+        let scenario = args.load()?;
+        let recordings = if self.from.is_empty() {
+            self.experiment(&scenario)?
+        } else {
+            let read = self.from.iter().map(|file| self.read(file, &scenario));
+            read.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten().collect()
+        };
+        let report = identify(&recordings);
+        let file = self.out.as_deref().map(|path| (path, rig_file(&report, &scenario)));
+        print(&if self.json { json(&object(&report))? } else { text(&report) })?;
+        if let Some(path) = &self.map {
+            let mut csv = "angle_rad,friction\n".to_owned();
+            report.map.iter().for_each(|p| csv += &format!("{:.9},{:.6}\n", p.angle, p.factor));
+            write(path, csv)?;
+        }
+        if let Some((path, file)) = file {
+            write(path, file?)?;
+        }
+        let told = rows(&report).iter().any(|row| row.finding.known().is_some());
+        Ok(if told { Exit::Done } else { Exit::Failed })
+    }
+
+    /// Runs the experiment, and says before what it does.
+    fn experiment(&self, scenario: &Scenario) -> anyhow::Result<Vec<Recording>> {
+        let programme = Programme::default();
+        let place = match &self.port {
+            Some(port) => format!("the board at {port}"),
+            None => "the simulated board, in virtual time".to_owned(),
+        };
+        let mut plan = format!("{:.0} s of experiment on {place}\n", programme.seconds());
+        programme.plan().iter().for_each(|line| plan += &format!("  {line}\n"));
+        let _ = std::io::stderr().write_all(shown(&plan).as_bytes());
+        if let Some(folder) = &self.log {
+            std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+        }
+        let Some(port) = &self.port else {
+            let logs = self.log.clone().map(|folder| (folder, BUILD.to_owned()));
+            let mut board = VirtualBoard { logs, ..VirtualBoard::default() };
+            return Ok(experiment(scenario, &programme, &mut |name, part| board.run(name, part))?);
+        };
+        if !self.uncertified {
+            bail!(
+                "nothing was started: the laws above have no certificate; --uncertified is your consent to them on the \
+                 board at {port}"
+            );
+        }
+        let folder = self.log.clone().unwrap_or_default();
+        let stop = stop_flag()?;
+        let run = &mut |name: &str, part: &Scenario| self.on_board(port, &folder.join(format!("{name}.mcap")), name, part, &stop);
+        Ok(experiment(scenario, &programme, run)?)
+    }
+
+    /// One run of the loop on the board at the port, read from its log.
+    fn on_board(
+        &self,
+        port: &Address,
+        log: &Path,
+        name: &str,
+        part: &Scenario,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Vec<Recording>, ExperimentError> {
+        let runs = |e: &dyn std::fmt::Display| ExperimentError::Runs(e.to_string());
+        let options = SessionOptions {
+            board: Board::Daq(port.clone()),
+            log: Some(log.to_owned()),
+            patient: self.patient,
+            uncertified: true,
+            version: BUILD.to_owned(),
+            ..SessionOptions::default()
+        };
+        let session = Session::new(part.clone(), options).map_err(|e| runs(&e))?;
+        let summary = session.run(stop, &mut |_| ()).map_err(|e| runs(&e))?;
+        if summary.verdict() != Verdict::Done {
+            let (part, cause) = (name.to_owned(), summary.cause_text());
+            return Err(ExperimentError::Ended { part, cause, remedy: REMEDY });
+        }
+        let whole = clutch_log::read(log, &Limits::default())?;
+        Ok(Recording::from_log(name, &whole)?)
+    }
+
+    /// Recordings in a file; of a CSV period and encoder are the scenario's.
+    fn read(&self, file: &Path, scenario: &Scenario) -> anyhow::Result<Vec<Recording>> {
+        let name = file.display().to_string();
+        if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+            let [counts, volts] = &self.columns[..] else {
+                bail!("--columns {}: expected two names, as counts,volts", self.columns.join(","));
+            };
+            let text = std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"))?;
+            let spec = scenario.spec();
+            let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev);
+            return Ok(vec![Recording::from_csv(&name, &text, (counts, volts), scale)?]);
+        }
+        let log = clutch_log::read(file, &Limits::default())?;
+        Ok(Recording::from_log(&name, &log)?)
+    }
+}
+
+fn text(report: &Report) -> String {
+    let (releases, slips, rates) = &report.found;
+    let rates: Vec<String> = rates.iter().map(|r| format!("{:.3}", r.to_degrees())).collect();
+    let mut out = format!(
+        "{releases} releases, {slips} break-aways, {} rides{}\n",
+        rates.len(),
+        if rates.is_empty() { String::new() } else { format!(" at {} °/s", rates.join(", ")) }
+    );
+    let rows = rows(report);
+    for row in &rows {
+        if let Some(e) = row.finding.known() {
+            let e = e.times(row.unit.1);
+            let interval = format!("{} … {}", number(e.low), number(e.high));
+            out += &format!("  {:<26}{:>10}  {interval:<24}{}\n", row.label, number(e.value), row.unit.0);
+        }
+    }
+    for row in &rows {
+        if let Finding::Refused(why) = row.finding {
+            out += &paragraph(&format!("{}: not told; {why}", row.label));
+        }
+    }
+    report.unexplained.iter().for_each(|line| out += &paragraph(&format!("unexplained: {line}")));
+    out
+}
+
+/// The result as `--json` prints it.
+fn object(report: &Report) -> Value {
+    let of = |finding: &Finding| match finding {
+        Finding::Known(e) => value!({ "value": e.value, "low": e.low, "high": e.high }),
+        Finding::Refused(why) => value!({ "refused": why }),
+    };
+    let parameters: serde_json::Map<String, Value> =
+        rows(report).iter().map(|row| (row.key.to_owned(), of(row.finding))).collect();
+    let (releases, slips, rates) = &report.found;
+    value!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "releases": releases,
+        "break_aways": slips,
+        "rides_rad_s": rates,
+        "parameters": parameters,
+        "unexplained": report.unexplained,
+        "map": report.map.iter().map(|p| [p.angle, p.factor]).collect::<Vec<_>>(),
+    })
+}

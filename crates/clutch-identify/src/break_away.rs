@@ -1,0 +1,282 @@
+//! μ_s/μ_d and the Stribeck velocity, from break-aways under a voltage that falls slowly.
+//!
+//! At break-away `μ_s K m u_b = T`, with the ripple's factor `m` at that place. A moment later the shaft slides at the same
+//! place, and `μ_d K m u_b = T μ_d/μ_s`: it sets off with `θ̈ = (T/J)(1 − μ_d/μ_s)`, whatever `m` is. Behind that friction changes
+//! along the way, which the filter of [`crate::filter`] follows from there.
+//!
+//! Nobody knows when the shaft broke away: the time is an unknown of each break-away, and what is told is summed over it.
+//! By the Stribeck velocity the shaft sets off late: from the step of the voltage that triggered it, one of several, friction
+//! first has to fall.
+
+use crate::filter::{Belief, Shaft};
+use crate::recording::Recording;
+use crate::ride;
+use crate::Estimate;
+
+/// What a break-away needs to be one.
+const RESTED: usize = 50; // samples
+const LONGEST: usize = 80; // samples
+const SILENT: usize = 14; // samples without an edge, after the first
+const FEWEST_COUNTS: i64 = 6;
+const MOST_COUNTS: i64 = 22;
+/// Step of the time at which it sets off, periods.
+const TIME_STEP: f64 = 0.25;
+/// Ratios that are tried at first: μ_s/μ_d − 1 from and to, and their number.
+const EXCESS: (f64, f64, usize) = (0.02, 3.0, 44);
+/// The same for the Stribeck velocity, rad/s.
+const VELOCITIES: (f64, f64, usize) = (1e-4, 3e-2, 58);
+/// Most steps of the voltage that may have triggered a break-away, and thresholds within each.
+const TRIGGERS: usize = 12;
+const THRESHOLDS: usize = 6;
+/// Share of break-aways that no Stribeck velocity explains.
+const STRAY: f64 = 0.01;
+
+/// A break-away.
+#[derive(Clone, Debug)]
+pub struct BreakAway<'a> {
+    recording: &'a Recording,
+    /// Sample of the first edge, and the last one that is looked at.
+    ticks: (usize, usize),
+}
+
+/// The shaft as known from releases and rides.
+#[derive(Clone, Copy, Debug)]
+pub struct Known {
+    /// T/J, rad/s².
+    pub pull: f64,
+    /// Delay, s.
+    pub delay: f64,
+    /// C/J, 1/s.
+    pub damping: f64,
+    /// Mean friction `h`, 1/V.
+    pub friction: f64,
+    /// Root mean square of the ripple, 1/V.
+    pub ripple: f64,
+}
+
+/// The break-aways in a recording.
+#[must_use]
+pub fn break_aways(recording: &Recording) -> Vec<BreakAway<'_>> {
+    let ticks = &recording.ticks;
+    let moved = |i: usize| ticks[i].counts != ticks[i - 1].counts;
+    let mut found = Vec::new();
+    let mut still = 0;
+    for i in 1..ticks.len() {
+        if !moved(i) {
+            still += 1;
+            continue;
+        }
+        let rested = std::mem::take(&mut still) >= RESTED;
+        // Not let go, but let slip: a voltage that has fallen by little.
+        let before = &ticks[i.saturating_sub(RESTED)..i];
+        let slowly = before.windows(2).all(|w| {
+            let step = w[0].volts - w[1].volts;
+            step.abs() <= (3.0 * recording.step_volts).max(0.01 * w[0].volts) && w[1].volts > 0.0
+        });
+        if !(rested && slowly) {
+            continue;
+        }
+        let mut end = i;
+        for j in i + 1..ticks.len().min(i + LONGEST) {
+            if ticks[j].counts < ticks[j - 1].counts || j - end > SILENT {
+                break;
+            }
+            if moved(j) {
+                end = j;
+            }
+            if ticks[j].counts - ticks[i].counts >= MOST_COUNTS {
+                break;
+            }
+        }
+        if ticks[end].counts - ticks[i].counts >= FEWEST_COUNTS {
+            found.push(BreakAway { recording, ticks: (i, end) });
+        }
+    }
+    found
+}
+
+/// Logarithm of a mean of exponentials.
+fn log_mean(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let (n, most) = logs.clone().fold((0_u32, f64::NEG_INFINITY), |(n, most), x| (n + 1, most.max(x)));
+    if n == 0 || most == f64::NEG_INFINITY {
+        return f64::NEG_INFINITY;
+    }
+    most + libm::log(logs.map(|x| libm::exp(x - most)).sum::<f64>() / f64::from(n))
+}
+
+impl BreakAway<'_> {
+    /// Tick of the run of its first edge.
+    #[must_use]
+    pub fn place(&self) -> (String, u64) {
+        (self.recording.name.clone(), self.recording.first_tick + self.ticks.0 as u64)
+    }
+
+    /// Times at which it may have set off with an acceleration, periods from the first sample: no later than the first
+    /// edge, no earlier than a count before it.
+    fn times(&self, acceleration: f64) -> Vec<f64> {
+        let first = self.ticks.0 as f64;
+        let longest = (2.8 / acceleration.max(1e-4)).sqrt() + 2.0;
+        let n = (longest.min(first - 2.0) / TIME_STEP) as usize;
+        (1..=n).map(|k| first - k as f64 * TIME_STEP).collect()
+    }
+
+    /// Logarithm of the density of the edges, for a ratio and a time at which it sets off.
+    fn density(&self, shaft: &Shaft, known: &Known, ratio: f64, time: f64) -> f64 {
+        let r = self.recording;
+        let (first, last) = self.ticks;
+        let delay = known.delay / r.period;
+        let i = time.floor() as usize;
+        let part = (time - i as f64, 1.0);
+        let at_rest = r.at_pad(i, (part.0, (part.0 + 0.01).min(1.0)), delay);
+        let friction = 1.0 / (ratio * at_rest);
+        let mut belief = Belief::new(shaft, 0.5, (0.0, 0.0), (known.friction, 0.0));
+        // A place within its count; friction as known as a step of the converter.
+        let step = friction * r.step_volts / at_rest;
+        belief.mean[3] = friction - known.friction;
+        belief.spread[(0, 0)] = 1.0 / 12.0;
+        belief.spread[(3, 3)] = step * step / 12.0;
+        let origin = r.ticks[first - 1].counts;
+        let mut log = 0.0;
+        for j in i..last {
+            let part = if j == i { part } else { (0.0, 1.0) };
+            belief.advance(shaft, r.at_pad(j, part, delay), part.1 - part.0);
+            let (before, now) = (r.ticks[j].counts, r.ticks[j + 1].counts);
+            if now > before {
+                log += belief.cross((now - origin) as f64).density;
+            }
+        }
+        log
+    }
+
+    /// Logarithm of the density for a ratio, over all times at which it may have set off; and these with theirs.
+    fn over_times(&self, known: &Known, ratio: f64) -> (f64, Vec<(f64, f64)>) {
+        let shaft = ride::shaft(self.recording, known.pull, known.damping, known.ripple);
+        let times = self.times(shaft.pull * (1.0 - 1.0 / ratio));
+        let logs: Vec<(f64, f64)> =
+            times.iter().map(|&time| (time, self.density(&shaft, known, ratio, time))).collect();
+        // A sum, not a mean: every time is as likely as another, however many are looked at.
+        let total = log_mean(logs.iter().map(|l| l.1)) + libm::log(logs.len().max(1) as f64);
+        (total, logs)
+    }
+}
+
+/// The curve of a likelihood over a parameter.
+#[derive(Clone, Debug)]
+struct Profile {
+    points: Vec<(f64, f64)>,
+}
+
+impl Profile {
+    fn best(&self) -> (f64, f64) {
+        self.points.iter().copied().fold((f64::NAN, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a })
+    }
+
+    /// Mean under the curve, and the values at which it has fallen by `fall`; none at an end that it does not fall to.
+    fn estimate(&self, fall: f64) -> (f64, Option<f64>, Option<f64>) {
+        let (_, top) = self.best();
+        let weight = |log: f64| libm::exp(log - top);
+        let mut sums = (0.0, 0.0);
+        for w in self.points.windows(2) {
+            let (middle, mean) = (0.5 * (w[0].0 + w[1].0), 0.5 * (weight(w[0].1) + weight(w[1].1)));
+            sums = (sums.0 + mean * (w[1].0 - w[0].0), sums.1 + mean * middle * (w[1].0 - w[0].0));
+        }
+        let level = top - fall;
+        let crossing = |a: (f64, f64), b: (f64, f64)| a.0 + (b.0 - a.0) * (level - a.1) / (b.1 - a.1);
+        let above: Vec<usize> = (0..self.points.len()).filter(|&i| self.points[i].1 >= level).collect();
+        let (first, last) = (above.first().copied().unwrap_or(0), above.last().copied().unwrap_or(0));
+        let low = (first > 0).then(|| crossing(self.points[first - 1], self.points[first]));
+        let high = self.points.get(last + 1).map(|&next| crossing(self.points[last], next));
+        (sums.1 / sums.0, low, high)
+    }
+}
+
+/// Numbers from one to another, evenly in the logarithm.
+fn spaced(low: f64, high: f64, n: usize) -> impl Iterator<Item = f64> + Clone {
+    (0..n).map(move |i| low * libm::pow(high / low, i as f64 / (n - 1) as f64))
+}
+
+/// μ_s/μ_d; none where the break-aways do not bound it.
+#[must_use]
+pub fn ratio(slips: &[BreakAway<'_>], known: &Known, fall: f64) -> Option<Estimate> {
+    let profile = |excess: &mut dyn Iterator<Item = f64>| Profile {
+        points: excess
+            .map(|e| (e, slips.iter().map(|slip| slip.over_times(known, 1.0 + e).0).sum()))
+            .collect(),
+    };
+    let coarse = profile(&mut spaced(EXCESS.0, EXCESS.1, EXCESS.2));
+    let (value, low, high) = coarse.estimate(3.0 * fall);
+    let (low, high) = (low.unwrap_or(EXCESS.0), high?);
+    let _ = value;
+    let fine = profile(&mut spaced(0.97 * low, 1.03 * high, 40));
+    let (value, low, high) = fine.estimate(fall);
+    Some(Estimate { value: 1.0 + value, low: 1.0 + low.unwrap_or(0.0), high: 1.0 + high? })
+}
+
+/// Time by which a shaft sets off later than one whose friction falls at once, s: `threshold` lies `above` (V) over the
+/// voltage that triggered it, at sample `i`.
+fn late(r: &Recording, known: &Known, ratio: f64, velocity: f64, threshold: f64, from: usize) -> f64 {
+    let mut time = 0.0;
+    let mut w = 0.0;
+    let enough = 8.0 * velocity;
+    let longest = 0.06;
+    let mut ideal = 0.0;
+    while w < enough && time < longest {
+        let i = from + (time / r.period) as usize;
+        let volts = r.volts(i as isize);
+        let drop = libm::exp(-w / velocity);
+        let slide = volts / (ratio * threshold);
+        let a = known.pull * (1.0 - slide * (1.0 + (ratio - 1.0) * drop));
+        let fast = known.pull * (1.0 - slide);
+        if a <= 0.0 {
+            return f64::INFINITY;
+        }
+        let dt = (0.05 * (w + 0.05 * velocity) / a).min(r.period / 4.0);
+        w += a * dt;
+        time += dt;
+        ideal = w / fast;
+    }
+    time - ideal
+}
+
+/// Stribeck velocity, rad/s; none where the break-aways do not bound it on either side.
+#[must_use]
+pub fn stribeck(slips: &[BreakAway<'_>], known: &Known, ratio: f64, fall: f64) -> Option<Estimate> {
+    // Of each: the times at which it set off, with their weights, and the steps that may have triggered it.
+    let mut all = Vec::new();
+    for slip in slips {
+        let r = slip.recording;
+        let (_, times) = slip.over_times(known, ratio);
+        let most = times.iter().map(|t| t.1).fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<(f64, f64)> = times.iter().map(|&(t, log)| (t, libm::exp(log - most))).collect();
+        let total: f64 = weights.iter().map(|w| w.1).sum();
+        let weights: Vec<(f64, f64)> =
+            weights.into_iter().map(|(t, w)| (t, w / total)).filter(|w| w.1 > 1e-5).collect();
+        let falls = (1..slip.ticks.0).rev().filter(|&i| r.ticks[i].volts < r.ticks[i - 1].volts);
+        all.push((r, weights, falls.take(TRIGGERS).collect::<Vec<usize>>()));
+    }
+    let points: Vec<(f64, f64)> = spaced(VELOCITIES.0, VELOCITIES.1, VELOCITIES.2)
+        .map(|velocity| {
+            let log = all.iter().map(|(r, weights, triggers)| {
+                let mut density = 0.0;
+                for &i in triggers {
+                    let (above, below) = (r.ticks[i - 1].volts, r.ticks[i].volts);
+                    for k in 0..THRESHOLDS {
+                        let part = (k as f64 + 0.5) / THRESHOLDS as f64;
+                        let threshold = below + part * (above - below);
+                        let late = late(r, known, ratio, velocity, threshold, i);
+                        let sets_off = i as f64 + (known.delay + late) / r.period;
+                        // Half a step of the time blurs it.
+                        for &(time, weight) in weights {
+                            let off = (time - sets_off) / (1.5 * TIME_STEP);
+                            density += weight * libm::exp(-0.5 * off * off);
+                        }
+                    }
+                }
+                libm::log(STRAY + density)
+            });
+            (libm::log(velocity), log.sum::<f64>())
+        })
+        .collect();
+    let (value, low, high) = Profile { points }.estimate(fall);
+    Some(Estimate { value: libm::exp(value), low: libm::exp(low?), high: libm::exp(high?) })
+}

@@ -1,0 +1,324 @@
+//! The experiment: runs of the loop's own laws, with all its checks, from which [`crate::identify`] learns.
+//!
+//! | part | law | shows |
+//! |---|---|---|
+//! | `releases` | PID without an integral on a path of steps | the brake lets go for some 40 ms: free falls |
+//! | `crawl` | a soft PD far below the rate at which it sticks | break-aways under a voltage that falls slowly |
+//! | `ride …` | glide, with what the releases told | mean friction at a rate, ripple |
+
+use crate::recording::{ReadError, Recording};
+use crate::release;
+use clutch_core::supervisor::State;
+use clutch_core::{DacCode, Real};
+use clutch_log::{LogWriter, Record, Source};
+use clutch_loop::from_scenario::{self, BuildError, BuiltRun};
+use clutch_loop::station::ControllerStation;
+use clutch_loop::summary::cause_text;
+use clutch_loop::to_log::PRESENT_CODE;
+use clutch_loop::virtual_time::{VirtualError, VirtualLoop, VirtualOptions};
+use clutch_node::ControllerNode;
+use clutch_sim::scenario::ScalarKind;
+use clutch_sim::{Scenario, ScenarioError};
+use std::path::PathBuf;
+use toml::{Table, Value};
+
+/// What the experiment does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Programme {
+    /// Releases.
+    pub releases: u32,
+    /// Way from one release to the next, °.
+    pub step_deg: f64,
+    /// Length of the crawl, s.
+    pub crawl_s: f64,
+    /// Rates of the rides, °/s, and their lengths, s.
+    pub rides: Vec<(f64, f64)>,
+}
+
+/// Less than a minute.
+impl Default for Programme {
+    fn default() -> Self {
+        Programme {
+            releases: 12,
+            step_deg: 2.5,
+            crawl_s: 24.0,
+            rides: vec![(5.0, 10.0), (20.0, 7.0), (60.0, 5.0)],
+        }
+    }
+}
+
+/// Time from one release to the next, s.
+const PACE_S: f64 = 0.45;
+/// Rate of the crawl, °/s, and its law: the voltage falls by 1 V/s while the shaft rests.
+const CRAWL_DEG_S: f64 = 0.5;
+const CRAWL_KP: f64 = 115.0; // V/rad
+const CRAWL_KD: f64 = 3.0; // V s/rad
+/// Following error at rest that ends a part, °: a release and a soft law are far from the path.
+const FOLLOWING_DEG: f64 = 6.0;
+/// Share of the speed limit with which a step of the path rises.
+const STEP_RATE: f64 = 0.8;
+
+impl Programme {
+    /// Its length, s.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.releases_s() + self.crawl_s + self.rides.iter().map(|ride| ride.1).sum::<f64>()
+    }
+
+    fn releases_s(&self) -> f64 {
+        PACE_S * (f64::from(self.releases) + 1.0)
+    }
+
+    /// The way that the shaft is turned by, °, beyond which only a fault goes.
+    #[must_use]
+    pub fn way_deg(&self) -> f64 {
+        let rides: f64 = self.rides.iter().map(|(rate, seconds)| rate * seconds).sum();
+        let parts = 2.0 + self.rides.len() as f64;
+        f64::from(self.releases) * self.step_deg + CRAWL_DEG_S * self.crawl_s + rides + parts * FOLLOWING_DEG
+    }
+
+    /// The plan, a line for each part: what it does, for how long, and how far.
+    #[must_use]
+    pub fn plan(&self) -> Vec<String> {
+        let mut lines = vec![
+            format!(
+                "releases    {} times 0 V until the shaft has fallen by about {} °, {:.1} s",
+                self.releases,
+                self.step_deg,
+                self.releases_s()
+            ),
+            format!("crawl       {CRAWL_DEG_S} °/s under a soft PD, it sticks and slips, {} s", self.crawl_s),
+        ];
+        lines.extend(
+            self.rides.iter().map(|(rate, seconds)| format!("ride        {rate} °/s under glide, {seconds} s")),
+        );
+        lines.push(format!(
+            "limits      {:.0}° in all; each part ends {FOLLOWING_DEG}° off its path, and by every other check",
+            self.way_deg()
+        ));
+        lines
+    }
+}
+
+/// The experiment could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ExperimentError {
+    /// A key of the scenario.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// A part makes no run.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// What was recorded.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A run in virtual time.
+    #[error(transparent)]
+    Virtual(#[from] VirtualError),
+    /// A log.
+    #[error(transparent)]
+    Log(#[from] clutch_log::LogError),
+    /// The output does not let go.
+    #[error("output.lowest_v = {0}: expected 0, as a release lets the brake go, or at most 0")]
+    NoRelease(f64),
+    /// The supervisor ended a part.
+    #[error("the part \"{part}\" ended early: {cause}; it is in its safe state. {remedy}")]
+    Ended {
+        /// The part.
+        part: String,
+        /// The cause, in words.
+        cause: String,
+        /// What may help.
+        remedy: &'static str,
+    },
+    /// Something else that runs a part.
+    #[error("{0}")]
+    Runs(String),
+}
+
+/// For a part that a check ended.
+pub const REMEDY: &str = "Wider [bounds] help if they do not hold the rig; look at the rig first";
+
+/// Runs the programme, part by part; `run` makes one run of the loop, and says what was recorded. Later parts are told
+/// what earlier ones gave.
+///
+/// # Errors
+/// The scenario has no safe state or does not let go; a part that cannot be run, or was ended by a check.
+pub fn experiment(
+    base: &Scenario,
+    programme: &Programme,
+    run: &mut dyn FnMut(&str, &Scenario) -> Result<Vec<Recording>, ExperimentError>,
+) -> Result<Vec<Recording>, ExperimentError> {
+    base.safety()?;
+    let lowest = base.params().output.lowest;
+    if lowest > 0.0 {
+        return Err(ExperimentError::NoRelease(lowest));
+    }
+    let mut recordings = run("releases", &releases(base, programme)?)?;
+    let releases: Vec<_> = recordings.iter().flat_map(release::releases).collect();
+    let fall = release::fall(&releases, crate::DAMPINGS).ok();
+    recordings.extend(run("crawl", &crawl(base, programme)?)?);
+    for ride in &programme.rides {
+        let name = format!("ride_{}", ride.0);
+        recordings.extend(run(&name, &glide(base, *ride, fall.as_ref())?)?);
+    }
+    Ok(recordings)
+}
+
+/// A table of one key after the other.
+fn table<const N: usize>(rows: [(&str, Value); N]) -> Value {
+    Value::Table(rows.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
+}
+
+/// A part: the scenario with another law, path and length. Rig, model, bounds, safe state and checks stay.
+fn part(base: &Scenario, law: Value, path: Value, seconds: f64) -> Result<Table, ScenarioError> {
+    let mut t = base.table().clone();
+    for other in ["velocity", "shell"] {
+        t.remove(other);
+    }
+    t.insert("law".to_owned(), law);
+    t.insert("reference".to_owned(), path);
+    if let Some(Value::Table(run)) = t.get_mut("run") {
+        run.insert("duration_s".to_owned(), Value::Float(seconds));
+        run.insert("settle_s".to_owned(), Value::Float(0.0));
+        run.insert("start".to_owned(), Value::String("rest".to_owned()));
+    }
+    if let Some(Value::Table(safety)) = t.get_mut("safety")
+        && let Some(Value::Table(limits)) = safety.get_mut("limits")
+    {
+        let given = limits.get("following_error_deg").and_then(Value::as_float).unwrap_or(0.0);
+        limits.insert("following_error_deg".to_owned(), Value::Float(given.max(FOLLOWING_DEG)));
+    }
+    Ok(t)
+}
+
+fn checked(base: &Scenario, name: &str, table: Table) -> Result<Scenario, ScenarioError> {
+    let title = Value::String(format!("{}: {name}", base.name()));
+    Scenario::from_table(&format!("{name} for {}", base.name()), table, &[("name".to_owned(), title)])
+}
+
+fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, ScenarioError> {
+    let spec = base.spec();
+    let rate = STEP_RATE * spec.rig.speed.speed_limit; // rad/s
+    // What holds the shaft while it waits.
+    let wait = base.safety()?.on_fault.holding_voltage().unwrap_or(0.8 * spec.output.highest);
+    let wait = wait.min(spec.output.highest);
+    // The first period of a step takes all of it away.
+    let kp = 1.5 * wait / (rate * spec.period.seconds::<f64>());
+    let law = table([("pid", table([
+        ("kp_v_rad", Value::Float(kp)),
+        ("ki_v_rad_s", Value::Float(0.0)),
+        ("kd_v_s_rad", Value::Float(0.0)),
+        ("bias_v", Value::Float(wait)),
+    ]))]);
+    let rise = programme.step_deg / rate.to_degrees();
+    let mut points = vec![(0.0, 0.0)];
+    for k in 0..programme.releases {
+        let (time, angle) = (PACE_S * f64::from(k + 1), programme.step_deg * f64::from(k));
+        points.extend([(time, angle), (time + rise, angle + programme.step_deg)]);
+    }
+    let points = points.into_iter().map(|(t, a)| Value::Array(vec![Value::Float(t), Value::Float(a)]));
+    let path = table([("table", table([
+        ("points_s_deg", Value::Array(points.collect())),
+        ("interpolation", Value::String("linear".to_owned())),
+    ]))]);
+    checked(base, "releases", part(base, law, path, programme.releases_s())?)
+}
+
+fn ramp(rate_deg_s: f64) -> Value {
+    table([("ramp", table([("rate_deg_s", Value::Float(rate_deg_s))]))])
+}
+
+fn crawl(base: &Scenario, programme: &Programme) -> Result<Scenario, ScenarioError> {
+    let law = table([("pd", table([("kp_v_rad", Value::Float(CRAWL_KP)), ("kd_v_s_rad", Value::Float(CRAWL_KD))]))]);
+    checked(base, "crawl", part(base, law, ramp(CRAWL_DEG_S), programme.crawl_s)?)
+}
+
+fn glide(
+    base: &Scenario,
+    (rate, seconds): (f64, f64),
+    fall: Option<&release::Fall>,
+) -> Result<Scenario, ScenarioError> {
+    let spec = base.spec();
+    let delay = fall.map_or(0.0, |fall| (fall.delay.value / spec.period.seconds::<f64>()).round().min(3.0));
+    let law = table([("glide", table([("filter", table([("delay_ticks", Value::Integer(delay as i64))]))]))]);
+    let mut t = part(base, law, ramp(rate), seconds)?;
+    if let (Some(fall), Some(Value::Table(model))) = (fall, t.get_mut("model")) {
+        // Drive torque stays what it is believed to be: only their ratio is told, and only it matters.
+        let inertia = spec.model.drive_torque / fall.pull.value;
+        model.insert("inertia_kg_m2".to_owned(), Value::Float(inertia));
+    }
+    checked(base, &format!("ride at {rate} °/s"), t)
+}
+
+/// The scenario's simulated board in virtual time, its shaft where the run before has left it.
+#[derive(Debug, Default)]
+pub struct VirtualBoard {
+    /// Folder for a log of each run, and the version that it tells.
+    pub logs: Option<(PathBuf, String)>,
+    /// Counts at which the shaft rests.
+    rests_at: Option<f64>,
+}
+
+impl VirtualBoard {
+    /// One run, and what was recorded.
+    ///
+    /// # Errors
+    /// As [`experiment`].
+    pub fn run(&mut self, name: &str, scenario: &Scenario) -> Result<Vec<Recording>, ExperimentError> {
+        let at = self.rests_at.map(|counts| ("run.start_counts".to_owned(), format!("{counts:?}")));
+        let set: Vec<(String, String)> = at.into_iter().collect();
+        let scenario = Scenario::parse(scenario.name(), &scenario.canonical(), &set)?;
+        match scenario.scalar() {
+            ScalarKind::F32 => self.run_in::<f32>(name, &scenario),
+            ScalarKind::F64 => self.run_in::<f64>(name, &scenario),
+        }
+    }
+
+    fn run_in<T: Real>(&mut self, name: &str, scenario: &Scenario) -> Result<Vec<Recording>, ExperimentError> {
+        let built = BuiltRun::<T>::new(scenario, 1)?;
+        let path = from_scenario::path::<T>(scenario)?;
+        let options = VirtualOptions {
+            record: true,
+            // After its end the safe state brings the shaft to rest.
+            duration: scenario.spec().run.duration + 1.0,
+            ticks: built.ticks,
+            ..VirtualOptions::default()
+        };
+        let (dac, servo) = (*built.servo.dac(), built.servo);
+        let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+        let mut on_rig = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })
+            .map_err(VirtualError::from)?;
+        let report = on_rig.run(&path)?;
+        let rig = on_rig.rig();
+        self.rests_at = Some(rig.shaft().position * rig.rig().encoder.counts_per_radian::<f64>());
+        if report.standing.state == State::Faulted || report.cause.is_some() {
+            let cause = report.cause.unwrap_or(report.standing.cause);
+            return Err(ExperimentError::Ended {
+                part: name.to_owned(),
+                cause: cause_text(cause, report.standing.value, false, false),
+                remedy: REMEDY,
+            });
+        }
+        if let Some((folder, version)) = &self.logs {
+            let mut header =
+                from_scenario::header(scenario, &servo, Source::Loop, "simulated, in virtual time", version);
+            header.extra.push((PRESENT_CODE.to_owned(), report.present.to_string()));
+            let mut log = LogWriter::create(folder.join(format!("{name}.mcap")), &header)?;
+            for record in &report.records {
+                log.write(record)?;
+            }
+            log.finish()?;
+        }
+        let (mut samples, mut commands) = (Vec::new(), Vec::new());
+        for record in &report.records {
+            match record {
+                Record::Sample(sample) => samples.push(*sample),
+                Record::Command(command) => commands.push(*command),
+                _ => {}
+            }
+        }
+        let before = dac.volts(DacCode(report.present)).to_f64();
+        Ok(Recording::from_records(name, scenario, Some(before), (&samples, &commands))?)
+    }
+}

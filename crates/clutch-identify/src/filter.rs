@@ -1,0 +1,132 @@
+//! Position, velocity, friction and its ripple along the way, from edges and volts: a Kalman filter, and its smoother.
+//!
+//! In counts and periods, with `G` = T/J, friction `h + r` in 1/V as a share of the drive's torque per volt:
+//!
+//! ```text
+//! a = G [1 − (h + r) u] − c ω,    ω' = ω + a Δt,    Δ = ω Δt + a Δt²/2
+//! s' = s − Δ (k² r + 2 ζ k s),    r' = r + Δ s'             ripple: a damped wave along the way
+//! ```
+
+use nalgebra::{SMatrix, SVector};
+
+/// Position, velocity, mean friction, ripple, its slope.
+pub type State = SVector<f64, 5>;
+/// Their covariance.
+pub type Spread = SMatrix<f64, 5, 5>;
+
+/// Numbers that stay.
+#[derive(Clone, Copy, Debug)]
+pub struct Shaft {
+    /// `G`, counts per period².
+    pub pull: f64,
+    /// `c`, per period.
+    pub damping: f64,
+    /// `k`, rad per count.
+    pub wave: f64,
+    /// `ζ`.
+    pub wave_damping: f64,
+    /// Root mean square of the ripple, 1/V.
+    pub ripple: f64,
+    /// Variance that the velocity gains in a period, (counts per period)².
+    pub walk: f64,
+}
+
+/// What is believed at a time.
+#[derive(Clone, Copy, Debug)]
+pub struct Belief {
+    /// Means.
+    pub mean: State,
+    /// Covariance.
+    pub spread: Spread,
+}
+
+/// A measured edge.
+#[derive(Clone, Copy, Debug)]
+pub struct Surprise {
+    /// Innovation², over its variance.
+    pub square: f64,
+    /// Logarithm of its density.
+    pub density: f64,
+}
+
+impl Belief {
+    /// A shaft at a position with a velocity, where the ripple may be anything.
+    #[must_use]
+    pub fn new(shaft: &Shaft, position: f64, velocity: (f64, f64), friction: (f64, f64)) -> Belief {
+        let mean = State::new(position, velocity.0, friction.0, 0.0, 0.0);
+        let slope = shaft.wave * shaft.ripple;
+        let deviations = State::new(0.3, velocity.1, friction.1, shaft.ripple, slope);
+        Belief { mean, spread: Spread::from_diagonal(&deviations.component_mul(&deviations)) }
+    }
+
+    /// A time `dt` (in periods) under a voltage; the matrix of small departures.
+    pub fn advance(&mut self, shaft: &Shaft, volts: f64, dt: f64) -> Spread {
+        let [position, velocity, mean, ripple, slope] = self.mean.into();
+        let load = shaft.pull * volts;
+        let a = shaft.pull - load * (mean + ripple) - shaft.damping * velocity;
+        let way = velocity * dt + 0.5 * a * dt * dt;
+        let (k2, decay) = (shaft.wave * shaft.wave, 2.0 * shaft.wave_damping * shaft.wave);
+        let fall = k2 * ripple + decay * slope;
+        let next = slope - way * fall;
+        self.mean = State::new(position + way, velocity + a * dt, mean, ripple + way * next, next);
+        // Of the way by velocity and friction.
+        let (by_velocity, by_friction) = (dt - 0.5 * shaft.damping * dt * dt, -0.5 * load * dt * dt);
+        let mut f = Spread::identity();
+        f[(0, 1)] = by_velocity;
+        f[(0, 2)] = by_friction;
+        f[(0, 3)] = by_friction;
+        f[(1, 1)] = 1.0 - shaft.damping * dt;
+        f[(1, 2)] = -load * dt;
+        f[(1, 3)] = -load * dt;
+        f[(4, 1)] = -fall * by_velocity;
+        f[(4, 2)] = -fall * by_friction;
+        f[(4, 3)] = -way * k2 - fall * by_friction;
+        f[(4, 4)] = 1.0 - way * decay;
+        for column in 0..5 {
+            let own = if column == 3 { 1.0 } else { 0.0 };
+            f[(3, column)] = own + way * f[(4, column)] + next * f[(0, column)];
+        }
+        f[(3, 0)] = 0.0;
+        self.spread = f * self.spread * f.transpose();
+        self.spread[(1, 1)] += shaft.walk * dt;
+        // With it the wave's variance stays what it is.
+        self.spread[(4, 4)] += 2.0 * decay * k2 * shaft.ripple * shaft.ripple * way.abs();
+        f
+    }
+
+    /// The shaft is at a position, with a variance.
+    pub fn correct(&mut self, position: f64, variance: f64) -> Surprise {
+        let y = position - self.mean[0];
+        let s = self.spread[(0, 0)] + variance;
+        let gain = self.spread.column(0) / s;
+        self.mean += gain * y;
+        self.spread -= gain * gain.transpose() * s;
+        let square = y * y / s;
+        Surprise { square, density: -0.5 * (square + libm::log(core::f64::consts::TAU * s)) }
+    }
+
+    /// An edge was crossed in the last period: it lies at most the period's way back.
+    pub fn cross(&mut self, counts: f64) -> Surprise {
+        let span = self.mean[1].clamp(0.02, 1.0);
+        self.correct(counts + 0.5 * span, span * span / 12.0)
+    }
+}
+
+/// The beliefs at all samples, each from the samples before and behind it (Rauch, Tung and Striebel 1965).
+///
+/// `passed[i]`: belief at sample `i` from those up to it, the one that was predicted for it, and the matrix of the period
+/// before it.
+#[must_use]
+pub fn smooth(passed: &[(Belief, Belief, Spread)]) -> Vec<Belief> {
+    let mut out: Vec<Belief> = passed.iter().map(|(belief, _, _)| *belief).collect();
+    for i in (0..out.len().saturating_sub(1)).rev() {
+        let (_, predicted, f) = &passed[i + 1];
+        let Some(cholesky) = predicted.spread.cholesky() else { continue };
+        // P F' P₋⁻¹, from the solution of P₋ X = F P.
+        let gain = cholesky.solve(&(f * out[i].spread)).transpose();
+        let (later, now) = (out[i + 1], out[i]);
+        out[i].mean = now.mean + gain * (later.mean - predicted.mean);
+        out[i].spread = now.spread + gain * (later.spread - predicted.spread) * gain.transpose();
+    }
+    out
+}

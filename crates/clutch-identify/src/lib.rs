@@ -1,0 +1,48 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+pub mod break_away;
+pub mod experiment;
+pub mod filter;
+pub mod recording;
+pub mod release;
+pub mod report;
+pub mod ride;
+pub mod rig_file;
+
+pub use recording::{ReadError, Recording, Tick};
+pub use report::{Finding, Report, identify};
+
+/// C/J that is thought possible before anything is known of it, 1/s: from nothing to five times the paper's.
+pub const DAMPINGS: (f64, f64) = (0.0, 3.0);
+
+/// A value with the interval that holds it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Estimate {
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Estimate {
+    /// The same in another unit.
+    #[must_use]
+    pub fn times(self, by: f64) -> Estimate {
+        Estimate { value: self.value * by, low: self.low * by, high: self.high * by }
+    }
+
+    /// `true` if a value lies within.
+    #[must_use]
+    pub fn holds(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+
+    /// Half its width, as a share of the value.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        (self.high - self.value).max(self.value - self.low) / self.value.abs()
+    }
+}

@@ -1,0 +1,249 @@
+//! What the estimators read: counts and the voltage given after each, from a log or a table.
+
+use clutch_core::supervisor::{Arrival, State};
+use clutch_core::{ActuatorKind, Dac, DacCode};
+use clutch_log::{CommandRecord, CommandSource, Log, SampleRecord};
+use clutch_loop::to_log::{PRESENT_CODE, START_VOLTAGE};
+use clutch_sim::{Scenario, ScenarioError};
+
+/// A sample, and the voltage that was given after it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tick {
+    /// Counts of the encoder.
+    pub counts: i64,
+    /// Voltage given after the sample, V.
+    pub volts: f64,
+}
+
+/// A stretch of samples without a gap, forwards being the way that the shaft is driven.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Name for messages: a file, a part of the experiment.
+    pub name: String,
+    /// Sampling period, s.
+    pub period: f64,
+    /// Counts of the encoder in a turn.
+    pub counts_per_rev: u32,
+    /// A step of the converter, V.
+    pub step_volts: f64,
+    /// Voltage before the first tick's, V.
+    pub volts_before: f64,
+    /// Tick of the run at which the stretch begins.
+    pub first_tick: u64,
+    /// The samples.
+    pub ticks: Vec<Tick>,
+}
+
+/// Ticks or tables that no estimator can use.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The log.
+    #[error(transparent)]
+    Log(#[from] clutch_log::LogError),
+    /// The log's scenario.
+    #[error("{name}: its scenario cannot be read: {error}")]
+    Scenario {
+        /// The log.
+        name: String,
+        /// The scenario's error.
+        error: Box<ScenarioError>,
+    },
+    /// A log of another plant.
+    #[error("{0}: it is of {1}: expected a brake, which 0 V lets go")]
+    Actuator(String, &'static str),
+    /// A log without samples under control.
+    #[error("{0}: has no samples under control")]
+    Empty(String),
+    /// A table.
+    #[error("{name}: {what}")]
+    Table {
+        /// The file.
+        name: String,
+        /// The mistake, its place and what is expected.
+        what: String,
+    },
+}
+
+impl Recording {
+    /// A count, rad.
+    #[must_use]
+    pub fn radians_per_count(&self) -> f64 {
+        core::f64::consts::TAU / f64::from(self.counts_per_rev)
+    }
+
+    /// Acceleration in counts per period² of 1 rad/s².
+    #[must_use]
+    pub fn per_rad_s2(&self) -> f64 {
+        self.period * self.period / self.radians_per_count()
+    }
+
+    /// Voltage given after sample `i`; before the first, the one that was there.
+    #[must_use]
+    pub fn volts(&self, i: isize) -> f64 {
+        usize::try_from(i).ok().and_then(|i| self.ticks.get(i)).map_or(self.volts_before, |t| t.volts)
+    }
+
+    /// Mean voltage at the pad over a part of a period: from `from` to `to` periods after sample `i`, both between 0
+    /// and 1, where a voltage takes `delay` periods to the pad.
+    #[must_use]
+    pub fn at_pad(&self, i: usize, (from, to): (f64, f64), delay: f64) -> f64 {
+        let whole = delay.floor();
+        let change = delay - whole; // within the period, the newer voltage comes then
+        let i = i as isize - whole as isize;
+        let (older, newer) = (self.volts(i - 1), self.volts(i));
+        if to <= change {
+            return older;
+        }
+        if from >= change {
+            return newer;
+        }
+        ((change - from) * older + (to - change) * newer) / (to - from)
+    }
+
+    /// The recordings in a log: more than one where samples are missing. A weight that drives backwards is turned round.
+    ///
+    /// # Errors
+    /// No scenario, no brake, no samples.
+    pub fn from_log(name: &str, log: &Log) -> Result<Vec<Recording>, ReadError> {
+        let scenario = Scenario::parse(name, &log.header.scenario_toml, &[])
+            .map_err(|error| ReadError::Scenario { name: name.to_owned(), error: Box::new(error) })?;
+        let extra = |key: &str| log.header.extra.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
+        let present = extra(PRESENT_CODE).and_then(|v| v.parse().ok());
+        let before = match present {
+            Some(code) => Some(converter(name, &scenario)?.volts(DacCode(code))),
+            None => {
+                extra(START_VOLTAGE).and_then(|v| u64::from_str_radix(v, 16).ok()).map(f64::from_bits)
+            }
+        };
+        Recording::from_records(name, &scenario, before, (&log.samples, &log.commands))
+    }
+
+    /// The recordings in the records of a run; `before`: the voltage before it, if it is known, V.
+    ///
+    /// # Errors
+    /// No brake, no samples.
+    pub fn from_records(
+        name: &str,
+        scenario: &Scenario,
+        before: Option<f64>,
+        (samples, commands): (&[SampleRecord], &[CommandRecord]),
+    ) -> Result<Vec<Recording>, ReadError> {
+        let spec = scenario.spec();
+        let kind = spec.rig.actuator.kind();
+        if kind != ActuatorKind::Brake {
+            return Err(ReadError::Actuator(name.to_owned(), kind.name()));
+        }
+        let dac = converter(name, scenario)?;
+        let template = Recording {
+            name: name.to_owned(),
+            period: spec.period.seconds(),
+            counts_per_rev: spec.rig.encoder.sensor.counts_per_rev,
+            step_volts: dac.volts(DacCode(1)) - dac.volts(DacCode(0)),
+            volts_before: 0.0,
+            first_tick: 0,
+            ticks: Vec::new(),
+        };
+        let by_the_law =
+            |c: &&CommandRecord| c.state == State::Running as u8 && c.source == CommandSource::Law as u8;
+        let mut samples =
+            samples.iter().filter(|s| s.arrival == Arrival::Fresh as u8 && !s.superseded).peekable();
+        let mut found: Vec<Recording> = Vec::new();
+        let (mut next, mut last) = (0, None);
+        for command in commands.iter().filter(by_the_law) {
+            while samples.next_if(|s| s.tick < command.tick).is_some() {}
+            let Some(sample) = samples.next_if(|s| s.tick == command.tick) else { continue };
+            if found.is_empty() || command.tick != next {
+                let volts_before = last.or(before).unwrap_or(command.voltage);
+                found.push(Recording { volts_before, first_tick: command.tick, ..template.clone() });
+            }
+            if let Some(recording) = found.last_mut() {
+                recording.ticks.push(Tick { counts: i64::from(sample.counts), volts: command.voltage });
+            }
+            (next, last) = (command.tick + 1, Some(command.voltage));
+        }
+        found.iter_mut().for_each(Recording::unwrap_counts);
+        found.retain(|r| r.ticks.len() > 1);
+        if found.is_empty() {
+            return Err(ReadError::Empty(name.to_owned()));
+        }
+        Ok(found)
+    }
+
+    /// A table of columns, one sample a row; `counts` and `volts` are the names of its columns.
+    ///
+    /// # Errors
+    /// The row, the column, and what is expected there.
+    pub fn from_csv(
+        name: &str,
+        text: &str,
+        (counts, volts): (&str, &str),
+        (period, counts_per_rev): (f64, u32),
+    ) -> Result<Recording, ReadError> {
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+        let heads = reader.headers().map_err(|e| table(name, &e.to_string()))?.clone();
+        let column = |wanted: &str| {
+            heads.iter().position(|head| head == wanted).ok_or_else(|| {
+                let all: Vec<&str> = heads.iter().collect();
+                table(name, &format!("has no column \"{wanted}\": expected one of: {}", all.join(", ")))
+            })
+        };
+        let (counts, volts) = (column(counts)?, column(volts)?);
+        let mut ticks = Vec::new();
+        for (i, row) in reader.records().enumerate() {
+            let line = i + 2;
+            let row = row.map_err(|e| table(name, &e.to_string()))?;
+            let number = |column: usize| {
+                let text = row.get(column).unwrap_or("");
+                let value = text.parse::<f64>().ok().filter(|x| x.is_finite());
+                value.ok_or_else(|| {
+                    let head = heads.get(column).unwrap_or("");
+                    table(name, &format!("line {line}, column \"{head}\" = \"{text}\": expected a number"))
+                })
+            };
+            let read = number(counts)?;
+            if read.fract() != 0.0 || read.abs() > 1e15 {
+                let what = format!("line {line}: counts = {read}: expected a whole number of counts");
+                return Err(table(name, &what));
+            }
+            ticks.push(Tick { counts: read as i64, volts: number(volts)? });
+        }
+        if ticks.len() < 2 {
+            return Err(ReadError::Empty(name.to_owned()));
+        }
+        let mut steps: Vec<f64> = ticks.windows(2).map(|w| (w[1].volts - w[0].volts).abs()).collect();
+        steps.retain(|step| *step > 1e-9);
+        let step_volts = steps.into_iter().fold(f64::INFINITY, f64::min);
+        Ok(Recording {
+            name: name.to_owned(),
+            period,
+            counts_per_rev,
+            step_volts: if step_volts.is_finite() { step_volts } else { 0.0 },
+            volts_before: ticks[0].volts,
+            first_tick: 0,
+            ticks,
+        })
+    }
+
+    /// Counts wrap at 2³², and a shaft that is driven backwards is turned round.
+    fn unwrap_counts(&mut self) {
+        let Some(first) = self.ticks.first().map(|t| t.counts) else { return };
+        let mut last = first;
+        for tick in &mut self.ticks {
+            let step = tick.counts.wrapping_sub(last) as i32;
+            tick.counts = last + i64::from(step);
+            last = tick.counts;
+        }
+        if last < first {
+            // −1 − n keeps counts that floor.
+            self.ticks.iter_mut().for_each(|tick| tick.counts = -1 - tick.counts);
+        }
+    }
+}
+
+fn converter(name: &str, scenario: &Scenario) -> Result<Dac<f64>, ReadError> {
+    Dac::new(&scenario.spec().rig.dac.converter).map_err(|e| table(name, &e.to_string()))
+}
+
+fn table(name: &str, what: &str) -> ReadError {
+    ReadError::Table { name: name.to_owned(), what: what.to_owned() }
+}

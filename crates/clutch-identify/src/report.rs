@@ -1,0 +1,236 @@
+//! What recordings tell of a shaft, and what they cannot.
+
+use crate::break_away::{self, BreakAway, Known, break_aways};
+use crate::recording::Recording;
+use crate::release::{self, Fall, Release};
+use crate::ride::{Place, Ride, Told, rides};
+use crate::{DAMPINGS, Estimate};
+use serde::Serialize;
+
+/// Standard deviations on either side of a value whose distribution is nearly normal. Two cover 90 %, not 95: the
+/// ripple that the filter believes in is not quite the disc's.
+const DEVIATIONS: f64 = 2.5;
+/// Fall of a logarithm of a likelihood at the ends of an interval.
+const FALL: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
+/// Rates that tell C/J lie this far apart, rad/s.
+const RATES_APART: f64 = 0.5;
+/// Fewest break-aways that tell μ_s/μ_d.
+const FEWEST_BREAK_AWAYS: usize = 3;
+/// Normalised innovation of an edge that no ride has: one in millions.
+const UNEXPLAINED: f64 = 7.0;
+
+/// What is known of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Finding {
+    /// A value with its interval.
+    Known(Estimate),
+    /// Why it cannot be told, and the experiment that would tell.
+    Refused(String),
+}
+
+impl Finding {
+    /// The value, if there is one.
+    #[must_use]
+    pub fn known(&self) -> Option<Estimate> {
+        match self {
+            Finding::Known(estimate) => Some(*estimate),
+            Finding::Refused(_) => None,
+        }
+    }
+}
+
+fn refused(why: &str) -> Finding {
+    Finding::Refused(why.to_owned())
+}
+
+/// All that recordings tell.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// T/J, rad/s².
+    pub pull: Finding,
+    /// Delay from a sample's voltage to its effect, s: dead time and lag together.
+    pub delay: Finding,
+    /// `v_hold = T/(μ_d K)`, V: the voltage under which a fast shaft keeps its rate.
+    pub hold: Finding,
+    /// Root mean square of friction's variation along the disc, as a share.
+    pub ripple: Finding,
+    /// μ_s/μ_d.
+    pub ratio: Finding,
+    /// Stribeck velocity, rad/s.
+    pub stribeck: Finding,
+    /// C/J, 1/s.
+    pub damping: Finding,
+    /// Time constant of the actuator, s.
+    pub lag: Finding,
+    /// Inertia, torque, gain and friction one by one.
+    pub each: Finding,
+    /// Friction along the disc, where the slowest ride went.
+    #[serde(skip)]
+    pub map: Vec<Place>,
+    /// Recordings and ticks that the model does not explain.
+    pub unexplained: Vec<String>,
+    /// Releases, break-aways, and rates of the rides (rad/s) that were found.
+    pub found: (usize, usize, Vec<f64>),
+}
+
+/// Identifies a shaft from recordings of it.
+#[must_use]
+pub fn identify(recordings: &[Recording]) -> Report {
+    let releases: Vec<Release> = recordings.iter().flat_map(release::releases).collect();
+    let slips: Vec<BreakAway<'_>> = recordings.iter().flat_map(break_aways).collect();
+    let rides: Vec<Ride<'_>> = recordings.iter().flat_map(rides).collect();
+    let mut unexplained = Vec::new();
+    let first = release::fall(&releases, DAMPINGS);
+    let told: Vec<Told> = match (&first, releases.is_empty()) {
+        (Ok(fall), false) => rides.iter().map(|r| r.told(fall.pull.value, fall.delay.value)).collect(),
+        _ => Vec::new(),
+    };
+    for Told { worst: (name, tick, off), .. } in told.iter().filter(|t| t.worst.2 > UNEXPLAINED) {
+        unexplained.push(format!(
+            "{name}: the edge at tick {tick} lies {off:.1} standard deviations from where the model has it"
+        ));
+    }
+    let line = Line::through(&told);
+    let damping = match (&first, &line) {
+        (Ok(fall), Some(line)) => line.damping(fall),
+        _ => None,
+    };
+    // With C/J, releases tell T/J more closely.
+    let fall = match damping {
+        Some(c) => release::fall(&releases, (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0))).or(first),
+        None => first,
+    };
+    if let (Err(at), false) = (&fall, releases.is_empty()) {
+        unexplained.push(format!("{}: no free fall with any delay explains the counts up to tick {}", at.name, at.tick));
+    }
+    let fall = fall.ok().filter(|_| !releases.is_empty());
+    let hold = hold(&told, line.as_ref(), fall.as_ref());
+    let slowest = told.iter().min_by(|a, b| a.rate.total_cmp(&b.rate));
+    let known = fall.as_ref().zip(hold).zip(slowest).map(|((fall, hold), slow)| Known {
+        pull: fall.pull.value,
+        delay: fall.delay.value,
+        damping: damping.map_or(0.0, |c| c.value),
+        friction: 1.0 / hold.value,
+        ripple: slow.ripple.0 / hold.value,
+    });
+    let ratio = ratio(&slips, known.as_ref());
+    let stribeck = stribeck(&slips, known.as_ref(), &ratio);
+    let no_fall = || match unexplained.last() {
+        Some(what) => refused(&format!("{what}: was it at rest before, and let go at once?")),
+        None => refused("no release: 0 V for 30 ms from rest tells it"),
+    };
+    let no_ride = "a ride at an even rate, as 5 °/s for 8 s, and releases for T/J tell it";
+    Report {
+        pull: fall.as_ref().map_or_else(no_fall, |f| Finding::Known(f.pull)),
+        delay: fall.as_ref().map_or_else(no_fall, |f| Finding::Known(f.delay)),
+        hold: hold.map_or_else(|| refused(no_ride), Finding::Known),
+        ripple: slowest.map_or_else(|| refused(no_ride), |slow| {
+            let (share, deviation) = slow.ripple;
+            let off = DEVIATIONS * deviation;
+            Finding::Known(Estimate { value: share, low: (share - off).max(0.0), high: share + off })
+        }),
+        ratio,
+        stribeck,
+        damping: damping.map_or_else(
+            || refused("it takes a fast ride beside a slow one: 60 °/s beside 20 °/s tell it"),
+            Finding::Known,
+        ),
+        lag: refused(
+            "the delay holds dead time and lag together: releases from two voltages, far apart, tell them apart",
+        ),
+        each: refused(
+            "J, T, K and μ one by one cannot be told from counts and volts: all of them scaled alike move alike; a second \
+             experiment with a known mass added tells them",
+        ),
+        map: slowest.map(|slow| slow.map.clone()).unwrap_or_default(),
+        unexplained,
+        found: (releases.len(), slips.len(), rides.iter().map(|r| r.rate).collect()),
+    }
+}
+
+/// The straight line `1/h_v = A − B v` through rides, with its covariance.
+struct Line {
+    value: f64,
+    slope: f64,
+    variances: (f64, f64),
+}
+
+impl Line {
+    /// None if the rates are too close for a slope.
+    fn through(told: &[Told]) -> Option<Line> {
+        let rates = told.iter().map(|t| t.rate);
+        let apart = rates.clone().fold(0.0, f64::max) - rates.fold(f64::INFINITY, f64::min);
+        if told.len() < 2 || apart < RATES_APART {
+            return None;
+        }
+        let (mut w, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for Told { rate, hold, .. } in told {
+            let weight = 1.0 / (hold.1 * hold.1);
+            w += weight;
+            x += weight * rate;
+            y += weight * hold.0;
+            xx += weight * rate * rate;
+            xy += weight * rate * hold.0;
+        }
+        let d = w * xx - x * x;
+        let (value, slope) = ((xx * y - x * xy) / d, (w * xy - x * y) / d);
+        Some(Line { value, slope: -slope, variances: (xx / d, w / d) })
+    }
+
+    /// C/J.
+    fn damping(&self, fall: &Fall) -> Option<Estimate> {
+        let per = fall.pull.value / self.value;
+        let off = DEVIATIONS * self.variances.1.sqrt() * per;
+        let value = self.slope * per;
+        // Damping does not drive.
+        (value + off > 0.0).then(|| Estimate {
+            value: value.max(0.0),
+            low: (value - off).max(0.0),
+            high: value + off,
+        })
+    }
+}
+
+/// `v_hold`: from the line through the rides; without one from the slowest, whatever damping takes.
+fn hold(told: &[Told], line: Option<&Line>, fall: Option<&Fall>) -> Option<Estimate> {
+    if let Some(line) = line {
+        let off = DEVIATIONS * line.variances.0.sqrt();
+        return Some(Estimate { value: line.value, low: line.value - off, high: line.value + off });
+    }
+    let slow = told.iter().min_by(|a, b| a.rate.total_cmp(&b.rate))?;
+    let (value, deviation) = slow.hold;
+    let most = value / (1.0 - DAMPINGS.1 * slow.rate / fall?.pull.low);
+    let off = DEVIATIONS * deviation;
+    Some(Estimate { value: 0.5 * (value + most), low: value - off, high: most + off })
+}
+
+fn ratio(slips: &[BreakAway<'_>], known: Option<&Known>) -> Finding {
+    let Some(known) = known else {
+        return refused("it takes T/J and v_hold, which releases and a ride tell");
+    };
+    if slips.len() < FEWEST_BREAK_AWAYS {
+        return Finding::Refused(format!(
+            "{} break-aways of the {FEWEST_BREAK_AWAYS} that it takes: a crawl at 0.5 °/s under a soft law, \
+             or a voltage that falls by one code each 10 ms, tells it",
+            slips.len()
+        ));
+    }
+    match break_away::ratio(slips, known, FALL) {
+        Some(estimate) => Finding::Known(estimate),
+        None => refused("the break-aways do not bound it: more of them, from a slower ramp, tell it"),
+    }
+}
+
+fn stribeck(slips: &[BreakAway<'_>], known: Option<&Known>, ratio: &Finding) -> Finding {
+    let (Some(known), Finding::Known(ratio)) = (known, ratio) else {
+        return refused("it takes μ_s/μ_d, and break-aways under slow ramps");
+    };
+    if ratio.low < 1.1 {
+        return refused("friction falls too little from rest to motion (μ_s/μ_d may be below 1.1) for its velocity to show");
+    }
+    match break_away::stribeck(slips, known, ratio.value, FALL) {
+        Some(estimate) => Finding::Known(estimate),
+        None => refused("the break-aways do not bound it on both sides: more of them, from a slower ramp, may tell it"),
+    }
+}

@@ -1,0 +1,188 @@
+//! Mean friction, its ripple along the disc, and C/J, from rides at even rates.
+//!
+//! A shaft that moves evenly at `v` says `1 = (h + r) u + (c/g) v` with `h = μ_d K/T`, `g` = T/J and `c = C_d/J`, so that a
+//! ride gives `1/h_v = (1/h) (1 − (c/g) v)`: a straight line over the rates, whose value at 0 is `v_hold = 1/h` and whose slope
+//! tells C/J.
+
+use crate::filter::{Belief, Shaft, Spread, smooth};
+use crate::recording::Recording;
+
+/// What a ride needs to be one.
+const LONGEST_SILENCE: f64 = 6.0; // times the median time between edges
+const SETTLING_S: f64 = 0.5;
+const SHORTEST_S: f64 = 1.0;
+const SHORTEST_RAD: f64 = 0.17;
+/// Waves per turn that a ripple is taken to have, and their damping: a wide band, as the law glide believes.
+pub const WAVES_PER_TURN: f64 = 340.0;
+/// See [`WAVES_PER_TURN`].
+pub const WAVE_DAMPING: f64 = 0.25;
+/// Wander of the velocity that no friction explains, rad/s/√s.
+pub const WALK: f64 = 0.01;
+/// Times that the ripple's size is estimated anew.
+const ROUNDS: usize = 8;
+
+/// A ride at an even rate.
+#[derive(Clone, Debug)]
+pub struct Ride<'a> {
+    recording: &'a Recording,
+    /// First and last tick, of the recording.
+    ticks: (usize, usize),
+    /// Rate, rad/s.
+    pub rate: f64,
+}
+
+/// A place of the disc and its friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Angle, rad, from the encoder's zero.
+    pub angle: f64,
+    /// Friction there, over its mean.
+    pub factor: f64,
+}
+
+/// What a ride tells.
+#[derive(Clone, Debug)]
+pub struct Told {
+    /// Rate, rad/s.
+    pub rate: f64,
+    /// `1/h_v`, V, and its standard deviation.
+    pub hold: (f64, f64),
+    /// Root mean square of the ripple, as a share of friction, and its standard deviation.
+    pub ripple: (f64, f64),
+    /// Friction along the way, each four counts.
+    pub map: Vec<Place>,
+    /// Recording, tick and normalised innovation of the edge that fits worst.
+    pub worst: (String, u64, f64),
+}
+
+/// The rides in a recording.
+#[must_use]
+pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
+    let ticks = &recording.ticks;
+    let edges: Vec<usize> = (1..ticks.len()).filter(|&i| ticks[i].counts > ticks[i - 1].counts).collect();
+    if edges.len() < 20 {
+        return Vec::new();
+    }
+    let mut gaps: Vec<usize> = edges.windows(2).map(|w| w[1] - w[0]).collect();
+    gaps.sort_unstable();
+    let longest = LONGEST_SILENCE * gaps[gaps.len() / 2] as f64;
+    let mut found = Vec::new();
+    let mut first = 0;
+    for k in 1..=edges.len() {
+        if k < edges.len() && ((edges[k] - edges[k - 1]) as f64) <= longest {
+            continue;
+        }
+        let begin = edges[first] + (SETTLING_S / recording.period) as usize;
+        let begin = edges[first..k].iter().copied().find(|&e| e >= begin);
+        let end = edges[k - 1];
+        first = k;
+        let Some(begin) = begin else { continue };
+        let seconds = end.saturating_sub(begin) as f64 * recording.period;
+        let way = |a: usize, b: usize| (ticks[b].counts - ticks[a].counts) as f64 * recording.radians_per_count();
+        if seconds < SHORTEST_S || way(begin, end) < SHORTEST_RAD {
+            continue;
+        }
+        let middle = begin.midpoint(end);
+        let halves = way(begin, middle) / way(middle, end).max(1e-9);
+        if (0.9..1.1).contains(&halves) {
+            found.push(Ride { recording, ticks: (begin, end), rate: way(begin, end) / seconds });
+        }
+    }
+    found
+}
+
+/// The shaft in counts and periods; `damping` in 1/s, `ripple` in 1/V.
+#[must_use]
+pub fn shaft(recording: &Recording, pull: f64, damping: f64, ripple: f64) -> Shaft {
+    let walk = WALK * recording.period.sqrt() * recording.period / recording.radians_per_count();
+    Shaft {
+        pull: pull * recording.per_rad_s2(),
+        damping: damping * recording.period,
+        wave: WAVES_PER_TURN * recording.radians_per_count(),
+        wave_damping: WAVE_DAMPING,
+        ripple,
+        walk: walk * walk,
+    }
+}
+
+impl Ride<'_> {
+    /// Friction along the way, for T/J (rad/s²) and delay (s) as known. Damping is left in friction: see the head of this
+    /// file.
+    #[must_use]
+    pub fn told(&self, pull: f64, delay: f64) -> Told {
+        let r = self.recording;
+        let (begin, end) = self.ticks;
+        let volts = (begin..end).map(|i| r.ticks[i].volts).sum::<f64>() / (end - begin) as f64;
+        let guess = 1.0 / volts.max(1e-6);
+        let mut share = 0.1;
+        let mut ripple_deviation = 0.0;
+        let (mut hold, mut map, mut worst) = ((0.0, 0.0), Vec::new(), (begin, 0.0));
+        for round in 0..ROUNDS {
+            let shaft = shaft(r, pull, 0.0, share * guess);
+            let (passed, surprise) = self.pass(&shaft, delay / r.period, guess);
+            let beliefs = smooth(&passed);
+            let last = &beliefs[beliefs.len() - 1];
+            let h = last.mean[2];
+            hold = (1.0 / h, last.spread[(2, 2)].max(0.0).sqrt() / (h * h));
+            // Expectation of r² along the way: what is seen of it, and what is not.
+            let weights: f64 = beliefs.iter().map(|b| b.mean[1].max(0.0)).sum();
+            let square: f64 = beliefs.iter().map(|b| b.mean[1].max(0.0) * (b.mean[3] * b.mean[3] + b.spread[(3, 3)])).sum();
+            share = (square / weights).max(1e-12).sqrt() / h;
+            if round + 1 == ROUNDS {
+                // Independent places: one for each radian of the wave.
+                let way = (r.ticks[end].counts - r.ticks[begin].counts) as f64 * shaft.wave;
+                ripple_deviation = share / (0.5 * way).max(1.0).sqrt();
+                map = self.map(&beliefs);
+                worst = surprise;
+            }
+        }
+        Told {
+            rate: self.rate,
+            hold,
+            ripple: (share, ripple_deviation),
+            map,
+            worst: (r.name.clone(), r.first_tick + worst.0 as u64, worst.1),
+        }
+    }
+
+    /// The filter along the ride: as [`smooth`] takes it, and the tick with the largest normalised innovation.
+    fn pass(&self, shaft: &Shaft, delay: f64, friction: f64) -> (Vec<(Belief, Belief, Spread)>, (usize, f64)) {
+        let r = self.recording;
+        let (begin, end) = self.ticks;
+        let origin = r.ticks[begin].counts;
+        let rate = self.rate * r.period / r.radians_per_count();
+        let mut belief = Belief::new(shaft, 0.5, (rate, rate), (friction, 0.5 * friction));
+        let mut out = vec![(belief, belief, Spread::identity())];
+        let mut worst = (begin, 0.0);
+        for i in begin..end {
+            let f = belief.advance(shaft, r.at_pad(i, (0.0, 1.0), delay), 1.0);
+            let predicted = belief;
+            let (before, now) = (r.ticks[i].counts, r.ticks[i + 1].counts);
+            if now > before {
+                let surprise = belief.cross((now - origin) as f64).square;
+                // The first edges tell where it is.
+                if i > begin + 100 && surprise > worst.1 {
+                    worst = (i + 1, surprise);
+                }
+            }
+            out.push((belief, predicted, f));
+        }
+        (out, (worst.0, f64::sqrt(worst.1)))
+    }
+
+    fn map(&self, beliefs: &[Belief]) -> Vec<Place> {
+        let r = self.recording;
+        let origin = r.ticks[self.ticks.0].counts as f64;
+        let mut next = f64::NEG_INFINITY;
+        let mut map = Vec::new();
+        for belief in beliefs {
+            let counts = origin + belief.mean[0];
+            if counts >= next {
+                next = counts + 4.0;
+                let factor = 1.0 + belief.mean[3] / belief.mean[2];
+                map.push(Place { angle: counts * r.radians_per_count(), factor });
+            }
+        }
+        map
+    }
+}

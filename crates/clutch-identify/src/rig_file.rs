@@ -1,0 +1,137 @@
+//! What was identified, as a file: `[model]` and `[bounds]` for scenarios, and the intervals behind them.
+
+use crate::report::{Finding, Report};
+use crate::Estimate;
+use clutch_core::Actuator;
+use clutch_sim::Scenario;
+use toml::{Table, Value};
+
+/// Standard deviations of the ripple that friction's bounds hold.
+const RIPPLE: f64 = 3.0;
+/// Largest tolerance that a scenario takes, %.
+const MOST_PERCENT: f64 = 99.9;
+
+/// A file cannot be written for want of a parameter.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("no rig file: {parameter} is not known: {why}")]
+pub struct Lacks {
+    /// The parameter.
+    pub parameter: &'static str,
+    /// Why it is not.
+    pub why: String,
+}
+
+fn need(parameter: &'static str, finding: &Finding) -> Result<Estimate, Lacks> {
+    match finding {
+        Finding::Known(estimate) => Ok(*estimate),
+        Finding::Refused(why) => Err(Lacks { parameter, why: why.clone() }),
+    }
+}
+
+/// The file. Drive torque and brake gain are those of the scenario's model: counts and volts tell the other parameters
+/// as ratios to them, and so does all that is calculated from them.
+///
+/// # Errors
+/// A parameter that is not known.
+pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
+    let pull = need("T/J", &report.pull)?;
+    let hold = need("T/(mu_d K)", &report.hold)?;
+    let ratio = need("mu_s/mu_d", &report.ratio)?;
+    let damping = need("C/J", &report.damping)?;
+    let ripple = need("the ripple", &report.ripple)?;
+    let model = scenario.spec().model;
+    let torque = model.drive_torque;
+    let gain = Actuator::new(&model.actuator).map_or(0.0, |a| a.brake_gain());
+    let inertia = around(torque / pull.high, torque / pull.low);
+    let damping = around(damping.low * inertia.0, damping.high * inertia.0);
+    let sliding = torque / (hold.value * gain);
+    let at_disc = report.map.iter().map(|place| (place.factor - 1.0).abs()).fold(RIPPLE * ripple.high, f64::max);
+    let friction = (1.0 + hold.share()) * (1.0 + ratio.share()) * (1.0 + at_disc) - 1.0;
+    let percent = |share: f64| Value::Float((100.0 * share).min(MOST_PERCENT));
+    let stribeck = [
+        ("mu_static", Some(ratio.value * sliding)),
+        ("mu_dynamic", Some(sliding)),
+        ("stribeck_velocity_rad_s", report.stribeck.known().map(|v| v.value)),
+    ];
+    let stribeck: Table = stribeck
+        .into_iter()
+        .filter_map(|(key, value)| Some((key.to_owned(), Value::Float(value?))))
+        .collect();
+    let friction_table = Table::from_iter([("stribeck".to_owned(), Value::Table(stribeck))]);
+    let model = Table::from_iter([
+        ("inertia_kg_m2".to_owned(), Value::Float(inertia.0)),
+        ("drive_torque_nm".to_owned(), Value::Float(torque)),
+        ("viscous_damping_nm_s_rad".to_owned(), Value::Float(damping.0)),
+        ("friction".to_owned(), Value::Table(friction_table)),
+    ]);
+    let bounds = Table::from_iter([
+        ("inertia_percent".to_owned(), percent(inertia.1)),
+        ("viscous_damping_percent".to_owned(), percent(damping.1)),
+        ("friction_percent".to_owned(), percent(friction)),
+        ("drive_torque_percent".to_owned(), Value::Float(0.0)),
+        ("brake_gain_percent".to_owned(), Value::Float(0.0)),
+    ]);
+    let file = Table::from_iter([
+        ("model".to_owned(), Value::Table(model)),
+        ("bounds".to_owned(), Value::Table(bounds)),
+        ("identified".to_owned(), Value::Table(intervals(report))),
+    ]);
+    Ok(format!(
+        "# What `clutch identify` found for: {}\n\
+         # For `clutch certify`, `clutch loop` and `clutch sim`: --identified THIS_FILE.toml puts [model] and [bounds] into a\n\
+         # scenario. Drive torque and brake gain are the scenario's own: only ratios to them can be told, and matter.\n\n{file}",
+        scenario.name().replace(['\n', '\r'], " ")
+    ))
+}
+
+/// Middle of an interval, and its half width as a share of that.
+fn around(low: f64, high: f64) -> (f64, f64) {
+    let middle = 0.5 * (low + high);
+    (middle, 0.5 * (high - low) / middle.max(f64::MIN_POSITIVE))
+}
+
+/// The intervals, each with the unit in its key.
+fn intervals(report: &Report) -> Table {
+    rows(report)
+        .into_iter()
+        .map(|row| {
+            let value = match row.finding {
+                Finding::Refused(why) => Value::String(why.clone()),
+                Finding::Known(e) => {
+                    let ends = [("value", e.value), ("low", e.low), ("high", e.high)];
+                    Value::Table(ends.into_iter().map(|(key, x)| (key.to_owned(), Value::Float(x))).collect())
+                }
+            };
+            (row.key.to_owned(), value)
+        })
+        .collect()
+}
+
+/// A parameter as it is shown.
+pub struct Row<'a> {
+    /// Key in files and JSON, SI.
+    pub key: &'static str,
+    /// Name for readers.
+    pub label: &'static str,
+    /// Unit for readers, and what SI is multiplied by for it.
+    pub unit: (&'static str, f64),
+    /// What is known.
+    pub finding: &'a Finding,
+}
+
+/// The parameters in the order in which they are shown.
+#[must_use]
+pub fn rows(report: &Report) -> Vec<Row<'_>> {
+    let row = |key, label, unit, finding| Row { key, label, unit, finding };
+    vec![
+        row("pull_rad_s2", "T/J", ("rad/s²", 1.0), &report.pull),
+        row("delay_s", "delay, dead time and lag", ("ms", 1e3), &report.delay),
+        row("hold_v", "v_hold = T/(μ_d K)", ("V", 1.0), &report.hold),
+        row("ripple_rms", "ripple, rms", ("%", 100.0), &report.ripple),
+        row("ratio", "μ_s/μ_d", ("", 1.0), &report.ratio),
+        row("stribeck_velocity_rad_s", "Stribeck velocity", ("mrad/s", 1e3), &report.stribeck),
+        row("damping_1_s", "C/J", ("1/s", 1.0), &report.damping),
+        row("lag_s", "lag", ("ms", 1e3), &report.lag),
+        row("each", "J, T, K, μ one by one", ("", 1.0), &report.each),
+    ]
+}

@@ -1,0 +1,157 @@
+//! Estimates of shafts that the estimators know nothing of, and refusals.
+
+use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
+use clutch_identify::release::{fall, releases};
+use clutch_identify::{DAMPINGS, Finding, Recording, Report, Tick, identify};
+use clutch_sim::Scenario;
+
+/// A rig that is not as the scenario's model has it: T/J, v_hold, μ_s/μ_d, C/J follow.
+const RIG: &str = r#"
+name = "unlike Table 1"
+[rig]
+base = "bench"
+delay_ticks = 1
+inertia_kg_m2 = 0.0014
+viscous_damping_nm_s_rad = 0.0021
+[rig.friction.stribeck]
+mu_static = 0.185
+mu_dynamic = 0.118
+stribeck_velocity_rad_s = 0.002
+[rig.ripple]
+rms = 0.08
+[law.smc]
+[reference.ramp]
+rate_deg_s = 2.0
+[bounds]
+friction_percent = 60.0
+inertia_percent = 40.0
+drive_torque_percent = 25.0
+viscous_damping_percent = 99.0
+[run]
+seed = 77
+start = "rest"
+[safety]
+reason = "a weight drives the shaft"
+[safety.on_fault.hold]
+volts_v = 9.99
+"#;
+
+fn recordings(set: &[(&str, &str)]) -> Vec<Recording> {
+    let set: Vec<(String, String)> = set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let scenario = Scenario::parse("rig", RIG, &set).unwrap();
+    let mut board = VirtualBoard::default();
+    experiment(&scenario, &Programme::default(), &mut |name, part| board.run(name, part)).unwrap()
+}
+
+fn assert_known(finding: &Finding, truth: f64, within: f64) {
+    let e = finding.known().unwrap_or_else(|| panic!("{finding:?}"));
+    assert!(e.holds(truth), "{truth}: {e:?}");
+    assert!((e.value - truth).abs() <= within, "{truth} ± {within}: {e:?}");
+    assert!(e.low < e.value && e.value < e.high, "{e:?}");
+}
+
+fn refusal(finding: &Finding) -> &str {
+    match finding {
+        Finding::Refused(why) => why,
+        Finding::Known(e) => panic!("{e:?}"),
+    }
+}
+
+fn part<'a>(all: &'a [Recording], name: &str) -> Vec<&'a Recording> {
+    all.iter().filter(|r| r.name == name).collect()
+}
+
+fn of(all: &[Recording], names: &[&str]) -> Report {
+    let some: Vec<Recording> = names.iter().flat_map(|name| part(all, name)).cloned().collect();
+    identify(&some)
+}
+
+#[test]
+fn a_hidden_rig_is_found_and_what_a_log_does_not_show_is_refused() {
+    let all = recordings(&[]);
+    let torque = 0.2094 * 9.81 * 0.024;
+    let hold = torque / (0.118 * 0.14);
+    let report = identify(&all);
+    assert_known(&report.pull, torque / 0.0014, 0.01 * torque / 0.0014);
+    assert_known(&report.delay, 1e-3, 0.15e-3);
+    assert_known(&report.hold, hold, 0.004 * hold);
+    assert_known(&report.ripple, 0.08, 0.01);
+    assert_known(&report.ratio, 0.185 / 0.118, 0.05);
+    assert_known(&report.damping, 1.5, 0.4);
+    assert!(report.unexplained.is_empty(), "{:?}", report.unexplained);
+    assert!(refusal(&report.each).contains("mass"));
+
+    // Part by part: no estimate without its experiment, and the experiment has a name.
+    let no_fall = of(&all, &["crawl", "ride_5", "ride_60"]);
+    assert!(refusal(&no_fall.pull).contains("0 V for 30 ms"), "{no_fall:?}");
+    assert!(refusal(&no_fall.hold).contains("releases"), "{no_fall:?}");
+    let one_rate = of(&all, &["releases", "ride_5"]);
+    assert!(refusal(&one_rate.damping).contains("60 °/s"), "{one_rate:?}");
+    assert_known(&one_rate.hold, hold, 0.01 * hold);
+    assert!(refusal(&one_rate.ratio).contains("crawl"), "{one_rate:?}");
+    assert!(refusal(&one_rate.stribeck).contains("break-aways"), "{one_rate:?}");
+}
+
+#[test]
+fn a_count_that_no_fall_explains_is_named() {
+    let all = recordings(&[]);
+    let mut bad: Vec<Recording> = part(&all, "releases").into_iter().cloned().collect();
+    let found = releases(&bad[0]);
+    assert_eq!(found.len(), 12);
+    assert!(fall(&found, DAMPINGS).is_ok());
+    // The fifth release loses ten counts on its way.
+    let first = found[4].place.1 as usize;
+    for tick in &mut bad[0].ticks[first + 20..] {
+        tick.counts -= 10;
+    }
+    let at = fall(&releases(&bad[0]), DAMPINGS).unwrap_err();
+    assert_eq!(at.name, "releases");
+    assert!((first..first + 40).contains(&(at.tick as usize)), "{at:?} for {first}");
+    let report = identify(&bad);
+    assert!(refusal(&report.pull).contains(&format!("tick {}", at.tick)), "{report:?}");
+}
+
+#[test]
+fn tables_of_others_are_read_and_their_mistakes_named() {
+    let scale = (0.001, 20_000);
+    let read = |text: &str| Recording::from_csv("t.csv", text, ("n", "u"), scale);
+    let good = read("t,n,u\n0,0,4.5\n1,1,4.5\n2,3,4.4\n").unwrap();
+    assert_eq!(good.ticks[2], Tick { counts: 3, volts: 4.4 });
+    assert!((good.step_volts - 0.1).abs() < 1e-12);
+    for (text, said) in [
+        ("t,m,u\n0,0,4.5\n", "t.csv: has no column \"n\": expected one of: t, m, u"),
+        ("n,u\n0,4.5\n0.5,4.5\n", "t.csv: line 3: counts = 0.5: expected a whole number of counts"),
+        ("n,u\n0,4.5\n1,high\n", "t.csv: line 3, column \"u\" = \"high\": expected a number"),
+        ("n,u\n0,inf\n", "t.csv: line 2, column \"u\" = \"inf\": expected a number"),
+        ("n,u\n0,4.5\n", "t.csv: has no samples under control"),
+    ] {
+        assert_eq!(read(text).unwrap_err().to_string(), said);
+    }
+}
+
+#[test]
+fn nothing_panics_on_recordings_that_make_no_sense() {
+    use rand::{RngExt, SeedableRng};
+    let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
+    for n in [2_usize, 3, 50, 3000] {
+        for _ in 0..20 {
+            let mut counts = 0;
+            let ticks = (0..n).map(|_| {
+                counts += rng.random_range(-2..=40_i64) * i64::from(rng.random_bool(0.3));
+                let volts = [0.0, 2.0, -1.0, rng.random_range(-10.0..10.0)][rng.random_range(0..4)];
+                Tick { counts, volts }
+            });
+            let ticks = ticks.collect();
+            let recording = Recording {
+                name: "noise".to_owned(),
+                period: 0.001,
+                counts_per_rev: 20_000,
+                step_volts: 0.005,
+                volts_before: 3.0,
+                first_tick: 0,
+                ticks,
+            };
+            let _ = identify(&[recording.clone(), recording]);
+        }
+    }
+}
