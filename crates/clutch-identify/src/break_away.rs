@@ -142,7 +142,7 @@ impl BreakAway<'_> {
             belief.advance(shaft, r.at_pad(j, part, delay), part.1 - part.0);
             let (before, now) = (r.ticks[j].counts, r.ticks[j + 1].counts);
             if now > before {
-                log += belief.cross((now - origin) as f64).density;
+                log += belief.cross((now - origin) as f64, 0.0).density;
             }
         }
         log

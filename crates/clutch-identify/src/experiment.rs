@@ -204,7 +204,7 @@ fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, Scenario
     let wait = base.safety()?.on_fault.holding_voltage().unwrap_or(0.8 * spec.output.highest);
     let wait = wait.min(spec.output.highest);
     // The first period of a step takes all of it away.
-    let kp = 1.5 * wait / (rate * spec.period.seconds::<f64>());
+    let kp = 8.0 * wait / (rate * spec.period.seconds::<f64>());
     let law = table([("pid", table([
         ("kp_v_rad", Value::Float(kp)),
         ("ki_v_rad_s", Value::Float(0.0)),

@@ -31,6 +31,9 @@ pub struct Shaft {
     pub walk: f64,
 }
 
+/// Standard deviations beyond which a measurement is far from what is believed.
+const FAR: f64 = 5.0;
+
 /// What is believed at a time.
 #[derive(Clone, Copy, Debug)]
 pub struct Belief {
@@ -66,48 +69,50 @@ impl Belief {
         let a = shaft.pull - load * (mean + ripple) - shaft.damping * velocity;
         let way = velocity * dt + 0.5 * a * dt * dt;
         let (k2, decay) = (shaft.wave * shaft.wave, 2.0 * shaft.wave_damping * shaft.wave);
-        let fall = k2 * ripple + decay * slope;
-        let next = slope - way * fall;
-        self.mean = State::new(position + way, velocity + a * dt, mean, ripple + way * next, next);
-        // Of the way by velocity and friction.
-        let (by_velocity, by_friction) = (dt - 0.5 * shaft.damping * dt * dt, -0.5 * load * dt * dt);
+        // The wave turns by the way that is believed, of which no covariance is kept: through slopes that are believed with the
+        // way it would be taken for a measurement of them. A brake drives nothing back.
+        let turned = way.max(0.0);
+        let next = slope - turned * (k2 * ripple + decay * slope);
+        self.mean = State::new(position + way, velocity + a * dt, mean, ripple + turned * next, next);
+        let by_friction = -0.5 * load * dt * dt;
         let mut f = Spread::identity();
-        f[(0, 1)] = by_velocity;
+        f[(0, 1)] = dt - 0.5 * shaft.damping * dt * dt;
         f[(0, 2)] = by_friction;
         f[(0, 3)] = by_friction;
         f[(1, 1)] = 1.0 - shaft.damping * dt;
         f[(1, 2)] = -load * dt;
         f[(1, 3)] = -load * dt;
-        f[(4, 1)] = -fall * by_velocity;
-        f[(4, 2)] = -fall * by_friction;
-        f[(4, 3)] = -way * k2 - fall * by_friction;
-        f[(4, 4)] = 1.0 - way * decay;
-        for column in 0..5 {
-            let own = if column == 3 { 1.0 } else { 0.0 };
-            f[(3, column)] = own + way * f[(4, column)] + next * f[(0, column)];
-        }
-        f[(3, 0)] = 0.0;
+        f[(4, 3)] = -turned * k2;
+        f[(4, 4)] = 1.0 - turned * decay;
+        f[(3, 3)] = 1.0 + turned * f[(4, 3)];
+        f[(3, 4)] = turned * f[(4, 4)];
         self.spread = f * self.spread * f.transpose();
         self.spread[(1, 1)] += shaft.walk * dt;
         // With it the wave's variance stays what it is.
-        self.spread[(4, 4)] += 2.0 * decay * k2 * shaft.ripple * shaft.ripple * way.abs();
+        self.spread[(4, 4)] += 2.0 * decay * k2 * shaft.ripple * shaft.ripple * turned;
         f
     }
 
-    /// The shaft is at a position, with a variance.
+    /// The shaft is at a position, with a variance. One far from what is believed widens the belief first, so that it is
+    /// found again.
     pub fn correct(&mut self, position: f64, variance: f64) -> Surprise {
         let y = position - self.mean[0];
+        let square = y * y / (self.spread[(0, 0)] + variance);
+        if square > FAR * FAR {
+            self.spread[(0, 0)] += y * y;
+            self.spread[(1, 1)] += 0.25 * y * y;
+        }
         let s = self.spread[(0, 0)] + variance;
         let gain = self.spread.column(0) / s;
         self.mean += gain * y;
         self.spread -= gain * gain.transpose() * s;
-        let square = y * y / s;
-        Surprise { square, density: -0.5 * (square + libm::log(core::f64::consts::TAU * s)) }
+        Surprise { square, density: -0.5 * (y * y / s + libm::log(core::f64::consts::TAU * s)) }
     }
 
-    /// An edge was crossed in the last period: it lies at most the period's way back.
-    pub fn cross(&mut self, counts: f64) -> Surprise {
-        let span = self.mean[1].clamp(0.02, 1.0);
+    /// An edge was crossed in the last period: it lies at most the period's way back. `least`: the way that a shaft makes at
+    /// least, counts.
+    pub fn cross(&mut self, counts: f64, least: f64) -> Surprise {
+        let span = self.mean[1].max(least).clamp(0.02, 1.0);
         self.correct(counts + 0.5 * span, span * span / 12.0)
     }
 }

@@ -83,7 +83,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
     let mut unexplained = Vec::new();
     let first = release::fall(&releases, DAMPINGS);
     let told: Vec<Told> = match (&first, releases.is_empty()) {
-        (Ok(fall), false) => rides.iter().map(|r| r.told(fall.pull.value, fall.delay.value)).collect(),
+        (Ok(fall), false) => tell(rides.clone(), fall),
         _ => Vec::new(),
     };
     for Told { worst: (name, tick, off), .. } in told.iter().filter(|t| t.worst.2 > UNEXPLAINED) {
@@ -106,7 +106,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
     }
     let fall = fall.ok().filter(|_| !releases.is_empty());
     let hold = hold(&told, line.as_ref(), fall.as_ref());
-    let slowest = told.iter().min_by(|a, b| a.rate.total_cmp(&b.rate));
+    let slowest = told.first();
     let known = fall.as_ref().zip(hold).zip(slowest).map(|((fall, hold), slow)| Known {
         pull: fall.pull.value,
         delay: fall.delay.value,
@@ -147,6 +147,20 @@ pub fn identify(recordings: &[Recording]) -> Report {
         unexplained,
         found: (releases.len(), slips.len(), rides.iter().map(|r| r.rate).collect()),
     }
+}
+
+/// What the rides tell, the slowest first: a fast one does not see the ripple, and takes its size from that.
+fn tell(mut rides: Vec<Ride<'_>>, fall: &Fall) -> Vec<Told> {
+    rides.sort_by(|a, b| a.rate.total_cmp(&b.rate));
+    let mut share = None;
+    rides
+        .iter()
+        .map(|ride| {
+            let told = ride.told(fall.pull.value, fall.delay.value, share);
+            share = share.or(Some(told.ripple.0));
+            told
+        })
+        .collect()
 }
 
 /// The straight line `1/h_v = A − B v` through rides, with its covariance.
@@ -198,7 +212,7 @@ fn hold(told: &[Told], line: Option<&Line>, fall: Option<&Fall>) -> Option<Estim
         let off = DEVIATIONS * line.variances.0.sqrt();
         return Some(Estimate { value: line.value, low: line.value - off, high: line.value + off });
     }
-    let slow = told.iter().min_by(|a, b| a.rate.total_cmp(&b.rate))?;
+    let slow = told.first()?;
     let (value, deviation) = slow.hold;
     let most = value / (1.0 - DAMPINGS.1 * slow.rate / fall?.pull.low);
     let off = DEVIATIONS * deviation;

@@ -18,8 +18,9 @@ pub const WAVES_PER_TURN: f64 = 340.0;
 pub const WAVE_DAMPING: f64 = 0.25;
 /// Wander of the velocity that no friction explains, rad/s/√s.
 pub const WALK: f64 = 0.01;
-/// Times that the ripple's size is estimated anew.
+/// Times that the ripple's size is estimated, and what it is taken to be before.
 const ROUNDS: usize = 8;
+const FIRST_SHARE: f64 = 0.15;
 
 /// A ride at an even rate.
 #[derive(Clone, Debug)]
@@ -107,40 +108,41 @@ pub fn shaft(recording: &Recording, pull: f64, damping: f64, ripple: f64) -> Sha
 
 impl Ride<'_> {
     /// Friction along the way, for T/J (rad/s²) and delay (s) as known. Damping is left in friction: see the head of this
-    /// file.
+    /// file. `share`: the ripple's size as a share of friction, or none, if this ride is to tell it.
     #[must_use]
-    pub fn told(&self, pull: f64, delay: f64) -> Told {
+    pub fn told(&self, pull: f64, delay: f64, share: Option<f64>) -> Told {
         let r = self.recording;
         let (begin, end) = self.ticks;
         let volts = (begin..end).map(|i| r.ticks[i].volts).sum::<f64>() / (end - begin) as f64;
-        let guess = 1.0 / volts.max(1e-6);
-        let mut share = 0.1;
-        let mut ripple_deviation = 0.0;
-        let (mut hold, mut map, mut worst) = ((0.0, 0.0), Vec::new(), (begin, 0.0));
-        for round in 0..ROUNDS {
-            let shaft = shaft(r, pull, 0.0, share * guess);
-            let (passed, surprise) = self.pass(&shaft, delay / r.period, guess);
-            let beliefs = smooth(&passed);
-            let last = &beliefs[beliefs.len() - 1];
-            let h = last.mean[2];
-            hold = (1.0 / h, last.spread[(2, 2)].max(0.0).sqrt() / (h * h));
-            // Expectation of r² along the way: what is seen of it, and what is not.
-            let weights: f64 = beliefs.iter().map(|b| b.mean[1].max(0.0)).sum();
-            let square: f64 = beliefs.iter().map(|b| b.mean[1].max(0.0) * (b.mean[3] * b.mean[3] + b.spread[(3, 3)])).sum();
-            share = (square / weights).max(1e-12).sqrt() / h;
-            if round + 1 == ROUNDS {
-                // Independent places: one for each radian of the wave.
-                let way = (r.ticks[end].counts - r.ticks[begin].counts) as f64 * shaft.wave;
-                ripple_deviation = share / (0.5 * way).max(1.0).sqrt();
-                map = self.map(&beliefs);
-                worst = surprise;
+        let mut friction = 1.0 / volts.max(1e-6);
+        let mut size = share.unwrap_or(FIRST_SHARE);
+        let rounds = if share.is_some() { 1 } else { ROUNDS };
+        let mut worst = (begin, 0.0);
+        let mut beliefs = Vec::new();
+        for round in 0..rounds {
+            let shaft = shaft(r, pull, 0.0, size * friction);
+            let (passed, surprise) = self.pass(&shaft, delay / r.period, friction);
+            beliefs = smooth(&passed);
+            worst = surprise;
+            friction = beliefs[beliefs.len() - 1].mean[2];
+            if round + 1 < rounds {
+                // Expectation of r² along the way: what is seen of it, and what is not.
+                let sums = beliefs.iter().fold((0.0, 0.0), |(way, square), b| {
+                    let v = b.mean[1].max(0.0);
+                    (way + v, square + v * (b.mean[3] * b.mean[3] + b.spread[(3, 3)]))
+                });
+                size = (sums.1 / sums.0).clamp(1e-6, 1.0).sqrt() / friction;
             }
         }
+        let last = &beliefs[beliefs.len() - 1];
+        // Independent places: one for each radian of the wave.
+        let wave = WAVES_PER_TURN * r.radians_per_count();
+        let places = 0.5 * wave * (r.ticks[end].counts - r.ticks[begin].counts) as f64;
         Told {
             rate: self.rate,
-            hold,
-            ripple: (share, ripple_deviation),
-            map,
+            hold: (1.0 / friction, last.spread[(2, 2)].max(0.0).sqrt() / (friction * friction)),
+            ripple: (size, size / places.max(1.0).sqrt()),
+            map: self.map(&beliefs),
             worst: (r.name.clone(), r.first_tick + worst.0 as u64, worst.1),
         }
     }
@@ -159,7 +161,7 @@ impl Ride<'_> {
             let predicted = belief;
             let (before, now) = (r.ticks[i].counts, r.ticks[i + 1].counts);
             if now > before {
-                let surprise = belief.cross((now - origin) as f64).square;
+                let surprise = belief.cross((now - origin) as f64, 0.5 * rate).square;
                 // The first edges tell where it is.
                 if i > begin + 100 && surprise > worst.1 {
                     worst = (i + 1, surprise);
