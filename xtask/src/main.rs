@@ -324,8 +324,10 @@ fn identify(rigs: u64, seed: u64) -> Result<()> {
     let example = ["run", "--release", "--package", "clutch-identify", "--example", "campaign", "--"];
     let (done, text) = cargo(example).args([rigs.to_string(), seed.to_string()]).quietly()?;
     anyhow::ensure!(done, "the campaign failed:\n{text}");
-    let (table, last): (Vec<&str>, Vec<&str>) =
-        text.lines().filter(|l| l.starts_with('|') || l.contains("rigs from seed")).partition(|l| l.starts_with('|'));
+    let (table, last): (Vec<&str>, Vec<&str>) = text
+        .lines()
+        .filter(|l| l.starts_with('|') || l.contains("rigs from seed"))
+        .partition(|l| l.starts_with('|'));
     write_between("docs/identify.md", "campaign", &format!("{}\n\n{}", table.join("\n"), last.join("\n")))
 }
 

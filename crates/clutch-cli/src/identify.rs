@@ -26,13 +26,11 @@ use std::sync::atomic::AtomicBool;
 /// virtual time, or with --port on a real one. With --from it reads logs instead. What cannot be told is refused, with the
 /// experiment that would tell it.
 #[derive(Args)]
-#[command(
-    after_help = "Examples:\n  clutch identify board_smc_2\n  \
+#[command(after_help = "Examples:\n  clutch identify board_smc_2\n  \
     clutch identify mine.toml --port /dev/ttyACM0 --log logs --uncertified --out rig.toml\n  \
     clutch identify --from logs/releases.mcap logs/crawl.mcap logs/ride_5.mcap\n  \
     clutch certify mine.toml --identified rig.toml\n\n\
-    docs/identify.md tells what is measured, how well, and what cannot be."
-)]
+    docs/identify.md tells what is measured, how well, and what cannot be.")]
 pub(crate) struct Identify {
     /// Scenario of the rig, with [safety]: file, or name of a built-in one.
     #[arg(value_name = "SCENARIO.toml", default_value = "board_smc_2")]
@@ -56,7 +54,13 @@ pub(crate) struct Identify {
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["port", "log"])]
     from: Vec<PathBuf>,
     /// Columns of a CSV that hold counts and volts, one sample a row.
-    #[arg(long, value_name = "COUNTS,VOLTS", value_delimiter = ',', num_args = 1, default_value = "counts,volts")]
+    #[arg(
+        long,
+        value_name = "COUNTS,VOLTS",
+        value_delimiter = ',',
+        num_args = 1,
+        default_value = "counts,volts"
+    )]
     columns: Vec<String>,
     /// Writes [model] and [bounds] for scenarios, with the intervals.
     #[arg(long, value_name = "FILE.toml")]
@@ -105,7 +109,8 @@ impl Identify {
         programme.plan().iter().for_each(|line| plan += &format!("  {line}\n"));
         let _ = std::io::stderr().write_all(shown(&plan).as_bytes());
         if let Some(folder) = &self.log {
-            std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+            std::fs::create_dir_all(folder)
+                .with_context(|| format!("{}: cannot be made", folder.display()))?;
         }
         let Some(port) = &self.port else {
             let logs = self.log.clone().map(|folder| (folder, BUILD.to_owned()));
@@ -120,7 +125,9 @@ impl Identify {
         }
         let folder = self.log.clone().unwrap_or_default();
         let stop = stop_flag()?;
-        let run = &mut |name: &str, part: &Scenario| self.on_board(port, &folder.join(format!("{name}.mcap")), name, part, &stop);
+        let run = &mut |name: &str, part: &Scenario| {
+            self.on_board(port, &folder.join(format!("{name}.mcap")), name, part, &stop)
+        };
         Ok(experiment(scenario, &programme, run)?)
     }
 

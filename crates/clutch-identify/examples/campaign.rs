@@ -151,7 +151,9 @@ fn main() -> Outcome<()> {
             report.unexplained.iter().for_each(|line| println!("  unexplained: {line}"));
         }
     }
-    println!("| parameter | told | error, median | p90 | largest | interval holds it | half width of the interval, median |");
+    println!(
+        "| parameter | told | error, median | p90 | largest | interval holds it | half width of the interval, median |"
+    );
     println!("|---|---|---|---|---|---|---|");
     for (name, how, (get, of)) in ROWS {
         let known: Vec<(Estimate, f64)> =

@@ -8,17 +8,19 @@
 //! By the Stribeck velocity the shaft sets off late: from the step of the voltage that triggered it, one of several, friction
 //! first has to fall.
 
+use crate::Estimate;
 use crate::filter::{Belief, Shaft};
 use crate::recording::Recording;
 use crate::ride;
-use crate::Estimate;
 
 /// What a break-away needs to be one.
 const RESTED: usize = 50; // samples
 const LONGEST: usize = 80; // samples
 const SILENT: usize = 14; // samples without an edge, after the first
 const FEWEST_COUNTS: i64 = 6;
-const MOST_COUNTS: i64 = 22;
+const MOST_COUNTS: i64 = 30;
+/// Slope of friction where a shaft rests, as a multiple of the ripple's.
+const STEEPER: f64 = 4.0;
 /// Step of the time at which it sets off, periods.
 const TIME_STEP: f64 = 0.25;
 /// Ratios that are tried at first: μ_s/μ_d − 1 from and to, and their number.
@@ -28,6 +30,9 @@ const VELOCITIES: (f64, f64, usize) = (1e-4, 3e-2, 58);
 /// Most steps of the voltage that may have triggered a break-away, and thresholds within each.
 const TRIGGERS: usize = 12;
 const THRESHOLDS: usize = 6;
+/// Ratios over which the Stribeck velocity is looked for, and the blur of the time at which a shaft sets off, periods.
+const RATIOS: usize = 7;
+const BLUR: f64 = 0.375;
 /// Share of break-aways that no Stribeck velocity explains.
 const STRAY: f64 = 0.01;
 
@@ -135,6 +140,8 @@ impl BreakAway<'_> {
         belief.mean[3] = friction - known.friction;
         belief.spread[(0, 0)] = 1.0 / 12.0;
         belief.spread[(3, 3)] = step * step / 12.0;
+        // A shaft comes to rest where friction rises: how it goes on from there is not as at any place of the disc.
+        belief.spread[(4, 4)] *= STEEPER * STEEPER;
         let origin = r.ticks[first - 1].counts;
         let mut log = 0.0;
         for j in i..last {
@@ -204,16 +211,15 @@ pub fn ratio(slips: &[BreakAway<'_>], known: &Known, fall: f64) -> Option<Estima
             .collect(),
     };
     let coarse = profile(&mut spaced(EXCESS.0, EXCESS.1, EXCESS.2));
-    let (value, low, high) = coarse.estimate(3.0 * fall);
+    let (_, low, high) = coarse.estimate(3.0 * fall);
     let (low, high) = (low.unwrap_or(EXCESS.0), high?);
-    let _ = value;
     let fine = profile(&mut spaced(0.97 * low, 1.03 * high, 40));
     let (value, low, high) = fine.estimate(fall);
     Some(Estimate { value: 1.0 + value, low: 1.0 + low.unwrap_or(0.0), high: 1.0 + high? })
 }
 
-/// Time by which a shaft sets off later than one whose friction falls at once, s: `threshold` lies `above` (V) over the
-/// voltage that triggered it, at sample `i`.
+/// Time by which a shaft sets off later than one whose friction falls at once, s: it breaks away at the voltage `threshold`,
+/// which sample `from` fell below.
 fn late(r: &Recording, known: &Known, ratio: f64, velocity: f64, threshold: f64, from: usize) -> f64 {
     let mut time = 0.0;
     let mut w = 0.0;
@@ -238,44 +244,65 @@ fn late(r: &Recording, known: &Known, ratio: f64, velocity: f64, threshold: f64,
     time - ideal
 }
 
-/// Stribeck velocity, rad/s; none where the break-aways do not bound it on either side.
-#[must_use]
-pub fn stribeck(slips: &[BreakAway<'_>], known: &Known, ratio: f64, fall: f64) -> Option<Estimate> {
-    // Of each: the times at which it set off, with their weights, and the steps that may have triggered it.
-    let mut all = Vec::new();
-    for slip in slips {
-        let r = slip.recording;
-        let (_, times) = slip.over_times(known, ratio);
-        let most = times.iter().map(|t| t.1).fold(f64::NEG_INFINITY, f64::max);
-        let weights: Vec<(f64, f64)> = times.iter().map(|&(t, log)| (t, libm::exp(log - most))).collect();
-        let total: f64 = weights.iter().map(|w| w.1).sum();
-        let weights: Vec<(f64, f64)> =
-            weights.into_iter().map(|(t, w)| (t, w / total)).filter(|w| w.1 > 1e-5).collect();
-        let falls = (1..slip.ticks.0).rev().filter(|&i| r.ticks[i].volts < r.ticks[i - 1].volts);
-        all.push((r, weights, falls.take(TRIGGERS).collect::<Vec<usize>>()));
+/// What a break-away tells of the time at which it set off: times (periods) with their weights, and the steps of the voltage
+/// that may have triggered it.
+struct SetOff<'a> {
+    recording: &'a Recording,
+    times: Vec<(f64, f64)>,
+    triggers: Vec<usize>,
+}
+
+impl<'a> BreakAway<'a> {
+    /// For a ratio; and the logarithm of its density.
+    fn set_off(&self, known: &Known, ratio: f64) -> (f64, SetOff<'a>) {
+        let r = self.recording;
+        let (log, times) = self.over_times(known, ratio);
+        let times = times.into_iter().map(|(time, own)| (time, libm::exp(own - log)));
+        let falls = (1..self.ticks.0).rev().filter(|&i| r.ticks[i].volts < r.ticks[i - 1].volts);
+        let times = times.filter(|t| t.1 > 1e-5).collect();
+        (log, SetOff { recording: r, times, triggers: falls.take(TRIGGERS).collect() })
     }
-    let points: Vec<(f64, f64)> = spaced(VELOCITIES.0, VELOCITIES.1, VELOCITIES.2)
-        .map(|velocity| {
-            let log = all.iter().map(|(r, weights, triggers)| {
-                let mut density = 0.0;
-                for &i in triggers {
-                    let (above, below) = (r.ticks[i - 1].volts, r.ticks[i].volts);
-                    for k in 0..THRESHOLDS {
-                        let part = (k as f64 + 0.5) / THRESHOLDS as f64;
-                        let threshold = below + part * (above - below);
-                        let late = late(r, known, ratio, velocity, threshold, i);
-                        let sets_off = i as f64 + (known.delay + late) / r.period;
-                        // Half a step of the time blurs it.
-                        for &(time, weight) in weights {
-                            let off = (time - sets_off) / (1.5 * TIME_STEP);
-                            density += weight * libm::exp(-0.5 * off * off);
-                        }
-                    }
+}
+
+impl SetOff<'_> {
+    /// Logarithm of the density of a Stribeck velocity.
+    fn density(&self, known: &Known, ratio: f64, velocity: f64) -> f64 {
+        let r = self.recording;
+        let mut density = 0.0;
+        for &i in &self.triggers {
+            let (above, below) = (r.ticks[i - 1].volts, r.ticks[i].volts);
+            for k in 0..THRESHOLDS {
+                let part = (k as f64 + 0.5) / THRESHOLDS as f64;
+                let late = late(r, known, ratio, velocity, below + part * (above - below), i);
+                let sets_off = i as f64 + (known.delay + late) / r.period;
+                for &(time, weight) in &self.times {
+                    let off = (time - sets_off) / BLUR;
+                    density += weight * libm::exp(-0.5 * off * off);
                 }
-                libm::log(STRAY + density)
-            });
-            (libm::log(velocity), log.sum::<f64>())
+            }
+        }
+        libm::log(STRAY + density)
+    }
+}
+
+/// Stribeck velocity, rad/s, over all of the ratio's interval; none where the break-aways do not bound it on either side.
+#[must_use]
+pub fn stribeck(slips: &[BreakAway<'_>], known: &Known, ratio: &Estimate, fall: f64) -> Option<Estimate> {
+    let ratios = (0..RATIOS).map(|k| ratio.low + (ratio.high - ratio.low) * k as f64 / (RATIOS - 1) as f64);
+    let curves: Vec<Vec<f64>> = ratios
+        .map(|ratio| {
+            let set_off: Vec<_> = slips.iter().map(|slip| slip.set_off(known, ratio)).collect();
+            let all: f64 = set_off.iter().map(|s| s.0).sum();
+            spaced(VELOCITIES.0, VELOCITIES.1, VELOCITIES.2)
+                .map(|velocity| {
+                    all + set_off.iter().map(|s| s.1.density(known, ratio, velocity)).sum::<f64>()
+                })
+                .collect()
         })
+        .collect();
+    let points = spaced(VELOCITIES.0, VELOCITIES.1, VELOCITIES.2)
+        .enumerate()
+        .map(|(i, velocity)| (libm::log(velocity), log_mean(curves.iter().map(|curve| curve[i]))))
         .collect();
     let (value, low, high) = Profile { points }.estimate(fall);
     Some(Estimate { value: libm::exp(value), low: libm::exp(low?), high: libm::exp(high?) })

@@ -90,7 +90,9 @@ impl Programme {
             format!("crawl       {CRAWL_DEG_S} °/s under a soft PD, it sticks and slips, {} s", self.crawl_s),
         ];
         lines.extend(
-            self.rides.iter().map(|(rate, seconds)| format!("ride        {rate} °/s under glide, {seconds} s")),
+            self.rides
+                .iter()
+                .map(|(rate, seconds)| format!("ride        {rate} °/s under glide, {seconds} s")),
         );
         lines.push(format!(
             "limits      {:.0}° in all; each part ends {FOLLOWING_DEG}° off its path, and by every other check",
@@ -205,12 +207,15 @@ fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, Scenario
     let wait = wait.min(spec.output.highest);
     // The first period of a step takes all of it away.
     let kp = 8.0 * wait / (rate * spec.period.seconds::<f64>());
-    let law = table([("pid", table([
-        ("kp_v_rad", Value::Float(kp)),
-        ("ki_v_rad_s", Value::Float(0.0)),
-        ("kd_v_s_rad", Value::Float(0.0)),
-        ("bias_v", Value::Float(wait)),
-    ]))]);
+    let law = table([(
+        "pid",
+        table([
+            ("kp_v_rad", Value::Float(kp)),
+            ("ki_v_rad_s", Value::Float(0.0)),
+            ("kd_v_s_rad", Value::Float(0.0)),
+            ("bias_v", Value::Float(wait)),
+        ]),
+    )]);
     let rise = programme.step_deg / rate.to_degrees();
     let mut points = vec![(0.0, 0.0)];
     for k in 0..programme.releases {
@@ -218,10 +223,13 @@ fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, Scenario
         points.extend([(time, angle), (time + rise, angle + programme.step_deg)]);
     }
     let points = points.into_iter().map(|(t, a)| Value::Array(vec![Value::Float(t), Value::Float(a)]));
-    let path = table([("table", table([
-        ("points_s_deg", Value::Array(points.collect())),
-        ("interpolation", Value::String("linear".to_owned())),
-    ]))]);
+    let path = table([(
+        "table",
+        table([
+            ("points_s_deg", Value::Array(points.collect())),
+            ("interpolation", Value::String("linear".to_owned())),
+        ]),
+    )]);
     checked(base, "releases", part(base, law, path, programme.releases_s())?)
 }
 
@@ -230,7 +238,10 @@ fn ramp(rate_deg_s: f64) -> Value {
 }
 
 fn crawl(base: &Scenario, programme: &Programme) -> Result<Scenario, ScenarioError> {
-    let law = table([("pd", table([("kp_v_rad", Value::Float(CRAWL_KP)), ("kd_v_s_rad", Value::Float(CRAWL_KD))]))]);
+    let law = table([(
+        "pd",
+        table([("kp_v_rad", Value::Float(CRAWL_KP)), ("kd_v_s_rad", Value::Float(CRAWL_KD))]),
+    )]);
     checked(base, "crawl", part(base, law, ramp(CRAWL_DEG_S), programme.crawl_s)?)
 }
 
@@ -275,7 +286,11 @@ impl VirtualBoard {
         }
     }
 
-    fn run_in<T: Real>(&mut self, name: &str, scenario: &Scenario) -> Result<Vec<Recording>, ExperimentError> {
+    fn run_in<T: Real>(
+        &mut self,
+        name: &str,
+        scenario: &Scenario,
+    ) -> Result<Vec<Recording>, ExperimentError> {
         let built = BuiltRun::<T>::new(scenario, 1)?;
         let path = from_scenario::path::<T>(scenario)?;
         let options = VirtualOptions {

@@ -111,9 +111,7 @@ impl Recording {
         let present = extra(PRESENT_CODE).and_then(|v| v.parse().ok());
         let before = match present {
             Some(code) => Some(converter(name, &scenario)?.volts(DacCode(code))),
-            None => {
-                extra(START_VOLTAGE).and_then(|v| u64::from_str_radix(v, 16).ok()).map(f64::from_bits)
-            }
+            None => extra(START_VOLTAGE).and_then(|v| u64::from_str_radix(v, 16).ok()).map(f64::from_bits),
         };
         Recording::from_records(name, &scenario, before, (&log.samples, &log.commands))
     }

@@ -10,8 +10,8 @@
 //!
 //! Nothing here is a matter of chance: a value outside the set contradicts a count.
 
-use crate::recording::Recording;
 use crate::Estimate;
+use crate::recording::Recording;
 
 /// Shortest release that tells something, periods.
 const SHORTEST: usize = 8;

@@ -98,11 +98,16 @@ pub fn identify(recordings: &[Recording]) -> Report {
     };
     // With C/J, releases tell T/J more closely.
     let fall = match damping {
-        Some(c) => release::fall(&releases, (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0))).or(first),
+        Some(c) => {
+            release::fall(&releases, (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0))).or(first)
+        }
         None => first,
     };
     if let (Err(at), false) = (&fall, releases.is_empty()) {
-        unexplained.push(format!("{}: no free fall with any delay explains the counts up to tick {}", at.name, at.tick));
+        unexplained.push(format!(
+            "{}: no free fall with any delay explains the counts up to tick {}",
+            at.name, at.tick
+        ));
     }
     let fall = fall.ok().filter(|_| !releases.is_empty());
     let hold = hold(&told, line.as_ref(), fall.as_ref());
@@ -125,11 +130,14 @@ pub fn identify(recordings: &[Recording]) -> Report {
         pull: fall.as_ref().map_or_else(no_fall, |f| Finding::Known(f.pull)),
         delay: fall.as_ref().map_or_else(no_fall, |f| Finding::Known(f.delay)),
         hold: hold.map_or_else(|| refused(no_ride), Finding::Known),
-        ripple: slowest.map_or_else(|| refused(no_ride), |slow| {
-            let (share, deviation) = slow.ripple;
-            let off = DEVIATIONS * deviation;
-            Finding::Known(Estimate { value: share, low: (share - off).max(0.0), high: share + off })
-        }),
+        ripple: slowest.map_or_else(
+            || refused(no_ride),
+            |slow| {
+                let (share, deviation) = slow.ripple;
+                let off = DEVIATIONS * deviation;
+                Finding::Known(Estimate { value: share, low: (share - off).max(0.0), high: share + off })
+            },
+        ),
         ratio,
         stribeck,
         damping: damping.map_or_else(
@@ -241,10 +249,14 @@ fn stribeck(slips: &[BreakAway<'_>], known: Option<&Known>, ratio: &Finding) -> 
         return refused("it takes μ_s/μ_d, and break-aways under slow ramps");
     };
     if ratio.low < 1.1 {
-        return refused("friction falls too little from rest to motion (μ_s/μ_d may be below 1.1) for its velocity to show");
+        return refused(
+            "friction falls too little from rest to motion (μ_s/μ_d may be below 1.1) for its velocity to show",
+        );
     }
-    match break_away::stribeck(slips, known, ratio.value, FALL) {
+    match break_away::stribeck(slips, known, ratio, FALL) {
         Some(estimate) => Finding::Known(estimate),
-        None => refused("the break-aways do not bound it on both sides: more of them, from a slower ramp, may tell it"),
+        None => refused(
+            "the break-aways do not bound it on both sides: more of them, from a slower ramp, may tell it",
+        ),
     }
 }

@@ -21,6 +21,12 @@ pub const WALK: f64 = 0.01;
 /// Times that the ripple's size is estimated, and what it is taken to be before.
 const ROUNDS: usize = 8;
 const FIRST_SHARE: f64 = 0.15;
+/// What is left of a ripple in the mean over a way, as a multiple of its size over the wave's radians of that way.
+const LEFT_OVER: f64 = 2.0;
+/// Part of the ripple's square that the filter may miss in a mean.
+const UNSEEN: f64 = 0.04;
+/// Share by which the mean of a ride is off for other reasons: delay and T/J as known, steps of the converter.
+const CLOCKWORK: f64 = 3e-4;
 
 /// A ride at an even rate.
 #[derive(Clone, Debug)]
@@ -79,7 +85,8 @@ pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
         first = k;
         let Some(begin) = begin else { continue };
         let seconds = end.saturating_sub(begin) as f64 * recording.period;
-        let way = |a: usize, b: usize| (ticks[b].counts - ticks[a].counts) as f64 * recording.radians_per_count();
+        let way =
+            |a: usize, b: usize| (ticks[b].counts - ticks[a].counts) as f64 * recording.radians_per_count();
         if seconds < SHORTEST_S || way(begin, end) < SHORTEST_RAD {
             continue;
         }
@@ -134,21 +141,35 @@ impl Ride<'_> {
                 size = (sums.1 / sums.0).clamp(1e-6, 1.0).sqrt() / friction;
             }
         }
-        let last = &beliefs[beliefs.len() - 1];
-        // Independent places: one for each radian of the wave.
-        let wave = WAVES_PER_TURN * r.radians_per_count();
-        let places = 0.5 * wave * (r.ticks[end].counts - r.ticks[begin].counts) as f64;
+        // Mean over the way of what friction was.
+        let sums = beliefs.iter().fold((0.0, 0.0), |(way, sum), b| {
+            let v = b.mean[1].max(0.0);
+            (way + v, sum + v * (b.mean[2] + b.mean[3]))
+        });
+        let hold = sums.0 / sums.1;
+        let radians =
+            WAVES_PER_TURN * r.radians_per_count() * (r.ticks[end].counts - r.ticks[begin].counts) as f64;
+        // A stretch of the disc does not hold whole waves.
+        let uneven = LEFT_OVER * size / radians.max(1.0);
+        // Volts that follow the ripple, and a filter that sees a part of it, are off by its square.
+        let unseen = UNSEEN * size * size;
         Told {
             rate: self.rate,
-            hold: (1.0 / friction, last.spread[(2, 2)].max(0.0).sqrt() / (friction * friction)),
-            ripple: (size, size / places.max(1.0).sqrt()),
+            hold: (hold, hold * (uneven * uneven + unseen * unseen + CLOCKWORK * CLOCKWORK).sqrt()),
+            // Independent places: one for two radians of the wave.
+            ripple: (size, size / (0.5 * radians).max(1.0).sqrt()),
             map: self.map(&beliefs),
             worst: (r.name.clone(), r.first_tick + worst.0 as u64, worst.1),
         }
     }
 
     /// The filter along the ride: as [`smooth`] takes it, and the tick with the largest normalised innovation.
-    fn pass(&self, shaft: &Shaft, delay: f64, friction: f64) -> (Vec<(Belief, Belief, Spread)>, (usize, f64)) {
+    fn pass(
+        &self,
+        shaft: &Shaft,
+        delay: f64,
+        friction: f64,
+    ) -> (Vec<(Belief, Belief, Spread)>, (usize, f64)) {
         let r = self.recording;
         let (begin, end) = self.ticks;
         let origin = r.ticks[begin].counts;

@@ -1,7 +1,7 @@
 //! What was identified, as a file: `[model]` and `[bounds]` for scenarios, and the intervals behind them.
 
-use crate::report::{Finding, Report};
 use crate::Estimate;
+use crate::report::{Finding, Report};
 use clutch_core::Actuator;
 use clutch_sim::Scenario;
 use toml::{Table, Value};
@@ -45,7 +45,8 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
     let inertia = around(torque / pull.high, torque / pull.low);
     let damping = around(damping.low * inertia.0, damping.high * inertia.0);
     let sliding = torque / (hold.value * gain);
-    let at_disc = report.map.iter().map(|place| (place.factor - 1.0).abs()).fold(RIPPLE * ripple.high, f64::max);
+    let at_disc =
+        report.map.iter().map(|place| (place.factor - 1.0).abs()).fold(RIPPLE * ripple.high, f64::max);
     let friction = (1.0 + hold.share()) * (1.0 + ratio.share()) * (1.0 + at_disc) - 1.0;
     let percent = |share: f64| Value::Float((100.0 * share).min(MOST_PERCENT));
     let stribeck = [
