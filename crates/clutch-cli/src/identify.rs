@@ -113,8 +113,8 @@ impl Identify {
                 .with_context(|| format!("{}: cannot be made", folder.display()))?;
         }
         let Some(port) = &self.port else {
-            let logs = self.log.clone().map(|folder| (folder, BUILD.to_owned()));
-            let mut board = VirtualBoard { logs, ..VirtualBoard::default() };
+            let logging = |folder: &PathBuf| VirtualBoard::logging(folder.clone(), BUILD);
+            let mut board = self.log.as_ref().map_or_else(VirtualBoard::default, logging);
             return Ok(experiment(scenario, &programme, &mut |name, part| board.run(name, part))?);
         };
         if !self.uncertified {
@@ -189,7 +189,9 @@ fn text(report: &Report) -> String {
         if let Some(e) = row.finding.known() {
             let e = e.times(row.unit.1);
             let interval = format!("{} … {}", number(e.low), number(e.high));
-            out += &format!("  {:<26}{:>10}  {interval:<24}{}\n", row.label, number(e.value), row.unit.0);
+            let line = format!("  {:<26}{:>10}  {interval:<24}{}", row.label, number(e.value), row.unit.0);
+            out += line.trim_end();
+            out.push('\n');
         }
     }
     for row in &rows {

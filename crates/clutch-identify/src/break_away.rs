@@ -212,7 +212,10 @@ pub fn ratio(slips: &[BreakAway<'_>], known: &Known, fall: f64) -> Option<Estima
     };
     let coarse = profile(&mut spaced(EXCESS.0, EXCESS.1, EXCESS.2));
     let (_, low, high) = coarse.estimate(3.0 * fall);
-    let (low, high) = (low.unwrap_or(EXCESS.0), high?);
+    // A peak may lie anywhere between the neighbours of the highest point.
+    let best = coarse.best().0;
+    let step = libm::pow(EXCESS.1 / EXCESS.0, 1.0 / (EXCESS.2 - 1) as f64);
+    let (low, high) = (low.unwrap_or(EXCESS.0).min(best / step), high?.max(best * step));
     let fine = profile(&mut spaced(0.97 * low, 1.03 * high, 40));
     let (value, low, high) = fine.estimate(fall);
     Some(Estimate { value: 1.0 + value, low: 1.0 + low.unwrap_or(0.0), high: 1.0 + high? })

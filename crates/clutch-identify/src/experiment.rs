@@ -138,6 +138,9 @@ pub enum ExperimentError {
     Runs(String),
 }
 
+/// What makes one run of the loop, given the part's name and its scenario, and says what was recorded.
+pub type Runs<'a> = dyn FnMut(&str, &Scenario) -> Result<Vec<Recording>, ExperimentError> + 'a;
+
 /// For a part that a check ended.
 pub const REMEDY: &str = "Wider [bounds] help if they do not hold the rig; look at the rig first";
 
@@ -149,7 +152,7 @@ pub const REMEDY: &str = "Wider [bounds] help if they do not hold the rig; look 
 pub fn experiment(
     base: &Scenario,
     programme: &Programme,
-    run: &mut dyn FnMut(&str, &Scenario) -> Result<Vec<Recording>, ExperimentError>,
+    run: &mut Runs<'_>,
 ) -> Result<Vec<Recording>, ExperimentError> {
     base.safety()?;
     let lowest = base.params().output.lowest;
@@ -266,12 +269,18 @@ fn glide(
 #[derive(Debug, Default)]
 pub struct VirtualBoard {
     /// Folder for a log of each run, and the version that it tells.
-    pub logs: Option<(PathBuf, String)>,
+    logs: Option<(PathBuf, String)>,
     /// Counts at which the shaft rests.
     rests_at: Option<f64>,
 }
 
 impl VirtualBoard {
+    /// A board whose runs leave a log each in a folder, which tells this version.
+    #[must_use]
+    pub fn logging(folder: PathBuf, version: &str) -> Self {
+        VirtualBoard { logs: Some((folder, version.to_owned())), rests_at: None }
+    }
+
     /// One run, and what was recorded.
     ///
     /// # Errors

@@ -117,12 +117,13 @@ impl Belief {
     }
 }
 
+/// A period: the belief at its end from the samples up to that, the one that was predicted, and the matrix of small
+/// departures over the period.
+pub type Passed = (Belief, Belief, Spread);
+
 /// The beliefs at all samples, each from the samples before and behind it (Rauch, Tung and Striebel 1965).
-///
-/// `passed[i]`: belief at sample `i` from those up to it, the one that was predicted for it, and the matrix of the period
-/// before it.
 #[must_use]
-pub fn smooth(passed: &[(Belief, Belief, Spread)]) -> Vec<Belief> {
+pub fn smooth(passed: &[Passed]) -> Vec<Belief> {
     let mut out: Vec<Belief> = passed.iter().map(|(belief, _, _)| *belief).collect();
     for i in (0..out.len().saturating_sub(1)).rev() {
         let (_, predicted, f) = &passed[i + 1];

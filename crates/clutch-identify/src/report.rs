@@ -16,6 +16,8 @@ const FALL: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
 const RATES_APART: f64 = 0.5;
 /// Fewest break-aways that tell μ_s/μ_d.
 const FEWEST_BREAK_AWAYS: usize = 3;
+/// Ripple that is always reckoned with, as a share.
+const LEAST_RIPPLE: f64 = 0.01;
 /// Normalised innovation of an edge that no ride has: one in millions.
 const UNEXPLAINED: f64 = 7.0;
 
@@ -117,7 +119,8 @@ pub fn identify(recordings: &[Recording]) -> Report {
         delay: fall.delay.value,
         damping: damping.map_or(0.0, |c| c.value),
         friction: 1.0 / hold.value,
-        ripple: slow.ripple.0 / hold.value,
+        // No disc is so even that a model holds to the last count.
+        ripple: slow.ripple.0.max(LEAST_RIPPLE) / hold.value,
     });
     let ratio = ratio(&slips, known.as_ref());
     let stribeck = stribeck(&slips, known.as_ref(), &ratio);
@@ -148,8 +151,8 @@ pub fn identify(recordings: &[Recording]) -> Report {
             "the delay holds dead time and lag together: releases from two voltages, far apart, tell them apart",
         ),
         each: refused(
-            "J, T, K and μ one by one cannot be told from counts and volts: all of them scaled alike move alike; a second \
-             experiment with a known mass added tells them",
+            "no counts and volts tell them, as all of them scaled alike move alike; a second experiment with a known mass added \
+             does",
         ),
         map: slowest.map(|slow| slow.map.clone()).unwrap_or_default(),
         unexplained,

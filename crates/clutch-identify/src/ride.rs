@@ -4,7 +4,7 @@
 //! ride gives `1/h_v = (1/h) (1 − (c/g) v)`: a straight line over the rates, whose value at 0 is `v_hold = 1/h` and whose slope
 //! tells C/J.
 
-use crate::filter::{Belief, Shaft, Spread, smooth};
+use crate::filter::{Belief, Passed, Shaft, Spread, smooth};
 use crate::recording::Recording;
 
 /// What a ride needs to be one.
@@ -164,12 +164,7 @@ impl Ride<'_> {
     }
 
     /// The filter along the ride: as [`smooth`] takes it, and the tick with the largest normalised innovation.
-    fn pass(
-        &self,
-        shaft: &Shaft,
-        delay: f64,
-        friction: f64,
-    ) -> (Vec<(Belief, Belief, Spread)>, (usize, f64)) {
+    fn pass(&self, shaft: &Shaft, delay: f64, friction: f64) -> (Vec<Passed>, (usize, f64)) {
         let r = self.recording;
         let (begin, end) = self.ticks;
         let origin = r.ticks[begin].counts;

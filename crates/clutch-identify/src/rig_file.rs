@@ -46,7 +46,7 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
     let damping = around(damping.low * inertia.0, damping.high * inertia.0);
     let sliding = torque / (hold.value * gain);
     let at_disc =
-        report.map.iter().map(|place| (place.factor - 1.0).abs()).fold(RIPPLE * ripple.high, f64::max);
+        report.map.iter().map(|place| (place.factor - 1.0).abs()).fold(RIPPLE * ripple.value, f64::max);
     let friction = (1.0 + hold.share()) * (1.0 + ratio.share()) * (1.0 + at_disc) - 1.0;
     let percent = |share: f64| Value::Float((100.0 * share).min(MOST_PERCENT));
     let stribeck = [
