@@ -36,6 +36,7 @@ fn the_help_of_every_verb_has_an_example() {
         &["map", "--help"],
         &["reproduce", "--help"],
         &["loop", "--help"],
+        &["identify", "--help"],
         &["daq", "--help"],
         &["replay", "--help"],
         &["log", "info", "--help"],
@@ -350,4 +351,63 @@ fn a_map_that_cannot_be_is_refused_by_key_value_and_expectation() {
     }
     let o = clutch(&["map", "minimum_jerk"]);
     assert!(err(&o).contains("minimum_jerk: reference: expected a ramp"), "{}", err(&o));
+}
+
+#[test]
+fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
+    let dir = folder("identified");
+    let path = |name: &str| dir.join(name).display().to_string();
+    let (rig, logs) = (path("rig.toml"), path("logs"));
+    let hold = ["--set", "safety.on_fault.hold.volts_v=9.9"];
+    let o = clutch(
+        &[&["identify", "board_smc_2", "--set", "rig.base=bench", "--out", &rig, "--log", &logs][..], &hold]
+            .concat(),
+    );
+    assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+    assert!(out(&o).contains("T/J  ") && out(&o).contains("lag: not told; "), "{}", out(&o));
+    // All that is printed fits a terminal.
+    assert!(out(&o).lines().all(|line| line.chars().count() <= 80), "{}", out(&o));
+
+    let o = clutch(&[&["certify", "board_smc_2", "--json", "--identified", &rig][..], &hold].concat());
+    let certificate: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");
+    let inertia = &certificate["bounds"]["inertia_kg_m2"];
+    // As a ratio to the model's torque: J T_model/T of the rig.
+    let truth = 0.0017 * 0.2 / 0.2094;
+    let ends = [inertia[0].as_f64(), inertia[1].as_f64()].map(Option::unwrap);
+    assert!(ends[0] < truth && truth < ends[1] && ends[1] / ends[0] < 1.03, "{truth}: {inertia}");
+
+    // The logs tell the same, and one of them what it can.
+    let o = clutch(&["identify", "--json", "--from", &format!("{logs}/releases.mcap")]);
+    let told: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");
+    let pull = &told["parameters"]["pull_rad_s2"];
+    let truth = 0.2094 * 9.81 * 0.024 / 0.0017;
+    assert!(pull["low"].as_f64() < Some(truth) && Some(truth) < pull["high"].as_f64(), "{pull}");
+    assert!(told["parameters"]["hold_v"]["refused"].is_string(), "{told}");
+
+    let missing = path("none.toml");
+    let o = clutch(&["certify", "board_smc_2", "--identified", &missing]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("none.toml: cannot be read"), "{}", err(&o));
+}
+
+#[test]
+fn identify_asks_for_consent_on_a_board_and_names_what_it_cannot_read() {
+    let dir = folder("identify_refuses");
+    let logs = dir.join("logs").display().to_string();
+    let o = clutch(&["identify", "--port", "/dev/none", "--log", &logs]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("--uncertified is your consent"), "{}", err(&o));
+    let table = dir.join("t.csv");
+    std::fs::write(&table, "n,u\n0,4.5\n1,4.5\n").expect("a file");
+    let table = table.display().to_string();
+    let o = clutch(&["identify", "--from", &table]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("has no column \"counts\": expected one of: n, u"), "{}", err(&o));
+    let o = clutch(&["identify", "--from", &table, "--columns", "n,u"]);
+    assert_eq!(o.status.code(), Some(1), "two samples tell nothing");
+    assert!(out(&o).contains("T/J: not told; no release: 0 V for 30 ms from rest tells it"), "{}", out(&o));
+    std::fs::write(dir.join("x.mcap"), b"no log").expect("a file");
+    let o = clutch(&["identify", "--from", &dir.join("x.mcap").display().to_string()]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("x.mcap"), "{}", err(&o));
 }

@@ -15,6 +15,8 @@ use crate::recording::Recording;
 
 /// Shortest release that tells something, periods.
 const SHORTEST: usize = 8;
+/// Samples of a release that are looked at: its pairs are counted by the million.
+const LONGEST: usize = 120;
 /// Samples for which the shaft has to have rested before.
 const RESTED: usize = 10;
 /// Longest delay that is looked for, periods.
@@ -75,7 +77,7 @@ pub fn releases(recording: &Recording) -> Vec<Release> {
             let first = ticks[i].counts;
             found.push(Release {
                 place: (recording.name.clone(), recording.first_tick + i as u64),
-                counts: ticks[i..=end].iter().map(|t| (t.counts - first) as f64).collect(),
+                counts: ticks[i..=end.min(i + LONGEST)].iter().map(|t| (t.counts - first) as f64).collect(),
                 units: (recording.period, recording.radians_per_count()),
             });
         }

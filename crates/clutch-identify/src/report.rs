@@ -16,6 +16,8 @@ const FALL: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
 const RATES_APART: f64 = 0.5;
 /// Fewest break-aways that tell μ_s/μ_d.
 const FEWEST_BREAK_AWAYS: usize = 3;
+/// Most releases and break-aways that are looked at: a minute of an experiment has fewer.
+const MOST: usize = 60;
 /// Ripple that is always reckoned with, as a share.
 const LEAST_RIPPLE: f64 = 0.01;
 /// Normalised innovation of an edge that no ride has: one in millions.
@@ -79,8 +81,8 @@ pub struct Report {
 /// Identifies a shaft from recordings of it.
 #[must_use]
 pub fn identify(recordings: &[Recording]) -> Report {
-    let releases: Vec<Release> = recordings.iter().flat_map(release::releases).collect();
-    let slips: Vec<BreakAway<'_>> = recordings.iter().flat_map(break_aways).collect();
+    let releases: Vec<Release> = recordings.iter().flat_map(release::releases).take(MOST).collect();
+    let slips: Vec<BreakAway<'_>> = recordings.iter().flat_map(break_aways).take(MOST).collect();
     let rides: Vec<Ride<'_>> = recordings.iter().flat_map(rides).collect();
     let mut unexplained = Vec::new();
     let first = release::fall(&releases, DAMPINGS);
