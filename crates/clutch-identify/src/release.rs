@@ -20,12 +20,14 @@ const LONGEST: usize = 120;
 /// Samples for which the shaft has to have rested before.
 const RESTED: usize = 10;
 /// Longest delay that is looked for, periods.
-const LONGEST_DELAY: f64 = 6.0;
+const LONGEST_DELAY: f64 = 16.0;
 /// Steps of the delay and of C/J, periods and number. [`SLACK`] covers what lies between.
 const DELAY_STEP: f64 = 0.025;
 const DAMPINGS: usize = 12;
 /// Counts by which an edge of the encoder may be off, half a step of the delay among them.
 const SLACK: f64 = 0.06;
+/// The same where each release has a delay of its own: at first, and where that explains nothing.
+const LOOSER: [f64; 2] = [SLACK, 0.5];
 
 /// A fall from rest.
 #[derive(Clone, Debug)]
@@ -45,6 +47,9 @@ pub struct Fall {
     pub pull: Estimate,
     /// Delay from a sample's voltage to its effect, s.
     pub delay: Estimate,
+    /// `None` if one delay explains all releases to the last count; else what it took: a delay for each release, and
+    /// counts by which edges were off.
+    pub looser: Option<f64>,
 }
 
 /// No fall explains all counts.
@@ -97,7 +102,13 @@ fn flight(time: f64, damping: f64) -> f64 {
 
 impl Release {
     /// Narrows bounds of T/J (rad/s²); the index of the sample at which nothing was left.
-    fn narrow(&self, delay: f64, damping: f64, (low, high): &mut (f64, f64)) -> Result<(), usize> {
+    fn narrow(
+        &self,
+        delay: f64,
+        damping: f64,
+        slack: f64,
+        (low, high): &mut (f64, f64),
+    ) -> Result<(), usize> {
         let (period, count) = self.units;
         let falls: Vec<f64> =
             (0..self.counts.len()).map(|i| flight((i as f64 * period - delay).max(0.0), damping)).collect();
@@ -105,7 +116,7 @@ impl Release {
             // The first edge says most together with the last: pairs within a count say nothing.
             for i in 0..j {
                 let (way, fall) = (self.counts[j] - self.counts[i], falls[j] - falls[i]);
-                let room = 1.0 + SLACK;
+                let room = 1.0 + slack;
                 if way + room <= *low * fall / count || way - room >= *high * fall / count {
                     return Err(j);
                 }
@@ -122,25 +133,70 @@ impl Release {
     }
 }
 
-/// The set of T/J and delay that explains every count of all releases, with C/J between two values, 1/s.
+/// The set of T/J and delay that explains every count of all releases, with C/J between two values, 1/s. Where there is none
+/// with one delay, each release has its own, as with a lag of the actuator; where there is none with sharp edges, they may be
+/// off by more.
 ///
 /// # Errors
 /// The tick that nothing explains, of the values that explain most.
-pub fn fall(releases: &[Release], (least, most): (f64, f64)) -> Result<Fall, Unexplained> {
+pub fn fall(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Unexplained> {
+    let looser = || LOOSER.into_iter().find_map(|slack| with_own_delays(releases, dampings, slack));
+    with_one_delay(releases, dampings).or_else(|at| looser().ok_or(at))
+}
+
+/// A value between two, of so many.
+fn between((least, most): (f64, f64), k: usize) -> f64 {
+    least + (most - least) * k as f64 / (DAMPINGS - 1) as f64
+}
+
+fn delays(releases: &[Release]) -> impl Iterator<Item = f64> + Clone {
+    let step = DELAY_STEP * releases.first().map_or(1e-3, |r| r.units.0);
+    (0..=(LONGEST_DELAY / DELAY_STEP) as usize).map(move |k| k as f64 * step)
+}
+
+fn with_own_delays(releases: &[Release], dampings: (f64, f64), slack: f64) -> Option<Fall> {
+    let (mut low, mut high, mut soonest, mut latest) = (f64::INFINITY, 0.0_f64, f64::INFINITY, 0.0_f64);
+    for k in 0..DAMPINGS {
+        let damping = between(dampings, k);
+        let mut common = (0.0_f64, f64::INFINITY);
+        let mut ends = (f64::INFINITY, 0.0_f64);
+        for release in releases {
+            let mut own = (f64::INFINITY, 0.0_f64);
+            for delay in delays(releases) {
+                let mut bounds = (0.0, f64::INFINITY);
+                if release.narrow(delay, damping, slack, &mut bounds).is_ok() {
+                    own = (own.0.min(bounds.0), own.1.max(bounds.1));
+                    ends = (ends.0.min(delay), ends.1.max(delay));
+                }
+            }
+            common = (common.0.max(own.0), common.1.min(own.1));
+        }
+        if common.0 < common.1 {
+            (low, high) = (low.min(common.0), high.max(common.1));
+            (soonest, latest) = (soonest.min(ends.0), latest.max(ends.1));
+        }
+    }
+    let middle = |low: f64, high: f64| Estimate { value: 0.5 * (low + high), low, high };
+    (low < high && high.is_finite()).then(|| Fall {
+        pull: middle(low, high),
+        delay: middle(soonest, latest),
+        looser: Some(slack),
+    })
+}
+
+fn with_one_delay(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Unexplained> {
     let mut set: Option<[f64; 4]> = None;
     // Weight, and sums of T/J and delay over the set.
     let mut sums = [0.0; 3];
     let mut longest = (0, 0, 0);
     let period = releases.first().map_or(1e-3, |r| r.units.0);
-    let steps = (LONGEST_DELAY / DELAY_STEP) as usize;
-    for step in 0..=steps {
-        let delay = step as f64 * DELAY_STEP * period;
+    for delay in delays(releases) {
         for k in 0..DAMPINGS {
-            let damping = least + (most - least) * k as f64 / (DAMPINGS - 1) as f64;
+            let damping = between(dampings, k);
             let mut bounds = (0.0, f64::INFINITY);
             let mut explained = 0;
             let failed = releases.iter().enumerate().find_map(|(n, release)| {
-                let failed = release.narrow(delay, damping, &mut bounds).err();
+                let failed = release.narrow(delay, damping, SLACK, &mut bounds).err();
                 explained += failed.unwrap_or(release.counts.len());
                 failed.map(|at| (n, at))
             });
@@ -166,5 +222,6 @@ pub fn fall(releases: &[Release], (least, most): (f64, f64)) -> Result<Fall, Une
     Ok(Fall {
         pull: Estimate { value: sums[1] / sums[0], low, high },
         delay: Estimate { value: sums[2] / sums[0], low: (soonest - half).max(0.0), high: latest + half },
+        looser: None,
     })
 }
