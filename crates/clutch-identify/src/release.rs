@@ -26,6 +26,8 @@ const DELAY_STEP: f64 = 0.025;
 const DAMPINGS: usize = 12;
 /// Counts by which an edge of the encoder may be off, half a step of the delay among them.
 const SLACK: f64 = 0.06;
+/// Periods by which delays of releases may be apart.
+const MOST_APART: f64 = 3.0;
 /// The same where each release has a delay of its own: at first, and where that explains nothing.
 const LOOSER: [f64; 2] = [SLACK, 0.5];
 
@@ -175,6 +177,11 @@ fn with_own_delays(releases: &[Release], dampings: (f64, f64), slack: f64) -> Op
             (low, high) = (low.min(common.0), high.max(common.1));
             (soonest, latest) = (soonest.min(ends.0), latest.max(ends.1));
         }
+    }
+    // A lag as long as that shows in the falls themselves.
+    let period = releases.first().map_or(1e-3, |r| r.units.0);
+    if latest - soonest > MOST_APART * period {
+        return None;
     }
     let middle = |low: f64, high: f64| Estimate { value: 0.5 * (low + high), low, high };
     (low < high && high.is_finite()).then(|| Fall {

@@ -16,10 +16,12 @@ const FALL: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
 const RATES_APART: f64 = 0.5;
 /// Fewest break-aways that tell μ_s/μ_d.
 const FEWEST_BREAK_AWAYS: usize = 3;
+/// Share by which μ_s/μ_d may be off on an even disc, where steps of the converter say as much as friction.
+const EVEN: f64 = 0.02;
 /// Most releases and break-aways that are looked at: a minute of an experiment has fewer.
 const MOST: usize = 60;
 /// Ripple that is always reckoned with, as a share.
-const LEAST_RIPPLE: f64 = 0.01;
+const LEAST_RIPPLE: f64 = 0.03;
 /// Normalised innovation of an edge that no ride has: one in millions.
 const UNEXPLAINED: f64 = 7.0;
 
@@ -130,8 +132,15 @@ pub fn identify(recordings: &[Recording]) -> Report {
         // No disc is so even that a model holds to the last count.
         ripple: slow.ripple.0.max(LEAST_RIPPLE) / hold.value,
     });
-    let ratio = ratio(&slips, known.as_ref());
+    let mut ratio = ratio(&slips, known.as_ref());
+    let even = slowest.is_some_and(|slow| slow.ripple.0 < LEAST_RIPPLE);
+    if let (true, Finding::Known(e)) = (even, &mut ratio) {
+        (e.low, e.high) = (e.low - EVEN * e.value, e.high + EVEN * e.value);
+    }
     let stribeck = match fall.as_ref().and_then(|f| f.looser) {
+        _ if even => {
+            refused("on a disc so even a step of the converter says as much; no experiment here tells it")
+        }
         None => stribeck(&slips, known.as_ref(), &ratio),
         Some(_) => refused(
             "it shows in parts of a millisecond, and the delay differs from release to release by more: an actuator without a \
