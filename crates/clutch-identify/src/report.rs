@@ -15,7 +15,7 @@ const FALL: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
 /// Rates that tell C/J lie this far apart, rad/s.
 const RATES_APART: f64 = 0.5;
 /// Fewest break-aways that tell μ_s/μ_d.
-const FEWEST_BREAK_AWAYS: usize = 3;
+const FEWEST_SLIPS: usize = 3;
 /// Share by which μ_s/μ_d may be off on an even disc, where steps of the converter say as much as friction.
 const EVEN: f64 = 0.02;
 /// Most releases and break-aways that are looked at: a minute of an experiment has fewer.
@@ -257,9 +257,9 @@ fn ratio(slips: &[BreakAway<'_>], known: Option<&Known>) -> Finding {
     let Some(known) = known else {
         return refused("it takes T/J and v_hold, which releases and a ride tell");
     };
-    if slips.len() < FEWEST_BREAK_AWAYS {
+    if slips.len() < FEWEST_SLIPS {
         return Finding::Refused(format!(
-            "{} break-aways of the {FEWEST_BREAK_AWAYS} that it takes: a crawl at 0.5 °/s under a soft law, \
+            "{} break-aways of the {FEWEST_SLIPS} that it takes: a crawl at 0.5 °/s under a soft law, \
              or a voltage that falls by one code each 10 ms, tells it",
             slips.len()
         ));
