@@ -236,3 +236,16 @@ def test_an_option_that_means_nothing_is_a_value_error(keywords, words):
     with pytest.raises(ValueError) as caught:
         package.loop("board_smc_2", **keywords)
     assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+def test_a_release_test_comes_first_and_ends_what_is_wired_wrongly():
+    tested = {"duration": 1.1, "release_test": "always", "release_deg": 0.3}
+    with pytest.raises(package.LoopError, match="ahead of the fastest shaft"):
+        package.loop(**tested, faults=["scale:at=0,factor=2"])
+    result = package.loop(**tested)
+    assert result.verdict == "done"
+    assert "0 V for 12 periods, at most 0.27°" in result.announcement
+    with pytest.raises(ValueError, match='release_test = "maybe": expected "auto" or "always" or "never"'):
+        package.loop(release_test="maybe")
+    with pytest.raises(package.LoopError, match="way of the release test = 11°: expected above 0 and at most 10"):
+        package.loop(release_deg=11)
