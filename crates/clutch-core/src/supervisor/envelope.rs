@@ -300,7 +300,7 @@ pub(super) struct EnvelopeState<T> {
 impl<T: Real> EnvelopeState<T> {
     /// A voltage is sent.
     pub(super) fn sends(&mut self, volts: T) {
-        self.last = (self.last + 1) % SENT;
+        self.last = self.last.wrapping_add(1) % SENT;
         if let Some(place) = self.sent.get_mut(self.last) {
             *place = volts;
         }
