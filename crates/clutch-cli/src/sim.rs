@@ -12,7 +12,7 @@ use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::Detected;
 use clutch_sim::reaching::Reaching;
 use clutch_sim::rig::Rig;
-use clutch_sim::{Keep, Metrics, Run, Scenario};
+use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -193,22 +193,8 @@ fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
     let t = &run.trace;
     let wrong = || format!("{}: cannot be written", file.display());
     let mut out = csv::Writer::from_path(file).with_context(wrong)?;
-    let mut header = vec![
-        "time_s",
-        "target_position_rad",
-        "target_velocity_rad_s",
-        "position_rad",
-        "velocity_rad_s",
-        "error_rad",
-        "counts",
-        "measured_error_rad",
-        "error_rate_rad_s",
-        "code",
-        "voltage_v",
-        "stuck",
-    ];
-    let names: Vec<String> = t.term_columns().map(|(name, _)| name).collect();
-    header.extend(names.iter().map(String::as_str));
+    let mut header: Vec<String> = SAMPLE_COLUMNS.map(str::to_owned).into();
+    header.extend(t.term_columns().map(|(name, _)| name));
     out.write_record(&header).with_context(wrong)?;
     for i in 0..t.time.len() {
         let floats = |xs: &[f64]| xs.iter().map(f64::to_string).collect::<Vec<_>>();
@@ -216,6 +202,7 @@ fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
             t.time[i],
             t.target_position[i],
             t.target_velocity[i],
+            t.target_acceleration[i],
             t.position[i],
             t.velocity[i],
             t.error[i],
@@ -223,7 +210,8 @@ fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
         row.push(t.counts[i].to_string());
         row.extend(floats(&[t.measured_error[i], t.error_rate[i]]));
         row.push(t.code[i].to_string());
-        row.push(t.voltage[i].to_string());
+        row.extend(floats(&[t.voltage[i], t.demand[i]]));
+        row.push((t.limit[i] as u8).to_string());
         row.push(u8::from(t.stuck[i]).to_string());
         row.extend(t.terms.iter().map(|(_, values)| values[i].to_string()));
         out.write_record(&row).with_context(wrong)?;

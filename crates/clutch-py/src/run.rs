@@ -4,7 +4,6 @@ use crate::convert::{core_error, from_json, os_error};
 use crate::scenario::Scenario;
 use crate::stepping::{PythonLaw, event_table, native};
 use crate::table::{Column, Table};
-use clutch_core::law::Limit;
 use clutch_core::{ParamError, Servo};
 use clutch_loop::to_log::{SaveError, save_simulation};
 use clutch_sim::engine::EngineKind;
@@ -109,13 +108,7 @@ pub(crate) fn lowest_smooth_speed<'py>(
 
 /// Samples as columns, the memory shared with the run.
 pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)> {
-    let limit = run.trace.limit.iter().map(|l| match l {
-        Limit::None => 0_u16,
-        Limit::Lowest => 1,
-        Limit::Highest => 2,
-        Limit::Invalid => 3,
-    });
-    let limit = Column::own(limit.collect::<Vec<u16>>());
+    let limit = Column::own(run.trace.limit.iter().map(|l| *l as u16).collect::<Vec<u16>>());
     let mut columns: Vec<(String, Column)> = vec![
         ("time_s".into(), Column::part(run, |r| &r.trace.time)),
         ("target_position_rad".into(), Column::part(run, |r| &r.trace.target_position)),
