@@ -1348,6 +1348,9 @@ class Glide(_Params):
     optimism : float, default 1.0
         Standard deviations by which friction is taken to be higher than believed, from a rest to the first
         edge. A number from 0 to 10.
+    micro_below_deg_s : float, default 0.0
+        Rate of the path below which the shaft goes in micro-steps, between which it rests; 0 takes none. A
+        finite number of at least 0 °/s.
     filter : EdgeTimed
         Filter of velocity and friction. By default `EdgeTimed()`.
 
@@ -1370,6 +1373,7 @@ class Glide(_Params):
     floor: float = 0.5
     cap: float = 3.0
     optimism: float = 1.0
+    micro_below_deg_s: float = 0.0
     filter: EdgeTimed = field(default_factory=EdgeTimed)
 
 

@@ -94,6 +94,26 @@ fn from_rest_it_is_smooth_within_150_ms_whatever_friction_it_believes() {
     }
 }
 
+#[test]
+fn below_the_rates_at_which_it_slides_it_steps_by_parts_of_a_count() {
+    let below = ("law.glide.micro_below_deg_s", Value::Float(0.95));
+    // A count is 0.018°.
+    for (rate, degrees) in [(0.05, 0.005), (0.2, 0.006), (0.5, 0.012), (0.7, 0.015)] {
+        for scalar in ["f64", "f32"] {
+            let keys = [(RATE, rate.into()), ("sampling.scalar", scalar.into()), below.clone()];
+            let error = most(&discs(1, 4, &keys), |m| m.max_error_rad).to_degrees();
+            assert!(error <= degrees, "{rate} °/s in {scalar}: {error}°");
+        }
+    }
+    // Above, nothing changes.
+    let at = |keys: &[(&str, Value)]| discs(1, 2, keys).iter().map(|m| m.max_error_rad).collect::<Vec<_>>();
+    assert_eq!(at(&[(RATE, 1.0.into())]), at(&[(RATE, 1.0.into()), below.clone()]));
+    // An actuator that lags lets go for longer, of which it is not told.
+    let keys = [(RATE, 0.3.into()), ("rig.actuator_time_constant_s", 0.001.into()), below];
+    let error = most(&discs(1, 4, &keys), |m| m.max_error_rad).to_degrees();
+    assert!(error <= 0.02, "{error}°");
+}
+
 /// A path of two moves with a rest of eight seconds after each, on a rig that differs from `bench` by keys.
 fn two_moves(keys: &[(&str, Value)], seed: i64) -> clutch_sim::Run {
     let base = clutch_sim::scenario::BUILT_IN.iter().find(|b| b.name == "bench_glide_2").unwrap();

@@ -314,7 +314,7 @@ fn certified(runs: u64) -> Result<()> {
 }
 
 fn smooth() -> Result<()> {
-    for table in ["laws", "plants", "rest"] {
+    for table in ["laws", "plants", "rest", "steps", "motions"] {
         write_between("docs/smooth.md", table, &table_of("smooth", &[table])?)?;
     }
     Ok(())

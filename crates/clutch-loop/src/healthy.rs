@@ -44,7 +44,10 @@ impl Healthy {
         let delay = rng.random_range(0..=1);
         let law = match law {
             "pid" => "[law.pid]\nkp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n".to_owned(),
-            "glide" => format!("[law.glide]\nfilter.delay_ticks = {delay}\n"),
+            "glide" => {
+                let steps = if rng.random_bool(0.5) { 0.95 } else { 0.0 };
+                format!("[law.glide]\nmicro_below_deg_s = {steps:?}\nfilter.delay_ticks = {delay}\n")
+            }
             _ => format!("[law.{law}]\n"),
         };
         let rate = [2.0, 5.0, 10.0, 20.0, 40.0, 60.0][rng.random_range(0..6)];

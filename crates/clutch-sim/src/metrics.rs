@@ -123,6 +123,8 @@ figures! {
         STICK_TIME stick_time_fraction: f64, "time stuck", "1" shown as "%" PERCENT;
         /// Stair height: largest movement between one stick and the next, 0 with fewer than two.
         STAIR_HEIGHT stair_height_rad: f64, "stair height", "rad" shown as "°" DEGREES;
+        /// Longest rest between two motions.
+        LONGEST_REST longest_rest_s: f64, "longest rest", "s" shown as "ms" MILLI;
         /// Mean magnitude of the torque of drive and motor at which the shaft broke away.
         BREAK_AWAY break_away_torque_nm: Option<f64>, "torque at break-away", "N m" shown as "mN m" MILLI;
         /// Total variation of the voltage, per time.
@@ -176,6 +178,9 @@ pub struct MetricsBuilder {
     sticks: u64,
     stuck_time: f64,
     last_stick: Option<f64>,
+    /// The rest that lasts, and the longest, s.
+    rest: f64,
+    longest_rest: f64,
     stair: f64,
     break_aways: u64,
     break_away_sum: f64,
@@ -200,6 +205,8 @@ impl MetricsBuilder {
             sticks: 0,
             stuck_time: 0.0,
             last_stick: None,
+            rest: 0.0,
+            longest_rest: 0.0,
             stair: 0.0,
             break_aways: 0,
             break_away_sum: 0.0,
@@ -251,19 +258,25 @@ impl MetricsBuilder {
 
     /// The period that began at `begin` (s), with the shaft stuck or not, and what happened in it.
     pub fn period(&mut self, begin: f64, mut stuck: bool, events: &[Event]) {
-        let (mut since, mut sum) = (begin, 0.0);
+        let counts = begin >= self.settle;
+        let mut rests = |rest: &mut f64, seconds: f64| {
+            if counts {
+                self.stuck_time += seconds;
+                *rest += seconds;
+                self.longest_rest = self.longest_rest.max(*rest);
+            }
+        };
+        let mut since = begin;
         for e in events {
             if stuck && e.kind == EventKind::BreakAway {
-                sum += e.time - since;
+                rests(&mut self.rest, e.time - since);
+                self.rest = 0.0;
             }
             stuck = e.kind == EventKind::Stick;
             since = e.time;
         }
         if stuck {
-            sum += begin + self.period - since;
-        }
-        if begin >= self.settle {
-            self.stuck_time += sum;
+            rests(&mut self.rest, begin + self.period - since);
         }
         events.iter().for_each(|e| self.event(e));
     }
@@ -282,6 +295,7 @@ impl MetricsBuilder {
             stick_slip_cycles_per_s: self.sticks as f64 / time,
             stick_time_fraction: self.stuck_time / time,
             stair_height_rad: self.stair,
+            longest_rest_s: self.longest_rest,
             break_away_torque_nm: (self.break_aways > 0)
                 .then(|| self.break_away_sum / self.break_aways as f64),
             control_variation_v_s: self.variation / time,

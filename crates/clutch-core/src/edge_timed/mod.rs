@@ -157,6 +157,11 @@ impl<T: Real> EdgeTimedState<T> {
         self.release > T::ZERO
     }
 
+    /// Friction, as a multiple of the model's, and its variance.
+    pub(crate) fn friction(&self) -> (T, T) {
+        (self.belief.friction(), self.belief.friction_variance())
+    }
+
     /// Velocity, counts per period.
     #[must_use]
     pub fn velocity(&self) -> T {
@@ -380,7 +385,7 @@ impl<T: Real> EdgeTimed<T> {
 
     /// Pull of drive and motor, and load of the pad, at a voltage there, counts per period².
     #[inline(never)]
-    fn forces(&self, volts: T) -> (T, T) {
+    pub(crate) fn forces(&self, volts: T) -> (T, T) {
         let pull = (self.drive_torque + self.actuator.torque(volts)) * self.per_torque;
         (pull, self.actuator.friction(self.mu * self.per_torque, volts))
     }
@@ -415,16 +420,8 @@ impl<T: Real> EdgeTimed<T> {
         (mean, end)
     }
 
-    /// One sample: the position now, the voltage that the converter gave since the last sample, and the path's
-    /// velocity, rad/s.
-    #[inline(never)]
-    pub fn update(
-        &self,
-        state: &mut EdgeTimedState<T>,
-        position: FixedCounts,
-        applied: T,
-        target_velocity: T,
-    ) {
+    /// What a sample says by itself: the counts since the last, and the mean voltage at the pad.
+    fn hear(&self, state: &mut EdgeTimedState<T>, position: FixedCounts, applied: T) -> (T, T) {
         let moved = self.place(state, position);
         let [newest, middle, oldest] = state.line;
         state.line = [applied, newest, middle];
@@ -436,6 +433,44 @@ impl<T: Real> EdgeTimed<T> {
         };
         let (volts, end) = self.at_pad(state.pad, arrived);
         state.pad = end;
+        (moved, volts)
+    }
+
+    /// One sample of a shaft that goes in steps, of which the filter knows nothing: the counts since the last.
+    pub(crate) fn stand_aside(&self, state: &mut EdgeTimedState<T>, position: FixedCounts, applied: T) -> T {
+        self.hear(state, position, applied).0
+    }
+
+    /// The shaft rests at a known position above the lower edge of its count, with a friction that steps have told; from
+    /// here the filter goes on.
+    pub(crate) fn take_over(&self, state: &mut EdgeTimedState<T>, position: T, friction: T) {
+        let belief = &mut state.belief;
+        belief.rest();
+        let share = belief.hh / (belief.hh + T::splat(0.2 * 0.2));
+        belief.mean += share * (friction - belief.mean);
+        belief.hh = belief.hh * (T::ONE - share);
+        (belief.hr, belief.hs) = (T::ZERO, T::ZERO);
+        belief.position = position;
+        // Known to the way of a step or two.
+        belief.tt = T::splat(0.02);
+        belief.know_friction(belief.mean, self.ripple * belief.mean);
+        state.at_edge = state.belief;
+        state.silent = T::ZERO;
+        state.release = T::ZERO;
+        state.phase = Phase::Resting;
+    }
+
+    /// One sample: the position now, the voltage that the converter gave since the last sample, and the path's
+    /// velocity, rad/s.
+    #[inline(never)]
+    pub fn update(
+        &self,
+        state: &mut EdgeTimedState<T>,
+        position: FixedCounts,
+        applied: T,
+        target_velocity: T,
+    ) {
+        let (moved, volts) = self.hear(state, position, applied);
         let (pull, load) = self.forces(volts);
         let way = match state.phase {
             Phase::Resting => T::ZERO,

@@ -11,6 +11,7 @@
 //! the first edge it is then held with less than the believed friction asks for, `optimism` standard deviations: too
 //! little voltage costs an overshoot of parts of a count, too much a stick.
 
+use super::micro_step::{MicroStep, MicroStepState, Stepping};
 use super::{Beside, Command, ControlLaw, Listed, Output, OutputState, Seen, Tick};
 use crate::edge_timed::{EdgeTimed, EdgeTimedParams, EdgeTimedState};
 use crate::friction::FrictionModel;
@@ -34,6 +35,8 @@ crate::params! {
         cap: T = 3.0, "cap" "" NONE, Range::at_least(1.0);
         /// Standard deviations by which friction is taken to be higher than believed, from a rest to the first edge.
         optimism: T = 1.0, "optimism" "" NONE, Range::at_least(0.0).up_to(10.0);
+        /// Rate of the path below which the shaft goes in micro-steps, between which it rests; 0 takes none.
+        micro: T = 0.0, "micro_below_deg_s" "" DEG_S, Range::at_least(0.0);
     }
     nested {
         /// Filter of velocity and friction.
@@ -55,6 +58,7 @@ pub struct Glide<T> {
     kd: T,
     estimator: EdgeTimed<T>,
     plant: Plant<T>,
+    steps: MicroStep<T>,
     /// Torque for an acceleration, N m per count per period².
     torque: T,
     /// Counts per period² of an acceleration in rad/s².
@@ -70,6 +74,7 @@ pub struct GlideState<T> {
     seen: Seen<T>,
     /// The filter has begun.
     begun: bool,
+    steps: MicroStepState<T>,
     output: OutputState<T>,
 }
 
@@ -93,16 +98,75 @@ impl<T: Real> Glide<T> {
         }
         let estimator = EdgeTimed::new(&p.filter, &plant, beside.encoder, beside.period)?;
         let acceleration = seconds * seconds * estimator.counts_per_radian();
-        Ok(Glide {
+        let mut law = Glide {
             params: *p,
             kp: p.kp * seconds,
             kd: p.kd * seconds,
+            steps: MicroStep::default(),
             estimator,
             torque: beside.model.inertia / acceleration,
             acceleration,
             plant,
             output: Output::new(beside.output, beside.period)?,
-        })
+        };
+        law.steps = law.steps_of(p);
+        Ok(law)
+    }
+
+    /// Micro-steps of the shaft that the law believes in.
+    fn steps_of(&self, p: &GlideParams<T>) -> MicroStep<T> {
+        let filter = &self.estimator;
+        let only = match self.plant.actuator().kind() {
+            ActuatorKind::Brake => self.plant.params().drive_torque.sgn(),
+            ActuatorKind::Motor | ActuatorKind::Both => T::ZERO,
+        };
+        let way = if only == T::ZERO { T::ONE } else { only };
+        let (pull, load) = filter.forces(self.stepping(Stepping::first(way)));
+        let go = way * pull - load;
+        let (pull, load) = filter.forces(self.stepping(Stepping::Hold));
+        MicroStep::new(filter.per_period(p.micro), (go, load - way * pull), only, filter.delay())
+    }
+
+    /// Voltage of a period in which the shaft goes in steps, V.
+    fn stepping(&self, demand: Stepping<T>) -> T {
+        match (self.plant.actuator().kind(), demand) {
+            (ActuatorKind::Brake, Stepping::Go(_)) => self.output.lowest(),
+            (ActuatorKind::Motor | ActuatorKind::Both, Stepping::Go(push)) => {
+                let at_rest = push.abs() * self.plant.friction().at_rest() / self.estimator.mu();
+                self.volts(T::ZERO, at_rest, push.sgn())
+            }
+            (ActuatorKind::Brake | ActuatorKind::Both, Stepping::Hold) => self.output.highest(),
+            (ActuatorKind::Motor, Stepping::Hold) => self.volts(T::ZERO, T::ZERO, T::ZERO),
+        }
+    }
+
+    /// Demand of a period in which the shaft goes in steps, V, and terms.
+    #[inline(never)]
+    fn step(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> (T, [T; 6]) {
+        let filter = &self.estimator;
+        let Seen { position, applied } = state.seen;
+        let pace = filter.per_period(tick.target_velocity);
+        if !state.steps.active() {
+            let ahead = filter.ahead(&state.estimator).position;
+            state.steps.begin(ahead, filter.delay());
+        }
+        let moved = filter.stand_aside(&mut state.estimator, position, applied);
+        let from_edge = tick.error * filter.counts_per_radian() + state.estimator.fraction();
+        let target = from_edge + filter.delay() * pace;
+        let demand = self.stepping(self.steps.demand(&mut state.steps, moved, target, pace));
+        let error = target - state.steps.position();
+        let belief = &state.estimator;
+        let (friction, variance) = belief.friction();
+        let mu = filter.mu();
+        let terms = [
+            T::ZERO,
+            mu * friction,
+            mu * mu * variance,
+            error * filter.radians_per_count(),
+            tick.target_velocity,
+            T::from_i32(3),
+        ];
+        (demand, terms)
     }
 
     /// Voltage for a torque on a shaft that goes a way, with a multiple of the model's friction, V.
@@ -200,14 +264,24 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
     fn update(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> Command<T, [T; 6]> {
         let filter = &self.estimator;
         let Seen { position, applied } = state.seen;
-        let belief = &mut state.estimator;
-        if state.begun {
-            filter.update(belief, position, applied, tick.target_velocity);
-        } else {
-            *belief = filter.start(position, applied, tick.target_velocity);
+        let begins = !state.begun;
+        if begins {
+            state.estimator = filter.start(position, applied, tick.target_velocity);
             state.begun = true;
         }
-        let (demand, terms) = self.demand(belief, tick);
+        let (demand, terms) = if self.steps.takes(&state.steps, filter.per_period(tick.target_velocity)) {
+            self.step(state, tick)
+        } else {
+            let belief = &mut state.estimator;
+            if state.steps.active() {
+                state.steps.end();
+                filter.take_over(belief, state.steps.position(), self.steps.friction(&state.steps));
+            }
+            if !begins {
+                filter.update(belief, position, applied, tick.target_velocity);
+            }
+            self.demand(belief, tick)
+        };
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
         Command { voltage, limit, terms }
     }

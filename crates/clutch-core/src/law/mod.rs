@@ -10,6 +10,7 @@
 //! turn their sign round: PD then is `u = K_p e + K_d ė`, as the paper prints it.
 
 mod list;
+mod micro_step;
 mod output;
 mod shell;
 

@@ -253,7 +253,7 @@ fn setting(rng: &mut Pcg64) -> Setting {
     let rig = [RigName::Paper, RigName::Paper, RigName::Paper, RigName::Bench, RigName::Motor];
     let rig = pick(rng, &rig, RigName::Paper);
     let laws: &[&str] = match rig {
-        RigName::Motor => &["pid", "smc", "ctc"],
+        RigName::Motor => &["pid", "smc", "ctc", "glide"],
         RigName::Paper => &["pd", "ctc", "smc", "smc_sign", "pid", "hold", "glide"],
         RigName::Bench => &["pd", "ctc", "smc", "glide"],
     };

@@ -170,6 +170,8 @@ impl Draw {
         }
         let gains = match s.law {
             "pid" => "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n".to_owned(),
+            // In one scalar with micro-steps, in the other without.
+            "glide" if s.single => format!("micro_below_deg_s = 0.95\nfilter.delay_ticks = {}\n", s.delay),
             "glide" => format!("filter.delay_ticks = {}\n", s.delay),
             _ => String::new(),
         };
@@ -206,6 +208,8 @@ impl Draw {
         let gains = match law {
             "smc" => "kp_v = 1.5\nkd_v_s_rad = 4.0\nslope_1_s = 40.0\nboundary_rad_s = 0.3\n",
             "pid" => "kp_v_rad = 200.0\nki_v_rad_s = 2000.0\nkd_v_s_rad = 4.0\n",
+            // Without them a motor under glide stands at each reversal.
+            "glide" => "micro_below_deg_s = 0.95\n",
             _ => "",
         };
         let amplitude = path.top_deg_s() / (std::f64::consts::TAU * MOTOR_HZ);

@@ -1,8 +1,10 @@
 //! Smooth motion on the rig `bench`, law by law and rate by rate: the tables of docs/smooth.md, by `cargo xtask smooth`.
 //!
 //! ```sh
-//! cargo run --release --package clutch-sim --example smooth -- laws    # or plants, rest
+//! cargo run --release --package clutch-sim --example smooth -- laws    # or plants, rest, steps, motions
 //! ```
+
+mod steps;
 
 use clutch_sim::sweep::{Row, Sweep};
 use clutch_sim::{Keep, Metrics};
@@ -88,17 +90,22 @@ const BELIEFS: &[(&str, f64)] = &[
     ("0.66 times", 0.4373),
 ];
 
-/// Runs of a law on `bench`, one for each seed.
+/// Runs of a law on `bench` along a ramp, one for each seed.
 fn runs(law: &str, keys: &[(&str, f64)], seeds: std::ops::Range<i64>) -> Outcome<Vec<Metrics>> {
-    let toml = format!(
-        "name = \"smooth\"\n\n[rig]\nbase = \"bench\"\n\n{law}\n\n[reference.ramp]\nrate_deg_s = 2.0\n"
-    );
-    let mut base: Table = toml.parse()?;
+    runs_of(&format!("[rig]\nbase = \"bench\"\n\n{law}\n\n[reference.ramp]\nrate_deg_s = 2.0\n"), keys, seeds)
+}
+
+/// Runs of a scenario without a name, one for each seed.
+fn runs_of(scenario: &str, keys: &[(&str, f64)], seeds: std::ops::Range<i64>) -> Outcome<Vec<Metrics>> {
+    let mut base: Table = format!("name = \"smooth\"\n\n{scenario}").parse()?;
     let mut names: Vec<String> = vec!["run.seed".into()];
     names.extend(keys.iter().map(|(key, _)| (*key).to_owned()));
     let rows = seeds.map(|seed| {
         let mut row = vec![Value::Integer(seed)];
-        row.extend(keys.iter().map(|(_, value)| Value::Float(*value)));
+        row.extend(keys.iter().map(|(key, value)| match *key {
+            "rig.encoder.counts_per_rev" => Value::Integer(*value as i64),
+            _ => Value::Float(*value),
+        }));
         row
     });
     base.entry("run").or_insert(Value::Table(Table::new()));
@@ -222,6 +229,8 @@ fn main() -> Outcome<()> {
         Some("laws") => laws(),
         Some("plants") => plants(),
         Some("rest") => rest(),
-        _ => Err("expected laws, plants or rest".into()),
+        Some("steps") => steps::steps(),
+        Some("motions") => steps::motions(),
+        _ => Err("expected laws, plants, rest, steps or motions".into()),
     }
 }

@@ -1,0 +1,345 @@
+//! Micro-steps: the motion below the slowest rate at which a shaft slides.
+//!
+//! ```text
+//! a step:  m periods let go (a motor pushes), n periods held;   way m² k,   k = a/2 (1 + a/b),   n ≥ m a/b
+//! ```
+//!
+//! `a` is the acceleration of the shaft that is let go, `b` the one that stops it again. A step is taken when the path
+//! is half a step ahead of where the steps before have brought the shaft, so that the error is half a step and what is
+//! not known of `k`. That is learnt: the steps from edge to edge make a count. A fall from rest needs no knowledge of
+//! friction, and the way to its end hardly any; where steps that should have made two counts made none, an actuator
+//! that lags lets go for longer and a motor, which has to break its friction first, pushes harder.
+
+use crate::Real;
+
+/// Share of the fastest succession of steps that the path takes: the rest makes up for steps that fall short.
+const SHARE: f64 = 0.8;
+/// Multiple of the believed friction at rest with which a motor pushes: at first, at least, at most.
+const PUSHED: f64 = 1.65;
+const PUSHES: (f64, f64) = (0.7, 5.0);
+/// Most periods for which a shaft is let go at once.
+const LONGEST: f64 = 64.0;
+/// Share of a new measurement in the way of a step.
+const LEARNT: f64 = 0.3;
+/// What the way of a step may become, as a multiple of the model's.
+const WAYS: (f64, f64) = (0.05, 5.0);
+/// Way of the shortest step above which a motor pushes less, counts.
+const COARSE: f64 = 0.6;
+
+/// The steps, checked. Lengths are in counts, times in periods.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct MicroStep<T> {
+    /// The path's velocity below which steps are taken; 0 takes none.
+    below: T,
+    /// `k` of the model.
+    way: T,
+    /// `a/b` of the model.
+    ratio: T,
+    /// The way in which a shaft that is let go sets off; 0 for a motor, which breaks friction either way.
+    only: T,
+    /// From a voltage to its effect.
+    delay: T,
+}
+
+/// Memory of the steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct MicroStepState<T> {
+    /// Steps are being taken.
+    active: bool,
+    /// Position above the lower edge of the last count, when all steps have ended.
+    position: T,
+    /// `k` as a multiple of the model's; 0 before the first step.
+    scale: T,
+    /// A motor's push.
+    push: T,
+    /// Least periods of a step.
+    least: T,
+    /// Steps since the last edge, each with the square of its periods.
+    since_edge: T,
+    /// They began at an edge.
+    from_edge: bool,
+    /// Counts of this step.
+    counts: T,
+    /// Periods of this step: all that let go, those still to let go, those still to hold.
+    periods: T,
+    go: T,
+    hold: T,
+    /// Its way: 1 or −1.
+    sign: T,
+}
+
+/// Demand of a period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Stepping<T> {
+    /// Lets go; a motor pushes with this multiple of the friction at rest, whose sign is the way.
+    Go(T),
+    /// Holds.
+    Hold,
+}
+
+impl<T: Real> Stepping<T> {
+    /// The first push, `way` 1 or −1.
+    pub(super) fn first(way: T) -> Self {
+        Stepping::Go(T::splat(PUSHED) * way)
+    }
+}
+
+impl<T: Real> MicroStepState<T> {
+    /// `true` while steps are taken.
+    pub(super) fn active(&self) -> bool {
+        self.active
+    }
+
+    /// Position at the end of the step, counts above the last edge.
+    pub(super) fn position(&self) -> T {
+        self.position
+    }
+
+    /// Begins at a position, counts above the last edge. What was learnt stays.
+    pub(super) fn begin(&mut self, position: T, delay: T) {
+        let known = self.scale > T::ZERO;
+        *self = MicroStepState {
+            active: true,
+            position: position.limit(T::ZERO, T::ONE),
+            scale: if known { self.scale } else { T::ONE },
+            push: if known { self.push } else { T::splat(PUSHED) },
+            least: self.least.max(T::ONE),
+            // What is on its way has to arrive, and the shaft to stop.
+            hold: T::ONE + delay,
+            ..MicroStepState::default()
+        };
+    }
+
+    /// Ends, at [`MicroStepState::position`].
+    pub(super) fn end(&mut self) {
+        self.active = false;
+    }
+}
+
+impl<T: Real> MicroStep<T> {
+    /// Steps for paths slower than `below`, counts per period. `go` and `stop` are the accelerations of a shaft that
+    /// is let go and of one that is held, counts per period²; `only` is the way that one goes that is let go, 0 for a
+    /// motor, which goes either way; `delay` are periods from a voltage to its effect.
+    pub(super) fn new(below: T, (go, stop): (T, T), only: T, delay: T) -> Self {
+        let least = T::splat(1e-9);
+        let (go, stop) = (go.max(least), stop.max(least));
+        MicroStep { below, way: T::splat(0.5) * go * (T::ONE + go / stop), ratio: go / stop, only, delay }
+    }
+
+    /// `true` if a path at `pace`, counts per period, is followed in steps. One that rests is where it was.
+    pub(super) fn takes(&self, state: &MicroStepState<T>, pace: T) -> bool {
+        let fast = pace.abs();
+        fast < self.below && (fast > T::ZERO || state.active)
+    }
+
+    /// Friction of a brake, as a multiple of the model's, by the way in which steps have stopped; the model's before any
+    /// was learnt.
+    pub(super) fn friction(&self, state: &MicroStepState<T>) -> T {
+        let ratio = state.scale * (T::ONE + self.ratio) - T::ONE;
+        if self.only == T::ZERO || state.scale == T::ONE || ratio <= T::ZERO {
+            return T::ONE;
+        }
+        // 1/r + 1 is the load of the pad over the drive.
+        ((T::ONE + ratio) * self.ratio / (ratio * (T::ONE + self.ratio))).limit(T::splat(0.3), T::splat(3.0))
+    }
+
+    /// Demand of a period in which the shaft has gone `moved` counts since the last sample, for a path at `pace`,
+    /// counts per period, whose target when the voltage takes effect is `target` counts above the last edge.
+    pub(super) fn demand(&self, state: &mut MicroStepState<T>, moved: T, target: T, pace: T) -> Stepping<T> {
+        state.counts += moved;
+        if state.go <= T::ZERO && state.hold <= T::ZERO {
+            self.judge(state);
+            self.decide(state, target - state.position, pace);
+        }
+        if state.go > T::ZERO {
+            state.go -= T::ONE;
+            return Stepping::Go(state.push * state.sign);
+        }
+        state.hold = (state.hold - T::ONE).max(T::ZERO);
+        Stepping::Hold
+    }
+
+    /// A step has ended: the place and the way that it came.
+    fn judge(&self, state: &mut MicroStepState<T>) {
+        let square = state.periods * state.periods;
+        let came = self.way * state.scale * square;
+        state.since_edge += square;
+        state.periods = T::ZERO;
+        if state.counts == T::ZERO {
+            state.position = (state.position + state.sign * came).limit(T::ZERO, T::ONE);
+            self.insist(state);
+            return;
+        }
+        if state.from_edge && state.since_edge > T::ZERO && state.counts * state.sign > T::ZERO {
+            let seen = state.counts.abs() / (state.since_edge * self.way);
+            let scale = state.scale + T::splat(LEARNT) * (seen - state.scale);
+            state.scale = scale.limit(T::splat(WAYS.0), T::splat(WAYS.1));
+            if self.only == T::ZERO && state.scale * self.way > T::splat(COARSE) {
+                state.push = (state.push * T::splat(0.95)).max(T::splat(PUSHES.0));
+            }
+        }
+        let beyond = T::splat(0.5) * came.min(T::ONE);
+        state.position = if state.counts > T::ZERO { beyond } else { T::ONE - beyond };
+        state.counts = T::ZERO;
+        state.from_edge = true;
+        state.since_edge = T::ZERO;
+    }
+
+    /// Steps that should have made two counts and made none have not moved the shaft.
+    fn insist(&self, state: &mut MicroStepState<T>) {
+        if state.since_edge * self.way * state.scale > T::splat(2.0) {
+            if self.only == T::ZERO {
+                state.push = (state.push * T::splat(1.15)).min(T::splat(PUSHES.1));
+            } else {
+                state.least = (state.least + T::ONE).min(T::splat(LONGEST));
+            }
+            state.since_edge = T::ZERO;
+            state.from_edge = false;
+        }
+    }
+
+    /// Whether a step begins, with the path `error` counts ahead.
+    fn decide(&self, state: &mut MicroStepState<T>, error: T, pace: T) {
+        let way = if error < T::ZERO { -T::ONE } else { T::ONE };
+        // The way of a step tells how long it takes to stop; a place with less friction has a whole period.
+        let ratio = (state.scale * (T::ONE + self.ratio) - T::ONE).max(T::ONE).max(self.ratio);
+        let k = self.way * state.scale;
+        // The least m for which m² k in m (1 + ratio) periods and the delay is as fast as the path.
+        let half = T::splat(0.5) * pace.abs() * (T::ONE + ratio) / (T::splat(SHARE) * k);
+        let needed = half + (half * half + pace.abs() * self.delay / (T::splat(SHARE) * k)).sqrt();
+        let periods = (-(-needed).floor()).max(state.least).min(T::splat(LONGEST));
+        // A path that goes one way is not gone back on, nor can a brake.
+        let along = way * pace >= T::ZERO && way * self.only >= T::ZERO;
+        if along && way * error > T::splat(0.5) * k * periods * periods {
+            state.go = periods;
+            state.periods = periods;
+            state.hold = -(-(periods * ratio)).floor() + self.delay;
+            state.from_edge &= way == state.sign;
+            state.sign = way;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A shaft in counts and periods: let go it gains `go` a period, held it loses `stop`.
+    struct Shaft {
+        go: f64,
+        stop: f64,
+        position: f64,
+        velocity: f64,
+    }
+
+    impl Shaft {
+        fn period(&mut self, acceleration: f64) {
+            let next = (self.velocity + acceleration).max(0.0);
+            let time =
+                if acceleration < 0.0 { ((self.velocity - next) / -acceleration).min(1.0) } else { 1.0 };
+            self.position += 0.5 * (self.velocity + next) * time;
+            self.velocity = next;
+        }
+    }
+
+    /// Largest error behind the tenth count, and what was learnt.
+    fn errors(steps: &MicroStep<f64>, shaft: &mut Shaft, pace: f64) -> (f64, MicroStepState<f64>) {
+        let mut state = MicroStepState::default();
+        state.begin(0.5, 0.0);
+        let (mut most, mut counts) = (0.0_f64, 0.0);
+        for k in 0..200_000 {
+            let path = 0.5 + pace * f64::from(k);
+            let moved = shaft.position.floor() - counts;
+            counts += moved;
+            let demand = steps.demand(&mut state, moved, path - counts, pace);
+            if path > 10.0 {
+                most = most.max((path - shaft.position).abs());
+            }
+            shaft.period(if demand == Stepping::Hold { -shaft.stop } else { shaft.go });
+        }
+        (most, state)
+    }
+
+    fn shaft(go: f64, stop: f64) -> Shaft {
+        Shaft { go, stop, position: 0.5, velocity: 0.0 }
+    }
+
+    #[test]
+    fn a_shaft_as_believed_is_never_farther_from_its_path_than_a_step_and_a_half() {
+        let (go, stop) = (0.09, 0.17);
+        let steps = MicroStep::new(1.0, (go, stop), 1.0, 0.0);
+        let step = 0.5 * go * (1.0 + go / stop);
+        for pace in [0.0005, 0.003, 0.01, 0.02] {
+            let (most, _) = errors(&steps, &mut shaft(go, stop), pace);
+            // Half a step, what an edge leaves open, and what the path goes on while a step is taken.
+            let bound = 1.5 * step + 3.0 * pace;
+            assert!(most < bound, "{pace}: {most}, {bound}");
+        }
+    }
+
+    #[test]
+    fn the_way_of_a_step_is_learnt_from_the_edges() {
+        for (go, stop) in [(0.06, 0.2), (0.09, 0.1), (0.13, 0.13)] {
+            let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, 0.0);
+            let (most, state) = errors(&steps, &mut shaft(go, stop), 0.005);
+            let (learnt, true_way) = (state.scale * steps.way, 0.5 * go * (1.0 + go / stop));
+            assert!((learnt / true_way - 1.0).abs() < 0.2, "{go}, {stop}: {learnt} for {true_way}");
+            assert!(most < 0.3, "{go}, {stop}: {most}");
+        }
+    }
+
+    #[test]
+    fn fast_paths_take_steps_of_more_periods_and_are_kept() {
+        let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, 0.0);
+        let (most, state) = errors(&steps, &mut shaft(0.09, 0.17), 0.06);
+        assert!(most < 1.0, "{most}");
+        assert!(state.periods + state.go > 1.0 || state.hold > 1.0);
+    }
+
+    #[test]
+    fn a_brake_never_steps_back_and_waits_for_a_path_that_is_behind() {
+        let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, 0.0);
+        let mut state = MicroStepState::default();
+        state.begin(0.5, 0.0);
+        for _ in 0..100 {
+            assert_eq!(steps.demand(&mut state, 0.0, -3.0, 0.001), Stepping::Hold);
+        }
+        let motor = MicroStep::new(1.0, (0.09, 0.17), 0.0, 0.0);
+        let mut back = None;
+        for _ in 0..10 {
+            if let Stepping::Go(push) = motor.demand(&mut state, 0.0, -3.0, 0.0) {
+                back = Some(push);
+            }
+        }
+        assert!(back.is_some_and(|push| push < 0.0), "{back:?}");
+    }
+
+    #[test]
+    fn where_no_edge_comes_a_motor_pushes_harder_and_a_brake_lets_go_for_longer() {
+        for (only, what) in [(0.0, "motor"), (1.0, "brake")] {
+            let steps = MicroStep::new(1.0, (0.09, 0.17), only, 0.0);
+            let mut state = MicroStepState::default();
+            state.begin(0.5, 0.0);
+            for k in 0..2000 {
+                steps.demand(&mut state, 0.0, 0.5 + 0.01 * f64::from(k), 0.01);
+            }
+            assert!(state.push <= 5.0 && state.least <= 64.0, "{what}");
+            let harder = if only == 0.0 { state.push / 1.65 } else { state.least };
+            assert!(harder > 1.1, "{what}: {harder}");
+        }
+    }
+
+    #[test]
+    fn nothing_that_is_no_number_is_remembered() {
+        let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, 1.0);
+        let mut state = MicroStepState::default();
+        state.begin(f64::NAN, 1.0);
+        for target in [f64::NAN, f64::INFINITY, -f64::INFINITY, 1.0] {
+            for _ in 0..10 {
+                steps.demand(&mut state, 0.0, target, 0.001);
+            }
+            let sum = state.position + state.scale + state.push + state.hold + state.go + state.since_edge;
+            assert!(sum.is_finite(), "{target}: {state:?}");
+        }
+    }
+}
