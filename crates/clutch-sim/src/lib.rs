@@ -3,6 +3,7 @@
 pub mod drive;
 pub mod engine;
 pub mod friction_lab;
+pub mod meter;
 pub mod metrics;
 pub mod moving_rig;
 mod number;

@@ -1,0 +1,364 @@
+//! The meter of stick-slip: between which bounds counts and voltage leave the cycles of a shaft.
+//!
+//! A shaft that sticks once in each count crosses its edges as evenly as one that slides: by the edges alone nobody can
+//! tell. But the voltage is known. A shaft that slides answers it with its velocity, and one that sticks breaks away only
+//! after the voltage has fallen by as much as friction at rest is above that in motion. Between two edges, where the
+//! shaft went one count, the meter therefore asks twice, for all frictions `h` that there may be:
+//!
+//! * Can it have slid all the way? If not, it has stuck: a *sure* stick.
+//! * Can it have stopped and broken away? If not, it has slid.
+//!
+//! A gap to which both answers are yes says nothing. Sure sticks are the least that there were, gaps that can hold a
+//! stick the most. A stick makes no edge, so that each lies within one gap, from its beginning to its end.
+//!
+//! ```text
+//! θ̈ = γ (p(t) − h l(t)) ± s,   p = (T_u + T(u))/J,  l = μ_d N(u)/J,  h constant over a count
+//! ```
+//!
+//! `docs/meter.md` has formulas, what is assumed, and how often the bounds hold the truth.
+
+use clutch_core::friction::FrictionModel;
+use clutch_core::law::LawParams;
+use clutch_core::{Counts, Encoder, Micros, Plant, VelocityParams};
+
+/// Friction as a multiple of the model's: from one over this to this.
+pub const FRICTION_RANGE: f64 = 2.5;
+/// Drive over inertia, of which the model's is believed to this share more and less.
+pub const GAIN_DOUBT: f64 = 0.2;
+/// Share of the model's rise of friction at rest over that in motion, of which a shaft that breaks away has at least
+/// this much.
+pub const RISE_BELIEVED: f64 = 0.5;
+/// Share by which friction changes along the disc, 1/rad: a ripple of 15 % with 340 waves per turn, as
+/// [`clutch_core::EdgeTimedParams`] believes it.
+pub const ROUGHNESS: f64 = 0.15 * 340.0;
+/// Periods from a voltage to its effect: from 0 to this, or to what a filter was told if that is more.
+const DELAY: u32 = 1;
+/// Points of a gap that are kept; of a longer one, every second, fourth and so on.
+const POINTS: usize = 256;
+/// Frictions that are tried: about 5 % from one to the next.
+const FRICTIONS: usize = 40;
+/// Steps of a search that halves (golden section) until friction is known to a millionth.
+const SEARCH: usize = 30;
+
+/// A gap between two edges, judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// Sample at which the count was entered, from 0.
+    pub begin: u64,
+    /// Sample at which it had been left.
+    pub end: u64,
+    /// The shaft cannot have slid all the way: it has stuck.
+    pub sure: bool,
+    /// The shaft can have stuck.
+    pub possible: bool,
+}
+
+/// Sticks so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Gaps in which the shaft has stuck.
+    pub least: u64,
+    /// Gaps in which it can have.
+    pub most: u64,
+}
+
+impl Tally {
+    /// Takes a gap. `from`: the first sample that counts; a gap that began before may hold a stick after it.
+    pub fn take(&mut self, gap: &Gap, from: u64) {
+        self.least += u64::from(gap.sure && gap.begin >= from);
+        self.most += u64::from(gap.possible && gap.end >= from);
+    }
+}
+
+/// The meter, with its memory. It allocates when it is made, and never later.
+#[derive(Clone, Debug)]
+pub struct Meter {
+    plant: Plant<f64>,
+    /// Acceleration of a torque, counts per period² and N m.
+    per_torque: f64,
+    /// The model's friction in motion, as μ.
+    sliding: f64,
+    /// Least ratio of friction at rest to that in motion.
+    ratio: f64,
+    /// Acceleration of a friction that changes within the count, counts per period².
+    slack: f64,
+    frictions: [f64; FRICTIONS],
+    /// One for each delay.
+    tracks: Vec<Track>,
+    scratch: Vec<f64>,
+    last: Option<Counts>,
+    /// Counts by which the gap was entered; 0 before the first edge.
+    entered: i32,
+    begin: u64,
+    sample: u64,
+}
+
+impl Meter {
+    /// A meter that believes `plant`, with `volts` on the actuator since long. Delays are tried from 0 to one period, or to
+    /// what law and velocity source were told.
+    #[must_use]
+    pub fn new(
+        plant: Plant<f64>,
+        (law, velocity): (&LawParams, &VelocityParams),
+        encoder: Encoder,
+        period: Micros,
+        volts: f64,
+    ) -> Self {
+        let seconds: f64 = period.seconds();
+        let count: f64 = encoder.radians_per_count();
+        let per_torque = seconds * seconds / (plant.params().inertia * count);
+        let sliding = plant.friction().sliding();
+        let rise = plant.friction().at_rest() / sliding - 1.0;
+        // What friction carries when the shaft slides: the drive, and what a disc or a gear drags.
+        let carried = plant.params().drive_torque.abs().max(sliding * plant.actuator().normal(0.0));
+        let told = match (law, velocity) {
+            (LawParams::Glide(p), _) => p.filter.delay,
+            (_, VelocityParams::EdgeTimed(p)) => p.delay,
+            _ => 0,
+        };
+        let step = 2.0 * libm::log(FRICTION_RANGE) / (FRICTIONS - 1) as f64;
+        Meter {
+            plant,
+            per_torque,
+            sliding,
+            ratio: 1.0 + RISE_BELIEVED * rise.max(0.0),
+            slack: (ROUGHNESS * count).min(1.0) * carried * per_torque,
+            frictions: std::array::from_fn(|i| libm::exp(step * i as f64) / FRICTION_RANGE),
+            tracks: (0..=told.max(DELAY)).map(|delay| Track::new(delay, volts)).collect(),
+            scratch: vec![0.0; POINTS + 2],
+            last: None,
+            entered: 0,
+            begin: 0,
+            sample: 0,
+        }
+    }
+
+    /// A sample: its counts, and the voltage that was given in answer to it, V. A gap that it ends is judged.
+    pub fn sample(&mut self, counts: Counts, volts: f64) -> Option<Gap> {
+        let moved = self.last.map(|last| counts.since(last));
+        self.last = Some(counts);
+        let mut judged = None;
+        if moved != Some(0) {
+            let left = moved.unwrap_or(0);
+            if self.entered != 0 {
+                judged = Some(self.judge(left));
+            }
+            self.entered = left;
+            self.begin = self.sample;
+            self.tracks.iter_mut().for_each(Track::enter);
+        }
+        let (plant, per_torque, sliding) = (&self.plant, self.per_torque, self.sliding);
+        for track in &mut self.tracks {
+            let volts = track.arrive(volts);
+            let actuator = plant.actuator();
+            let pull = (plant.params().drive_torque + actuator.torque(volts)) * per_torque;
+            track.advance(pull, sliding * actuator.normal(volts) * per_torque);
+        }
+        self.sample += 1;
+        judged
+    }
+
+    /// The gap that ends now, with so many counts.
+    fn judge(&mut self, left: i32) -> Gap {
+        let mut gap = Gap { begin: self.begin, end: self.sample, sure: false, possible: false };
+        if left.signum() != self.entered.signum() {
+            // It turned round, and was at rest for a moment at least.
+            gap.possible = true;
+            return gap;
+        }
+        let sign = f64::from(left.signum());
+        self.tracks.iter_mut().for_each(Track::leave);
+        gap.sure = self.tracks.iter().all(|track| !self.slides(track, sign));
+        let mut scratch = std::mem::take(&mut self.scratch);
+        gap.possible = gap.sure || self.tracks.iter().any(|track| self.stops(track, sign, &mut scratch));
+        self.scratch = scratch;
+        gap
+    }
+
+    /// True if there are a friction and a velocity with which the shaft slid all the way.
+    fn slides(&self, track: &Track, sign: f64) -> bool {
+        let end = track.now;
+        if end.time < 2.0 {
+            return true; // two samples fix no velocity
+        }
+        let (mut low, mut high) = (1.0 / FRICTION_RANGE, FRICTION_RANGE);
+        // Velocities at the beginning have to be at or above one bound and below another: the former less the latter is
+        // convex in friction.
+        for _ in 0..SEARCH {
+            let span = 0.381_966 * (high - low);
+            let (left, right) = (low + span, high - span);
+            let missing = [left, right].map(|h| self.missing(track, sign, h));
+            if missing[0] <= 0.0 || missing[1] <= 0.0 {
+                return true;
+            }
+            if missing[0] < missing[1] { high = right } else { low = left }
+        }
+        false
+    }
+
+    /// The least velocity at the beginning that has the shaft go on to the edge, less the most that does not bring it
+    /// there too early, counts per period.
+    fn missing(&self, track: &Track, sign: f64, friction: f64) -> f64 {
+        let gain = 1.0 - GAIN_DOUBT;
+        let (end, slack) = (&track.now, self.slack);
+        let mut least = 0.0_f64;
+        for x in &track.points {
+            least = least.max(-gain * x.speed(sign, friction) - slack * x.time);
+        }
+        // Over one count from the sample before the first to the last.
+        let (pull, load) = track.before;
+        let whole = end.time + 1.0;
+        let outside = gain * (end.way(sign, friction) - 0.5 * (sign * pull - friction * load));
+        least = least.max((1.0 - outside - 0.5 * slack * whole * whole) / whole);
+        // Below one count from the first sample in it to the last.
+        let inner = &track.inner;
+        let inside = gain * inner.way(sign, friction);
+        least - (1.0 - inside + 0.5 * slack * inner.time * inner.time) / inner.time
+    }
+
+    /// True if there is a friction with which the shaft came to rest and broke away, one count further in all.
+    fn stops(&self, track: &Track, sign: f64, after: &mut [f64]) -> bool {
+        let lets_go = |x: &Point, friction: f64| {
+            self.ratio * friction * x.load <= sign * x.pull + self.slack
+        };
+        if !track.points.iter().any(|x| lets_go(x, self.frictions[0])) {
+            return false;
+        }
+        let gain = 1.0 + GAIN_DOUBT;
+        let (end, slack) = (&track.now, self.slack);
+        let bowed = |time: f64| 0.5 * slack * time * time;
+        self.frictions.iter().any(|&h| {
+            // From rest at a point to the end: it goes on if nowhere later the velocity is lower.
+            let mut lowest = f64::INFINITY;
+            for (x, way) in track.points.iter().zip(after.iter_mut()).rev() {
+                let (speed, left) = (gain * x.speed(sign, h), end.time - x.time);
+                let goes_on = speed <= lowest + slack * left;
+                lowest = lowest.min(speed);
+                let far = gain * (end.way(sign, h) - x.way(sign, h)) - speed * left + bowed(left);
+                *way = if goes_on && lets_go(x, h) { far } else { f64::NEG_INFINITY };
+            }
+            // From the edge to rest at a point: it came so far if nowhere earlier the velocity was lower.
+            let (mut lowest, mut farthest) = (f64::INFINITY, f64::NEG_INFINITY);
+            let (pull, load) = track.before;
+            let first = sign * pull - h * load;
+            let (mut slows, first) = (first <= slack, 0.5 * gain * first);
+            track.points.iter().zip(after.iter()).any(|(x, way)| {
+                let speed = gain * x.speed(sign, h);
+                if slows && speed <= lowest + slack * x.time {
+                    let far = gain * x.way(sign, h) - speed * x.time + bowed(x.time);
+                    farthest = farthest.max(far + (-speed - first).max(0.0));
+                }
+                lowest = lowest.min(speed);
+                slows |= sign * x.pull - h * x.load <= slack;
+                farthest + way >= 1.0
+            })
+        })
+    }
+}
+
+/// A gap, as it was with one delay.
+#[derive(Clone, Debug)]
+struct Track {
+    /// Voltages on their way, the oldest first, V.
+    line: [f64; 4],
+    delay: usize,
+    /// The last of them may be told late: the newest.
+    points: Vec<Point>,
+    /// Periods from one point to the next.
+    stride: u64,
+    since: u64,
+    /// The last sample, and the one before.
+    now: Point,
+    inner: Point,
+    /// Pull and load of the period that entered the count.
+    before: (f64, f64),
+    acts: (f64, f64),
+}
+
+/// A sample within a gap: what has come together since the gap began, and what acts from here on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Point {
+    /// Periods since the beginning.
+    time: f64,
+    /// Integrals of pull and load, and their integrals.
+    pulled: f64,
+    loaded: f64,
+    pulled_far: f64,
+    loaded_far: f64,
+    pull: f64,
+    load: f64,
+}
+
+impl Point {
+    /// Velocity gained since the beginning, counts per period.
+    fn speed(&self, sign: f64, friction: f64) -> f64 {
+        sign * self.pulled - friction * self.loaded
+    }
+
+    /// Way that this makes, counts.
+    fn way(&self, sign: f64, friction: f64) -> f64 {
+        sign * self.pulled_far - friction * self.loaded_far
+    }
+}
+
+impl Track {
+    fn new(delay: u32, volts: f64) -> Self {
+        Track {
+            line: [volts; 4],
+            delay: (delay as usize).min(3),
+            points: Vec::with_capacity(POINTS + 2),
+            stride: 1,
+            since: 0,
+            now: Point::default(),
+            inner: Point::default(),
+            before: (0.0, 0.0),
+            acts: (0.0, 0.0),
+        }
+    }
+
+    /// The voltage that takes effect now.
+    fn arrive(&mut self, given: f64) -> f64 {
+        self.line.rotate_right(1);
+        self.line[0] = given;
+        self.line[self.delay]
+    }
+
+    /// The shaft has entered a count.
+    fn enter(&mut self) {
+        self.points.clear();
+        (self.stride, self.since) = (1, 0);
+        self.before = self.acts;
+        self.now = Point::default();
+        self.inner = Point::default();
+    }
+
+    /// A period passes.
+    fn advance(&mut self, pull: f64, load: f64) {
+        self.acts = (pull, load);
+        let x = &mut self.now;
+        (x.pull, x.load) = (pull, load);
+        self.inner = *x;
+        if self.since.is_multiple_of(self.stride) {
+            self.points.push(*x);
+            if self.points.len() > POINTS {
+                let mut kept = false;
+                self.points.retain(|_| {
+                    kept = !kept;
+                    kept
+                });
+                self.stride *= 2;
+            }
+        }
+        self.since += 1;
+        x.pulled_far += x.pulled + 0.5 * pull;
+        x.loaded_far += x.loaded + 0.5 * load;
+        x.pulled += pull;
+        x.loaded += load;
+        x.time += 1.0;
+    }
+
+    /// The shaft has left it.
+    fn leave(&mut self) {
+        self.points.push(self.now);
+    }
+}
