@@ -251,9 +251,7 @@ def loop(
     if figures["value"] is None:  # JSON has no number that is none
         figures["value"] = float("nan")
     metrics = figures.pop("metrics")
-    # The encoder is all that is seen here: what it detects is what there is.
-    for name in ("stick_slip_cycles_per_s", "stick_time_fraction"):
-        metrics[f"detected_{name}"] = metrics[name]
+    metrics.update({f"detected_{name}": value for name, value in figures.pop("detected").items()})
     return LoopResult(
         scenario=checked if changed is None else Scenario.from_toml(changed),
         metrics=Metrics(**metrics),

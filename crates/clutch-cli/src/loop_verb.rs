@@ -299,7 +299,7 @@ fn status(p: &Progress) {
 #[must_use]
 pub fn summary(s: &Summary) -> String {
     let r = &s.report;
-    let m = &r.metrics;
+    let (m, d) = (&r.metrics, &r.detected);
     let us = |ns: u64| number(ns as f64 / 1e3);
     let latency = |s: &CycleSummary| {
         format!("{} / {} / {} / {}", us(s.p50_ns), us(s.p99_ns), us(s.p99_9_ns), us(s.max_ns))
@@ -318,7 +318,10 @@ pub fn summary(s: &Summary) -> String {
             row(&Metrics::MAX_ERROR, m),
             row(&Metrics::RMS_ERROR, m),
             row(&Metrics::MEAN_ERROR, m),
-            (Detected::STICK_SLIP.label, number(m.stick_slip_cycles_per_s), Detected::STICK_SLIP.shown_unit),
+            row(&Detected::STICK_SLIP, d),
+            (Detected::TOLD.label, d.words(), Detected::TOLD.shown_unit),
+            row(&Detected::STICK_TIME, d),
+            row(&Detected::STAIRS, d),
             row(&Metrics::VARIATION, m),
             ("samples received", r.link.received.to_string(), ""),
             ("samples lost", r.lost.to_string(), ""),

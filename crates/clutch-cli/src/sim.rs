@@ -156,8 +156,9 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     );
     let mut rows = figures(m);
     // Beside what it was in truth.
-    let truth = rows.iter().position(|(label, ..)| *label == Metrics::STICK_SLIP.label);
-    rows.insert(truth.map_or(0, |i| i + 1), row(&Detected::STICK_SLIP, s.detected));
+    let truth = rows.iter().position(|(label, ..)| *label == Metrics::STICK_SLIP.label).map_or(0, |i| i + 1);
+    let told = (Detected::TOLD.label, s.detected.words(), Detected::TOLD.shown_unit);
+    rows.splice(truth..truth, [row(&Detected::STICK_SLIP, s.detected), told]);
     if let Some(time) = s.reaching.time_s {
         rows.push(("sliding surface reached after", number(time), "s"));
         if let Some(bound) = s.reaching.bound_s {
@@ -173,6 +174,9 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     let mut text = quantities(&title, &rows);
     text += &format!("gains, continuous time: {certified}\n");
     text += &paragraph(&format!("gains, as sampled: {}", s.as_sampled));
+    if let Some(reason) = s.detected.reason() {
+        text += &paragraph(&format!("stick-slip: {reason}"));
+    }
     if jump > 1e-9 {
         text += &format!(
             "note: the path's velocity jumps by {} °/s, which no shaft follows at once; the shaft catches up\n",

@@ -22,11 +22,12 @@ use crate::station::{Station, StationNotice};
 use crate::to_log;
 use crate::watch::Watch;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{Arithmetic, Micros, Real, StickSlip, StickSlipState};
+use clutch_core::{Arithmetic, Micros, Real};
 use clutch_log::{EventKind, EventRecord, Record, SampleRecord};
 use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Standing};
 use clutch_sim::Metrics;
-use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
+use clutch_sim::detected::Detector;
+use clutch_sim::metrics::{Detected, MetricsBuilder, MetricsSample};
 use clutch_wire::{Refused, StopReason};
 use rustix::fd::AsFd;
 use std::sync::atomic::Ordering;
@@ -66,8 +67,10 @@ pub struct LoopReport {
     pub value: f64,
     /// Ticks in which the law was asked.
     pub ticks: u64,
-    /// Tracking figures from the encoder, sticking as [`StickSlip`] sees it; no torque.
+    /// Tracking figures from the encoder, sticking as its silences show it; no torque.
     pub metrics: Metrics,
+    /// Stick-slip from counts and voltages.
+    pub detected: Detected,
     /// Counts of what the line carried.
     pub link: LinkCounts,
     /// Samples lost.
@@ -125,8 +128,8 @@ pub struct ConfiguredRun<'a, S> {
     pub ticks: u64,
     /// The board's clock.
     pub clock: ClockOffset,
-    /// The detector that sees stick-slip in the counts.
-    pub detector: StickSlip<f64>,
+    /// The detector that sees stick-slip in counts and voltages.
+    pub detector: Detector,
     /// The board is simulated and its clock waits for this machine: a stall is then no late answer.
     pub patient: bool,
 }
@@ -192,10 +195,7 @@ struct Control<'a, S: Station> {
     ping_sent: Option<(u32, u64)>,
     pings: u32,
     figures: MetricsBuilder,
-    detector: StickSlip<f64>,
-    sticks: StickSlipState<f64>,
-    /// Cycles and ticks stuck before the figures begin.
-    sticks_before: (u64, u64),
+    detector: Detector,
     answers: u64,
     response: CycleStats,
     interval: CycleStats,
@@ -248,8 +248,6 @@ impl<'a, S: Station> Control<'a, S> {
             pings: 0,
             figures: MetricsBuilder::new(seconds, options.settle),
             detector: configured.detector,
-            sticks: StickSlipState::default(),
-            sticks_before: (0, 0),
             answers: 0,
             response: CycleStats::new(),
             interval: CycleStats::new(),
@@ -416,10 +414,8 @@ impl<'a, S: Station> Control<'a, S> {
                 self.answers += 1;
                 self.figures.sample(time, MetricsSample { error, velocity, voltage });
                 let counts = clutch_core::Counts(n.sample.counts);
-                self.detector.update(&mut self.sticks, counts, n.cycle.target.velocity.to_f64());
-                if time < self.settle {
-                    self.sticks_before = (self.sticks.cycles(), self.sticks.stuck_ticks());
-                }
+                let path_velocity = n.cycle.target.velocity.to_f64();
+                self.detector.sample(n.cycle.tick, counts, path_velocity, voltage);
                 self.watch.error_nrad.store((error * 1e9) as i64, Ordering::Relaxed);
                 self.watch.millivolts.store((voltage * 1e3) as i64, Ordering::Relaxed);
             }
@@ -620,13 +616,11 @@ impl<'a, S: Station> Control<'a, S> {
         self.housekeeping(monotonic_ns());
         let standing = self.station.standing();
         let mut metrics = self.figures.finish();
-        let measured = metrics.measured_s.max(self.period);
         // On hardware the encoder's silence is all that is seen of sticking.
-        let (cycles, ticks) =
-            (self.sticks.cycles() - self.sticks_before.0, self.sticks.stuck_ticks() - self.sticks_before.1);
-        metrics.stick_slip_cycles_per_s = cycles as f64 / measured;
-        metrics.stick_time_fraction = ticks as f64 * self.period / measured;
-        metrics.stair_height_rad = f64::from(self.sticks.stair()) * self.radians;
+        let detected = self.detector.finish(metrics.measured_s);
+        metrics.stick_slip_cycles_per_s = detected.stick_slip_cycles_per_s;
+        metrics.stick_time_fraction = detected.stick_time_fraction;
+        metrics.stair_height_rad = f64::from(self.detector.stair()) * self.radians;
         let _ = self.watch.log_dropped.fetch_max(self.dropped, Ordering::Relaxed);
         LoopReport {
             state: standing.state,
@@ -634,6 +628,7 @@ impl<'a, S: Station> Control<'a, S> {
             value: standing.value.to_f64(),
             ticks: self.answers,
             metrics,
+            detected,
             link: *self.station.counts(),
             lost: standing.lost,
             implausible: standing.rejected,

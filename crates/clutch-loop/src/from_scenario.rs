@@ -3,11 +3,11 @@
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::Checks;
 use clutch_core::{
-    ActuatorKind, DacCode, FixedCounts, Micros, ParamError, Real, Servo, ServoParams, StickSlip,
-    StickSlipParams, Supervisor, Target,
+    ActuatorKind, DacCode, FixedCounts, Micros, ParamError, Real, Servo, ServoParams, Supervisor, Target,
 };
 use clutch_log::{Header, Source};
 use clutch_node::{ControllerParams, RunParams, RunTimes, Settings, Unsupported};
+use clutch_sim::detected::Detector;
 use clutch_sim::scenario::{Plan, ScalarKind};
 use clutch_sim::{Scenario, ScenarioError};
 use clutch_wire::Hello;
@@ -68,8 +68,8 @@ pub struct BuiltRun<T: Real> {
     pub supervisor: Supervisor<T>,
     /// Numbers for the wire.
     pub controller: ControllerParams,
-    /// The detector that sees stick-slip in the counts.
-    pub detector: StickSlip<f64>,
+    /// The detector that sees stick-slip in counts and voltages.
+    pub detector: Detector,
     /// Ticks of the run.
     pub ticks: u64,
 }
@@ -110,7 +110,7 @@ impl<T: Real> BuiltRun<T> {
                 valid: cycles(safety.limits.valid_cycles),
                 silence: cycles(safety.limits.supervisor.silence_cycles),
             },
-            detector: StickSlip::new(&StickSlipParams::default(), servo_params.encoder, spec.period)?,
+            detector: Detector::new(&spec)?,
             ticks: scenario.ticks(),
         })
     }

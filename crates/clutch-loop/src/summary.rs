@@ -121,6 +121,7 @@ impl Summary {
     pub fn remarks(&self) -> Vec<String> {
         let r = &self.report;
         let mut lines = vec![format!("as sampled: {}", self.sampled.verdict)];
+        lines.extend(r.detected.reason().map(|reason| format!("stick-slip: {reason}")));
         if r.clock_hz > 0 {
             let us = |cycles: u64| number(cycles as f64 * 1e6 / f64::from(r.clock_hz));
             let c = &r.tick_cycles;
@@ -218,6 +219,7 @@ impl Summary {
             },
             "ticks": r.ticks,
             "metrics": r.metrics,
+            "detected": r.detected,
             "samples": {
                 "received": r.link.received, "lost": r.lost, "late": r.link.late,
                 "duplicated": r.link.duplicated, "reordered": r.link.reordered, "implausible": r.implausible,

@@ -1,57 +1,317 @@
+//! The meter of stick-slip against the simulator's events: the tables of docs/meter.md, by `cargo xtask meter`.
+//!
+//! ```sh
+//! cargo run --release --package clutch-sim --example meter -- laws 20000    # or rates, rigs
+//! ```
+
 use clutch_core::{Counts, Encoder, Plant};
+use clutch_sim::detected::Verdict;
 use clutch_sim::engine::EventKind;
 use clutch_sim::meter::Meter;
 use clutch_sim::sweep::{Row, Sweep};
-use clutch_sim::Keep;
+use clutch_sim::{Keep, Run, Scenario};
+use std::error::Error;
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use toml::{Table, Value};
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// Rates of the paths, °/s.
+const RATES: [f64; 10] = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 6.0, 10.0, 20.0];
+/// Encoders, counts per turn.
+const ENCODERS: [i64; 3] = [2_000, 20_000, 200_000];
+/// Discs on which the meter was made, and discs that no number of it was chosen on.
+const MADE_ON: std::ops::Range<i64> = 1..11;
+const HELD_OUT: std::ops::Range<i64> = 3001..3011;
+/// Length of a run and its settling time, s.
+const LENGTH: (f64, f64) = (9.0, 1.0);
+
+/// Laws that follow a path, as readers are told them, and their part of a scenario.
 const LAWS: &[(&str, &str)] = &[
-    ("glide", "[law.glide.filter]\ndelay_ticks = 1"),
-    ("pid", "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.smoothed_derivative]\nsmoothing = 0.67"),
-    ("pd", "[law.pd]"), ("smc", "[law.smc]"), ("ctc", "[law.ctc]"), ("smc_sign", "[law.smc_sign]"),
+    ("PD", "[law.pd]"),
+    ("CTC", "[law.ctc]"),
+    ("SMC", "[law.smc]"),
+    ("SMC, sign", "[law.smc_sign]"),
+    (
+        "PI with feed-forward",
+        "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.smoothed_derivative]\nsmoothing = 0.67",
+    ),
+    (
+        "PI, edge-timed",
+        "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.edge_timed]\ndelay_ticks = 1\nripple_waves_per_turn = WAVES",
+    ),
+    ("glide", "[law.glide.filter]\ndelay_ticks = 1\nripple_waves_per_turn = WAVES"),
+    (
+        "glide in a shell",
+        "[law.glide.filter]\ndelay_ticks = 1\nripple_waves_per_turn = WAVES\n\n[shell]\nslope_1_s = 50.0\nboundary_rad_s = 0.1",
+    ),
 ];
-#[derive(Default, Clone, Copy)]
-struct S { truth: u64, seen: u64, must: u64, may: u64, right: u64, missed: u64, gaps: u64, time: f64, in_gaps: u64, calls_right: u64 }
-fn main() {
-    let arg = |i: usize, d: f64| std::env::args().nth(i).map_or(d, |s| s.parse().unwrap());
-    let seeds = arg(5, 4.0) as i64;
-    let counts: Vec<i64> = std::env::args().nth(8).map_or(vec![20000, 2000, 200000], |s| vec![s.parse().unwrap()]);
-    for n in counts { for (name, law) in LAWS { for rate in [0.05, 0.2, 0.5, 1.0, 2.0, 4.0, 6.0, 10.0, 20.0] {
-        let toml = format!("name = \"m\"\n[rig]\nbase = \"bench\"\n[rig.encoder]\ncounts_per_rev = {n}\n{law}\n[reference.ramp]\nrate_deg_s = {rate:?}\n[run]\nduration_s = 5.0");
-        let base: Table = toml.parse().unwrap();
-        let rows = (1..=seeds).map(|s| vec![Value::Integer(s)]).collect();
-        let sweep = Sweep::new("m", base, vec!["run.seed".into()], rows).unwrap();
-        let total = Mutex::new(S::default());
-        sweep.run(2, Keep::Trace, &AtomicBool::new(false), &|i, row| {
-            let Row { run, .. } = match row { Ok(r) => r, Err(e) => { println!("{name} {rate}: {e}"); return; } };
-            let sc = sweep.scenario(i).unwrap();
-            let spec = sc.spec();
-            let enc = Encoder::new::<f64>(n as u32).unwrap();
-            let q: f64 = enc.radians_per_count();
-            let mut judge = Meter::new(Plant::new(&spec.model).unwrap(), (&spec.law, &spec.velocity), enc, spec.period, run.trace.start_voltage);
-            let mut s = S { time: run.metrics.measured_s, ..S::default() };
-            let sticks: Vec<(f64, f64)> = run.events.iter().filter(|e| e.kind == EventKind::Stick && e.time >= 1.0).map(|e| (e.time, e.position)).collect();
-            s.truth = sticks.len() as u64;
-            s.seen = run.detections.iter().filter(|k| **k >= 1000).count() as u64;
-            for k in 0..run.trace.counts.len() {
-                if let Some(g) = judge.sample(Counts(run.trace.counts[k]), run.trace.voltage[k]) {
-                    let (from, to) = ((g.begin as f64 - 1.0) * 1e-3, (g.end) as f64 * 1e-3);
-                    if from < 1.0 { continue; }
-                    s.gaps += 1;
-                    let here = run.trace.counts[g.begin as usize];
-                    let inside = sticks.iter().filter(|(t, p)| *t >= from && *t <= to && (p / q).floor() as i32 == here).count() as u64;
-                    s.must += u64::from(g.sure); s.may += u64::from(g.possible);
-                    s.right += u64::from(g.sure && inside > 0); s.in_gaps += inside;
-                    if !g.possible { s.missed += inside; }
-                    let called = run.detections.iter().any(|k| *k >= g.begin && *k < g.end);
-                    s.calls_right += u64::from(called && inside > 0);
-                }
+
+/// Departures of the rig from what it is and is believed to be.
+const RIGS: &[(&str, &[(&str, f64)])] = &[
+    ("bench", &[]),
+    (
+        "friction − 20 %",
+        &[("rig.friction.stribeck.mu_static", 0.1624), ("rig.friction.stribeck.mu_dynamic", 0.0832)],
+    ),
+    (
+        "friction + 20 %",
+        &[("rig.friction.stribeck.mu_static", 0.2436), ("rig.friction.stribeck.mu_dynamic", 0.1248)],
+    ),
+    ("friction at rest 1.1 times that in motion", &[("rig.friction.stribeck.mu_static", 0.1144)]),
+    ("friction at rest 2.5 times that in motion", &[("rig.friction.stribeck.mu_static", 0.26)]),
+    ("Stribeck velocity × 7", &[("rig.friction.stribeck.stribeck_velocity_rad_s", 0.01)]),
+    ("inertia + 20 %", &[("rig.inertia_kg_m2", 0.00204)]),
+    ("inertia − 20 %", &[("rig.inertia_kg_m2", 0.00136)]),
+    ("inertia − 40 %", &[("rig.inertia_kg_m2", 0.00102)]),
+    ("ripple × 2", &[("rig.ripple.rms", 0.3)]),
+    ("torque noise of 1 mN m", &[("rig.torque_noise_nm", 0.001)]),
+    ("no delay", &[("rig.delay_ticks", 0.0)]),
+    ("delay of 2 periods", &[("rig.delay_ticks", 2.0)]),
+    ("delay of 3 periods", &[("rig.delay_ticks", 3.0)]),
+    ("lag of 1 ms", &[("rig.actuator_time_constant_s", 0.001)]),
+    ("lag of 3 ms", &[("rig.actuator_time_constant_s", 0.003)]),
+];
+/// Laws and rates for them.
+const ON_RIGS: [&str; 5] = ["PD", "CTC", "SMC", "PI with feed-forward", "glide"];
+const RATES_ON_RIGS: [f64; 4] = [0.2, 1.0, 4.0, 10.0];
+
+/// Agreement of the meter with the truth over some runs. A stick is one of the simulator's, after settling, within a gap
+/// between two edges.
+#[derive(Clone, Default)]
+struct Score {
+    sticks: usize,
+    /// Gaps that hold a stick.
+    stuck_gaps: usize,
+    sure: usize,
+    sure_right: usize,
+    possible: usize,
+    possible_right: usize,
+    calls: usize,
+    calls_right: usize,
+    runs: usize,
+    told: usize,
+    told_right: usize,
+    /// From a stick's beginning to the call, and to the edge at which it is sure, s.
+    to_call: Vec<f64>,
+    to_edge: Vec<f64>,
+}
+
+impl Score {
+    fn add(&mut self, o: Score) {
+        self.sticks += o.sticks;
+        self.stuck_gaps += o.stuck_gaps;
+        self.sure += o.sure;
+        self.sure_right += o.sure_right;
+        self.possible += o.possible;
+        self.possible_right += o.possible_right;
+        self.calls += o.calls;
+        self.calls_right += o.calls_right;
+        self.runs += o.runs;
+        self.told += o.told;
+        self.told_right += o.told_right;
+        self.to_call.extend(o.to_call);
+        self.to_edge.extend(o.to_edge);
+    }
+
+    fn of(scenario: &Scenario, run: &Run) -> Outcome<Score> {
+        let spec = scenario.spec();
+        let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev)?;
+        let per_radian: f64 = encoder.counts_per_radian();
+        let period: f64 = spec.period.seconds();
+        let mut meter =
+            Meter::new(Plant::new(&spec.model)?, (&spec.law, &spec.velocity), encoder, spec.period);
+        let sticks: Vec<(f64, i32)> = run
+            .events
+            .iter()
+            .filter(|e| e.kind == EventKind::Stick)
+            .map(|e| (e.time, (e.position * per_radian).floor() as i32))
+            .collect();
+        let mut score = Score { runs: 1, ..Score::default() };
+        for (k, (counts, volts)) in run.trace.counts.iter().zip(&run.trace.voltage).enumerate() {
+            let Some(gap) = meter.sample(k as u64, Counts(*counts), *volts) else { continue };
+            let (begin, end) = (gap.begin as f64 * period, gap.end as f64 * period);
+            if begin < spec.run.settle {
+                continue;
             }
-            let mut t = total.lock().unwrap();
-            t.truth += s.truth; t.seen += s.seen; t.must += s.must; t.may += s.may; t.right += s.right; t.missed += s.missed; t.gaps += s.gaps; t.in_gaps += s.in_gaps; t.time += s.time; t.calls_right += s.calls_right;
-        });
-        let t = total.into_inner().unwrap();
-        println!("{n:6} {name:9} {rate:5} time {:4.0} gaps {:6} true {:5} in gaps {:5} | silence {:5} right {:5} | must {:5} right {:5} | may {:5} missed {:4}", t.time, t.gaps, t.truth, t.in_gaps, t.seen, t.calls_right, t.must, t.right, t.may, t.missed);
-    }}}
+            let count = run.trace.counts[gap.begin as usize];
+            let within: Vec<f64> = sticks
+                .iter()
+                .filter(|(t, at)| *at == count && *t >= begin - period && *t <= end)
+                .map(|(t, _)| *t)
+                .collect();
+            let call = run.detections.iter().find(|k| **k >= gap.begin && **k < gap.end);
+            let one = |yes: bool| usize::from(yes);
+            score.sticks += within.len();
+            score.stuck_gaps += one(!within.is_empty());
+            score.sure += one(gap.sure);
+            score.sure_right += one(gap.sure && !within.is_empty());
+            score.possible += one(gap.possible);
+            score.possible_right += one(gap.possible && !within.is_empty());
+            score.calls += one(call.is_some());
+            score.calls_right += one(call.is_some() && !within.is_empty());
+            if let Some(first) = within.first() {
+                score.to_call.extend(call.map(|k| *k as f64 * period - first));
+                score.to_edge.extend(gap.sure.then_some(end - first));
+            }
+        }
+        // All of the run, with what its end cuts off.
+        let (d, truth) = (&run.detected, run.metrics.stick_slip_cycles_per_s);
+        if let Verdict::Told(told) = d.verdict() {
+            score.told = 1;
+            score.told_right = usize::from((told - truth).abs() <= 0.2 * d.most_cycles_per_s + 1.0);
+        }
+        Ok(score)
+    }
+}
+
+/// The scenario of a law on `bench`; the filter's waves have to be resolved by the encoder.
+fn scenario(law: &str, counts: i64) -> Outcome<Table> {
+    let law = law.replace("WAVES", if counts < 10_000 { "90.0" } else { "340.0" });
+    let (duration, settle) = LENGTH;
+    Ok(format!(
+        "name = \"meter\"\n\n[rig]\nbase = \"bench\"\n\n[rig.encoder]\ncounts_per_rev = {counts}\n\n{law}\n\n[reference.ramp]\nrate_deg_s = 2.0\n\n[run]\nduration_s = {duration:?}\nsettle_s = {settle:?}\n"
+    )
+    .parse()?)
+}
+
+/// The score of a law at a rate with an encoder, over some discs; `keys` are the rig's departures.
+fn score(
+    law: &str,
+    counts: i64,
+    rate: f64,
+    keys: &[(&str, f64)],
+    discs: std::ops::Range<i64>,
+) -> Outcome<Score> {
+    let mut names: Vec<String> = vec!["run.seed".into(), "reference.ramp.rate_deg_s".into()];
+    names.extend(keys.iter().map(|(key, _)| (*key).to_owned()));
+    let rows = discs.map(|seed| {
+        let mut row = vec![Value::Integer(seed), Value::Float(rate)];
+        row.extend(keys.iter().map(|(key, value)| {
+            if key.ends_with("ticks") { Value::Integer(*value as i64) } else { Value::Float(*value) }
+        }));
+        row
+    });
+    let sweep = Sweep::new("meter", scenario(law, counts)?, names, rows.collect())?;
+    let total = Mutex::new((Score::default(), None));
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    sweep.run(threads, Keep::Trace, &AtomicBool::new(false), &|i, row| {
+        let scored: Outcome<Score> = row
+            .map_err(Into::into)
+            .and_then(|Row { run, .. }| Score::of(&sweep.scenario(i)?, &run));
+        if let Ok(mut total) = total.lock() {
+            match scored {
+                Ok(score) => total.0.add(score),
+                Err(error) => total.1 = Some(error.to_string()),
+            }
+        }
+    });
+    let (score, error) = total.into_inner().map_err(|_| "a run has panicked")?;
+    error.map_or(Ok(score), |error| Err(error.into()))
+}
+
+/// A share with its denominator; none of nothing.
+fn share(a: usize, b: usize) -> String {
+    if b == 0 { "–".into() } else { format!("{:.2} ({a}/{b})", a as f64 / b as f64) }
+}
+
+/// Median and ninth decile, ms.
+fn times(of: &mut [f64]) -> String {
+    of.sort_by(f64::total_cmp);
+    let at = |share: f64| of.get((share * of.len() as f64) as usize).map(|t| t * 1e3);
+    match (at(0.5), at(0.9)) {
+        (Some(a), Some(b)) => format!("{a:.0}, {b:.0}"),
+        _ => "–".into(),
+    }
+}
+
+/// Sticks, and bounds and silences, of every law at every rate.
+fn laws(counts: i64) -> Outcome<()> {
+    let rates: Vec<String> = RATES.iter().map(|rate| format!("{rate} °/s")).collect();
+    println!("| law | {} |", rates.join(" | "));
+    println!("|---|{}", "---|".repeat(RATES.len()));
+    for (title, law) in LAWS {
+        let mut cells = Vec::new();
+        for rate in RATES {
+            let s = score(law, counts, rate, &[], MADE_ON)?;
+            cells.push(format!("{}: {}…{}, {}", s.stuck_gaps, s.sure, s.possible, s.calls));
+        }
+        println!("| {title} | {} |", cells.join(" | "));
+    }
+    Ok(())
+}
+
+/// Precision, recall and latency over all laws, by encoder and rate.
+fn rates() -> Outcome<()> {
+    println!(
+        "| counts | discs | °/s | sticks | silence: precision | recall | ms | sure: precision | recall | ms | possible: precision | recall | runs told | told right |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+    for counts in ENCODERS {
+        for (discs, range) in [("1–10", MADE_ON), ("3001–3010", HELD_OUT)] {
+            let mut total = Score::default();
+            for rate in RATES {
+                let mut s = Score::default();
+                for (_, law) in LAWS {
+                    s.add(score(law, counts, rate, &[], range.clone())?);
+                }
+                total.add(s.clone());
+                print_row(&format!("{counts} | {discs} | {rate}"), s);
+            }
+            print_row(&format!("{counts} | {discs} | all"), total);
+        }
+    }
+    Ok(())
+}
+
+fn print_row(title: &str, mut s: Score) {
+    println!(
+        "| {title} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+        s.sticks,
+        share(s.calls_right, s.calls),
+        share(s.calls_right, s.stuck_gaps),
+        times(&mut s.to_call),
+        share(s.sure_right, s.sure),
+        share(s.sure_right, s.stuck_gaps),
+        times(&mut s.to_edge),
+        share(s.possible_right, s.possible),
+        share(s.possible_right, s.stuck_gaps),
+        share(s.told, s.runs),
+        share(s.told_right, s.told),
+    );
+}
+
+/// The same with rigs that are not as believed.
+fn rigs() -> Outcome<()> {
+    println!("| the rig | sticks | sure: precision | recall | possible: precision | recall | told right |");
+    println!("|---|---|---|---|---|---|---|");
+    for (title, keys) in RIGS {
+        let mut s = Score::default();
+        for (_, law) in LAWS.iter().filter(|(name, _)| ON_RIGS.contains(name)) {
+            for rate in RATES_ON_RIGS {
+                s.add(score(law, 20_000, rate, keys, HELD_OUT)?);
+            }
+        }
+        println!(
+            "| {title} | {} | {} | {} | {} | {} | {} |",
+            s.sticks,
+            share(s.sure_right, s.sure),
+            share(s.sure_right, s.stuck_gaps),
+            share(s.possible_right, s.possible),
+            share(s.possible_right, s.stuck_gaps),
+            share(s.told_right, s.told),
+        );
+    }
+    Ok(())
+}
+
+fn main() -> Outcome<()> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    match args.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        ["laws", counts] => laws(counts.parse()?),
+        ["rates"] => rates(),
+        ["rigs"] => rigs(),
+        _ => Err("expected laws and an encoder, rates, or rigs".into()),
+    }
 }

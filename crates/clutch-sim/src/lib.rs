@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod detected;
 pub mod drive;
 pub mod engine;
 pub mod friction_lab;

@@ -35,9 +35,11 @@ pub const ROUGHNESS: f64 = 0.15 * 340.0;
 const DELAY: u32 = 1;
 /// Points of a gap that are kept; of a longer one, every second, fourth and so on.
 const POINTS: usize = 256;
+/// Room for them, for one that halves them, and for the end of the gap.
+const ROOM: usize = POINTS + 2;
 /// Frictions that are tried: about 5 % from one to the next.
 const FRICTIONS: usize = 40;
-/// Steps of a search that halves (golden section) until friction is known to a millionth.
+/// Steps of a search by golden section: friction to a millionth.
 const SEARCH: usize = 30;
 
 /// A gap between two edges, judged.
@@ -85,24 +87,24 @@ pub struct Meter {
     frictions: [f64; FRICTIONS],
     /// One for each delay.
     tracks: Vec<Track>,
-    scratch: Vec<f64>,
     last: Option<Counts>,
     /// Counts by which the gap was entered; 0 before the first edge.
     entered: i32,
     begin: u64,
-    sample: u64,
+    /// The number of the next sample, if none is lost.
+    next: u64,
+    /// A sample of the gap is lost.
+    broken: bool,
 }
 
 impl Meter {
-    /// A meter that believes `plant`, with `volts` on the actuator since long. Delays are tried from 0 to one period, or to
-    /// what law and velocity source were told.
+    /// A meter that believes `plant`. Delays are tried from 0 to one period, or to what law and velocity source were told.
     #[must_use]
     pub fn new(
         plant: Plant<f64>,
         (law, velocity): (&LawParams, &VelocityParams),
         encoder: Encoder,
         period: Micros,
-        volts: f64,
     ) -> Self {
         let seconds: f64 = period.seconds();
         let count: f64 = encoder.radians_per_count();
@@ -124,27 +126,32 @@ impl Meter {
             ratio: 1.0 + RISE_BELIEVED * rise.max(0.0),
             slack: (ROUGHNESS * count).min(1.0) * carried * per_torque,
             frictions: std::array::from_fn(|i| libm::exp(step * i as f64) / FRICTION_RANGE),
-            tracks: (0..=told.max(DELAY)).map(|delay| Track::new(delay, volts)).collect(),
-            scratch: vec![0.0; POINTS + 2],
+            tracks: (0..=told.max(DELAY)).map(|delay| Track::new(delay)).collect(),
             last: None,
             entered: 0,
             begin: 0,
-            sample: 0,
+            next: 0,
+            broken: false,
         }
     }
 
-    /// A sample: its counts, and the voltage that was given in answer to it, V. A gap that it ends is judged.
-    pub fn sample(&mut self, counts: Counts, volts: f64) -> Option<Gap> {
+    /// Sample number `tick`: its counts, and the voltage that was given in answer to it, V. A gap that it ends is judged.
+    ///
+    /// Of a gap with a lost sample nothing is known: it can hold a stick, and need not.
+    pub fn sample(&mut self, tick: u64, counts: Counts, volts: f64) -> Option<Gap> {
+        self.broken |= tick != self.next;
         let moved = self.last.map(|last| counts.since(last));
+        if moved.is_none() {
+            self.tracks.iter_mut().for_each(|track| track.line = [volts; 4]);
+        }
         self.last = Some(counts);
         let mut judged = None;
         if moved != Some(0) {
             let left = moved.unwrap_or(0);
             if self.entered != 0 {
-                judged = Some(self.judge(left));
+                judged = Some(self.judge(left, tick));
             }
-            self.entered = left;
-            self.begin = self.sample;
+            (self.entered, self.begin, self.broken) = (left, tick, false);
             self.tracks.iter_mut().for_each(Track::enter);
         }
         let (plant, per_torque, sliding) = (&self.plant, self.per_torque, self.sliding);
@@ -154,25 +161,22 @@ impl Meter {
             let pull = (plant.params().drive_torque + actuator.torque(volts)) * per_torque;
             track.advance(pull, sliding * actuator.normal(volts) * per_torque);
         }
-        self.sample += 1;
+        self.next = tick + 1;
         judged
     }
 
     /// The gap that ends now, with so many counts.
-    fn judge(&mut self, left: i32) -> Gap {
-        let mut gap = Gap { begin: self.begin, end: self.sample, sure: false, possible: false };
-        if left.signum() != self.entered.signum() {
-            // It turned round, and was at rest for a moment at least.
-            gap.possible = true;
+    fn judge(&mut self, left: i32, end: u64) -> Gap {
+        let gap = Gap { begin: self.begin, end, sure: false, possible: true };
+        // A shaft that turned round was at rest, for a moment at least.
+        if self.broken || left.signum() != self.entered.signum() {
             return gap;
         }
         let sign = f64::from(left.signum());
         self.tracks.iter_mut().for_each(Track::leave);
-        gap.sure = self.tracks.iter().all(|track| !self.slides(track, sign));
-        let mut scratch = std::mem::take(&mut self.scratch);
-        gap.possible = gap.sure || self.tracks.iter().any(|track| self.stops(track, sign, &mut scratch));
-        self.scratch = scratch;
-        gap
+        let sure = self.tracks.iter().all(|track| !self.slides(track, sign));
+        let possible = sure || self.tracks.iter().any(|track| self.stops(track, sign));
+        Gap { sure, possible, ..gap }
     }
 
     /// True if there are a friction and a velocity with which the shaft slid all the way.
@@ -202,7 +206,7 @@ impl Meter {
         let gain = 1.0 - GAIN_DOUBT;
         let (end, slack) = (&track.now, self.slack);
         let mut least = 0.0_f64;
-        for x in &track.points {
+        for x in track.points() {
             least = least.max(-gain * x.speed(sign, friction) - slack * x.time);
         }
         // Over one count from the sample before the first to the last.
@@ -217,11 +221,12 @@ impl Meter {
     }
 
     /// True if there is a friction with which the shaft came to rest and broke away, one count further in all.
-    fn stops(&self, track: &Track, sign: f64, after: &mut [f64]) -> bool {
+    fn stops(&self, track: &Track, sign: f64) -> bool {
+        let mut after = [0.0; ROOM];
         let lets_go = |x: &Point, friction: f64| {
             self.ratio * friction * x.load <= sign * x.pull + self.slack
         };
-        if !track.points.iter().any(|x| lets_go(x, self.frictions[0])) {
+        if !track.points().iter().any(|x| lets_go(x, self.frictions[0])) {
             return false;
         }
         let gain = 1.0 + GAIN_DOUBT;
@@ -230,7 +235,7 @@ impl Meter {
         self.frictions.iter().any(|&h| {
             // From rest at a point to the end: it goes on if nowhere later the velocity is lower.
             let mut lowest = f64::INFINITY;
-            for (x, way) in track.points.iter().zip(after.iter_mut()).rev() {
+            for (x, way) in track.points().iter().zip(after.iter_mut()).rev() {
                 let (speed, left) = (gain * x.speed(sign, h), end.time - x.time);
                 let goes_on = speed <= lowest + slack * left;
                 lowest = lowest.min(speed);
@@ -242,7 +247,7 @@ impl Meter {
             let (pull, load) = track.before;
             let first = sign * pull - h * load;
             let (mut slows, first) = (first <= slack, 0.5 * gain * first);
-            track.points.iter().zip(after.iter()).any(|(x, way)| {
+            track.points().iter().zip(after.iter()).any(|(x, way)| {
                 let speed = gain * x.speed(sign, h);
                 if slows && speed <= lowest + slack * x.time {
                     let far = gain * x.way(sign, h) - speed * x.time + bowed(x.time);
@@ -262,8 +267,9 @@ struct Track {
     /// Voltages on their way, the oldest first, V.
     line: [f64; 4],
     delay: usize,
-    /// The last of them may be told late: the newest.
-    points: Vec<Point>,
+    /// Points of the gap, of which so many are used.
+    kept: Box<[Point; ROOM]>,
+    used: usize,
     /// Periods from one point to the next.
     stride: u64,
     since: u64,
@@ -302,11 +308,12 @@ impl Point {
 }
 
 impl Track {
-    fn new(delay: u32, volts: f64) -> Self {
+    fn new(delay: u32) -> Self {
         Track {
-            line: [volts; 4],
+            line: [0.0; 4],
             delay: (delay as usize).min(3),
-            points: Vec::with_capacity(POINTS + 2),
+            kept: Box::new([Point::default(); ROOM]),
+            used: 0,
             stride: 1,
             since: 0,
             now: Point::default(),
@@ -325,8 +332,7 @@ impl Track {
 
     /// The shaft has entered a count.
     fn enter(&mut self) {
-        self.points.clear();
-        (self.stride, self.since) = (1, 0);
+        (self.used, self.stride, self.since) = (0, 1, 0);
         self.before = self.acts;
         self.now = Point::default();
         self.inner = Point::default();
@@ -339,13 +345,13 @@ impl Track {
         (x.pull, x.load) = (pull, load);
         self.inner = *x;
         if self.since.is_multiple_of(self.stride) {
-            self.points.push(*x);
-            if self.points.len() > POINTS {
-                let mut kept = false;
-                self.points.retain(|_| {
-                    kept = !kept;
-                    kept
-                });
+            self.kept[self.used] = *x;
+            self.used += 1;
+            if self.used > POINTS {
+                for i in 0..self.used.div_ceil(2) {
+                    self.kept[i] = self.kept[2 * i];
+                }
+                self.used = self.used.div_ceil(2);
                 self.stride *= 2;
             }
         }
@@ -359,6 +365,11 @@ impl Track {
 
     /// The shaft has left it.
     fn leave(&mut self) {
-        self.points.push(self.now);
+        self.kept[self.used] = self.now;
+        self.used += 1;
+    }
+
+    fn points(&self) -> &[Point] {
+        &self.kept[..self.used]
     }
 }

@@ -135,12 +135,20 @@ figures! {
 }
 
 figures! {
-    /// Stick-slip as the encoder shows it: what a loop on hardware would count.
+    /// Stick-slip as a loop on hardware knows it: the encoder's silences, and the bounds that counts and voltage leave.
     pub struct Detected, columns "detected_" {
-        /// Stick-slip cycles as the encoder shows them: what a loop on hardware would count.
+        /// Stick-slip cycles as the encoder's silences show them; one in each count, or shorter, shows none.
         STICK_SLIP stick_slip_cycles_per_s: f64, "stick-slip seen by the encoder", "cycles/s" shown as "cycles/s" SAME;
         /// Share of the time that the shaft was stuck, as the encoder shows it.
         STICK_TIME stick_time_fraction: f64, "time stuck seen by the encoder", "1" shown as "%" PERCENT;
+        /// Stairs: silences in which the shaft fell a count or more behind even motion.
+        STAIRS stairs_per_s: f64, "stairs of a count seen by the encoder", "1/s" shown as "1/s" SAME;
+        /// Least stick-slip cycles with which counts and voltage agree.
+        LEAST least_cycles_per_s: f64, "least stick-slip by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
+        /// Most stick-slip cycles with which counts and voltage agree.
+        MOST most_cycles_per_s: f64, "most stick-slip by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
+        /// Stick-slip cycles where least and most are within 20 % and one a second, and so tell them.
+        TOLD told_cycles_per_s: Option<f64>, "stick-slip told by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
     }
 }
 

@@ -1,5 +1,6 @@
 //! One run: rig, servo and path in closed loop.
 
+use crate::detected::Detector;
 use crate::engine::{EngineError, EngineKind, Event, ExactFlow, Motion, Shaft};
 use crate::metrics::{Detected, Metrics, MetricsBuilder, MetricsSample};
 use crate::moving_rig::MovingRig;
@@ -11,7 +12,7 @@ use clutch_core::params::{Range, Table};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
     Counts, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoOutput, ServoParams,
-    ServoState, StickSlip, StickSlipParams, StickSlipState, Target, VelocityParams, params,
+    ServoState, Target, VelocityParams, params,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -380,9 +381,9 @@ pub struct Run {
     pub events: Vec<Event>,
     /// Figures.
     pub metrics: Metrics,
-    /// Stick-slip as the encoder shows it: what a loop on hardware would count.
+    /// Stick-slip as a loop on hardware knows it.
     pub detected: Detected,
-    /// Ticks at which the [`StickSlip`] detector called the shaft stuck, in order.
+    /// Ticks at which the encoder's silence showed a stick ([`clutch_core::StickSlip`]), in order.
     pub detections: Vec<u64>,
     /// Engine that ran.
     pub engine: EngineKind,
@@ -431,9 +432,7 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
     }
     let mut events = Vec::new();
     let mut figures = MetricsBuilder::new(period, p.settle);
-    let detector = StickSlip::<f64>::new(&StickSlipParams::default(), servo.encoder(), spec.period)?;
-    let mut seen_by_encoder = StickSlipState::default();
-    let mut before_settling = (0, 0);
+    let mut detector = Detector::new(spec)?;
     let mut detections = Vec::new();
     for k in 0..ticks {
         if k % REPORT_EVERY == 0 {
@@ -467,11 +466,9 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
             }
         }
 
-        if detector.update(&mut seen_by_encoder, counts, target.velocity.to_f64()) && keep == Keep::Trace {
+        let begins = detector.sample(k, counts, target.velocity.to_f64(), commanded);
+        if begins && keep == Keep::Trace {
             detections.push(k);
-        }
-        if time < p.settle {
-            before_settling = (seen_by_encoder.cycles(), seen_by_encoder.stuck_ticks());
         }
         let seen = run.advance()?;
         figures.period(time, shaft.motion == Motion::Stuck, seen);
@@ -480,11 +477,7 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
         }
     }
     let metrics = figures.finish();
-    let measured = metrics.measured_s.max(period);
-    let detected = Detected {
-        stick_slip_cycles_per_s: (seen_by_encoder.cycles() - before_settling.0) as f64 / measured,
-        stick_time_fraction: (seen_by_encoder.stuck_ticks() - before_settling.1) as f64 * period / measured,
-    };
+    let detected = detector.finish(metrics.measured_s);
     Ok(Run { trace, events, metrics, detected, detections, engine })
 }
 

@@ -1,0 +1,137 @@
+//! Stick-slip as a loop on hardware knows it: from counts, voltages and the path.
+
+use crate::meter::{Meter, Tally};
+use crate::metrics::Detected;
+use crate::number;
+use crate::run::RunSpec;
+use clutch_core::{Counts, Encoder, ParamError, Plant, StickSlip, StickSlipParams, StickSlipState};
+
+/// Way of the path in a silence that is a stair: in even motion it goes one count, in a stair at least one more.
+const STAIR: StickSlipParams<f64> = StickSlipParams { gap: 2.0, ticks: 1 };
+/// Width of the bounds within which a number of cycles is told: this share of the upper one, and so many a second.
+const TOLD_WITHIN: (f64, f64) = (0.2, 1.0);
+
+/// What a run's counts and voltages say of its stick-slip cycles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// So many a second, within 20 % and one a second.
+    Told(f64),
+    /// No fewer, and perhaps many more.
+    AtLeast(f64),
+    /// Perhaps none, perhaps many.
+    CannotTell,
+}
+
+impl Detected {
+    /// What it says.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        match self.told_cycles_per_s {
+            Some(told) => Verdict::Told(told),
+            None if self.least_cycles_per_s > 0.0 => Verdict::AtLeast(self.least_cycles_per_s),
+            None => Verdict::CannotTell,
+        }
+    }
+
+    /// The same in words, without the unit.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let (least, most) = (number(self.least_cycles_per_s), number(self.most_cycles_per_s));
+        match self.verdict() {
+            Verdict::Told(_) if least == most => least,
+            Verdict::Told(_) => format!("{least} to {most}"),
+            Verdict::AtLeast(_) => format!("at least {least}, at most {most}"),
+            Verdict::CannotTell => format!("cannot tell, at most {most}"),
+        }
+    }
+
+    /// The reason why there is no number, if there is none.
+    #[must_use]
+    pub fn reason(&self) -> Option<String> {
+        self.told_cycles_per_s.is_none().then(|| {
+            format!(
+                "up to {} times a second the shaft may have stuck between two edges unseen: a count lasts long \
+                 enough for it, and the voltage falls far enough; a finer encoder, or another rate, tells more",
+                number(self.most_cycles_per_s - self.least_cycles_per_s)
+            )
+        })
+    }
+}
+
+/// Watches a run, sample by sample. It allocates when it is made, and never later.
+#[derive(Clone, Debug)]
+pub struct Detector {
+    silence: StickSlip<f64>,
+    stairs: StickSlip<f64>,
+    silent: StickSlipState<f64>,
+    climbing: StickSlipState<f64>,
+    meter: Meter,
+    tally: Tally,
+    period: f64,
+    settle: f64,
+    /// The first sample after settling.
+    from: u64,
+    /// Cycles, periods stuck and stairs before it.
+    before: (u64, u64, u64),
+}
+
+impl Detector {
+    /// For a run's encoder, period and settling time; it believes the run's model.
+    ///
+    /// # Errors
+    /// A parameter out of range.
+    pub fn new(spec: &RunSpec<'_>) -> Result<Self, ParamError> {
+        let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev)?;
+        let (period, settle) = (spec.period.period::<f64>()?, spec.run.settle);
+        Ok(Detector {
+            silence: StickSlip::new(&StickSlipParams::default(), encoder, spec.period)?,
+            stairs: StickSlip::new(&STAIR, encoder, spec.period)?,
+            silent: StickSlipState::default(),
+            climbing: StickSlipState::default(),
+            meter: Meter::new(Plant::new(&spec.model)?, (&spec.law, &spec.velocity), encoder, spec.period),
+            tally: Tally::default(),
+            period,
+            settle,
+            from: libm::ceil(settle / period - 1e-9) as u64,
+            before: (0, 0, 0),
+        })
+    }
+
+    /// Sample number `tick`: its counts, the velocity of the path (rad/s), and the voltage that was given in answer to it,
+    /// V. True if a silence begins to count as a stick.
+    pub fn sample(&mut self, tick: u64, counts: Counts, path_velocity: f64, volts: f64) -> bool {
+        let begins = self.silence.update(&mut self.silent, counts, path_velocity);
+        self.stairs.update(&mut self.climbing, counts, path_velocity);
+        if let Some(gap) = self.meter.sample(tick, counts, volts) {
+            self.tally.take(&gap, self.from);
+        }
+        if (tick as f64) * self.period < self.settle {
+            self.before = (self.silent.cycles(), self.silent.stuck_ticks(), self.climbing.cycles());
+        }
+        begins
+    }
+
+    /// The figures so far, over `measured_s` seconds after settling.
+    #[must_use]
+    pub fn finish(&self, measured_s: f64) -> Detected {
+        let time = measured_s.max(self.period);
+        let per_s = |n: u64| n as f64 / time;
+        let seen = per_s(self.silent.cycles() - self.before.0);
+        let (least, most) = (per_s(self.tally.least), per_s(self.tally.most));
+        let told = most - least <= TOLD_WITHIN.0 * most + TOLD_WITHIN.1;
+        Detected {
+            stick_slip_cycles_per_s: seen,
+            stick_time_fraction: (self.silent.stuck_ticks() - self.before.1) as f64 * self.period / time,
+            stairs_per_s: per_s(self.climbing.cycles() - self.before.2),
+            least_cycles_per_s: least,
+            most_cycles_per_s: most,
+            told_cycles_per_s: told.then(|| seen.max(least).min(most)),
+        }
+    }
+
+    /// Largest movement between one silence and the next, counts; 0 with fewer than two.
+    #[must_use]
+    pub fn stair(&self) -> u32 {
+        self.silent.stair()
+    }
+}
