@@ -16,6 +16,7 @@ fn a_figures_name_ends_with_its_unit() {
         "cycles/s" => "_cycles_per_s",
         "N m" => "_nm",
         "V/s" => "_v_s",
+        "1/s" => "_per_s",
         other => panic!("{other}: a unit without a suffix"),
     };
     for (name, unit) in Metrics::FIGURES.iter().map(|f| (f.name, f.unit)) {

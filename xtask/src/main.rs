@@ -136,6 +136,9 @@ enum Verb {
     /// Runs laws on the rig `bench` from 0.5 to 100 °/s, and glide on rigs that are not as it believes, two minutes: the tables
     /// of docs/smooth.md.
     Smooth,
+    /// Holds the meter of stick-slip against the simulator's events, laws, rates and encoders, and on rigs that are not as it
+    /// believes, five minutes: the tables of docs/meter.md.
+    Meter,
     /// Identifies random rigs, each from less than a minute of experiment on the simulated board: the table of
     /// docs/identify.md, some minutes.
     Identify {
@@ -217,6 +220,7 @@ fn main() -> Result<()> {
         Verb::Miri => miri::run(),
         Verb::Certified { runs } => certified(runs),
         Verb::Smooth => smooth(),
+        Verb::Meter => meter(),
         Verb::Identify { rigs, seed } => identify(rigs, seed),
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
         Verb::Ablate { runs } => ablate::all(runs),
@@ -316,6 +320,16 @@ fn certified(runs: u64) -> Result<()> {
 fn smooth() -> Result<()> {
     for table in ["laws", "plants", "rest", "steps", "motions"] {
         write_between("docs/smooth.md", table, &table_of("smooth", &[table])?)?;
+    }
+    Ok(())
+}
+
+fn meter() -> Result<()> {
+    for counts in ["2000", "20000", "200000"] {
+        write_between("docs/meter.md", &format!("laws {counts}"), &table_of("meter", &["laws", counts])?)?;
+    }
+    for table in ["rates", "rigs"] {
+        write_between("docs/meter.md", table, &table_of("meter", &[table])?)?;
     }
     Ok(())
 }

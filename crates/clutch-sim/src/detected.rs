@@ -8,13 +8,13 @@ use clutch_core::{Counts, Encoder, ParamError, Plant, StickSlip, StickSlipParams
 
 /// Way of the path in a silence that is a stair: in even motion it goes one count, in a stair at least one more.
 const STAIR: StickSlipParams<f64> = StickSlipParams { gap: 2.0, ticks: 1 };
-/// Width of the bounds within which a number of cycles is told: this share of the upper one, and so many a second.
-const TOLD_WITHIN: (f64, f64) = (0.2, 1.0);
+/// Width of the bounds within which a number of cycles is told: this share of the upper one, and so many cycles.
+const TOLD_WITHIN: (f64, f64) = (0.2, 2.0);
 
 /// What a run's counts and voltages say of its stick-slip cycles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// So many a second, within 20 % and one a second.
+    /// So many a second, within 20 % and two cycles of the run.
     Told(f64),
     /// No fewer, and perhaps many more.
     AtLeast(f64),
@@ -118,7 +118,7 @@ impl Detector {
         let per_s = |n: u64| n as f64 / time;
         let seen = per_s(self.silent.cycles() - self.before.0);
         let (least, most) = (per_s(self.tally.least), per_s(self.tally.most));
-        let told = most - least <= TOLD_WITHIN.0 * most + TOLD_WITHIN.1;
+        let told = most - least <= TOLD_WITHIN.0 * most + TOLD_WITHIN.1 / time;
         Detected {
             stick_slip_cycles_per_s: seen,
             stick_time_fraction: (self.silent.stuck_ticks() - self.before.1) as f64 * self.period / time,

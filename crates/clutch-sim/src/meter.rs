@@ -22,7 +22,7 @@ use clutch_core::law::LawParams;
 use clutch_core::{Counts, Encoder, Micros, Plant, VelocityParams};
 
 /// Friction as a multiple of the model's: from one over this to this.
-pub const FRICTION_RANGE: f64 = 2.5;
+pub const FRICTION_RANGE: f64 = 3.0;
 /// Drive over inertia, of which the model's is believed to this share more and less.
 pub const GAIN_DOUBT: f64 = 0.2;
 /// Share of the model's rise of friction at rest over that in motion, of which a shaft that breaks away has at least
@@ -37,7 +37,7 @@ const DELAY: u32 = 1;
 const POINTS: usize = 256;
 /// Room for them, for one that halves them, and for the end of the gap.
 const ROOM: usize = POINTS + 2;
-/// Frictions that are tried: about 5 % from one to the next.
+/// Frictions that are tried: 6 % from one to the next.
 const FRICTIONS: usize = 40;
 /// Steps of a search by golden section: friction to a millionth.
 const SEARCH: usize = 30;
@@ -222,17 +222,23 @@ impl Meter {
 
     /// True if there is a friction with which the shaft came to rest and broke away, one count further in all.
     fn stops(&self, track: &Track, sign: f64) -> bool {
-        let mut after = [0.0; ROOM];
-        let lets_go = |x: &Point, friction: f64| {
-            self.ratio * friction * x.load <= sign * x.pull + self.slack
-        };
-        if !track.points().iter().any(|x| lets_go(x, self.frictions[0])) {
+        let (slack, ratio) = (self.slack, self.ratio);
+        let lets_go = |x: &Point, h: f64| ratio * h * x.load <= sign * x.pull + slack;
+        // Friction has to be so high that it slows the shaft somewhere, and so low that it lets it go somewhere.
+        let (pull, load) = track.before;
+        let (mut low, mut high) = ((sign * pull - slack) / load, 0.0_f64);
+        for x in track.points() {
+            low = low.min((sign * x.pull - slack) / x.load);
+            high = high.max((sign * x.pull + slack) / (ratio * x.load));
+        }
+        if low > high {
             return false;
         }
+        let mut after = [0.0; ROOM];
         let gain = 1.0 + GAIN_DOUBT;
-        let (end, slack) = (&track.now, self.slack);
+        let end = &track.now;
         let bowed = |time: f64| 0.5 * slack * time * time;
-        self.frictions.iter().any(|&h| {
+        self.frictions.iter().filter(|h| low <= **h && **h <= high).any(|&h| {
             // From rest at a point to the end: it goes on if nowhere later the velocity is lower.
             let mut lowest = f64::INFINITY;
             for (x, way) in track.points().iter().zip(after.iter_mut()).rev() {
@@ -244,7 +250,6 @@ impl Meter {
             }
             // From the edge to rest at a point: it came so far if nowhere earlier the velocity was lower.
             let (mut lowest, mut farthest) = (f64::INFINITY, f64::NEG_INFINITY);
-            let (pull, load) = track.before;
             let first = sign * pull - h * load;
             let (mut slows, first) = (first <= slack, 0.5 * gain * first);
             track.points().iter().zip(after.iter()).any(|(x, way)| {
@@ -371,5 +376,81 @@ impl Track {
 
     fn points(&self) -> &[Point] {
         &self.kept[..self.used]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clutch_core::PlantParams;
+    use clutch_core::law::PdParams;
+
+    /// Samples per count.
+    const EVEN: u64 = 36;
+
+    fn meter() -> Meter {
+        let plant = Plant::new(&PlantParams::default()).unwrap();
+        let law = LawParams::Pd(PdParams::default());
+        Meter::new(plant, (&law, &VelocityParams::default()), Encoder::PAPER, Micros(1000))
+    }
+
+    /// Gaps of counts that come evenly, 0.5 °/s, with the voltage a function of the period within a count.
+    fn even(volts: impl Fn(u64) -> f64) -> Vec<Gap> {
+        let mut meter = meter();
+        (0..20 * EVEN).filter_map(|k| meter.sample(k, Counts((k / EVEN) as i32), volts(k % EVEN))).collect()
+    }
+
+    #[test]
+    fn even_edges_under_an_even_voltage_are_a_shaft_that_slides() {
+        let hold = Plant::<f64>::new(&PlantParams::default()).unwrap().holding_voltage_sliding();
+        for share in [0.5, 1.0, 1.5] {
+            let gaps = even(|_| share * hold);
+            assert_eq!(gaps.len(), 18);
+            assert!(gaps.iter().all(|gap| !gap.sure && !gap.possible), "{share}: {gaps:?}");
+        }
+    }
+
+    #[test]
+    fn even_edges_under_a_voltage_that_swings_are_a_shaft_that_sticks() {
+        // A half of the count with a third more, the other with a third less: sliding it would go 20 counts to and fro.
+        let hold = Plant::<f64>::new(&PlantParams::default()).unwrap().holding_voltage_sliding();
+        let gaps = even(|k| hold * if k < EVEN / 2 { 4.0 / 3.0 } else { 2.0 / 3.0 });
+        assert_eq!(gaps.len(), 18);
+        assert!(gaps.iter().all(|gap| gap.sure && gap.possible), "{gaps:?}");
+    }
+
+    #[test]
+    fn a_gap_with_a_lost_sample_or_a_turn_can_hold_a_stick_and_need_not() {
+        let mut meter = meter();
+        let ticks = (0..3 * EVEN).filter(|k| *k != EVEN + 5);
+        let gaps: Vec<Gap> =
+            ticks.filter_map(|k| meter.sample(k, Counts((k / EVEN) as i32), 2.24)).collect();
+        assert_eq!(gaps, [Gap { begin: EVEN, end: 2 * EVEN, sure: false, possible: true }]);
+
+        let turned = meter.sample(3 * EVEN, Counts(1), 2.24);
+        assert_eq!(turned, Some(Gap { begin: 2 * EVEN, end: 3 * EVEN, sure: false, possible: true }));
+    }
+
+    #[test]
+    fn a_long_gap_keeps_some_of_its_points_and_is_judged_alike() {
+        let mut meter = meter();
+        let mut gaps = Vec::new();
+        for k in 0..40_000_u64 {
+            // A count in 10 s; the voltage swings once in it.
+            let volts = if k % 10_000 < 5_000 { 3.0 } else { 1.5 };
+            gaps.extend(meter.sample(k, Counts((k / 10_000) as i32), volts));
+        }
+        assert_eq!(gaps.len(), 2);
+        assert!(gaps.iter().all(|gap| gap.sure), "{gaps:?}");
+    }
+
+    #[test]
+    fn what_began_before_the_first_sample_that_counts_is_not_sure_to_be_after_it() {
+        let gap = Gap { begin: 5, end: 20, sure: true, possible: true };
+        let mut tally = Tally::default();
+        for from in [5, 6, 21] {
+            tally.take(&gap, from);
+        }
+        assert_eq!(tally, Tally { least: 1, most: 2 });
     }
 }
