@@ -31,15 +31,23 @@ class Metrics:
     longest_rest_s : float
         Longest rest between two motions, s.
     break_away_torque_nm : float or None
-        Mean magnitude of the torque of drive and motor at which the shaft broke away, N m; None if there was none.
+        Mean magnitude of the torque of drive and motor at which the shaft broke away, N m; None if there is none to tell.
     control_variation_v_s : float
         Total variation of the voltage, per time, V/s.
     jerk_rms_rad_s3 : float
         Root mean square of the sampled jerk, the second difference of the velocity over T², rad/s³.
     detected_stick_slip_cycles_per_s : float
-        Stick-slip cycles as the encoder shows them: what a loop on hardware would count, cycles/s.
+        Stick-slip cycles as the encoder's silences show them; one in each count, or shorter, shows none, cycles/s.
     detected_stick_time_fraction : float
         Share of the time that the shaft was stuck, as the encoder shows it.
+    detected_stairs_per_s : float
+        Stairs: silences in which the shaft fell a count or more behind even motion, 1/s.
+    detected_least_cycles_per_s : float
+        Least stick-slip cycles with which counts and voltage agree, cycles/s.
+    detected_most_cycles_per_s : float
+        Most stick-slip cycles with which counts and voltage agree, cycles/s.
+    detected_told_cycles_per_s : float or None
+        Stick-slip cycles, where least and most are within 20 % and two cycles of the run, cycles/s; None if there is none to tell.
 
     Examples
     --------
@@ -63,6 +71,10 @@ class Metrics:
     jerk_rms_rad_s3: float
     detected_stick_slip_cycles_per_s: float
     detected_stick_time_fraction: float
+    detected_stairs_per_s: float
+    detected_least_cycles_per_s: float
+    detected_most_cycles_per_s: float
+    detected_told_cycles_per_s: float | None
 
 
 class Figure(NamedTuple):
@@ -89,4 +101,8 @@ FIGURES = {
     "jerk_rms_rad_s3": Figure("jerk RMS", "rad/s³", "rad/s³", 1.0),
     "detected_stick_slip_cycles_per_s": Figure("stick-slip seen by the encoder", "cycles/s", "cycles/s", 1.0),
     "detected_stick_time_fraction": Figure("time stuck seen by the encoder", "1", "%", 100.0),
+    "detected_stairs_per_s": Figure("stairs of a count seen by the encoder", "1/s", "1/s", 1.0),
+    "detected_least_cycles_per_s": Figure("least stick-slip by counts and voltage", "cycles/s", "cycles/s", 1.0),
+    "detected_most_cycles_per_s": Figure("most stick-slip by counts and voltage", "cycles/s", "cycles/s", 1.0),
+    "detected_told_cycles_per_s": Figure("stick-slip by counts and voltage", "cycles/s", "cycles/s", 1.0),
 }

@@ -40,7 +40,7 @@ fn the_truth_lies_between_the_bounds_on_every_disc() {
             }
         }
     }
-    assert!(all > 5_000.0 && sure > 1_500.0, "{sure} sure of {all}");
+    assert!(all > 3_000.0 && sure > 1_000.0, "{sure} sure of {all}");
 }
 
 #[test]
@@ -61,7 +61,7 @@ fn with_a_tenth_of_the_counts_it_says_that_it_cannot_tell() {
     let [truth, ..] = cycles(&run);
     assert!(truth > 5.0 && run.detected.stick_slip_cycles_per_s == 0.0, "{run:?}");
     assert_eq!(run.detected.verdict(), Verdict::CannotTell);
-    assert_eq!(run.detected.words(), format!("cannot tell, at most {}", run.detected.most_cycles_per_s));
+    assert_eq!(run.detected.words(), "cannot tell");
     assert!(run.detected.reason().is_some());
 }
 

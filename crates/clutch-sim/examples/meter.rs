@@ -199,9 +199,8 @@ fn score(
     let total = Mutex::new((Score::default(), None));
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     sweep.run(threads, Keep::Trace, &AtomicBool::new(false), &|i, row| {
-        let scored: Outcome<Score> = row
-            .map_err(Into::into)
-            .and_then(|Row { run, .. }| Score::of(&sweep.scenario(i)?, &run));
+        let scored: Outcome<Score> =
+            row.map_err(Into::into).and_then(|Row { run, .. }| Score::of(&sweep.scenario(i)?, &run));
         if let Ok(mut total) = total.lock() {
             match scored {
                 Ok(score) => total.0.add(score),

@@ -40,8 +40,8 @@ impl Detected {
         match self.verdict() {
             Verdict::Told(_) if least == most => least,
             Verdict::Told(_) => format!("{least} to {most}"),
-            Verdict::AtLeast(_) => format!("at least {least}, at most {most}"),
-            Verdict::CannotTell => format!("cannot tell, at most {most}"),
+            Verdict::AtLeast(_) => format!("at least {least}"),
+            Verdict::CannotTell => "cannot tell".into(),
         }
     }
 
@@ -50,9 +50,10 @@ impl Detected {
     pub fn reason(&self) -> Option<String> {
         self.told_cycles_per_s.is_none().then(|| {
             format!(
-                "up to {} times a second the shaft may have stuck between two edges unseen: a count lasts long \
-                 enough for it, and the voltage falls far enough; a finer encoder, or another rate, tells more",
-                number(self.most_cycles_per_s - self.least_cycles_per_s)
+                "counts and voltage leave {} to {} cycles/s: gaps between two edges last long enough for a stick \
+                 unseen, and the voltage falls far enough in them; a finer encoder, or another rate, tells more",
+                number(self.least_cycles_per_s),
+                number(self.most_cycles_per_s)
             )
         })
     }
@@ -117,7 +118,9 @@ impl Detector {
         let time = measured_s.max(self.period);
         let per_s = |n: u64| n as f64 / time;
         let seen = per_s(self.silent.cycles() - self.before.0);
-        let (least, most) = (per_s(self.tally.least), per_s(self.tally.most));
+        // A shaft that stands at the end may have stuck, and no edge has judged it.
+        let unended = u64::from(self.silent.stuck());
+        let (least, most) = (per_s(self.tally.least), per_s(self.tally.most + unended));
         let told = most - least <= TOLD_WITHIN.0 * most + TOLD_WITHIN.1 / time;
         Detected {
             stick_slip_cycles_per_s: seen,

@@ -423,8 +423,7 @@ mod tests {
     fn a_gap_with_a_lost_sample_or_a_turn_can_hold_a_stick_and_need_not() {
         let mut meter = meter();
         let ticks = (0..3 * EVEN).filter(|k| *k != EVEN + 5);
-        let gaps: Vec<Gap> =
-            ticks.filter_map(|k| meter.sample(k, Counts((k / EVEN) as i32), 2.24)).collect();
+        let gaps: Vec<Gap> = ticks.filter_map(|k| meter.sample(k, Counts((k / EVEN) as i32), 2.24)).collect();
         assert_eq!(gaps, [Gap { begin: EVEN, end: 2 * EVEN, sure: false, possible: true }]);
 
         let turned = meter.sample(3 * EVEN, Counts(1), 2.24);

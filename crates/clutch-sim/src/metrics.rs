@@ -148,7 +148,7 @@ figures! {
         /// Most stick-slip cycles with which counts and voltage agree.
         MOST most_cycles_per_s: f64, "most stick-slip by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
         /// Stick-slip cycles, where least and most are within 20 % and two cycles of the run.
-        TOLD told_cycles_per_s: Option<f64>, "stick-slip told by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
+        TOLD told_cycles_per_s: Option<f64>, "stick-slip by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
     }
 }
 
