@@ -1,7 +1,7 @@
 //! `clutch loop`.
 
 use crate::args::{ScenarioArgs, key_value};
-use crate::output::{BUILD, Exit, json, not_certified, print, shown};
+use crate::output::{BUILD, Exit, json, not_certified, paragraph, print, shown};
 use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
@@ -338,6 +338,9 @@ pub fn summary(s: &Summary) -> String {
             ("wake-up late by p50 / p99 / p99.9 / max", late, "µs"),
         ],
     );
+    if let Some(reason) = d.reason() {
+        text += &paragraph(&format!("stick-slip: {reason}"));
+    }
     for line in s.remarks() {
         text += &line;
         text.push('\n');

@@ -121,7 +121,6 @@ impl Summary {
     pub fn remarks(&self) -> Vec<String> {
         let r = &self.report;
         let mut lines = vec![format!("as sampled: {}", self.sampled.verdict)];
-        lines.extend(r.detected.reason().map(|reason| format!("stick-slip: {reason}")));
         if r.clock_hz > 0 {
             let us = |cycles: u64| number(cycles as f64 * 1e6 / f64::from(r.clock_hz));
             let c = &r.tick_cycles;
