@@ -6,7 +6,8 @@
 //! [`StickSlipParams::ticks`], the shaft is called stuck; the next count ends it. Each entry is
 //! one stick-slip cycle, as in the paper's Table 3.
 //!
-//! `docs/theory.md` measures how often it agrees with the simulator's ground truth.
+//! Sticks that come once in each count show no silence: edges are as even as in even motion. And a shaft that nearly stops
+//! is silent for as long as one that does. `docs/meter.md` has precision and recall, and what the voltage tells besides.
 
 use crate::params::{Range, Table};
 use crate::{Counts, Encoder, Micros, ParamError, Real};

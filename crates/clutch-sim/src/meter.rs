@@ -126,7 +126,7 @@ impl Meter {
             ratio: 1.0 + RISE_BELIEVED * rise.max(0.0),
             slack: (ROUGHNESS * count).min(1.0) * carried * per_torque,
             frictions: std::array::from_fn(|i| libm::exp(step * i as f64) / FRICTION_RANGE),
-            tracks: (0..=told.max(DELAY)).map(|delay| Track::new(delay)).collect(),
+            tracks: (0..=told.max(DELAY)).map(Track::new).collect(),
             last: None,
             entered: 0,
             begin: 0,
