@@ -31,7 +31,7 @@ class Metrics:
     longest_rest_s : float
         Longest rest between two motions, s.
     break_away_torque_nm : float or None
-        Mean magnitude of the torque of drive and motor at which the shaft broke away, N m; None if there is none to tell.
+        Mean magnitude of the torque of drive and motor at which the shaft broke away, N m; None if there is none.
     control_variation_v_s : float
         Total variation of the voltage, per time, V/s.
     jerk_rms_rad_s3 : float
@@ -47,7 +47,7 @@ class Metrics:
     detected_most_cycles_per_s : float
         Most stick-slip cycles with which counts and voltage agree, cycles/s.
     detected_told_cycles_per_s : float or None
-        Stick-slip cycles, where least and most are within 20 % and two cycles of the run, cycles/s; None if there is none to tell.
+        Stick-slip cycles, if least and most are within 20 % and two cycles, cycles/s; None if there is none.
 
     Examples
     --------

@@ -56,6 +56,16 @@ def test_law_and_plant_stepped_by_hand_are_the_simulation_bit_for_bit(name):
     assert plant.events() == run.events
 
 
+def test_the_meter_tells_none_where_counts_and_voltage_cannot_tell():
+    few = {"reference.ramp.rate_deg_s": 0.5, "rig.encoder.counts_per_rev": 2000}
+    blind = package.simulate("bench_pd_2", overrides=few).metrics
+    assert blind.stick_slip_cycles_per_s > 1.0 and blind.detected_stick_slip_cycles_per_s == 0.0
+    assert blind.detected_told_cycles_per_s is None
+    assert blind.detected_least_cycles_per_s == 0.0 < blind.detected_most_cycles_per_s
+    smooth = package.simulate("bench_glide_2").metrics
+    assert smooth.detected_told_cycles_per_s == smooth.detected_most_cycles_per_s == 0.0
+
+
 @pytest.mark.parametrize("name", ["pd_2", "bench_smc_2"])
 def test_stick_slip_detected_by_hand_is_that_of_the_simulation(name):
     scenario = package.Scenario.load(name).override({"run.duration_s": 2.0, "run.settle_s": 0.0})

@@ -147,7 +147,7 @@ figures! {
         LEAST least_cycles_per_s: f64, "least stick-slip by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
         /// Most stick-slip cycles with which counts and voltage agree.
         MOST most_cycles_per_s: f64, "most stick-slip by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
-        /// Stick-slip cycles, where least and most are within 20 % and two cycles of the run.
+        /// Stick-slip cycles, if least and most are within 20 % and two cycles.
         TOLD told_cycles_per_s: Option<f64>, "stick-slip by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
     }
 }
