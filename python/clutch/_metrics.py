@@ -42,10 +42,10 @@ class Metrics:
         Share of the time that the shaft was stuck, as the encoder shows it.
     detected_stairs_per_s : float
         Stairs: silences in which the shaft fell a count or more behind even motion, 1/s.
-    detected_least_cycles_per_s : float
-        Least stick-slip cycles with which counts and voltage agree, cycles/s.
-    detected_most_cycles_per_s : float
-        Most stick-slip cycles with which counts and voltage agree, cycles/s.
+    detected_least_cycles_per_s : float or None
+        Least stick-slip cycles with which counts and voltage agree; not of a run of which only figures are kept, cycles/s; None if there is none.
+    detected_most_cycles_per_s : float or None
+        Most stick-slip cycles with which counts and voltage agree, cycles/s; None if there is none.
     detected_told_cycles_per_s : float or None
         Stick-slip cycles, if least and most are within 20 % and two cycles, cycles/s; None if there is none.
 
@@ -72,8 +72,8 @@ class Metrics:
     detected_stick_slip_cycles_per_s: float
     detected_stick_time_fraction: float
     detected_stairs_per_s: float
-    detected_least_cycles_per_s: float
-    detected_most_cycles_per_s: float
+    detected_least_cycles_per_s: float | None
+    detected_most_cycles_per_s: float | None
     detected_told_cycles_per_s: float | None
 
 

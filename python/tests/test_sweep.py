@@ -29,9 +29,6 @@ FIGURES = [
     "detected_stick_slip_cycles_per_s",
     "detected_stick_time_fraction",
     "detected_stairs_per_s",
-    "detected_least_cycles_per_s",
-    "detected_most_cycles_per_s",
-    "detected_told_cycles_per_s",
 ]
 #: A run of 0.3 s, so that tests stay short.
 SHORT = {"run.duration_s": 0.3, "run.settle_s": 0.1}

@@ -1,8 +1,8 @@
 //! The figures of a run: names, units and what each is.
 
-use clutch_sim::metrics::{Detected, Metrics, columns};
+use clutch_sim::metrics::{Detected, Metrics, columns, figure_columns};
 use clutch_sim::progress::UNWATCHED;
-use clutch_sim::{Keep, Scenario};
+use clutch_sim::{Keep, Run, Scenario};
 use std::collections::BTreeSet;
 
 #[test]
@@ -30,7 +30,7 @@ fn a_figures_name_ends_with_its_unit() {
 #[test]
 fn json_has_each_figure_under_its_field_and_columns_have_them_all() {
     let scenario = Scenario::built_in("pd_2").unwrap().unwrap();
-    let run = scenario.run(Keep::Figures, UNWATCHED).unwrap();
+    let run = scenario.run(Keep::Trace, UNWATCHED).unwrap();
     let json = serde_json::to_value((&run.metrics, &run.detected)).unwrap();
     let count = [&json[0], &json[1]].map(|object| object.as_object().unwrap().len());
     assert_eq!(count, [Metrics::FIGURES.len(), Detected::FIGURES.len()]);
@@ -42,4 +42,11 @@ fn json_has_each_figure_under_its_field_and_columns_have_them_all() {
     }
     let names: BTreeSet<_> = columns(&run.metrics, &run.detected).map(|(name, _)| name).collect();
     assert_eq!(names.len(), count[0] + count[1]);
+
+    // Without its samples a run has no bounds by counts and voltage, and the same figures else.
+    let bare = scenario.run(Keep::Figures, UNWATCHED).unwrap();
+    let of = |run: &Run| figure_columns(&run.metrics, &run.detected).collect::<Vec<_>>();
+    assert_eq!(of(&bare), of(&run));
+    assert_eq!(of(&bare).len(), names.len() - 3);
+    assert_eq!(bare.detected.least_cycles_per_s, None);
 }

@@ -9,7 +9,7 @@ use clutch_log::{Header, Source};
 use clutch_node::{ControllerParams, RunParams, RunTimes, Settings, Unsupported};
 use clutch_sim::detected::Detector;
 use clutch_sim::scenario::{Plan, ScalarKind};
-use clutch_sim::{Scenario, ScenarioError};
+use clutch_sim::{Keep, Scenario, ScenarioError};
 use clutch_wire::Hello;
 
 /// FNV-1a, 64 bit: for telling apart, not for secrets.
@@ -110,7 +110,7 @@ impl<T: Real> BuiltRun<T> {
                 valid: cycles(safety.limits.valid_cycles),
                 silence: cycles(safety.limits.supervisor.silence_cycles),
             },
-            detector: Detector::new(&spec)?,
+            detector: Detector::new(&spec, Keep::Trace)?,
             ticks: scenario.ticks(),
         })
     }

@@ -3,7 +3,7 @@
 use crate::convert::{scenario_error, to_table, to_toml};
 use crate::run::sample_columns;
 use crate::table::{Column, Table};
-use clutch_sim::metrics::columns;
+use clutch_sim::metrics::figure_columns;
 use clutch_sim::{Keep, ScenarioError, sweep};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -81,7 +81,7 @@ impl Sweep {
             .map(|row| row.try_iter()?.map(|v| to_toml(&v?)).collect::<PyResult<Vec<_>>>())
             .collect::<PyResult<Vec<_>>>()?;
         let known: Vec<&str> =
-            columns(&Default::default(), &Default::default()).map(|(name, _)| name).collect();
+            figure_columns(&Default::default(), &Default::default()).map(|(name, _)| name).collect();
         for name in &metrics {
             if name != "certified" && !known.contains(&name.as_str()) {
                 let text = format!("metrics: \"{name}\": expected certified, {}", known.join(", "));
@@ -231,7 +231,7 @@ fn row(
         Ok(sweep::Row { certified, run }) => {
             let value = |name: &String| {
                 let found =
-                    columns(&run.metrics, &run.detected).find(|(n, _)| n == name).and_then(|(_, x)| x);
+                    figure_columns(&run.metrics, &run.detected).find(|(n, _)| n == name).and_then(|(_, x)| x);
                 if name == "certified" { f64::from(u8::from(certified)) } else { found.unwrap_or(f64::NAN) }
             };
             let metrics = metrics.iter().map(value).collect();

@@ -161,7 +161,7 @@ impl Score {
         if let Verdict::Told(told) = d.verdict() {
             score.told = 1;
             // Two cycles that may be told apart from none, and one that the end of the run cuts off.
-            let band = 0.2 * d.most_cycles_per_s + 3.0 / run.metrics.measured_s;
+            let band = 0.2 * d.most_cycles_per_s.unwrap_or(0.0) + 3.0 / run.metrics.measured_s;
             score.told_right = usize::from((told - truth).abs() <= band);
         }
         Ok(score)

@@ -3,7 +3,7 @@
 use crate::meter::{Meter, Tally};
 use crate::metrics::Detected;
 use crate::number;
-use crate::run::RunSpec;
+use crate::run::{Keep, RunSpec};
 use clutch_core::{Counts, Encoder, ParamError, Plant, StickSlip, StickSlipParams, StickSlipState};
 
 /// Way of the path in a silence that is a stair: in even motion it goes one count, in a stair at least one more.
@@ -28,15 +28,17 @@ impl Detected {
     pub fn verdict(&self) -> Verdict {
         match self.told_cycles_per_s {
             Some(told) => Verdict::Told(told),
-            None if self.least_cycles_per_s > 0.0 => Verdict::AtLeast(self.least_cycles_per_s),
-            None => Verdict::CannotTell,
+            None => match self.least_cycles_per_s {
+                Some(least) if least > 0.0 => Verdict::AtLeast(least),
+                _ => Verdict::CannotTell,
+            },
         }
     }
 
     /// The same in words, without the unit.
     #[must_use]
     pub fn words(&self) -> String {
-        let (least, most) = (number(self.least_cycles_per_s), number(self.most_cycles_per_s));
+        let [least, most] = self.bounds().map(number);
         match self.verdict() {
             Verdict::Told(_) if least == most => least,
             Verdict::Told(_) => format!("{least} to {most}"),
@@ -49,13 +51,19 @@ impl Detected {
     #[must_use]
     pub fn reason(&self) -> Option<String> {
         self.told_cycles_per_s.is_none().then(|| {
+            let [least, most] = self.bounds();
             format!(
                 "counts and voltage leave {} to {} cycles/s: gaps between two edges last long enough for a stick \
                  unseen, and the voltage falls far enough in them; a finer encoder, or another rate, tells more",
-                number(self.least_cycles_per_s),
-                number(self.most_cycles_per_s)
+                number(least),
+                number(most)
             )
         })
+    }
+
+    /// The bounds, cycles/s; where they were not asked for, all that there may be.
+    fn bounds(&self) -> [f64; 2] {
+        [self.least_cycles_per_s.unwrap_or(0.0), self.most_cycles_per_s.unwrap_or(f64::INFINITY)]
     }
 }
 
@@ -66,7 +74,7 @@ pub struct Detector {
     stairs: StickSlip<f64>,
     silent: StickSlipState<f64>,
     climbing: StickSlipState<f64>,
-    meter: Meter,
+    meter: Option<Meter>,
     tally: Tally,
     period: f64,
     settle: f64,
@@ -77,19 +85,27 @@ pub struct Detector {
 }
 
 impl Detector {
-    /// For a run's encoder, period and settling time; it believes the run's model.
+    /// For a run's encoder, period and settling time; it believes the run's model. Bounds by counts and voltage are found
+    /// if samples are kept.
     ///
     /// # Errors
     /// A parameter out of range.
-    pub fn new(spec: &RunSpec<'_>) -> Result<Self, ParamError> {
+    pub fn new(spec: &RunSpec<'_>, keep: Keep) -> Result<Self, ParamError> {
         let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev)?;
         let (period, settle) = (spec.period.period::<f64>()?, spec.run.settle);
+        let meter = match keep {
+            Keep::Trace => {
+                let plant = Plant::new(&spec.model)?;
+                Some(Meter::new(plant, (&spec.law, &spec.velocity), encoder, spec.period))
+            }
+            Keep::Figures => None,
+        };
         Ok(Detector {
             silence: StickSlip::new(&StickSlipParams::default(), encoder, spec.period)?,
             stairs: StickSlip::new(&STAIR, encoder, spec.period)?,
             silent: StickSlipState::default(),
             climbing: StickSlipState::default(),
-            meter: Meter::new(Plant::new(&spec.model)?, (&spec.law, &spec.velocity), encoder, spec.period),
+            meter,
             tally: Tally::default(),
             period,
             settle,
@@ -103,7 +119,7 @@ impl Detector {
     pub fn sample(&mut self, tick: u64, counts: Counts, path_velocity: f64, volts: f64) -> bool {
         let begins = self.silence.update(&mut self.silent, counts, path_velocity);
         self.stairs.update(&mut self.climbing, counts, path_velocity);
-        if let Some(gap) = self.meter.sample(tick, counts, volts) {
+        if let Some(gap) = self.meter.as_mut().and_then(|meter| meter.sample(tick, counts, volts)) {
             self.tally.take(&gap, self.from);
         }
         if (tick as f64) * self.period < self.settle {
@@ -121,13 +137,14 @@ impl Detector {
         // A shaft that stands at the end may have stuck, and no edge has judged it.
         let unended = u64::from(self.silent.stuck());
         let (least, most) = (per_s(self.tally.least), per_s(self.tally.most + unended));
-        let told = most - least <= TOLD_WITHIN.0 * most + TOLD_WITHIN.1 / time;
+        let told = self.meter.is_some() && most - least <= TOLD_WITHIN.0 * most + TOLD_WITHIN.1 / time;
+        let of_meter = |bound: f64| self.meter.is_some().then_some(bound);
         Detected {
             stick_slip_cycles_per_s: seen,
             stick_time_fraction: (self.silent.stuck_ticks() - self.before.1) as f64 * self.period / time,
             stairs_per_s: per_s(self.climbing.cycles() - self.before.2),
-            least_cycles_per_s: least,
-            most_cycles_per_s: most,
+            least_cycles_per_s: of_meter(least),
+            most_cycles_per_s: of_meter(most),
             told_cycles_per_s: told.then(|| seen.max(least).min(most)),
         }
     }

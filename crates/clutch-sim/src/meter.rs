@@ -141,8 +141,11 @@ impl Meter {
     pub fn sample(&mut self, tick: u64, counts: Counts, volts: f64) -> Option<Gap> {
         self.broken |= tick != self.next;
         let moved = self.last.map(|last| counts.since(last));
+        let actuator = self.plant.actuator();
+        let pull = (self.plant.params().drive_torque + actuator.torque(volts)) * self.per_torque;
+        let given = (pull, self.sliding * actuator.normal(volts) * self.per_torque);
         if moved.is_none() {
-            self.tracks.iter_mut().for_each(|track| track.line = [volts; 4]);
+            self.tracks.iter_mut().for_each(|track| track.line = [given; 4]);
         }
         self.last = Some(counts);
         let mut judged = None;
@@ -154,12 +157,9 @@ impl Meter {
             (self.entered, self.begin, self.broken) = (left, tick, false);
             self.tracks.iter_mut().for_each(Track::enter);
         }
-        let (plant, per_torque, sliding) = (&self.plant, self.per_torque, self.sliding);
         for track in &mut self.tracks {
-            let volts = track.arrive(volts);
-            let actuator = plant.actuator();
-            let pull = (plant.params().drive_torque + actuator.torque(volts)) * per_torque;
-            track.advance(pull, sliding * actuator.normal(volts) * per_torque);
+            let (pull, load) = track.arrive(given);
+            track.advance(pull, load);
         }
         self.next = tick + 1;
         judged
@@ -227,16 +227,22 @@ impl Meter {
         // Friction has to be so high that it slows the shaft somewhere, and so low that it lets it go somewhere.
         let (pull, load) = track.before;
         let (mut low, mut high) = ((sign * pull - slack) / load, 0.0_f64);
+        let (mut pulls, mut loads) = (pull.abs(), load);
         for x in track.points() {
             low = low.min((sign * x.pull - slack) / x.load);
             high = high.max((sign * x.pull + slack) / (ratio * x.load));
+            pulls = pulls.max(x.pull.abs());
+            loads = loads.max(x.load);
         }
-        if low > high {
+        let gain = 1.0 + GAIN_DOUBT;
+        let end = &track.now;
+        // No acceleration is more than this; a way to a rest and on from it is at most what it makes of the whole time.
+        let most = gain * (pulls + high.min(FRICTION_RANGE) * loads) + slack;
+        let time = end.time + 1.0;
+        if low > high || 0.5 * most * time * time < 1.0 {
             return false;
         }
         let mut after = [0.0; ROOM];
-        let gain = 1.0 + GAIN_DOUBT;
-        let end = &track.now;
         let bowed = |time: f64| 0.5 * slack * time * time;
         self.frictions.iter().filter(|h| low <= **h && **h <= high).any(|&h| {
             // From rest at a point to the end: it goes on if nowhere later the velocity is lower.
@@ -269,8 +275,8 @@ impl Meter {
 /// A gap, as it was with one delay.
 #[derive(Clone, Debug)]
 struct Track {
-    /// Voltages on their way, the oldest first, V.
-    line: [f64; 4],
+    /// Pulls and loads of voltages on their way, the newest first.
+    line: [(f64, f64); 4],
     delay: usize,
     /// Points of the gap, of which so many are used.
     kept: Box<[Point; ROOM]>,
@@ -315,7 +321,7 @@ impl Point {
 impl Track {
     fn new(delay: u32) -> Self {
         Track {
-            line: [0.0; 4],
+            line: [(0.0, 0.0); 4],
             delay: (delay as usize).min(3),
             kept: Box::new([Point::default(); ROOM]),
             used: 0,
@@ -328,8 +334,8 @@ impl Track {
         }
     }
 
-    /// The voltage that takes effect now.
-    fn arrive(&mut self, given: f64) -> f64 {
+    /// Pull and load of the voltage that takes effect now.
+    fn arrive(&mut self, given: (f64, f64)) -> (f64, f64) {
         self.line.rotate_right(1);
         self.line[0] = given;
         self.line[self.delay]

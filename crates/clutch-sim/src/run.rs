@@ -240,7 +240,7 @@ pub enum RunError {
 /// Parts that a run keeps besides its figures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keep {
-    /// Every sample and event.
+    /// Every sample and event; the bounds on stick-slip by counts and voltage among the figures.
     Trace,
     /// Nothing: for sweeps, whose traces would fill the memory.
     Figures,
@@ -432,7 +432,7 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
     }
     let mut events = Vec::new();
     let mut figures = MetricsBuilder::new(period, p.settle);
-    let mut detector = Detector::new(spec)?;
+    let mut detector = Detector::new(spec, keep)?;
     let mut detections = Vec::new();
     for k in 0..ticks {
         if k % REPORT_EVERY == 0 {

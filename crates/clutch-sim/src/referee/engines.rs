@@ -359,7 +359,7 @@ fn run_scenario(
         _ => e.into(),
     })?;
     let run = scenario.run(Keep::Figures, UNWATCHED)?;
-    let metrics = metrics::columns(&run.metrics, &run.detected)
+    let metrics = metrics::figure_columns(&run.metrics, &run.detected)
         .filter_map(|(name, x)| Some((name.to_owned(), x?)))
         .collect();
     Ok(Trajectory { metrics, ..Trajectory::default() })

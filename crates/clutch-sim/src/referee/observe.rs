@@ -2,7 +2,7 @@
 
 use super::case::{Case, Expect, Model};
 use super::trajectory::Trajectory;
-use crate::metrics::{Detected, Metrics};
+use crate::metrics::{Detected, Metrics, figure_columns};
 use serde::Deserialize;
 
 /// A way to observe.
@@ -168,13 +168,13 @@ impl Observe {
                 Err("kind: a scenario has metrics only".into())
             }
             Model::Scenario(_) => {
-                let names =
-                    Metrics::FIGURES.iter().map(|f| f.name).chain(Detected::FIGURES.iter().map(|f| f.name));
+                let none = (Metrics::default(), Detected::default());
+                let names = figure_columns(&none.0, &none.1).map(|(name, _)| name);
                 let name = self.metric.as_deref().unwrap_or_default();
-                if names.clone().any(|known| known == name) {
+                let names: Vec<&str> = names.collect();
+                if names.contains(&name) {
                     return Ok(());
                 }
-                let names: Vec<&str> = names.collect();
                 Err(format!("metric = \"{name}\": expected one of: {}", names.join(", ")))
             }
             Model::Mechanism(_) if self.kind == Kind::Metric => Err("kind: metrics are of scenarios".into()),
