@@ -17,6 +17,9 @@ pub(crate) struct Fineness {
     pub(crate) steps: usize,
     /// Directions nearer to one another than this are one.
     pub(crate) apart: f64,
+    /// Orbits are of brakes weaker and stronger than the middle one by at least this factor; 1: only of those that there are,
+    /// of one where they hardly differ.
+    pub(crate) spread: f64,
 }
 
 /// The law near its steady voltage: volts per count, and per count per tick.
@@ -103,8 +106,10 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
         (Gains::Smc { .. }, _) => &[1.0, 2.0, 4.0, 0.5],
     };
     let middle = (u.brake[0] * u.brake[1]).sqrt();
-    let wide = u.brake[1] > 1.25 * u.brake[0];
-    let brakes = if wide { vec![u.brake[0], middle, u.brake[1]] } else { vec![middle] };
+    let spread = fineness.spread;
+    let wide = u.brake[1] > 1.25 * u.brake[0] || spread > 1.0;
+    let ends = [u.brake[0].min(middle / spread), u.brake[1].max(middle * spread)];
+    let brakes = if wide { vec![ends[0], middle, ends[1]] } else { vec![middle] };
     let mut orbits: Vec<Vec<[f64; N]>> = vec![plain];
     for _ in 0..fineness.steps {
         orbits.push(Vec::new());

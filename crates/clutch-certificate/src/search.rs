@@ -21,6 +21,9 @@ pub struct Options {
     pub refinements: usize,
     /// Most comparisons of a point with a constraint per attempt, about 1e9 a second.
     pub work: u64,
+    /// Looks on with finer directions: `false` leaves it at the coarse ones, of shells, which take seconds and give a looser
+    /// bound.
+    pub patient: bool,
 }
 
 impl Default for Options {
@@ -31,6 +34,7 @@ impl Default for Options {
             error_limit: 2.0_f64.to_radians(),
             refinements: 2,
             work: 1_000_000_000,
+            patient: true,
         }
     }
 }
@@ -129,15 +133,19 @@ fn split([low, high]: Ends, widest: f64) -> Vec<Ends> {
 }
 
 /// Fineness of the directions, and share by which radii grow, from quick to patient.
-const QUICK: (Fineness, f64) = (Fineness { steps: 16, apart: 0.05 }, 0.001);
-const USUAL: (Fineness, f64) = (Fineness { steps: 30, apart: 0.03 }, 0.001);
-const LONG: (Fineness, f64) = (Fineness { steps: 60, apart: 0.02 }, 0.0003);
-const PATIENT: (Fineness, f64) = (Fineness { steps: 40, apart: 0.02 }, 0.0001);
+const QUICK: (Fineness, f64) = (Fineness { steps: 16, apart: 0.05, spread: 1.0 }, 0.001);
+const USUAL: (Fineness, f64) = (Fineness { steps: 30, apart: 0.03, spread: 1.0 }, 0.001);
+const LONG: (Fineness, f64) = (Fineness { steps: 60, apart: 0.02, spread: 1.0 }, 0.0003);
+const PATIENT: (Fineness, f64) = (Fineness { steps: 40, apart: 0.02, spread: 1.0 }, 0.0001);
+
+/// For shells: few directions, of brakes far apart, which a voltage of any size asks for.
+const COARSE: (Fineness, f64) = (Fineness { steps: 30, apart: 0.1, spread: 1.4 }, 0.001);
 
 /// The best of the first attempts, or the first of the later ones that is proven.
 fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
     let (first, later): (&[_], &[_]) = match setup.law {
-        Gains::Shell { .. } => (&[(Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
+        Gains::Shell { .. } if !options.patient => (&[(Form::Exact, COARSE)], &[]),
+        Gains::Shell { .. } => (&[(Form::Exact, COARSE), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
         Gains::Pd { .. } => (&[(Form::Noise, LONG), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
         // (31) has hundreds of modes, times the counts of the exact form.
         Gains::Smc { .. } => (&[(Form::Noise, QUICK), (Form::Noise, USUAL)], &[(Form::Noise, PATIENT)]),
@@ -244,7 +252,8 @@ fn hopeless(u: &Units) -> f64 {
     let volts_per_count = match u.law {
         Gains::Pd { kp, .. } => kp * u.count,
         Gains::Smc { kp, slope, boundary, .. } => kp * slope / boundary * u.count,
-        Gains::Shell { slope, boundary } => u.volts[1] * slope / (2.0 * boundary) * u.count,
+        // What a law within may do at its worst takes a wider set.
+        Gains::Shell { slope, boundary } => u.volts[1] * slope / (6.0 * boundary) * u.count,
     };
     12.0 + 6.0 * u.drive[1] / u.brake[0] / volts_per_count.max(1e-6)
 }
@@ -262,7 +271,7 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
     let mut search = Search::new(&u, &modes, p.form, &rows, &initial(p.setup, &u, p.form));
     let effort = Effort {
         growth: p.growth,
-        sweeps: 300,
+        sweeps: if matches!(p.setup.law, Gains::Shell { .. }) { 600 } else { 300 },
         shrinks: 40,
         error_limit: (p.options.error_limit / u.count).min(hopeless(&u)),
         work: p.options.work,

@@ -69,6 +69,7 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
         ("inertia_percent".to_owned(), percent(inertia.1)),
         ("viscous_damping_percent".to_owned(), percent(damping.1)),
         ("friction_percent".to_owned(), percent(friction)),
+        ("ripple_percent".to_owned(), percent(at_disc)),
         ("drive_torque_percent".to_owned(), Value::Float(0.0)),
         ("brake_gain_percent".to_owned(), Value::Float(0.0)),
     ]);

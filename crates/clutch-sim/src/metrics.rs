@@ -121,10 +121,10 @@ figures! {
         STICK_SLIP stick_slip_cycles_per_s: f64, "stick-slip", "cycles/s" shown as "cycles/s" SAME;
         /// Share of the time that the shaft was stuck.
         STICK_TIME stick_time_fraction: f64, "time stuck", "1" shown as "%" PERCENT;
+        /// Longest time in one stick.
+        LONGEST_STICK longest_stick_s: f64, "longest stick", "s" shown as "ms" MILLI;
         /// Stair height: largest movement between one stick and the next, 0 with fewer than two.
         STAIR_HEIGHT stair_height_rad: f64, "stair height", "rad" shown as "°" DEGREES;
-        /// Longest rest between two motions.
-        LONGEST_REST longest_rest_s: f64, "longest rest", "s" shown as "ms" MILLI;
         /// Mean magnitude of the torque of drive and motor at which the shaft broke away.
         BREAK_AWAY break_away_torque_nm: Option<f64>, "torque at break-away", "N m" shown as "mN m" MILLI;
         /// Total variation of the voltage, per time.
@@ -192,10 +192,10 @@ pub struct MetricsBuilder {
     jerk_square: f64,
     sticks: u64,
     stuck_time: f64,
+    /// Time in the stick that lasts, and the longest so far.
+    this_stick: f64,
+    longest_stick: f64,
     last_stick: Option<f64>,
-    /// The rest that lasts, and the longest, s.
-    rest: f64,
-    longest_rest: f64,
     stair: f64,
     break_aways: u64,
     break_away_sum: f64,
@@ -219,9 +219,9 @@ impl MetricsBuilder {
             jerk_square: 0.0,
             sticks: 0,
             stuck_time: 0.0,
+            this_stick: 0.0,
+            longest_stick: 0.0,
             last_stick: None,
-            rest: 0.0,
-            longest_rest: 0.0,
             stair: 0.0,
             break_aways: 0,
             break_away_sum: 0.0,
@@ -271,27 +271,28 @@ impl MetricsBuilder {
         }
     }
 
+    fn stuck_for(&mut self, time: f64) {
+        self.stuck_time += time;
+        self.this_stick += time;
+        self.longest_stick = self.longest_stick.max(self.this_stick);
+    }
+
     /// The period that began at `begin` (s), with the shaft stuck or not, and what happened in it.
     pub fn period(&mut self, begin: f64, mut stuck: bool, events: &[Event]) {
         let counts = begin >= self.settle;
-        let mut rests = |rest: &mut f64, seconds: f64| {
-            if counts {
-                self.stuck_time += seconds;
-                *rest += seconds;
-                self.longest_rest = self.longest_rest.max(*rest);
-            }
-        };
         let mut since = begin;
         for e in events {
-            if stuck && e.kind == EventKind::BreakAway {
-                rests(&mut self.rest, e.time - since);
-                self.rest = 0.0;
+            if stuck && e.kind == EventKind::BreakAway && counts {
+                self.stuck_for(e.time - since);
             }
             stuck = e.kind == EventKind::Stick;
+            if !stuck {
+                self.this_stick = 0.0;
+            }
             since = e.time;
         }
-        if stuck {
-            rests(&mut self.rest, begin + self.period - since);
+        if stuck && counts {
+            self.stuck_for(begin + self.period - since);
         }
         events.iter().for_each(|e| self.event(e));
     }
@@ -309,8 +310,8 @@ impl MetricsBuilder {
             iae_rad_s: self.absolute * self.period,
             stick_slip_cycles_per_s: self.sticks as f64 / time,
             stick_time_fraction: self.stuck_time / time,
+            longest_stick_s: self.longest_stick,
             stair_height_rad: self.stair,
-            longest_rest_s: self.longest_rest,
             break_away_torque_nm: (self.break_aways > 0)
                 .then(|| self.break_away_sum / self.break_aways as f64),
             control_variation_v_s: self.variation / time,

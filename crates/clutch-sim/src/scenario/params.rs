@@ -39,10 +39,31 @@ params! {
         /// Rate of reaching the sliding surface that the certificate shall give, in (15); above 0 the reaching time gets
         /// a bound.
         reach_rate: f64 = 0.0, "reach_rate_rad_s2" "γ" RAD_S2, Range::at_least(0.0);
+        /// The part of `friction_percent` that changes along the disc and with time; the rest is a mean that is not known
+        /// more closely. Absent: all of it is the mean's, and the sampled certificate adds the ripple of the rig.
+        ripple: Option<f64>, "ripple_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
     }
     flat {
         /// Accuracy to which each parameter of the model is known.
         tolerances: Tolerances;
+    }
+    relations(p) {
+        /// The ripple is a part of what friction may be off.
+        PART: ripple, "at most friction_percent, of which it is a part" =>
+            p.ripple.is_none_or(|share| share <= p.tolerances.friction);
+    }
+}
+
+impl ScenarioBounds {
+    /// Shares by which the mean of friction is known, below and above 1, and by which friction departs from it along the
+    /// disc; `ripple` is the rig's, which counts where the bounds say nothing of one.
+    #[must_use]
+    pub fn friction_shares(&self, ripple: f64) -> ([f64; 2], f64) {
+        let off = self.tolerances.friction;
+        match self.ripple {
+            Some(share) => ([(1.0 - off) / (1.0 - share), (1.0 + off) / (1.0 + share)], share),
+            None => ([1.0 - off, 1.0 + off], ripple),
+        }
     }
 }
 

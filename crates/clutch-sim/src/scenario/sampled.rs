@@ -1,6 +1,6 @@
 //! The sampled loop of a scenario, and the box of plants around it: what a sampled-data certificate speaks of.
 
-use super::Scenario;
+use super::{Scenario, ScenarioBounds};
 use crate::rig::Rig;
 use crate::ripple::Ripple;
 use crate::run::Start;
@@ -55,6 +55,7 @@ impl Scenario {
         let plant = Rig::new(&p.rig, p.run.seed).map(|rig| *rig.model.plant.params());
         p.model = plant.map_err(|_| not("rig", "a rig out of range", "rigs that can be built"))?;
         (p.rig.ripple, p.rig.runout, p.rig.torque_noise) = (None, None, 0.0);
+        p.bounds = ScenarioBounds::default();
         (p.rig.encoder.quantised, p.output.bumpless_time, p.shell.boundary) = (true, 0.0, 0.0);
         let bounds = Bounds::around(&p.model, &Tolerances::default())
             .map_err(|_| not("rig", "a rig out of range", "rigs that can be built"))?;
@@ -137,7 +138,17 @@ impl Scenario {
                 "noise below the weakest drive",
             ));
         }
-        let ripple = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+        let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+        let (mean, ripple) = p.bounds.friction_shares(swing);
+        // Of the bounds on friction the part that is the mean's.
+        let off = p.bounds.tolerances.friction;
+        let mean_of = |i: &clutch_core::Interval| {
+            if p.bounds.ripple.is_some() {
+                [i.low / (1.0 - off) * mean[0], i.high / (1.0 + off) * mean[1]]
+            } else {
+                [i.low, i.high]
+            }
+        };
         let ends = |i: &clutch_core::Interval| [i.low, i.high];
         let dac = &rig.dac;
         // A converter that rounds nothing gives all that it is asked for.
@@ -166,8 +177,8 @@ impl Scenario {
             drive_torque: torque,
             viscous_damping: ends(&bounds.viscous_damping),
             brake_gain: gain,
-            sliding: ends(&bounds.friction_sliding),
-            at_rest: ends(&bounds.friction_at_rest),
+            sliding: mean_of(&bounds.friction_sliding),
+            at_rest: mean_of(&bounds.friction_at_rest),
             rest_not_below_sliding: friction.at_rest() >= friction.sliding(),
             stribeck,
             ripple,
