@@ -82,6 +82,14 @@ impl Setup {
         }
     }
 
+    /// Exponent of Stribeck's curve, (2), at which its slow speeds end: what is left of it there, `e` to the power of minus this,
+    /// counts as friction at every speed. Within a shell any voltage may come, and narrow slow speeds are worth more than
+    /// a narrow friction.
+    #[must_use]
+    pub fn slow_exponent(&self) -> f64 {
+        if matches!(self.law, Gains::Shell { .. }) { 2.0 } else { 7.0 }
+    }
+
     /// Keys in which two setups differ, with both values: `key: this, that`.
     #[must_use]
     pub fn differences(&self, other: &Setup) -> Vec<String> {

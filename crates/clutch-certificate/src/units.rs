@@ -3,8 +3,6 @@
 use crate::setup::{Ends, Gains, Setup};
 use core::f64::consts::TAU;
 
-/// From this many Stribeck velocities on (to the power of `δ`) the curve has left its level at rest by all but e⁻⁷.
-const LEFT: f64 = 7.0;
 /// Target positions are whole numbers of 2⁻¹⁶ counts, and their steps those of the path to one such number.
 pub(crate) const TARGET_STEP: f64 = 1.001 / 65536.0;
 /// Share of a law's rounding, in either scalar, in a voltage, V.
@@ -53,8 +51,8 @@ impl Units {
         let (j0, j1) = (s.inertia[0], s.inertia[1]);
         let rest = rest_of(s, sliding);
         let strongest = drive_high(s) / j0 * per;
-        let slow = s.stribeck[0] * libm::pow(LEFT, 1.0 / s.stribeck[1]);
-        let left = libm::exp(-LEFT);
+        let slow = s.stribeck[0] * libm::pow(s.slow_exponent(), 1.0 / s.stribeck[1]);
+        let left = libm::exp(-s.slow_exponent());
         // A slow part of the curve may lie on either side of the fast one.
         let (low, high) = (
             sliding[0] + left * (rest[0] - sliding[0]).min(0.0),

@@ -1,10 +1,11 @@
 //! Arguments of several verbs: a scenario, and what to change in it.
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::Args;
+use clutch_identify::RigFile;
 use clutch_sim::Scenario;
-use std::path::PathBuf;
-use toml::{Table, Value};
+use std::path::{Path, PathBuf};
+use toml::Table;
 
 /// A scenario and what to change in it.
 #[derive(Args)]
@@ -31,19 +32,15 @@ impl ScenarioArgs {
         let (origin, text) = Scenario::text(&self.scenario)?;
         // A scenario that is no TOML says so itself.
         let Ok(mut table) = text.parse::<Table>() else { return Ok(Scenario::parse(&origin, &text, &[])?) };
-        let shown = file.display();
-        let found = std::fs::read_to_string(file).with_context(|| format!("{shown}: cannot be read"))?;
-        let found: Table = found.parse().with_context(|| format!("{shown}: is no TOML"))?;
-        for section in ["model", "bounds"] {
-            let Some(Value::Table(from)) = found.get(section) else {
-                bail!("{shown}: has no table [{section}]; expected a file of `clutch identify --out`");
-            };
-            let to = table.entry(section).or_insert_with(|| Value::Table(Table::new()));
-            if let Value::Table(to) = to {
-                to.extend(from.clone());
-            }
-        }
-        let origin = format!("{origin} with {shown}");
+        read_rig_file(file)?.put_into(&mut table);
+        let origin = format!("{origin} with {}", file.display());
         Ok(Scenario::parse(&origin, &table.to_string(), &self.set)?)
     }
+}
+
+/// A file that `clutch identify --out` has written.
+pub(crate) fn read_rig_file(file: &Path) -> anyhow::Result<RigFile> {
+    let name = file.display().to_string();
+    let text = std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"))?;
+    Ok(RigFile::parse(&name, &text)?)
 }

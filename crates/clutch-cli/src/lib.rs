@@ -22,6 +22,7 @@ mod scenario;
 mod signals;
 mod sim;
 mod table;
+pub mod tune;
 
 use clap::{Parser, Subcommand};
 use output::Exit;
@@ -59,6 +60,7 @@ enum Verb {
     Daq(daq::Daq),
     Hil(hil::Hil),
     Identify(identify::Identify),
+    Tune(tune::Tune),
     Replay(replay::Replay),
     Log(log::Log),
     Sim(sim::Sim),
@@ -86,6 +88,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Daq(v) => v.run(),
         Verb::Hil(v) => v.run(),
         Verb::Identify(v) => v.run(),
+        Verb::Tune(v) => v.run(),
         Verb::Replay(v) => v.run(),
         Verb::Log(v) => v.run(),
         Verb::Sim(v) => v.run(),

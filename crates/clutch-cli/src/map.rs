@@ -57,12 +57,12 @@ pub(crate) struct Map {
 
 /// Values of an axis.
 #[derive(Clone, Debug)]
-struct List(Vec<f64>);
+pub(crate) struct List(pub(crate) Vec<f64>);
 
 /// More values than anybody waits for.
 const MOST: usize = 1000;
 
-fn values(text: &str) -> Result<List, String> {
+pub(crate) fn values(text: &str) -> Result<List, String> {
     let expected = "expected LOW:HIGH:NUMBER, as 500:5000:8, or a list, as 5,10,20";
     let wrong = |what: &str| format!("{text}: {what}");
     let read = |x: &str| x.trim().parse::<f64>().map_err(|_| wrong(expected));

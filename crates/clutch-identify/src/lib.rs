@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+pub mod believed;
 pub mod break_away;
 pub mod experiment;
 pub mod filter;
@@ -10,8 +11,10 @@ pub mod report;
 pub mod ride;
 pub mod rig_file;
 
+pub use believed::{Believed, Corner, believed};
 pub use recording::{ReadError, Recording, Tick};
 pub use report::{Finding, Report, identify};
+pub use rig_file::RigFile;
 
 /// C/J that is thought possible before anything is known of it, 1/s: from nothing to five times the paper's.
 pub const DAMPINGS: (f64, f64) = (0.0, 3.0);

@@ -92,6 +92,73 @@ fn around(low: f64, high: f64) -> (f64, f64) {
     (middle, 0.5 * (high - low) / middle.max(f64::MIN_POSITIVE))
 }
 
+/// A rig file, read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigFile {
+    model: Table,
+    bounds: Table,
+    /// Delay from a sample's voltage to its effect, s.
+    pub delay: Option<Estimate>,
+    /// Root mean square of friction's variation along the disc, as a share.
+    pub ripple: Option<Estimate>,
+}
+
+/// A text is no rig file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoRigFile {
+    /// It is no TOML.
+    #[error("{name}: is no TOML: {error}")]
+    Toml {
+        /// The file.
+        name: String,
+        /// Where, and why not.
+        error: toml::de::Error,
+    },
+    /// A table is missing.
+    #[error("{name}: has no table [{table}]; expected a file of `clutch identify --out`")]
+    Table {
+        /// The file.
+        name: String,
+        /// The table.
+        table: &'static str,
+    },
+}
+
+impl RigFile {
+    /// Reads the text of a file of that name.
+    ///
+    /// # Errors
+    /// It is no TOML, or has no table `[model]` or `[bounds]`.
+    pub fn parse(name: &str, text: &str) -> Result<RigFile, NoRigFile> {
+        let file: Table = text.parse().map_err(|error| NoRigFile::Toml { name: name.to_owned(), error })?;
+        let table = |key: &'static str| match file.get(key) {
+            Some(Value::Table(table)) => Ok(table.clone()),
+            _ => Err(NoRigFile::Table { name: name.to_owned(), table: key }),
+        };
+        let told = |key: &str| {
+            let row = file.get("identified")?.get(key)?;
+            let end = |end: &str| row.get(end).and_then(Value::as_float).filter(|x| x.is_finite() && *x >= 0.0);
+            Some(Estimate { value: end("value")?, low: end("low")?, high: end("high")? })
+        };
+        Ok(RigFile {
+            model: table("model")?,
+            bounds: table("bounds")?,
+            delay: told("delay_s"),
+            ripple: told("ripple_rms"),
+        })
+    }
+
+    /// Puts model and bounds into a scenario's table, key by key.
+    pub fn put_into(&self, scenario: &mut Table) {
+        for (section, from) in [("model", &self.model), ("bounds", &self.bounds)] {
+            let to = scenario.entry(section).or_insert_with(|| Value::Table(Table::new()));
+            if let Value::Table(to) = to {
+                to.extend(from.clone());
+            }
+        }
+    }
+}
+
 /// The intervals, each with the unit in its key.
 fn intervals(report: &Report) -> Table {
     rows(report)

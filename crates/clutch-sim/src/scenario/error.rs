@@ -36,7 +36,9 @@ impl ScenarioError {
         ScenarioError::new(origin, "", "", format!("this is not TOML:\n{e}"))
     }
 
-    pub(crate) fn value(origin: &str, key: &str, value: &str, expected: &str) -> Self {
+    /// An error of a key's value, and what is expected instead; `origin` is what it begins with.
+    #[must_use]
+    pub fn value(origin: &str, key: &str, value: &str, expected: &str) -> Self {
         ScenarioError::new(origin, key, value, format!("expected {expected}"))
     }
 

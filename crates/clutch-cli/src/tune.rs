@@ -1,0 +1,318 @@
+//! `clutch tune`.
+
+use crate::args::{ScenarioArgs, key_value, read_rig_file};
+use crate::map::{List, values};
+use crate::output::{Exit, json, paragraph, print, with_progress, write};
+use crate::plot::{self, Figure, Panel, Series};
+use crate::report::{self, ReportFigure};
+use crate::table::number;
+use clap::Args;
+use clutch_certificate::file;
+use clutch_sim::progress::UNWATCHED;
+use clutch_sim::scenario::Value;
+use clutch_sim::smooth_speed::RATE;
+use clutch_sim::{Keep, Scenario, ScenarioError};
+use clutch_tune::{Candidate, Options, Standing, Tuned, Verdict, tune};
+use comfy_table::{CellAlignment, ContentArrangement, Table, TableStyle};
+use std::path::PathBuf;
+
+/// Finds the law and the gains that move a rig most smoothly, certified.
+///
+/// Candidates of each law run on simulated rigs at the corners of the bounds, on discs that no gain was chosen on; the
+/// smoothest one with a certificate, as sampled or in a shell, that also starts from rest, is given out. Exit code 0: gains
+/// are given out; 2: none is certified, or none starts from rest.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  clutch tune board_smc_2 --identified rig.toml --out tuned.toml\n  \
+    clutch tune mine.toml --rates 1,2,6 --html tuned.html\n  \
+    clutch loop tuned.toml --certificate proof.json   # after --save proof.json\n\n\
+    docs/tune.md tells what is tried, on what, and what is proven.")]
+pub(crate) struct Tune {
+    /// Scenario of the rig, with a ramp: file, or name of a built-in one. Its law is tried with its own gains, too.
+    #[arg(value_name = "SCENARIO.toml")]
+    scenario: PathBuf,
+    /// Overrides a key of the scenario; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    set: Vec<(String, String)>,
+    /// What `clutch identify --out` has written: model, bounds, delay and ripple; without it the scenario's.
+    #[arg(long, value_name = "FILE.toml")]
+    identified: Option<PathBuf>,
+    /// Rates at which it is to be smooth, °/s, as LOW:HIGH:NUMBER or a list; unless given, the scenario's own.
+    #[arg(long, value_name = "VALUES", value_parser = values)]
+    rates: Option<List>,
+    /// Candidates of each law.
+    #[arg(long, value_name = "N", default_value_t = Options::default().candidates)]
+    candidates: u32,
+    /// Gives out the smoothest law without a certificate if none with one starts from rest; `clutch loop` asks for
+    /// --uncertified again.
+    #[arg(long)]
+    uncertified: bool,
+    /// Writes the tuned scenario, whole, with the rig as it is believed to be.
+    #[arg(long, value_name = "FILE.toml")]
+    out: Option<PathBuf>,
+    /// Writes the proof, which `clutch loop --certificate` and `clutch certify --check` read.
+    #[arg(long, value_name = "FILE.json")]
+    save: Option<PathBuf>,
+    /// Prints the result as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Draws the error of the best gains of each law on a disc that they were not chosen on.
+    #[arg(long, value_name = "FILE.svg|png")]
+    plot: Option<PathBuf>,
+    /// Writes the result as a page, with that picture and every setting.
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
+}
+
+impl Tune {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
+        if let Some(file) = &self.plot {
+            plot::figure_format(file)?; // before a long run, not after
+        }
+        let args = ScenarioArgs {
+            scenario: self.scenario.clone(),
+            set: self.set.clone(),
+            identified: self.identified.clone(),
+        };
+        let scenario = args.load()?;
+        let rig = self.identified.as_deref().map(read_rig_file).transpose()?;
+        let options = Options {
+            rates_deg_s: self.rates.as_ref().map_or_else(Vec::new, |list| list.0.clone()),
+            candidates: self.candidates,
+            uncertified: self.uncertified,
+        };
+        let tuned = with_progress("runs", |progress| tune(&scenario, rig.as_ref(), &options, progress))?;
+        if let Some(file) = &self.plot {
+            figure(&tuned)?.save(file)?;
+        }
+        if let Some(file) = &self.html {
+            write(file, page(&tuned)?)?;
+        }
+        print(&if self.json { json(&tuned)? } else { text(&tuned) })?;
+        let Some(winner) = tuned.winner().and_then(|w| w.scenario.as_ref()) else {
+            for file in self.out.iter().chain(&self.save) {
+                eprintln!("{}: not written: no gains are given out", file.display());
+            }
+            return Ok(Exit::NotCertified);
+        };
+        if let Some(path) = &self.out {
+            write(path, scenario_file(&tuned, winner))?;
+        }
+        match (&self.save, &tuned.certificate) {
+            (Some(path), Some(certificate)) => file::write(path, certificate)?,
+            (Some(path), None) => eprintln!("{}: not written: nothing is proven", path.display()),
+            _ => {}
+        }
+        Ok(Exit::Done)
+    }
+}
+
+/// The tuned scenario as a file.
+#[must_use]
+pub fn scenario_file(tuned: &Tuned, winner: &Scenario) -> String {
+    let comment = |line: &str| paragraph(line).lines().map(|l| format!("# {}\n", l.trim_start())).collect::<String>();
+    let verdict = comment(&format!("Found by `clutch tune`. {}", verdict(tuned)));
+    let rig = comment("[rig] is the rig as it is believed to be, from [model] and what was identified; a board has its own.");
+    format!("{verdict}{rig}\n{}", winner.canonical())
+}
+
+/// The verdict on what is chosen, with its scope; or what limits.
+#[must_use]
+pub fn verdict(tuned: &Tuned) -> String {
+    let Some(winner) = tuned.winner() else { return nothing(tuned) };
+    match &winner.verdict {
+        Verdict::Certified { lines, shell, .. } => {
+            let how = if *shell { "inside a certified shell" } else { "certified as sampled" };
+            format!("{}: {how}: {}", winner.name, lines.join("; "))
+        }
+        Verdict::Uncertified { why } => format!("{}: UNCERTIFIED: {why}", winner.name),
+        Verdict::NotLookedFor => format!("{}: UNCERTIFIED", winner.name),
+    }
+}
+
+/// Why nothing is given out.
+fn nothing(tuned: &Tuned) -> String {
+    let any = |f: &dyn Fn(&Standing) -> bool| tuned.candidates.iter().find(|c| f(&c.standing));
+    if let Some(c) = any(&|s| matches!(s, Standing::Refused { .. })) {
+        return format!(
+            "no gains are given out: {}: {}; a higher rate may help, or a finer encoder (clutch map)",
+            c.name,
+            lost(c)
+        );
+    }
+    match any(&|s| matches!(s, Standing::Uncertified { .. })) {
+        Some(c) => format!(
+            "no gains are given out: nothing is certified; of the smoothest, {}: {}; --uncertified takes it all the same",
+            c.name,
+            lost(c)
+        ),
+        None => "no gains are given out: no law goes with the path on every corner of the bounds".to_owned(),
+    }
+}
+
+/// Why a candidate lost.
+fn lost(c: &Candidate) -> String {
+    match &c.standing {
+        Standing::Chosen => "chosen".to_owned(),
+        Standing::Rougher { than } => format!("rougher, by {:.2}", c.score.cost.unwrap_or(0.0) - than),
+        Standing::Uncertified { why } if why.is_empty() => "not looked at: nothing smoother is certified".to_owned(),
+        Standing::Uncertified { why } => format!("uncertified: {why}"),
+        Standing::Refused { why } => format!("refused: {why}"),
+        Standing::Strays => "leaves its path on a corner of the bounds".to_owned(),
+        Standing::Unstable => "no gains whose sampled loop is stable".to_owned(),
+    }
+}
+
+/// The certificate of a candidate in a word or two.
+fn certified(c: &Candidate) -> String {
+    match &c.verdict {
+        Verdict::Certified { error_rad, .. } => format!("≤ {:.3}°", error_rad.to_degrees()),
+        Verdict::Uncertified { .. } => "no".to_owned(),
+        Verdict::NotLookedFor => "–".to_owned(),
+    }
+}
+
+/// A row for each candidate, under a head.
+fn rows(tuned: &Tuned) -> Vec<Vec<String>> {
+    let head = ["law", "cost", "cycles/s", "runs that stick", "longest, ms", "error, °", "certified"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for c in &tuned.candidates {
+        let s = &c.score;
+        let cell = |text: String| if c.scenario.is_some() { text } else { "–".to_owned() };
+        rows.push(vec![
+            c.name.clone(),
+            s.cost.map_or("–".to_owned(), |x| format!("{x:.2}")),
+            cell(format!("{:.2}", s.cycles_per_s)),
+            cell(format!("{} of {}", s.runs_with_sticks, s.runs)),
+            cell(format!("{:.0}", 1e3 * s.longest_stick_s)),
+            cell(format!("{:.3}", s.max_error_rad.to_degrees())),
+            certified(c),
+        ]);
+    }
+    rows
+}
+
+/// The runs behind the table.
+fn about(tuned: &Tuned) -> String {
+    let rates: Vec<String> = tuned.rates_deg_s.iter().map(|r| number(*r)).collect();
+    format!(
+        "At {} °/s, from rest, {} of the bounds; figures are the worst of runs on discs 101 to 112, the first second left out. Cost: \
+         cycles/s + 30 × RMS error, ° + longest stick/20 ms. {:.0} s were simulated.",
+        rates.join(", "),
+        if tuned.corners.len() == 1 { "1 corner".to_owned() } else { format!("{} corners", tuned.corners.len()) },
+        tuned.simulated_s
+    )
+}
+
+fn text(tuned: &Tuned) -> String {
+    let mut table = Table::new();
+    table.load_style(TableStyle::new()).set_content_arrangement(ContentArrangement::Disabled);
+    table.add_rows(rows(tuned));
+    for n in 1..7 {
+        if let Some(column) = table.column_mut(n) {
+            column.set_cell_alignment(CellAlignment::Right);
+            column.set_padding((1, 0));
+        }
+    }
+    if let Some(column) = table.column_mut(0) {
+        column.set_padding((0, 0));
+    }
+    let mut out = paragraph(&format!("{}: gains", tuned.believed.name())) + "\n";
+    for line in table.to_string().lines() {
+        out += line.trim_end();
+        out.push('\n');
+    }
+    out.push('\n');
+    out += &paragraph(&about(tuned));
+    for c in &tuned.candidates {
+        let (tried, unstable) = c.tried;
+        let left_out = if unstable > 0 { format!(", {unstable} left out as unstable") } else { String::new() };
+        out += &paragraph(&format!("{}: {}; {tried} sets of gains{left_out}", c.name, lost(c)));
+    }
+    for (shell, why) in &tuned.open_shells {
+        out += &paragraph(&format!(
+            "shell f {} 1/s, S {} rad/s, smoothing {}: {why}",
+            number(shell.slope_1_s),
+            number(shell.boundary_rad_s),
+            number(shell.smoothing)
+        ));
+    }
+    if let Some(winner) = tuned.winner() {
+        out.push('\n');
+        for (key, value) in &winner.gains {
+            out += &format!("  {key} = {}\n", number(*value));
+        }
+        if winner.gains.is_empty() {
+            out += "  the scenario's own gains, or the law's defaults\n";
+        }
+        if let Some(s) = &tuned.from_rest {
+            out += &paragraph(&format!(
+                "accepted: {} starts from rest at {} °/s on discs 201 to 210: no stick after the first second, error up to {:.3}°",
+                s.runs,
+                number(tuned.rates_deg_s[0]),
+                s.max_error_rad.to_degrees()
+            ));
+        }
+    }
+    out + &paragraph(&verdict(tuned))
+}
+
+/// Disc of the picture: the first of those that candidates are judged on.
+const DRAWN: i64 = 101;
+
+/// The error over time of each candidate, at the lowest rate, on the believed rig.
+fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
+    let mut panels = Vec::new();
+    for c in &tuned.candidates {
+        let Some(scenario) = &c.scenario else { continue };
+        let title = match c.standing {
+            Standing::Chosen => format!("{} (chosen)", c.name),
+            _ => c.name.clone(),
+        };
+        panels.push(Panel {
+            title,
+            x_label: "t, s".to_owned(),
+            y_label: "error, °".to_owned(),
+            series: vec![Series { label: String::new(), points: errors(scenario, tuned.rates_deg_s[0])? }],
+            ..Panel::default()
+        });
+    }
+    let most = |p: &Panel| p.series.iter().flat_map(|s| &s.points).map(|(_, e)| e.abs()).fold(0.0, f64::max);
+    // One scale for all that follow their path.
+    let scale = panels.iter().map(most).filter(|e| *e < 2.0).fold(0.02, f64::max);
+    for panel in &mut panels {
+        panel.y_range = Some((-scale, scale));
+    }
+    Ok(Figure {
+        title: format!("{}: error at {} °/s from rest, disc {DRAWN}", tuned.believed.name(), number(tuned.rates_deg_s[0])),
+        columns: 2,
+        panels,
+    })
+}
+
+fn errors(scenario: &Scenario, rate: f64) -> Result<Vec<(f64, f64)>, ScenarioError> {
+    let set = [
+        (RATE.to_owned(), Value::Float(rate)),
+        ("run.seed".to_owned(), Value::Integer(DRAWN)),
+        ("run.duration_s".to_owned(), Value::Float(5.0)),
+        ("run.settle_s".to_owned(), Value::Float(1.0)),
+    ];
+    let here = Scenario::from_table(scenario.name(), scenario.table().clone(), &set)?;
+    let trace = here.run(Keep::Trace, UNWATCHED)?.trace;
+    Ok(trace.time.iter().zip(&trace.error).map(|(t, e)| (*t, e.to_degrees())).collect())
+}
+
+fn page(tuned: &Tuned) -> anyhow::Result<String> {
+    let title = format!("{}: gains", tuned.believed.name());
+    let mut intro = vec![verdict(tuned), about(tuned)];
+    for row in rows(tuned).iter().skip(1) {
+        intro.push(format!(
+            "{}: cost {}, {} cycles/s, {} runs stick, longest stick {} ms, error up to {}°, certified {}",
+            row[0], row[1], row[2], row[3], row[4], row[5], row[6]
+        ));
+    }
+    intro.extend(tuned.candidates.iter().map(|c| format!("{}: {}", c.name, lost(c))));
+    let caption = "Error of the best gains of each law, from rest, on a disc that no gain was chosen on.".to_owned();
+    let figure = ReportFigure { id: "tune".to_owned(), caption, svg: figure(tuned)?.svg()? };
+    let settings = tuned.winner().and_then(|w| w.scenario.as_ref()).unwrap_or(&tuned.believed).parameters();
+    Ok(report::html(&title, &intro, &[], &[figure], &[], &settings))
+}

@@ -1,0 +1,144 @@
+//! The rig as it is believed to be: what is simulated where the rig itself is to be spared.
+
+use crate::rig_file::RigFile;
+use clutch_core::{ActuatorKind, Interval};
+use clutch_sim::drive::DriveParams;
+use clutch_sim::{Scenario, ScenarioError};
+use toml::{Table, Value};
+
+/// A scenario whose rig is its own belief.
+#[derive(Clone, Debug)]
+pub struct Believed {
+    /// `[rig]` is `[model]`, with sensor, converter and torque noise of the scenario's rig; it begins at rest.
+    pub scenario: Scenario,
+    /// Why the delay told is no whole number of periods, which all that is certified assumes; none if it is one.
+    pub delay_between: Option<String>,
+    /// T/J and T/(μ_d K) of the corners of the bounds, as shares of the believed ones.
+    pub corners: Vec<Corner>,
+}
+
+/// A corner of the bounds: motion under a brake depends on these two ratios, and little on damping.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Corner {
+    /// T/J over the believed one.
+    pub pull: f64,
+    /// T/(μ_d K) over the believed one.
+    pub hold: f64,
+}
+
+/// Waves along the disc of a rig whose file tells of none: those of the rig `bench`.
+const WAVES: [i64; 2] = [136, 544];
+/// Waves of the believed disc: so few that all of them together, √8 of their root mean square, stay within the bounds that
+/// three make.
+const NUMBER: i64 = 4;
+
+/// The scenario with the rig that it believes in; `file` is what was identified, which also tells delay and ripple: without
+/// it these are those of the scenario's rig.
+///
+/// # Errors
+/// The rig is driven by other than a brake, or is refused.
+pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed, ScenarioError> {
+    let kind = scenario.spec().rig.actuator.kind();
+    let refuse =
+        |key: &str, value: &str, expected: &str| Err(ScenarioError::value(scenario.name(), key, value, expected));
+    if kind != ActuatorKind::Brake {
+        return refuse("rig.actuator", kind.name(), "brake, which drives nothing and is all that can be identified and tuned");
+    }
+    let mut table = scenario.table().clone();
+    if let Some(file) = file {
+        file.put_into(&mut table);
+    }
+    let told = Scenario::from_table(scenario.name(), table.clone(), &[])?;
+    let spec = told.spec();
+    if spec.model.drive_torque <= 0.0 {
+        return refuse(
+            "model.drive_torque_nm",
+            &spec.model.drive_torque.to_string(),
+            "above 0: a shaft that is driven forwards",
+        );
+    }
+    let period: f64 = spec.period.seconds();
+    let mut delay_between = None;
+    let mut set = vec![("run.start".to_owned(), Value::String("rest".to_owned()))];
+    if let Some(delay) = file.and_then(|file| file.delay) {
+        let ticks = (delay.value / period).round();
+        if !(delay.low..=delay.high).contains(&(ticks * period)) {
+            delay_between = Some(format!(
+                "the delay told, {:.2} … {:.2} ms, holds no whole number of periods",
+                1e3 * delay.low,
+                1e3 * delay.high
+            ));
+        }
+        set.push(("rig.delay_ticks".to_owned(), Value::Integer(ticks as i64)));
+    }
+    let weight = match spec.rig.drive {
+        DriveParams::Weight(w) => (w.gravity, w.pulley_radius),
+        _ => (9.81, 0.024),
+    };
+    let model = table_of(told.table(), "model");
+    let mut rig = table_of(told.table(), "rig");
+    for key in ["inertia_kg_m2", "viscous_damping_nm_s_rad", "friction", "actuator"] {
+        if let Some(value) = model.get(key) {
+            rig.insert(key.to_owned(), value.clone());
+        }
+    }
+    let mass = spec.model.drive_torque / (weight.0 * weight.1);
+    let weight = [("mass_kg", mass), ("gravity_m_s2", weight.0), ("pulley_radius_m", weight.1)];
+    let weight = weight.into_iter().map(|(key, x)| (key.to_owned(), Value::Float(x))).collect::<Table>();
+    rig.insert("drive".to_owned(), Value::Table(Table::from_iter([("weight".to_owned(), Value::Table(weight))])));
+    if let Some(ripple) = file.and_then(|file| file.ripple) {
+        rig.insert("ripple".to_owned(), Value::Table(waves(&rig, ripple.value)));
+        rig.remove("runout");
+    }
+    let mut table = told.table().clone();
+    table.insert("rig".to_owned(), Value::Table(rig));
+    let scenario = Scenario::from_table(scenario.name(), table, &set)?;
+    let corners = corners(&scenario)?;
+    Ok(Believed { scenario, delay_between, corners })
+}
+
+fn table_of(table: &Table, key: &str) -> Table {
+    table.get(key).and_then(Value::as_table).cloned().unwrap_or_default()
+}
+
+/// A disc with that ripple, in the band of the rig's own.
+fn waves(rig: &Table, rms: f64) -> Table {
+    let own = rig.get("ripple").and_then(Value::as_table);
+    let wave = |key: &str, default: i64| own.and_then(|t| t.get(key)).and_then(Value::as_integer).unwrap_or(default);
+    let (lowest, highest) = (wave("lowest_waves_per_turn", WAVES[0]), wave("highest_waves_per_turn", WAVES[1]));
+    // Evenly spaced from the lowest on, as far as the spacing divides it; else the one wave at the middle.
+    let spacing = ((highest - lowest) / (NUMBER - 1)).max(1);
+    let (lowest, spacing, highest) = if highest > lowest && spacing <= lowest {
+        let lowest = (lowest / spacing).max(1) * spacing;
+        (lowest, spacing, lowest + (NUMBER - 1) * spacing)
+    } else {
+        let middle = ((lowest + highest) / 2).max(1);
+        (middle, middle, middle)
+    };
+    let whole = [
+        ("lowest_waves_per_turn", lowest),
+        ("highest_waves_per_turn", highest),
+        ("spacing_waves_per_turn", spacing),
+    ];
+    let mut table: Table = whole.into_iter().map(|(key, n)| (key.to_owned(), Value::Integer(n))).collect();
+    // Friction does not reach 0.
+    let most = 0.99 / (2.0 * NUMBER as f64).sqrt();
+    table.insert("rms".to_owned(), Value::Float(rms.clamp(0.0, most)));
+    table
+}
+
+/// Both ends of both ratios; one corner where they are known exactly.
+fn corners(scenario: &Scenario) -> Result<Vec<Corner>, ScenarioError> {
+    let bounds = scenario.plan()?.bounds;
+    let model = scenario.spec().model;
+    let shares = |i: &Interval, value: f64| [i.low / value, i.high / value];
+    let torque = shares(&bounds.drive_torque, model.drive_torque);
+    let inertia = shares(&bounds.inertia, model.inertia);
+    let middle = 0.5 * (bounds.brake_gain.low + bounds.brake_gain.high);
+    let gain = shares(&bounds.brake_gain, middle);
+    let (friction, _) = scenario.params().bounds.friction_shares(0.0);
+    let pull = [torque[0] / inertia[1], torque[1] / inertia[0]];
+    let hold = [torque[0] / (friction[1] * gain[1]), torque[1] / (friction[0] * gain[0])];
+    let ends = |[low, high]: [f64; 2]| if high - low < 1e-9 { vec![1.0] } else { vec![low, high] };
+    Ok(ends(pull).into_iter().flat_map(|pull| ends(hold).into_iter().map(move |hold| Corner { pull, hold })).collect())
+}

@@ -1,0 +1,481 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod laws;
+mod proof;
+mod trial;
+
+pub use proof::ShellTried;
+pub use trial::Score;
+
+use clutch_certificate::Certificate;
+use clutch_core::reference::ReferenceParams;
+use clutch_identify::{Believed, Corner, RigFile, believed};
+use clutch_sim::progress::Report;
+
+use clutch_sim::scenario::{Table, Value};
+use clutch_sim::smooth_speed::RATE;
+use clutch_sim::{Scenario, ScenarioError};
+use laws::{FAMILIES, Family, Gains, SMOOTHING, family_of, holding};
+use proof::{Bounds, SHELLS, prove};
+use serde::Serialize;
+use trial::{Trial, scores};
+
+/// What is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Rates at which gains are to be smooth, °/s; none: the scenario's own.
+    pub rates_deg_s: Vec<f64>,
+    /// Candidates of each law.
+    pub candidates: u32,
+    /// Gives out gains without a certificate if no law with one is smooth.
+    pub uncertified: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options { rates_deg_s: Vec::new(), candidates: 48, uncertified: false }
+    }
+}
+
+/// Candidates of a law that may be asked for.
+const MOST_CANDIDATES: u32 = 10_000;
+/// Rates that may be asked for.
+const MOST_RATES: usize = 20;
+/// Candidates of a law that go on to the corners.
+const KEPT: usize = 6;
+/// Seeds of discs: to sort the candidates out, to choose among the rest, to judge, and to accept. None is in two of them.
+const FIRST: std::ops::RangeInclusive<u64> = 1..=2;
+const CHOOSING: std::ops::RangeInclusive<u64> = 3..=6;
+const JUDGING: std::ops::RangeInclusive<u64> = 101..=112;
+const ACCEPTING: std::ops::RangeInclusive<u64> = 201..=210;
+/// Lengths of their runs, s.
+const SHORT_S: f64 = 2.0;
+const LONG_S: f64 = 4.0;
+const ACCEPT_S: f64 = 6.0;
+
+/// Where a candidate stands.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "is")]
+pub enum Standing {
+    /// Its gains are given out.
+    Chosen,
+    /// Smoother ones are.
+    Rougher {
+        /// The cost of the one that is chosen.
+        than: f64,
+    },
+    /// It has no certificate, and one that has is chosen, or none without one was asked for.
+    Uncertified {
+        /// What limits.
+        why: String,
+    },
+    /// From rest it sticks, or leaves its path.
+    Refused {
+        /// What it does.
+        why: String,
+    },
+    /// On the discs on which candidates are judged it leaves its path.
+    Strays,
+    /// No gains were found whose sampled loop is stable.
+    Unstable,
+}
+
+/// What is proven of a candidate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "is")]
+pub enum Verdict {
+    /// The error is bounded.
+    Certified {
+        /// Bound on the error, the largest of all rates, rad.
+        error_rad: f64,
+        /// Within a shell, whatever law is inside; else by the law's own gains.
+        shell: bool,
+        /// The bound at each rate, with its scope.
+        lines: Vec<String>,
+    },
+    /// Nothing is.
+    Uncertified {
+        /// What limits.
+        why: String,
+    },
+    /// No proof was looked for: a smoother candidate was chosen before.
+    NotLookedFor,
+}
+
+/// The best gains of a law.
+#[derive(Clone, Debug, Serialize)]
+pub struct Candidate {
+    /// Law, and if it stands in a shell.
+    pub name: String,
+    /// The gains that were varied.
+    pub gains: Vec<(String, f64)>,
+    /// Its score on discs that no gain was chosen on.
+    pub score: Score,
+    /// What is proven.
+    pub verdict: Verdict,
+    /// Chosen, or why not.
+    pub standing: Standing,
+    /// Candidates of this law that were tried, and those that were left out as unstable before.
+    pub tried: (u32, u32),
+    /// The whole scenario.
+    #[serde(skip)]
+    pub scenario: Option<Scenario>,
+}
+
+/// The outcome.
+#[derive(Clone, Debug, Serialize)]
+pub struct Tuned {
+    /// Rates, °/s, the lowest first.
+    pub rates_deg_s: Vec<f64>,
+    /// Corners of the bounds.
+    pub corners: Vec<Corner>,
+    /// Candidates, the smoothest first.
+    pub candidates: Vec<Candidate>,
+    /// Number of the one that is chosen.
+    pub chosen: Option<usize>,
+    /// Its score from rest, at the lowest rate.
+    pub from_rest: Option<Score>,
+    /// Shells that were tried and not proven, with what limits.
+    pub open_shells: Vec<(ShellTried, String)>,
+    /// Simulated time, s.
+    pub simulated_s: f64,
+    /// The proof of the chosen one at the scenario's rate.
+    #[serde(skip)]
+    pub certificate: Option<Certificate>,
+    /// The scenario with the rig that it believes in.
+    #[serde(skip)]
+    pub believed: Scenario,
+}
+
+impl Tuned {
+    /// The candidate that is chosen.
+    #[must_use]
+    pub fn winner(&self) -> Option<&Candidate> {
+        self.chosen.and_then(|n| self.candidates.get(n))
+    }
+}
+
+/// Looks for the law and the gains that move a shaft most smoothly on the worst corner of its bounds, and that are certified.
+/// `file` is what was identified; without it corners, delay and ripple are the scenario's. The same comes again, on any
+/// number of cores. `report` is told of each run.
+///
+/// # Errors
+/// A path that is no ramp, a rig without a brake, an option out of range; the end of `report`'s patience.
+pub fn tune(
+    scenario: &Scenario,
+    file: Option<&RigFile>,
+    options: &Options,
+    report: Report<'_>,
+) -> Result<Tuned, ScenarioError> {
+    let rates_deg_s = rates(scenario, options)?;
+    let Believed { scenario: base, delay_between, corners } = believed(scenario, file)?;
+    let set = [(RATE.to_owned(), Value::Float(rates_deg_s[0]))];
+    let base = Scenario::from_table(base.name(), base.table().clone(), &set)?;
+    let job = Job { base, rates_deg_s, corners, delay_between, options, report };
+    let mut candidates = job.candidates()?;
+    let shell = job.shelled(&mut candidates)?;
+    job.judge(&mut candidates)?;
+    job.choose(candidates, shell)
+}
+
+/// The rates, checked, the lowest first.
+fn rates(scenario: &Scenario, options: &Options) -> Result<Vec<f64>, ScenarioError> {
+    let wrong = |key: &str, value: &str, expected: &str| {
+        Err(ScenarioError::value(scenario.name(), key, value, expected))
+    };
+    let ReferenceParams::Ramp(ramp) = scenario.params().reference else {
+        return wrong("reference", "another path", "a ramp, [reference.ramp]: gains are tuned for a rate");
+    };
+    let mut rates = if options.rates_deg_s.is_empty() { vec![ramp.rate.to_degrees()] } else { options.rates_deg_s.clone() };
+    if let Some(bad) = rates.iter().find(|rate| !(rate.is_finite() && **rate > 0.0)) {
+        return wrong("rates", &bad.to_string(), "finite numbers above 0 °/s");
+    }
+    rates.sort_by(f64::total_cmp);
+    rates.dedup();
+    if rates.len() > MOST_RATES {
+        return wrong("rates", &format!("{} rates", rates.len()), &format!("at most {MOST_RATES}"));
+    }
+    if !(1..=MOST_CANDIDATES).contains(&options.candidates) {
+        let expected = format!("a whole number from 1 to {MOST_CANDIDATES}");
+        return wrong("candidates", &options.candidates.to_string(), &expected);
+    }
+    Ok(rates)
+}
+
+/// A candidate on its way.
+struct Finalist {
+    family: &'static Family,
+    gains: Gains,
+    scenario: Option<Scenario>,
+    shell: Option<usize>,
+    score: Score,
+    tried: (u32, u32),
+}
+
+/// The shell that was proven, and those that were not.
+struct Shells {
+    proven: Option<Bounds>,
+    open: Vec<(ShellTried, String)>,
+}
+
+struct Job<'a> {
+    base: Scenario,
+    rates_deg_s: Vec<f64>,
+    corners: Vec<Corner>,
+    delay_between: Option<String>,
+    options: &'a Options,
+    report: Report<'a>,
+}
+
+/// The rig as it is believed to be.
+const BELIEVED: [Corner; 1] = [Corner { pull: 1.0, hold: 1.0 }];
+
+impl Job<'_> {
+    fn scores(
+        &self,
+        of: &[&Scenario],
+        corners: &[Corner],
+        discs: std::ops::RangeInclusive<u64>,
+        seconds: f64,
+    ) -> Result<Vec<Score>, ScenarioError> {
+        let trial = Trial { rates_deg_s: &self.rates_deg_s, corners, discs, seconds };
+        scores(of, &trial, self.report)
+    }
+
+    /// The best gains of each law: sorted out on the believed rig, chosen on the corners.
+    fn candidates(&self) -> Result<Vec<Finalist>, ScenarioError> {
+        let hold = holding(&self.base);
+        let own = family_of(&self.base.params().law);
+        let order = own.into_iter().chain(FAMILIES.iter().filter(|f| own.is_none_or(|own| own.key != f.key)));
+        order.map(|family| self.best_of(family, hold)).collect()
+    }
+
+    fn best_of(&self, family: &'static Family, hold: f64) -> Result<Finalist, ScenarioError> {
+        let all = (0..self.options.candidates).map(|n| {
+            let gains = family.gains(n, hold);
+            Ok((family.scenario(&self.base, &gains)?, gains))
+        });
+        let all = all.collect::<Result<Vec<_>, ScenarioError>>()?;
+        let tried = all.len() as u32;
+        let stable: Vec<(Scenario, Gains)> = all.into_iter().filter(|(s, _)| is_stable(s)).collect();
+        let unstable = tried - stable.len() as u32;
+        let nothing = Finalist {
+            family,
+            gains: Gains::new(),
+            scenario: None,
+            shell: None,
+            score: Score::default(),
+            tried: (tried, unstable),
+        };
+        if stable.is_empty() {
+            return Ok(nothing);
+        }
+        let first = self.scores(&refs(&stable), &BELIEVED, FIRST, SHORT_S)?;
+        let mut kept: Vec<(f64, (Scenario, Gains))> =
+            first.iter().map(Score::order).zip(stable).collect();
+        kept.sort_by(|a, b| a.0.total_cmp(&b.0)); // stable: ties stay in order
+        kept.truncate(KEPT);
+        let kept: Vec<(Scenario, Gains)> = kept.into_iter().map(|(_, candidate)| candidate).collect();
+        let second = self.scores(&refs(&kept), &self.corners, CHOOSING, LONG_S)?;
+        let simulated = first.iter().chain(&second).map(|s| s.simulated_s).sum::<f64>();
+        let best = (0..kept.len()).min_by(|a, b| second[*a].order().total_cmp(&second[*b].order())).unwrap_or(0);
+        let Some((scenario, gains)) = kept.into_iter().nth(best) else { return Ok(nothing) };
+        let score = Score { simulated_s: simulated, ..Score::default() };
+        Ok(Finalist { gains, scenario: Some(scenario), score, ..nothing })
+    }
+
+    /// Puts the first shell that is proven around laws that have no certificate of their own.
+    fn shelled(&self, all: &mut Vec<Finalist>) -> Result<Shells, ScenarioError> {
+        let mut shells = Shells { proven: None, open: Vec::new() };
+        if let Some(why) = &self.delay_between {
+            shells.open.extend(SHELLS.first().map(|shell| (*shell, why.clone())));
+            return Ok(shells);
+        }
+        let inner: Vec<&Finalist> =
+            all.iter().filter(|f| !f.family.certified_alone && f.scenario.is_some()).collect();
+        let Some(any) = inner.first().and_then(|f| f.scenario.as_ref()) else { return Ok(shells) };
+        for (n, shell) in SHELLS.iter().enumerate() {
+            let within = within(any, shell)?;
+            if let Some(why) = edge_trips(&within, shell) {
+                shells.open.push((*shell, why));
+                continue;
+            }
+            match prove(&within, &self.rates_deg_s)? {
+                Err(why) => shells.open.push((*shell, why)),
+                Ok(bounds) => {
+                    shells.proven = Some(bounds);
+                    let mut more = Vec::new();
+                    for f in inner {
+                        let Some(scenario) = &f.scenario else { continue };
+                        let scenario = Some(crate::within(scenario, shell)?);
+                        let (gains, tried) = (f.gains.clone(), f.tried);
+                        let score = Score::default();
+                        more.push(Finalist { family: f.family, gains, scenario, shell: Some(n), score, tried });
+                    }
+                    all.extend(more);
+                    break;
+                }
+            }
+        }
+        Ok(shells)
+    }
+
+    /// Scores on discs that no gain was chosen on.
+    fn judge(&self, all: &mut [Finalist]) -> Result<(), ScenarioError> {
+        let scenarios: Vec<&Scenario> = all.iter().filter_map(|f| f.scenario.as_ref()).collect();
+        let judged = self.scores(&scenarios, &self.corners, JUDGING, LONG_S)?;
+        let some = all.iter_mut().filter(|f| f.scenario.is_some());
+        for (f, score) in some.zip(judged) {
+            f.score = Score { simulated_s: f.score.simulated_s + score.simulated_s, ..score };
+        }
+        all.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
+        Ok(())
+    }
+
+    /// The first that has a certificate and starts from rest; without one if that is asked for.
+    fn choose(&self, all: Vec<Finalist>, shells: Shells) -> Result<Tuned, ScenarioError> {
+        let Shells { proven: mut shell, open: open_shells } = shells;
+        let mut tuned = Tuned {
+            rates_deg_s: self.rates_deg_s.clone(),
+            corners: self.corners.clone(),
+            simulated_s: all.iter().map(|f| f.score.simulated_s).sum(),
+            candidates: all.into_iter().map(Finalist::told).collect(),
+            chosen: None,
+            from_rest: None,
+            open_shells,
+            certificate: None,
+            believed: self.base.clone(),
+        };
+        for n in 0..tuned.candidates.len() {
+            let candidate = &mut tuned.candidates[n];
+            let Some(scenario) = candidate.scenario.clone().filter(|_| candidate.score.cost.is_some()) else {
+                continue;
+            };
+            let in_shell = scenario.params().shell.boundary > 0.0;
+            let bounds = match (&self.delay_between, in_shell) {
+                (Some(why), _) => Err(why.clone()),
+                (None, true) => shell.take().map_or_else(|| prove(&scenario, &self.rates_deg_s), |b| Ok(Ok(b)))?,
+                (None, false) => prove(&scenario, &self.rates_deg_s)?,
+            };
+            match bounds {
+                Err(why) => {
+                    candidate.verdict = Verdict::Uncertified { why: why.clone() };
+                    candidate.standing = Standing::Uncertified { why };
+                }
+                Ok(Bounds { lines, error_rad, certificate }) => {
+                    candidate.verdict = Verdict::Certified { error_rad, shell: in_shell, lines };
+                    if self.accept(n, &scenario, &mut tuned)? {
+                        tuned.certificate = Some(certificate);
+                        break;
+                    }
+                }
+            }
+        }
+        if tuned.chosen.is_none() && self.options.uncertified {
+            for n in 0..tuned.candidates.len() {
+                let open = matches!(tuned.candidates[n].standing, Standing::Uncertified { .. });
+                let Some(scenario) = tuned.candidates[n].scenario.clone().filter(|_| open) else { continue };
+                if self.accept(n, &scenario, &mut tuned)? {
+                    break;
+                }
+            }
+        }
+        if let Some(cost) = tuned.winner().and_then(|w| w.score.cost) {
+            for other in &mut tuned.candidates {
+                if other.verdict == Verdict::NotLookedFor && other.score.cost.is_some() {
+                    other.standing = Standing::Rougher { than: cost };
+                }
+            }
+        }
+        Ok(tuned)
+    }
+
+    /// Lets a candidate start from rest at the lowest rate, on discs of its own: it has to slide once it has settled, and to
+    /// stay within what is proven of it.
+    fn accept(&self, n: usize, scenario: &Scenario, tuned: &mut Tuned) -> Result<bool, ScenarioError> {
+        let trial = Trial {
+            rates_deg_s: &self.rates_deg_s[..1],
+            corners: &self.corners,
+            discs: ACCEPTING,
+            seconds: ACCEPT_S,
+        };
+        let score = scores(&[scenario], &trial, self.report)?.pop().unwrap_or_default();
+        tuned.simulated_s += score.simulated_s;
+        let candidate = &mut tuned.candidates[n];
+        let within = match candidate.verdict {
+            Verdict::Certified { error_rad, .. } => score.max_error_rad <= error_rad,
+            _ => true,
+        };
+        let why = if score.cost.is_none() {
+            "from rest it leaves its path".to_owned()
+        } else if score.runs_with_sticks > 0 {
+            format!(
+                "from rest at {} °/s it sticks in {} of {} runs",
+                self.rates_deg_s[0], score.runs_with_sticks, score.runs
+            )
+        } else if !within {
+            "its error exceeds what is proven: please report this as a defect".to_owned()
+        } else {
+            candidate.standing = Standing::Chosen;
+            (tuned.chosen, tuned.from_rest) = (Some(n), Some(score));
+            return Ok(true);
+        };
+        candidate.standing = Standing::Refused { why };
+        Ok(false)
+    }
+}
+
+impl Finalist {
+    /// For sorting: a law without stable gains comes last. Of laws that are alike smooth, the one in a shell goes first.
+    fn rank(&self) -> f64 {
+        if self.scenario.is_none() { f64::INFINITY } else { self.score.order() }
+    }
+
+    fn told(self) -> Candidate {
+        let name = if self.shell.is_some() { format!("{} in a shell", self.family.name) } else { self.family.name.to_owned() };
+        let standing = match (&self.scenario, self.score.cost) {
+            (None, _) => Standing::Unstable,
+            (_, None) => Standing::Strays,
+            _ => Standing::Uncertified { why: String::new() },
+        };
+        Candidate {
+            name,
+            gains: self.gains,
+            score: self.score,
+            verdict: Verdict::NotLookedFor,
+            standing,
+            tried: self.tried,
+            scenario: self.scenario,
+        }
+    }
+}
+
+fn refs(of: &[(Scenario, Gains)]) -> Vec<&Scenario> {
+    of.iter().map(|(scenario, _)| scenario).collect()
+}
+
+/// Where the spectral radius is known, with every brake of the bounds, it decides; where it is not, trials do.
+fn is_stable(scenario: &Scenario) -> bool {
+    scenario.plan().is_ok_and(|plan| scenario.sampled(&plan.bounds).stable() != Some(false))
+}
+
+/// A scenario's law in a shell.
+fn within(scenario: &Scenario, shell: &ShellTried) -> Result<Scenario, ScenarioError> {
+    let mut table = scenario.table().clone();
+    table.remove("velocity");
+    let rows = [("slope_1_s", shell.slope_1_s), ("boundary_rad_s", shell.boundary_rad_s)];
+    let rows: Table = rows.into_iter().map(|(key, x)| (key.to_owned(), Value::Float(x))).collect();
+    table.insert("shell".to_owned(), Value::Table(rows));
+    Scenario::from_table(scenario.name(), table, &[(SMOOTHING.to_owned(), Value::Float(shell.smoothing))])
+}
+
+/// An edge of the encoder alone would have the shell act, which would be rougher than any law.
+fn edge_trips(scenario: &Scenario, shell: &ShellTried) -> Option<String> {
+    let spec = scenario.spec();
+    let count = core::f64::consts::TAU / f64::from(spec.rig.encoder.sensor.counts_per_rev);
+    let edge = count * (shell.smoothing / spec.period.seconds::<f64>() + shell.slope_1_s);
+    (edge > 0.6 * shell.boundary_rad_s).then(|| {
+        format!("an edge of the encoder counts as {edge:.2} rad/s there, and the shell would act on it")
+    })
+}

@@ -1,0 +1,93 @@
+//! Certificates of candidates: each is found, and then checked by the checker, which shares nothing with the search.
+
+use clutch_certificate::{Certificate, Options, checker, largest, search};
+use clutch_sim::Scenario;
+use clutch_sim::ScenarioError;
+use clutch_sim::scenario::{Proven, Value};
+use clutch_sim::smooth_speed::RATE;
+
+/// A shell that is tried around a law.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ShellTried {
+    /// `f`, 1/s.
+    pub slope_1_s: f64,
+    /// `S`, rad/s.
+    pub boundary_rad_s: f64,
+    /// Smoothing of (5), by which the shell knows the rate.
+    pub smoothing: f64,
+}
+
+/// Shells that are tried, the tightest first. Each lets an edge of an encoder of 20 000 counts pass, which with the smoothing
+/// `κ` counts as `κ q/T_s` = 0.06 rad/s.
+pub(crate) const SHELLS: [ShellTried; 3] = [
+    ShellTried { slope_1_s: 50.0, boundary_rad_s: 0.2, smoothing: 0.2 },
+    ShellTried { slope_1_s: 70.0, boundary_rad_s: 0.3, smoothing: 0.2 },
+    ShellTried { slope_1_s: 50.0, boundary_rad_s: 0.3, smoothing: 0.2 },
+];
+
+/// Effort of a search: comparisons per attempt, some seconds.
+const WORK: u64 = 8_000_000_000;
+const WORK_ALONE: u64 = 400_000_000;
+/// Errors above this are not worth proving, rad.
+const WORST: f64 = 6.0_f64.to_radians();
+
+/// Bounds that were proven, one for each rate.
+#[derive(Clone, Debug)]
+pub(crate) struct Bounds {
+    /// The bound at each rate, in words with its scope.
+    pub(crate) lines: Vec<String>,
+    /// The largest, rad.
+    pub(crate) error_rad: f64,
+    /// The certificate of the scenario's own rate, for a file.
+    pub(crate) certificate: Certificate,
+}
+
+/// Looks for a bound at each rate, the first of which is the scenario's; what limits, where there is none.
+pub(crate) fn prove(scenario: &Scenario, rates_deg_s: &[f64]) -> Result<Result<Bounds, String>, ScenarioError> {
+    let (mut lines, mut error_rad, mut first) = (Vec::new(), 0.0_f64, None);
+    for rate in rates_deg_s {
+        let set = [(RATE.to_owned(), Value::Float(*rate))];
+        let here = Scenario::from_table(scenario.name(), scenario.table().clone(), &set)?;
+        let sampled = here.sampled(&here.plan()?.bounds);
+        let setup = match &sampled.setup {
+            Ok(setup) => setup,
+            Err(why) => return Ok(Err(why.to_string())),
+        };
+        let shell = sampled.any_law();
+        if let (false, Some(radii)) = (shell, &sampled.stability)
+            && largest(radii) >= 1.0
+        {
+            return Ok(Err(format!("the sampled loop is unstable, spectral radius {:.3}", largest(radii))));
+        }
+        let options = Options {
+            refinements: 0,
+            work: if shell { WORK } else { WORK_ALONE },
+            // A shell minds little how strong the brake is: a wide cell costs less than many narrow ones.
+            widest: if shell { 1.5 } else { Options::default().widest },
+            error_limit: WORST,
+            patient: !shell,
+            ..Options::default()
+        };
+        let found = search(setup, &options, false);
+        if let Some(open) = found.open.first() {
+            let how = if open.grew { "grew beyond all limits" } else { "did not close" };
+            return Ok(Err(format!(
+                "no proof found at {rate} °/s (not shown unsafe): for mu_d {:.4} … {:.4} the set {how}",
+                open.sliding[0], open.sliding[1]
+            )));
+        }
+        // Nothing is believed that the checker does not pass.
+        let checked = match checker::check(&found.certificate) {
+            Ok(checked) => checked,
+            Err(flaw) => return Ok(Err(format!("the proof does not pass its check: {flaw}"))),
+        };
+        let proven = Proven { checked, cells: found.certificate.cells.len() };
+        lines.push(sampled.bound_line(&proven));
+        error_rad = error_rad.max(checked.error_bound);
+        first.get_or_insert(found.certificate);
+    }
+    Ok(match first {
+        Some(certificate) => Ok(Bounds { lines, error_rad, certificate }),
+        None => Err("no rate".to_owned()),
+    })
+}
