@@ -173,7 +173,7 @@ fn certified(c: &Candidate) -> String {
 
 /// A row for each candidate, under a head.
 fn rows(tuned: &Tuned) -> Vec<Vec<String>> {
-    let head = ["law", "cost", "cycles/s", "runs that stick", "longest, ms", "error, °", "certified"];
+    let head = ["law", "cost", "cycles/s", "stick in", "longest", "error", "proven"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for c in &tuned.candidates {
         let s = &c.score;
@@ -182,9 +182,9 @@ fn rows(tuned: &Tuned) -> Vec<Vec<String>> {
             c.name.clone(),
             s.cost.map_or("–".to_owned(), |x| format!("{x:.2}")),
             cell(format!("{:.2}", s.cycles_per_s)),
-            cell(format!("{} of {}", s.runs_with_sticks, s.runs)),
-            cell(format!("{:.0}", 1e3 * s.longest_stick_s)),
-            cell(format!("{:.3}", s.max_error_rad.to_degrees())),
+            cell(format!("{}/{}", s.runs_with_sticks, s.runs)),
+            cell(format!("{:.0} ms", 1e3 * s.longest_stick_s)),
+            cell(format!("{:.3}°", s.max_error_rad.to_degrees())),
             certified(c),
         ]);
     }
@@ -195,7 +195,7 @@ fn rows(tuned: &Tuned) -> Vec<Vec<String>> {
 fn about(tuned: &Tuned) -> String {
     let rates: Vec<String> = tuned.rates_deg_s.iter().map(|r| number(*r)).collect();
     format!(
-        "At {} °/s, from rest, {} of the bounds; figures are the worst of runs on discs 101 to 112, the first second left out. Cost: \
+        "At {} °/s, from rest, {} of the bounds; figures are the worst of runs on discs 101 to 108, the first second left out. Cost: \
          cycles/s + 30 × RMS error, ° + longest stick/20 ms. {:.0} s were simulated.",
         rates.join(", "),
         if tuned.corners.len() == 1 { "1 corner".to_owned() } else { format!("{} corners", tuned.corners.len()) },
@@ -306,7 +306,7 @@ fn page(tuned: &Tuned) -> anyhow::Result<String> {
     let mut intro = vec![verdict(tuned), about(tuned)];
     for row in rows(tuned).iter().skip(1) {
         intro.push(format!(
-            "{}: cost {}, {} cycles/s, {} runs stick, longest stick {} ms, error up to {}°, certified {}",
+            "{}: cost {}, {} cycles/s, sticks in {} runs, longest stick {}, error up to {}, proven {}",
             row[0], row[1], row[2], row[3], row[4], row[5], row[6]
         ));
     }

@@ -1,6 +1,7 @@
 //! The rig as it is believed to be: what is simulated where the rig itself is to be spared.
 
 use crate::rig_file::RigFile;
+use clutch_core::friction::FrictionParams;
 use clutch_core::{ActuatorKind, Interval};
 use clutch_sim::drive::DriveParams;
 use clutch_sim::{Scenario, ScenarioError};
@@ -25,6 +26,9 @@ pub struct Corner {
     /// T/(μ_d K) over the believed one.
     pub hold: f64,
 }
+
+/// Stribeck velocity that is reckoned with where none is told, rad/s: the largest of the rigs that identification was tried on.
+const UNKNOWN_STRIBECK: f64 = 0.005;
 
 /// Waves along the disc of a rig whose file tells of none: those of the rig `bench`.
 const WAVES: [i64; 2] = [136, 544];
@@ -60,6 +64,14 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
     let period: f64 = spec.period.seconds();
     let mut delay_between = None;
     let mut set = vec![("run.start".to_owned(), Value::String("rest".to_owned()))];
+    // What holds for a Stribeck velocity holds for all below it: the slow speeds are those of the largest.
+    if let (Some(file), FrictionParams::Stribeck(_)) = (file, spec.model.friction) {
+        let most = file.stribeck.map_or(UNKNOWN_STRIBECK, |stribeck| stribeck.high);
+        for section in ["model", "rig"] {
+            let key = format!("{section}.friction.stribeck.stribeck_velocity_rad_s");
+            set.push((key, Value::Float(most)));
+        }
+    }
     if let Some(delay) = file.and_then(|file| file.delay) {
         let ticks = (delay.value / period).round();
         if !(delay.low..=delay.high).contains(&(ticks * period)) {
@@ -127,7 +139,10 @@ fn waves(rig: &Table, rms: f64) -> Table {
     table
 }
 
-/// Both ends of both ratios; one corner where they are known exactly.
+/// Ratios known more closely than this, end from end, are taken for known: discs differ by more.
+const NARROW: f64 = 0.01;
+
+/// Both ends of both ratios; one where a ratio is known.
 fn corners(scenario: &Scenario) -> Result<Vec<Corner>, ScenarioError> {
     let bounds = scenario.plan()?.bounds;
     let model = scenario.spec().model;
@@ -139,6 +154,6 @@ fn corners(scenario: &Scenario) -> Result<Vec<Corner>, ScenarioError> {
     let (friction, _) = scenario.params().bounds.friction_shares(0.0);
     let pull = [torque[0] / inertia[1], torque[1] / inertia[0]];
     let hold = [torque[0] / (friction[1] * gain[1]), torque[1] / (friction[0] * gain[0])];
-    let ends = |[low, high]: [f64; 2]| if high - low < 1e-9 { vec![1.0] } else { vec![low, high] };
+    let ends = |[low, high]: [f64; 2]| if high - low < NARROW { vec![1.0] } else { vec![low, high] };
     Ok(ends(pull).into_iter().flat_map(|pull| ends(hold).into_iter().map(move |hold| Corner { pull, hold })).collect())
 }

@@ -101,6 +101,8 @@ pub struct RigFile {
     pub delay: Option<Estimate>,
     /// Root mean square of friction's variation along the disc, as a share.
     pub ripple: Option<Estimate>,
+    /// Stribeck velocity, rad/s.
+    pub stribeck: Option<Estimate>,
 }
 
 /// A text is no rig file.
@@ -145,6 +147,7 @@ impl RigFile {
             bounds: table("bounds")?,
             delay: told("delay_s"),
             ripple: told("ripple_rms"),
+            stribeck: told("stribeck_velocity_rad_s"),
         })
     }
 

@@ -34,7 +34,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Options { rates_deg_s: Vec::new(), candidates: 48, uncertified: false }
+        Options { rates_deg_s: Vec::new(), candidates: 32, uncertified: false }
     }
 }
 
@@ -47,7 +47,7 @@ const KEPT: usize = 6;
 /// Seeds of discs: to sort the candidates out, to choose among the rest, to judge, and to accept. None is in two of them.
 const FIRST: std::ops::RangeInclusive<u64> = 1..=2;
 const CHOOSING: std::ops::RangeInclusive<u64> = 3..=6;
-const JUDGING: std::ops::RangeInclusive<u64> = 101..=112;
+const JUDGING: std::ops::RangeInclusive<u64> = 101..=108;
 const ACCEPTING: std::ops::RangeInclusive<u64> = 201..=210;
 /// Lengths of their runs, s.
 const SHORT_S: f64 = 2.0;

@@ -19,15 +19,14 @@ pub struct ShellTried {
 
 /// Shells that are tried, the tightest first. Each lets an edge of an encoder of 20 000 counts pass, which with the smoothing
 /// `κ` counts as `κ q/T_s` = 0.06 rad/s.
-pub(crate) const SHELLS: [ShellTried; 3] = [
+pub(crate) const SHELLS: [ShellTried; 2] = [
     ShellTried { slope_1_s: 50.0, boundary_rad_s: 0.2, smoothing: 0.2 },
     ShellTried { slope_1_s: 70.0, boundary_rad_s: 0.3, smoothing: 0.2 },
-    ShellTried { slope_1_s: 50.0, boundary_rad_s: 0.3, smoothing: 0.2 },
 ];
 
 /// Effort of a search: comparisons per attempt, some seconds.
-const WORK: u64 = 8_000_000_000;
-const WORK_ALONE: u64 = 400_000_000;
+const WORK: u64 = 2_500_000_000;
+const WORK_ALONE: u64 = 200_000_000;
 /// Errors above this are not worth proving, rad.
 const WORST: f64 = 6.0_f64.to_radians();
 

@@ -1,0 +1,224 @@
+//! Hidden rigs, each identified, tuned, and driven by the loop in virtual time: the table of docs/tune.md, by `cargo xtask
+//! tune`.
+//!
+//! ```sh
+//! cargo run --release --package clutch-tune --example campaign -- 50 30001
+//! ```
+
+#[path = "../../clutch-identify/examples/random_rig/mod.rs"]
+mod random_rig;
+
+use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
+use clutch_identify::rig_file::rig_file;
+use clutch_identify::{RigFile, identify};
+use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::station::ControllerStation;
+use clutch_loop::virtual_time::{VirtualLoop, VirtualOptions};
+use clutch_node::ControllerNode;
+use clutch_sim::progress::UNWATCHED;
+use clutch_sim::rig::Rig;
+use clutch_sim::scenario::{Table, Value};
+use clutch_sim::{Metrics, Scenario};
+use clutch_tune::{Options, Tuned, Verdict, tune};
+use random_rig::{Outcome, Truth, truth};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Length of the loop's run, s, of which the first second does not count.
+const LOOP_S: f64 = 10.0;
+const SETTLE_S: f64 = 1.0;
+
+/// A rig from the experiment to the loop.
+struct Course {
+    seed: u64,
+    truth: Truth,
+    tuned: Tuned,
+    /// The truth lies in the box that the certificate speaks of; what does not.
+    outside: Vec<&'static str>,
+    /// Figures of the loop's run, and why it ended early, if it did.
+    run: Option<(Metrics, f64, Option<String>)>,
+    /// Time that tuning took here, s.
+    tuning_s: f64,
+}
+
+/// What tuning is given: the hidden rig's bounds and safe state, and of its rig nothing.
+fn known(truth: &Truth) -> Outcome<Scenario> {
+    let mut table = truth.scenario.table().clone();
+    table.insert("rig".to_owned(), Value::Table(Table::from_iter([("base".to_owned(), Value::String("paper".to_owned()))])));
+    Ok(Scenario::from_table("rig", table, &[])?)
+}
+
+/// The tuned law on the hidden rig.
+fn on_hidden(tuned: &Scenario, truth: &Truth) -> Outcome<Scenario> {
+    let mut table = tuned.table().clone();
+    if let Some(rig) = truth.scenario.table().get("rig") {
+        table.insert("rig".to_owned(), rig.clone());
+    }
+    let set = [
+        ("run.duration_s".to_owned(), Value::Float(LOOP_S)),
+        ("run.settle_s".to_owned(), Value::Float(SETTLE_S)),
+        ("run.seed".to_owned(), Value::Integer(truth.scenario.params().run.seed as i64)),
+    ];
+    Ok(Scenario::from_table("loop", table, &set)?)
+}
+
+/// The loop in virtual time, on the simulated board: figures by the true motion.
+fn drive(scenario: &Scenario) -> Outcome<(Metrics, f64, Option<String>)> {
+    let built = BuiltRun::<f64>::new(scenario, 1)?;
+    let path = from_scenario::path::<f64>(scenario)?;
+    let options = VirtualOptions {
+        duration: scenario.spec().run.duration + 1.0,
+        ticks: built.ticks,
+        settle: SETTLE_S,
+        ..VirtualOptions::default()
+    };
+    let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
+    let report = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })?.run(&path)?;
+    let ended = report.cause.map(|cause| format!("{cause:?}"));
+    Ok((report.metrics, report.largest_error, ended))
+}
+
+/// Largest departure of friction from its mean that the disc has, as a share.
+fn largest_ripple(truth: &Truth) -> Outcome<f64> {
+    let rig = Rig::new(&truth.scenario.params().rig, truth.scenario.params().run.seed)?;
+    let ripple = rig.model.ripple.as_ref();
+    let at = |k: u32| ripple.map_or(0.0, |r| (r.factor(f64::from(k) * 1e-5) - 1.0).abs());
+    Ok((0..628_319).step_by(7).map(at).fold(0.0, f64::max))
+}
+
+fn outside(tuned: &Scenario, truth: &Truth) -> Outcome<Vec<&'static str>> {
+    let plan = tuned.plan()?;
+    let mut names = Vec::new();
+    let Ok(setup) = tuned.sampled_setup(&plan.bounds) else { return Ok(vec!["not covered"]) };
+    let mut check = |name, holds: bool| {
+        if !holds {
+            names.push(name);
+        }
+    };
+    // J, T, K and mu count in their ratios alone: those of the box, scaled to the truth's torque and gain.
+    let torque = setup.drive_torque[0];
+    let between = |x: f64, [low, high]: [f64; 2]| (low..=high).contains(&x);
+    let friction = torque / (truth.hold * setup.brake_gain[0]);
+    check("T/J", between(torque / truth.pull, setup.inertia));
+    check("T/(mu_d K)", between(friction, setup.sliding));
+    check("mu_s/mu_d", between(truth.ratio * friction, setup.at_rest));
+    check("C/J", truth.damping / truth.pull * torque <= setup.viscous_damping[1]);
+    check("Stribeck velocity", truth.stribeck <= setup.stribeck[0]);
+    check("delay", (truth.delay - f64::from(setup.delay_ticks) * setup.period_s).abs() < 1e-9);
+    check("ripple", largest_ripple(truth)? <= setup.ripple);
+    Ok(names)
+}
+
+fn course(seed: u64) -> Outcome<Course> {
+    let truth = truth(seed)?;
+    let mut board = VirtualBoard::default();
+    let recordings =
+        experiment(&truth.scenario, &Programme::default(), &mut |name, part| board.run(name, part))?;
+    let file = rig_file(&identify(&recordings), &truth.scenario)?;
+    let file = RigFile::parse("rig.toml", &file)?;
+    let start = Instant::now();
+    let options = Options { uncertified: true, ..Options::default() };
+    let tuned = tune(&known(&truth)?, Some(&file), &options, UNWATCHED)?;
+    let tuning_s = start.elapsed().as_secs_f64();
+    let winner = tuned.winner().and_then(|w| w.scenario.clone());
+    let outside = winner.as_ref().map_or(Ok(Vec::new()), |w| outside(w, &truth))?;
+    let run = winner.map(|w| drive(&on_hidden(&w, &truth)?)).transpose()?;
+    Ok(Course { seed, truth, tuned, outside, run, tuning_s })
+}
+
+fn bound(course: &Course) -> Option<f64> {
+    match course.tuned.winner()?.verdict {
+        Verdict::Certified { error_rad, .. } => Some(error_rad),
+        _ => None,
+    }
+}
+
+fn smooth(course: &Course) -> bool {
+    course.run.as_ref().is_some_and(|(m, _, ended)| m.stick_time_fraction == 0.0 && ended.is_none())
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// A row over some rigs.
+fn row(name: &str, of: &[&Course]) -> String {
+    let count = |f: &dyn Fn(&Course) -> bool| of.iter().filter(|c| f(c)).count();
+    let degrees = |values: Vec<f64>| {
+        let most = values.iter().copied().fold(0.0, f64::max);
+        if values.is_empty() { "–".to_owned() } else { format!("{:.3}°, {most:.3}°", median(values)) }
+    };
+    let bounds = of.iter().filter_map(|c| bound(c)).map(f64::to_degrees).collect();
+    let errors = of.iter().filter_map(|c| Some(c.run.as_ref()?.1.to_degrees())).collect();
+    let (n, certified) = (of.len(), count(&|c| bound(c).is_some()));
+    format!(
+        "| {name} | {n} | {} of {n} | {certified} of {n} | {} of {certified} | {} | {} | {} |",
+        count(&smooth),
+        count(&|c| bound(c).is_some() && c.outside.is_empty()),
+        degrees(bounds),
+        degrees(errors),
+        count(&|c| bound(c).is_some_and(|b| c.run.as_ref().is_none_or(|run| run.1 > b))),
+    )
+}
+
+fn detail(c: &Course) {
+    let rig = format!(
+        "rig {}: delay {:.0} ms, hold {:.2} V, ratio {:.2}, v_s {:.2} mrad/s, ripple {:.1} %",
+        c.seed,
+        1e3 * c.truth.delay,
+        c.truth.hold,
+        c.truth.ratio,
+        1e3 * c.truth.stribeck,
+        100.0 * c.truth.ripple
+    );
+    let run = c.run.as_ref().map_or("no run".to_owned(), |(m, error, ended)| {
+        format!("{:.2} cycles/s, error up to {:.3}°, {ended:?}", m.stick_slip_cycles_per_s, error.to_degrees())
+    });
+    let winner = c.tuned.winner().map_or("nothing", |w| w.name.as_str());
+    let proven = bound(c).map_or("UNCERTIFIED".to_owned(), |b| format!("≤ {:.3}°", b.to_degrees()));
+    println!(
+        "{rig}: {winner}, {proven}; {run}; outside the box: {:?}; {:.1} s of tuning, {:.0} s simulated",
+        c.outside, c.tuning_s, c.tuned.simulated_s
+    );
+    for (shell, why) in &c.tuned.open_shells {
+        println!("    shell f {} S {}: {why}", shell.slope_1_s, shell.boundary_rad_s);
+    }
+}
+
+fn main() -> Outcome<()> {
+    let mut args = std::env::args().skip(1);
+    let mut number = |default: u64| args.next().map_or(Ok(default), |text| text.parse::<u64>());
+    let (rigs, first) = (number(50)?, number(30_001)?);
+    let all: Vec<Outcome<Course>> = (first..first + rigs)
+        .into_par_iter()
+        .map(|seed| course(seed).inspect(detail).map_err(|e| format!("rig {seed}: {e}").into()))
+        .collect();
+    let mut done = Vec::new();
+    for result in all {
+        match result {
+            Ok(course) => done.push(course),
+            Err(e) => println!("failed: {e}"),
+        }
+    }
+    println!(
+        "| rigs | number | no stick after 1 s | certified in a shell, or as sampled | of these with the rig in the certified box | \
+         bound: median, largest | error seen: median, largest | bounds broken |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for ticks in 0..=2_u32 {
+        let of: Vec<&Course> =
+            done.iter().filter(|c| (c.truth.delay * 1e3).round() as u32 == ticks).collect();
+        println!("{}", row(&format!("delay of {ticks} periods"), &of));
+    }
+    println!("{}", row("all", &done.iter().collect::<Vec<_>>()));
+    let experiment_s = Programme::default().seconds();
+    println!(
+        "{rigs} rigs from seed {first}, {} of them to the end: {experiment_s:.1} s of experiment and {LOOP_S:.0} s of the loop each, in \
+         virtual time; tuning simulates {:.0} s of believed rigs, and takes {:.0} s here (medians)",
+        done.len(),
+        median(done.iter().map(|c| c.tuned.simulated_s).collect()),
+        median(done.iter().map(|c| c.tuning_s).collect()),
+    );
+    Ok(())
+}
