@@ -32,6 +32,7 @@ from clutch._run import Result, SteppedLaw, simulate
 from clutch._smooth import SmoothSpeed, lowest_smooth_speed
 from clutch._sweep import Samples, SweepResult, grid, latin_hypercube, samples, sobol, sweep
 from clutch._tables import *  # noqa: F403
+from clutch._tune import Candidate, Estimate, Identified, Tuned, identify, tune
 
 if TYPE_CHECKING:
     from clutch import dynamics, executors, gym, plot, referee
@@ -39,8 +40,11 @@ if TYPE_CHECKING:
 __version__ = _clutch.VERSION
 
 __all__ = [
+    "Candidate",
     "Certificate",
     "Difference",
+    "Estimate",
+    "Identified",
     "Log",
     "LoopError",
     "LoopResult",
@@ -63,11 +67,13 @@ __all__ = [
     "Table",
     "Target",
     "Tick",
+    "Tuned",
     "__version__",
     "dynamics",
     "executors",
     "grid",
     "gym",
+    "identify",
     "latin_hypercube",
     "loop",
     "lowest_smooth_speed",
@@ -81,6 +87,7 @@ __all__ = [
     "simulate",
     "sobol",
     "sweep",
+    "tune",
 ]
 __all__ += _tables.__all__
 

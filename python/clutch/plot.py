@@ -1079,3 +1079,88 @@ def _events(axes: list[Axes], event: Table) -> None:
                 size=7,
                 color=_RED if bad else "0.3",
             )
+
+
+#: Parameters of a rig, in the order in which they are drawn.
+_TOLD = {
+    "pull_rad_s2": "T/J",
+    "hold_v": "T/(μ_d K)",
+    "ratio": "μ_s/μ_d",
+    "damping_1_s": "C/J",
+    "ripple_rms": "ripple, RMS",
+    "delay_s": "delay",
+    "stribeck_velocity_rad_s": "Stribeck velocity",
+}
+
+
+@_styled
+def identified(found: Identified) -> Figure:
+    """Draw what identification saw and what it believes.
+
+    Parameters
+    ----------
+    found : Identified
+        What :func:`clutch.identify` found.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Left each interval, in per cent of its value; right friction along the disc, where the slowest ride went.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> figure = clutch.plot.identified(clutch.identify("board_smc_2"))
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(180 * MM, 70 * MM), layout="constrained")
+    told = [key for key in _TOLD if key in found.parameters]
+    for row, key in enumerate(reversed(told)):
+        e = found.parameters[key]
+        scale = 100 / e.value if e.value else 0.0
+        left.plot([(e.low - e.value) * scale, (e.high - e.value) * scale], [row, row], lw=3, solid_capstyle="butt")
+        left.plot([0], [row], "k|", ms=8)
+    left.set_yticks(range(len(told)), [_TOLD[key] for key in reversed(told)])
+    left.set_xscale("symlog", linthresh=1)
+    left.set_xlabel("interval around the value, %")
+    if found.map:
+        angle, factor = np.array(found.map).T
+        right.plot(np.degrees(angle), factor)
+    right.set_xlabel("angle, °")
+    right.set_ylabel("friction over its mean")
+    return figure
+
+
+@_styled
+def candidates(runs: Mapping[str, Result], chosen: str | None = None) -> Figure:
+    """Draw the error of several runs below one another, on one scale.
+
+    Parameters
+    ----------
+    runs : mapping of str to Result
+        Runs by their names.
+    chosen : str, optional
+        The name of the one to mark.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A row for each run: the error over time, in degrees.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> figure = clutch.plot.candidates({"SMC": clutch.simulate("smc_2")})
+    """
+    rows = max(len(runs), 1)
+    size = (150 * MM, (14 * rows + 12) * MM)
+    figure, grid = plt.subplots(rows, 1, figsize=size, sharex=True, squeeze=False, layout="constrained")
+    most = max((float(np.max(np.abs(_error_deg(run)))) for run in runs.values()), default=1.0)
+    scale = min(most, 0.5)
+    for ax, (name, run) in zip(grid[:, 0], runs.items(), strict=False):
+        _line(ax, np.asarray(run.samples["time_s"]), _error_deg(run))
+        ax.set_ylim(-1.05 * scale, 1.05 * scale)
+        marked = f"{name} (chosen)" if name == chosen else name
+        ax.set_title(marked, loc="left", fontweight="bold" if name == chosen else "normal", pad=2)
+    figure.supylabel("error, °")
+    grid[-1, 0].set_xlabel("t, s")
+    return figure

@@ -140,12 +140,11 @@ const PATIENT: (Fineness, f64) = (Fineness { steps: 40, apart: 0.02, spread: 1.0
 
 /// For shells: few directions, of brakes far apart, which a voltage of any size asks for.
 const COARSE: (Fineness, f64) = (Fineness { steps: 30, apart: 0.1, spread: 1.4 }, 0.001);
-const MIDDLE: (Fineness, f64) = (Fineness { steps: 30, apart: 0.07, spread: 1.4 }, 0.001);
 
 /// The best of the first attempts, or the first of the later ones that is proven.
 fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
     let (first, later): (&[_], &[_]) = match setup.law {
-        Gains::Shell { .. } if !options.patient => (&[(Form::Exact, COARSE)], &[(Form::Exact, MIDDLE)]),
+        Gains::Shell { .. } if !options.patient => (&[(Form::Exact, COARSE)], &[]),
         Gains::Shell { .. } => (&[(Form::Exact, COARSE), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
         Gains::Pd { .. } => (&[(Form::Noise, LONG), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
         // (31) has hundreds of modes, times the counts of the exact form.

@@ -204,7 +204,8 @@ fn text(report: &Report) -> String {
 }
 
 /// The result as `--json` prints it.
-fn object(report: &Report) -> Value {
+#[must_use]
+pub fn object(report: &Report) -> Value {
     let of = |finding: &Finding| match finding {
         Finding::Known(e) => value!({ "value": e.value, "low": e.low, "high": e.high }),
         Finding::Refused(why) => value!({ "refused": why }),

@@ -7,7 +7,7 @@ pub mod certify;
 mod daq;
 mod friction;
 mod hil;
-mod identify;
+pub mod identify;
 mod log;
 mod loop_verb;
 mod map;

@@ -13,6 +13,7 @@ mod session;
 mod stepping;
 mod sweep;
 mod table;
+mod tune;
 
 use pyo3::prelude::*;
 
@@ -47,6 +48,8 @@ mod _clutch {
     use super::sweep::Sweep;
     #[pymodule_export]
     use super::table::Table;
+    #[pymodule_export]
+    use super::tune::{as_identified, identify, tune};
     /// Priority of the loop's control thread unless another is given.
     #[pymodule_export]
     const DEFAULT_PRIORITY: u8 = super::session::DEFAULT_PRIORITY;

@@ -28,7 +28,7 @@ pub(crate) struct Run {
 }
 
 /// Ends the work when a signal waits, as Ctrl-C.
-fn unless_interrupted(_: Progress) -> ControlFlow<()> {
+pub(crate) fn unless_interrupted(_: Progress) -> ControlFlow<()> {
     match Python::attach(|py| py.check_signals()) {
         Ok(()) => ControlFlow::Continue(()),
         Err(e) => {

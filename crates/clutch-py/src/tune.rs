@@ -1,0 +1,125 @@
+//! Identification and tuning: `clutch.identify`, `clutch.tune`.
+
+use crate::convert::{from_json, log_error, loop_error, os_error, scenario_error};
+use crate::run::unless_interrupted;
+use crate::stepping::native;
+use clutch_identify::experiment::{ExperimentError, Programme, VirtualBoard, experiment};
+use clutch_identify::recording::ReadError;
+use clutch_identify::rig_file::rig_file;
+use clutch_identify::{Recording, RigFile, believed};
+use clutch_log::Limits;
+use clutch_tune::Options;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+fn read_error(py: Python<'_>, e: &ReadError) -> PyErr {
+    match e {
+        ReadError::Log(e) => log_error(py, e),
+        _ => PyValueError::new_err(e.to_string()),
+    }
+}
+
+fn experiment_error(py: Python<'_>, e: &ExperimentError) -> PyErr {
+    match e {
+        ExperimentError::Scenario(e) => scenario_error(py, e, None),
+        ExperimentError::Read(e) => read_error(py, e),
+        ExperimentError::Log(e) => log_error(py, e),
+        _ => loop_error(py, &e.to_string()),
+    }
+}
+
+/// Identifies a rig: the object that `clutch identify --json` prints, and the rig file, or why there is none. Without logs
+/// the scenario's simulated board is run, in virtual time.
+#[pyfunction]
+#[pyo3(signature = (scenario, logs, columns, log))]
+pub(crate) fn identify<'py>(
+    py: Python<'py>,
+    scenario: &Bound<'py, PyAny>,
+    logs: Vec<PathBuf>,
+    columns: (String, String),
+    log: Option<PathBuf>,
+) -> PyResult<(Bound<'py, PyAny>, Option<String>, Option<String>)> {
+    let scenario = native(scenario)?;
+    let mut recordings = Vec::new();
+    for path in &logs {
+        let name = path.display().to_string();
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+            let text = std::fs::read_to_string(path).map_err(|e| os_error(py, path, &format!("{name}: {e}"), &e))?;
+            let spec = scenario.0.spec();
+            let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev);
+            let read = Recording::from_csv(&name, &text, (&columns.0, &columns.1), scale);
+            recordings.push(read.map_err(|e| read_error(py, &e))?);
+        } else {
+            let whole = clutch_log::read(path, &Limits::default()).map_err(|e| log_error(py, &e))?;
+            recordings.extend(Recording::from_log(&name, &whole).map_err(|e| read_error(py, &e))?);
+        }
+    }
+    if let Some(folder) = &log {
+        std::fs::create_dir_all(folder)
+            .map_err(|e| os_error(py, folder, &format!("{}: cannot be made", folder.display()), &e))?;
+    }
+    let found = py.detach(|| {
+        let recordings = if logs.is_empty() {
+            let mut board =
+                log.map_or_else(VirtualBoard::default, |folder| VirtualBoard::logging(folder, clutch_cli::BUILD));
+            experiment(&scenario.0, &Programme::default(), &mut |name, part| board.run(name, part))?
+        } else {
+            recordings
+        };
+        Ok(clutch_identify::identify(&recordings))
+    });
+    let report = found.map_err(|e| experiment_error(py, &e))?;
+    let object = from_json(py, &clutch_cli::identify::object(&report))?;
+    let (file, why) = match rig_file(&report, &scenario.0) {
+        Ok(file) => (Some(file), None),
+        Err(why) => (None, Some(why.to_string())),
+    };
+    Ok((object, file, why))
+}
+
+/// A rig file that was made by this package.
+fn rig(text: Option<&str>) -> PyResult<Option<RigFile>> {
+    text.map(|text| RigFile::parse("identified", text))
+        .transpose()
+        .map_err(|e| PyValueError::new_err(e.to_string()))
+}
+
+/// The scenario with the rig that it believes in, as TOML.
+#[pyfunction]
+pub(crate) fn as_identified(py: Python<'_>, scenario: &Bound<'_, PyAny>, file: &str) -> PyResult<String> {
+    let scenario = native(scenario)?;
+    let rig = rig(Some(file))?;
+    let found = py.detach(|| believed(&scenario.0, rig.as_ref()));
+    Ok(found.map_err(|e| scenario_error(py, &e, None))?.scenario.canonical())
+}
+
+/// A result, and beside it the scenario of each candidate as TOML, the verdict in words, and the proof as a file has it.
+type Found<'py> = (Bound<'py, PyAny>, Vec<Option<String>>, String, Option<String>);
+
+/// Tunes a scenario: the object that `clutch tune --json` prints, and what goes with it.
+#[pyfunction]
+#[pyo3(signature = (scenario, file, rates_deg_s, candidates, uncertified))]
+pub(crate) fn tune<'py>(
+    py: Python<'py>,
+    scenario: &Bound<'py, PyAny>,
+    file: Option<&str>,
+    rates_deg_s: Vec<f64>,
+    candidates: u32,
+    uncertified: bool,
+) -> PyResult<Found<'py>> {
+    let scenario = native(scenario)?;
+    let rig = rig(file)?;
+    let options = Options { rates_deg_s, candidates, uncertified };
+    let found = py.detach(|| clutch_tune::tune(&scenario.0, rig.as_ref(), &options, &unless_interrupted));
+    // The signal's exception is set already.
+    if let Some(e) = PyErr::take(py) {
+        return Err(e);
+    }
+    let tuned = found.map_err(|e| scenario.error(py, &e))?;
+    let object = serde_json::to_value(&tuned).map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
+    let files = tuned.candidates.iter().map(|c| c.scenario.as_ref().map(clutch_sim::Scenario::canonical)).collect();
+    let proof = tuned.certificate.as_ref().map(serde_json::to_string).transpose();
+    let proof = proof.map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
+    Ok((from_json(py, &object)?, files, clutch_cli::tune::verdict(&tuned), proof))
+}

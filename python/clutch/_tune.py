@@ -1,0 +1,451 @@
+"""What a rig is, and the gains for it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from clutch import _clutch
+from clutch._model import Scenario
+from clutch._run import ScenarioLike, as_scenario, simulate
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """A value with the interval that holds it.
+
+    Attributes
+    ----------
+    value : float
+        Best value, in the unit of the parameter's name.
+    low : float
+        Lower end.
+    high : float
+        Upper end.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Estimate(value=2.0, low=1.9, high=2.2).holds(2.1)
+    True
+    """
+
+    value: float
+    low: float
+    high: float
+
+    def holds(self, value: float) -> bool:
+        """Tell whether a value lies in the interval.
+
+        Parameters
+        ----------
+        value : float
+            The value, in the same unit.
+
+        Returns
+        -------
+        bool
+            True from `low` to `high`, both among them.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.Estimate(value=2.0, low=1.9, high=2.2).holds(3)
+        False
+        """
+        return self.low <= value <= self.high
+
+
+class Identified:
+    """What a rig was found to be, as :func:`clutch.identify` returns it.
+
+    Attributes
+    ----------
+    parameters : dict of str to Estimate
+        What is told: ``pull_rad_s2`` (T/J), ``delay_s``, ``hold_v`` (T/(μ_d K)), ``ripple_rms``, ``ratio`` (μ_s/μ_d),
+        ``stribeck_velocity_rad_s``, ``damping_1_s`` (C/J).
+    refused : dict of str to str
+        What is not, by name, with the experiment that would tell it.
+    unexplained : tuple of str
+        Ticks and recordings that the model does not explain.
+    map : list of tuple of float
+        Friction along the disc: angle in rad, and friction over its mean.
+    releases, break_aways : int
+        Numbers of each that were found.
+    rides_rad_s : tuple of float
+        Rates of the rides, rad/s.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> found = clutch.identify("board_smc_2")
+    >>> found.parameters["pull_rad_s2"].holds(0.047088 / 0.0017)
+    True
+    """
+
+    def __init__(self, base: Scenario, found: tuple[dict[str, Any], str | None, str | None]) -> None:
+        told, self._file, self._lacks = found
+        self._base = base
+        parameters: dict[str, dict[str, Any]] = told["parameters"]
+        self.parameters = {key: Estimate(**row) for key, row in parameters.items() if "value" in row}
+        self.refused: dict[str, str] = {key: row["refused"] for key, row in parameters.items() if "refused" in row}
+        self.unexplained: tuple[str, ...] = tuple(told["unexplained"])
+        self.map: list[tuple[float, float]] = [(angle, factor) for angle, factor in told["map"]]
+        self.releases: int = told["releases"]
+        self.break_aways: int = told["break_aways"]
+        self.rides_rad_s: tuple[float, ...] = tuple(told["rides_rad_s"])
+
+    def to_toml(self) -> str:
+        """Give the file of ``clutch identify --out``, which ``--identified`` takes.
+
+        Returns
+        -------
+        str
+            ``[model]`` and ``[bounds]`` for scenarios, and the intervals.
+
+        Raises
+        ------
+        ValueError
+            A parameter that the file needs is not told; the message names it.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> "[bounds]" in clutch.identify("board_smc_2").to_toml()
+        True
+        """
+        if self._file is None:
+            raise ValueError(self._lacks or "no rig file")
+        return self._file
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario as identified: model and bounds as found, and as its rig the one that it believes in.
+
+        Raises
+        ------
+        ValueError
+            As :meth:`to_toml`.
+        """
+        return Scenario.from_toml(_clutch.as_identified(self._base._native, self.to_toml()))
+
+    def plot(self) -> Figure:
+        """Draw what was seen and what is believed: intervals in per cent of their values, and friction along the disc.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, in millimetres and with a font size for print.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> figure = clutch.identify("board_smc_2").plot()
+        """
+        from clutch import plot
+
+        return plot.identified(self)
+
+    def __repr__(self) -> str:
+        rows = [f"{key} = {e.value:.5g} [{e.low:.5g}, {e.high:.5g}]" for key, e in self.parameters.items()]
+        return "Identified(" + ", ".join(rows) + ")"
+
+
+def identify(
+    scenario: ScenarioLike = "board_smc_2",
+    *,
+    logs: Iterable[str | os.PathLike[str]] = (),
+    columns: tuple[str, str] = ("counts", "volts"),
+    log: str | os.PathLike[str] | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> Identified:
+    """Find out what a rig is: T/J, delay, friction, ripple, damping, each with an interval, as ``clutch identify`` does.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path, default "board_smc_2"
+        A scenario with ``[safety]``. Its simulated board is run in virtual time, 52 s of it, unless there are `logs`.
+    logs : iterable of path, optional
+        Logs to read instead: MCAP, or CSV with one sample a row.
+    columns : tuple of str, default ("counts", "volts")
+        Columns of a CSV that hold counts, and volts given after them.
+    log : path, optional
+        Folder for a log of each part of the experiment.
+    overrides : mapping, optional
+        Values for dotted keys of the scenario.
+
+    Returns
+    -------
+    Identified
+        Intervals, refusals, and the scenario as identified.
+
+    Raises
+    ------
+    ParamError
+        A scenario without a safe state, or one whose output does not let go.
+    LoopError
+        A check ended a part of the experiment.
+    ValueError
+        A log of another plant than a brake, or a table that cannot be read.
+    OSError
+        A file cannot be read or written.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> found = clutch.identify("board_smc_2")
+    >>> 0.99 < found.parameters["hold_v"].value / 2.2423 < 1.01
+    True
+    """
+    checked = as_scenario(scenario, overrides)
+    files = [os.fspath(path) for path in logs]
+    folder = None if log is None else os.fspath(log)
+    return Identified(checked, _clutch.identify(checked._native, files, columns, folder))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """The best gains of a law.
+
+    Attributes
+    ----------
+    name : str
+        The law, and if it stands in a shell.
+    gains : dict of str to float
+        The gains that were varied, by their dotted keys, SI.
+    cost : float or None
+        Cycles/s + 30 × RMS error in degrees + longest stick over 20 ms, on the worst of all runs; None if it left its path.
+    cycles_per_s : float
+        Stick-slip cycles a second, in the worst run.
+    max_error_rad : float
+        Largest error, rad.
+    longest_stick_s : float
+        Longest stick, s.
+    runs, runs_with_sticks : int
+        Runs behind these figures, and those in which the shaft stuck.
+    error_bound_rad : float or None
+        What is proven of the error, rad; None where nothing is, or was not looked for.
+    standing : str
+        ``"chosen"``, ``"rougher"``, ``"uncertified"``, ``"refused"`` (from rest it sticks), ``"strays"``, ``"unstable"``.
+    why : str
+        What limits, where it is uncertified or refused; else empty.
+    scenario : Scenario or None
+        The whole scenario; None if no gains are stable.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> tuned = clutch.tune("board_smc_2", candidates=2)
+    >>> tuned.winner.standing
+    'chosen'
+    """
+
+    name: str
+    gains: dict[str, float]
+    cost: float | None
+    cycles_per_s: float
+    max_error_rad: float
+    longest_stick_s: float
+    runs: int
+    runs_with_sticks: int
+    error_bound_rad: float | None
+    standing: Literal["chosen", "rougher", "uncertified", "refused", "strays", "unstable"]
+    why: str
+    scenario: Scenario | None
+
+
+class Tuned:
+    """Laws and gains for a rig, as :func:`clutch.tune` returns them.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        The best gains of each law, the smoothest first.
+    winner : Candidate or None
+        The one that is given out; None if none is certified, or none starts from rest.
+    verdict : str
+        What is proven of it, with its scope; or what limits.
+    rates_deg_s : tuple of float
+        Rates that it was tuned for, °/s.
+    simulated_s : float
+        Simulated time, s.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> tuned = clutch.tune("board_smc_2", candidates=2)
+    >>> tuned.winner.name, "shell" in tuned.verdict
+    ('glide in a shell', True)
+    """
+
+    def __init__(self, found: tuple[dict[str, Any], list[str | None], str, str | None]) -> None:
+        told, files, self.verdict, self._proof = found
+        rows = zip(told["candidates"], files, strict=True)
+        self.candidates: tuple[Candidate, ...] = tuple(_candidate(row, file) for row, file in rows)
+        chosen: int | None = told["chosen"]
+        self.winner: Candidate | None = None if chosen is None else self.candidates[chosen]
+        self.rates_deg_s: tuple[float, ...] = tuple(told["rates_deg_s"])
+        self.simulated_s: float = told["simulated_s"]
+
+    @property
+    def scenario(self) -> Scenario:
+        """The tuned scenario, whole.
+
+        Raises
+        ------
+        ValueError
+            No gains are given out; the message says what limits.
+        """
+        if self.winner is None or self.winner.scenario is None:
+            raise ValueError(self.verdict)
+        return self.winner.scenario
+
+    def save_proof(self, path: str | os.PathLike[str]) -> None:
+        """Write the proof, which ``clutch loop --certificate`` and ``clutch.loop(certificate=…)`` read.
+
+        Parameters
+        ----------
+        path : path
+            The file, JSON.
+
+        Raises
+        ------
+        ValueError
+            Nothing is proven.
+        OSError
+            The file cannot be written.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.tune("board_smc_2", candidates=2).save_proof("proof.json")
+        """
+        if self._proof is None:
+            raise ValueError(f"nothing is proven: {self.verdict}")
+        Path(path).write_text(self._proof, encoding="utf-8")
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Give the candidates as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each candidate, the smoothest first, by name; columns as the attributes of :class:`Candidate`,
+            without gains and scenario.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> clutch.tune("board_smc_2", candidates=2).to_pandas()["standing"].iloc[0] in ("chosen", "uncertified")
+        True
+        """
+        import pandas as pd
+
+        left_out = ("gains", "scenario")
+        rows = [{k: v for k, v in vars(c).items() if k not in left_out} for c in self.candidates]
+        return pd.DataFrame(rows).set_index("name")
+
+    def plot(self, *, seed: int = 101, duration_s: float = 5.0) -> Figure:
+        """Draw the error of each candidate over time, from rest, on the rig as it is believed to be.
+
+        Parameters
+        ----------
+        seed : int, default 101
+            The disc; 101 to 108 are those that candidates are judged on, and no gain is chosen on them.
+        duration_s : float, default 5.0
+            Length of the runs, s, above 1.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, in millimetres and with a font size for print.
+
+        Examples
+        --------
+        >>> import clutch
+        >>> figure = clutch.tune("board_smc_2", candidates=2).plot(duration_s=2)
+        """
+        from clutch import plot
+
+        length = {"run.seed": seed, "run.duration_s": duration_s, "run.settle_s": 1.0}
+        runs = {c.name: simulate(c.scenario, overrides=length) for c in self.candidates if c.scenario is not None}
+        return plot.candidates(runs, None if self.winner is None else self.winner.name)
+
+    def __repr__(self) -> str:
+        return f"Tuned({self.verdict})"
+
+
+def _candidate(row: dict[str, Any], file: str | None) -> Candidate:
+    score, verdict, standing = row["score"], row["verdict"], row["standing"]
+    return Candidate(
+        name=row["name"],
+        gains=dict(row["gains"]),
+        cost=score["cost"],
+        cycles_per_s=score["cycles_per_s"],
+        max_error_rad=score["max_error_rad"],
+        longest_stick_s=score["longest_stick_s"],
+        runs=score["runs"],
+        runs_with_sticks=score["runs_with_sticks"],
+        error_bound_rad=verdict.get("error_rad"),
+        standing=standing["is"],
+        why=standing.get("why", ""),
+        scenario=None if file is None else Scenario.from_toml(file),
+    )
+
+
+def tune(
+    scenario: ScenarioLike,
+    *,
+    identified: Identified | None = None,
+    rates_deg_s: Iterable[float] | None = None,
+    candidates: int = 32,
+    uncertified: bool = False,
+    overrides: Mapping[str, object] | None = None,
+) -> Tuned:
+    """Find the law and the gains that move a rig most smoothly, certified, as ``clutch tune`` does.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path
+        A scenario of the rig whose path is a ramp.
+    identified : Identified, optional
+        What :func:`clutch.identify` found; default: the scenario's model and bounds, with delay and ripple of its rig.
+    rates_deg_s : iterable of float, optional
+        Rates at which it is to be smooth, °/s; default: the scenario's own.
+    candidates : int, default 32
+        Candidates of each law.
+    uncertified : bool, default False
+        Give out the smoothest law without a certificate if none with one starts from rest.
+    overrides : mapping, optional
+        Values for dotted keys of the scenario.
+
+    Returns
+    -------
+    Tuned
+        The table of candidates, the scenario that is given out, and what is proven of it.
+
+    Raises
+    ------
+    ParamError
+        A path that is no ramp, a rig without a brake, or a value out of range.
+    OSError
+        The file cannot be read.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> tuned = clutch.tune("board_smc_2", candidates=2)
+    >>> tuned.winner.runs_with_sticks
+    0
+    """
+    checked = as_scenario(scenario, overrides)
+    file = None if identified is None else identified.to_toml()
+    rates = [] if rates_deg_s is None else [float(rate) for rate in rates_deg_s]
+    return Tuned(_clutch.tune(checked._native, file, rates, candidates, uncertified))
