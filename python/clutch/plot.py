@@ -21,7 +21,7 @@ import dataclasses
 import functools
 import itertools
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
 from clutch._metrics import FIGURES
@@ -41,11 +41,14 @@ if TYPE_CHECKING:
     from clutch._paper import PaperFigure
     from clutch._run import Result
     from clutch._sweep import SweepResult
+    from clutch._tune import Identified
 
 __all__ = [
     "STYLE",
+    "candidates",
     "certificate_region",
     "friction",
+    "identified",
     "log_overview",
     "paper_figure",
     "phase_plane",
@@ -1112,7 +1115,10 @@ def identified(found: Identified) -> Figure:
     >>> import clutch
     >>> figure = clutch.plot.identified(clutch.identify("board_smc_2"))
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(180 * MM, 70 * MM), layout="constrained")
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(180 * _MM, 70 * _MM), layout="constrained")
     told = [key for key in _TOLD if key in found.parameters]
     for row, key in enumerate(reversed(told)):
         e = found.parameters[key]
@@ -1151,8 +1157,11 @@ def candidates(runs: Mapping[str, Result], chosen: str | None = None) -> Figure:
     >>> import clutch
     >>> figure = clutch.plot.candidates({"SMC": clutch.simulate("smc_2")})
     """
+    import matplotlib.pyplot as plt
+    import numpy as np
+
     rows = max(len(runs), 1)
-    size = (150 * MM, (14 * rows + 12) * MM)
+    size = (150 * _MM, (14 * rows + 12) * _MM)
     figure, grid = plt.subplots(rows, 1, figsize=size, sharex=True, squeeze=False, layout="constrained")
     most = max((float(np.max(np.abs(_error_deg(run)))) for run in runs.values()), default=1.0)
     scale = min(most, 0.5)

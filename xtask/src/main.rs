@@ -149,6 +149,16 @@ enum Verb {
         #[arg(default_value_t = 10_001)]
         seed: u64,
     },
+    /// Identifies and tunes hidden random rigs, and drives them by the loop in virtual time: the table of docs/tune.md, half an
+    /// hour.
+    Tune {
+        /// Rigs.
+        #[arg(default_value_t = 50)]
+        rigs: u64,
+        /// Seed of the first.
+        #[arg(default_value_t = 30_001)]
+        seed: u64,
+    },
     /// Compares the engines with SciPy over random single intervals: the table of docs/theory.md, section 10.
     Intervals {
         /// Intervals, half of them of extreme parameters.
@@ -221,7 +231,10 @@ fn main() -> Result<()> {
         Verb::Certified { runs } => certified(runs),
         Verb::Smooth => smooth(),
         Verb::Meter => meter(),
-        Verb::Identify { rigs, seed } => identify(rigs, seed),
+        Verb::Identify { rigs, seed } => {
+            random_rigs("clutch-identify", "docs/identify.md", rigs, seed)
+        }
+        Verb::Tune { rigs, seed } => random_rigs("clutch-tune", "docs/tune.md", rigs, seed),
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
         Verb::Ablate { runs } => ablate::all(runs),
         Verb::Lies { trials } => lies(trials),
@@ -334,15 +347,16 @@ fn meter() -> Result<()> {
     Ok(())
 }
 
-fn identify(rigs: u64, seed: u64) -> Result<()> {
-    let example = ["run", "--release", "--package", "clutch-identify", "--example", "campaign", "--"];
+/// The campaign of a package over random rigs, into its page.
+fn random_rigs(package: &str, page: &str, rigs: u64, seed: u64) -> Result<()> {
+    let example = ["run", "--release", "--package", package, "--example", "campaign", "--"];
     let (done, text) = cargo(example).args([rigs.to_string(), seed.to_string()]).quietly()?;
     anyhow::ensure!(done, "the campaign failed:\n{text}");
     let (table, last): (Vec<&str>, Vec<&str>) = text
         .lines()
         .filter(|l| l.starts_with('|') || l.contains("rigs from seed"))
         .partition(|l| l.starts_with('|'));
-    write_between("docs/identify.md", "campaign", &format!("{}\n\n{}", table.join("\n"), last.join("\n")))
+    write_between(page, "campaign", &format!("{}\n\n{}", table.join("\n"), last.join("\n")))
 }
 
 /// The table that an example of the simulator prints.

@@ -1,0 +1,86 @@
+//! Gains for a rig: what is given out, what is refused, and that the same comes again.
+
+use clutch_certificate::checker;
+use clutch_sim::progress::UNWATCHED;
+use clutch_sim::scenario::Value;
+use clutch_sim::{Keep, Scenario};
+use clutch_tune::{Options, Standing, Tuned, Verdict, tune};
+
+fn scenario(set: &[(&str, &str)]) -> Scenario {
+    let set: Vec<(String, String)> = set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let text = Scenario::text("board_smc_2".as_ref()).unwrap().1;
+    Scenario::parse("rig", &text, &set).unwrap()
+}
+
+fn few() -> Options {
+    Options { candidates: 3, ..Options::default() }
+}
+
+fn tuned(set: &[(&str, &str)], options: &Options) -> Tuned {
+    tune(&scenario(set), None, options, UNWATCHED).unwrap()
+}
+
+#[test]
+fn the_paper_rig_gets_a_certified_law_that_slides_and_the_same_again() {
+    let found = tuned(&[], &few());
+    let winner = found.winner().expect("a winner");
+    assert_eq!((winner.name.as_str(), &winner.standing), ("glide in a shell", &Standing::Chosen));
+    let Verdict::Certified { error_rad, shell: true, ref lines } = winner.verdict else { panic!("{winner:?}") };
+    assert!(lines[0].contains("with any inner law") && lines[0].contains("from rest"), "{lines:?}");
+    // The proof is the scenario's, and holds.
+    let certificate = found.certificate.as_ref().unwrap();
+    assert_eq!(checker::check(certificate).unwrap().error_bound, error_rad);
+    let scenario = winner.scenario.as_ref().unwrap();
+    assert_eq!(scenario.sampled_setup(&scenario.plan().unwrap().bounds).unwrap(), certificate.setup);
+    // The file alone gives the run back, on a disc that nobody has seen, and it slides within the bound.
+    let seed = [("run.seed".to_owned(), Value::Integer(777))];
+    let again = Scenario::from_table("tuned", scenario.canonical().parse().unwrap(), &seed).unwrap();
+    let metrics = again.run(Keep::Figures, UNWATCHED).unwrap().metrics;
+    assert_eq!(metrics.stick_slip_cycles_per_s, 0.0);
+    assert!(metrics.max_error_rad < error_rad && metrics.max_error_rad < 0.1_f64.to_radians(), "{metrics:?}");
+    // Each law is in the table, and nothing that was looked at is smoother and certified.
+    assert!(found.candidates.len() >= 5, "{:?}", found.candidates);
+    let costs: Vec<f64> = found.candidates.iter().filter_map(|c| c.score.cost).collect();
+    assert!(costs.windows(2).all(|w| w[0] <= w[1]), "{costs:?}");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let alone = pool.install(|| tuned(&[], &few()));
+    assert_eq!(format!("{:?}", alone.candidates), format!("{:?}", found.candidates));
+}
+
+#[test]
+fn without_a_certificate_nothing_is_given_out_unless_that_is_asked_for() {
+    // A lag has no sampled certificate.
+    let lag = [("rig.actuator_time_constant_s", "0.001")];
+    let found = tuned(&lag, &few());
+    assert!(found.winner().is_none() && found.certificate.is_none());
+    let limits = |c: &clutch_tune::Candidate| matches!(&c.standing, Standing::Uncertified { why } if why.contains("a lag"));
+    assert!(found.candidates.iter().any(limits), "{:?}", found.candidates);
+    let found = tuned(&lag, &Options { uncertified: true, ..few() });
+    let winner = found.winner().expect("a winner");
+    assert!(matches!(winner.verdict, Verdict::Uncertified { .. }), "{winner:?}");
+    assert_eq!(found.from_rest.unwrap().runs_with_sticks, 0);
+}
+
+#[test]
+fn what_sticks_from_rest_is_refused() {
+    // Below what 20 000 counts allow, every law sticks.
+    let slow = [("rig.base", "bench"), ("reference.ramp.rate_deg_s", "0.2")];
+    let found = tuned(&slow, &Options { uncertified: true, candidates: 1, ..Options::default() });
+    assert!(found.winner().is_none(), "{:?}", found.winner());
+    let refused = |c: &clutch_tune::Candidate| matches!(&c.standing, Standing::Refused { why } if why.contains("it sticks in"));
+    assert!(found.candidates.iter().any(refused), "{:?}", found.candidates);
+}
+
+#[test]
+fn mistakes_are_named_by_key_value_and_expectation() {
+    let refusal = |set: &[(&str, &str)], options: Options| {
+        tune(&scenario(set), None, &options, UNWATCHED).unwrap_err().to_string()
+    };
+    let rates = |rates: &[f64]| Options { rates_deg_s: rates.to_vec(), ..few() };
+    assert!(refusal(&[], rates(&[2.0, -1.0])).contains("rates = -1: expected finite numbers above 0 °/s"));
+    let none = refusal(&[], Options { candidates: 0, ..few() });
+    assert!(none.contains("candidates = 0: expected a whole number from 1 to 10000"), "{none}");
+    let motor = Scenario::built_in("motor_pid").unwrap().unwrap();
+    let motor = tune(&motor, None, &few(), UNWATCHED).unwrap_err().to_string();
+    assert!(motor.contains("a ramp") || motor.contains("brake"), "{motor}");
+}

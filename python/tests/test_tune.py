@@ -1,0 +1,96 @@
+"""Identification and tuning from Python: the command's figures, refusals, pictures."""
+
+import json
+import subprocess
+import sys
+
+import matplotlib.pyplot as plt
+import pytest
+
+import clutch
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return clutch.identify("board_smc_2")
+
+
+@pytest.fixture(scope="module")
+def tuned(rig):
+    return clutch.tune("board_smc_2", identified=rig, candidates=2)
+
+
+def command(*words):
+    ran = subprocess.run([sys.executable, "-m", "clutch", *words], capture_output=True, check=True)
+    return json.loads(ran.stdout)
+
+
+def test_identification_is_the_commands_and_holds_the_truth(rig):
+    told = command("identify", "board_smc_2", "--json")
+    for key, row in told["parameters"].items():
+        assert rig.refused[key] == row["refused"] if "refused" in row else vars(rig.parameters[key]) == row
+    assert rig.parameters["pull_rad_s2"].holds(0.047088 / 0.0017)
+    assert not rig.parameters["pull_rad_s2"].holds(20)
+    assert "mass" in rig.refused["each"]
+    assert "[bounds]" in rig.to_toml()
+
+
+def test_the_scenario_as_identified_moves_as_the_rig_does(rig):
+    believed = rig.scenario
+    assert believed.rig.inertia_kg_m2 == believed.model.inertia_kg_m2
+    own, theirs = (clutch.simulate(s, overrides={"run.duration_s": 3.0}) for s in ("board_smc_2", believed))
+    assert own.metrics.max_error_rad == pytest.approx(theirs.metrics.max_error_rad, rel=0.5)
+
+
+def test_tuning_is_the_commands(rig, tuned, tmp_path):
+    file = tmp_path / "rig.toml"
+    file.write_text(rig.to_toml(), encoding="utf-8")
+    told = command("tune", "board_smc_2", "--identified", str(file), "--candidates", "2", "--json")
+    assert [c.name for c in tuned.candidates] == [c["name"] for c in told["candidates"]]
+    assert [c.cost for c in tuned.candidates] == [c["score"]["cost"] for c in told["candidates"]]
+    assert tuned.winner is tuned.candidates[told["chosen"]]
+
+
+def test_what_is_given_out_slides_is_proven_and_runs(tuned, tmp_path):
+    assert tuned.winner.standing == "chosen" and tuned.winner.runs_with_sticks == 0
+    assert "|e| stays below" in tuned.verdict
+    result = clutch.simulate(tuned.scenario, overrides={"run.seed": 999, "run.duration_s": 3.0})
+    assert result.metrics.stick_slip_cycles_per_s == 0
+    assert result.metrics.max_error_rad < tuned.winner.error_bound_rad
+    tuned.save_proof(tmp_path / "proof.json")
+    assert json.loads((tmp_path / "proof.json").read_text())["setup"]["delay_ticks"] == 0
+    table = tuned.to_pandas()
+    assert table.loc[tuned.winner.name, "standing"] == "chosen"
+
+
+def test_pictures_have_what_they_say(rig, tuned):
+    left, right = rig.plot().axes
+    assert len(left.get_yticklabels()) == len(rig.parameters) and len(right.lines) == 1
+    figure = tuned.plot(duration_s=2)
+    titles = [ax.get_title(loc="left") for ax in figure.axes]
+    assert f"{tuned.winner.name} (chosen)" in titles
+    plt.close("all")
+
+
+@pytest.mark.parametrize(
+    ("scenario", "more", "field", "said"),
+    [
+        ("minimum_jerk", {}, "reference", "a ramp"),
+        ("board_smc_2", {"rates_deg_s": [-1]}, "rates", "rates = -1: expected finite numbers above 0 °/s"),
+        ("board_smc_2", {"candidates": 0}, "candidates", "a whole number from 1 to 10000"),
+    ],
+)
+def test_what_cannot_be_tuned_is_refused_by_key_and_value(scenario, more, field, said):
+    with pytest.raises(clutch.ParamError) as refused:
+        clutch.tune(scenario, **more)
+    assert refused.value.field == field
+    assert said in str(refused.value)
+
+
+def test_without_a_certificate_nothing_is_given_out():
+    tuned = clutch.tune("board_smc_2", candidates=1, overrides={"rig.actuator_time_constant_s": 0.001})
+    assert tuned.winner is None and "a lag" in tuned.verdict
+    with pytest.raises(ValueError, match="no gains are given out"):
+        _ = tuned.scenario
+    with pytest.raises(ValueError, match="nothing is proven"):
+        tuned.save_proof("never.json")
