@@ -231,9 +231,7 @@ fn main() -> Result<()> {
         Verb::Certified { runs } => certified(runs),
         Verb::Smooth => smooth(),
         Verb::Meter => meter(),
-        Verb::Identify { rigs, seed } => {
-            random_rigs("clutch-identify", "docs/identify.md", rigs, seed)
-        }
+        Verb::Identify { rigs, seed } => random_rigs("clutch-identify", "docs/identify.md", rigs, seed),
         Verb::Tune { rigs, seed } => random_rigs("clutch-tune", "docs/tune.md", rigs, seed),
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
         Verb::Ablate { runs } => ablate::all(runs),

@@ -109,9 +109,12 @@ impl Tune {
 /// The tuned scenario as a file.
 #[must_use]
 pub fn scenario_file(tuned: &Tuned, winner: &Scenario) -> String {
-    let comment = |line: &str| paragraph(line).lines().map(|l| format!("# {}\n", l.trim_start())).collect::<String>();
+    let comment =
+        |line: &str| paragraph(line).lines().map(|l| format!("# {}\n", l.trim_start())).collect::<String>();
     let verdict = comment(&format!("Found by `clutch tune`. {}", verdict(tuned)));
-    let rig = comment("[rig] is the rig as it is believed to be, from [model] and what was identified; a board has its own.");
+    let rig = comment(
+        "[rig] is the rig as it is believed to be, from [model] and what was identified; a board has its own.",
+    );
     format!("{verdict}{rig}\n{}", winner.canonical())
 }
 
@@ -154,7 +157,9 @@ fn lost(c: &Candidate) -> String {
     match &c.standing {
         Standing::Chosen => "chosen".to_owned(),
         Standing::Rougher { than } => format!("rougher, by {:.2}", c.score.cost.unwrap_or(0.0) - than),
-        Standing::Uncertified { why } if why.is_empty() => "not looked at: nothing smoother is certified".to_owned(),
+        Standing::Uncertified { why } if why.is_empty() => {
+            "not looked at: nothing smoother is certified".to_owned()
+        }
         Standing::Uncertified { why } => format!("uncertified: {why}"),
         Standing::Refused { why } => format!("refused: {why}"),
         Standing::Strays => "leaves its path on a corner of the bounds".to_owned(),
@@ -198,7 +203,11 @@ fn about(tuned: &Tuned) -> String {
         "At {} °/s, from rest, {} of the bounds; figures are the worst of runs on discs 101 to 108, the first second left out. Cost: \
          cycles/s + 30 × RMS error, ° + longest stick/20 ms. {:.0} s were simulated.",
         rates.join(", "),
-        if tuned.corners.len() == 1 { "1 corner".to_owned() } else { format!("{} corners", tuned.corners.len()) },
+        if tuned.corners.len() == 1 {
+            "1 corner".to_owned()
+        } else {
+            format!("{} corners", tuned.corners.len())
+        },
         tuned.simulated_s
     )
 }
@@ -225,7 +234,8 @@ fn text(tuned: &Tuned) -> String {
     out += &paragraph(&about(tuned));
     for c in &tuned.candidates {
         let (tried, unstable) = c.tried;
-        let left_out = if unstable > 0 { format!(", {unstable} left out as unstable") } else { String::new() };
+        let left_out =
+            if unstable > 0 { format!(", {unstable} left out as unstable") } else { String::new() };
         out += &paragraph(&format!("{}: {}; {tried} sets of gains{left_out}", c.name, lost(c)));
     }
     for (shell, why) in &tuned.open_shells {
@@ -283,7 +293,11 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
         panel.y_range = Some((-scale, scale));
     }
     Ok(Figure {
-        title: format!("{}: error at {} °/s from rest, disc {DRAWN}", tuned.believed.name(), number(tuned.rates_deg_s[0])),
+        title: format!(
+            "{}: error at {} °/s from rest, disc {DRAWN}",
+            tuned.believed.name(),
+            number(tuned.rates_deg_s[0])
+        ),
         columns: 2,
         panels,
     })
@@ -311,7 +325,8 @@ fn page(tuned: &Tuned) -> anyhow::Result<String> {
         ));
     }
     intro.extend(tuned.candidates.iter().map(|c| format!("{}: {}", c.name, lost(c))));
-    let caption = "Error of the best gains of each law, from rest, on a disc that no gain was chosen on.".to_owned();
+    let caption =
+        "Error of the best gains of each law, from rest, on a disc that no gain was chosen on.".to_owned();
     let figure = ReportFigure { id: "tune".to_owned(), caption, svg: figure(tuned)?.svg()? };
     let settings = tuned.winner().and_then(|w| w.scenario.as_ref()).unwrap_or(&tuned.believed).parameters();
     Ok(report::html(&title, &intro, &[], &[figure], &[], &settings))

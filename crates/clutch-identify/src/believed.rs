@@ -43,10 +43,15 @@ const NUMBER: i64 = 4;
 /// The rig is driven by other than a brake, or is refused.
 pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed, ScenarioError> {
     let kind = scenario.spec().rig.actuator.kind();
-    let refuse =
-        |key: &str, value: &str, expected: &str| Err(ScenarioError::value(scenario.name(), key, value, expected));
+    let refuse = |key: &str, value: &str, expected: &str| {
+        Err(ScenarioError::value(scenario.name(), key, value, expected))
+    };
     if kind != ActuatorKind::Brake {
-        return refuse("rig.actuator", kind.name(), "brake, which drives nothing and is all that can be identified and tuned");
+        return refuse(
+            "rig.actuator",
+            kind.name(),
+            "brake, which drives nothing and is all that can be identified and tuned",
+        );
     }
     let mut table = scenario.table().clone();
     if let Some(file) = file {
@@ -97,7 +102,10 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
     let mass = spec.model.drive_torque / (weight.0 * weight.1);
     let weight = [("mass_kg", mass), ("gravity_m_s2", weight.0), ("pulley_radius_m", weight.1)];
     let weight = weight.into_iter().map(|(key, x)| (key.to_owned(), Value::Float(x))).collect::<Table>();
-    rig.insert("drive".to_owned(), Value::Table(Table::from_iter([("weight".to_owned(), Value::Table(weight))])));
+    rig.insert(
+        "drive".to_owned(),
+        Value::Table(Table::from_iter([("weight".to_owned(), Value::Table(weight))])),
+    );
     if let Some(ripple) = file.and_then(|file| file.ripple) {
         rig.insert("ripple".to_owned(), Value::Table(waves(&rig, ripple.value)));
         rig.remove("runout");
@@ -116,8 +124,10 @@ fn table_of(table: &Table, key: &str) -> Table {
 /// A disc with that ripple, in the band of the rig's own.
 fn waves(rig: &Table, rms: f64) -> Table {
     let own = rig.get("ripple").and_then(Value::as_table);
-    let wave = |key: &str, default: i64| own.and_then(|t| t.get(key)).and_then(Value::as_integer).unwrap_or(default);
-    let (lowest, highest) = (wave("lowest_waves_per_turn", WAVES[0]), wave("highest_waves_per_turn", WAVES[1]));
+    let wave =
+        |key: &str, default: i64| own.and_then(|t| t.get(key)).and_then(Value::as_integer).unwrap_or(default);
+    let (lowest, highest) =
+        (wave("lowest_waves_per_turn", WAVES[0]), wave("highest_waves_per_turn", WAVES[1]));
     // Evenly spaced from the lowest on, as far as the spacing divides it; else the one wave at the middle.
     let spacing = ((highest - lowest) / (NUMBER - 1)).max(1);
     let (lowest, spacing, highest) = if highest > lowest && spacing <= lowest {
@@ -155,5 +165,8 @@ fn corners(scenario: &Scenario) -> Result<Vec<Corner>, ScenarioError> {
     let pull = [torque[0] / inertia[1], torque[1] / inertia[0]];
     let hold = [torque[0] / (friction[1] * gain[1]), torque[1] / (friction[0] * gain[0])];
     let ends = |[low, high]: [f64; 2]| if high - low < NARROW { vec![1.0] } else { vec![low, high] };
-    Ok(ends(pull).into_iter().flat_map(|pull| ends(hold).into_iter().map(move |hold| Corner { pull, hold })).collect())
+    Ok(ends(pull)
+        .into_iter()
+        .flat_map(|pull| ends(hold).into_iter().map(move |hold| Corner { pull, hold }))
+        .collect())
 }

@@ -139,7 +139,8 @@ impl RigFile {
         };
         let told = |key: &str| {
             let row = file.get("identified")?.get(key)?;
-            let end = |end: &str| row.get(end).and_then(Value::as_float).filter(|x| x.is_finite() && *x >= 0.0);
+            let end =
+                |end: &str| row.get(end).and_then(Value::as_float).filter(|x| x.is_finite() && *x >= 0.0);
             Some(Estimate { value: end("value")?, low: end("low")?, high: end("high")? })
         };
         Ok(RigFile {

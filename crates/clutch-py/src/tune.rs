@@ -45,7 +45,8 @@ pub(crate) fn identify<'py>(
     for path in &logs {
         let name = path.display().to_string();
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
-            let text = std::fs::read_to_string(path).map_err(|e| os_error(py, path, &format!("{name}: {e}"), &e))?;
+            let text =
+                std::fs::read_to_string(path).map_err(|e| os_error(py, path, &format!("{name}: {e}"), &e))?;
             let spec = scenario.0.spec();
             let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev);
             let read = Recording::from_csv(&name, &text, (&columns.0, &columns.1), scale);
@@ -61,8 +62,9 @@ pub(crate) fn identify<'py>(
     }
     let found = py.detach(|| {
         let recordings = if logs.is_empty() {
-            let mut board =
-                log.map_or_else(VirtualBoard::default, |folder| VirtualBoard::logging(folder, clutch_cli::BUILD));
+            let mut board = log.map_or_else(VirtualBoard::default, |folder| {
+                VirtualBoard::logging(folder, clutch_cli::BUILD)
+            });
             experiment(&scenario.0, &Programme::default(), &mut |name, part| board.run(name, part))?
         } else {
             recordings
@@ -118,7 +120,8 @@ pub(crate) fn tune<'py>(
     }
     let tuned = found.map_err(|e| scenario.error(py, &e))?;
     let object = serde_json::to_value(&tuned).map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
-    let files = tuned.candidates.iter().map(|c| c.scenario.as_ref().map(clutch_sim::Scenario::canonical)).collect();
+    let files =
+        tuned.candidates.iter().map(|c| c.scenario.as_ref().map(clutch_sim::Scenario::canonical)).collect();
     let proof = tuned.certificate.as_ref().map(serde_json::to_string).transpose();
     let proof = proof.map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
     Ok((from_json(py, &object)?, files, clutch_cli::tune::verdict(&tuned), proof))

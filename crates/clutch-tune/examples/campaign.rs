@@ -44,7 +44,10 @@ struct Course {
 /// What tuning is given: the hidden rig's bounds and safe state, and of its rig nothing.
 fn known(truth: &Truth) -> Outcome<Scenario> {
     let mut table = truth.scenario.table().clone();
-    table.insert("rig".to_owned(), Value::Table(Table::from_iter([("base".to_owned(), Value::String("paper".to_owned()))])));
+    table.insert(
+        "rig".to_owned(),
+        Value::Table(Table::from_iter([("base".to_owned(), Value::String("paper".to_owned()))])),
+    );
     Ok(Scenario::from_table("rig", table, &[])?)
 }
 
@@ -173,7 +176,11 @@ fn detail(c: &Course) {
         100.0 * c.truth.ripple
     );
     let run = c.run.as_ref().map_or("no run".to_owned(), |(m, error, ended)| {
-        format!("{:.2} cycles/s, error up to {:.3}°, {ended:?}", m.stick_slip_cycles_per_s, error.to_degrees())
+        format!(
+            "{:.2} cycles/s, error up to {:.3}°, {ended:?}",
+            m.stick_slip_cycles_per_s,
+            error.to_degrees()
+        )
     });
     let winner = c.tuned.winner().map_or("nothing", |w| w.name.as_str());
     let proven = bound(c).map_or("UNCERTIFIED".to_owned(), |b| format!("≤ {:.3}°", b.to_degrees()));

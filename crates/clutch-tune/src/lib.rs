@@ -187,7 +187,11 @@ fn rates(scenario: &Scenario, options: &Options) -> Result<Vec<f64>, ScenarioErr
     let ReferenceParams::Ramp(ramp) = scenario.params().reference else {
         return wrong("reference", "another path", "a ramp, [reference.ramp]: gains are tuned for a rate");
     };
-    let mut rates = if options.rates_deg_s.is_empty() { vec![ramp.rate.to_degrees()] } else { options.rates_deg_s.clone() };
+    let mut rates = if options.rates_deg_s.is_empty() {
+        vec![ramp.rate.to_degrees()]
+    } else {
+        options.rates_deg_s.clone()
+    };
     if let Some(bad) = rates.iter().find(|rate| !(rate.is_finite() && **rate > 0.0)) {
         return wrong("rates", &bad.to_string(), "finite numbers above 0 °/s");
     }
@@ -272,14 +276,14 @@ impl Job<'_> {
             return Ok(nothing);
         }
         let first = self.scores(&refs(&stable), &BELIEVED, FIRST, SHORT_S)?;
-        let mut kept: Vec<(f64, (Scenario, Gains))> =
-            first.iter().map(Score::order).zip(stable).collect();
+        let mut kept: Vec<(f64, (Scenario, Gains))> = first.iter().map(Score::order).zip(stable).collect();
         kept.sort_by(|a, b| a.0.total_cmp(&b.0)); // stable: ties stay in order
         kept.truncate(KEPT);
         let kept: Vec<(Scenario, Gains)> = kept.into_iter().map(|(_, candidate)| candidate).collect();
         let second = self.scores(&refs(&kept), &self.corners, CHOOSING, LONG_S)?;
         let simulated = first.iter().chain(&second).map(|s| s.simulated_s).sum::<f64>();
-        let best = (0..kept.len()).min_by(|a, b| second[*a].order().total_cmp(&second[*b].order())).unwrap_or(0);
+        let best =
+            (0..kept.len()).min_by(|a, b| second[*a].order().total_cmp(&second[*b].order())).unwrap_or(0);
         let Some((scenario, gains)) = kept.into_iter().nth(best) else { return Ok(nothing) };
         let score = Score { simulated_s: simulated, ..Score::default() };
         Ok(Finalist { gains, scenario: Some(scenario), score, ..nothing })
@@ -311,7 +315,14 @@ impl Job<'_> {
                         let scenario = Some(crate::within(scenario, shell)?);
                         let (gains, tried) = (f.gains.clone(), f.tried);
                         let score = Score::default();
-                        more.push(Finalist { family: f.family, gains, scenario, shell: Some(n), score, tried });
+                        more.push(Finalist {
+                            family: f.family,
+                            gains,
+                            scenario,
+                            shell: Some(n),
+                            score,
+                            tried,
+                        });
                     }
                     all.extend(more);
                     break;
@@ -355,7 +366,9 @@ impl Job<'_> {
             let in_shell = scenario.params().shell.boundary > 0.0;
             let bounds = match (&self.delay_between, in_shell) {
                 (Some(why), _) => Err(why.clone()),
-                (None, true) => shell.take().map_or_else(|| prove(&scenario, &self.rates_deg_s), |b| Ok(Ok(b)))?,
+                (None, true) => {
+                    shell.take().map_or_else(|| prove(&scenario, &self.rates_deg_s), |b| Ok(Ok(b)))?
+                }
                 (None, false) => prove(&scenario, &self.rates_deg_s)?,
             };
             match bounds {
@@ -433,7 +446,11 @@ impl Finalist {
     }
 
     fn told(self) -> Candidate {
-        let name = if self.shell.is_some() { format!("{} in a shell", self.family.name) } else { self.family.name.to_owned() };
+        let name = if self.shell.is_some() {
+            format!("{} in a shell", self.family.name)
+        } else {
+            self.family.name.to_owned()
+        };
         let standing = match (&self.scenario, self.score.cost) {
             (None, _) => Standing::Unstable,
             (_, None) => Standing::Strays,

@@ -42,7 +42,10 @@ pub(crate) struct Bounds {
 }
 
 /// Looks for a bound at each rate, the first of which is the scenario's; what limits, where there is none.
-pub(crate) fn prove(scenario: &Scenario, rates_deg_s: &[f64]) -> Result<Result<Bounds, String>, ScenarioError> {
+pub(crate) fn prove(
+    scenario: &Scenario,
+    rates_deg_s: &[f64],
+) -> Result<Result<Bounds, String>, ScenarioError> {
     let (mut lines, mut error_rad, mut first) = (Vec::new(), 0.0_f64, None);
     for rate in rates_deg_s {
         let set = [(RATE.to_owned(), Value::Float(*rate))];

@@ -25,7 +25,9 @@ fn the_paper_rig_gets_a_certified_law_that_slides_and_the_same_again() {
     let found = tuned(&[], &few());
     let winner = found.winner().expect("a winner");
     assert_eq!((winner.name.as_str(), &winner.standing), ("glide in a shell", &Standing::Chosen));
-    let Verdict::Certified { error_rad, shell: true, ref lines } = winner.verdict else { panic!("{winner:?}") };
+    let Verdict::Certified { error_rad, shell: true, ref lines } = winner.verdict else {
+        panic!("{winner:?}")
+    };
     assert!(lines[0].contains("with any inner law") && lines[0].contains("from rest"), "{lines:?}");
     // The proof is the scenario's, and holds.
     let certificate = found.certificate.as_ref().unwrap();
