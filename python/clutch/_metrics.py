@@ -26,6 +26,8 @@ class Metrics:
         Stick-slip cycles: entries into the stuck state, cycles/s.
     stick_time_fraction : float
         Share of the time that the shaft was stuck.
+    longest_stick_s : float
+        Longest time in one stick, s.
     stair_height_rad : float
         Stair height: largest movement between one stick and the next, 0 with fewer than two, rad.
     longest_rest_s : float
@@ -64,6 +66,7 @@ class Metrics:
     iae_rad_s: float
     stick_slip_cycles_per_s: float
     stick_time_fraction: float
+    longest_stick_s: float
     stair_height_rad: float
     longest_rest_s: float
     break_away_torque_nm: float | None
@@ -94,6 +97,7 @@ FIGURES = {
     "iae_rad_s": Figure("integral of |error|", "rad s", "° s", 57.29577951308232),
     "stick_slip_cycles_per_s": Figure("stick-slip", "cycles/s", "cycles/s", 1.0),
     "stick_time_fraction": Figure("time stuck", "1", "%", 100.0),
+    "longest_stick_s": Figure("longest stick", "s", "ms", 1000.0),
     "stair_height_rad": Figure("stair height", "rad", "°", 57.29577951308232),
     "longest_rest_s": Figure("longest rest", "s", "ms", 1000.0),
     "break_away_torque_nm": Figure("torque at break-away", "N m", "mN m", 1000.0),

@@ -1913,6 +1913,10 @@ class Bounds(_Params):
     reach_rate_rad_s2 : float, default 0.0
         Rate of reaching the sliding surface that the certificate shall give, in (15); above 0 the reaching
         time gets a bound. `γ`: a finite number of at least 0 rad/s².
+    ripple_percent : float or None, default None
+        The part of `friction_percent` that changes along the disc and with time; the rest is a mean that is
+        not known more closely. Absent: all of it is the mean's, and the sampled certificate adds the ripple
+        of the rig. A number of at least 0 and below 100 %; at most friction_percent, of which it is a part.
 
     Raises
     ------
@@ -1935,6 +1939,7 @@ class Bounds(_Params):
     motor_gain_percent: float = 0.0
     friction_percent: float = 0.0
     reach_rate_rad_s2: float = 0.0
+    ripple_percent: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
