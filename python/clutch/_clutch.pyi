@@ -718,6 +718,11 @@ def _plant(scenario: str, words: Sequence[int]) -> Plant:
     A pickled plant.
     """
 
+def as_identified(scenario: _model.Scenario | Scenario, file: str) -> str:
+    """
+    The scenario with the rig that it believes in, as TOML.
+    """
+
 def brake_gain(table: dict[str, Any]) -> float:
     """
     `K_COF` (18) of a brake's geometry, N m/V.
@@ -733,6 +738,12 @@ def friction_lab(scenario: Scenario) -> dict[str, Any]:
     """
     The experiments of the friction laboratory with the friction of a scenario's rig: by name, what was set and what was
     found.
+    """
+
+def identify(scenario: _model.Scenario | Scenario, logs: Sequence[str | PathLike[str]], columns: tuple[str, str], log: str | PathLike[str] | None) -> tuple[dict[str, Any], str | None, str | None]:
+    """
+    Identifies a rig: the object that `clutch identify --json` prints, and the rig file, or why there is none. Without logs
+    the scenario's simulated board is run, in virtual time.
     """
 
 def lowest_smooth_speed(scenario: _model.Scenario | Scenario, rates: Sequence[float] | None, discs: SupportsIndex) -> dict[str, Any]:
@@ -791,4 +802,9 @@ def simulate(scenario: _model.Scenario | Scenario, law: Callable[[Tick], float] 
 def steady_friction(scenario: Scenario, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     Coefficients of the steady friction of a scenario's rig at some velocities, rad/s, with their signs.
+    """
+
+def tune(scenario: _model.Scenario | Scenario, file: str | None, rates_deg_s: Sequence[float], candidates: SupportsIndex, uncertified: bool) -> tuple[dict[str, Any], list[str | None], str, str | None]:
+    """
+    Tunes a scenario: the object that `clutch tune --json` prints, and what goes with it.
     """

@@ -26,8 +26,8 @@ class Metrics:
         Stick-slip cycles: entries into the stuck state, cycles/s.
     stick_time_fraction : float
         Share of the time that the shaft was stuck.
-    longest_stick_s : float
-        Longest time in one stick, s.
+    longest_stick_s : float or None
+        Longest time in one stick, by the true motion, s.
     stair_height_rad : float
         Stair height: largest movement between one stick and the next, 0 with fewer than two, rad.
     longest_rest_s : float
@@ -66,7 +66,7 @@ class Metrics:
     iae_rad_s: float
     stick_slip_cycles_per_s: float
     stick_time_fraction: float
-    longest_stick_s: float
+    longest_stick_s: float | None
     stair_height_rad: float
     longest_rest_s: float
     break_away_torque_nm: float | None

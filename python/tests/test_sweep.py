@@ -22,6 +22,7 @@ FIGURES = [
     "iae_rad_s",
     "stick_slip_cycles_per_s",
     "stick_time_fraction",
+    "longest_stick_s",
     "stair_height_rad",
     "break_away_torque_nm",
     "control_variation_v_s",

@@ -37,6 +37,7 @@ fn the_help_of_every_verb_has_an_example() {
         &["reproduce", "--help"],
         &["loop", "--help"],
         &["identify", "--help"],
+        &["tune", "--help"],
         &["daq", "--help"],
         &["replay", "--help"],
         &["log", "info", "--help"],
@@ -276,6 +277,37 @@ fn the_referee_prints_a_table_of_80_columns_and_fails_where_a_case_is_missed() {
     let o = clutch(&["referee", "P9"]);
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).starts_with("clutch: P9: no such file, and no built-in case"), "{}", err(&o));
+}
+
+#[test]
+fn tuning_prints_who_lost_and_why_in_80_columns_and_writes_what_the_other_verbs_take() {
+    let dir = folder("tune");
+    let file = |name: &str| dir.join(name).to_str().unwrap().to_owned();
+    let (tuned, proof, page) = (file("tuned.toml"), file("proof.json"), file("tuned.html"));
+    let files = ["--out", &tuned, "--save", &proof, "--html", &page];
+    let o = clutch(&[&["tune", "board_smc_2", "--candidates", "2"][..], &files].concat());
+    let text = out(&o);
+    assert!(o.status.success(), "{}", err(&o));
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    for words in ["glide in a shell: chosen", "PD: rougher", "accepted: 10 starts from rest", "inside a certified shell: |e| stays"]
+    {
+        let flat = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(flat.contains(words), "lacks {words}:\n{text}");
+    }
+    let page = std::fs::read_to_string(page).unwrap();
+    assert!(page.contains("<svg") && page.contains("law.glide.kp_1_s"));
+    let checked = clutch(&["certify", &tuned, "--check", &proof]);
+    assert!(checked.status.success(), "{}{}", out(&checked), err(&checked));
+    assert!(clutch(&["sim", &tuned]).status.success());
+
+    // Nothing certified: nothing is given out, and the last line names what limits.
+    let lag = ["--set", "rig.actuator_time_constant_s=0.001", "--candidates", "1", "--out", &tuned];
+    let o = clutch(&[&["tune", "board_smc_2"][..], &lag].concat());
+    assert_eq!(o.status.code(), Some(2), "{}", out(&o));
+    assert!(out(&o).contains("no gains are given out") && out(&o).contains("--uncertified"), "{}", out(&o));
+    assert!(err(&o).contains("not written"), "{}", err(&o));
+    let o = clutch(&["tune", "minimum_jerk"]);
+    assert!(err(&o).contains("reference") && err(&o).contains("a ramp"), "{}", err(&o));
 }
 
 #[test]

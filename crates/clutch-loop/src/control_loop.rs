@@ -618,6 +618,7 @@ impl<'a, S: Station> Control<'a, S> {
         let detected = self.detector.finish(metrics.measured_s);
         metrics.stick_slip_cycles_per_s = detected.stick_slip_cycles_per_s;
         metrics.stick_time_fraction = detected.stick_time_fraction;
+        metrics.longest_stick_s = None;
         metrics.stair_height_rad = f64::from(self.detector.stair()) * self.radians;
         let _ = self.watch.log_dropped.fetch_max(self.dropped, Ordering::Relaxed);
         LoopReport {

@@ -121,8 +121,8 @@ figures! {
         STICK_SLIP stick_slip_cycles_per_s: f64, "stick-slip", "cycles/s" shown as "cycles/s" SAME;
         /// Share of the time that the shaft was stuck.
         STICK_TIME stick_time_fraction: f64, "time stuck", "1" shown as "%" PERCENT;
-        /// Longest time in one stick.
-        LONGEST_STICK longest_stick_s: f64, "longest stick", "s" shown as "ms" MILLI;
+        /// Longest time in one stick, by the true motion.
+        LONGEST_STICK longest_stick_s: Option<f64>, "longest stick", "s" shown as "ms" MILLI;
         /// Stair height: largest movement between one stick and the next, 0 with fewer than two.
         STAIR_HEIGHT stair_height_rad: f64, "stair height", "rad" shown as "°" DEGREES;
         /// Mean magnitude of the torque of drive and motor at which the shaft broke away.
@@ -310,7 +310,7 @@ impl MetricsBuilder {
             iae_rad_s: self.absolute * self.period,
             stick_slip_cycles_per_s: self.sticks as f64 / time,
             stick_time_fraction: self.stuck_time / time,
-            longest_stick_s: self.longest_stick,
+            longest_stick_s: Some(self.longest_stick),
             stair_height_rad: self.stair,
             break_away_torque_nm: (self.break_aways > 0)
                 .then(|| self.break_away_sum / self.break_aways as f64),

@@ -133,16 +133,17 @@ fn run(
         Err(RunError::Motion(_)) => return Ok(own),
         Err(e) => return Err(candidate.run_error(&e)),
     };
+    let longest = m.longest_stick_s.unwrap_or(0.0);
     let cost = m.stick_slip_cycles_per_s
         + PER_DEGREE * m.rms_error_rad.to_degrees()
-        + PER_SECOND * m.longest_stick_s;
+        + PER_SECOND * longest;
     let follows = m.max_error_rad < FAR && cost.is_finite();
     Ok(Score {
         cost: follows.then_some(cost),
         cycles_per_s: m.stick_slip_cycles_per_s,
         rms_error_rad: m.rms_error_rad,
         max_error_rad: m.max_error_rad,
-        longest_stick_s: m.longest_stick_s,
+        longest_stick_s: longest,
         runs_with_sticks: u32::from(m.stick_time_fraction > 0.0),
         ..own
     })
