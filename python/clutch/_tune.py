@@ -166,7 +166,7 @@ def identify(
     log: str | os.PathLike[str] | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> Identified:
-    """Find out what a rig is: T/J, delay, friction, ripple, damping, each with an interval, as ``clutch identify`` does.
+    """Find out what a rig is: T/J, delay, friction, ripple, damping, each with an interval: ``clutch identify``.
 
     Parameters
     ----------
@@ -221,7 +221,8 @@ class Candidate:
     gains : dict of str to float
         The gains that were varied, by their dotted keys, SI.
     cost : float or None
-        Cycles/s + 30 × RMS error in degrees + longest stick over 20 ms, on the worst of all runs; None if it left its path.
+        Cycles/s + 30 × RMS error in degrees + longest stick over 20 ms, on the worst of all runs; None if it
+        left its path.
     cycles_per_s : float
         Stick-slip cycles a second, in the worst run.
     max_error_rad : float
@@ -233,7 +234,8 @@ class Candidate:
     error_bound_rad : float or None
         What is proven of the error, rad; None where nothing is, or was not looked for.
     standing : str
-        ``"chosen"``, ``"rougher"``, ``"uncertified"``, ``"refused"`` (from rest it sticks), ``"strays"``, ``"unstable"``.
+        ``"chosen"``, ``"rougher"``, ``"uncertified"``, ``"refused"`` (it sticks from rest),
+        ``"strays"``, ``"unstable"``.
     why : str
         What limits, where it is uncertified or refused; else empty.
     scenario : Scenario or None
