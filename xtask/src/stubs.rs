@@ -100,7 +100,10 @@ const NAMED: &[(&str, &str)] = &[
     ("def identify(scenario: Any,", "def identify(scenario: _model.Scenario | Scenario,"),
     ("-> tuple[Any, str | None, str | None]", "-> tuple[dict[str, Any], str | None, str | None]"),
     ("def tune(scenario: Any,", "def tune(scenario: _model.Scenario | Scenario,"),
-    ("-> tuple[Any, list[str | None], str, str | None]", "-> tuple[dict[str, Any], list[str | None], str, str | None]"),
+    (
+        "-> tuple[Any, list[str | None], str, str | None]",
+        "-> tuple[dict[str, Any], list[str | None], str, str | None]",
+    ),
     ("def run_loop(scenario: Any,", "def run_loop(scenario: _model.Scenario | Scenario,"),
     ("-> tuple[Any, str, str, str | None]:", "-> tuple[dict[str, Any], str, str, str | None]:"),
     ("velocity: Incomplete) -> Incomplete", "velocity: NDArray[np.float64]) -> NDArray[np.float64]"),

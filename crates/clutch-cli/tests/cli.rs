@@ -289,8 +289,12 @@ fn tuning_prints_who_lost_and_why_in_80_columns_and_writes_what_the_other_verbs_
     let text = out(&o);
     assert!(o.status.success(), "{}", err(&o));
     assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
-    for words in ["glide in a shell: chosen", "PD: rougher", "accepted: 10 starts from rest", "inside a certified shell: |e| stays"]
-    {
+    for words in [
+        "glide in a shell: chosen",
+        "PD: rougher",
+        "accepted: 10 starts from rest",
+        "inside a certified shell: |e| stays",
+    ] {
         let flat = text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(flat.contains(words), "lacks {words}:\n{text}");
     }

@@ -134,9 +134,7 @@ fn run(
         Err(e) => return Err(candidate.run_error(&e)),
     };
     let longest = m.longest_stick_s.unwrap_or(0.0);
-    let cost = m.stick_slip_cycles_per_s
-        + PER_DEGREE * m.rms_error_rad.to_degrees()
-        + PER_SECOND * longest;
+    let cost = m.stick_slip_cycles_per_s + PER_DEGREE * m.rms_error_rad.to_degrees() + PER_SECOND * longest;
     let follows = m.max_error_rad < FAR && cost.is_finite();
     Ok(Score {
         cost: follows.then_some(cost),
