@@ -27,11 +27,9 @@ class Metrics:
     stick_time_fraction : float
         Share of the time that the shaft was stuck.
     longest_stick_s : float or None
-        Longest time in one stick, by the true motion, s.
+        Longest time in one stick, by the true motion, s; None if there is none.
     stair_height_rad : float
         Stair height: largest movement between one stick and the next, 0 with fewer than two, rad.
-    longest_rest_s : float
-        Longest rest between two motions, s.
     break_away_torque_nm : float or None
         Mean magnitude of the torque of drive and motor at which the shaft broke away, N m; None if there is none.
     control_variation_v_s : float
@@ -68,7 +66,6 @@ class Metrics:
     stick_time_fraction: float
     longest_stick_s: float | None
     stair_height_rad: float
-    longest_rest_s: float
     break_away_torque_nm: float | None
     control_variation_v_s: float
     jerk_rms_rad_s3: float
@@ -99,7 +96,6 @@ FIGURES = {
     "stick_time_fraction": Figure("time stuck", "1", "%", 100.0),
     "longest_stick_s": Figure("longest stick", "s", "ms", 1000.0),
     "stair_height_rad": Figure("stair height", "rad", "°", 57.29577951308232),
-    "longest_rest_s": Figure("longest rest", "s", "ms", 1000.0),
     "break_away_torque_nm": Figure("torque at break-away", "N m", "mN m", 1000.0),
     "control_variation_v_s": Figure("voltage variation", "V/s", "V/s", 1.0),
     "jerk_rms_rad_s3": Figure("jerk RMS", "rad/s³", "rad/s³", 1.0),

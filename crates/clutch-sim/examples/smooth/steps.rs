@@ -33,7 +33,7 @@ const RIGS: &[(&str, &[(&str, f64)])] = &[
 fn print_row(title: &str, of: &[Metrics], without: Option<&[Metrics]>) {
     let s = Summary::of(of);
     let largest = of.iter().map(|m| m.stair_height_rad).fold(0.0, f64::max).to_degrees();
-    let longest = of.iter().map(|m| m.longest_rest_s).fold(0.0, f64::max) * 1e3;
+    let longest = of.iter().map(|m| m.longest_stick_s.unwrap_or(0.0)).fold(0.0, f64::max) * 1e3;
     let without = without.map_or(String::new(), |runs| {
         let s = Summary::of(runs);
         format!(" {}, {:.3}° |", shown(s.cycles), s.error)
