@@ -298,7 +298,7 @@ impl SimBoard {
             self.params.boot = self.params.boot.wrapping_add(1);
             self.node = BoardNode::new(&self.params)?;
             self.next_sample_ns = None;
-            self.apply();
+            self.rig.reset(self.volts());
             return Ok(());
         }
         let counts = if loss { Counts(0) } else { self.frozen.unwrap_or(counts) };

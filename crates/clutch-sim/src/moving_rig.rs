@@ -163,6 +163,14 @@ impl MovingRig {
         }
     }
 
+    /// The converter's board was reset: it gives this voltage, V, and nothing is on its way any more. It has no periods until
+    /// it is configured, with which a delay would end.
+    pub fn reset(&mut self, volts: f64) {
+        self.commanded = volts;
+        self.arriving = volts;
+        self.line.iter_mut().for_each(|on_its_way| *on_its_way = volts);
+    }
+
     /// Time passes, s; what happened in it.
     ///
     /// # Errors

@@ -122,7 +122,8 @@ fn line(s: &Setting, t: &Trouble, kind: FaultKind, way: Direction, base: &Promis
                 let causes: &[Cause] = if up { &[Cause::Silence, Cause::Board] } else { &[] };
                 ends(watchdog + 0.6 * PERIOD, causes)
             } else if stays && up && t.often > 0.1 {
-                ends(0.5, &[Cause::Silence, Cause::Board, Cause::Lost])
+                // After many that were lost the next one may be too far away.
+                ends(0.5, &[Cause::Silence, Cause::Board, Cause::Lost, Cause::Jump])
             } else {
                 *base
             }
@@ -145,9 +146,6 @@ fn line(s: &Setting, t: &Trouble, kind: FaultKind, way: Direction, base: &Promis
         FaultKind::Delay(by) if always && stays && by > watchdog + PERIOD => {
             ends(watchdog + 0.6 * PERIOD, &[Cause::Silence, Cause::Board, Cause::Late])
         }
-        FaultKind::Delay(by) if by < 0.002 && !up && stays && (0.1..0.5).contains(&t.often) => {
-            ends(0.5, &[Cause::Late, Cause::Board])
-        }
         FaultKind::Jitter(by) if always && stays && by > 2.0 * watchdog => {
             ends(0.03, &[Cause::Silence, Cause::Board, Cause::Late])
         }
@@ -167,13 +165,21 @@ fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promis
     let ctc = s.law == "ctc";
     // Glide waits for the edges of a slow shaft, and for that of a first start; then it lets go for good.
     let glide = s.law == "glide";
-    let hidden = (ctc || glide) && t.at == 0.0 || s.path.slowest_deg_s() < if ctc { 10.0 } else { 3.0 };
+    // A path from rest asks for so little at first.
+    let from_rest = t.at == 0.0 && (ctc || glide || matches!(s.path, PathKind::MinimumJerk(_)));
+    let told = match s.law {
+        "ctc" => 10.0,
+        // Its error is in degrees, and its voltage as far off.
+        "pid" => 6.0,
+        _ => 3.0,
+    };
+    let hidden = from_rest || s.path.slowest_deg_s() < told;
     let exact = s.rig == RigName::Paper && !s.wide && s.delay == 0 && s.law != "pid";
     let open = by_the_way(s) + if glide { 0.08 } else { 0.0 };
     let way = Promise { blind: (!hidden).then_some(open), truthful: false, ..*base };
     let blind = Promise { blind: None, truthful: false, ..*base };
-    // Glide lets go for good after silence and two starts of 25 ms that brought no edge.
-    let within = if glide { 0.3 } else { 0.5 };
+    // Glide lets go for good after silence and two starts of 25 ms that brought no edge; a path from rest is slow first.
+    let within = if glide { 0.4 } else { 0.5 };
     let found = |causes| Promise { fate: Fate::Ends(within), causes, ..way };
     match kind {
         // The board sees it, and does not ask.
@@ -183,7 +189,7 @@ fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promis
             found(&[Cause::Channel, Cause::StandStill, Cause::TooSlow, Cause::Reversed])
         }
         FaultKind::EncoderScale(by) if by < 0.0 && stays && moves => {
-            found(&[Cause::Reversed, Cause::Channel, Cause::StandStill, Cause::TooSlow])
+            found(&[Cause::Reversed, Cause::Channel, Cause::StandStill, Cause::TooSlow, Cause::Jump])
         }
         // From the first sample on it is another zero, and nothing else.
         FaultKind::EncoderJump(_) if t.at == 0.0 => blind,
@@ -286,6 +292,13 @@ fn healthy_deg(s: &Setting) -> f64 {
 #[must_use]
 pub fn judge(draw: &Draw, o: &VirtualReport) -> Option<String> {
     let s = &draw.setting;
+    // A dead controller is seen by the board's clock alone: where that stands still, only a watchdog in hardware acts.
+    let has = |what: fn(&What) -> bool| draw.troubles.iter().any(|t| what(&t.what));
+    if has(|what| *what == What::ControllerDies)
+        && has(|what| matches!(what, What::Fault(FaultKind::Clock(by), _) if *by <= 0.0))
+    {
+        return None;
+    }
     let promises: Vec<Promise> = draw.troubles.iter().map(|t| Promise::of(s, t)).collect();
     output(draw, o).or_else(|| fate(draw, &promises, o)).or_else(|| degrees(s, &promises, o))
 }
@@ -356,6 +369,11 @@ fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> 
         let begun = if alone && hits(trouble) { o.hit } else { Some(trouble.at) };
         // It was never there.
         let Some(begun) = begun else { continue };
+        // Whoever plays old samples back keeps a line from being silent.
+        let played_back = |t: &Trouble| matches!(t.what, What::Fault(FaultKind::Forged(Forgery::Echo(_)), _));
+        if !alone && trouble.what != What::ControllerDies && draw.troubles.iter().any(played_back) {
+            continue;
+        }
         // Beside another, a whole period until it is there, and what a line that is broken as well takes to be found.
         let line = draw.troubles.iter().any(|t| match t.what {
             What::Fault(kind, _) => kind.silences(),
