@@ -12,7 +12,6 @@ use clutch_certificate::Certificate;
 use clutch_core::reference::ReferenceParams;
 use clutch_identify::{Believed, Corner, RigFile, believed};
 use clutch_sim::progress::Report;
-
 use clutch_sim::scenario::{Table, Value};
 use clutch_sim::smooth_speed::RATE;
 use clutch_sim::{Scenario, ScenarioError};
@@ -440,7 +439,7 @@ impl Job<'_> {
 }
 
 impl Finalist {
-    /// For sorting: a law without stable gains comes last. Of laws that are alike smooth, the one in a shell goes first.
+    /// For sorting: a law without stable gains comes last.
     fn rank(&self) -> f64 {
         if self.scenario.is_none() { f64::INFINITY } else { self.score.order() }
     }

@@ -142,9 +142,12 @@ impl<T: Real> Glide<T> {
 
     /// Demand of a period in which the shaft goes in steps, V, and terms.
     #[inline(never)]
-    fn step(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> (T, [T; 6]) {
+    fn step(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> (T, [T; 6]) {
         let filter = &self.estimator;
         let Seen { position, applied } = state.seen;
+        if !begun {
+            state.estimator = filter.start(position, applied, tick.target_velocity);
+        }
         let pace = filter.per_period(tick.target_velocity);
         if !state.steps.active() {
             let ahead = filter.ahead(&state.estimator).position;
@@ -194,6 +197,36 @@ impl<T: Real> Glide<T> {
             ActuatorKind::Motor => self.volts(T::ZERO, T::ZERO, T::ZERO),
             ActuatorKind::Brake | ActuatorKind::Both => self.volts(T::ZERO, T::splat(HELD) * friction, T::ONE),
         }
+    }
+
+    /// Demand of a period, V, and terms: of its own, so that a board's bound counts one of the two.
+    #[inline(never)]
+    fn decide(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> (T, [T; 6]) {
+        let begun = core::mem::replace(&mut state.begun, true);
+        let pace = self.estimator.per_period(tick.target_velocity);
+        if self.steps.takes(&state.steps, pace) {
+            self.step(state, tick, begun)
+        } else {
+            self.slide(state, tick, begun)
+        }
+    }
+
+    /// Demand of a period in which the shaft slides, V, and terms.
+    #[inline(never)]
+    fn slide(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> (T, [T; 6]) {
+        let filter = &self.estimator;
+        let Seen { position, applied } = state.seen;
+        let belief = &mut state.estimator;
+        if begun {
+            if state.steps.active() {
+                state.steps.end();
+                filter.take_over(belief, state.steps.position(), self.steps.friction(&state.steps));
+            }
+            filter.update(belief, position, applied, tick.target_velocity);
+        } else {
+            *belief = filter.start(position, applied, tick.target_velocity);
+        }
+        self.demand(belief, tick)
     }
 
     /// Demand of a period, V, and terms.
@@ -262,26 +295,7 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
     }
 
     fn update(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> Command<T, [T; 6]> {
-        let filter = &self.estimator;
-        let Seen { position, applied } = state.seen;
-        let begins = !state.begun;
-        if begins {
-            state.estimator = filter.start(position, applied, tick.target_velocity);
-            state.begun = true;
-        }
-        let (demand, terms) = if self.steps.takes(&state.steps, filter.per_period(tick.target_velocity)) {
-            self.step(state, tick)
-        } else {
-            let belief = &mut state.estimator;
-            if state.steps.active() {
-                state.steps.end();
-                filter.take_over(belief, state.steps.position(), self.steps.friction(&state.steps));
-            }
-            if !begins {
-                filter.update(belief, position, applied, tick.target_velocity);
-            }
-            self.demand(belief, tick)
-        };
+        let (demand, terms) = self.decide(state, tick);
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
         Command { voltage, limit, terms }
     }

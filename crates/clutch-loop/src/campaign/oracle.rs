@@ -199,7 +199,8 @@ fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promis
         FaultKind::DacStuck(StuckAt::Volts(v)) if stays && s.rig != RigName::Motor && v < 0.01 => {
             // A path that begins with a jump asks for an open brake, until a shaft that falls is as fast.
             let start = if t.at == 0.0 { 0.02 + s.path.top_deg_s() / 1587.0 } else { 0.0 };
-            Promise { fate: Fate::Ends(2.0 * by_the_way(s) + start), causes: &[Cause::TooFast], ..blind }
+            let within = 2.0 * by_the_way(s) + PERIOD + start;
+            Promise { fate: Fate::Ends(within), causes: &[Cause::TooFast], ..blind }
         }
         FaultKind::DacStuck(StuckAt::Volts(v)) if stays && moves && v > 9.0 => {
             Promise { fate: Fate::Ends(0.5), ..blind }
