@@ -29,7 +29,7 @@ pub const GAIN_DOUBT: f64 = 0.2;
 /// this much.
 pub const RISE_BELIEVED: f64 = 0.5;
 /// Share by which friction changes along the disc, 1/rad: a ripple of 15 % with 340 waves per turn, as
-/// [`clutch_core::EdgeTimedParams`] believes it.
+/// the defaults of the edge-timed filter have it.
 pub const ROUGHNESS: f64 = 0.15 * 340.0;
 /// Periods from a voltage to its effect: from 0 to this, or to what a filter was told if that is more.
 const DELAY: u32 = 1;
