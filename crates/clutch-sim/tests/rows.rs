@@ -17,6 +17,7 @@ const SAMPLES: &[(&str, &str)] = &[
     ("rig.base", "\"paper\""),
     ("rig.ripple.rms", "0.05"),
     ("rig.runout.amplitude", "0.2"),
+    ("bounds.ripple_percent", "0.0"), // a part of the default friction_percent
     ("amplitude_deg", "0.1"),
     ("actuator.motor.preload_nm", "0.1"),
     ("volts_v", "4.5"),
