@@ -146,6 +146,12 @@ fn line(s: &Setting, t: &Trouble, kind: FaultKind, way: Direction, base: &Promis
         FaultKind::Delay(by) if always && stays && by > watchdog + PERIOD => {
             ends(watchdog + 0.6 * PERIOD, &[Cause::Silence, Cause::Board, Cause::Late])
         }
+        // With a period of delay of its own the rig's codes are now and then not late often enough.
+        FaultKind::Delay(by)
+            if by < 0.002 && !up && stays && s.delay == 0 && (0.1..0.5).contains(&t.often) =>
+        {
+            ends(0.5, &[Cause::Late, Cause::Board])
+        }
         FaultKind::Jitter(by) if always && stays && by > 2.0 * watchdog => {
             ends(0.03, &[Cause::Silence, Cause::Board, Cause::Late])
         }
