@@ -43,7 +43,7 @@ class Metrics:
     detected_stairs_per_s : float
         Stairs: silences in which the shaft fell a count or more behind even motion, 1/s.
     detected_least_cycles_per_s : float or None
-        Least stick-slip cycles with which counts and voltage agree; not of a run of which only figures are kept, cycles/s; None if there is none.
+        Least stick-slip cycles with which counts and voltage agree, cycles/s; None if there is none.
     detected_most_cycles_per_s : float or None
         Most stick-slip cycles with which counts and voltage agree, cycles/s; None if there is none.
     detected_told_cycles_per_s : float or None

@@ -143,7 +143,7 @@ figures! {
         STICK_TIME stick_time_fraction: f64, "time stuck seen by the encoder", "1" shown as "%" PERCENT;
         /// Stairs: silences in which the shaft fell a count or more behind even motion.
         STAIRS stairs_per_s: f64, "stairs of a count seen by the encoder", "1/s" shown as "1/s" SAME;
-        /// Least stick-slip cycles with which counts and voltage agree; not of a run of which only figures are kept.
+        /// Least stick-slip cycles with which counts and voltage agree.
         LEAST least_cycles_per_s: Option<f64>, "least stick-slip by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
         /// Most stick-slip cycles with which counts and voltage agree.
         MOST most_cycles_per_s: Option<f64>, "most stick-slip by counts and voltage", "cycles/s" shown as "cycles/s" SAME;
