@@ -740,7 +740,7 @@ def friction_lab(scenario: Scenario) -> dict[str, Any]:
     found.
     """
 
-def identify(scenario: _model.Scenario | Scenario, logs: SupportsGetItem[int, str | PathLike[str]], columns: tuple[str, str], log: str | PathLike[str] | None) -> tuple[dict[str, Any], str | None, str | None]:
+def identify(scenario: _model.Scenario | Scenario, logs: Sequence[str | PathLike[str]], columns: tuple[str, str], log: str | PathLike[str] | None) -> tuple[dict[str, Any], str | None, str | None]:
     """
     Identifies a rig: the object that `clutch identify --json` prints, and the rig file, or why there is none. Without logs
     the scenario's simulated board is run, in virtual time.
@@ -804,7 +804,7 @@ def steady_friction(scenario: Scenario, velocity: NDArray[np.float64]) -> NDArra
     Coefficients of the steady friction of a scenario's rig at some velocities, rad/s, with their signs.
     """
 
-def tune(scenario: _model.Scenario | Scenario, file: str | None, rates_deg_s: SupportsGetItem[int, SupportsFloat | SupportsIndex], candidates: SupportsIndex, uncertified: bool) -> tuple[dict[str, Any], list[str | None], str, str | None]:
+def tune(scenario: _model.Scenario | Scenario, file: str | None, rates_deg_s: Sequence[float], candidates: SupportsIndex, uncertified: bool) -> tuple[dict[str, Any], list[str | None], str, str | None]:
     """
     Tunes a scenario: the object that `clutch tune --json` prints, and what goes with it.
     """

@@ -25,6 +25,8 @@ const NAMED: &[(&str, &str)] = &[
     ),
     ("SupportsGetItem[int, str]", "Sequence[str]"),
     ("SupportsGetItem[int, SupportsIndex]", "Sequence[int]"),
+    ("logs: SupportsGetItem[int, str | PathLike[str]]", "logs: Sequence[str | PathLike[str]]"),
+    ("rates_deg_s: SupportsGetItem[int, SupportsFloat | SupportsIndex]", "rates_deg_s: Sequence[float]"),
     (
         "scenario: Scenario | None = None, law: Any | None = None)",
         "scenario: Scenario | None = None, law: Callable[[Tick], float] | _run.SteppedLaw | None = None)",
