@@ -454,8 +454,12 @@ def _seeds(seeds: int | Iterable[int]) -> tuple[int, ...]:
     return _values("seeds", range(1, n + 1))
 
 
+_OF_SAMPLES = {"detected_least_cycles_per_s", "detected_most_cycles_per_s", "detected_told_cycles_per_s"}
+
+
 def _known_metrics(metrics: str | Sequence[str] | None) -> list[str]:
-    known = [*FIGURES, "certified"]
+    # Those that a run has of which only figures are kept.
+    known = [*(name for name in FIGURES if name not in _OF_SAMPLES), "certified"]
     chosen = [metrics] if isinstance(metrics, str) else known if metrics is None else list(metrics)
     unknown = [m for m in chosen if m not in known]
     if unknown:

@@ -393,7 +393,7 @@ def wrong_types(cls, name):
         return [x for x in NOT_A_COUNT if name != "seed" or x != 2**32]
     if kind is float:
         return NOT_A_NUMBER
-    if name in ("actuator_time_constant_s", "start_counts"):
+    if name in ("actuator_time_constant_s", "start_counts", "ripple_percent"):
         return [x for x in NOT_A_NUMBER if x is not None]
     return ["", None, object(), math.nan, "\ud800"]
 
