@@ -363,6 +363,11 @@ impl<T: Real> EdgeTimed<T> {
         T::from_u64(u64::from(self.delay))
     }
 
+    /// Periods of the actuator's lag.
+    pub(crate) fn lag(&self) -> T {
+        self.lag_periods
+    }
+
     /// Periods in which an edge has to come after a start.
     #[must_use]
     pub fn patience(&self) -> T {

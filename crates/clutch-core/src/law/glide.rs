@@ -124,7 +124,7 @@ impl<T: Real> Glide<T> {
         let (pull, load) = filter.forces(self.stepping(Stepping::first(way)));
         let go = way * pull - load;
         let (pull, load) = filter.forces(self.stepping(Stepping::Hold));
-        MicroStep::new(filter.per_period(p.micro), (go, load - way * pull), only, filter.delay())
+        MicroStep::new(filter.per_period(p.micro), (go, load - way * pull), only, (filter.delay(), filter.lag()))
     }
 
     /// Voltage of a period in which the shaft goes in steps, V.
@@ -196,18 +196,6 @@ impl<T: Real> Glide<T> {
         match self.plant.actuator().kind() {
             ActuatorKind::Motor => self.volts(T::ZERO, T::ZERO, T::ZERO),
             ActuatorKind::Brake | ActuatorKind::Both => self.volts(T::ZERO, T::splat(HELD) * friction, T::ONE),
-        }
-    }
-
-    /// Demand of a period, V, and terms: of its own, so that a board's bound counts one of the two.
-    #[inline(never)]
-    fn decide(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> (T, [T; 6]) {
-        let begun = core::mem::replace(&mut state.begun, true);
-        let pace = self.estimator.per_period(tick.target_velocity);
-        if self.steps.takes(&state.steps, pace) {
-            self.step(state, tick, begun)
-        } else {
-            self.slide(state, tick, begun)
         }
     }
 
@@ -294,8 +282,15 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
         state.seen = *seen;
     }
 
+    #[inline(never)] // by itself a board's bound counts a step or a slide, and no other law's frame grows
     fn update(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> Command<T, [T; 6]> {
-        let (demand, terms) = self.decide(state, tick);
+        let begun = core::mem::replace(&mut state.begun, true);
+        let pace = self.estimator.per_period(tick.target_velocity);
+        let (demand, terms) = if self.steps.takes(&state.steps, pace) {
+            self.step(state, tick, begun)
+        } else {
+            self.slide(state, tick, begun)
+        };
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
         Command { voltage, limit, terms }
     }
