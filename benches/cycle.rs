@@ -2,7 +2,7 @@
 //! and with the share of a log.
 
 use clutch_core::supervisor::{BoardMode, Sample, State};
-use clutch_core::{Counts, DacCode, FixedCounts, Real, SupervisorState, Target};
+use clutch_core::{Counts, DacCode, FixedCounts, Planned, Real, SupervisorState, Target};
 use clutch_log::Record;
 use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_loop::to_log;
@@ -24,26 +24,26 @@ fn counts(tick: u64) -> i32 {
 }
 
 /// The servo alone: what the rest is added to.
-fn servo<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) -> Target<T>) {
+fn servo<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Planned<T> + Copy)) {
     let servo = built.servo;
-    let mut state = servo.start(Counts(0), &path(0), T::ZERO);
+    let mut state = servo.start(Counts(0), &path.target(0), T::ZERO);
     let mut tick = 0;
     group.bench_function("path", |b| {
         b.iter(|| {
             tick += 1;
-            black_box(path(black_box(tick)))
+            black_box(path.target(black_box(tick)))
         });
     });
     let mut tick = 0;
     group.bench_function("path and servo", |b| {
         b.iter(|| {
             tick += 1;
-            servo.tick(&mut state, black_box(Counts(counts(tick))), &path(tick))
+            servo.tick(&mut state, black_box(Counts(counts(tick))), &path.target(tick))
         });
     });
 }
 
-fn supervisor<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) -> Target<T>) {
+fn supervisor<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Planned<T> + Copy)) {
     let (servo, supervisor) = (built.servo, built.supervisor);
     let mut supervised = SupervisorState::default();
     supervisor.connect(&mut supervised);
@@ -58,7 +58,7 @@ fn supervisor<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl F
                 ..Sample::default()
             };
             tick += 1;
-            supervisor.sample(&servo, &mut supervised, black_box(&sample), path)
+            supervisor.sample(&servo, &mut supervised, black_box(&sample), *path)
         });
     });
     // A run that had ended would be measured without its law; one that nobody asked for has not begun.
@@ -90,7 +90,7 @@ fn armed<T: Real>(built: &BuiltRun<T>) -> ControllerNode<T> {
     node
 }
 
-fn frames<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) -> Target<T>) {
+fn frames<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Planned<T> + Copy)) {
     let mut tick = 0;
     group.bench_function("a sample's frame made", |b| {
         b.iter(|| {
@@ -112,7 +112,7 @@ fn frames<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u6
 }
 
 /// The time that a log adds.
-fn log<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &impl Fn(u64) -> Target<T>) {
+fn log<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Planned<T> + Copy)) {
     let (mut controller, mut out, mut tick) = (armed(built), Outbox::default(), 0);
     let (mut ring, mut drain) = rtrb::RingBuffer::<Record>::new(1 << 15);
     let servo = built.servo;

@@ -25,6 +25,7 @@ __all__ = [
     "EdgeTimed",
     "ElastoPlasticFriction",
     "Encoder",
+    "FrictionMap",
     "Glide",
     "HandDrive",
     "Hold",
@@ -109,6 +110,7 @@ UNITS = {
     "ticks": "periods",
     "bits": "bits",
     "s_deg": "s, °",
+    "deg_factor": "°, 1",
     "s_nm": "s, N m",
     "m": "m",
     "s": "s",
@@ -1832,8 +1834,8 @@ class TablePath(_Params):
     ----------
     points_s_deg : sequence of (float, float)
         Points of time and angle, from the start; times rise. A brake follows only angles that do not fall. A
-        list of at least one pair [s, °] of finite numbers, with times that rise from 0 s on; at least one
-        point; times of at least 0 s that rise from point to point; positions below 7e13 counts of
+        list of at least one pair [s, °] of finite numbers, with times that rise from 0 to 1000000000000 s; at
+        least one point; times of at least 0 s that rise from point to point; positions below 7e13 counts of
         rig.encoder.counts_per_rev.
     interpolation : {"linear", "cubic"}, default "cubic"
         Curve from point to point. `linear`: Straight lines: the velocity jumps at each point. `cubic`:
@@ -1996,6 +1998,39 @@ class RunSettings(_Params):
     start_counts: float | None = None
     seed: int = 1
     engine: Literal["auto", "dormand_prince", "exact_flow", "bristle"] = "auto"
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class FrictionMap(_Params):
+    """Friction along the disc, as an earlier ride has shown it: `clutch identify --map` writes it. The law
+    glide takes it where it shows to be right; other laws have no use for it.
+
+    Parameters
+    ----------
+    rig : str
+        The rig, and the ride, that it is of: any text.
+    points_deg_factor : sequence of (float, float)
+        Points of angle, from the encoder's zero, and friction, over its mean; angles rise. A list of at least
+        one pair [°, 1] of finite numbers, with angles that rise from -36000 to 36000 °; a list of 4 to 100
+        000 points; factors of 0.1 to 10; an angle less than 1 ° from the one before: the ripple of a disc has
+        waves of about 1 °.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.FrictionMap(rig="disc 7", points_deg_factor=[(0.1 * i, 1 + 0.01 * (i % 3)) for i in range(50)]).rig
+    'disc 7'
+    """
+
+    _key: ClassVar[str] = "friction_map"
+
+    rig: str
+    points_deg_factor: Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -2261,6 +2296,8 @@ class _Scenario(_Params):
         Accuracy to which the believed plant is known. By default `Bounds()`.
     run : RunSettings
         Length, beginning, seed and engine. By default `RunSettings()`.
+    friction_map : FrictionMap or None, default None
+        Friction along the disc, from an earlier ride.
     safety : Safety or None, default None
         The way a run on a board ends, and what ends it: `clutch loop` and `clutch daq` need it.
 
@@ -2292,4 +2329,5 @@ class _Scenario(_Params):
     sampling: Sampling = field(default_factory=Sampling)
     bounds: Bounds = field(default_factory=Bounds)
     run: RunSettings = field(default_factory=RunSettings)
+    friction_map: FrictionMap | None = None
     safety: Safety | None = None

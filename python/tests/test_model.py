@@ -85,6 +85,10 @@ REQUIRED = {
     clutch.Sine: SINE,
     clutch.Chirp: CHIRP,
     clutch.TablePath: {"points_s_deg": ((0.5, 0.0), (2.0, 20.0))},
+    clutch.FrictionMap: {
+        "rig": "disc 7",
+        "points_deg_factor": ((0.0, 1.0), (0.3, 1.1), (0.6, 0.9), (0.9, 1.0)),
+    },
     clutch.Sampling: {},
     clutch.Bounds: {},
     clutch.RunSettings: {},
@@ -188,7 +192,7 @@ def test_repr_pickle_copy_hash_and_toml_keep_every_built_in_scenario(name):
     assert again == scenario
     assert again.to_toml() == scenario.to_toml()
     for f in dataclasses.fields(scenario):
-        if f.name not in ("name", "safety"):
+        if f.name not in ("name", "safety", "friction_map"):
             assert_nothing_is_lost(getattr(scenario, f.name))
 
 
@@ -205,7 +209,7 @@ def test_the_text_has_every_key_of_the_objects():
     scenario = clutch.Scenario.load("board_smc_2")
     table = tomllib.loads(scenario.to_toml())
     assert table == scenario._tables()
-    assert set(table) == {f.name for f in dataclasses.fields(scenario)}
+    assert set(table) == {f.name for f in dataclasses.fields(scenario)} - {"friction_map"}
     assert table["law"] == {"smc": dataclasses.asdict(scenario.law)}
     assert table["safety"]["limits"] == dataclasses.asdict(clutch.Limits())
 
@@ -355,6 +359,10 @@ DEPENDENT = {
     clutch.TablePath: {
         "points_s_deg": [[], [(-1.0, 0.0)], [(0.0, math.nan)], [(1.0, 1.0), (1.0, 2.0)], [(1.0,)]],
         "interpolation": ["Cubic", ""],
+    },
+    clutch.FrictionMap: {
+        "rig": [3],
+        "points_deg_factor": [[], [(0.0, 1.0)], [(0.0, math.nan)], [(1.0, 1.0), (1.0, 2.0)], [(1.0,)]],
     },
     clutch.Sampling: {"scalar": ["f16", "", 64]},
     clutch.RunSettings: {"start": ["stop", 1], "engine": ["euler", 4]},
@@ -746,6 +754,12 @@ VALID = {
     ),
     clutch.TablePath: each(
         points_s_deg=points(st.floats(-1e4, 1e4), 2), interpolation=st.sampled_from(["cubic", "linear"])
+    ),
+    clutch.FrictionMap: each(
+        rig=st.text(max_size=20),
+        points_deg_factor=st.lists(number(0.2, 5), min_size=4, max_size=40).map(
+            lambda factors: tuple((0.5 * i, factor) for i, factor in enumerate(factors))
+        ),
     ),
     clutch.Sampling: each(period_us=st.integers(1, 10**6), scalar=st.sampled_from(["f32", "f64"])),
     clutch.Bounds: each(

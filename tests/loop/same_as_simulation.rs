@@ -130,3 +130,41 @@ fn ten_seconds_over_a_pseudo_terminal_agree_with_the_simulation_and_lose_no_samp
 fn ten_seconds_over_tcp_agree_with_the_simulation_and_lose_no_sample() {
     ten_seconds_agree("j2-tcp", &["--listen", "tcp://127.0.0.1:0"]);
 }
+
+#[test]
+fn a_run_with_a_map_of_the_disc_replays_as_it_was() {
+    let _alone = alone();
+    let name = "mapped";
+    let folder = folder(name);
+    let file = |name: &str| folder.join(name).display().to_string();
+    let (scenario, ride, map) = (file("glide.toml"), file("ride.mcap"), file("map.toml"));
+    let text = PD
+        .replace("base = \"paper\"", "base = \"bench\"")
+        .replace("[law.pd]\nkp_v_rad = 5000.0\nkd_v_s_rad = 50.0", "[law.glide.filter]\ndelay_ticks = 1")
+        .replace("volts_v = 4.5", "volts_v = 9.9");
+    std::fs::write(&scenario, text).unwrap();
+    let _ = run(&["sim", &scenario, "--log", &ride]).expect(0);
+    let _ = run(&["identify", &scenario, "--from", &ride, "--map", &map]).expect(0);
+
+    let board = Board::start(&[&scenario, "--patient"]);
+    let log = folder.join("run.mcap");
+    unless_held_up(name, || {
+        let _ = std::fs::remove_file(&log); // of an attempt that the machine spoiled
+        let log = log.to_str().unwrap();
+        let port = ["--patient", "--uncertified", "--port", &board.port, "--log", log];
+        let done =
+            run(&[&["loop", &scenario, "--map", &map, "--duration", "4", "--json"][..], &port].concat());
+        let report = done.json();
+        if report["cycle"]["max_us"].as_f64().unwrap_or(f64::INFINITY) > 400e3 {
+            return Err("a cycle took too long".to_owned());
+        }
+        let _ = done.expect(0);
+        Ok(())
+    });
+    let read = read_log(&log);
+    let map = read.header.term_names.iter().position(|name| name == "map").expect("the term");
+    let drove = read.commands.iter().filter(|c| c.terms.get(map).copied() == Some(2.0)).count();
+    assert!(drove > 2000, "the map drove for {drove} ms");
+    replays_identically(&log);
+    let _ = board.end();
+}

@@ -1,6 +1,5 @@
 //! Before consent.
 
-use clutch_core::Target;
 use clutch_core::supervisor::State;
 use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_node::{ControllerNode, Outbox};
@@ -17,7 +16,6 @@ fn samples_that_pile_up_before_consent_do_not_end_the_run() {
     let (run, config) = (1, built.controller.config);
     let mut node = ControllerNode::new(built.controller, built.servo, built.supervisor);
     let path = from_scenario::path::<f64>(&scenario).unwrap();
-    let path = |tick: u64| -> Target<f64> { path(tick) };
     let mut out = Outbox::default();
     let mut hear = |node: &mut ControllerNode<f64>, now_ns: u64, messages: &[Message]| {
         let bytes: Vec<u8> = messages.iter().flat_map(|m| encode(m).as_bytes().to_vec()).collect();

@@ -107,7 +107,7 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
         if Some(tick) == spoilt {
             drop(black_box(Box::new(tick)));
         }
-        path(tick)
+        (path.path)(tick)
     };
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
     let mut station = ControllerStation { node, path: &path };

@@ -332,7 +332,7 @@ fn smooth() -> Result<()> {
     for table in ["laws", "plants", "rest", "steps", "motions"] {
         write_between("docs/smooth.md", table, &table_of("smooth", &[table])?)?;
     }
-    Ok(())
+    write_between("docs/smooth.md", "maps", &table_of_package("clutch-identify", "maps", &[])?)
 }
 
 fn meter() -> Result<()> {
@@ -359,10 +359,15 @@ fn random_rigs(package: &str, page: &str, rigs: u64, seed: u64) -> Result<()> {
 
 /// The table that an example of the simulator prints.
 fn table_of(example: &str, args: &[&str]) -> Result<String> {
-    let run = ["run", "--release", "--package", "clutch-sim", "--example", example, "--"];
+    table_of_package("clutch-sim", example, args)
+}
+
+fn table_of_package(package: &str, example: &str, args: &[&str]) -> Result<String> {
+    let run = ["run", "--release", "--package", package, "--example", example, "--"];
     let (done, text) = cargo(run).args(args).quietly()?;
     anyhow::ensure!(done, "the example {example} failed:\n{text}");
-    let table: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
+    let table: Vec<&str> =
+        text.lines().filter(|l| l.starts_with('|') || l.starts_with("Maps of") || l.is_empty()).collect();
     Ok(table.join("\n"))
 }
 

@@ -1,11 +1,11 @@
 //! Arguments of several verbs: a scenario, and what to change in it.
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
 use clutch_identify::RigFile;
 use clutch_sim::Scenario;
 use std::path::{Path, PathBuf};
-use toml::Table;
+use toml::{Table, Value};
 
 /// A scenario and what to change in it.
 #[derive(Args)]
@@ -19,6 +19,9 @@ pub(crate) struct ScenarioArgs {
     /// Takes the model and its bounds from a file that `clutch identify --out` has written.
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) identified: Option<PathBuf>,
+    /// Takes friction along the disc from a file that `clutch identify --map` has written.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) map: Option<PathBuf>,
 }
 
 pub(crate) fn key_value(text: &str) -> Result<(String, String), String> {
@@ -28,13 +31,35 @@ pub(crate) fn key_value(text: &str) -> Result<(String, String), String> {
 
 impl ScenarioArgs {
     pub(crate) fn load(&self) -> anyhow::Result<Scenario> {
-        let Some(file) = &self.identified else { return Ok(Scenario::load(&self.scenario, &self.set)?) };
-        let (origin, text) = Scenario::text(&self.scenario)?;
+        if self.identified.is_none() && self.map.is_none() {
+            return Ok(Scenario::load(&self.scenario, &self.set)?);
+        }
+        let (mut origin, text) = Scenario::text(&self.scenario)?;
         // A scenario that is no TOML says so itself.
         let Ok(mut table) = text.parse::<Table>() else { return Ok(Scenario::parse(&origin, &text, &[])?) };
-        read_rig_file(file)?.put_into(&mut table);
-        let origin = format!("{origin} with {}", file.display());
+        if let Some(file) = &self.identified {
+            read_rig_file(file)?.put_into(&mut table);
+            origin += &format!(" with {}", file.display());
+        }
+        if let Some(file) = &self.map {
+            table.insert(MAP.to_owned(), read_map(file)?);
+            origin += &format!(" with {}", file.display());
+        }
         Ok(Scenario::parse(&origin, &table.to_string(), &self.set)?)
+    }
+}
+
+/// The table of a scenario that is the map of its disc.
+const MAP: &str = "friction_map";
+
+/// That table in a file that `clutch identify --map` has written.
+fn read_map(file: &Path) -> anyhow::Result<Value> {
+    let name = file.display().to_string();
+    let text = std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"))?;
+    let mut table: Table = text.parse().with_context(|| format!("{name}: is no TOML"))?;
+    match table.remove(MAP) {
+        Some(map @ Value::Table(_)) => Ok(map),
+        _ => bail!("{name}: has no table [{MAP}]; expected a file of `clutch identify --map`"),
     }
 }
 

@@ -80,7 +80,8 @@ impl Hil {
         if self.link == Link::Uart {
             self.set.push(("safety.limits.deadline_us".to_owned(), "1000000".to_owned()));
         }
-        let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone(), identified: None };
+        let (scenario, set) = (self.scenario.clone(), self.set.clone());
+        let args = ScenarioArgs { scenario, set, identified: None, map: None };
         let session = match LockstepSession::new(args.load()?, self.options()) {
             Ok(session) => session,
             Err(refusal @ SessionError::NotCertified { .. }) => {

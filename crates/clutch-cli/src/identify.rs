@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clutch_identify::experiment::{ExperimentError, Programme, REMEDY, VirtualBoard, experiment};
 use clutch_identify::rig_file::{rig_file, rows};
-use clutch_identify::{Finding, Recording, Report, identify};
+use clutch_identify::{Finding, Recording, Report, identify, map_as_believed, map_file};
 use clutch_log::Limits;
 use clutch_loop::port::Address;
 use clutch_loop::session::{Board, Session, SessionOptions};
@@ -65,8 +65,9 @@ pub(crate) struct Identify {
     /// Writes [model] and [bounds] for scenarios, with the intervals.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
-    /// Writes friction along the disc: angle in rad, and friction over its mean.
-    #[arg(long, value_name = "FILE.csv")]
+    /// Writes friction along the disc as [friction_map], for `--map` of sim and loop. Without releases T/J and delay are taken
+    /// as the scenario has them.
+    #[arg(long, value_name = "FILE.toml")]
     map: Option<PathBuf>,
     /// Prints the result as JSON, and nothing else, on standard output.
     #[arg(long)]
@@ -75,7 +76,8 @@ pub(crate) struct Identify {
 
 impl Identify {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
-        let args = ScenarioArgs { scenario: self.scenario.clone(), set: self.set.clone(), identified: None };
+        let (scenario, set) = (self.scenario.clone(), self.set.clone());
+        let args = ScenarioArgs { scenario, set, identified: None, map: None };
         let scenario = args.load()?;
         let recordings = if self.from.is_empty() {
             self.experiment(&scenario)?
@@ -87,15 +89,21 @@ impl Identify {
         let file = self.out.as_deref().map(|path| (path, rig_file(&report, &scenario)));
         print(&if self.json { json(&object(&report))? } else { text(&report) })?;
         if let Some(path) = &self.map {
-            let mut csv = "angle_rad,friction\n".to_owned();
-            report.map.iter().for_each(|p| csv += &format!("{:.9},{:.6}\n", p.angle, p.factor));
-            write(path, csv)?;
+            let believed = || map_as_believed(&recordings, &scenario);
+            let map = if report.map.is_empty() { believed() } else { report.map.clone() };
+            if map.is_empty() {
+                bail!(
+                    "{}: not written: no ride at an even rate was found; docs/identify.md says what is one",
+                    path.display()
+                );
+            }
+            write(path, map_file(&map, scenario.name()))?;
         }
         if let Some((path, file)) = file {
             write(path, file?)?;
         }
         let told = rows(&report).iter().any(|row| row.finding.known().is_some());
-        Ok(if told { Exit::Done } else { Exit::Failed })
+        Ok(if told || self.map.is_some() { Exit::Done } else { Exit::Failed })
     }
 
     /// Runs the experiment, and says before what it does.

@@ -75,6 +75,9 @@ pub(crate) struct Loop {
     /// Takes the model and its bounds from a file that `clutch identify --out` has written.
     #[arg(long, value_name = "FILE.toml")]
     identified: Option<PathBuf>,
+    /// Takes friction along the disc from a file that `clutch identify --map` has written.
+    #[arg(long, value_name = "FILE.toml")]
+    map: Option<PathBuf>,
     /// The board's port; without it a board is simulated.
     #[arg(long, value_name = "PATH|tcp://HOST:PORT|unix:///PATH")]
     port: Option<Address>,
@@ -151,8 +154,9 @@ pub(crate) struct Loop {
 impl Loop {
     pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
         self.set_shortcuts()?;
-        let (scenario, set, identified) = (self.scenario.clone(), self.set.clone(), self.identified.clone());
-        let args = ScenarioArgs { scenario, set, identified };
+        let (scenario, set) = (self.scenario.clone(), self.set.clone());
+        let (identified, map) = (self.identified.clone(), self.map.clone());
+        let args = ScenarioArgs { scenario, set, identified, map };
         let scenario = args.load()?;
         if let Some(log) = &self.log
             && log.canonicalize().is_ok_and(|l| self.scenario.canonicalize().is_ok_and(|s| s == l))

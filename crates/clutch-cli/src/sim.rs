@@ -9,6 +9,7 @@ use anyhow::Context;
 use clap::Args;
 use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
+use clutch_sim::friction_map::MapInRun;
 use clutch_sim::metrics::Detected;
 use clutch_sim::reaching::Reaching;
 use clutch_sim::rig::Rig;
@@ -54,6 +55,9 @@ struct Summary<'a> {
     as_sampled: String,
     sampled: serde_json::Value,
     rig_outside_bounds: Vec<String>,
+    /// The part that a map of the disc had.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    friction_map: Option<MapInRun>,
     /// Viscous damping that the rig's bristles lack to be passive, N m s/rad.
     #[serde(skip_serializing_if = "Option::is_none")]
     bristles_lack_nm_s_rad: Option<f64>,
@@ -121,6 +125,7 @@ impl Sim {
             as_sampled: as_sampled.stability_line(),
             sampled: sampled::json(&as_sampled, &sampled::Bound::NotLookedFor),
             rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
+            friction_map: scenario.map_grid().and_then(|_| MapInRun::of(&run.trace)),
             bristles_lack_nm_s_rad: Rig::new(&scenario.spec().rig, scenario.spec().run.seed)?
                 .lacks_damping(run.trace.start_voltage),
         };
@@ -176,6 +181,16 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     text += &paragraph(&format!("gains, as sampled: {}", s.as_sampled));
     if let Some(reason) = s.detected.reason() {
         text += &paragraph(&format!("stick-slip: {reason}"));
+    }
+    if let Some(MapInRun { drove, dropped_s }) = s.friction_map {
+        let told = match dropped_s {
+            None => format!("drove for {} % of the run, and was tried before", number(100.0 * drove)),
+            Some(at) => format!(
+                "dropped after {} s: edges came where they would without it; is it another disc's, or is the encoder's zero another?",
+                number(at)
+            ),
+        };
+        text += &paragraph(&format!("map of the disc: {told}"));
     }
     if jump > 1e-9 {
         text += &format!(

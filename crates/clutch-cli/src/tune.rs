@@ -72,6 +72,7 @@ impl Tune {
             scenario: self.scenario.clone(),
             set: self.set.clone(),
             identified: self.identified.clone(),
+            map: None,
         };
         let scenario = args.load()?;
         let rig = self.identified.as_deref().map(read_rig_file).transpose()?;

@@ -447,3 +447,43 @@ fn identify_asks_for_consent_on_a_board_and_names_what_it_cannot_read() {
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).contains("x.mcap"), "{}", err(&o));
 }
+
+#[test]
+fn a_map_of_one_ride_makes_the_next_smoother_and_one_of_another_disc_is_dropped() {
+    let dir = folder("friction_map");
+    let path = |name: &str| dir.join(name).display().to_string();
+    let (ride, map, second) = (path("ride.mcap"), path("map.toml"), path("second.mcap"));
+    let o = clutch(&["sim", "bench_glide_2", "--set", "run.duration_s=8.0", "--log", &ride]);
+    assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+    let o = clutch(&["identify", "bench_glide_2", "--from", &ride, "--map", &map]);
+    assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+
+    let sim = |more: &[&str]| {
+        let slow = ["sim", "bench_glide_2", "--json", "--set", "reference.ramp.rate_deg_s=1.5"];
+        let o = clutch(&[&slow[..], &["--set", "run.start_counts=40.0"], more].concat());
+        serde_json::from_slice::<serde_json::Value>(&o.stdout).unwrap_or_else(|_| panic!("{}", err(&o)))
+    };
+    let rms = |told: &serde_json::Value| told["metrics"]["rms_error_rad"].as_f64().expect("a figure");
+    let (without, with) = (sim(&[]), sim(&["--map", &map, "--log", &second]));
+    assert!(without["friction_map"].is_null());
+    assert!(with["friction_map"]["drove"].as_f64() > Some(0.8), "{with}");
+    assert!(rms(&with) < 0.5 * rms(&without), "{} with the map, {} without", rms(&with), rms(&without));
+    let other = sim(&["--map", &map, "--set", "run.seed=2"]);
+    assert!(other["friction_map"]["dropped_s"].as_f64() < Some(1.0), "{other}");
+    let alone = sim(&["--set", "run.seed=2"]);
+    assert!(rms(&other) < 1.1 * rms(&alone), "{} with another's map, {} without", rms(&other), rms(&alone));
+
+    // The log has the map, and so has its replay.
+    let o = clutch(&["replay", &second]);
+    assert_eq!(o.status.code(), Some(0), "{}{}", out(&o), err(&o));
+
+    let o = clutch(&["sim", "bench_glide_2", "--map", &ride]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("ride.mcap: cannot be read"), "{}", err(&o));
+    let empty = path("empty.toml");
+    std::fs::write(&empty, "x = 1\n").expect("a file");
+    let o = clutch(&["sim", "bench_glide_2", "--map", &empty]);
+    assert!(err(&o).contains("empty.toml: has no table [friction_map]; expected a file of"), "{}", err(&o));
+    let o = clutch(&["identify", "board_smc_2", "--from", &path("none.mcap"), "--map", &map]);
+    assert_eq!(o.status.code(), Some(1));
+}

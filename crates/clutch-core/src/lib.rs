@@ -45,10 +45,12 @@ mod error;
 mod feasibility;
 mod fnv;
 pub mod friction;
+mod friction_map;
 pub mod law;
 #[cfg(feature = "linalg")]
 mod observer;
 pub mod params;
+mod planned;
 mod plant;
 mod real;
 pub mod reference;
@@ -74,8 +76,10 @@ pub use friction::{
     Bend, Bristles, Coulomb, CoulombParams, Dahl, DahlParams, ElastoPlastic, ElastoPlasticParams, Friction,
     FrictionModel, FrictionParams, Lugre, LugreParams, Maxwell, MaxwellParams, Stribeck, StribeckParams,
 };
+pub use friction_map::{FrictionMap, NoMap, Place, off_map};
 #[cfg(feature = "linalg")]
 pub use observer::{Estimate, Observer, ObserverGains, ObserverParams, ObserverState};
+pub use planned::{BeginningAt, OnDisc, Planned};
 pub use plant::{GRAVITY, Plant, PlantParams};
 pub use real::{Real, sin_cos_turns};
 pub use reference::Target;

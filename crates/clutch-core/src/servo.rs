@@ -11,8 +11,8 @@
 use crate::law::{Beside, Command, ControlLaw, Law, LawParams, OutputParams, Seen, Shell, ShellParams, Tick};
 use crate::velocity::{VelocityParams, VelocitySource, VelocityState};
 use crate::{
-    Arithmetic, Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros, ParamError, Plant,
-    PlantParams, Real, Target,
+    Arithmetic, Counts, Dac, DacCode, DacParams, Encoder, FixedCounts, Micros, ParamError, Place, Plant,
+    PlantParams, Real, Target, off_map,
 };
 
 /// Everything a servo is built from.
@@ -205,7 +205,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
     pub fn start_at(&self, position: FixedCounts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
         let tick = self.measure(position, target, T::ZERO);
         let mut law = self.law.start(&tick, applied);
-        self.law.sees(&mut law, &Seen { position, applied });
+        self.law.sees(&mut law, &Seen { position, applied, place: Place::default() });
         ServoState {
             position,
             last: Counts::default(),
@@ -224,25 +224,49 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         counts: Counts,
         target: &Target<T>,
     ) -> ServoOutput<T, C::Terms> {
-        let moved = FixedCounts::from_counts(i64::from(counts.since(state.last)));
-        state.last = counts;
-        self.tick_at(state, state.position.plus(moved), target)
+        self.tick_on(state, counts, target, off_map)
     }
 
-    /// One period with a position finer than a count: an interpolating encoder, or the ideal
-    /// sensor of a simulation. Use this or [`Servo::tick`] on one state, not both in turn.
+    /// One period on a disc of which a map tells friction around a position.
+    #[inline]
+    pub fn tick_on(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        counts: Counts,
+        target: &Target<T>,
+        map: impl FnOnce(FixedCounts) -> Place<T>,
+    ) -> ServoOutput<T, C::Terms> {
+        let moved = FixedCounts::from_counts(i64::from(counts.since(state.last)));
+        state.last = counts;
+        self.tick_at(state, state.position.plus(moved), target, map)
+    }
+
+    /// As [`Servo::tick_on`], with a position finer than a count: an interpolating encoder, or the ideal sensor of a
+    /// simulation. Use this or [`Servo::tick`] on one state, not both in turn.
     #[inline]
     pub fn tick_at(
         &self,
         state: &mut ServoState<T, C::State>,
         position: FixedCounts,
         target: &Target<T>,
+        map: impl FnOnce(FixedCounts) -> Place<T>,
+    ) -> ServoOutput<T, C::Terms> {
+        self.step(state, position, target, map(position))
+    }
+
+    // Of no closure's own: a board has its code once.
+    fn step(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        position: FixedCounts,
+        target: &Target<T>,
+        place: Place<T>,
     ) -> ServoOutput<T, C::Terms> {
         state.position = position;
         state.error = FixedCounts(target.position.0.wrapping_sub(position.0));
         let error_rate = self.velocity.update(&mut state.velocity, position, target, state.applied);
         let tick = self.measure(position, target, error_rate);
-        self.law.sees(&mut state.law, &Seen { position, applied: state.applied });
+        self.law.sees(&mut state.law, &Seen { position, applied: state.applied, place });
         let command = self.shell.around(self.law.update(&mut state.law, &tick), &tick);
         let code = self.dac.code(command.voltage);
         state.applied = self.dac.volts(code);
@@ -258,6 +282,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         next: (Counts, &Target<T>),
         target: &Target<T>,
         (step, steps): (u32, u32),
+        map: impl FnOnce(FixedCounts) -> Place<T>,
     ) {
         // What the encoder said and what the brake got: neither is of this step's making.
         let before = (state.position, state.last, state.applied);
@@ -267,7 +292,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         // Each step closes its share of what is left.
         let share = end.wrapping_sub(state.error.0).checked_div(left).unwrap_or(0);
         let error = state.error.0.wrapping_add(share);
-        let _ = self.tick_at(state, FixedCounts(target.position.0.wrapping_sub(error)), target);
+        let _ = self.tick_at(state, FixedCounts(target.position.0.wrapping_sub(error)), target, map);
         (state.position, state.last, state.applied) = before;
     }
 
@@ -343,7 +368,7 @@ mod tests {
         let (next, goal) = run(before + i64::from(lost) + 1);
         for step in 1..=lost {
             let passed = run(before + i64::from(step)).1;
-            servo.bridge(&mut state, (next, &goal), &passed, (step, lost + 1));
+            servo.bridge(&mut state, (next, &goal), &passed, (step, lost + 1), off_map);
         }
         let out = servo.tick(&mut state, next, &goal);
         (state, out.tick)
@@ -394,7 +419,7 @@ mod tests {
         let servo = servo();
         let mut state = servo.start(Counts(7), &target(7), 3.0);
         let before = state;
-        servo.bridge(&mut state, (Counts(i32::MIN), &target(900)), &target(400), (1, 2));
+        servo.bridge(&mut state, (Counts(i32::MIN), &target(900)), &target(400), (1, 2), off_map);
         let kept = |s: &ServoState<f64, _>| (s.position, s.last, s.applied);
         assert_eq!(kept(&state), kept(&before));
         assert_ne!(state, before, "filter and law have gone on");
@@ -418,7 +443,7 @@ mod tests {
             let servo = servo();
             let to = |position| Target { position: FixedCounts(position), ..target(0) };
             let mut state = servo.start(Counts(last), &to(at), 0.0);
-            servo.bridge(&mut state, (Counts(next), &to(goal)), &to(at), (step, steps));
+            servo.bridge(&mut state, (Counts(next), &to(goal)), &to(at), (step, steps), off_map);
             let out = servo.tick(&mut state, Counts(next), &to(goal));
             proptest::prop_assert!(out.command.voltage >= 0.0 && out.command.voltage <= 10.0);
         }

@@ -5,6 +5,7 @@ pub mod believed;
 pub mod break_away;
 pub mod experiment;
 pub mod filter;
+pub mod map_file;
 pub mod recording;
 pub mod release;
 pub mod report;
@@ -12,6 +13,7 @@ pub mod ride;
 pub mod rig_file;
 
 pub use believed::{Believed, Corner, believed};
+pub use map_file::{map_as_believed, map_file};
 pub use recording::{ReadError, Recording, Tick};
 pub use report::{Finding, Report, identify};
 pub use rig_file::RigFile;

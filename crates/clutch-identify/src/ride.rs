@@ -18,6 +18,11 @@ pub const WAVES_PER_TURN: f64 = 340.0;
 pub const WAVE_DAMPING: f64 = 0.25;
 /// Wander of the velocity that no friction explains, rad/s/√s.
 pub const WALK: f64 = 0.01;
+/// The same two for a map, whose places are told one by one and not in the mean.
+const MAP_WAVE_DAMPING: f64 = 0.2;
+const MAP_WALK: f64 = 0.02;
+/// Time at the beginning of a ride, with its break-away, that a map leaves out, s.
+const MAP_SETTLING_S: f64 = 0.25;
 /// Times that the ripple's size is estimated, and what it is taken to be before.
 const ROUNDS: usize = 8;
 const FIRST_SHARE: f64 = 0.15;
@@ -25,6 +30,8 @@ const FIRST_SHARE: f64 = 0.15;
 const LEFT_OVER: f64 = 2.0;
 /// Part of the ripple's square that the filter may miss in a mean.
 const UNSEEN: f64 = 0.04;
+/// Points of a map per turn: of the waves of a disc, each has fifteen.
+const PER_TURN: f64 = 5000.0;
 /// Share by which the mean of a ride is off for other reasons: delay and T/J as known, steps of the converter.
 const CLOCKWORK: f64 = 3e-4;
 
@@ -32,8 +39,10 @@ const CLOCKWORK: f64 = 3e-4;
 #[derive(Clone, Debug)]
 pub struct Ride<'a> {
     recording: &'a Recording,
-    /// First and last tick, of the recording.
+    /// First and last tick of the even part, of the recording.
     ticks: (usize, usize),
+    /// Tick at which a map begins.
+    first: usize,
     /// Rate, rad/s.
     pub rate: f64,
 }
@@ -56,7 +65,7 @@ pub struct Told {
     pub hold: (f64, f64),
     /// Root mean square of the ripple, as a share of friction, and its standard deviation.
     pub ripple: (f64, f64),
-    /// Friction along the way, each four counts.
+    /// Friction along the way, but for its very beginning.
     pub map: Vec<Place>,
     /// Recording, tick and normalised innovation of the edge that fits worst.
     pub worst: (String, u64, f64),
@@ -79,6 +88,7 @@ pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
         if k < edges.len() && ((edges[k] - edges[k - 1]) as f64) <= longest {
             continue;
         }
+        let mapped_from = edges[first] + (MAP_SETTLING_S / recording.period) as usize;
         let begin = edges[first] + (SETTLING_S / recording.period) as usize;
         let begin = edges[first..k].iter().copied().find(|&e| e >= begin);
         let end = edges[k - 1];
@@ -93,7 +103,8 @@ pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
         let middle = begin.midpoint(end);
         let halves = way(begin, middle) / way(middle, end).max(1e-9);
         if (0.9..1.1).contains(&halves) {
-            found.push(Ride { recording, ticks: (begin, end), rate: way(begin, end) / seconds });
+            let rate = way(begin, end) / seconds;
+            found.push(Ride { recording, ticks: (begin, end), first: mapped_from, rate });
         }
     }
     found
@@ -102,12 +113,22 @@ pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
 /// The shaft in counts and periods; `damping` in 1/s, `ripple` in 1/V.
 #[must_use]
 pub fn shaft(recording: &Recording, pull: f64, damping: f64, ripple: f64) -> Shaft {
-    let walk = WALK * recording.period.sqrt() * recording.period / recording.radians_per_count();
+    shaft_with(recording, pull, damping, ripple, (WAVE_DAMPING, WALK))
+}
+
+fn shaft_with(
+    recording: &Recording,
+    pull: f64,
+    damping: f64,
+    ripple: f64,
+    (wave_damping, walk): (f64, f64),
+) -> Shaft {
+    let walk = walk * recording.period.sqrt() * recording.period / recording.radians_per_count();
     Shaft {
         pull: pull * recording.per_rad_s2(),
         damping: damping * recording.period,
         wave: WAVES_PER_TURN * recording.radians_per_count(),
-        wave_damping: WAVE_DAMPING,
+        wave_damping,
         ripple,
         walk: walk * walk,
     }
@@ -128,7 +149,7 @@ impl Ride<'_> {
         let mut beliefs = Vec::new();
         for round in 0..rounds {
             let shaft = shaft(r, pull, 0.0, size * friction);
-            let (passed, surprise) = self.pass(&shaft, delay / r.period, friction);
+            let (passed, surprise) = self.pass(begin, &shaft, delay / r.period, friction);
             beliefs = smooth(&passed);
             worst = surprise;
             friction = beliefs[beliefs.len() - 1].mean[2];
@@ -158,15 +179,19 @@ impl Ride<'_> {
             hold: (hold, hold * (uneven * uneven + unseen * unseen + CLOCKWORK * CLOCKWORK).sqrt()),
             // Independent places: one for two radians of the wave.
             ripple: (size, size / (0.5 * radians).max(1.0).sqrt()),
-            map: self.map(&beliefs),
+            map: self.map(
+                &shaft_with(r, pull, 0.0, size * friction, (MAP_WAVE_DAMPING, MAP_WALK)),
+                delay / r.period,
+                friction,
+            ),
             worst: (r.name.clone(), r.first_tick + worst.0 as u64, worst.1),
         }
     }
 
     /// The filter along the ride: as [`smooth`] takes it, and the tick with the largest normalised innovation.
-    fn pass(&self, shaft: &Shaft, delay: f64, friction: f64) -> (Vec<Passed>, (usize, f64)) {
+    fn pass(&self, begin: usize, shaft: &Shaft, delay: f64, friction: f64) -> (Vec<Passed>, (usize, f64)) {
         let r = self.recording;
-        let (begin, end) = self.ticks;
+        let end = self.ticks.1;
         let origin = r.ticks[begin].counts;
         let rate = self.rate * r.period / r.radians_per_count();
         let mut belief = Belief::new(shaft, 0.5, (rate, rate), (friction, 0.5 * friction));
@@ -188,17 +213,26 @@ impl Ride<'_> {
         (out, (worst.0, f64::sqrt(worst.1)))
     }
 
-    fn map(&self, beliefs: &[Belief]) -> Vec<Place> {
+    /// Friction each [`PER_TURN`]th of a turn, where the shaft has been.
+    fn map(&self, shaft: &Shaft, delay: f64, friction: f64) -> Vec<Place> {
         let r = self.recording;
-        let origin = r.ticks[self.ticks.0].counts as f64;
-        let mut next = f64::NEG_INFINITY;
+        let origin = r.ticks[self.first].counts as f64;
+        let (passed, _) = self.pass(self.first, shaft, delay, friction);
+        let beliefs = smooth(&passed);
+        let counts = |belief: &Belief| origin + belief.mean[0];
+        let factor = |belief: &Belief| 1.0 + belief.mean[3] / belief.mean[2];
+        let step = (f64::from(r.counts_per_rev) / PER_TURN).round().max(1.0);
         let mut map = Vec::new();
-        for belief in beliefs {
-            let counts = origin + belief.mean[0];
-            if counts >= next {
-                next = counts + 4.0;
-                let factor = 1.0 + belief.mean[3] / belief.mean[2];
-                map.push(Place { angle: counts * r.radians_per_count(), factor });
+        let mut next = (counts(&beliefs[0]) / step).ceil() * step;
+        for pair in beliefs.windows(2) {
+            let (a, b) = (&pair[0], &pair[1]);
+            // Between two samples, of which a fast shaft makes several points.
+            while counts(b) >= next {
+                let way = counts(b) - counts(a);
+                let share = if way > 0.0 { ((next - counts(a)) / way).clamp(0.0, 1.0) } else { 1.0 };
+                let factor = factor(a) + share * (factor(b) - factor(a));
+                map.push(Place { angle: next * r.radians_per_count(), factor });
+                next += step;
             }
         }
         map

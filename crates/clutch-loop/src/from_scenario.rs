@@ -3,7 +3,8 @@
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::Checks;
 use clutch_core::{
-    ActuatorKind, DacCode, FixedCounts, Micros, ParamError, Real, Servo, ServoParams, Supervisor, Target,
+    ActuatorKind, DacCode, FixedCounts, Micros, OnDisc, ParamError, Real, Servo, ServoParams, Supervisor,
+    Target,
 };
 use clutch_log::{Header, Source};
 use clutch_node::{ControllerParams, RunParams, RunTimes, Settings, Unsupported};
@@ -29,8 +30,17 @@ pub fn config_hash(scenario: &Scenario) -> u64 {
 /// converter. Two logs with the same hash come from the same law.
 #[must_use]
 pub fn law_hash(scenario: &Scenario) -> u64 {
-    let tables =
-        ["law.", "model.", "velocity.", "output.", "shell.", "sampling.", "rig.encoder.", "rig.dac."];
+    let tables = [
+        "law.",
+        "model.",
+        "velocity.",
+        "output.",
+        "shell.",
+        "sampling.",
+        "rig.encoder.",
+        "rig.dac.",
+        "friction_map.",
+    ];
     let mut text = String::new();
     for (key, value) in scenario.parameters() {
         if tables.iter().any(|t| key.starts_with(t)) {
@@ -55,6 +65,11 @@ pub enum BuildError {
     /// A board that closes the loop calculates in single precision.
     #[error("sampling.scalar = \"f64\": expected \"f32\", the scalar of a board that closes the loop itself")]
     Scalar,
+    /// A board that closes the loop has no room for a map of the disc.
+    #[error(
+        "friction_map: a board that closes the loop itself takes none: leave out [friction_map], or close the loop on this machine"
+    )]
+    Map,
 }
 
 /// The parts of a run on a board, in the scalar `T`.
@@ -130,6 +145,9 @@ pub fn settings(
         return Err(BuildError::Scalar);
     }
     let spec = scenario.spec();
+    if spec.friction_map.is_some() {
+        return Err(BuildError::Map);
+    }
     let within = spec.run.start_position().0 & ((1 << FixedCounts::FRACTION_BITS) - 1);
     Ok(Settings::new(&RunParams {
         servo: &built.params,
@@ -162,21 +180,24 @@ pub fn in_single_precision(scenario: &Scenario) -> Result<Option<Scenario>, Scen
     Scenario::parse(scenario.name(), &scenario.canonical(), &set).map(Some)
 }
 
-/// The scenario's path from the count on which a run begins: its first point lies within that
-/// count, where the simulation's does, and its targets are the simulation's in the same scalar.
+/// The scenario's path from the count on which a run begins, and its map of the disc. The path's first point lies within
+/// that count, where the simulation's does, and its targets are the simulation's in the same scalar.
 ///
 /// # Errors
 /// None for a checked scenario.
-pub fn path<T: Real>(scenario: &Scenario) -> Result<impl Fn(u64) -> Target<T> + '_, BuildError> {
+pub fn path<T: Real>(
+    scenario: &Scenario,
+) -> Result<OnDisc<'_, impl Fn(u64) -> Target<T> + Copy>, BuildError> {
     let reference = scenario.spec().path::<T>()?;
     // Whole counts, so that nothing is rounded anew.
     let first = reference.at(0).position.0 >> FixedCounts::FRACTION_BITS;
     let first = FixedCounts::from_counts(first);
-    Ok(move |tick: u64| {
+    let path = move |tick: u64| {
         let target = reference.at(tick);
         let position = FixedCounts(target.position.0.wrapping_sub(first.0));
         Target { position, ..target }
-    })
+    };
+    Ok(OnDisc { path, map: scenario.spec().friction_map })
 }
 
 /// The scalar of a scenario, as a log names it.
@@ -295,7 +316,7 @@ mod tests {
             let origin = trace.target_fixed[0].0 >> FixedCounts::FRACTION_BITS;
             let origin = FixedCounts::from_counts(origin);
             for (k, simulated) in trace.target_fixed.iter().enumerate() {
-                let looped = path(k as u64);
+                let looped = (path.path)(k as u64);
                 let what = format!("{name} in {scalar} from {start}, tick {k}");
                 assert_eq!(looped.position.plus(origin), *simulated, "{what}");
                 assert_eq!(looped.velocity.to_f64(), trace.target_velocity[k], "{what}");

@@ -4,7 +4,7 @@ use crate::from_scenario::{self, BuildError, BuiltRun};
 use crate::lockstep_board::LockstepBoard;
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE, Station, StationNotice};
 use clutch_core::law::LawTerms;
-use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Target};
+use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned};
 use clutch_node::lockstep::Exchange;
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Settings, Standing};
 use clutch_sim::Scenario;
@@ -32,7 +32,7 @@ pub fn lockstep_host<'a, L: LockstepBoard>(
     built: &BuiltRun<f32>,
     link: L,
     ticks: u64,
-) -> Result<LockstepHost<L, impl Fn(u64) -> Target<f32> + 'a>, BuildError> {
+) -> Result<LockstepHost<L, impl Planned<f32> + 'a>, BuildError> {
     let configure = ControllerNode::new(built.controller, built.servo, built.supervisor).configuration();
     Ok(LockstepHost {
         host: HostNode::new(built.servo, configure, ALIVE_NS, BOARD_SILENCE_NS),
@@ -53,7 +53,7 @@ pub fn lockstep_host<'a, L: LockstepBoard>(
     })
 }
 
-impl<L: LockstepBoard, P: Fn(u64) -> Target<f32>> LockstepHost<L, P> {
+impl<L: LockstepBoard, P: Planned<f32>> LockstepHost<L, P> {
     /// The link.
     pub fn link(&mut self) -> &mut L {
         &mut self.link
@@ -126,7 +126,7 @@ impl<L: LockstepBoard, P: Fn(u64) -> Target<f32>> LockstepHost<L, P> {
     }
 }
 
-impl<L: LockstepBoard, P: Fn(u64) -> Target<f32>> Station for LockstepHost<L, P> {
+impl<L: LockstepBoard, P: Planned<f32>> Station for LockstepHost<L, P> {
     type Scalar = f32;
     type Terms = LawTerms<f32>;
     const LOOKS_ON: bool = true;

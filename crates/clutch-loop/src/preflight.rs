@@ -366,7 +366,7 @@ impl<'a, S: Station> Talk<'a, S> {
     }
 }
 
-impl<P: Fn(u64) -> clutch_core::Target<f32>> Talk<'_, HostStation<P>> {
+impl<P: clutch_core::Planned<f32>> Talk<'_, HostStation<P>> {
     /// Sends a run's settings, each until the board has said that it has it.
     ///
     /// # Errors

@@ -4,7 +4,9 @@ use crate::from_scenario::{self, BuildError, BuiltRun};
 use crate::to_log::{self, FOREIGN_LAW, PRESENT_CODE, START_VOLTAGE};
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Cycle, Sample, State};
-use clutch_core::{Counts, DacCode, FixedCounts, Micros, Real, Servo, SupervisorState, Target};
+use clutch_core::{
+    BeginningAt, Counts, DacCode, FixedCounts, Micros, Place, Real, Servo, SupervisorState, Target,
+};
 use clutch_log::{CommandRecord, EventKind, EventRecord, InChannel, Kind, Log, SampleRecord, Source, Value};
 use clutch_sim::Scenario;
 use clutch_sim::scenario::ScalarKind;
@@ -228,11 +230,8 @@ fn looped<T: Real>(
         if state.state() == State::Armed {
             origin = FixedCounts::from_counts(i64::from(sample.counts));
         }
-        let target = |tick: u64| {
-            let target = path(tick);
-            Target { position: target.position.plus(origin), ..target }
-        };
-        let cycle = supervisor.sample(servo, &mut state, &seen(sample), target);
+        let planned = BeginningAt { planned: &path, origin };
+        let cycle = supervisor.sample(servo, &mut state, &seen(sample), planned);
         commands.push(to_log::command(sample.time_ns, &cycle, servo.dac(), radians));
     }
     Ok(commands)
@@ -258,7 +257,8 @@ fn simulated<T: Real, C: ControlLaw<T>>(
         .iter()
         .map(|sample| {
             let target = path.at(sample.tick);
-            let output = servo.tick(&mut state, Counts(sample.counts), &target);
+            let map = |position| spec.friction_map.map_or_else(Place::default, |map| map.at(position));
+            let output = servo.tick_on(&mut state, Counts(sample.counts), &target, map);
             let cycle = simulated_cycle(sample.tick, target, output);
             to_log::command(sample.time_ns, &cycle, servo.dac(), radians)
         })

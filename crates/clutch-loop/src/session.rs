@@ -787,7 +787,7 @@ fn host<'a>(
     scenario: &'a Scenario,
     built: &BuiltRun<f32>,
     patient: bool,
-) -> Result<HostStation<impl Fn(u64) -> clutch_core::Target<f32> + 'a>, BuildError> {
+) -> Result<HostStation<impl clutch_core::Planned<f32> + 'a>, BuildError> {
     let configure = ControllerNode::new(built.controller, built.servo, built.supervisor).configuration();
     let silence = if patient { u64::from(PATIENT_SILENCE.0) * 1000 } else { BOARD_SILENCE_NS };
     let node = HostNode::new(built.servo, configure, ALIVE_NS, silence);

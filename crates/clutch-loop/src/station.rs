@@ -4,7 +4,7 @@
 //! which of the two it is.
 
 use clutch_core::law::{ControlLaw, LawTerms, Terms};
-use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Real, Target};
+use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned, Real};
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
 use clutch_wire::StopReason;
 
@@ -79,11 +79,11 @@ pub trait Station {
 pub struct ControllerStation<T: Real, C: ControlLaw<T>, P> {
     /// The controller.
     pub node: ControllerNode<T, C>,
-    /// The path, from position 0 on.
+    /// The path, from position 0 on, and the map of the disc.
     pub path: P,
 }
 
-impl<T: Real, C: ControlLaw<T>, P: Fn(u64) -> Target<T>> Station for ControllerStation<T, C, P> {
+impl<T: Real, C: ControlLaw<T>, P: Planned<T>> Station for ControllerStation<T, C, P> {
     type Scalar = T;
     type Terms = C::Terms;
     const LOOKS_ON: bool = false;
@@ -162,7 +162,7 @@ pub struct HostStation<P> {
     pub path: P,
 }
 
-impl<P: Fn(u64) -> Target<f32>> Station for HostStation<P> {
+impl<P: Planned<f32>> Station for HostStation<P> {
     type Scalar = f32;
     type Terms = LawTerms<f32>;
     const LOOKS_ON: bool = true;

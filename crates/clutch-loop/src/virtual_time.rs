@@ -10,7 +10,7 @@ use crate::sim_board::{SimBoard, SimBoardError};
 use crate::station::{Station, StationNotice};
 use crate::to_log;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{DacCode, Micros, Real, Target};
+use clutch_core::{DacCode, Micros, Planned, Real};
 use clutch_log::Record;
 use clutch_node::{Ending, Notice, Outbox, Standing};
 use clutch_sim::engine::{Event, Motion, Shaft};
@@ -166,7 +166,7 @@ impl<S: Station> VirtualLoop<S> {
     ///
     /// # Errors
     /// The engine gave up, or the station.
-    pub fn run(&mut self, path: &impl Fn(u64) -> Target<S::Scalar>) -> Result<VirtualReport, VirtualError> {
+    pub fn run(&mut self, path: &impl Planned<S::Scalar>) -> Result<VirtualReport, VirtualError> {
         let mut course = Course::new(self, path);
         course.discover()?;
         while let Some(now) = course.next_event() {
@@ -244,7 +244,7 @@ struct Course<'a, S: Station, P> {
     first_sample: Option<u64>,
 }
 
-impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
+impl<'a, S: Station, P: Planned<S::Scalar>> Course<'a, S, P> {
     fn new(on: &'a mut VirtualLoop<S>, path: &'a P) -> Self {
         let (period, present) = (on.station.period(), on.board.code());
         Course {
@@ -481,7 +481,7 @@ impl<'a, S: Station, P: Fn(u64) -> Target<S::Scalar>> Course<'a, S, P> {
     /// The path's position at a tick, rad.
     fn target(&self, tick: u64) -> f64 {
         let radians = self.on.station.encoder().radians_per_count::<f64>();
-        let position = (self.path)(tick).position.plus(self.on.station.origin());
+        let position = self.path.target(tick).position.plus(self.on.station.origin());
         position.minus::<f64>(clutch_core::FixedCounts(0)) * radians
     }
 }

@@ -6,7 +6,8 @@ use crate::pace::HostPace;
 use clutch_core::law::{ControlLaw, Law};
 use clutch_core::supervisor::{BoardMode, Cause, Sample as Seen, State};
 use clutch_core::{
-    Counts, DacCode, FixedCounts, Micros, Real, SafeKind, Servo, Supervisor, SupervisorState, Target,
+    BeginningAt, Counts, DacCode, FixedCounts, Micros, Planned, Real, SafeKind, Servo, Supervisor,
+    SupervisorState,
 };
 use clutch_wire::{
     Actuate, Arm, BoardState, Configure, Decoder, Discover, Message, Ping, SCHEMA, STATUS_DAC_FAULT,
@@ -190,12 +191,12 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         }
     }
 
-    /// Bytes from the board. `path` is the planned path from position 0 on.
+    /// Bytes from the board. The path is planned from position 0 on.
     pub fn receive(
         &mut self,
         now_ns: u64,
         bytes: &[u8],
-        path: &impl Fn(u64) -> Target<T>,
+        planned: &impl Planned<T>,
         out: &mut Outbox,
         notices: &mut impl FnMut(Notice<T, C::Terms>),
     ) {
@@ -219,7 +220,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
                 let newer = sample.is_some_and(|s| {
                     s.run == earlier.run && (s.sequence.wrapping_sub(earlier.sequence) as i16) > 0
                 });
-                self.sample(now_ns, &earlier, newer, path, out, notices);
+                self.sample(now_ns, &earlier, newer, planned, out, notices);
             }
             match sample {
                 Some(sample) => waiting = Some(sample),
@@ -227,7 +228,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             }
         }
         if let Some(sample) = waiting {
-            self.sample(now_ns, &sample, false, path, out, notices);
+            self.sample(now_ns, &sample, false, planned, out, notices);
         }
     }
 
@@ -289,7 +290,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         now_ns: u64,
         sample: &Sample,
         superseded: bool,
-        path: &impl Fn(u64) -> Target<T>,
+        planned: &impl Planned<T>,
         out: &mut Outbox,
         notices: &mut impl FnMut(Notice<T, C::Terms>),
     ) {
@@ -323,11 +324,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         if self.state.state() == State::Armed {
             self.origin = FixedCounts::from_counts(i64::from(sample.counts));
         }
-        let origin = self.origin;
-        let from_here = |tick: u64| {
-            let target = path(tick);
-            Target { position: target.position.plus(origin), ..target }
-        };
+        let from_here = BeginningAt { planned, origin: self.origin };
         let cycle = self.supervisor.sample(&self.servo, &mut self.state, &seen, from_here);
         if let Some(code) = cycle.answer {
             out.push(&Message::Actuate(Actuate {

@@ -6,7 +6,7 @@ use crate::pace::HostPace;
 use crate::telemetry::{both_states, notice};
 use clutch_core::law::LawTerms;
 use clutch_core::supervisor::{Cause, State};
-use clutch_core::{FixedCounts, Micros, Servo, Target};
+use clutch_core::{FixedCounts, Micros, Planned, Servo, Target};
 use clutch_wire::{
     Arm, Configure, ControllerHello, Decoder, Discover, Message, Ping, SCHEMA, Set, Stop, StopReason,
     TELEMETRY_ASKED, Telemetry, VERSION,
@@ -230,7 +230,7 @@ impl HostNode {
         &mut self,
         now_ns: u64,
         bytes: &[u8],
-        path: &impl Fn(u64) -> Target<f32>,
+        path: &impl Planned<f32>,
         notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
     ) {
         for byte in bytes {
@@ -246,7 +246,7 @@ impl HostNode {
         &mut self,
         now_ns: u64,
         message: &Message,
-        path: &impl Fn(u64) -> Target<f32>,
+        path: &impl Planned<f32>,
         notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
     ) {
         let (run, config) = (self.configure.run, self.configure.config);
@@ -338,7 +338,7 @@ impl HostNode {
         &mut self,
         now_ns: u64,
         m: &Telemetry,
-        path: &impl Fn(u64) -> Target<f32>,
+        path: &impl Planned<f32>,
         notices: &mut impl FnMut(Notice<f32, LawTerms<f32>>),
     ) {
         if self.given_up {
@@ -358,7 +358,7 @@ impl HostNode {
         if both_states(m.states).is_some_and(|(from, _)| from == State::Armed) {
             self.origin = Some(FixedCounts::from_counts(i64::from(m.counts)));
         }
-        let target = path(tick);
+        let target = path.target(tick);
         if self.origin.is_none() && m.flags & TELEMETRY_ASKED != 0 {
             self.origin = Some(self.origin_from(m, target.position));
         }

@@ -8,11 +8,12 @@ use clutch_core::law::{
     Command, ControlLaw, Law, LawState, LawTerms, Limit, Output, OutputState, Seen, Terms,
 };
 use clutch_core::{
-    Counts, Dac, Encoder, FixedCounts, ParamError, Real, ServoOutput, ServoState, StickSlipParams,
-    StickSlipState, law,
+    Counts, Dac, Encoder, FixedCounts, FrictionMap, ParamError, Real, ServoOutput, ServoState,
+    StickSlipParams, StickSlipState, law, off_map,
 };
 use clutch_sim::MovingRig;
 use clutch_sim::engine::{Event, EventKind, Motion};
+use clutch_sim::friction_map::MapGrid;
 use clutch_sim::scenario::ScalarKind;
 use pyo3::exceptions::{PyAttributeError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -71,6 +72,7 @@ pub(crate) struct Servo {
     /// The converter rounds; else the law's own voltage goes out.
     rounds: bool,
     dac: Dac<f64>,
+    map: Option<Arc<MapGrid>>,
 }
 
 fn begin<T: Real>(py: Python<'_>, scenario: &Scenario) -> PyResult<Running<T>> {
@@ -83,12 +85,19 @@ fn begin<T: Real>(py: Python<'_>, scenario: &Scenario) -> PyResult<Running<T>> {
 }
 
 impl<T: Real> Running<T> {
-    fn step(&mut self, counts: f64, whole: bool, target: &Target) -> (u16, f64) {
+    fn step(
+        &mut self,
+        counts: f64,
+        whole: bool,
+        target: &Target,
+        map: Option<FrictionMap<'_>>,
+    ) -> (u16, f64) {
         let target = target.0.cast();
+        let map = |position| map.map_or_else(|| off_map(position), |map| map.at(position));
         self.last = if whole {
-            self.servo.tick(&mut self.state, Counts(counts as i64 as i32), &target)
+            self.servo.tick_on(&mut self.state, Counts(counts as i64 as i32), &target, map)
         } else {
-            self.servo.tick_at(&mut self.state, FixedCounts::from_real(counts), &target)
+            self.servo.tick_at(&mut self.state, FixedCounts::from_real(counts), &target, map)
         };
         (self.last.code.0, self.last.command.voltage.to_f64())
     }
@@ -151,6 +160,7 @@ impl Servo {
             whole: spec.rig.encoder.quantised,
             rounds: spec.rig.dac.quantised,
             dac: Dac::new(&spec.rig.dac.converter).map_err(|e| core_error(py, &e))?,
+            map: scenario.0.map_grid().cloned(),
         })
     }
 
@@ -182,7 +192,8 @@ impl Servo {
     fn step(&mut self, counts: f64, target: &Target) -> PyResult<f64> {
         let whole = self.whole;
         let counts = checked_counts(counts, whole)?;
-        let (code, volts) = either!(&mut self.running, r => r.step(counts, whole, target));
+        let map = self.map.as_ref().and_then(|grid| grid.map());
+        let (code, volts) = either!(&mut self.running, r => r.step(counts, whole, target, map));
         Ok(if self.rounds { self.dac.volts(clutch_core::DacCode(code)) } else { volts })
     }
 

@@ -4,6 +4,7 @@ pub mod detected;
 pub mod drive;
 pub mod engine;
 pub mod friction_lab;
+pub mod friction_map;
 pub mod meter;
 pub mod metrics;
 pub mod moving_rig;

@@ -11,8 +11,8 @@ use clutch_core::law::{ControlLaw, LawParams, Limit, OutputParams, ShellParams, 
 use clutch_core::params::{Range, Table};
 use clutch_core::reference::{Reference, ReferenceParams};
 use clutch_core::{
-    Counts, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real, Servo, ServoOutput, ServoParams,
-    ServoState, Target, VelocityParams, params,
+    Counts, Encoder, FixedCounts, FrictionMap, Micros, ParamError, Place, PlantParams, Real, Servo,
+    ServoOutput, ServoParams, ServoState, Target, VelocityParams, params,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -110,6 +110,8 @@ pub struct RunSpec<'a> {
     pub shell: ShellParams,
     /// The path.
     pub reference: ReferenceParams<'a>,
+    /// Friction along the disc, where there is a map.
+    pub friction_map: Option<FrictionMap<'a>>,
     /// Length, beginning, seed and engine.
     pub run: RunParams,
 }
@@ -127,6 +129,7 @@ impl<'a> RunSpec<'a> {
             output: OutputParams::default(),
             shell: ShellParams::default(),
             reference,
+            friction_map: None,
             run: RunParams::default(),
         }
     }
@@ -486,6 +489,7 @@ pub(crate) struct ClosedLoop<'a, 's, T: Real, C: ControlLaw<T>> {
     servo: &'s Servo<T, C>,
     state: ServoState<T, C::State>,
     reference: Reference<'a, T>,
+    map: Option<FrictionMap<'a>>,
     moving: MovingRig,
     period: f64,
 }
@@ -517,7 +521,7 @@ impl<'a, 's, T: Real, C: ControlLaw<T>> ClosedLoop<'a, 's, T, C> {
         let state = prepared.servo_state(servo);
         let Prepared { reference, moving, volts, engine } = prepared;
         let period = spec.period.seconds();
-        Ok((ClosedLoop { servo, state, reference, moving, period }, volts, engine))
+        Ok((ClosedLoop { servo, state, reference, map: spec.friction_map, moving, period }, volts, engine))
     }
 
     /// Tick `k` begins: sensor, law, converter.
@@ -531,10 +535,11 @@ impl<'a, 's, T: Real, C: ControlLaw<T>> ClosedLoop<'a, 's, T, C> {
         let shaft = *moving.shaft();
         let counts = moving.counts();
         let rig = moving.rig();
+        let map = |position| self.map.map_or_else(Place::default, |map| map.at(position));
         let out = if rig.params.encoder.quantised {
-            self.servo.tick(&mut self.state, counts, &target)
+            self.servo.tick_on(&mut self.state, counts, &target, map)
         } else {
-            self.servo.tick_at(&mut self.state, moving.fine_counts(), &target)
+            self.servo.tick_at(&mut self.state, moving.fine_counts(), &target, map)
         };
         let commanded =
             if rig.params.dac.quantised { rig.dac.volts(out.code) } else { out.command.voltage.to_f64() };

@@ -13,6 +13,7 @@ use toml::{Table, Value};
 
 /// Values with which a scenario is good, where one made of the range alone is not. Keys or their ends.
 const SAMPLES: &[(&str, &str)] = &[
+    ("points_deg_factor", "[[0.0, 1.0], [0.3, 1.1], [0.6, 0.9], [0.9, 1.0]]"),
     ("name", "\"rows\""),
     ("rig.base", "\"paper\""),
     ("rig.ripple.rms", "0.05"),

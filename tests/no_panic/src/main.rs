@@ -35,11 +35,11 @@ use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Ta
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Checks, Sample, State, SupervisorState};
 use clutch_core::{
     Actuator, ActuatorKind, ActuatorParams, Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams, DerivativeState, Encoder, FixedCounts, Friction,
-    FrictionModel, FrictionParams, Interval, Micros, Observer, ObserverGains, ObserverParams, Plant,
+    FrictionMap, FrictionModel, FrictionParams, Interval, Micros, Observer, ObserverGains, ObserverParams, Plant,
     PlantParams, Real, SafeCodes, SafeKind, SafeRun, SafeState, Servo, ServoParams, SmoothedDerivative,
     SmoothedDerivativeParams, StickSlip, StickSlipParams, StickSlipState, Stribeck, StribeckParams,
     Supervisor, SupervisorParams, Target, Tolerances, VelocityParams, VelocitySource, check_path,
-    sin_cos_turns,
+    off_map, sin_cos_turns,
 };
 use clutch_node::lockstep::Exchange;
 use clutch_node::{
@@ -391,9 +391,13 @@ fn turns<T: Real, C: ControlLaw<T>>(servo: Option<Servo<T, C>>) {
     let mut state = opaque(servo.start(Counts(word() as i32), &target(), real()));
     sink(servo.tick(&mut state, Counts(word() as i32), &target()));
     sink(servo.start_at(fixed(), &target(), real()));
-    sink(servo.tick_at(&mut state, fixed(), &target()));
+    sink(servo.tick_at(&mut state, fixed(), &target(), off_map));
+    let factors = [word() as u16; 8];
+    if let Ok(map) = FrictionMap::new(fixed().0, word() as u32, opaque(&factors)) {
+        sink(servo.tick_on(&mut state, Counts(word() as i32), &target(), |position| map.at(position)));
+    }
     let (next, steps) = (target(), (word() as u32, word() as u32));
-    servo.bridge(&mut state, (Counts(word() as i32), &next), &target(), steps);
+    servo.bridge(&mut state, (Counts(word() as i32), &next), &target(), steps, off_map);
     sink(state);
 }
 

@@ -28,6 +28,15 @@ pub(super) struct Shaft<T> {
     pub(super) roughness: T,
 }
 
+/// A measured position that is not the one foreseen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Surprise<T> {
+    /// Square of the distance, counts².
+    pub(crate) square: T,
+    /// The variance that it was foreseen with, counts²; 0 where nothing was measured.
+    pub(crate) variance: T,
+}
+
 /// Means and covariance of position `t`, velocity `w`, mean friction `h`, ripple `r` and its slope `s`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Belief<T> {
@@ -207,15 +216,18 @@ impl<T: Real> Belief<T> {
         [self.tt, self.tw, self.th, self.tr, self.ts]
     }
 
-    /// The position was measured, with a variance. A measurement far beyond what is believed widens the belief first.
+    /// The position was measured, with a variance: what it was off by, squared, and the variance of that. A measurement far
+    /// beyond what is believed widens the belief first.
     #[inline(never)]
-    pub(super) fn correct(&mut self, measured: T, variance: T) {
+    pub(super) fn correct(&mut self, measured: T, variance: T) -> Surprise<T> {
         let y = measured - self.position;
+        let surprise = Surprise { square: y * y, variance: self.tt + variance };
         if y * y > T::splat(25.0) * (self.tt + variance) {
             self.tt += y * y;
             self.ww += T::splat(0.25) * (y * y);
         }
         self.take(self.at_position(), self.tt + variance, y, T::ONE);
+        surprise
     }
 
     /// No edge has come: the position is below `end` (`side` 1) or above it (`side` −1). The belief becomes the normal

@@ -18,11 +18,13 @@
 //! of a shaft that only a brake holds is none: a channel that is dead counts to and fro.
 
 mod belief;
+mod beside_map;
 
 use crate::friction::{FrictionModel, Stribeck};
 use crate::params::{Range, Table};
-use crate::{Actuator, ActuatorKind, Encoder, FixedCounts, Micros, ParamError, Plant, Real};
-use belief::{Belief, Shaft};
+use crate::{Actuator, ActuatorKind, Encoder, FixedCounts, Micros, ParamError, Place, Plant, Real};
+use belief::{Belief, Shaft, Surprise};
+pub(crate) use beside_map::{BesideMap, BesideMapState};
 
 crate::params! {
     /// A Kalman filter that is corrected where an edge of the encoder is crossed, and by silence between edges. It
@@ -99,10 +101,13 @@ pub struct EdgeTimed<T> {
     doubt: T,
     ripple: T,
     wave: T,
+    /// Variance by which the end of a count is blurred where silence cuts the belief off, counts².
+    blur: T,
 }
 
 /// Motion, as far as the filter knows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)] // a board copies a state without bytes of its own by words
 enum Phase {
     /// At rest, or never seen to move.
     #[default]
@@ -136,6 +141,8 @@ pub struct EdgeTimedState<T> {
     phase: Phase,
     /// Starts in a row that brought no edge.
     unmoved: T,
+    /// The edge of the last period; no variance where there was none, or the shaft did not slide.
+    surprise: Surprise<T>,
 }
 
 impl<T: Real> EdgeTimedState<T> {
@@ -160,6 +167,11 @@ impl<T: Real> EdgeTimedState<T> {
     /// Friction, as a multiple of the model's, and its variance.
     pub(crate) fn friction(&self) -> (T, T) {
         (self.belief.friction(), self.belief.friction_variance())
+    }
+
+    /// Distance of the last period's edge from where it was foreseen; no variance without one that a sliding shaft crossed.
+    pub(crate) fn surprise(&self) -> Surprise<T> {
+        self.surprise
     }
 
     /// Velocity, counts per period.
@@ -245,6 +257,7 @@ impl<T: Real> EdgeTimed<T> {
             doubt: p.friction_doubt,
             ripple: p.ripple,
             wave,
+            blur: T::splat(BLUR * BLUR),
         })
     }
 
@@ -325,6 +338,12 @@ impl<T: Real> EdgeTimed<T> {
     #[must_use]
     #[inline(never)]
     pub fn ahead(&self, state: &EdgeTimedState<T>) -> Ahead<T> {
+        self.ahead_on(state, &Place::even())
+    }
+
+    /// As [`EdgeTimed::ahead`], where friction is known beside its mean.
+    #[inline(never)]
+    pub(crate) fn ahead_on(&self, state: &EdgeTimedState<T>, place: &Place<T>) -> Ahead<T> {
         let mut belief = state.belief;
         let mut pad = state.pad;
         let [newest, middle, oldest] = state.line;
@@ -334,18 +353,20 @@ impl<T: Real> EdgeTimed<T> {
                 let (volts, end) = self.at_pad(pad, arrived);
                 pad = end;
                 let (pull, load) = self.forces(volts);
-                let load = load * self.shape(belief.velocity);
+                let load = load * place.friction(belief.position) * self.shape(belief.velocity);
                 let (way, ..) = belief.glide(&self.shaft, pull, load);
                 belief.ripple += way * belief.slope;
             }
         }
         // In the middle of the period.
-        belief.ripple += T::splat(0.5) * belief.velocity * belief.slope;
+        let way = T::splat(0.5) * belief.velocity;
+        belief.ripple += way * belief.slope;
+        let here = place.friction(belief.position + way);
         Ahead {
             position: belief.position,
             velocity: belief.velocity,
-            friction: belief.friction(),
-            variance: belief.friction_variance(),
+            friction: belief.friction() * here,
+            variance: belief.friction_variance() * (here * here),
             pad,
         }
     }
@@ -465,6 +486,21 @@ impl<T: Real> EdgeTimed<T> {
         state.phase = Phase::Resting;
     }
 
+    /// The state of a filter that knows friction along the disc but for its mean, where `other` knows nothing of the disc.
+    pub(crate) fn known_from(&self, other: &EdgeTimedState<T>, place: &Place<T>) -> EdgeTimedState<T> {
+        let mut state = *other;
+        let friction = other.belief.friction() / place.friction(other.belief.position);
+        for belief in [&mut state.belief, &mut state.at_edge] {
+            belief.hh += belief.rr;
+            belief.mean = friction;
+            (belief.th, belief.wh, belief.hr, belief.hs) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
+            belief.know_friction(friction, self.ripple * friction);
+            (belief.ts, belief.ws) = (T::ZERO, T::ZERO);
+            belief.ss = belief.rr * self.wave * self.wave;
+        }
+        state
+    }
+
     /// One sample: the position now, the voltage that the converter gave since the last sample, and the path's
     /// velocity, rad/s.
     #[inline(never)]
@@ -475,8 +511,26 @@ impl<T: Real> EdgeTimed<T> {
         applied: T,
         target_velocity: T,
     ) {
+        self.update_on(state, position, applied, target_velocity, &Place::even());
+    }
+
+    /// As [`EdgeTimed::update`], where friction is known beside its mean: around the count of this sample.
+    #[inline(never)]
+    pub(crate) fn update_on(
+        &self,
+        state: &mut EdgeTimedState<T>,
+        position: FixedCounts,
+        applied: T,
+        target_velocity: T,
+        place: &Place<T>,
+    ) {
         let (moved, volts) = self.hear(state, position, applied);
+        state.surprise = Surprise::default();
         let (pull, load) = self.forces(volts);
+        // In the middle of the period that has passed, above the edge of this sample's count.
+        let belief = &state.belief;
+        let here = belief.position + T::splat(0.5) * belief.velocity - moved;
+        let load = load * place.friction(here);
         let way = match state.phase {
             Phase::Resting => T::ZERO,
             Phase::Starting | Phase::Sliding => {
@@ -494,14 +548,14 @@ impl<T: Real> EdgeTimed<T> {
             if state.phase != Phase::Resting {
                 let backward = state.belief.velocity < T::ZERO;
                 let (end, side) = if backward { (T::ZERO, -T::ONE) } else { (T::ONE, T::ONE) };
-                state.belief.keep_within(end, side, T::splat(BLUR * BLUR));
+                state.belief.keep_within(end, side, self.blur);
             }
         }
         // What only resists turns no shaft round.
         if !self.actuator.kind().two_sided() {
             state.belief.velocity = state.belief.velocity.max(T::ZERO);
         }
-        self.look_for_rest(state, self.per_period(target_velocity));
+        self.look_for_rest(state, self.per_period(target_velocity), place);
         if !state.belief.is_finite() {
             *state = self.start(position, applied, target_velocity);
         }
@@ -520,7 +574,10 @@ impl<T: Real> EdgeTimed<T> {
         };
         let inside = T::splat(0.5) * span;
         let measured = if moved > T::ZERO { inside } else { T::ONE - inside };
-        belief.correct(measured, span * span / T::from_i32(12));
+        let surprise = belief.correct(measured, span * span / T::from_i32(12));
+        if state.phase == Phase::Sliding {
+            state.surprise = surprise;
+        }
         state.at_edge = *belief;
         state.silent = T::ZERO;
         state.release = T::ZERO;
@@ -536,7 +593,7 @@ impl<T: Real> EdgeTimed<T> {
     }
 
     /// A shaft that is silent for too long rests. `pace`: the path's velocity, counts per period.
-    fn look_for_rest(&self, state: &mut EdgeTimedState<T>, pace: T) {
+    fn look_for_rest(&self, state: &mut EdgeTimedState<T>, pace: T, place: &Place<T>) {
         match state.phase {
             Phase::Resting => {}
             Phase::Sliding if self.too_long(state.silent, pace) => {
@@ -559,6 +616,7 @@ impl<T: Real> EdgeTimed<T> {
             Phase::Starting if state.silent > self.patience => {
                 // The voltage has stopped it before the next edge: it would have carried no more friction than this.
                 let (pull, load) = self.forces(state.pad);
+                let load = load * place.friction(state.belief.position);
                 let carried = T::splat(ABOVE) * pull.abs() / load.max(T::splat(1e-6));
                 let friction = state.belief.friction().max(carried.min(T::splat(10.0)));
                 state.belief.rest();

@@ -13,7 +13,7 @@
 
 use super::micro_step::{MicroStep, MicroStepState, Stepping};
 use super::{Beside, Command, ControlLaw, Listed, Output, OutputState, Seen, Tick};
-use crate::edge_timed::{EdgeTimed, EdgeTimedParams, EdgeTimedState};
+use crate::edge_timed::{BesideMap, BesideMapState, EdgeTimedParams};
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
 use crate::{ActuatorKind, FixedCounts, ParamError, Plant, Real};
@@ -56,7 +56,7 @@ pub struct Glide<T> {
     /// Gains per period.
     kp: T,
     kd: T,
-    estimator: EdgeTimed<T>,
+    filters: BesideMap<T>,
     plant: Plant<T>,
     steps: MicroStep<T>,
     /// Torque for an acceleration, N m per count per period².
@@ -69,11 +69,11 @@ pub struct Glide<T> {
 /// Memory of the law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GlideState<T> {
-    estimator: EdgeTimedState<T>,
-    /// The sample that the filter sees in the next period.
+    filters: BesideMapState<T>,
+    /// The sample that the filters see in the next period.
     seen: Seen<T>,
-    /// The filter has begun.
-    begun: bool,
+    /// 1 once the filters have begun, else 0.
+    begun: T,
     steps: MicroStepState<T>,
     output: OutputState<T>,
 }
@@ -96,14 +96,14 @@ impl<T: Real> Glide<T> {
         if plant.actuator().kind() != ActuatorKind::Motor {
             plant.friction().check_divisor()?;
         }
-        let estimator = EdgeTimed::new(&p.filter, &plant, beside.encoder, beside.period)?;
-        let acceleration = seconds * seconds * estimator.counts_per_radian();
+        let filters = BesideMap::new(&p.filter, &plant, beside.encoder, beside.period)?;
+        let acceleration = seconds * seconds * filters.plain().counts_per_radian();
         let mut law = Glide {
             params: *p,
             kp: p.kp * seconds,
             kd: p.kd * seconds,
             steps: MicroStep::default(),
-            estimator,
+            filters,
             torque: beside.model.inertia / acceleration,
             acceleration,
             plant,
@@ -115,7 +115,7 @@ impl<T: Real> Glide<T> {
 
     /// Micro-steps of the shaft that the law believes in.
     fn steps_of(&self, p: &GlideParams<T>) -> MicroStep<T> {
-        let filter = &self.estimator;
+        let filter = self.filters.plain();
         let only = match self.plant.actuator().kind() {
             ActuatorKind::Brake => self.plant.params().drive_torque.sgn(),
             ActuatorKind::Motor | ActuatorKind::Both => T::ZERO,
@@ -132,7 +132,7 @@ impl<T: Real> Glide<T> {
         match (self.plant.actuator().kind(), demand) {
             (ActuatorKind::Brake, Stepping::Go(_)) => self.output.lowest(),
             (ActuatorKind::Motor | ActuatorKind::Both, Stepping::Go(push)) => {
-                let at_rest = push.abs() * self.plant.friction().at_rest() / self.estimator.mu();
+                let at_rest = push.abs() * self.plant.friction().at_rest() / self.filters.plain().mu();
                 self.volts(T::ZERO, at_rest, push.sgn())
             }
             (ActuatorKind::Brake | ActuatorKind::Both, Stepping::Hold) => self.output.highest(),
@@ -142,23 +142,24 @@ impl<T: Real> Glide<T> {
 
     /// Demand of a period in which the shaft goes in steps, V, and terms.
     #[inline(never)]
-    fn step(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> (T, [T; 6]) {
-        let filter = &self.estimator;
-        let Seen { position, applied } = state.seen;
+    fn step(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> (T, [T; 7]) {
+        let filter = self.filters.plain();
+        let Seen { position, applied, place } = state.seen;
         if !begun {
-            state.estimator = filter.start(position, applied, tick.target_velocity);
+            state.filters = self.filters.start(position, applied, tick.target_velocity);
         }
         let pace = filter.per_period(tick.target_velocity);
         if !state.steps.active() {
-            let ahead = filter.ahead(&state.estimator).position;
+            let (driving, belief, here) = self.filters.driving(&state.filters);
+            let ahead = driving.ahead_on(belief, &here).position;
             state.steps.begin(ahead, filter.delay());
         }
-        let moved = filter.stand_aside(&mut state.estimator, position, applied);
-        let from_edge = tick.error * filter.counts_per_radian() + state.estimator.fraction();
+        let moved = self.filters.stand_aside(&mut state.filters, (position, place), applied);
+        let belief = state.filters.driving();
+        let from_edge = tick.error * filter.counts_per_radian() + belief.fraction();
         let target = from_edge + filter.delay() * pace;
         let demand = self.stepping(self.steps.demand(&mut state.steps, moved, target, pace));
         let error = target - state.steps.position();
-        let belief = &state.estimator;
         let (friction, variance) = belief.friction();
         let mu = filter.mu();
         let terms = [
@@ -168,13 +169,14 @@ impl<T: Real> Glide<T> {
             error * filter.radians_per_count(),
             tick.target_velocity,
             T::from_i32(3),
+            state.filters.part(),
         ];
         (demand, terms)
     }
 
     /// Voltage for a torque on a shaft that goes a way, with a multiple of the model's friction, V.
     fn volts(&self, torque: T, friction: T, way: T) -> T {
-        let mu = self.estimator.mu() * friction;
+        let mu = self.filters.plain().mu() * friction;
         self.plant.actuator().volts_for(torque - self.plant.params().drive_torque, mu, way)
     }
 
@@ -183,7 +185,7 @@ impl<T: Real> Glide<T> {
         if self.plant.actuator().kind() == ActuatorKind::Brake {
             return self.output.lowest();
         }
-        let at_rest = T::splat(PUSHED) * friction * self.plant.friction().at_rest() / self.estimator.mu();
+        let at_rest = T::splat(PUSHED) * friction * self.plant.friction().at_rest() / self.filters.plain().mu();
         let still = way * self.volts(T::ZERO, at_rest, way);
         let moved = way * self.volts(self.torque * pace, friction, way);
         // What resists above 0 V drives below it.
@@ -201,27 +203,27 @@ impl<T: Real> Glide<T> {
 
     /// Demand of a period in which the shaft slides, V, and terms.
     #[inline(never)]
-    fn slide(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> (T, [T; 6]) {
-        let filter = &self.estimator;
-        let Seen { position, applied } = state.seen;
-        let belief = &mut state.estimator;
+    fn slide(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> (T, [T; 7]) {
+        let Seen { position, applied, place } = state.seen;
+        let filters = &mut state.filters;
         if begun {
             if state.steps.active() {
                 state.steps.end();
-                filter.take_over(belief, state.steps.position(), self.steps.friction(&state.steps));
+                let friction = self.steps.friction(&state.steps);
+                self.filters.take_over(filters, state.steps.position(), friction);
             }
-            filter.update(belief, position, applied, tick.target_velocity);
+            self.filters.update(filters, (position, place), applied, tick.target_velocity);
         } else {
-            *belief = filter.start(position, applied, tick.target_velocity);
+            *filters = self.filters.start(position, applied, tick.target_velocity);
         }
-        self.demand(belief, tick)
+        self.demand(filters, tick)
     }
 
     /// Demand of a period, V, and terms.
     #[inline(never)]
-    fn demand(&self, belief: &mut EdgeTimedState<T>, tick: &Tick<T>) -> (T, [T; 6]) {
-        let filter = &self.estimator;
-        let ahead = filter.ahead(belief);
+    fn demand(&self, filters: &mut BesideMapState<T>, tick: &Tick<T>) -> (T, [T; 7]) {
+        let (filter, belief, place) = self.filters.driving(filters);
+        let ahead = filter.ahead_on(belief, &place);
         let pace = filter.per_period(tick.target_velocity);
         let (way, fast) = (pace.sgn(), pace.abs());
         let from_edge = tick.error * filter.counts_per_radian() + belief.fraction();
@@ -229,8 +231,9 @@ impl<T: Real> Glide<T> {
         // A shaft at rest waits until the path is about to leave its count.
         let half = T::splat(0.5);
         if belief.rests() && fast > T::ZERO && way * error + filter.patience() * fast > half {
-            filter.let_go(belief, tick.target_velocity);
+            self.filters.let_go(filters, tick.target_velocity);
         }
+        let belief = filters.driving();
         let p = &self.params;
         let wanted = way * (fast + self.kp * way * error).limit(p.floor * fast, p.cap * fast);
         let friction = if belief.starts() {
@@ -259,6 +262,7 @@ impl<T: Real> Glide<T> {
             error * filter.radians_per_count(),
             filter.rad_per_s(wanted),
             phase,
+            filters.part(),
         ];
         (demand, terms)
     }
@@ -266,14 +270,14 @@ impl<T: Real> Glide<T> {
 
 impl<T: Real> ControlLaw<T> for Glide<T> {
     type State = GlideState<T>;
-    type Terms = [T; 6];
+    type Terms = [T; 7];
     const TERMS: &'static [&'static str] =
-        &["velocity_rad_s", "mu", "mu_variance", "error_ahead_rad", "wanted_velocity_rad_s", "phase"];
+        &["velocity_rad_s", "mu", "mu_variance", "error_ahead_rad", "wanted_velocity_rad_s", "phase", "map"];
 
     fn start(&self, tick: &Tick<T>, applied: T) -> GlideState<T> {
         // The first period's demand does not depend on where the shaft is.
-        let mut belief = self.estimator.start(FixedCounts(0), applied, tick.target_velocity);
-        let (demand, _) = self.demand(&mut belief, tick);
+        let mut filters = self.filters.start(FixedCounts(0), applied, tick.target_velocity);
+        let (demand, _) = self.demand(&mut filters, tick);
         let seen = Seen { applied, ..Seen::default() };
         GlideState { seen, output: self.output.start(demand, applied), ..GlideState::default() }
     }
@@ -283,9 +287,9 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
     }
 
     #[inline(never)] // by itself a board's bound counts a step or a slide, and no other law's frame grows
-    fn update(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> Command<T, [T; 6]> {
-        let begun = core::mem::replace(&mut state.begun, true);
-        let pace = self.estimator.per_period(tick.target_velocity);
+    fn update(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> Command<T, [T; 7]> {
+        let begun = core::mem::replace(&mut state.begun, T::ONE) > T::ZERO;
+        let pace = self.filters.plain().per_period(tick.target_velocity);
         let (demand, terms) = if self.steps.takes(&state.steps, pace) {
             self.step(state, tick, begun)
         } else {

@@ -17,7 +17,7 @@ mod shell;
 pub use output::{Limit, Output, OutputParams, OutputState};
 pub use shell::{Shell, ShellParams};
 
-use crate::{Arithmetic, Encoder, FixedCounts, Micros, ParamError, PlantParams, Real};
+use crate::{Arithmetic, Encoder, FixedCounts, Micros, ParamError, Place, PlantParams, Real};
 
 list::laws! {
     pd Pd PdParams "Proportional–derivative control (4).";
@@ -59,6 +59,8 @@ pub struct Seen<T> {
     pub position: FixedCounts,
     /// Voltage since the last tick, as the converter gave it, V.
     pub applied: T,
+    /// Friction around the count of the position, by a map, where there is one.
+    pub place: Place<T>,
 }
 
 /// The answer of a law.
@@ -269,7 +271,7 @@ mod tests {
         assert_eq!(ControlLaw::<f64>::term_names(&by), ControlLaw::<f64>::term_names(&law));
         let tick = behind(-1e-3);
         let (mut one, mut other) = (law.start(&tick, 2.0), ControlLaw::start(&by, &tick, 2.0));
-        let seen = Seen { position: FixedCounts::from_counts(3), applied: 2.0 };
+        let seen = Seen { position: FixedCounts::from_counts(3), applied: 2.0, ..Seen::default() };
         law.sees(&mut one, &seen);
         ControlLaw::sees(&by, &mut other, &seen);
         assert_eq!(one, other);
@@ -283,7 +285,7 @@ mod tests {
         for law in &laws {
             for other in &laws {
                 let mut foreign = other.start(&tick, 3.0);
-                law.sees(&mut foreign, &Seen { position: FixedCounts(0), applied: 1.0 });
+                law.sees(&mut foreign, &Seen { applied: 1.0, ..Seen::default() });
                 let command = law.update(&mut foreign, &tick);
                 assert!((0.0..=9.0).contains(&command.voltage), "{command:?}");
             }

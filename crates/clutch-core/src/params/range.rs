@@ -110,11 +110,14 @@ impl fmt::Display for Words {
             Kind::Switch => return f.write_str("true or false"),
             Kind::Text => return f.write_str("a text in quotes"),
             Kind::Points => {
-                let from = if has_low { " from 0 s on" } else { "" };
-                return write!(
-                    f,
-                    "a list of at least one pair [{text}] of finite numbers, with times that rise{from}"
-                );
+                write!(f, "a list of at least one pair [{text}] of finite numbers, with ")?;
+                let (of, unit) = if text.starts_with('s') { ("times", "s") } else { ("angles", "°") };
+                write!(f, "{of} that rise")?;
+                return match (has_low, has_high) {
+                    (true, true) => write!(f, " from {low} to {high} {unit}"),
+                    (true, false) => write!(f, " from {low} {unit} on"),
+                    _ => Ok(()),
+                };
             }
             Kind::Word(words) => {
                 f.write_str("one of: ")?;

@@ -53,7 +53,7 @@ pub use state::{Arrival, BoardMode, Cause, Checks, Cycle, Sample, State, Supervi
 use crate::law::{ControlLaw, Limit, Terms};
 use crate::safe_state::{SafeCodes, SafeRun};
 use crate::{
-    Bounds, Counts, Dac, DacCode, Micros, ParamError, Real, Servo, ServoOutput, ServoParams, Target,
+    Bounds, Counts, Dac, DacCode, Micros, ParamError, Planned, Real, Servo, ServoOutput, ServoParams, Target,
 };
 use params::Limits;
 
@@ -165,7 +165,7 @@ impl<T: Real> Supervisor<T> {
         self.check(s, Cause::Clock, T::from_i32(micros));
     }
 
-    /// One sample: judged, and if it may pass, given to the servo. `target` is the path.
+    /// One sample: judged, and if it may pass, given to the servo.
     ///
     /// The answer, if there is one, belongs on the wire at once.
     pub fn sample<C: ControlLaw<T>>(
@@ -173,12 +173,12 @@ impl<T: Real> Supervisor<T> {
         servo: &Servo<T, C>,
         s: &mut SupervisorState<T, C::State>,
         sample: &Sample,
-        target: impl Fn(u64) -> Target<T>,
+        planned: impl Planned<T>,
     ) -> Cycle<T, C::Terms> {
         let from = s.state;
         let fresh_fault = s.cause;
         let mut cycle = Cycle { tick: s.tick, from, ..Cycle::default() };
-        self.judge(servo, s, sample, &target, &mut cycle);
+        self.judge(servo, s, sample, &planned, &mut cycle);
         if matches!(s.state, State::Faulted | State::Holding | State::Released) {
             cycle.answer = None;
             // A fault of this very cycle has taken its first step already.
@@ -199,7 +199,7 @@ impl<T: Real> Supervisor<T> {
         servo: &Servo<T, C>,
         s: &mut SupervisorState<T, C::State>,
         sample: &Sample,
-        target: &impl Fn(u64) -> Target<T>,
+        planned: &impl Planned<T>,
         cycle: &mut Cycle<T, C::Terms>,
     ) {
         let Some(periods) = self.in_sequence(s, sample, cycle) else { return };
@@ -218,13 +218,13 @@ impl<T: Real> Supervisor<T> {
         if s.state != State::Running {
             return;
         }
-        let goal = target(s.tick);
+        let goal = planned.target(s.tick);
         cycle.target = goal;
         if !self.plausible_target(s, &goal) {
             return;
         }
-        let since_served = self.bridge(servo, s, sample.counts, &goal, target);
-        let out = servo.tick(&mut s.servo, sample.counts, &goal);
+        let since_served = self.bridge(servo, s, sample.counts, &goal, planned);
+        let out = servo.tick_on(&mut s.servo, sample.counts, &goal, |position| planned.place(position));
         s.served = Some(s.tick);
         cycle.output = Some(out);
         self.check_output(s, &out, &goal, since_served);
@@ -419,7 +419,7 @@ impl<T: Real> Supervisor<T> {
         s: &mut SupervisorState<T, C::State>,
         counts: Counts,
         goal: &Target<T>,
-        target: &impl Fn(u64) -> Target<T>,
+        planned: &impl Planned<T>,
     ) -> u32 {
         let Some(served) = s.served else {
             let applied = servo.dac().volts(s.code);
@@ -431,8 +431,9 @@ impl<T: Real> Supervisor<T> {
         // More than that is silence.
         let steps = u32::try_from(steps).unwrap_or(1).min(self.limits.silence_cycles.saturating_add(8));
         for step in 1..steps {
-            let passed = target(served.wrapping_add(u64::from(step)));
-            servo.bridge(&mut s.servo, (counts, goal), &passed, (step, steps));
+            let passed = planned.target(served.wrapping_add(u64::from(step)));
+            let map = |position| planned.place(position);
+            servo.bridge(&mut s.servo, (counts, goal), &passed, (step, steps), map);
         }
         steps
     }

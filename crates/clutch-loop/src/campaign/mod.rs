@@ -16,7 +16,7 @@ use crate::station::ControllerStation;
 use crate::virtual_time::{Stall, VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
 use clutch_core::law::{Command, ControlLaw, Law, Seen, Tick};
 use clutch_core::supervisor::Checks;
-use clutch_core::{Real, Servo};
+use clutch_core::{OnDisc, Planned, Real, Servo};
 use clutch_node::ControllerNode;
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Scenario, ScenarioError};
@@ -307,8 +307,9 @@ impl Draw {
         let nan = T::from_f64(f64::NAN);
         let not_finite = self.broken_from(period, |what| what == What::TargetNotFinite);
         let huge = self.broken_from(period, |what| what == What::TargetHuge);
+        let map = path.map;
         let path = move |tick: u64| {
-            let mut target = path(tick);
+            let mut target = path.target(tick);
             if not_finite.is_some_and(|from| tick >= from) {
                 target.velocity = nan;
             }
@@ -317,6 +318,7 @@ impl Draw {
             }
             target
         };
+        let path = OnDisc { path, map };
         if let Some(from) = self.broken_from(period, |what| what == What::LawNotFinite) {
             let law = BrokenLaw { law: *built.servo.law(), from };
             let servo = Servo::with_law(&built.params, law).map_err(|e| BuildError::Param(e.cast()))?;

@@ -271,6 +271,13 @@ Sine(rate_deg_s=10.0, amplitude_deg=1.5, frequency_hz=1.0, phase_turns=-0.25)",
         r">>> clutch.TablePath(points_s_deg=[(0.5, 0), (2, 20)])
 TablePath(points_s_deg=((0.5, 0.0), (2.0, 20.0)), interpolation='cubic')",
     ),
+    known(
+        "FrictionMapParams",
+        "FrictionMap",
+        false,
+        r#">>> clutch.FrictionMap(rig="disc 7", points_deg_factor=[(0.1 * i, 1 + 0.01 * (i % 3)) for i in range(50)]).rig
+'disc 7'"#,
+    ),
     known("ScenarioSampling", "Sampling", false, ""),
     known(
         "ScenarioBounds",

@@ -18,6 +18,7 @@ pub use schema::schema;
 pub use section::check_section;
 pub use verdict::{CertificateError, Proven, Sampled};
 
+use crate::friction_map::MapGrid;
 use crate::progress::Report;
 use crate::rig::{Rig, RigBase, RigParams};
 use crate::ripple::Ripple;
@@ -86,6 +87,7 @@ pub struct Scenario {
     table: OnceLock<Table>,
     params: ScenarioParams,
     knots: Vec<Knot>,
+    map: Option<Arc<MapGrid>>,
     /// Made once: it walks the whole path.
     plan: Option<Plan>,
 }
@@ -166,6 +168,7 @@ impl Scenario {
             table: OnceLock::new(),
             params,
             knots: Vec::new(),
+            map: None,
             plan: None,
         };
         scenario.make(None)?;
@@ -182,6 +185,7 @@ impl Scenario {
             table: OnceLock::new(),
             params: self.params.clone(),
             knots: self.knots.clone(),
+            map: self.map.clone(),
             plan: None,
         };
         // The path is walked anew unless all keys are ones that it knows nothing of.
@@ -262,6 +266,7 @@ impl Scenario {
             return Err(error_of(&self.origin, &path, self.table(), &e));
         }
         self.knots = self.read_knots()?;
+        self.map = self.read_map()?;
         self.check_parts()?;
         let plan = self.make_plan(envelope)?;
         self.params.safety.as_ref().map_or(Ok(()), |s| self.check_safety(s, &plan))?;
@@ -290,6 +295,18 @@ impl Scenario {
                 Ok(Knot { time_us, position: FixedCounts::from_real(counts) })
             })
             .collect()
+    }
+
+    /// The map of the disc, on the grid of the encoder. No key of it changes without a new scenario.
+    fn read_map(&self) -> Result<Option<Arc<MapGrid>>, ScenarioError> {
+        let Some(params) = &self.params.friction_map else { return Ok(None) };
+        let encoder = Encoder::new::<f64>(self.params.rig.encoder.sensor.counts_per_rev)
+            .map_err(|e| self.at("rig", &e))?;
+        if let Some(grid) = self.map.as_ref().filter(|grid| grid.is_of(encoder)) {
+            return Ok(Some(grid.clone()));
+        }
+        let grid = MapGrid::new(params, encoder).map_err(|e| self.at("friction_map", &e))?;
+        Ok(Some(Arc::new(grid)))
     }
 
     /// The error of a parameter somewhere in the table `section` ("" = the whole file), as this file has it.
@@ -537,8 +554,15 @@ impl Scenario {
             output: p.output,
             shell: p.shell,
             reference: self.reference(),
+            friction_map: self.map.as_ref().and_then(|grid| grid.map()),
             run: p.run,
         }
+    }
+
+    /// The map of the disc on the encoder's grid, if there is one.
+    #[must_use]
+    pub fn map_grid(&self) -> Option<&Arc<MapGrid>> {
+        self.map.as_ref()
     }
 
     fn reference(&self) -> ReferenceParams<'_> {

@@ -1,5 +1,6 @@
 //! The tables of a scenario: those of core, rig and run, and the few that are a scenario's own.
 
+use crate::friction_map::FrictionMapParams;
 use crate::rig::RigParams;
 use crate::run::RunParams;
 use crate::tables::Text;
@@ -139,6 +140,8 @@ params! {
         run: RunParams, "run";
     }
     optional {
+        /// Friction along the disc, from an earlier ride.
+        friction_map: FrictionMapParams, "friction_map";
         /// The way a run on a board ends, and what ends it: `clutch loop` and `clutch daq` need it.
         safety: Safety, "safety";
     }

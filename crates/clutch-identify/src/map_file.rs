@@ -1,0 +1,41 @@
+//! Friction along the disc, from a ride to `[friction_map]` of a scenario.
+
+use crate::recording::Recording;
+use crate::ride::{Place, rides};
+use clutch_core::law::LawParams;
+use clutch_sim::Scenario;
+
+/// Friction along the disc where the slowest ride of the recordings went, with T/J and delay as the scenario believes them to
+/// be: for recordings without releases, which would tell both. Empty without a ride.
+#[must_use]
+pub fn map_as_believed(recordings: &[Recording], scenario: &Scenario) -> Vec<Place> {
+    let spec = scenario.spec();
+    let delay = match spec.law {
+        LawParams::Glide(p) => p.filter.delay,
+        _ => spec.rig.delay_ticks,
+    };
+    let pull = (spec.model.drive_torque / spec.model.inertia).abs();
+    let slowest = recordings.iter().flat_map(rides).min_by(|a, b| a.rate.total_cmp(&b.rate));
+    slowest.map_or_else(Vec::new, |ride| {
+        ride.told(pull, f64::from(delay) * spec.period.seconds::<f64>(), None).map
+    })
+}
+
+/// The map as a file: `[friction_map]`, which `--map` puts into a scenario. `rig` says of which rig and ride it is.
+#[must_use]
+pub fn map_file(map: &[Place], rig: &str) -> String {
+    let mut points = String::new();
+    for chunk in map.chunks(4) {
+        let line: Vec<String> = chunk
+            .iter()
+            .map(|place| format!("[{:.6}, {:.5}]", place.angle.to_degrees(), place.factor))
+            .collect();
+        points += &format!("    {},\n", line.join(", "));
+    }
+    format!(
+        "# Friction along the disc, over its mean, from the encoder's zero on: for the law glide.\n\
+         # clutch sim|loop SCENARIO --map THIS_FILE.toml\n\n\
+         [friction_map]\nrig = {}\npoints_deg_factor = [\n{points}]\n",
+        toml::Value::String(rig.to_owned())
+    )
+}
