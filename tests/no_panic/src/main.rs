@@ -28,7 +28,7 @@
 use clutch_core::certificate::{Demand, certify, paper_conditions};
 use clutch_core::law::{
     Beside, Command, ControlLaw, Ctc, Dob, Glide, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid, Shell, ShellParams,
-    Smc, SmcSign, Terms, Tick,
+    Smc, SmcIntegral, SmcSign, SuperTwisting, Terms, Tick,
 };
 use clutch_core::params::{self, Choice, Editor, Params};
 use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
