@@ -22,6 +22,7 @@ __all__ = [
     "Ctc",
     "Dac",
     "DahlFriction",
+    "Dob",
     "EdgeTimed",
     "ElastoPlasticFriction",
     "Encoder",
@@ -57,10 +58,12 @@ __all__ = [
     "Sine",
     "SineDrive",
     "Smc",
+    "SmcIntegral",
     "SmcSign",
     "SmoothedDerivative",
     "SpringDrive",
     "StribeckFriction",
+    "SuperTwisting",
     "TableDrive",
     "TablePath",
     "Trapezoid",
@@ -79,6 +82,7 @@ UNITS = {
     "nm_a": "N m/A",
     "v_s2_rad": "V s²/rad",
     "v_s_rad": "V s/rad",
+    "v_rt_s_rad": "V √(s/rad)",
     "v_rad_s": "V/(rad s)",
     "v_rad": "V/rad",
     "rad_s2": "rad/s²",
@@ -1269,6 +1273,125 @@ class Pid(_Params):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class SuperTwisting(_Params):
+    """Super-twisting, a sliding mode of second order: a root and the integral of a sign, which switches
+    behind an integral and not at the output.
+
+    `u = v − K_1 √|σ| sgn σ`, `v̇ = −K_2 sgn σ` with `σ = f e + ė` and a brake; with a motor both terms turn
+    round. A start is bumpless, and the integral does not wind up at a limit.
+
+    Parameters
+    ----------
+    k1_v_rt_s_rad : float, default 4.4
+        Gain of the root. `K_1`: a finite number above 0 V √(s/rad).
+    k2_v_s : float, default 15.0
+        Gain of the integral: its rate beyond the layer. `K_2`: a finite number above 0 V/s.
+    slope_1_s : float, default 35.0
+        Slope of the sliding surface (13). `f`: a finite number above 0 1/s.
+    boundary_rad_s : float, default 0.0
+        Thickness of a boundary layer in which both terms are linear; 0 has none. `ε`: a finite number of at
+        least 0 rad/s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.SuperTwisting().k1_v_rt_s_rad
+    4.4
+    """
+
+    _key: ClassVar[str] = "law.super_twisting"
+
+    k1_v_rt_s_rad: float = 4.4
+    k2_v_s: float = 15.0
+    slope_1_s: float = 35.0
+    boundary_rad_s: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SmcIntegral(_Params):
+    """Sliding-mode control with a boundary layer, whose surface has the integral of the error: it keeps no
+    offset.
+
+    `u = −{K_p sat(σ/ε) + K_d sat(σ ė/ε) ė}` with `σ = ė + f e + g ∫ e dt` and a brake, `{…}` with a motor. A
+    start is bumpless up to `K_p`, and the integral does not wind up at a limit.
+
+    Parameters
+    ----------
+    kp_v : float, default 7.0
+        Switching gain. `K_p`: a finite number above 0 V.
+    kd_v_s_rad : float, default 0.0
+        Damping gain. `K_d`: a finite number of at least 0 V s/rad.
+    slope_1_s : float, default 30.0
+        Slope of the sliding surface. `f`: a finite number above 0 1/s.
+    integral_1_s2 : float, default 3000.0
+        Gain of the integral in the surface. `g`: a finite number of at least 0 1/s².
+    boundary_rad_s : float, default 0.27
+        Thickness of the boundary layer (30). `ε`: a finite number above 0 rad/s whose inverse is finite, too.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.SmcIntegral().kp_v
+    7.0
+    """
+
+    _key: ClassVar[str] = "law.smc_integral"
+
+    kp_v: float = 7.0
+    kd_v_s_rad: float = 0.0
+    slope_1_s: float = 30.0
+    integral_1_s2: float = 3000.0
+    boundary_rad_s: float = 0.27
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Dob(_Params):
+    """Proportional–derivative control with a disturbance observer: whatever torque the model does not explain
+    is found from voltage and velocity, and given back.
+
+    `T(u) = J (θ̈_d + K_d ė + K_p e) + d̂`, `d̂ = g/(s + g) [T(u) − J θ̈]` with inertia and `T(u)`, friction
+    of a sliding shaft included, as `Model` has them. A start is bumpless, and nothing winds up at a limit.
+
+    Parameters
+    ----------
+    kp_1_s2 : float, default 10000.0
+        Gain from position to acceleration. `K_p`: a finite number of at least 0 1/s².
+    kd_1_s : float, default 250.0
+        Gain from velocity to acceleration. `K_d`: a finite number of at least 0 1/s.
+    bandwidth_rad_s : float, default 33.0
+        Bandwidth of the observer. Delay and the velocity's filter bound it from above. `g`: a finite number
+        above 0 rad/s.
+
+    Raises
+    ------
+    ParamError
+        A value out of range; its `field` and `value` say which.
+
+    Examples
+    --------
+    >>> import clutch
+    >>> clutch.Dob().kp_1_s2
+    10000.0
+    """
+
+    _key: ClassVar[str] = "law.dob"
+
+    kp_1_s2: float = 10000.0
+    kd_1_s: float = 250.0
+    bandwidth_rad_s: float = 33.0
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class EdgeTimed(_Params):
     """A Kalman filter that is corrected where an edge of the encoder is crossed, and by silence between
     edges. It knows the voltage and, from the model, drive torque over inertia; friction it learns.
@@ -1448,7 +1571,7 @@ class HoldLaw(_Params):
     margin: float = 1.25
 
 
-Law = Pd | Ctc | Smc | SmcSign | Pid | Glide | Voltage | HoldLaw
+Law = Pd | Ctc | Smc | SmcSign | Pid | SuperTwisting | SmcIntegral | Dob | Glide | Voltage | HoldLaw
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -2280,7 +2403,7 @@ class _Scenario(_Params):
         The shaft as it is. By default `Rig()`.
     model : Model
         The shaft as law, observer and certificate believe it to be. By default `Model()`.
-    law : Pd, Ctc, Smc, SmcSign, Pid, Glide, Voltage or HoldLaw
+    law : Pd, Ctc, Smc, SmcSign, Pid, SuperTwisting, SmcIntegral, Dob, Glide, Voltage or HoldLaw
         The law and its gains.
     velocity : SmoothedDerivative, EdgeTimed or Observer
         Source of the velocity that the law is given. By default `SmoothedDerivative()`.

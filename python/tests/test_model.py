@@ -69,6 +69,9 @@ REQUIRED = {
     clutch.Smc: {},
     clutch.SmcSign: {},
     clutch.Pid: {},
+    clutch.SuperTwisting: {},
+    clutch.SmcIntegral: {},
+    clutch.Dob: {},
     clutch.Glide: {},
     clutch.EdgeTimed: {},
     clutch.Shell: {},
@@ -706,6 +709,13 @@ VALID = {
         velocity_v_s_rad=number(-10, 10),
         acceleration_v_s2_rad=number(-10, 10),
     ),
+    clutch.SuperTwisting: each(
+        k1_v_rt_s_rad=POSITIVE, k2_v_s=POSITIVE, slope_1_s=POSITIVE, boundary_rad_s=number(0, 10)
+    ),
+    clutch.SmcIntegral: each(
+        kp_v=POSITIVE, kd_v_s_rad=GAIN, slope_1_s=POSITIVE, integral_1_s2=GAIN, boundary_rad_s=POSITIVE
+    ),
+    clutch.Dob: each(kp_1_s2=GAIN, kd_1_s=GAIN, bandwidth_rad_s=POSITIVE),
     clutch.Glide: each(
         kp_1_s=GAIN,
         kd_1_s=POSITIVE,

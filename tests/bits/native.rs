@@ -13,7 +13,7 @@ use std::fmt;
 use std::path::Path;
 
 /// Names and scenarios.
-pub const RUNS: [(&str, &str); 21] = [
+pub const RUNS: [(&str, &str); 24] = [
     ("pd_ramp", include_str!("runs/pd_ramp.toml")),
     ("pd_sine_bench", include_str!("runs/pd_sine_bench.toml")),
     ("pd_table_cubic", include_str!("runs/pd_table_cubic.toml")),
@@ -28,6 +28,9 @@ pub const RUNS: [(&str, &str); 21] = [
     ("pid_ramp_bench", include_str!("runs/pid_ramp_bench.toml")),
     ("pid_sine", include_str!("runs/pid_sine.toml")),
     ("motor_pid_sine", include_str!("runs/motor_pid_sine.toml")),
+    ("twisting_ramp_bench", include_str!("runs/twisting_ramp_bench.toml")),
+    ("integral_sine", include_str!("runs/integral_sine.toml")),
+    ("motor_dob_sine", include_str!("runs/motor_dob_sine.toml")),
     ("glide_ramp_bench", include_str!("runs/glide_ramp_bench.toml")),
     ("glide_slow_bench", include_str!("runs/glide_slow_bench.toml")),
     ("motor_glide_sine", include_str!("runs/motor_glide_sine.toml")),

@@ -2,8 +2,8 @@
 
 use clutch_core::edge_timed::EdgeTimedParams;
 use clutch_core::law::{
-    Beside, ControlLaw, CtcParams, GlideParams, Law, LawParams, Limit, OutputParams, PdParams, PidParams,
-    SmcParams, SmcSignParams, Terms, Tick,
+    Beside, ControlLaw, CtcParams, DobParams, GlideParams, Law, LawParams, Limit, OutputParams, PdParams,
+    PidParams, SmcIntegralParams, SmcParams, SmcSignParams, SuperTwistingParams, Terms, Tick,
 };
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Counts, FixedCounts, PlantParams, Servo, ServoParams, Target};
@@ -21,6 +21,19 @@ fn laws() -> impl Strategy<Value = LawParams> {
             .prop_map(|(kp, kd, slope, boundary)| LawParams::Smc(SmcParams { kp, kd, slope, boundary })),
         (gain.clone(), gain.clone(), 1.0..500.0_f64)
             .prop_map(|(kp, kd, slope)| LawParams::SmcSign(SmcSignParams { kp, kd, slope })),
+        (1e-3_f64..1e4, 1e-3_f64..1e4, 1.0..500.0_f64, 0.0..1.0_f64)
+            .prop_map(|(k1, k2, slope, boundary)| { SuperTwistingParams { k1, k2, slope, boundary }.into() }),
+        (1e-3_f64..1e4, gain.clone(), 1.0..500.0_f64, gain.clone(), 1e-3..10.0_f64).prop_map(
+            |(kp, kd, slope, integral, boundary)| {
+                SmcIntegralParams { kp, kd, slope, integral, boundary }.into()
+            }
+        ),
+        (gain.clone(), gain.clone(), 1e-3..1e3_f64).prop_map(|(kp, kd, bandwidth)| DobParams {
+            kp,
+            kd,
+            bandwidth
+        }
+        .into()),
         (0.0..500.0_f64, 1.0..500.0_f64, 0.4..1.0_f64, 1.0..10.0_f64).prop_map(|(kp, kd, floor, cap)| {
             GlideParams { kp, kd, floor, cap, ..GlideParams::default() }.into()
         }),
@@ -103,6 +116,15 @@ proptest! {
             prop_assert!(after.limit != Limit::Invalid && (0.0..=10.0).contains(&after.voltage));
             let integral = Terms::values(&after.terms)[1];
             prop_assert!(integral.abs() <= 10.0 + 1e3, "{} V", integral);
+        } else if let LawParams::SuperTwisting(_) | LawParams::SmcIntegral(_) | LawParams::Dob(_) = p {
+            // So do these: no memory is beyond what the output, or the layer, can give.
+            prop_assert!(after.limit != Limit::Invalid && (0.0..=10.0).contains(&after.voltage));
+            let (place, most) = match p {
+                LawParams::SuperTwisting(_) => (2, 10.0),
+                LawParams::SmcIntegral(p) => (1, p.boundary),
+                _ => (1, 10.0 * 0.15 * 0.14),
+            };
+            prop_assert!(Terms::values(&after.terms)[place].abs() <= most * (1.0 + 1e-12), "{:?}", after.terms);
         } else if matches!(p, LawParams::Glide(_)) {
             // It remembers a period that has passed; none of its terms is beyond measure.
             prop_assert!(after.limit != Limit::Invalid && (0.0..=10.0).contains(&after.voltage));

@@ -6,6 +6,7 @@ mod bristles;
 mod detector;
 mod engines;
 mod errata;
+mod field_laws;
 mod glide;
 mod intervals;
 mod laws;

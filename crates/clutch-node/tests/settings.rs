@@ -4,7 +4,10 @@
 
 mod desk;
 
-use clutch_core::law::{CtcParams, LawParams, OutputParams, PdParams, PidParams, SmcParams, SmcSignParams};
+use clutch_core::law::{
+    CtcParams, DobParams, LawParams, OutputParams, PdParams, PidParams, SmcIntegralParams, SmcParams,
+    SmcSignParams, SuperTwistingParams,
+};
 use clutch_core::params::{Kind, Params};
 use clutch_core::reference::{
     Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, ReferenceParams, Sine, Table, Trapezoid,
@@ -74,6 +77,15 @@ fn each_law_is_built_as_it_was_planned() {
         LawParams::Ctc(CtcParams { outer_gain: 3.0, kp: 70.0, kd: 1.25 }),
         LawParams::Smc(SmcParams { kp: 20.0, kd: 3.0, slope: 11.0, boundary: 0.5 }),
         LawParams::SmcSign(SmcSignParams { kp: 20.0, kd: 3.0, slope: 11.0 }),
+        LawParams::SuperTwisting(SuperTwistingParams { k1: 20.0, k2: 3.0, slope: 11.0, boundary: 0.5 }),
+        LawParams::SmcIntegral(SmcIntegralParams {
+            kp: 20.0,
+            kd: 3.0,
+            slope: 11.0,
+            integral: 7.0,
+            boundary: 0.5,
+        }),
+        LawParams::Dob(DobParams { kp: 20.0, kd: 3.0, bandwidth: 11.0 }),
         LawParams::Pid(PidParams { ki: 3.0, tracking_time: 0.5, bias: 2.5, ..PidParams::default() }),
     ];
     for law in LawParams::<f32>::all().into_iter().chain(other) {
@@ -274,8 +286,8 @@ fn a_number_that_a_constructor_refuses_is_told_with_key_value_and_expectation() 
         ),
         (
             "law",
-            8,
-            "8: the board lacks it, or knows no such value: expected one of: pd, ctc, smc, smc_sign, pid, glide, voltage, hold",
+            11,
+            "11: the board lacks it, or knows no such value: expected one of: pd, ctc, smc, smc_sign, pid, super_twisting, smc_integral, dob, glide, voltage, hold",
         ),
         ("bounds.brake_gain_nm_v.high", real(f32::INFINITY), "inf: expected a finite number"),
     ] {
@@ -339,7 +351,7 @@ fn the_hash_is_that_of_names_types_and_units() {
     let text: String = Setting::all().map(|s| format!("{}:{}:{}\n", s.name, s.kind(), s.unit())).collect();
     assert_eq!(SETTINGS_HASH, fnv1a_64(FNV_64, text.as_bytes()), "{text}");
     assert!(
-        text.contains("\nlaw:pd/ctc/smc/smc_sign/pid/glide/voltage/hold:\nlaw.pd.kp_v_rad:f32:V/rad\n"),
+        text.contains("\nlaw:pd/ctc/smc/smc_sign/pid/super_twisting/smc_integral/dob/glide/voltage/hold:\nlaw.pd.kp_v_rad:f32:V/rad\n"),
         "{text}"
     );
 }

@@ -27,8 +27,8 @@
 
 use clutch_core::certificate::{Demand, certify, paper_conditions};
 use clutch_core::law::{
-    Beside, Command, ControlLaw, Ctc, Glide, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid, Shell, ShellParams,
-    Smc, SmcSign, Terms, Tick,
+    Beside, Command, ControlLaw, Ctc, Dob, Glide, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid, Shell, ShellParams,
+    Smc, SmcIntegral, SmcSign, SuperTwisting, Terms, Tick,
 };
 use clutch_core::params::{self, Choice, Editor, Params};
 use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
@@ -299,6 +299,9 @@ fn laws<T: Real>() {
     runs(made(Smc::new(&any(), &out, micros())));
     runs(made(SmcSign::new(&any(), &out, micros())));
     runs(made(Pid::new(&any(), &out, micros())));
+    runs(made(SuperTwisting::new(&any(), &out, micros())));
+    runs(made(SmcIntegral::new(&any(), &out, micros())));
+    runs(made(Dob::new(&any(), &beside)));
     runs(made(Glide::new(&any(), &beside)));
 }
 

@@ -1,4 +1,5 @@
-//! Control laws: PD (4), CTC (11), SMC (29) and (31), PID, glide; open-loop voltages.
+//! Control laws: PD (4), CTC (11), SMC (29) and (31), PID, super-twisting, SMC with an integral, PD with a disturbance
+//! observer, glide; open-loop voltages.
 //!
 //! A law is a file of this folder and a line in the list below: its parameters (`Default` = Table 2), what it
 //! remembers, its terms, and what it has, as a sliding surface. Three tiers: parameters → `new`, the only step
@@ -25,6 +26,9 @@ list::laws! {
     smc Smc SmcParams "Sliding mode with the boundary layer (31).";
     smc_sign SmcSign SmcSignParams "Sliding mode with the sign function (29).";
     pid Pid PidParams "Proportional–integral–derivative control with feed-forward.";
+    super_twisting SuperTwisting SuperTwistingParams "Super-twisting: sliding mode of second order.";
+    smc_integral SmcIntegral SmcIntegralParams "Sliding mode with a boundary layer and an integral in its surface.";
+    dob Dob DobParams "Proportional–derivative control with a disturbance observer.";
     glide Glide GlideParams "Friction inverted by an edge-timed filter: smooth at low rates.";
     voltage Voltage VoltageParams "Open-loop voltage.";
     hold Hold HoldParams "Open-loop voltage that holds the resting shaft.";

@@ -48,17 +48,17 @@ impl<T: Real> Smc<T> {
     }
 }
 
-/// `σ` of (13), and what the two parts of a sliding law make of `σ` and `σ ė`.
+/// What the two parts of a sliding law make of `σ` and `σ ė`: their sum, and `σ` with both.
 #[inline]
 pub(super) fn switched<T: Arithmetic>(
-    (kp, kd, slope): (T, T, T),
-    tick: &Tick<T>,
+    (kp, kd): (T, T),
+    surface: T,
+    error_rate: T,
     switch: impl Fn(T) -> T,
 ) -> (T, [T; 3]) {
-    let surface = slope * tick.error + tick.error_rate;
-    let across = surface * tick.error_rate;
+    let across = surface * error_rate;
     let switching = -(kp * switch(surface));
-    let damping = -(kd * switch(across) * tick.error_rate);
+    let damping = -(kd * switch(across) * error_rate);
     (switching + damping, [surface, switching, damping])
 }
 
@@ -79,7 +79,8 @@ impl<T: Arithmetic> Smc<T> {
     #[inline]
     fn terms(&self, tick: &Tick<T>) -> (T, [T; 3]) {
         let SmcParams { kp, kd, slope, .. } = self.params;
-        switched((kp, kd, slope), tick, |x| (x * self.inverse_boundary).sat())
+        let surface = slope * tick.error + tick.error_rate;
+        switched((kp, kd), surface, tick.error_rate, |x| (x * self.inverse_boundary).sat())
     }
 }
 

@@ -58,7 +58,8 @@ impl<T: Arithmetic> SmcSign<T> {
     #[inline]
     fn terms(&self, tick: &Tick<T>) -> (T, [T; 3]) {
         let SmcSignParams { kp, kd, slope } = self.params;
-        switched((kp, kd, slope), tick, T::sgn)
+        let surface = slope * tick.error + tick.error_rate;
+        switched((kp, kd), surface, tick.error_rate, T::sgn)
     }
 }
 

@@ -91,6 +91,7 @@ units! {
     NM_A "nm_a" "N m/A" "N m/A" None "" 1.0;
     V_S2_RAD "v_s2_rad" "V s²/rad" "V s²/rad" None "" 1.0;
     V_S_RAD "v_s_rad" "V s/rad" "V s/rad" None "" 1.0;
+    V_RT_S_RAD "v_rt_s_rad" "V √(s/rad)" "V √(s/rad)" None "" 1.0;
     V_RAD_S "v_rad_s" "V/(rad s)" "V/(rad s)" None "" 1.0;
     V_RAD "v_rad" "V/rad" "V/rad" None "" 1.0;
     RAD_S2 "rad_s2" "rad/s²" "rad/s²" None "acceleration" 1.0;

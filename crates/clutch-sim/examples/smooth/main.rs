@@ -33,6 +33,34 @@ const LAWS: &[(&str, &str)] = &[
         "PD 1660/12.9, (5)",
         "[law.pd]\nkp_v_rad = 1660.0\nkd_v_s_rad = 12.9\n\n[velocity.smoothed_derivative]\nsmoothing = 0.712",
     ),
+    (
+        "DOB 6700/150/120, (5)",
+        "[law.dob]\nkp_1_s2 = 6700.0\nkd_1_s = 150.0\nbandwidth_rad_s = 120.0\n\n[velocity.smoothed_derivative]\nsmoothing = 0.41",
+    ),
+    (
+        "DOB 12000/400/100, edge-timed",
+        "[law.dob]\nkp_1_s2 = 12000.0\nkd_1_s = 400.0\nbandwidth_rad_s = 100.0\n\n[velocity.edge_timed]\ndelay_ticks = 1",
+    ),
+    (
+        "SMC with an integral 10/0/61/4250/0.51, (5)",
+        "[law.smc_integral]\nkp_v = 10.0\nslope_1_s = 61.0\nintegral_1_s2 = 4250.0\nboundary_rad_s = 0.51\n\n[velocity.smoothed_derivative]\nsmoothing = 0.27",
+    ),
+    (
+        "SMC with an integral 10/38/16.3/1460/0.18, edge-timed",
+        "[law.smc_integral]\nkp_v = 10.0\nkd_v_s_rad = 38.0\nslope_1_s = 16.3\nintegral_1_s2 = 1460.0\nboundary_rad_s = 0.18\n\n[velocity.edge_timed]\ndelay_ticks = 1",
+    ),
+    (
+        "super-twisting 4.4/42/37, (5)",
+        "[law.super_twisting]\nk1_v_rt_s_rad = 4.4\nk2_v_s = 42.0\nslope_1_s = 37.0\n\n[velocity.smoothed_derivative]\nsmoothing = 0.34",
+    ),
+    (
+        "super-twisting 5.35/46.8/19.3, edge-timed",
+        "[law.super_twisting]\nk1_v_rt_s_rad = 5.35\nk2_v_s = 46.8\nslope_1_s = 19.3\n\n[velocity.edge_timed]\ndelay_ticks = 1",
+    ),
+    (
+        "super-twisting 8.4/230/26, layer 0.063, edge-timed",
+        "[law.super_twisting]\nk1_v_rt_s_rad = 8.4\nk2_v_s = 230.0\nslope_1_s = 26.0\nboundary_rad_s = 0.063\n\n[velocity.edge_timed]\ndelay_ticks = 1",
+    ),
     ("SMC of Table 2, (5)", "[law.smc]"),
     ("the same, observer", "[law.smc]\n\n[velocity.observer]"),
     ("the same, edge-timed", "[law.smc]\n\n[velocity.edge_timed]\ndelay_ticks = 1"),

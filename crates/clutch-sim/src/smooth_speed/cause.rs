@@ -128,9 +128,15 @@ fn damping(scenario: &Scenario, rig: &Rig) -> Option<f64> {
         LawParams::Pd(g) => Some(g.kd * per_volt),
         LawParams::Pid(g) => Some(g.kd * per_volt),
         LawParams::Smc(g) => Some(g.kp / g.boundary * per_volt),
+        LawParams::SmcIntegral(g) => Some(g.kp / g.boundary * per_volt),
+        // The root is as steep as you like without a layer.
+        LawParams::SuperTwisting(g) if g.boundary > 0.0 => Some(g.k1 / libm::sqrt(g.boundary) * per_volt),
         // These ask for an acceleration, of the inertia that they believe in.
         LawParams::Ctc(g) => Some(g.outer_gain * g.kd * p.model.inertia),
+        LawParams::Dob(g) => Some(g.kd * p.model.inertia),
         LawParams::Glide(g) => Some(g.kd * p.model.inertia),
-        LawParams::SmcSign(_) | LawParams::Voltage(_) | LawParams::Hold(_) => None,
+        LawParams::SuperTwisting(_) | LawParams::SmcSign(_) | LawParams::Voltage(_) | LawParams::Hold(_) => {
+            None
+        }
     }
 }
