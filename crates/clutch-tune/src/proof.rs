@@ -72,7 +72,6 @@ pub(crate) fn prove(
             narrowest: if shell { WIDE } else { Options::default().narrowest },
             error_limit: WORST,
             patient: !shell,
-            ..Options::default()
         };
         let found = search(setup, &options, false);
         if let Some(open) = found.open.first() {
