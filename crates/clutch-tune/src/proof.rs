@@ -66,8 +66,8 @@ pub(crate) fn prove(
         let options = Options {
             refinements: 0,
             work: if shell { WORK } else { WORK_ALONE },
-            // A shell minds little how strong the brake is: a wide cell costs less than many narrow ones, and where it does
-            // not close, none of its parts did either, on any rig that was looked at.
+            // A shell minds little how strong the brake is: a wide cell costs less than many narrow ones, and where it did not
+            // close, narrow ones did not either (docs/tune.md).
             widest: if shell { WIDE } else { Options::default().widest },
             narrowest: if shell { WIDE } else { Options::default().narrowest },
             error_limit: WORST,
