@@ -2040,8 +2040,9 @@ class Bounds(_Params):
         time gets a bound. `γ`: a finite number of at least 0 rad/s².
     ripple_percent : float or None, default None
         The part of `friction_percent` that changes along the disc and with time; the rest is a mean that is
-        not known more closely. Absent: all of it is the mean's, and the sampled certificate adds the ripple
-        of the rig. A number of at least 0 and below 100 %; at most friction_percent, of which it is a part.
+        off by as much in ratio either way, (1 + friction)/(1 + ripple). Absent: all of it is the mean's, and
+        the sampled certificate adds the ripple of the rig. A number of at least 0 and below 100 %; at most
+        friction_percent, of which it is a part.
 
     Raises
     ------

@@ -1084,15 +1084,15 @@ def _events(axes: list[Axes], event: Table) -> None:
             )
 
 
-#: Parameters of a rig, in the order in which they are drawn.
+#: Parameters of a rig, in the order in which they are drawn: name, unit for readers, and how many of it an SI unit has.
 _TOLD = {
-    "pull_rad_s2": "T/J",
-    "hold_v": "T/(μ_d K)",
-    "ratio": "μ_s/μ_d",
-    "damping_1_s": "C/J",
-    "ripple_rms": "ripple, RMS",
-    "delay_s": "delay",
-    "stribeck_velocity_rad_s": "Stribeck velocity",
+    "pull_rad_s2": ("T/J", "rad/s²", 1.0),
+    "hold_v": ("T/(μ_d K)", "V", 1.0),
+    "ratio": ("μ_s/μ_d", "", 1.0),
+    "damping_1_s": ("C/J", "1/s", 1.0),
+    "ripple_rms": ("ripple, RMS", "%", 100.0),
+    "delay_s": ("delay", "ms", 1e3),
+    "stribeck_velocity_rad_s": ("Stribeck velocity", "mrad/s", 1e3),
 }
 
 
@@ -1123,10 +1123,20 @@ def identified(found: Identified) -> Figure:
     for row, key in enumerate(reversed(told)):
         e = found.parameters[key]
         scale = 100 / e.value if e.value else 0.0
-        left.plot([(e.low - e.value) * scale, (e.high - e.value) * scale], [row, row], lw=3, solid_capstyle="butt")
+        ends = [(e.low - e.value) * scale, (e.high - e.value) * scale]
+        left.plot(ends, [row, row], lw=3, color=_BLUE, solid_capstyle="butt")
         left.plot([0], [row], "k|", ms=8)
-    left.set_yticks(range(len(told)), [_TOLD[key] for key in reversed(told)])
+    values = {key: found.parameters[key].value * _TOLD[key][2] for key in told}
+    names = [f"{_TOLD[key][0]}\n{values[key]:.4g} {_TOLD[key][1]}".rstrip() for key in reversed(told)]
+    left.set_yticks(range(len(told)), names)
+    left.set_ylim(-0.6, len(told) - 0.4)
     left.set_xscale("symlog", linthresh=1)
+    ticks = [-100, -10, -1, 0, 1, 10, 100]
+    left.set_xticks(ticks, [f"{tick}".replace("-", "−") for tick in ticks])
+    left.set_xticks([], minor=True)
+    far = 1.3 * max([1.0, *(abs(end) for line in left.lines for end in line.get_xdata())])
+    left.set_xlim(-far, far)
+    left.axvline(0, lw=0.6, color="0.8", zorder=0)
     left.set_xlabel("interval around the value, %")
     if found.map:
         angle, factor = np.array(found.map).T
@@ -1150,7 +1160,7 @@ def candidates(runs: Mapping[str, Result], chosen: str | None = None) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        A row for each run: the error over time, in degrees.
+        A row for each run: the error over time, in degrees, and the largest of it.
 
     Examples
     --------
@@ -1161,7 +1171,7 @@ def candidates(runs: Mapping[str, Result], chosen: str | None = None) -> Figure:
     import numpy as np
 
     rows = max(len(runs), 1)
-    size = (150 * _MM, (14 * rows + 12) * _MM)
+    size = (150 * _MM, (max(14 * rows, 56) + 12) * _MM)
     figure, grid = plt.subplots(rows, 1, figsize=size, sharex=True, squeeze=False, layout="constrained")
     most = max((float(np.max(np.abs(_error_deg(run)))) for run in runs.values()), default=1.0)
     scale = min(most, 0.5)
@@ -1170,6 +1180,7 @@ def candidates(runs: Mapping[str, Result], chosen: str | None = None) -> Figure:
         ax.set_ylim(-1.05 * scale, 1.05 * scale)
         marked = f"{name} (chosen)" if name == chosen else name
         ax.set_title(marked, loc="left", fontweight="bold" if name == chosen else "normal", pad=2)
+        ax.set_title(f"up to {float(np.max(np.abs(_error_deg(run)))):.3f}°", loc="right", pad=2)
     figure.supylabel("error, °")
     grid[-1, 0].set_xlabel("t, s")
     return figure

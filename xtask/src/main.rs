@@ -150,7 +150,7 @@ enum Verb {
         seed: u64,
     },
     /// Identifies and tunes hidden random rigs, and drives them by the loop in virtual time: the table of docs/tune.md, half an
-    /// hour.
+    /// hour. Stopped and started again it goes on with the next rig.
     Tune {
         /// Rigs.
         #[arg(default_value_t = 50)]
@@ -348,13 +348,16 @@ fn meter() -> Result<()> {
 /// The campaign of a package over random rigs, into its page.
 fn random_rigs(package: &str, page: &str, rigs: u64, seed: u64) -> Result<()> {
     let example = ["run", "--release", "--package", package, "--example", "campaign", "--"];
-    let (done, text) = cargo(example).args([rigs.to_string(), seed.to_string()]).quietly()?;
-    anyhow::ensure!(done, "the campaign failed:\n{text}");
-    let (table, last): (Vec<&str>, Vec<&str>) = text
-        .lines()
-        .filter(|l| l.starts_with('|') || l.contains("rigs from seed"))
-        .partition(|l| l.starts_with('|'));
-    write_between(page, "campaign", &format!("{}\n\n{}", table.join("\n"), last.join("\n")))
+    let (mut table, mut last) = (Vec::new(), String::new());
+    let done = cargo(example).args([rigs.to_string(), seed.to_string()]).lines(|line| {
+        if line.starts_with('|') {
+            table.push(line.to_owned());
+        } else if line.contains("rigs from seed") {
+            line.clone_into(&mut last);
+        }
+    })?;
+    anyhow::ensure!(done, "the campaign failed");
+    write_between(page, "campaign", &format!("{}\n\n{last}", table.join("\n")))
 }
 
 /// The table that an example of the simulator prints.

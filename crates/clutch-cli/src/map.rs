@@ -1,8 +1,8 @@
 //! `clutch map`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{Exit, json, paragraph, print, with_progress, write};
-use crate::plot::{self, Cell, Cells, Figure, Panel};
+use crate::output::{Exit, Forms, json, paragraph, with_progress};
+use crate::plot::{Cell, Cells, Figure, Panel};
 use crate::report::{self, ReportFigure};
 use crate::table::number;
 use clap::Args;
@@ -13,7 +13,6 @@ use clutch_sim::smooth_speed::{
 };
 use serde::Serialize;
 use serde_json::json as value;
-use std::path::PathBuf;
 
 /// Maps the lowest rate at which a scenario moves without a stick, and the reason why slower does not.
 ///
@@ -44,15 +43,8 @@ pub(crate) struct Map {
     /// first.
     #[arg(long, value_name = "N", default_value_t = 1)]
     discs_above: u32,
-    /// Prints the map as JSON, and nothing else, on standard output.
-    #[arg(long)]
-    json: bool,
-    /// Draws the map.
-    #[arg(long, value_name = "FILE.svg|png")]
-    plot: Option<PathBuf>,
-    /// Writes the map as a page with legend and settings.
-    #[arg(long, value_name = "FILE.html")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    forms: Forms,
 }
 
 /// Values of an axis.
@@ -118,9 +110,7 @@ enum Found {
 
 impl Map {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
-        if let Some(file) = &self.plot {
-            plot::figure_format(file)?; // before a long run, not after
-        }
+        self.forms.check()?;
         let scenario = self.scenario.load()?;
         let origin = self.scenario.scenario.to_string_lossy();
         let rates = self.rates.as_ref().map_or(&RATES_DEG_S[..], |list| &list.0);
@@ -136,17 +126,15 @@ impl Map {
             Found::Gains(map) => gains(&scenario, &trials, map),
             Found::Rates(map) => against_rates(&scenario, &trials, map),
         };
-        if let Some(file) = &self.plot {
-            grid.figure(&scenario).save(file)?;
-        }
-        if let Some(file) = &self.html {
-            write(file, grid.page(&scenario)?)?;
-        }
-        print(&match (self.json, &found) {
-            (true, Found::Gains(map)) => whole(&scenario, map)?,
-            (true, Found::Rates(map)) => whole(&scenario, map)?,
-            (false, _) => grid.text(&scenario),
-        })?;
+        self.forms.give(
+            || Ok(grid.figure(&scenario)),
+            |figure| grid.page(&scenario, figure),
+            || match &found {
+                Found::Gains(map) => whole(&scenario, map),
+                Found::Rates(map) => whole(&scenario, map),
+            },
+            || grid.text(&scenario),
+        )?;
         Ok(Exit::Done)
     }
 }
@@ -405,12 +393,12 @@ impl Grid {
         }
     }
 
-    fn page(&self, scenario: &Scenario) -> anyhow::Result<String> {
+    fn page(&self, scenario: &Scenario, figure: &Figure) -> anyhow::Result<String> {
         let title = format!("{}: {}", scenario.name(), self.about);
         let legend = self.legend.iter().map(|(sign, text)| format!("{sign} {text}"));
         let intro: Vec<String> = legend.chain(self.notes.iter().cloned()).collect();
         let caption = format!("{} over {} and {}.", self.about, self.across, self.down);
-        let figure = ReportFigure { id: "map".to_owned(), caption, svg: self.figure(scenario).svg()? };
-        Ok(report::html(&title, &intro, &[], &[figure], &[], &scenario.parameters()))
+        let figure = ReportFigure { id: "map".to_owned(), caption, svg: figure.svg()? };
+        Ok(report::html(&title, &intro, &[], &[], &[figure], &scenario.parameters()))
     }
 }

@@ -1,6 +1,8 @@
 //! The results of verbs: text, files, an exit code.
 
+use crate::plot::{self, Figure};
 use anyhow::Context;
+use clap::Args;
 use clutch_log::printable;
 use clutch_loop::session::SessionError;
 use clutch_sim::progress::Report;
@@ -8,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The end of a verb, if it was not an error.
 pub(crate) enum Exit {
@@ -95,6 +97,47 @@ pub(crate) fn print(text: &str) -> anyhow::Result<()> {
 /// Writes a file; errors name it.
 pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) -> anyhow::Result<()> {
     std::fs::write(path, bytes).with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// Forms in which a result is given: a text on standard output, unless another is asked for.
+#[derive(Args)]
+pub(crate) struct Forms {
+    /// Prints the result as JSON, and nothing else, on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Draws the result.
+    #[arg(long, value_name = "FILE.svg|png")]
+    plot: Option<PathBuf>,
+    /// Writes the result as a page, with the picture and every setting.
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
+}
+
+impl Forms {
+    /// Refuses a picture's file that cannot be drawn: before a long run, not after.
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
+        self.plot.as_deref().map_or(Ok(()), |file| plot::figure_format(file).map(drop))
+    }
+
+    /// Writes and prints what is asked for; nothing else is made.
+    pub(crate) fn give(
+        &self,
+        figure: impl FnOnce() -> anyhow::Result<Figure>,
+        page: impl FnOnce(&Figure) -> anyhow::Result<String>,
+        json: impl FnOnce() -> anyhow::Result<String>,
+        text: impl FnOnce() -> String,
+    ) -> anyhow::Result<()> {
+        if self.plot.is_some() || self.html.is_some() {
+            let figure = figure()?;
+            if let Some(file) = &self.plot {
+                figure.save(file)?;
+            }
+            if let Some(file) = &self.html {
+                write(file, page(&figure)?)?;
+            }
+        }
+        print(&if self.json { json()? } else { text() })
+    }
 }
 
 /// Pretty JSON with a line end.

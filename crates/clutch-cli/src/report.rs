@@ -17,26 +17,39 @@ pub struct ReportFigure {
     pub svg: String,
 }
 
+/// A table of the page.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReportTable {
+    /// Short name, unique in the page: the anchor of its part.
+    pub id: String,
+    /// Name of its part of the page.
+    pub title: String,
+    /// The content of the table, in words.
+    pub caption: String,
+    /// The rows, of which the first is the header.
+    pub rows: Vec<Vec<String>>,
+    /// Last columns that hold words, not numbers.
+    pub words: usize,
+}
+
 /// A page with everything in it: it opens without a network, runs no script, prints, fits a phone
 /// and follows the reader's choice of light or dark.
 ///
-/// `intro` are paragraphs; the first row of `table3` is its header; `settings` are names and values.
+/// `intro` are paragraphs; `settings` are names and values.
 /// A part without content is left out. All texts are escaped.
 #[must_use]
 pub fn html(
     title: &str,
     intro: &[String],
     claims: &[Claim],
+    tables: &[ReportTable],
     figures: &[ReportFigure],
-    table3: &[Vec<String>],
     settings: &[(String, String)],
 ) -> String {
-    let parts = [
-        ("claims", "Claims", !claims.is_empty()),
-        ("table-3", "Table 3", !table3.is_empty()),
-        ("figures", "Figures", !figures.is_empty()),
-        ("settings", "Settings", !settings.is_empty()),
-    ];
+    let mut parts = vec![("claims", "Claims", !claims.is_empty())];
+    parts.extend(tables.iter().map(|t| (t.id.as_str(), t.title.as_str(), t.rows.len() > 1)));
+    parts.push(("figures", "Figures", !figures.is_empty()));
+    parts.push(("settings", "Settings", !settings.is_empty()));
     let mut page =
         Page(String::from("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"));
     page.raw("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
@@ -48,16 +61,17 @@ pub fn html(
     }
     page.raw("<nav aria-label=\"Contents\">\n<ul>\n");
     for (id, name, _) in parts.iter().filter(|p| p.2) {
-        page.raw(&format!("<li><a href=\"#{id}\">{name}</a></li>\n"));
+        page.raw(&format!("<li><a href=\"#{}\">{}</a></li>\n", escape(id), escape(name)));
     }
     page.raw("</ul>\n</nav>\n</header>\n<main>\n");
     for (id, name, _) in parts.iter().filter(|p| p.2) {
+        let (id, name) = (escape(id), escape(name));
         page.raw(&format!("<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{name}</h2>\n"));
-        match *id {
-            "claims" => page.claims(claims),
-            "table-3" => page.table3(table3),
-            "figures" => page.figures(figures),
-            _ => page.settings(settings),
+        match (tables.iter().find(|t| escape(&t.id) == id), &*id) {
+            (Some(table), _) => page.table(table),
+            (None, "claims") => page.claims(claims),
+            (None, "figures") => page.figures(figures),
+            (None, _) => page.settings(settings),
         }
         page.raw("</section>\n");
     }
@@ -243,7 +257,7 @@ impl Page {
         if claims.iter().any(|c| c.fitted) {
             summary += " “fitted” marks those to which the rig was fitted.";
         }
-        self.raw("<table class=\"claims\" role=\"table\">\n").element("caption", "", &summary);
+        self.raw("<table class=\"cards\" role=\"table\">\n").element("caption", "", &summary);
         self.raw("<thead role=\"rowgroup\">\n<tr role=\"row\">\n");
         for (name, class) in
             [("id", ""), ("paper", ""), ("measured", "number"), ("band", "number"), ("verdict", "")]
@@ -277,27 +291,40 @@ impl Page {
         self.raw("</tbody>\n</table>\n");
     }
 
-    fn table3(&mut self, rows: &[Vec<String>]) {
-        let Some((header, rows)) = rows.split_first() else { return };
-        self.raw("<div class=\"scroll\" role=\"region\" aria-labelledby=\"table-3\" tabindex=\"0\">\n");
-        self.raw("<table class=\"narrow\">\n");
-        self.element("caption", "", "Table 3 of the paper, and the results here.");
-        self.raw("<thead>\n<tr>\n");
+    fn table(&mut self, table: &ReportTable) {
+        let Some((header, rows)) = table.rows.split_first() else { return };
+        // Rows with words become cards where they do not fit; rows of numbers scroll.
+        let cards = table.words > 0;
+        let numbers = header.len() - table.words;
+        let role = |name: &str| if cards { format!(" role=\"{name}\"") } else { String::new() };
+        let class = |column: usize| if column < numbers { "number" } else { "wide whole" };
+        let id = escape(&table.id);
+        self.raw(&format!(
+            "<div class=\"scroll\" role=\"region\" aria-labelledby=\"{id}\" tabindex=\"0\">\n"
+        ));
+        let look = if cards { "cards" } else { "narrow" };
+        self.raw(&format!("<table class=\"{look}\"{}>\n", role("table"))).element(
+            "caption",
+            "",
+            &table.caption,
+        );
+        self.raw(&format!("<thead{}>\n<tr{}>\n", role("rowgroup"), role("row")));
         for (column, name) in header.iter().enumerate() {
-            self.element(
-                "th",
-                if column == 0 { "scope=\"col\"" } else { "scope=\"col\" class=\"number\"" },
-                name,
-            );
+            let class = if column == 0 { String::new() } else { format!(" class=\"{}\"", class(column)) };
+            self.element("th", &format!("scope=\"col\"{}{class}", role("columnheader")), name);
         }
-        self.raw("</tr>\n</thead>\n<tbody>\n");
+        self.raw(&format!("</tr>\n</thead>\n<tbody{}>\n", role("rowgroup")));
         for row in rows {
-            self.raw("<tr>\n");
-            for (column, text) in row.iter().enumerate() {
-                match column {
-                    0 => self.element("th", "scope=\"row\"", text),
-                    _ => self.element("td", "class=\"number\"", text),
-                };
+            self.raw(&format!("<tr{}>\n", role("row")));
+            for (column, (text, name)) in row.iter().zip(header).enumerate() {
+                if column == 0 {
+                    let whole = if cards { " class=\"whole\"" } else { "" };
+                    self.element("th", &format!("scope=\"row\"{}{whole}", role("rowheader")), text);
+                } else {
+                    let name = if cards { format!(" data-name=\"{}\"", escape(name)) } else { String::new() };
+                    let attributes = format!("class=\"{}\"{}{name}", class(column), role("cell"));
+                    self.element("td", &attributes, text);
+                }
             }
             self.raw("</tr>\n");
         }
@@ -383,13 +410,20 @@ mod tests {
             Claim { deviation: Some([0.17, 0.19]), ..claim(0.18, "°", [None, Some(0.12)]) },
             Claim { fitted: true, ..claim(99.0, "%", [Some(83.6), Some(93.6)]) },
         ];
-        let table3 = [["rate", "paper (%)"], ["10 °/s", "88.6"]].map(|r| r.map(str::to_owned).to_vec());
+        let rows = [["rate", "paper (%)", "why"], ["10 °/s", "88.6", "a < b"]];
+        let table3 = ReportTable {
+            id: "table-3".to_owned(),
+            title: "Table 3".to_owned(),
+            caption: "Table 3 of the paper.".to_owned(),
+            rows: rows.map(|r| r.map(str::to_owned).to_vec()).to_vec(),
+            words: 1,
+        };
         html(
             "Laws <b>",
             &["First & second".to_owned()],
             &claims,
+            &[table3],
             &figures,
-            &table3,
             &[("seed".to_owned(), "1 < 2".to_owned())],
         )
     }
@@ -404,6 +438,8 @@ mod tests {
             "worst of ten &lt;seeds&gt; &amp; &quot;more&quot;",
             "aria-label=\"Figure 8: &quot;errors&quot; &lt; 0.12°\"",
             "<td>1 &lt; 2</td>",
+            "<td class=\"number\" role=\"cell\" data-name=\"paper (%)\">88.6</td>",
+            "<td class=\"wide whole\" role=\"cell\" data-name=\"why\">a &lt; b</td>",
         ] {
             assert!(page.contains(text), "{text}");
         }

@@ -2,7 +2,7 @@
 
 use crate::output::{Exit, json, print, with_progress, write};
 use crate::plot::{Figure, Panel, Series};
-use crate::report::{ReportFigure, claims_table, html};
+use crate::report::{ReportFigure, ReportTable, claims_table, html};
 use crate::table::number;
 use anyhow::Context;
 use clap::Args;
@@ -37,12 +37,18 @@ impl Reproduce {
             write(&dir.join(format!("{id}.png")), figure.png()?)?;
             figures.push(ReportFigure { id, caption: caption(data), svg });
         }
-        let table3 = table3_cells(&outcome.table3);
+        let table3 = ReportTable {
+            id: "table-3".to_owned(),
+            title: "Table 3".to_owned(),
+            caption: "Table 3 of the paper, and the results here.".to_owned(),
+            rows: table3_cells(&outcome.table3),
+            words: 0,
+        };
         write_table3(&outcome.table3, &dir.join("table3.csv"))?;
         let settings = settings();
         write(
             &dir.join("report.html"),
-            html("The paper, reproduced", &intro(), &outcome.claims, &figures, &table3, &settings),
+            html("The paper, reproduced", &intro(), &outcome.claims, &[table3], &figures, &settings),
         )?;
         write(
             &dir.join("report.json"),

@@ -1,10 +1,10 @@
 //! `clutch tune`.
 
-use crate::args::{ScenarioArgs, key_value, read_rig_file};
+use crate::args::{ScenarioArgs, read_rig_file};
 use crate::map::{List, values};
-use crate::output::{Exit, json, paragraph, print, with_progress, write};
-use crate::plot::{self, Figure, Panel, Series};
-use crate::report::{self, ReportFigure};
+use crate::output::{Exit, Forms, json, paragraph, with_progress, write};
+use crate::plot::{Figure, Panel, Series};
+use crate::report::{self, ReportFigure, ReportTable};
 use crate::table::number;
 use clap::Args;
 use clutch_certificate::file;
@@ -19,23 +19,17 @@ use std::path::PathBuf;
 /// Finds the law and the gains that move a rig most smoothly, certified.
 ///
 /// Candidates of each law run on simulated rigs at the corners of the bounds, on discs that no gain was chosen on; the
-/// smoothest one with a certificate, as sampled or in a shell, that also starts from rest, is given out. Exit code 0: gains
-/// are given out; 2: none is certified, or none starts from rest.
+/// smoothest one with a certificate, as sampled or in a shell, that also starts from rest, is given out. The scenario's path
+/// is a ramp; its law is tried with its own gains, too. Exit code 0: gains are given out; 2: none is certified, or none
+/// starts from rest.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  clutch tune board_smc_2 --identified rig.toml --out tuned.toml\n  \
     clutch tune mine.toml --rates 1,2,6 --html tuned.html\n  \
     clutch loop tuned.toml --certificate proof.json   # after --save proof.json\n\n\
     docs/tune.md tells what is tried, on what, and what is proven.")]
 pub(crate) struct Tune {
-    /// Scenario of the rig, with a ramp: file, or name of a built-in one. Its law is tried with its own gains, too.
-    #[arg(value_name = "SCENARIO.toml")]
-    scenario: PathBuf,
-    /// Overrides a key of the scenario; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
-    set: Vec<(String, String)>,
-    /// What `clutch identify --out` has written: model, bounds, delay and ripple; without it the scenario's.
-    #[arg(long, value_name = "FILE.toml")]
-    identified: Option<PathBuf>,
+    #[command(flatten)]
+    scenario: ScenarioArgs,
     /// Rates at which it is to be smooth, °/s, as LOW:HIGH:NUMBER or a list; unless given, the scenario's own.
     #[arg(long, value_name = "VALUES", value_parser = values)]
     rates: Option<List>,
@@ -52,43 +46,27 @@ pub(crate) struct Tune {
     /// Writes the proof, which `clutch loop --certificate` and `clutch certify --check` read.
     #[arg(long, value_name = "FILE.json")]
     save: Option<PathBuf>,
-    /// Prints the result as JSON, and nothing else, on standard output.
-    #[arg(long)]
-    json: bool,
-    /// Draws the error of the best gains of each law on a disc that they were not chosen on.
-    #[arg(long, value_name = "FILE.svg|png")]
-    plot: Option<PathBuf>,
-    /// Writes the result as a page, with that picture and every setting.
-    #[arg(long, value_name = "FILE.html")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    forms: Forms,
 }
 
 impl Tune {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
-        if let Some(file) = &self.plot {
-            plot::figure_format(file)?; // before a long run, not after
-        }
-        let args = ScenarioArgs {
-            scenario: self.scenario.clone(),
-            set: self.set.clone(),
-            identified: self.identified.clone(),
-            map: None,
-        };
-        let scenario = args.load()?;
-        let rig = self.identified.as_deref().map(read_rig_file).transpose()?;
+        self.forms.check()?;
+        let scenario = self.scenario.load()?;
+        let rig = self.scenario.identified.as_deref().map(read_rig_file).transpose()?;
         let options = Options {
             rates_deg_s: self.rates.as_ref().map_or_else(Vec::new, |list| list.0.clone()),
             candidates: self.candidates,
             uncertified: self.uncertified,
         };
         let tuned = with_progress("runs", |progress| tune(&scenario, rig.as_ref(), &options, progress))?;
-        if let Some(file) = &self.plot {
-            figure(&tuned)?.save(file)?;
-        }
-        if let Some(file) = &self.html {
-            write(file, page(&tuned)?)?;
-        }
-        print(&if self.json { json(&tuned)? } else { text(&tuned) })?;
+        self.forms.give(
+            || figure(&tuned),
+            |figure| page(&tuned, figure),
+            || json(&tuned),
+            || text(&tuned),
+        )?;
         let Some(winner) = tuned.winner().and_then(|w| w.scenario.as_ref()) else {
             for file in self.out.iter().chain(&self.save) {
                 eprintln!("{}: not written: no gains are given out", file.display());
@@ -135,21 +113,24 @@ pub fn verdict(tuned: &Tuned) -> String {
 
 /// Why nothing is given out.
 fn nothing(tuned: &Tuned) -> String {
-    let any = |f: &dyn Fn(&Standing) -> bool| tuned.candidates.iter().find(|c| f(&c.standing));
-    if let Some(c) = any(&|s| matches!(s, Standing::Refused { .. })) {
-        return format!(
-            "no gains are given out: {}: {}; a higher rate may help, or a finer encoder (clutch map)",
-            c.name,
-            lost(c)
-        );
-    }
-    match any(&|s| matches!(s, Standing::Uncertified { .. })) {
-        Some(c) => format!(
+    let first = |f: &dyn Fn(&Candidate) -> bool| tuned.candidates.iter().find(|c| f(c));
+    let refused = |c: &Candidate| matches!(c.standing, Standing::Refused { .. });
+    let certified = |c: &Candidate| matches!(c.verdict, Verdict::Certified { .. });
+    let open = first(&|c| matches!(&c.standing, Standing::Uncertified { why } if !why.is_empty()));
+    match (first(&|c| refused(c) && certified(c)), open, first(&refused)) {
+        (None, Some(c), _) => format!(
             "no gains are given out: nothing is certified; of the smoothest, {}: {}; --uncertified takes it all the same",
             c.name,
             lost(c)
         ),
-        None => "no gains are given out: no law goes with the path on every corner of the bounds".to_owned(),
+        (Some(c), ..) | (None, None, Some(c)) => format!(
+            "no gains are given out: {}: {}; a higher rate may help, or a finer encoder (clutch map)",
+            c.name,
+            lost(c)
+        ),
+        (None, None, None) => {
+            "no gains are given out: no law goes with the path on every corner of the bounds".to_owned()
+        }
     }
 }
 
@@ -291,7 +272,7 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
     // One scale for all that follow their path.
     let scale = panels.iter().map(most).filter(|e| *e < 2.0).fold(0.02, f64::max);
     for panel in &mut panels {
-        panel.y_range = Some((-scale, scale));
+        panel.y_range = Some((-1.05 * scale, 1.05 * scale));
     }
     Ok(Figure {
         title: format!(
@@ -316,19 +297,47 @@ fn errors(scenario: &Scenario, rate: f64) -> Result<Vec<(f64, f64)>, ScenarioErr
     Ok(trace.time.iter().zip(&trace.error).map(|(t, e)| (*t, e.to_degrees())).collect())
 }
 
-fn page(tuned: &Tuned) -> anyhow::Result<String> {
+fn page(tuned: &Tuned, figure: &Figure) -> anyhow::Result<String> {
     let title = format!("{}: gains", tuned.believed.name());
-    let mut intro = vec![verdict(tuned), about(tuned)];
-    for row in rows(tuned).iter().skip(1) {
-        intro.push(format!(
-            "{}: cost {}, {} cycles/s, sticks in {} runs, longest stick {}, error up to {}, proven {}",
-            row[0], row[1], row[2], row[3], row[4], row[5], row[6]
-        ));
+    let mut laws = rows(tuned);
+    for (row, why) in
+        laws.iter_mut().zip(std::iter::once("standing".to_owned()).chain(tuned.candidates.iter().map(lost)))
+    {
+        row.push(why);
     }
-    intro.extend(tuned.candidates.iter().map(|c| format!("{}: {}", c.name, lost(c))));
+    let open = tuned.open_shells.iter().map(|(shell, why)| {
+        vec![number(shell.slope_1_s), number(shell.boundary_rad_s), number(shell.smoothing), why.clone()]
+    });
+    let head = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    let gains = tuned.winner().map_or(&[][..], |winner| &winner.gains);
+    let gains = gains.iter().map(|(key, value)| vec![key.clone(), number(*value)]);
+    let table = |id: &str, title: &str, caption: &str, rows, words| ReportTable {
+        id: id.to_owned(),
+        title: title.to_owned(),
+        caption: caption.to_owned(),
+        rows,
+        words,
+    };
+    let tables = [
+        table("laws", "Laws", "The best gains of each law, the smoothest first.", laws, 1),
+        table(
+            "gains",
+            "Gains",
+            "The gains that are given out, SI.",
+            std::iter::once(head(&["key", "value"])).chain(gains).collect(),
+            0,
+        ),
+        table(
+            "shells",
+            "Shells without a proof",
+            "Shells that were tried before, or in vain.",
+            std::iter::once(head(&["f, 1/s", "S, rad/s", "smoothing", "what limits"])).chain(open).collect(),
+            1,
+        ),
+    ];
     let caption =
         "Error of the best gains of each law, from rest, on a disc that no gain was chosen on.".to_owned();
-    let figure = ReportFigure { id: "tune".to_owned(), caption, svg: figure(tuned)?.svg()? };
+    let figure = ReportFigure { id: "tune".to_owned(), caption, svg: figure.svg()? };
     let settings = tuned.winner().and_then(|w| w.scenario.as_ref()).unwrap_or(&tuned.believed).parameters();
-    Ok(report::html(&title, &intro, &[], &[figure], &[], &settings))
+    Ok(report::html(&title, &[verdict(tuned), about(tuned)], &[], &tables, &[figure], &settings))
 }

@@ -178,19 +178,24 @@ impl Profile {
         self.points.iter().copied().fold((f64::NAN, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a })
     }
 
-    /// Mean under the curve, and the values at which it has fallen by `fall`; none at an end that it does not fall to.
+    /// Mean under the curve, and the values at which it has fallen by `fall`; none at an end that it does not fall to. A peak
+    /// below the best one lies between these ends, one above it does not: it sets off a whole step of the voltage earlier, and
+    /// any curve has another one step on.
     fn estimate(&self, fall: f64) -> (f64, Option<f64>, Option<f64>) {
         let (_, top) = self.best();
+        let level = top - fall;
+        let at = self.points.iter().position(|p| p.1 == top).unwrap_or(0);
+        let first = self.points.iter().position(|p| p.1 >= level).unwrap_or(0);
+        let last = (at..self.points.len()).take_while(|&i| self.points[i].1 >= level).last().unwrap_or(at);
         let weight = |log: f64| libm::exp(log - top);
         let mut sums = (0.0, 0.0);
-        for w in self.points.windows(2) {
+        let end =
+            (last + 1..self.points.len()).take_while(|&i| self.points[i].1 <= self.points[i - 1].1).last();
+        for w in self.points[..=end.unwrap_or(last)].windows(2) {
             let (middle, mean) = (0.5 * (w[0].0 + w[1].0), 0.5 * (weight(w[0].1) + weight(w[1].1)));
             sums = (sums.0 + mean * (w[1].0 - w[0].0), sums.1 + mean * middle * (w[1].0 - w[0].0));
         }
-        let level = top - fall;
         let crossing = |a: (f64, f64), b: (f64, f64)| a.0 + (b.0 - a.0) * (level - a.1) / (b.1 - a.1);
-        let above: Vec<usize> = (0..self.points.len()).filter(|&i| self.points[i].1 >= level).collect();
-        let (first, last) = (above.first().copied().unwrap_or(0), above.last().copied().unwrap_or(0));
         let low = (first > 0).then(|| crossing(self.points[first - 1], self.points[first]));
         let high = self.points.get(last + 1).map(|&next| crossing(self.points[last], next));
         (sums.1 / sums.0, low, high)
@@ -288,7 +293,8 @@ impl SetOff<'_> {
     }
 }
 
-/// Stribeck velocity, rad/s, over all of the ratio's interval; none where the break-aways do not bound it on either side.
+/// Stribeck velocity, rad/s, over all of the ratio's interval, down to 0 where it is too small to be told; none where the
+/// break-aways do not bound it above.
 #[must_use]
 pub fn stribeck(slips: &[BreakAway<'_>], known: &Known, ratio: &Estimate, fall: f64) -> Option<Estimate> {
     let ratios = (0..RATIOS).map(|k| ratio.low + (ratio.high - ratio.low) * k as f64 / (RATIOS - 1) as f64);
@@ -308,5 +314,27 @@ pub fn stribeck(slips: &[BreakAway<'_>], known: &Known, ratio: &Estimate, fall: 
         .map(|(i, velocity)| (libm::log(velocity), log_mean(curves.iter().map(|curve| curve[i]))))
         .collect();
     let (value, low, high) = Profile { points }.estimate(fall);
-    Some(Estimate { value: libm::exp(value), low: libm::exp(low?), high: libm::exp(high?) })
+    Some(Estimate { value: libm::exp(value), low: low.map_or(0.0, libm::exp), high: libm::exp(high?) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn profile(logs: &[f64]) -> Profile {
+        Profile { points: logs.iter().enumerate().map(|(i, log)| (i as f64, *log)).collect() }
+    }
+
+    #[test]
+    fn an_interval_ends_above_its_best_peak_and_begins_at_the_lowest_value_that_is_as_likely() {
+        let (value, low, high) = profile(&[-9.0, -4.0, 0.0, -4.0, -9.0, -1.0, -9.0]).estimate(2.0);
+        assert_eq!((low, high), (Some(1.5), Some(2.5)));
+        assert!((value - 2.0).abs() < 0.01, "{value}");
+        let (value, low, high) = profile(&[-9.0, -1.0, -9.0, 0.0, -9.0]).estimate(2.0);
+        assert_eq!((low, high), (Some(0.875), Some(3.0 + 2.0 / 9.0)));
+        assert!(value > 1.0 && value < 3.0, "{value}");
+        // An end that the curve does not fall to is open.
+        assert_eq!(profile(&[-1.0, 0.0, -9.0]).estimate(2.0).1, None);
+        assert_eq!(profile(&[-9.0, 0.0, -1.0]).estimate(2.0).2, None);
+    }
 }

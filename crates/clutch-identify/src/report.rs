@@ -281,8 +281,6 @@ fn stribeck(slips: &[BreakAway<'_>], known: Option<&Known>, ratio: &Finding) -> 
     }
     match break_away::stribeck(slips, known, ratio, FALL) {
         Some(estimate) => Finding::Known(estimate),
-        None => refused(
-            "the break-aways do not bound it on both sides: more of them, from a slower ramp, may tell it",
-        ),
+        None => refused("the break-aways do not bound it: more of them, from a slower ramp, may tell it"),
     }
 }

@@ -21,24 +21,33 @@ use clutch_sim::scenario::{Table, Value};
 use clutch_sim::{Metrics, Scenario};
 use clutch_tune::{Options, Tuned, Verdict, tune};
 use random_rig::{Outcome, Truth, truth};
-use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::hash::{DefaultHasher, Hasher};
+use std::io::{BufRead, BufReader, Write};
 use std::time::Instant;
 
 /// Length of the loop's run, s, of which the first second does not count.
 const LOOP_S: f64 = 10.0;
 const SETTLE_S: f64 = 1.0;
 
-/// A rig from the experiment to the loop.
+/// A rig from the experiment to the loop: what the table asks of it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Course {
     seed: u64,
-    truth: Truth,
-    tuned: Tuned,
-    /// The truth lies in the box that the certificate speaks of; what does not.
-    outside: Vec<&'static str>,
-    /// Figures of the loop's run, and why it ended early, if it did.
-    run: Option<(Metrics, f64, Option<String>)>,
+    /// Delay of the hidden rig, periods.
+    delay_ticks: u32,
+    /// What is proven of the error, rad.
+    bound_rad: Option<f64>,
+    /// What of the truth lies outside of the box that the certificate speaks of.
+    outside: Vec<String>,
+    /// Largest error of the loop's run, rad, and if it went to its end without a stick after the first second.
+    run: Option<(f64, bool)>,
+    simulated_s: f64,
     /// Time that tuning took here, s.
     tuning_s: f64,
+    /// All of it in words.
+    told: String,
 }
 
 /// What tuning is given: the hidden rig's bounds and safe state, and of its rig nothing.
@@ -126,18 +135,88 @@ fn course(seed: u64) -> Outcome<Course> {
     let winner = tuned.winner().and_then(|w| w.scenario.clone());
     let outside = winner.as_ref().map_or(Ok(Vec::new()), |w| outside(w, &truth))?;
     let run = winner.map(|w| drive(&on_hidden(&w, &truth)?)).transpose()?;
-    Ok(Course { seed, truth, tuned, outside, run, tuning_s })
+    let smooth = |m: &Metrics, ended: &Option<String>| m.stick_time_fraction == 0.0 && ended.is_none();
+    Ok(Course {
+        seed,
+        delay_ticks: (truth.delay * 1e3).round() as u32,
+        bound_rad: match tuned.winner().map(|w| &w.verdict) {
+            Some(Verdict::Certified { error_rad, .. }) => Some(*error_rad),
+            _ => None,
+        },
+        told: told(&truth, &tuned, run.as_ref(), tuning_s),
+        outside: outside.into_iter().map(str::to_owned).collect(),
+        run: run.map(|(m, error, ended)| (error, smooth(&m, &ended))),
+        simulated_s: tuned.simulated_s,
+        tuning_s,
+    })
 }
 
-fn bound(course: &Course) -> Option<f64> {
-    match course.tuned.winner()?.verdict {
-        Verdict::Certified { error_rad, .. } => Some(error_rad),
-        _ => None,
+/// A rig's course in words: what was given out and what it did; where nothing certified was, what limits.
+fn told(truth: &Truth, tuned: &Tuned, run: Option<&(Metrics, f64, Option<String>)>, tuning_s: f64) -> String {
+    let mut text = format!(
+        "delay {:.0} ms, hold {:.2} V, ratio {:.2}, v_s {:.2} mrad/s, ripple {:.1} %: ",
+        1e3 * truth.delay,
+        truth.hold,
+        truth.ratio,
+        1e3 * truth.stribeck,
+        100.0 * truth.ripple
+    );
+    text += &match tuned.winner().map(|w| (&w.name, &w.verdict)) {
+        None => "nothing".to_owned(),
+        Some((name, Verdict::Certified { error_rad, .. })) => {
+            format!("{name}, ≤ {:.3}°", error_rad.to_degrees())
+        }
+        Some((name, _)) => format!("{name}, UNCERTIFIED"),
+    };
+    text += &match run {
+        None => "; no run".to_owned(),
+        Some((m, error, ended)) => format!(
+            "; {:.2} cycles/s, error up to {:.3}°{}",
+            m.stick_slip_cycles_per_s,
+            error.to_degrees(),
+            ended.as_ref().map_or(String::new(), |cause| format!(", ended by {cause}"))
+        ),
+    };
+    text += &format!("; {tuning_s:.1} s of tuning");
+    for (shell, why) in &tuned.open_shells {
+        text += &format!("\n    shell f {} S {}: {why}", shell.slope_1_s, shell.boundary_rad_s);
     }
+    if tuned.winner().is_none() {
+        for c in &tuned.candidates {
+            text += &format!("\n    {}: {:?}", c.name, c.standing);
+        }
+    }
+    text
 }
 
-fn smooth(course: &Course) -> bool {
-    course.run.as_ref().is_some_and(|(m, _, ended)| m.stick_time_fraction == 0.0 && ended.is_none())
+/// What is done is kept beside this program, under a name of its bytes: started anew it goes on, and a program that was built
+/// anew begins anew.
+struct Kept {
+    file: File,
+    done: Vec<Course>,
+}
+
+impl Kept {
+    fn open() -> Outcome<Kept> {
+        let program = std::env::current_exe()?;
+        let mut bytes = DefaultHasher::new();
+        bytes.write(&std::fs::read(&program)?);
+        let path = program.with_extension(format!("{:016x}.jsonl", bytes.finish()));
+        let file = File::options().create(true).append(true).read(true).open(&path)?;
+        // A line that was cut off is done again.
+        let lines = BufReader::new(&file).lines().collect::<Result<Vec<_>, _>>()?;
+        let done = lines.iter().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        Ok(Kept { file, done })
+    }
+
+    fn course(&mut self, seed: u64) -> Outcome<Course> {
+        if let Some(course) = self.done.iter().find(|c| c.seed == seed) {
+            return Ok(course.clone());
+        }
+        let course = course(seed)?;
+        writeln!(self.file, "{}", serde_json::to_string(&course)?)?;
+        Ok(course)
+    }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -152,60 +231,33 @@ fn row(name: &str, of: &[&Course]) -> String {
         let most = values.iter().copied().fold(0.0, f64::max);
         if values.is_empty() { "–".to_owned() } else { format!("{:.3}°, {most:.3}°", median(values)) }
     };
-    let bounds = of.iter().filter_map(|c| bound(c)).map(f64::to_degrees).collect();
-    let errors = of.iter().filter_map(|c| Some(c.run.as_ref()?.1.to_degrees())).collect();
-    let (n, certified) = (of.len(), count(&|c| bound(c).is_some()));
+    let bounds = of.iter().filter_map(|c| c.bound_rad).map(f64::to_degrees).collect();
+    let errors = of.iter().filter_map(|c| Some(c.run?.0.to_degrees())).collect();
+    let (n, certified) = (of.len(), count(&|c| c.bound_rad.is_some()));
     format!(
         "| {name} | {n} | {} of {n} | {certified} of {n} | {} of {certified} | {} | {} | {} |",
-        count(&smooth),
-        count(&|c| bound(c).is_some() && c.outside.is_empty()),
+        count(&|c| c.run.is_some_and(|(_, smooth)| smooth)),
+        count(&|c| c.bound_rad.is_some() && c.outside.is_empty()),
         degrees(bounds),
         degrees(errors),
-        count(&|c| bound(c).is_some_and(|b| c.run.as_ref().is_none_or(|run| run.1 > b))),
+        count(&|c| c.bound_rad.zip(c.run).is_some_and(|(bound, (error, _))| error > bound)),
     )
-}
-
-fn detail(c: &Course) {
-    let rig = format!(
-        "rig {}: delay {:.0} ms, hold {:.2} V, ratio {:.2}, v_s {:.2} mrad/s, ripple {:.1} %",
-        c.seed,
-        1e3 * c.truth.delay,
-        c.truth.hold,
-        c.truth.ratio,
-        1e3 * c.truth.stribeck,
-        100.0 * c.truth.ripple
-    );
-    let run = c.run.as_ref().map_or("no run".to_owned(), |(m, error, ended)| {
-        format!(
-            "{:.2} cycles/s, error up to {:.3}°, {ended:?}",
-            m.stick_slip_cycles_per_s,
-            error.to_degrees()
-        )
-    });
-    let winner = c.tuned.winner().map_or("nothing", |w| w.name.as_str());
-    let proven = bound(c).map_or("UNCERTIFIED".to_owned(), |b| format!("≤ {:.3}°", b.to_degrees()));
-    println!(
-        "{rig}: {winner}, {proven}; {run}; outside the box: {:?}; {:.1} s of tuning, {:.0} s simulated",
-        c.outside, c.tuning_s, c.tuned.simulated_s
-    );
-    for (shell, why) in &c.tuned.open_shells {
-        println!("    shell f {} S {}: {why}", shell.slope_1_s, shell.boundary_rad_s);
-    }
 }
 
 fn main() -> Outcome<()> {
     let mut args = std::env::args().skip(1);
     let mut number = |default: u64| args.next().map_or(Ok(default), |text| text.parse::<u64>());
     let (rigs, first) = (number(50)?, number(30_001)?);
-    let all: Vec<Outcome<Course>> = (first..first + rigs)
-        .into_par_iter()
-        .map(|seed| course(seed).inspect(detail).map_err(|e| format!("rig {seed}: {e}").into()))
-        .collect();
+    let mut kept = Kept::open()?;
     let mut done = Vec::new();
-    for result in all {
-        match result {
-            Ok(course) => done.push(course),
-            Err(e) => println!("failed: {e}"),
+    // One after another: each takes all cores, and its time is its own.
+    for seed in first..first + rigs {
+        match kept.course(seed) {
+            Ok(course) => {
+                println!("rig {seed}: {}", course.told);
+                done.push(course);
+            }
+            Err(e) => println!("rig {seed}: failed: {e}"),
         }
     }
     println!(
@@ -214,18 +266,19 @@ fn main() -> Outcome<()> {
     );
     println!("|---|---|---|---|---|---|---|---|");
     for ticks in 0..=2_u32 {
-        let of: Vec<&Course> =
-            done.iter().filter(|c| (c.truth.delay * 1e3).round() as u32 == ticks).collect();
+        let of: Vec<&Course> = done.iter().filter(|c| c.delay_ticks == ticks).collect();
         println!("{}", row(&format!("delay of {ticks} periods"), &of));
     }
     println!("{}", row("all", &done.iter().collect::<Vec<_>>()));
     let experiment_s = Programme::default().seconds();
+    let tuning: Vec<f64> = done.iter().map(|c| c.tuning_s).collect();
     println!(
         "{rigs} rigs from seed {first}, {} of them to the end: {experiment_s:.1} s of experiment and {LOOP_S:.0} s of the loop each, in \
-         virtual time; tuning simulates {:.0} s of believed rigs, and takes {:.0} s here (medians)",
+         virtual time; tuning simulates {:.0} s of believed rigs (median), and takes {:.0} s here (median; {:.0} s at most)",
         done.len(),
-        median(done.iter().map(|c| c.tuned.simulated_s).collect()),
-        median(done.iter().map(|c| c.tuning_s).collect()),
+        median(done.iter().map(|c| c.simulated_s).collect()),
+        median(tuning.clone()),
+        tuning.iter().copied().fold(0.0, f64::max),
     );
     Ok(())
 }

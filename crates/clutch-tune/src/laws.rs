@@ -34,53 +34,58 @@ const fn volts(key: &'static str, low: f64, high: f64) -> Gain {
     Gain { key, low, high, volts: true }
 }
 
+/// A law with a sampled certificate of its own.
+const fn alone(key: &'static str, name: &'static str, gains: &'static [Gain]) -> Family {
+    Family { key, name, gains, certified_alone: true }
+}
+
+/// A law that is certified in a shell only.
+const fn in_a_shell(key: &'static str, name: &'static str, gains: &'static [Gain]) -> Family {
+    Family { key, name, gains, certified_alone: false }
+}
+
 /// Key of the smoothing of (5).
 pub(crate) const SMOOTHING: &str = "velocity.smoothed_derivative.smoothing";
 const SMOOTHED: Gain = plain(SMOOTHING, 0.2, 1.0);
 
 /// Every law that is tried. Ends were chosen so that the sets of docs/smooth.md and docs/certified.md lie within.
 pub(crate) const FAMILIES: [Family; 5] = [
-    Family {
-        key: "glide",
-        name: "glide",
-        gains: &[plain("law.glide.kp_1_s", 20.0, 60.0), plain("law.glide.kd_1_s", 80.0, 220.0)],
-        certified_alone: false,
-    },
-    Family {
-        key: "pid",
-        name: "PI with feed-forward",
-        gains: &[
+    in_a_shell(
+        "glide",
+        "glide",
+        &[plain("law.glide.kp_1_s", 20.0, 60.0), plain("law.glide.kd_1_s", 80.0, 220.0)],
+    ),
+    in_a_shell(
+        "pid",
+        "PI with feed-forward",
+        &[
             volts("law.pid.kp_v_rad", 150.0, 1600.0),
             volts("law.pid.ki_v_rad_s", 1000.0, 16_000.0),
             volts("law.pid.kd_v_s_rad", 1.5, 16.0),
             SMOOTHED,
         ],
-        certified_alone: false,
-    },
-    Family {
-        key: "pd",
-        name: "PD",
-        gains: &[volts("law.pd.kp_v_rad", 150.0, 2500.0), volts("law.pd.kd_v_s_rad", 1.5, 24.0), SMOOTHED],
-        certified_alone: true,
-    },
-    Family {
-        key: "smc",
-        name: "SMC (31)",
-        gains: &[
+    ),
+    alone(
+        "pd",
+        "PD",
+        &[volts("law.pd.kp_v_rad", 150.0, 2500.0), volts("law.pd.kd_v_s_rad", 1.5, 24.0), SMOOTHED],
+    ),
+    alone(
+        "smc",
+        "SMC (31)",
+        &[
             volts("law.smc.kp_v", 1.2, 3.0),
             volts("law.smc.kd_v_s_rad", 2.0, 180.0),
             plain("law.smc.slope_1_s", 30.0, 120.0),
             plain("law.smc.boundary_rad_s", 0.05, 0.4),
             SMOOTHED,
         ],
-        certified_alone: true,
-    },
-    Family {
-        key: "ctc",
-        name: "CTC",
-        gains: &[plain("law.ctc.kp_1_s2", 20.0, 400.0), plain("law.ctc.kd_1_s", 0.2, 3.0), SMOOTHED],
-        certified_alone: false,
-    },
+    ),
+    in_a_shell(
+        "ctc",
+        "CTC",
+        &[plain("law.ctc.kp_1_s2", 20.0, 400.0), plain("law.ctc.kd_1_s", 0.2, 3.0), SMOOTHED],
+    ),
 ];
 
 /// Element `n` of the van der Corput sequence in a base: evenly spread between 0 and 1, whatever the number.

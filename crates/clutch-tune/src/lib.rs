@@ -17,6 +17,7 @@ use clutch_sim::smooth_speed::RATE;
 use clutch_sim::{Scenario, ScenarioError};
 use laws::{FAMILIES, Family, Gains, SMOOTHING, family_of, holding};
 use proof::{Bounds, SHELLS, prove};
+use rayon::prelude::*;
 use serde::Serialize;
 use trial::{Trial, scores};
 
@@ -69,7 +70,7 @@ pub enum Standing {
         /// What limits.
         why: String,
     },
-    /// From rest it sticks, or leaves its path.
+    /// On discs that it was not chosen on it sticks, or leaves its path.
     Refused {
         /// What it does.
         why: String,
@@ -172,10 +173,12 @@ pub fn tune(
     let set = [(RATE.to_owned(), Value::Float(rates_deg_s[0]))];
     let base = Scenario::from_table(base.name(), base.table().clone(), &set)?;
     let job = Job { base, rates_deg_s, corners, delay_between, options, report };
-    let mut candidates = job.candidates()?;
-    let shell = job.shelled(&mut candidates)?;
+    // A shell holds with any law within: it is looked for meanwhile.
+    let (candidates, shells) = rayon::join(|| job.candidates(), || job.shells());
+    let (mut candidates, shells) = (candidates?, shells?);
+    job.shelled(&mut candidates, &shells)?;
     job.judge(&mut candidates)?;
-    job.choose(candidates, shell)
+    job.choose(candidates, shells)
 }
 
 /// The rates, checked, the lowest first.
@@ -211,14 +214,14 @@ struct Finalist {
     family: &'static Family,
     gains: Gains,
     scenario: Option<Scenario>,
-    shell: Option<usize>,
+    in_shell: bool,
     score: Score,
     tried: (u32, u32),
 }
 
-/// The shell that was proven, and those that were not.
+/// The shell that was proven, and those before it that were not.
 struct Shells {
-    proven: Option<Bounds>,
+    proven: Option<(ShellTried, Bounds)>,
     open: Vec<(ShellTried, String)>,
 }
 
@@ -267,7 +270,7 @@ impl Job<'_> {
             family,
             gains: Gains::new(),
             scenario: None,
-            shell: None,
+            in_shell: false,
             score: Score::default(),
             tried: (tried, unstable),
         };
@@ -288,47 +291,47 @@ impl Job<'_> {
         Ok(Finalist { gains, scenario: Some(scenario), score, ..nothing })
     }
 
-    /// Puts the first shell that is proven around laws that have no certificate of their own.
-    fn shelled(&self, all: &mut Vec<Finalist>) -> Result<Shells, ScenarioError> {
+    /// The first shell that is proven.
+    fn shells(&self) -> Result<Shells, ScenarioError> {
         let mut shells = Shells { proven: None, open: Vec::new() };
         if let Some(why) = &self.delay_between {
             shells.open.extend(SHELLS.first().map(|shell| (*shell, why.clone())));
             return Ok(shells);
         }
-        let inner: Vec<&Finalist> =
-            all.iter().filter(|f| !f.family.certified_alone && f.scenario.is_some()).collect();
-        let Some(any) = inner.first().and_then(|f| f.scenario.as_ref()) else { return Ok(shells) };
-        for (n, shell) in SHELLS.iter().enumerate() {
-            let within = within(any, shell)?;
-            if let Some(why) = edge_trips(&within, shell) {
-                shells.open.push((*shell, why));
-                continue;
+        let Some(inner) = FAMILIES.iter().find(|family| !family.certified_alone) else { return Ok(shells) };
+        let inner = inner.scenario(&self.base, &Gains::new())?;
+        let one = |shell: &ShellTried| {
+            let within = within(&inner, shell)?;
+            match edge_trips(&within, shell) {
+                Some(why) => Ok(Err(why)),
+                None => prove(&within, &self.rates_deg_s),
             }
-            match prove(&within, &self.rates_deg_s)? {
+        };
+        let tried = SHELLS.par_iter().map(one).collect::<Result<Vec<_>, ScenarioError>>()?;
+        for (shell, found) in SHELLS.iter().zip(tried) {
+            match found {
                 Err(why) => shells.open.push((*shell, why)),
                 Ok(bounds) => {
-                    shells.proven = Some(bounds);
-                    let mut more = Vec::new();
-                    for f in inner {
-                        let Some(scenario) = &f.scenario else { continue };
-                        let scenario = Some(crate::within(scenario, shell)?);
-                        let (gains, tried) = (f.gains.clone(), f.tried);
-                        let score = Score::default();
-                        more.push(Finalist {
-                            family: f.family,
-                            gains,
-                            scenario,
-                            shell: Some(n),
-                            score,
-                            tried,
-                        });
-                    }
-                    all.extend(more);
+                    shells.proven = Some((*shell, bounds));
                     break;
                 }
             }
         }
         Ok(shells)
+    }
+
+    /// Puts the shell that is proven around laws that have no certificate of their own.
+    fn shelled(&self, all: &mut Vec<Finalist>, shells: &Shells) -> Result<(), ScenarioError> {
+        let Some((shell, _)) = &shells.proven else { return Ok(()) };
+        let mut more = Vec::new();
+        for f in all.iter().filter(|f| !f.family.certified_alone) {
+            let Some(scenario) = &f.scenario else { continue };
+            let scenario = Some(within(scenario, shell)?);
+            let (gains, score) = (f.gains.clone(), Score::default());
+            more.push(Finalist { family: f.family, gains, scenario, in_shell: true, score, tried: f.tried });
+        }
+        all.extend(more);
+        Ok(())
     }
 
     /// Scores on discs that no gain was chosen on.
@@ -343,9 +346,21 @@ impl Job<'_> {
         Ok(())
     }
 
+    /// What is proven of a candidate.
+    fn proven(&self, scenario: &Scenario, shells: &Shells) -> Result<Result<Bounds, String>, ScenarioError> {
+        if let Some(why) = &self.delay_between {
+            return Ok(Err(why.clone()));
+        }
+        if let Some((_, bounds)) = shells.proven.as_ref().filter(|_| scenario.params().shell.boundary > 0.0)
+            && scenario.sampled_setup(&scenario.plan()?.bounds).as_ref() == Ok(&bounds.certificate.setup)
+        {
+            return Ok(Ok(bounds.clone()));
+        }
+        prove(scenario, &self.rates_deg_s)
+    }
+
     /// The first that has a certificate and starts from rest; without one if that is asked for.
     fn choose(&self, all: Vec<Finalist>, shells: Shells) -> Result<Tuned, ScenarioError> {
-        let Shells { proven: mut shell, open: open_shells } = shells;
         let mut tuned = Tuned {
             rates_deg_s: self.rates_deg_s.clone(),
             corners: self.corners.clone(),
@@ -353,7 +368,7 @@ impl Job<'_> {
             candidates: all.into_iter().map(Finalist::told).collect(),
             chosen: None,
             from_rest: None,
-            open_shells,
+            open_shells: shells.open.clone(),
             certificate: None,
             believed: self.base.clone(),
         };
@@ -362,21 +377,23 @@ impl Job<'_> {
             let Some(scenario) = candidate.scenario.clone().filter(|_| candidate.score.cost.is_some()) else {
                 continue;
             };
-            let in_shell = scenario.params().shell.boundary > 0.0;
-            let bounds = match (&self.delay_between, in_shell) {
-                (Some(why), _) => Err(why.clone()),
-                (None, true) => {
-                    shell.take().map_or_else(|| prove(&scenario, &self.rates_deg_s), |b| Ok(Ok(b)))?
-                }
-                (None, false) => prove(&scenario, &self.rates_deg_s)?,
-            };
-            match bounds {
+            let Score { runs_with_sticks, runs, .. } = candidate.score;
+            if runs_with_sticks > 0 {
+                // It would be refused from rest, too, behind a proof that takes its time.
+                let why = format!(
+                    "it sticks in {runs_with_sticks} of {runs} runs on discs that it was not chosen on"
+                );
+                candidate.standing = Standing::Refused { why };
+                continue;
+            }
+            match self.proven(&scenario, &shells)? {
                 Err(why) => {
                     candidate.verdict = Verdict::Uncertified { why: why.clone() };
                     candidate.standing = Standing::Uncertified { why };
                 }
                 Ok(Bounds { lines, error_rad, certificate }) => {
-                    candidate.verdict = Verdict::Certified { error_rad, shell: in_shell, lines };
+                    let shell = scenario.params().shell.boundary > 0.0;
+                    candidate.verdict = Verdict::Certified { error_rad, shell, lines };
                     if self.accept(n, &scenario, &mut tuned)? {
                         tuned.certificate = Some(certificate);
                         break;
@@ -395,7 +412,7 @@ impl Job<'_> {
         }
         if let Some(cost) = tuned.winner().and_then(|w| w.score.cost) {
             for other in &mut tuned.candidates {
-                if other.verdict == Verdict::NotLookedFor && other.score.cost.is_some() {
+                if matches!(&other.standing, Standing::Uncertified { why } if why.is_empty()) {
                     other.standing = Standing::Rougher { than: cost };
                 }
             }
@@ -445,7 +462,7 @@ impl Finalist {
     }
 
     fn told(self) -> Candidate {
-        let name = if self.shell.is_some() {
+        let name = if self.in_shell {
             format!("{} in a shell", self.family.name)
         } else {
             self.family.name.to_owned()

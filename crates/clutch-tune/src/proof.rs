@@ -27,6 +27,8 @@ pub(crate) const SHELLS: [ShellTried; 2] = [
 /// Effort of a search: comparisons per attempt, some seconds.
 const WORK: u64 = 2_500_000_000;
 const WORK_ALONE: u64 = 200_000_000;
+/// Widest cell of a shell, largest `μ_d` over smallest.
+const WIDE: f64 = 1.5;
 /// Errors above this are not worth proving, rad.
 const WORST: f64 = 6.0_f64.to_radians();
 
@@ -64,11 +66,12 @@ pub(crate) fn prove(
         let options = Options {
             refinements: 0,
             work: if shell { WORK } else { WORK_ALONE },
-            // A shell minds little how strong the brake is: a wide cell costs less than many narrow ones.
-            widest: if shell { 1.5 } else { Options::default().widest },
+            // A shell minds little how strong the brake is: a wide cell costs less than many narrow ones, and where it did not
+            // close, narrow ones did not either (docs/tune.md).
+            widest: if shell { WIDE } else { Options::default().widest },
+            narrowest: if shell { WIDE } else { Options::default().narrowest },
             error_limit: WORST,
             patient: !shell,
-            ..Options::default()
         };
         let found = search(setup, &options, false);
         if let Some(open) = found.open.first() {

@@ -60,8 +60,12 @@ fn without_a_certificate_nothing_is_given_out_unless_that_is_asked_for() {
     let lag = [("rig.actuator_time_constant_s", "0.001")];
     let found = tuned(&lag, &few());
     assert!(found.winner().is_none() && found.certificate.is_none());
-    let limits = |c: &clutch_tune::Candidate| matches!(&c.standing, Standing::Uncertified { why } if why.contains("a lag"));
-    assert!(found.candidates.iter().any(limits), "{:?}", found.candidates);
+    assert!(found.open_shells.iter().any(|(_, why)| why.contains("a lag")), "{:?}", found.open_shells);
+    // What sticks where it is judged is refused before anything is proven of it.
+    for c in &found.candidates {
+        let refused = matches!(&c.standing, Standing::Refused { why } if why.contains("it sticks in"));
+        assert_eq!(refused, c.score.runs_with_sticks > 0, "{}: {:?}", c.name, c.standing);
+    }
     let found = tuned(&lag, &Options { uncertified: true, ..few() });
     let winner = found.winner().expect("a winner");
     assert!(matches!(winner.verdict, Verdict::Uncertified { .. }), "{winner:?}");

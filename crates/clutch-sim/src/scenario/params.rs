@@ -40,8 +40,9 @@ params! {
         /// Rate of reaching the sliding surface that the certificate shall give, in (15); above 0 the reaching time gets
         /// a bound.
         reach_rate: f64 = 0.0, "reach_rate_rad_s2" "γ" RAD_S2, Range::at_least(0.0);
-        /// The part of `friction_percent` that changes along the disc and with time; the rest is a mean that is not known
-        /// more closely. Absent: all of it is the mean's, and the sampled certificate adds the ripple of the rig.
+        /// The part of `friction_percent` that changes along the disc and with time; the rest is a mean that is off by as
+        /// much in ratio either way, (1 + friction)/(1 + ripple). Absent: all of it is the mean's, and the sampled certificate
+        /// adds the ripple of the rig.
         ripple: Option<f64>, "ripple_percent" "" PERCENT, Range::at_least(0.0).below(100.0);
     }
     flat {
@@ -62,7 +63,10 @@ impl ScenarioBounds {
     pub fn friction_shares(&self, ripple: f64) -> ([f64; 2], f64) {
         let off = self.tolerances.friction;
         match self.ripple {
-            Some(share) => ([(1.0 - off) / (1.0 - share), (1.0 + off) / (1.0 + share)], share),
+            Some(share) => {
+                let most = (1.0 + off) / (1.0 + share);
+                ([1.0 / most, most], share)
+            }
             None => ([1.0 - off, 1.0 + off], ripple),
         }
     }
