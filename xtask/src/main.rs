@@ -332,7 +332,7 @@ fn smooth() -> Result<()> {
     for table in ["laws", "plants", "rest", "steps", "motions"] {
         write_between("docs/smooth.md", table, &table_of("smooth", &[table])?)?;
     }
-    write_between("docs/smooth.md", "maps", &table_of_package("clutch-identify", "maps", &[])?)
+    write_between("docs/smooth.md", "maps", &table_in("clutch-identify", "maps", &[])?)
 }
 
 fn meter() -> Result<()> {
@@ -362,10 +362,10 @@ fn random_rigs(package: &str, page: &str, rigs: u64, seed: u64) -> Result<()> {
 
 /// The table that an example of the simulator prints.
 fn table_of(example: &str, args: &[&str]) -> Result<String> {
-    table_of_package("clutch-sim", example, args)
+    table_in("clutch-sim", example, args)
 }
 
-fn table_of_package(package: &str, example: &str, args: &[&str]) -> Result<String> {
+fn table_in(package: &str, example: &str, args: &[&str]) -> Result<String> {
     let run = ["run", "--release", "--package", package, "--example", example, "--"];
     let (done, text) = cargo(run).args(args).quietly()?;
     anyhow::ensure!(done, "the example {example} failed:\n{text}");
