@@ -20,6 +20,7 @@
 
 pub mod campaign;
 pub mod control_loop;
+pub mod drift;
 pub mod faults;
 pub mod faulty_line;
 pub mod from_scenario;
