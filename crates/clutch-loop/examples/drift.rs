@@ -58,12 +58,11 @@ struct Change {
     rise: f64,
 }
 
-const CHANGES: [Change; 9] = [
+const CHANGES: [Change; 8] = [
     change("friction + 20 %", 1.2, 1.0, 0.0),
     change("friction − 20 %", 0.8, 1.0, 0.0),
     change("load + 15 %", 1.0, 1.15, 0.0),
     change("load − 15 %", 1.0, 0.85, 0.0),
-    change("load − 10 %", 1.0, 0.9, 0.0),
     change("friction + 1 %/s", 1.0, 1.0, 0.01),
     change("friction − 1 %/s", 1.0, 1.0, -0.01),
     change("friction + 5 %/s", 1.0, 1.0, 0.05),

@@ -29,8 +29,8 @@ use serde_json::{Value, json};
 /// Slices of a mean.
 const SLICES: usize = 16;
 /// Windows, each of slices that are so many of the one before: they tell less soon, and smaller drifts.
-const LEVELS: usize = 3;
-const LONGER: u64 = 8;
+const LEVELS: usize = 4;
+const LONGER: u64 = 4;
 /// A slice takes at least this time, s, this way, rad, and so many counts.
 const SHORTEST: f64 = 0.1;
 const LEAST_WAY: f64 = 0.5 / 180.0 * std::f64::consts::PI;
@@ -44,8 +44,8 @@ const LONGEST_GAP: f64 = 2.0;
 /// Samples in a row that may be lost: the board kept its voltage.
 const MOST_LOST: u64 = 5;
 /// Standard errors of a mean that it may be off.
-const STANDARD_ERRORS: f64 = 5.0;
-/// What it may be off beside, as a share: rounding of converter and velocity, a delay.
+const STANDARD_ERRORS: f64 = 4.0;
+/// What it may be off beside, as a share: a ripple gives the mean of its inverse, and there are delay and rounding.
 const RESOLUTION: f64 = 0.03;
 
 /// Friction over load of a window, as multiples of the model's, and what the bounds leave of it.
@@ -140,13 +140,16 @@ impl DriftReport {
     pub fn alarm_words(&self, alarm: &Alarm) -> String {
         let seen = &alarm.seen;
         let (way, bound) = if seen.least > seen.high { ("above", seen.high) } else { ("below", seen.low) };
+        let least = number(seen.least);
+        let interval = match seen.most.is_finite() {
+            true => format!("{least} to {}", number(seen.most)),
+            false => format!("at least {least}"),
+        };
         format!(
-            "DRIFT at {} s: {} is {} of the model's ({} to {}), {way} the bound of {}",
+            "DRIFT at {} s: {} is {} of the model's ({interval}), {way} the bound of {}",
             number(alarm.tick as f64 * self.period),
             self.label(),
             number(seen.friction),
-            number(seen.least),
-            number(seen.most),
             number(bound)
         )
     }
