@@ -45,8 +45,10 @@ const LONGEST_GAP: f64 = 2.0;
 const MOST_LOST: u64 = 5;
 /// Standard errors of a mean that it may be off.
 const STANDARD_ERRORS: f64 = 4.0;
-/// What it may be off beside, as a share: a ripple gives the mean of its inverse, and there are delay and rounding.
-const RESOLUTION: f64 = 0.03;
+/// What it may be off beside, as a share: delay and rounding.
+const RESOLUTION: f64 = 0.02;
+/// Share by which it is low with a ripple of 15 %, as the meter believes it: what is seen is the mean of the inverse.
+const INVERSE: f64 = 0.15 * 0.15;
 
 /// Friction over load of a window, as multiples of the model's, and what the bounds leave of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -275,7 +277,7 @@ impl Window {
         Some(Seen {
             friction,
             least: sums.given / (sums.friction + sums.more_at_rest) - off,
-            most: friction.max(let_go) + off,
+            most: friction.max(let_go) + off + INVERSE * friction.abs(),
             low: if sums.given > 0.0 {
                 weak * (sums.given / sums.given_high)
             } else {

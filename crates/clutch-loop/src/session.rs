@@ -790,12 +790,19 @@ impl Course<'_> {
                 log_ended = true;
                 (self.event)(Event::LogEnded);
             }
-            let (number, alarm) = watch.drift.last();
-            if number > alarms {
-                alarms = number;
-                (self.event)(Event::Drift(drift.alarm_words(&alarm)));
-            }
+            self.tell_drift(watch, drift, &mut alarms);
             std::thread::sleep(LOOK_EVERY);
+        }
+        // One that has ended the run came after the last look.
+        self.tell_drift(watch, drift, &mut alarms);
+    }
+
+    /// Tells an alarm of drift that is new.
+    fn tell_drift(&mut self, watch: &Watch, drift: &DriftReport, told: &mut u64) {
+        let (number, alarm) = watch.drift.last();
+        if number > *told {
+            *told = number;
+            (self.event)(Event::Drift(drift.alarm_words(&alarm)));
         }
     }
 }
