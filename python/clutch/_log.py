@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from clutch import _clutch
 from clutch._clutch import Table
@@ -106,19 +106,22 @@ class Replay:
         The first difference, if there is one.
     commands : Table
         The law's commands in the replay, a row for each command of the log.
+    drift : dict
+        Friction over load in the log against the bounds of the scenario, as :class:`clutch.LoopResult` has it.
 
     Examples
     --------
     See :func:`clutch.replay`.
 
     >>> import clutch
-    >>> clutch.Replay(ticks=0, first=None, commands=clutch.Table({})).identical
+    >>> clutch.Replay(ticks=0, first=None, commands=clutch.Table({}), drift={}).identical
     True
     """
 
     ticks: int
     first: Difference | None
     commands: Table
+    drift: dict[str, Any]
 
     @property
     def identical(self) -> bool:
@@ -169,7 +172,8 @@ def replay(
         The log, or its file.
     overrides : mapping, optional
         Values for dotted keys of its scenario. The law then gives the commands that it would have given on the same
-        counts: an open loop, which does not predict the motion of the shaft.
+        counts: an open loop, which does not predict the motion of the shaft. Other bounds are those against which
+        friction over load is held.
     law : callable or object, optional
         The law of a simulation whose law was written in Python, as for :func:`clutch.simulate`.
 
@@ -200,9 +204,9 @@ def replay(
     """
     opened = log if isinstance(log, Log) else read_log(log)
     changed = opened.scenario.override(overrides)._native if overrides else None
-    commands, ticks, first = opened._log.replay(changed, as_law(law))
+    commands, ticks, first, drift = opened._log.replay(changed, as_law(law))
     difference = None
     if first is not None:
         tick, field, logged, replayed = first
         difference = Difference(tick=tick, field=field, logged=logged, replayed=replayed)
-    return Replay(ticks=ticks, first=difference, commands=commands)
+    return Replay(ticks=ticks, first=difference, commands=commands, drift=drift)

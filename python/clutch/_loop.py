@@ -38,6 +38,14 @@ class LoopResult:
         ``certificate``, the file. Without one file and bound are None.
     ticks : int
         Periods in which the law was asked.
+    drift : dict
+        Friction over load, as counts and voltages show it, as multiples of the model's: ``quantity``, its name;
+        ``last``, a dict of ``friction``, the interval ``least`` to ``most`` that is certain, and the bounds ``low`` and
+        ``high``, or None if there was too little motion; ``lowest`` and ``highest`` of the run; ``alarms``, the times
+        at which it left the bounds; ``first_alarm_s`` and ``first_alarm``, as ``last``; ``windows`` judged, of which
+        ``one_sided`` could not exclude a friction below the bounds; ``words``, the same in words.
+    ended_by_drift : bool
+        True if that ended the run.
     metrics : Metrics
         Figures after the settling time, **from the encoder**: the true position is not known here. The torque at
         break-away is None.
@@ -83,6 +91,8 @@ class LoopResult:
     value: float
     certified: bool
     sampled: dict[str, Any]
+    drift: dict[str, Any]
+    ended_by_drift: bool
     ticks: int
     metrics: Metrics
     samples: dict[str, int]
@@ -128,6 +138,7 @@ def loop(
     certificate: str | os.PathLike[str] | None = None,
     release_test: Literal["auto", "always", "never"] = "auto",
     release_deg: float = 0.1,
+    on_drift: Literal["tell", "stop"] = "tell",
     patient: bool = False,
     strict: bool = False,
     faults: Sequence[str] = (),
@@ -172,6 +183,9 @@ def loop(
         encoder and converter. "auto" does so on a serial device, where the scenario allows it.
     release_deg : float, default 0.1
         The longest way in that test of any shaft within the bounds, above 0 and up to 10°: a longer one tells more.
+    on_drift : {"tell", "stop"}
+        Effect of friction over load that leaves the bounds: the result and the log tell, or the run ends in the safe
+        state as well.
     patient : bool, default False
         The board at the port is a simulated one whose clock waits when this machine stalls, and so does the loop.
     strict : bool, default False
@@ -235,6 +249,7 @@ def loop(
         certificate=_text(certificate),
         release_test=release_test,
         release_deg=release_deg,
+        on_drift=on_drift,
         patient=patient,
         faults=list(faults),
         fault_seed=fault_seed,

@@ -1065,7 +1065,7 @@ def _events(axes: list[Axes], event: Table) -> None:
     left, right = axes[3].get_xlim()
     columns = (event[name] for name in ("time_s", "kind", "to_state", "cause"))
     for time, kind, to, cause in zip(*columns, strict=True):
-        bad = to == "Faulted" or kind in ("PortLost", "LogDropped")
+        bad = to == "Faulted" or kind in ("PortLost", "LogDropped", "Drift")
         for ax in axes:
             ax.axvline(time, color=_RED if bad else _GREY, linewidth=0.5, zorder=1)
         words = kind if cause == "None" else cause

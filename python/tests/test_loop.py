@@ -249,3 +249,37 @@ def test_a_release_test_comes_first_and_ends_what_is_wired_wrongly():
         package.loop(release_test="maybe")
     with pytest.raises(package.LoopError, match="way of the release test = 11°: expected above 0 and at most 10"):
         package.loop(release_deg=11)
+
+
+def test_friction_over_load_is_watched_and_may_end_the_run(tmp_path):
+    fast = {"reference.ramp.rate_deg_s": 10, "bounds.friction_percent": 10}
+    strong = ["dac-scale:at=2,factor=1.25"]
+    result = package.loop(
+        overrides=fast, duration=30, uncertified=True, faults=strong, on_drift="stop", log=tmp_path / "run.mcap"
+    )
+    assert result.verdict == "stopped" and result.ended_by_drift
+    assert result.cause_text == "stopped as friction over load left the bounds"
+    drift = result.drift
+    first = drift["first_alarm"]
+    assert drift["quantity"] == "friction over load" and drift["alarms"] == 1 and drift["windows"] > 0
+    assert 2 < drift["first_alarm_s"] < 6 and first["friction"] > 1.15 and first["least"] > first["high"]
+    assert first["low"] == pytest.approx(0.9, abs=2e-3) and first["high"] == pytest.approx(1.1, abs=2e-3)
+    assert 0.9 < drift["lowest"] < first["friction"] <= drift["highest"]
+    again = package.replay(result.log)
+    assert again.identical and again.drift == drift
+    event = package.read_log(result.log).channels["event"]
+    row = list(event["kind"]).index("Drift")
+    assert event["value"][row] == first["friction"]
+    assert event["tick"][row] * 1e-3 == pytest.approx(drift["first_alarm_s"])
+    assert package.replay(result.log, {"bounds.friction_percent": 60}).drift["alarms"] == 0
+
+
+def test_a_shaft_that_stands_has_no_friction_to_be_told():
+    result = package.loop("board_smc_2", overrides=STILL)
+    assert result.drift["last"] is None and result.drift["lowest"] is None and result.drift["alarms"] == 0
+    assert result.drift["words"] == "not told: too little motion without a stand" and not result.ended_by_drift
+
+
+def test_an_effect_of_a_drift_that_there_is_none_is_refused():
+    with pytest.raises(ValueError, match="on_drift"):
+        package.loop(on_drift="perhaps")

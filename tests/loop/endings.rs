@@ -1,6 +1,6 @@
 //! Runs that end before their time.
 
-use crate::harness::{Board, Running, alone, clutch, folder, read_log, replays_identically, start};
+use crate::harness::{Board, Running, alone, clutch, folder, read_log, replays_identically, run, start};
 use rustix::process::Signal;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -105,4 +105,26 @@ fn every_stall_of_the_loop_is_counted_and_harmless() {
     let misses = done.json()["deadline_misses"].as_u64().unwrap();
     // The machine's own stalls are counted, too.
     assert!(misses >= STALLS, "{misses} misses counted for {STALLS} stalls");
+}
+
+#[test]
+fn a_drift_is_told_on_standard_error_and_ends_the_run_on_request() {
+    let _alone = alone();
+    let log = logged("drift");
+    let log = log.to_str().unwrap();
+    let loops = ["loop", "board_smc_2", "--set", "reference.ramp.rate_deg_s=10", "--set", "run.settle_s=0"];
+    let drifts = ["--uncertified", "--fault", "dac-scale:at=2,factor=0.85", "--duration", "30"];
+    let ends = ["--on-drift", "stop", "--log", log];
+    let done = run(&[&loops[..], &drifts, &ends].concat()).expect(4);
+    let done = done.says(&["DRIFT at ", "friction over load is 0.8", ", below the bound of 1"]).prints(&[
+        "friction over load: 0.8",
+        "DRIFT at ",
+        "stopped as friction over load left the bounds; the board is in its safe state",
+    ]);
+    let told = done.out.lines().find(|line| line.starts_with("DRIFT at ")).expect("the line");
+    assert!(done.err.lines().any(|line| line == told), "{}", done.err);
+    let _ = run(&["replay", log]).expect(0).prints(&["identical over ", told]);
+    let wide = ["replay", log, "--set", "bounds.friction_percent=60"];
+    assert!(!run(&wide).expect(0).prints(&["bounds 0.4 to 1.6"]).out.contains("DRIFT"));
+    let _ = run(&["loop", "--on-drift", "perhaps"]).expect(64).says(&["--on-drift", "tell, stop"]);
 }

@@ -3,7 +3,7 @@
 
 use clutch_core::{DacCode, Target};
 use clutch_log::Source;
-use clutch_loop::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, Pace};
+use clutch_loop::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, OnDrift, Pace};
 use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_loop::log_thread::LogThread;
 use clutch_loop::port::{Endpoint, Port, PseudoTerminal, SerialOptions};
@@ -130,16 +130,17 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
         realtime: RealtimeOptions { thread_priority: 0, lock_memory: false, ..RealtimeOptions::default() },
         pace,
         settle: 0.5,
+        on_drift: OnDrift::Tell,
         hooks: (|| INSIDE.set(true), || INSIDE.set(false)),
     };
     for counter in [&TAKEN, &GIVEN_BACK, &SIZE] {
         counter.store(0, Ordering::Relaxed);
     }
-    let (ticks, detector) = (built.ticks, built.detector);
+    let (ticks, detector, drift) = (built.ticks, built.detector, built.drift);
     let report = std::thread::scope(|scope| {
         let (station, port, watch) = (&mut station, &mut port, &*watch);
-        let configured =
-            ConfiguredRun { station, port, ring: Some(ring), watch, ticks, clock, detector, patient: true };
+        let (ring, patient) = (Some(ring), true);
+        let configured = ConfiguredRun { station, port, ring, watch, ticks, clock, detector, drift, patient };
         scope.spawn(move || control_loop::run(configured, &options)).join().unwrap()
     });
     stop.store(true, Ordering::Relaxed);

@@ -139,6 +139,9 @@ enum Verb {
     /// Holds the meter of stick-slip against the simulator's events, laws, rates and encoders, and on rigs that are not as it
     /// believes, five minutes: the tables of docs/meter.md.
     Meter,
+    /// Holds the watch over friction and load against rigs that drift and rigs that do not, half an hour: the tables of
+    /// docs/loop.md.
+    Drift,
     /// Identifies random rigs, each from less than a minute of experiment on the simulated board: the table of
     /// docs/identify.md, some minutes.
     Identify {
@@ -231,6 +234,7 @@ fn main() -> Result<()> {
         Verb::Certified { runs } => certified(runs),
         Verb::Smooth => smooth(),
         Verb::Meter => meter(),
+        Verb::Drift => drift(),
         Verb::Identify { rigs, seed } => random_rigs("clutch-identify", "docs/identify.md", rigs, seed),
         Verb::Tune { rigs, seed } => random_rigs("clutch-tune", "docs/tune.md", rigs, seed),
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
@@ -335,6 +339,13 @@ fn smooth() -> Result<()> {
     write_between("docs/smooth.md", "maps", &table_in("clutch-identify", "maps", &[])?)
 }
 
+fn drift() -> Result<()> {
+    for table in ["drifts", "healthy"] {
+        write_between("docs/loop.md", table, &table_in("clutch-loop", "drift", &[table])?)?;
+    }
+    Ok(())
+}
+
 fn meter() -> Result<()> {
     for counts in ["2000", "20000", "200000"] {
         write_between("docs/meter.md", &format!("laws {counts}"), &table_of("meter", &["laws", counts])?)?;
@@ -365,6 +376,7 @@ fn table_of(example: &str, args: &[&str]) -> Result<String> {
     table_in("clutch-sim", example, args)
 }
 
+/// The same of another package.
 fn table_in(package: &str, example: &str, args: &[&str]) -> Result<String> {
     let run = ["run", "--release", "--package", package, "--example", example, "--"];
     let (done, text) = cargo(run).args(args).quietly()?;

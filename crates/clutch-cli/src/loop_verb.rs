@@ -6,7 +6,7 @@ use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use clutch_loop::control_loop::Pace;
+use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
 use clutch_loop::port::Address;
 use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode};
@@ -33,6 +33,14 @@ enum OverrunsArg {
     Manage,
     /// The first late answer ends control.
     Fault,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum OnDriftArg {
+    /// It is told and logged, and the run goes on.
+    Tell,
+    /// The run ends in the safe state.
+    Stop,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -63,7 +71,7 @@ enum WaitArg {
     after_help = "Examples:\n  clutch loop\n  clutch loop mine.toml --port /dev/ttyACM0 --log run.mcap\n  \
     clutch loop --fault freeze:at=2 --strict\n\n\
     Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run, and the output is in the \
-    safe state; 4 stopped by Ctrl-C or SIGTERM, likewise. docs/loop.md is the guide, docs/safety.md lists the checks."
+    safe state; 4 stopped by Ctrl-C or SIGTERM, or by --on-drift stop, likewise. docs/loop.md is the guide, docs/safety.md lists the checks."
 )]
 pub(crate) struct Loop {
     /// Scenario file, or the name of a built-in scenario; board_smc_2 if none is given.
@@ -128,6 +136,9 @@ pub(crate) struct Loop {
     /// Effect of a late answer.
     #[arg(long, value_enum, default_value = "manage")]
     overruns: OverrunsArg,
+    /// Effect of friction over load that leaves the bounds, by what counts and voltages show.
+    #[arg(long, value_enum, default_value = "tell")]
+    on_drift: OnDriftArg,
     /// Start of a cycle.
     #[arg(long, value_enum, default_value = "sample")]
     pace: PaceArg,
@@ -189,6 +200,10 @@ impl Loop {
             // A terminal that has gone away does not stop a loop.
             Event::LogEnded => {
                 let _ = writeln!(std::io::stderr(), "\nthe log has ended early; the loop continues");
+            }
+            Event::Drift(text) => {
+                let clear = if show { "\r\x1b[K" } else { "" };
+                let _ = writeln!(std::io::stderr(), "{clear}{text}");
             }
         });
         if show {
@@ -271,6 +286,10 @@ impl Loop {
             pace: match self.pace {
                 PaceArg::Sample => Pace::Sample,
                 PaceArg::Clock => Pace::Clock,
+            },
+            on_drift: match self.on_drift {
+                OnDriftArg::Tell => OnDrift::Tell,
+                OnDriftArg::Stop => OnDrift::Stop,
             },
             version: BUILD.to_owned(),
         }

@@ -6,14 +6,15 @@ use crate::plot::{self, Figure, Panel, Series};
 use crate::table::{number, quantities};
 use clap::Args;
 use clutch_log::{CommandRecord, Limits, Log, Tail};
-use clutch_loop::replay::replay;
+use clutch_loop::replay::{drift, replay};
 use clutch_sim::Scenario;
 use std::path::PathBuf;
 
 /// Feeds a log's encoder counts to its law again and compares every output bit for bit.
 ///
 /// With --set the law gets other parameters: an open-loop replay, which gives the commands that
-/// those would have caused on the same counts, and does not predict the motion of the shaft.
+/// those would have caused on the same counts, and does not predict the motion of the shaft. Other
+/// bounds are those against which friction over load is held.
 ///
 /// Exit code 0: identical, or replayed with --set; 3: the outputs differ; 5: the same, as far as they can be compared: the
 /// log ended early, or has a gap, behind which nothing is.
@@ -59,6 +60,9 @@ impl Replay {
         if replayed.behind_gap > 0 {
             text += &format!("a gap: {} ticks behind it are not comparable\n", replayed.behind_gap);
         }
+        let drift = drift(&log, &scenario)?;
+        text += &format!("{}: {}\n", drift.label(), drift.words());
+        text.extend(drift.alarm_line().map(|line| line + "\n"));
         let whole = log.complete && replayed.behind_gap == 0 && replayed.dropped == 0;
         let done = if whole { Exit::Done } else { Exit::Incomplete };
         if !self.set.is_empty() {

@@ -92,6 +92,9 @@ named! {
         LogDropped = 2,
         /// The port is gone.
         PortLost = 3,
+        /// Friction over load left the bounds that a certificate assumes: `value` is the multiple of the
+        /// model's that was seen.
+        Drift = 4,
     }
 }
 

@@ -11,6 +11,7 @@
 //! Between its first and its last cycle the control thread allocates nothing, takes no lock, and
 //! makes no system call but the wait for the next sample, the read and the write.
 
+use crate::drift::{Drift, DriftReport};
 use crate::log_thread::Ring;
 use crate::port::Port;
 use crate::preflight::ClockOffset;
@@ -23,10 +24,11 @@ use crate::to_log;
 use crate::watch::Watch;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Arithmetic, Micros, Real};
-use clutch_log::{EventKind, EventRecord, Record, SampleRecord};
+use clutch_log::{CommandRecord, EventKind, EventRecord, Record, SampleRecord};
 use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Standing};
 use clutch_sim::Metrics;
 use clutch_sim::detected::Detector;
+use clutch_sim::meter::Gap;
 use clutch_sim::metrics::{Detected, MetricsBuilder, MetricsSample};
 use clutch_wire::{Refused, StopReason};
 use rustix::fd::AsFd;
@@ -43,6 +45,16 @@ pub enum Pace {
     Clock,
 }
 
+/// The effect of a drift out of the bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OnDrift {
+    /// It is told and logged, and the run goes on.
+    #[default]
+    Tell,
+    /// It ends the run in the safe state, as an operator would.
+    Stop,
+}
+
 /// Options of the loop.
 #[derive(Clone, Copy, Debug)]
 pub struct LoopOptions {
@@ -52,6 +64,8 @@ pub struct LoopOptions {
     pub pace: Pace,
     /// Time left out of the figures, s.
     pub settle: f64,
+    /// The effect of a drift out of the bounds.
+    pub on_drift: OnDrift,
     /// Called on the control thread when its cycles begin and when they have ended.
     pub hooks: (fn(), fn()),
 }
@@ -71,6 +85,10 @@ pub struct LoopReport {
     pub metrics: Metrics,
     /// Stick-slip from counts and voltages.
     pub detected: Detected,
+    /// Friction over load, and whether it left the bounds.
+    pub drift: DriftReport,
+    /// True if that ended the run.
+    pub ended_by_drift: bool,
     /// Counts of what the line carried.
     pub link: LinkCounts,
     /// Samples lost.
@@ -130,6 +148,8 @@ pub struct ConfiguredRun<'a, S> {
     pub clock: ClockOffset,
     /// The detector that sees stick-slip in counts and voltages.
     pub detector: Detector,
+    /// The watch over friction and load.
+    pub drift: Drift,
     /// The board is simulated and its clock waits for this machine: a stall is then no late answer.
     pub patient: bool,
 }
@@ -195,6 +215,9 @@ struct Control<'a, S: Station> {
     pings: u32,
     figures: MetricsBuilder,
     detector: Detector,
+    drift: Drift,
+    on_drift: OnDrift,
+    ended_by_drift: bool,
     answers: u64,
     response: CycleStats,
     interval: CycleStats,
@@ -246,6 +269,9 @@ impl<'a, S: Station> Control<'a, S> {
             pings: 0,
             figures: MetricsBuilder::new(seconds, options.settle),
             detector: configured.detector,
+            drift: configured.drift,
+            on_drift: options.on_drift,
+            ended_by_drift: false,
             answers: 0,
             response: CycleStats::new(),
             interval: CycleStats::new(),
@@ -391,7 +417,8 @@ impl<'a, S: Station> Control<'a, S> {
             let wake_us = u32::try_from(late / 1000).unwrap_or(u32::MAX);
             let sample = SampleRecord { wake_us, ..to_log::sample(time_ns, age, n) };
             let mut records = [Record::Sample(sample); 3];
-            records[1] = Record::Command(to_log::command(time_ns, &n.cycle, &self.dac, self.radians));
+            let command = to_log::command(time_ns, &n.cycle, &self.dac, self.radians);
+            records[1] = Record::Command(command);
             let change = to_log::change(time_ns, &n.cycle);
             let used = if let Some(change) = change {
                 records[2] = change;
@@ -413,7 +440,9 @@ impl<'a, S: Station> Control<'a, S> {
                 self.figures.sample(time, MetricsSample { error, velocity, voltage });
                 let counts = clutch_core::Counts(n.sample.counts);
                 let path_velocity = n.cycle.target.velocity.to_f64();
-                self.detector.sample(n.cycle.tick, counts, path_velocity, voltage);
+                let noticed = self.detector.sample(n.cycle.tick, counts, path_velocity, voltage);
+                // What the log has of it, so that a replay sees the same.
+                self.look_for_drift(&sample, &command, noticed.gap);
                 self.watch.error_nrad.store((error * 1e9) as i64, Ordering::Relaxed);
                 self.watch.millivolts.store((voltage * 1e3) as i64, Ordering::Relaxed);
             }
@@ -438,6 +467,16 @@ impl<'a, S: Station> Control<'a, S> {
         w.tick.store(state.tick, Ordering::Relaxed);
         w.lost.store(state.lost, Ordering::Relaxed);
         w.late_answers.store(state.deadline_misses, Ordering::Relaxed);
+    }
+
+    /// Watches friction and load, with a sample that the law has answered.
+    fn look_for_drift(&mut self, sample: &SampleRecord, command: &CommandRecord, gap: Option<Gap>) {
+        let Some(alarm) = self.drift.record(sample, command, gap.as_ref()) else { return };
+        self.push(&[to_log::drift(sample.time_ns, self.station.standing().state, &alarm)]);
+        if self.on_drift == OnDrift::Stop {
+            self.ended_by_drift |= !self.watch.stop.swap(true, Ordering::Relaxed);
+        }
+        self.watch.drift.show(&alarm);
     }
 
     /// The lateness of the wake-up, ns, with the oldest sample that it found; 0 where it is not known.
@@ -628,6 +667,8 @@ impl<'a, S: Station> Control<'a, S> {
             ticks: self.answers,
             metrics,
             detected,
+            drift: *self.drift.report(),
+            ended_by_drift: self.ended_by_drift,
             link: *self.station.counts(),
             lost: standing.lost,
             implausible: standing.rejected,

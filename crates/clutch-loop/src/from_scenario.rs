@@ -1,5 +1,6 @@
 //! From a scenario to what runs: servo, supervisor, path, numbers for the wire and the log.
 
+use crate::drift::Drift;
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::Checks;
 use clutch_core::{
@@ -85,6 +86,8 @@ pub struct BuiltRun<T: Real> {
     pub controller: ControllerParams,
     /// The detector that sees stick-slip in counts and voltages.
     pub detector: Detector,
+    /// The watch over friction and load.
+    pub drift: Drift,
     /// Ticks of the run.
     pub ticks: u64,
 }
@@ -126,6 +129,7 @@ impl<T: Real> BuiltRun<T> {
                 silence: cycles(safety.limits.supervisor.silence_cycles),
             },
             detector: Detector::new(&spec, Keep::Trace)?,
+            drift: Drift::new(scenario, &plan.bounds)?,
             ticks: scenario.ticks(),
         })
     }

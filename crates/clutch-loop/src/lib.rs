@@ -9,6 +9,7 @@
 //! | `session`, `summary` | a scenario and options in; refusals, events and a summary out |
 //! | `release` | the test of encoder and brake that comes before a run |
 //! | `control_loop` | the run on its control thread |
+//! | `drift` | friction over load against the bounds, from counts and voltages |
 //! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
 //! | `virtual_time` | the same run with a computed clock |
 //! | `sim_board`, `sim_board_server` | a board on a rig, both simulated; the same in real time behind a port |
@@ -20,6 +21,7 @@
 
 pub mod campaign;
 pub mod control_loop;
+pub mod drift;
 pub mod faults;
 pub mod faulty_line;
 pub mod from_scenario;

@@ -1,5 +1,6 @@
 //! Replay: the recorded counts to the recorded law, every output compared bit for bit.
 
+use crate::drift::{Drift, DriftReport};
 use crate::from_scenario::{self, BuildError, BuiltRun};
 use crate::to_log::{self, FOREIGN_LAW, PRESENT_CODE, START_VOLTAGE};
 use clutch_core::law::ControlLaw;
@@ -8,8 +9,9 @@ use clutch_core::{
     BeginningAt, Counts, DacCode, FixedCounts, Micros, Place, Real, Servo, SupervisorState, Target,
 };
 use clutch_log::{CommandRecord, EventKind, EventRecord, InChannel, Kind, Log, SampleRecord, Source, Value};
-use clutch_sim::Scenario;
+use clutch_sim::detected::Detector;
 use clutch_sim::scenario::ScalarKind;
+use clutch_sim::{Keep, Scenario};
 use clutch_wire::{BoardState, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE};
 
 /// A log could not be replayed.
@@ -130,6 +132,20 @@ pub fn replay_law<C: ControlLaw<f64>>(log: &Log, scenario: &Scenario, law: C) ->
     let servo = Servo::with_law(&scenario.spec().servo().map_err(BuildError::from)?, law);
     let servo = servo.map_err(BuildError::from)?;
     Ok(compared(log, simulated(log, samples, scenario, &servo)?))
+}
+
+/// The drift of friction over load in a log, by a scenario's model and bounds: its own, or others. Lost samples and gaps of
+/// the log interrupt it.
+///
+/// # Errors
+/// The scenario is none for a run like the log's; samples and commands do not belong together.
+pub fn drift(log: &Log, scenario: &Scenario) -> Result<DriftReport, ReplayError> {
+    let samples = paired(log)?;
+    let plan = scenario.plan().map_err(BuildError::from)?;
+    let mut detector = Detector::new(&scenario.spec(), Keep::Trace).map_err(BuildError::from)?;
+    let mut drift = Drift::new(scenario, &plan.bounds)?;
+    drift.watch_log(&mut detector, samples.iter().zip(&log.commands));
+    Ok(*drift.report())
 }
 
 fn replay_in<T: Real>(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayError> {

@@ -5,7 +5,8 @@
 //! the path's end, and leaves the board in its safe state. Starting it is the consent.
 
 use crate::campaign::CampaignError;
-use crate::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, Pace};
+use crate::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, OnDrift, Pace};
+use crate::drift::DriftReport;
 use crate::faults::Fault;
 use crate::from_scenario::{self, BuildError, BuiltRun};
 use crate::log_thread::{LogThread, Ring};
@@ -98,6 +99,8 @@ pub struct SessionOptions {
     pub realtime: RealtimeOptions,
     /// The event that starts a cycle.
     pub pace: Pace,
+    /// The effect of friction over load that leaves the bounds.
+    pub on_drift: OnDrift,
     /// Version and commit of the build, for log and summary.
     pub version: String,
 }
@@ -116,6 +119,7 @@ impl Default for SessionOptions {
             release_way: release::WAY,
             realtime: RealtimeOptions::default(),
             pace: Pace::default(),
+            on_drift: OnDrift::default(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }
     }
@@ -311,6 +315,8 @@ pub enum Event {
     Progress(Progress),
     /// The log has ended early; the loop continues.
     LogEnded,
+    /// Friction over load has left the bounds that a certificate assumes, in words.
+    Drift(String),
 }
 
 /// A checked session.
@@ -509,6 +515,7 @@ impl Course<'_> {
             ticks: built.ticks,
             clock,
             detector: built.detector,
+            drift: built.drift,
         };
         self.drive(scenario, configured, log.thread)
     }
@@ -566,6 +573,7 @@ impl Course<'_> {
             ticks: built.ticks,
             clock,
             detector: built.detector,
+            drift: built.drift,
         };
         let (report, log) = self.drive(scenario, configured, log.thread)?;
         Ok((LoopReport { clock_hz: met.map_or(0, |c| c.clock_hz), ..report }, log))
@@ -739,15 +747,17 @@ impl Course<'_> {
         log: Option<LogThread>,
     ) -> Result<Ran, SessionError> {
         let (watch, ticks) = (configured.watch, configured.ticks);
-        let SessionOptions { realtime, pace, log: path, .. } = &self.session.options;
+        let SessionOptions { realtime, pace, on_drift, log: path, .. } = &self.session.options;
         let settle = scenario.spec().run.settle;
-        let options = LoopOptions { realtime: *realtime, pace: *pace, settle, hooks: (|| (), || ()) };
+        let hooks: (fn(), fn()) = (|| (), || ());
+        let options = LoopOptions { realtime: *realtime, pace: *pace, settle, on_drift: *on_drift, hooks };
+        let drift = *configured.drift.report();
         let report = std::thread::scope(|scope| {
             let control = std::thread::Builder::new()
                 .name("clutch-control".to_owned())
                 .spawn_scoped(scope, move || control_loop::run(configured, &options))
                 .map_err(system("the control thread could not be started"))?;
-            self.look_on(&control, watch, ticks);
+            self.look_on(&control, watch, ticks, &drift);
             control.join().map_err(|_| SessionError::Panicked("the control thread came to a bad end; the board's watchdog has put the brake into the safe state"))
         })?;
         let log = log.zip(path.as_ref()).map(|(thread, path)| LogSummary {
@@ -758,9 +768,15 @@ impl Course<'_> {
     }
 
     /// Tells where the run stands until it is over.
-    fn look_on(&mut self, control: &ScopedJoinHandle<'_, LoopReport>, watch: &Watch, ticks: u64) {
+    fn look_on(
+        &mut self,
+        control: &ScopedJoinHandle<'_, LoopReport>,
+        watch: &Watch,
+        ticks: u64,
+        drift: &DriftReport,
+    ) {
         let period = self.session.scenario.spec().period.seconds::<f64>();
-        let mut log_ended = false;
+        let (mut log_ended, mut alarms) = (false, 0);
         while !control.is_finished() {
             (self.event)(Event::Progress(Progress {
                 time: watch.tick.load(Ordering::Relaxed) as f64 * period,
@@ -774,7 +790,19 @@ impl Course<'_> {
                 log_ended = true;
                 (self.event)(Event::LogEnded);
             }
+            self.tell_drift(watch, drift, &mut alarms);
             std::thread::sleep(LOOK_EVERY);
+        }
+        // One that has ended the run came after the last look.
+        self.tell_drift(watch, drift, &mut alarms);
+    }
+
+    /// Tells an alarm of drift that is new.
+    fn tell_drift(&mut self, watch: &Watch, drift: &DriftReport, told: &mut u64) {
+        let (number, alarm) = watch.drift.last();
+        if number > *told {
+            *told = number;
+            (self.event)(Event::Drift(drift.alarm_words(&alarm)));
         }
     }
 }

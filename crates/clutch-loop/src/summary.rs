@@ -112,6 +112,9 @@ impl Summary {
     /// The cause of the end of control, in words.
     #[must_use]
     pub fn cause_text(&self) -> String {
+        if self.report.ended_by_drift && self.report.cause == Cause::Operator {
+            return format!("stopped as {} left the bounds", self.report.drift.label());
+        }
         cause_text(self.report.cause, self.report.value, self.report.on_the_board, self.stopped)
     }
 
@@ -121,6 +124,8 @@ impl Summary {
     pub fn remarks(&self) -> Vec<String> {
         let r = &self.report;
         let mut lines = vec![format!("as sampled: {}", self.sampled.verdict)];
+        lines.push(format!("{}: {}", r.drift.label(), r.drift.words()));
+        lines.extend(r.drift.alarm_line());
         if r.clock_hz > 0 {
             let us = |cycles: u64| number(cycles as f64 * 1e6 / f64::from(r.clock_hz));
             let c = &r.tick_cycles;
@@ -219,6 +224,8 @@ impl Summary {
             "ticks": r.ticks,
             "metrics": r.metrics,
             "detected": r.detected,
+            "drift": r.drift.to_json(),
+            "ended_by_drift": r.ended_by_drift,
             "samples": {
                 "received": r.link.received, "lost": r.lost, "late": r.link.late,
                 "duplicated": r.link.duplicated, "reordered": r.link.reordered, "implausible": r.implausible,

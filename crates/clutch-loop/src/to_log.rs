@@ -1,8 +1,9 @@
 //! The records that a log gets of each sample, of the link and of the shaft.
 
+use crate::drift::Alarm;
 use crate::from_scenario::{self, BuildError};
 use clutch_core::law::Terms;
-use clutch_core::supervisor::{Cycle, State};
+use clutch_core::supervisor::{Cause, Cycle, State};
 use clutch_core::{Dac, FixedCounts, Real, Servo};
 use clutch_log::{
     CommandRecord, CommandSource, EventKind, EventRecord, LinkRecord, LogError, LogWriter, Record,
@@ -90,6 +91,13 @@ pub fn change<T: Real, X>(time_ns: u64, cycle: &Cycle<T, X>) -> Option<Record> {
 #[must_use]
 pub fn ended<T: Real>(time_ns: u64, ending: &Ending<T>) -> Record {
     event(EventKind::Ended, time_ns, ending)
+}
+
+/// Friction over load left the bounds.
+#[must_use]
+pub fn drift(time_ns: u64, state: State, alarm: &Alarm) -> Record {
+    let (cause, value, tick) = (Cause::None, alarm.seen.friction, alarm.tick);
+    event(EventKind::Drift, time_ns, &Ending { from: state, state, cause, value, tick })
 }
 
 fn event<T: Real>(kind: EventKind, time_ns: u64, e: &Ending<T>) -> Record {

@@ -1,7 +1,8 @@
 //! The values of a loop that may be seen while it runs: atomics that its threads write.
 
+use crate::drift::{Alarm, Seen};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU64};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU64, Ordering};
 
 /// The values that a watcher sees while the loop runs.
 #[derive(Debug, Default)]
@@ -24,4 +25,33 @@ pub struct Watch {
     pub log_dropped: AtomicU64,
     /// Set by the log thread when it could not go on.
     pub log_ended: AtomicBool,
+    /// Alarms of drift.
+    pub drift: SharedAlarm,
+}
+
+/// An alarm of drift from one thread for another.
+#[derive(Debug, Default)]
+pub struct SharedAlarm {
+    shown: AtomicU64,
+    /// Tick and figures of the last one, as bits.
+    bits: [AtomicU64; 6],
+}
+
+impl SharedAlarm {
+    /// Shows an alarm.
+    pub fn show(&self, alarm: &Alarm) {
+        let Seen { friction, least, most, low, high } = alarm.seen;
+        let bits = [alarm.tick].into_iter().chain([friction, least, most, low, high].map(f64::to_bits));
+        self.bits.iter().zip(bits).for_each(|(to, bits)| to.store(bits, Ordering::Relaxed));
+        self.shown.fetch_add(1, Ordering::Release);
+    }
+
+    /// The number of alarms so far, and the last of them. Alarms are seconds apart.
+    #[must_use]
+    pub fn last(&self) -> (u64, Alarm) {
+        let number = self.shown.load(Ordering::Acquire);
+        let [tick, bits @ ..] = self.bits.each_ref().map(|bits| bits.load(Ordering::Relaxed));
+        let [friction, least, most, low, high] = bits.map(f64::from_bits);
+        (number, Alarm { tick, seen: Seen { friction, least, most, low, high } })
+    }
 }

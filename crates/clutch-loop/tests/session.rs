@@ -2,9 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use clutch_core::supervisor::Cause;
+use clutch_log::{EventKind, Limits};
+use clutch_loop::control_loop::OnDrift;
 use clutch_loop::faults::Fault;
 use clutch_loop::port::Address;
 use clutch_loop::realtime::RealtimeOptions;
+use clutch_loop::replay;
 use clutch_loop::session::{Board, Event, Release, Session, SessionError, SessionOptions};
 use clutch_loop::summary::{Summary, Verdict};
 use clutch_sim::Scenario;
@@ -160,4 +163,50 @@ fn a_release_test_that_cannot_be_is_refused_only_if_it_was_asked_for() {
         let text = refusal.unwrap_err().to_string();
         assert!(text.contains("expected above 0 and at most 10"), "{way}: {text}");
     }
+}
+
+#[test]
+fn a_drift_is_told_at_once_logged_replayed_and_ends_the_run_where_that_was_asked_for() {
+    let fast =
+        [("reference.ramp.rate_deg_s", "10"), ("run.duration_s", "30"), ("bounds.friction_percent", "10")];
+    let log = std::env::temp_dir().join(format!("clutch-drift-{}.mcap", std::process::id()));
+    let options = SessionOptions {
+        board: faults("dac-scale:at=2.5,factor=1.25"),
+        on_drift: OnDrift::Stop,
+        log: Some(log.clone()),
+        uncertified: true,
+        ..options()
+    };
+    let session = Session::new(scenario("board_smc_2", &fast), options).unwrap();
+    let mut told = Vec::new();
+    let summary = session
+        .run(&Arc::default(), &mut |event| {
+            if let Event::Drift(text) = event {
+                told.push(text);
+            }
+        })
+        .unwrap();
+    let report = &summary.report;
+    assert_eq!((summary.verdict(), report.cause), (Verdict::Stopped, Cause::Operator));
+    assert!(report.ended_by_drift && report.board_safe);
+    assert_eq!(
+        summary.last_line(),
+        "stopped as friction over load left the bounds; the board is in its safe state"
+    );
+    let first = report.drift.first.unwrap();
+    // Sixteen slices of a tenth of a second.
+    assert!((2_500..5_500).contains(&first.tick), "{first:?}");
+    assert!(report.ticks >= first.tick && report.ticks < first.tick + 500, "{} {first:?}", report.ticks);
+    assert_eq!(told, [report.drift.alarm_line().unwrap()]);
+    assert!(summary.remarks().contains(&told[0]));
+    let json = summary.to_json();
+    assert_eq!((&json["ended_by_drift"], &json["drift"]["alarms"]), (&true.into(), &1.into()));
+    assert!((json["drift"]["first_alarm_s"].as_f64().unwrap() - first.tick as f64 * 1e-3).abs() < 1e-9);
+
+    let written = clutch_log::read(&log, &Limits::default()).unwrap();
+    let event = written.events.iter().find(|e| e.kind == EventKind::Drift as u8).unwrap();
+    assert_eq!((event.tick, event.value), (first.tick, first.seen.friction));
+    // A log has every sample that the loop had.
+    assert_eq!(replay::drift(&written, session.scenario()).unwrap(), report.drift);
+    std::fs::remove_file(&log).unwrap();
 }

@@ -1,6 +1,6 @@
 //! Logs: their channels as tables, and replay.
 
-use crate::convert::{log_error, scenario_error};
+use crate::convert::{from_json, log_error, scenario_error};
 use crate::scenario::Scenario;
 use crate::stepping::PythonLaw;
 use crate::table::{Column, Table, pairs};
@@ -160,15 +160,15 @@ impl Log {
     }
 
     /// Feeds the recorded counts to the recorded law, to another scenario's, or to one written in Python: commands of the
-    /// replay, ticks, and the first difference (tick, field, logged, replayed).
+    /// replay, ticks, the first difference (tick, field, logged, replayed), and the drift of friction over load.
     #[pyo3(signature = (scenario=None, law=None))]
     #[allow(clippy::type_complexity, reason = "the parts of clutch.replay's object")]
-    fn replay(
+    fn replay<'py>(
         &self,
-        py: Python<'_>,
+        py: Python<'py>,
         scenario: Option<&Scenario>,
         law: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<(Table, usize, Option<(u64, String, f64, f64)>)> {
+    ) -> PyResult<(Table, usize, Option<(u64, String, f64, f64)>, Bound<'py, PyAny>)> {
         let scenario = match scenario {
             Some(other) => other.clone(),
             None => {
@@ -188,9 +188,16 @@ impl Log {
                 replayed
             }
         };
-        let replayed = replayed.map_err(|e| PyValueError::new_err(format!("{}: {e}", self.origin)))?;
+        let failed = |e: replay::ReplayError| PyValueError::new_err(format!("{}: {e}", self.origin));
+        let replayed = replayed.map_err(failed)?;
+        let drift = py.detach(|| replay::drift(&self.log, &scenario.0)).map_err(failed)?;
         let first = replayed.first.as_ref().map(|d| (d.tick, d.field.clone(), d.logged, d.replayed));
         let terms = &self.log.header.term_names;
-        Ok((table(&replayed.commands, terms), replayed.commands.len(), first))
+        Ok((
+            table(&replayed.commands, terms),
+            replayed.commands.len(),
+            first,
+            from_json(py, &drift.to_json())?,
+        ))
     }
 }

@@ -3,7 +3,7 @@
 use crate::convert::{core_error, from_json, log_error, loop_error};
 use crate::scenario::Scenario;
 use crate::stepping::native;
-use clutch_loop::control_loop::Pace;
+use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
 use clutch_loop::from_scenario::BuildError;
 use clutch_loop::port::Address;
@@ -54,7 +54,7 @@ fn error(py: Python<'_>, scenario: &Scenario, e: &SessionError) -> PyErr {
 #[pyfunction]
 #[pyo3(signature = (
     scenario, *, port, board, baud, log, uncertified, certificate, release_test, release_deg,
-    patient, faults, fault_seed, strict, pace, wait, spin_us, thread_priority,
+    on_drift, patient, faults, fault_seed, strict, pace, wait, spin_us, thread_priority,
     lock_memory, cpu_affinity
 ))]
 #[allow(
@@ -72,6 +72,7 @@ pub(crate) fn run_loop<'py>(
     certificate: Option<PathBuf>,
     release_test: &str,
     release_deg: f64,
+    on_drift: &str,
     patient: bool,
     faults: Vec<String>,
     fault_seed: u64,
@@ -121,6 +122,7 @@ pub(crate) fn run_loop<'py>(
                 [("sleep", WaitMode::Sleep), ("spin", WaitMode::SleepSpin { spin_us })],
             )?,
         },
+        on_drift: chosen("on_drift", on_drift, [("tell", OnDrift::Tell), ("stop", OnDrift::Stop)])?,
         pace: chosen("pace", pace, [("sample", Pace::Sample), ("clock", Pace::Clock)])?,
         version: clutch_cli::BUILD.to_owned(),
     };
@@ -139,7 +141,7 @@ pub(crate) fn run_loop<'py>(
                     stop.store(true, Ordering::Relaxed);
                 }
             }
-            Event::LogEnded => {}
+            Event::LogEnded | Event::Drift(_) => {}
         })
     });
     if let Some(interrupt) = interrupt {

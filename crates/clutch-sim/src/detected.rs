@@ -1,6 +1,6 @@
 //! Stick-slip as a loop on hardware knows it: from counts, voltages and the path.
 
-use crate::meter::{Meter, Tally};
+use crate::meter::{Gap, Meter, Tally};
 use crate::metrics::Detected;
 use crate::number;
 use crate::run::{Keep, RunSpec};
@@ -67,6 +67,15 @@ impl Detected {
     }
 }
 
+/// What a sample brought.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Noticed {
+    /// A silence begins to count as a stick.
+    pub begins: bool,
+    /// The gap that the sample has ended, judged, if bounds are found.
+    pub gap: Option<Gap>,
+}
+
 /// Watches a run, sample by sample. It allocates when it is made, and never later.
 #[derive(Clone, Debug)]
 pub struct Detector {
@@ -115,17 +124,18 @@ impl Detector {
     }
 
     /// Sample number `tick`: its counts, the velocity of the path (rad/s), and the voltage that was given in answer to it,
-    /// V. True if a silence begins to count as a stick.
-    pub fn sample(&mut self, tick: u64, counts: Counts, path_velocity: f64, volts: f64) -> bool {
+    /// V.
+    pub fn sample(&mut self, tick: u64, counts: Counts, path_velocity: f64, volts: f64) -> Noticed {
         let begins = self.silence.update(&mut self.silent, counts, path_velocity);
         self.stairs.update(&mut self.climbing, counts, path_velocity);
-        if let Some(gap) = self.meter.as_mut().and_then(|meter| meter.sample(tick, counts, volts)) {
-            self.tally.take(&gap, self.from);
+        let gap = self.meter.as_mut().and_then(|meter| meter.sample(tick, counts, volts));
+        if let Some(gap) = &gap {
+            self.tally.take(gap, self.from);
         }
         if (tick as f64) * self.period < self.settle {
             self.before = (self.silent.cycles(), self.silent.stuck_ticks(), self.climbing.cycles());
         }
-        begins
+        Noticed { begins, gap }
     }
 
     /// The figures so far, over `measured_s` seconds after settling.

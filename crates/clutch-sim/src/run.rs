@@ -469,7 +469,7 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
             }
         }
 
-        let begins = detector.sample(k, counts, target.velocity.to_f64(), commanded);
+        let begins = detector.sample(k, counts, target.velocity.to_f64(), commanded).begins;
         if begins && keep == Keep::Trace {
             detections.push(k);
         }

@@ -572,6 +572,12 @@ impl Scenario {
         }
     }
 
+    /// Shares of the model's between which `[bounds]` has mean friction, the ripple along the disc apart.
+    #[must_use]
+    pub fn mean_friction_shares(&self) -> [f64; 2] {
+        self.params.bounds.friction_shares(0.0).0
+    }
+
     /// The number of ticks in the run.
     #[must_use]
     pub fn ticks(&self) -> u64 {
