@@ -766,7 +766,7 @@ VALID = {
         points_s_deg=points(st.floats(-1e4, 1e4), 2), interpolation=st.sampled_from(["cubic", "linear"])
     ),
     clutch.FrictionMap: each(
-        rig=st.text(max_size=20),
+        rig=st.text(max_size=20).map(lambda text: f"disc {text}"),
         points_deg_factor=st.lists(number(0.2, 5), min_size=4, max_size=40).map(
             lambda factors: tuple((0.5 * i, factor) for i, factor in enumerate(factors))
         ),

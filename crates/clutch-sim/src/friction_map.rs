@@ -23,7 +23,9 @@ params! {
     }
     relations(p) {
         /// A curve goes through the points.
-        ENOUGH: points, "a list of 4 to 100 000 points";
+        ENOUGH: points, "a list of 4 to 100 000 points" => (4..=MOST).contains(&p.points.0.len());
+        /// A map is of one disc.
+        NAMED: rig, "the rig and the ride that it is of, as \"disc 7, 2 °/s\"" => !p.rig.0.trim().is_empty();
         /// Friction stays friction.
         FACTORS: points, "factors of 0.1 to 10";
         /// No gap.
