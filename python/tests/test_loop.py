@@ -271,7 +271,7 @@ def test_friction_over_load_is_watched_and_may_end_the_run(tmp_path):
     row = list(event["kind"]).index("Drift")
     assert event["value"][row] == first["friction"]
     assert event["tick"][row] * 1e-3 == pytest.approx(drift["first_alarm_s"])
-    assert package.replay(result.log, {"bounds.friction_percent": 60}).drift["alarms"] == 0
+    assert package.replay(result.log, {"bounds.friction_percent": 40}).drift["alarms"] == 0
 
 
 def test_a_shaft_that_stands_has_no_friction_to_be_told():

@@ -124,7 +124,7 @@ fn a_drift_is_told_on_standard_error_and_ends_the_run_on_request() {
     let told = done.out.lines().find(|line| line.starts_with("DRIFT at ")).expect("the line");
     assert!(done.err.lines().any(|line| line == told), "{}", done.err);
     let _ = run(&["replay", log]).expect(0).prints(&["identical over ", told]);
-    let wide = ["replay", log, "--set", "bounds.friction_percent=60"];
-    assert!(!run(&wide).expect(0).prints(&["bounds 0.4 to 1.6"]).out.contains("DRIFT"));
+    let wide = ["replay", log, "--set", "bounds.friction_percent=40"];
+    assert!(!run(&wide).expect(0).prints(&["bounds 0.6 to 1.4"]).out.contains("DRIFT"));
     let _ = run(&["loop", "--on-drift", "perhaps"]).expect(64).says(&["--on-drift", "tell, stop"]);
 }
