@@ -1278,7 +1278,8 @@ class SuperTwisting(_Params):
     behind an integral and not at the output.
 
     `u = v − K_1 √|σ| sgn σ`, `v̇ = −K_2 sgn σ` with `σ = f e + ė` and a brake; with a motor both terms turn
-    round. A start is bumpless, and the integral does not wind up at a limit.
+    round. A start is bumpless where the integral that it takes is within the output's limits, and the
+    integral does not wind up at a limit.
 
     Parameters
     ----------
@@ -1957,8 +1958,8 @@ class TablePath(_Params):
     ----------
     points_s_deg : sequence of (float, float)
         Points of time and angle, from the start; times rise. A brake follows only angles that do not fall. A
-        list of at least one pair [s, °] of finite numbers, with times that rise from 0 to 1000000000000 s; at
-        least one point; times of at least 0 s that rise from point to point; positions below 7e13 counts of
+        list of at least one pair [s, °] of finite numbers, with times that rise from 0 s on; at least one
+        point; times of at least 0 s that rise from point to point; positions below 7e13 counts of
         rig.encoder.counts_per_rev.
     interpolation : {"linear", "cubic"}, default "cubic"
         Curve from point to point. `linear`: Straight lines: the velocity jumps at each point. `cubic`:

@@ -88,6 +88,9 @@ impl Identify {
         let report = identify(&recordings);
         let file = self.out.as_deref().map(|path| (path, rig_file(&report, &scenario)));
         print(&if self.json { json(&object(&report))? } else { text(&report) })?;
+        if let Some((path, file)) = file {
+            write(path, file?)?;
+        }
         if let Some(path) = &self.map {
             let believed = || map_as_believed(&recordings, &scenario);
             let map = if report.map.is_empty() { believed() } else { report.map.clone() };
@@ -99,11 +102,8 @@ impl Identify {
             }
             write(path, map_file(&map, scenario.name()))?;
         }
-        if let Some((path, file)) = file {
-            write(path, file?)?;
-        }
         let told = rows(&report).iter().any(|row| row.finding.known().is_some());
-        Ok(if told || self.map.is_some() { Exit::Done } else { Exit::Failed })
+        Ok(if told || (self.map.is_some() && self.out.is_none()) { Exit::Done } else { Exit::Failed })
     }
 
     /// Runs the experiment, and says before what it does.

@@ -182,9 +182,17 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     if let Some(reason) = s.detected.reason() {
         text += &paragraph(&format!("stick-slip: {reason}"));
     }
-    if let Some(MapInRun { drove, dropped_s }) = s.friction_map {
+    if let Some(MapInRun { within, drove, dropped_s }) = s.friction_map {
         let told = match dropped_s {
-            None => format!("drove for {} % of the run, and was tried before", number(100.0 * drove)),
+            None if within == 0.0 => "the shaft never was where it tells friction".to_owned(),
+            None => {
+                let percent = |share: f64| number(100.0 * share);
+                format!(
+                    "drove for {} % of the run, {} % of which was within it",
+                    percent(drove),
+                    percent(within)
+                )
+            }
             Some(at) => format!(
                 "dropped after {} s: edges came where they would without it; is it another disc's, or is the encoder's zero another?",
                 number(at)

@@ -3,6 +3,9 @@
 use crate::{FixedCounts, Real};
 use core::fmt;
 
+/// Least friction that a map tells, over its mean.
+const LEAST: f64 = 0.1;
+
 /// Friction at points of the disc, at even distances: each a multiple of the mean, in parts of [`FrictionMap::ONE`].
 /// Between the points it is a cubic (Catmull and Rom 1974).
 ///
@@ -90,7 +93,7 @@ impl<'a> FrictionMap<'a> {
         let c2 = two * a - T::splat(5.0) * b + T::splat(4.0) * c - d;
         let c3 = three * (b - c) + (d - a);
         Place {
-            factor: b + half * u * (c1 + u * (c2 + u * c3)),
+            factor: (b + half * u * (c1 + u * (c2 + u * c3))).max(T::splat(LEAST)),
             slope: half * per_step * (c1 + u * (two * c2 + three * u * c3)),
             bend: per_step * per_step * (c2 + three * u * c3),
             reach: T::from_u64(u64::from(self.step)),
@@ -137,7 +140,8 @@ impl<T: Real> Place<T> {
     #[must_use]
     pub fn friction(&self, counts: T) -> T {
         let away = counts.limit(-self.reach, self.reach);
-        self.factor + away * (self.slope + T::splat(0.5) * away * self.bend)
+        // A cubic swings beyond its points; friction stays one, by which a law divides.
+        (self.factor + away * (self.slope + T::splat(0.5) * away * self.bend)).max(T::splat(LEAST))
     }
 }
 
@@ -182,6 +186,23 @@ mod tests {
         let place = map.at::<f64>(FixedCounts::from_counts(5));
         assert_eq!(place.friction(1e9), place.friction(4.0));
         assert_eq!(Place::<f64>::even().friction(1e30), 1.0);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn friction_is_known_and_positive_between_any_points(
+            first in -1_i64 << 40..1 << 40, step in 1_u32..=10_000, factors in proptest::collection::vec(409_u16..=40_960, 4..30),
+            at: i64, away in -1e5_f64..1e5,
+        ) {
+            let map = FrictionMap::new(first, step, &factors).unwrap();
+            let last = (factors.len() as i64 - 2) * i64::from(step);
+            for counts in [at, first.wrapping_add(at.rem_euclid(last + i64::from(step)))] {
+                let place = map.at::<f64>(FixedCounts::from_counts(counts));
+                let within = counts.wrapping_sub(first);
+                proptest::prop_assert_eq!(place.is_known(), (i64::from(step)..last).contains(&within) || place.is_known() && counts != (counts << 16) >> 16);
+                proptest::prop_assert!(!place.is_known() || place.friction(away) >= 0.1);
+            }
+        }
     }
 
     #[test]

@@ -54,6 +54,8 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
         );
     }
     let mut table = scenario.table().clone();
+    // Trials run on other discs.
+    let _ = table.remove("friction_map");
     if let Some(file) = file {
         file.put_into(&mut table);
     }

@@ -10,15 +10,15 @@ use clutch_sim::Scenario;
 #[must_use]
 pub fn map_as_believed(recordings: &[Recording], scenario: &Scenario) -> Vec<Place> {
     let spec = scenario.spec();
+    let period: f64 = spec.period.seconds();
+    // A lag is, for a voltage that follows the ripple, a delay.
     let delay = match spec.law {
-        LawParams::Glide(p) => p.filter.delay,
-        _ => spec.rig.delay_ticks,
+        LawParams::Glide(p) => f64::from(p.filter.delay) * period + p.filter.lag,
+        _ => f64::from(spec.rig.delay_ticks) * period + spec.rig.actuator_time_constant.unwrap_or(0.0),
     };
     let pull = (spec.model.drive_torque / spec.model.inertia).abs();
     let slowest = recordings.iter().flat_map(rides).min_by(|a, b| a.rate.total_cmp(&b.rate));
-    slowest.map_or_else(Vec::new, |ride| {
-        ride.told(pull, f64::from(delay) * spec.period.seconds::<f64>(), None).map
-    })
+    slowest.map_or_else(Vec::new, |ride| ride.told(pull, delay, None).map)
 }
 
 /// The map as a file: `[friction_map]`, which `--map` puts into a scenario. `rig` says of which rig and ride it is.

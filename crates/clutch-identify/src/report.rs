@@ -74,6 +74,9 @@ pub struct Report {
     /// Friction along the disc, where the slowest ride went.
     #[serde(skip)]
     pub map: Vec<Place>,
+    /// The most that friction departs from its mean there, as a share.
+    #[serde(skip)]
+    pub uneven: f64,
     /// Recordings and ticks that the model does not explain.
     pub unexplained: Vec<String>,
     /// Releases, break-aways, and rates of the rides (rad/s) that were found.
@@ -178,6 +181,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
              does",
         ),
         map: slowest.map(|slow| slow.map.clone()).unwrap_or_default(),
+        uneven: slowest.map_or(0.0, |slow| slow.uneven),
         unexplained,
         found: (releases.len(), slips.len(), rides.iter().map(|r| r.rate).collect()),
     }

@@ -67,6 +67,8 @@ pub struct Told {
     pub ripple: (f64, f64),
     /// Friction along the way, but for its very beginning.
     pub map: Vec<Place>,
+    /// The most that friction departs from its mean, as a share, while the ride is even.
+    pub uneven: f64,
     /// Recording, tick and normalised innovation of the edge that fits worst.
     pub worst: (String, u64, f64),
 }
@@ -179,6 +181,7 @@ impl Ride<'_> {
             hold: (hold, hold * (uneven * uneven + unseen * unseen + CLOCKWORK * CLOCKWORK).sqrt()),
             // Independent places: one for two radians of the wave.
             ripple: (size, size / (0.5 * radians).max(1.0).sqrt()),
+            uneven: beliefs.iter().map(|b| (b.mean[3] / b.mean[2]).abs()).fold(0.0, f64::max),
             map: self.map(
                 &shaft_with(r, pull, 0.0, size * friction, (MAP_WAVE_DAMPING, MAP_WALK)),
                 delay / r.period,

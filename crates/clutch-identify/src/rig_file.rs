@@ -45,8 +45,7 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
     let inertia = around(torque / pull.high, torque / pull.low);
     let damping = around(damping.low * inertia.0, damping.high * inertia.0);
     let sliding = torque / (hold.value * gain);
-    let at_disc =
-        report.map.iter().map(|place| (place.factor - 1.0).abs()).fold(RIPPLE * ripple.value, f64::max);
+    let at_disc = report.uneven.max(RIPPLE * ripple.value);
     let friction = (1.0 + hold.share()) * (1.0 + ratio.share()) * (1.0 + at_disc) - 1.0;
     let percent = |share: f64| Value::Float((100.0 * share).min(MOST_PERCENT));
     let stribeck = [

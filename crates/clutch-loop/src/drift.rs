@@ -72,8 +72,15 @@ impl Seen {
         self.least > self.high || self.most < self.low
     }
 
+    /// As far within the bounds as a mean is known: bounds may be a single point.
     fn inside(&self) -> bool {
-        self.friction >= self.low && self.friction <= self.high
+        self.friction >= self.low * (1.0 - RESOLUTION - INVERSE)
+            && self.friction <= self.high * (1.0 + RESOLUTION)
+    }
+
+    /// True if friction is above the bounds, where it is outside.
+    fn above(&self) -> bool {
+        self.least > self.high
     }
 }
 
@@ -246,8 +253,8 @@ struct Window {
     slices: [Sums; SLICES],
     taken: u64,
     whole: Sums,
-    /// The bounds were left, and the mean is not yet within them again.
-    out: bool,
+    /// The bounds were left, above them or below, and the mean is not yet within them again.
+    out: Option<bool>,
 }
 
 impl Window {
@@ -569,10 +576,11 @@ impl Drift {
                 report.last = Some(seen);
                 report.range = (report.range.0.min(seen.friction), report.range.1.max(seen.friction));
             }
-            let told = self.windows.iter().any(|window| window.out);
+            let side = seen.outside().then(|| seen.above());
+            let told = self.windows.iter().any(|window| window.out.is_some() && window.out == side);
             let window = &mut self.windows[level];
-            window.out = seen.outside() || (window.out && !seen.inside());
-            if window.out && !told {
+            window.out = side.or(window.out.filter(|_| !seen.inside()));
+            if side.is_some() && !told {
                 let left = Alarm { tick, seen };
                 report.alarms += 1;
                 report.first.get_or_insert(left);

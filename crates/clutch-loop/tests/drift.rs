@@ -116,7 +116,7 @@ fn what_stays_within_the_bounds_is_not_told() {
     let along = [wide[0], wide[1], ("bounds.ripple_percent", "25.0")];
     let (alarms, _) = run(&ramp("ctc", 2.0, &along), &["dac-scale:at=5,factor=0.8"]);
     assert_eq!(alarms.len(), 1);
-    assert!((alarms[0].seen.low - 0.7 / 0.75).abs() < 2e-3, "{alarms:?}");
+    assert!((alarms[0].seen.low - 1.25 / 1.3).abs() < 2e-3, "{alarms:?}");
 }
 
 #[test]

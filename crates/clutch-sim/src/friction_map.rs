@@ -107,6 +107,8 @@ impl MapGrid {
 /// The part that a map had in a run of glide.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct MapInRun {
+    /// Share of the run that was within the map, until it was dropped.
+    pub within: f64,
     /// Share of the run in which the filter with the map drove.
     pub drove: f64,
     /// Time at which the map was dropped as wrong, if it was, s.
@@ -119,9 +121,12 @@ impl MapInRun {
     pub fn of(trace: &Trace) -> Option<MapInRun> {
         // Parts: 0 none, 1 tried, 2 drives, 3 wrong.
         let (_, part) = trace.terms.iter().find(|(name, _)| *name == "map")?;
-        let drove = part.iter().filter(|&&part| part == 2.0).count() as f64 / part.len().max(1) as f64;
+        let share = |of: fn(f64) -> bool| {
+            part.iter().filter(|&&part| of(part)).count() as f64 / part.len().max(1) as f64
+        };
         let dropped = part.iter().position(|&part| part == 3.0).and_then(|at| trace.time.get(at).copied());
-        Some(MapInRun { drove, dropped_s: dropped })
+        let (within, drove) = (share(|part| part == 1.0 || part == 2.0), share(|part| part == 2.0));
+        Some(MapInRun { within, drove, dropped_s: dropped })
     }
 }
 

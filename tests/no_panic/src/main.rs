@@ -400,7 +400,7 @@ fn turns<T: Real, C: ControlLaw<T>>(servo: Option<Servo<T, C>>) {
         sink(servo.tick_on(&mut state, Counts(word() as i32), &target(), |position| map.at(position)));
     }
     let (next, steps) = (target(), (word() as u32, word() as u32));
-    servo.bridge(&mut state, (Counts(word() as i32), &next), &target(), steps, off_map);
+    servo.bridge(&mut state, (Counts(word() as i32), &next), &target(), steps);
     sink(state);
 }
 

@@ -21,7 +21,7 @@ crate::params! {
     /// not at the output.
     ///
     /// `u = v − K_1 √|σ| sgn σ`, `v̇ = −K_2 sgn σ` with `σ = f e + ė` and a brake; with a motor both terms turn round. A
-    /// start is bumpless, and the integral does not wind up at a limit.
+    /// start is bumpless where the integral that it takes is within the output's limits, and the integral does not wind up at a limit.
     pub struct SuperTwistingParams<T>: Default {
         /// Gain of the root.
         k1: T = 4.4, "k1_v_rt_s_rad" "K_1" V_RT_S_RAD, Range::above(0.0);

@@ -113,7 +113,8 @@ impl fmt::Display for Words {
                 write!(f, "a list of at least one pair [{text}] of finite numbers, with ")?;
                 let (of, unit) = if text.starts_with('s') { ("times", "s") } else { ("angles", "°") };
                 write!(f, "{of} that rise")?;
-                return match (has_low, has_high) {
+                // Beyond a million of either nobody asks.
+                return match (has_low, has_high && high < 1e6) {
                     (true, true) => write!(f, " from {low} to {high} {unit}"),
                     (true, false) => write!(f, " from {low} {unit} on"),
                     _ => Ok(()),

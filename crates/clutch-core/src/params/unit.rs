@@ -124,7 +124,7 @@ units! {
     BITS "bits" "bits" "bits" None "" 1.0;
     IN_128 "" "within 128 periods" "within 128 periods" None "" 1.0;
     S_DEG "s_deg" "s, °" "s, rad" None "" 1.0;
-    DEG_FACTOR "deg_factor" "°, 1" "rad, 1" None "" 1.0;
+    DEG_FACTOR "deg_factor" "°, 1" "°, 1" None "" 1.0;
     S_NM "s_nm" "s, N m" "s, N m" None "" 1.0;
     M "m" "m" "m" None "length" 1.0;
     S "s" "s" "s" None "time" 1.0;

@@ -432,8 +432,7 @@ impl<T: Real> Supervisor<T> {
         let steps = u32::try_from(steps).unwrap_or(1).min(self.limits.silence_cycles.saturating_add(8));
         for step in 1..steps {
             let passed = planned.target(served.wrapping_add(u64::from(step)));
-            let map = |position| planned.place(position);
-            servo.bridge(&mut s.servo, (counts, goal), &passed, (step, steps), map);
+            servo.bridge(&mut s.servo, (counts, goal), &passed, (step, steps));
         }
         steps
     }
