@@ -180,6 +180,31 @@ fn a_rig_outside_the_bounds_of_the_certificate_is_told() {
 }
 
 #[test]
+fn a_rig_whose_mean_is_outside_of_what_its_ripple_leaves_is_told() {
+    let outside = |factor: f64| {
+        let mu = |key: &str, mu: f64| (format!("rig.friction.stribeck.{key}"), format!("{}", factor * mu));
+        let set = [
+            ("bounds.friction_percent".to_owned(), "35".to_owned()),
+            ("bounds.ripple_percent".to_owned(), "20".to_owned()),
+            mu("mu_static", 0.2),
+            mu("mu_dynamic", 0.15),
+        ];
+        let text = BUILT_IN.iter().find(|b| b.name == "pd_2").unwrap().toml;
+        let s = Scenario::parse("mean", text, &set).unwrap();
+        s.outside_bounds(&s.plan().unwrap().bounds).unwrap()
+    };
+    // 1.35/1.2 is 1.125, and the mean at least 1/1.125.
+    for within in [0.9, 1.0, 1.12] {
+        assert!(outside(within).is_empty(), "{:?}", outside(within));
+    }
+    for (beyond, times) in [(0.88, 2), (1.13, 2)] {
+        let lines = outside(beyond);
+        assert_eq!(lines.len(), times, "{lines:?}");
+        assert!(lines[0].starts_with("mean static friction is "), "{lines:?}");
+    }
+}
+
+#[test]
 fn a_run_that_does_not_fit_into_memory_is_refused() {
     refuses(with("run.duration_s", "1e5"), "my.toml: run.duration_s = 100000: ", &["10 million"]);
     refuses(with("run.duration_s", "1e300"), "my.toml: run.duration_s = ", &["10 million"]);

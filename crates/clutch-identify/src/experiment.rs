@@ -10,7 +10,7 @@ use crate::recording::{ReadError, Recording};
 use crate::release;
 use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Real};
-use clutch_log::{LogWriter, Record, Source};
+use clutch_log::{LogWriter, Source};
 use clutch_loop::from_scenario::{self, BuildError, BuiltRun};
 use clutch_loop::station::ControllerStation;
 use clutch_loop::summary::cause_text;
@@ -334,14 +334,7 @@ impl VirtualBoard {
             }
             log.finish()?;
         }
-        let (mut samples, mut commands) = (Vec::new(), Vec::new());
-        for record in &report.records {
-            match record {
-                Record::Sample(sample) => samples.push(*sample),
-                Record::Command(command) => commands.push(*command),
-                _ => {}
-            }
-        }
+        let (samples, commands) = report.samples_and_commands();
         let before = dac.volts(DacCode(report.present)).to_f64();
         Ok(Recording::from_records(name, scenario, Some(before), (&samples, &commands))?)
     }

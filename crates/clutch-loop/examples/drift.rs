@@ -7,7 +7,6 @@
 
 use clutch_core::friction::FrictionModel;
 use clutch_core::{Bounds, Interval, Plant, Real};
-use clutch_log::Record;
 use clutch_loop::drift::{Alarm, Drift, DriftReport};
 use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::from_scenario::{self, BuiltRun};
@@ -128,14 +127,7 @@ fn watch_in<T: Real>(
     let mut world = VirtualLoop::new(run, options, ControllerStation { node, path: &path })?;
     let report = world.run(&path)?;
     let mut detector = Detector::new(&run.spec(), Keep::Trace)?;
-    let (mut samples, mut commands) = (Vec::new(), Vec::new());
-    for record in &report.records {
-        match record {
-            Record::Sample(sample) => samples.push(*sample),
-            Record::Command(command) => commands.push(*command),
-            _ => {}
-        }
-    }
+    let (samples, commands) = report.samples_and_commands();
     let alarms = drift.watch_log(&mut detector, samples.iter().zip(&commands));
     Ok((alarms, *drift.report()))
 }

@@ -45,7 +45,7 @@ const LONGEST_GAP: f64 = 2.0;
 const MOST_LOST: u64 = 5;
 /// Standard errors of a mean that it may be off.
 const STANDARD_ERRORS: f64 = 4.0;
-/// What it may be off beside, as a share: delay and rounding.
+/// Share by which it may be off beside: delay and rounding.
 const RESOLUTION: f64 = 0.02;
 /// Share by which it is low with a ripple of 15 %, as the meter believes it: what is seen is the mean of the inverse.
 const INVERSE: f64 = 0.15 * 0.15;
@@ -117,7 +117,7 @@ pub struct DriftReport {
 }
 
 impl DriftReport {
-    /// What it is called.
+    /// Name of the quantity.
     #[must_use]
     pub fn label(&self) -> &'static str {
         match self.actuator {
@@ -194,7 +194,7 @@ impl DriftReport {
     }
 }
 
-/// What acted since the last edge.
+/// Torques and forces since the last edge.
 #[derive(Clone, Copy, Debug, Default)]
 struct Acted {
     periods: f64,
@@ -445,7 +445,7 @@ impl Drift {
             .collect()
     }
 
-    /// What has been seen.
+    /// The drift so far.
     #[must_use]
     pub fn report(&self) -> &DriftReport {
         &self.report

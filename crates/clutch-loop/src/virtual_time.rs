@@ -11,7 +11,7 @@ use crate::station::{Station, StationNotice};
 use crate::to_log;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{DacCode, Micros, Planned, Real};
-use clutch_log::Record;
+use clutch_log::{CommandRecord, Record, SampleRecord};
 use clutch_node::{Ending, Notice, Outbox, Standing};
 use clutch_sim::engine::{Event, Motion, Shaft};
 use clutch_sim::metrics::{MetricsBuilder, MetricsSample};
@@ -110,6 +110,22 @@ pub struct VirtualReport {
     /// Figures of the shaft's true motion under control, as a simulation has them; the last period of the
     /// run, in which it ends, is not among them.
     pub metrics: Metrics,
+}
+
+impl VirtualReport {
+    /// Samples and commands of a run that was recorded, each in their order.
+    #[must_use]
+    pub fn samples_and_commands(&self) -> (Vec<SampleRecord>, Vec<CommandRecord>) {
+        let (mut samples, mut commands) = (Vec::new(), Vec::new());
+        for record in &self.records {
+            match record {
+                Record::Sample(sample) => samples.push(*sample),
+                Record::Command(command) => commands.push(*command),
+                _ => {}
+            }
+        }
+        (samples, commands)
+    }
 }
 
 /// A run in virtual time could not be made.

@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use clutch_core::{Bounds, Interval};
-use clutch_log::Record;
 use clutch_loop::drift::{Alarm, Drift, DriftReport};
 use clutch_loop::from_scenario::{self, BuiltRun};
 use clutch_loop::station::ControllerStation;
@@ -45,14 +44,7 @@ fn watched(scenario: &Scenario, bounds: &Bounds<f64>, faults: &[&str]) -> (Vec<A
     let mut world = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path }).unwrap();
     let report = world.run(&path).unwrap();
     assert_eq!(report.cause, None, "control went on");
-    let (mut samples, mut commands) = (Vec::new(), Vec::new());
-    for record in &report.records {
-        match record {
-            Record::Sample(sample) => samples.push(*sample),
-            Record::Command(command) => commands.push(*command),
-            _ => {}
-        }
-    }
+    let (samples, commands) = report.samples_and_commands();
     let mut drift = Drift::new(scenario, bounds).unwrap();
     let mut detector = Detector::new(&scenario.spec(), Keep::Trace).unwrap();
     let alarms = drift.watch_log(&mut detector, samples.iter().zip(&commands));

@@ -67,7 +67,7 @@ impl Detected {
     }
 }
 
-/// What a sample brought.
+/// The result of a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Noticed {
     /// A silence begins to count as a stick.

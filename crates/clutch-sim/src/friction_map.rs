@@ -116,7 +116,7 @@ pub struct MapInRun {
 }
 
 impl MapInRun {
-    /// Of a run of a scenario with a map; none where the law has no use for one.
+    /// The part in a run of a scenario with a map; none where the law has no use for one.
     #[must_use]
     pub fn of(trace: &Trace) -> Option<MapInRun> {
         // Parts: 0 none, 1 tried, 2 drives, 3 wrong.

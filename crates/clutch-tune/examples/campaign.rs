@@ -37,9 +37,9 @@ struct Course {
     seed: u64,
     /// Delay of the hidden rig, periods.
     delay_ticks: u32,
-    /// What is proven of the error, rad.
+    /// The proven bound on the error, rad.
     bound_rad: Option<f64>,
-    /// What of the truth lies outside of the box that the certificate speaks of.
+    /// Quantities of the true rig outside of the box that the certificate speaks of.
     outside: Vec<String>,
     /// Largest error of the loop's run, rad, and if it went to its end without a stick after the first second.
     run: Option<(f64, bool)>,

@@ -346,7 +346,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// What is proven of a candidate.
+    /// The proof of a candidate.
     fn proven(&self, scenario: &Scenario, shells: &Shells) -> Result<Result<Bounds, String>, ScenarioError> {
         if let Some(why) = &self.delay_between {
             return Ok(Err(why.clone()));

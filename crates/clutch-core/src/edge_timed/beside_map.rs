@@ -320,6 +320,22 @@ mod tests {
     }
 
     #[test]
+    fn a_count_back_that_is_none_is_no_other_place() {
+        let (f, points) = (filters::<f64>(), points(0.0));
+        let map = FrictionMap::new(0, 4, &points).unwrap();
+        let state = ride::<f64>(Some(&points), 1500)[1499];
+        let told = |counts: i64| {
+            let (mut state, read) = (state, FixedCounts::from_counts(counts));
+            f.update(&mut state, (read, map.at(read)), 2.2, 0.035);
+            let (filter, belief, place) = f.driving(&state);
+            filter.ahead_on(belief, &place).friction
+        };
+        let counts = state.mapped.counts;
+        let (still, back) = (told(counts), told(counts - 1));
+        assert!((back / still - 1.0).abs() < 2e-4, "{still} and {back}");
+    }
+
+    #[test]
     fn a_rest_is_one_of_both_filters() {
         let (f, points) = (filters::<f64>(), points(0.0));
         let mut state = ride::<f64>(Some(&points), 1500)[1499];

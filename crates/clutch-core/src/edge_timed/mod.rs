@@ -345,6 +345,7 @@ impl<T: Real> EdgeTimed<T> {
     #[inline(never)]
     pub(crate) fn ahead_on(&self, state: &EdgeTimedState<T>, place: &Place<T>) -> Ahead<T> {
         let mut belief = state.belief;
+        let back = Self::back(state);
         let mut pad = state.pad;
         let [newest, middle, oldest] = state.line;
         // What is on its way, the oldest first.
@@ -353,7 +354,7 @@ impl<T: Real> EdgeTimed<T> {
                 let (volts, end) = self.at_pad(pad, arrived);
                 pad = end;
                 let (pull, load) = self.forces(volts);
-                let load = load * place.friction(belief.position) * self.shape(belief.velocity);
+                let load = load * place.friction(belief.position + back) * self.shape(belief.velocity);
                 let (way, ..) = belief.glide(&self.shaft, pull, load);
                 belief.ripple += way * belief.slope;
             }
@@ -361,7 +362,7 @@ impl<T: Real> EdgeTimed<T> {
         // In the middle of the period.
         let way = T::splat(0.5) * belief.velocity;
         belief.ripple += way * belief.slope;
-        let here = place.friction(belief.position + way);
+        let here = place.friction(belief.position + way + back);
         Ahead {
             position: belief.position,
             velocity: belief.velocity,
@@ -407,6 +408,11 @@ impl<T: Real> EdgeTimed<T> {
         state.fraction =
             T::from_i32(fraction as i32) * (T::ONE / T::from_i32(1 << FixedCounts::FRACTION_BITS));
         T::from_i32(i32::try_from(moved).unwrap_or(if moved < 0 { i32::MIN } else { i32::MAX }))
+    }
+
+    /// Count from the edge that positions are told from down to the one of the last sample: 1 of a count back that is none.
+    fn back(state: &EdgeTimedState<T>) -> T {
+        if state.fraction < T::ZERO { T::ONE } else { T::ZERO }
     }
 
     /// Pull of drive and motor, and load of the pad, at a voltage there, counts per period².
@@ -530,7 +536,7 @@ impl<T: Real> EdgeTimed<T> {
         // In the middle of the period that has passed, above the edge of this sample's count.
         let belief = &state.belief;
         let here = belief.position + T::splat(0.5) * belief.velocity - moved;
-        let load = load * place.friction(here);
+        let load = load * place.friction(here + Self::back(state));
         let way = match state.phase {
             Phase::Resting => T::ZERO,
             Phase::Starting | Phase::Sliding => {
@@ -616,7 +622,7 @@ impl<T: Real> EdgeTimed<T> {
             Phase::Starting if state.silent > self.patience => {
                 // The voltage has stopped it before the next edge: it would have carried no more friction than this.
                 let (pull, load) = self.forces(state.pad);
-                let load = load * place.friction(state.belief.position);
+                let load = load * place.friction(state.belief.position + Self::back(state));
                 let carried = T::splat(ABOVE) * pull.abs() / load.max(T::splat(1e-6));
                 let friction = state.belief.friction().max(carried.min(T::splat(10.0)));
                 state.belief.rest();

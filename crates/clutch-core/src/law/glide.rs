@@ -155,13 +155,13 @@ impl<T: Real> Glide<T> {
             state.steps.begin(ahead, filter.delay());
         }
         let moved = self.filters.stand_aside(&mut state.filters, (position, place), applied);
-        let belief = state.filters.driving();
+        let (_, belief, place) = self.filters.driving(&state.filters);
         let from_edge = tick.error * filter.counts_per_radian() + belief.fraction();
         let target = from_edge + filter.delay() * pace;
         let demand = self.stepping(self.steps.demand(&mut state.steps, moved, target, pace));
         let error = target - state.steps.position();
         let (friction, variance) = belief.friction();
-        let mu = filter.mu();
+        let mu = filter.mu() * place.friction(state.steps.position());
         let terms = [
             T::ZERO,
             mu * friction,

@@ -48,7 +48,7 @@ impl<T: Real> Smc<T> {
     }
 }
 
-/// What the two parts of a sliding law make of `σ` and `σ ė`: their sum, and `σ` with both.
+/// The two parts of a sliding law, of `σ` and `σ ė`: their sum, and `σ` with both.
 #[inline]
 pub(super) fn switched<T: Arithmetic>(
     (kp, kd): (T, T),

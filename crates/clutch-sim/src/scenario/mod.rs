@@ -745,6 +745,19 @@ impl Scenario {
         check("load share", actuator.load_share(), actuator.load_share(), &exactly(bounds.load_share));
         check("static friction", s.0, s.1, &bounds.friction_at_rest);
         check("dynamic friction", d.0, d.1, &bounds.friction_sliding);
+        let known = &self.params.bounds;
+        if let Some(share) = known.ripple {
+            // The change along the disc, and the mean that is left, have bounds of their own.
+            let model = rig.model.plant.friction();
+            let means = [
+                ("mean static friction", model.at_rest(), &bounds.friction_at_rest),
+                ("mean dynamic friction", model.sliding(), &bounds.friction_sliding),
+            ];
+            for (name, mean, bound) in means {
+                check(name, mean, mean, &known.mean_of(bound));
+            }
+            check("ripple of friction", swing, swing, &Interval { low: 0.0, high: share });
+        }
         if rig.model.plant.friction().bristles().is_some_and(|b| b.damps()) {
             lines.push("friction has bristles with damping, bounds that of steady sliding".to_owned());
         }

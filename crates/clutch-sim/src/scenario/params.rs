@@ -7,7 +7,9 @@ use crate::tables::Text;
 use clutch_core::law::{LawParams, OutputParams, ShellParams};
 use clutch_core::params::Range;
 use clutch_core::reference::ReferenceParams;
-use clutch_core::{LimitParams, PlantParams, SafeState, SamplingParams, Tolerances, VelocityParams, params};
+use clutch_core::{
+    Interval, LimitParams, PlantParams, SafeState, SamplingParams, Tolerances, VelocityParams, params,
+};
 
 clutch_core::words! {
     /// Scalar that the servo runs in.
@@ -69,6 +71,16 @@ impl ScenarioBounds {
             }
             None => ([1.0 - off, 1.0 + off], ripple),
         }
+    }
+
+    /// The part of a bound on friction that is the mean's: all of it, where the bounds say nothing of a ripple.
+    pub(crate) fn mean_of(&self, friction: &Interval) -> Interval {
+        if self.ripple.is_none() {
+            return *friction;
+        }
+        let ([low, high], _) = self.friction_shares(0.0);
+        let off = self.tolerances.friction;
+        Interval { low: friction.low / (1.0 - off) * low, high: friction.high / (1.0 + off) * high }
     }
 }
 

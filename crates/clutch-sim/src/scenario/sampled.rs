@@ -139,16 +139,7 @@ impl Scenario {
             ));
         }
         let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
-        let (mean, ripple) = p.bounds.friction_shares(swing);
-        // Of the bounds on friction the part that is the mean's.
-        let off = p.bounds.tolerances.friction;
-        let mean_of = |i: &clutch_core::Interval| {
-            if p.bounds.ripple.is_some() {
-                [i.low / (1.0 - off) * mean[0], i.high / (1.0 + off) * mean[1]]
-            } else {
-                [i.low, i.high]
-            }
-        };
+        let (_, ripple) = p.bounds.friction_shares(swing);
         let ends = |i: &clutch_core::Interval| [i.low, i.high];
         let dac = &rig.dac;
         // A converter that rounds nothing gives all that it is asked for.
@@ -177,8 +168,8 @@ impl Scenario {
             drive_torque: torque,
             viscous_damping: ends(&bounds.viscous_damping),
             brake_gain: gain,
-            sliding: mean_of(&bounds.friction_sliding),
-            at_rest: mean_of(&bounds.friction_at_rest),
+            sliding: ends(&p.bounds.mean_of(&bounds.friction_sliding)),
+            at_rest: ends(&p.bounds.mean_of(&bounds.friction_at_rest)),
             rest_not_below_sliding: friction.at_rest() >= friction.sliding(),
             stribeck,
             ripple,
