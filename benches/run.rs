@@ -6,11 +6,15 @@ use clutch_core::reference::ReferenceParams;
 use clutch_core::{Friction, FrictionModel, Plant, PlantParams, StribeckParams};
 use clutch_sim::drive::{Drive, DriveParams, SineDrive};
 use clutch_sim::engine::{self, DormandPrince, Engine, EngineKind, Input, Model, Volts};
+use clutch_sim::progress::UNWATCHED;
 use clutch_sim::rig::RigBase;
+use clutch_sim::scenario::Value;
+use clutch_sim::sweep::Sweep;
 use clutch_sim::system::{Motion, State, System};
-use clutch_sim::{RigParams, RunSpec, simulate};
+use clutch_sim::{Keep, RigParams, RunSpec, simulate};
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{SMatrix, SVector};
+use std::sync::atomic::AtomicBool;
 
 fn ten_seconds(rig: RigParams, law: LawParams, rate_deg_s: f64) -> RunSpec<'static> {
     let mut spec = RunSpec::new(rig, law, ReferenceParams::ramp(rate_deg_s.to_radians()));
@@ -109,5 +113,31 @@ fn systems(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, rigs, engines, systems);
+/// 256 runs with gains of their own: in the lanes of vectors, as a sweep does, and one by one; on one thread.
+fn lanes(c: &mut Criterion) {
+    let mut group = c.benchmark_group("sweep_256_x_10_s");
+    group.sample_size(10);
+    let base = "name = \"PD\"\n[rig]\nbase = \"paper\"\n[law.pd]\n[run]\nduration_s = 10.0\n";
+    for rate in [20.0, 2.0] {
+        let table = format!("{base}[reference.ramp]\nrate_deg_s = {rate}\n").parse().expect("a table");
+        let keys = vec!["law.pd.kp_v_rad".to_owned()];
+        let rows = (0..256).map(|i| vec![Value::Float(4000.0 + 8.0 * f64::from(i))]).collect();
+        let sweep = Sweep::new("PD", table, keys, rows).expect("a value for the key in each row");
+        let never = AtomicBool::new(false);
+        group.bench_function(format!("in_lanes/pd_{rate}_deg_s"), |b| {
+            b.iter(|| sweep.run(1, Keep::Figures, &never, &|_, row| assert!(row.is_ok())));
+        });
+        group.bench_function(format!("one_by_one/pd_{rate}_deg_s"), |b| {
+            b.iter(|| {
+                for i in 0..sweep.len() {
+                    let scenario = sweep.scenario(i).expect("in range");
+                    scenario.run(Keep::Figures, UNWATCHED).expect("runs");
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, rigs, engines, systems, lanes);
 criterion_main!(benches);

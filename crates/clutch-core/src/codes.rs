@@ -215,6 +215,18 @@ impl<T: Real> Dac<T> {
     pub fn step(&self) -> T {
         self.step
     }
+
+    /// Codes per volt, as [`Dac::code`] computes with it.
+    #[must_use]
+    pub fn per_volt(&self) -> T {
+        self.per_volt
+    }
+
+    /// The highest code.
+    #[must_use]
+    pub fn top(&self) -> DacCode {
+        DacCode(self.top)
+    }
 }
 
 #[cfg(test)]

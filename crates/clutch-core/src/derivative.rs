@@ -8,7 +8,7 @@
 //! difference is taken in integers, so it stays exact however far the shaft has turned.
 
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Encoder, FixedCounts, Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Encoder, FixedCounts, Micros, ParamError, Real};
 
 crate::params! {
     /// The smoothed difference (5), which the paper calls a Kalman filter: a first-order low-pass on the backward
@@ -74,6 +74,12 @@ impl<T: Real> SmoothedDerivative<T> {
 }
 
 impl<T: Arithmetic> SmoothedDerivative<T> {
+    /// The filters of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> SmoothedDerivative<L> {
+        SmoothedDerivative { keep: each(&|f| f.keep), scale: each(&|f| f.scale) }
+    }
+
     /// The next rate from the last one, rad/s, and the difference of the error, counts.
     #[inline]
     #[must_use]

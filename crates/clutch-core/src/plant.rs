@@ -87,6 +87,15 @@ impl<T: Arithmetic> Plant<T> {
     }
 }
 
+impl<T: Arithmetic> Plant<T> {
+    /// Largest torque that friction holds at rest, N m.
+    #[inline]
+    #[must_use]
+    pub fn break_away_torque(&self, volts: T) -> T {
+        self.actuator.friction(self.friction.at_rest(), volts)
+    }
+}
+
 impl<T> Plant<T> {
     /// The parameters it was built from.
     #[must_use]
@@ -114,13 +123,6 @@ impl<T: Real> Plant<T> {
     #[must_use]
     pub fn friction_torque(&self, velocity: T, volts: T) -> T {
         self.actuator.friction(self.friction.coefficient(velocity), volts)
-    }
-
-    /// Largest torque that friction holds at rest, N m.
-    #[inline]
-    #[must_use]
-    pub fn break_away_torque(&self, volts: T) -> T {
-        self.actuator.friction(self.friction.at_rest(), volts)
     }
 
     /// `θ̈` of (1) for a shaft in motion, rad/s².

@@ -5,6 +5,7 @@ pub mod drive;
 pub mod engine;
 pub mod friction_lab;
 pub mod friction_map;
+mod lanes;
 pub mod meter;
 pub mod metrics;
 pub mod moving_rig;

@@ -8,6 +8,8 @@
 //! is known (simulation), else the measured one.
 
 use crate::engine::{Event, EventKind};
+use crate::lanes::Lane;
+use clutch_core::Arithmetic;
 use serde::Serialize;
 
 /// Declaration of a figure: all that is known of it without a run.
@@ -176,20 +178,89 @@ pub struct MetricsSample {
     pub voltage: f64,
 }
 
-/// Gathers a run's figures sample by sample, in constant memory.
+/// The figures of samples, of a run or of several that are sampled at the same times.
 #[derive(Clone, Debug)]
-pub struct MetricsBuilder {
+pub(crate) struct Sampled<V> {
     period: f64,
     settle: f64,
     samples: u64,
-    max: f64,
-    sum: f64,
-    square: f64,
-    absolute: f64,
-    variation: f64,
-    voltage: Option<f64>,
-    velocities: [f64; 2],
-    jerk_square: f64,
+    max: V,
+    sum: V,
+    square: V,
+    absolute: V,
+    variation: V,
+    voltage: V,
+    velocities: [V; 2],
+    jerk_square: V,
+}
+
+impl<V: Arithmetic> Sampled<V> {
+    pub(crate) fn new(period: f64, settle: f64) -> Self {
+        let zero = V::ZERO;
+        Sampled {
+            period,
+            settle,
+            samples: 0,
+            max: zero,
+            sum: zero,
+            square: zero,
+            absolute: zero,
+            variation: zero,
+            voltage: zero,
+            velocities: [zero; 2],
+            jerk_square: zero,
+        }
+    }
+
+    /// A sample at time `t`, s: error (rad), velocity (rad/s) and voltage (V).
+    #[inline(always)]
+    pub(crate) fn sample(&mut self, t: f64, error: V, velocity: V, voltage: V) {
+        if t < self.settle {
+            return;
+        }
+        let magnitude = error.abs();
+        self.max = self.max.max(magnitude);
+        self.sum = self.sum + error;
+        self.square = self.square + error * error;
+        self.absolute = self.absolute + magnitude;
+        if self.samples >= 1 {
+            self.variation = self.variation + (voltage - self.voltage).abs();
+        }
+        self.voltage = voltage;
+        if self.samples >= 2 {
+            let second = velocity - V::splat(2.0) * self.velocities[1] + self.velocities[0];
+            let jerk = second / V::splat(self.period * self.period);
+            self.jerk_square = self.jerk_square + jerk * jerk;
+        }
+        self.velocities = [self.velocities[1], velocity];
+        self.samples += 1;
+    }
+}
+
+impl<V: Lane> Sampled<V> {
+    /// Those of one lane.
+    pub(crate) fn lane(&self, i: usize) -> Sampled<f64> {
+        Sampled {
+            period: self.period,
+            settle: self.settle,
+            samples: self.samples,
+            max: self.max.lane(i),
+            sum: self.sum.lane(i),
+            square: self.square.lane(i),
+            absolute: self.absolute.lane(i),
+            variation: self.variation.lane(i),
+            voltage: self.voltage.lane(i),
+            velocities: self.velocities.map(|v| v.lane(i)),
+            jerk_square: self.jerk_square.lane(i),
+        }
+    }
+}
+
+/// The figures of sticks.
+#[derive(Clone, Debug)]
+pub(crate) struct Sticks {
+    period: f64,
+    settle: f64,
     sticks: u64,
     stuck_time: f64,
     /// Time in the stick that lasts, and the longest so far.
@@ -201,22 +272,11 @@ pub struct MetricsBuilder {
     break_away_sum: f64,
 }
 
-impl MetricsBuilder {
-    /// For samples every `period` seconds, of which those before `settle` do not count.
-    #[must_use]
-    pub fn new(period: f64, settle: f64) -> Self {
-        MetricsBuilder {
+impl Sticks {
+    pub(crate) fn new(period: f64, settle: f64) -> Self {
+        Sticks {
             period,
             settle,
-            samples: 0,
-            max: 0.0,
-            sum: 0.0,
-            square: 0.0,
-            absolute: 0.0,
-            variation: 0.0,
-            voltage: None,
-            velocities: [0.0; 2],
-            jerk_square: 0.0,
             sticks: 0,
             stuck_time: 0.0,
             this_stick: 0.0,
@@ -226,29 +286,6 @@ impl MetricsBuilder {
             break_aways: 0,
             break_away_sum: 0.0,
         }
-    }
-
-    /// A sample at time `t`, s.
-    pub fn sample(&mut self, t: f64, s: MetricsSample) {
-        if t < self.settle {
-            return;
-        }
-        let magnitude = s.error.abs();
-        self.max = self.max.max(magnitude);
-        self.sum += s.error;
-        self.square += s.error * s.error;
-        self.absolute += magnitude;
-        if let Some(last) = self.voltage {
-            self.variation += (s.voltage - last).abs();
-        }
-        self.voltage = Some(s.voltage);
-        if self.samples >= 2 {
-            let second = s.velocity - 2.0 * self.velocities[1] + self.velocities[0];
-            let jerk = second / (self.period * self.period);
-            self.jerk_square += jerk * jerk;
-        }
-        self.velocities = [self.velocities[1], s.velocity];
-        self.samples += 1;
     }
 
     /// An event between samples.
@@ -278,7 +315,7 @@ impl MetricsBuilder {
     }
 
     /// The period that began at `begin` (s), with the shaft stuck or not, and what happened in it.
-    pub fn period(&mut self, begin: f64, mut stuck: bool, events: &[Event]) {
+    pub(crate) fn period(&mut self, begin: f64, mut stuck: bool, events: &[Event]) {
         let counts = begin >= self.settle;
         let mut since = begin;
         for e in events {
@@ -296,26 +333,56 @@ impl MetricsBuilder {
         }
         events.iter().for_each(|e| self.event(e));
     }
+}
+
+/// Gathers a run's figures sample by sample, in constant memory.
+#[derive(Clone, Debug)]
+pub struct MetricsBuilder {
+    samples: Sampled<f64>,
+    sticks: Sticks,
+}
+
+impl MetricsBuilder {
+    /// For samples every `period` seconds, of which those before `settle` do not count.
+    #[must_use]
+    pub fn new(period: f64, settle: f64) -> Self {
+        Self::of(Sampled::new(period, settle), Sticks::new(period, settle))
+    }
+
+    /// Of figures that were gathered apart.
+    pub(crate) fn of(samples: Sampled<f64>, sticks: Sticks) -> Self {
+        MetricsBuilder { samples, sticks }
+    }
+
+    /// A sample at time `t`, s.
+    pub fn sample(&mut self, t: f64, s: MetricsSample) {
+        self.samples.sample(t, s.error, s.velocity, s.voltage);
+    }
+
+    /// The period that began at `begin` (s), with the shaft stuck or not, and what happened in it.
+    pub fn period(&mut self, begin: f64, stuck: bool, events: &[Event]) {
+        self.sticks.period(begin, stuck, events);
+    }
 
     /// The figures so far.
     #[must_use]
     pub fn finish(&self) -> Metrics {
-        let n = self.samples.max(1) as f64;
-        let time = (n * self.period).max(self.period);
+        let (s, of) = (&self.samples, &self.sticks);
+        let n = s.samples.max(1) as f64;
+        let time = (n * s.period).max(s.period);
         Metrics {
-            measured_s: self.samples as f64 * self.period,
-            max_error_rad: self.max,
-            rms_error_rad: libm::sqrt(self.square / n),
-            mean_error_rad: self.sum / n,
-            iae_rad_s: self.absolute * self.period,
-            stick_slip_cycles_per_s: self.sticks as f64 / time,
-            stick_time_fraction: self.stuck_time / time,
-            longest_stick_s: Some(self.longest_stick),
-            stair_height_rad: self.stair,
-            break_away_torque_nm: (self.break_aways > 0)
-                .then(|| self.break_away_sum / self.break_aways as f64),
-            control_variation_v_s: self.variation / time,
-            jerk_rms_rad_s3: libm::sqrt(self.jerk_square / (n - 2.0).max(1.0)),
+            measured_s: s.samples as f64 * s.period,
+            max_error_rad: s.max,
+            rms_error_rad: libm::sqrt(s.square / n),
+            mean_error_rad: s.sum / n,
+            iae_rad_s: s.absolute * s.period,
+            stick_slip_cycles_per_s: of.sticks as f64 / time,
+            stick_time_fraction: of.stuck_time / time,
+            longest_stick_s: Some(of.longest_stick),
+            stair_height_rad: of.stair,
+            break_away_torque_nm: (of.break_aways > 0).then(|| of.break_away_sum / of.break_aways as f64),
+            control_variation_v_s: s.variation / time,
+            jerk_rms_rad_s3: libm::sqrt(s.jerk_square / (n - 2.0).max(1.0)),
         }
     }
 }

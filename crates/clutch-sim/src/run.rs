@@ -392,6 +392,20 @@ pub struct Run {
     pub engine: EngineKind,
 }
 
+impl Run {
+    /// A run of which only figures were kept, by the exact flow.
+    pub(crate) fn of_figures(metrics: Metrics, detected: Detected) -> Self {
+        Run {
+            trace: Trace::default(),
+            events: Vec::new(),
+            metrics,
+            detected,
+            detections: Vec::new(),
+            engine: EngineKind::ExactFlow,
+        }
+    }
+}
+
 /// Runs the law of the specification, in the scalar `T`.
 ///
 /// # Errors

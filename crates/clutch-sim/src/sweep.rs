@@ -3,13 +3,20 @@
 //! Each row is a run of its own, with its own seed. Its result depends on nothing but the row: not on
 //! the number of threads, nor on which other rows there are.
 
+use crate::lanes;
 use crate::progress::UNWATCHED;
 use crate::run::{Keep, Run};
-use crate::scenario::{Scenario, ScenarioError};
-use std::ops::ControlFlow;
+use crate::scenario::{ScalarKind, Scenario, ScenarioError};
+use fearless_simd::Level;
+use std::ops::{ControlFlow, Range};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use toml::{Table, Value};
+
+/// Rows that run side by side in one vector.
+const LANES: usize = 8;
+/// Most rows that a thread takes at once.
+const BATCH: usize = 256;
 
 /// A scenario and the keys that change from row to row.
 #[derive(Clone, Debug)]
@@ -98,17 +105,14 @@ impl Sweep {
         done: &(dyn Fn(usize, Result<Row, ScenarioError>) + Sync),
     ) {
         let next = AtomicUsize::new(0);
+        let batch = self.batch(threads, keep);
         let work = || {
             while !stop.load(Ordering::Relaxed) {
-                let i = next.fetch_add(1, Ordering::Relaxed);
-                if i >= self.rows.len() {
+                let first = next.fetch_add(batch, Ordering::Relaxed);
+                if first >= self.rows.len() {
                     break;
                 }
-                let outcome = self.row(i, keep, stop);
-                if stop.load(Ordering::Relaxed) {
-                    break;
-                }
-                done(i, outcome);
+                self.some(first..(first + batch).min(self.rows.len()), keep, stop, done);
             }
         };
         std::thread::scope(|scope| {
@@ -122,13 +126,55 @@ impl Sweep {
         });
     }
 
-    fn row(&self, i: usize, keep: Keep, stop: &AtomicBool) -> Result<Row, ScenarioError> {
-        let scenario = self.scenario(i)?;
-        let certified = scenario.plan()?.certificate.certified();
-        let run = scenario.run(keep, &|p| {
-            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { UNWATCHED(p) }
-        })?;
-        Ok(Row { certified, run })
+    /// Rows that a thread takes at once: one by one where samples are kept; else as many as fill lanes, and few enough that
+    /// each thread has some.
+    fn batch(&self, threads: usize, keep: Keep) -> usize {
+        match keep {
+            Keep::Trace => 1,
+            Keep::Figures => (self.rows.len() / (2 * threads.max(1))).next_multiple_of(LANES).clamp(1, BATCH),
+        }
+    }
+
+    /// Some rows: those that can in lanes, the others one by one.
+    fn some(
+        &self,
+        rows: Range<usize>,
+        keep: Keep,
+        stop: &AtomicBool,
+        done: &(dyn Fn(usize, Result<Row, ScenarioError>) + Sync),
+    ) {
+        let stopped = || stop.load(Ordering::Relaxed);
+        let mut scenarios = Vec::with_capacity(rows.len());
+        for i in rows {
+            let planned = self.scenario(i).and_then(|scenario| {
+                let certified = scenario.plan()?.certificate.certified();
+                Ok((i, certified, scenario))
+            });
+            match planned {
+                Ok(row) => scenarios.push(row),
+                Err(e) => done(i, Err(e)),
+            }
+        }
+        let mut in_lanes = vec![None; scenarios.len()];
+        if keep == Keep::Figures {
+            let doubles = scenarios.iter().enumerate().filter(|(_, row)| row.2.scalar() == ScalarKind::F64);
+            let specs: Vec<_> = doubles.map(|(place, row)| (place, row.2.spec())).collect();
+            let Some(figures) = lanes::run_all(Level::new(), &specs, &stopped) else { return };
+            for (place, metrics, detected) in figures {
+                in_lanes[place] = Some((metrics, detected));
+            }
+        }
+        for ((i, certified, scenario), figures) in scenarios.iter().zip(in_lanes) {
+            let progress = |p| if stopped() { ControlFlow::Break(()) } else { UNWATCHED(p) };
+            let run = match figures {
+                Some((metrics, detected)) => Ok(Run::of_figures(metrics, detected)),
+                None => scenario.run(keep, &progress),
+            };
+            if stopped() {
+                return;
+            }
+            done(*i, run.map(|run| Row { certified: *certified, run }));
+        }
     }
 }
 

@@ -13,7 +13,7 @@
 
 mod bristle;
 mod dormand_prince;
-mod exact_flow;
+pub(crate) mod exact_flow;
 pub(crate) mod pair;
 pub(crate) mod rosenbrock;
 
@@ -47,7 +47,7 @@ impl Motion {
         }
     }
 
-    fn along(torque: f64) -> Motion {
+    pub(crate) fn along(torque: f64) -> Motion {
         if torque > 0.0 { Motion::Forward } else { Motion::Backward }
     }
 }

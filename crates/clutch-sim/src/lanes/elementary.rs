@@ -1,0 +1,141 @@
+//! Exponential and logarithm in lanes, with the bits of `libm`, on whose scalars all results rest.
+//!
+//! The way is that of Sun Microsystems' fdlibm (1993), as `libm` and musl have it: reduce the argument by multiples of ln 2,
+//! a polynomial, and scale. A scalar branches; here both sides are computed and one is selected. Coefficients and the order
+//! of operations are fdlibm's, or the last bit would differ.
+
+use super::Lane;
+
+const LN2_HI: f64 = 6.931_471_803_691_238e-1;
+const LN2_LO: f64 = 1.908_214_929_270_587_7e-10;
+const INVERSE_LN2: f64 = core::f64::consts::LOG2_E;
+/// Magnitude above which an argument of an exponential is reduced: half of ln 2 in its upper word.
+const REDUCED: f64 = f64::from_bits(0x3fd6_2e43_0000_0000);
+
+/// What the exponentials need of the bits of a number.
+pub(super) trait Powers: Lane {
+    /// 2 to the power of a whole number from −1022 to 1023.
+    fn power_of_two(self) -> Self;
+    /// Whole part, towards 0.
+    fn trunc(self) -> Self;
+    /// Exponent and mantissa of a positive normal number, the mantissa between the square roots of 1/2 and of 2.
+    fn split(self) -> (Self, Self);
+}
+
+/// The multiple of ln 2 that an argument is reduced by, and what is left in two parts.
+#[inline(always)]
+fn reduced<V: Powers>(x: V) -> (V, V, V) {
+    let half = V::select(x.less(V::ZERO), V::splat(-0.5), V::splat(0.5));
+    let k = (V::splat(INVERSE_LN2) * x + half).trunc();
+    let k = V::select(V::splat(REDUCED).less_or_equal(x.abs()), k, V::ZERO);
+    (k, x - k * V::splat(LN2_HI), k * V::splat(LN2_LO))
+}
+
+#[inline(always)]
+pub(super) fn exp<V: Powers>(x: V) -> V {
+    const P: [f64; 5] = [
+        1.666_666_666_666_660_2e-1,
+        -2.777_777_777_701_559_3e-3,
+        6.613_756_321_437_934e-5,
+        -1.653_390_220_546_525_2e-6,
+        4.138_136_797_057_238_5e-8,
+    ];
+    let p = |i: usize| V::splat(P[i]);
+    let (k, hi, lo) = reduced(x);
+    let r = hi - lo;
+    let rr = r * r;
+    let c = r - rr * (p(0) + rr * (p(1) + rr * (p(2) + rr * (p(3) + rr * p(4)))));
+    let y = V::ONE + (r * c / (V::splat(2.0) - c) - lo + hi);
+    let y = y * k.power_of_two();
+    // 2⁻²⁸ and less: 1 + x, in its upper word.
+    V::select(x.abs().less(V::splat(f64::from_bits(0x3e30_0001_0000_0000))), V::ONE + x, y)
+}
+
+#[inline(always)]
+pub(super) fn expm1<V: Powers>(x: V) -> V {
+    const Q: [f64; 5] = [
+        -3.333_333_333_333_313e-2,
+        1.587_301_587_254_814_6e-3,
+        -7.936_507_578_674_88e-5,
+        4.008_217_827_329_362e-6,
+        -2.010_992_181_836_243_7e-7,
+    ];
+    let (one, half) = (V::ONE, V::splat(0.5));
+    let q = |i: usize| V::splat(Q[i]);
+    let (k, hi, lo) = reduced(x);
+    let r = hi - lo;
+    let c = (hi - r) - lo;
+    let hfx = half * r;
+    let hxs = r * hfx;
+    let r1 = one + hxs * (q(0) + hxs * (q(1) + hxs * (q(2) + hxs * (q(3) + hxs * q(4)))));
+    let t = V::splat(3.0) - r1 * hfx;
+    let e = hxs * ((r1 - t) / (V::splat(6.0) - r * t));
+    let unreduced = k.less(half) & (-half).less(k);
+    let near = r - (r * e - hxs);
+    let near = V::select(x.abs().less(V::splat(f64::from_bits(0x3c90_0000_0000_0000))), x, near);
+    if V::all(unreduced) {
+        return near;
+    }
+    let e = r * (e - c) - c;
+    let e = e - hxs;
+    let below = half * (r - e) - half;
+    let above =
+        V::select(r.less(V::splat(-0.25)), V::splat(-2.0) * (e - (r + half)), one + V::splat(2.0) * (r - e));
+    let power = k.power_of_two();
+    let inverse = (-k).power_of_two();
+    let far = (r - e + one) * power - one;
+    let small = (r - e + (one - inverse)) * power;
+    let large = (r - (e + inverse) + one) * power;
+    let y = V::select(k.less(V::splat(19.5)), small, large);
+    let y = V::select(k.less(V::ZERO) | V::splat(56.5).less(k), far, y);
+    let y = V::select(k.less(V::splat(1.5)) & half.less(k), above, y);
+    let y = V::select(k.less(-half) & V::splat(-1.5).less(k), below, y);
+    let y = V::select(unreduced, near, y);
+    // −56 ln 2 and less, in its upper word.
+    V::select(x.less_or_equal(V::splat(f64::from_bits(0xc043_687a_0000_0000))), -one, y)
+}
+
+/// `log(1 + f)` less `f − f²/2`, over `s` that stands beside `f²/2`: the polynomial of both logarithms.
+#[inline(always)]
+fn series<V: Powers>(f: V) -> (V, V, V) {
+    const LG: [f64; 7] = [
+        6.666_666_666_666_735e-1,
+        3.999_999_999_940_942e-1,
+        2.857_142_874_366_239e-1,
+        2.222_219_843_214_978_4e-1,
+        1.818_357_216_161_805e-1,
+        1.531_383_769_920_937_3e-1,
+        1.479_819_860_511_658_6e-1,
+    ];
+    let lg = |i: usize| V::splat(LG[i]);
+    let hfsq = V::splat(0.5) * f * f;
+    let s = f / (V::splat(2.0) + f);
+    let z = s * s;
+    let w = z * z;
+    let t1 = w * (lg(1) + w * (lg(3) + w * lg(5)));
+    let t2 = z * (lg(0) + w * (lg(2) + w * (lg(4) + w * lg(6))));
+    (hfsq, s, t2 + t1)
+}
+
+#[inline(always)]
+pub(super) fn log<V: Powers>(x: V) -> V {
+    let (k, m) = x.split();
+    let f = m - V::ONE;
+    let (hfsq, s, r) = series(f);
+    s * (hfsq + r) + k * V::splat(LN2_LO) - hfsq + f + k * V::splat(LN2_HI)
+}
+
+#[inline(always)]
+pub(super) fn log1p<V: Powers>(x: V) -> V {
+    let unreduced = V::splat(-f64::from_bits(0x3fd2_bec5_0000_0000)).less(x)
+        & x.less(V::splat(f64::from_bits(0x3fda_827a_0000_0000)));
+    let u = V::ONE + x;
+    let (k, m) = u.split();
+    let c = V::select(V::splat(1.5).less(k), V::ONE - (u - x), x - (u - V::ONE)) / u;
+    let c = V::select(k.less(V::splat(53.5)), c, V::ZERO);
+    let (k, c) = (V::select(unreduced, V::ZERO, k), V::select(unreduced, V::ZERO, c));
+    let f = V::select(unreduced, x, m - V::ONE);
+    let (hfsq, s, r) = series(f);
+    let y = s * (hfsq + r) + (k * V::splat(LN2_LO) + c) - hfsq + f + k * V::splat(LN2_HI);
+    V::select(x.abs().less(V::splat(f64::from_bits(0x3ca0_0000_0000_0000))), x, y)
+}

@@ -1,0 +1,110 @@
+//! The runs that go together in lanes, and those that go alone.
+
+use super::block::{Block, has_lanes};
+use super::vector::at;
+use crate::engine::EngineKind;
+use crate::metrics::{Detected, Metrics};
+use crate::rig::Rig;
+use crate::run::{Prepared, RunSpec};
+use clutch_core::reference::Reference;
+use clutch_core::{FixedCounts, Servo, SmoothedDerivative, VelocityParams};
+use fearless_simd::Level;
+
+/// Runs in a block: enough to fill vectors with those in the layer, few enough for a core's own memory.
+const BLOCK: usize = 256;
+
+/// A run that can go in lanes, at its beginning.
+pub(super) struct Candidate<'a> {
+    /// Its place among the runs that were handed in.
+    place: usize,
+    common: Common,
+    pub(super) servo: Servo<f64>,
+    pub(super) filter: SmoothedDerivative<f64>,
+    pub(super) prepared: Prepared<'a, f64>,
+    /// The path as it would be from 0, and its beginning.
+    pub(super) path: Reference<'a, f64>,
+    pub(super) start: FixedCounts,
+}
+
+/// What the runs of a block have in common.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct Common {
+    pub(super) period: f64,
+    pub(super) ticks: u64,
+    pub(super) settle: f64,
+    /// Periods from sample to voltage.
+    pub(super) delay: usize,
+    pub(super) whole_counts: bool,
+    pub(super) whole_codes: bool,
+    law: std::mem::Discriminant<clutch_core::law::LawParams>,
+    actuator: clutch_core::ActuatorKind,
+}
+
+impl<'a> Candidate<'a> {
+    /// A run that lanes can do; none if it has to go alone, be it to say what is wrong with it.
+    fn of(place: usize, spec: &RunSpec<'a>) -> Option<Self> {
+        let VelocityParams::SmoothedDerivative(filter) = &spec.velocity else { return None };
+        let rig = &spec.rig;
+        if spec.shell.boundary > 0.0 || spec.friction_map.is_some() || rig.torque_noise > 0.0 {
+            return None;
+        }
+        let servo = Servo::<f64>::new(&spec.servo().ok()?).ok()?;
+        if !has_lanes(servo.law()) {
+            return None;
+        }
+        let prepared = spec.prepare::<f64>().ok()?;
+        if prepared.engine != EngineKind::ExactFlow {
+            return None;
+        }
+        let encoder = servo.encoder();
+        Some(Candidate {
+            place,
+            common: Common {
+                period: spec.period.seconds(),
+                ticks: spec.run.ticks(spec.period),
+                settle: spec.run.settle,
+                delay: rig.delay_ticks as usize,
+                whole_counts: rig.encoder.quantised,
+                whole_codes: rig.dac.quantised,
+                law: std::mem::discriminant(&spec.law),
+                actuator: prepared.moving.rig().model.plant.actuator().kind(),
+            },
+            filter: SmoothedDerivative::new(filter, encoder, spec.period).ok()?,
+            path: Reference::new(&spec.reference, FixedCounts(0), encoder, spec.period).ok()?,
+            start: spec.run.start_position(),
+            servo,
+            prepared,
+        })
+    }
+
+    pub(super) fn rig(&self) -> &Rig {
+        self.prepared.moving.rig()
+    }
+}
+
+/// Runs in lanes what can be, by the instructions of a level. `runs` are the specifications by their places, and what comes
+/// back are figures by these; none of a run that has to go alone. None at all once `stop`, which is asked every
+/// few milliseconds, says so.
+pub(crate) fn run_all(
+    level: Level,
+    runs: &[(usize, RunSpec<'_>)],
+    stop: &dyn Fn() -> bool,
+) -> Option<Vec<(usize, Metrics, Detected)>> {
+    let candidates: Vec<Candidate<'_>> =
+        runs.iter().filter_map(|(place, spec)| Candidate::of(*place, spec)).collect();
+    let mut left: Vec<&Candidate<'_>> = candidates.iter().collect();
+    let mut found = Vec::new();
+    while let Some(first) = left.first() {
+        let common = first.common;
+        let (rows, others): (Vec<_>, Vec<_>) = left.into_iter().partition(|c| c.common == common);
+        left = others;
+        for rows in rows.chunks(BLOCK) {
+            let Some(done) = at(level, Block { rows, common, stop }) else { return Some(found) };
+            let figures = done?;
+            for (row, figures) in rows.iter().zip(figures) {
+                found.extend(figures.map(|(metrics, detected)| (row.place, metrics, detected)));
+            }
+        }
+    }
+    Some(found)
+}

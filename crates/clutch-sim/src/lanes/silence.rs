@@ -1,0 +1,64 @@
+//! Silences of an encoder in lanes: as [`clutch_core::StickSlip`] finds them one by one.
+
+use super::Lane;
+use clutch_core::StickSlipParams;
+
+/// A detector for several runs, and its memory. Whole numbers are doubles here, exact far beyond any run.
+#[derive(Clone)]
+pub(super) struct Silence<V: Lane> {
+    gap: V,
+    ticks: V,
+    /// Counts that the path moves in a tick at a rad/s.
+    counts_per_tick_second: V,
+    stuck: V::Mask,
+    silent_ticks: V,
+    path_moved: V,
+    cycles: V,
+    stuck_ticks: V,
+    /// Cycles and ticks stuck before the run had settled.
+    before: (V, V),
+}
+
+impl<V: Lane> Silence<V> {
+    pub(super) fn new(p: &StickSlipParams<f64>, counts_per_tick_second: V) -> Self {
+        Silence {
+            gap: V::splat(p.gap),
+            ticks: V::splat(f64::from(p.ticks)),
+            counts_per_tick_second,
+            stuck: V::ZERO.less(V::ZERO),
+            silent_ticks: V::ZERO,
+            path_moved: V::ZERO,
+            cycles: V::ZERO,
+            stuck_ticks: V::ZERO,
+            before: (V::ZERO, V::ZERO),
+        }
+    }
+
+    /// A sample: whether the counts have moved since the last one, and the velocity of the path, rad/s.
+    #[inline(always)]
+    pub(super) fn update(&mut self, moved: V::Mask, path_velocity: V, settled: bool) {
+        let still = !moved;
+        let (was, lasts) = (self.stuck, self.stuck & still);
+        self.silent_ticks = V::select(moved, V::ZERO, self.silent_ticks + V::ONE);
+        let step = (path_velocity * self.counts_per_tick_second).abs();
+        self.path_moved = V::select(moved, V::ZERO, self.path_moved + step);
+        self.stuck = lasts;
+        if V::any(still) {
+            self.stuck_ticks = V::select(lasts, self.stuck_ticks + V::ONE, self.stuck_ticks);
+            let long = self.ticks.less_or_equal(self.silent_ticks);
+            let begins = still & !was & long & self.gap.less_or_equal(self.path_moved);
+            self.cycles = V::select(begins, self.cycles + V::ONE, self.cycles);
+            self.stuck_ticks = V::select(begins, self.stuck_ticks + self.silent_ticks, self.stuck_ticks);
+            self.stuck = lasts | begins;
+        }
+        if !settled {
+            self.before = (self.cycles, self.stuck_ticks);
+        }
+    }
+
+    /// Cycles and ticks stuck of a lane since its run had settled.
+    pub(super) fn since_settled(&self, i: usize) -> (f64, f64) {
+        let (cycles, stuck_ticks) = &self.before;
+        (self.cycles.lane(i) - cycles.lane(i), self.stuck_ticks.lane(i) - stuck_ticks.lane(i))
+    }
+}

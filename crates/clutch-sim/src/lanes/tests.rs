@@ -1,0 +1,214 @@
+//! Lanes against runs alone.
+
+use super::elementary::Powers;
+use super::run_all;
+use super::vector::{InLanes, at, levels};
+use crate::progress::UNWATCHED;
+use crate::run::Keep;
+use crate::scenario::{BUILT_IN, Scenario};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// A function of numbers, in lanes.
+struct Of<'a>(Function, &'a [f64]);
+
+#[derive(Clone, Copy, Debug)]
+enum Function {
+    Exp,
+    Expm1,
+    Log,
+    Log1p,
+}
+
+impl InLanes for Of<'_> {
+    type Output = Vec<f64>;
+
+    fn run<V: Powers>(self) -> Vec<f64> {
+        let Of(function, numbers) = self;
+        let of = |some: &[f64]| {
+            let x = V::of(|i| some[i.min(some.len() - 1)]);
+            let y = match function {
+                Function::Exp => x.exp(),
+                Function::Expm1 => x.expm1(),
+                Function::Log => x.log(),
+                Function::Log1p => x.log1p(),
+            };
+            (0..some.len()).map(|i| y.lane(i)).collect::<Vec<_>>()
+        };
+        numbers.chunks(V::WIDTH).flat_map(of).collect()
+    }
+}
+
+/// Numbers of all magnitudes up to `largest`, and those around which the functions change their way.
+fn numbers(largest: f64, signs: &[f64]) -> Vec<f64> {
+    let mut rng = Pcg64::seed_from_u64(7);
+    let mut all: Vec<f64> = (0..400_000)
+        .map(|i| {
+            let even = largest * rng.random::<f64>();
+            let magnitude =
+                if i % 2 == 0 { even } else { libm::exp(libm::log(largest) - 90.0 * rng.random::<f64>()) };
+            magnitude * signs[rng.random_range(0..signs.len())]
+        })
+        .collect();
+    let edges = [0.5, 1.5, 1.0, 2.0, 19.5, 20.5, 55.5, 56.0, 57.0].map(|n| n * core::f64::consts::LN_2);
+    let edges = edges.into_iter().chain([
+        0.25,
+        0.2929,
+        0.414_213_6,
+        1.0,
+        3.725_290_298_461_914e-9,
+        5.551_115_123_125_783e-17,
+    ]);
+    for edge in edges.filter(|edge| *edge < largest) {
+        for step in -2000..2000_i64 {
+            let near = f64::from_bits(edge.to_bits().wrapping_add_signed(step * 2_097_152 + step));
+            all.extend(signs.iter().map(|sign| sign * near));
+        }
+    }
+    all
+}
+
+#[test]
+fn exponentials_and_logarithms_have_the_bits_of_libm_at_every_level() {
+    type Alone = fn(f64) -> f64;
+    let cases: [(Function, Alone, Vec<f64>); 4] = [
+        (Function::Exp, libm::exp, numbers(700.0, &[1.0, -1.0])),
+        (Function::Expm1, libm::expm1, numbers(700.0, &[1.0, -1.0])),
+        (Function::Log, libm::log, numbers(1e300, &[1.0])),
+        (
+            Function::Log1p,
+            libm::log1p,
+            numbers(1e300, &[1.0]).into_iter().chain(numbers(0.999_999, &[-1.0])).collect(),
+        ),
+    ];
+    for (function, alone, numbers) in cases {
+        for level in levels() {
+            let together = at(level, Of(function, &numbers)).unwrap();
+            for (x, y) in numbers.iter().zip(together) {
+                assert_eq!(alone(*x).to_bits(), y.to_bits(), "{function:?} of {x:e} at {level:?}");
+            }
+        }
+    }
+}
+
+/// Scenarios around a built-in one, each with other values for some keys.
+fn around(name: &str, keys: &[(&str, f64, f64)], more: &[(&str, &str)], n: u64) -> Vec<Scenario> {
+    let built_in = BUILT_IN.iter().find(|b| b.name == name).unwrap();
+    let mut rng = Pcg64::seed_from_u64(11);
+    let mut one = |i: u64| {
+        let mut set: Vec<(String, String)> = keys
+            .iter()
+            .map(|(key, low, high)| {
+                ((*key).to_owned(), format!("{}", low + (high - low) * rng.random::<f64>()))
+            })
+            .collect();
+        set.push(("run.seed".into(), (i + 1).to_string()));
+        set.extend(more.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())));
+        // What drives a run in lanes is a weight.
+        let weight = "[rig.drive.weight]\nmass_kg = 0.001\n";
+        let toml = built_in
+            .toml
+            .replace("points_s_nm = [[0.0, 0.0]]", "")
+            .replace("[rig.drive.table]        # no load\n", weight);
+        Scenario::parse(name, &toml, &set).unwrap()
+    };
+    (0..n).map(&mut one).collect()
+}
+
+/// Figures of runs in lanes, at every level, against each run alone; how many went in lanes.
+fn same_bits(scenarios: &[Scenario]) -> usize {
+    let alone: Vec<_> = scenarios
+        .iter()
+        .map(|s| s.run(Keep::Figures, UNWATCHED).unwrap())
+        .map(|r| (r.metrics, r.detected))
+        .collect();
+    let specs: Vec<_> = scenarios.iter().map(Scenario::spec).enumerate().collect();
+    let mut went = 0;
+    for level in levels() {
+        let together = run_all(level, &specs, &|| false).unwrap();
+        went = together.len();
+        for (place, metrics, detected) in together {
+            let bits = |m: &crate::Metrics, d: &crate::metrics::Detected| -> Vec<_> {
+                crate::metrics::figure_columns(m, d).map(|(name, x)| (name, x.map(f64::to_bits))).collect()
+            };
+            let (m, d) = &alone[place];
+            assert_eq!(bits(&metrics, &detected), bits(m, d), "run {place} at {level:?}");
+        }
+    }
+    went
+}
+
+/// Ranges of keys that a case draws from, and values that all its runs have.
+type Case<'a> = (&'a str, &'a [(&'a str, f64, f64)], &'a [(&'a str, &'a str)]);
+
+#[test]
+fn runs_in_lanes_have_the_bits_of_runs_alone() {
+    let pd = [("law.pd.kp_v_rad", 500.0, 8000.0), ("law.pd.kd_v_s_rad", 2.0, 80.0)];
+    let smc = [("law.smc.kp_v", 2.3, 6.0), ("law.smc.kd_v_s_rad", 1.0, 500.0)];
+    let ctc = [("law.ctc.kp_1_s2", 500.0, 3000.0)];
+    let rigs = [
+        ("rig.friction.stribeck.stribeck_velocity_rad_s", 1e-4, 0.02),
+        ("rig.friction.stribeck.mu_static", 0.05, 0.4),
+        ("rig.viscous_damping_nm_s_rad", 0.0, 0.3),
+        ("reference.ramp.rate_deg_s", 0.5, 60.0),
+    ];
+    let cases: [Case<'_>; 11] = [
+        ("pd_2", &pd, &[]),
+        ("pd_2", &pd, &[("reference.ramp.rate_deg_s", "20")]),
+        ("pd_2", &[("rig.drive.weight.mass_kg", 0.05, 0.3)], &[("rig.friction.coulomb.mu_static", "0.2")]),
+        ("pd_2", &rigs, &[]),
+        ("pd_2", &pd, &[("rig.delay_ticks", "2"), ("rig.dac.quantised", "false")]),
+        ("pd_2", &pd, &[("rig.encoder.quantised", "false"), ("run.start", "rest")]),
+        ("smc_2", &smc, &[]),
+        ("ctc_2", &ctc, &[]),
+        ("pid_2", &[("law.pid.kp_v_rad", 500.0, 3000.0)], &[("rig.base", "\"paper\"")]),
+        ("motor_pid", &[("law.pid.kp_v_rad", 5.0, 60.0)], &[]),
+        ("motor_smc", &[("law.smc.kp_v", 1.0, 3.0)], &[]),
+    ];
+    let mut went = 0;
+    for (name, keys, more) in cases {
+        let more: Vec<_> = more.iter().copied().chain([("run.duration_s", "2.5")]).collect();
+        let n = same_bits(&around(name, keys, &more, 19));
+        assert_eq!(n, 19, "{name} {keys:?} {more:?}");
+        went += n;
+    }
+    assert_eq!(went, 19 * cases.len());
+}
+
+#[test]
+fn a_million_periods_that_stick_have_the_bits_of_runs_alone() {
+    let pd = [("law.pd.kp_v_rad", 4000.0, 6000.0), ("law.pd.kd_v_s_rad", 40.0, 60.0)];
+    assert_eq!(same_bits(&around("pd_2", &pd, &[("run.duration_s", "65")], 16)), 16);
+}
+
+#[test]
+fn a_run_that_is_not_for_lanes_goes_alone() {
+    for more in [
+        ("rig.torque_noise_nm", "0.001"),
+        ("rig.actuator_time_constant_s", "0.001"),
+        ("shell.boundary_rad_s", "0.1"),
+        ("rig.base", "\"bench\""),
+        ("velocity.edge_timed", "{}"),
+        ("run.engine", "\"dormand_prince\""),
+    ] {
+        let scenarios = around("pd_2", &[], &[more, ("run.duration_s", "1.5")], 3);
+        let specs: Vec<_> = scenarios.iter().map(Scenario::spec).enumerate().collect();
+        assert_eq!(run_all(levels()[0], &specs, &|| false), Some(vec![]), "{more:?}");
+    }
+    let scenarios = around("pd_2", &[], &[("run.duration_s", "1.5")], 3);
+    let specs: Vec<_> = scenarios.iter().map(Scenario::spec).enumerate().collect();
+    assert_eq!(run_all(levels()[0], &specs, &|| true), None, "stopped");
+}
+
+#[test]
+fn a_shaft_that_runs_away_goes_alone() {
+    // Nothing brakes it: after 60 s it is beyond what counts in lanes hold.
+    let more = [
+        ("law.pd.kp_v_rad", "0.0"),
+        ("law.pd.kd_v_s_rad", "0.0"),
+        ("rig.encoder.counts_per_rev", "16000000"),
+        ("run.duration_s", "30"),
+    ];
+    let scenarios = around("pd_2", &[], &more, 2);
+    assert_eq!(same_bits(&scenarios), 0);
+}

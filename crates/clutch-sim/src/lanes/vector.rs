@@ -1,0 +1,302 @@
+//! The vector: eight doubles, by whatever instructions the processor has.
+//!
+//! The only unsafe code of this crate: a vector of a set of instructions is made out of nothing, as [`Arithmetic`] asks, and
+//! not out of the token that proves the set to be there. [`at`] has seen the token before any vector is made, and no vector
+//! leaves what it calls.
+
+use super::Lane;
+use super::elementary::{self, Powers};
+use clutch_core::Arithmetic;
+use clutch_core::law::Limit;
+use fearless_simd::{Bytes as _, Level, Simd, SimdBase as _, SimdFloat as _, SimdMask as _};
+use fearless_simd::{Select as _, f64x8, mask64x8, u64x8};
+use std::fmt;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A set of instructions as a constant.
+pub(super) trait Instructions: Simd + 'static {
+    /// Its token; only what runs under [`at`] may use it.
+    const TOKEN: Self;
+}
+
+/// Work that is done in lanes.
+pub(super) trait InLanes {
+    /// Its result.
+    type Output;
+    /// Does it.
+    fn run<V: Powers>(self) -> Self::Output;
+}
+
+macro_rules! instructions {
+    ($($(#[$when:meta])* $set:ident;)+) => {
+        $(
+            $(#[$when])*
+            impl Instructions for fearless_simd::$set {
+                // SAFETY: used by vectors alone, and these only under `at`, which was given such a token by a processor
+                // that has the instructions.
+                const TOKEN: Self = unsafe { fearless_simd::$set::assume_supported() };
+            }
+        )+
+
+        /// Does some work by the instructions of a level; none where there are no lanes.
+        pub(super) fn at<W: InLanes>(level: Level, work: W) -> Option<W::Output> {
+            match level {
+                $(
+                    $(#[$when])*
+                    Level::$set(token) => {
+                        Some(token.vectorize(
+                            // A call would leave the instructions behind.
+                            #[inline(always)]
+                            || work.run::<Vector<fearless_simd::$set>>(),
+                        ))
+                    }
+                )+
+                #[allow(unreachable_patterns, reason = "those of other processors")]
+                _ => None,
+            }
+        }
+    };
+}
+instructions! {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))] Sse2;
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))] Sse4_2;
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))] Avx2;
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))] Avx512;
+    #[cfg(target_arch = "aarch64")] Neon;
+}
+
+/// The levels that this processor has, the lowest first.
+#[cfg(test)]
+pub(super) fn levels() -> Vec<Level> {
+    let best = Level::new();
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    let lower = [
+        best.as_sse2().map(Level::Sse2),
+        best.as_sse4_2().map(Level::Sse4_2),
+        best.as_avx2().map(Level::Avx2),
+        best.as_avx512().map(Level::Avx512),
+    ];
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    let lower = [Some(best)];
+    lower.into_iter().flatten().collect()
+}
+
+/// Eight doubles.
+#[derive(Clone, Copy)]
+pub(super) struct Vector<S: Simd>(f64x8<S>);
+
+/// A vector as a constant.
+const fn constant<S: Instructions>(x: f64) -> Vector<S> {
+    // SAFETY: an `f64x8` is documented to have the layout of an array of eight doubles, but for its alignment, which a copy
+    // of bytes does not need.
+    Vector(unsafe { std::mem::transmute_copy(&[x; 8]) })
+}
+
+impl<S: Instructions> Default for Vector<S> {
+    #[inline(always)]
+    fn default() -> Self {
+        Self::splat(0.0)
+    }
+}
+
+impl<S: Instructions> fmt::Debug for Vector<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries((0..8).map(|i| self.lane(i))).finish()
+    }
+}
+
+impl<S: Instructions> PartialEq for Vector<S> {
+    #[inline(always)]
+    fn eq(&self, other: &Self) -> bool {
+        self.0.simd_eq(other.0).all_true()
+    }
+}
+
+macro_rules! operators {
+    ($($of:ident $f:ident $op:tt;)+) => { $(
+        impl<S: Instructions> $of for Vector<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $f(self, other: Self) -> Self {
+                Vector(self.0 $op other.0)
+            }
+        }
+    )+ };
+}
+operators! { Add add +; Sub sub -; Mul mul *; Div div /; }
+
+impl<S: Instructions> Neg for Vector<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Vector(-self.0)
+    }
+}
+
+impl<S: Instructions> Arithmetic for Vector<S> {
+    type Mask = mask64x8<S>;
+    /// Nobody asks: figures have no limits.
+    type Limit = ();
+    const ZERO: Self = constant(0.0);
+    const ONE: Self = constant(1.0);
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Vector(f64x8::splat(S::TOKEN, x))
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> Self::Mask {
+        self.0.simd_lt(other.0)
+    }
+    #[inline(always)]
+    fn less_or_equal(self, other: Self) -> Self::Mask {
+        self.0.simd_le(other.0)
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
+        Vector(mask.select(a.0, b.0))
+    }
+    #[inline(always)]
+    fn limit_of(_: Limit) {}
+    #[inline(always)]
+    fn select_limit(_: Self::Mask, (): (), (): ()) {}
+    #[inline(always)]
+    fn all(mask: Self::Mask) -> bool {
+        mask.all_true()
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Vector(self.0.abs())
+    }
+    #[inline(always)]
+    fn exp_neg(self) -> Self {
+        if Self::all(self.abs().less(Self::splat(700.0))) {
+            return (-self).exp();
+        }
+        Self::of(|i| Arithmetic::exp_neg(self.lane(i)))
+    }
+    #[inline(always)]
+    fn powf(self, n: Self) -> Self {
+        Self::of(|i| Arithmetic::powf(self.lane(i), n.lane(i)))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        let number = self.0.simd_eq(self.0);
+        Self::select(number & !self.less(other), self, other)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        let number = self.0.simd_eq(self.0);
+        Self::select(number & !other.less(self), self, other)
+    }
+    #[inline(always)]
+    fn is_finite(self) -> Self::Mask {
+        self.abs().less_or_equal(Self::splat(f64::MAX))
+    }
+    #[inline(always)]
+    fn limited(self, lowest: Self, highest: Self, invalid: Self) -> (Self, ()) {
+        let (below, above) = (self.less(lowest), highest.less(self));
+        let value = Self::select(above, highest, Self::select(below, lowest, self));
+        (Self::select(self.0.simd_eq(self.0), value, invalid), ())
+    }
+    #[inline(always)]
+    fn sgn(self) -> Self {
+        let below = Self::select(self.less(Self::ZERO), -Self::ONE, Self::ZERO);
+        Self::select(Self::ZERO.less(self), Self::ONE, below)
+    }
+    #[inline(always)]
+    fn sat(self) -> Self {
+        let within = Self::select(self.less(Self::ONE), self, Self::ONE);
+        let within = Self::select(self.less_or_equal(-Self::ONE), -Self::ONE, within);
+        Self::select(self.0.simd_eq(self.0), within, Self::ZERO)
+    }
+}
+
+impl<S: Instructions> Lane for Vector<S> {
+    const WIDTH: usize = 8;
+    const EXPONENT: f64 = 600.0;
+
+    #[inline(always)]
+    fn apart<R>(work: impl FnOnce() -> R) -> R {
+        S::TOKEN.vectorize(work)
+    }
+    #[inline(always)]
+    fn of(mut each: impl FnMut(usize) -> f64) -> Self {
+        let mut all = [0.0; 8];
+        for (i, x) in all.iter_mut().enumerate() {
+            *x = each(i);
+        }
+        Vector(f64x8::from_slice(S::TOKEN, &all))
+    }
+    #[inline(always)]
+    fn lane(&self, i: usize) -> f64 {
+        self.0[i]
+    }
+    #[inline(always)]
+    fn put(&mut self, i: usize, x: f64) {
+        self.0[i] = x;
+    }
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        mask.any_true()
+    }
+    #[inline(always)]
+    fn bits(mask: Self::Mask) -> u64 {
+        mask.to_bitmask()
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        Vector(self.0.floor())
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        Self::apart(
+            #[inline(always)]
+            || elementary::exp(self),
+        )
+    }
+    #[inline(always)]
+    fn expm1(self) -> Self {
+        Self::apart(
+            #[inline(always)]
+            || elementary::expm1(self),
+        )
+    }
+    #[inline(always)]
+    fn log(self) -> Self {
+        Self::apart(
+            #[inline(always)]
+            || elementary::log(self),
+        )
+    }
+    #[inline(always)]
+    fn log1p(self) -> Self {
+        Self::apart(
+            #[inline(always)]
+            || elementary::log1p(self),
+        )
+    }
+}
+
+impl<S: Instructions> Powers for Vector<S> {
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        // 2⁵² + n has n in its low bits.
+        let biased = (self + Self::splat(4_503_599_627_370_496.0 + 1023.0)).0.bitcast::<u64x8<S>>();
+        Vector((biased << 52).bitcast())
+    }
+    #[inline(always)]
+    fn trunc(self) -> Self {
+        Vector(self.0.trunc())
+    }
+    #[inline(always)]
+    fn split(self) -> (Self, Self) {
+        let word = |upper: u64| u64x8::splat(S::TOKEN, upper << 32);
+        let moved = self.0.bitcast::<u64x8<S>>() + word(0x3ff0_0000 - 0x3fe6_a09e);
+        let mantissa = (moved & u64x8::splat(S::TOKEN, 0x000f_ffff_ffff_ffff)) + word(0x3fe6_a09e);
+        // As above, the other way round.
+        let exponent = (moved >> 52) | word(0x4330_0000);
+        let exponent = Vector(exponent.bitcast()) - Self::splat(4_503_599_627_370_496.0 + 1023.0);
+        (exponent, Vector(mantissa.bitcast()))
+    }
+}
