@@ -21,6 +21,7 @@ mod sampled;
 mod scenario;
 mod signals;
 mod sim;
+mod sweep;
 mod table;
 pub mod tune;
 
@@ -41,7 +42,7 @@ pub use output::BUILD;
 /// and replays its logs.
 ///
 /// Exit codes: 0 done; 1 an error, which is printed; 2 not certified; 3 from `loop`: ended by a
-/// fault, from `replay`: the outputs differ; 4 from `loop`: stopped by a signal;
+/// fault, from `replay`: the outputs differ; 4 from `loop` and `sweep`: stopped by a signal;
 /// 5 the log ended early, or has a gap; 64 the command
 /// line could not be understood.
 #[derive(Parser)]
@@ -64,6 +65,7 @@ enum Verb {
     Replay(replay::Replay),
     Log(log::Log),
     Sim(sim::Sim),
+    Sweep(sweep::SweepVerb),
     Scenario(scenario::ScenarioVerb),
     Certify(certify::Certify),
     Map(map::Map),
@@ -92,6 +94,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Replay(v) => v.run(),
         Verb::Log(v) => v.run(),
         Verb::Sim(v) => v.run(),
+        Verb::Sweep(v) => v.run(),
         Verb::Scenario(v) => v.run(),
         Verb::Certify(v) => v.run(),
         Verb::Map(v) => v.run(),

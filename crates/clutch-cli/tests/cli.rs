@@ -28,6 +28,7 @@ fn the_help_of_every_verb_has_an_example() {
     for verb in [
         &["--help"][..],
         &["sim", "--help"],
+        &["sweep", "--help"],
         &["scenario", "--help"],
         &["scenario", "list", "--help"],
         &["scenario", "show", "--help"],
@@ -486,4 +487,99 @@ fn a_map_of_one_ride_makes_the_next_smoother_and_one_of_another_disc_is_dropped(
     assert!(err(&o).contains("empty.toml: has no table [friction_map]; expected a file of"), "{}", err(&o));
     let o = clutch(&["identify", "board_smc_2", "--from", &path("none.mcap"), "--map", &map]);
     assert_eq!(o.status.code(), Some(1));
+}
+
+/// `clutch sweep` of 24 rows of 1.2 s each into a file of a folder.
+fn sweep<'a>(file: &'a str, more: &[&'a str]) -> Output {
+    let args = ["sweep", "pd_2", "--set", "run.duration_s=1.2", "--over", "law.pd.kp_v_rad=500:5000:4"];
+    let over = ["--over", "law.pd.kd_v_s_rad=10,20,30", "--seeds", "2", "--out", file];
+    clutch(&[&args[..], &over, more].concat())
+}
+
+#[test]
+fn a_sweep_writes_for_each_row_what_sim_says_of_it() {
+    let file = folder("sweep").join("a.csv");
+    let name = file.to_str().expect("UTF-8");
+    let o = sweep(name, &[]);
+    assert!(o.status.success(), "{}", err(&o));
+    assert!(out(&o).starts_with("24 of 24 rows in "), "{}", out(&o));
+    let text = std::fs::read_to_string(&file).expect("a file");
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().expect("a header");
+    let rows: Vec<_> = lines.collect();
+    assert_eq!(rows.len(), 24);
+    let at = |name: &str| header.iter().position(|column| *column == name).expect(name);
+    for row in [0, 7, 23] {
+        let set = |i: usize| format!("{}={}", header[i], rows[row][i]);
+        let keys = [set(0), set(1), set(2), "run.duration_s=1.2".to_owned()];
+        let keys = keys.iter().flat_map(|key| ["--set", key]).collect::<Vec<_>>();
+        let o = clutch(&[&["sim", "pd_2", "--json"][..], &keys].concat());
+        let alone: serde_json::Value = serde_json::from_str(&out(&o)).expect("JSON");
+        for figure in ["max_error_rad", "rms_error_rad", "stick_slip_cycles_per_s", "jerk_rms_rad_s3"] {
+            let found: f64 = rows[row][at(figure)].parse().expect("a number");
+            assert_eq!(alone["metrics"][figure].as_f64(), Some(found), "{figure} of row {row}");
+        }
+    }
+}
+
+#[test]
+fn a_sweep_that_was_cut_off_goes_on_and_ends_with_the_same_file() {
+    let dir = folder("sweep_resumed");
+    let (whole, cut) = (dir.join("whole.csv"), dir.join("cut.csv"));
+    let (whole_name, cut_name) = (whole.to_str().expect("UTF-8"), cut.to_str().expect("UTF-8"));
+    assert!(sweep(whole_name, &[]).status.success());
+    let text = std::fs::read(&whole).expect("a file");
+    // Within the header, after it, within a row, after one, at the end.
+    let ends: Vec<usize> =
+        text.iter().enumerate().filter(|(_, b)| **b == b'\n').map(|(i, _)| i + 1).collect();
+    for length in [ends[0], ends[0] + 5, ends[3], ends[7] - 1, text.len() - 1, text.len()] {
+        std::fs::write(&cut, &text[..length]).expect("a file");
+        let o = sweep(cut_name, &["--resume"]);
+        assert!(o.status.success(), "{length} bytes: {}", err(&o));
+        assert!(std::fs::read(&cut).expect("a file") == text, "{length} bytes: another file");
+    }
+    for (bytes, expected) in [
+        (&text[..10], "has no header of a sweep"),
+        (&b"a,b\n1,2\n"[..], "has other columns"),
+        (&[&text[..], &text[ends[0]..]].concat(), "has 48 rows, and this sweep 24"),
+    ] {
+        std::fs::write(&cut, bytes).expect("a file");
+        let o = sweep(cut_name, &["--resume"]);
+        assert_eq!(o.status.code(), Some(1));
+        assert!(err(&o).contains(expected), "{}", err(&o));
+        assert!(std::fs::read(&cut).expect("a file") == bytes, "a file that is refused stays as it is");
+    }
+    std::fs::write(&cut, &text[..ends[5]]).expect("a file");
+    let other = sweep(cut_name, &["--resume", "--set", "rig.delay_ticks=1"]);
+    assert!(err(&other).contains("its row 5 is not what this sweep gives"), "{}", err(&other));
+    let again = sweep(whole_name, &[]);
+    assert!(err(&again).contains("is there already; --resume goes on with it"), "{}", err(&again));
+}
+
+#[test]
+fn rows_that_a_sweep_refuses_say_why_and_a_sweep_without_any_other_leaves_no_file() {
+    let dir = folder("sweep_refused");
+    let (file, none) = (dir.join("some.csv"), dir.join("none.csv"));
+    let args = |file: &Path, over: &'static str| {
+        clutch(&[
+            "sweep",
+            "pd_2",
+            "--set",
+            "run.duration_s=1.2",
+            "--over",
+            over,
+            "--out",
+            file.to_str().expect("UTF-8"),
+        ])
+    };
+    let o = args(&file, "law.pd.kp_v_rad=1000,-1,2000");
+    assert!(o.status.success(), "{}", err(&o));
+    assert!(out(&o).contains("1 refused, with the reason in the column error"), "{}", out(&o));
+    let text = std::fs::read_to_string(&file).expect("a file");
+    assert!(text.lines().nth(2).is_some_and(|row| row.contains("law.pd.kp_v_rad = -1")), "{text}");
+    let o = args(&none, "law.pd.kp=1,2");
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("none of the first 2 rows is a scenario that runs: "), "{}", err(&o));
+    assert!(err(&o).contains("did you mean kp_v_rad?"), "{}", err(&o));
+    assert!(!none.exists());
 }

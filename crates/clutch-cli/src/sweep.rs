@@ -1,0 +1,333 @@
+//! `clutch sweep`.
+
+use crate::args::ScenarioArgs;
+use crate::map;
+use crate::output::{Exit, print, with_progress};
+use crate::signals::stop_flag;
+use anyhow::{Context, bail, ensure};
+use clap::Args;
+use clutch_sim::Keep;
+use clutch_sim::metrics::{Detected, Metrics, figure_columns};
+use clutch_sim::progress::{Progress, Report};
+use clutch_sim::scenario::{Table, Value};
+use clutch_sim::sweep::{Row, Sweep};
+use clutch_sim::{Scenario, ScenarioError};
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Write};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Runs a scenario with many values of its keys, and writes the figures of each run as a row of a CSV file.
+///
+/// Each --over is a key with its values; together they are a grid, of which the last key runs fastest. Rows are written in
+/// their order, some thousand at a time: what stops early goes on with --resume.
+#[derive(Args)]
+#[command(
+    after_help = "Example:\n  clutch sweep pd_2 --over law.pd.kp_v_rad=500:5000:50 --over law.pd.kd_v_s_rad=5,10,20,50 \\\n      \
+    --seeds 10 --out pd.csv\n\n\
+    Columns are the keys in the units of their names, then figures in SI units and radians (docs/scenario.md), `certified` in\n\
+    continuous time, and `error`, the reason where a row is refused."
+)]
+pub(crate) struct SweepVerb {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+    /// A key and its values: LOW:HIGH:NUMBER, evenly spaced in ratio, or a list. May be given several times.
+    #[arg(long, value_name = "KEY=VALUES", value_parser = over, required = true)]
+    over: Vec<Over>,
+    /// Runs each row with the seeds 1 to N.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    seeds: Option<u64>,
+    /// The file that the rows are written to.
+    #[arg(long, value_name = "FILE.csv")]
+    out: PathBuf,
+    /// Goes on with a file that an earlier sweep of the same rows has begun.
+    #[arg(long)]
+    resume: bool,
+    /// Threads; as many as the machine runs at once unless given.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+/// Rows between two times that the file is written.
+const CHUNK: u64 = 4096;
+/// More rows than anybody waits for.
+const MOST: u64 = 1_000_000_000;
+/// The key of `--seeds`.
+const SEED: &str = "run.seed";
+
+/// A key and its values.
+#[derive(Clone, Debug)]
+struct Over {
+    key: String,
+    values: Vec<Value>,
+}
+
+fn over(text: &str) -> Result<Over, String> {
+    let (key, list) = text.split_once('=').ok_or("expected KEY=VALUES, as law.pd.kp_v_rad=500:5000:50")?;
+    let values = if list.contains(':') {
+        map::values(list)?.0.into_iter().map(Value::Float).collect()
+    } else {
+        list.split(',').map(|item| value(item.trim())).collect::<Result<_, _>>()?
+    };
+    Ok(Over { key: key.trim().to_owned(), values })
+}
+
+/// A value as in a scenario file; a bare word is a string.
+fn value(text: &str) -> Result<Value, String> {
+    if let Ok(mut table) = format!("x = {text}").parse::<Table>()
+        && let Some(value) = table.remove("x")
+    {
+        return Ok(value);
+    }
+    let word = !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    word.then(|| Value::String(text.to_owned()))
+        .ok_or_else(|| format!("`{text}`: expected numbers or words with a comma between them"))
+}
+
+/// The rows of a sweep by their number.
+struct Grid {
+    origin: String,
+    base: Table,
+    axes: Vec<Over>,
+    rows: u64,
+}
+
+impl Grid {
+    fn new(
+        origin: String,
+        scenario: &Scenario,
+        mut axes: Vec<Over>,
+        seeds: Option<u64>,
+    ) -> anyhow::Result<Self> {
+        if let Some(n) = seeds {
+            let values = (1..=n.min(MOST)).map(|seed| Value::Integer(seed as i64)).collect();
+            axes.push(Over { key: SEED.to_owned(), values });
+        }
+        for (i, axis) in axes.iter().enumerate() {
+            let twice = axes[..i].iter().any(|other| other.key == axis.key);
+            ensure!(!twice, "{}: named twice; name a key once, with all of its values", axis.key);
+        }
+        let rows = axes.iter().try_fold(1_u64, |n, axis| n.checked_mul(axis.values.len() as u64));
+        match rows {
+            Some(rows) if rows <= MOST => Ok(Grid { origin, base: scenario.table().clone(), axes, rows }),
+            _ => bail!("--over: the grid has more than {MOST} rows; give fewer values"),
+        }
+    }
+
+    /// The values of a row, the last key the fastest.
+    fn values(&self, row: u64) -> Vec<Value> {
+        let mut left = row;
+        let mut values: Vec<Value> = self
+            .axes
+            .iter()
+            .rev()
+            .map(|axis| {
+                let n = axis.values.len() as u64;
+                let value = axis.values[(left % n) as usize].clone();
+                left /= n;
+                value
+            })
+            .collect();
+        values.reverse();
+        values
+    }
+
+    fn header(&self) -> Vec<String> {
+        let keys = self.axes.iter().map(|axis| axis.key.clone());
+        let figures = figures(&Metrics::default(), &Detected::default());
+        keys.chain(figures.into_iter().map(|(name, _)| name.to_owned()))
+            .chain(["certified".into(), "error".into()])
+            .collect()
+    }
+
+    /// A row of the file.
+    fn record(&self, row: u64, outcome: &Result<Row, ScenarioError>) -> Vec<String> {
+        let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        let mut record: Vec<String> = self.values(row).iter().map(plain).collect();
+        let (metrics, detected) = match outcome {
+            Ok(row) => (row.run.metrics, row.run.detected),
+            Err(_) => Default::default(),
+        };
+        let shown =
+            |x: Option<f64>| x.filter(|_| outcome.is_ok()).map_or_else(String::new, |x| x.to_string());
+        record.extend(figures(&metrics, &detected).into_iter().map(|(_, x)| shown(x)));
+        record.extend(match outcome {
+            Ok(row) => [row.certified.to_string(), String::new()],
+            // A record is a line.
+            Err(e) => [String::new(), e.to_string().replace('\n', " ")],
+        });
+        record
+    }
+
+    /// Runs some rows; none of them if it was stopped.
+    fn run(
+        &self,
+        rows: std::ops::Range<u64>,
+        threads: usize,
+        stop: &AtomicBool,
+        progress: Report<'_>,
+    ) -> anyhow::Result<Option<Vec<Result<Row, ScenarioError>>>> {
+        let keys = self.axes.iter().map(|axis| axis.key.clone()).collect();
+        let values: Vec<Vec<Value>> = rows.map(|row| self.values(row)).collect();
+        let sweep = Sweep::new(&self.origin, self.base.clone(), keys, values)?;
+        let found: Mutex<Vec<Option<Result<Row, ScenarioError>>>> =
+            Mutex::new(std::iter::repeat_with(|| None).take(sweep.len()).collect());
+        sweep.run(threads, Keep::Figures, stop, &|i, row| {
+            if let Ok(mut found) = found.lock() {
+                found[i] = Some(row);
+            }
+            if progress(Progress { total: self.rows, finished: 1 }).is_break() {
+                stop.store(true, Ordering::Relaxed);
+            }
+        });
+        let found = found.into_inner().unwrap_or_default();
+        Ok(if stop.load(Ordering::Relaxed) { None } else { found.into_iter().collect() })
+    }
+}
+
+/// The figures of a row by the names of their columns.
+fn figures(metrics: &Metrics, detected: &Detected) -> Vec<(&'static str, Option<f64>)> {
+    figure_columns(metrics, detected).collect()
+}
+
+/// A record as a line of CSV.
+fn line(record: &[String]) -> anyhow::Result<Vec<u8>> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    out.write_record(record)?;
+    Ok(out.into_inner()?)
+}
+
+/// A file that rows are added to, and how many it has.
+struct Begun {
+    file: File,
+    rows: u64,
+}
+
+impl SweepVerb {
+    pub(crate) fn run(self) -> anyhow::Result<Exit> {
+        let scenario = self.scenario.load()?;
+        let origin = self.scenario.scenario.to_string_lossy().into_owned();
+        let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let threads = self.threads.map_or_else(cores, NonZeroUsize::get);
+        let (out, resume) = (self.out, self.resume);
+        let grid = Grid::new(origin, &scenario, self.over, self.seeds)?;
+        let stop = stop_flag()?;
+        let Begun { mut file, rows: before } =
+            if resume && out.exists() { go_on(&grid, &out, threads, &stop)? } else { begin(&grid, &out)? };
+        let wrong = || format!("{}: cannot be written", out.display());
+        let (mut rows, mut refused) = (before, 0);
+        let done = with_progress("rows", |progress| -> anyhow::Result<bool> {
+            if before > 0 {
+                let _ = progress(Progress { total: grid.rows, finished: before });
+            }
+            while rows < grid.rows {
+                let chunk = rows..(rows + CHUNK).min(grid.rows);
+                let Some(found) = grid.run(chunk.clone(), threads, &stop, progress)? else {
+                    return Ok(false);
+                };
+                if rows == 0
+                    && let Some(Err(first)) = found.first()
+                    && found.iter().all(Result::is_err)
+                {
+                    drop(std::fs::remove_file(&out));
+                    bail!("none of the first {} rows is a scenario that runs: {first}", found.len());
+                }
+                let mut text = Vec::new();
+                for (row, outcome) in chunk.clone().zip(&found) {
+                    refused += u64::from(outcome.is_err());
+                    text.extend(line(&grid.record(row, outcome))?);
+                }
+                file.write_all(&text).and_then(|()| file.flush()).with_context(wrong)?;
+                rows = chunk.end;
+            }
+            Ok(true)
+        })?;
+        let mut text = format!("{rows} of {} rows in {}", grid.rows, out.display());
+        if before > 0 {
+            text += &format!(", {before} of them from before");
+        }
+        if refused > 0 {
+            text += &format!("; {refused} refused, with the reason in the column error");
+        }
+        if !done {
+            text += "; stopped: --resume goes on";
+        }
+        print(&(text + "\n"))?;
+        Ok(if done { Exit::Done } else { Exit::Stopped })
+    }
+}
+
+/// A new file.
+fn begin(grid: &Grid, out: &Path) -> anyhow::Result<Begun> {
+    let wrong = || format!("{}: cannot be written", out.display());
+    if out.exists() {
+        bail!("{}: is there already; --resume goes on with it, or name another file", out.display());
+    }
+    let mut file = OpenOptions::new().write(true).create_new(true).open(out).with_context(wrong)?;
+    file.write_all(&line(&grid.header())?).with_context(wrong)?;
+    Ok(Begun { file, rows: 0 })
+}
+
+/// A file of the same sweep: its last whole row, run again, has to come out the same.
+fn go_on(grid: &Grid, out: &Path, threads: usize, stop: &AtomicBool) -> anyhow::Result<Begun> {
+    let name = out.display();
+    let wrong = || format!("{}: cannot be read", out.display());
+    let mut reader = BufReader::new(File::open(out).with_context(wrong)?);
+    let (mut last, mut length, mut lines) = (Vec::new(), 0, 0_u64);
+    loop {
+        let mut next = Vec::new();
+        reader.read_until(b'\n', &mut next).with_context(wrong)?;
+        if next.last() != Some(&b'\n') {
+            break; // the end, or a row that a kill has cut off
+        }
+        if lines == 0 && next != line(&grid.header())? {
+            bail!("{name}: has other columns than this sweep; name another file");
+        }
+        length += next.len() as u64;
+        lines += 1;
+        last = next;
+    }
+    let rows = lines.saturating_sub(1);
+    ensure!(lines > 0, "{name}: has no header of a sweep; name another file");
+    ensure!(rows <= grid.rows, "{name}: has {rows} rows, and this sweep {}; name another file", grid.rows);
+    if rows > 0 {
+        let again = grid.run(rows - 1..rows, threads, stop, clutch_sim::progress::UNWATCHED)?;
+        let again = again.as_deref().and_then(<[_]>::first).map(|row| line(&grid.record(rows - 1, row)));
+        let same = again.transpose()?.is_some_and(|again| again == last);
+        ensure!(
+            same,
+            "{name}: its row {rows} is not what this sweep gives: it is of another scenario, other values or another version \
+             of clutch; name another file"
+        );
+    }
+    let wrong = || format!("{}: cannot be written", out.display());
+    let file = OpenOptions::new().append(true).open(out).with_context(wrong)?;
+    file.set_len(length).with_context(wrong)?;
+    Ok(Begun { file, rows })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_ranges_or_lists_of_numbers_and_words() {
+        let list = |text: &str| over(text).unwrap().values;
+        assert_eq!(list("a.b=1,2.5, x"), [Value::Integer(1), Value::Float(2.5), Value::String("x".into())]);
+        assert_eq!(list("a=1:100:3"), [1.0, 10.0, 100.0].map(Value::Float));
+        for wrong in ["a", "a=", "a=1,,2", "a=1:2", "a=0:1:3", "a=x y"] {
+            assert!(over(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_last_key_runs_fastest() {
+        let axes = vec![over("a=1,2").unwrap(), over("b=3,4,5").unwrap()];
+        let grid = Grid { origin: String::new(), base: Table::new(), axes, rows: 6 };
+        let rows: Vec<Vec<i64>> =
+            (0..6).map(|row| grid.values(row).iter().filter_map(Value::as_integer).collect()).collect();
+        assert_eq!(rows, [[1, 3], [1, 4], [1, 5], [2, 3], [2, 4], [2, 5]]);
+    }
+}
