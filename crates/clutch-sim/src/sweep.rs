@@ -126,12 +126,14 @@ impl Sweep {
         });
     }
 
-    /// Rows that a thread takes at once: one by one where samples are kept; else as many as fill lanes, and few enough that
-    /// each thread has some.
+    /// Rows that a thread takes at once: one by one where samples are kept; else as many as fill lanes if there are so many
+    /// for each thread, and fewer if not.
     fn batch(&self, threads: usize, keep: Keep) -> usize {
-        match keep {
-            Keep::Trace => 1,
-            Keep::Figures => (self.rows.len() / (2 * threads.max(1))).next_multiple_of(LANES).clamp(1, BATCH),
+        let (rows, threads) = (self.rows.len(), threads.max(1));
+        match (keep, rows / (2 * threads)) {
+            (Keep::Trace, _) => 1,
+            (Keep::Figures, n) if n < LANES => rows.div_ceil(threads).clamp(1, LANES),
+            (Keep::Figures, n) => (n - n % LANES).min(BATCH),
         }
     }
 
@@ -144,32 +146,36 @@ impl Sweep {
         done: &(dyn Fn(usize, Result<Row, ScenarioError>) + Sync),
     ) {
         let stopped = || stop.load(Ordering::Relaxed);
-        let mut scenarios = Vec::with_capacity(rows.len());
+        let mut planned = Vec::with_capacity(rows.len());
         for i in rows {
-            let planned = self.scenario(i).and_then(|scenario| {
+            if stopped() {
+                return;
+            }
+            let row = self.scenario(i).and_then(|scenario| {
                 let certified = scenario.plan()?.certificate.certified();
                 Ok((i, certified, scenario))
             });
-            match planned {
-                Ok(row) => scenarios.push(row),
+            match row {
+                Ok(row) => planned.push(row),
                 Err(e) => done(i, Err(e)),
             }
         }
-        let mut in_lanes = vec![None; scenarios.len()];
+        let mut told = vec![false; planned.len()];
         if keep == Keep::Figures {
-            let doubles = scenarios.iter().enumerate().filter(|(_, row)| row.2.scalar() == ScalarKind::F64);
+            let doubles = planned.iter().enumerate().filter(|(_, row)| row.2.scalar() == ScalarKind::F64);
             let specs: Vec<_> = doubles.map(|(place, row)| (place, row.2.spec())).collect();
-            let Some(figures) = lanes::run_all(Level::new(), &specs, &stopped) else { return };
-            for (place, metrics, detected) in figures {
-                in_lanes[place] = Some((metrics, detected));
+            let goes_on = lanes::run_all(Level::new(), &specs, &stopped, &mut |place, metrics, detected| {
+                let (i, certified, _) = &planned[place];
+                told[place] = true;
+                done(*i, Ok(Row { certified: *certified, run: Run::of_figures(metrics, detected) }));
+            });
+            if !goes_on {
+                return;
             }
         }
-        for ((i, certified, scenario), figures) in scenarios.iter().zip(in_lanes) {
+        for ((i, certified, scenario), _) in planned.iter().zip(told).filter(|(_, told)| !told) {
             let progress = |p| if stopped() { ControlFlow::Break(()) } else { UNWATCHED(p) };
-            let run = match figures {
-                Some((metrics, detected)) => Ok(Run::of_figures(metrics, detected)),
-                None => scenario.run(keep, &progress),
-            };
+            let run = scenario.run(keep, &progress);
             if stopped() {
                 return;
             }
@@ -232,5 +238,30 @@ mod tests {
     fn rows_that_do_not_fit_the_keys_are_refused() {
         let bad = Sweep::new("x", Table::new(), vec!["run.seed".into()], vec![vec![]]).unwrap_err();
         assert_eq!(bad, Misfit { row: 0, values: 0, keys: 1 });
+    }
+
+    #[test]
+    fn rows_in_lanes_and_rows_alone_are_told_once_each_and_are_what_they_are_alone() {
+        let pd = BUILT_IN.iter().find(|b| b.name == "pd_2").unwrap();
+        let keys =
+            ["law.pd.kp_v_rad", "rig.torque_noise_nm", "run.duration_s", "run.seed"].map(str::to_owned);
+        // More than a block; each fifth has noise, and goes alone; some last longer; one is refused.
+        let row = |i: i64| {
+            let kp = if i == 400 { -1.0 } else { 3000.0 + 5.0 * i as f64 };
+            let (noise, length) = (if i % 5 == 0 { 1e-3 } else { 0.0 }, if i % 7 == 0 { 1.2 } else { 1.1 });
+            vec![Value::Float(kp), Value::Float(noise), Value::Float(length), Value::Integer(i + 1)]
+        };
+        let rows: Vec<_> = (0..700).map(row).collect();
+        let s = Sweep::new("pd_2", pd.toml.parse().unwrap(), keys.to_vec(), rows).unwrap();
+        let told = Mutex::new(vec![0; s.len()]);
+        for threads in [1, 2, 3] {
+            let found = outcomes(&s, threads);
+            for i in (0..s.len()).step_by(23).chain([399, 400, 401, 699]) {
+                let alone = s.scenario(i).and_then(|row| Ok(row.run(Keep::Figures, UNWATCHED)?.metrics));
+                assert_eq!(found[i], alone, "row {i}, {threads} threads");
+            }
+            s.run(threads, Keep::Figures, &AtomicBool::new(false), &|i, _| told.lock().unwrap()[i] += 1);
+        }
+        assert!(told.into_inner().unwrap().iter().all(|n| *n == 3));
     }
 }

@@ -300,8 +300,6 @@ impl<V: Lane> Flow<V> {
         // some three times as large.
         let last = odd.abs().max(even.abs() / s(3.0)) / time;
         let fits = V::ZERO.less(time * way) & (last * last).less_or_equal(s(TOLERANCE));
-        // What the guess asked the exponential.
-        let fits = fits & ((now + slip) * rest).abs().less_or_equal(s(V::EXPONENT));
         let (time, moment) = (time * way, moment * way * way);
         let stops = way.less_or_equal(-at.speed) & (-at.speed).less_or_equal(way);
         let left = rest - time;
@@ -355,6 +353,14 @@ impl<V: Lane> Flow<V> {
         (slip, rate, balanced)
     }
 
+    /// Where a quadrature's guesses ask exponentials for no more than lanes have.
+    #[inline(always)]
+    fn within_exponents(&self, drive: V, rest: V) -> V::Mask {
+        let most = V::splat(V::EXPONENT);
+        // The drag on a way of no more than twice REACH comes on top.
+        !most.less((drive * rest).abs()) & !most.less(V::splat(20.0) * self.drag * rest)
+    }
+
     /// The piece from the begin of an interval, if it is one outside of the layer or at its fringe: most are. As
     /// [`Flow::piece`].
     #[inline(always)]
@@ -391,11 +397,13 @@ impl<V: Lane> Flow<V> {
         if V::all(piece.done) {
             return piece;
         }
+        // Neither a quadrature nor a series that a run alone would not take.
+        let within = self.within_exponents(rate + slip, rest) & !piece.done;
         let (fits, stops, through) = V::apart(
             #[inline(always)]
             || self.quadrature(at, rate, slip, rest),
         );
-        let fits = fits & !piece.done;
+        let fits = fits & within;
         piece.takes(fits, stops, &through);
         if V::all(piece.done) {
             return piece;
@@ -404,7 +412,7 @@ impl<V: Lane> Flow<V> {
             #[inline(always)]
             || series(at, rate, slip, self.drag, rest),
         );
-        let goes_on = goes_on & !piece.done;
+        let goes_on = goes_on & within & !piece.done;
         piece.takes(goes_on, goes_on & !goes_on, &along);
         piece
     }

@@ -11,7 +11,7 @@ use crate::metrics::{Detected, Metrics, MetricsBuilder, Sampled, Sticks};
 use crate::run::REPORT_EVERY;
 use clutch_core::law::{ControlLaw, Ctc, Hold, Law, Pd, Pid, Smc, SmcSign, Tick, Voltage};
 use clutch_core::reference::Reference;
-use clutch_core::{FixedCounts, Plant, SmoothedDerivative, StickSlipParams};
+use clutch_core::{FixedCounts, Plant, SmoothedDerivative, StickSlipParams, Target};
 
 /// Counts of an encoder beyond which a run goes alone: what wraps, wraps there.
 const FARTHEST: f64 = (1 << 30) as f64;
@@ -154,8 +154,13 @@ impl InLanes for Block<'_, '_> {
         let (mut waiting, mut events) = (Vec::new(), Vec::new());
         let asks = (REPORT_EVERY / rows.len() as u64).max(1);
         for k in 0..common.ticks {
-            if k % asks == 0 && stop() {
-                return None;
+            if k % asks == 0 {
+                if stop() {
+                    return None;
+                }
+                if chunks.iter().all(|chunk| chunk.lost == !0) {
+                    break;
+                }
             }
             let time = k as f64 * common.period;
             for (n, chunk) in chunks.iter_mut().enumerate() {
@@ -172,7 +177,7 @@ impl InLanes for Block<'_, '_> {
 impl<'a, V: Lane> Chunk<'a, V> {
     /// The runs as they begin; none if they have no lanes together.
     fn of(rows: &[&Candidate<'a>], common: &Common) -> Option<Self> {
-        // Lanes that are left over repeat the last run.
+        // Lanes that are left over begin as the last run, and are lost from there.
         let row = |i: usize| rows[i.min(rows.len() - 1)];
         let of = |get: &dyn Fn(&Candidate<'a>) -> f64| V::of(|i| get(row(i)));
         let all = || (0..V::WIDTH).map(row);
@@ -215,7 +220,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
             sampled: Sampled::new(common.period, common.settle),
             silences: Silence::new(&StickSlipParams::default(), counts_per_radian * V::splat(common.period)),
             stairs: Silence::new(&STAIR, counts_per_radian * V::splat(common.period)),
-            lost: 0,
+            lost: u64::MAX.unbounded_shl(rows.len() as u32),
             lanes: beds
                 .into_iter()
                 .map(|bed| Alone { bed, sticks: Sticks::new(common.period, common.settle) })
@@ -242,7 +247,10 @@ impl<'a, V: Lane> Chunk<'a, V> {
                 }
             }
             Paths::Each(paths) => {
-                let all: Vec<_> = paths.iter().map(|path| path.at(k)).collect();
+                let mut all = [Target::default(); 8];
+                for (target, path) in all.iter_mut().zip(paths) {
+                    *target = path.at(k);
+                }
                 Targets {
                     position: V::of(|i| all[i].position.0 as f64) + self.start,
                     velocity: V::of(|i| all[i].velocity),
@@ -325,7 +333,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let breaks_away = !moves & pushed.holds.less(pushed.torque.abs());
         let stuck = !moves & !breaks_away;
         if V::any(stuck) {
-            each(V::bits(stuck), |i| self.lanes[i].sticks.period(time, true, &[]));
+            each(V::bits(stuck) & !self.lost, |i| self.lanes[i].sticks.period(time, true, &[]));
         }
         if !V::any(!stuck) {
             return;
@@ -334,7 +342,11 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let flow = self.bed.flow(&pushed, sign, rest);
         let v_s = self.bed.velocity();
         let begin = State::at(sign * self.velocity / v_s);
-        let Piece { done, state, .. } = flow.first(&begin, rest);
+        // What no exponential here has room for.
+        self.lost |= V::bits(!flow.edge.less(V::splat(700.0)) & !stuck);
+        let Piece { done, stops, state } = flow.first(&begin, rest);
+        // Its event is for what finds it.
+        let (done, state) = (done & !stops, State::select(stops, &begin, &state));
         // To the end, and not to a stop.
         let whole = rest.less_or_equal(state.time) & V::ZERO.less(state.speed);
         let done = done & moves & whole & state.speed.is_finite() & state.way.is_finite();

@@ -6,12 +6,20 @@ use crate::engine::EngineKind;
 use crate::metrics::{Detected, Metrics};
 use crate::rig::Rig;
 use crate::run::{Prepared, RunSpec};
+use clutch_core::law::LawParams;
 use clutch_core::reference::Reference;
-use clutch_core::{FixedCounts, Servo, SmoothedDerivative, VelocityParams};
+use clutch_core::{ActuatorKind, FixedCounts, FrictionParams, Servo, SmoothedDerivative, VelocityParams};
 use fearless_simd::Level;
+use std::mem::{Discriminant, discriminant};
 
 /// Runs in a block: enough to fill vectors with those in the layer, few enough for a core's own memory.
 const BLOCK: usize = 256;
+/// Periods of all runs of a block together, so that each block ends within a second or so.
+const LONGEST: u64 = 1 << 22;
+/// Lanes of the widest vector.
+const MOST_LANES: usize = 8;
+/// Runs below which lanes would stay empty: they are faster alone.
+const FEWEST: usize = 3;
 
 /// A run that can go in lanes, at its beginning.
 pub(super) struct Candidate<'a> {
@@ -36,8 +44,9 @@ pub(super) struct Common {
     pub(super) delay: usize,
     pub(super) whole_counts: bool,
     pub(super) whole_codes: bool,
-    law: std::mem::Discriminant<clutch_core::law::LawParams>,
-    actuator: clutch_core::ActuatorKind,
+    law: Discriminant<LawParams>,
+    /// Actuator and friction of rig and model.
+    plants: [(ActuatorKind, Discriminant<FrictionParams>); 2],
 }
 
 impl<'a> Candidate<'a> {
@@ -66,8 +75,11 @@ impl<'a> Candidate<'a> {
                 delay: rig.delay_ticks as usize,
                 whole_counts: rig.encoder.quantised,
                 whole_codes: rig.dac.quantised,
-                law: std::mem::discriminant(&spec.law),
-                actuator: prepared.moving.rig().model.plant.actuator().kind(),
+                law: discriminant(&spec.law),
+                plants: [
+                    (rig.actuator.kind(), discriminant(&rig.friction)),
+                    (spec.model.actuator.kind(), discriminant(&spec.model.friction)),
+                ],
             },
             filter: SmoothedDerivative::new(filter, encoder, spec.period).ok()?,
             path: Reference::new(&spec.reference, FixedCounts(0), encoder, spec.period).ok()?,
@@ -82,29 +94,40 @@ impl<'a> Candidate<'a> {
     }
 }
 
-/// Runs in lanes what can be, by the instructions of a level. `runs` are the specifications by their places, and what comes
-/// back are figures by these; none of a run that has to go alone. None at all once `stop`, which is asked every
-/// few milliseconds, says so.
+/// Runs in lanes what can be, by the instructions of a level. `runs` are the specifications by their places; `done` is told
+/// the figures of a run by its place, as they come. What it is not told of has to go alone. False once `stop`, which is
+/// asked every few milliseconds, says so; nothing is told any more then.
 pub(crate) fn run_all(
     level: Level,
     runs: &[(usize, RunSpec<'_>)],
     stop: &dyn Fn() -> bool,
-) -> Option<Vec<(usize, Metrics, Detected)>> {
-    let candidates: Vec<Candidate<'_>> =
-        runs.iter().filter_map(|(place, spec)| Candidate::of(*place, spec)).collect();
+    done: &mut dyn FnMut(usize, Metrics, Detected),
+) -> bool {
+    let mut candidates = Vec::new();
+    for (place, spec) in runs {
+        if stop() {
+            return false;
+        }
+        candidates.extend(Candidate::of(*place, spec));
+    }
     let mut left: Vec<&Candidate<'_>> = candidates.iter().collect();
-    let mut found = Vec::new();
     while let Some(first) = left.first() {
         let common = first.common;
         let (rows, others): (Vec<_>, Vec<_>) = left.into_iter().partition(|c| c.common == common);
         left = others;
-        for rows in rows.chunks(BLOCK) {
-            let Some(done) = at(level, Block { rows, common, stop }) else { return Some(found) };
-            let figures = done?;
+        let block = (LONGEST / common.ticks.max(1)).clamp(MOST_LANES as u64, BLOCK as u64) as usize;
+        for rows in rows.chunks(block).filter(|rows| rows.len() >= FEWEST) {
+            let Some(figures) = at(level, Block { rows, common, stop }) else { return true };
+            let Some(figures) = figures else { return false };
             for (row, figures) in rows.iter().zip(figures) {
-                found.extend(figures.map(|(metrics, detected)| (row.place, metrics, detected)));
+                if stop() {
+                    return false;
+                }
+                if let Some((metrics, detected)) = figures {
+                    done(row.place, metrics, detected);
+                }
             }
         }
     }
-    Some(found)
+    true
 }

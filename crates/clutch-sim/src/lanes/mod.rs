@@ -27,7 +27,7 @@ use clutch_core::Arithmetic;
 pub(crate) trait Lane: Arithmetic {
     /// Lanes.
     const WIDTH: usize;
-    /// Magnitude of an exponential's argument beyond which a motion is for a run alone.
+    /// Magnitude of what asks an exponential, beyond which a motion goes on alone; 100 below where exponentials end here.
     const EXPONENT: f64;
 
     /// Does some work in a function of its own, by the same instructions: code that many call is there once.

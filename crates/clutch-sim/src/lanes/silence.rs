@@ -41,6 +41,8 @@ impl<V: Lane> Silence<V> {
         let (was, lasts) = (self.stuck, self.stuck & still);
         self.silent_ticks = V::select(moved, V::ZERO, self.silent_ticks + V::ONE);
         let step = (path_velocity * self.counts_per_tick_second).abs();
+        // A path that is not a number moves nothing.
+        let step = V::select(step.is_finite(), step, V::ZERO);
         self.path_moved = V::select(moved, V::ZERO, self.path_moved + step);
         self.stuck = lasts;
         if V::any(still) {

@@ -3,11 +3,14 @@
 use super::elementary::Powers;
 use super::run_all;
 use super::vector::{InLanes, at, levels};
+use crate::metrics::Detected;
 use crate::progress::UNWATCHED;
 use crate::run::Keep;
 use crate::scenario::{BUILT_IN, Scenario};
+use fearless_simd::Level;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use std::cell::Cell;
 
 /// A function of numbers, in lanes.
 struct Of<'a>(Function, &'a [f64]);
@@ -96,14 +99,12 @@ fn around(name: &str, keys: &[(&str, f64, f64)], more: &[(&str, &str)], n: u64) 
     let built_in = BUILT_IN.iter().find(|b| b.name == name).unwrap();
     let mut rng = Pcg64::seed_from_u64(11);
     let mut one = |i: u64| {
-        let mut set: Vec<(String, String)> = keys
-            .iter()
-            .map(|(key, low, high)| {
-                ((*key).to_owned(), format!("{}", low + (high - low) * rng.random::<f64>()))
-            })
-            .collect();
+        let mut set: Vec<(String, String)> =
+            more.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        set.extend(keys.iter().map(|(key, low, high)| {
+            ((*key).to_owned(), format!("{}", low + (high - low) * rng.random::<f64>()))
+        }));
         set.push(("run.seed".into(), (i + 1).to_string()));
-        set.extend(more.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())));
         // What drives a run in lanes is a weight.
         let weight = "[rig.drive.weight]\nmass_kg = 0.001\n";
         let toml = built_in
@@ -115,6 +116,16 @@ fn around(name: &str, keys: &[(&str, f64, f64)], more: &[(&str, &str)], n: u64) 
     (0..n).map(&mut one).collect()
 }
 
+type Told = Vec<(usize, crate::Metrics, Detected)>;
+
+/// Figures of those that go in lanes; false if it was stopped.
+fn together(level: Level, scenarios: &[Scenario], stop: &dyn Fn() -> bool) -> (Told, bool) {
+    let specs: Vec<_> = scenarios.iter().map(Scenario::spec).enumerate().collect();
+    let mut told = Vec::new();
+    let whole = run_all(level, &specs, stop, &mut |place, m, d| told.push((place, m, d)));
+    (told, whole)
+}
+
 /// Figures of runs in lanes, at every level, against each run alone; how many went in lanes.
 fn same_bits(scenarios: &[Scenario]) -> usize {
     let alone: Vec<_> = scenarios
@@ -122,13 +133,13 @@ fn same_bits(scenarios: &[Scenario]) -> usize {
         .map(|s| s.run(Keep::Figures, UNWATCHED).unwrap())
         .map(|r| (r.metrics, r.detected))
         .collect();
-    let specs: Vec<_> = scenarios.iter().map(Scenario::spec).enumerate().collect();
     let mut went = 0;
     for level in levels() {
-        let together = run_all(level, &specs, &|| false).unwrap();
+        let (together, whole) = together(level, scenarios, &|| false);
+        assert!(whole);
         went = together.len();
         for (place, metrics, detected) in together {
-            let bits = |m: &crate::Metrics, d: &crate::metrics::Detected| -> Vec<_> {
+            let bits = |m: &crate::Metrics, d: &Detected| -> Vec<_> {
                 crate::metrics::figure_columns(m, d).map(|(name, x)| (name, x.map(f64::to_bits))).collect()
             };
             let (m, d) = &alone[place];
@@ -152,7 +163,29 @@ fn runs_in_lanes_have_the_bits_of_runs_alone() {
         ("rig.viscous_damping_nm_s_rad", 0.0, 0.3),
         ("reference.ramp.rate_deg_s", 0.5, 60.0),
     ];
-    let cases: [Case<'_>; 11] = [
+    let stiff = [("rig.friction.stribeck.stribeck_velocity_rad_s", 1e-6, 3e-5)];
+    let light = [("rig.inertia_kg_m2", 1e-5, 1e-4), ("law.pd.kd_v_s_rad", 0.1, 2.0)];
+    let voltage = [("law.voltage.start_v", 0.5, 3.0)];
+    let open = ("output.bumpless_time_s", "0.1");
+    let path = |path: &'static str| ("reference", path);
+    let sine = "{ sine = { rate_deg_s = 5.0, amplitude_deg = 0.5, frequency_hz = 1.0 } }";
+    let jerk = "{ minimum_jerk = { distance_deg = 8.0, duration_s = 2.0 } }";
+    let cases: [Case<'_>; 22] = [
+        ("pd_2", &stiff, &[]),
+        ("pd_2", &stiff, &[("sampling.period_us", "20000")]),
+        ("pd_2", &light, &[]),
+        ("pd_2", &pd, &[("sampling.period_us", "10000"), ("rig.viscous_damping_nm_s_rad", "0.5")]),
+        ("pd_2", &pd, &[path(sine), ("rig.delay_ticks", "1"), ("run.settle_s", "0")]),
+        ("pd_2", &pd, &[path(jerk), open, ("rig.delay_ticks", "7")]),
+        ("pd_2", &pd, &[("rig.encoder.counts_per_rev", "400"), ("rig.friction.stribeck.mu_static", "0.1")]),
+        ("pd_2", &voltage, &[("law", "{ voltage = {} }")]),
+        ("pd_2", &[("rig.drive.weight.mass_kg", 0.1, 0.3)], &[("law", "{ hold = {} }")]),
+        ("smc_2", &[("rig.friction.stribeck.mu_dynamic", 0.1, 0.2)], &[("law", "{ smc_sign = {} }")]),
+        (
+            "pid_2",
+            &[("law.pid.kp_v_rad", 500.0, 3000.0)],
+            &[("rig.base", "\"paper\""), ("law.pid.kd_v_s_rad", "0")],
+        ),
         ("pd_2", &pd, &[]),
         ("pd_2", &pd, &[("reference.ramp.rate_deg_s", "20")]),
         ("pd_2", &[("rig.drive.weight.mass_kg", 0.05, 0.3)], &[("rig.friction.coulomb.mu_static", "0.2")]),
@@ -192,23 +225,39 @@ fn a_run_that_is_not_for_lanes_goes_alone() {
         ("run.engine", "\"dormand_prince\""),
     ] {
         let scenarios = around("pd_2", &[], &[more, ("run.duration_s", "1.5")], 3);
-        let specs: Vec<_> = scenarios.iter().map(Scenario::spec).enumerate().collect();
-        assert_eq!(run_all(levels()[0], &specs, &|| false), Some(vec![]), "{more:?}");
+        assert_eq!(together(levels()[0], &scenarios, &|| false), (vec![], true), "{more:?}");
     }
-    let scenarios = around("pd_2", &[], &[("run.duration_s", "1.5")], 3);
-    let specs: Vec<_> = scenarios.iter().map(Scenario::spec).enumerate().collect();
-    assert_eq!(run_all(levels()[0], &specs, &|| true), None, "stopped");
+}
+
+#[test]
+fn a_run_that_is_stopped_is_not_told() {
+    let scenarios = around("pd_2", &[], &[("run.duration_s", "5")], 9);
+    for after in [0, 5, 9, 10, 11] {
+        let asked = Cell::new(0);
+        let stop = || asked.replace(asked.get() + 1) >= after;
+        assert_eq!(together(levels()[0], &scenarios, &stop), (vec![], false), "after {after} questions");
+    }
 }
 
 #[test]
 fn a_shaft_that_runs_away_goes_alone() {
-    // Nothing brakes it: after 60 s it is beyond what counts in lanes hold.
+    // Nothing brakes it: after 11 s it is beyond what counts in lanes hold.
     let more = [
         ("law.pd.kp_v_rad", "0.0"),
         ("law.pd.kd_v_s_rad", "0.0"),
         ("rig.encoder.counts_per_rev", "16000000"),
-        ("run.duration_s", "30"),
+        ("run.duration_s", "15"),
     ];
-    let scenarios = around("pd_2", &[], &more, 2);
-    assert_eq!(same_bits(&scenarios), 0);
+    assert_eq!(same_bits(&around("pd_2", &[], &more, 3)), 0);
+}
+
+#[test]
+fn runs_that_have_little_in_common_go_in_groups() {
+    let mut scenarios = around("pd_2", &[], &[("run.duration_s", "1.5")], 4);
+    scenarios.extend(around("smc_2", &[], &[("run.duration_s", "1.5")], 5));
+    scenarios.extend(around("pd_2", &[], &[("run.duration_s", "2")], 11));
+    // Too few to fill lanes, and one that has none.
+    scenarios.extend(around("pd_2", &[], &[("run.duration_s", "1.6")], 2));
+    scenarios.extend(around("pd_2", &[], &[("run.duration_s", "1.5"), ("rig.torque_noise_nm", "0.001")], 1));
+    assert_eq!(same_bits(&scenarios), 20);
 }

@@ -1,8 +1,8 @@
 //! The vector: eight doubles, by whatever instructions the processor has.
 //!
 //! The only unsafe code of this crate: a vector of a set of instructions is made out of nothing, as [`Arithmetic`] asks, and
-//! not out of the token that proves the set to be there. [`at`] has seen the token before any vector is made, and no vector
-//! leaves what it calls.
+//! not out of the token that proves the set to be there. [`at`] has seen the token before any vector is made. Nothing outside
+//! of this file can name a vector, and [`InLanes`] is given one by [`at`] alone; its result must hold none.
 
 use super::Lane;
 use super::elementary::{self, Powers};
@@ -14,7 +14,7 @@ use std::fmt;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A set of instructions as a constant.
-pub(super) trait Instructions: Simd + 'static {
+trait Instructions: Simd + 'static {
     /// Its token; only what runs under [`at`] may use it.
     const TOKEN: Self;
 }
@@ -83,10 +83,11 @@ pub(super) fn levels() -> Vec<Level> {
 
 /// Eight doubles.
 #[derive(Clone, Copy)]
-pub(super) struct Vector<S: Simd>(f64x8<S>);
+struct Vector<S: Simd>(f64x8<S>);
 
 /// A vector as a constant.
 const fn constant<S: Instructions>(x: f64) -> Vector<S> {
+    const { assert!(size_of::<f64x8<S>>() == size_of::<[f64; 8]>()) }
     // SAFETY: an `f64x8` is documented to have the layout of an array of eight doubles, but for its alignment, which a copy
     // of bytes does not need.
     Vector(unsafe { std::mem::transmute_copy(&[x; 8]) })
@@ -186,8 +187,8 @@ impl<S: Instructions> Arithmetic for Vector<S> {
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        let number = self.0.simd_eq(self.0);
-        Self::select(number & !other.less(self), self, other)
+        let number = other.0.simd_eq(other.0);
+        Self::select(number & !self.less(other), other, self)
     }
     #[inline(always)]
     fn is_finite(self) -> Self::Mask {
