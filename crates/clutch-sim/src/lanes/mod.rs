@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! rows of a sweep ─► group (same law, same length, …) ─► block of chunks of eight lanes
-//!     each period:  encoder ─► (5) ─► law ─► converter ─► linear motion       in lanes, every run
-//!                                                     └─► quadrature          in lanes, the runs inside the layer
-//!                                                     └─► series, stick, …    one by one
+//!     each period:  encoder ─► (5) ─► law ─► converter ─► linear motion          in lanes, every run
+//!                                                     └─► quadrature, series     in lanes, the runs in the layer
+//!                                                     └─► stops                  one by one
 //! ```
 //!
 //! Arithmetic, law, output stage, actuator and the pieces of the exact flow are the very functions of one run, over
