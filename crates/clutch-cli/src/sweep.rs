@@ -9,7 +9,7 @@ use clap::Args;
 use clutch_sim::Keep;
 use clutch_sim::metrics::{Detected, Metrics, figure_columns};
 use clutch_sim::progress::{Progress, Report};
-use clutch_sim::scenario::{Table, Value};
+use clutch_sim::scenario::{Table, Value, written_value};
 use clutch_sim::sweep::{Row, Sweep};
 use clutch_sim::{Scenario, ScenarioError};
 use std::fs::{File, OpenOptions};
@@ -74,16 +74,9 @@ fn over(text: &str) -> Result<Over, String> {
     Ok(Over { key: key.trim().to_owned(), values })
 }
 
-/// A value as in a scenario file; a bare word is a string.
 fn value(text: &str) -> Result<Value, String> {
-    if let Ok(mut table) = format!("x = {text}").parse::<Table>()
-        && let Some(value) = table.remove("x")
-    {
-        return Ok(value);
-    }
-    let word = !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    word.then(|| Value::String(text.to_owned()))
-        .ok_or_else(|| format!("`{text}`: expected numbers or words with a comma between them"))
+    let value = written_value(text).filter(|_| !text.is_empty());
+    value.ok_or_else(|| format!("`{text}`: expected numbers or words with a comma between them"))
 }
 
 /// The rows of a sweep by their number.

@@ -238,7 +238,7 @@ impl<V: Arithmetic> Sampled<V> {
 }
 
 impl<V: Lane> Sampled<V> {
-    /// Those of one lane.
+    /// The figures of one lane.
     pub(crate) fn lane(&self, i: usize) -> Sampled<f64> {
         Sampled {
             period: self.period,
@@ -349,7 +349,7 @@ impl MetricsBuilder {
         Self::of(Sampled::new(period, settle), Sticks::new(period, settle))
     }
 
-    /// Of figures that were gathered apart.
+    /// A builder that goes on from figures gathered apart.
     pub(crate) fn of(samples: Sampled<f64>, sticks: Sticks) -> Self {
         MetricsBuilder { samples, sticks }
     }

@@ -1,9 +1,10 @@
 //! A block of runs in lockstep: chunks of as many as a vector has lanes.
 
+use super::elementary::Powers;
 use super::group::{Candidate, Common};
 use super::silence::Silence;
 use super::vector::InLanes;
-use super::{Lane, elementary::Powers};
+use super::{Lane, each};
 use crate::detected::STAIR;
 use crate::engine::exact_flow::{Bed, Flow, PIECE_LIMIT, Piece, Pushed, State};
 use crate::engine::{Event, EventKind, Motion, Shaft};
@@ -28,17 +29,22 @@ macro_rules! laws {
 
         impl<V: Lane> LawInLanes<V> {
             /// The laws of the runs as one; none if they are not of one kind, or of a kind that has no lanes.
-            fn of(laws: &[&Law<f64>], tick: &Tick<V>, applied: V) -> Option<Self> {
+            fn of(laws: &[&Law<f64>]) -> Option<Self> {
                 match laws.first()? {
                     $(Law::$law(_) => {
                         let own = |law: &&Law<f64>| if let Law::$law(law) = law { Some(*law) } else { None };
                         let own: Vec<$law<f64>> = laws.iter().map(own).collect::<Option<_>>()?;
                         let law: Option<$law<V>> = $law::in_lanes(&|get| V::of(|i| get(&own[i]))).into();
-                        let law = law?;
-                        let state = law.start(tick, applied);
-                        Some(LawInLanes::$law(law, state))
+                        Some(LawInLanes::$law(law?, Default::default()))
                     })+
                     _ => None,
+                }
+            }
+
+            /// Begins at a tick, with so many volts on the actuator.
+            fn start(&mut self, tick: &Tick<V>, applied: V) {
+                match self {
+                    $(LawInLanes::$law(law, state) => *state = law.start(tick, applied),)+
                 }
             }
 
@@ -111,7 +117,7 @@ struct Chunk<'a, V: Lane> {
     lanes: Vec<Alone>,
 }
 
-/// What a lane has by itself.
+/// The part of a run that is kept lane by lane.
 struct Alone {
     bed: Bed<f64>,
     sticks: Sticks,
@@ -136,7 +142,7 @@ pub(super) type Figures = Option<(Metrics, Detected)>;
 pub(super) struct Block<'b, 'a> {
     pub(super) rows: &'b [&'b Candidate<'a>],
     pub(super) common: Common,
-    /// Asked now and then: whether to stop.
+    /// True once it has to stop; asked now and then.
     pub(super) stop: &'b dyn Fn() -> bool,
 }
 
@@ -207,8 +213,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
             plant: Plant::in_lanes(&|get| V::of(|i| get(&row(i).rig().model.plant)))?,
             bed: Bed::in_lanes(&beds),
             drive: of(&|r| r.rig().drive.torque(0.0, 0.0) + 0.0),
-            // Until the law has been asked.
-            law: LawInLanes::of(&all().map(|r| r.servo.law()).collect::<Vec<_>>(), &Tick::default(), volts)?,
+            law: LawInLanes::of(&all().map(|r| r.servo.law()).collect::<Vec<_>>())?,
             error: V::ZERO,
             rate: V::ZERO,
             counts: V::ZERO,
@@ -230,7 +235,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let (_, seen) = chunk.seen(common);
         chunk.error = targets.position - seen;
         let tick = chunk.tick(&targets, V::ZERO);
-        chunk.law = LawInLanes::of(&all().map(|r| r.servo.law()).collect::<Vec<_>>(), &tick, volts)?;
+        chunk.law.start(&tick, volts);
         Some(chunk)
     }
 
@@ -303,12 +308,11 @@ impl<'a, V: Lane> Chunk<'a, V> {
         };
         let target = targets.position * V::splat(1.0 / FIXED) * self.radians_per_count;
         self.sampled.sample(time, target - self.position, self.velocity, commanded);
-        let rests = counts.less_or_equal(self.counts) & self.counts.less_or_equal(counts);
-        let moved = if k == 0 { !(rests & !rests) } else { !rests };
+        let rests = if k == 0 { V::none() } else { V::same(counts, self.counts) };
         self.counts = counts;
         let settled = time >= common.settle;
-        self.silences.update(moved, targets.velocity, settled);
-        self.stairs.update(moved, targets.velocity, settled);
+        self.silences.update(!rests, targets.velocity, settled);
+        self.stairs.update(!rests, targets.velocity, settled);
         if common.delay == 0 {
             self.arriving = commanded;
         } else {
@@ -386,15 +390,6 @@ impl<'a, V: Lane> Chunk<'a, V> {
             ..Detected::default()
         };
         Some((metrics, detected))
-    }
-}
-
-/// Each lane whose bit is set.
-#[inline(always)]
-fn each(mut bits: u64, mut lane: impl FnMut(usize)) {
-    while bits != 0 {
-        lane(bits.trailing_zeros() as usize);
-        bits &= bits - 1;
     }
 }
 

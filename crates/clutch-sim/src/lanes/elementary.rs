@@ -12,7 +12,7 @@ const INVERSE_LN2: f64 = core::f64::consts::LOG2_E;
 /// Magnitude above which an argument of an exponential is reduced: half of ln 2 in its upper word.
 const REDUCED: f64 = f64::from_bits(0x3fd6_2e43_0000_0000);
 
-/// What the exponentials need of the bits of a number.
+/// Access to the bits of a number, as exponentials and logarithms need it.
 pub(super) trait Powers: Lane {
     /// 2 to the power of a whole number from −1022 to 1023.
     fn power_of_two(self) -> Self;

@@ -34,7 +34,7 @@ pub(super) struct Candidate<'a> {
     pub(super) start: FixedCounts,
 }
 
-/// What the runs of a block have in common.
+/// Settings that the runs of a block have in common.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) struct Common {
     pub(super) period: f64,

@@ -42,6 +42,16 @@ pub(crate) trait Lane: Arithmetic {
     fn any(mask: Self::Mask) -> bool;
     /// The mask, lane `i` in bit `i`.
     fn bits(mask: Self::Mask) -> u64;
+    /// Lanes in which both are one number; NaN is none.
+    #[inline(always)]
+    fn same(a: Self, b: Self) -> Self::Mask {
+        a.less_or_equal(b) & b.less_or_equal(a)
+    }
+    /// A mask that is true in no lane.
+    #[inline(always)]
+    fn none() -> Self::Mask {
+        Self::ZERO.less(Self::ZERO)
+    }
     /// Largest whole number not above self.
     fn floor(self) -> Self;
     /// e to the power of self, for |self| ≤ 700.
@@ -52,6 +62,25 @@ pub(crate) trait Lane: Arithmetic {
     fn log(self) -> Self;
     /// Natural logarithm of 1 + self, for self > −1.
     fn log1p(self) -> Self;
+}
+
+/// Does something for each lane whose bit is set.
+#[inline(always)]
+pub(crate) fn each(mut bits: u64, mut lane: impl FnMut(usize)) {
+    while bits != 0 {
+        lane(bits.trailing_zeros() as usize);
+        bits &= bits - 1;
+    }
+}
+
+/// The functions of a number that `libm` has by the same names.
+macro_rules! libm {
+    ($($f:ident)+) => { $(
+        #[inline]
+        fn $f(self) -> f64 {
+            libm::$f(self)
+        }
+    )+ };
 }
 
 impl Lane for f64 {
@@ -82,24 +111,5 @@ impl Lane for f64 {
     fn bits(mask: bool) -> u64 {
         mask.into()
     }
-    #[inline]
-    fn floor(self) -> f64 {
-        libm::floor(self)
-    }
-    #[inline]
-    fn exp(self) -> f64 {
-        libm::exp(self)
-    }
-    #[inline]
-    fn expm1(self) -> f64 {
-        libm::expm1(self)
-    }
-    #[inline]
-    fn log(self) -> f64 {
-        libm::log(self)
-    }
-    #[inline]
-    fn log1p(self) -> f64 {
-        libm::log1p(self)
-    }
+    libm! { floor exp expm1 log log1p }
 }

@@ -25,7 +25,7 @@ impl<V: Lane> Silence<V> {
             gap: V::splat(p.gap),
             ticks: V::splat(f64::from(p.ticks)),
             counts_per_tick_second,
-            stuck: V::ZERO.less(V::ZERO),
+            stuck: V::none(),
             silent_ticks: V::ZERO,
             path_moved: V::ZERO,
             cycles: V::ZERO,

@@ -3,6 +3,7 @@
 use super::elementary::Powers;
 use super::run_all;
 use super::vector::{InLanes, at, levels};
+use crate::engine::exact_flow::{Flow, LINEAR_ABOVE, State};
 use crate::metrics::Detected;
 use crate::progress::UNWATCHED;
 use crate::run::Keep;
@@ -91,6 +92,38 @@ fn exponentials_and_logarithms_have_the_bits_of_libm_at_every_level() {
                 assert_eq!(alone(*x).to_bits(), y.to_bits(), "{function:?} of {x:e} at {level:?}");
             }
         }
+    }
+}
+
+/// The first piece of a motion without a layer and without drag, in each lane: whether there is one, and whether it stops.
+struct Slows {
+    drive: f64,
+    speed: f64,
+    rest: f64,
+}
+
+impl InLanes for Slows {
+    type Output = (u64, u64, f64);
+
+    fn run<V: Powers>(self) -> Self::Output {
+        let drive = V::splat(self.drive);
+        let flow =
+            Flow { drive, excess: drive, drag: V::ZERO, stribeck: V::ZERO, edge: V::splat(LINEAR_ABOVE) };
+        let piece = flow.first(&State::at(V::splat(self.speed)), V::splat(self.rest));
+        (V::bits(piece.done), V::bits(piece.stops), piece.state.time.lane(7))
+    }
+}
+
+#[test]
+fn a_motion_that_stops_just_as_the_period_ends_stops_in_lanes_too() {
+    // In exact numbers it would reach 0 an ulp after the end; rounded it is there at the end.
+    let (drive, speed, rest) = (-8.497_374_274_981_322, 0.008_497_374_274_981_323, 1e-3);
+    let alone = Flow { drive, excess: drive, drag: 0.0, stribeck: 0.0, edge: LINEAR_ABOVE };
+    let (end, stops) = alone.run(State::at(speed), rest).unwrap();
+    assert!(stops && end.time == rest, "alone: {stops}, at {} s", end.time);
+    for level in levels() {
+        let (done, stops, time) = at(level, Slows { drive, speed, rest }).unwrap();
+        assert_eq!((done, stops, time), (0xff, 0xff, rest), "{level:?}");
     }
 }
 

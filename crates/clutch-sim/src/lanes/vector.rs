@@ -213,6 +213,19 @@ impl<S: Instructions> Arithmetic for Vector<S> {
     }
 }
 
+/// The functions that lanes have of their own, each once for a set of instructions.
+macro_rules! elementary {
+    ($($f:ident)+) => { $(
+        #[inline(always)]
+        fn $f(self) -> Self {
+            Self::apart(
+                #[inline(always)]
+                || elementary::$f(self),
+            )
+        }
+    )+ };
+}
+
 impl<S: Instructions> Lane for Vector<S> {
     const WIDTH: usize = 8;
     const EXPONENT: f64 = 600.0;
@@ -246,37 +259,14 @@ impl<S: Instructions> Lane for Vector<S> {
         mask.to_bitmask()
     }
     #[inline(always)]
+    fn same(a: Self, b: Self) -> Self::Mask {
+        a.0.simd_eq(b.0)
+    }
+    #[inline(always)]
     fn floor(self) -> Self {
         Vector(self.0.floor())
     }
-    #[inline(always)]
-    fn exp(self) -> Self {
-        Self::apart(
-            #[inline(always)]
-            || elementary::exp(self),
-        )
-    }
-    #[inline(always)]
-    fn expm1(self) -> Self {
-        Self::apart(
-            #[inline(always)]
-            || elementary::expm1(self),
-        )
-    }
-    #[inline(always)]
-    fn log(self) -> Self {
-        Self::apart(
-            #[inline(always)]
-            || elementary::log(self),
-        )
-    }
-    #[inline(always)]
-    fn log1p(self) -> Self {
-        Self::apart(
-            #[inline(always)]
-            || elementary::log1p(self),
-        )
-    }
+    elementary! { exp expm1 log log1p }
 }
 
 impl<S: Instructions> Powers for Vector<S> {

@@ -47,20 +47,22 @@ impl ScenarioError {
     }
 }
 
-/// A value, written as in the file.
-pub(super) fn read_value(origin: &str, key: &str, text: &str) -> Result<Value, ScenarioError> {
+/// A value, written as in the file; a bare word is a string, as shells make quoting hard.
+#[must_use]
+pub fn written_value(text: &str) -> Option<Value> {
+    let word = || text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     match format!("x = {text}").parse::<Table>() {
-        Ok(mut t) => Ok(t.remove("x").unwrap_or(Value::String(text.into()))),
-        // A bare word is a string, as shells make quoting hard.
-        Err(_) if text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') => {
-            Ok(Value::String(text.into()))
-        }
-        Err(_) => {
-            let origin = format!("{origin} with --set {key}={text}");
-            let expected = "a TOML value: a number, true, \"text\" or [a, list]";
-            Err(ScenarioError::value(&origin, key, text, expected))
-        }
+        Ok(mut table) => table.remove("x"),
+        Err(_) => word().then(|| Value::String(text.into())),
     }
+}
+
+/// As [`written_value`], for a key.
+pub(super) fn read_value(origin: &str, key: &str, text: &str) -> Result<Value, ScenarioError> {
+    written_value(text).ok_or_else(|| {
+        let origin = format!("{origin} with --set {key}={text}");
+        ScenarioError::value(&origin, key, text, "a TOML value: a number, true, \"text\" or [a, list]")
+    })
 }
 
 /// Tables within tables that a key may name; no scenario has more than five.

@@ -11,7 +11,7 @@ mod schema;
 mod section;
 mod verdict;
 
-pub use error::ScenarioError;
+pub use error::{ScenarioError, written_value};
 pub use params::{Safety, ScalarKind, ScenarioBounds, ScenarioLimits, ScenarioParams, ScenarioSampling};
 pub use sampled::{NOISE_ROOTS, NotCovered};
 pub use schema::schema;
