@@ -393,7 +393,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
     }
 }
 
-/// The motions that wait, piece by piece, as many at once as there are lanes; those that stop one by one.
+/// The motions that wait, piece by piece, as many at once as there are lanes; what follows a stop one by one.
 #[inline(always)]
 fn through_the_layer<V: Lane>(
     chunks: &mut [Chunk<'_, V>],
@@ -426,19 +426,24 @@ fn through_the_layer<V: Lane>(
                 way: of(|w| w.state.way),
             };
             let Piece { done, stops, state } = flow.piece(&at, whole - at.time);
-            let goes_on = done & !stops & state.speed.is_finite() & state.way.is_finite();
-            let ends = V::bits(goes_on & whole.less_or_equal(state.time));
-            let goes_on = V::bits(goes_on);
+            let done = done & state.speed.is_finite() & state.way.is_finite();
+            let ends = V::bits(done & !stops & whole.less_or_equal(state.time));
+            let (done, stops) = (V::bits(done), V::bits(stops));
             for (i, at) in some.enumerate() {
                 let chunk = &mut chunks[waiting[at].chunk];
-                if ends >> i & 1 == 1 {
+                let is = |bits: u64| bits >> i & 1 == 1;
+                if is(ends) {
                     chunk.ends(&waiting[at], (state.speed.lane(i), state.way.lane(i)), time);
-                } else if goes_on >> i & 1 == 1 {
+                    continue;
+                }
+                if is(done) {
                     waiting[at].state = state.lane(i);
+                }
+                if is(done & !stops) {
                     waiting.swap(left, at);
                     left += 1;
                 } else {
-                    chunk.alone(&waiting[at], time, common, events);
+                    chunk.alone(&waiting[at], is(done & stops), time, common, events);
                 }
             }
         }
@@ -463,17 +468,22 @@ impl<V: Lane> Chunk<'_, V> {
         self.velocity.put(w.lane, scale * speed);
     }
 
-    /// A motion that no vector takes.
+    /// A motion that stops where it is, or that no vector takes.
     #[inline(never)]
-    fn alone(&mut self, w: &Waiting, time: f64, common: &Common, events: &mut Vec<Event>) {
+    fn alone(&mut self, w: &Waiting, stops: bool, time: f64, common: &Common, events: &mut Vec<Event>) {
         let Waiting { lane, flow, state, .. } = *w;
         let stuck = w.breaks_away;
         let mut shaft = Shaft::new(self.position.lane(lane), self.velocity.lane(lane));
         shaft.motion = if stuck { Motion::Stuck } else { Motion::along(w.sign) };
         events.clear();
         let alone = &mut self.lanes[lane];
-        let moved =
-            alone.bed.advance(&w.pushed, (time, common.period), &mut shaft, events, Some((flow, state)));
+        let moved = alone.bed.advance(
+            &w.pushed,
+            (time, common.period),
+            &mut shaft,
+            events,
+            Some((flow, state, stops)),
+        );
         if moved.is_err() {
             self.lost |= 1 << lane;
             return;

@@ -4,7 +4,7 @@
 //! rows of a sweep ─► group (same law, same length, …) ─► block of chunks of eight lanes
 //!     each period:  encoder ─► (5) ─► law ─► converter ─► linear motion          in lanes, every run
 //!                                                     └─► quadrature, series     in lanes, the runs in the layer
-//!                                                     └─► stops                  one by one
+//!                                                     └─► what follows a stop    one by one
 //! ```
 //!
 //! Arithmetic, law, output stage, actuator and the pieces of the exact flow are the very functions of one run, over

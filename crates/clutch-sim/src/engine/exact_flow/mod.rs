@@ -146,7 +146,7 @@ impl<V: Lane> Bed<V> {
 
 impl Bed<f64> {
     /// Moves `shaft` over an interval that begins at `time` and lasts for `duration`, s, and adds what happened to `events`.
-    /// If the motion has begun already, `begun` has its flow and its state.
+    /// If the motion has begun already, `begun` has its flow, its state, and whether it stops there.
     ///
     /// # Errors
     /// If the motion cannot be followed.
@@ -156,7 +156,7 @@ impl Bed<f64> {
         (time, duration): (f64, f64),
         shaft: &mut Shaft,
         events: &mut Vec<Event>,
-        mut begun: Option<(Flow<f64>, State<f64>)>,
+        mut begun: Option<(Flow<f64>, State<f64>, bool)>,
     ) -> Result<(), EngineError> {
         let Pushed { torque, holds, .. } = *pushed;
         let v_s = self.curve.velocity;
@@ -173,10 +173,12 @@ impl Bed<f64> {
                 events.push(event(EventKind::BreakAway, s, shaft.position));
             }
             let (sign, left) = (shaft.motion.sign(), duration - s);
-            let (flow, at) = begun
-                .take()
-                .unwrap_or_else(|| (self.flow(pushed, sign, left), State::at(sign * shaft.velocity / v_s)));
-            let Some((end, stops)) = flow.run(at, left) else {
+            let run = match begun.take() {
+                Some((_, end, true)) => Some((State { speed: 0.0, ..end }, true)),
+                Some((flow, at, false)) => flow.run(at, left),
+                None => self.flow(pushed, sign, left).run(State::at(sign * shaft.velocity / v_s), left),
+            };
+            let Some((end, stops)) = run else {
                 return Err(EngineError::TooManySteps { time, limit: PIECE_LIMIT });
             };
             if !(end.way.is_finite() && end.speed.is_finite()) {
