@@ -15,10 +15,6 @@ import importlib
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-# Before the native module, which it chooses.
-from clutch import _processor  # noqa: F401
-
-# isort: split
 from clutch import _clutch, _tables
 from clutch._certificate import Certificate
 from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
