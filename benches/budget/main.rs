@@ -11,7 +11,7 @@ mod memory;
 mod plan;
 
 use anyhow::{Context, Result, bail};
-use clutch_benches::machine_code::{Bounds, Cost, Fault, Image, traced};
+use clutch_benches::machine_code::{Bounds, CallFact, Cost, Fault, Image, traced};
 use emulator::Measured;
 use plan::{Item, Plan};
 use std::collections::{BTreeMap, BTreeSet};
@@ -99,6 +99,15 @@ fn told(faults: Vec<Fault>) -> anyhow::Error {
     anyhow::anyhow!("no bound:\n{}", lines.join("\n"))
 }
 
+/// The bound of an item: to its return, or along the functions that it leads through.
+fn bound(item: &Item, bounds: &mut Bounds<'_>) -> Result<Cost, Vec<Fault>> {
+    if item.until.is_empty() {
+        return bounds.of(&item.symbol);
+    }
+    let from = std::iter::once(&item.symbol).chain(&item.until);
+    from.zip(&item.until).map(|(from, to)| bounds.until(from, to)).sum()
+}
+
 /// The bound of each item.
 fn all_bounds(image: &Image, plan: &Plan, loops: bool) -> Result<Vec<Cost>> {
     let facts = plan.facts();
@@ -107,16 +116,30 @@ fn all_bounds(image: &Image, plan: &Plan, loops: bool) -> Result<Vec<Cost>> {
     for item in &plan.items {
         let case = item.case();
         let mut bounds = Bounds::new(image, &facts, &case);
-        all.push(bounds.of(&item.symbol).map_err(told).with_context(|| item.name.clone())?);
+        all.push(bound(item, &mut bounds).map_err(told).with_context(|| item.name.clone())?);
         unused.retain(|name| !bounds.used(false).any(|used| used == name));
         if let Some(fact) = case.names().find(|name| !bounds.used(true).any(|used| used == name)) {
             bail!("{}: this statement applies to no code: {fact}", item.name);
         }
         if loops {
-            println!("\n{}:", item.name);
+            let bound = all.last().copied().unwrap_or_default();
+            println!("\n{}: {} instructions, {} cycles", item.name, bound.instructions, bound.cycles);
+            println!(
+                "| function | instructions | cycles | cycles of the bound that it is |\n|---|---|---|---|"
+            );
             for (f, length, cost) in bounds.functions() {
                 let of = length.map_or(String::new(), |n| format!(" of {n} bytes"));
-                println!("{}{of}: {} instructions, {} cycles", f.name, cost.instructions, cost.cycles);
+                let without = CallFact {
+                    function: String::new(),
+                    of: format!("{}$", f.name),
+                    most: 0,
+                    why: "to see its share".to_owned(),
+                };
+                let mut case = item.case();
+                case.calls.insert(0, without);
+                let rest = self::bound(item, &mut Bounds::new(image, &facts, &case)).unwrap_or_default();
+                let share = bound.cycles.saturating_sub(rest.cycles);
+                println!("| {}{of} | {} | {} | {share} |", f.name, cost.instructions, cost.cycles);
             }
             bounds.loops().for_each(|(address, what)| println!("{address:#x} {what}"));
         }

@@ -43,6 +43,9 @@ pub(crate) struct Item {
     /// True if its cycles along the executed paths are added up, too.
     #[serde(default)]
     pub(crate) traced: bool,
+    /// The function whose call ends the path, after those that it leads through; without any, the return ends it.
+    #[serde(default)]
+    pub(crate) until: Vec<String>,
     pub(crate) budget: Limit,
     #[serde(default, rename = "loop")]
     loops: Vec<LoopFact>,

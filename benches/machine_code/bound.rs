@@ -7,6 +7,7 @@ use super::graph::{Graph, Loop};
 use super::image::{Function, Image};
 use super::{Fault, facts};
 use std::collections::{BTreeMap, BTreeSet};
+use std::iter::Sum;
 use std::ops::{Add, Mul};
 
 /// Instructions and cycles, each by itself: the longest path in one is not always the longest in
@@ -37,6 +38,12 @@ impl Add for Cost {
     type Output = Cost;
     fn add(self, o: Cost) -> Cost {
         Cost { instructions: self.instructions + o.instructions, cycles: self.cycles + o.cycles }
+    }
+}
+
+impl Sum for Cost {
+    fn sum<I: Iterator<Item = Cost>>(all: I) -> Cost {
+        all.fold(Cost::default(), Add::add)
     }
 }
 
@@ -105,6 +112,109 @@ impl<'a> Bounds<'a> {
         if self.found.is_empty() { Ok(cost) } else { Err(std::mem::take(&mut self.found)) }
     }
 
+    /// The bound from the first instruction of a function to any call of another, in it or in what it calls: also
+    /// to the last of several. What runs after that, and the other function itself, cost nothing.
+    ///
+    /// # Errors
+    /// Everything that prevents a bound; the second function is not called.
+    pub fn until(&mut self, name: &str, until: &str) -> Result<Cost, Vec<Fault>> {
+        let of = |name| self.image.function(name).map_err(|f| vec![f]);
+        let (function, end) = (of(name)?, of(until)?);
+        let cost = self.up_to(function, end.address, &mut BTreeMap::new());
+        match cost {
+            _ if !self.found.is_empty() => Err(std::mem::take(&mut self.found)),
+            Some(cost) => Ok(cost),
+            None => Err(vec![Fault::NoReturn { function: format!("{name}, up to {until}") }]),
+        }
+    }
+
+    /// None if the call is not reached from there. `known`: the functions that were looked at.
+    fn up_to(
+        &mut self,
+        function: &Function,
+        end: u32,
+        known: &mut BTreeMap<u32, Option<Cost>>,
+    ) -> Option<Cost> {
+        if function.address == end {
+            return Some(Cost::default());
+        }
+        if let Some(cost) = known.get(&function.address) {
+            return *cost;
+        }
+        known.insert(function.address, None); // in case of recursion, which the whole bound refuses
+        let mut graph = match Graph::new(self.image, function) {
+            Ok(graph) => graph,
+            Err(fault) => {
+                self.fault(fault);
+                return None;
+            }
+        };
+        // For each block, the place of the last call from which the end is reached, and the cost from there on.
+        let mut ends: BTreeMap<usize, (usize, Cost)> = BTreeMap::new();
+        for (n, block) in graph.blocks.iter().enumerate() {
+            for (k, i) in block.instructions.iter().enumerate() {
+                let target = match i.flow {
+                    Flow::Call(target) => Some(target),
+                    _ if k + 1 == block.instructions.len() => block.tail_call,
+                    _ => None,
+                };
+                let Some(callee) = target.and_then(|t| self.image.function_at(t)) else { continue };
+                // A call that the case rules out is none.
+                if self.cap(&function.name, &callee.name).is_some_and(|c| c.most == 0) {
+                    continue;
+                }
+                if let Some(rest) = self.up_to(callee, end, known) {
+                    ends.insert(n, (k, rest + Cost::cycles(refill(i))));
+                }
+            }
+        }
+        // Only the blocks from which the end is still to come; of those that are its last, only what is before.
+        let reaches = graph.reaching(&ends.keys().copied().collect());
+        for (n, block) in graph.blocks.iter_mut().enumerate() {
+            block.returns = false;
+            block.tail_call = None;
+            block.next.retain(|to| reaches.contains(to));
+            match ends.get(&n) {
+                Some((k, _)) if block.next.is_empty() => block.instructions.truncate(k + 1),
+                _ => {}
+            }
+        }
+        let cost = (!ends.is_empty()).then(|| self.longest_to(function, &graph, &ends));
+        known.insert(function.address, cost);
+        cost
+    }
+
+    fn longest_to(
+        &mut self,
+        function: &Function,
+        graph: &Graph,
+        ends: &BTreeMap<usize, (usize, Cost)>,
+    ) -> Cost {
+        let mut capped = BTreeMap::new();
+        let mut ways = self.ways(function, graph, None, &mut capped, Some(ends));
+        let loops = match graph.loops() {
+            Ok(loops) => loops,
+            Err(block) => {
+                let (function, address) = (function.name.clone(), graph.address(block));
+                return self.fault(Fault::Irreducible { function, address });
+            }
+        };
+        for round in &loops {
+            let most = self.rounds(function, graph, &loops, round, None);
+            collapse(&mut ways, round, most, capped.values());
+        }
+        let path = reach(&ways, 0, None).1.remove(&None).unwrap_or_default();
+        capped.values().fold(path, |sum, c| sum + c.cost * c.most)
+    }
+
+    /// The statement about the number of calls of one function in another.
+    fn cap(&mut self, function: &str, callee: &str) -> Option<&'a facts::CallFact> {
+        let cap = both(&self.case.calls, &self.facts.calls)
+            .find(|(_, f)| means(&f.function, function) && means(&f.of, callee));
+        self.used.extend(cap.map(|(case, f)| (case, f.name())));
+        cap.map(|(_, f)| f)
+    }
+
     /// The functions examined so far, with the bound of each; a function that works on memory has
     /// one for each length.
     pub fn functions(&self) -> impl Iterator<Item = (&Function, Option<u64>, Cost)> {
@@ -153,7 +263,7 @@ impl<'a> Bounds<'a> {
 
     fn longest(&mut self, function: &Function, graph: &Graph, length: Option<u64>) -> Cost {
         let mut capped = BTreeMap::new();
-        let mut ways = self.ways(function, graph, length, &mut capped);
+        let mut ways = self.ways(function, graph, length, &mut capped, None);
         let loops = match graph.loops() {
             Ok(loops) => loops,
             Err(block) => {
@@ -171,13 +281,14 @@ impl<'a> Bounds<'a> {
         capped.values().fold(path, |sum, c| sum + c.cost * c.most)
     }
 
-    /// The cost of each way: the block that it leaves, and the jump.
+    /// The cost of each way: the block that it leaves, and the jump. With `ends`, the function is left at these calls.
     fn ways(
         &mut self,
         function: &Function,
         graph: &Graph,
         length: Option<u64>,
         capped: &mut BTreeMap<u32, Capped>,
+        ends: Option<&BTreeMap<usize, (usize, Cost)>>,
     ) -> Ways {
         let mut ways = Ways::new();
         for (n, block) in graph.blocks.iter().enumerate() {
@@ -190,6 +301,13 @@ impl<'a> Bounds<'a> {
                 };
                 let stalled = block.instructions.get(k + 1).map_or(0, |next| stall(i, next));
                 cost = cost + Cost { instructions: 1, cycles: c + stalled };
+                if let Some((_, rest)) = ends.and_then(|e| e.get(&n)).filter(|(at, _)| *at == k) {
+                    or_longer(&mut ways, (n, None), cost + *rest);
+                    // The last block of all: nothing of it is called as a whole.
+                    if block.next.is_empty() {
+                        break;
+                    }
+                }
                 if let Flow::Call(target) = i.flow {
                     cost = cost + Cost::cycles(refill(i));
                     let so_far = &block.instructions[..k];
@@ -228,10 +346,7 @@ impl<'a> Bounds<'a> {
             let (function, address) = (function.name.clone(), i.address);
             return self.fault(Fault::NoTarget { function, address, target });
         };
-        let cap = both(&self.case.calls, &self.facts.calls)
-            .find(|(_, f)| means(&f.function, &function.name) && means(&f.of, &callee.name));
-        self.used.extend(cap.map(|(case, f)| (case, f.name())));
-        let cap = cap.map(|(_, f)| f);
+        let cap = self.cap(&function.name, &callee.name);
         if cap.is_some_and(|c| c.most == 0) {
             return Cost::default();
         }
@@ -239,10 +354,19 @@ impl<'a> Bounds<'a> {
             let handed_on = length.filter(|_| length_register(&function.name).is_some());
             let stated =
                 self.facts.lengths.iter().find(|f| means(&f.function, &function.name) && callee.name == f.of);
-            handed_on.or_else(|| constant(before, register)).or_else(|| {
-                self.used.extend(stated.map(|f| (false, f.name())));
-                stated.map(|f| f.most)
-            })
+            let known = handed_on.or_else(|| constant(before, register));
+            // What is left of a longer copy may be stated, too.
+            match (known, stated) {
+                (Some(known), Some(f)) if handed_on.is_some() => {
+                    self.used.insert((false, f.name()));
+                    Some(known.min(f.most))
+                }
+                (Some(known), _) => Some(known),
+                (None, stated) => {
+                    self.used.extend(stated.map(|f| (false, f.name())));
+                    stated.map(|f| f.most)
+                }
+            }
         });
         if length_register(&callee.name).is_some() && bytes.is_none() {
             let (function, callee) = (function.name.clone(), callee.name.clone());
@@ -282,7 +406,7 @@ impl<'a> Bounds<'a> {
         self.used.extend(fact.map(|(case, f)| (case, f.name())));
         let fact = fact.map(|(_, f)| f);
         let worked = |f: &facts::LoopFact| Some(length? / f.step? + 1);
-        let stated = fact.and_then(|f| f.most.or_else(|| worked(f)));
+        let stated = fact.and_then(|f| [f.most, worked(f)].into_iter().flatten().min());
         let each = fact.filter(|f| !f.by.is_empty()).map_or(1, |f| graph.least_each_round(round, &f.by));
         if let (Some(stated), Some(fact), 1..) = (stated, fact, each) {
             // In the last round, the head may be executed and none of the counted instructions.

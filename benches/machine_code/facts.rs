@@ -64,7 +64,7 @@ pub struct LoopFact {
     pub by: Vec<String>,
     /// Highest number.
     pub most: Option<u64>,
-    /// For memcpy and its like, instead: bytes that one of them does.
+    /// For memcpy and its like, instead or as well: bytes that one of them does. The lower number holds.
     pub step: Option<u64>,
     /// Reason why that holds.
     pub why: String,

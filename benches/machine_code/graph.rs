@@ -113,6 +113,18 @@ impl Graph {
         }
     }
 
+    /// The blocks from which one of these is reached, themselves among them.
+    pub(super) fn reaching(&self, ends: &BTreeSet<usize>) -> BTreeSet<usize> {
+        let before = self.before();
+        let (mut found, mut open) = (BTreeSet::new(), Vec::from_iter(ends.iter().copied()));
+        while let Some(b) = open.pop() {
+            if found.insert(b) {
+                open.extend(&before[b]);
+            }
+        }
+        found
+    }
+
     /// Address of a block's first instruction.
     pub(super) fn address(&self, block: usize) -> u32 {
         self.blocks[block].instructions[0].address

@@ -66,6 +66,21 @@ fn a_call_costs_what_is_called() {
 }
 
 #[test]
+fn a_path_up_to_a_call_ends_there_also_in_what_is_called() {
+    // f: push {r4, lr}; bl g; bl h; bl g; pop {r4, pc}   g: bx lr   h: bx lr   k: push {r4, lr}; bl f; pop {r4, pc}
+    let f = [0xb510, 0xf000, 0xf805, 0xf000, 0xf804, 0xf000, 0xf801, 0xbd10];
+    let k = [0xb510, 0xf7ff, 0xfff3, 0xbd10];
+    let image = image(&[("f", &f), ("g", &[BX_LR]), ("h", &[BX_LR]), ("k", &k)]);
+    let (none, case) = (Facts::default(), Facts::default());
+    let up_to_h = cost(4, 3 + 4 + 4 + 4);
+    assert_eq!(Bounds::new(&image, &none, &case).until("f", "h"), Ok(up_to_h));
+    assert_eq!(Bounds::new(&image, &none, &case).until("k", "h"), Ok(up_to_h + cost(2, 3 + 4)));
+    // To the last of two calls; and nothing leads to the function itself.
+    assert_eq!(Bounds::new(&image, &none, &case).until("f", "g"), Ok(cost(6, 3 + 4 + 4 + 4 + 4 + 4)));
+    assert!(Bounds::new(&image, &none, &case).until("f", "k").is_err());
+}
+
+#[test]
 fn a_jump_to_another_function_is_a_call_that_does_not_come_back() {
     // f: b.w g   g: bx lr
     let image = image(&[("f", &[0xf000, 0xb800]), ("g", &[BX_LR])]);

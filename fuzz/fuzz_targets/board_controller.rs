@@ -205,8 +205,10 @@ impl Bench {
 
     /// Bytes from the host, to both.
     fn host(&mut self, bytes: &[u8]) {
-        self.board_controller.host(self.now_ns(), bytes, &mut self.outboxes);
-        self.chip.host(self.now_us, bytes);
+        let now_ns = self.now_ns();
+        let Outboxes { host, daq } = &mut self.outboxes;
+        self.board_controller.host(now_ns, bytes, host, daq);
+        self.chip.host(self.now_us, bytes, &mut |_| ());
         self.settle();
     }
 
@@ -215,9 +217,11 @@ impl Bench {
             let mut out = Outbox::default();
             f(if chip { &mut self.chip_host } else { &mut self.host }, &mut out);
             if chip {
-                self.chip.host(self.now_us, out.as_bytes());
+                self.chip.host(self.now_us, out.as_bytes(), &mut |_| ());
             } else {
-                self.board_controller.host(self.now_ns(), out.as_bytes(), &mut self.outboxes);
+                let now_ns = self.now_ns();
+                let Outboxes { host, daq } = &mut self.outboxes;
+                self.board_controller.host(now_ns, out.as_bytes(), host, daq);
             }
         }
         self.settle();
@@ -239,7 +243,8 @@ impl Bench {
             self.board.receive(self.now_us as u32, &bytes, &mut self.up);
             let (bytes, _) = frames(&mut self.up);
             if !bytes.is_empty() {
-                self.board_controller.daq(now_ns, &bytes, &mut self.outboxes);
+                let Outboxes { host, daq } = &mut self.outboxes;
+                self.board_controller.daq(now_ns, &bytes, host, daq);
             }
             let (bytes, _) = frames(&mut self.outboxes.host);
             self.host.receive(now_ns, &bytes, &at, &mut |_| ());
@@ -269,11 +274,12 @@ impl Bench {
     fn boards_pass(&mut self, us: u64) {
         self.now_us = self.now_us.saturating_add(us);
         let now_ns = self.now_ns();
-        self.board_controller.poll(now_ns, &mut self.outboxes);
+        let Outboxes { host, daq } = &mut self.outboxes;
+        self.board_controller.poll(now_ns, host, daq);
         // At the end of all times there is no later.
         assert!(self.board_controller.poll_at().is_none_or(|at| at > now_ns || now_ns == u64::MAX));
         self.board.poll(self.now_us as u32, &mut self.up);
-        self.chip.poll(self.now_us);
+        self.chip.poll(self.now_us, &mut |_| ());
         self.settle();
     }
 
@@ -281,8 +287,9 @@ impl Bench {
         self.counts = self.counts.wrapping_add(moved);
         let (counts, encoder, converter) = (Counts(self.counts), faults & 1 != 0, faults & 2 != 0);
         self.board.sample(self.now_us as u32, counts, encoder, converter, &mut self.up);
-        let code = self.chip.sample(self.now_us, counts, encoder, converter);
-        assert_eq!(code, self.chip.code());
+        let mut out = None;
+        self.chip.sample(self.now_us, counts, encoder, converter, &mut |code| out = Some(code));
+        assert_eq!(out, Some(self.chip.code()));
         if faults & 4 != 0 {
             self.up.clear(); // lost
         }
@@ -342,7 +349,9 @@ impl Bench {
             }
             12 => {
                 let frame = input.frame();
-                self.board_controller.daq(self.now_ns(), &frame, &mut self.outboxes);
+                let now_ns = self.now_ns();
+                let Outboxes { host, daq } = &mut self.outboxes;
+                self.board_controller.daq(now_ns, &frame, host, daq);
                 self.settle();
             }
             13 => {
@@ -355,7 +364,9 @@ impl Bench {
                 let length = usize::from(input.byte());
                 let bytes = input.some(length);
                 self.host(&bytes);
-                self.board_controller.daq(self.now_ns(), &bytes, &mut self.outboxes);
+                let now_ns = self.now_ns();
+                let Outboxes { host, daq } = &mut self.outboxes;
+                self.board_controller.daq(now_ns, &bytes, host, daq);
                 self.settle();
             }
             _ => {

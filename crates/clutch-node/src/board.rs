@@ -12,12 +12,12 @@
 //! `docs/wire.md` is the specification; this is one implementation, the one that the simulated
 //! board and the firmware run.
 
-use crate::outbox::Outbox;
+use crate::outbox::Sink;
 use clutch_core::{Counts, DacCode, SafeCodes, SafeKind, SafeRun};
 use clutch_wire::{
-    Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, Hello, Message,
-    Pong, Refusal, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, StopReason,
-    Stopped, VERSION, WATCHDOG_PERIODS,
+    Actuate, Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, Hello,
+    Message, Pong, Refusal, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample,
+    StopReason, Stopped, VERSION, WATCHDOG_PERIODS,
 };
 
 /// Parameters of a board.
@@ -228,8 +228,8 @@ impl BoardNode {
     }
 
     /// Bytes from the controller.
-    pub fn receive(&mut self, now_us: u32, bytes: &[u8], out: &mut Outbox) {
-        // A code that comes after the watchdog's time does not undo what the watchdog does.
+    pub fn receive(&mut self, now_us: u32, bytes: &[u8], out: &mut impl Sink) {
+        // Also where no message is whole: a code that comes after the watchdog's time does not undo what that does.
         self.poll(now_us, out);
         for byte in bytes {
             // A frame that is not whole is dropped without a word.
@@ -239,25 +239,56 @@ impl BoardNode {
         }
     }
 
-    /// A sampling period begins: the encoder's counts, and what the board sees of its hardware.
+    /// A message from the controller, by value.
+    pub fn hear(&mut self, now_us: u32, message: &Message, out: &mut impl Sink) {
+        self.poll(now_us, out);
+        self.message(now_us, message, out);
+    }
+
+    /// A code from the controller, by value.
+    pub fn obey(&mut self, now_us: u32, answer: &Actuate, out: &mut impl Sink) {
+        self.poll(now_us, out);
+        if answer.run == self.run && self.driving() {
+            self.actuate(now_us, answer, out);
+        }
+    }
+
+    /// A sampling period begins: the encoder's counts, and what the board sees of its hardware. Its messages go out.
     pub fn sample(
         &mut self,
         now_us: u32,
         counts: Counts,
         encoder_fault: bool,
         converter_fault: bool,
-        out: &mut Outbox,
+        out: &mut impl Sink,
     ) {
+        let (fault, sample) = self.begin_period(now_us, counts, encoder_fault, converter_fault);
+        if let Some(fault) = fault {
+            out.push(&Message::Fault(fault));
+        }
+        if let Some(sample) = sample {
+            out.push(&Message::Sample(sample));
+        }
+    }
+
+    /// The same for who hears by value: first the fault, if there is one, then the sample.
+    pub fn begin_period(
+        &mut self,
+        now_us: u32,
+        counts: Counts,
+        encoder_fault: bool,
+        converter_fault: bool,
+    ) -> (Option<Fault>, Option<Sample>) {
         if self.state == BoardState::Boot {
-            return;
+            return (None, None);
         }
         // The safe output goes on through Ready, until a new run takes over; the period in which it
         // begins has its first step already.
         let begun = self.safe_under_way;
-        self.poll(now_us, out);
+        let mut fault = self.watch(now_us);
         if self.driving() && (encoder_fault || converter_fault) {
             let cause = if encoder_fault { BoardFault::Encoder } else { BoardFault::Converter };
-            self.fault(now_us, cause, 0, out);
+            fault = Some(self.fault(now_us, cause, 0));
         } else if begun {
             self.code = self.safe_run.next(&self.ending);
         }
@@ -267,32 +298,32 @@ impl BoardNode {
             | flag(converter_fault, STATUS_DAC_FAULT)
             | flag(self.late, STATUS_LATE);
         self.late = false;
-        out.push(&Message::Sample(Sample {
-            run: self.run,
-            sequence: self.sequence,
-            time_us: now_us,
-            counts: counts.0,
-            status,
-        }));
+        let sample =
+            Sample { run: self.run, sequence: self.sequence, time_us: now_us, counts: counts.0, status };
         if let Some(slot) = self.recent.get_mut(usize::from(self.sequence) % RECENT) {
             *slot = Some(now_us);
         }
         self.sequence = self.sequence.wrapping_add(1);
+        (fault, Some(sample))
     }
 
     /// Looks at the clock: the watchdog.
-    pub fn poll(&mut self, now_us: u32, out: &mut Outbox) {
-        let silent = now_us.wrapping_sub(self.fed_us);
-        if self.driving() && silent >= self.watchdog_us {
-            self.fault(now_us, BoardFault::Watchdog, silent, out);
+    pub fn poll(&mut self, now_us: u32, out: &mut impl Sink) {
+        if let Some(fault) = self.watch(now_us) {
+            out.push(&Message::Fault(fault));
         }
     }
 
-    fn fault(&mut self, now_us: u32, cause: BoardFault, value: u32, out: &mut Outbox) {
+    fn watch(&mut self, now_us: u32) -> Option<Fault> {
+        let silent = now_us.wrapping_sub(self.fed_us);
+        let bites = self.driving() && silent >= self.watchdog_us;
+        bites.then(|| self.fault(now_us, BoardFault::Watchdog, silent))
+    }
+
+    fn fault(&mut self, now_us: u32, cause: BoardFault, value: u32) -> Fault {
         self.make_safe(BoardState::Faulted);
         let sequence = self.sequence.wrapping_sub(1);
-        let cause = cause as u8;
-        out.push(&Message::Fault(Fault { run: self.run, sequence, time_us: now_us, cause, value }));
+        Fault { run: self.run, sequence, time_us: now_us, cause: cause as u8, value }
     }
 
     fn make_safe(&mut self, state: BoardState) {
@@ -303,7 +334,7 @@ impl BoardNode {
         self.state = state;
     }
 
-    fn message(&mut self, now_us: u32, message: &Message, out: &mut Outbox) {
+    fn message(&mut self, now_us: u32, message: &Message, out: &mut impl Sink) {
         match message {
             Message::Discover(m) => self.discover(m, out),
             Message::Configure(m) => self.configure(m, out),
@@ -328,7 +359,7 @@ impl BoardNode {
         }
     }
 
-    fn discover(&self, m: &Discover, out: &mut Outbox) {
+    fn discover(&self, m: &Discover, out: &mut impl Sink) {
         if let Some(refused) = misunderstood(m) {
             out.push(&Message::Refused(refused));
             return;
@@ -354,7 +385,7 @@ impl BoardNode {
         }));
     }
 
-    fn configure(&mut self, m: &Configure, out: &mut Outbox) {
+    fn configure(&mut self, m: &Configure, out: &mut impl Sink) {
         let p = &self.params;
         let safe_kind = clutch_wire::SafeKind::from_u8(m.safe_kind);
         let codes_fit = m.hold_code <= self.params.top() && m.release_code <= self.params.top();
@@ -410,7 +441,7 @@ impl BoardNode {
         out.push(&Message::Configured(Configured { run: self.run, config: self.config, boot }));
     }
 
-    fn arm(&mut self, now_us: u32, m: &Arm, out: &mut Outbox) {
+    fn arm(&mut self, now_us: u32, m: &Arm, out: &mut impl Sink) {
         let again = self.state == BoardState::Armed;
         let refusal = if self.state != BoardState::Ready && !again {
             Some((Refusal::State, self.state as u32))
@@ -438,13 +469,10 @@ impl BoardNode {
         out.push(&Message::Armed(Armed { run: self.run, config: self.config }));
     }
 
-    fn actuate(&mut self, now_us: u32, m: &clutch_wire::Actuate, out: &mut Outbox) {
+    fn actuate(&mut self, now_us: u32, m: &Actuate, out: &mut impl Sink) {
         if m.code > self.params.top() {
-            let refused = Refused {
-                request: clutch_wire::Actuate::KIND,
-                reason: Refusal::Code as u8,
-                value: u32::from(m.code),
-            };
+            let refused =
+                Refused { request: Actuate::KIND, reason: Refusal::Code as u8, value: u32::from(m.code) };
             out.push(&Message::Refused(refused));
             return;
         }

@@ -15,7 +15,7 @@
 use crate::board::misunderstood;
 use crate::controller::{ControllerNode, ControllerParams};
 use crate::notice::{Ending, Notice};
-use crate::outbox::Outbox;
+use crate::outbox::{Outbox, Sink};
 use crate::settings::{Built, MAX_KNOTS, Misfit, Path, SETTINGS_HASH, Settings};
 use crate::telemetry::{frame, states};
 use clutch_core::law::LawTerms;
@@ -23,7 +23,7 @@ use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Micros};
 use clutch_wire::{
     Armed, BoardState, Configure, Configured, ControllerHello, Decoder, Discover, Ended, Hello, Link,
-    Message, Pong, Refusal, Refused, SCHEMA, Set, Stop, StopReason, Taken, VERSION,
+    Message, Pong, Refusal, Refused, SCHEMA, Sample, Set, Stop, StopReason, Taken, VERSION,
 };
 
 /// Parameters of a board in the controller role.
@@ -35,15 +35,6 @@ pub struct BoardControllerParams {
     pub boot: u32,
     /// Frequency of the clock whose cycles [`BoardController::spent`] is given, Hz; 0 if it is not called.
     pub clock_hz: u32,
-}
-
-/// Frames on their way out.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Outboxes {
-    /// To the host.
-    pub host: Outbox,
-    /// To encoder and converter.
-    pub daq: Outbox,
 }
 
 /// Interval at which the host is told what the line has carried.
@@ -78,9 +69,27 @@ pub struct BoardController {
     heard_ns: u64,
     linked_ns: u64,
     spent: u32,
+    /// What was heard, and is still to be followed.
+    news: News,
 }
 
 type Cycle = Notice<f32, LawTerms<f32>>;
+
+/// The way of a run's notices to the host. Not a function: it borrows field by field, and control goes on beside it.
+macro_rules! report {
+    ($node:ident, $run:ident, $host:ident) => {
+        Report {
+            run: $run.number,
+            config: $run.config,
+            boot: $node.params.boot,
+            told: &mut $run.told,
+            spent: $node.spent,
+            hello: &mut $node.hello,
+            host: $host,
+            news: &mut $node.news,
+        }
+    };
+}
 
 impl BoardController {
     /// A board at power-up.
@@ -97,6 +106,7 @@ impl BoardController {
             heard_ns: 0,
             linked_ns: 0,
             spent: 0,
+            news: News::default(),
         }
     }
 
@@ -147,113 +157,94 @@ impl BoardController {
     }
 
     /// Looks at the clock: silence of encoder and converter, silence of the host.
-    pub fn poll(&mut self, now_ns: u64, out: &mut Outboxes) {
+    pub fn poll(&mut self, now_ns: u64, host: &mut Outbox, daq: &mut impl Sink) {
         let Some(run) = &mut self.run else { return };
         let (number, mut ends) = (run.number, false);
-        let host = &mut out.host;
-        run.control.poll(now_ns, &mut out.daq, &mut |n: Cycle| {
+        run.control.poll(now_ns, daq, &mut |n: Cycle| {
             if let Notice::Ended(ending) = n {
                 host.push(&ended(number, &ending));
                 ends = true;
             }
         });
         if ends {
-            tell_link(run, &mut out.host);
+            tell_link(run, host);
         }
         let silent = now_ns.saturating_sub(self.heard_ns);
         if run.driving() && run.host_silence_ns > 0 && silent >= run.host_silence_ns {
-            run.end(StopReason::Operator, out);
+            run.end(StopReason::Operator, host, daq);
         }
     }
 
     /// Bytes from the host.
-    pub fn host(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outboxes) {
+    pub fn host(&mut self, now_ns: u64, bytes: &[u8], host: &mut Outbox, daq: &mut impl Sink) {
         for byte in bytes {
             if let Some(Ok(message)) = self.decoder.push(*byte) {
-                self.message(now_ns, &message, out);
+                self.message(now_ns, &message, host, daq);
             }
         }
     }
 
     /// Bytes from encoder and converter.
-    pub fn daq(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outboxes) {
+    pub fn daq(&mut self, now_ns: u64, bytes: &[u8], host: &mut Outbox, daq: &mut impl Sink) {
         let Some(run) = &mut self.run else {
-            self.introduction(bytes, out);
+            for byte in bytes {
+                if let Some(Ok(message)) = self.introduced.push(*byte) {
+                    introduction(&mut self.hello, &message, host);
+                }
+            }
             return;
         };
         let drove = run.driving();
-        let (number, config, boot) = (run.number, run.config, self.params.boot);
-        let (host, told, path, knots) = (&mut out.host, &mut run.told, &run.path, self.settings.knots());
-        let (spent, mut armed, mut hello, mut ends) = (&mut self.spent, false, None, false);
+        let (path, knots) = (&run.path, self.settings.knots());
         let at = |tick: u64| path.target(knots, tick);
-        run.control.receive(now_ns, bytes, &at, &mut out.daq, &mut |n: Cycle| match n {
-            // Before consent nothing is driven, and the line stays free.
-            Notice::Cycle(n) if n.cycle.state == State::Ready => {}
-            Notice::Cycle(mut n) => {
-                n.cycles = core::mem::take(spent);
-                *told = told.wrapping_add(1);
-                host.push(&Message::Telemetry(frame(number, *told, &n)));
-            }
-            Notice::Configured => host.push(&Message::Configured(Configured { run: number, config, boot })),
-            Notice::Armed => {
-                armed = true;
-                host.push(&Message::Armed(Armed { run: number, config }));
-            }
-            Notice::Refused(m) => host.push(&Message::Refused(m)),
-            Notice::Pong(nonce, time_us) => {
-                host.push(&Message::Pong(Pong { run: number, nonce, time_us }));
-            }
-            Notice::Stopped(m) => host.push(&Message::Stopped(m)),
-            Notice::BoardFault(m) => host.push(&Message::Fault(m)),
-            // Before the telemetry of the sample that shows it.
-            Notice::Ended(ending) => {
-                ends = true;
-                host.push(&ended(number, &ending));
-            }
-            Notice::Hello(m) => hello = Some(m),
-            // Another power-up of encoder and converter: the host hears nothing, asks again, and is told who is there.
-            Notice::OtherBoot(_)
-            | Notice::ControllerHello(_)
-            | Notice::Taken(_)
-            | Notice::BadFrame(_)
-            | Notice::Echo => {}
-        });
-        if let Some(m) = hello {
-            self.hello = Some(m);
-            host.push(&Message::Hello(m));
+        let mut report = report!(self, run, host);
+        run.control.receive(now_ns, bytes, &at, daq, &mut |n| report.notice(n));
+        self.follow(now_ns, drove, host, daq);
+    }
+
+    /// A message of encoder and converter by value, other than a sample. [`BoardController::follow`] comes after it.
+    pub(crate) fn hear(&mut self, message: &Message, host: &mut Outbox, daq: &mut impl Sink) {
+        let Some(run) = &mut self.run else { return introduction(&mut self.hello, message, host) };
+        let mut report = report!(self, run, host);
+        run.control.message(message, daq, &mut |n| report.notice(n));
+    }
+
+    /// A sample by value. [`BoardController::follow`] comes after it.
+    pub(crate) fn sample(&mut self, now_ns: u64, sample: &Sample, host: &mut Outbox, daq: &mut impl Sink) {
+        let Some(run) = &mut self.run else { return };
+        let (path, knots) = (&run.path, self.settings.knots());
+        let at = |tick: u64| path.target(knots, tick);
+        let mut report = report!(self, run, host);
+        run.control.sample(now_ns, sample, false, &at, daq, &mut |n| report.notice(n));
+    }
+
+    /// What follows from what the controller has heard; `drove`: whether it drove before.
+    pub(crate) fn follow(&mut self, now_ns: u64, drove: bool, host: &mut Outbox, daq: &mut impl Sink) {
+        let news = core::mem::take(&mut self.news);
+        let Some(run) = &mut self.run else { return };
+        if news.told {
+            self.spent = 0;
         }
-        if armed && let Some(hello) = &mut self.hello {
+        if news.armed
+            && let Some(hello) = &mut self.hello
+        {
             // From now on the converter has not the code of power-up any more.
             hello.state = BoardState::Armed as u8;
         }
-        if ends || (drove && !run.driving()) {
-            tell_link(run, &mut out.host);
+        if news.ends || (drove && !run.driving()) {
+            tell_link(run, host);
         }
         let state = run.control.state();
         if state.state() == State::Running && state.tick().saturating_add(1) >= run.ticks {
-            run.end(StopReason::Done, out);
+            run.end(StopReason::Done, host, daq);
         }
         if run.driving() && now_ns.saturating_sub(self.linked_ns) >= LINK_EVERY_NS {
             self.linked_ns = now_ns;
-            tell_link(run, &mut out.host);
+            tell_link(run, host);
         }
     }
 
-    /// Before there is a run: who are encoder and converter?
-    fn introduction(&mut self, bytes: &[u8], out: &mut Outboxes) {
-        for byte in bytes {
-            match self.introduced.push(*byte) {
-                Some(Ok(Message::Hello(m))) => {
-                    self.hello = Some(m);
-                    out.host.push(&Message::Hello(m));
-                }
-                Some(Ok(Message::Refused(m))) => out.host.push(&Message::Refused(m)),
-                _ => {}
-            }
-        }
-    }
-
-    fn message(&mut self, now_ns: u64, message: &Message, out: &mut Outboxes) {
+    fn message(&mut self, now_ns: u64, message: &Message, host: &mut Outbox, daq: &mut impl Sink) {
         match message {
             // What only a host says shows that it lives; an echo of this board's own words does not.
             Message::Discover(_)
@@ -265,12 +256,12 @@ impl BoardController {
             _ => return,
         }
         match message {
-            Message::Discover(m) => self.discover(m, out),
-            Message::Set(m) => self.set(m, &mut out.host),
+            Message::Discover(m) => self.discover(m, host, daq),
+            Message::Set(m) => self.set(m, host),
             Message::Configure(m) => {
-                if let Err((reason, value)) = self.configure(now_ns, m, out) {
+                if let Err((reason, value)) = self.configure(now_ns, m, daq) {
                     let request = Configure::KIND;
-                    out.host.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
+                    host.push(&Message::Refused(Refused { request, reason: reason as u8, value }));
                 }
             }
             Message::Arm(m) => {
@@ -279,7 +270,7 @@ impl BoardController {
                     Some(run) if run.number == m.run && run.config == m.config => match state {
                         _ if m.boot != self.params.boot => (Refusal::Boot, 0),
                         State::Ready | State::Armed | State::Running => {
-                            run.control.arm(&mut out.daq);
+                            run.control.arm(daq);
                             return;
                         }
                         _ => (Refusal::State, state as u32),
@@ -288,11 +279,11 @@ impl BoardController {
                 };
                 let (reason, value) = (refusal.0 as u8, refusal.1);
                 let request = clutch_wire::Arm::KIND;
-                out.host.push(&Message::Refused(Refused { request, reason, value }));
+                host.push(&Message::Refused(Refused { request, reason, value }));
             }
-            Message::Stop(m) => self.stop(m, out),
+            Message::Stop(m) => self.stop(m, host, daq),
             Message::Ping(m) => match &mut self.run {
-                Some(run) if run.number == m.run => run.control.ping(m.nonce, &mut out.daq),
+                Some(run) if run.number == m.run => run.control.ping(m.nonce, daq),
                 _ => {}
             },
             _ => {}
@@ -303,12 +294,12 @@ impl BoardController {
         self.run.as_ref().map_or(0, |r| r.number)
     }
 
-    fn discover(&mut self, m: &Discover, out: &mut Outboxes) {
+    fn discover(&mut self, m: &Discover, host: &mut Outbox, daq: &mut impl Sink) {
         if let Some(refused) = misunderstood(m) {
-            out.host.push(&Message::Refused(refused));
+            host.push(&Message::Refused(refused));
             return;
         }
-        out.host.push(&Message::ControllerHello(ControllerHello {
+        host.push(&Message::ControllerHello(ControllerHello {
             nonce: m.nonce,
             version: VERSION,
             schema: SCHEMA,
@@ -321,7 +312,7 @@ impl BoardController {
             run: self.number(),
             config: self.run.as_ref().map_or(0, |r| r.config),
         }));
-        out.daq.push(&Message::Discover(*m));
+        daq.push(&Message::Discover(*m));
     }
 
     fn set(&mut self, m: &Set, host: &mut Outbox) {
@@ -349,7 +340,7 @@ impl BoardController {
         });
     }
 
-    fn configure(&mut self, now_ns: u64, m: &Configure, out: &mut Outboxes) -> Result<(), (Refusal, u32)> {
+    fn configure(&mut self, now_ns: u64, m: &Configure, daq: &mut impl Sink) -> Result<(), (Refusal, u32)> {
         if self.driving() {
             return Err((Refusal::State, self.state() as u32));
         }
@@ -375,7 +366,7 @@ impl BoardController {
         if control.configuration() != *m {
             return Err((Refusal::Differs, 0));
         }
-        control.configure(present_code(&hello, built.supervisor.safe_codes().hold), &mut out.daq);
+        control.configure(present_code(&hello, built.supervisor.safe_codes().hold), daq);
         self.run = Some(Run {
             control,
             path: built.path,
@@ -389,12 +380,12 @@ impl BoardController {
         Ok(())
     }
 
-    fn stop(&mut self, m: &Stop, out: &mut Outboxes) {
+    fn stop(&mut self, m: &Stop, host: &mut Outbox, daq: &mut impl Sink) {
         let Some(run) = self.run.as_mut().filter(|r| r.number == m.run) else { return };
         let reason = if m.reason == StopReason::Done as u8 { StopReason::Done } else { StopReason::Operator };
-        if !run.end(reason, out) {
+        if !run.end(reason, host, daq) {
             // It has ended before. Encoder and converter are told again, and say where they are.
-            out.daq.push(&Message::Stop(*m));
+            daq.push(&Message::Stop(*m));
         }
     }
 }
@@ -405,15 +396,88 @@ impl Run {
     }
 
     /// Ends control as wanted and tells the host; whether there was anything to end.
-    fn end(&mut self, reason: StopReason, out: &mut Outboxes) -> bool {
+    fn end(&mut self, reason: StopReason, host: &mut Outbox, daq: &mut impl Sink) -> bool {
         let from = self.control.state().state();
-        self.control.stop(reason, &mut out.daq);
+        self.control.stop(reason, daq);
         let ends = self.control.state().state() != from;
         if ends {
-            out.host.push(&ended(self.number, &self.control.ending(from)));
-            tell_link(self, &mut out.host);
+            host.push(&ended(self.number, &self.control.ending(from)));
+            tell_link(self, host);
         }
         ends
+    }
+}
+
+/// What the controller's notices mean for the run.
+#[derive(Clone, Copy, Debug, Default)]
+struct News {
+    told: bool,
+    armed: bool,
+    ends: bool,
+}
+
+/// The controller's notices on their way to the host.
+struct Report<'a> {
+    run: u16,
+    config: u64,
+    boot: u32,
+    told: &'a mut u16,
+    spent: u32,
+    /// Encoder and converter, as they have introduced themselves.
+    hello: &'a mut Option<Hello>,
+    host: &'a mut Outbox,
+    news: &'a mut News,
+}
+
+impl Report<'_> {
+    fn notice(&mut self, n: Cycle) {
+        let (run, config, boot) = (self.run, self.config, self.boot);
+        match n {
+            // Before consent nothing is driven, and the line stays free.
+            Notice::Cycle(n) if n.cycle.state == State::Ready => {}
+            Notice::Cycle(mut n) => {
+                n.cycles = if self.news.told { 0 } else { self.spent };
+                self.news.told = true;
+                *self.told = self.told.wrapping_add(1);
+                self.host.push(&Message::Telemetry(frame(run, *self.told, &n)));
+            }
+            Notice::Configured => self.host.push(&Message::Configured(Configured { run, config, boot })),
+            Notice::Armed => {
+                self.news.armed = true;
+                self.host.push(&Message::Armed(Armed { run, config }));
+            }
+            Notice::Refused(m) => self.host.push(&Message::Refused(m)),
+            Notice::Pong(nonce, time_us) => self.host.push(&Message::Pong(Pong { run, nonce, time_us })),
+            Notice::Stopped(m) => self.host.push(&Message::Stopped(m)),
+            Notice::BoardFault(m) => self.host.push(&Message::Fault(m)),
+            // Before the telemetry of the sample that shows it.
+            Notice::Ended(ending) => {
+                self.news.ends = true;
+                self.host.push(&ended(run, &ending));
+            }
+            Notice::Hello(m) => {
+                *self.hello = Some(m);
+                self.host.push(&Message::Hello(m));
+            }
+            // Another power-up of encoder and converter: the host hears nothing, asks again, and is told who is there.
+            Notice::OtherBoot(_)
+            | Notice::ControllerHello(_)
+            | Notice::Taken(_)
+            | Notice::BadFrame(_)
+            | Notice::Echo => {}
+        }
+    }
+}
+
+/// Before there is a run: who are encoder and converter?
+fn introduction(known: &mut Option<Hello>, message: &Message, host: &mut Outbox) {
+    match message {
+        Message::Hello(m) => {
+            *known = Some(*m);
+            host.push(message);
+        }
+        Message::Refused(_) => host.push(message),
+        _ => {}
     }
 }
 

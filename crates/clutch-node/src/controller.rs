@@ -1,7 +1,7 @@
 //! The controller: handshake, cycle, stop. On a PC, and within [`crate::BoardController`].
 
 use crate::notice::{CycleNotice, Ending, LinkCounts, Notice};
-use crate::outbox::Outbox;
+use crate::outbox::Sink;
 use crate::pace::HostPace;
 use clutch_core::law::{ControlLaw, Law};
 use clutch_core::supervisor::{BoardMode, Cause, Sample as Seen, State};
@@ -100,12 +100,12 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
     }
 
     /// Asks who is there.
-    pub fn discover(&mut self, nonce: u32, out: &mut Outbox) {
+    pub fn discover(&mut self, nonce: u32, out: &mut impl Sink) {
         out.push(&Message::Discover(Discover { nonce, version: VERSION, schema: SCHEMA }));
     }
 
     /// Tells the board of the run; `present` is the code that its converter has now. The pre-flight has taken place.
-    pub fn configure(&mut self, present: DacCode, out: &mut Outbox) {
+    pub fn configure(&mut self, present: DacCode, out: &mut impl Sink) {
         self.present = present;
         out.push(&Message::Configure(self.configuration()));
     }
@@ -133,7 +133,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
     }
 
     /// Consent.
-    pub fn arm(&mut self, out: &mut Outbox) {
+    pub fn arm(&mut self, out: &mut impl Sink) {
         out.push(&Message::Arm(Arm {
             run: self.params.run,
             config: self.params.config,
@@ -142,12 +142,12 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
     }
 
     /// Asks for the board's clock.
-    pub fn ping(&mut self, nonce: u32, out: &mut Outbox) {
+    pub fn ping(&mut self, nonce: u32, out: &mut impl Sink) {
         out.push(&Message::Ping(Ping { run: self.params.run, nonce }));
     }
 
     /// Ends control as wanted: `Done` or `Operator`.
-    pub fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
+    pub fn stop(&mut self, reason: StopReason, out: &mut impl Sink) {
         if self.stopping.is_some() {
             return; // what ended control first is what the board is told, again and again
         }
@@ -176,7 +176,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
     }
 
     /// Looks at the clock: silence.
-    pub fn poll(&mut self, now_ns: u64, out: &mut Outbox, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
+    pub fn poll(&mut self, now_ns: u64, out: &mut impl Sink, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
         // Between samples, so that a replay knows which of them came before.
         if let Some(micros) = self.pace.off.take() {
             let from = self.state.state();
@@ -197,7 +197,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         now_ns: u64,
         bytes: &[u8],
         planned: &impl Planned<T>,
-        out: &mut Outbox,
+        out: &mut impl Sink,
         notices: &mut impl FnMut(Notice<T, C::Terms>),
     ) {
         // A sample waits until it is known whether a newer one came with it.
@@ -220,7 +220,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
                 let newer = sample.is_some_and(|s| {
                     s.run == earlier.run && (s.sequence.wrapping_sub(earlier.sequence) as i16) > 0
                 });
-                self.sample(now_ns, &earlier, newer, planned, out, notices);
+                self.sample_of_line(now_ns, &earlier, newer, planned, out, notices);
             }
             match sample {
                 Some(sample) => waiting = Some(sample),
@@ -228,16 +228,32 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             }
         }
         if let Some(sample) = waiting {
-            self.sample(now_ns, &sample, false, planned, out, notices);
+            self.sample_of_line(now_ns, &sample, false, planned, out, notices);
         }
+    }
+
+    /// A sample over a line comes by the clock of another machine, whose pace is watched.
+    fn sample_of_line(
+        &mut self,
+        now_ns: u64,
+        sample: &Sample,
+        superseded: bool,
+        planned: &impl Planned<T>,
+        out: &mut impl Sink,
+        notices: &mut impl FnMut(Notice<T, C::Terms>),
+    ) {
+        if sample.run == self.params.run {
+            self.pace.sample(now_ns, sample.sequence, self.servo.period(), self.params.silence);
+        }
+        self.sample(now_ns, sample, superseded, planned, out, notices);
     }
 
     // A function of its own in machine code, too: the timing analysis is told how often it is called.
     #[inline(never)]
-    fn message(
+    pub(crate) fn message(
         &mut self,
         message: &Message,
-        out: &mut Outbox,
+        out: &mut impl Sink,
         notices: &mut impl FnMut(Notice<T, C::Terms>),
     ) {
         let (run, config) = (self.params.run, self.params.config);
@@ -285,13 +301,13 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
 
     // A function of its own in machine code, too: the timing analysis is told how often it is called.
     #[inline(never)]
-    fn sample(
+    pub(crate) fn sample(
         &mut self,
         now_ns: u64,
         sample: &Sample,
         superseded: bool,
         planned: &impl Planned<T>,
-        out: &mut Outbox,
+        out: &mut impl Sink,
         notices: &mut impl FnMut(Notice<T, C::Terms>),
     ) {
         if sample.run != self.params.run {
@@ -300,7 +316,6 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         }
         self.counts.received = self.counts.received.wrapping_add(1);
         self.last_sample_ns = Some(now_ns);
-        self.pace.sample(now_ns, sample.sequence, self.servo.period(), self.params.silence);
         self.silence_told = false;
         let board = BoardState::from_u8(sample.status & 0x07);
         let seen = Seen {
@@ -327,15 +342,13 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         let from_here = BeginningAt { planned, origin: self.origin };
         let cycle = self.supervisor.sample(&self.servo, &mut self.state, &seen, from_here);
         if let Some(code) = cycle.answer {
-            out.push(&Message::Actuate(Actuate {
+            out.actuate(&Actuate {
                 run: self.params.run,
                 sequence: sample.sequence,
                 code: code.0,
                 valid_us: u16::try_from(self.params.valid.0).unwrap_or(u16::MAX),
-            }));
+            });
         }
-        self.count(cycle.arrival);
-        notices(Notice::Cycle(CycleNotice { sample: *sample, superseded, lateness, cycles: 0, cycle }));
         if cycle.from != State::Faulted && cycle.state == State::Faulted {
             self.send_stop(StopReason::Fault, out);
         } else if let Some(reason) = self.stopping {
@@ -344,6 +357,9 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
                 self.send_stop(reason, out);
             }
         }
+        // Control first: whoever is told of the cycle takes his time.
+        self.count(cycle.arrival);
+        notices(Notice::Cycle(CycleNotice { sample: *sample, superseded, lateness, cycles: 0, cycle }));
     }
 
     fn count(&mut self, arrival: clutch_core::supervisor::Arrival) {
@@ -357,7 +373,12 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         *counter = counter.wrapping_add(1);
     }
 
-    fn after_fault(&mut self, from: State, out: &mut Outbox, notices: &mut impl FnMut(Notice<T, C::Terms>)) {
+    fn after_fault(
+        &mut self,
+        from: State,
+        out: &mut impl Sink,
+        notices: &mut impl FnMut(Notice<T, C::Terms>),
+    ) {
         if self.state.state() == State::Faulted && self.stopping.is_none() {
             notices(Notice::Ended(self.ending(from)));
             self.send_stop(StopReason::Fault, out);
@@ -370,7 +391,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         Ending { from, state: s.state(), cause: s.cause(), value: s.value(), tick: s.tick() }
     }
 
-    fn send_stop(&mut self, reason: StopReason, out: &mut Outbox) {
+    fn send_stop(&mut self, reason: StopReason, out: &mut impl Sink) {
         self.stopping = Some(reason);
         out.push(&Message::Stop(Stop { run: self.params.run, reason: reason as u8 }));
     }

@@ -1,7 +1,7 @@
 //! The work of a board's program in each period, and with each byte that comes: the same on all boards.
 //!
 //! ```text
-//!  encoder ─┐          ┌─► converter      1. the code goes out
+//!  encoder ─┐          ┌─► converter      1. the code goes out, from within the role, before it makes a frame
 //!           ├─► role ──┼─► watchdog       2. only then is the watchdog fed
 //!  line ────┘          └─► line           3. and only then are frames handed over
 //! ```
@@ -13,6 +13,7 @@ use crate::board::{BoardMisfit, BoardNode, BoardParams};
 use crate::one_chip::OneChip;
 use crate::outbox::Outbox;
 use clutch_core::{Counts, DacCode, Micros};
+use clutch_wire::Message;
 
 /// The functions that a board's one file gives. None of them may wait.
 pub trait Hardware {
@@ -35,8 +36,9 @@ pub trait Hardware {
     /// else.
     fn feed_watchdog(&mut self);
 
-    /// Hands frames to the line: all of them or, without room, none.
-    fn send(&mut self, frames: &[u8]);
+    /// Hands frames to the line: all of them, and `true`; or none, while the line is busy with earlier ones. They are
+    /// offered again then, with what comes after them.
+    fn send(&mut self, frames: &[u8]) -> bool;
 
     /// A counter of the core's clock cycles; wraps.
     fn cycles(&self) -> u32;
@@ -44,14 +46,19 @@ pub trait Hardware {
 
 /// A board's role towards the host. Times are [`Hardware::now_us`].
 pub trait Role {
-    /// Bytes from the host.
-    fn receive(&mut self, now_us: u64, bytes: &[u8]);
+    /// Bytes from the host. `put_out` gets the code that the converter is to give afterwards.
+    fn receive(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode));
 
-    /// A period begins. Afterwards [`Role::code`] is what this period's sample led to.
-    fn sample(&mut self, now_us: u64, counts: Counts, encoder_fault: bool, converter_fault: bool);
-
-    /// The code that the converter is to give now.
-    fn code(&self) -> DacCode;
+    /// A period begins. `put_out` gets the codes, at least one, and the last one is what this period's sample led to;
+    /// frames are made after that.
+    fn sample(
+        &mut self,
+        now_us: u64,
+        counts: Counts,
+        encoder_fault: bool,
+        converter_fault: bool,
+        put_out: &mut impl FnMut(DacCode),
+    );
 
     /// The sampling period, µs; none before one was configured.
     fn period_us(&self) -> Option<u32>;
@@ -64,30 +71,33 @@ pub trait Role {
 }
 
 /// One sampling period: sample, code, watchdog, frames.
+// A function of its own in machine code, too: its longest path is the bound of a period.
+#[inline(never)]
 pub fn tick(role: &mut impl Role, hardware: &mut impl Hardware) {
     let begun = hardware.cycles();
     let now_us = hardware.now_us();
     let counts = hardware.counts();
     let (encoder_fault, converter_fault) = (hardware.encoder_fault(), hardware.converter_fault());
-    role.sample(now_us, counts, encoder_fault, converter_fault);
-    hardware.put_out(role.code());
+    let (mut cycles, mut lateness) = (0, Micros(0));
+    role.sample(now_us, counts, encoder_fault, converter_fault, &mut |code| {
+        hardware.put_out(code);
+        cycles = hardware.cycles().wrapping_sub(begun);
+        lateness = Micros(hardware.now_us().wrapping_sub(now_us) as u32);
+    });
     hardware.feed_watchdog();
-    let lateness = Micros(hardware.now_us().wrapping_sub(now_us) as u32);
-    role.answered(hardware.cycles().wrapping_sub(begun), lateness);
+    role.answered(cycles, lateness);
     send(role, hardware);
 }
 
 /// Bytes from the host. A code among them goes out at once; the watchdog gets nothing from them.
 pub fn receive(role: &mut impl Role, hardware: &mut impl Hardware, bytes: &[u8]) {
-    role.receive(hardware.now_us(), bytes);
-    hardware.put_out(role.code());
+    role.receive(hardware.now_us(), bytes, &mut |code| hardware.put_out(code));
     send(role, hardware);
 }
 
 fn send(role: &mut impl Role, hardware: &mut impl Hardware) {
     let outbox = role.outbox();
-    if !outbox.as_bytes().is_empty() {
-        hardware.send(outbox.as_bytes());
+    if !outbox.is_empty() && hardware.send(outbox.as_bytes()) {
         outbox.clear();
     }
 }
@@ -110,16 +120,23 @@ impl DaqBoard {
 }
 
 impl Role for DaqBoard {
-    fn receive(&mut self, now_us: u64, bytes: &[u8]) {
+    fn receive(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode)) {
         self.node.receive(now_us as u32, bytes, &mut self.outbox);
+        put_out(self.node.code());
     }
 
-    fn sample(&mut self, now_us: u64, counts: Counts, encoder_fault: bool, converter_fault: bool) {
-        self.node.sample(now_us as u32, counts, encoder_fault, converter_fault, &mut self.outbox);
-    }
-
-    fn code(&self) -> DacCode {
-        self.node.code()
+    fn sample(
+        &mut self,
+        now_us: u64,
+        counts: Counts,
+        encoder_fault: bool,
+        converter_fault: bool,
+        put_out: &mut impl FnMut(DacCode),
+    ) {
+        let (fault, sample) = self.node.begin_period(now_us as u32, counts, encoder_fault, converter_fault);
+        put_out(self.node.code());
+        fault.iter().for_each(|fault| self.outbox.push(&Message::Fault(*fault)));
+        sample.iter().for_each(|sample| self.outbox.push(&Message::Sample(*sample)));
     }
 
     fn period_us(&self) -> Option<u32> {
@@ -136,16 +153,20 @@ impl Role for DaqBoard {
 
 /// The board as controller: it closes the loop by itself.
 impl Role for OneChip {
-    fn receive(&mut self, now_us: u64, bytes: &[u8]) {
-        self.host(now_us, bytes);
+    fn receive(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode)) {
+        self.host(now_us, bytes, put_out);
+        put_out(self.code());
     }
 
-    fn sample(&mut self, now_us: u64, counts: Counts, encoder_fault: bool, converter_fault: bool) {
-        OneChip::sample(self, now_us, counts, encoder_fault, converter_fault);
-    }
-
-    fn code(&self) -> DacCode {
-        OneChip::code(self)
+    fn sample(
+        &mut self,
+        now_us: u64,
+        counts: Counts,
+        encoder_fault: bool,
+        converter_fault: bool,
+        put_out: &mut impl FnMut(DacCode),
+    ) {
+        OneChip::sample(self, now_us, counts, encoder_fault, converter_fault, put_out);
     }
 
     fn period_us(&self) -> Option<u32> {

@@ -45,13 +45,14 @@ mod telemetry;
 mod wide_counter;
 
 pub use board::{BoardMisfit, BoardNode, BoardParams};
-pub use board_controller::{BoardController, BoardControllerParams, Outboxes, present_code};
+pub use board_controller::{BoardController, BoardControllerParams, present_code};
 pub use controller::{ControllerNode, ControllerParams};
 pub use hardware::{DaqBoard, Hardware, Role, receive, tick};
 pub use host::HostNode;
+pub use lockstep::Outboxes;
 pub use notice::{CycleNotice, Ending, LinkCounts, Notice, Standing};
 pub use one_chip::OneChip;
-pub use outbox::Outbox;
+pub use outbox::{Outbox, Sink};
 pub use settings::{
     Built, Declared, MAX_KNOTS, Misfit, Name, Path, Refusing, RunParams, RunSettings, RunTimes, SETTINGS,
     SETTINGS_HASH, Setting, Settings, Unsupported,

@@ -8,7 +8,8 @@
 //! All little-endian. Whoever sends a request decides how long it is until the next, so that a run is
 //! the same however fast the machine is.
 
-use crate::board_controller::{BoardController, Outboxes};
+use crate::board_controller::BoardController;
+use crate::outbox::Outbox;
 use clutch_core::Micros;
 
 /// Bytes before those that are carried.
@@ -71,26 +72,36 @@ impl<'a> Exchange<'a> {
     }
 }
 
+/// Frames on their way out of a controller at two lines.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Outboxes {
+    /// To the host.
+    pub host: Outbox,
+    /// To encoder and converter.
+    pub daq: Outbox,
+}
+
 /// A controller's answer: what has arrived goes in, what is due comes out.
 pub fn answer<'p>(
     node: &mut BoardController,
     request: &Exchange<'_>,
     outboxes: &'p mut Outboxes,
 ) -> Exchange<'p> {
-    outboxes.host.clear();
-    outboxes.daq.clear();
+    let Outboxes { host, daq } = outboxes;
+    host.clear();
+    daq.clear();
     if request.lateness_us > 0 {
         node.answered(Micros(request.lateness_us));
     }
-    node.host(request.time_ns, request.host, outboxes);
+    node.host(request.time_ns, request.host, host, daq);
     if !request.daq.is_empty() {
-        node.daq(request.time_ns, request.daq, outboxes);
+        node.daq(request.time_ns, request.daq, host, daq);
     }
-    node.poll(request.time_ns, outboxes);
+    node.poll(request.time_ns, host, daq);
     Exchange {
         time_ns: node.poll_at().unwrap_or(u64::MAX),
         lateness_us: 0,
-        host: outboxes.host.as_bytes(),
-        daq: outboxes.daq.as_bytes(),
+        host: host.as_bytes(),
+        daq: daq.as_bytes(),
     }
 }

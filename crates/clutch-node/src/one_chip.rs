@@ -1,23 +1,47 @@
 //! Controller, encoder and converter on one chip.
 
 use crate::board::{BoardMisfit, BoardNode, BoardParams};
-use crate::board_controller::{BoardController, BoardControllerParams, Outboxes};
-use crate::outbox::Outbox;
+use crate::board_controller::{BoardController, BoardControllerParams};
+use crate::outbox::{Mail, Outbox, Sink};
 use clutch_core::{Counts, DacCode, Micros};
-use clutch_wire::BoardState;
+use clutch_wire::{Actuate, BoardState, Message};
 
-/// Rounds of frames to and fro within one call. A handshake takes two; more rounds would mean a livelock; the
+/// Messages of the board that are heard after bytes of the host. A handshake has two; more would mean a livelock; the
 /// remainder waits for the next call.
-const ROUNDS: u32 = 4;
+const MOST_HEARD: u32 = 8;
 
-/// An [`BoardController`] that drives a [`BoardNode`] in the same memory. Both speak as over a line, so that
-/// what was shown for one is shown for the other. Times are the chip's clock since power-up, µs.
+/// A [`BoardController`] that drives a [`BoardNode`] in the same memory. They exchange messages by value, without
+/// frames, and a code is out before anything else follows from its sample. Times are the chip's clock since power-up,
+/// µs.
 #[derive(Clone, Debug)]
 pub struct OneChip {
     controller: BoardController,
     board: BoardNode,
-    outboxes: Outboxes,
-    up: Outbox,
+    /// Of the board, to the controller.
+    up: Mail,
+    to_host: Outbox,
+}
+
+/// The way from the controller to the board: a message is heard, and its code out, before the controller goes on.
+struct ToBoard<'a, F> {
+    board: &'a mut BoardNode,
+    up: &'a mut Mail,
+    now_us: u32,
+    put_out: &'a mut F,
+}
+
+impl<F: FnMut(DacCode)> Sink for ToBoard<'_, F> {
+    fn push(&mut self, message: &Message) {
+        self.board.hear(self.now_us, message, self.up);
+        (self.put_out)(self.board.code());
+    }
+
+    // A function of its own in machine code, too: the bound of the path from a sample to its code leads through it.
+    #[inline(never)]
+    fn actuate(&mut self, answer: &Actuate) {
+        self.board.obey(self.now_us, answer, self.up);
+        (self.put_out)(self.board.code());
+    }
 }
 
 impl OneChip {
@@ -29,49 +53,71 @@ impl OneChip {
         Ok(OneChip {
             controller: BoardController::new(controller),
             board: BoardNode::new(board)?,
-            outboxes: Outboxes::default(),
-            up: Outbox::default(),
+            up: Mail::default(),
+            to_host: Outbox::default(),
         })
     }
 
-    /// A sampling period begins: the encoder's counts, and what the chip sees of its hardware. The code
-    /// that the converter is to give now.
+    /// A sampling period begins: the encoder's counts, and what the chip sees of its hardware. `put_out` gets each
+    /// code as soon as it is known, at least once; frames for the host are made after that.
     pub fn sample(
         &mut self,
         now_us: u64,
         counts: Counts,
         encoder_fault: bool,
         converter_fault: bool,
-    ) -> DacCode {
-        self.board.sample(now_us as u32, counts, encoder_fault, converter_fault, &mut self.up);
-        self.settle(now_us);
-        self.poll(now_us);
-        self.board.code()
+        put_out: &mut impl FnMut(DacCode),
+    ) {
+        let (fault, sample) = self.board.begin_period(now_us as u32, counts, encoder_fault, converter_fault);
+        // The safe output goes on by itself; under control the sample's answer is the next code.
+        put_out(self.board.code());
+        let OneChip { controller, board, up, to_host } = self;
+        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+        let (now_ns, drove) = (now_us.saturating_mul(1000), controller.driving());
+        if let Some(fault) = fault {
+            controller.hear(&Message::Fault(fault), to_host, daq);
+        }
+        if let Some(sample) = sample {
+            controller.sample(now_ns, &sample, to_host, daq);
+        }
+        controller.follow(now_ns, drove, to_host, daq);
+        controller.poll(now_ns, to_host, daq);
+        // One a period: that it has stopped, or that it refuses. What follows from it does so a period later.
+        if let Some(message) = daq.up.take() {
+            controller.hear(&message, to_host, daq);
+        }
     }
 
     /// Bytes from the host.
-    pub fn host(&mut self, now_us: u64, bytes: &[u8]) {
-        self.controller.host(now_us.saturating_mul(1000), bytes, &mut self.outboxes);
-        self.settle(now_us);
+    pub fn host(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode)) {
+        let OneChip { controller, board, up, to_host } = self;
+        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+        controller.host(now_us.saturating_mul(1000), bytes, to_host, daq);
+        self.settle(now_us, put_out);
     }
 
     /// Looks at the clock.
-    pub fn poll(&mut self, now_us: u64) {
-        self.controller.poll(now_us.saturating_mul(1000), &mut self.outboxes);
+    pub fn poll(&mut self, now_us: u64, put_out: &mut impl FnMut(DacCode)) {
+        let OneChip { controller, board, up, to_host } = self;
+        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+        controller.poll(now_us.saturating_mul(1000), to_host, daq);
+        let before = self.board.code();
         self.board.poll(now_us as u32, &mut self.up);
-        self.settle(now_us);
+        if self.board.code() != before {
+            put_out(self.board.code());
+        }
+        self.settle(now_us, put_out);
     }
 
-    /// Frames between the two, until neither has more to say.
-    fn settle(&mut self, now_us: u64) {
-        for _ in 0..ROUNDS {
-            if self.up.is_empty() && self.outboxes.daq.is_empty() {
-                return;
-            }
-            self.controller.daq(now_us.saturating_mul(1000), self.up.as_bytes(), &mut self.outboxes);
-            self.up.clear();
-            self.board.receive(now_us as u32, self.outboxes.daq.as_bytes(), &mut self.up);
-            self.outboxes.daq.clear();
+    /// The controller hears what the board has to say.
+    fn settle(&mut self, now_us: u64, put_out: &mut impl FnMut(DacCode)) {
+        for _ in 0..MOST_HEARD {
+            let Some(message) = self.up.take() else { return };
+            let OneChip { controller, board, up, to_host } = self;
+            let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+            let drove = controller.driving();
+            controller.hear(&message, to_host, daq);
+            controller.follow(now_us.saturating_mul(1000), drove, to_host, daq);
         }
     }
 
@@ -95,7 +141,7 @@ impl OneChip {
 
     /// Frames for the host.
     pub fn to_host(&mut self) -> &mut Outbox {
-        &mut self.outboxes.host
+        &mut self.to_host
     }
 
     /// Clock cycles that the last tick took.

@@ -1,6 +1,17 @@
-//! Bytes on their way out.
+//! Messages on their way out.
 
-use clutch_wire::{Message, encode};
+use clutch_wire::{Actuate, Message, encode_into};
+
+/// The way of a node's messages to its other end: frames on a line, or the other end itself.
+pub trait Sink {
+    /// Hands a message over.
+    fn push(&mut self, message: &Message);
+
+    /// Hands a code over: the message that must not wait for anything.
+    fn actuate(&mut self, answer: &Actuate) {
+        self.push(&Message::Actuate(*answer));
+    }
+}
 
 const CAPACITY: usize = 512;
 
@@ -27,8 +38,14 @@ impl Outbox {
     }
 
     /// Adds a frame.
+    // A function of its own in machine code: it is called from many places, and the timing analysis counts its calls.
+    #[inline(never)]
     pub fn push(&mut self, message: &Message) {
-        self.append(encode(message).as_bytes());
+        let free = self.bytes.get_mut(self.used..).unwrap_or_default();
+        match encode_into(message, free) {
+            Some(length) => self.used = self.used.wrapping_add(length),
+            None => self.dropped = self.dropped.saturating_add(1),
+        }
     }
 
     /// Adds whole frames that have been made before.
@@ -64,5 +81,46 @@ impl Outbox {
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped
+    }
+}
+
+impl Sink for Outbox {
+    fn push(&mut self, message: &Message) {
+        Outbox::push(self, message);
+    }
+}
+
+/// Messages that wait for the end that is in the same memory.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Mail {
+    waiting: [Option<Message>; Mail::MOST],
+    /// The place of the oldest.
+    first: u8,
+    count: u8,
+}
+
+impl Mail {
+    /// An end answers a message with one, and reports one fault: nothing waits behind more.
+    const MOST: usize = 4;
+
+    /// The oldest message.
+    pub(crate) fn take(&mut self) -> Option<Message> {
+        self.count = self.count.checked_sub(1)?;
+        let at = usize::from(self.first) % Mail::MOST;
+        self.first = self.first.wrapping_add(1);
+        self.waiting.get_mut(at)?.take()
+    }
+}
+
+impl Sink for Mail {
+    /// A message without room is lost, as on a line; the ends bear that.
+    fn push(&mut self, message: &Message) {
+        let at = usize::from(self.first.wrapping_add(self.count)) % Mail::MOST;
+        if usize::from(self.count) < Mail::MOST
+            && let Some(place) = self.waiting.get_mut(at)
+        {
+            *place = Some(*message);
+            self.count = self.count.wrapping_add(1);
+        }
     }
 }

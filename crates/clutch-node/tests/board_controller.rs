@@ -258,7 +258,8 @@ fn a_setting_while_consent_is_on_its_way_lets_the_boards_watchdog_bite() {
     desk.board_controller.host(
         desk.now_ns,
         encode(&Message::Arm(Arm { run: 5, config: CONFIG, boot: BOARD_CONTROLLER.boot })).as_bytes(),
-        &mut arm,
+        &mut arm.host,
+        &mut arm.daq,
     );
     let (key, value) = desk.plan.pairs()[0];
     desk.uploads(&[(key, value)]);
@@ -686,7 +687,7 @@ proptest! {
         line[place] ^= bits;
         let (mut board_controller, mut outboxes, mut taken) = (BoardController::new(BOARD_CONTROLLER), Outboxes::default(), Vec::new());
         for byte in line {
-            board_controller.host(0, &[byte], &mut outboxes);
+            board_controller.host(0, &[byte], &mut outboxes.host, &mut outboxes.daq);
             taken.extend(frames(&desk::drain(&mut outboxes.host)));
         }
         prop_assert!(taken.len() + lost >= sets.len());

@@ -48,6 +48,7 @@ struct Desk {
     cycles: u32,
     counts: i32,
     encoder_fault: bool,
+    busy: bool,
     done: Vec<Done>,
 }
 
@@ -74,10 +75,14 @@ impl Hardware for Desk {
     fn feed_watchdog(&mut self) {
         self.done.push(Done::FedWatchdog);
     }
-    fn send(&mut self, frames: &[u8]) {
+    fn send(&mut self, frames: &[u8]) -> bool {
+        if self.busy {
+            return false;
+        }
         let mut decoder = Decoder::new();
         self.done
             .push(Done::Sent(frames.iter().filter_map(|b| decoder.push(*b)).map(Result::unwrap).collect()));
+        true
     }
     fn cycles(&self) -> u32 {
         self.cycles
@@ -136,6 +141,20 @@ fn a_code_from_the_host_goes_out_at_once_and_bytes_never_feed_the_watchdog() {
 }
 
 #[test]
+fn frames_wait_while_the_line_is_busy_and_none_is_sent_twice() {
+    let (mut board, mut desk) = driving();
+    desk.busy = true;
+    assert_eq!(desk.ticks(&mut board), [Done::Sampled, Done::PutOut(BOOT_CODE), Done::FedWatchdog]);
+    desk.busy = false;
+    let sent = |done: &[Done]| match done {
+        [.., Done::Sent(messages)] => messages.len(),
+        _ => 0,
+    };
+    assert_eq!(sent(&desk.ticks(&mut board)), 2, "that of the period before, and its own");
+    assert_eq!(sent(&desk.ticks(&mut board)), 1);
+}
+
+#[test]
 fn a_fault_of_the_hardware_is_answered_with_the_safe_output_within_its_period() {
     let (mut board, mut desk) = driving();
     desk.encoder_fault = true;
@@ -150,10 +169,11 @@ struct Clerk {
 }
 
 impl Role for Clerk {
-    fn receive(&mut self, _: u64, _: &[u8]) {}
-    fn sample(&mut self, _: u64, _: Counts, _: bool, _: bool) {}
-    fn code(&self) -> DacCode {
-        DacCode(100)
+    fn receive(&mut self, _: u64, _: &[u8], put_out: &mut impl FnMut(DacCode)) {
+        put_out(DacCode(100));
+    }
+    fn sample(&mut self, _: u64, _: Counts, _: bool, _: bool, put_out: &mut impl FnMut(DacCode)) {
+        put_out(DacCode(100));
     }
     fn period_us(&self) -> Option<u32> {
         None

@@ -71,7 +71,7 @@ impl Bench {
     fn asks(&mut self, f: impl FnOnce(&mut HostNode, &mut Outbox)) -> Vec<Message> {
         let mut out = Outbox::default();
         f(&mut self.host, &mut out);
-        self.chip.host(self.now_us, out.as_bytes());
+        self.chip.host(self.now_us, out.as_bytes(), &mut |_| ());
         self.hears()
     }
 
@@ -114,8 +114,10 @@ impl Bench {
 
     fn period_with(&mut self, encoder_fault: bool, converter_fault: bool) -> (DacCode, Vec<Message>) {
         self.now_us += 1000;
-        let code = self.chip.sample(self.now_us, self.shaft.counts(), encoder_fault, converter_fault);
-        assert_eq!(code, self.chip.code());
+        let (mut codes, counts) = (Vec::new(), self.shaft.counts());
+        self.chip.sample(self.now_us, counts, encoder_fault, converter_fault, &mut |code| codes.push(code));
+        let code = self.chip.code();
+        assert_eq!(codes.last(), Some(&code), "the converter has the last code");
         self.shaft.turns(code, 0.001);
         (code, self.hears())
     }
@@ -177,6 +179,17 @@ fn the_code_that_a_sample_gives_is_the_laws_answer_to_that_sample() {
 }
 
 #[test]
+fn each_period_repeats_the_code_that_is_out_and_then_puts_out_the_sample_s_answer() {
+    let mut bench = Bench::running(Plan::new());
+    let (before, counts) = (bench.chip.code(), bench.shaft.counts().0 - 3);
+    let mut codes = Vec::new();
+    bench.now_us += 1000;
+    bench.chip.sample(bench.now_us, Counts(counts), false, false, &mut |code| codes.push(code));
+    assert_eq!(codes, [before, bench.chip.code()]);
+    assert_ne!(before, bench.chip.code(), "three counts are an error that is answered");
+}
+
+#[test]
 fn before_consent_the_output_is_that_of_power_up() {
     let mut bench = Bench::new(Plan::new());
     let boot = DacCode(BOARD.boot_code);
@@ -193,7 +206,7 @@ fn a_sample_that_comes_late_finds_the_watchdogs_safe_output() {
         let mut bench = Bench::running(Plan { silence: Micros(8000), ..Plan::new() });
         let safe = bench.plan.supervisor().safe_codes().hold;
         bench.now_us += late_us;
-        bench.chip.poll(bench.now_us);
+        bench.chip.poll(bench.now_us, &mut |_| ());
         assert_eq!(bench.chip.state() == BoardState::Faulted, bites, "{late_us} µs");
         assert_eq!(bench.chip.code() == safe, bites);
         let heard = bench.hears();
@@ -202,7 +215,9 @@ fn a_sample_that_comes_late_finds_the_watchdogs_safe_output() {
         let ends =
             bench.notices.iter().filter(|n| matches!(n, Notice::Ended(e) if e.cause == Cause::Board)).count();
         assert_eq!(ends, usize::from(bites));
-        let code = bench.chip.sample(bench.now_us, bench.shaft.counts(), false, false);
+        let counts = bench.shaft.counts();
+        bench.chip.sample(bench.now_us, counts, false, false, &mut |_| ());
+        let code = bench.chip.code();
         assert_eq!(code == safe, bites, "and stays there");
     }
 }
@@ -211,7 +226,7 @@ fn a_sample_that_comes_late_finds_the_watchdogs_safe_output() {
 fn silence_of_the_encoder_ends_in_a_fault_also_before_the_watchdog_bites() {
     let mut bench = Bench::running(Plan { watchdog: Micros(20_000), ..Plan::new() });
     bench.now_us += 3000;
-    bench.chip.poll(bench.now_us);
+    bench.chip.poll(bench.now_us, &mut |_| ());
     bench.hears();
     assert_eq!(bench.chip.state(), BoardState::Faulted);
     assert_eq!((bench.host.standing().state, bench.host.standing().cause), (State::Faulted, Cause::Silence));

@@ -36,34 +36,66 @@ impl Frame {
 /// The frame of a message.
 #[must_use]
 pub fn encode(message: &Message) -> Frame {
-    let mut body = [0; MAX_BODY];
-    let length = message.put(&mut Put::new(&mut body));
-    let (content, rest) = body.split_at_mut_checked(length).unwrap_or_default();
-    Put::new(rest).bytes(CRC.checksum(content).to_le_bytes());
-    stuff(&body, length.wrapping_add(4))
+    let mut bytes = [0; MAX_FRAME];
+    let length = encode_into(message, &mut bytes).unwrap_or(0);
+    Frame { bytes, length }
 }
 
-/// COBS, from the end to the start: each zero, and the place in front of the first byte, gets the
-/// distance to the next zero; the end counts as one.
-fn stuff(body: &[u8; MAX_BODY], length: usize) -> Frame {
-    let mut bytes = [0; MAX_FRAME];
-    let mut distance = 1_u8;
-    let [first, places @ ..] = &mut bytes;
-    let mut end = length;
-    // Not `zip(…).rev()`: that keeps a check of its own that can panic.
-    while let Some(i) = end.checked_sub(1) {
-        end = i;
-        let (Some(place), Some(&byte)) = (places.get_mut(i), body.get(i)) else { continue };
-        if byte == 0 {
-            *place = distance;
-            distance = 1;
-        } else {
-            *place = byte;
-            distance = distance.wrapping_add(1);
-        }
+/// Writes the frame of a message to the start of a buffer; its length, or nothing if the buffer is too short. What a
+/// short buffer holds then is no frame.
+#[must_use]
+pub fn encode_into(message: &Message, buffer: &mut [u8]) -> Option<usize> {
+    let mut body = [0; MAX_BODY];
+    let length = message.put(&mut Put::new(&mut body));
+    // Checksum, stuffing and copy in one pass: on a board this is most of the time that a period takes.
+    let mut out = Stuffing { buffer, at: 1, code: 0 };
+    let mut digest = CRC.digest();
+    for byte in body.get(..length)? {
+        digest.update(core::slice::from_ref(byte));
+        out.push(*byte)?;
     }
-    *first = distance;
-    Frame { bytes, length: length.wrapping_add(2) }
+    for byte in digest.finalize().to_le_bytes() {
+        out.push(byte)?;
+    }
+    out.end()
+}
+
+/// COBS, byte by byte: each zero, and the place in front of the first byte, gets the distance to the next zero; the
+/// end counts as one.
+struct Stuffing<'a> {
+    buffer: &'a mut [u8],
+    /// Place of the next byte.
+    at: usize,
+    /// Place of the last zero, which waits for its distance.
+    code: usize,
+}
+
+impl Stuffing<'_> {
+    #[inline]
+    fn push(&mut self, byte: u8) -> Option<()> {
+        if byte == 0 {
+            self.close()?;
+        } else {
+            *self.buffer.get_mut(self.at)? = byte;
+        }
+        self.at = self.at.wrapping_add(1);
+        Some(())
+    }
+
+    /// The distance from the last zero to here: below 254, see `MAX_FRAME`.
+    #[inline]
+    fn close(&mut self) -> Option<()> {
+        *self.buffer.get_mut(self.code)? = self.at.wrapping_sub(self.code) as u8;
+        self.code = self.at;
+        Some(())
+    }
+
+    /// The delimiter; the length of all.
+    fn end(mut self) -> Option<usize> {
+        self.close()?;
+        *self.buffer.get_mut(self.at)? = 0;
+        Some(self.at.wrapping_add(1))
+    }
 }
 
 /// The reason why bytes were dropped.

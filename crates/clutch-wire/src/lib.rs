@@ -15,7 +15,7 @@ pub use codes::{
     STATUS_ENCODER_FAULT, STATUS_LATE, STATUS_STATE, SafeKind, StopReason, TELEMETRY, TELEMETRY_ANSWERED,
     TELEMETRY_ASKED, TELEMETRY_LIMIT, TELEMETRY_SUPERSEDED, TELEMETRY_TARGETED,
 };
-pub use frame::{Decoder, Frame, FrameError, MAX_BODY, MAX_FRAME, encode};
+pub use frame::{Decoder, Frame, FrameError, MAX_BODY, MAX_FRAME, encode, encode_into};
 pub use list::List;
 pub use message::{
     Actuate, Arm, Armed, Configure, Configured, ControllerHello, Direction, Discover, Ended, Fault,

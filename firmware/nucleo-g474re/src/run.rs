@@ -8,7 +8,6 @@ use embassy_futures::select::{Either, select};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::InterruptExt;
 use embassy_time::{Duration, Ticker};
-use embedded_io_async::Read;
 
 /// Bytes that are processed at a time: the longest wait of a period.
 const CHUNK: usize = 32;

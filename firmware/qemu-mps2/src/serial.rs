@@ -2,7 +2,7 @@
 
 use crate::last_word;
 use clutch_core::Micros;
-use clutch_node::{BoardController, Outbox, Outboxes};
+use clutch_node::{BoardController, Outbox};
 use core::ptr::{read_volatile, write_volatile};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::interrupt::InterruptNumber;
@@ -197,7 +197,8 @@ pub fn run(mut node: BoardController) -> ! {
     let mut watchdog = Watchdog::start();
     HOST.enable();
     DAQ.enable();
-    let (mut outboxes, mut host, mut daq) = (Outboxes::default(), [0; 64], [0; 64]);
+    let (mut outbox, mut to_daq) = (Outbox::default(), Outbox::default());
+    let (mut host, mut daq) = ([0; 64], [0; 64]);
     loop {
         let (host_bytes, daq_bytes) = cortex_m::interrupt::free(|cs| {
             let (a, b) = (FROM_HOST.drain(cs, &mut host), FROM_DAQ.drain(cs, &mut daq));
@@ -211,24 +212,24 @@ pub fn run(mut node: BoardController) -> ! {
         let arrived = clock.now_us();
         let now_ns = arrived.saturating_mul(1000);
         if daq_bytes > 0 {
-            node.daq(now_ns, daq.get(..daq_bytes).unwrap_or(&[]), &mut outboxes);
+            node.daq(now_ns, daq.get(..daq_bytes).unwrap_or(&[]), &mut outbox, &mut to_daq);
         }
         // The answer comes before anything else; a frame from the host to encoder and converter is
         // not an answer.
-        let ticked = !outboxes.daq.is_empty();
-        DAQ.flush(&mut outboxes.daq);
+        let ticked = !to_daq.is_empty();
+        DAQ.flush(&mut to_daq);
         if ticked {
             let late = clock.now_us().wrapping_sub(arrived);
             node.answered(Micros(u32::try_from(late).unwrap_or(u32::MAX)));
         }
-        node.host(now_ns, host.get(..host_bytes).unwrap_or(&[]), &mut outboxes);
-        node.poll(now_ns, &mut outboxes);
-        DAQ.flush(&mut outboxes.daq);
+        node.host(now_ns, host.get(..host_bytes).unwrap_or(&[]), &mut outbox, &mut to_daq);
+        node.poll(now_ns, &mut outbox, &mut to_daq);
+        DAQ.flush(&mut to_daq);
         // While it drives a shaft, only a completed tick shows that the board works.
         if ticked || !node.driving() {
             watchdog.feed();
         }
-        HOST.flush(&mut outboxes.host);
+        HOST.flush(&mut outbox);
         last_word::prepare(node.last_word());
     }
 }

@@ -594,8 +594,9 @@ impl Hardware for Unknown {
         sink(code);
     }
     fn feed_watchdog(&mut self) {}
-    fn send(&mut self, frames: &[u8]) {
+    fn send(&mut self, frames: &[u8]) -> bool {
         black_box(frames);
+        flag()
     }
     fn cycles(&self) -> u32 {
         word() as u32
@@ -608,7 +609,7 @@ fn runner(params: &BoardParams) {
     }
     if let Some(mut chip) = made(OneChip::new(board_controller_params(), params)) {
         // The functions that the runner does not call.
-        chip.poll(word());
+        chip.poll(word(), &mut |code| sink(code));
         sink((chip.state() == BoardState::Running, chip.code()));
         periods(opaque(chip));
     }
@@ -731,11 +732,11 @@ fn board_controller() {
     let mut node = opaque(BoardController::new(board_controller_params()));
     let mut out = opaque(Outboxes::default());
     loop {
-        node.host(word(), bytes(&any_bytes()), &mut out);
+        node.host(word(), bytes(&any_bytes()), &mut out.host, &mut out.daq);
         node = opaque(node);
-        node.daq(word(), bytes(&any_bytes()), &mut out);
+        node.daq(word(), bytes(&any_bytes()), &mut out.host, &mut out.daq);
         node = opaque(node);
-        node.poll(word(), &mut out);
+        node.poll(word(), &mut out.host, &mut out.daq);
         node.spent(word() as u32);
         node.answered(micros());
         sink((node.state(), node.driving(), node.poll_at(), node.last_word()));

@@ -533,6 +533,20 @@ proptest! {
     }
 
     #[test]
+    fn straight_lines_are_exact_however_long_they_are(
+        length in 1_u64..1_000_000_000_000_000_000,
+        rise in -(1_i64 << 61)..1 << 61,
+        at in 0.0..1.0_f64,
+    ) {
+        let knots = [Knot { time_us: 0, position: FixedCounts(0) }, Knot { time_us: length, position: FixedCounts(rise) }];
+        let tick = ((length as f64 * at) as u64).min(length - 1) / 1000;
+        let expected = (i128::from(rise) * i128::from(tick * 1000)).div_euclid(i128::from(length));
+        let line = Table { knots: &knots, interpolation: Interpolation::Linear };
+        let target: Target<f64> = line.at(tick, Encoder::PAPER, Micros(1000));
+        prop_assert_eq!(i128::from(target.position.0), expected);
+    }
+
+    #[test]
     fn a_cubic_table_passes_through_its_points(knots in points(-1_000_000_000_000..1_000_000_000_000)) {
         let whole: Vec<_> = knots.iter().map(|k| Knot { time_us: k.time_us * 1000, ..*k }).collect();
         let (double, single) =

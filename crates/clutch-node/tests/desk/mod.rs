@@ -238,9 +238,11 @@ impl Desk {
             {
                 return heard;
             }
-            self.board_controller.host(self.now_ns, &down, &mut self.outboxes);
+            let Outboxes { host, daq } = &mut self.outboxes;
+            self.board_controller.host(self.now_ns, &down, host, daq);
             if !up.is_empty() {
-                self.board_controller.daq(self.now_ns, &up, &mut self.outboxes);
+                let Outboxes { host, daq } = &mut self.outboxes;
+                self.board_controller.daq(self.now_ns, &up, host, daq);
                 let (path, expected) = (self.plan.path(), &mut self.expected);
                 self.twin.receive(self.now_ns, &up, &path, &mut Outbox::default(), &mut |n| expected.push(n));
             }
@@ -326,7 +328,8 @@ impl Desk {
 
     /// Both ends look at the clock.
     pub fn polls(&mut self) -> Vec<Message> {
-        self.board_controller.poll(self.now_ns, &mut self.outboxes);
+        let Outboxes { host, daq } = &mut self.outboxes;
+        self.board_controller.poll(self.now_ns, host, daq);
         if self.host_alive {
             let notices = &mut self.notices;
             self.host.poll(self.now_ns + self.host_later_ns, &mut self.to_board, &mut |n| notices.push(n));

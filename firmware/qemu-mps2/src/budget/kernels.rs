@@ -2,9 +2,10 @@
 //! uses the crates.
 
 use clutch_core::law::LawState;
-use clutch_core::{Counts, Servo, ServoState, Target};
-use clutch_node::{BoardController, Outboxes};
+use clutch_core::{Counts, DacCode, Servo, ServoState, Target};
+use clutch_node::{BoardController, Hardware, OneChip, Outboxes};
 use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
+use cortex_m::peripheral::SYST;
 
 /// Bytes of one frame, as they come over the line: one delimiter, at their end.
 #[derive(Clone, Copy)]
@@ -102,7 +103,8 @@ pub extern "C" fn encode_actuate(answer: &Actuate, frame: &mut Option<Frame>) {
 pub extern "C" fn whole_tick(session: &mut Session, bytes: &Bytes) {
     session.outboxes.host.clear();
     session.outboxes.daq.clear();
-    session.node.daq(session.now_ns, bytes.as_slice(), &mut session.outboxes);
+    let Session { node, outboxes, now_ns } = session;
+    node.daq(*now_ns, bytes.as_slice(), &mut outboxes.host, &mut outboxes.daq);
 }
 
 /// A controller and its lines.
@@ -110,4 +112,72 @@ pub struct Session {
     pub node: BoardController,
     pub outboxes: Outboxes,
     pub now_ns: u64,
+}
+
+/// A chip that is controller and board, and its pins: a period is `clutch_node::tick`.
+pub struct Chip {
+    pub node: OneChip,
+    pub pins: Pins,
+}
+
+/// Encoder, converter and line of a chip, in memory.
+pub struct Pins {
+    pub now_us: u64,
+    pub counts: i32,
+    pub encoder_fault: bool,
+    pub converter_fault: bool,
+    pub line: [u8; 512],
+    /// Bytes of the line that are used.
+    pub used: usize,
+    /// The timer as the period began, and as its last code was out; it counts downwards.
+    pub begun: u32,
+    pub out: u32,
+}
+
+/// The converter is written: the end of the path from a sample to its code.
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn converter_written(pins: &mut Pins, code: u16) {
+    // SAFETY: a register that may be read at any time.
+    pins.out = unsafe { (*SYST::PTR).cvr.read() };
+    core::hint::black_box(code);
+}
+
+impl Hardware for Pins {
+    fn now_us(&self) -> u64 {
+        self.now_us
+    }
+    fn counts(&mut self) -> Counts {
+        // SAFETY: as above.
+        self.begun = unsafe { (*SYST::PTR).cvr.read() };
+        Counts(self.counts)
+    }
+    fn encoder_fault(&self) -> bool {
+        self.encoder_fault
+    }
+    fn converter_fault(&self) -> bool {
+        self.converter_fault
+    }
+    fn put_out(&mut self, code: DacCode) {
+        converter_written(self, code.0);
+    }
+    fn feed_watchdog(&mut self) {}
+    fn send(&mut self, frames: &[u8]) -> bool {
+        match self.line.get_mut(..frames.len()) {
+            Some(line) => line.copy_from_slice(frames),
+            None => return false,
+        }
+        self.used = frames.len();
+        true
+    }
+    fn cycles(&self) -> u32 {
+        self.out
+    }
+}
+
+/// A whole period of a chip.
+#[inline(never)]
+#[unsafe(no_mangle)]
+pub extern "C" fn chip_period(chip: &mut Chip) {
+    clutch_node::tick(&mut chip.node, &mut chip.pins);
 }

@@ -48,8 +48,13 @@ pub unsafe fn instructions(function: usize, arguments: [usize; 3]) -> u32 {
             out("d4") _, out("d5") _, out("d6") _, out("d7") _,
         );
     }
-    let ticks = before.wrapping_sub(after as u32) & WRAP;
-    (ticks.wrapping_mul(10).wrapping_add(TICKS_PER_TEN / 2) / TICKS_PER_TEN).wrapping_sub(AROUND)
+    between(before, after as u32).wrapping_sub(AROUND)
+}
+
+/// Instructions between two readings of the timer.
+pub fn between(before: u32, after: u32) -> u32 {
+    let ticks = before.wrapping_sub(after) & WRAP;
+    ticks.wrapping_mul(10).wrapping_add(TICKS_PER_TEN / 2) / TICKS_PER_TEN
 }
 
 /// The counts of one function.

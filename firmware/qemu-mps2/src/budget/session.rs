@@ -1,8 +1,8 @@
 //! Whole periods of a controller: runs in which the line and the board do everything they can.
 
 use crate::inputs::Random;
-use crate::kernels::{Bytes, Session, whole_tick};
-use crate::meter::{Tally, instructions};
+use crate::kernels::{Bytes, Chip, Pins, Session, chip_period, whole_tick};
+use crate::meter::{Tally, between, instructions};
 use clutch_core::law::LawParams;
 use clutch_core::reference::{Interpolation, Knot, MinimumJerk, ReferenceParams, Sine, Table};
 use clutch_core::{
@@ -10,8 +10,8 @@ use clutch_core::{
     Tolerances,
 };
 use clutch_node::{
-    BoardController, BoardControllerParams, ControllerNode, ControllerParams, Outboxes, RunParams, RunTimes,
-    Settings,
+    BoardController, BoardControllerParams, BoardParams, ControllerNode, ControllerParams, OneChip, Outboxes,
+    RunParams, RunTimes, Settings,
 };
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configured, Discover, Fault, Hello, Message, Pong, Refused, SCHEMA,
@@ -25,8 +25,8 @@ const BOOT: u32 = 0x5eed_b007;
 const RUNS: u32 = 600;
 const PERIODS: u32 = 60;
 
-/// A controller that has been configured by its host, up to the question to encoder and converter.
-fn session(kind: u32) -> Option<Session> {
+/// A run: its settings, and the question of its host whether it may begin.
+fn run(kind: u32) -> Option<(Settings, Message)> {
     let laws = LawParams::<f32>::all();
     let servo = ServoParams::paper(*laws.get(kind as usize % laws.len())?);
     let bounds = Bounds::around(&PlantParams::default(), &Tolerances::default()).ok()?;
@@ -58,19 +58,122 @@ fn session(kind: u32) -> Option<Session> {
         ticks: u64::from(PERIODS) - 5,
     })
     .ok()?;
-    let mut session = Session {
-        node: BoardController::new(BoardControllerParams { board: 1, boot: BOOT, clock_hz: 0 }),
-        outboxes: Outboxes::default(),
-        now_ns: 0,
-    };
-    session.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
-    session.node.daq(0, encode(&hello(RUN)).as_bytes(), &mut session.outboxes);
-    settings.each(|key, value| session.asks(&Message::Set(Set { run: RUN, key, value })));
     let params = ControllerParams { run: RUN, config: CONFIG, boot: BOOT, watchdog, valid, silence };
     let supervisor = Supervisor::new(&supervisor, &servo, &bounds).ok()?;
     let node = ControllerNode::new(params, Servo::new(&servo).ok()?, supervisor);
-    session.asks(&Message::Configure(node.configuration()));
+    Some((settings, Message::Configure(node.configuration())))
+}
+
+const CONTROLLER: BoardControllerParams = BoardControllerParams { board: 1, boot: BOOT, clock_hz: 0 };
+
+/// A controller that has been configured by its host, up to the question to encoder and converter.
+fn session(kind: u32) -> Option<Session> {
+    let (settings, configure) = run(kind)?;
+    let mut session =
+        Session { node: BoardController::new(CONTROLLER), outboxes: Outboxes::default(), now_ns: 0 };
+    session.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
+    let Outboxes { host, daq } = &mut session.outboxes;
+    session.node.daq(0, encode(&hello(RUN)).as_bytes(), host, daq);
+    settings.each(|key, value| session.asks(&Message::Set(Set { run: RUN, key, value })));
+    session.asks(&configure);
     Some(session)
+}
+
+/// A chip that is controller and board, armed.
+fn chip(kind: u32) -> Option<Chip> {
+    let (settings, configure) = run(kind)?;
+    let board = BoardParams {
+        board: 1,
+        boot: BOOT,
+        counts_per_rev: 20_000,
+        dac_bits: 12,
+        dac_lowest_mv: -10_000,
+        dac_highest_mv: 10_000,
+        period_min_us: 100,
+        period_max_us: 10_000,
+        watchdog_max_us: 100_000,
+        boot_code: 2048,
+    };
+    let node = OneChip::new(CONTROLLER, &board).ok()?;
+    let (begun, out) = (0, 0);
+    let pins = Pins {
+        now_us: 0,
+        counts: 0,
+        encoder_fault: false,
+        converter_fault: false,
+        line: [0; 512],
+        used: 0,
+        begun,
+        out,
+    };
+    let mut chip = Chip { node, pins };
+    chip.asks(&Message::Discover(Discover { nonce: 1, version: VERSION, schema: SCHEMA }));
+    settings.each(|key, value| chip.asks(&Message::Set(Set { run: RUN, key, value })));
+    chip.asks(&configure);
+    chip.asks(&Message::Arm(Arm { run: RUN, config: CONFIG, boot: BOOT }));
+    Some(chip)
+}
+
+impl Chip {
+    /// A frame of the host's, which is not measured.
+    fn asks(&mut self, message: &Message) {
+        clutch_node::receive(&mut self.node, &mut self.pins, encode(message).as_bytes());
+    }
+
+    /// A period; its instructions, and those of them up to the code, the reading of the clock among them.
+    fn period(&mut self) -> (u32, u32) {
+        self.pins.now_us = self.pins.now_us.wrapping_add(1000);
+        let arguments = [&raw mut *self as usize, 0, 0];
+        let function = chip_period as extern "C" fn(&mut Chip);
+        // SAFETY: the arguments are those of the function.
+        let whole = unsafe { instructions(function as usize, arguments) };
+        (whole, between(self.pins.begun, self.pins.out))
+    }
+}
+
+/// Runs of a chip: laws, safe states and paths in turn, with faults of its hardware and implausible counts.
+fn measure_chip(random: &mut Random) -> Option<()> {
+    let tally = |code, goes_on, any| [Tally::new(code), Tally::new(goes_on), Tally::new(any)];
+    let mut others = tally("chip_code", "chip_goes_on", "chip_period");
+    let mut table = tally("chip_code_table", "chip_goes_on_table", "chip_period_table");
+    let mut glide = tally("chip_code_glide", "chip_goes_on_glide", "chip_period_glide");
+    let laws = LawParams::<f32>::all();
+    for kind in 0..RUNS {
+        let glides = matches!(laws.get(kind as usize % laws.len())?, LawParams::Glide(_));
+        let [code, goes_on, any] = match kind % 5 {
+            // Bounded apart, and not both at once.
+            3 | 4 if glides => continue,
+            3 | 4 => &mut table,
+            _ if glides => &mut glide,
+            _ => &mut others,
+        };
+        let mut chip = chip(kind)?;
+        // The first sample starts the servo, and is bounded with any period.
+        let (mut began, mut periods) = (false, 0);
+        let rarity = [20, 60, 100_000].get(kind as usize % 3).copied()?;
+        for _ in 0..PERIODS {
+            chip.pins.counts = chip.pins.counts.wrapping_add(random.below(3) as i32);
+            match (random.below(rarity), random.below(3)) {
+                (0, 0) => chip.pins.encoder_fault = true,
+                (0, 1) => chip.pins.converter_fault = true,
+                (0, _) => chip.pins.counts = random.next() as i32,
+                _ => {}
+            }
+            let (period, to_code) = chip.period();
+            any.add(period);
+            if began && chip.node.state() == BoardState::Running && periods + 8 < PERIODS {
+                goes_on.add(period);
+                code.add(to_code);
+            }
+            began = chip.node.state() == BoardState::Running;
+            periods += 1;
+            if random.below(500) == 0 {
+                chip.asks(&Message::Stop(Stop { run: RUN, reason: StopReason::Operator as u8 }));
+            }
+        }
+    }
+    [others, table, glide].iter().flatten().for_each(Tally::print);
+    Some(())
 }
 
 impl Session {
@@ -78,7 +181,8 @@ impl Session {
     fn asks(&mut self, message: &Message) {
         self.outboxes.host.clear();
         self.outboxes.daq.clear();
-        self.node.host(self.now_ns, encode(message).as_bytes(), &mut self.outboxes);
+        let Outboxes { host, daq } = &mut self.outboxes;
+        self.node.host(self.now_ns, encode(message).as_bytes(), host, daq);
     }
 
     /// A period; its instructions.
@@ -232,5 +336,5 @@ pub fn measure() -> Option<()> {
         }
     }
     [in_order, formula, table, others].iter().for_each(Tally::print);
-    Some(())
+    measure_chip(&mut random)
 }
