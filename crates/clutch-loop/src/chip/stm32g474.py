@@ -2,7 +2,8 @@
 
 The core is Unicorn's Cortex-M4F; what Unicorn leaves out is here: exceptions, NVIC, and the peripherals that the
 image drives. Code takes no time. Time goes on only while the core sleeps (WFI) with nothing to do, or spins for ever.
-An interrupt is taken when the core sleeps, when a handler returns, and after an instruction that may unmask it. Bytes that the serial line sends are gone at once; bytes for its receiver come when the host gives them.
+An interrupt is taken when the core sleeps, when a handler returns, and after an instruction that may unmask it.
+Bytes that the serial line sends are gone at once; bytes for its receiver come when the host gives them.
 
 Not modelled: pins and what is analogue, clock gates of the peripherals, process stack (PSP), memory protection,
 breakpoints. A register without a model is plain memory.
@@ -31,17 +32,16 @@ import struct
 import sys
 from collections import OrderedDict
 from collections.abc import Callable
-from enum import IntFlag
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from unicorn import UC_ARCH_ARM, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
 from unicorn import arm_const as arm
 from unicorn import unicorn_const as uc_const
 
 
-class Fault(IntFlag):
-    """Fault of the chip; those after CRYSTAL_DEAD begin once, when their bit is set."""
+class Fault:
+    """Bits for the chip's faults; those after CRYSTAL_DEAD happen once, when their bit is set."""
 
     CONVERTER_STUCK = 1 << 0  # DOR1 does not follow DHR
     CRYSTAL_DEAD = 1 << 1  # HSE stops, or never starts
@@ -50,10 +50,11 @@ class Fault(IntFlag):
     UNDEFINED = 1 << 4  # the core meets an undefined instruction
     NMI = 1 << 5
     UNEXPECTED = 1 << 6  # an interrupt that the program never enabled: WWDG
+    METERED = 1 << 31  # no fault: the instructions of this request count
 
 
-class Flag(IntFlag):
-    """State of the chip, or what happened since the last answer."""
+class Flag:
+    """Bits for the state of the chip, or for what happened since the last answer."""
 
     SAMPLED = 1 << 0  # the count of TIM3 was read
     RESET = 1 << 1  # a reset
@@ -111,7 +112,7 @@ class Page:
 class Block:
     """A peripheral at an offset within a page; `reset` gives its registers the values that they have after one."""
 
-    initial: dict[int, int] = {}
+    initial: ClassVar[dict[int, int]] = {}
 
     def __init__(self, chip: Chip, page: Page, base: int) -> None:
         self.chip, self.page, self.base = chip, page, base
@@ -140,7 +141,7 @@ class Timer(Block):
     """A timer that counts up: CR1, DIER, SR, EGR, CNT, PSC, ARR, CCR1 to CCR4."""
 
     CR1, DIER, SR, EGR, CNT, PSC, ARR, CCR1 = 0x00, 0x0C, 0x10, 0x14, 0x24, 0x28, 0x2C, 0x34
-    initial = {ARR: 0xFFFF}
+    initial: ClassVar = {ARR: 0xFFFF}
 
     def __init__(self, chip: Chip, page: Page, base: int) -> None:
         super().__init__(chip, page, base)
@@ -166,7 +167,7 @@ class Timer(Block):
 
     def ticks(self) -> int:
         """Ticks since a count of 0, with all the turns since."""
-        hz = self.chip.rcc.timer_hz() if self[self.CR1] & 1 else 0
+        hz = self.chip.rcc.timer_hz if self[self.CR1] & 1 else 0
         return self.from_ticks + (self.chip.now_ns - self.since_ns) * hz // ((self.prescaler + 1) * 1_000_000_000)
 
     def rebase(self) -> None:
@@ -191,11 +192,11 @@ class Timer(Block):
             self.seen = now
         return self[self.SR]
 
-    def line(self) -> bool:
-        return bool(self.status() & self[self.DIER] & 0x1F)
+    def lines(self) -> list[int]:
+        return [16 + 50] if self.status() & self[self.DIER] & 0x1F else []
 
     def next_ns(self) -> int:
-        hz = self.chip.rcc.timer_hz()
+        hz = self.chip.rcc.timer_hz
         if not self[self.CR1] & 1 or not hz:
             return NEVER
         now, enabled = self.ticks(), self[self.DIER]
@@ -291,7 +292,7 @@ class Watchdog(Block):
     """IWDG, on the clock LSI of 32 kHz: it runs whatever happens to the core's."""
 
     KR, PR, RLR = 0x00, 0x04, 0x08
-    initial = {RLR: 0xFFF}
+    initial: ClassVar = {RLR: 0xFFF}
 
     def __init__(self, chip: Chip, page: Page, base: int) -> None:
         super().__init__(chip, page, base)
@@ -365,11 +366,11 @@ class Serial(Block):
             flags |= 1 << 22  # REACK
         return flags
 
-    def line(self) -> bool:
+    def lines(self) -> list[int]:
         flags, control = self.status(), self[self.CR1]
         # IDLEIE, RXNEIE, TCIE and TXEIE stand where their flags do.
         errors = flags & self.ORE and (control & self.RXNE or self[self.CR3] & 1)
-        return bool(flags & control & 0xF0) or bool(errors)
+        return [16 + 91] if flags & control & 0xF0 or errors else []
 
     def set_plain(self, at: int, value: int) -> None:
         self[at] = value
@@ -415,8 +416,8 @@ class Dma(Block):
     ISR, IFCR, CCR, CNDTR, CPAR, CMAR = 0x00, 0x04, 0x08, 0x0C, 0x10, 0x14
     EN, TCIE, HTIE, CIRC, MINC = 1 << 0, 1 << 1, 1 << 2, 1 << 5, 1 << 7
 
-    def __init__(self, chip: Chip, page: Page, base: int, first_mux: int) -> None:
-        self.first_mux = first_mux
+    def __init__(self, chip: Chip, page: Page, base: int, first_mux: int, numbers: list[int]) -> None:
+        self.first_mux, self.numbers = first_mux, numbers
         super().__init__(chip, page, base)
         self.on(self.IFCR, write=self.clear)
         for n in range(8):
@@ -439,8 +440,11 @@ class Dma(Block):
         self[self.CCR + 20 * n] = value
         self.chip.transfer()
 
-    def line(self, n: int) -> bool:
-        return bool(self[self.ISR] >> 4 * n & self[self.CCR + 20 * n] & 0xE)
+    def lines(self) -> list[int]:
+        flags = self[self.ISR]
+        if not flags:
+            return []
+        return [self.numbers[n] for n in range(8) if flags >> 4 * n & self[self.CCR + 20 * n] & 0xE]
 
     def serves(self, request: int) -> int | None:
         """The channel that is ready for a request of DMAMUX."""
@@ -474,16 +478,16 @@ class Clocks(Block):
     """RCC: oscillators and PLL are ready at once, or never; the crystal can die."""
 
     CR, CFGR, PLLCFGR, CIFR, CICR, BDCR, CSR, CRRCR = 0x00, 0x08, 0x0C, 0x1C, 0x20, 0x90, 0x94, 0x98
-    initial = {CR: 0x500, CFGR: 0x5, PLLCFGR: 0x1000}
+    initial: ClassVar = {CR: 0x500, CFGR: 0x5, PLLCFGR: 0x1000}
     HSEON, CSSON, PLLON = 1 << 16, 1 << 19, 1 << 24
     CSSF = 1 << 8
 
     def __init__(self, chip: Chip, page: Page, base: int) -> None:
         self.flags = 0x0C00_0000  # BORRSTF, PINRSTF: power-up
         super().__init__(chip, page, base)
-        self.on(self.CR, self.control, self.set_control)
+        self.on(self.CR, self.control, lambda value: self.change(self.CR, value))
         self.on(self.CFGR, write=self.configure)
-        self.on(self.PLLCFGR, write=self.set_pll)
+        self.on(self.PLLCFGR, write=lambda value: self.change(self.PLLCFGR, value))
         self.on(self.CICR, write=self.clear)
         self.on(self.BDCR, lambda: self[self.BDCR] & ~2 | (self[self.BDCR] & 1) << 1)
         self.on(self.CRRCR, lambda: self[self.CRRCR] & ~2 | (self[self.CRRCR] & 1) << 1)
@@ -496,44 +500,45 @@ class Clocks(Block):
 
     def pll_hz(self) -> int:
         setting = self[self.PLLCFGR]
-        source = {2: HSI_HZ, 3: HSE_HZ if self.crystal() else 0}.get(setting & 3, 0)
-        if not self[self.CR] & self.PLLON or not source:
+        if not setting & 1 << 24:  # PLLREN
             return 0
-        enabled = setting >> 24 & 1
-        return source // ((setting >> 4 & 15) + 1) * (setting >> 8 & 127) // (2 * ((setting >> 25 & 3) + 1)) * enabled
+        multiplied = self.pll_input_hz() * (setting >> 8 & 127) // ((setting >> 4 & 15) + 1)
+        return multiplied // (2 * ((setting >> 25 & 3) + 1))
+
+    def pll_input_hz(self) -> int:
+        source = {2: HSI_HZ, 3: HSE_HZ if self.crystal() else 0}.get(self[self.PLLCFGR] & 3, 0)
+        return source if self[self.CR] & self.PLLON else 0
 
     def source_hz(self, source: int) -> int:
         return {1: HSI_HZ, 2: HSE_HZ if self.crystal() else 0, 3: self.pll_hz()}.get(source, 0)
 
-    def system_hz(self) -> int:
-        return self.source_hz(self[self.CFGR] >> 2 & 3)
+    def change(self, at: int, value: int) -> None:
+        """A setting of the clocks changes; the timer's count so far is that of the clocks before."""
+        self.chip.timer.rebase()
+        self[at] = value
+        self.settle()
 
-    def timer_hz(self) -> int:
-        """Clock of the timers on APB1."""
-        divider = self[self.CFGR] >> 4 & 15
-        core = self.system_hz() >> {8: 1, 9: 2, 10: 3, 11: 4, 12: 6, 13: 7, 14: 8, 15: 9}.get(divider, 0)
-        return core >> {5: 1, 6: 2, 7: 3}.get(self[self.CFGR] >> 8 & 7, 0)
+    def settle(self) -> None:
+        """The clocks of the core, and of the timers on APB1, Hz; 0 if one stands still."""
+        setting = self[self.CFGR]
+        divided = {8: 1, 9: 2, 10: 3, 11: 4, 12: 6, 13: 7, 14: 8, 15: 9}.get(setting >> 4 & 15, 0)
+        self.core_hz = self.source_hz(setting >> 2 & 3) >> divided
+        # A divided bus has timers at twice its clock.
+        self.timer_hz = self.core_hz >> {5: 0, 6: 1, 7: 2}.get(setting >> 8 & 7, 0)
+
+    def reset(self) -> None:
+        super().reset()
+        self.settle()
 
     def control(self) -> int:
         ready = 1 << 10 if self[self.CR] & 1 << 8 else 0
         ready |= 1 << 17 if self.crystal() else 0
-        ready |= 1 << 25 if self.pll_hz() or (self[self.CR] & self.PLLON and self[self.PLLCFGR] & 3 == 2) else 0
-        if self[self.CR] & self.PLLON and self[self.PLLCFGR] & 3 == 3 and self.crystal():
-            ready |= 1 << 25
+        ready |= 1 << 25 if self.pll_input_hz() else 0
         return self[self.CR] & ~(1 << 10 | 1 << 17 | 1 << 25) | ready
 
-    def set_control(self, value: int) -> None:
-        self.chip.timer.rebase()
-        self[self.CR] = value
-
-    def set_pll(self, value: int) -> None:
-        self.chip.timer.rebase()
-        self[self.PLLCFGR] = value
-
     def configure(self, value: int) -> None:
-        self.chip.timer.rebase()
         source = value & 3 if self.source_hz(value & 3) else self[self.CFGR] >> 2 & 3
-        self[self.CFGR] = value & ~0xC | source << 2
+        self.change(self.CFGR, value & ~0xC | source << 2)
 
     def clear(self, value: int) -> None:
         self[self.CIFR] &= ~value
@@ -547,47 +552,50 @@ class Clocks(Block):
             self.flags = 0
 
     def crystal_died(self) -> None:
-        """Called before the fault is in force; with the security system on the chip goes on with HSI, and an NMI."""
-        self.chip.timer.rebase()
-        if self.crystal() and self[self.CR] & self.CSSON:
+        """Without the security system the clocks stop; with it the chip goes on with HSI, and there is an NMI."""
+        if self[self.CR] & self.HSEON and self[self.CR] & self.CSSON:
             self[self.CR] &= ~(self.HSEON | self.PLLON)
             self[self.CFGR] = self[self.CFGR] & ~0xF | 0x5
             self[self.CIFR] |= self.CSSF
             self.chip.pended.add(NMI)
+        self.settle()
 
 
 class System(Block):
     """SCS: NVIC and system control block."""
 
     ICSR, VTOR, AIRCR, CFSR, HFSR, BFAR, STIR = 0xD04, 0xD08, 0xD0C, 0xD28, 0xD2C, 0xD38, 0xF00
-    initial = {0xD00: 0x410F_C241, AIRCR: 0xFA05_0000, 0xF34: 0xC000_0000}
+    initial: ClassVar = {0xD00: 0x410F_C241, AIRCR: 0xFA05_0000, 0xF34: 0xC000_0000}
 
     def __init__(self, chip: Chip, page: Page, base: int) -> None:
         super().__init__(chip, page, base)
         for n in range(4):
-            self.on(0x100 + 4 * n, lambda n=n: self.bits(chip.enabled, n), lambda v, n=n: self.set(chip.enabled, n, v))
-            self.on(0x180 + 4 * n, lambda n=n: self.bits(chip.enabled, n), lambda v, n=n: self.unset(chip.enabled, n, v))
-            self.on(0x200 + 4 * n, lambda n=n: self.bits(chip.pended, n), lambda v, n=n: self.set(chip.pended, n, v))
-            self.on(0x280 + 4 * n, lambda n=n: self.bits(chip.pended, n), lambda v, n=n: self.unset(chip.pended, n, v))
+            for begin in (0x100, 0x200):  # ISER, ICER; ISPR, ICPR
+                read = lambda n=n, begin=begin: self.bits(self.numbers(begin), n)  # noqa: E731
+                self.on(begin + 4 * n, read, lambda value, n=n, begin=begin: self.set(begin, n, value))
+                self.on(begin + 0x80 + 4 * n, read, lambda value, n=n, begin=begin: self.unset(begin, n, value))
         self.on(self.ICSR, lambda: chip.active[-1] if chip.active else 0, self.set_icsr)
         self.on(self.AIRCR, write=self.restart)
         self.on(self.CFSR, write=lambda value: self.write_one(self.CFSR, value))
         self.on(self.HFSR, write=lambda value: self.write_one(self.HFSR, value))
-        self.on(self.STIR, write=lambda value: self.set(chip.pended, 0, 1 << (value & 0xFF)))
+        self.on(self.STIR, write=lambda value: self.set(0x200, 0, 1 << (value & 0xFF)))
 
     def reset(self) -> None:
         self.page.words.clear()
         super().reset()
 
+    def numbers(self, begin: int) -> set[int]:
+        return self.chip.enabled if begin == 0x100 else self.chip.pended
+
     def bits(self, numbers: set[int], n: int) -> int:
         return sum(1 << bit for bit in range(32) if 16 + 32 * n + bit in numbers)
 
-    def set(self, numbers: set[int], n: int, value: int) -> None:
-        numbers.update(16 + 32 * n + bit for bit in range(value.bit_length()) if value >> bit & 1)
+    def set(self, begin: int, n: int, value: int) -> None:
+        self.numbers(begin).update(16 + 32 * n + bit for bit in range(value.bit_length()) if value >> bit & 1)
         self.chip.attend()
 
-    def unset(self, numbers: set[int], n: int, value: int) -> None:
-        numbers.difference_update(16 + 32 * n + bit for bit in range(32) if value >> bit & 1)
+    def unset(self, begin: int, n: int, value: int) -> None:
+        self.numbers(begin).difference_update(16 + 32 * n + bit for bit in range(32) if value >> bit & 1)
 
     def set_icsr(self, value: int) -> None:
         for bit, number in [(31, NMI), (28, PENDSV)]:
@@ -613,9 +621,9 @@ class System(Block):
 class Chip:
     """The chip, with an image in its flash."""
 
-    def __init__(self, image: bytes, meter: type[Meter] | None = None) -> None:
+    def __init__(self, image: bytes, metered: bool = False) -> None:
         self.now_ns, self.counts, self.resets = 0, 0, 0
-        self.faults, self.flags = Fault(0), Flag(0)
+        self.faults = self.flags = 0
         self.uc = uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M4)
         self.memory: list[Any] = []
@@ -630,7 +638,7 @@ class Chip:
         uc.mem_write(0x1FFF_7590, b"clutch model")  # UID, 96 bits
         self.map_registers()
         self.hooks(image)
-        self.meter = meter(self) if meter else None
+        self.meter = Meter(self) if metered else None
         self.clear()
 
     def share(self, size: int, rights: int, *where: int) -> Any:
@@ -658,7 +666,8 @@ class Chip:
         self.watchdog = Watchdog(self, pages[0x4000_3000], 0)
         self.serial = Serial(self, pages[0x4000_8000], 0)
         self.mux = Block(self, pages[0x4002_0000], 0x800)
-        self.dma = [Dma(self, pages[0x4002_0000], 0x400 * n, 8 * n) for n in range(2)]
+        numbers = [[*range(27, 34), 112], [*range(72, 77), 113, 114, 115]]
+        self.dma = [Dma(self, pages[0x4002_0000], 0x400 * n, 8 * n, numbers[n]) for n in range(2)]
         self.converter = Converter(self, pages[0x5000_0000], 0x800)
         self.noise = Noise(self, pages[0x5006_0000], 0x800)
         self.trace = Block(self, pages[0xE000_1000], 0)
@@ -667,13 +676,15 @@ class Chip:
         self.blocks += [*self.dma, self.converter, self.noise, self.trace]
         # Offset in RCC and bit of a peripheral's reset.
         self.resettable: dict[tuple[int, int], list[Block]] = {
-            (0x28, 0): [self.dma[0]], (0x28, 1): [self.dma[1]], (0x28, 2): [self.mux], (0x2C, 16): [self.converter],
-            (0x38, 1): [self.encoder], (0x38, 3): [self.timer], (0x3C, 0): [self.serial],
+            (0x28, 0): [self.dma[0]],
+            (0x28, 1): [self.dma[1]],
+            (0x28, 2): [self.mux],
+            (0x2C, 16): [self.converter],
+            (0x38, 1): [self.encoder],
+            (0x38, 3): [self.timer],
+            (0x3C, 0): [self.serial],
         }
-        lines: list[tuple[int, Callable[[], bool]]] = [(50, self.timer.line), (91, self.serial.line)]
-        for dma, numbers in zip(self.dma, [[*range(11, 18), 96], [*range(56, 61), 97, 98, 99]], strict=True):
-            lines += [(number, lambda dma=dma, n=n: dma.line(n)) for n, number in enumerate(numbers)]
-        self.lines = {16 + number: line for number, line in lines}
+        self.sources = [self.timer, self.serial, *self.dma]
 
     def hooks(self, image: bytes) -> None:
         self.uc.hook_add(uc_const.UC_HOOK_INTR, self.interrupted)
@@ -717,7 +728,7 @@ class Chip:
         self.serial.sent = sent  # is on its way
         self.resets += 1
         self.rcc.flags |= cause
-        self.flags |= Flag.RESET | (Flag.WATCHDOG if cause == 1 << 29 else Flag(0))
+        self.flags |= Flag.RESET | (Flag.WATCHDOG if cause == 1 << 29 else 0)
 
     def reset_blocks(self, at: int, value: int) -> None:
         for (offset, bit), blocks in self.resettable.items():
@@ -725,13 +736,15 @@ class Chip:
                 for block in blocks:
                     block.reset()
 
-    def set_faults(self, faults: Fault) -> None:
+    def set_faults(self, faults: int) -> None:
         new = faults & ~self.faults
         if new & Fault.CRYSTAL_DEAD:
-            self.rcc.crystal_died()
+            self.timer.rebase()
         if self.faults & ~faults & Fault.OVERRUN:
             self.overrun = False
         self.faults = faults
+        if new & Fault.CRYSTAL_DEAD:
+            self.rcc.crystal_died()
         if new & Fault.HANG:
             self.uc.reg_write(arm.UC_ARM_REG_PRIMASK, 1)
             self.uc.reg_write(arm.UC_ARM_REG_PC, STUB | 1)
@@ -753,9 +766,11 @@ class Chip:
 
     def best(self) -> int:
         """The pending exception that comes first, whatever masks it; 0 if none is."""
-        lines = (number for number, line in self.lines.items() if number in self.enabled and line())
-        kept = (number for number in self.pended if number < 16 or number in self.enabled)
-        pending = [(self.system.priority(number), number) for number in (*kept, *lines) if number not in self.active]
+        numbers = [*self.pended]
+        for source in self.sources:
+            numbers += source.lines()
+        enabled, active, priority = self.enabled, self.active, self.system.priority
+        pending = [(priority(n), n) for n in numbers if (n < 16 or n in enabled) and n not in active]
         return min(pending)[1] if pending else 0
 
     def next_exception(self) -> int:
@@ -800,6 +815,9 @@ class Chip:
         self.pended.discard(number)
         self.active.append(number)
         self.asleep = self.spinning = False
+        if self.meter:
+            self.meter.wakes()
+            self.meter.cycles += 12
         vector = self.system[System.VTOR] + 4 * number
         uc.reg_write(arm.UC_ARM_REG_LR, tail)
         uc.reg_write(arm.UC_ARM_REG_XPSR, 1 << 24 | number)
@@ -832,6 +850,8 @@ class Chip:
         if number:
             self.enter(number, value)
             return
+        if self.meter:
+            self.meter.cycles += 10
         stack = uc.reg_read(arm.UC_ARM_REG_SP)
         *registers, status = struct.unpack("<8I", uc.mem_read(stack, 32))
         if not value & 0x10:
@@ -861,7 +881,7 @@ class Chip:
     def step(self) -> None:
         """Runs code until the core sleeps with nothing to do, or spins, or has no clock."""
         uc = self.uc
-        while self.rcc.system_hz() and not self.locked:
+        while self.rcc.core_hz and not self.locked:
             number = self.next_exception()
             if number:
                 self.enter(number)
@@ -925,26 +945,26 @@ class Chip:
         if self.meter:
             self.meter.put_out()
 
-    def state(self) -> Flag:
+    def state(self) -> int:
         flags = self.flags
-        self.flags = Flag(0)
+        self.flags = 0
         if any(number in (HARD_FAULT, NMI) for number in self.active):
             flags |= Flag.IN_FAULT
-        flags |= Flag.SPINNING if self.spinning else Flag(0)
-        flags |= Flag.LOCKUP if self.locked else Flag(0)
-        flags |= Flag.STOPPED if not self.rcc.system_hz() else Flag(0)
-        flags |= Flag.FLOATING if not self.converter[Converter.CR] & 1 else Flag(0)
+        flags |= Flag.SPINNING if self.spinning else 0
+        flags |= Flag.LOCKUP if self.locked else 0
+        flags |= 0 if self.rcc.core_hz else Flag.STOPPED
+        flags |= 0 if self.converter[Converter.CR] & 1 else Flag.FLOATING
         return flags
 
-    def answer(self, now_ns: int, counts: int, faults: int, data: bytes) -> tuple[int, int, Flag, int, bytes]:
+    def answer(self, now_ns: int, counts: int, faults: int, data: bytes) -> tuple[int, int, int, int, bytes]:
         """One exchange with the host, see the head of this file."""
         self.counts = counts
-        self.set_faults(Fault(faults))
+        self.set_faults(faults)
         self.go_to(now_ns)
         self.step()
         if data:
             if self.meter:
-                self.meter.begin()
+                self.meter.received()
             self.serial.take(data)
             self.step()
         sent = bytes(self.serial.sent)
@@ -966,11 +986,139 @@ def segments(image: bytes) -> list[tuple[int, bytes]]:
 
 
 class Meter:
-    """Counts instructions."""
+    """Counts instructions, and estimates their cycles.
+
+    The estimate assumes: 170 MHz; one cycle for an instruction, two for a load, more for what moves several registers,
+    divides, or multiplies and adds in floating point, as the core's manual has them; two for a branch that is taken;
+    12 and 10 for a handler's begin and end. Flash is read by 64 bits with four wait states, into an instruction
+    cache of 1 KB and a data cache of 256 bytes, each by least recent use; without prefetch, as after a reset. No
+    account is taken of how instructions overlap, nor of waits for the peripherals' buses.
+    """
+
+    WAIT_STATES, BRANCH, CLOCK_MHZ = 4, 2, 170
+    CODE_WORDS, DATA_WORDS = 128, 32  # of 64 bits
+
+    def __init__(self, chip: Chip) -> None:
+        self.chip, self.executed, self.cycles = chip, 0, 0
+        self.cost: dict[int, int] = {}
+        self.next, self.word = 0, -1
+        self.code: OrderedDict[int, None] = OrderedDict()
+        self.data: OrderedDict[int, None] = OrderedDict()
+        self.woke: tuple[int, int] | None = None
+        self.sample: tuple[int, int] | None = None
+        self.bytes: tuple[int, int] | None = None
+        self.kind = "other"
+        self.counted: dict[str, list[tuple[int, int]]] = {}
+        chip.uc.hook_add(uc_const.UC_HOOK_CODE, self.instruction)
+        flash = (0x0800_0000, 0x0808_0000)
+        chip.uc.hook_add(uc_const.UC_HOOK_MEM_READ, self.load, None, *flash)
+
+    def instruction(self, uc: Uc, at: int, size: int, _data: Any) -> None:
+        self.executed += 1
+        cost = self.cost.get(at)
+        if cost is None:
+            cost = self.cost[at] = cycles_of(bytes(uc.mem_read(at, size)))
+        self.cycles += cost + (self.BRANCH if at != self.next else 0)
+        self.next = at + size
+        if at >> 3 != self.word:
+            self.word = at >> 3
+            self.fetch(self.code, self.word, self.CODE_WORDS)
+
+    def load(self, _uc: Uc, _kind: int, at: int, _size: int, _value: int, _data: Any) -> None:
+        self.fetch(self.data, at >> 3, self.DATA_WORDS)
+
+    def fetch(self, cache: OrderedDict[int, None], word: int, words: int) -> None:
+        if word in cache:
+            cache.move_to_end(word)
+            return
+        self.cycles += self.WAIT_STATES
+        cache[word] = None
+        if len(cache) > words:
+            cache.popitem(last=False)
+
+    def now(self) -> tuple[int, int]:
+        return self.executed, self.cycles
+
+    def since(self, name: str, begin: tuple[int, int]) -> None:
+        if self.chip.faults & Fault.METERED:
+            self.counted.setdefault(name, []).append((self.executed - begin[0], self.cycles - begin[1]))
+
+    def wakes(self) -> None:
+        if not self.woke:
+            self.woke, self.kind = self.now(), "other"
+
+    def sampled(self) -> None:
+        self.sample, self.kind = self.now(), "period"
+
+    def received(self) -> None:
+        self.bytes = self.woke = self.now()
+        self.kind = "bytes"
+
+    def put_out(self) -> None:
+        """A code goes to the converter: the first one after a sample, or after bytes came, is the answer to them."""
+        if self.sample:
+            self.since("sample_to_converter", self.sample)
+            self.sample = None
+        elif self.bytes:
+            self.since("bytes_to_converter", self.bytes)
+            self.bytes = None
+
+    def slept(self) -> None:
+        if self.woke:
+            self.since(self.kind, self.woke)
+        self.woke = self.bytes = None
+
+    def report(self) -> dict[str, Any]:
+        """Lowest, mean and highest number of instructions, and of estimated microseconds, by what they were for."""
+
+        def figures(numbers: list[float]) -> dict[str, float]:
+            return {"lowest": min(numbers), "mean": sum(numbers) / len(numbers), "highest": max(numbers)}
+
+        return {
+            name: {
+                "count": len(pairs),
+                "instructions": figures([float(executed) for executed, _ in pairs]),
+                "estimated_us": figures([cycles / self.CLOCK_MHZ for _, cycles in pairs]),
+            }
+            for name, pairs in self.counted.items()
+        }
+
+
+def cycles_of(code: bytes) -> int:
+    """Cycles of a Thumb instruction without waits, as the manual of the Cortex-M4 has them."""
+    first = int.from_bytes(code[:2], "little")
+    if len(code) == 2:
+        if first >> 12 == 0b0101:
+            return 2 if first >> 9 & 7 >= 3 else 1
+        if first >> 12 in (0b0110, 0b0111, 0b1000, 0b1001):
+            return 2 if first & 0x800 else 1
+        if first >> 11 == 0b01001:  # literal
+            return 2
+        if first & 0xF600 == 0xB400:  # PUSH, POP
+            return 1 + (first & 0x1FF).bit_count()
+        return 1 + (first & 0xFF).bit_count() if first >> 12 == 0b1100 else 1
+    second = int.from_bytes(code[2:], "little")
+    if first & 0xFE40 == 0xE800:  # LDM, STM
+        return 1 + second.bit_count()
+    if first & 0xFE40 == 0xE840:  # LDRD, STRD, exclusive
+        return 3
+    if first & 0xFE00 == 0xF800:
+        return 2 if first & 0x10 else 1
+    if first & 0xFFD0 == 0xFB90:  # SDIV, UDIV: 2 to 12
+        return 7
+    if first & 0xFE00 == 0xEC00:  # VLDR, VSTR, VLDM, VSTM
+        several = not first & 0x100 or first & 0x20
+        return 1 + (second & 0xFF if several else 1)
+    if first & 0xFF00 == 0xEE00 and second & 0xE00 == 0xA00 and not second & 0x10:
+        if first & 0xB0 == 0x80 or (first & 0xBF == 0xB1 and second & 0xC0 == 0xC0):  # VDIV, VSQRT
+            return 14
+        return 3 if first & 0xB0 in (0x00, 0x10, 0xA0, 0x90) else 1  # VMLA, VNMLA, VFMA, VFNMA
+    return 1
 
 
 def main() -> None:
-    chip = Chip(Path(sys.argv[1]).read_bytes())
+    image, *rest = sys.argv[1:]
+    chip = Chip(Path(image).read_bytes(), metered=rest[:1] == ["--count"])
     requests, answers = sys.stdin.buffer, sys.stdout.buffer
     head = struct.Struct("<QiIH")
     while len(request := requests.read(head.size)) == head.size:
@@ -978,6 +1126,8 @@ def main() -> None:
         next_ns, code, flags, resets, sent = chip.answer(now_ns, counts, faults, requests.read(length))
         answers.write(struct.pack("<QHHIH", next_ns, code, flags, resets, len(sent)) + sent)
         answers.flush()
+    if chip.meter:
+        Path(rest[1]).write_text(json.dumps(chip.meter.report()))
 
 
 if __name__ == "__main__":
