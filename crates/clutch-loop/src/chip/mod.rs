@@ -55,6 +55,9 @@ pub struct ChipBoard {
     events: Vec<Event>,
 }
 
+/// A bit beside those of the faults: instructions of this request are counted, `Fault.METERED` in the model.
+const METERED: u32 = 1 << 31;
+
 /// Events that wait to be asked for.
 const MAX_EVENTS: usize = 1 << 12;
 
@@ -145,7 +148,8 @@ impl ChipBoard {
         if bits != 0 && armed.is_some() {
             self.first_hit_ns.get_or_insert(now_ns);
         }
-        bits
+        // What the chip does under control is counted, and nothing else.
+        bits | if self.state == BoardState::Running { METERED } else { 0 }
     }
 
     /// The rig where it will be at a time, and what happens until then. It moves when the chip looks at it or acts on it,

@@ -71,11 +71,12 @@ WORD = 0xFFFF_FFFF
 HSI_HZ, HSE_HZ, LSI_HZ = 16_000_000, 24_000_000, 32_000
 BUDGET = 2_000_000  # instructions without sleep after which the core spins: 12 ms and more at 170 MHz
 AGAIN = 20_000  # instructions that a spinning core gets each time that something falls due
-STUB = 0x1FFF_0000  # system memory, here with two instructions for faults: `b .` and `udf`
+ROM = 0x1FFF_0000  # system memory, here with two instructions for faults: `b .` and `udf`
+SPIN, UNDEFINED = ROM + 4, ROM + 6
 THREAD, HANDLER = 0xFFFF_FFF9, 0xFFFF_FFF1  # EXC_RETURN without floating-point state
 HARD_FAULT, NMI, SVCALL, PENDSV = 3, 2, 11, 14
 CALLEE = [arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12]
-FRAME = [*CALLEE, arm.UC_ARM_REG_LR, arm.UC_ARM_REG_PC]
+FRAME = [*CALLEE, arm.UC_ARM_REG_LR]
 FLOATS = [arm.UC_ARM_REG_D0 + n for n in range(8)]
 
 Read = Callable[[], int]
@@ -160,7 +161,8 @@ class Timer(Block):
 
     def hold(self, ticks: int) -> None:
         """Counts from `ticks` on, from now on."""
-        self.since_ns, self.from_ticks, self.seen = self.chip.now_ns, ticks, ticks
+        self.since_ns = self.seen_ns = self.chip.now_ns
+        self.from_ticks = self.seen = ticks
 
     def period(self) -> int:
         return self[self.ARR] + 1
@@ -184,7 +186,9 @@ class Timer(Block):
         return [0, *(self[self.CCR1 + 4 * n] for n in range(4))]
 
     def status(self) -> int:
-        now = self.ticks()
+        if self.chip.now_ns == self.seen_ns:
+            return self[self.SR]
+        self.seen_ns, now = self.chip.now_ns, self.ticks()
         if now > self.seen:
             for bit, point in enumerate(self.points()):
                 if point < self.period() and self.due(self.seen, point) <= now:
@@ -633,8 +637,8 @@ class Chip:
         ctypes.memset(flash, 0xFF, len(flash))
         for at, data in segments(image):
             ctypes.memmove(ctypes.addressof(flash) + at - 0x0800_0000, data, len(data))
-        uc.mem_map(STUB, 0x1_0000)
-        uc.mem_write(STUB, b"\xfe\xe7\x00\xde")
+        uc.mem_map(ROM, 0x1_0000)
+        uc.mem_write(SPIN, b"\xfe\xe7\x00\xde")
         uc.mem_write(0x1FFF_7590, b"clutch model")  # UID, 96 bits
         self.map_registers()
         self.hooks(image)
@@ -688,6 +692,7 @@ class Chip:
 
     def hooks(self, image: bytes) -> None:
         self.uc.hook_add(uc_const.UC_HOOK_INTR, self.interrupted)
+        self.has_base = False  # the image uses BASEPRI
         # An interrupt that waits is taken when its mask goes: after CPSIE, and MSR PRIMASK or BASEPRI.
         for at, data in segments(image):
             if not 0x0800_0000 <= at < 0x0808_0000:
@@ -695,6 +700,7 @@ class Chip:
             for n in range(0, len(data) - 3, 2):
                 first, second = struct.unpack_from("<HH", data, n)
                 length = 2 if first == 0xB662 else 4 if first & 0xFFF0 == 0xF380 and second in MASKS else 0
+                self.has_base |= length == 4 and second != MASKS[0]
                 if length:
                     after = at + n + length
                     self.uc.hook_add(uc_const.UC_HOOK_CODE, self.unmasked, None, after, after)
@@ -706,6 +712,7 @@ class Chip:
         self.enabled: set[int] = set()
         self.pended: set[int] = set()
         self.active: list[int] = []
+        self.returns: list[int] = []  # EXC_RETURN of each
         self.waiting = self.asleep = self.spinning = self.locked = self.reset_wanted = self.overrun = False
         self.returning = self.called = False
         for block in self.blocks:
@@ -718,9 +725,8 @@ class Chip:
         self.uc.reg_write(arm.UC_ARM_REG_BASEPRI, 0)
         self.uc.reg_write(arm.UC_ARM_REG_XPSR, 1 << 24)
         self.uc.reg_write(arm.UC_ARM_REG_LR, WORD)
-        stack, entry = struct.unpack("<II", self.uc.mem_read(0x0800_0000, 8))
+        stack, self.pc = struct.unpack("<II", self.uc.mem_read(0x0800_0000, 8))
         self.uc.reg_write(arm.UC_ARM_REG_SP, stack)
-        self.uc.reg_write(arm.UC_ARM_REG_PC, entry)
 
     def reset(self, cause: int) -> None:
         sent = self.serial.sent
@@ -747,10 +753,10 @@ class Chip:
             self.rcc.crystal_died()
         if new & Fault.HANG:
             self.uc.reg_write(arm.UC_ARM_REG_PRIMASK, 1)
-            self.uc.reg_write(arm.UC_ARM_REG_PC, STUB | 1)
+            self.pc = SPIN
             self.asleep = False
         if new & Fault.UNDEFINED:
-            self.uc.reg_write(arm.UC_ARM_REG_PC, STUB + 2 | 1)
+            self.pc = UNDEFINED
             self.asleep = False
         if new & Fault.NMI:
             self.pended.add(NMI)
@@ -783,7 +789,7 @@ class Chip:
         if priority >= 0:
             if self.uc.reg_read(arm.UC_ARM_REG_PRIMASK) & 1:
                 return 0
-            mask = self.uc.reg_read(arm.UC_ARM_REG_BASEPRI) >> 4 & 15
+            mask = self.uc.reg_read(arm.UC_ARM_REG_BASEPRI) >> 4 & 15 if self.has_base else 0
             level = min(level, mask) if mask else level
         return number if priority < level else 0
 
@@ -818,16 +824,17 @@ class Chip:
         if self.meter:
             self.meter.wakes()
             self.meter.cycles += 12
-        vector = self.system[System.VTOR] + 4 * number
+        self.returns.append(tail)
         uc.reg_write(arm.UC_ARM_REG_LR, tail)
         uc.reg_write(arm.UC_ARM_REG_XPSR, 1 << 24 | number)
-        uc.reg_write(arm.UC_ARM_REG_PC, int.from_bytes(uc.mem_read(vector, 4), "little"))
+        vector = self.system[System.VTOR] + 4 * number
+        self.pc = int.from_bytes(uc.mem_read(vector, 4), "little")
 
     def push(self) -> int:
         """Puts the caller's registers on the stack; the EXC_RETURN that takes them from there."""
         uc = self.uc
         stack, status = uc.reg_read(arm.UC_ARM_REG_SP), uc.reg_read(arm.UC_ARM_REG_XPSR)
-        registers = [uc.reg_read(name) for name in FRAME]
+        registers = [*(uc.reg_read(name) for name in FRAME), self.pc & ~1]
         floats = uc.reg_read(arm.UC_ARM_REG_CONTROL) & 4
         align = stack & 4
         frame = struct.pack("<8I", *registers, status & ~0x200 | align << 7)
@@ -844,7 +851,7 @@ class Chip:
     def leave(self) -> None:
         """A handler ends: the next one that waits follows, or what was interrupted goes on."""
         uc = self.uc
-        value = uc.reg_read(arm.UC_ARM_REG_PC) | 1
+        value = self.returns.pop()
         self.active.pop()
         number = self.next_exception()
         if number:
@@ -863,9 +870,9 @@ class Chip:
         uc.reg_write(arm.UC_ARM_REG_CONTROL, 0 if value & 0x10 else 4)
         uc.reg_write(arm.UC_ARM_REG_SP, stack + 32 + (status >> 7 & 4))
         uc.reg_write(arm.UC_ARM_REG_XPSR, status & ~0x200)
-        for name, number in zip(FRAME[:-1], registers[:-1], strict=True):
+        *registers, self.pc = registers
+        for name, number in zip(FRAME, registers, strict=True):
             uc.reg_write(name, number)
-        uc.reg_write(arm.UC_ARM_REG_PC, registers[-1] | 1)
 
     def hard_fault(self, error: UcError) -> None:
         undefined = error.errno == uc_const.UC_ERR_INSN_INVALID
@@ -880,29 +887,32 @@ class Chip:
 
     def step(self) -> None:
         """Runs code until the core sleeps with nothing to do, or spins, or has no clock."""
-        uc = self.uc
+        uc, entered = self.uc, False
         while self.rcc.core_hz and not self.locked:
-            number = self.next_exception()
-            if number:
+            if not entered and (number := self.next_exception()):
                 self.enter(number)
             elif self.asleep and not self.waiting:
                 return
             budget = AGAIN if self.spinning else BUDGET
-            self.asleep = False
+            self.asleep = entered = False
             try:
-                uc.emu_start(uc.reg_read(arm.UC_ARM_REG_PC) | 1, WORD, count=budget)
+                uc.emu_start(self.pc | 1, WORD, count=budget)
             except UcError as error:
+                self.pc = uc.reg_read(arm.UC_ARM_REG_PC)
                 self.hard_fault(error)
                 continue
-            if self.reset_wanted:
-                self.reset(1 << 28)
-            elif self.returning:
+            if self.returning:
                 self.returning = False
                 self.leave()
+                entered = True  # or there is none to enter
+                continue
+            self.pc = uc.reg_read(arm.UC_ARM_REG_PC)
+            if self.reset_wanted:
+                self.reset(1 << 28)
             elif self.called:  # a breakpoint, and no debugger
                 self.called = False
                 self.hard_fault(UcError(uc_const.UC_ERR_OK))
-            elif bytes(uc.mem_read(uc.reg_read(arm.UC_ARM_REG_PC) - 2, 2)) == b"\x30\xbf":
+            elif bytes(uc.mem_read(self.pc - 2, 2)) == b"\x30\xbf":
                 self.asleep = True
                 if self.meter:
                     self.meter.slept()
