@@ -137,7 +137,11 @@ impl Hil {
 
     /// On the model of the chip.
     fn on_chip(self) -> anyhow::Result<Exit> {
-        let chip = ChipOptions { faults: self.chip_fault.clone(), count: self.count.clone() };
+        let chip = ChipOptions {
+            faults: self.chip_fault.clone(),
+            count: self.count.clone(),
+            ..ChipOptions::default()
+        };
         let role = ChipRole::of(&self.image);
         let session = ChipSession::new(self.load()?, self.options(), chip, role);
         let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };

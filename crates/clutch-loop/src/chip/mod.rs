@@ -107,6 +107,11 @@ impl ChipBoard {
         Ok(board)
     }
 
+    /// Begins a fault with the next exchange.
+    pub fn inject(&mut self, kind: ChipFaultKind) {
+        self.faults.push(ChipFault { kind, at: None });
+    }
+
     /// Resets since power-up.
     #[must_use]
     pub fn resets(&self) -> u32 {
@@ -124,6 +129,12 @@ impl ChipBoard {
     pub fn dead(&self) -> bool {
         let dead = [Flags::SPINNING, Flags::LOCKUP, Flags::STOPPED];
         dead.into_iter().any(|flag| self.last.flags.has(flag))
+    }
+
+    /// True if the core is in the handler of a fault or of a non-maskable interrupt.
+    #[must_use]
+    pub fn in_fault(&self) -> bool {
+        self.last.flags.has(Flags::IN_FAULT)
     }
 
     /// Voltage at the brake now, V.

@@ -21,13 +21,17 @@ const PATIENCE_S: u32 = 60;
 #[derive(Debug, thiserror::Error)]
 pub enum ChipError {
     /// No interpreter.
-    #[error("{program} was not found. The model of the chip needs Python 3.11 or later; {INTERPRETER} names another interpreter")]
+    #[error(
+        "{program} was not found. The model of the chip needs Python 3.11 or later; {INTERPRETER} names another interpreter"
+    )]
     NoPython {
         /// The interpreter.
         program: String,
     },
     /// No engine.
-    #[error("{program} has no module {MODULE}, the engine that carries the chip's core: {program} -m pip install {MODULE}")]
+    #[error(
+        "{program} has no module {MODULE}, the engine that carries the chip's core: {program} -m pip install {MODULE}"
+    )]
     NoModule {
         /// The interpreter.
         program: String,
@@ -75,6 +79,7 @@ pub(super) struct Flags(u16);
 
 impl Flags {
     pub(super) const SAMPLED: u16 = 1;
+    pub(super) const IN_FAULT: u16 = 1 << 3;
     pub(super) const SPINNING: u16 = 1 << 4;
     pub(super) const LOCKUP: u16 = 1 << 5;
     pub(super) const FLOATING: u16 = 1 << 6;

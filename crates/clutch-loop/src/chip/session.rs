@@ -37,6 +37,10 @@ pub struct ChipOptions {
     pub faults: Vec<ChipFault>,
     /// A file for the numbers of instructions; counting makes the run slower.
     pub count: Option<PathBuf>,
+    /// True if the records of a log are kept in the report, without a log as well.
+    pub record: bool,
+    /// Time after arming at which the run is left as it is, s.
+    pub until: Option<f64>,
 }
 
 /// The outcome of a session with the chip.
@@ -104,6 +108,17 @@ impl ChipSession {
     /// # Errors
     /// The chip does not start or ends; the board does not take the run; the log cannot be written.
     pub fn run(&self, image: &Path) -> Result<ChipReport, LockstepError> {
+        let (ran, board) = self.run_board(image)?;
+        let (resets, dead, floating) = (board.resets(), board.dead(), board.floating());
+        let counted = board.end().map_err(VirtualError::from)?;
+        Ok(ChipReport { ran, resets, dead, floating, counted })
+    }
+
+    /// The same; gives the board as the run has left it.
+    ///
+    /// # Errors
+    /// As [`ChipSession::run`].
+    pub fn run_board(&self, image: &Path) -> Result<(VirtualReport, ChipBoard), LockstepError> {
         match (self.role, self.scenario.scalar()) {
             (ChipRole::Controller, _) => self.controller(image),
             (ChipRole::Daq, ScalarKind::F32) => self.daq::<f32>(image),
@@ -112,13 +127,12 @@ impl ChipSession {
     }
 
     /// The loop is closed on the chip.
-    fn controller(&self, image: &Path) -> Result<ChipReport, LockstepError> {
+    fn controller(&self, image: &Path) -> Result<(VirtualReport, ChipBoard), LockstepError> {
         let scenario = &self.scenario;
         let built = BuiltRun::<f32>::new(scenario, 1).map_err(SessionError::from)?;
         // The last period is the one in which the run ends.
         let ticks = built.ticks + 1;
-        let configure =
-            ControllerNode::new(built.controller, built.servo, built.supervisor).configuration();
+        let configure = ControllerNode::new(built.controller, built.servo, built.supervisor).configuration();
         let path = || from_scenario::path::<f32>(scenario).map_err(SessionError::from);
         let node = HostNode::new(built.servo, configure, ALIVE_NS, BOARD_SILENCE_NS);
         let settings = from_scenario::settings(scenario, &built, HOST_SILENCE, ticks);
@@ -128,7 +142,7 @@ impl ChipSession {
     }
 
     /// The loop is closed here.
-    fn daq<T: Real>(&self, image: &Path) -> Result<ChipReport, LockstepError> {
+    fn daq<T: Real>(&self, image: &Path) -> Result<(VirtualReport, ChipBoard), LockstepError> {
         let built = BuiltRun::<T>::new(&self.scenario, 1).map_err(SessionError::from)?;
         let path = from_scenario::path::<T>(&self.scenario).map_err(SessionError::from)?;
         let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
@@ -143,14 +157,17 @@ impl ChipSession {
         ticks: u64,
         station: S,
         path: &impl Planned<S::Scalar>,
-    ) -> Result<ChipReport, LockstepError> {
+    ) -> Result<(VirtualReport, ChipBoard), LockstepError> {
         let (run, o) = (&self.scenario.spec().run, &self.options);
+        // A host hears only after a while that a board is silent.
+        let broken = !o.faults.is_empty() || !self.chip.faults.is_empty();
+        let after = if broken { 0.1 + BOARD_SILENCE_NS as f64 / 1e9 } else { 0.1 };
         let params = VirtualOptions {
             latency_ns: o.latency_ns,
             faults: o.faults.clone(),
             seed: o.seed,
-            record: o.log.is_some(),
-            duration: run.duration + 1.0,
+            record: o.log.is_some() || self.chip.record,
+            duration: self.chip.until.unwrap_or(run.duration + after),
             ticks,
             settle: run.settle,
             ..VirtualOptions::default()
@@ -160,9 +177,6 @@ impl ChipSession {
         let ran = on_chip.run(path)?;
         let certified = self.certified;
         o.write_log(&self.scenario, &built.servo, ("model of an STM32G474RE", certified), &ran)?;
-        let board = on_chip.into_board();
-        let (resets, dead, floating) = (board.resets(), board.dead(), board.floating());
-        let counted = board.end().map_err(VirtualError::from)?;
-        Ok(ChipReport { ran, resets, dead, floating, counted })
+        Ok((ran, on_chip.into_board()))
     }
 }

@@ -45,7 +45,7 @@ class Fault:
 
     CONVERTER_STUCK = 1 << 0  # DOR1 does not follow DHR
     CRYSTAL_DEAD = 1 << 1  # HSE stops, or never starts
-    OVERRUN = 1 << 2  # the next bytes come faster than they are read: ORE
+    OVERRUN = 1 << 2  # the next bytes come faster than they are read: ORE, and the ninth is lost
     HANG = 1 << 3  # the core spins with interrupts off
     UNDEFINED = 1 << 4  # the core meets an undefined instruction
     NMI = 1 << 5
@@ -409,7 +409,7 @@ class Serial(Block):
         if self.chip.faults & Fault.OVERRUN and not self.chip.overrun:
             self.chip.overrun = True
             self.kept |= self.ORE
-            data = data[: self.FIFO]
+            data = data[: self.FIFO] + data[self.FIFO + 1 :]
         self.received += data
         self.chip.transfer()
 
