@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
 use clutch_loop::chip::{ChipFault, ChipOptions, ChipReport, ChipRole, ChipSession};
-use clutch_loop::faults::Fault;
+use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::lockstep_session::{LockstepOptions, LockstepSession};
 use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_loop::session::SessionError;
@@ -54,7 +54,7 @@ pub(crate) struct Hil {
     /// Runs a law that is not certified for the scenario's bounds.
     #[arg(long)]
     uncertified: bool,
-    /// Injects a fault on line or rig; see `clutch daq --help`.
+    /// Injects a fault on line or rig, with a nucleo image on the line; see `clutch daq --help`.
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
     /// Injects a fault into the chip of a nucleo image: converter-stuck, crystal, overrun, hang,
@@ -143,6 +143,18 @@ impl Hil {
             ..ChipOptions::default()
         };
         let role = ChipRole::of(&self.image);
+        if self.link == Link::Uart {
+            anyhow::bail!(
+                "--link uart: it is for the board in qemu; the chip's model always goes through its line"
+            );
+        }
+        let of_the_line = |fault: &&Fault| fault.kind.silences() && fault.kind != FaultKind::Reset;
+        if let Some(fault) = self.fault.iter().find(|fault| !of_the_line(fault)) {
+            anyhow::bail!(
+                "--fault {fault}: the simulated board's; on the chip's model --fault takes the line's faults, and \
+                 --chip-fault those of the chip"
+            );
+        }
         let session = ChipSession::new(self.load()?, self.options(), chip, role);
         let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };
         tell(session.note());
