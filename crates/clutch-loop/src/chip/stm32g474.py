@@ -30,6 +30,8 @@ import ctypes
 import json
 import struct
 import sys
+import threading
+import time
 from collections import OrderedDict
 from collections.abc import Callable
 from pathlib import Path
@@ -69,7 +71,8 @@ class Flag:
 NEVER = (1 << 64) - 1
 WORD = 0xFFFF_FFFF
 HSI_HZ, HSE_HZ, LSI_HZ = 16_000_000, 24_000_000, 32_000
-BUDGET = 2_000_000  # instructions without sleep after which the core spins: 12 ms and more at 170 MHz
+PATIENCE_S = 0.1  # time of this machine after which code is suspected to spin; counting all would slow all of it
+BUDGET = 2_000_000  # further instructions without sleep after which it does: 12 ms and more at 170 MHz
 AGAIN = 20_000  # instructions that a spinning core gets each time that something falls due
 ROM = 0x1FFF_0000  # system memory, here with two instructions for faults: `b .` and `udf`
 SPIN, UNDEFINED = ROM + 4, ROM + 6
@@ -631,6 +634,7 @@ class Chip:
         self.uc = uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M4)
         self.memory: list[Any] = []
+        self.vectors: dict[int, int] = {}  # those in flash, which stay
         flash = self.share(0x8_0000, uc_const.UC_PROT_READ | uc_const.UC_PROT_EXEC, 0x0800_0000, 0)
         self.share(0x1_8000, uc_const.UC_PROT_ALL, 0x2000_0000)
         self.share(0x8000, uc_const.UC_PROT_ALL, 0x1000_0000, 0x2001_8000)  # CCM
@@ -642,6 +646,8 @@ class Chip:
         uc.mem_write(0x1FFF_7590, b"clutch model")  # UID, 96 bits
         self.map_registers()
         self.hooks(image)
+        self.run = 0  # number of the stretch of code that runs
+        threading.Thread(target=self.watch, daemon=True).start()
         self.meter = Meter(self) if metered else None
         self.clear()
 
@@ -697,6 +703,9 @@ class Chip:
         for at, data in segments(image):
             if not 0x0800_0000 <= at < 0x0808_0000:
                 continue
+            if at == 0x0800_0000:
+                words = struct.iter_unpack("<I", data[: len(data) & ~3])
+                self.vectors = {at + 4 * n: word for n, (word,) in enumerate(words)}
             for n in range(0, len(data) - 3, 2):
                 first, second = struct.unpack_from("<HH", data, n)
                 length = 2 if first == 0xB662 else 4 if first & 0xFFF0 == 0xF380 and second in MASKS else 0
@@ -828,7 +837,7 @@ class Chip:
         uc.reg_write(arm.UC_ARM_REG_LR, tail)
         uc.reg_write(arm.UC_ARM_REG_XPSR, 1 << 24 | number)
         vector = self.system[System.VTOR] + 4 * number
-        self.pc = int.from_bytes(uc.mem_read(vector, 4), "little")
+        self.pc = self.vectors.get(vector, 0) or int.from_bytes(uc.mem_read(vector, 4), "little")
 
     def push(self) -> int:
         """Puts the caller's registers on the stack; the EXC_RETURN that takes them from there."""
@@ -887,14 +896,15 @@ class Chip:
 
     def step(self) -> None:
         """Runs code until the core sleeps with nothing to do, or spins, or has no clock."""
-        uc, entered = self.uc, False
+        uc, entered, suspect = self.uc, False, False
         while self.rcc.core_hz and not self.locked:
             if not entered and (number := self.next_exception()):
                 self.enter(number)
             elif self.asleep and not self.waiting:
                 return
-            budget = AGAIN if self.spinning else BUDGET
+            budget = AGAIN if self.spinning else BUDGET if suspect else 0
             self.asleep = entered = False
+            self.run += 1
             try:
                 uc.emu_start(self.pc | 1, WORD, count=budget)
             except UcError as error:
@@ -917,8 +927,18 @@ class Chip:
                 if self.meter:
                     self.meter.slept()
             elif not self.next_exception():
-                self.spinning = True
-                return
+                if budget:
+                    self.spinning = True
+                    return
+                suspect = True
+
+    def watch(self) -> None:
+        """Stops code that runs for long, on a thread of its own; whether it spins a number of instructions decides."""
+        while True:
+            run = self.run
+            time.sleep(PATIENCE_S)
+            if run == self.run:
+                self.uc.emu_stop()
 
     def next_ns(self) -> int:
         return min(self.timer.next_ns(), self.watchdog.fires_ns)
