@@ -34,6 +34,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -155,7 +156,7 @@ class Timer(Block):
         self.on(self.CNT, self.count, self.set_count)
         self.on(self.PSC, write=self.set_prescaler)
         for at in [self.DIER, self.ARR, *(self.CCR1 + 4 * n for n in range(4))]:
-            self.on(at, write=lambda value, at=at: self.set_plain(at, value))
+            self.on(at, write=partial(self.set_plain, at))
 
     def reset(self) -> None:
         super().reset()
@@ -348,8 +349,8 @@ class Serial(Block):
 
     def __init__(self, chip: Chip, page: Page, base: int) -> None:
         super().__init__(chip, page, base)
-        self.on(self.CR1, write=lambda value: self.set_plain(self.CR1, value))
-        self.on(self.CR3, write=lambda value: self.set_plain(self.CR3, value))
+        self.on(self.CR1, write=partial(self.set_plain, self.CR1))
+        self.on(self.CR3, write=partial(self.set_plain, self.CR3))
         self.on(self.RQR, write=self.ask)
         self.on(self.ISR, self.status)
         self.on(self.ICR, write=self.clear)
@@ -407,7 +408,7 @@ class Serial(Block):
 
     def take(self, data: bytes) -> None:
         """Bytes come over the line."""
-        if self[self.CR1] & 5 != 5 or not data:  # off: UE, RE
+        if self[self.CR1] & 5 != 5 or not data:  # the receiver is off
             return
         if self.chip.faults & Fault.OVERRUN and not self.chip.overrun:
             self.chip.overrun = True
@@ -428,7 +429,7 @@ class Dma(Block):
         super().__init__(chip, page, base)
         self.on(self.IFCR, write=self.clear)
         for n in range(8):
-            self.on(self.CCR + 20 * n, write=lambda value, n=n: self.set_control(n, value))
+            self.on(self.CCR + 20 * n, write=partial(self.set_control, n))
 
     def reset(self) -> None:
         super().reset()
@@ -492,15 +493,15 @@ class Clocks(Block):
     def __init__(self, chip: Chip, page: Page, base: int) -> None:
         self.flags = 0x0C00_0000  # BORRSTF, PINRSTF: power-up
         super().__init__(chip, page, base)
-        self.on(self.CR, self.control, lambda value: self.change(self.CR, value))
+        self.on(self.CR, self.control, partial(self.change, self.CR))
         self.on(self.CFGR, write=self.configure)
-        self.on(self.PLLCFGR, write=lambda value: self.change(self.PLLCFGR, value))
+        self.on(self.PLLCFGR, write=partial(self.change, self.PLLCFGR))
         self.on(self.CICR, write=self.clear)
         self.on(self.BDCR, lambda: self[self.BDCR] & ~2 | (self[self.BDCR] & 1) << 1)
         self.on(self.CRRCR, lambda: self[self.CRRCR] & ~2 | (self[self.CRRCR] & 1) << 1)
         self.on(self.CSR, self.causes, self.set_causes)
         for at in range(0x28, 0x44, 4):
-            self.on(at, write=lambda value, at=at: self.chip.reset_blocks(at, value))
+            self.on(at, write=partial(self.chip.reset_blocks, at))
 
     def crystal(self) -> bool:
         return bool(self[self.CR] & self.HSEON) and not self.chip.faults & Fault.CRYSTAL_DEAD
@@ -578,13 +579,13 @@ class System(Block):
         super().__init__(chip, page, base)
         for n in range(4):
             for begin in (0x100, 0x200):  # ISER, ICER; ISPR, ICPR
-                read = lambda n=n, begin=begin: self.bits(self.numbers(begin), n)  # noqa: E731
-                self.on(begin + 4 * n, read, lambda value, n=n, begin=begin: self.set(begin, n, value))
-                self.on(begin + 0x80 + 4 * n, read, lambda value, n=n, begin=begin: self.unset(begin, n, value))
+                read = partial(self.bits, begin, n)
+                self.on(begin + 4 * n, read, partial(self.set, begin, n))
+                self.on(begin + 0x80 + 4 * n, read, partial(self.unset, begin, n))
         self.on(self.ICSR, lambda: chip.active[-1] if chip.active else 0, self.set_icsr)
         self.on(self.AIRCR, write=self.restart)
-        self.on(self.CFSR, write=lambda value: self.write_one(self.CFSR, value))
-        self.on(self.HFSR, write=lambda value: self.write_one(self.HFSR, value))
+        self.on(self.CFSR, write=partial(self.write_one, self.CFSR))
+        self.on(self.HFSR, write=partial(self.write_one, self.HFSR))
         self.on(self.STIR, write=lambda value: self.set(0x200, 0, 1 << (value & 0xFF)))
 
     def reset(self) -> None:
@@ -594,7 +595,8 @@ class System(Block):
     def numbers(self, begin: int) -> set[int]:
         return self.chip.enabled if begin == 0x100 else self.chip.pended
 
-    def bits(self, numbers: set[int], n: int) -> int:
+    def bits(self, begin: int, n: int) -> int:
+        numbers = self.numbers(begin)
         return sum(1 << bit for bit in range(32) if 16 + 32 * n + bit in numbers)
 
     def set(self, begin: int, n: int, value: int) -> None:
@@ -694,7 +696,7 @@ class Chip:
             (0x38, 3): [self.timer],
             (0x3C, 0): [self.serial],
         }
-        self.sources = [self.timer, self.serial, *self.dma]
+        self.sources: list[Timer | Serial | Dma] = [self.timer, self.serial, *self.dma]
 
     def hooks(self, image: bytes) -> None:
         self.uc.hook_add(uc_const.UC_HOOK_INTR, self.interrupted)
