@@ -1,4 +1,4 @@
-//! Images of the emulated board for tests.
+//! Images of the boards for tests.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,6 +11,22 @@ static IMAGES: LazyLock<Result<PathBuf, &str>> = LazyLock::new(|| {
     if !Command::new("qemu-system-arm").arg("--version").output().is_ok_and(|o| o.status.success()) {
         return Err("qemu-system-arm is not installed (Debian and Ubuntu: qemu-system-arm)");
     }
+    built("clutch-qemu-mps2")
+});
+
+/// The same for the images that run on the model of their chip.
+static NUCLEO: LazyLock<Result<PathBuf, &str>> = LazyLock::new(|| {
+    let python = std::env::var_os("CLUTCH_PYTHON").unwrap_or_else(|| "python3".into());
+    if !Command::new(python).args(["-c", "import unicorn"]).output().is_ok_and(|o| o.status.success()) {
+        return Err(
+            "no Python with the module unicorn (pip install unicorn; CLUTCH_PYTHON names the interpreter)",
+        );
+    }
+    built("clutch-nucleo-g474re")
+});
+
+/// Builds the images of a board.
+fn built(package: &str) -> Result<PathBuf, &'static str> {
     let libraries =
         Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().ok();
     let libraries = libraries.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_default();
@@ -21,23 +37,23 @@ static IMAGES: LazyLock<Result<PathBuf, &str>> = LazyLock::new(|| {
     let target = root.join("target/firmware");
     // From within its folder: cargo looks there for the file with its flags.
     let done = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["build", "--release", "--locked", "--package", "clutch-qemu-mps2", "--target-dir"])
+        .args(["build", "--release", "--locked", "--package", package, "--target-dir"])
         .arg(&target)
         .current_dir(root.join("firmware"))
         .output()
         .expect("cargo starts");
     assert!(done.status.success(), "the images do not build:\n{}", String::from_utf8_lossy(&done.stderr));
     Ok(target.join(TARGET).join("release"))
-});
+}
 
-/// An image of the emulated board; none, with a message, where emulator or target are missing. CI has
-/// both.
+/// An image of a board; none, with a message, where emulator or target are missing. CI has
+/// all.
 ///
 /// # Panics
 /// The image does not build; or in CI, where there is none.
 #[must_use]
 pub fn image(name: &str) -> Option<PathBuf> {
-    match &*IMAGES {
+    match if name.starts_with("nucleo-") { &*NUCLEO } else { &*IMAGES } {
         Ok(folder) => Some(folder.join(name)),
         Err(why) => {
             assert!(std::env::var_os("CI").is_none(), "{why}: CI must not skip this test");

@@ -1,6 +1,7 @@
 //! The emulated Cortex-M4F board in the controller role: it behaves like the simulation, bit for
 //! bit, and faults of its line end in the safe state.
 
+mod chip;
 mod serial;
 mod verb;
 

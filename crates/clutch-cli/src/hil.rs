@@ -7,7 +7,8 @@ use crate::table::{number, quantities};
 use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
-use clutch_loop::faults::Fault;
+use clutch_loop::chip::{ChipFault, ChipOptions, ChipReport, ChipRole, ChipSession};
+use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::lockstep_session::{LockstepOptions, LockstepSession};
 use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_loop::session::SessionError;
@@ -15,18 +16,22 @@ use clutch_loop::summary::cause_text;
 use clutch_loop::virtual_time::VirtualReport as Ran;
 use clutch_sim::Scenario;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Runs the loop on an emulated Cortex-M4F board, with the simulated rig as its encoder and converter.
+/// Runs the loop on an emulated board, with the simulated rig as its encoder and converter.
 ///
-/// This is hardware in the loop, without the hardware: the board's own image runs in
-/// qemu-system-arm, takes a step, and waits for the simulation to take one. Time is computed, so
-/// that a run is the same each time, bit for bit, however long it takes; the figures are those of
-/// `clutch sim` in single precision.
+/// This is hardware in the loop, without the hardware: the board's own image runs, on a Cortex-M4F
+/// in qemu-system-arm or, for a NUCLEO-G474RE, on a register model of its chip; it takes a step, and
+/// waits for the simulation to take one. Time is computed, so that a run is the same each time, bit
+/// for bit, however long it takes; the figures are those of `clutch sim` in single precision.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask firmware build && clutch hil\n  clutch hil board_smc_2 --log run.mcap && \
-    clutch replay run.mcap\n  clutch hil --fault silence:at=2\n\n\
+    clutch replay run.mcap\n  clutch hil --fault silence:at=2\n  \
+    clutch hil examples/nucleo_smc_2.toml --image nucleo-controller\n  \
+    clutch hil examples/nucleo_smc_2.toml --image nucleo-daq --chip-fault hang:at=2\n\n\
+    The chip's model needs Python with the module unicorn (pip install unicorn); CLUTCH_PYTHON names another\n\
+    interpreter than python3. Images are looked for in $CLUTCH_IMAGES, then in target/firmware.\n\n\
     Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run. docs/firmware.md is the guide."
 )]
 pub(crate) struct Hil {
@@ -36,14 +41,11 @@ pub(crate) struct Hil {
     /// Overrides a key of the scenario; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
-    /// The board's image.
-    #[arg(
-        long,
-        value_name = "FILE",
-        default_value = "target/firmware/thumbv7em-none-eabihf/release/mps2-controller"
-    )]
+    /// The board's image: a file, or mps2-controller, nucleo-controller or nucleo-daq. One whose name
+    /// begins with nucleo- runs on the chip's model, in the role daq if its name says so.
+    #[arg(long, value_name = "IMAGE", default_value = "mps2-controller")]
     image: PathBuf,
-    /// Link to the board.
+    /// Link to the board in qemu.
     #[arg(long, value_enum, default_value = "memory")]
     link: Link,
     /// Writes an MCAP log, with the shaft's true motion.
@@ -52,9 +54,17 @@ pub(crate) struct Hil {
     /// Runs a law that is not certified for the scenario's bounds.
     #[arg(long)]
     uncertified: bool,
-    /// Injects a fault on line or rig; see `clutch daq --help`.
+    /// Injects a fault on line or rig, with a nucleo image on the line; see `clutch daq --help`.
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
+    /// Injects a fault into the chip of a nucleo image: converter-stuck, crystal, overrun, hang,
+    /// undefined, nmi or unexpected; :at=SECONDS after arming, else from power-up on.
+    #[arg(long, value_name = "KIND[:at=S]")]
+    chip_fault: Vec<ChipFault>,
+    /// Counts the instructions of a nucleo image, and writes the numbers as JSON; takes several
+    /// times as long.
+    #[arg(long, value_name = "FILE.json")]
+    count: Option<PathBuf>,
     /// Seed of the random faults.
     #[arg(long, default_value_t = 1)]
     fault_seed: u64,
@@ -75,24 +85,41 @@ enum Link {
     Uart,
 }
 
+/// The names of images that are found without a path.
+const NAMES: [&str; 3] = ["mps2-controller", "nucleo-controller", "nucleo-daq"];
+
+/// The folder in which `cargo xtask firmware build` leaves them.
+const BUILT: &str = "target/firmware/thumbv7em-none-eabihf/release";
+
+/// A file, or where the image of that name should be.
+fn image(named: PathBuf) -> PathBuf {
+    if !NAMES.iter().any(|name| Path::new(name) == named) || named.is_file() {
+        return named;
+    }
+    let folder = std::env::var_os("CLUTCH_IMAGES").map(|folder| Path::new(&folder).join(&named));
+    folder.filter(|file| file.is_file()).unwrap_or_else(|| Path::new(BUILT).join(named))
+}
+
 impl Hil {
     pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
+        self.image = image(self.image);
+        if self.image.file_name().is_some_and(|name| name.to_string_lossy().starts_with("nucleo-")) {
+            return self.on_chip();
+        }
+        if !self.chip_fault.is_empty() || self.count.is_some() {
+            anyhow::bail!(
+                "--chip-fault and --count: {} does not run on the chip's model; use --image nucleo-controller or \
+                 nucleo-daq",
+                self.image.display()
+            );
+        }
         if self.link == Link::Uart {
             self.set.push(("safety.limits.deadline_us".to_owned(), "1000000".to_owned()));
         }
-        let (scenario, set) = (self.scenario.clone(), self.set.clone());
-        let args = ScenarioArgs { scenario, set, identified: None, map: None };
-        let session = match LockstepSession::new(args.load()?, self.options()) {
-            Ok(session) => session,
-            Err(refusal @ SessionError::NotCertified { .. }) => {
-                print(&not_certified(&refusal, &self.scenario))?;
-                return Ok(Exit::NotCertified);
-            }
-            Err(refusal) => return Err(refusal.into()),
+        let Some(session) = self.checked(LockstepSession::new(self.load()?, self.options()))? else {
+            return Ok(Exit::NotCertified);
         };
-        if let Some(note) = session.note() {
-            let _ = writeln!(std::io::stderr(), "note: {note}"); // a terminal that has gone away
-        }
+        tell(session.note());
         let started = std::time::Instant::now();
         let ran = match self.link {
             Link::Memory => session.run(|| QemuBoard::start(&self.image))?,
@@ -100,12 +127,72 @@ impl Hil {
         };
         let took = started.elapsed().as_secs_f64();
         let scenario = session.scenario();
-        print(&if self.json { summary(scenario, &ran, took)? } else { self.text(scenario, &ran, took) })?;
-        Ok(match ran.standing.cause {
-            Cause::Done => Exit::Done,
-            Cause::None => Exit::Failed,
-            _ => Exit::Fault,
-        })
+        print(&if self.json {
+            json(&summary(scenario, &ran, took))?
+        } else {
+            self.text(scenario, &ran, "the emulated board", took)
+        })?;
+        Ok(exit(&ran))
+    }
+
+    /// On the model of the chip.
+    fn on_chip(self) -> anyhow::Result<Exit> {
+        let chip = ChipOptions {
+            faults: self.chip_fault.clone(),
+            count: self.count.clone(),
+            ..ChipOptions::default()
+        };
+        let role = ChipRole::of(&self.image);
+        if self.link == Link::Uart {
+            anyhow::bail!(
+                "--link uart: it is for the board in qemu; the chip's model always goes through its line"
+            );
+        }
+        let of_the_line = |fault: &&Fault| fault.kind.silences() && fault.kind != FaultKind::Reset;
+        if let Some(fault) = self.fault.iter().find(|fault| !of_the_line(fault)) {
+            anyhow::bail!(
+                "--fault {fault}: the simulated board's; on the chip's model --fault takes the line's faults, and \
+                 --chip-fault those of the chip"
+            );
+        }
+        let session = ChipSession::new(self.load()?, self.options(), chip, role);
+        let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };
+        tell(session.note());
+        let started = std::time::Instant::now();
+        let report = session.run(&self.image)?;
+        let took = started.elapsed().as_secs_f64();
+        let (scenario, ran) = (session.scenario(), &report.ran);
+        print(&if self.json {
+            let mut all = summary(scenario, ran, took);
+            all["chip"] = serde_json::json!({
+                "resets": report.resets,
+                "dead": report.dead,
+                "floating": report.floating,
+                "code": ran.last_code,
+                "counted": report.counted,
+            });
+            json(&all)?
+        } else {
+            self.text(scenario, ran, "the model of the chip", took) + &chip_text(&report)
+        })?;
+        Ok(exit(ran))
+    }
+
+    fn load(&self) -> anyhow::Result<Scenario> {
+        let (scenario, set) = (self.scenario.clone(), self.set.clone());
+        ScenarioArgs { scenario, set, identified: None, map: None }.load()
+    }
+
+    /// A session; none, and the reason is printed, if the gains are not certified.
+    fn checked<T>(&self, session: Result<T, SessionError>) -> anyhow::Result<Option<T>> {
+        match session {
+            Ok(session) => Ok(Some(session)),
+            Err(refusal @ SessionError::NotCertified { .. }) => {
+                print(&not_certified(&refusal, &self.scenario))?;
+                Ok(None)
+            }
+            Err(refusal) => Err(refusal.into()),
+        }
     }
 
     fn options(&self) -> LockstepOptions {
@@ -121,9 +208,9 @@ impl Hil {
         }
     }
 
-    fn text(&self, scenario: &Scenario, ran: &Ran, took: f64) -> String {
+    fn text(&self, scenario: &Scenario, ran: &Ran, board: &str, took: f64) -> String {
         let title = format!(
-            "{}\n{} ticks on the emulated board in {took:.1} s, seed {}; figures over {} s after settling",
+            "{}\n{} ticks on {board} in {took:.1} s, seed {}; figures over {} s after settling",
             scenario.name(),
             ran.answers,
             scenario.spec().run.seed,
@@ -150,8 +237,38 @@ impl Hil {
     }
 }
 
-fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> anyhow::Result<String> {
-    json(&serde_json::json!({
+/// A remark, on standard error.
+fn tell(note: Option<&str>) {
+    if let Some(note) = note {
+        let _ = writeln!(std::io::stderr(), "note: {note}"); // a terminal that has gone away
+    }
+}
+
+fn exit(ran: &Ran) -> Exit {
+    match ran.standing.cause {
+        Cause::Done => Exit::Done,
+        Cause::None => Exit::Failed,
+        _ => Exit::Fault,
+    }
+}
+
+/// What the chip is like at the end, where it is not as always.
+fn chip_text(report: &ChipReport) -> String {
+    let mut text = String::new();
+    if report.resets > 0 {
+        text += &format!("the chip was reset: {}\n", report.resets);
+    }
+    if report.dead {
+        text += "the chip's program does not run any more\n";
+    }
+    if report.floating {
+        text += "the converter's pin floats: the divider at the driver's input holds\n";
+    }
+    text
+}
+
+fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> serde_json::Value {
+    serde_json::json!({
         "scenario": scenario.name(),
         "version": env!("CARGO_PKG_VERSION"),
         "seed": scenario.spec().run.seed,
@@ -164,5 +281,5 @@ fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> anyhow::Result<String> 
         "value": ran.standing.value,
         "board": ran.board.map(|s| format!("{s:?}")),
         "lost": ran.standing.lost,
-    }))
+    })
 }

@@ -17,9 +17,11 @@
 //! | `healthy` | runs in which nothing breaks |
 //! | `lockstep_board`, `lockstep_host`, `lockstep_session` | a board controller that is asked instead of keeping time, its host, and a session with it |
 //! | `qemu_board` | such a board, emulated |
+//! | `chip` | a board's own image on a register model of its chip |
 //! | `to_log`, `replay` | what a log gets; a log's counts to the law again |
 
 pub mod campaign;
+pub mod chip;
 pub mod control_loop;
 pub mod drift;
 pub mod faults;

@@ -9,7 +9,7 @@ use crate::qemu_board::QemuError;
 use crate::session::{self, SessionError};
 use crate::to_log::PRESENT_CODE;
 use crate::virtual_time::{VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
-use clutch_core::Micros;
+use clutch_core::{Micros, Real, Servo};
 use clutch_log::{LogWriter, Source};
 use clutch_sim::Scenario;
 use std::path::PathBuf;
@@ -31,6 +31,29 @@ pub struct LockstepOptions {
     pub silence: Option<Micros>,
     /// Version and commit of the build, for the log.
     pub version: String,
+}
+
+impl LockstepOptions {
+    /// Writes the log of a run, if one is wanted: `on` is the kind of board, and whether the gains are certified.
+    pub(crate) fn write_log<T: Real>(
+        &self,
+        scenario: &Scenario,
+        servo: &Servo<T>,
+        (board, certified): (&str, bool),
+        report: &VirtualReport,
+    ) -> Result<(), SessionError> {
+        let Some(file) = &self.log else { return Ok(()) };
+        let mut header = from_scenario::header(scenario, servo, Source::Loop, board, &self.version);
+        header.extra.push((PRESENT_CODE.to_owned(), report.present.to_string()));
+        header.extra.push(("board".to_owned(), "emulated".to_owned()));
+        header.extra.push(("certified".to_owned(), certified.to_string()));
+        let mut log = LogWriter::create(file, &header)?;
+        for record in &report.records {
+            log.write(record)?;
+        }
+        log.finish()?;
+        Ok(())
+    }
 }
 
 /// A session in lockstep was refused, or could not go on.
@@ -112,23 +135,7 @@ impl LockstepSession {
         let path = from_scenario::path::<f32>(scenario).map_err(SessionError::from)?;
         let on_rig = VirtualLoop::new(scenario, params, station).map_err(VirtualError::from);
         let report = on_rig?.run(&path)?;
-        self.log(&built, &report)?;
+        self.options.write_log(scenario, &built.servo, ("emulated board", self.certified), &report)?;
         Ok(report)
-    }
-
-    fn log(&self, built: &BuiltRun<f32>, report: &VirtualReport) -> Result<(), SessionError> {
-        let Some(file) = &self.options.log else { return Ok(()) };
-        let version = &self.options.version;
-        let mut header =
-            from_scenario::header(&self.scenario, &built.servo, Source::Loop, "emulated board", version);
-        header.extra.push((PRESENT_CODE.to_owned(), report.present.to_string()));
-        header.extra.push(("board".to_owned(), "emulated".to_owned()));
-        header.extra.push(("certified".to_owned(), self.certified.to_string()));
-        let mut log = LogWriter::create(file, &header)?;
-        for record in &report.records {
-            log.write(record)?;
-        }
-        log.finish()?;
-        Ok(())
     }
 }

@@ -3,6 +3,7 @@
 //! The same state machines, frames and rig as in real time; only the clock is computed. A run of
 //! one second takes some milliseconds and repeats bit for bit.
 
+use crate::chip::ChipError;
 use crate::faults::{Direction, Fault};
 use crate::faulty_line::FaultyLine;
 use crate::preflight;
@@ -134,6 +135,9 @@ pub enum VirtualError {
     /// The board or its rig.
     #[error(transparent)]
     Board(#[from] SimBoardError),
+    /// The chip, or what carries it.
+    #[error(transparent)]
+    Chip(#[from] ChipError),
     /// The station.
     #[error("{0}")]
     Station(String),
@@ -151,9 +155,78 @@ struct Sampled {
     tick: Option<u64>,
 }
 
+/// A board with a rig, both in virtual time. Times are the board's, ns; voltages V.
+pub trait VirtualBoard {
+    /// The time at which [`VirtualBoard::step`] has to be called next.
+    fn next_ns(&self) -> Option<u64>;
+    /// Does what is due by now.
+    ///
+    /// # Errors
+    /// Rig or board cannot go on.
+    fn step(&mut self, now_ns: u64, out: &mut Outbox) -> Result<(), VirtualError>;
+    /// Bytes from the line arrive.
+    ///
+    /// # Errors
+    /// As [`VirtualBoard::step`].
+    fn receive(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outbox) -> Result<(), VirtualError>;
+    /// Seconds since the consent; none before.
+    fn armed_for(&self, now_ns: u64) -> Option<f64>;
+    /// Samples taken since it was configured.
+    fn samples(&self) -> u64;
+    /// The shaft's events since the last call.
+    fn take_events(&mut self) -> Vec<Event>;
+    /// The voltage in the period that the last sample ended.
+    fn volts(&self) -> f64;
+    /// The rig.
+    fn rig(&self) -> &MovingRig;
+    /// Its state.
+    fn state(&self) -> BoardState;
+    /// The code that the converter has been given.
+    fn code(&self) -> DacCode;
+    /// The time at which a fault of its hardware first showed.
+    fn first_hit_ns(&self) -> Option<u64>;
+}
+
+impl VirtualBoard for SimBoard {
+    fn next_ns(&self) -> Option<u64> {
+        SimBoard::next_ns(self)
+    }
+    fn step(&mut self, now_ns: u64, out: &mut Outbox) -> Result<(), VirtualError> {
+        Ok(SimBoard::step(self, now_ns, out)?)
+    }
+    fn receive(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outbox) -> Result<(), VirtualError> {
+        Ok(SimBoard::receive(self, now_ns, bytes, out)?)
+    }
+    fn armed_for(&self, now_ns: u64) -> Option<f64> {
+        SimBoard::armed_for(self, now_ns)
+    }
+    fn samples(&self) -> u64 {
+        SimBoard::samples(self)
+    }
+    fn take_events(&mut self) -> Vec<Event> {
+        SimBoard::take_events(self)
+    }
+    // The code of the last sample comes over the line, after it.
+    fn volts(&self) -> f64 {
+        SimBoard::volts(self)
+    }
+    fn rig(&self) -> &MovingRig {
+        SimBoard::rig(self)
+    }
+    fn state(&self) -> BoardState {
+        self.node().state()
+    }
+    fn code(&self) -> DacCode {
+        SimBoard::code(self)
+    }
+    fn first_hit_ns(&self) -> Option<u64> {
+        SimBoard::first_hit_ns(self)
+    }
+}
+
 /// ControlLaw, line and board.
-pub struct VirtualLoop<S> {
-    board: SimBoard,
+pub struct VirtualLoop<S, B = SimBoard> {
+    board: B,
     station: S,
     up: FaultyLine,
     down: FaultyLine,
@@ -167,15 +240,17 @@ impl<S: Station> VirtualLoop<S> {
     /// # Errors
     /// As [`SimBoard::new`].
     pub fn new(scenario: &Scenario, params: VirtualOptions, station: S) -> Result<Self, SimBoardError> {
+        let board = SimBoard::new(scenario, &params.faults, 1, false)?;
+        Ok(VirtualLoop::with_board(board, params, station))
+    }
+}
+
+impl<S: Station, B: VirtualBoard> VirtualLoop<S, B> {
+    /// A station, and a board with its rig.
+    pub fn with_board(board: B, params: VirtualOptions, station: S) -> Self {
         let line = |way| FaultyLine::new(way, params.latency_ns, &params.faults, params.seed);
-        Ok(VirtualLoop {
-            board: SimBoard::new(scenario, &params.faults, 1, false)?,
-            station,
-            up: line(Direction::Up),
-            down: line(Direction::Down),
-            params,
-            now_ns: 0,
-        })
+        let (up, down) = (line(Direction::Up), line(Direction::Down));
+        VirtualLoop { board, station, up, down, params, now_ns: 0 }
     }
 
     /// Discovers, configures, arms, and runs to the end; `path` is the one that the controller follows.
@@ -209,6 +284,12 @@ impl<S: Station> VirtualLoop<S> {
         self.board.rig()
     }
 
+    /// The board, as the run has left it.
+    #[must_use]
+    pub fn into_board(self) -> B {
+        self.board
+    }
+
     /// An error if the station cannot go on.
     fn sound(&self) -> Result<(), VirtualError> {
         self.station.failure().map_or(Ok(()), |why| Err(VirtualError::Station(why)))
@@ -232,8 +313,8 @@ struct Heard<T> {
 }
 
 /// A run on its way.
-struct Course<'a, S: Station, P> {
-    on: &'a mut VirtualLoop<S>,
+struct Course<'a, S: Station, B, P> {
+    on: &'a mut VirtualLoop<S, B>,
     path: &'a P,
     report: VirtualReport,
     figures: MetricsBuilder,
@@ -260,8 +341,8 @@ struct Course<'a, S: Station, P> {
     first_sample: Option<u64>,
 }
 
-impl<'a, S: Station, P: Planned<S::Scalar>> Course<'a, S, P> {
-    fn new(on: &'a mut VirtualLoop<S>, path: &'a P) -> Self {
+impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P> {
+    fn new(on: &'a mut VirtualLoop<S, B>, path: &'a P) -> Self {
         let (period, present) = (on.station.period(), on.board.code());
         Course {
             report: VirtualReport {
@@ -310,7 +391,7 @@ impl<'a, S: Station, P: Planned<S::Scalar>> Course<'a, S, P> {
     /// The run is over: the rig moves to its end, and no further.
     fn stop_the_clock(&mut self) -> Result<(), VirtualError> {
         self.on.now_ns = self.end_ns;
-        Ok(self.on.board.step(self.end_ns, &mut self.up)?)
+        self.on.board.step(self.end_ns, &mut self.up)
     }
 
     /// The board: its clock first, then what has arrived. Time since it was armed, s.
@@ -337,7 +418,7 @@ impl<'a, S: Station, P: Planned<S::Scalar>> Course<'a, S, P> {
             self.sampled = v.board.samples();
             self.sample_taken();
         }
-        let state = self.on.board.node().state();
+        let state = self.on.board.state();
         let safe = matches!(state, BoardState::Stopped | BoardState::Faulted | BoardState::Boot);
         if armed_for.is_some() && safe && self.safe_at.is_none() {
             self.safe_at = Some(now);
@@ -479,7 +560,7 @@ impl<'a, S: Station, P: Planned<S::Scalar>> Course<'a, S, P> {
         let overrun = self.on.board.rig().shaft().position - self.path_at(self.safe_at.unwrap_or(now_ns));
         let v = &self.on;
         self.report.standing = v.station.standing().map(Real::to_f64);
-        self.report.board = Some(v.board.node().state());
+        self.report.board = Some(v.board.state());
         self.report.last_code = v.board.code().0;
         let hits = [v.up.hits().1, v.down.hits().1, v.board.first_hit_ns()];
         let first = hits.into_iter().flatten().min();

@@ -100,8 +100,9 @@ fn build(tally: &mut Tally) -> Result<bool> {
 fn host(tally: &mut Tally) -> Result<bool> {
     tally.stage("tests");
     let tests = ["test", "--no-fail-fast"];
-    // Some run the command: the one that was built with them.
-    let sound = cargo(tests).args(WORKSPACE).env("CLUTCH_BIN", command()).lines(|l| tally.read(l))?;
+    // Some run the command: the one that was built with them. And some a model of a chip, in Python.
+    let tested = cargo(tests).args(WORKSPACE).env("CLUTCH_BIN", command());
+    let sound = tested.env("CLUTCH_PYTHON", python::interpreter()?).lines(|l| tally.read(l))?;
     tally.stage("tests of the core as firmware takes it");
     // Without the features that the workspace turns on.
     let core = ["--package", "clutch-core", "--lib"];

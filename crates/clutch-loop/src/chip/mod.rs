@@ -1,0 +1,293 @@
+//! A board's own image on a register model of its chip, with the simulated rig behind the chip's timer and converter.
+//!
+//! | file | is |
+//! |---|---|
+//! | `stm32g474.py` | the chip: registers and exceptions around the core of the Unicorn engine; its head has the protocol |
+//! | `process` | the process that carries it |
+//! | `faults` | what breaks on the chip |
+//! | `host` | the host of a board controller that sends its settings over a line in virtual time |
+//! | `session` | a session with it |
+
+mod faults;
+mod host;
+mod process;
+mod session;
+
+pub use faults::{ChipFault, ChipFaultError, ChipFaultKind};
+pub use host::UploadingHost;
+pub use process::{ChipError, Counted, MODULE};
+pub use session::{ChipOptions, ChipReport, ChipRole, ChipSession};
+
+use crate::from_scenario;
+use crate::sim_board::SimBoardError;
+use crate::virtual_time::{VirtualBoard, VirtualError};
+use clutch_core::{Dac, DacCode, FixedCounts, SafeCodes};
+use clutch_node::Outbox;
+use clutch_sim::engine::Event;
+use clutch_sim::rig::Rig;
+use clutch_sim::{MovingRig, Scenario};
+use clutch_wire::{BoardState, Decoder, Message, STATUS_STATE};
+use process::{Answer, Chip, Flags};
+use std::path::Path;
+
+/// A board at power-up on the scenario's rig: its image runs on a model of the chip.
+pub struct ChipBoard {
+    chip: Chip,
+    scenario: Scenario,
+    rig: MovingRig,
+    dac: Dac<f64>,
+    /// Voltage at the brake while the converter's pin floats, V: the divider's, which holds.
+    pull: f64,
+    faults: Vec<ChipFault>,
+    decoder: Decoder,
+    state: BoardState,
+    last: Answer,
+    /// Voltage in the period that the last sample ended, V.
+    volts_before: f64,
+    /// Time up to which the rig has moved, ns; none before the board is configured.
+    moved_ns: Option<u64>,
+    /// Time of the first sample, ns.
+    started_ns: Option<u64>,
+    samples: u64,
+    armed_ns: Option<u64>,
+    first_hit_ns: Option<u64>,
+    resets: u32,
+    events: Vec<Event>,
+}
+
+/// A bit beside those of the faults: instructions of this request are counted, `Fault.METERED` in the model.
+const METERED: u32 = 1 << 31;
+
+/// Events that wait to be asked for.
+const MAX_EVENTS: usize = 1 << 12;
+
+impl ChipBoard {
+    /// Powers up a board with an image.
+    ///
+    /// # Errors
+    /// No Python, no module, no image; the scenario has no safe state, or its rig cannot be simulated.
+    pub fn start(
+        image: &Path,
+        scenario: &Scenario,
+        faults: &[ChipFault],
+        count: Option<&Path>,
+    ) -> Result<ChipBoard, VirtualError> {
+        let spec = scenario.spec();
+        let safety = scenario.safety().map_err(SimBoardError::from)?;
+        let rig = Rig::new(&spec.rig, spec.run.seed).map_err(SimBoardError::from)?;
+        let engine = spec.engine(&rig).map_err(SimBoardError::from)?;
+        let dac = Dac::new(&spec.rig.dac.converter).map_err(SimBoardError::from)?;
+        let codes = SafeCodes::new(&safety.on_fault, &dac, spec.period, spec.model.actuator.kind())
+            .map_err(SimBoardError::from)?;
+        let pull = dac.volts(codes.hold);
+        let start = spec.run.start_position().minus::<f64>(FixedCounts(0));
+        let start = start * rig.encoder.radians_per_count::<f64>();
+        let rig = MovingRig::new(rig, engine, spec.run.seed, (start, 0.0), pull);
+        let mut board = ChipBoard {
+            chip: Chip::start(image, count)?,
+            scenario: scenario.clone(),
+            rig,
+            dac,
+            pull,
+            faults: faults.to_vec(),
+            decoder: Decoder::new(),
+            state: BoardState::Boot,
+            last: Answer::default(),
+            volts_before: pull,
+            moved_ns: None,
+            started_ns: None,
+            samples: 0,
+            armed_ns: None,
+            first_hit_ns: None,
+            resets: 0,
+            events: Vec::new(),
+        };
+        board.exchange(0, &[], &mut Outbox::default())?;
+        board.volts_before = board.volts_now();
+        Ok(board)
+    }
+
+    /// Begins a fault with the next exchange.
+    pub fn inject(&mut self, kind: ChipFaultKind) {
+        self.faults.push(ChipFault { kind, at: None });
+    }
+
+    /// Resets since power-up.
+    #[must_use]
+    pub fn resets(&self) -> u32 {
+        self.resets
+    }
+
+    /// True if the converter is off, and its pin floats.
+    #[must_use]
+    pub fn floating(&self) -> bool {
+        self.last.flags.has(Flags::FLOATING)
+    }
+
+    /// True if the core spins, has no clock, or has locked up: nothing but a watchdog's reset will run its program again.
+    #[must_use]
+    pub fn dead(&self) -> bool {
+        let dead = [Flags::SPINNING, Flags::LOCKUP, Flags::STOPPED];
+        dead.into_iter().any(|flag| self.last.flags.has(flag))
+    }
+
+    /// True if the core is in the handler of a fault or of a non-maskable interrupt.
+    #[must_use]
+    pub fn in_fault(&self) -> bool {
+        self.last.flags.has(Flags::IN_FAULT)
+    }
+
+    /// Voltage at the brake now, V.
+    #[must_use]
+    pub fn volts_now(&self) -> f64 {
+        if self.floating() { self.pull } else { self.dac.volts(DacCode(self.last.code)) }
+    }
+
+    /// Ends the chip: the numbers of instructions, if they were counted.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    pub fn end(self) -> Result<Option<Counted>, ChipError> {
+        self.chip.end()
+    }
+
+    /// The faults that are in force, as the chip takes them.
+    fn active(&mut self, now_ns: u64) -> u32 {
+        let armed = self.armed_for(now_ns);
+        let active = self.faults.iter().filter(|fault| fault.active(armed));
+        let bits = active.fold(0, |bits, fault| bits | fault.kind.bit());
+        if bits != 0 && armed.is_some() {
+            self.first_hit_ns.get_or_insert(now_ns);
+        }
+        // What the chip does under control is counted, and nothing else.
+        bits | if self.state == BoardState::Running { METERED } else { 0 }
+    }
+
+    /// The rig where it will be at a time, and what happens until then. It moves when the chip looks at it or acts on it,
+    /// not when the chip's clock wakes up in between: a motion in two pieces has other bits than in one.
+    fn ahead(&self, now_ns: u64) -> Result<(MovingRig, Vec<Event>), VirtualError> {
+        let mut rig = self.rig.clone();
+        let since = self.moved_ns.unwrap_or(now_ns);
+        let mut events = Vec::new();
+        if now_ns > since {
+            let moved = rig.advance((now_ns - since) as f64 / 1e9).map_err(SimBoardError::from)?;
+            events.extend_from_slice(moved);
+        }
+        Ok((rig, events))
+    }
+
+    /// The chip goes on to a time, and bytes come to it.
+    fn exchange(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outbox) -> Result<(), VirtualError> {
+        let (ahead, events) = self.ahead(now_ns)?;
+        let before = self.volts_now();
+        let faults = self.active(now_ns);
+        self.last = self.chip.exchange(now_ns, ahead.counts().0, faults, bytes)?;
+        let sampling = self.started_ns.is_some() || self.moved_ns.is_some();
+        let sampled = self.last.flags.has(Flags::SAMPLED) && sampling;
+        if self.last.resets != self.resets {
+            self.resets = self.last.resets;
+            self.state = BoardState::Boot;
+        }
+        if sampled || self.volts_now().to_bits() != before.to_bits() {
+            self.rig = ahead;
+            if let Some(moved) = &mut self.moved_ns {
+                *moved = now_ns;
+            }
+            // Nobody may ask for them: what waits is bounded.
+            if self.events.len() < MAX_EVENTS {
+                self.events.extend(events);
+            }
+        }
+        if sampled {
+            let started = *self.started_ns.get_or_insert(now_ns);
+            self.rig.set_time((now_ns - started) as f64 / 1e9);
+            self.rig.begin_period();
+            self.samples += 1;
+            self.volts_before = before;
+        }
+        self.rig.command(self.volts_now());
+        self.listen(now_ns, out)
+    }
+
+    /// Hears what the chip has said: to whom it goes, and what state it tells of.
+    fn listen(&mut self, now_ns: u64, out: &mut Outbox) -> Result<(), VirtualError> {
+        for frame in self.last.sent.split_inclusive(|byte| *byte == 0) {
+            out.append(frame);
+        }
+        for at in 0..self.last.sent.len() {
+            let Some(Ok(message)) = self.last.sent.get(at).and_then(|byte| self.decoder.push(*byte)) else {
+                continue;
+            };
+            match message {
+                Message::Hello(hello) => {
+                    let misfits = from_scenario::misfits(&self.scenario, &hello);
+                    if !misfits.is_empty() {
+                        return Err(VirtualError::Refused(misfits.join("; ")));
+                    }
+                }
+                Message::Configured(_) => {
+                    self.state = BoardState::Ready;
+                    (self.started_ns, self.samples) = (None, 0);
+                    self.moved_ns = Some(now_ns);
+                }
+                Message::Armed(_) => {
+                    self.state = BoardState::Armed;
+                    self.armed_ns.get_or_insert(now_ns);
+                }
+                Message::Sample(sample) => self.tell(sample.status),
+                Message::Telemetry(telemetry) => self.tell(telemetry.status),
+                Message::Stopped(_) => self.state = BoardState::Stopped,
+                Message::Fault(_) => self.state = BoardState::Faulted,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// A sample's status: the state in which it was taken.
+    fn tell(&mut self, status: u8) {
+        // The first code follows its sample at once.
+        let state = match BoardState::from_u8(status & STATUS_STATE) {
+            Some(BoardState::Armed) => Some(BoardState::Running),
+            state => state,
+        };
+        self.state = state.unwrap_or(self.state);
+    }
+}
+
+impl VirtualBoard for ChipBoard {
+    fn next_ns(&self) -> Option<u64> {
+        (self.last.next_ns != u64::MAX).then_some(self.last.next_ns)
+    }
+    fn step(&mut self, now_ns: u64, out: &mut Outbox) -> Result<(), VirtualError> {
+        self.exchange(now_ns, &[], out)
+    }
+    fn receive(&mut self, now_ns: u64, bytes: &[u8], out: &mut Outbox) -> Result<(), VirtualError> {
+        self.exchange(now_ns, bytes, out)
+    }
+    fn armed_for(&self, now_ns: u64) -> Option<f64> {
+        self.armed_ns.map(|t| now_ns.saturating_sub(t) as f64 / 1e9)
+    }
+    fn samples(&self) -> u64 {
+        self.samples
+    }
+    fn take_events(&mut self) -> Vec<Event> {
+        std::mem::take(&mut self.events)
+    }
+    // The chip's own code is out when its sample is told.
+    fn volts(&self) -> f64 {
+        self.volts_before
+    }
+    fn rig(&self) -> &MovingRig {
+        &self.rig
+    }
+    fn state(&self) -> BoardState {
+        self.state
+    }
+    fn code(&self) -> DacCode {
+        DacCode(self.last.code)
+    }
+    fn first_hit_ns(&self) -> Option<u64> {
+        self.first_hit_ns
+    }
+}

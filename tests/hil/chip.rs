@@ -1,0 +1,215 @@
+//! The NUCLEO's own images on the model of their chip: they behave like the simulation, bit for bit, and what breaks on
+//! the chip ends as docs/firmware.md says.
+
+use crate::{beside, equal, on, simulate};
+use clutch_core::supervisor::{Cause, State};
+use clutch_loop::chip::{
+    ChipBoard, ChipFault, ChipFaultKind, ChipOptions, ChipReport, ChipRole, ChipSession,
+};
+use clutch_loop::lockstep_board::InProcessBoard;
+use clutch_loop::lockstep_session::LockstepOptions;
+use clutch_loop::virtual_time::{VirtualBoard, VirtualReport};
+use clutch_node::Outbox;
+use clutch_sim::Scenario;
+use clutch_tests::firmware::image;
+use clutch_wire::BoardState;
+use std::path::Path;
+
+const ROLES: [(&str, ChipRole); 2] =
+    [("nucleo-controller", ChipRole::Controller), ("nucleo-daq", ChipRole::Daq)];
+
+/// `BOOT_CODE` of the image.
+const BOOT_CODE: u16 = 1844;
+
+/// A law at 2 °/s, on the rig that the image is made for; the safe output is `BOOT_CODE`'s, 1844 · 10 V / 4096.
+fn nucleo(law: &str, duration: f64) -> Scenario {
+    let text = format!(
+        "name = \"{law} at 2 °/s\"\n[rig]\nbase = \"paper\"\nencoder.counts_per_rev = 20000\ndac.bits = 12\n\
+         dac.lowest_v = 0.0\ndac.highest_v = 10.0\n[law.{law}]\n[reference.ramp]\nrate_deg_s = 2.0\n\
+         [sampling]\nscalar = \"f32\"\n[run]\nduration_s = {duration:?}\nstart = \"rest\"\n\
+         [safety]\nreason = \"a weight drives the shaft\"\n[safety.on_fault.hold]\nvolts_v = 4.501953125\n\
+         [safety.limits]\nfollowing_error_deg = 5.0\n"
+    );
+    Scenario::parse(law, &text, &[]).expect("a scenario")
+}
+
+fn session(scenario: &Scenario, role: ChipRole, chip: ChipOptions) -> ChipSession {
+    let options = LockstepOptions {
+        log: None,
+        uncertified: true,
+        faults: Vec::new(),
+        seed: 1,
+        latency_ns: 0,
+        silence: None,
+        version: String::new(),
+    };
+    ChipSession::new(scenario.clone(), options, chip, role).expect("a session")
+}
+
+fn figures_and_codes_are_the_simulations(name: &str, role: ChipRole, law: &str) {
+    let Some(image) = image(name) else { return };
+    let _beside = beside();
+    let scenario = nucleo(law, 2.0);
+    let chip = ChipOptions { record: true, ..ChipOptions::default() };
+    let report = session(&scenario, role, chip).run(&image).expect("the chip runs");
+    equal(&format!("{law} on {name}"), &report.ran, &simulate(&scenario));
+    assert_eq!((report.resets, report.dead, report.floating), (0, false, false), "{law} on {name}");
+    assert_eq!(report.ran.standing.cause, Cause::Done, "{law} on {name}");
+}
+
+#[test]
+fn pd_on_the_chip_is_the_simulation_bit_for_bit() {
+    figures_and_codes_are_the_simulations("nucleo-controller", ChipRole::Controller, "pd");
+}
+
+#[test]
+fn ctc_on_the_chip_is_the_simulation_bit_for_bit() {
+    figures_and_codes_are_the_simulations("nucleo-controller", ChipRole::Controller, "ctc");
+}
+
+#[test]
+fn smc_on_the_chip_is_the_simulation_bit_for_bit() {
+    figures_and_codes_are_the_simulations("nucleo-controller", ChipRole::Controller, "smc");
+}
+
+/// A law with memory begins with the voltage that the brake has: on a board its power-up output, in the simulation
+/// what holds the shaft at rest. The same node on this machine begins as the chip does.
+fn commands_are_those_of_the_same_node_in_this_process(law: &str) {
+    let Some(image) = image("nucleo-controller") else { return };
+    let _beside = beside();
+    let scenario = nucleo(law, 2.0);
+    let chip = ChipOptions { record: true, ..ChipOptions::default() };
+    let report = session(&scenario, ChipRole::Controller, chip).run(&image).expect("the chip runs");
+    let here = on(&scenario, InProcessBoard::default(), 3000);
+    assert_eq!(here.present, BOOT_CODE, "{law}: the output at the start");
+    assert_eq!(report.ran.metrics, here.metrics, "{law}: the figures differ");
+    let (_, theirs) = report.ran.samples_and_commands();
+    let (_, ours) = here.samples_and_commands();
+    let ticks = (scenario.ticks() as usize)..;
+    assert!(theirs.get(ticks).is_some_and(|rest| !rest.is_empty()), "{law}: {} ticks", theirs.len());
+    for (theirs, ours) in theirs.iter().zip(&ours) {
+        assert_eq!(theirs, ours, "{law}: tick {}", ours.tick);
+    }
+}
+
+#[test]
+fn pid_on_the_chip_is_the_same_node_in_this_process_bit_for_bit() {
+    commands_are_those_of_the_same_node_in_this_process("pid");
+}
+
+#[test]
+fn super_twisting_on_the_chip_is_the_same_node_in_this_process_bit_for_bit() {
+    commands_are_those_of_the_same_node_in_this_process("super_twisting");
+}
+
+#[test]
+fn a_law_on_this_machine_through_the_chip_is_the_simulation_bit_for_bit() {
+    figures_and_codes_are_the_simulations("nucleo-daq", ChipRole::Daq, "smc");
+}
+
+/// A run in which something breaks on the chip; `at` s after arming, or at power-up.
+fn broken(image: &Path, role: ChipRole, kind: ChipFaultKind, at: Option<f64>) -> ChipReport {
+    let chip = ChipOptions { faults: vec![ChipFault { kind, at }], ..ChipOptions::default() };
+    session(&nucleo("smc", 1.5), role, chip).run(image).expect("the chip runs")
+}
+
+/// Ends of control and of the board: state of the supervisor, cause, state of the board.
+fn ends(ran: &VirtualReport) -> (State, Cause, Option<BoardState>) {
+    (ran.standing.state, ran.standing.cause, ran.board)
+}
+
+#[test]
+fn a_program_that_cannot_go_on_is_reset_into_its_boot_code() {
+    for (name, role) in ROLES {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        use ChipFaultKind::{Hang, Nmi, Undefined, Unexpected};
+        for kind in [Hang, Undefined, Nmi, Unexpected] {
+            let what = format!("{kind:?} on {name}");
+            let ChipReport { ran, resets, dead, floating, .. } = broken(&image, role, kind, Some(0.3));
+            let expected = (State::Faulted, Cause::Silence, Some(BoardState::Boot));
+            assert_eq!((ends(&ran), resets), (expected, 1), "{what}");
+            assert_eq!((dead, floating, ran.last_code), (false, false, BOOT_CODE), "{what}");
+            // The watchdog was fed in the period before; its clock counts 80 of 32 kHz / 4.
+            let safe = ran.safe.expect("a safe output") - ran.hit.expect("a fault");
+            assert!((0.008..=0.011).contains(&safe), "{what}: the reset came after {safe} s");
+        }
+    }
+}
+
+/// A chip in the middle of a run, with a code that is not the one of power-up.
+fn running(image: &Path, role: ChipRole) -> (ChipBoard, u64) {
+    let chip = ChipOptions { until: Some(0.3), ..ChipOptions::default() };
+    let (_, board) = session(&nucleo("smc", 1.5), role, chip).run_board(image).expect("the chip runs");
+    assert_ne!(board.code().0, BOOT_CODE);
+    let now_ns = board.next_ns().expect("it has a next period");
+    (board, now_ns)
+}
+
+#[test]
+fn a_fault_handler_puts_the_boot_code_out_at_once() {
+    for (name, role) in ROLES {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        for kind in [ChipFaultKind::Undefined, ChipFaultKind::Nmi, ChipFaultKind::Unexpected] {
+            let (mut board, now_ns) = running(&image, role);
+            board.inject(kind);
+            board.step(now_ns - 1, &mut Outbox::default()).expect("the chip runs");
+            assert_eq!((board.code().0, board.resets()), (BOOT_CODE, 0), "{kind:?} on {name}");
+            assert_eq!(board.in_fault(), kind != ChipFaultKind::Unexpected, "{kind:?} on {name}");
+        }
+        // One that hangs puts out what it did last, until the watchdog.
+        let (mut board, now_ns) = running(&image, role);
+        let last = board.code();
+        board.inject(ChipFaultKind::Hang);
+        board.step(now_ns - 1, &mut Outbox::default()).expect("the chip runs");
+        assert_eq!((board.code(), board.dead(), board.resets()), (last, true, 0), "{name}");
+    }
+}
+
+#[test]
+fn a_converter_that_does_not_follow_ends_the_run() {
+    for (name, role) in ROLES {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        let ChipReport { ran, resets, dead, .. } =
+            broken(&image, role, ChipFaultKind::ConverterStuck, Some(0.3));
+        assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)), "{name}");
+        assert_eq!((resets, dead), (0, false), "{name}");
+    }
+}
+
+#[test]
+fn a_crystal_that_stops_leads_to_a_reset_and_then_to_a_floating_pin() {
+    for (name, role) in ROLES {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        let ChipReport { ran, resets, dead, floating, .. } =
+            broken(&image, role, ChipFaultKind::Crystal, Some(0.3));
+        assert_eq!(ends(&ran), (State::Faulted, Cause::Silence, Some(BoardState::Boot)), "{name}");
+        assert_eq!((resets, dead, floating), (1, true, true), "{name}");
+    }
+}
+
+#[test]
+fn a_crystal_that_never_starts_leaves_the_pin_floating() {
+    for (name, role) in ROLES {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        let ChipReport { ran, resets, dead, floating, .. } =
+            broken(&image, role, ChipFaultKind::Crystal, None);
+        assert_eq!(ends(&ran), (State::Disconnected, Cause::None, Some(BoardState::Boot)), "{name}");
+        assert_eq!((resets, dead, floating), (0, true, true), "{name}");
+    }
+}
+
+#[test]
+fn an_overrun_of_the_line_costs_one_frame() {
+    for (name, role) in ROLES {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        let ChipReport { ran, resets, .. } = broken(&image, role, ChipFaultKind::Overrun, Some(0.3));
+        assert_eq!(ends(&ran), (State::Holding, Cause::Done, Some(BoardState::Stopped)), "{name}");
+        assert_eq!((resets, ran.unanswered), (0, 0), "{name}");
+    }
+}
