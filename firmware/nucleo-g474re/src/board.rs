@@ -3,19 +3,21 @@
 
 use clutch_core::{Counts, DacCode};
 use clutch_node::{BoardParams, Hardware, WideCounter};
+use core::future::poll_fn;
+use core::task::Poll;
 use cortex_m::peripheral::DWT;
 use embassy_stm32::dac::{self, DacChannel, Value};
 use embassy_stm32::gpio::Pull;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use embassy_stm32::mode::Async;
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac::timer::vals::FilterValue;
 use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::qei::{self, Qei};
-use embassy_stm32::usart::{self, RingBufferedUartRx, TxDma, Uart, UartTx};
+use embassy_stm32::usart::{self, RxDma, TxDma, Uart};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{bind_interrupts, dma, interrupt, pac, peripherals, uid};
+use embassy_stm32::{dma, interrupt, pac, peripherals, uid};
+use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::Instant;
 use static_cell::ConstStaticCell;
 
@@ -57,9 +59,11 @@ const WATCHDOG_US: u32 = 10_000;
 /// Threshold of the supply monitor, by the chip's list: 2.9 V.
 const SUPPLY_2_9_V: u8 = 6;
 
-/// The DMA channel of the line to the host, from 0, and room for the frames of one period.
+/// The DMA channels of the line, from 0; room for the frames of one period to the host, and for 11 ms from it.
 const TO_HOST: usize = 0;
+const FROM_HOST: usize = 1;
 const LINE: usize = 512;
+const RING: usize = 1024;
 
 /// The core's clock, Hz.
 pub const CLOCK_HZ: u32 = 170_000_000;
@@ -67,17 +71,8 @@ pub const CLOCK_HZ: u32 = 170_000_000;
 /// Priority of the control task.
 pub const CONTROL: Priority = Priority::P6;
 
-/// Below it: bytes come and go by DMA, and these interrupts only wake the task that reads them.
+/// Below it: bytes come and go by DMA, and the line's interrupt only wakes the task that reads them.
 const SERIAL: Priority = Priority::P7;
-
-bind_interrupts!(struct Irqs {
-    LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
-    DMA1_CHANNEL1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
-    DMA1_CHANNEL2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
-});
-
-/// Bytes from the host.
-pub type Line = RingBufferedUartRx<'static>;
 
 /// The hardware as the node sees it.
 pub struct Board {
@@ -145,19 +140,15 @@ pub fn start() -> (Board, Line) {
     // A level counts when it has lasted 64 clocks, 0.38 µs: at 200 000 counts/s one has 5 µs.
     pac::TIM3.ccmr_input(0).modify(|w| [0, 1].map(|n| w.set_icf(n, FilterValue::FDTS_DIV8_N8)));
 
-    static FROM_HOST: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
     let mut line = usart::Config::default();
     line.baudrate = BAUD;
-    interrupt::LPUART1.set_priority(SERIAL);
-    interrupt::DMA1_CHANNEL1.set_priority(SERIAL);
-    interrupt::DMA1_CHANNEL2.set_priority(SERIAL);
-    let request = TxDma::<peripherals::LPUART1>::request(&*p.DMA1_CH1);
-    let line = Uart::new(p.LPUART1, p.PA3, p.PA2, p.DMA1_CH1, p.DMA1_CH2, Irqs, line);
+    let line = Uart::new_blocking(p.LPUART1, p.PA3, p.PA2, line);
     let core = cortex_m::Peripherals::take();
     let (Ok(line), Some(mut core), Some(boot)) = (line, core, random()) else { stop() };
-    let (to_host, from_host) = line.split();
-    let (to_host, from_host) =
-        (ToHost::new(to_host, request), from_host.into_ring_buffered(FROM_HOST.take()));
+    // Pins and baud rate stay; the bytes are the DMA's.
+    core::mem::forget(line);
+    let to_host = ToHost::new(TxDma::<peripherals::LPUART1>::request(&*p.DMA1_CH1));
+    let from_host = Line::new(RxDma::<peripherals::LPUART1>::request(&*p.DMA1_CH2));
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
 
@@ -170,12 +161,10 @@ pub fn start() -> (Board, Line) {
 /// The line to the host: frames leave it by DMA, without an interrupt and without the processor.
 struct ToHost {
     bytes: &'static mut [u8; LINE],
-    /// Owns pin and peripheral.
-    _line: UartTx<'static, Async>,
 }
 
 impl ToHost {
-    fn new(line: UartTx<'static, Async>, request: dma::Request) -> ToHost {
+    fn new(request: dma::Request) -> ToHost {
         static BYTES: ConstStaticCell<[u8; LINE]> = ConstStaticCell::new([0; LINE]);
         pac::DMAMUX1.ccr(TO_HOST).write(|w| w.set_dmareq_id(request));
         pac::LPUART1.cr3().modify(|w| w.set_dmat(true));
@@ -185,7 +174,7 @@ impl ToHost {
             w.set_dir(pac::bdma::vals::Dir::FROM_MEMORY);
             w.set_minc(true);
         });
-        ToHost { bytes: BYTES.take(), _line: line }
+        ToHost { bytes: BYTES.take() }
     }
 
     /// True if it takes the frames; false while it is still sending earlier ones.
@@ -203,6 +192,74 @@ impl ToHost {
         cortex_m::asm::dmb();
         channel.cr().modify(|w| w.set_en(true));
         true
+    }
+}
+
+/// Bytes from the host: the DMA puts them into a ring for ever, also after an error of the line, which costs the frame
+/// that it falls into and no other.
+pub struct Line {
+    ring: *const [u8; RING],
+    /// The place of the next byte to be read.
+    at: usize,
+}
+
+// SAFETY: the ring is read by this one alone; the DMA writes it.
+unsafe impl Send for Line {}
+
+/// Wakes the control task: the host has paused.
+static PAUSED: AtomicWaker = AtomicWaker::new();
+
+#[interrupt]
+fn LPUART1() {
+    // The flags of pauses and of errors: noise and a wrong stop bit show in a frame's checksum.
+    pac::LPUART1.icr().write(|w| {
+        w.set_idle(true);
+        w.set_ore(true);
+        w.set_ne(true);
+        w.set_fe(true);
+        w.set_pe(true);
+    });
+    PAUSED.wake();
+}
+
+impl Line {
+    fn new(request: dma::Request) -> Line {
+        static BYTES: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
+        let ring: *const [u8; RING] = BYTES.take();
+        pac::DMAMUX1.ccr(FROM_HOST).write(|w| w.set_dmareq_id(request));
+        let channel = pac::DMA1.ch(FROM_HOST);
+        channel.par().write_value(pac::LPUART1.rdr().as_ptr() as u32);
+        channel.mar().write_value(ring as u32);
+        channel.ndtr().write(|w| w.set_ndt(RING as u16));
+        channel.cr().write(|w| {
+            w.set_minc(true);
+            w.set_circ(true);
+            w.set_en(true);
+        });
+        pac::LPUART1.cr3().modify(|w| w.set_dmar(true));
+        pac::LPUART1.cr1().modify(|w| w.set_idleie(true));
+        interrupt::LPUART1.set_priority(SERIAL);
+        // SAFETY: its handler shares nothing but the waker.
+        unsafe { interrupt::LPUART1.enable() };
+        Line { ring, at: 0 }
+    }
+
+    /// Waits for bytes, and moves as many as there are, and fit, to `bytes`; their number.
+    pub async fn read(&mut self, bytes: &mut [u8]) -> usize {
+        poll_fn(|context| {
+            // First: a pause between the look and the wait wakes, too.
+            PAUSED.register(context.waker());
+            let end = RING - usize::from(pac::DMA1.ch(FROM_HOST).ndtr().read().ndt());
+            let waiting = (end + RING - self.at) % RING;
+            let count = waiting.min(bytes.len());
+            for byte in &mut bytes[..count] {
+                // SAFETY: a byte of the ring, which the DMA may write at any time and has written here.
+                *byte = unsafe { self.ring.cast::<u8>().add(self.at).read_volatile() };
+                self.at = (self.at + 1) % RING;
+            }
+            if count > 0 { Poll::Ready(count) } else { Poll::Pending }
+        })
+        .await
     }
 }
 

@@ -44,8 +44,7 @@ pub async fn run(role: &mut impl Role, mut board: Board, mut line: Line) -> ! {
         // In this order: a period that is due takes precedence over waiting bytes.
         match select(beat.next(), line.read(&mut bytes)).await {
             Either::First(()) => tick(role, &mut board),
-            Either::Second(Ok(count)) => receive(role, &mut board, &bytes[..count]),
-            Either::Second(Err(_)) => {}
+            Either::Second(count) => receive(role, &mut board, &bytes[..count]),
         }
         let wanted_us = role.period_us().unwrap_or(BOOT_PERIOD_US);
         if wanted_us != period_us {

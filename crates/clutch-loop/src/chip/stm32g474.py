@@ -1023,8 +1023,8 @@ class Meter:
     The estimate assumes: 170 MHz; one cycle for an instruction, two for a load, more for what moves several registers,
     divides, or multiplies and adds in floating point, as the core's manual has them; two for a branch that is taken;
     12 and 10 for a handler's begin and end. Flash is read by 64 bits with four wait states, into an instruction
-    cache of 1 KB and a data cache of 256 bytes, each by least recent use; without prefetch, as after a reset. No
-    account is taken of how instructions overlap, nor of waits for the peripherals' buses.
+    cache of 1 KB and a data cache of 256 bytes, each by least recent use. No account is taken of the prefetch, which
+    the image switches on, of how instructions overlap, nor of waits for the peripherals' buses.
     """
 
     WAIT_STATES, BRANCH, CLOCK_MHZ = 4, 2, 170
@@ -1039,6 +1039,7 @@ class Meter:
         self.woke: tuple[int, int] | None = None
         self.sample: tuple[int, int] | None = None
         self.bytes: tuple[int, int] | None = None
+        self.out: tuple[int, int] | None = None
         self.kind = "other"
         self.counted: dict[str, list[tuple[int, int]]] = {}
         chip.uc.hook_add(uc_const.UC_HOOK_CODE, self.instruction)
@@ -1071,9 +1072,9 @@ class Meter:
     def now(self) -> tuple[int, int]:
         return self.executed, self.cycles
 
-    def since(self, name: str, begin: tuple[int, int]) -> None:
+    def since(self, name: str, begin: tuple[int, int], end: tuple[int, int]) -> None:
         if self.chip.faults & Fault.METERED:
-            self.counted.setdefault(name, []).append((self.executed - begin[0], self.cycles - begin[1]))
+            self.counted.setdefault(name, []).append((end[0] - begin[0], end[1] - begin[1]))
 
     def wakes(self) -> None:
         if not self.woke:
@@ -1087,18 +1088,15 @@ class Meter:
         self.kind = "bytes"
 
     def put_out(self) -> None:
-        """A code goes to the converter: the first one after a sample, or after bytes came, is the answer to them."""
-        if self.sample:
-            self.since("sample_to_converter", self.sample)
-            self.sample = None
-        elif self.bytes:
-            self.since("bytes_to_converter", self.bytes)
-            self.bytes = None
+        """A code goes to the converter: the last one after a sample, or after bytes came, is the answer to them."""
+        self.out = self.now()
 
     def slept(self) -> None:
         if self.woke:
-            self.since(self.kind, self.woke)
-        self.woke = self.bytes = None
+            self.since(self.kind, self.woke, self.now())
+        if self.out and (begun := self.sample or self.bytes):
+            self.since("sample_to_converter" if self.sample else "bytes_to_converter", begun, self.out)
+        self.woke = self.sample = self.bytes = self.out = None
 
     def report(self) -> dict[str, Any]:
         """Lowest, mean and highest number of instructions, and of estimated microseconds, by what they were for."""
