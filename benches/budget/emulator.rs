@@ -61,8 +61,8 @@ pub(crate) fn no_target() -> Option<String> {
     (!folder.is_dir()).then(|| format!("the target is not there: rustup target add {TARGET}"))
 }
 
-/// Builds the images; the folder that they are in.
-pub(crate) fn build(firmware: &Path, peer: bool) -> Result<PathBuf> {
+/// Builds the images of a board; the folder that they are in.
+pub(crate) fn build(firmware: &Path, package: &str, peer: bool) -> Result<PathBuf> {
     let target = std::env::var_os("CLUTCH_FIRMWARE_TARGET_DIR")
         .map_or(firmware.join("../target/firmware"), PathBuf::from);
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -72,7 +72,7 @@ pub(crate) fn build(firmware: &Path, peer: bool) -> Result<PathBuf> {
         "--release",
         "--locked",
         "--package",
-        "clutch-qemu-mps2",
+        package,
         "--target-dir",
     ]);
     command.arg(&target).args(if peer { &["--features", "peer"][..] } else { &[] });

@@ -2,13 +2,33 @@
 
 use crate::plan::Memory;
 use anyhow::{Context, Result};
-use clutch_benches::machine_code::{Image, Stack, Stacks};
+use clutch_benches::machine_code::{Fault, Image, Stack, Stacks};
 
 /// Start of RAM, on every Cortex-M.
 const RAM: u32 = 0x2000_0000;
 /// Bytes that an exception puts on the stack: the registers of core and floating-point unit, and a
 /// word to align them.
 const EXCEPTION: u64 = 104 + 4;
+
+/// A period, in the images that are flashed. What polls the task calls through registers, and has no bound.
+const PERIOD: &str = "clutch_node::hardware::tick";
+
+/// Prints flash, static RAM and a period's stack of an image that is flashed.
+///
+/// # Errors
+/// The stack cannot be followed.
+pub(crate) fn flashed(name: &str, image: &Image) -> Result<(), Fault> {
+    let (mut flash, mut ram) = (0, 0);
+    for s in image.sections() {
+        flash += if s.stored { u64::from(s.size) } else { 0 };
+        ram += if s.address >= RAM { u64::from(s.size) } else { 0 };
+    }
+    println!("\nImage `{name}`, bytes: flash {flash}, static RAM {ram}");
+    let stack = Stacks::new(image).of(PERIOD)?;
+    println!("\n| stack of a period | {} |\n|---|---|", stack.bytes);
+    stack.path.iter().for_each(|(function, bytes)| println!("| `{function}` | {bytes} |"));
+    Ok(())
+}
 
 /// Prints the sections with their sizes; gives the values over budget.
 pub(crate) fn size(image: &Image, budget: &Memory) -> Vec<String> {

@@ -36,9 +36,12 @@ pub(crate) struct Core {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Item {
     pub(crate) name: String,
+    /// The image that it is in; without it, the one that measures.
+    pub(crate) image: Option<String>,
     /// Its name in the image.
     pub(crate) symbol: String,
-    /// The name under which the image prints its counts.
+    /// The name under which the measuring image prints its counts; empty for what is not measured there.
+    #[serde(default)]
     pub(crate) measured: String,
     /// True if its cycles along the executed paths are added up, too.
     #[serde(default)]

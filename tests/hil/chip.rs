@@ -151,7 +151,10 @@ fn a_fault_handler_puts_the_boot_code_out_at_once() {
     for (name, role) in ROLES {
         let Some(image) = image(name) else { return };
         let _beside = beside();
-        for kind in [ChipFaultKind::Undefined, ChipFaultKind::Nmi, ChipFaultKind::Unexpected] {
+        // A crystal that stops is an NMI, too, by the clock security.
+        for kind in
+            [ChipFaultKind::Undefined, ChipFaultKind::Nmi, ChipFaultKind::Unexpected, ChipFaultKind::Crystal]
+        {
             let (mut board, now_ns) = running(&image, role);
             board.inject(kind);
             board.step(now_ns - 1, &mut Outbox::default()).expect("the chip runs");
@@ -176,6 +179,17 @@ fn a_converter_that_does_not_follow_ends_the_run() {
             broken(&image, role, ChipFaultKind::ConverterStuck, Some(0.3));
         assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)), "{name}");
         assert_eq!((resets, dead), (0, false), "{name}");
+    }
+}
+
+#[test]
+fn a_supply_that_is_too_low_for_the_converter_ends_the_run() {
+    for (name, role) in ROLES {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        let ChipReport { ran, resets, .. } = broken(&image, role, ChipFaultKind::SupplyLow, Some(0.3));
+        assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)), "{name}");
+        assert_eq!(resets, 0, "{name}");
     }
 }
 

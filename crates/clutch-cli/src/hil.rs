@@ -58,7 +58,7 @@ pub(crate) struct Hil {
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
     /// Injects a fault into the chip of a nucleo image: converter-stuck, crystal, overrun, hang,
-    /// undefined, nmi or unexpected; :at=SECONDS after arming, else from power-up on.
+    /// undefined, nmi, unexpected or supply-low; :at=SECONDS after arming, else from power-up on.
     #[arg(long, value_name = "KIND[:at=S]")]
     chip_fault: Vec<ChipFault>,
     /// Counts the instructions of a nucleo image, and writes the numbers as JSON; takes several

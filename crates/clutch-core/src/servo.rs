@@ -201,6 +201,8 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
     }
 
     /// As [`Servo::start`], for [`Servo::tick_at`].
+    // A function of its own in machine code: it runs once, and a period's bound leaves it out.
+    #[inline(never)]
     #[must_use]
     pub fn start_at(&self, position: FixedCounts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
         let tick = self.measure(position, target, T::ZERO);

@@ -19,11 +19,13 @@ pub enum ChipFaultKind {
     Nmi,
     /// An interrupt that the program never enabled.
     Unexpected,
+    /// The supply is below the threshold of the chip's monitor, and the converter's reference with it.
+    SupplyLow,
 }
 
 impl ChipFaultKind {
     /// All, by name.
-    pub const ALL: [(&'static str, ChipFaultKind); 7] = [
+    pub const ALL: [(&'static str, ChipFaultKind); 8] = [
         ("converter-stuck", ChipFaultKind::ConverterStuck),
         ("crystal", ChipFaultKind::Crystal),
         ("overrun", ChipFaultKind::Overrun),
@@ -31,6 +33,7 @@ impl ChipFaultKind {
         ("undefined", ChipFaultKind::Undefined),
         ("nmi", ChipFaultKind::Nmi),
         ("unexpected", ChipFaultKind::Unexpected),
+        ("supply-low", ChipFaultKind::SupplyLow),
     ];
 
     /// Its bit, as `Fault` in the model of the chip has it.
@@ -43,6 +46,7 @@ impl ChipFaultKind {
             ChipFaultKind::Undefined => 1 << 4,
             ChipFaultKind::Nmi => 1 << 5,
             ChipFaultKind::Unexpected => 1 << 6,
+            ChipFaultKind::SupplyLow => 1 << 7,
         }
     }
 }

@@ -44,7 +44,7 @@ from unicorn import unicorn_const as uc_const
 
 
 class Fault:
-    """Bits for the chip's faults; those after CRYSTAL_DEAD happen once, when their bit is set."""
+    """Bits for the chip's faults; those from OVERRUN to UNEXPECTED happen once, when their bit is set."""
 
     CONVERTER_STUCK = 1 << 0  # DOR1 does not follow DHR
     CRYSTAL_DEAD = 1 << 1  # HSE stops, or never starts
@@ -53,6 +53,7 @@ class Fault:
     UNDEFINED = 1 << 4  # the core meets an undefined instruction
     NMI = 1 << 5
     UNEXPECTED = 1 << 6  # an interrupt that the program never enabled: WWDG
+    SUPPLY_LOW = 1 << 7  # the supply is below the monitor's threshold: PVDO, while the monitor is on
     METERED = 1 << 31  # no fault: the instructions of this request count
 
 
@@ -716,6 +717,12 @@ class Chip:
                     after = at + n + length
                     self.uc.hook_add(uc_const.UC_HOOK_CODE, self.unmasked, None, after, after)
 
+    def deepest_stack(self, statics_end: int) -> int:
+        """Bytes from the top of the stack down to the last one that was ever written; memory begins as zeros."""
+        (top,) = struct.unpack("<I", self.uc.mem_read(0x0800_0000, 4))
+        free = bytes(self.uc.mem_read(statics_end, top - statics_end))
+        return len(free.lstrip(b"\0"))
+
     # Power, reset, faults.
 
     def clear(self) -> None:
@@ -755,6 +762,10 @@ class Chip:
 
     def set_faults(self, faults: int) -> None:
         new = faults & ~self.faults
+        if (faults | self.faults) & Fault.SUPPLY_LOW:
+            watched = self.uc.mem_read(0x4000_7004, 1)[0] & 1  # PWR_CR2.PVDE
+            low = bool(faults & Fault.SUPPLY_LOW and watched)
+            self.uc.mem_write(0x4000_7014, struct.pack("<I", low << 11))  # PWR_SR2.PVDO
         if new & Fault.CRYSTAL_DEAD:
             self.timer.rebase()
         if self.faults & ~faults & Fault.OVERRUN:
@@ -1017,6 +1028,13 @@ def segments(image: bytes) -> list[tuple[int, bytes]]:
     return [(where, image[at : at + length]) for kind, at, _, where, length in headers if kind == 1 and length]
 
 
+def statics_end(image: bytes) -> int:
+    """The first address in SRAM behind what an ELF image has there: as far as its stack may reach."""
+    table, size, count = (*struct.unpack_from("<I", image, 28), *struct.unpack_from("<HH", image, 42))
+    headers = [struct.unpack_from("<6I", image, table + size * n) for n in range(count)]
+    return max([at + size for kind, _, at, _, _, size in headers if kind == 1 and at >> 28 == 2], default=0x2000_0000)
+
+
 class Meter:
     """Counts instructions, and estimates their cycles.
 
@@ -1157,7 +1175,8 @@ def main() -> None:
         answers.write(struct.pack("<QHHIH", next_ns, code, flags, resets, len(sent)) + sent)
         answers.flush()
     if chip.meter:
-        Path(rest[1]).write_text(json.dumps(chip.meter.report()))
+        report = chip.meter.report() | {"stack_bytes": chip.deepest_stack(statics_end(Path(image).read_bytes()))}
+        Path(rest[1]).write_text(json.dumps(report))
 
 
 if __name__ == "__main__":
