@@ -63,8 +63,9 @@ pub(crate) fn no_target() -> Option<String> {
 
 /// Builds the images of a board; the folder that they are in.
 pub(crate) fn build(firmware: &Path, package: &str, peer: bool) -> Result<PathBuf> {
-    let target = std::env::var_os("CLUTCH_FIRMWARE_TARGET_DIR")
-        .map_or(firmware.join("../target/firmware"), PathBuf::from);
+    // With laws in C the emulated board's are others than those that are tested: they may have a folder of their own.
+    let own = std::env::var_os("CLUTCH_FIRMWARE_TARGET_DIR").filter(|_| peer).map(PathBuf::from);
+    let target = own.unwrap_or(firmware.join("../target/firmware"));
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
     command.current_dir(firmware).args([

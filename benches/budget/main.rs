@@ -61,7 +61,7 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
         return Ok(Vec::new());
     }
     let images = emulator::build(&firmware, EMULATED, no_gcc.is_none())?;
-    emulator::build(&firmware, FLASHED, false)?;
+    let flashed = emulator::build(&firmware, FLASHED, false)?;
     let controller = Image::read(&images.join("mps2-controller"))?;
     let mut over = Vec::new();
     if part.is_none_or(|p| p == "size") {
@@ -72,7 +72,7 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
     }
     if part.is_none_or(|p| p != "loops") {
         for name in ["nucleo-controller", "nucleo-daq"] {
-            memory::flashed(name, &Image::read(&images.join(name))?)?;
+            memory::flashed(name, &Image::read(&flashed.join(name))?)?;
         }
     }
     if part.is_some_and(|p| p != "loops") {
@@ -86,7 +86,7 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
     }
     let mut others = BTreeMap::new();
     for name in plan.items.iter().filter_map(|i| i.image.as_ref()) {
-        others.insert(name.as_str(), Image::read(&images.join(name))?);
+        others.insert(name.as_str(), Image::read(&flashed.join(name))?);
     }
     for (name, image) in &others {
         let found = image.double_precision();
