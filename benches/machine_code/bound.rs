@@ -141,7 +141,23 @@ impl<'a> Bounds<'a> {
         if let Some(cost) = known.get(&function.address) {
             return *cost;
         }
-        known.insert(function.address, None); // in case of recursion, which the whole bound refuses
+        if self.within.contains(&function.address) {
+            self.fault(Fault::Recursion(function.name.clone()));
+            return None;
+        }
+        self.within.push(function.address);
+        let cost = self.up_to_calls(function, end, known);
+        self.within.pop();
+        known.insert(function.address, cost);
+        cost
+    }
+
+    fn up_to_calls(
+        &mut self,
+        function: &Function,
+        end: u32,
+        known: &mut BTreeMap<u32, Option<Cost>>,
+    ) -> Option<Cost> {
         let mut graph = match Graph::new(self.image, function) {
             Ok(graph) => graph,
             Err(fault) => {
@@ -179,9 +195,7 @@ impl<'a> Bounds<'a> {
                 _ => {}
             }
         }
-        let cost = (!ends.is_empty()).then(|| self.longest_to(function, &graph, &ends));
-        known.insert(function.address, cost);
-        cost
+        if ends.is_empty() { None } else { self.longest_to(function, &graph, &ends) }
     }
 
     fn longest_to(
@@ -189,22 +203,23 @@ impl<'a> Bounds<'a> {
         function: &Function,
         graph: &Graph,
         ends: &BTreeMap<usize, (usize, Cost)>,
-    ) -> Cost {
+    ) -> Option<Cost> {
         let mut capped = BTreeMap::new();
         let mut ways = self.ways(function, graph, None, &mut capped, Some(ends));
         let loops = match graph.loops() {
             Ok(loops) => loops,
             Err(block) => {
                 let (function, address) = (function.name.clone(), graph.address(block));
-                return self.fault(Fault::Irreducible { function, address });
+                self.fault(Fault::Irreducible { function, address });
+                return None;
             }
         };
         for round in &loops {
             let most = self.rounds(function, graph, &loops, round, None);
             collapse(&mut ways, round, most, capped.values());
         }
-        let path = reach(&ways, 0, None).1.remove(&None).unwrap_or_default();
-        capped.values().fold(path, |sum, c| sum + c.cost * c.most)
+        let path = reach(&ways, 0, None).1.remove(&None)?;
+        Some(capped.values().fold(path, |sum, c| sum + c.cost * c.most))
     }
 
     /// The statement about the number of calls of one function in another.

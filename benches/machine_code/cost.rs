@@ -22,7 +22,6 @@ pub(super) fn cycles(i: &Instruction) -> Option<u64> {
         | "sxtb" | "sxth" | "teq" | "tst" | "ubfx" | "usat" | "uxtab" | "uxtah" | "uxtb" | "uxth" => 1,
         "smlabb" | "smlabt" | "smlatb" | "smlatt" | "smlal" | "smulbb" | "smulbt" | "smultb" | "smultt"
         | "smull" | "smmul" | "smmla" | "umaal" | "umlal" | "umull" => 1,
-        "cps" | "cpsid" | "cpsie" | "mrs" | "msr" => 2,
         // 1 and what a store on its way takes.
         "dmb" | "dsb" | "isb" => 4,
         "mla" | "mls" => 2,

@@ -255,6 +255,27 @@ impl Arithmetic for f32 {
     }
 }
 
+/// True on a processor that has no instruction to convert 64 bits.
+const WORDS_OF_32_BITS: bool = cfg!(target_pointer_width = "32");
+
+/// The nearest number: small integers, which are nearly all, by the one instruction for 32 bits.
+#[inline]
+fn nearest(n: i64) -> f32 {
+    match i32::try_from(n) {
+        Ok(small) => small as f32,
+        Err(_) => n as f32,
+    }
+}
+
+/// The same without a sign.
+#[inline]
+fn nearest_unsigned(n: u64) -> f32 {
+    match u32::try_from(n) {
+        Ok(small) => small as f32,
+        Err(_) => n as f32,
+    }
+}
+
 impl Real for f32 {
     const PI: f32 = core::f32::consts::PI;
     const EPSILON: f32 = f32::EPSILON;
@@ -274,11 +295,11 @@ impl Real for f32 {
     }
     #[inline]
     fn from_i64(n: i64) -> f32 {
-        n as f32
+        if WORDS_OF_32_BITS { nearest(n) } else { n as f32 }
     }
     #[inline]
     fn from_u64(n: u64) -> f32 {
-        n as f32
+        if WORDS_OF_32_BITS { nearest_unsigned(n) } else { n as f32 }
     }
     #[inline]
     fn to_i64(self) -> i64 {
@@ -355,6 +376,19 @@ mod tests {
             let (s, c) = sin_cos_turns::<f32>(phase);
             assert!((f64::from(s) - libm::sin(angle)).abs() < 1.2e-7, "sinf {angle}");
             assert!((f64::from(c) - libm::cos(angle)).abs() < 1.2e-7, "cosf {angle}");
+        }
+    }
+
+    #[test]
+    fn integers_become_the_same_number_on_every_board() {
+        // Around each power of two, where rounding changes: 24 bits are exact, 32 are one word.
+        for power in 0..63 {
+            for off in -300..300_i64 {
+                let n = (1_i64 << power).wrapping_add(off);
+                assert_eq!(nearest(n), n as f32, "{n}");
+                assert_eq!(nearest(n.wrapping_neg()), n.wrapping_neg() as f32, "-{n}");
+                assert_eq!(nearest_unsigned(n as u64), n as u64 as f32, "{n} unsigned");
+            }
         }
     }
 

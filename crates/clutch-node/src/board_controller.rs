@@ -377,6 +377,7 @@ impl BoardController {
             told: 0,
         });
         self.linked_ns = now_ns;
+        self.news = News::default();
         Ok(())
     }
 

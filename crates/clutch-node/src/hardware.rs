@@ -66,7 +66,8 @@ pub trait Role {
     /// Frames for the host.
     fn outbox(&mut self) -> &mut Outbox;
 
-    /// The code of the last sample is out: what that took, in cycles of the core and in time.
+    /// The code of the last sample is out, and its frames are made: cycles of the core for both, and the time up to the
+    /// code.
     fn answered(&mut self, cycles: u32, lateness: Micros);
 }
 
@@ -78,14 +79,16 @@ pub fn tick(role: &mut impl Role, hardware: &mut impl Hardware) {
     let now_us = hardware.now_us();
     let counts = hardware.counts();
     let (encoder_fault, converter_fault) = (hardware.encoder_fault(), hardware.converter_fault());
-    let (mut cycles, mut lateness) = (0, Micros(0));
+    let mut lateness = None;
     role.sample(now_us, counts, encoder_fault, converter_fault, &mut |code| {
         hardware.put_out(code);
-        cycles = hardware.cycles().wrapping_sub(begun);
-        lateness = Micros(hardware.now_us().wrapping_sub(now_us) as u32);
+        lateness = Some(Micros(hardware.now_us().wrapping_sub(now_us) as u32));
     });
-    hardware.feed_watchdog();
-    role.answered(cycles, lateness);
+    // A role that puts nothing out is not one that works.
+    if let Some(lateness) = lateness {
+        hardware.feed_watchdog();
+        role.answered(hardware.cycles().wrapping_sub(begun), lateness);
+    }
     send(role, hardware);
 }
 

@@ -90,10 +90,13 @@ impl OneChip {
 
     /// Bytes from the host.
     pub fn host(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode)) {
-        let OneChip { controller, board, up, to_host } = self;
-        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
-        controller.host(now_us.saturating_mul(1000), bytes, to_host, daq);
-        self.settle(now_us, put_out);
+        // Frame by frame: what the board answers to one is heard before the next.
+        for frame in bytes.split_inclusive(|byte| *byte == 0) {
+            let OneChip { controller, board, up, to_host } = self;
+            let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+            controller.host(now_us.saturating_mul(1000), frame, to_host, daq);
+            self.settle(now_us, put_out);
+        }
     }
 
     /// Looks at the clock.

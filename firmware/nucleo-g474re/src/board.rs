@@ -116,15 +116,6 @@ pub fn start() -> (Board, Line) {
     config.rcc.sys = Sysclk::PLL1_R;
     config.rcc.boost = true;
     let p = embassy_stm32::init(config);
-    // A crystal that stops: the chip goes on with its internal oscillator, and calls the NMI.
-    pac::RCC.cr().modify(|w| w.set_csson(true));
-    // Each line of flash is fetched before it is asked for: four wait states less on a straight path.
-    pac::FLASH.acr().modify(|w| w.set_prften(true));
-    // The supply is the converter's reference: a fall below 2.9 V shows in `converter_fault`.
-    pac::PWR.cr2().modify(|w| {
-        w.set_pls(SUPPLY_2_9_V);
-        w.set_pvde(true);
-    });
 
     // Without the chip's output buffer, which reaches neither 0 V nor the top: 0.2 V at the pin would
     // be 0.6 V at a brake that is to let go. Until the write the code is 0, for some clocks.
@@ -134,6 +125,16 @@ pub fn start() -> (Board, Line) {
     converter.set(Value::Bit12Right(BOOT_CODE.0));
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();
+    // Only now, when its handler has a converter to write and a watchdog to wait for: a crystal that stops calls the
+    // NMI, and the chip goes on with its internal oscillator.
+    pac::RCC.cr().modify(|w| w.set_csson(true));
+    // Each line of flash is fetched before it is asked for: four wait states less on a straight path.
+    pac::FLASH.acr().modify(|w| w.set_prften(true));
+    // The supply is the converter's reference: a fall below 2.9 V shows in `converter_fault`.
+    pac::PWR.cr2().modify(|w| {
+        w.set_pls(SUPPLY_2_9_V);
+        w.set_pvde(true);
+    });
 
     let pins = qei::Config { ch1_pull: Pull::Up, ch2_pull: Pull::Up, ..qei::Config::default() };
     let encoder = Qei::new(p.TIM3, p.PA6, p.PA7, pins);
@@ -181,7 +182,8 @@ impl ToHost {
     fn send(&mut self, frames: &[u8]) -> bool {
         let channel = pac::DMA1.ch(TO_HOST);
         let Some(bytes) = self.bytes.get_mut(..frames.len()) else { return false };
-        if channel.ndtr().read().ndt() != 0 {
+        // An error of the transfer switches the channel off: the rest of those frames is given up.
+        if channel.cr().read().en() && channel.ndtr().read().ndt() != 0 {
             return false;
         }
         bytes.copy_from_slice(frames);
@@ -244,7 +246,8 @@ impl Line {
         Line { ring, at: 0 }
     }
 
-    /// Waits for bytes, and moves as many as there are, and fit, to `bytes`; their number.
+    /// Waits for bytes, and moves as many as there are, and fit, to `bytes`; their number. Whoever is more than the
+    /// ring behind gets later ones in their place; the checksums of the frames show it.
     pub async fn read(&mut self, bytes: &mut [u8]) -> usize {
         poll_fn(|context| {
             // First: a pause between the look and the wait wakes, too.
@@ -263,22 +266,23 @@ impl Line {
     }
 }
 
-/// Lets a stack that grows into the statics end in the fault handler, and not in numbers that are wrong: the lowest 32
-/// bytes that it may reach can be neither read nor written.
+/// Lets a stack that grows towards the statics end in the fault handler, and not in numbers that are wrong: the lowest
+/// 16 KiB that it may reach can be neither read nor written. So much, because one function's frame may step over less.
 fn guard_stack() {
+    const GUARD_LOG2: u32 = 14;
     unsafe extern "C" {
         /// The end of the statics, from the linker.
         static mut __sheap: u32;
     }
-    let base = (&raw const __sheap as u32).next_multiple_of(32);
+    let base = (&raw const __sheap as u32).next_multiple_of(1 << GUARD_LOG2);
     // SAFETY: nothing else uses the memory protection; its registers are written before the region is on, and what is
     // protected is nobody's memory.
     unsafe {
         let mpu = &*cortex_m::peripheral::MPU::PTR;
         mpu.rnr.write(0);
         mpu.rbar.write(base);
-        // Execute never, no access, 2⁵ bytes, on.
-        mpu.rasr.write(1 << 28 | (5 - 1) << 1 | 1);
+        // Execute never, no access, its size, on.
+        mpu.rasr.write(1 << 28 | (GUARD_LOG2 - 1) << 1 | 1);
         // The default map for everything else; off in a fault handler, which must be able to run.
         mpu.ctrl.write(1 << 2 | 1);
     }

@@ -280,7 +280,11 @@ impl History {
     }
 
     pub(super) fn pass(&mut self, periods: u16) {
-        self.0 = self.0.checked_shl(u32::from(periods)).unwrap_or(0);
+        self.0 = match periods {
+            // Nearly always: a shift by any number takes a board of 32 bits six times as long.
+            1 => self.0 << 1,
+            more => self.0.checked_shl(u32::from(more)).unwrap_or(0),
+        };
     }
 
     pub(super) fn count(self) -> u32 {

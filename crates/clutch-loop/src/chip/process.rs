@@ -22,7 +22,7 @@ const PATIENCE_S: u32 = 60;
 pub enum ChipError {
     /// No interpreter.
     #[error(
-        "{program} was not found. The model of the chip needs Python 3.11 or later; {INTERPRETER} names another interpreter"
+        "{program}: not found, or older than Python 3.11, which the model of the chip needs; {INTERPRETER} names another interpreter"
     )]
     NoPython {
         /// The interpreter.
@@ -65,7 +65,7 @@ pub enum ChipError {
     #[error("{0} bytes at once: more than the chip's line takes")]
     TooLong(usize),
     /// What it has counted is not to be read.
-    #[error("what the model of the chip has counted cannot be read: {0}")]
+    #[error("--count: {0}")]
     Counted(String),
 }
 
@@ -122,8 +122,12 @@ impl Chip {
         let image = image.canonicalize().map_err(|_| ChipError::NoImage { path: image.to_owned() })?;
         let program = std::env::var(INTERPRETER).unwrap_or_else(|_| "python3".to_owned());
         let mut command = Command::new(&program);
-        command.args(["-c", MODEL]).arg(image);
+        // -P: a file in the working directory is no module.
+        command.args(["-P", "-c", MODEL]).arg(image);
         if let Some(file) = count {
+            // Before the run, not after it.
+            std::fs::File::create(file)
+                .map_err(|e| ChipError::Counted(format!("{}: {e}", file.display())))?;
             command.arg("--count").arg(file);
         }
         let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -202,6 +206,9 @@ impl Chip {
         };
         if said.contains(&format!("No module named '{MODULE}'")) {
             return ChipError::NoModule { program: self.program.clone() };
+        }
+        if said.to_lowercase().contains("unknown option") {
+            return ChipError::NoPython { program: self.program.clone() };
         }
         let last = said.trim().lines().last().unwrap_or_default().to_owned();
         ChipError::Ended { status, said: last }

@@ -89,9 +89,13 @@ Write = Callable[[int], None]
 
 
 class Page:
-    """4 KiB of registers: plain words, and those of which reading or writing does something."""
+    """4 KiB of registers: plain words, and those of which reading or writing does something.
+
+    A peripheral without its clock reads as zeros, and what is written to it is lost.
+    """
 
     def __init__(self, chip: Chip, base: int) -> None:
+        self.gates: dict[int, Callable[[], bool]] = {}  # by the KiB in the page
         self.words: dict[int, int] = {}
         self.reads: dict[int, Read] = {}
         self.writes: dict[int, Write] = {}
@@ -99,12 +103,18 @@ class Page:
 
     def read(self, _uc: Uc, offset: int, size: int, _data: Any) -> int:
         at = offset & ~3
+        gate = self.gates.get(offset >> 10)
+        if gate and not gate():
+            return 0
         read = self.reads.get(at)
         value = self.words.get(at, 0) if read is None else read()
         return value if size == 4 else (value >> 8 * (offset & 3)) & ((1 << 8 * size) - 1)
 
     def write(self, _uc: Uc, offset: int, size: int, value: int, _data: Any) -> None:
         at = offset & ~3
+        gate = self.gates.get(offset >> 10)
+        if gate and not gate():
+            return
         if size < 4:
             shift, mask = 8 * (offset & 3), (1 << 8 * size) - 1
             value = self.words.get(at, 0) & ~(mask << shift) | (value & mask) << shift
@@ -697,7 +707,13 @@ class Chip:
             (0x38, 3): [self.timer],
             (0x3C, 0): [self.serial],
         }
+        for (offset, bit), blocks in self.resettable.items():
+            for block in blocks:
+                block.page.gates[block.base >> 10] = partial(self.clocked, offset + 0x20, bit)
         self.sources: list[Timer | Serial | Dma] = [self.timer, self.serial, *self.dma]
+
+    def clocked(self, at: int, bit: int) -> bool:
+        return bool(self.rcc[at] >> bit & 1)
 
     def hooks(self, image: bytes) -> None:
         self.uc.hook_add(uc_const.UC_HOOK_INTR, self.interrupted)
