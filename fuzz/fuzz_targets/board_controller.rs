@@ -15,7 +15,7 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, Built, ControllerNode, ControllerParams,
-    HostNode, OneChip, Outbox, Outboxes, RunParams, RunTimes, SETTINGS, Settings,
+    HostNode, OneChip, Outbox, Outboxes, Role, RunParams, RunTimes, SETTINGS, Settings,
 };
 use clutch_wire::{Decoder, Message, StopReason, TABLE};
 use libfuzzer_sys::fuzz_target;
@@ -208,7 +208,7 @@ impl Bench {
         let now_ns = self.now_ns();
         let Outboxes { host, daq } = &mut self.outboxes;
         self.board_controller.host(now_ns, bytes, host, daq);
-        self.chip.host(self.now_us, bytes, &mut |_| ());
+        self.chip.receive(self.now_us, bytes, &mut |_| ());
         self.settle();
     }
 
@@ -217,7 +217,7 @@ impl Bench {
             let mut out = Outbox::default();
             f(if chip { &mut self.chip_host } else { &mut self.host }, &mut out);
             if chip {
-                self.chip.host(self.now_us, out.as_bytes(), &mut |_| ());
+                self.chip.receive(self.now_us, out.as_bytes(), &mut |_| ());
             } else {
                 let now_ns = self.now_ns();
                 let Outboxes { host, daq } = &mut self.outboxes;
@@ -248,7 +248,7 @@ impl Bench {
             }
             let (bytes, _) = frames(&mut self.outboxes.host);
             self.host.receive(now_ns, &bytes, &at, &mut |_| ());
-            let (bytes, _) = frames(self.chip.to_host());
+            let (bytes, _) = frames(self.chip.outbox());
             self.chip_host.receive(now_ns, &bytes, &at, &mut |_| ());
             if self.outboxes.daq.is_empty() {
                 break;
@@ -299,7 +299,7 @@ impl Bench {
         let took = Micros(u32::from(faults) * 10);
         self.board_controller.spent(u32::from(faults));
         self.board_controller.answered(took);
-        self.chip.answered(took);
+        self.chip.answered(0, took);
     }
 
     fn acts(&mut self, input: &mut Input<'_>) {

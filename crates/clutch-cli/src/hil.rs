@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
     clutch hil examples/nucleo_smc_2.toml --image nucleo-controller\n  \
     clutch hil examples/nucleo_smc_2.toml --image nucleo-daq --chip-fault hang:at=2\n\n\
     The chip's model needs Python with the module unicorn (pip install unicorn); CLUTCH_PYTHON names another\n\
-    interpreter than python3. Images are looked for in $CLUTCH_IMAGES, then in target/firmware.\n\n\
+    interpreter than python3. Images are in $CLUTCH_IMAGES if it is set, else in target/firmware.\n\n\
     Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run. docs/firmware.md is the guide."
 )]
 pub(crate) struct Hil {
@@ -96,8 +96,8 @@ fn image(named: PathBuf) -> PathBuf {
     if !NAMES.iter().any(|name| Path::new(name) == named) || named.is_file() {
         return named;
     }
-    let folder = std::env::var_os("CLUTCH_IMAGES").map(|folder| Path::new(&folder).join(&named));
-    folder.filter(|file| file.is_file()).unwrap_or_else(|| Path::new(BUILT).join(named))
+    // Not both: an image of another build than the one that was asked for would run unseen.
+    std::env::var_os("CLUTCH_IMAGES").map_or_else(|| BUILT.into(), PathBuf::from).join(named)
 }
 
 impl Hil {
@@ -252,7 +252,7 @@ fn exit(ran: &Ran) -> Exit {
     }
 }
 
-/// What the chip is like at the end, where it is not as always.
+/// The state of the chip at the end, where it is not as always.
 fn chip_text(report: &ChipReport) -> String {
     let mut text = String::new();
     if report.resets > 0 {

@@ -819,7 +819,7 @@ fn host<'a>(
     let configure = ControllerNode::new(built.controller, built.servo, built.supervisor).configuration();
     let silence = if patient { u64::from(PATIENT_SILENCE.0) * 1000 } else { BOARD_SILENCE_NS };
     let node = HostNode::new(built.servo, configure, ALIVE_NS, silence);
-    Ok(HostStation { node, path: from_scenario::path::<f32>(scenario)? })
+    Ok(HostStation::new(node, from_scenario::path::<f32>(scenario)?))
 }
 
 /// True for a device, of which nobody knows how it is wired.

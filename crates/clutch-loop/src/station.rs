@@ -3,10 +3,12 @@
 //! Both are asked the same, and report the same, so that pre-flight, loop and virtual time need not know
 //! which of the two it is.
 
+use crate::preflight;
 use clutch_core::law::{ControlLaw, LawTerms, Terms};
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned, Real};
-use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
-use clutch_wire::StopReason;
+use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Settings, Standing};
+use clutch_wire::{Set, StopReason};
+use std::collections::VecDeque;
 
 /// The interval at which the host shows that it lives, ns; [`HOST_SILENCE`] is the silence after which the board ends
 /// a run.
@@ -160,6 +162,38 @@ pub struct HostStation<P> {
     pub node: HostNode,
     /// The path, from position 0 on.
     pub path: P,
+    /// Settings that go to the board before it is configured, where nobody has sent them before.
+    upload: Option<Upload>,
+}
+
+/// Settings on their way, each once the one before was taken. The line loses none: who fears for that sends them by the
+/// pre-flight, which asks again.
+struct Upload {
+    settings: Settings,
+    /// Those to be sent; the first is on its way.
+    waiting: VecDeque<(u16, u64)>,
+    failure: Option<String>,
+}
+
+impl<P> HostStation<P> {
+    /// A host whose board has the run's settings when it is configured.
+    pub fn new(node: HostNode, path: P) -> Self {
+        HostStation { node, path, upload: None }
+    }
+
+    /// A host that sends the run's settings first.
+    pub fn uploading(node: HostNode, path: P, settings: Settings) -> Self {
+        let upload = Upload { settings, waiting: VecDeque::new(), failure: None };
+        HostStation { upload: Some(upload), ..HostStation::new(node, path) }
+    }
+
+    /// The next setting, and after the last one the configuration.
+    fn set_up(&mut self, out: &mut Outbox) {
+        match self.upload.as_ref().and_then(|u| u.waiting.front()) {
+            Some((key, value)) => self.node.set(*key, *value, out),
+            None => self.node.configure(out),
+        }
+    }
 }
 
 impl<P: Planned<f32>> Station for HostStation<P> {
@@ -171,7 +205,11 @@ impl<P: Planned<f32>> Station for HostStation<P> {
         self.node.discover(nonce, out);
     }
     fn configure(&mut self, _: DacCode, out: &mut Outbox) {
-        self.node.configure(out);
+        if let Some(Upload { settings, waiting, .. }) = &mut self.upload {
+            waiting.clear();
+            settings.each(|key, value| waiting.push_back((key, value)));
+        }
+        self.set_up(out);
     }
     fn arm(&mut self, out: &mut Outbox) {
         self.node.arm(out);
@@ -196,10 +234,29 @@ impl<P: Planned<f32>> Station for HostStation<P> {
         &mut self,
         now_ns: u64,
         bytes: &[u8],
-        _: &mut Outbox,
+        out: &mut Outbox,
         notices: &mut impl FnMut(StationNotice<Self>),
     ) {
-        self.node.receive(now_ns, bytes, &self.path, notices);
+        let mut taken = false;
+        self.node.receive(now_ns, bytes, &self.path, &mut |n| {
+            if let Some(Upload { settings, waiting, failure }) = &mut self.upload {
+                match &n {
+                    Notice::Taken(m) => taken |= waiting.front() == Some(&(m.key, m.value)),
+                    Notice::Refused(m) if m.request == Set::KIND => {
+                        let why = preflight::why(m, Some(settings));
+                        *failure = Some(format!("the board did not take a setting: {why}"));
+                    }
+                    _ => {}
+                }
+            }
+            notices(n);
+        });
+        if taken {
+            if let Some(upload) = &mut self.upload {
+                upload.waiting.pop_front();
+            }
+            self.set_up(out);
+        }
     }
     fn standing(&self) -> Standing<f32> {
         *self.node.standing()
@@ -218,5 +275,8 @@ impl<P: Planned<f32>> Station for HostStation<P> {
     }
     fn period(&self) -> Micros {
         self.node.servo().period()
+    }
+    fn failure(&self) -> Option<String> {
+        self.upload.as_ref()?.failure.clone()
     }
 }

@@ -69,7 +69,7 @@ pub struct BoardController {
     heard_ns: u64,
     linked_ns: u64,
     spent: u32,
-    /// What was heard, and is still to be followed.
+    /// Notices that were heard and are still to be followed.
     news: News,
 }
 
@@ -218,7 +218,7 @@ impl BoardController {
         run.control.sample(now_ns, sample, false, &at, daq, &mut |n| report.notice(n));
     }
 
-    /// What follows from what the controller has heard; `drove`: whether it drove before.
+    /// Draws the conclusions from the notices that were heard; `drove`: true if it drove before them.
     pub(crate) fn follow(&mut self, now_ns: u64, drove: bool, host: &mut Outbox, daq: &mut impl Sink) {
         let news = core::mem::take(&mut self.news);
         let Some(run) = &mut self.run else { return };
@@ -409,7 +409,7 @@ impl Run {
     }
 }
 
-/// What the controller's notices mean for the run.
+/// The meaning of the controller's notices for the run.
 #[derive(Clone, Copy, Debug, Default)]
 struct News {
     told: bool,

@@ -216,11 +216,15 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
                 Message::Sample(sample) => Some(sample),
                 _ => None,
             };
+            // Over a line a sample comes by the clock of another machine.
+            if let Some(sample) = sample.filter(|s| s.run == self.params.run) {
+                self.pace.sample(now_ns, sample.sequence, self.servo.period(), self.params.silence);
+            }
             if let Some(earlier) = waiting.take() {
                 let newer = sample.is_some_and(|s| {
                     s.run == earlier.run && (s.sequence.wrapping_sub(earlier.sequence) as i16) > 0
                 });
-                self.sample_of_line(now_ns, &earlier, newer, planned, out, notices);
+                self.sample(now_ns, &earlier, newer, planned, out, notices);
             }
             match sample {
                 Some(sample) => waiting = Some(sample),
@@ -228,24 +232,8 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             }
         }
         if let Some(sample) = waiting {
-            self.sample_of_line(now_ns, &sample, false, planned, out, notices);
+            self.sample(now_ns, &sample, false, planned, out, notices);
         }
-    }
-
-    /// A sample over a line comes by the clock of another machine, whose pace is watched.
-    fn sample_of_line(
-        &mut self,
-        now_ns: u64,
-        sample: &Sample,
-        superseded: bool,
-        planned: &impl Planned<T>,
-        out: &mut impl Sink,
-        notices: &mut impl FnMut(Notice<T, C::Terms>),
-    ) {
-        if sample.run == self.params.run {
-            self.pace.sample(now_ns, sample.sequence, self.servo.period(), self.params.silence);
-        }
-        self.sample(now_ns, sample, superseded, planned, out, notices);
     }
 
     // A function of its own in machine code, too: the timing analysis is told how often it is called.

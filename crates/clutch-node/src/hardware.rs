@@ -10,7 +10,6 @@
 //! from one place, so that neither interrupts the other: nothing here locks.
 
 use crate::board::{BoardMisfit, BoardNode, BoardParams};
-use crate::one_chip::OneChip;
 use crate::outbox::Outbox;
 use clutch_core::{Counts, DacCode, Micros};
 use clutch_wire::Message;
@@ -152,36 +151,4 @@ impl Role for DaqBoard {
 
     /// A sample has no room for it.
     fn answered(&mut self, _cycles: u32, _lateness: Micros) {}
-}
-
-/// The board as controller: it closes the loop by itself.
-impl Role for OneChip {
-    fn receive(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode)) {
-        self.host(now_us, bytes, put_out);
-        put_out(self.code());
-    }
-
-    fn sample(
-        &mut self,
-        now_us: u64,
-        counts: Counts,
-        encoder_fault: bool,
-        converter_fault: bool,
-        put_out: &mut impl FnMut(DacCode),
-    ) {
-        OneChip::sample(self, now_us, counts, encoder_fault, converter_fault, put_out);
-    }
-
-    fn period_us(&self) -> Option<u32> {
-        OneChip::period_us(self)
-    }
-
-    fn outbox(&mut self) -> &mut Outbox {
-        self.to_host()
-    }
-
-    fn answered(&mut self, cycles: u32, lateness: Micros) {
-        self.spent(cycles);
-        OneChip::answered(self, lateness);
-    }
 }

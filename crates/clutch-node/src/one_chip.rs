@@ -2,6 +2,7 @@
 
 use crate::board::{BoardMisfit, BoardNode, BoardParams};
 use crate::board_controller::{BoardController, BoardControllerParams};
+use crate::hardware::Role;
 use crate::outbox::{Mail, Outbox, Sink};
 use clutch_core::{Counts, DacCode, Micros};
 use clutch_wire::{Actuate, BoardState, Message};
@@ -17,7 +18,7 @@ const MOST_HEARD: u32 = 8;
 pub struct OneChip {
     controller: BoardController,
     board: BoardNode,
-    /// Of the board, to the controller.
+    /// Messages of the board, to the controller.
     up: Mail,
     to_host: Outbox,
 }
@@ -58,47 +59,6 @@ impl OneChip {
         })
     }
 
-    /// A sampling period begins: the encoder's counts, and what the chip sees of its hardware. `put_out` gets each
-    /// code as soon as it is known, at least once; frames for the host are made after that.
-    pub fn sample(
-        &mut self,
-        now_us: u64,
-        counts: Counts,
-        encoder_fault: bool,
-        converter_fault: bool,
-        put_out: &mut impl FnMut(DacCode),
-    ) {
-        let (fault, sample) = self.board.begin_period(now_us as u32, counts, encoder_fault, converter_fault);
-        // The safe output goes on by itself; under control the sample's answer is the next code.
-        put_out(self.board.code());
-        let OneChip { controller, board, up, to_host } = self;
-        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
-        let (now_ns, drove) = (now_us.saturating_mul(1000), controller.driving());
-        if let Some(fault) = fault {
-            controller.hear(&Message::Fault(fault), to_host, daq);
-        }
-        if let Some(sample) = sample {
-            controller.sample(now_ns, &sample, to_host, daq);
-        }
-        controller.follow(now_ns, drove, to_host, daq);
-        controller.poll(now_ns, to_host, daq);
-        // One a period: that it has stopped, or that it refuses. What follows from it does so a period later.
-        if let Some(message) = daq.up.take() {
-            controller.hear(&message, to_host, daq);
-        }
-    }
-
-    /// Bytes from the host.
-    pub fn host(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode)) {
-        // Frame by frame: what the board answers to one is heard before the next.
-        for frame in bytes.split_inclusive(|byte| *byte == 0) {
-            let OneChip { controller, board, up, to_host } = self;
-            let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
-            controller.host(now_us.saturating_mul(1000), frame, to_host, daq);
-            self.settle(now_us, put_out);
-        }
-    }
-
     /// Looks at the clock.
     pub fn poll(&mut self, now_us: u64, put_out: &mut impl FnMut(DacCode)) {
         let OneChip { controller, board, up, to_host } = self;
@@ -135,25 +95,59 @@ impl OneChip {
     pub fn state(&self) -> BoardState {
         self.board.state()
     }
+}
 
-    /// The sampling period, µs; none before one was configured.
-    #[must_use]
-    pub fn period_us(&self) -> Option<u32> {
+/// The board as controller: it closes the loop by itself.
+impl Role for OneChip {
+    /// Frame by frame: what the board answers to one is heard before the next.
+    fn receive(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode)) {
+        for frame in bytes.split_inclusive(|byte| *byte == 0) {
+            let OneChip { controller, board, up, to_host } = self;
+            let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+            controller.host(now_us.saturating_mul(1000), frame, to_host, daq);
+            self.settle(now_us, put_out);
+        }
+        put_out(self.board.code());
+    }
+
+    fn sample(
+        &mut self,
+        now_us: u64,
+        counts: Counts,
+        encoder_fault: bool,
+        converter_fault: bool,
+        put_out: &mut impl FnMut(DacCode),
+    ) {
+        let (fault, sample) = self.board.begin_period(now_us as u32, counts, encoder_fault, converter_fault);
+        // The safe output goes on by itself; under control the sample's answer is the next code.
+        put_out(self.board.code());
+        let OneChip { controller, board, up, to_host } = self;
+        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+        let (now_ns, drove) = (now_us.saturating_mul(1000), controller.driving());
+        if let Some(fault) = fault {
+            controller.hear(&Message::Fault(fault), to_host, daq);
+        }
+        if let Some(sample) = sample {
+            controller.sample(now_ns, &sample, to_host, daq);
+        }
+        controller.follow(now_ns, drove, to_host, daq);
+        controller.poll(now_ns, to_host, daq);
+        // One a period: that it has stopped, or that it refuses. What follows from it does so a period later.
+        if let Some(message) = daq.up.take() {
+            controller.hear(&message, to_host, daq);
+        }
+    }
+
+    fn period_us(&self) -> Option<u32> {
         self.board.period_us()
     }
 
-    /// Frames for the host.
-    pub fn to_host(&mut self) -> &mut Outbox {
+    fn outbox(&mut self) -> &mut Outbox {
         &mut self.to_host
     }
 
-    /// Clock cycles that the last tick took.
-    pub fn spent(&mut self, cycles: u32) {
+    fn answered(&mut self, cycles: u32, lateness: Micros) {
         self.controller.spent(cycles);
-    }
-
-    /// Reports how long the last answer took, from sample to converter.
-    pub fn answered(&mut self, lateness: Micros) {
         self.controller.answered(lateness);
     }
 }

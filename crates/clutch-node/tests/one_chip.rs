@@ -7,7 +7,7 @@ mod desk;
 use clutch_core::law::LawParams;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Counts, Dac, DacCode, Encoder, LimitParams, Micros, Plant, PlantParams, SupervisorParams};
-use clutch_node::{BoardMisfit, BoardParams, HostNode, Notice, OneChip, Outbox};
+use clutch_node::{BoardMisfit, BoardParams, HostNode, Notice, OneChip, Outbox, Role};
 use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configured, Message, Sample, StopReason, TELEMETRY_ANSWERED,
     Telemetry, encode,
@@ -61,8 +61,8 @@ impl Bench {
     }
 
     fn hears(&mut self) -> Vec<Message> {
-        assert_eq!(self.chip.to_host().dropped(), 0);
-        let bytes = drain(self.chip.to_host());
+        assert_eq!(self.chip.outbox().dropped(), 0);
+        let bytes = drain(self.chip.outbox());
         let notices = &mut self.notices;
         self.host.receive(self.now_us * 1000, &bytes, &self.plan.path(), &mut |n| notices.push(n));
         frames(&bytes)
@@ -71,7 +71,7 @@ impl Bench {
     fn asks(&mut self, f: impl FnOnce(&mut HostNode, &mut Outbox)) -> Vec<Message> {
         let mut out = Outbox::default();
         f(&mut self.host, &mut out);
-        self.chip.host(self.now_us, out.as_bytes(), &mut |_| ());
+        self.chip.receive(self.now_us, out.as_bytes(), &mut |_| ());
         self.hears()
     }
 
@@ -291,8 +291,7 @@ fn without_its_host_the_chip_goes_to_the_safe_state() {
 #[test]
 fn how_long_a_period_took_is_told_with_the_next() {
     let mut bench = Bench::running(Plan::new());
-    bench.chip.spent(777);
-    bench.chip.answered(Micros(42));
+    bench.chip.answered(777, Micros(42));
     let told = telemetry(&bench.period().1);
     assert_eq!((told.cycles, told.lateness_us), (777, 42));
     let told = telemetry(&bench.period().1);

@@ -1,4 +1,4 @@
-//! What breaks on the chip: what, and when.
+//! Faults of the chip: their kinds and times.
 
 use std::str::FromStr;
 

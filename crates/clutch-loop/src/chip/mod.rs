@@ -4,17 +4,14 @@
 //! |---|---|
 //! | `stm32g474.py` | the chip: registers and exceptions around the core of the Unicorn engine; its head has the protocol |
 //! | `process` | the process that carries it |
-//! | `faults` | what breaks on the chip |
-//! | `host` | the host of a board controller that sends its settings over a line in virtual time |
+//! | `faults` | faults of the chip |
 //! | `session` | a session with it |
 
 mod faults;
-mod host;
 mod process;
 mod session;
 
 pub use faults::{ChipFault, ChipFaultError, ChipFaultKind};
-pub use host::UploadingHost;
 pub use process::{ChipError, Counted, MODULE};
 pub use session::{ChipOptions, ChipReport, ChipRole, ChipSession};
 

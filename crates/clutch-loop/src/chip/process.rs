@@ -64,7 +64,7 @@ pub enum ChipError {
     /// More bytes than a request can take.
     #[error("{0} bytes at once: more than the chip's line takes")]
     TooLong(usize),
-    /// What it has counted is not to be read.
+    /// The file of counts cannot be written or read.
     #[error("--count: {0}")]
     Counted(String),
 }
@@ -100,7 +100,7 @@ pub(super) struct Answer {
     pub(super) flags: Flags,
     /// Resets since power-up.
     pub(super) resets: u32,
-    /// What it has sent over its line.
+    /// Bytes that it has sent over its line.
     pub(super) sent: Vec<u8>,
 }
 
@@ -195,7 +195,8 @@ impl Chip {
 
     /// Why it has ended.
     fn ended(&mut self) -> ChipError {
-        self.requests = None; // it ends now, if it has not
+        self.requests = None;
+        let _ = self.child.kill(); // it has closed a line, so that nothing more is to come of it
         let mut said = String::new();
         if let Some(mut stderr) = self.child.stderr.take() {
             let _ = stderr.read_to_string(&mut said); // the status alone tells, too

@@ -1,6 +1,6 @@
 //! A session with a board whose image runs on the model of its chip, in virtual time.
 
-use super::{ChipBoard, ChipFault, Counted, UploadingHost};
+use super::{ChipBoard, ChipFault, Counted};
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_session::{LockstepError, LockstepOptions};
 use crate::session::{self, SessionError};
@@ -33,7 +33,7 @@ impl ChipRole {
 /// Options of a session with the chip, beside those of any session in virtual time.
 #[derive(Clone, Debug, Default)]
 pub struct ChipOptions {
-    /// What breaks on the chip.
+    /// Faults of the chip.
     pub faults: Vec<ChipFault>,
     /// A file for the numbers of instructions; counting makes the run slower.
     pub count: Option<PathBuf>,
@@ -137,7 +137,7 @@ impl ChipSession {
         let node = HostNode::new(built.servo, configure, ALIVE_NS, BOARD_SILENCE_NS);
         let settings = from_scenario::settings(scenario, &built, HOST_SILENCE, ticks);
         let settings = settings.map_err(SessionError::from)?;
-        let station = UploadingHost::new(HostStation { node, path: path()? }, settings);
+        let station = HostStation::uploading(node, path()?, settings);
         self.drive(image, &built, ticks, station, &path()?)
     }
 

@@ -1036,7 +1036,7 @@ SUPERVISOR_CALL, EXCEPTION_EXIT = 2, 8  # as Unicorn numbers them
 
 
 def segments(image: bytes) -> list[tuple[int, bytes]]:
-    """What an ELF image loads: physical addresses, and bytes."""
+    """The contents that an ELF image loads: physical addresses, and bytes."""
     if image[:6] != b"\x7fELF\x01\x01":
         raise ValueError("not an ELF image of 32 bits, little-endian")
     table, size, count = (*struct.unpack_from("<I", image, 28), *struct.unpack_from("<HH", image, 42))

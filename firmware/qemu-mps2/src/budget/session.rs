@@ -64,6 +64,20 @@ fn run(kind: u32) -> Option<(Settings, Message)> {
     Some((settings, Message::Configure(node.configuration())))
 }
 
+/// Encoder and converter.
+const BOARD: BoardParams = BoardParams {
+    board: 1,
+    boot: BOOT,
+    counts_per_rev: 20_000,
+    dac_bits: 12,
+    dac_lowest_mv: -10_000,
+    dac_highest_mv: 10_000,
+    period_min_us: 100,
+    period_max_us: 10_000,
+    watchdog_max_us: 100_000,
+    boot_code: 2048,
+};
+
 const CONTROLLER: BoardControllerParams = BoardControllerParams { board: 1, boot: BOOT, clock_hz: 0 };
 
 /// A controller that has been configured by its host, up to the question to encoder and converter.
@@ -82,19 +96,7 @@ fn session(kind: u32) -> Option<Session> {
 /// A chip that is controller and board, armed.
 fn chip(kind: u32) -> Option<Chip> {
     let (settings, configure) = run(kind)?;
-    let board = BoardParams {
-        board: 1,
-        boot: BOOT,
-        counts_per_rev: 20_000,
-        dac_bits: 12,
-        dac_lowest_mv: -10_000,
-        dac_highest_mv: 10_000,
-        period_min_us: 100,
-        period_max_us: 10_000,
-        watchdog_max_us: 100_000,
-        boot_code: 2048,
-    };
-    let node = OneChip::new(CONTROLLER, &board).ok()?;
+    let node = OneChip::new(CONTROLLER, &BOARD).ok()?;
     let (begun, out) = (0, 0);
     let pins = Pins {
         now_us: 0,
@@ -196,20 +198,32 @@ impl Session {
 }
 
 fn hello(run: u16) -> Message {
+    let BoardParams {
+        board,
+        boot,
+        counts_per_rev,
+        dac_bits,
+        dac_lowest_mv,
+        dac_highest_mv,
+        period_min_us,
+        period_max_us,
+        watchdog_max_us,
+        boot_code,
+    } = BOARD;
     Message::Hello(Hello {
         nonce: 1,
         version: VERSION,
         schema: SCHEMA,
-        board: 1,
-        boot: BOOT,
-        counts_per_rev: 20_000,
-        dac_bits: 12,
-        dac_lowest_mv: -10_000,
-        dac_highest_mv: 10_000,
-        period_min_us: 100,
-        period_max_us: 10_000,
-        watchdog_max_us: 100_000,
-        boot_code: 2048,
+        board,
+        boot,
+        counts_per_rev,
+        dac_bits,
+        dac_lowest_mv,
+        dac_highest_mv,
+        period_min_us,
+        period_max_us,
+        watchdog_max_us,
+        boot_code,
         state: BoardState::Running as u8,
         run,
         config: CONFIG,
