@@ -54,6 +54,20 @@ pub(crate) struct Item {
     loops: Vec<LoopFact>,
     #[serde(default, rename = "call")]
     calls: Vec<CallFact>,
+    /// The same code in an image that is flashed: a row of its own, on the same statements.
+    flashed: Option<Flashed>,
+}
+
+/// A function of an image that is flashed.
+#[derive(Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Flashed {
+    name: String,
+    image: String,
+    symbol: String,
+    #[serde(default)]
+    until: Vec<String>,
+    budget: Limit,
 }
 
 /// A law in C.
@@ -88,7 +102,9 @@ pub(crate) struct Memory {
 impl Plan {
     pub(crate) fn read(path: &Path) -> Result<Plan> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        toml::from_str(&text).with_context(|| path.display().to_string())
+        let mut plan: Plan = toml::from_str(&text).with_context(|| path.display().to_string())?;
+        plan.items = plan.items.into_iter().flat_map(Item::with_flashed).collect();
+        Ok(plan)
     }
 
     /// The facts of every case.
@@ -104,6 +120,23 @@ impl Plan {
 }
 
 impl Item {
+    /// It, and the same code in the image that is flashed.
+    fn with_flashed(mut self) -> impl Iterator<Item = Item> {
+        let flashed = self.flashed.take().map(|f| Item {
+            name: f.name,
+            image: Some(f.image),
+            symbol: f.symbol,
+            measured: String::new(),
+            traced: false,
+            until: f.until,
+            budget: f.budget,
+            loops: self.loops.clone(),
+            calls: self.calls.clone(),
+            flashed: None,
+        });
+        std::iter::once(self).chain(flashed)
+    }
+
     /// The facts of this case.
     pub(crate) fn case(&self) -> Facts {
         Facts { loops: self.loops.clone(), calls: self.calls.clone(), lengths: Vec::new() }
