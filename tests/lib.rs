@@ -4,8 +4,10 @@
 pub mod bits;
 mod command;
 pub mod firmware;
+mod libclutch;
 
 pub use command::command;
+pub use libclutch::{compiled, libclutch};
 
 /// The README's example runs as a test.
 #[cfg(doctest)]

@@ -4,6 +4,7 @@ mod ablate;
 mod coverage;
 mod firmware;
 mod fuzz;
+mod libclutch;
 mod miri;
 mod mutants;
 mod product;
@@ -53,6 +54,11 @@ enum Verb {
     Firmware {
         #[command(subcommand)]
         verb: firmware::Verb,
+    },
+    /// Builds the static libraries for C, in target/libclutch; adds their Rust targets. In none of them can a panic be reached.
+    Libclutch {
+        /// Only these targets.
+        targets: Vec<String>,
     },
     /// Builds the API documentation, in target/doc.
     Docs,
@@ -249,6 +255,7 @@ fn main() -> Result<()> {
         Verb::Latency { rest } => {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
+        Verb::Libclutch { targets } => libclutch::run(&targets),
         Verb::Stubs => stubs::generate(&python::interpreter()?),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),
         Verb::Size { revisions } => size::print(&revisions),

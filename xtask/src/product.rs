@@ -30,6 +30,7 @@ pub(crate) const GENERATED: &[(&str, &str)] = &[
     ("python/clutch/_tables.py", "cargo xtask generate"),
     ("docs/scenario.schema.json", "cargo xtask generate"),
     ("crates/clutch-wire/include/clutch_wire.h", "cargo run -p clutch-wire --example table -- header"),
+    ("crates/clutch-c/include/clutch.h", "cargo run -p clutch-c --example header"),
     ("tests/wire/vectors.csv", "cargo run -p clutch-wire --example table -- vectors"),
 ];
 

@@ -3,6 +3,7 @@
 //! The verbs hold no control or friction of their own: they call `clutch-sim` and show its results.
 
 mod args;
+mod c_header;
 pub mod certify;
 mod daq;
 mod friction;

@@ -1,5 +1,6 @@
 //! `clutch scenario`.
 
+use crate::c_header::HeaderVerb;
 use crate::output::{Exit, json, print};
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -7,7 +8,8 @@ use clutch_sim::scenario::{BUILT_IN, BuiltIn, schema};
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Lists, prints and copies the built-in scenarios; prints the schema with which editors complete a file.
+/// Lists, prints and copies the built-in scenarios; prints the schema with which editors complete a file, and a scenario's
+/// settings for a program in C.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  clutch scenario list\n  clutch scenario show smc_2\n  clutch scenario new mine.toml\n  clutch scenario schema > scenario.schema.json"
@@ -40,6 +42,7 @@ enum Verb {
     /// Prints the JSON Schema of scenario files, with which editors complete and check them.
     #[command(after_help = "Example:\n  clutch scenario schema > scenario.schema.json")]
     Schema,
+    Header(HeaderVerb),
 }
 
 fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
@@ -63,6 +66,7 @@ impl ScenarioVerb {
                 print(&(lines.join("\n") + "\n"))?;
             }
             Verb::Schema => print(&json(&schema())?)?,
+            Verb::Header(verb) => return verb.run(),
             Verb::Show { name } => print(find(&name)?.toml)?,
             Verb::New { file, from } => {
                 let text = find(&from)?.toml;

@@ -4,6 +4,7 @@ mod tally;
 
 use crate::firmware;
 use crate::fuzz;
+use crate::libclutch;
 use crate::python;
 use crate::run::{Program, beside, cargo, program, root};
 use crate::stubs;
@@ -15,8 +16,9 @@ use tally::Tally;
 /// and RISC-V.
 const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
 
-/// Checks that need the targets: two builds each, the two link tests, the example, two boards, the budgets.
-const SKIPPED_WITHOUT_TARGETS: u64 = 2 * TARGETS.len() as u64 + 6;
+/// Checks that need the targets: two builds each, the two link tests, the libraries with their control, the example, two
+/// boards, the budgets.
+const SKIPPED_WITHOUT_TARGETS: u64 = 2 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 7;
 
 /// The packages that are built for this machine. Always the same selection: with another one cargo gives libraries
 /// other features, and compiles them once more. The wheel's module only links inside of Python.
@@ -143,6 +145,7 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
         }
     }
     no_panic(tally)?;
+    libraries(tally)?;
     let example = core(&["--target", firmware::TARGET, "--example", "own_friction"])?;
     tally.check_quiet("the example with friction numbers of one's own builds for a Cortex-M4F", example);
     tally.stage("images");
@@ -173,6 +176,23 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
     let (links, text) = image().args(["--features", "control"]).quietly()?;
     let refused = !links && text.contains("__panic_path_survived");
     tally.check("the link test sees a panic that is put in (control)", refused);
+    Ok(())
+}
+
+/// The libraries for C, and the check that no panic can be reached in them.
+fn libraries(tally: &mut Tally) -> Result<()> {
+    libclutch::add(&libclutch::TARGETS)?;
+    for target in libclutch::TARGETS {
+        let built = libclutch::built(target, "staticlib").map(|path| path.display().to_string());
+        let (holds, text) = built.map_or_else(|why| (false, why.to_string()), |path| (true, path));
+        tally.check_quiet(
+            &format!("libclutch builds for {target}, without a panic that can be reached"),
+            (holds, text),
+        );
+    }
+    let control = libclutch::built(firmware::TARGET, "staticlib,control");
+    let refused = control.is_err_and(|why| why.to_string().contains("a panic can be reached"));
+    tally.check("a panic that is put into libclutch is seen (control)", refused);
     Ok(())
 }
 

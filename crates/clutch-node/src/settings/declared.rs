@@ -1,13 +1,13 @@
 //! The settings of a run: one tree of parameters, each declared once, and the keys that follow.
 
 use clutch_core::law::{LawParams, OutputParams, ShellParams};
-use clutch_core::params::{ChoiceInfo, Info, Kind, Range, Row, TableInfo};
+use clutch_core::params::{ChoiceInfo, Conversion, Info, Kind, NONE, Range, Row, TableInfo};
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{
     Bounds, DacParams, EncoderParams, FNV_64, LimitParams, PlantParams, SafeState, SamplingParams,
     SmoothedDerivativeParams, SpeedLimit, fnv1a_64,
 };
-use core::fmt;
+use core::fmt::{self, Write as _};
 
 clutch_core::params! {
     /// Waiting times of a board controller, and of encoder and converter for it.
@@ -242,6 +242,43 @@ impl Setting {
     /// Every setting, in the order of the keys.
     pub fn all() -> impl Iterator<Item = Setting> {
         (0..SETTINGS as u16).filter_map(Setting::of)
+    }
+
+    /// Its name as a constant in C, as `LAW_SMC_KP_V`: it ends with the unit on the wire, which is not always that of the key.
+    #[must_use]
+    pub fn constant(&self) -> impl fmt::Display {
+        struct Constant(Setting);
+        impl fmt::Display for Constant {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                let name = self.0.name;
+                let mut write = |text: &str| {
+                    text.chars().try_for_each(|c| {
+                        f.write_char(if c.is_ascii_alphanumeric() { c.to_ascii_uppercase() } else { '_' })
+                    })
+                };
+                for (i, part) in name.parts.iter().take(name.used).enumerate() {
+                    write(if i > 0 { "_" } else { "" })?;
+                    let unit = match self.0.declared {
+                        Declared::Row(row, _) if i + 1 == name.used => row.unit,
+                        _ => NONE,
+                    };
+                    match (part.strip_suffix(unit.suffix), unit.conversion) {
+                        (Some(stem), Conversion::Degrees) => {
+                            write(stem)?;
+                            write("rad")?;
+                            write(unit.suffix.strip_prefix("deg").unwrap_or_default())?;
+                        }
+                        (Some(stem), Conversion::Percent) => {
+                            write(stem)?;
+                            write("share")?;
+                        }
+                        _ => write(part)?,
+                    }
+                }
+                Ok(())
+            }
+        }
+        Constant(*self)
     }
 
     /// Its type, as the hash has it.

@@ -227,17 +227,37 @@ impl Settings {
 
     /// Room for the points of a table; [`Path::target`] knows their number.
     #[must_use]
-    pub fn knots(&self) -> &[Knot; MAX_KNOTS] {
+    pub fn knots(&self) -> &[Knot] {
         &self.knots
     }
 
     /// Servo, supervisor and path.
     ///
     /// # Errors
-    /// A setting that is missing, a choice that is not known, a number that a constructor refuses.
+    /// As [`Built::new`].
     pub fn build(&self) -> Result<Built, Misfit> {
+        let whole = usize::from(self.set_knots / 2);
+        Built::new(&|key| self.get(key), self.knots.get(..whole).unwrap_or(&[])).map_err(
+            |misfit| match misfit {
+                // Of a point whose time is set, the position is what is missing.
+                Misfit::Missing(key) if key >= FIRST_KNOT => {
+                    Misfit::Missing(FIRST_KNOT.wrapping_add(self.set_knots))
+                }
+                misfit => misfit,
+            },
+        )
+    }
+}
+
+impl Built {
+    /// Servo, supervisor and path from numbers wherever they lie: `number` gives a setting's value as it goes over the wire, none if it
+    /// has none; `knots` are the points of a path that is a table.
+    ///
+    /// # Errors
+    /// A setting or a point that is missing, a choice that is not known, a number that a constructor refuses.
+    pub fn new(number: &dyn Fn(u16) -> Option<u64>, knots: &[Knot]) -> Result<Built, Misfit> {
         let mut run = <RunSettings<'static> as Params<f32>>::blank();
-        let mut reader = Reader::new(self);
+        let mut reader = Reader::new(number);
         let points = reader.walk(&mut run, 0).min(MAX_KNOTS as u64);
         // The parameters now hold the values that were sent, or they cannot hold them.
         reader.read = true;
@@ -245,19 +265,18 @@ impl Settings {
         if let Some(misfit) = reader.misfit {
             return Err(misfit);
         }
-        let points = points as u16;
-        if self.set_knots / 2 < points {
-            return Err(Misfit::Missing(FIRST_KNOT.wrapping_add(self.set_knots)));
-        }
-        self.build_from(&run, points).map_err(|error| {
+        let Some(knots) = knots.get(..points as usize) else {
+            return Err(Misfit::Missing(FIRST_KNOT.wrapping_add((knots.len() as u16).wrapping_mul(2))));
+        };
+        Built::from(&run, knots).map_err(|error| {
             reader.error = Some(error);
-            reader.walk(&mut run, points.into());
+            reader.walk(&mut run, points);
             let ParamError { relation, value, .. } = error;
             Misfit::Unfit { key: reader.key.unwrap_or(u16::MAX), relation, value }
         })
     }
 
-    fn build_from(&self, run: &RunSettings<'static>, points: u16) -> Result<Built, ParamError<f32>> {
+    fn from(run: &RunSettings<'static>, knots: &[Knot]) -> Result<Built, ParamError<f32>> {
         run.check_rows()?;
         let servo = ServoParams {
             period: run.sampling.period,
@@ -270,9 +289,14 @@ impl Settings {
             shell: run.shell,
         };
         let limits = SupervisorParams { on_fault: run.on_fault, speed: run.speed, limits: run.limits };
-        let (start, knots) = (FixedCounts(run.start.into()), (&self.knots, points.into()));
         Ok(Built {
-            path: Path::new(&run.reference, knots, start, servo.encoder, servo.period)?,
+            path: Path::new(
+                &run.reference,
+                knots,
+                FixedCounts(run.start.into()),
+                servo.encoder,
+                servo.period,
+            )?,
             servo: Servo::new(&servo)?,
             supervisor: Supervisor::new(&limits, &servo, &run.bounds)?,
             times: run.times,
@@ -298,7 +322,7 @@ impl Visit for Writer<'_> {
 
 /// Gives settings to a run's parameters.
 struct Reader<'a> {
-    settings: &'a Settings,
+    number: &'a dyn Fn(u16) -> Option<u64>,
     /// The parameters have been read before.
     read: bool,
     /// The next one is a real number.
@@ -312,8 +336,8 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn new(settings: &'a Settings) -> Self {
-        Reader { settings, read: false, real: false, misfit: None, error: None, key: None, exact: false }
+    fn new(number: &'a dyn Fn(u16) -> Option<u64>) -> Self {
+        Reader { number, read: false, real: false, misfit: None, error: None, key: None, exact: false }
     }
 
     /// Walks over them; the number of points of a table.
@@ -333,7 +357,7 @@ impl Visit for &mut Reader<'_> {
     #[inline]
     fn visit(&mut self, place: Place, held: u64) -> u64 {
         let (key, real) = (place.key, core::mem::take(&mut self.real));
-        let Some(sent) = self.settings.get(key) else {
+        let Some(sent) = (self.number)(key) else {
             self.misfit.get_or_insert(Misfit::Missing(key));
             return held;
         };

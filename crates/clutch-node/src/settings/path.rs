@@ -1,6 +1,5 @@
 //! The path of a run, with the points of a table kept elsewhere.
 
-use super::MAX_KNOTS;
 use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
 use clutch_core::{Encoder, FixedCounts, Micros, ParamError, Target};
 
@@ -23,20 +22,19 @@ enum Kind {
 }
 
 impl Path {
-    /// The path of these parameters; `knots` are the points of a table, of which it has `points`.
+    /// The path of these parameters; `knots` are the points of a table.
     pub(super) fn new(
         p: &ReferenceParams<'static, f32>,
-        (knots, points): (&[Knot; MAX_KNOTS], usize),
+        knots: &[Knot],
         start: FixedCounts,
         encoder: Encoder,
         period: Micros,
     ) -> Result<Path, ParamError<f32>> {
         let kind = match p {
             ReferenceParams::Table(Table { interpolation, .. }) => {
-                let knots = knots.get(..points).unwrap_or(&[]);
                 let table = ReferenceParams::Table(Table { knots, interpolation: *interpolation });
                 Reference::<f32>::new(&table, start, encoder, period)?;
-                Kind::Table(*interpolation, points)
+                Kind::Table(*interpolation, knots.len())
             }
             formula => Kind::Formula(Reference::new(formula, start, encoder, period)?),
         };
@@ -45,9 +43,10 @@ impl Path {
         Ok(Path { first: FixedCounts::from_counts(first), ..path })
     }
 
-    /// The target of the shaft at a tick, from the count on which the run begins; `knots` are the settings'.
+    /// The target of the shaft at a tick, from the count on which the run begins; `knots` are the
+    /// points of a table, and may have more behind them.
     #[must_use]
-    pub fn target(&self, knots: &[Knot; MAX_KNOTS], tick: u64) -> Target<f32> {
+    pub fn target(&self, knots: &[Knot], tick: u64) -> Target<f32> {
         let target = match &self.kind {
             Kind::Formula(reference) => reference.at(tick),
             Kind::Table(interpolation, points) => {

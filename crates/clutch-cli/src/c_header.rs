@@ -1,0 +1,114 @@
+//! `clutch scenario header`: a scenario's settings for libclutch.
+
+use crate::args::ScenarioArgs;
+use crate::output::{BUILD, Exit, not_certified, print};
+use anyhow::ensure;
+use clap::Args;
+use clutch_core::Micros;
+use clutch_core::params::Kind;
+use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::session::{SessionError, check};
+use clutch_node::{Declared, SETTINGS_HASH, Setting, Settings};
+use clutch_sim::Scenario;
+use std::fmt::Write as _;
+
+/// Prints the settings of a scenario as a C header for libclutch.
+#[derive(Args)]
+#[command(after_help = "Example:\n  clutch scenario header mine.toml > run.h")]
+pub(crate) struct HeaderVerb {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+    /// Begin of the names in the header.
+    #[arg(long, default_value = "run")]
+    name: String,
+    /// Prints them although the gains are not certified.
+    #[arg(long)]
+    uncertified: bool,
+}
+
+impl HeaderVerb {
+    pub(crate) fn run(&self) -> anyhow::Result<Exit> {
+        let named = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        ensure!(
+            self.name.chars().all(named) && self.name.starts_with(|c: char| c.is_ascii_alphabetic()),
+            "--name {}: expected a name of C, of letters, digits and underscores",
+            self.name
+        );
+        let scenario = self.scenario.load()?;
+        match check(&scenario, None, self.uncertified, None) {
+            Ok(_) => {}
+            Err(refusal @ SessionError::NotCertified { .. }) => {
+                print(&not_certified(&refusal, &self.scenario.scenario))?;
+                return Ok(Exit::NotCertified);
+            }
+            Err(refusal) => return Err(refusal.into()),
+        }
+        let single = from_scenario::in_single_precision(&scenario)?.unwrap_or(scenario);
+        let run = BuiltRun::new(&single, 0)?;
+        // Nobody but the program itself looks on.
+        let settings = from_scenario::settings(&single, &run, Micros(0), run.ticks)?;
+        print(&header(&self.name, &single, &settings))?;
+        Ok(Exit::Done)
+    }
+}
+
+fn header(name: &str, scenario: &Scenario, settings: &Settings) -> String {
+    let guard = name.to_ascii_uppercase();
+    let mut out = format!(
+        "/* {}: written by `clutch scenario header`, {BUILD}. */\n\
+         #ifndef {guard}_SETTINGS_H\n#define {guard}_SETTINGS_H\n\n#include \"clutch.h\"\n\n\
+         #if CLUTCH_SETTINGS_HASH != {SETTINGS_HASH:#018x}\n\
+         #error \"these settings are of another version of libclutch: write them anew\"\n#endif\n\n\
+         static const clutch_setting {name}_settings[] = {{\n",
+        comment(scenario.name())
+    );
+    let (mut count, mut points) = (0, Vec::new());
+    settings.each(|key, value| match Setting::of(key) {
+        Some(setting) => {
+            count += 1;
+            let _ = writeln!(out, "    {{CLUTCH_KEY_{}, {}", setting.constant(), told(&setting, value));
+        }
+        None => points.push(value),
+    });
+    out += "};\n\n";
+    let of_points = points.len() / 2;
+    let knots = points.chunks_exact(2).fold(String::new(), |mut text, point| {
+        let _ = writeln!(text, "    {{{}, {}}},", point[0], point[1].cast_signed());
+        text
+    });
+    if knots.is_empty() {
+        // C has no empty lists.
+        let _ = writeln!(out, "#define {name}_knots ((const clutch_knot *)0)");
+    } else {
+        let _ = writeln!(out, "static const clutch_knot {name}_knots[] = {{\n{knots}}};");
+    }
+    out + &format!(
+        "\nenum {{ {name}_settings_count = {count}, {name}_knots_count = {of_points}, {name}_period_us = {}, {name}_counts_per_rev = {} }};\n\n#endif\n",
+        scenario.spec().period.0,
+        scenario.spec().rig.encoder.sensor.counts_per_rev
+    )
+}
+
+/// A value as C has it, the end of its line, and what it means.
+fn told(setting: &Setting, value: u64) -> String {
+    let unit = if setting.unit().is_empty() { String::new() } else { format!(" {}", setting.unit()) };
+    let word = |words: Vec<&str>| match words.get(value as usize) {
+        Some(word) => format!("CLUTCH_{}_{}}},", setting.constant(), word.to_ascii_uppercase()),
+        None => format!("{value}}},"),
+    };
+    match setting.declared {
+        Declared::Choice(choice) => word(choice.options.iter().map(|option| option.key).collect()),
+        Declared::Row(row, _) => match row.kind {
+            Kind::Real => {
+                format!("{:#010x}}}, /* {}{} */", value, f32::from_bits(value as u32), comment(&unit))
+            }
+            Kind::Word(words) => word(words.iter().map(|word| word.name).collect()),
+            _ => format!("{value}}},"),
+        },
+    }
+}
+
+/// A text that ends no comment.
+fn comment(text: &str) -> String {
+    text.replace("*/", "* /")
+}

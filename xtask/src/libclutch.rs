@@ -1,0 +1,64 @@
+//! libclutch: static libraries for C, in target/libclutch.
+
+use crate::run::{cargo, program, root};
+use anyhow::{Context, Result, bail, ensure};
+use std::path::{Path, PathBuf};
+
+/// Targets of the libraries: what is programmed in C most, with a floating-point unit and without.
+pub(crate) const TARGETS: [&str; 6] = [
+    "thumbv6m-none-eabi",
+    "thumbv7em-none-eabihf",
+    "thumbv8m.main-none-eabihf",
+    "riscv32imac-unknown-none-elf",
+    "x86_64-unknown-linux-gnu",
+    "aarch64-unknown-linux-gnu",
+];
+
+/// The function that a panic would call, and that nobody has.
+const SURVIVED: &[u8] = b"clutch_panic_path_survived";
+
+/// Builds the libraries of these targets, all unless some are given, and lays the header beside them.
+pub(crate) fn run(targets: &[String]) -> Result<()> {
+    let targets: Vec<&str> =
+        if targets.is_empty() { TARGETS.to_vec() } else { targets.iter().map(String::as_str).collect() };
+    if let Some(unknown) = targets.iter().find(|target| !TARGETS.contains(target)) {
+        bail!("no target {unknown}: expected one of {}", TARGETS.join(", "));
+    }
+    add(&targets)?;
+    for target in &targets {
+        println!("{}", built(target, "staticlib")?.display());
+    }
+    let header = folder().join("include/clutch.h");
+    std::fs::create_dir_all(folder().join("include"))?;
+    std::fs::copy(root().join("crates/clutch-c/include/clutch.h"), &header)?;
+    println!("{}", header.display());
+    Ok(())
+}
+
+/// Adds the targets to the compiler.
+pub(crate) fn add(targets: &[&str]) -> Result<()> {
+    program("rustup").args(["target", "add"]).args(targets).run().context("rustup cannot add the targets")
+}
+
+fn folder() -> PathBuf {
+    root().join("target/libclutch")
+}
+
+/// Builds the library of a target; its path. One in which a panic can be reached is refused.
+pub(crate) fn built(target: &str, features: &str) -> Result<PathBuf> {
+    let args = ["rustc", "--locked", "--package", "clutch-c", "--profile", "c", "--crate-type", "staticlib"];
+    let cache = folder().join("build");
+    let build = cargo(args).args(["--features", features, "--target", target, "--target-dir"]).arg(&cache);
+    let (done, text) = build.silently()?;
+    ensure!(done, "libclutch does not build for {target}:\n{text}");
+    let library = folder().join(target).join("libclutch.a");
+    std::fs::create_dir_all(folder().join(target))?;
+    std::fs::copy(cache.join(target).join("c/libclutch.a"), &library)?;
+    ensure!(!names(&library, SURVIVED)?, "a panic can be reached in libclutch for {target}");
+    Ok(library)
+}
+
+/// True if a file has this text in it.
+fn names(file: &Path, text: &[u8]) -> Result<bool> {
+    Ok(std::fs::read(file)?.windows(text.len()).any(|window| window == text))
+}
