@@ -3,6 +3,7 @@
 mod ablate;
 mod coverage;
 mod firmware;
+mod fmu;
 mod fuzz;
 mod libclutch;
 mod miri;
@@ -59,6 +60,11 @@ enum Verb {
     Libclutch {
         /// Only these targets.
         targets: Vec<String>,
+    },
+    /// Packs rig and law as FMI 3.0 co-simulation units, in target/fmu.
+    Fmu {
+        /// The scenario within them; smc_2 if none is given.
+        scenario: Option<PathBuf>,
     },
     /// Builds the API documentation, in target/doc.
     Docs,
@@ -255,6 +261,7 @@ fn main() -> Result<()> {
         Verb::Latency { rest } => {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
+        Verb::Fmu { scenario } => fmu::pack(scenario.as_deref(), true).map(drop),
         Verb::Libclutch { targets } => libclutch::run(&targets),
         Verb::Stubs => stubs::generate(&python::interpreter()?),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),

@@ -3,6 +3,7 @@
 mod tally;
 
 use crate::firmware;
+use crate::fmu;
 use crate::fuzz;
 use crate::libclutch;
 use crate::python;
@@ -237,12 +238,14 @@ fn wheel_of(tally: &mut Tally) -> Result<bool> {
     let built = |name: &str| root().join("target/debug/examples").join(name);
     let bits = root().join("target/bits");
     program(built("bits")).arg(&bits).run()?;
+    let units = fmu::pack(None, false)?;
     tally.stage("tests of the wheel");
     python(&["pytest", "--color=no", "-q"])?
         .arg(root().join("python/tests"))
         .env("CLUTCH_BIN", command())
         .env("CLUTCH_LOG_DEMO", built("write_demo"))
         .env("CLUTCH_BITS", bits)
+        .env("CLUTCH_FMU", units)
         .env("CLUTCH_INTERVALS", built("intervals"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .lines(|l| tally.read(l))

@@ -1,0 +1,337 @@
+//! The functions that a simulator calls. What these units do not have answers with an error; the standard wants the
+//! function all the same.
+#![allow(non_snake_case, reason = "the names are the standard's")]
+
+use crate::instance::{Instance, Kept, LogMessage, Status};
+use crate::variables::Part;
+use std::ffi::{CStr, CString, c_char, c_void};
+use std::path::PathBuf;
+use std::slice::from_raw_parts;
+
+type Reference = u32;
+
+/// A text of the simulator's.
+unsafe fn text<'a>(pointer: *const c_char) -> Option<&'a str> {
+    if pointer.is_null() {
+        return None;
+    }
+    // SAFETY: the simulator's texts end with a zero.
+    unsafe { CStr::from_ptr(pointer) }.to_str().ok()
+}
+
+/// A list of the simulator's.
+unsafe fn list<'a, T>(pointer: *const T, count: usize) -> &'a [T] {
+    if count == 0 || pointer.is_null() {
+        return &[];
+    }
+    // SAFETY: the simulator says how many there are.
+    unsafe { from_raw_parts(pointer, count) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3GetVersion() -> *const c_char {
+    c"3.0".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3SetDebugLogging(_: *mut Instance, _: bool, _: usize, _: *const *const c_char) -> Status {
+    Status::Ok
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3InstantiateCoSimulation(
+    _name: *const c_char,
+    token: *const c_char,
+    resources: *const c_char,
+    _visible: bool,
+    _logging: bool,
+    _event_mode: bool,
+    _early_return: bool,
+    _required: *const Reference,
+    _required_count: usize,
+    environment: *mut c_void,
+    log: LogMessage,
+    _intermediate: *const c_void,
+) -> *mut Instance {
+    // SAFETY: the simulator's texts.
+    let (token, resources) =
+        unsafe { (text(token).unwrap_or_default(), text(resources).unwrap_or_default()) };
+    match Part::ALL.into_iter().find(|part| part.token() == token) {
+        Some(part) => {
+            Box::into_raw(Box::new(Instance::new(part, PathBuf::from(resources), environment, log)))
+        }
+        None => {
+            let wanted = Part::ALL.map(Part::token).join(" or ");
+            let none = Instance::new(Part::Rig, PathBuf::new(), environment, log);
+            none.fail(&format!("instantiationToken = {token}: expected {wanted}"));
+            std::ptr::null_mut()
+        }
+    }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3FreeInstance(instance: *mut Instance) {
+    if !instance.is_null() {
+        // SAFETY: it came from the instantiation, and nobody uses it any more.
+        drop(unsafe { Box::from_raw(instance) });
+    }
+}
+
+/// The instance behind a call.
+unsafe fn of<'a>(instance: *mut Instance) -> Option<&'a mut Instance> {
+    // SAFETY: it came from the instantiation.
+    unsafe { instance.as_mut() }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3EnterInitializationMode(
+    instance: *mut Instance,
+    _tolerance_defined: bool,
+    _tolerance: f64,
+    start: f64,
+    _stop_defined: bool,
+    _stop: f64,
+) -> Status {
+    // SAFETY: the simulator's.
+    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+    let begun = instance.initialise(start);
+    instance.told(begun)
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3Reset(instance: *mut Instance) -> Status {
+    // SAFETY: the simulator's.
+    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+    instance.reset();
+    Status::Ok
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3DoStep(
+    instance: *mut Instance,
+    now: f64,
+    step: f64,
+    _final: bool,
+    event: *mut bool,
+    terminate: *mut bool,
+    early: *mut bool,
+    last: *mut f64,
+) -> Status {
+    // SAFETY: the simulator's.
+    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+    let stepped = instance.step(now, step);
+    let reached = if stepped.is_ok() { now + step } else { now };
+    // SAFETY: the simulator's places for them.
+    unsafe {
+        for place in [event, terminate, early] {
+            if !place.is_null() {
+                place.write(false);
+            }
+        }
+        if !last.is_null() {
+            last.write(reached);
+        }
+    }
+    instance.told(stepped)
+}
+
+/// Reads variables of a type.
+macro_rules! get {
+    ($name:ident, $type:ty, $of:ident) => {
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $name(
+            instance: *mut Instance,
+            references: *const Reference,
+            count: usize,
+            values: *mut $type,
+            values_count: usize,
+        ) -> Status {
+            // SAFETY: the simulator's.
+            let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+            if values_count < count || (count > 0 && values.is_null()) {
+                return instance.fail("fewer values than variables");
+            }
+            // SAFETY: the simulator says how many there are.
+            for (i, reference) in unsafe { list(references, count) }.iter().enumerate() {
+                match instance.$of(*reference) {
+                    // SAFETY: there is room for as many.
+                    Ok(value) => unsafe { values.add(i).write(value) },
+                    Err(why) => return instance.fail(&why),
+                }
+            }
+            Status::Ok
+        }
+    };
+}
+
+/// Writes variables of a type.
+macro_rules! set {
+    ($name:ident, $type:ty, $of:ident) => {
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $name(
+            instance: *mut Instance,
+            references: *const Reference,
+            count: usize,
+            values: *const $type,
+            values_count: usize,
+        ) -> Status {
+            // SAFETY: the simulator's.
+            let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+            // SAFETY: the simulator says how many there are.
+            let (references, values) = unsafe { (list(references, count), list(values, values_count)) };
+            if values.len() < references.len() {
+                return instance.fail("fewer values than variables");
+            }
+            let set = references.iter().zip(values).try_for_each(|(r, value)| instance.$of(*r, *value));
+            instance.told(set)
+        }
+    };
+}
+
+get!(fmi3GetFloat64, f64, real);
+get!(fmi3GetInt32, i32, whole);
+get!(fmi3GetBoolean, bool, truth);
+set!(fmi3SetFloat64, f64, set_real);
+set!(fmi3SetInt32, i32, set_whole);
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3GetString(
+    instance: *mut Instance,
+    references: *const Reference,
+    count: usize,
+    values: *mut *const c_char,
+    values_count: usize,
+) -> Status {
+    // SAFETY: the simulator's.
+    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+    if values_count < count || (count > 0 && values.is_null()) {
+        return instance.fail("fewer values than variables");
+    }
+    let mut texts = Vec::new();
+    // SAFETY: the simulator says how many there are.
+    for reference in unsafe { list(references, count) } {
+        match instance.text(*reference) {
+            Ok(text) => texts.push(CString::new(text).unwrap_or_default()),
+            Err(why) => return instance.fail(&why),
+        }
+    }
+    for (i, text) in texts.iter().enumerate() {
+        // SAFETY: there is room for as many; the texts live on in the instance.
+        unsafe { values.add(i).write(text.as_ptr()) };
+    }
+    instance.texts = texts;
+    Status::Ok
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3SetString(
+    instance: *mut Instance,
+    references: *const Reference,
+    count: usize,
+    values: *const *const c_char,
+    values_count: usize,
+) -> Status {
+    // SAFETY: the simulator's.
+    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+    // SAFETY: the simulator says how many there are.
+    let (references, values) = unsafe { (list(references, count), list(values, values_count)) };
+    if values.len() < references.len() {
+        return instance.fail("fewer values than variables");
+    }
+    let set = references.iter().zip(values).try_for_each(|(reference, value)| {
+        // SAFETY: the simulator's text.
+        let text = unsafe { text(*value) }.ok_or("a text that is none, or not UTF-8")?;
+        instance.set_text(*reference, text)
+    });
+    instance.told(set)
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3GetFMUState(instance: *mut Instance, state: *mut *mut Kept) -> Status {
+    // SAFETY: the simulator's.
+    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+    if state.is_null() {
+        return instance.fail("no place for the state");
+    }
+    // SAFETY: the simulator's place for it, which holds null or a state of ours.
+    unsafe {
+        if (*state).is_null() {
+            *state = Box::into_raw(Box::new(instance.kept.clone()));
+        } else {
+            (**state).clone_from(&instance.kept);
+        }
+    }
+    Status::Ok
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3SetFMUState(instance: *mut Instance, state: *mut Kept) -> Status {
+    // SAFETY: the simulator's.
+    let (Some(instance), Some(state)) = (unsafe { (of(instance), state.as_ref()) }) else {
+        return Status::Error;
+    };
+    instance.kept.clone_from(state);
+    Status::Ok
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi3FreeFMUState(_: *mut Instance, state: *mut *mut Kept) -> Status {
+    // SAFETY: the simulator's place for a state of ours.
+    unsafe {
+        if !state.is_null() && !(*state).is_null() {
+            drop(Box::from_raw(*state));
+            *state = std::ptr::null_mut();
+        }
+    }
+    Status::Ok
+}
+
+/// Calls that change nothing here.
+macro_rules! nothing {
+    ($($name:ident)+) => {
+        $(#[unsafe(no_mangle)]
+        extern "C" fn $name(_: *mut Instance) -> Status {
+            Status::Ok
+        })+
+    };
+}
+
+nothing!(fmi3ExitInitializationMode fmi3Terminate fmi3EnterStepMode);
+
+/// Functions of the standard that these units do not have. A caller hands over more than the instance, which is his to clear
+/// away.
+macro_rules! missing {
+    ($($name:ident)+) => {
+        $(#[unsafe(no_mangle)]
+        unsafe extern "C" fn $name(instance: *mut Instance) -> Status {
+            // SAFETY: the simulator's.
+            let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+            instance.fail(concat!(stringify!($name), ": this unit does not have it"))
+        })+
+    };
+}
+
+missing!(fmi3EnterEventMode fmi3EnterConfigurationMode fmi3ExitConfigurationMode fmi3EvaluateDiscreteStates
+    fmi3UpdateDiscreteStates fmi3GetFloat32 fmi3GetInt8 fmi3GetUInt8 fmi3GetInt16 fmi3GetUInt16 fmi3GetUInt32
+    fmi3GetInt64 fmi3GetUInt64 fmi3GetBinary fmi3GetClock fmi3SetFloat32 fmi3SetInt8 fmi3SetUInt8 fmi3SetInt16
+    fmi3SetUInt16 fmi3SetUInt32 fmi3SetInt64 fmi3SetUInt64 fmi3SetBoolean fmi3SetBinary fmi3SetClock
+    fmi3GetNumberOfVariableDependencies fmi3GetVariableDependencies fmi3SerializedFMUStateSize
+    fmi3SerializeFMUState fmi3DeserializeFMUState fmi3GetDirectionalDerivative fmi3GetAdjointDerivative
+    fmi3GetIntervalDecimal fmi3GetIntervalFraction fmi3GetShiftDecimal fmi3GetShiftFraction
+    fmi3SetIntervalDecimal fmi3SetIntervalFraction fmi3SetShiftDecimal fmi3SetShiftFraction
+    fmi3EnterContinuousTimeMode fmi3CompletedIntegratorStep fmi3SetTime fmi3SetContinuousStates
+    fmi3GetContinuousStateDerivatives fmi3GetEventIndicators fmi3GetContinuousStates
+    fmi3GetNominalsOfContinuousStates fmi3GetNumberOfEventIndicators fmi3GetNumberOfContinuousStates
+    fmi3GetOutputDerivatives fmi3ActivateModelPartition);
+
+/// Interfaces that these units do not have.
+macro_rules! no_instance {
+    ($($name:ident)+) => {
+        $(#[unsafe(no_mangle)]
+        extern "C" fn $name() -> *mut Instance {
+            std::ptr::null_mut()
+        })+
+    };
+}
+
+no_instance!(fmi3InstantiateModelExchange fmi3InstantiateScheduledExecution);
