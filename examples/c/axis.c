@@ -7,37 +7,26 @@
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
 #include "run.h"
+#include "shaft.h"
 
 #include <stdio.h>
 
-/* The shaft of the paper: a weight drives it, a brake holds it back. */
-static double angle, speed;  /* rad, rad/s */
-static double volts = 4.502; /* at power-up: the brake is on */
+static shaft_t shaft = SHAFT_AT_REST;
 
 static int32_t read_encoder(void)
 {
-    const double counts = angle * run_counts_per_rev / 6.283185307179586;
-    return (int32_t)counts - (counts < (double)(int32_t)counts);
+    return shaft_counts(&shaft, run_counts_per_rev);
 }
 
 static void write_converter(uint16_t code)
 {
-    volts = -10.0 + 20.0 * code / 4096.0;
+    shaft_convert(&shaft, code);
 }
 
 static void wait_for_the_next_period(void)
 {
-    for (int i = 0; i < 1000; i++) {
-        const double push = volts > 0.0 ? 0.14 * volts : 0.0;
-        const double drive = 0.047088 - 0.001 * speed;
-        const double friction = speed > 0.0 ? 0.15 * push : 0.2 * push;
-        if (speed <= 0.0 && drive <= friction) {
-            speed = 0.0;
-            continue;
-        }
-        speed += 1e-6 * (drive - friction) / 0.0017;
-        angle += 1e-6 * speed;
-    }
+    for (int i = 0; i < run_period_us; i++)
+        shaft_move(&shaft);
 }
 
 int main(void)

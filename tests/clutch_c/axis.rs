@@ -131,6 +131,10 @@ fn a_shaft_that_jumps_and_a_silence_end_in_the_safe_state() {
         assert_eq!((now, code), (FAULTED, 2970));
         // Jump, silence.
         assert_eq!(cause, if silent { 11 } else { 5 });
+        let mut volts = 0.0;
+        // SAFETY: it has been built.
+        unsafe { clutch_axis_volts(axis.as_mut_ptr(), code, &raw mut volts) };
+        assert!((volts - 4.5).abs() < 0.005, "{volts} V");
         // Without an acknowledgement there is no new consent.
         // SAFETY: it has been built.
         unsafe {

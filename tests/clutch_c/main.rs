@@ -1,7 +1,9 @@
 //! libclutch: the same bits from C, here and on a Cortex-M4F; an axis that runs as the loop does; and a caller's mistakes.
 
 mod axis;
+mod linuxcnc;
 mod misuse;
+mod users;
 
 use clutch_tests::bits::Run;
 use clutch_tests::{command, compiled, libclutch};

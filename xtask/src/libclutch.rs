@@ -32,6 +32,33 @@ pub(crate) fn run(targets: &[String]) -> Result<()> {
     std::fs::create_dir_all(folder().join("include"))?;
     std::fs::copy(root().join("crates/clutch-c/include/clutch.h"), &header)?;
     println!("{}", header.display());
+    arduino(&targets)
+}
+
+/// Targets that Arduino's cores have, and where its builder looks for their library.
+const ARDUINO: [(&str, &str); 3] = [
+    ("thumbv6m-none-eabi", "cortex-m0plus"),
+    ("thumbv7em-none-eabihf", "cortex-m4/fpv4-sp-d16-hard"),
+    ("thumbv8m.main-none-eabihf", "cortex-m33/fpv5-sp-d16-hard"),
+];
+
+/// The library for Arduino, to be copied into the folder of a sketchbook's libraries.
+fn arduino(targets: &[&str]) -> Result<()> {
+    let (from, to) = (root().join("examples/arduino/Clutch"), folder().join("arduino/Clutch"));
+    for (target, place) in ARDUINO.iter().filter(|(target, _)| targets.contains(target)) {
+        let place = to.join("src").join(place);
+        std::fs::create_dir_all(&place)?;
+        std::fs::copy(folder().join(target).join("libclutch.a"), place.join("libclutch.a"))?;
+    }
+    if !to.exists() {
+        return Ok(());
+    }
+    std::fs::create_dir_all(to.join("examples/Axis"))?;
+    for file in ["library.properties", "src/Clutch.h", "examples/Axis/Axis.ino"] {
+        std::fs::copy(from.join(file), to.join(file)).with_context(|| file.to_owned())?;
+    }
+    std::fs::copy(root().join("crates/clutch-c/include/clutch.h"), to.join("src/clutch.h"))?;
+    println!("{}", to.display());
     Ok(())
 }
 

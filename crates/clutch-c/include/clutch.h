@@ -876,6 +876,11 @@ clutch_result clutch_axis_acknowledge(clutch_axis *axis);
 clutch_result clutch_axis_state(clutch_axis *axis, uint8_t *state, uint8_t *cause, uint16_t *code);
 
 /**
+ * The voltage that a code stands for, V: for a converter of another kind than the settings'.
+ */
+clutch_result clutch_axis_volts(clutch_axis *axis, uint16_t code, float *volts);
+
+/**
  * The safe state of the axis, for a watchdog.
  */
 clutch_result clutch_axis_safe(clutch_axis *axis, clutch_safe_codes *codes);

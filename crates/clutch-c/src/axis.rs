@@ -210,6 +210,21 @@ pub unsafe extern "C" fn clutch_axis_state(
     })
 }
 
+/// The voltage that a code stands for, V: for a converter of another kind than the settings'.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn clutch_axis_volts(
+    axis: *mut clutch_axis,
+    code: u16,
+    volts: *mut f32,
+) -> clutch_result {
+    outcome(|| {
+        // SAFETY: the caller's promise.
+        let kept = unsafe { object::<Kept>(axis)? };
+        // SAFETY: the caller's promise.
+        unsafe { output(volts, kept.servo.dac().volts(DacCode(code))) }
+    })
+}
+
 /// The safe state of the axis, for a watchdog.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_axis_safe(

@@ -74,7 +74,37 @@ fn programs() -> Result<()> {
     let is_missing = |name: &str| program(name).args(["--version"]).quietly().is_err();
     let missing: Vec<&str> =
         needed.iter().filter(|(name, _)| is_missing(name)).map(|(_, package)| *package).collect();
-    if missing.is_empty() { Ok(()) } else { python::install_debian(&missing) }
+    if !missing.is_empty() {
+        python::install_debian(&missing)?;
+    }
+    linuxcnc()
+}
+
+/// The folder with LinuxCNC's files, unpacked and not installed: its hundred dependencies are for its windows.
+fn linuxcnc_folder() -> PathBuf {
+    root().join("target/linuxcnc")
+}
+
+/// Fetches and unpacks LinuxCNC's package for developers, with the parser that its tool needs.
+fn linuxcnc() -> Result<()> {
+    let folder = linuxcnc_folder();
+    if folder.join("usr/bin/halcompile").exists() {
+        return Ok(());
+    }
+    std::fs::create_dir_all(&folder)?;
+    let packages = ["linuxcnc-uspace-dev", "python3-yapps"];
+    let fetch = || program("apt-get").args(["download", "-q"]).args(packages).within(&folder);
+    if !fetch().lines(|_| ())? {
+        program("apt-get").args(["update", "-q"]).run()?;
+        fetch().run()?;
+    }
+    for entry in std::fs::read_dir(&folder)? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|ending| ending == "deb") {
+            program("dpkg").arg("-x").arg(&path).arg(&folder).run()?;
+        }
+    }
+    Ok(())
 }
 
 /// Adds the embedded targets. Without rustup they are skipped on a user's machine, not in CI.
@@ -105,7 +135,10 @@ fn host(tally: &mut Tally) -> Result<bool> {
     let tests = ["test", "--no-fail-fast"];
     // Some run the command: the one that was built with them. And some a model of a chip, in Python.
     let tested = cargo(tests).args(WORKSPACE).env("CLUTCH_BIN", command());
-    let sound = tested.env("CLUTCH_PYTHON", python::interpreter()?).lines(|l| tally.read(l))?;
+    let tested = tested.env("CLUTCH_PYTHON", python::interpreter()?);
+    let unpacked = linuxcnc_folder();
+    let tested = if unpacked.exists() { tested.env("CLUTCH_LINUXCNC", unpacked) } else { tested };
+    let sound = tested.lines(|l| tally.read(l))?;
     tally.stage("tests of the core as firmware takes it");
     // Without the features that the workspace turns on.
     let core = ["--package", "clutch-core", "--lib"];
