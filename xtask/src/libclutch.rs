@@ -54,7 +54,7 @@ fn arduino(targets: &[&str]) -> Result<()> {
         return Ok(());
     }
     std::fs::create_dir_all(to.join("examples/Axis"))?;
-    for file in ["library.properties", "src/Clutch.h", "examples/Axis/Axis.ino"] {
+    for file in ["library.properties", "src/ClutchAxis.h", "examples/Axis/Axis.ino"] {
         std::fs::copy(from.join(file), to.join(file)).with_context(|| file.to_owned())?;
     }
     std::fs::copy(root().join("crates/clutch-c/include/clutch.h"), to.join("src/clutch.h"))?;

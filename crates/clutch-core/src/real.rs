@@ -405,6 +405,56 @@ mod tests {
         }
     }
 
+    /// A hash of a function's bits over numbers of all sizes between two limits.
+    fn bits(lowest: f64, highest: f64, of: impl Fn(f64) -> u64) -> u64 {
+        let mut hash = crate::FNV_64;
+        let steps = if cfg!(miri) { 500 } else { 200_000 };
+        for k in 0..steps {
+            // Evenly by the logarithm: small arguments and large ones.
+            let share = (k * 7919 % 200_003) as f64 / 200_003.0;
+            let x = lowest * 2.0_f64.powi((share * 60.0) as i32 - 60)
+                + (highest - lowest) * share * share * share;
+            hash = crate::fnv1a_64(hash, &of(x).to_le_bytes());
+        }
+        hash
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "Miri gives the last bits of some operations at random")]
+    fn the_elementary_functions_have_the_bits_of_the_guarantee() {
+        let single = |f: fn(f32) -> f32| move |x: f64| u64::from(f(x as f32).to_bits());
+        let found = [
+            ("exp, f64", bits(-700.0, 700.0, |x| Real::exp(x).to_bits())),
+            ("ln, f64", bits(1e-300, 1e300, |x| Real::ln(x).to_bits())),
+            ("power, f64", bits(1e-9, 1e3, |x| Arithmetic::powf(x, 0.1 + x / 300.0).to_bits())),
+            ("sine, f64", bits(-0.785, 0.785, |x| x.sin_cos_octant().0.to_bits())),
+            ("cosine, f64", bits(-0.785, 0.785, |x| x.sin_cos_octant().1.to_bits())),
+            ("exp, f32", bits(-87.0, 88.0, single(Real::exp))),
+            ("ln, f32", bits(1e-37, 1e38, single(Real::ln))),
+            (
+                "power, f32",
+                bits(1e-9, 1e3, |x| Arithmetic::powf(x as f32, 0.1 + x as f32 / 300.0).to_bits().into()),
+            ),
+            ("short exponential", bits(0.0, 87.0, single(Arithmetic::exp_neg))),
+            ("sine, f32", bits(-0.785, 0.785, |x| (x as f32).sin_cos_octant().0.to_bits().into())),
+            ("cosine, f32", bits(-0.785, 0.785, |x| (x as f32).sin_cos_octant().1.to_bits().into())),
+        ];
+        let guaranteed = [
+            ("exp, f64", 0xc1a2e07227e12390),
+            ("ln, f64", 0x0996f302b478527a),
+            ("power, f64", 0x350b670aa54a39e6),
+            ("sine, f64", 0x448ca37c67777382),
+            ("cosine, f64", 0x10c4db08862b3cb0),
+            ("exp, f32", 0x03d49ff70c8e7e96),
+            ("ln, f32", 0xf46cb23ffec5e1e1),
+            ("power, f32", 0xc9572cac8c8f2303),
+            ("short exponential", 0x2644f9a93ff0a6fd),
+            ("sine, f32", 0x11f6671f7741bb8a),
+            ("cosine, f32", 0x44b3985f093f11c1),
+        ];
+        assert_eq!(found, guaranteed, "another libm than 0.2.16 has other last bits: docs/bits.md");
+    }
+
     #[test]
     fn limit_sends_nan_to_the_lower_end_and_never_panics() {
         assert_eq!(f64::NAN.limit(1.0, 2.0), 1.0);

@@ -9,7 +9,7 @@
  *
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
-#include <Clutch.h>
+#include <ClutchAxis.h>
 #include "run.h"
 
 const int PIN_A = 2, PIN_B = 3, PIN_CONSENT = 4;

@@ -2,8 +2,8 @@
  *
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
-#ifndef CLUTCH_ARDUINO_H
-#define CLUTCH_ARDUINO_H
+#ifndef CLUTCH_AXIS_H
+#define CLUTCH_AXIS_H
 
 #include "clutch.h"
 
