@@ -8,6 +8,7 @@ use crate::params::{Range, Table};
 use crate::{ParamError, Real};
 
 /// Encoder counts as the counter gives them; wraps.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Counts(pub i32);
 
@@ -22,6 +23,7 @@ impl Counts {
 }
 
 /// A position in 2⁻¹⁶ counts, unwrapped: ±1.4e14 counts, exact over any run.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FixedCounts(pub i64);
 
@@ -60,10 +62,12 @@ impl FixedCounts {
 }
 
 /// A code for the digital-to-analogue converter.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DacCode(pub u16);
 
 /// A time span in microseconds: the sampling period `T`, for one.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Micros(pub u32);
 

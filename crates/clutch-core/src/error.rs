@@ -15,6 +15,7 @@ use core::fmt;
 /// ```
 ///
 /// A board has numbers only, and its text says so.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParamError<T = f64> {
     /// Its table.

@@ -17,9 +17,9 @@ use tally::Tally;
 /// and RISC-V.
 const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
 
-/// Checks that need the targets: two builds each, the two link tests, the libraries with their control, the example, two
-/// boards, the budgets.
-const SKIPPED_WITHOUT_TARGETS: u64 = 2 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 7;
+/// Checks that need the targets: three builds of the core and one of the parts of boards each, the two link tests, the
+/// libraries with their control, the example, two boards, the budgets.
+const SKIPPED_WITHOUT_TARGETS: u64 = 4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 7;
 
 /// The packages that are built for this machine. Always the same selection: with another one cargo gives libraries
 /// other features, and compiles them once more. The wheel's module only links inside of Python.
@@ -172,11 +172,14 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     let folder = ["build", "--release", "--target-dir", "target/embedded", "--package", "clutch-core"];
     let core = |args: &[&str]| cargo(folder).args(args).quietly();
     for target in embedded {
-        for features in ["", "linalg"] {
+        for features in ["", "linalg", "defmt"] {
             let with = if features.is_empty() { "no feature" } else { features };
             let built = core(&["--target", target, "--features", features])?;
             tally.check_quiet(&format!("clutch-core builds for {target} with {with}"), built);
         }
+        let parts = ["build", "--release", "--target-dir", "target/embedded", "--package", "clutch-hal"];
+        let built = cargo(parts).args(["--target", target]).quietly()?;
+        tally.check_quiet(&format!("clutch-hal builds for {target}"), built);
     }
     no_panic(tally)?;
     libraries(tally)?;

@@ -109,6 +109,17 @@ macro_rules! laws {
             }
         }
 
+        #[cfg(feature = "defmt")]
+        impl<T: Real + defmt::Format> defmt::Format for LawTerms<T> {
+            fn format(&self, f: defmt::Formatter<'_>) {
+                match self {
+                    $(LawTerms::$law(terms) => {
+                        defmt::write!(f, "{=str} {}", stringify!($law), Terms::<T>::values(terms));
+                    })+
+                }
+            }
+        }
+
         const _: () = {
             $(assert!(<$law<f64> as ControlLaw<f64>>::TERMS.len() <= MAX_TERMS);)+
         };

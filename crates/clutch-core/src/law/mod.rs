@@ -35,6 +35,7 @@ list::laws! {
 }
 
 /// Input of a law in each period.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tick<T> {
     /// `e = θ_d − θ`, rad.

@@ -65,6 +65,7 @@ impl<T: Real> OutputParams<T> {
 }
 
 /// The limit at which the output stage changed the demand, if it did.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Limit {

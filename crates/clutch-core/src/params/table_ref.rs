@@ -57,3 +57,10 @@ impl fmt::Debug for TableRef {
         }
     }
 }
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for TableRef {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "table {=u32:#010x}", self.id);
+    }
+}

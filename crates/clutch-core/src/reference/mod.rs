@@ -32,6 +32,7 @@ use profile::Profile;
 use wave::Wave;
 
 /// The point of the path at which the shaft shall be now.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Target<T> {
     /// `θ_d`, in 2⁻¹⁶ counts from the encoder's zero.

@@ -7,6 +7,7 @@ use crate::safe_state::SafeRun;
 use crate::{Arithmetic, Counts, DacCode, Micros, Real, ServoOutput, ServoState, Target};
 
 /// The state of control; see the [module](super)'s diagram.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum State {
@@ -45,6 +46,7 @@ impl State {
 }
 
 /// The cause of the end of control.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Cause {
@@ -162,6 +164,7 @@ impl Checks {
 }
 
 /// The board's report of itself with a sample.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BoardMode {
     /// Configured, output as it was.
@@ -197,6 +200,7 @@ pub struct Sample {
 }
 
 /// The fate of a sample.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Arrival {

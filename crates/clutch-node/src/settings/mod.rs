@@ -29,6 +29,7 @@ pub const MAX_KNOTS: usize = 256;
 const FIRST_KNOT: u16 = 0x1000;
 
 /// A run that a board cannot take.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsupported {
     /// The velocity comes from an observer; boards have the smoothed derivative (5).
@@ -113,6 +114,7 @@ pub struct Built {
 }
 
 /// The reason why settings make no run.
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Misfit {
     /// A setting that was not set: its key.
