@@ -114,18 +114,18 @@ impl embedded_io::ReadReady for Port {
 fn a_line_takes_frames_whole_or_not_at_all_and_never_waits() {
     let port = Port::default();
     let mut line = Line::<_, 8>::new(port.clone());
-    assert!(line.offer(b"frames"), "into the buffer");
-    assert!(!line.offer(b"more"), "the first ones are still there");
+    assert!(line.offer(b"123456"), "into the buffer");
+    assert!(!line.offer(b"7890"), "the first ones are still there");
     port.room.set(4);
     line.pump();
-    assert_eq!(*port.written.borrow(), b"fram");
-    assert!(!line.offer(b"more"));
+    assert_eq!(*port.written.borrow(), b"1234");
+    assert!(!line.offer(b"7890"));
     port.room.set(4);
-    assert!(line.offer(b"more"));
-    assert_eq!(*port.written.borrow(), b"framesmo");
+    assert!(line.offer(b"7890"));
+    assert_eq!(*port.written.borrow(), b"12345678");
     port.room.set(100);
     line.pump();
-    assert_eq!(*port.written.borrow(), b"framesmore");
+    assert_eq!(*port.written.borrow(), b"1234567890");
     assert!(!line.offer(b"too much room"), "more than its room");
     assert_eq!(line.take(&mut [0; 4]), b"");
     port.coming.borrow_mut().extend(b"commands");
