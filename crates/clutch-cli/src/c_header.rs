@@ -6,8 +6,8 @@ use anyhow::ensure;
 use clap::Args;
 use clutch_core::Micros;
 use clutch_core::params::Kind;
+use clutch_loop::clearance::{ClearanceError, check};
 use clutch_loop::from_scenario::{self, BuiltRun};
-use clutch_loop::session::{SessionError, check};
 use clutch_node::{Declared, SETTINGS_HASH, Setting, Settings};
 use clutch_sim::Scenario;
 use std::fmt::Write as _;
@@ -37,7 +37,7 @@ impl HeaderVerb {
         let scenario = self.scenario.load()?;
         match check(&scenario, None, self.uncertified, None) {
             Ok(_) => {}
-            Err(refusal @ SessionError::NotCertified { .. }) => {
+            Err(refusal @ ClearanceError::NotCertified { .. }) => {
                 print(&not_certified(&refusal, &self.scenario.scenario))?;
                 return Ok(Exit::NotCertified);
             }

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
 use clutch_loop::chip::{ChipFault, ChipOptions, ChipReport, ChipRole, ChipSession};
+use clutch_loop::clearance::ClearanceError;
 use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::lockstep_session::{LockstepOptions, LockstepSession};
 use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
@@ -187,7 +188,7 @@ impl Hil {
     fn checked<T>(&self, session: Result<T, SessionError>) -> anyhow::Result<Option<T>> {
         match session {
             Ok(session) => Ok(Some(session)),
-            Err(refusal @ SessionError::NotCertified { .. }) => {
+            Err(SessionError::Clearance(refusal @ ClearanceError::NotCertified { .. })) => {
                 print(&not_certified(&refusal, &self.scenario))?;
                 Ok(None)
             }

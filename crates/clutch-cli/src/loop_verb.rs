@@ -6,6 +6,7 @@ use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use clutch_loop::clearance::ClearanceError;
 use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
 use clutch_loop::port::Address;
@@ -176,7 +177,7 @@ impl Loop {
         }
         let session = match Session::new(scenario, self.options()) {
             Ok(session) => session,
-            Err(refusal @ SessionError::NotCertified { .. }) => {
+            Err(SessionError::Clearance(refusal @ ClearanceError::NotCertified { .. })) => {
                 self.say(&not_certified(&refusal, &self.scenario))?;
                 return Ok(Exit::NotCertified);
             }

@@ -4,7 +4,7 @@ use crate::plot::{self, Figure};
 use anyhow::Context;
 use clap::Args;
 use clutch_log::printable;
-use clutch_loop::session::SessionError;
+use clutch_loop::clearance::ClearanceError;
 use clutch_sim::progress::Report;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::borrow::Cow;
@@ -32,7 +32,7 @@ pub(crate) enum Exit {
 pub const BUILD: &str = env!("CLUTCH_BUILD");
 
 /// That nothing was started, and what to do.
-pub(crate) fn not_certified(refusal: &SessionError, file: &Path) -> String {
+pub(crate) fn not_certified(refusal: &ClearanceError, file: &Path) -> String {
     format!("{refusal}\n`clutch certify {}` says why; --uncertified runs it all the same.\n", file.display())
 }
 

@@ -21,28 +21,41 @@
 //! | `to_log`, `replay` | what a log gets; a log's counts to the law again |
 
 pub mod campaign;
+#[cfg(target_os = "linux")]
 pub mod chip;
+pub mod clearance;
+#[cfg(target_os = "linux")]
 pub mod control_loop;
 pub mod drift;
 pub mod faults;
 pub mod faulty_line;
 pub mod from_scenario;
+#[cfg(target_os = "linux")]
 mod greeting;
 pub mod healthy;
 pub mod lockstep_board;
 pub mod lockstep_host;
+#[cfg(target_os = "linux")]
 pub mod lockstep_session;
 pub mod log_thread;
+#[cfg(target_os = "linux")]
 pub mod port;
+#[cfg(target_os = "linux")]
 pub mod preflight;
+#[cfg(target_os = "linux")]
 pub mod qemu_board;
+#[cfg(target_os = "linux")]
 pub mod realtime;
+mod refusal;
 pub mod release;
 pub mod replay;
+#[cfg(target_os = "linux")]
 pub mod session;
 pub mod sim_board;
+#[cfg(target_os = "linux")]
 pub mod sim_board_server;
 pub mod station;
+#[cfg(target_os = "linux")]
 pub mod summary;
 pub mod to_log;
 pub mod virtual_time;

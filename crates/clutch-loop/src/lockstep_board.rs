@@ -1,6 +1,5 @@
-//! A board controller that is asked in lockstep: emulated, or in this process.
+//! A board controller that is asked in lockstep, and one in this process.
 
-use crate::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_node::lockstep::{Exchange, answer};
 use clutch_node::{BoardController, BoardControllerParams, Outboxes};
 
@@ -11,18 +10,6 @@ pub trait LockstepBoard {
     /// # Errors
     /// In words.
     fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String>;
-}
-
-impl LockstepBoard for QemuBoard {
-    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
-        QemuBoard::exchange(self, request).map_err(|e| e.to_string())
-    }
-}
-
-impl LockstepBoard for QemuSerialBoard {
-    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
-        QemuSerialBoard::exchange(self, request).map_err(|e| e.to_string())
-    }
 }
 
 /// The board's state machine in this process: what an image runs, compiled for this machine.

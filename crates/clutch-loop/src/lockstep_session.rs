@@ -1,12 +1,13 @@
 //! A session with a board controller in lockstep: the board's own image, and the simulated rig as its encoder and
 //! converter, in virtual time.
 
+use crate::clearance::check;
 use crate::faults::Fault;
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_board::LockstepBoard;
 use crate::lockstep_host::lockstep_host;
 use crate::qemu_board::QemuError;
-use crate::session::{self, SessionError};
+use crate::session::SessionError;
 use crate::to_log::PRESENT_CODE;
 use crate::virtual_time::{VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
 use clutch_core::{Micros, Real, Servo};
@@ -83,12 +84,12 @@ impl LockstepSession {
     /// Checks everything that can be checked without a board.
     ///
     /// # Errors
-    /// As [`session::check`].
+    /// As [`check`].
     pub fn new(scenario: Scenario, options: LockstepOptions) -> Result<Self, SessionError> {
         let single = from_scenario::in_single_precision(&scenario)?;
         let changed = single.is_some();
         let scenario = single.unwrap_or(scenario);
-        let cleared = session::check(&scenario, None, options.uncertified, options.log.as_deref())?;
+        let cleared = check(&scenario, None, options.uncertified, options.log.as_deref())?;
         let certified = cleared.plan.certificate.certified();
         Ok(LockstepSession { scenario, options, certified, changed })
     }

@@ -1,5 +1,6 @@
 //! The emulated board: a Cortex-M4F in `qemu-system-arm`, asked in lockstep.
 
+use crate::lockstep_board::LockstepBoard;
 use clutch_node::lockstep::{Exchange, LONGEST};
 use clutch_wire::{BoardState, Decoder, Message, STATUS_STATE, Set, encode};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -348,5 +349,17 @@ impl Drop for QemuSerialBoard {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+impl LockstepBoard for QemuBoard {
+    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
+        QemuBoard::exchange(self, request).map_err(|e| e.to_string())
+    }
+}
+
+impl LockstepBoard for QemuSerialBoard {
+    fn exchange(&mut self, request: &Exchange<'_>) -> Result<Exchange<'_>, String> {
+        QemuSerialBoard::exchange(self, request).map_err(|e| e.to_string())
     }
 }

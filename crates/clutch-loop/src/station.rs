@@ -3,7 +3,7 @@
 //! Both are asked the same, and report the same, so that pre-flight, loop and virtual time need not know
 //! which of the two it is.
 
-use crate::preflight;
+use crate::refusal::why;
 use clutch_core::law::{ControlLaw, LawTerms, Terms};
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned, Real};
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Settings, Standing};
@@ -243,8 +243,8 @@ impl<P: Planned<f32>> Station for HostStation<P> {
                 match &n {
                     Notice::Taken(m) => taken |= waiting.front() == Some(&(m.key, m.value)),
                     Notice::Refused(m) if m.request == Set::KIND => {
-                        let why = preflight::why(m, Some(settings));
-                        *failure = Some(format!("the board did not take a setting: {why}"));
+                        let reason = why(m, Some(settings));
+                        *failure = Some(format!("the board did not take a setting: {reason}"));
                     }
                     _ => {}
                 }

@@ -1,9 +1,9 @@
 //! The summary of a session: its figures, and what ended it in words.
 
+use crate::clearance::Cleared;
 use crate::control_loop::LoopReport;
-use crate::preflight;
 use crate::realtime::CycleSummary;
-use crate::session::Cleared;
+use crate::refusal::why;
 use crate::sim_board_server::ServeReport;
 use clutch_core::supervisor::{Cause, State};
 use clutch_sim::number;
@@ -192,7 +192,7 @@ impl Summary {
                 "stopped before the board was armed; its output is as it was".into()
             }
             _ if self.stopped => format!("stopped before the board said that it was armed; {safe}"),
-            Some(m) => format!("the board was not armed: {}", preflight::why(m, None)),
+            Some(m) => format!("the board was not armed: {}", why(m, None)),
             None => format!("the board did not say that it was armed; {safe}"),
         }
     }

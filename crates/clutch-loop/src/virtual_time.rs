@@ -3,10 +3,11 @@
 //! The same state machines, frames and rig as in real time; only the clock is computed. A run of
 //! one second takes some milliseconds and repeats bit for bit.
 
+#[cfg(target_os = "linux")]
 use crate::chip::ChipError;
 use crate::faults::{Direction, Fault};
 use crate::faulty_line::FaultyLine;
-use crate::preflight;
+use crate::refusal::why;
 use crate::sim_board::{SimBoard, SimBoardError};
 use crate::station::{Station, StationNotice};
 use crate::to_log;
@@ -136,6 +137,7 @@ pub enum VirtualError {
     #[error(transparent)]
     Board(#[from] SimBoardError),
     /// The chip, or what carries it.
+    #[cfg(target_os = "linux")]
     #[error(transparent)]
     Chip(#[from] ChipError),
     /// The station.
@@ -467,7 +469,7 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
         let mut heard = self.hear(now, time_ns);
         self.on.sound()?;
         if let Some(m) = heard.refused {
-            return Err(VirtualError::Refused(preflight::why(&m, None)));
+            return Err(VirtualError::Refused(why(&m, None)));
         }
         if self.hands.configured && !self.hands.asked && self.on.board.samples() >= 3 {
             self.hands.asked = true;

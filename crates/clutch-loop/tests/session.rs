@@ -3,6 +3,7 @@
 
 use clutch_core::supervisor::Cause;
 use clutch_log::{EventKind, Limits};
+use clutch_loop::clearance::ClearanceError;
 use clutch_loop::control_loop::OnDrift;
 use clutch_loop::faults::Fault;
 use clutch_loop::port::Address;
@@ -47,7 +48,9 @@ fn what_can_be_refused_without_a_board_is_refused_before_one_is_looked_for() {
     let refused = |scenario, options| Session::new(scenario, options).unwrap_err();
     let weak = scenario("board_smc_2", &[("law.smc.kp_v", "0.1")]);
     let refusal = refused(weak.clone(), options.clone());
-    assert!(matches!(&refusal, SessionError::NotCertified { scenario, .. } if *scenario == weak.name()));
+    assert!(
+        matches!(&refusal, SessionError::Clearance(ClearanceError::NotCertified { scenario, .. }) if *scenario == weak.name())
+    );
     let asked_for = Session::new(weak, SessionOptions { uncertified: true, ..options.clone() }).unwrap();
     assert!(!asked_for.certified());
 
@@ -58,7 +61,7 @@ fn what_can_be_refused_without_a_board_is_refused_before_one_is_looked_for() {
     std::fs::write(&log, "the only record of a run").unwrap();
     let refusal =
         refused(scenario("board_smc_2", &[]), SessionOptions { log: Some(log.clone()), ..options.clone() });
-    assert!(matches!(refusal, SessionError::LogExists { .. }), "{refusal}");
+    assert!(matches!(refusal, SessionError::Clearance(ClearanceError::LogExists { .. })), "{refusal}");
     assert_eq!(std::fs::read_to_string(&log).unwrap(), "the only record of a run");
     std::fs::remove_file(&log).unwrap();
 

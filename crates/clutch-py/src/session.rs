@@ -3,6 +3,7 @@
 use crate::convert::{core_error, from_json, log_error, loop_error};
 use crate::scenario::Scenario;
 use crate::stepping::native;
+use clutch_loop::clearance::ClearanceError;
 use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
 use clutch_loop::from_scenario::BuildError;
@@ -35,13 +36,16 @@ fn chosen<T, const N: usize>(name: &str, word: &str, choices: [(&str, T); N]) ->
 fn error(py: Python<'_>, scenario: &Scenario, e: &SessionError) -> PyErr {
     match e {
         SessionError::Scenario(e)
+        | SessionError::Clearance(ClearanceError::Scenario(e))
         | SessionError::Build(BuildError::Scenario(e))
         | SessionError::Preflight(PreflightError::Build(BuildError::Scenario(e))) => scenario.error(py, e),
         SessionError::Build(BuildError::Param(e))
         | SessionError::Preflight(PreflightError::Build(BuildError::Param(e))) => core_error(py, e),
         SessionError::Log(e) => log_error(py, e),
-        SessionError::LogExists { .. } => PyFileExistsError::new_err(e.to_string()),
-        SessionError::NotCertified { .. } => loop_error(
+        SessionError::Clearance(ClearanceError::LogExists { .. }) => {
+            PyFileExistsError::new_err(e.to_string())
+        }
+        SessionError::Clearance(ClearanceError::NotCertified { .. }) => loop_error(
             py,
             &format!("{e}\n`scenario.certificate()` says why; uncertified=True runs it all the same."),
         ),

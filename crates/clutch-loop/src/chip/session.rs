@@ -1,9 +1,10 @@
 //! A session with a board whose image runs on the model of its chip, in virtual time.
 
 use super::{ChipBoard, ChipFault, Counted};
+use crate::clearance::check;
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_session::{LockstepError, LockstepOptions};
-use crate::session::{self, SessionError};
+use crate::session::SessionError;
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, ControllerStation, HOST_SILENCE, HostStation, Station};
 use crate::virtual_time::{VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
 use clutch_core::{Planned, Real};
@@ -73,7 +74,7 @@ impl ChipSession {
     /// Checks everything that can be checked without a board.
     ///
     /// # Errors
-    /// As [`session::check`].
+    /// As [`check`].
     pub fn new(
         scenario: Scenario,
         options: LockstepOptions,
@@ -86,7 +87,7 @@ impl ChipSession {
         };
         let changed = single.is_some();
         let scenario = single.unwrap_or(scenario);
-        let cleared = session::check(&scenario, None, options.uncertified, options.log.as_deref())?;
+        let cleared = check(&scenario, None, options.uncertified, options.log.as_deref())?;
         let certified = cleared.plan.certificate.certified();
         Ok(ChipSession { scenario, options, chip, role, certified, changed })
     }

@@ -1,0 +1,93 @@
+//! May a scenario run on a board?
+
+use clutch_sim::scenario::{CertificateError, Plan, Proven, Sampled};
+use clutch_sim::{Scenario, ScenarioError, Start};
+use std::path::{Path, PathBuf};
+
+/// A scenario may not run on a board, or not with these gains.
+#[derive(Debug, thiserror::Error)]
+pub enum ClearanceError {
+    /// The scenario.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The gains are not certified, and were not asked for all the same.
+    #[error(
+        "{scenario}: the gains are not certified, in continuous time{}, for these bounds and this path, so nothing was started.",
+        if *.unstable { ", and the sampled loop is linearly unstable" } else { "" }
+    )]
+    NotCertified {
+        /// The scenario's name.
+        scenario: String,
+        /// True if there is a bound of the sampled loop, which is linearly unstable.
+        unstable: bool,
+    },
+    /// The sampled loop's certificate is none of this scenario's.
+    #[error(
+        "{0}\nNothing was started; `clutch certify SCENARIO --sampled --save FILE.json` makes a certificate"
+    )]
+    Certificate(#[from] CertificateError),
+    /// The certificate is one of a run that begins in motion.
+    #[error(
+        "run.start = \"on_path\": expected \"rest\" with a certificate, as a shaft on a board begins at rest; save one of that \
+         start with --set run.start=rest"
+    )]
+    CertifiedInMotion,
+    /// A log is never written over: it may be the only record of a run.
+    #[error("{}: exists already; name a new file for the log", path.display())]
+    LogExists {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// A scenario that may run on a board.
+#[derive(Clone, Debug)]
+pub struct Cleared {
+    /// Path and gains against the bounds.
+    pub plan: Plan,
+    /// Verdicts on the sampled loop.
+    pub sampled: Sampled,
+    /// The bound of its error, if a certificate was given.
+    pub proven: Option<Proven>,
+}
+
+impl Cleared {
+    /// The verdict on the error of the sampled loop with its scope, for log and summary.
+    #[must_use]
+    pub fn bound_line(&self) -> String {
+        match &self.proven {
+            Some(proven) => self.sampled.bound_line(proven),
+            None => "the bound of the error is uncertified: no certificate was given".to_owned(),
+        }
+    }
+}
+
+/// Checks a scenario for a run on a board: there is a safe state, a brake can follow the path, a certificate that is given
+/// holds and is the scenario's, the gains are certified, by it or in continuous time, or uncertified ones were asked for, and
+/// the log is a new file.
+///
+/// # Errors
+/// The first of these that does not hold.
+pub fn check(
+    scenario: &Scenario,
+    certificate: Option<&Path>,
+    uncertified: bool,
+    log: Option<&Path>,
+) -> Result<Cleared, ClearanceError> {
+    scenario.safety()?;
+    let plan = scenario.plan()?;
+    let sampled = scenario.sampled(&plan.bounds);
+    let proven = certificate.map(|path| sampled.proven_by(path)).transpose()?;
+    if proven.is_some() && scenario.spec().run.start != Start::Rest {
+        return Err(ClearanceError::CertifiedInMotion);
+    }
+    let certified = plan.certificate.certified() || (proven.is_some() && sampled.bound_suffices());
+    if !certified && !uncertified {
+        let unstable = proven.is_some();
+        return Err(ClearanceError::NotCertified { scenario: scenario.name().to_owned(), unstable });
+    }
+    match log {
+        Some(path) if path.exists() => Err(ClearanceError::LogExists { path: path.to_owned() }),
+        _ => Ok(Cleared { plan, sampled, proven }),
+    }
+}
