@@ -1,7 +1,7 @@
 //! `clutch friction`.
 
 use crate::args::key_value;
-use crate::output::{Exit, print};
+use crate::output::{Exit, print, tell, wrote};
 use crate::plot::{self, Figure, Panel, Series};
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -81,7 +81,7 @@ impl FrictionVerb {
                     .map(|name| Ok((name.as_str(), examine(&friction(name, &set)?)?)))
                     .collect::<anyhow::Result<Vec<_>>>()?;
                 figure(&labs).save(&out)?;
-                print(&format!("wrote {}\n", out.display()))?;
+                tell(&wrote(&[&out]))?;
             }
         }
         Ok(Exit::Done)
@@ -106,16 +106,14 @@ fn figure(labs: &[(&str, Lab)]) -> Figure {
         title: title.to_owned(),
         x_label: x.to_owned(),
         y_label: y.to_owned(),
-        series: labs
-            .iter()
-            .map(|(name, lab)| Series { label: (*name).to_owned(), points: points(lab) })
-            .collect(),
+        series: labs.iter().map(|(name, lab)| Series::new(*name, points(lab))).collect(),
         ..Panel::default()
     };
     let log = |points: &[(f64, f64)]| points.iter().map(|(x, y)| (x.log10(), *y)).collect();
     Figure {
         title: labs.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", "),
         columns: 2,
+        share_y: false,
         panels: vec![
             panel("Steady sliding", "log₁₀ of the velocity (rad/s)", "coefficient", &|lab| {
                 log(&lab.steady)

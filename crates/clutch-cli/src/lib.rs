@@ -4,6 +4,7 @@
 
 mod args;
 pub mod certify;
+mod compare;
 mod daq;
 mod friction;
 mod hil;
@@ -17,6 +18,7 @@ mod referee;
 mod replay;
 pub mod report;
 mod reproduce;
+mod run_figure;
 mod sampled;
 mod scenario;
 mod signals;
@@ -46,11 +48,14 @@ pub use output::BUILD;
 /// 5 the log ended early, or has a gap; 64 the command
 /// line could not be understood.
 #[derive(Parser)]
-#[command(name = "clutch", version, max_term_width = 100)]
+#[command(name = "clutch", version, max_term_width = 80)]
 #[command(
     after_help = "Example:\n  clutch loop                        # the loop on a simulated board\n  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario"
 )]
 struct Cli {
+    /// Tells nothing but errors and what was asked for: JSON, lists, files.
+    #[arg(long, short, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     verb: Verb,
 }
@@ -65,6 +70,7 @@ enum Verb {
     Replay(replay::Replay),
     Log(log::Log),
     Sim(sim::Sim),
+    Compare(compare::Compare),
     Sweep(sweep::SweepVerb),
     Scenario(scenario::ScenarioVerb),
     Certify(certify::Certify),
@@ -85,6 +91,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
             return if asked_for { 0 } else { 64 };
         }
     };
+    output::set_quiet(cli.quiet);
     let outcome = match cli.verb {
         Verb::Loop(v) => v.run(),
         Verb::Daq(v) => v.run(),
@@ -94,6 +101,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Replay(v) => v.run(),
         Verb::Log(v) => v.run(),
         Verb::Sim(v) => v.run(),
+        Verb::Compare(v) => v.run(),
         Verb::Sweep(v) => v.run(),
         Verb::Scenario(v) => v.run(),
         Verb::Certify(v) => v.run(),

@@ -1,7 +1,7 @@
 //! `clutch loop`.
 
 use crate::args::{ScenarioArgs, key_value};
-use crate::output::{BUILD, Exit, json, not_certified, paragraph, print, shown};
+use crate::output::{BUILD, Exit, json, not_certified, paragraph, quiet, report, shown, tell};
 use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
@@ -187,7 +187,7 @@ impl Loop {
         let ignored = Arc::new(AtomicBool::new(false));
         signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
             .context("signals could not be caught")?;
-        let show = std::io::stderr().is_terminal();
+        let show = std::io::stderr().is_terminal() && !quiet();
         let mut said = Ok(());
         let ran = session.run(&stop, &mut |event| match event {
             // What cannot be said is not done: nothing has moved yet.
@@ -219,7 +219,7 @@ impl Loop {
             Err(obstacle) => return Err(obstacle.into()),
         };
         said?;
-        print(&if self.json { json(&ran.to_json())? } else { summary(&ran) })?;
+        report(self.json, || json(&ran.to_json()), || summary(&ran))?;
         Ok(match ran.verdict() {
             Verdict::Done if ran.log.as_ref().is_some_and(|log| log.records.is_err()) => Exit::Incomplete,
             Verdict::Done => Exit::Done,
@@ -301,7 +301,7 @@ impl Loop {
             let _ = std::io::stderr().write_all(shown(text).as_bytes());
             return Ok(());
         }
-        print(text)
+        tell(text)
     }
 }
 

@@ -383,6 +383,7 @@ impl Grid {
         Figure {
             title: format!("{}: {}", scenario.name(), self.about),
             columns: 1,
+            share_y: false,
             panels: vec![Panel {
                 title: marks.join(" · "),
                 x_label: self.across.clone(),

@@ -395,8 +395,9 @@ mod tests {
         let figure = Figure {
             title: "Figure".to_owned(),
             columns: 1,
+            share_y: false,
             panels: vec![Panel {
-                series: vec![Series { label: String::new(), points: vec![(0.0, 1.0), (1.0, 2.0)] }],
+                series: vec![Series::new("", vec![(0.0, 1.0), (1.0, 2.0)])],
                 ..Panel::default()
             }],
         };

@@ -1,6 +1,6 @@
 //! `clutch reproduce`.
 
-use crate::output::{Exit, json, print, with_progress, write};
+use crate::output::{Exit, json, tell, with_progress, write};
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{ReportFigure, ReportTable, claims_table, html};
 use crate::table::number;
@@ -73,7 +73,7 @@ impl Reproduce {
         } else {
             format!("not as documented: {}", unexpected.join(", "))
         };
-        print(&format!(
+        tell(&format!(
             "{}\n{verdict}\nfigures, table3.csv, report.json and report.html are in {}\n",
             claims_table(&outcome.claims),
             dir.display()
@@ -105,10 +105,10 @@ fn draw(f: &FigureData) -> Figure {
             ),
             x_label: "time (s)".to_owned(),
             y_label: "error (°)".to_owned(),
-            series: vec![Series {
-                label: "error".to_owned(),
-                points: p.time_s.iter().copied().zip(p.error_deg.iter().copied()).collect(),
-            }],
+            series: vec![Series::new(
+                "error",
+                p.time_s.iter().copied().zip(p.error_deg.iter().copied()).collect(),
+            )],
             lines: vec![0.0],
             ..Panel::default()
         })
@@ -117,6 +117,7 @@ fn draw(f: &FigureData) -> Figure {
         title: format!("Fig. {}: positional errors with the {}", f.number, f.law.name()),
         columns: 2,
         panels,
+        share_y: true,
     }
 }
 

@@ -1,6 +1,6 @@
 //! `clutch scenario`.
 
-use crate::output::{Exit, json, print};
+use crate::output::{Exit, json, print, tell};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use clutch_sim::scenario::{BUILT_IN, BuiltIn, schema};
@@ -45,7 +45,8 @@ enum Verb {
 fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
     BUILT_IN.iter().find(|b| b.name == name).with_context(|| {
         let names: Vec<&str> = BUILT_IN.iter().map(|b| b.name).collect();
-        format!("no built-in scenario is called {name}; expected one of: {}", names.join(", "))
+        let like = BuiltIn::like(name);
+        format!("no built-in scenario is called {name}{like}; expected one of: {}", names.join(", "))
     })
 }
 
@@ -71,7 +72,7 @@ impl ScenarioVerb {
                 let mut out = std::fs::File::create_new(&file)
                     .with_context(|| format!("{shown}: cannot be created"))?;
                 out.write_all(text.as_bytes()).with_context(|| format!("{shown}: cannot be written"))?;
-                print(&format!("wrote {shown}; run it with: clutch sim {shown}\n"))?;
+                tell(&format!("wrote {shown}; run it with: clutch sim {shown}\n"))?;
             }
         }
         Ok(Exit::Done)

@@ -264,7 +264,7 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
             title,
             x_label: "t, s".to_owned(),
             y_label: "error, °".to_owned(),
-            series: vec![Series { label: String::new(), points: errors(scenario, tuned.rates_deg_s[0])? }],
+            series: vec![Series::new("", errors(scenario, tuned.rates_deg_s[0])?)],
             ..Panel::default()
         });
     }
@@ -281,6 +281,7 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
             number(tuned.rates_deg_s[0])
         ),
         columns: 2,
+        share_y: false,
         panels,
     })
 }

@@ -28,6 +28,7 @@ fn the_help_of_every_verb_has_an_example() {
     for verb in [
         &["--help"][..],
         &["sim", "--help"],
+        &["compare", "--help"],
         &["sweep", "--help"],
         &["scenario", "--help"],
         &["scenario", "list", "--help"],
@@ -152,6 +153,148 @@ fn a_run_writes_its_samples_and_its_figure() {
     assert!(err(&o).contains("run.jpg") && err(&o).contains(".svg or .png"), "{}", err(&o));
     let o = clutch(&["sim", "smc_2", "--csv", "no/such/folder/run.csv"]);
     assert!(err(&o).starts_with("clutch: no/such/folder/run.csv: cannot be written"), "{}", err(&o));
+}
+
+/// Texts and curves of a drawing.
+fn drawing(svg: &Path) -> (Vec<String>, usize) {
+    let text = std::fs::read_to_string(svg).expect("a drawing");
+    let document = roxmltree::Document::parse(&text).expect("well-formed");
+    let texts =
+        document.descendants().filter(|n| n.is_text()).filter_map(|n| n.text().map(|t| t.trim().to_owned()));
+    let bands = document.descendants().filter(|n| {
+        n.has_tag_name("polygon") && n.attribute("opacity").is_some_and(|o| o.starts_with("0.2"))
+    });
+    (texts.filter(|t| !t.is_empty()).collect(), bands.count())
+}
+
+#[test]
+fn a_run_is_drawn_closely_around_a_stick_and_whole_as_an_envelope() {
+    let svg = folder("sim_plot").join("run.svg");
+    let o = clutch(&["sim", "bench_pd_2", "--plot", svg.to_str().unwrap()]);
+    assert!(o.status.success(), "{}", err(&o));
+    assert!(out(&o).lines().last().is_some_and(|l| l == format!("wrote {}", svg.display())), "{}", out(&o));
+    let (texts, bands) = drawing(&svg);
+    for text in
+        ["position (counts)", "velocity (°/s)", "error (°)", "voltage (V)", "path", "at rest", "the window"]
+    {
+        assert!(texts.iter().any(|t| t == text), "lacks {text}: {texts:?}");
+    }
+    assert!(texts.iter().any(|t| t.starts_with("216 ms around the stick at ")), "{texts:?}");
+    assert_eq!(bands, 2, "error and voltage");
+    // A run that does not stick is shown around its largest error.
+    assert!(clutch(&["sim", "bench_glide_2", "--plot", svg.to_str().unwrap()]).status.success());
+    let (texts, _) = drawing(&svg);
+    assert!(texts.iter().any(|t| t.contains("around the largest error, at ")), "{texts:?}");
+}
+
+#[test]
+fn runs_are_compared_in_a_table_of_80_columns_and_on_common_axes() {
+    let svg = folder("compare").join("laws.svg");
+    let two = ["bench_pd_2", "bench_smc_2"];
+    let o = clutch(&[&["compare"][..], &two, &["--plot", svg.to_str().unwrap()]].concat());
+    let text = out(&o);
+    assert!(o.status.success(), "{}", err(&o));
+    let short = |text: &str| text.lines().all(|line| line.chars().count() <= 80);
+    assert!(text.lines().filter(|l| !l.starts_with("wrote")).all(short), "{text}");
+    let cells = |name: &str| {
+        let line = text.lines().find(|l| l.trim_start().starts_with(name)).expect(name);
+        line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+    };
+    // The figures of `clutch sim`.
+    for (column, name) in two.iter().enumerate() {
+        let one = out(&clutch(&["sim", name]));
+        let line = one.lines().find(|l| l.trim_start().starts_with("max |error|")).expect("a figure");
+        assert_eq!(line.split_whitespace().nth(2), cells("max |error|").get(2 + column).map(String::as_str));
+    }
+    assert_eq!(cells("A "), ["A", "B"]);
+    let (texts, bands) = drawing(&svg);
+    assert_eq!(bands, 4);
+    let path = texts.iter().filter(|t| *t == "path").count();
+    assert_eq!(path, 2, "one path in each of two panels: {texts:?}");
+    for law in ["A: PD at 2 °/s, bench", "B: SMC at 2 °/s, bench"] {
+        assert_eq!(texts.iter().filter(|t| *t == law).count(), 4, "{texts:?}");
+    }
+
+    let set = ["--set", "reference.ramp.rate_deg_s=6", "--json"];
+    let all = ["pd_2", "smc_2", "ctc_2", "pid_2", "observer_smc_2"];
+    let o = clutch(&[&["compare"][..], &all, &set].concat());
+    let value: serde_json::Value = serde_json::from_slice(&o.stdout).expect("only JSON");
+    let runs = value["runs"].as_array().expect("runs");
+    assert_eq!(runs.len(), 5);
+    for run in runs {
+        let rate = run["path"]["highest_velocity_rad_s"].as_f64().expect("a rate");
+        assert!((rate.to_degrees() - 6.0).abs() < 1e-9, "{rate}");
+    }
+    assert!(value["window"]["from_s"].as_f64() < value["window"]["to_s"].as_f64());
+    let text = out(&clutch(&[&["compare"][..], &all].concat()));
+    assert!(short(&text) && text.matches("max |error|").count() == 2, "five columns are two tables: {text}");
+
+    assert_eq!(clutch(&["compare", "pd_2"]).status.code(), Some(64));
+    let o = clutch(&[&["compare"][..], &["pd_2"; 8]].concat());
+    assert!(err(&o).contains("8 scenarios: expected 2 to 7"), "{}", err(&o));
+}
+
+#[test]
+fn what_every_built_in_run_prints_fits_a_terminal() {
+    let list = out(&clutch(&["scenario", "list"]));
+    for name in list.lines().filter_map(|line| line.split_whitespace().next()) {
+        let text = out(&clutch(&["sim", name]));
+        assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+        let bars = text.lines().skip_while(|l| !l.contains("|error| of the whole run")).nth(1).expect("bars");
+        assert!(bars.trim().chars().all(|c| ('▁'..='█').contains(&c)) && bars.contains('█'), "{text}");
+    }
+}
+
+#[test]
+fn a_quiet_command_tells_nothing_but_what_was_asked_for() {
+    let svg = folder("quiet").join("run.svg");
+    let o = clutch(&["--quiet", "sim", "smc_2", "--plot", svg.to_str().unwrap()]);
+    assert!(o.status.success() && out(&o).is_empty() && err(&o).is_empty(), "{}{}", out(&o), err(&o));
+    assert!(svg.exists());
+    assert!(out(&clutch(&["sim", "smc_2", "--json", "-q"])).starts_with('{'));
+    assert!(out(&clutch(&["scenario", "list", "-q"])).contains("smc_2"));
+    assert!(err(&clutch(&["-q", "sim", "missing.toml"])).contains("no such file"));
+}
+
+/// Output of a command on a terminal, made by `script`; none where that program is missing.
+fn on_a_terminal(command: &str, environment: &[(&str, &str)]) -> Option<String> {
+    let line = format!("'{}' {command}", env!("CARGO_BIN_EXE_clutch"));
+    let mut script = Command::new("script");
+    script.args(["-qec", &line, "/dev/null"]).env_remove("NO_COLOR").env("TERM", "xterm-256color");
+    script.envs(environment.iter().copied());
+    let o = script.output().ok()?;
+    Some(out(&o))
+}
+
+#[test]
+fn verdicts_have_colours_on_a_terminal_alone() {
+    let escape = '\u{1b}';
+    assert!(!out(&clutch(&["sim", "bench_pd_2"])).contains(escape), "no terminal");
+    let Some(text) = on_a_terminal("sim bench_pd_2", &[]) else {
+        eprintln!("skipped: no program `script`");
+        return;
+    };
+    assert!(text.contains(&format!("{escape}[1m{escape}[31mUNSTABLE{escape}[0m")), "{text:?}");
+    for plain in [("NO_COLOR", "1"), ("TERM", "dumb")] {
+        let text = on_a_terminal("sim bench_pd_2", &[plain]).expect("it was there");
+        assert!(text.contains("UNSTABLE") && !text.contains(&format!("{escape}[31m")), "{plain:?}: {text:?}");
+    }
+}
+
+#[test]
+fn a_name_in_other_letters_is_recognised() {
+    for (args, meant) in [
+        (&["sim", "SMC_2"][..], "did you mean smc_2?"),
+        (&["scenario", "show", "Bench_PD_2"], "did you mean bench_pd_2?"),
+        (&["sim", "smc_2", "--set", "law.smc.KP_V=3"], "did you mean kp_v?"),
+        (&["sim", "smc_2", "--set", "law.smc.Kp=3"], "did you mean kp_v?"),
+        (&["sim", "smc_2", "--set", "RUN.seed=3"], "did you mean run?"),
+        (&["sim", "smc_2", "--set", "rig.base=Bench"], "did you mean bench?"),
+    ] {
+        let o = clutch(args);
+        assert_eq!(o.status.code(), Some(1), "{args:?}");
+        assert!(err(&o).contains(meant), "{args:?}: {}", err(&o));
+    }
 }
 
 #[test]
