@@ -113,7 +113,6 @@ fn figure(labs: &[(&str, Lab)]) -> Figure {
     Figure {
         title: labs.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", "),
         columns: 2,
-        share_y: false,
         panels: vec![
             panel("Steady sliding", "log₁₀ of the velocity (rad/s)", "coefficient", &|lab| {
                 log(&lab.steady)
@@ -128,5 +127,6 @@ fn figure(labs: &[(&str, Lab)]) -> Figure {
                 log(&lab.break_away)
             }),
         ],
+        ..Figure::default()
     }
 }

@@ -116,6 +116,8 @@ pub struct Figure {
     pub panels: Vec<Panel>,
     /// True if the panels of a row have one vertical scale: they are to be compared.
     pub share_y: bool,
+    /// True if panels are narrow, so that their texts can be read on a phone.
+    pub narrow: bool,
 }
 
 impl Figure {
@@ -183,6 +185,29 @@ impl Figure {
         Ok(file)
     }
 
+    /// The panels as narrow figures of their own, with the scales that they have in this one.
+    #[must_use]
+    pub fn split(&self) -> Vec<Figure> {
+        let alone = |(panel, (_, y)): (&Panel, (Axis, Axis))| {
+            let y_range = if panel.cells.is_some() { panel.y_range } else { Some((y.lo, y.hi)) };
+            let panels = vec![Panel { y_range, ..panel.clone() }];
+            Figure { columns: 1, panels, narrow: true, ..Figure::default() }
+        };
+        self.panels.iter().zip(self.axes()).map(alone).collect()
+    }
+
+    /// The axes of each panel.
+    fn axes(&self) -> Vec<(Axis, Axis)> {
+        let mut ranges: Vec<_> = self.panels.iter().map(heights).collect();
+        if self.share_y {
+            for row in ranges.chunks_mut(self.columns.max(1)) {
+                let all = extent(row.iter().flatten().flat_map(|(low, high)| [*low, *high]));
+                row.fill(all);
+            }
+        }
+        self.panels.iter().zip(ranges).map(|(panel, range)| axes(panel, range)).collect()
+    }
+
     /// Writes the figure to a file whose name ends in `.svg` or `.png`.
     ///
     /// # Errors
@@ -219,8 +244,9 @@ pub fn figure_format(path: &Path) -> anyhow::Result<FigureFormat> {
     }
 }
 
-/// Size of a panel, px.
+/// Size of a panel, px, and width of a narrow one.
 const PANEL: (f64, f64) = (600.0, 350.0);
+const NARROW: f64 = 480.0;
 /// Least height of a row of cells, px.
 const CELL: f64 = 22.0;
 /// Ends of the scale of shades: of one hue, so that it is read without colours, too.
@@ -512,15 +538,7 @@ impl Layout {
         let columns = figure.columns.clamp(1, figure.panels.len().max(1));
         let rows = figure.panels.len().div_ceil(columns);
         let head = if figure.title.is_empty() { 0.0 } else { space::FIGURE_TITLE };
-        let mut ranges: Vec<_> = figure.panels.iter().map(heights).collect();
-        if figure.share_y {
-            for row in ranges.chunks_mut(columns) {
-                let all = extent(row.iter().flatten().flat_map(|(low, high)| [*low, *high]));
-                row.fill(all);
-            }
-        }
-        let mut axes: Vec<(Axis, Axis)> =
-            figure.panels.iter().zip(ranges).map(|(panel, range)| axes(panel, range)).collect();
+        let mut axes = figure.axes();
 
         let mut labels = 0.0_f64;
         for (_, label) in axes.iter().flat_map(|(_, y)| &y.ticks) {
@@ -528,7 +546,8 @@ impl Layout {
         }
         let named = figure.panels.iter().any(|p| !p.y_label.is_empty());
         let left = labels + if named { 19.0 + LABEL } else { 10.0 };
-        let width = PANEL.0 - left - space::RIGHT;
+        let panel = if figure.narrow { NARROW } else { PANEL.0 };
+        let width = panel - left - space::RIGHT;
         for ((x, _), panel) in axes.iter_mut().zip(&figure.panels) {
             if panel.cells.is_none() {
                 x.thin_out(width)?;
@@ -552,7 +571,7 @@ impl Layout {
             let cells = cells.map(|c| CELL * c.rows.len() as f64).fold(0.0, f64::max);
             let bottom = area_top + (PANEL.1 - space::PANEL_TITLE - space::BELOW).max(cells);
             for (column, (index, entries)) in these.zip(legends).enumerate() {
-                let from = space::EDGE + column as f64 * PANEL.0 + left;
+                let from = space::EDGE + column as f64 * panel + left;
                 let (x, y) = axes[index].clone();
                 panels.push(Placed {
                     x,
@@ -566,7 +585,7 @@ impl Layout {
             }
             top = bottom + space::BELOW;
         }
-        let (width, height) = (2.0 * space::EDGE + columns as f64 * PANEL.0, top + space::EDGE);
+        let (width, height) = (2.0 * space::EDGE + columns as f64 * panel, top + space::EDGE);
         if width * height > LARGEST {
             bail!("a figure of {} panels is too large to draw; split it", figure.panels.len());
         }
@@ -999,7 +1018,7 @@ mod tests {
     }
 
     fn figure(panels: Vec<Panel>) -> Figure {
-        Figure { title: "Figure 8 <&> \"e\" & θ̇".to_owned(), columns: 2, panels, share_y: false }
+        Figure { title: "Figure 8 <&> \"e\" & θ̇".to_owned(), columns: 2, panels, ..Figure::default() }
     }
 
     fn wave(n: u32) -> impl Iterator<Item = (f64, f64)> {

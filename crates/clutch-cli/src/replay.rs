@@ -143,7 +143,6 @@ fn figure(log: &Log, replayed: &[CommandRecord]) -> Figure {
     Figure {
         title: format!("Replay of {}", log.header.scenario_name),
         columns: 1,
-        share_y: false,
         panels: vec![
             panel(
                 "Voltage",
@@ -164,5 +163,6 @@ fn figure(log: &Log, replayed: &[CommandRecord]) -> Figure {
                 vec![series("logged", &|i| log.commands[i].error.to_degrees())],
             ),
         ],
+        ..Figure::default()
     }
 }

@@ -134,5 +134,5 @@ pub(crate) fn figure(title: &str, runs: &[Drawn<'_>]) -> Figure {
         let volts = runs.iter().map(|d| d.envelope(&d.run.trace.voltage, 1.0)).collect();
         panels.push(whole("The whole run: voltage, lowest to highest and mean", "voltage (V)", volts));
     }
-    Figure { title: title.to_owned(), columns: 2, panels, share_y: false }
+    Figure { title: title.to_owned(), columns: 2, panels, ..Figure::default() }
 }

@@ -4,7 +4,7 @@ use crate::args::{ScenarioArgs, read_rig_file};
 use crate::map::{List, values};
 use crate::output::{Exit, Forms, json, paragraph, with_progress, write};
 use crate::plot::{Figure, Panel, Series};
-use crate::report::{self, ReportFigure, ReportTable};
+use crate::report::{Page, ReportFigure, ReportTable};
 use crate::table::number;
 use clap::Args;
 use clutch_certificate::file;
@@ -281,8 +281,8 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
             number(tuned.rates_deg_s[0])
         ),
         columns: 2,
-        share_y: false,
         panels,
+        ..Figure::default()
     })
 }
 
@@ -336,9 +336,17 @@ fn page(tuned: &Tuned, figure: &Figure) -> anyhow::Result<String> {
             1,
         ),
     ];
-    let caption =
-        "Error of the best gains of each law, from rest, on a disc that no gain was chosen on.".to_owned();
-    let figure = ReportFigure { id: "tune".to_owned(), caption, svg: figure.svg()? };
+    let caption = "Error of the best gains of each law, from rest, on a disc that no gain was chosen on.";
+    let figures = [ReportFigure::new("tune", caption, figure)?];
     let settings = tuned.winner().and_then(|w| w.scenario.as_ref()).unwrap_or(&tuned.believed).parameters();
-    Ok(report::html(&title, &[verdict(tuned), about(tuned)], &[], &tables, &[figure], &settings))
+    let page = Page {
+        title: &title,
+        lead: &[verdict(tuned)],
+        figures: &figures,
+        tables: &tables,
+        about: &[about(tuned)],
+        settings: &settings,
+        ..Page::default()
+    };
+    page.html()
 }

@@ -334,6 +334,36 @@ fn reproduce_names_a_folder_that_it_cannot_make() {
 }
 
 #[test]
+fn the_report_begins_with_three_sentences_and_the_figures_and_prints_80_columns() {
+    let dir = folder("report");
+    let o = clutch(&["reproduce", "--out", dir.to_str().unwrap()]);
+    assert!(o.status.success(), "{}", err(&o));
+    let lines = out(&o);
+    let long = |line: &&str| line.chars().count() > 80 && !line.starts_with("figures, table3.csv");
+    assert_eq!(lines.lines().find(long), None);
+    let page = std::fs::read_to_string(dir.join("report.html")).unwrap();
+    let at = |text: &str| page.find(text).expect(text);
+    let (figures, claims) = (at("<h2 id=\"figures\">"), at("<h2 id=\"claims\">"));
+    assert_eq!(page[..figures].matches("<p class=\"lead\">").count(), 3);
+    assert!(at("<svg") > figures && at("<svg") < claims);
+    // The sentences tell what was computed.
+    let report = std::fs::read_to_string(dir.join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let slowest = &report["table3"][2];
+    for (name, after) in
+        [("pd_cycles_per_s", " times a second under PD"), ("reduction_percent", " % less, where")]
+    {
+        let told = format!("{:.1}{after}", slowest[name].as_f64().unwrap());
+        assert!(page[..figures].contains(&told), "lacks {told}");
+    }
+    for name in ["laws", "fig8", "fig9", "fig10"] {
+        assert!(std::fs::read(dir.join(name).with_extension("png")).unwrap().starts_with(b"\x89PNG"));
+        drawing(&dir.join(name).with_extension("svg"));
+        assert!(page.contains(&format!("<figure id=\"figure-{name}\">")));
+    }
+}
+
+#[test]
 fn the_errors_that_the_docs_show_are_the_errors_that_come() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/scenario.md");
     let page = std::fs::read_to_string(page).unwrap();
