@@ -127,7 +127,7 @@ def compare(
     --------
     >>> import clutch
     >>> both = clutch.compare("bench_pd_2", "bench_smc_2")
-    >>> list(both.table["stick_slip_cycles_per_s"])
+    >>> both.table["stick_slip_cycles_per_s"].tolist()
     [40.75, 9.0]
     """
     if len(runs) < 2:

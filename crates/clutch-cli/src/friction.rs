@@ -1,7 +1,7 @@
 //! `clutch friction`.
 
 use crate::args::key_value;
-use crate::output::{Exit, print, tell, wrote};
+use crate::output::{Exit, paragraph, print, tell, wrote};
 use crate::plot::{self, Figure, Panel, Series};
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -91,13 +91,15 @@ impl FrictionVerb {
 fn list() -> String {
     let mut out = String::new();
     for option in <FrictionParams as Choice<f64>>::CHOICE.options {
-        out += &format!("{}: {}\n", option.key, option.doc);
+        out += &paragraph(&format!("{}: {}", option.key, option.doc));
         for row in option.table.rows {
             let unit = if row.unit.text.is_empty() { String::new() } else { format!(" {}", row.unit.text) };
             out += &format!("   {:26} {:8} {}{unit}\n", row.key, row.symbol, row.default);
         }
     }
-    out + "Write them below [rig.friction.NAME] or [model.friction.NAME]; the default is stribeck.\n"
+    out + &paragraph(
+        "Write them below [rig.friction.NAME] or [model.friction.NAME]; the default is stribeck.",
+    )
 }
 
 /// The four experiments, a curve for each model.

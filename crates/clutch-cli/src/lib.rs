@@ -27,7 +27,8 @@ mod sweep;
 mod table;
 pub mod tune;
 
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue};
+use clap::{CommandFactory, Parser, Subcommand};
 use output::Exit;
 use std::ffi::OsString;
 use std::io::Write;
@@ -80,12 +81,24 @@ enum Verb {
     Reproduce(reproduce::Reproduce),
 }
 
+/// A verb written in other letters is the verb: clap compares them as they are.
+fn suggest_verb(e: &mut clap::Error) {
+    let Some(ContextValue::String(unknown)) = e.get(ContextKind::InvalidSubcommand) else { return };
+    let meant = unknown.to_lowercase();
+    if e.get(ContextKind::SuggestedSubcommand).is_none()
+        && Cli::command().get_subcommands().any(|verb| verb.get_name() == meant)
+    {
+        e.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![meant]));
+    }
+}
+
 /// Runs the command with its arguments, the program's name first; its exit code.
 #[must_use]
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,
-        Err(e) => {
+        Err(mut e) => {
+            suggest_verb(&mut e);
             let asked_for = !e.use_stderr(); // --help, --version
             let _ = e.print(); // nobody is left to receive it
             return if asked_for { 0 } else { 64 };

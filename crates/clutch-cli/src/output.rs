@@ -63,15 +63,23 @@ pub(crate) fn new_log(path: &Path) -> anyhow::Result<()> {
 
 /// A verdict as a paragraph of at most 80 columns, its further lines indented.
 pub(crate) fn paragraph(text: &str) -> String {
-    let mut out = String::new();
-    let mut column = 0;
+    flow("", text, 4)
+}
+
+/// A text beside a head, as a name in a list; further lines stand below the text.
+pub(crate) fn beside(head: &str, text: &str) -> String {
+    flow(head, text, head.chars().count() + 1)
+}
+
+fn flow(head: &str, text: &str, indent: usize) -> String {
+    let mut out = head.to_owned();
+    let mut column = head.chars().count();
     for word in text.split_whitespace() {
         let length = word.chars().count();
         if column > 0 && column + 1 + length > WIDTH {
-            out += "\n   ";
-            column = 3;
-        }
-        if column > 0 {
+            out += &format!("\n{:1$}", "", indent);
+            column = indent;
+        } else if column > 0 {
             out.push(' ');
             column += 1;
         }
@@ -180,10 +188,9 @@ fn whole_word(text: &str, word: &str) -> Option<usize> {
         .find(|at| !text[..*at].ends_with(part) && !text[*at + word.len()..].starts_with(part))
 }
 
-/// The line that tells which files were written.
+/// The lines that tell which files were written.
 pub(crate) fn wrote(files: &[&Path]) -> String {
-    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-    if names.is_empty() { String::new() } else { paragraph(&format!("wrote {}", names.join(", "))) }
+    files.iter().map(|file| format!("wrote {}\n", file.display())).collect()
 }
 
 /// Bars of one line, the higher the larger the value; the highest stands for `most`.
@@ -261,6 +268,29 @@ mod tests {
         assert_eq!(anstream::adapter::strip_str(&shown).to_string(), text);
         assert_eq!(shown, text.replace("NOT certified", &format!("{BAD}NOT certified{BAD:#}")));
         assert_eq!(coloured("UNCERTIFIED, then certified").matches('\u{1b}').count(), 4 + 1);
+    }
+
+    #[test]
+    fn no_line_is_longer_than_80_columns_unless_a_word_is() {
+        let words = "seven by seven ".repeat(20);
+        let text = paragraph(&words);
+        assert!(text.lines().all(|l| l.chars().count() <= WIDTH) && text.lines().count() == 4, "{text}");
+        assert!(text.lines().skip(1).all(|l| l.starts_with("    s") || l.starts_with("    b")), "{text}");
+        let listed = beside("A8                ", &words);
+        assert!(listed.starts_with("A8                 seven by"), "{listed}");
+        assert!(
+            listed.lines().skip(1).all(|l| l.starts_with(&format!("{:19}", "")) && !l.ends_with(' ')),
+            "{listed}"
+        );
+        assert!(listed.lines().all(|l| l.chars().count() <= WIDTH));
+        assert_eq!(
+            listed.split_whitespace().skip(1).collect::<Vec<_>>(),
+            words.split_whitespace().collect::<Vec<_>>()
+        );
+        let long = "w".repeat(100);
+        assert_eq!(paragraph(&long), long.clone() + "\n");
+        assert_eq!(paragraph(&format!("about {long}")), format!("about\n    {long}\n"));
+        assert_eq!(paragraph(""), "\n");
     }
 
     #[test]

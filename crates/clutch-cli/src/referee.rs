@@ -1,6 +1,6 @@
 //! `clutch referee`.
 
-use crate::output::{Exit, json, print, tell};
+use crate::output::{Exit, beside, json, print, tell};
 use anyhow::Context;
 use clap::Args;
 use clutch_sim::referee::{BUILT_IN, Case, ENGINES, RefereeEngine, RefereeError, Verdict, run};
@@ -91,7 +91,7 @@ impl Referee {
         if self.list {
             for (name, text) in BUILT_IN {
                 let case = Case::parse(name, text)?;
-                print(&format!("{:18} {}\n", case.id, case.title))?;
+                print(&beside(&format!("{:18}", case.id), &case.title))?;
             }
             return Ok(Exit::Done);
         }

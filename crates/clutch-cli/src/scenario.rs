@@ -1,6 +1,6 @@
 //! `clutch scenario`.
 
-use crate::output::{Exit, json, print, tell};
+use crate::output::{Exit, beside, json, print, tell};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use clutch_sim::scenario::{BUILT_IN, BuiltIn, schema};
@@ -54,14 +54,11 @@ impl ScenarioVerb {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
         match self.verb {
             Verb::List => {
-                let lines: Vec<String> = BUILT_IN
-                    .iter()
-                    .map(|b| {
-                        let title = b.toml.lines().find_map(|l| l.strip_prefix("name = "));
-                        format!("{:20} {}", b.name, title.unwrap_or_default().trim_matches('"'))
-                    })
-                    .collect();
-                print(&(lines.join("\n") + "\n"))?;
+                let line = |b: &BuiltIn| {
+                    let title = b.toml.lines().find_map(|l| l.strip_prefix("name = "));
+                    beside(&format!("{:20}", b.name), title.unwrap_or_default().trim_matches('"'))
+                };
+                print(&BUILT_IN.iter().map(line).collect::<String>())?;
             }
             Verb::Schema => print(&json(&schema())?)?,
             Verb::Show { name } => print(find(&name)?.toml)?,

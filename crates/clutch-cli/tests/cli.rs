@@ -50,6 +50,9 @@ fn the_help_of_every_verb_has_an_example() {
         assert!(o.status.success());
         let text = out(&o).replace("Examples:", "Example:");
         assert!(text.contains("Example:\n  clutch "), "{verb:?}:\n{}", out(&o));
+        // The line of usage is clap's, which does not break it.
+        let long = text.lines().find(|line| line.chars().count() > 80 && !line.starts_with("Usage:"));
+        assert_eq!(long, None, "{verb:?}: a line is longer than a terminal");
     }
 }
 
@@ -294,6 +297,11 @@ fn a_name_in_other_letters_is_recognised() {
         let o = clutch(args);
         assert_eq!(o.status.code(), Some(1), "{args:?}");
         assert!(err(&o).contains(meant), "{args:?}: {}", err(&o));
+    }
+    for (verb, meant) in [("SIM", "sim"), ("Reproduce", "reproduce"), ("comprae", "compare")] {
+        let o = clutch(&[verb]);
+        assert_eq!(o.status.code(), Some(64));
+        assert!(err(&o).contains(&format!("similar subcommand exists: '{meant}'")), "{}", err(&o));
     }
 }
 
