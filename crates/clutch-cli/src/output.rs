@@ -158,6 +158,7 @@ const VERDICTS: &[(&str, Style)] = &[
     ("does not hold", BAD),
     ("documented deviation", KNOWN),
     ("cannot tell", KNOWN),
+    ("certified for the model", KNOWN),
     ("linearly stable", GOOD),
     ("certified", GOOD),
     ("holds", GOOD),

@@ -190,8 +190,10 @@ impl Figure {
     pub fn split(&self) -> Vec<Figure> {
         let alone = |(panel, (_, y)): (&Panel, (Axis, Axis))| {
             let y_range = if panel.cells.is_some() { panel.y_range } else { Some((y.lo, y.hi)) };
+            // Cells need their width.
+            let narrow = panel.cells.is_none();
             let panels = vec![Panel { y_range, ..panel.clone() }];
-            Figure { columns: 1, panels, narrow: true, ..Figure::default() }
+            Figure { columns: 1, panels, narrow, ..Figure::default() }
         };
         self.panels.iter().zip(self.axes()).map(alone).collect()
     }

@@ -74,9 +74,11 @@ impl Window {
         if trace.time.is_empty() {
             return None;
         }
+        // Where the path rests, a shaft at rest is where it should be.
         let goes_on = |s: &Stick| {
-            let target = &trace.target_position;
-            (target[index(s.to)] - target[index(s.from)]).abs() >= 0.5 * count
+            let (target, end) = (&trace.target_position, index(s.to));
+            let way = target[end] - target[index(s.from)];
+            way.abs() >= 0.5 * count && trace.target_velocity[end] != 0.0
         };
         let mut those = sticks(&run.events, duration);
         those.retain(|s| s.from >= settle && goes_on(s));
@@ -202,14 +204,17 @@ mod tests {
     }
 
     #[test]
-    fn a_shaft_at_rest_where_its_path_rests_does_not_stick_in_a_picture() {
+    fn a_shaft_that_stops_where_its_path_rests_does_not_stick_in_a_picture() {
         let (scenario, run) = run_of("minimum_jerk", &[]);
         let window = Window::of(&scenario, &run).expect("samples");
-        assert!(0.0 <= window.from && window.from < window.to && window.to <= scenario.spec().run.duration);
-        if let Around::Stick(s) = window.around {
-            let at = |t: f64| run.trace.target_position[run.trace.time.partition_point(|x| *x < t).min(4999)];
-            assert!(at(s.to) != at(s.from), "{window:?}");
-        }
+        let Around::Stick(stick) = window.around else { panic!("{window:?}") };
+        assert!(stick.to < 6.0, "it ends on the way, not with the run: {window:?}");
+        // Of all its sticks but the last, at the path's end.
+        let stop = run.events.iter().rev().find(|e| e.kind == EventKind::Stick).copied();
+        let stopped = Run { events: stop.into_iter().collect(), ..run };
+        assert_eq!(sticks(&stopped.events, 8.0).len(), 1);
+        let window = Window::of(&scenario, &stopped).expect("samples");
+        assert!(matches!(window.around, Around::LargestError(_)), "{window:?}");
     }
 
     #[test]
