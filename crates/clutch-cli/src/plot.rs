@@ -630,14 +630,14 @@ fn axes(panel: &Panel, heights: Option<(f64, f64)>) -> (Axis, Axis) {
     (x, y)
 }
 
-/// The legend of a panel, in lines of that width: none for a single curve.
+/// The legend of a panel, in lines of that width: of what has a name, if that is more than one.
 fn legend(panel: &Panel, width: f64) -> anyhow::Result<Vec<Entry>> {
-    let shades = || panel.shades.iter().filter(|shade| !shade.label.is_empty());
-    if panel.series.len() + shades().count() < 2 {
+    let curves = panel.series.iter().enumerate().map(|(i, s)| (&s.label, Swatch::Line(s.colour(i))));
+    let shades = panel.shades.iter().map(|s| (&s.label, Swatch::Field(s.colour(SHADE))));
+    let names: Vec<_> = curves.chain(shades).filter(|(label, _)| !label.is_empty()).collect();
+    if names.len() < 2 {
         return Ok(Vec::new());
     }
-    let curves = panel.series.iter().enumerate().map(|(i, s)| (&s.label, Swatch::Line(s.colour(i))));
-    let names = curves.chain(shades().map(|s| (&s.label, Swatch::Field(s.colour(SHADE)))));
     let (swatch, gap, next) = space::SWATCH;
     let (mut line, mut left, mut entries) = (0, 0.0, Vec::new());
     for (label, sign) in names {
@@ -1188,6 +1188,61 @@ mod tests {
         let [line] = trail.lines.as_slice() else { panic!("{trail:?}") };
         assert_eq!(line.len(), 5);
         assert!(line.windows(2).all(|w| w[0].0 == w[1].0 || w[0].1 == w[1].1));
+    }
+
+    #[test]
+    fn a_band_a_guide_and_shades_are_drawn_in_their_colours_and_named_once() {
+        let time: Vec<f64> = (0..1000).map(f64::from).collect();
+        let values: Vec<f64> = time.iter().map(|t| (0.9 * t).sin()).collect();
+        let whole = Series::envelope("mean", &Envelope::new(&time, &values, 50), 2.0);
+        let guide = |label: &str| Series { guide: true, ..series(label, [(0.0, 0.0), (999.0, 1.0)]) };
+        let rest = Shade {
+            label: "at rest".to_owned(),
+            stretches: vec![(-50.0, 100.0), (300.0, 400.0)],
+            of: Some(0),
+        };
+        let panel = Panel { shades: vec![rest], ..panel(vec![whole, guide("path"), guide("")]) };
+        let svg = figure(vec![panel.clone()]).svg().unwrap();
+        let seen = texts(&svg);
+        assert_eq!(seen.iter().filter(|t| *t == "path").count(), 2, "its element and its text: {seen:?}");
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let fields: Vec<_> = document.descendants().filter(|n| n.has_tag_name("polygon")).collect();
+        let of = |n: &roxmltree::Node<'_, '_>| {
+            (n.attribute("fill").unwrap().to_owned(), n.attribute("opacity").is_some())
+        };
+        // Two stretches and their swatch, pale; the band, through which the grid is seen.
+        let (pale, band): (Vec<_>, Vec<_>) = fields.iter().map(of).partition(|(_, through)| !through);
+        assert_eq!((pale.len(), band), (3, vec![("#0072B2".to_owned(), true)]));
+        let layout = Layout::new(&figure(vec![panel])).unwrap();
+        let Area { left, right, top, bottom } = layout.panels[0].area;
+        for field in &fields {
+            for corner in field.attribute("points").unwrap().split_whitespace() {
+                let (x, y) = corner.split_once(',').unwrap();
+                let [x, y] = [x, y].map(|v| v.parse::<f64>().unwrap() / f64::from(UNITS));
+                assert!(x >= left - 0.2 && x <= right + 0.2 && y <= bottom + 0.2, "{corner}");
+                assert!(y >= top - 40.0, "a swatch is above the axes, not more");
+            }
+        }
+        // Twice the sine, at most 2: no peak is lost.
+        let (low, high) = heights(&Panel {
+            series: vec![Series::envelope("", &Envelope::new(&time, &values, 50), 2.0)],
+            ..Panel::default()
+        })
+        .unwrap();
+        assert!(low < -1.99 && high > 1.99);
+    }
+
+    #[test]
+    fn the_panels_of_a_row_share_a_scale_and_keep_it_alone() {
+        let of = |scale: f64| panel(vec![series("e", wave(500).map(|(x, y)| (x, scale * y)))]);
+        let both = Figure { share_y: true, ..figure(vec![of(1.0), of(5.0), of(0.1)]) };
+        let y = |figure: &Figure| figure.axes().into_iter().map(|(_, y)| (y.lo, y.hi)).collect::<Vec<_>>();
+        let together = y(&both);
+        assert_eq!(together[0], together[1]);
+        assert!(together[2].1 < together[0].1, "another row has its own");
+        let alone: Vec<_> = both.split().iter().map(|one| y(one)[0]).collect();
+        assert_eq!(alone, together);
+        assert!(y(&Figure { share_y: false, ..both })[0].1 < together[0].1);
     }
 
     #[test]
