@@ -1009,8 +1009,8 @@ def _overview(runs: list[Result], names: list[str]) -> Figure:
         ax.set_xlabel("time (s)")
     # One legend for all, which covers no data.
     handles, labels = position.get_legend_handles_labels()
-    mark, words = error.get_legend_handles_labels()
-    named = dict(zip(labels, handles, strict=True)) | {words[-1]: mark[-1]}
+    (mark,), (marked,) = error.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True)) | {marked: mark}
     columns = min(len(named), 4 if max(map(len, named)) <= _ROW // 2 else 2)
     figure.legend(named.values(), named.keys(), loc="outside lower left", ncols=columns)
     return figure
