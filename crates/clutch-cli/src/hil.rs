@@ -1,7 +1,7 @@
 //! `clutch hil`.
 
 use crate::args::{ScenarioArgs, key_value};
-use crate::output::{BUILD, Exit, json, not_certified, print, report};
+use crate::output::{BUILD, Exit, json, not_certified, report, warn};
 use crate::sim;
 use crate::table::{number, quantities};
 use clap::{Args, ValueEnum};
@@ -189,7 +189,7 @@ impl Hil {
         match session {
             Ok(session) => Ok(Some(session)),
             Err(refusal @ SessionError::NotCertified { .. }) => {
-                print(&not_certified(&refusal, &self.scenario))?;
+                warn(&not_certified(&refusal, &self.scenario))?;
                 Ok(None)
             }
             Err(refusal) => Err(refusal.into()),

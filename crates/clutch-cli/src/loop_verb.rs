@@ -1,7 +1,7 @@
 //! `clutch loop`.
 
 use crate::args::{ScenarioArgs, key_value};
-use crate::output::{BUILD, Exit, json, not_certified, paragraph, quiet, report, shown, tell};
+use crate::output::{BUILD, Exit, json, not_certified, paragraph, quiet, report, shown, warn};
 use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
@@ -192,7 +192,7 @@ impl Loop {
         let ran = session.run(&stop, &mut |event| match event {
             // What cannot be said is not done: nothing has moved yet.
             Event::Announced(announcement) => {
-                said = self.say(&announcement.to_string());
+                said = if quiet() { Ok(()) } else { self.say(&announcement.to_string()) };
                 stop.fetch_or(said.is_err(), Ordering::Relaxed);
             }
             Event::Progress(progress) if show => status(&progress),
@@ -301,7 +301,7 @@ impl Loop {
             let _ = std::io::stderr().write_all(shown(text).as_bytes());
             return Ok(());
         }
-        tell(text)
+        warn(text)
     }
 }
 

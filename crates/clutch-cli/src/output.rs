@@ -120,12 +120,14 @@ pub(crate) fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Prints a text for a reader, unless the command is to be quiet: verdicts in colour on a terminal that shows colours and
-/// where NO_COLOR is not set.
+/// Prints a text for a reader, unless the command is to be quiet.
 pub(crate) fn tell(text: &str) -> anyhow::Result<()> {
-    if quiet() {
-        return Ok(());
-    }
+    if quiet() { Ok(()) } else { warn(text) }
+}
+
+/// Prints what a reader must know, as that nothing was started: verdicts in colour on a terminal that shows colours and
+/// where NO_COLOR is not set.
+pub(crate) fn warn(text: &str) -> anyhow::Result<()> {
     // Foreign escapes are taken out before ours are put in.
     let text = coloured(&shown(text));
     // On anything else the escapes are left out again.

@@ -257,6 +257,15 @@ fn a_quiet_command_tells_nothing_but_what_was_asked_for() {
     assert!(out(&clutch(&["sim", "smc_2", "--json", "-q"])).starts_with('{'));
     assert!(out(&clutch(&["scenario", "list", "-q"])).contains("smc_2"));
     assert!(err(&clutch(&["-q", "sim", "missing.toml"])).contains("no such file"));
+    // That nothing was started is no chatter.
+    let refused = clutch(&["-q", "loop", "board_smc_2", "--set", "law.smc.kp_v=1"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        out(&refused).contains("--uncertified runs it all the same"),
+        "{}{}",
+        out(&refused),
+        err(&refused)
+    );
 }
 
 /// Output of a command on a terminal, made by `script`; none where that program is missing.
