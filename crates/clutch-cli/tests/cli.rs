@@ -15,6 +15,11 @@ fn err(o: &Output) -> String {
     String::from_utf8(o.stderr.clone()).expect("UTF-8")
 }
 
+/// True if a terminal of 80 columns holds the text; a file's name may be as long as it is.
+fn narrow(text: &str) -> bool {
+    text.lines().filter(|line| !line.starts_with("wrote ")).all(|line| line.chars().count() <= 80)
+}
+
 /// A folder of this test's own.
 fn folder(name: &str) -> PathBuf {
     let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -197,8 +202,7 @@ fn runs_are_compared_in_a_table_of_80_columns_and_on_common_axes() {
     let o = clutch(&[&["compare"][..], &two, &["--plot", svg.to_str().unwrap()]].concat());
     let text = out(&o);
     assert!(o.status.success(), "{}", err(&o));
-    let short = |text: &str| text.lines().all(|line| line.chars().count() <= 80);
-    assert!(text.lines().filter(|l| !l.starts_with("wrote")).all(short), "{text}");
+    assert!(narrow(&text), "{text}");
     let cells = |name: &str| {
         let line = text.lines().find(|l| l.trim_start().starts_with(name)).expect(name);
         line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
@@ -230,7 +234,7 @@ fn runs_are_compared_in_a_table_of_80_columns_and_on_common_axes() {
     }
     assert!(value["window"]["from_s"].as_f64() < value["window"]["to_s"].as_f64());
     let text = out(&clutch(&[&["compare"][..], &all].concat()));
-    assert!(short(&text) && text.matches("max |error|").count() == 2, "five columns are two tables: {text}");
+    assert!(narrow(&text) && text.matches("max |error|").count() == 2, "five columns are two tables: {text}");
 
     assert_eq!(clutch(&["compare", "pd_2"]).status.code(), Some(64));
     let o = clutch(&[&["compare"][..], &["pd_2"; 8]].concat());
@@ -242,7 +246,7 @@ fn what_every_built_in_run_prints_fits_a_terminal() {
     let list = out(&clutch(&["scenario", "list"]));
     for name in list.lines().filter_map(|line| line.split_whitespace().next()) {
         let text = out(&clutch(&["sim", name]));
-        assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+        assert!(narrow(&text), "{text}");
         let bars = text.lines().skip_while(|l| !l.contains("|error| of the whole run")).nth(1).expect("bars");
         assert!(bars.trim().chars().all(|c| ('▁'..='█').contains(&c)) && bars.contains('█'), "{text}");
     }
@@ -356,8 +360,7 @@ fn the_report_begins_with_three_sentences_and_the_figures_and_prints_80_columns(
     let o = clutch(&["reproduce", "--out", dir.to_str().unwrap()]);
     assert!(o.status.success(), "{}", err(&o));
     let lines = out(&o);
-    let long = |line: &&str| line.chars().count() > 80 && !line.starts_with("figures, table3.csv");
-    assert_eq!(lines.lines().find(long), None);
+    assert!(narrow(lines.split("figures, table3.csv").next().unwrap()), "{lines}");
     let page = std::fs::read_to_string(dir.join("report.html")).unwrap();
     let at = |text: &str| page.find(text).expect(text);
     let (figures, claims) = (at("<h2 id=\"figures\">"), at("<h2 id=\"claims\">"));
@@ -456,7 +459,7 @@ fn the_referee_prints_a_table_of_80_columns_and_fails_where_a_case_is_missed() {
     let o = clutch(&["referee", "P3", "X1"]);
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
     assert!(out(&o).contains("P3  A brake that closes at 0.1 s stops a sliding mass"), "{}", out(&o));
-    assert!(out(&o).lines().all(|line| line.chars().count() <= 80), "{}", out(&o));
+    assert!(narrow(&out(&o)), "{}", out(&o));
     let text = out(&clutch(&["referee", "--show", "P3"]));
     let file = folder("referee").join("mine.toml");
     std::fs::write(&file, text.replace("value = 1.1", "value = 1.2")).expect("the folder is there");
@@ -479,7 +482,7 @@ fn tuning_prints_who_lost_and_why_in_80_columns_and_writes_what_the_other_verbs_
     let o = clutch(&[&["tune", "board_smc_2", "--candidates", "2"][..], &files].concat());
     let text = out(&o);
     assert!(o.status.success(), "{}", err(&o));
-    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    assert!(narrow(&text), "{text}");
     for words in [
         "glide in a shell: chosen",
         "PD: rougher",
@@ -515,7 +518,7 @@ fn the_map_has_80_columns_a_legend_and_the_cause_of_each_cell() {
     let o = clutch(&[&["map", "bench_pd_2"][..], &gains, &few, &files].concat());
     let text = out(&o);
     assert!(o.status.success(), "{}", err(&o));
-    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    assert!(narrow(&text), "{text}");
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "PD at 2 °/s, bench: lowest rate without a stick, °/s");
     let row = lines.iter().find(|line| line.starts_with("     50 ")).expect(&text);
@@ -593,7 +596,7 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
     assert!(out(&o).contains("T/J  ") && out(&o).contains("lag: not told; "), "{}", out(&o));
     // All that is printed fits a terminal.
-    assert!(out(&o).lines().all(|line| line.chars().count() <= 80), "{}", out(&o));
+    assert!(narrow(&out(&o)), "{}", out(&o));
 
     let o = clutch(&[&["certify", "board_smc_2", "--json", "--identified", &rig][..], &hold].concat());
     let certificate: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");
