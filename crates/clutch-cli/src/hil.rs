@@ -211,7 +211,7 @@ impl Hil {
 
     fn text(&self, scenario: &Scenario, ran: &Ran, board: &str, took: f64) -> String {
         let title = format!(
-            "{}\n{} ticks on {board} in {took:.1} s, seed {}; figures over {} s after settling",
+            "{}\n{} ticks on {board} in {took:.1} s, seed {}\nfigures over {} s after settling",
             scenario.name(),
             ran.answers,
             scenario.spec().run.seed,
