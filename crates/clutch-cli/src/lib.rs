@@ -33,7 +33,7 @@ use output::Exit;
 use std::ffi::OsString;
 use std::io::Write;
 
-pub use loop_verb::summary;
+pub use loop_verb::{plan, summary};
 pub use output::BUILD;
 
 /// Slow, smooth motion of shafts restrained by friction.

@@ -374,8 +374,9 @@ fn us(ns: u64) -> String {
     format!("{us:.digits$}")
 }
 
-/// What the loop is about to do, in lines of a terminal.
-fn plan(a: &Announcement) -> String {
+/// Plan of a loop, told before anything moves, in lines of a terminal.
+#[must_use]
+pub fn plan(a: &Announcement) -> String {
     let rows = a.rows.iter().map(|(name, value)| beside(&format!("  {name:<11}"), value));
     let remarks = a.remarks.iter().map(|line| paragraph(line));
     std::iter::once(paragraph(&a.title)).chain(rows).chain(remarks).collect()
