@@ -20,7 +20,7 @@ pub(crate) const WIDTH: usize = 80;
 /// True if the command line has `--quiet`.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
-/// What was not asked for in so many words is not told from here on.
+/// Sets whether a text is told that was not asked for in so many words.
 pub(crate) fn set_quiet(quiet: bool) {
     QUIET.store(quiet, Ordering::Relaxed);
 }
