@@ -38,10 +38,11 @@ def main():
     pd, _, smc = runs
     keep(plot.tracking(runs, labels=list(laws)), "tracking")
     keep(plot.phase_plane(smc), "phase_plane")
-    keep(plot.run_overview(clutch.simulate("minimum_jerk")), "run_overview")
+    keep(plot.run_overview(clutch.simulate("bench_pd_2")), "run_overview")
 
     observer = clutch.simulate("observer_smc_2")
     bench = [clutch.simulate(name) for name in ("bench_pd_2", "bench_smc_2")]
+    keep(plot.comparison(bench, labels=["PD", "sliding mode"]), "comparison")
     labels = ["PD", "sliding mode", "… with observer", "PD, bench", "sliding mode, bench"]
     keep(plot.stick_slip([pd, smc, observer, *bench], labels=labels), "stick_slip")
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from clutch import _clutch, _tables
 from clutch._certificate import Certificate
 from clutch._clutch import Path, Plant, Servo, StickSlip, Table, Target, Tick, scenarios
+from clutch._compare import Comparison, compare
 from clutch._errors import LoopError, ParamError
 from clutch._log import Difference, Log, Replay, read_log, replay
 from clutch._loop import LoopResult, loop
@@ -38,6 +39,7 @@ __version__ = _clutch.VERSION
 __all__ = [
     "Candidate",
     "Certificate",
+    "Comparison",
     "Difference",
     "Estimate",
     "Identified",
@@ -65,6 +67,7 @@ __all__ = [
     "Tick",
     "Tuned",
     "__version__",
+    "compare",
     "dynamics",
     "executors",
     "grid",

@@ -18,7 +18,7 @@ from typing_extensions import CapsuleType
 from clutch import _model, _run
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "as_identified", "brake_gain", "check", "friction_lab", "identify", "lowest_smooth_speed", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction", "tune"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "as_identified", "brake_gain", "check", "envelope", "friction_lab", "identify", "lowest_smooth_speed", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction", "tune"]
 
 BUILD: Final[str]
 """
@@ -281,6 +281,17 @@ class Run:
     def save(self, /, path: str | PathLike[str]) -> None:
         """
         Writes the log that `clutch sim --log` writes.
+        """
+    @property
+    def sticks(self, /) -> Table:
+        """
+        Times at rest: from a stick to its break-away, or to the end of the run.
+        """
+    @property
+    def window(self, /) -> tuple[float, float, str, bool] | None:
+        """
+        The stretch that a picture shows closely: its begin and end, s; what is in its middle, in words; true if that is a
+        stick.
         """
 
 @final
@@ -732,6 +743,11 @@ def check(key: str, name: str, table: dict[str, Any]) -> dict[str, Any]:
     """
     Checks one table by itself: `key` as `law.smc`, `name` its name in errors. Gives the table
     back with its defaults filled in.
+    """
+
+def envelope(time: NDArray[np.float64], values: NDArray[np.float64]) -> Table:
+    """
+    A curve over time in parts of equal length: the middle of each, s, its lowest and highest value, and its mean.
     """
 
 def friction_lab(scenario: Scenario) -> dict[str, Any]:

@@ -49,6 +49,8 @@ class Result:
         A row for each sample; SI units and radians, as docs/scenario.md says under CSV.
     events : Table
         Sticks and break-aways: time_s, kind (``"stick"``, ``"break_away"``), position_rad, torque_nm.
+    sticks : Table
+        Times at rest, from a stick to its break-away or the end of the run: from_s, to_s.
 
     Examples
     --------
@@ -66,6 +68,8 @@ class Result:
         self.engine: str = run.engine
         self.samples: Table = run.samples
         self.events: Table = run.events
+        self.sticks: Table = run.sticks
+        self._window = run.window
         self._run: _clutch.Run | None = run
 
     def __getstate__(self) -> dict[str, Any]:
@@ -122,8 +126,13 @@ class Result:
         """Give the samples as an Arrow C stream, which other libraries read."""
         return self.samples.__arrow_c_stream__(requested_schema)
 
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """Begin and end of the stretch that :meth:`plot` shows closely, s: around a stick, else the largest error."""
+        return None if self._window is None else self._window[:2]
+
     def plot(self) -> Figure:
-        """Draw error, velocity and voltage over time: :func:`clutch.plot.run_overview`."""
+        """Draw the run closely around a stick, and whole: :func:`clutch.plot.run_overview`."""
         from clutch import plot
 
         return plot.run_overview(self)

@@ -47,6 +47,7 @@ __all__ = [
     "STYLE",
     "candidates",
     "certificate_region",
+    "comparison",
     "friction",
     "identified",
     "log_overview",
@@ -237,17 +238,10 @@ def _error_deg(result: Result) -> NDArray[np.float64]:
 
 
 def _sticks(result: Result) -> NDArray[np.float64]:
-    """Start and end of each time in the stuck state, s; those at either end of the run end with it."""
+    """Begin and end of each time at rest, s."""
     import numpy as np
 
-    times, kinds = result.events["time_s"], list(result.events["kind"])
-    starts = [t for t, kind in zip(times, kinds, strict=True) if kind == "stick"]
-    ends = [t for t, kind in zip(times, kinds, strict=True) if kind == "break_away"]
-    if ends and (not starts or ends[0] < starts[0]):
-        starts.insert(0, 0.0)
-    if len(starts) > len(ends):
-        ends.append(result.scenario.run.duration_s)
-    return np.array([starts, ends], dtype=np.float64).T.reshape(-1, 2)
+    return np.stack([result.sticks["from_s"], result.sticks["to_s"]], axis=1)
 
 
 def _bars(spans: NDArray[np.float64]) -> list[tuple[float, float]]:
@@ -306,6 +300,8 @@ def tracking(
 def paper_figure(figure: PaperFigure) -> Figure:
     """Draw figure 8, 9 or 10 in the paper's arrangement: a row for each rate, simulation left, bench right.
 
+    The band goes from the lowest to the highest error in each of 120 parts of the run, the line is the mean.
+
     Parameters
     ----------
     figure : PaperFigure
@@ -333,7 +329,7 @@ def paper_figure(figure: PaperFigure) -> Figure:
     rates = list(dict.fromkeys(panel.rate_deg_s for panel in figure.panels))
     if not rates:
         raise ValueError(f"paper_figure: figure {figure.number} has no panels")
-    drawing, axes = _panels(len(rates), 2, width_mm=170, height_mm=12 + 46 * len(rates), sharex=True)
+    drawing, axes = _panels(len(rates), 2, width_mm=170, height_mm=12 + 46 * len(rates), sharex=True, sharey="row")
     title = f"Fig. {figure.number}: positional errors with the {figure.law}"
     drawing.suptitle(title, x=0.01, ha="left", size=9)
     for panel in figure.panels:
@@ -342,7 +338,7 @@ def paper_figure(figure: PaperFigure) -> Figure:
         side = "(b) bench" if panel.experiment else "(a) simulation"
         ax.set_title(f"{side}, {panel.rate_deg_s:g} °/s")
         _zero(ax)
-        _line(ax, time, np.asarray(panel.error_deg), color=_BLUE)
+        _envelope(ax, time, np.asarray(panel.error_deg), {"color": _BLUE})
         ax.set(ylabel="error (°)", xlim=(0.0, 2 * time[-1] - time[-2]))
     for ax in axes[-1]:
         ax.set_xlabel("time (s)")
@@ -880,9 +876,11 @@ def friction(*frictions: _Friction, labels: Sequence[str] | None = None) -> Figu
 
 @_styled
 def run_overview(result: Result) -> Figure:
-    """Draw a run: its error, its velocity with the path's, and the voltage.
+    """Draw a run closely around a stick, and whole.
 
-    Times at which the shaft was stuck are shaded behind the voltage.
+    The window on the left is ``result.window``, the one that ``clutch sim --plot`` shows; times at rest are shaded. The
+    whole run on the right is an envelope: in each of its 120 parts the band goes from the lowest to the highest value,
+    and the line is the mean.
 
     Parameters
     ----------
@@ -892,44 +890,141 @@ def run_overview(result: Result) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Three panels over time in s: error in °, velocity in °/s, voltage in V.
+        Four panels over time in s: position by the encoder against the path, in counts, and velocity in °/s, both in
+        the window; error in ° and voltage in V of the whole run.
 
     Examples
     --------
     >>> from clutch import plot, simulate
     >>> [ax.get_ylabel() for ax in plot.run_overview(simulate("smc_2")).axes]
-    ['error (°)', 'velocity (°/s)', 'voltage (V)']
+    ['position (counts)', 'error (°)', 'velocity (°/s)', 'voltage (V)']
     """
+    return _overview([result], [result.scenario.name])
+
+
+@_styled
+def comparison(results: Iterable[Result], *, labels: Sequence[str] | None = None) -> Figure:
+    """Draw several runs on common axes: closely in one window, and whole.
+
+    The panels are those of :func:`run_overview`. The window is that of the first run that sticks; positions are counted
+    from where each path is at its begin. Strips on top show when each shaft is at rest.
+
+    Parameters
+    ----------
+    results : iterable of Result
+        Runs to compare, of other laws, gains or rigs.
+    labels : sequence of str, optional
+        A name for each run; by default the scenarios' names, with the seeds if these are alike.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Position, error, velocity and voltage over time in s.
+
+    Raises
+    ------
+    ValueError
+        There is no result, or the number of labels differs from that of the results.
+    TypeError
+        Something is not a Result.
+
+    Examples
+    --------
+    >>> from clutch import plot, simulate
+    >>> figure = plot.comparison([simulate("pd_2"), simulate("smc_2")], labels=["PD", "sliding mode"])
+    >>> len(figure.axes)
+    4
+    """
+    return _overview(*_runs("comparison", results, labels))
+
+
+def _overview(runs: list[Result], names: list[str]) -> Figure:
+    """One run or several: position and velocity in a window, error and voltage whole."""
     import numpy as np
 
-    samples = result.samples
-    time = samples["time_s"]
-    figure, axes = _panels(3, height_mm=105, sharex=True)
-    error, velocity, voltage = (row[0] for row in axes)
+    alone = len(runs) == 1
+    figure, axes = _panels(2, 2, width_mm=170, height_mm=110 if alone else 116)
+    (position, error), (velocity, voltage) = axes
+    windows = [run._window for run in runs if run._window is not None]
+    shown = next((w for w in windows if w[3]), windows[0] if windows else (0.0, _end(runs), "", False))
+    start, end, words = shown[:3]
+    counts = {run.scenario.rig.encoder.counts_per_rev for run in runs}
+    paths: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]] = []
+    for i, (run, name) in enumerate(zip(runs, names, strict=True)):
+        look: dict[str, Any] = {"color": _COLOURS[i % len(_COLOURS)], "linestyle": _DASHES[i // len(_COLOURS) % 4]}
+        samples = run.samples
+        time = samples["time_s"]
+        part = slice(*np.searchsorted(time, [start, end]))
+        per_rad = run.scenario.rig.encoder.counts_per_rev / (2 * np.pi)
+        path = np.asarray(samples["target_position_rad"][part]) * per_rad
+        origin = np.floor(path[0]) if len(path) else 0.0
+        unit = 1.0 if len(counts) == 1 else np.degrees(1 / per_rad)
+        stairs = (samples["counts"][part] - origin) * unit
+        position.step(time[part], stairs, where="post", label="shaft" if alone else name, linewidth=0.8, **look)
+        shaft = np.degrees(samples["velocity_rad_s"][part])
+        velocity.plot(time[part], shaft, linewidth=0.8, **look)
+        target = np.degrees(samples["target_velocity_rad_s"][part])
+        # Paths that are the same are drawn once.
+        guide = (time[part], (path - origin) * unit, target)
+        if not any(np.array_equal(guide[1], other[1]) for other in paths):
+            paths.append(guide)
+        _envelope(error, time, _error_deg(run), look)
+        _envelope(voltage, time, np.asarray(samples["voltage_v"]), look)
+        rest = _sticks(run)
+        rest = np.clip(rest[(rest[:, 1] > start) & (rest[:, 0] < end)], start, end)
+        for ax in (position, velocity):
+            # One run is shaded over the whole height, each of several in a strip on top.
+            place = (0, 1) if alone else (1.0 - 0.035 * (i + 1), 0.028)
+            shade: dict[str, Any] = {"facecolor": look["color"], "alpha": 0.2 if alone else 0.5}
+            ax.broken_barh(
+                _bars(rest),
+                place,
+                transform=ax.get_xaxis_transform(),
+                linewidth=0,
+                zorder=0,
+                label="at rest" if alone else None,
+                snap=False,
+                **shade,
+            )
+    for i, (time, way, rate) in enumerate(paths):
+        for ax, values in ((position, way), (velocity, rate)):
+            ax.plot(time, values, color="0.1", linewidth=0.6, zorder=1.5, label=None if i else "path")
     _zero(error)
-    _line(error, time, _error_deg(result), color=_BLUE)
+    for ax in (error, voltage):
+        ax.axvspan(start, end, color="0.85", linewidth=0, zorder=0, label="the window")
+        ax.set(xlim=(0.0, _end(runs)))
+    position.set_title(f"{1e3 * (end - start):.0f} ms {words}", pad=4)
+    velocity.set_title("The same: velocity" if alone else "The same: velocity; strips on top: at rest")
+    error.set_title("Whole run: error, lowest to highest and mean")
+    voltage.set_title("Whole run: voltage, lowest to highest and mean")
+    position.set_ylabel("position (counts)" if len(counts) == 1 else "position (°)")
     error.set_ylabel("error (°)")
-    _line(velocity, time, np.degrees(samples["velocity_rad_s"]), color=_BLUE, label="shaft")
-    target = np.degrees(samples["target_velocity_rad_s"])
-    _line(velocity, time, target, color=_RED, linewidth=0.8, label="target")
     velocity.set_ylabel("velocity (°/s)")
-    _legend_above(velocity)
-    spans = _bars(_sticks(result))
-    if spans:
-        shade: dict[str, Any] = {
-            "facecolor": "#F3CDA8",
-            "linewidth": 0,
-            "label": "stuck",
-            "zorder": 0,
-            "snap": False,
-        }
-        voltage.broken_barh(spans, (0, 1), transform=voltage.get_xaxis_transform(), **shade)
-    _line(voltage, time, samples["voltage_v"], color=_BLUE, label="voltage")
-    voltage.set(xlabel="time (s)", ylabel="voltage (V)", xlim=(0.0, _end([result])))
-    if spans:
-        _legend_above(voltage)
-    figure.align_ylabels()
+    voltage.set_ylabel("voltage (V)")
+    for ax in (position, velocity):
+        ax.set_xlim(start, end)
+        if not alone:
+            ax.margins(y=0.05 + 0.04 * len(runs))
+    for ax in (position, error, velocity, voltage):
+        ax.set_xlabel("time (s)")
+    # One legend for all, which covers no data.
+    handles, labels = position.get_legend_handles_labels()
+    (mark,), (marked,) = error.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True)) | {marked: mark}
+    columns = min(len(named), 4 if max(map(len, named)) <= _ROW // 2 else 2)
+    figure.legend(named.values(), named.keys(), loc="outside lower left", ncols=columns)
     return figure
+
+
+def _envelope(ax: Axes, time: NDArray[Any], values: NDArray[Any], look: dict[str, Any]) -> None:
+    """The means of a curve's parts, and the band from their lowest to their highest."""
+    import numpy as np
+
+    from clutch import _clutch
+
+    parts = _clutch.envelope(np.ascontiguousarray(time), np.ascontiguousarray(values))
+    ax.fill_between(parts["time_s"], parts["low"], parts["high"], color=look["color"], alpha=0.22, linewidth=0)
+    ax.plot(parts["time_s"], parts["mean"], linewidth=0.8, **look)
 
 
 _STATES = ("Disconnected", "Ready", "Armed", "Running", "Holding", "Released", "Faulted")

@@ -165,7 +165,7 @@ def test_table_3_is_the_reduction_that_the_papers_example_means(reproduced):
         assert r["reduction_percent"] == pytest.approx(reduction, rel=1e-12), "(32) is 100 (1 − SMC/PD)"
 
 
-@pytest.mark.parametrize("figure", ["fig8", "fig9", "fig10"])
+@pytest.mark.parametrize("figure", ["laws", "fig8", "fig9", "fig10"])
 def test_figures_are_valid_files(reproduced, figure):
     check_svg(reproduced[0] / f"{figure}.svg")
     check_png(reproduced[0] / f"{figure}.png")
@@ -180,7 +180,7 @@ def test_the_report_is_one_page_that_needs_no_network(reproduced):
     page.close()
     assert page.open == [] and page.wrong == [], (page.open, page.wrong)
     assert all(x.startswith(("#", "data:")) for x in page.references), page.references
-    assert page.seen.count("svg") == 3 and "table" in page.seen
+    assert page.seen.count("svg") == 4 + 6 + 4 + 6 and "table" in page.seen
 
 
 class Page(html.parser.HTMLParser):

@@ -75,8 +75,8 @@ def test_the_text_is_the_commands_line_by_line(clutch):
     result = package.loop("board_smc_2", overrides=STILL)
 
     def names(text):
-        # Without numbers, the port's path, and what only a busy machine has to say.
-        lines = [line.split("  ")[1:2] or [line] for line in text.splitlines()]
+        # Without numbers, the port's path, what only a busy machine has to say, and the ends of broken lines.
+        lines = [line.split("  ")[1:2] or [line] for line in text.splitlines() if not line.startswith("    ")]
         return [line[0].strip() for line in lines if "waited" not in line[0] and not line[0].startswith("note: ")]
 
     assert names(f"{result.announcement}\n{result}") == names(out)

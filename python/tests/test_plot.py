@@ -1,5 +1,6 @@
 """Figures: the lines are the runs, the axes have units, and nothing of matplotlib is left changed."""
 
+import re
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -61,6 +62,14 @@ def drawn(drawing, folder, name):
 def line(ax, label):
     (found,) = [one for one in ax.lines if one.get_label() == label]
     return found
+
+
+def band(ax, number=0):
+    """Lowest and highest of each part of a curve's envelope."""
+    vertices = ax.collections[number].get_paths()[0].vertices
+    places = np.unique(vertices[:, 0])
+    at = [vertices[vertices[:, 0] == x, 1] for x in places]
+    return np.array([y.min() for y in at]), np.array([y.max() for y in at])
 
 
 def names(ax):
@@ -186,11 +195,15 @@ def test_the_papers_figures_have_a_row_for_each_rate_with_the_simulation_left(tm
         drawn(drawing, tmp_path, f"paper{figure.number}")
         rates = list(dict.fromkeys(panel.rate_deg_s for panel in figure.panels))
         assert len(drawing.axes) == len(figure.panels) == 2 * len(rates)
+        for left, right in zip(drawing.axes[::2], drawing.axes[1::2], strict=True):
+            assert left.get_ylim() == right.get_ylim(), "they are compared"
         for ax, panel in zip(drawing.axes, figure.panels, strict=True):
             side = "(b) bench" if panel.experiment else "(a) simulation"
             assert ax.get_title(loc="left") == f"{side}, {panel.rate_deg_s:g} °/s"
             assert ax.get_ylabel() == "error (°)"
-            assert np.array_equal(ax.lines[-1].get_ydata(), panel.error_deg)
+            low, high = band(ax)
+            assert (low.min(), high.max()) == (np.min(panel.error_deg), np.max(panel.error_deg)), "no peak is lost"
+            assert np.mean(ax.lines[-1].get_ydata()) == pytest.approx(np.mean(panel.error_deg), rel=1e-2)
         assert [ax.get_xlabel() for ax in drawing.axes[-2:]] == ["time (s)"] * 2
     with pytest.raises(ValueError, match="figure 8 has no panels"):
         plot.paper_figure(SimpleNamespace(number=8, law="PD controller", panels=[]))
@@ -513,17 +526,59 @@ def test_what_has_no_region_is_named():
 # --- Runs and logs -------------------------------------------------------------------------------
 
 
-def test_a_run_is_drawn_in_three_panels_with_the_sticks_behind_the_voltage(smc, tmp_path):
-    figure = plot.run_overview(smc)
+def test_a_run_is_drawn_closely_around_a_stick_and_whole_as_an_envelope(pd, tmp_path):
+    figure = plot.run_overview(pd)
     drawn(figure, tmp_path, "run")
-    error, velocity, voltage = figure.axes
-    labels = ["error (°)", "velocity (°/s)", "voltage (V)"]
-    assert [ax.get_ylabel() for ax in figure.axes] == labels and voltage.get_xlabel() == "time (s)"
-    assert np.array_equal(error.lines[-1].get_ydata(), np.degrees(smc.samples["error_rad"]))
-    assert np.array_equal(line(velocity, "shaft").get_ydata(), np.degrees(smc.samples["velocity_rad_s"]))
-    assert line(velocity, "target").get_ydata() == pytest.approx(2.0)
-    assert np.array_equal(line(voltage, "voltage").get_ydata(), smc.samples["voltage_v"])
-    assert len(voltage.collections[0].get_paths()) == len(plot._sticks(smc))
+    position, error, velocity, voltage = figure.axes
+    labels = ["position (counts)", "error (°)", "velocity (°/s)", "voltage (V)"]
+    assert [ax.get_ylabel() for ax in figure.axes] == labels
+    start, end = pd.window
+    assert position.get_xlim() == velocity.get_xlim() == (start, end) and 0.0 <= start < end <= 1.0
+    assert error.get_xlim() == voltage.get_xlim() == (0.0, 1.0)
+    # The window is the one of the command, and holds the stick that its title names.
+    at, ms = re.search(r"around the stick at (\S+) s, (\S+) ms long", position.get_title("left")).groups()
+    sticks = np.stack([pd.sticks["from_s"], pd.sticks["to_s"]], axis=1)
+    (this,) = sticks[np.abs(sticks[:, 0] - float(at)) < 6e-4]
+    assert this[1] - this[0] == pytest.approx(float(ms) / 1e3, abs=1e-4)
+    assert start <= this[0] and this[1] <= end
+    # Stairs of whole counts, against a path that goes on by some 24 of them.
+    shaft, path = line(position, "shaft").get_ydata(), line(position, "path").get_ydata()
+    assert np.array_equal(shaft, np.round(shaft)) and 22 < path[-1] - path[0] < 26
+    assert line(velocity, "path").get_ydata() == pytest.approx(2.0)
+    for ax, values in ((error, np.degrees(pd.samples["error_rad"])), (voltage, pd.samples["voltage_v"])):
+        low, high = band(ax)
+        assert len(low) == 120 and (low.min(), high.max()) == (values.min(), values.max())
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["shaft", "at rest", "path", "the window"]
+
+
+def test_a_run_without_a_stick_is_shown_around_its_largest_error():
+    glide = simulate("bench_glide_2")
+    title = plot.run_overview(glide).axes[0].get_title("left")
+    at = float(re.search(r"around the largest error, at (\S+) s", title).group(1))
+    settled = glide.time >= glide.scenario.run.settle_s
+    worst = np.abs(glide.samples["error_rad"])[settled].max()
+    assert abs(glide.samples["error_rad"][np.argmin(np.abs(glide.time - at))]) == worst
+
+
+def test_runs_are_compared_on_the_same_axes_against_one_path(pd, smc, tmp_path):
+    figure = plot.comparison([pd, smc], labels=["PD", "sliding mode"])
+    drawn(figure, tmp_path, "comparison")
+    position, error, velocity, _ = figure.axes
+    assert position.get_xlim() == pd.window, "the window of the first that sticks"
+    assert [one.get_label() for one in position.lines if one.get_label() == "path"] == ["path"]
+    for ax in (position, velocity):
+        assert line(ax, "PD" if ax is position else "path")
+    for number, run in enumerate((pd, smc)):
+        low, high = band(error, number)
+        values = np.degrees(run.samples["error_rad"])
+        assert (low.min(), high.max()) == (values.min(), values.max())
+    both = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert both == ["PD", "sliding mode", "path", "the window"]
+    # Other encoders: not counts, but degrees.
+    coarse = simulate("pd_2", overrides={**SHORT, "rig.encoder.counts_per_rev": 2000})
+    assert plot.comparison([pd, coarse]).axes[0].get_ylabel() == "position (°)"
+    with pytest.raises(ValueError, match="expected 2, one for each result"):
+        plot.comparison([pd, smc], labels=["PD"])
 
 
 @pytest.fixture(scope="module")
@@ -614,5 +669,5 @@ def test_a_log_without_commands_is_refused(log):
 
 
 def test_a_result_a_sweep_and_the_paper_draw_themselves(smc, gains):
-    assert [ax.get_ylabel() for ax in smc.plot().axes] == ["error (°)", "velocity (°/s)", "voltage (V)"]
+    assert [ax.get_ylabel() for ax in smc.plot().axes][:2] == ["position (counts)", "error (°)"]
     assert gains.plot("law.smc.kp_v", "law.smc.boundary_rad_s", "rms_error_rad").get_xlabel() == "law.smc.kp (V)"

@@ -64,8 +64,11 @@ impl Done {
     /// Fails unless standard output has all these words.
     #[track_caller]
     pub(crate) fn prints(self, words: &[&str]) -> Done {
+        // Lines are broken between words.
+        let flat = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let out = flat(&self.out);
         for word in words {
-            assert!(self.out.contains(word), "expected \"{word}\" in:\n{}\n{}", self.out, self.err);
+            assert!(out.contains(&flat(word)), "expected \"{word}\" in:\n{}\n{}", self.out, self.err);
         }
         self
     }

@@ -330,7 +330,7 @@ fn figures() -> Result<()> {
     let (out, kept) = (root().join("target/figures"), root().join("docs/figures"));
     cargo(["run", "--release", "--", "reproduce", "--out"]).arg(&out).run()?;
     std::fs::create_dir_all(&kept)?;
-    for name in ["fig8.svg", "fig9.svg", "fig10.svg"] {
+    for name in ["laws.svg", "fig8.svg", "fig9.svg", "fig10.svg"] {
         std::fs::copy(out.join(name), kept.join(name)).with_context(|| format!("copying {name}"))?;
     }
     let clutch =

@@ -109,6 +109,7 @@ const NAMED: &[(&str, &str)] = &[
     ("def run_loop(scenario: Any,", "def run_loop(scenario: _model.Scenario | Scenario,"),
     ("-> tuple[Any, str, str, str | None]:", "-> tuple[dict[str, Any], str, str, str | None]:"),
     ("velocity: Incomplete) -> Incomplete", "velocity: NDArray[np.float64]) -> NDArray[np.float64]"),
+    ("time: Incomplete, values: Incomplete)", "time: NDArray[np.float64], values: NDArray[np.float64])"),
     ("table: dict", "table: dict[str, Any]"),
     ("tables: dict,", "tables: dict[str, Any],"),
     ("overrides: dict |", "overrides: Mapping[str, object] |"),

@@ -1,7 +1,7 @@
 //! `clutch scenario header`: a scenario's settings for libclutch.
 
 use crate::args::ScenarioArgs;
-use crate::output::{BUILD, Exit, not_certified, print};
+use crate::output::{BUILD, Exit, not_certified, print, warn};
 use anyhow::ensure;
 use clap::Args;
 use clutch_core::Micros;
@@ -38,7 +38,7 @@ impl HeaderVerb {
         match check(&scenario, None, self.uncertified, None) {
             Ok(_) => {}
             Err(refusal @ ClearanceError::NotCertified { .. }) => {
-                print(&not_certified(&refusal, &self.scenario.scenario))?;
+                warn(&not_certified(&refusal, &self.scenario.scenario))?;
                 return Ok(Exit::NotCertified);
             }
             Err(refusal) => return Err(refusal.into()),

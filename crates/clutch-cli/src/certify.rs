@@ -1,7 +1,7 @@
 //! `clutch certify`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{Exit, json, paragraph, print};
+use crate::output::{Exit, json, paragraph, report};
 use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
 use clap::Args;
@@ -49,12 +49,11 @@ impl Certify {
             (None, true) => Bound::search(&sampled, self.save.as_deref())?,
             (None, false) => Bound::NotLookedFor,
         };
-        let shown = if self.json {
-            json(&whole(&scenario, &sampled, &bound)?)?
-        } else {
-            text(&scenario, &plan, &outside) + &sampled::lines(&sampled, &bound)
-        };
-        print(&shown)?;
+        report(
+            self.json,
+            || json(&whole(&scenario, &sampled, &bound)?),
+            || text(&scenario, &plan, &outside) + &sampled::lines(&sampled, &bound),
+        )?;
         if let (Some(file), None) = (&self.save, bound.proven()) {
             eprintln!("{}: not written: nothing is proven", file.display());
         }

@@ -1,7 +1,7 @@
 //! `clutch daq`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{Exit, print};
+use crate::output::{Exit, print, tell};
 use crate::signals::stop_flag;
 use clap::Args;
 use clutch_loop::faults::Fault;
@@ -98,7 +98,7 @@ impl Daq {
         };
         let report = sim_board_server::serve(&scenario, &options, endpoint.as_mut(), &stop, |notice| {
             // A terminal that has gone away does not stop a board.
-            let _ = print(&match notice {
+            let _ = tell(&match notice {
                 ServeNotice::Client(ClientEvent::Connected) => "client connected\n".to_owned(),
                 ServeNotice::Client(ClientEvent::Left) => "client left\n".to_owned(),
                 ServeNotice::Dismissed(reason) => format!("client sent away: {reason}\n"),
@@ -115,7 +115,7 @@ impl Daq {
                 report.waits, report.waited
             );
         }
-        print(&(text + "\n"))?;
+        tell(&(text + "\n"))?;
         Ok(Exit::Done)
     }
 }

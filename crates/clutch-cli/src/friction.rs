@@ -1,7 +1,7 @@
 //! `clutch friction`.
 
 use crate::args::key_value;
-use crate::output::{Exit, print};
+use crate::output::{Exit, paragraph, print, tell, wrote};
 use crate::plot::{self, Figure, Panel, Series};
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -81,7 +81,7 @@ impl FrictionVerb {
                     .map(|name| Ok((name.as_str(), examine(&friction(name, &set)?)?)))
                     .collect::<anyhow::Result<Vec<_>>>()?;
                 figure(&labs).save(&out)?;
-                print(&format!("wrote {}\n", out.display()))?;
+                tell(&wrote(&[&out]))?;
             }
         }
         Ok(Exit::Done)
@@ -91,13 +91,15 @@ impl FrictionVerb {
 fn list() -> String {
     let mut out = String::new();
     for option in <FrictionParams as Choice<f64>>::CHOICE.options {
-        out += &format!("{}: {}\n", option.key, option.doc);
+        out += &paragraph(&format!("{}: {}", option.key, option.doc));
         for row in option.table.rows {
             let unit = if row.unit.text.is_empty() { String::new() } else { format!(" {}", row.unit.text) };
             out += &format!("   {:26} {:8} {}{unit}\n", row.key, row.symbol, row.default);
         }
     }
-    out + "Write them below [rig.friction.NAME] or [model.friction.NAME]; the default is stribeck.\n"
+    out + &paragraph(
+        "Write them below [rig.friction.NAME] or [model.friction.NAME]; the default is stribeck.",
+    )
 }
 
 /// The four experiments, a curve for each model.
@@ -106,10 +108,7 @@ fn figure(labs: &[(&str, Lab)]) -> Figure {
         title: title.to_owned(),
         x_label: x.to_owned(),
         y_label: y.to_owned(),
-        series: labs
-            .iter()
-            .map(|(name, lab)| Series { label: (*name).to_owned(), points: points(lab) })
-            .collect(),
+        series: labs.iter().map(|(name, lab)| Series::new(*name, points(lab))).collect(),
         ..Panel::default()
     };
     let log = |points: &[(f64, f64)]| points.iter().map(|(x, y)| (x.log10(), *y)).collect();
@@ -130,5 +129,6 @@ fn figure(labs: &[(&str, Lab)]) -> Figure {
                 log(&lab.break_away)
             }),
         ],
+        ..Figure::default()
     }
 }

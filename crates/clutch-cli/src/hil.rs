@@ -1,7 +1,7 @@
 //! `clutch hil`.
 
 use crate::args::{ScenarioArgs, key_value};
-use crate::output::{BUILD, Exit, json, not_certified, print};
+use crate::output::{BUILD, Exit, json, not_certified, report, warn};
 use crate::sim;
 use crate::table::{number, quantities};
 use clap::{Args, ValueEnum};
@@ -128,11 +128,11 @@ impl Hil {
         };
         let took = started.elapsed().as_secs_f64();
         let scenario = session.scenario();
-        print(&if self.json {
-            json(&summary(scenario, &ran, took))?
-        } else {
-            self.text(scenario, &ran, "the emulated board", took)
-        })?;
+        report(
+            self.json,
+            || json(&summary(scenario, &ran, took)),
+            || self.text(scenario, &ran, "the emulated board", took),
+        )?;
         Ok(exit(&ran))
     }
 
@@ -160,21 +160,22 @@ impl Hil {
         let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };
         tell(session.note());
         let started = std::time::Instant::now();
-        let report = session.run(&self.image)?;
+        let on_chip = session.run(&self.image)?;
         let took = started.elapsed().as_secs_f64();
-        let (scenario, ran) = (session.scenario(), &report.ran);
-        print(&if self.json {
+        let (scenario, ran) = (session.scenario(), &on_chip.ran);
+        let all = || {
             let mut all = summary(scenario, ran, took);
             all["chip"] = serde_json::json!({
-                "resets": report.resets,
-                "dead": report.dead,
-                "floating": report.floating,
+                "resets": on_chip.resets,
+                "dead": on_chip.dead,
+                "floating": on_chip.floating,
                 "code": ran.last_code,
-                "counted": report.counted,
+                "counted": on_chip.counted,
             });
-            json(&all)?
-        } else {
-            self.text(scenario, ran, "the model of the chip", took) + &chip_text(&report)
+            json(&all)
+        };
+        report(self.json, all, || {
+            self.text(scenario, ran, "the model of the chip", took) + &chip_text(&on_chip)
         })?;
         Ok(exit(ran))
     }
@@ -189,7 +190,7 @@ impl Hil {
         match session {
             Ok(session) => Ok(Some(session)),
             Err(SessionError::Clearance(refusal @ ClearanceError::NotCertified { .. })) => {
-                print(&not_certified(&refusal, &self.scenario))?;
+                warn(&not_certified(&refusal, &self.scenario))?;
                 Ok(None)
             }
             Err(refusal) => Err(refusal.into()),
@@ -211,7 +212,7 @@ impl Hil {
 
     fn text(&self, scenario: &Scenario, ran: &Ran, board: &str, took: f64) -> String {
         let title = format!(
-            "{}\n{} ticks on {board} in {took:.1} s, seed {}; figures over {} s after settling",
+            "{}\n{} ticks on {board} in {took:.1} s, seed {}\nfigures over {} s after settling",
             scenario.name(),
             ran.answers,
             scenario.spec().run.seed,

@@ -1,7 +1,7 @@
 //! `clutch identify`.
 
 use crate::args::{ScenarioArgs, key_value};
-use crate::output::{BUILD, Exit, json, paragraph, print, shown, write};
+use crate::output::{self, BUILD, Exit, json, paragraph, quiet, shown, write};
 use crate::signals::stop_flag;
 use crate::table::number;
 use anyhow::{Context, bail};
@@ -87,7 +87,7 @@ impl Identify {
         };
         let report = identify(&recordings);
         let file = self.out.as_deref().map(|path| (path, rig_file(&report, &scenario)));
-        print(&if self.json { json(&object(&report))? } else { text(&report) })?;
+        output::report(self.json, || json(&object(&report)), || text(&report))?;
         if let Some((path, file)) = file {
             write(path, file?)?;
         }
@@ -115,7 +115,9 @@ impl Identify {
         };
         let mut plan = format!("{:.0} s of experiment on {place}\n", programme.seconds());
         programme.plan().iter().for_each(|line| plan += &format!("  {line}\n"));
-        let _ = std::io::stderr().write_all(shown(&plan).as_bytes());
+        if !quiet() {
+            let _ = std::io::stderr().write_all(shown(&plan).as_bytes());
+        }
         if let Some(folder) = &self.log {
             std::fs::create_dir_all(folder)
                 .with_context(|| format!("{}: cannot be made", folder.display()))?;

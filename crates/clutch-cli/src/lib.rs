@@ -5,6 +5,7 @@
 mod args;
 mod c_header;
 pub mod certify;
+mod compare;
 mod daq;
 mod friction;
 mod hil;
@@ -18,6 +19,7 @@ mod referee;
 mod replay;
 pub mod report;
 mod reproduce;
+mod run_figure;
 mod sampled;
 mod scenario;
 mod signals;
@@ -26,12 +28,13 @@ mod sweep;
 mod table;
 pub mod tune;
 
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue};
+use clap::{CommandFactory, Parser, Subcommand};
 use output::Exit;
 use std::ffi::OsString;
 use std::io::Write;
 
-pub use loop_verb::summary;
+pub use loop_verb::{plan, summary};
 pub use output::BUILD;
 
 /// Slow, smooth motion of shafts restrained by friction.
@@ -47,11 +50,14 @@ pub use output::BUILD;
 /// 5 the log ended early, or has a gap; 64 the command
 /// line could not be understood.
 #[derive(Parser)]
-#[command(name = "clutch", version, max_term_width = 100)]
+#[command(name = "clutch", version, max_term_width = 80)]
 #[command(
     after_help = "Example:\n  clutch loop                        # the loop on a simulated board\n  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario"
 )]
 struct Cli {
+    /// Tells nothing but errors and what was asked for: JSON, lists, files.
+    #[arg(long, short, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     verb: Verb,
 }
@@ -66,6 +72,7 @@ enum Verb {
     Replay(replay::Replay),
     Log(log::Log),
     Sim(sim::Sim),
+    Compare(compare::Compare),
     Sweep(sweep::SweepVerb),
     Scenario(scenario::ScenarioVerb),
     Certify(certify::Certify),
@@ -75,17 +82,30 @@ enum Verb {
     Reproduce(reproduce::Reproduce),
 }
 
+/// A verb written in other letters is the verb: clap compares them as they are.
+fn suggest_verb(e: &mut clap::Error) {
+    let Some(ContextValue::String(unknown)) = e.get(ContextKind::InvalidSubcommand) else { return };
+    let meant = unknown.to_lowercase();
+    if e.get(ContextKind::SuggestedSubcommand).is_none()
+        && Cli::command().get_subcommands().any(|verb| verb.get_name() == meant)
+    {
+        e.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![meant]));
+    }
+}
+
 /// Runs the command with its arguments, the program's name first; its exit code.
 #[must_use]
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,
-        Err(e) => {
+        Err(mut e) => {
+            suggest_verb(&mut e);
             let asked_for = !e.use_stderr(); // --help, --version
             let _ = e.print(); // nobody is left to receive it
             return if asked_for { 0 } else { 64 };
         }
     };
+    output::set_quiet(cli.quiet);
     let outcome = match cli.verb {
         Verb::Loop(v) => v.run(),
         Verb::Daq(v) => v.run(),
@@ -95,6 +115,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Replay(v) => v.run(),
         Verb::Log(v) => v.run(),
         Verb::Sim(v) => v.run(),
+        Verb::Compare(v) => v.run(),
         Verb::Sweep(v) => v.run(),
         Verb::Scenario(v) => v.run(),
         Verb::Certify(v) => v.run(),

@@ -1,7 +1,7 @@
 //! `clutch loop`.
 
 use crate::args::{ScenarioArgs, key_value};
-use crate::output::{BUILD, Exit, json, not_certified, paragraph, print, shown};
+use crate::output::{BUILD, Exit, beside, json, not_certified, paragraph, quiet, report, shown, warn};
 use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
@@ -11,7 +11,9 @@ use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
 use clutch_loop::port::Address;
 use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode};
-use clutch_loop::session::{Board, Event, Progress, Release, Session, SessionError, SessionOptions};
+use clutch_loop::session::{
+    Announcement, Board, Event, Progress, Release, Session, SessionError, SessionOptions,
+};
 use clutch_loop::summary::{Summary, Verdict};
 use clutch_sim::Metrics;
 use clutch_sim::metrics::Detected;
@@ -188,12 +190,12 @@ impl Loop {
         let ignored = Arc::new(AtomicBool::new(false));
         signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
             .context("signals could not be caught")?;
-        let show = std::io::stderr().is_terminal();
+        let show = std::io::stderr().is_terminal() && !quiet();
         let mut said = Ok(());
         let ran = session.run(&stop, &mut |event| match event {
             // What cannot be said is not done: nothing has moved yet.
             Event::Announced(announcement) => {
-                said = self.say(&announcement.to_string());
+                said = if quiet() { Ok(()) } else { self.say(&plan(&announcement)) };
                 stop.fetch_or(said.is_err(), Ordering::Relaxed);
             }
             Event::Progress(progress) if show => status(&progress),
@@ -220,7 +222,7 @@ impl Loop {
             Err(obstacle) => return Err(obstacle.into()),
         };
         said?;
-        print(&if self.json { json(&ran.to_json())? } else { summary(&ran) })?;
+        report(self.json, || json(&ran.to_json()), || summary(&ran))?;
         Ok(match ran.verdict() {
             Verdict::Done if ran.log.as_ref().is_some_and(|log| log.records.is_err()) => Exit::Incomplete,
             Verdict::Done => Exit::Done,
@@ -302,7 +304,7 @@ impl Loop {
             let _ = std::io::stderr().write_all(shown(text).as_bytes());
             return Ok(());
         }
-        print(text)
+        warn(text)
     }
 }
 
@@ -324,10 +326,7 @@ fn status(p: &Progress) {
 pub fn summary(s: &Summary) -> String {
     let r = &s.report;
     let (m, d) = (&r.metrics, &r.detected);
-    let us = |ns: u64| number(ns as f64 / 1e3);
-    let latency = |s: &CycleSummary| {
-        format!("{} / {} / {} / {}", us(s.p50_ns), us(s.p99_ns), us(s.p99_9_ns), us(s.max_ns))
-    };
+    let latency = |s: &CycleSummary| [s.p50_ns, s.p99_ns, s.p99_9_ns, s.max_ns].map(us).join(" / ");
     // A board whose clock waits for this machine says nothing of it.
     let late = if r.wake.count > 0 { latency(&r.wake) } else { "not told".to_owned() };
     let title = format!(
@@ -365,9 +364,21 @@ pub fn summary(s: &Summary) -> String {
     if let Some(reason) = d.reason() {
         text += &paragraph(&format!("stick-slip: {reason}"));
     }
-    for line in s.remarks() {
-        text += &line;
-        text.push('\n');
-    }
+    text.extend(s.remarks().iter().map(|line| paragraph(line)));
     text
+}
+
+/// A time as µs, to three digits.
+fn us(ns: u64) -> String {
+    let us = ns as f64 / 1e3;
+    let digits = if us < 10.0 { 2 } else { usize::from(us < 100.0) };
+    format!("{us:.digits$}")
+}
+
+/// Plan of a loop, told before anything moves, in lines of a terminal.
+#[must_use]
+pub fn plan(a: &Announcement) -> String {
+    let rows = a.rows.iter().map(|(name, value)| beside(&format!("  {name:<11}"), value));
+    let remarks = a.remarks.iter().map(|line| paragraph(line));
+    std::iter::once(paragraph(&a.title)).chain(rows).chain(remarks).collect()
 }

@@ -3,7 +3,7 @@
 use crate::args::ScenarioArgs;
 use crate::output::{Exit, Forms, json, paragraph, with_progress};
 use crate::plot::{Cell, Cells, Figure, Panel};
-use crate::report::{self, ReportFigure};
+use crate::report::{Page, ReportFigure};
 use crate::table::number;
 use clap::Args;
 use clutch_sim::Scenario;
@@ -390,15 +390,18 @@ impl Grid {
                 cells: Some(cells),
                 ..Panel::default()
             }],
+            ..Figure::default()
         }
     }
 
     fn page(&self, scenario: &Scenario, figure: &Figure) -> anyhow::Result<String> {
         let title = format!("{}: {}", scenario.name(), self.about);
         let legend = self.legend.iter().map(|(sign, text)| format!("{sign} {text}"));
-        let intro: Vec<String> = legend.chain(self.notes.iter().cloned()).collect();
+        let about: Vec<String> = legend.chain(self.notes.iter().cloned()).collect();
         let caption = format!("{} over {} and {}.", self.about, self.across, self.down);
-        let figure = ReportFigure { id: "map".to_owned(), caption, svg: figure.svg()? };
-        Ok(report::html(&title, &intro, &[], &[], &[figure], &scenario.parameters()))
+        let figures = [ReportFigure::new("map", &caption, figure)?];
+        let settings = scenario.parameters();
+        Page { title: &title, about: &about, figures: &figures, settings: &settings, ..Page::default() }
+            .html()
     }
 }

@@ -1,6 +1,7 @@
 //! The results of verbs: text, files, an exit code.
 
 use crate::plot::{self, Figure};
+use anstyle::{AnsiColor, Style};
 use anyhow::Context;
 use clap::Args;
 use clutch_log::printable;
@@ -11,6 +12,22 @@ use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Columns of a terminal.
+pub(crate) const WIDTH: usize = 80;
+
+/// True if the command line has `--quiet`.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Sets whether a text is told that was not asked for in so many words.
+pub(crate) fn set_quiet(quiet: bool) {
+    QUIET.store(quiet, Ordering::Relaxed);
+}
+
+pub(crate) fn quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
 
 /// The end of a verb, if it was not an error.
 pub(crate) enum Exit {
@@ -46,15 +63,23 @@ pub(crate) fn new_log(path: &Path) -> anyhow::Result<()> {
 
 /// A verdict as a paragraph of at most 80 columns, its further lines indented.
 pub(crate) fn paragraph(text: &str) -> String {
-    let mut out = String::new();
-    let mut column = 0;
+    flow("", text, 4)
+}
+
+/// A text beside a head, as a name in a list; further lines stand below the text.
+pub(crate) fn beside(head: &str, text: &str) -> String {
+    flow(head, text, head.chars().count() + 1)
+}
+
+fn flow(head: &str, text: &str, indent: usize) -> String {
+    let mut out = head.to_owned();
+    let mut column = head.chars().count();
     for word in text.split_whitespace() {
         let length = word.chars().count();
-        if column > 0 && column + 1 + length > 80 {
-            out += "\n   ";
-            column = 3;
-        }
-        if column > 0 {
+        if column > 0 && column + 1 + length > WIDTH {
+            out += &format!("\n{:1$}", "", indent);
+            column = indent;
+        } else if column > 0 {
             out.push(' ');
             column += 1;
         }
@@ -70,7 +95,8 @@ pub(crate) fn with_progress<T>(unit: &str, work: impl FnOnce(Report<'_>) -> T) -
     let style = ProgressStyle::with_template(&format!(
         "{{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{eta}} left"
     ));
-    let bar = ProgressBar::no_length().with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = if quiet() { ProgressBar::hidden() } else { ProgressBar::no_length() };
+    let bar = bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let result = work(&|p| {
         bar.set_length(p.total);
         bar.inc(p.finished);
@@ -85,13 +111,100 @@ pub(crate) fn shown(text: &str) -> Cow<'_, str> {
     printable(text, &['\n', '\t'])
 }
 
-/// Prints to standard output. A reader that has gone away (`| head`) is not an error.
+/// Prints to standard output what was asked for. A reader that has gone away (`| head`) is not an error.
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(shown(text).as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
         other => other.context("standard output"),
     }
+}
+
+/// Prints a text for a reader, unless the command is to be quiet.
+pub(crate) fn tell(text: &str) -> anyhow::Result<()> {
+    if quiet() { Ok(()) } else { warn(text) }
+}
+
+/// Prints what a reader must know, as that nothing was started: verdicts in colour on a terminal that shows colours and
+/// where NO_COLOR is not set.
+pub(crate) fn warn(text: &str) -> anyhow::Result<()> {
+    // Foreign escapes are taken out before ours are put in.
+    let text = coloured(&shown(text));
+    // On anything else the escapes are left out again.
+    let mut out = anstream::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("standard output"),
+    }
+}
+
+/// The result as JSON, which is all that standard output then holds, or as a text.
+pub(crate) fn report(
+    as_json: bool,
+    json: impl FnOnce() -> anyhow::Result<String>,
+    text: impl FnOnce() -> String,
+) -> anyhow::Result<()> {
+    if as_json { print(&json()?) } else { tell(&text()) }
+}
+
+const BAD: Style = AnsiColor::Red.on_default().bold();
+const KNOWN: Style = AnsiColor::Yellow.on_default();
+const GOOD: Style = AnsiColor::Green.on_default();
+
+/// Words of verdicts. The first that stands at a place counts.
+const VERDICTS: &[(&str, Style)] = &[
+    ("NOT certified", BAD),
+    ("not certified", BAD),
+    ("UNCERTIFIED", BAD),
+    ("UNSTABLE", BAD),
+    ("does not hold", BAD),
+    ("documented deviation", KNOWN),
+    ("cannot tell", KNOWN),
+    ("certified for the model", KNOWN),
+    ("linearly stable", GOOD),
+    ("certified", GOOD),
+    ("holds", GOOD),
+    ("identical", GOOD),
+];
+
+/// The text with its verdicts in their colours.
+fn coloured(text: &str) -> String {
+    let mut out = String::with_capacity(text.len() + 64);
+    let mut rest = text;
+    let first = |rest: &str| {
+        let places =
+            VERDICTS.iter().filter_map(|(word, style)| Some((whole_word(rest, word)?, word, *style)));
+        places.min_by_key(|(at, ..)| *at)
+    };
+    while let Some((at, word, style)) = first(rest) {
+        out += &format!("{}{style}{word}{style:#}", &rest[..at]);
+        rest = &rest[at + word.len()..];
+    }
+    out + rest
+}
+
+/// Place of a word that is no part of a longer one, as a name.
+fn whole_word(text: &str, word: &str) -> Option<usize> {
+    let part = |c: char| c.is_alphanumeric() || "_-./`".contains(c);
+    text.match_indices(word)
+        .map(|(at, _)| at)
+        .find(|at| !text[..*at].ends_with(part) && !text[*at + word.len()..].starts_with(part))
+}
+
+/// The lines that tell which files were written.
+pub(crate) fn wrote(files: &[&Path]) -> String {
+    files.iter().map(|file| format!("wrote {}\n", file.display())).collect()
+}
+
+/// Bars of one line, the higher the larger the value; the highest stands for `most`.
+pub(crate) fn bars(values: &[f64], most: f64) -> String {
+    const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let last = BARS.len() - 1;
+    let bar = |x: &f64| {
+        let share = if most > 0.0 { x / most } else { 0.0 };
+        BARS[((share * BARS.len() as f64) as usize).min(last)]
+    };
+    values.iter().map(bar).collect()
 }
 
 /// Writes a file; errors name it.
@@ -136,11 +249,56 @@ impl Forms {
                 write(file, page(&figure)?)?;
             }
         }
-        print(&if self.json { json()? } else { text() })
+        let files: Vec<&Path> =
+            [&self.plot, &self.html].into_iter().flatten().map(PathBuf::as_path).collect();
+        report(self.json, json, || text() + &wrote(&files))
     }
 }
 
 /// Pretty JSON with a line end.
 pub(crate) fn json(value: &impl serde::Serialize) -> anyhow::Result<String> {
     Ok(serde_json::to_string_pretty(value)? + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn verdicts_have_a_colour_and_names_that_hold_their_words_have_none() {
+        let text = "gains: NOT certified; `clutch certify not_certified.toml`, as certified-2";
+        let shown = coloured(text);
+        assert_eq!(anstream::adapter::strip_str(&shown).to_string(), text);
+        assert_eq!(shown, text.replace("NOT certified", &format!("{BAD}NOT certified{BAD:#}")));
+        assert_eq!(coloured("UNCERTIFIED, then certified").matches('\u{1b}').count(), 4 + 1);
+    }
+
+    #[test]
+    fn no_line_is_longer_than_80_columns_unless_a_word_is() {
+        let words = "seven by seven ".repeat(20);
+        let text = paragraph(&words);
+        assert!(text.lines().all(|l| l.chars().count() <= WIDTH) && text.lines().count() == 4, "{text}");
+        assert!(text.lines().skip(1).all(|l| l.starts_with("    s") || l.starts_with("    b")), "{text}");
+        let listed = beside("A8                ", &words);
+        assert!(listed.starts_with("A8                 seven by"), "{listed}");
+        assert!(
+            listed.lines().skip(1).all(|l| l.starts_with(&format!("{:19}", "")) && !l.ends_with(' ')),
+            "{listed}"
+        );
+        assert!(listed.lines().all(|l| l.chars().count() <= WIDTH));
+        assert_eq!(
+            listed.split_whitespace().skip(1).collect::<Vec<_>>(),
+            words.split_whitespace().collect::<Vec<_>>()
+        );
+        let long = "w".repeat(100);
+        assert_eq!(paragraph(&long), long.clone() + "\n");
+        assert_eq!(paragraph(&format!("about {long}")), format!("about\n    {long}\n"));
+        assert_eq!(paragraph(""), "\n");
+    }
+
+    #[test]
+    fn bars_rise_with_the_value() {
+        assert_eq!(bars(&[0.0, 0.2, 0.5, 0.99, 1.0, 1.0], 1.0), "▁▂▅███");
+        assert_eq!(bars(&[0.0, 0.0], 0.0), "▁▁");
+    }
 }

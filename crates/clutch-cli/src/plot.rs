@@ -1,7 +1,7 @@
 //! Drawings of curves, as SVG and PNG.
 //!
-//! A [`Figure`] is a grid of [`Panel`]s, each with its own axes, and curves or shaded cells. One layout serves both
-//! formats. It uses nothing of the machine – no font, no clock, no random number – so the same data
+//! A [`Figure`] is a grid of [`Panel`]s, each with its own axes, and curves or shaded cells. The PNG is the SVG, rendered.
+//! Nothing of the machine is used – no font, no clock, no random number – so the same data
 //! give the same bytes.
 //!
 //! A curve is drawn from at most four of its points per pixel column: the first, the lowest, the
@@ -9,15 +9,18 @@
 //! a million samples is thus the true one, and no narrow peak is lost. A value that is not a number,
 //! not finite or beyond ±1e150 is a gap. A point between two gaps is a dot.
 
-use ab_glyph::{Font, FontRef, Glyph, PxScale, ScaleFont, point};
 use anyhow::{Context, bail};
+use clutch_sim::picture::Envelope;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use plotters::style::FontTransform;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::{Options, Tree};
+use skrifa::MetadataProvider;
+use skrifa::instance::{LocationRef, Size};
 use std::path::Path;
-use std::sync::OnceLock;
 
 /// A curve.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,6 +29,37 @@ pub struct Series {
     pub label: String,
     /// Points in the order in which they are joined, in the units of the panel's axes.
     pub points: Vec<(f64, f64)>,
+    /// Band behind the curve, pale in its colour: place, lowest, highest. None for no band.
+    pub band: Vec<(f64, f64, f64)>,
+    /// True for what the others are held against, as a path: dark, behind them, and of no colour of its own.
+    pub guide: bool,
+}
+
+impl Series {
+    /// A curve without a band.
+    pub fn new(label: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
+        Series { label: label.into(), points, ..Series::default() }
+    }
+
+    /// A curve of means over time (s), with the band from lowest to highest.
+    #[must_use]
+    pub fn envelope(label: impl Into<String>, of: &Envelope, factor: f64) -> Series {
+        let points = of.time.iter().zip(&of.mean).map(|(t, y)| (*t, y * factor)).collect();
+        let ends = of.low.iter().zip(&of.high);
+        let band = of.time.iter().zip(ends).map(|(t, (low, high))| (*t, low * factor, high * factor));
+        Series { band: band.collect(), ..Series::new(label, points) }
+    }
+}
+
+/// Stretches of the horizontal axis, shaded behind the curves. Of several shades in a panel each is a strip at its top.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shade {
+    /// Name in the legend.
+    pub label: String,
+    /// Begin and end of each stretch.
+    pub stretches: Vec<(f64, f64)>,
+    /// Number of the curve whose colour it takes; none for grey.
+    pub of: Option<usize>,
 }
 
 /// One pair of axes with its curves.
@@ -37,8 +71,10 @@ pub struct Panel {
     pub x_label: String,
     /// Name and unit of the vertical axis.
     pub y_label: String,
-    /// The curves. More than one get a legend.
+    /// The curves. With more than one there is a legend.
     pub series: Vec<Series>,
+    /// Shaded stretches behind the curves.
+    pub shades: Vec<Shade>,
     /// Ends of the vertical axis; none, or no interval = from the data and the guide lines.
     pub y_range: Option<(f64, f64)>,
     /// True if a value holds until the next one: stairs instead of straight lines.
@@ -78,6 +114,10 @@ pub struct Figure {
     pub columns: usize,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
+    /// True if the panels of a row have one vertical scale: they are to be compared.
+    pub share_y: bool,
+    /// True if panels are narrow, so that their texts can be read on a phone.
+    pub narrow: bool,
 }
 
 impl Figure {
@@ -91,8 +131,8 @@ impl Figure {
         let (width, height) = layout.size;
         let mut text = String::new();
         {
-            let backend = SVGBackend::with_string(&mut text, layout.units(Kind::Vector));
-            let canvas = Canvas { area: backend.into_drawing_area(), kind: Kind::Vector };
+            let backend = SVGBackend::with_string(&mut text, layout.units());
+            let canvas = Canvas { area: backend.into_drawing_area() };
             canvas.figure(self, &layout).context("cannot draw an SVG")?;
             canvas.area.present().context("cannot draw an SVG")?;
         }
@@ -105,7 +145,7 @@ impl Figure {
             .replace(&family, "")
             .replace(">\n", ">")
             .replace("\n</text>", "</text>");
-        let (w, h) = layout.units(Kind::Vector);
+        let (w, h) = layout.units();
         let head = head.replacen(
             &format!("width=\"{w}\" height=\"{h}\""),
             &format!("width=\"{width}\" height=\"{height}\""),
@@ -119,15 +159,15 @@ impl Figure {
     /// # Errors
     /// The font cannot be read (it is built in), or the figure is too large to draw.
     pub fn png(&self) -> anyhow::Result<Vec<u8>> {
-        let layout = Layout::new(self)?;
-        let (width, height) = layout.units(Kind::Raster);
-        let mut pixels = vec![255; 3 * width as usize * height as usize];
-        {
-            let backend = BitMapBackend::with_buffer(&mut pixels, (width, height));
-            let canvas = Canvas { area: backend.into_drawing_area(), kind: Kind::Raster };
-            canvas.figure(self, &layout).context("cannot draw a PNG")?;
-            canvas.area.present().context("cannot draw a PNG")?;
-        }
+        let mut options = Options { font_family: FAMILY.to_owned(), ..Options::default() };
+        let fonts = options.fontdb_mut();
+        fonts.load_font_data(dejavu::sans::regular().to_vec());
+        fonts.set_sans_serif_family("DejaVu Sans");
+        let tree = Tree::from_str(&self.svg()?, &options).context("cannot draw a PNG")?;
+        let size = tree.size().to_int_size();
+        let (width, height) = (2 * size.width(), 2 * size.height());
+        let mut pixels = Pixmap::new(width, height).context("cannot draw a PNG")?;
+        resvg::render(&tree, Transform::from_scale(2.0, 2.0), &mut pixels.as_mut());
         let mut file = Vec::new();
         let mut encoder = png::Encoder::new(&mut file, width, height);
         encoder.set_color(png::ColorType::Rgb);
@@ -137,10 +177,37 @@ impl Figure {
             yppu: PIXELS_PER_METRE,
             unit: png::Unit::Meter,
         }));
+        // The figure has a ground: nothing shines through.
+        let opaque: Vec<u8> = pixels.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
         let mut writer = encoder.write_header()?;
-        writer.write_image_data(&pixels)?;
+        writer.write_image_data(&opaque)?;
         writer.finish()?;
         Ok(file)
+    }
+
+    /// The panels as narrow figures of their own, with the scales that they have in this one.
+    #[must_use]
+    pub fn split(&self) -> Vec<Figure> {
+        let alone = |(panel, (_, y)): (&Panel, (Axis, Axis))| {
+            let y_range = if panel.cells.is_some() { panel.y_range } else { Some((y.lo, y.hi)) };
+            // Cells need their width.
+            let narrow = panel.cells.is_none();
+            let panels = vec![Panel { y_range, ..panel.clone() }];
+            Figure { columns: 1, panels, narrow, ..Figure::default() }
+        };
+        self.panels.iter().zip(self.axes()).map(alone).collect()
+    }
+
+    /// The axes of each panel.
+    fn axes(&self) -> Vec<(Axis, Axis)> {
+        let mut ranges: Vec<_> = self.panels.iter().map(heights).collect();
+        if self.share_y {
+            for row in ranges.chunks_mut(self.columns.max(1)) {
+                let all = extent(row.iter().flatten().flat_map(|(low, high)| [*low, *high]));
+                row.fill(all);
+            }
+        }
+        self.panels.iter().zip(ranges).map(|(panel, range)| axes(panel, range)).collect()
     }
 
     /// Writes the figure to a file whose name ends in `.svg` or `.png`.
@@ -179,8 +246,9 @@ pub fn figure_format(path: &Path) -> anyhow::Result<FigureFormat> {
     }
 }
 
-/// Size of a panel, px.
+/// Size of a panel, px, and width of a narrow one.
 const PANEL: (f64, f64) = (600.0, 350.0);
+const NARROW: f64 = 480.0;
 /// Least height of a row of cells, px.
 const CELL: f64 = 22.0;
 /// Ends of the scale of shades: of one hue, so that it is read without colours, too.
@@ -189,6 +257,8 @@ const SHADES: [RGBColor; 2] = [RGBColor(0xee, 0xf4, 0xfb), RGBColor(0x08, 0x30, 
 const LARGEST: f64 = 21e6;
 /// 192 dpi.
 const PIXELS_PER_METRE: u32 = 7559;
+/// Units per CSS pixel: plotters takes whole numbers only.
+const UNITS: u32 = 4;
 /// Beyond this a value is not a datum: squares and differences stay finite.
 const BEYOND: f64 = 1e150;
 
@@ -213,6 +283,13 @@ const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
 const QUIET: RGBColor = RGBColor(0x6b, 0x6b, 0x6b);
 const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe6);
 const ZERO: RGBColor = RGBColor(0xbd, 0xbd, 0xbd);
+/// Strength of the colour of a band, of a shade and of strips.
+const BAND: f64 = 0.22;
+const SHADE: f64 = 0.2;
+const STRIP: f64 = 0.5;
+/// Height of a strip, px, and the part of it that is filled.
+const STRIP_HEIGHT: f64 = 9.0;
+const STRIP_FILLED: f64 = 7.0;
 
 /// A point that can be drawn.
 fn drawable(&(x, y): &(f64, f64)) -> bool {
@@ -346,43 +423,14 @@ impl Axis {
     }
 }
 
-/// DejaVu Sans.
-fn font() -> anyhow::Result<&'static FontRef<'static>> {
-    static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
-    FONT.get_or_init(|| FontRef::try_from_slice(dejavu::sans::regular()).ok())
-        .as_ref()
-        .context("the built-in font DejaVu Sans cannot be read")
-}
-
-/// The letters of a text, the first at 0, and its width; in the unit of `em`, the type size.
-fn typeset(text: &str, em: f64) -> anyhow::Result<(Vec<Glyph>, f32)> {
-    let font = font()?;
-    let scale = font.units_per_em().map_or(1.0, |units| font.height_unscaled() / units) * em as f32;
-    let scaled = font.as_scaled(PxScale::from(scale));
-    let (mut pen, mut glyphs): (f32, Vec<Glyph>) = (0.0, Vec::new());
-    for letter in text.chars() {
-        let id = font.glyph_id(letter);
-        pen += glyphs.last().map_or(0.0, |last| scaled.kern(last.id, id));
-        let mut glyph = id.with_scale_and_position(scale, point(pen, 0.0));
-        if ('\u{300}'..='\u{314}').contains(&letter)
-            && let Some(last) = glyphs.last()
-        {
-            // An accent of its own, as on θ̇: above the letter, in its middle.
-            let ink = |g: &Glyph| font.outline_glyph(g.clone()).map(|o| o.px_bounds());
-            if let (Some(below), Some(above)) = (ink(last), ink(&glyph)) {
-                glyph.position.x += 0.5 * (below.min.x + below.max.x - above.min.x - above.max.x);
-                glyph.position.y -= (above.max.y - below.min.y + 0.05 * scale).max(0.0);
-            }
-        }
-        glyphs.push(glyph);
-        pen += scaled.h_advance(id);
-    }
-    Ok((glyphs, pen))
-}
-
-/// Width of a text in the unit of its type size.
+/// Width of a text in the unit of its type size, in DejaVu Sans, without kerning.
 fn text_width(text: &str, size: f64) -> anyhow::Result<f64> {
-    Ok(f64::from(typeset(text, size)?.1))
+    let font = skrifa::FontRef::new(dejavu::sans::regular())
+        .context("the built-in font DejaVu Sans cannot be read")?;
+    let (letters, widths) = (font.charmap(), font.glyph_metrics(Size::unscaled(), LocationRef::default()));
+    let em = f64::from(font.metrics(Size::unscaled(), LocationRef::default()).units_per_em);
+    let width = |c| letters.map(c).and_then(|glyph| widths.advance_width(glyph)).unwrap_or_default();
+    Ok(text.chars().map(|c| f64::from(width(c))).sum::<f64>() * size / em)
 }
 
 /// A text made to fit: its size reduced by at most a third, then its end left out.
@@ -425,15 +473,40 @@ struct Placed {
     entries: Vec<Entry>,
 }
 
-/// A curve's name in the legend.
+/// The name of a curve or a shade in the legend.
 #[derive(Clone, Debug)]
 struct Entry {
-    number: usize,
+    swatch: Swatch,
     label: String,
     /// Line of the legend, from 0.
     line: usize,
     /// Left end within the line, px.
     left: f64,
+}
+
+/// The sign before a name in the legend.
+#[derive(Clone, Copy, Debug)]
+enum Swatch {
+    /// A line.
+    Line(RGBColor),
+    /// A field.
+    Field(RGBColor),
+}
+
+impl Series {
+    /// Colour of the curve of that number.
+    fn colour(&self, number: usize) -> RGBColor {
+        if self.guide { INK } else { PALETTE[number % PALETTE.len()] }
+    }
+}
+
+impl Shade {
+    /// Colour of that strength, as it is on white.
+    fn colour(&self, strength: f64) -> RGBColor {
+        let RGBColor(r, g, b) = self.of.map_or(QUIET, |number| PALETTE[number % PALETTE.len()]);
+        let pale = |c: u8| (255.0 - strength * (255.0 - f64::from(c))).round() as u8;
+        RGBColor(pale(r), pale(g), pale(b))
+    }
 }
 
 /// Places of all parts.
@@ -467,7 +540,7 @@ impl Layout {
         let columns = figure.columns.clamp(1, figure.panels.len().max(1));
         let rows = figure.panels.len().div_ceil(columns);
         let head = if figure.title.is_empty() { 0.0 } else { space::FIGURE_TITLE };
-        let mut axes: Vec<(Axis, Axis)> = figure.panels.iter().map(axes).collect();
+        let mut axes = figure.axes();
 
         let mut labels = 0.0_f64;
         for (_, label) in axes.iter().flat_map(|(_, y)| &y.ticks) {
@@ -475,7 +548,8 @@ impl Layout {
         }
         let named = figure.panels.iter().any(|p| !p.y_label.is_empty());
         let left = labels + if named { 19.0 + LABEL } else { 10.0 };
-        let width = PANEL.0 - left - space::RIGHT;
+        let panel = if figure.narrow { NARROW } else { PANEL.0 };
+        let width = panel - left - space::RIGHT;
         for ((x, _), panel) in axes.iter_mut().zip(&figure.panels) {
             if panel.cells.is_none() {
                 x.thin_out(width)?;
@@ -499,7 +573,7 @@ impl Layout {
             let cells = cells.map(|c| CELL * c.rows.len() as f64).fold(0.0, f64::max);
             let bottom = area_top + (PANEL.1 - space::PANEL_TITLE - space::BELOW).max(cells);
             for (column, (index, entries)) in these.zip(legends).enumerate() {
-                let from = space::EDGE + column as f64 * PANEL.0 + left;
+                let from = space::EDGE + column as f64 * panel + left;
                 let (x, y) = axes[index].clone();
                 panels.push(Placed {
                     x,
@@ -513,20 +587,27 @@ impl Layout {
             }
             top = bottom + space::BELOW;
         }
-        let (width, height) = (2.0 * space::EDGE + columns as f64 * PANEL.0, top + space::EDGE);
+        let (width, height) = (2.0 * space::EDGE + columns as f64 * panel, top + space::EDGE);
         if width * height > LARGEST {
             bail!("a figure of {} panels is too large to draw; split it", figure.panels.len());
         }
         Ok(Layout { size: (width.ceil() as u32, height.ceil() as u32), panels })
     }
 
-    fn units(&self, kind: Kind) -> (u32, u32) {
-        (self.size.0 * kind.units(), self.size.1 * kind.units())
+    fn units(&self) -> (u32, u32) {
+        (self.size.0 * UNITS, self.size.1 * UNITS)
     }
 }
 
-/// The axes of a panel.
-fn axes(panel: &Panel) -> (Axis, Axis) {
+/// Lowest and highest of what a panel shows.
+fn heights(panel: &Panel) -> Option<(f64, f64)> {
+    let points = panel.series.iter().flat_map(|s| &s.points).filter(|p| drawable(p)).map(|p| p.1);
+    let bands = panel.series.iter().flat_map(|s| &s.band).flat_map(|b| [b.1, b.2]);
+    extent(points.chain(bands).chain(panel.lines.iter().copied()))
+}
+
+/// The axes of a panel whose heights are these.
+fn axes(panel: &Panel, heights: Option<(f64, f64)>) -> (Axis, Axis) {
     if let Some(cells) = &panel.cells {
         let axis = |names: &[String]| {
             let ticks = names.iter().enumerate().map(|(i, name)| (i as f64 + 0.5, name.clone()));
@@ -541,7 +622,7 @@ fn axes(panel: &Panel) -> (Axis, Axis) {
     let y = match fixed {
         Some((lo, hi)) => Axis::new(lo, hi, 5.5),
         None => {
-            let (lo, hi) = widen(extent(points().map(|p| p.1).chain(panel.lines.iter().copied())));
+            let (lo, hi) = widen(heights);
             let room = 0.05 * (hi - lo);
             Axis::over_data(lo - room, hi + room, 5.5, 0.05)
         }
@@ -549,20 +630,23 @@ fn axes(panel: &Panel) -> (Axis, Axis) {
     (x, y)
 }
 
-/// The legend of a panel, in lines of that width: none for a single curve.
+/// The legend of a panel, in lines of that width: of what has a name, if that is more than one.
 fn legend(panel: &Panel, width: f64) -> anyhow::Result<Vec<Entry>> {
-    if panel.series.len() < 2 {
+    let curves = panel.series.iter().enumerate().map(|(i, s)| (&s.label, Swatch::Line(s.colour(i))));
+    let shades = panel.shades.iter().map(|s| (&s.label, Swatch::Field(s.colour(SHADE))));
+    let names: Vec<_> = curves.chain(shades).filter(|(label, _)| !label.is_empty()).collect();
+    if names.len() < 2 {
         return Ok(Vec::new());
     }
     let (swatch, gap, next) = space::SWATCH;
     let (mut line, mut left, mut entries) = (0, 0.0, Vec::new());
-    for (number, series) in panel.series.iter().enumerate() {
-        let (label, _) = fit(&series.label, TICK, width - swatch - gap)?;
+    for (label, sign) in names {
+        let (label, _) = fit(label, TICK, width - swatch - gap)?;
         let needed = swatch + gap + text_width(&label, TICK)?;
         if left > 0.0 && left + needed > width {
             (line, left) = (line + 1, 0.0);
         }
-        entries.push(Entry { number, label, line, left });
+        entries.push(Entry { swatch: sign, label, line, left });
         left += needed + next;
     }
     Ok(entries)
@@ -657,29 +741,9 @@ impl Trail {
     }
 }
 
-/// The elements of a drawing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    /// Lines and texts.
-    Vector,
-    /// Pixels.
-    Raster,
-}
-
-impl Kind {
-    /// Units per CSS pixel: plotters takes whole numbers only.
-    fn units(self) -> u32 {
-        match self {
-            Kind::Vector => 4,
-            Kind::Raster => 2,
-        }
-    }
-}
-
 /// A plotters drawing.
 struct Canvas<DB: DrawingBackend> {
     area: DrawingArea<DB, Shift>,
-    kind: Kind,
 }
 
 type Drawn<DB> = Result<(), DrawingAreaErrorKind<<DB as DrawingBackend>::ErrorType>>;
@@ -692,7 +756,7 @@ fn middle(px: f64) -> f64 {
 impl<DB: DrawingBackend> Canvas<DB> {
     /// px to units.
     fn units(&self, px: f64) -> f64 {
-        px * f64::from(self.kind.units())
+        px * f64::from(UNITS)
     }
 
     /// px to the nearest unit.
@@ -700,21 +764,11 @@ impl<DB: DrawingBackend> Canvas<DB> {
         (self.units(x).round() as i32, self.units(y).round() as i32)
     }
 
-    fn line(&self, points: &[(f64, f64)], color: RGBColor, width: f64) -> Drawn<DB> {
-        match self.kind {
-            Kind::Vector => self.path(points, color, width),
-            Kind::Raster => points.windows(2).try_for_each(|w| self.stroke(w[0], w[1], color, width, true)),
-        }
-    }
-
     fn straight(&self, from: (f64, f64), to: (f64, f64), color: RGBColor, width: f64) -> Drawn<DB> {
-        match self.kind {
-            Kind::Vector => self.path(&[from, to], color, width),
-            Kind::Raster => self.stroke(from, to, color, width, false),
-        }
+        self.line(&[from, to], color, width)
     }
 
-    fn path(&self, points: &[(f64, f64)], color: RGBColor, width: f64) -> Drawn<DB> {
+    fn line(&self, points: &[(f64, f64)], color: RGBColor, width: f64) -> Drawn<DB> {
         let mut path: Vec<(i32, i32)> = points.iter().map(|p| self.place(*p)).collect();
         path.dedup();
         let stroke_width = self.units(width).round() as u32;
@@ -722,54 +776,15 @@ impl<DB: DrawingBackend> Canvas<DB> {
         self.area.draw(&PathElement::new(path, style))
     }
 
-    /// A straight line in pixels, each as dark as the line covers it. plotters draws wide lines uneven
-    /// in width and with holes where they bend.
-    fn stroke(
-        &self,
-        from: (f64, f64),
-        to: (f64, f64),
-        color: RGBColor,
-        width: f64,
-        round_ends: bool,
-    ) -> Drawn<DB> {
-        let [from, to] = [from, to].map(|p| (self.units(p.0), self.units(p.1)));
-        let steep = (to.1 - from.1).abs() > (to.0 - from.0).abs();
-        let turn = |p: (f64, f64)| if steep { (p.1, p.0) } else { p };
-        let (a, b) = (turn(from), turn(to));
-        let (dx, dy) = (b.0 - a.0, b.1 - a.1);
-        let (square, half) = (dx * dx + dy * dy, 0.5 * self.units(width));
-        // Along the longer side; across it as far as the line can reach.
-        let reach = 1.5 * half + 1.0;
-        for i in (a.0.min(b.0) - half).floor() as i32..=(a.0.max(b.0) + half).ceil() as i32 {
-            let x = f64::from(i) + 0.5 - a.0;
-            let centre = a.1 + if dx == 0.0 { 0.0 } else { dy * (x / dx).clamp(0.0, 1.0) };
-            for j in (centre - reach).floor() as i32..=(centre + reach).ceil() as i32 {
-                let y = f64::from(j) + 0.5 - a.1;
-                let share = if square > 0.0 { (x * dx + y * dy) / square } else { 0.0 };
-                if !round_ends && !(0.0..=1.0).contains(&share) {
-                    continue;
-                }
-                let share = share.clamp(0.0, 1.0);
-                let (beside_x, beside_y) = (x - share * dx, y - share * dy);
-                let distance = (beside_x * beside_x + beside_y * beside_y).sqrt();
-                let cover = (half + 0.5 - distance).clamp(0.0, 1.0);
-                if cover > 0.0 {
-                    self.area.draw_pixel(if steep { (j, i) } else { (i, j) }, &color.mix(cover))?;
-                }
-            }
-        }
-        Ok(())
+    /// An area in a colour of that strength, from 0 to 1.
+    fn field(&self, corners: &[(f64, f64)], color: RGBColor, strength: f64) -> Drawn<DB> {
+        let corners: Vec<(i32, i32)> = corners.iter().map(|p| self.place(*p)).collect();
+        self.area.draw(&Polygon::new(corners, color.mix(strength)))
     }
 
     fn dot(&self, at: (f64, f64), color: RGBColor) -> Drawn<DB> {
-        let size = 5.0;
-        match self.kind {
-            Kind::Vector => {
-                let radius = self.units(0.5 * size).round() as i32;
-                self.area.draw(&Circle::new(self.place(at), radius, color.filled()))
-            }
-            Kind::Raster => self.stroke(at, at, color, size, true),
-        }
+        let radius = self.units(2.5).round() as i32;
+        self.area.draw(&Circle::new(self.place(at), radius, color.filled()))
     }
 
     /// A text by its anchor on the baseline; `upwards` = turned a quarter to the left.
@@ -790,55 +805,26 @@ impl<DB: DrawingBackend> Canvas<DB> {
         // Control characters are not part of XML.
         let text = &text.replace(char::is_control, " ");
         let em = self.units(size);
-        if self.kind == Kind::Vector {
-            // For plotters, a font's size is 1.24 em, and the top of a text 0.76 em above its
-            // baseline.
-            let mut font = FontDesc::new(FontFamily::Name(FAMILY), 1.24 * em, FontStyle::Normal);
-            let ascent = 0.76 * size;
-            let (mut x, mut y) = at;
-            if upwards {
-                font = font.transform(FontTransform::Rotate270);
-                x -= ascent;
-            } else {
-                y -= ascent;
-            }
-            let style = TextStyle::from(font).color(&color).pos(Pos::new(anchor, VPos::Top));
-            return Ok(self.area.draw_text(text, &style, self.place((x, y)))?);
+        // For plotters, a font's size is 1.24 em, and the top of a text 0.76 em above its
+        // baseline.
+        let mut font = FontDesc::new(FontFamily::Name(FAMILY), 1.24 * em, FontStyle::Normal);
+        let ascent = 0.76 * size;
+        let (mut x, mut y) = at;
+        if upwards {
+            font = font.transform(FontTransform::Rotate270);
+            x -= ascent;
+        } else {
+            y -= ascent;
         }
-        // Not through plotters: it forgets the space left of a letter, and an accent lands beside it.
-        let (font, (glyphs, width)) = (font()?, typeset(text, em)?);
-        let start = match anchor {
-            HPos::Left => 0.0,
-            HPos::Center => -0.5 * width,
-            HPos::Right => -width,
-        };
-        let at = (self.units(at.0), self.units(at.1));
-        for mut glyph in glyphs {
-            // The space between letters is not a whole number of pixels, and need not be.
-            glyph.position.x += start + if upwards { -at.1 } else { at.0 } as f32;
-            glyph.position.y += if upwards { at.0 } else { at.1 } as f32;
-            let Some(letter) = font.outline_glyph(glyph) else { continue };
-            let bounds = letter.px_bounds();
-            let (left, top) = (bounds.min.x as i32, bounds.min.y as i32);
-            let mut drawn = Ok(());
-            letter.draw(|x, y, cover| {
-                let (x, y) = (left + x as i32, top + y as i32);
-                let (x, y) = if upwards { (y, -1 - x) } else { (x, y) };
-                if drawn.is_ok() && cover > 0.0 {
-                    let color = color.mix(f64::from(cover.min(1.0)));
-                    drawn = self.area.draw_pixel((x, y), &color);
-                }
-            });
-            drawn?;
-        }
-        Ok(())
+        let style = TextStyle::from(font).color(&color).pos(Pos::new(anchor, VPos::Top));
+        Ok(self.area.draw_text(text, &style, self.place((x, y)))?)
     }
 
     fn figure(&self, figure: &Figure, layout: &Layout) -> anyhow::Result<()>
     where
         DB::ErrorType: 'static,
     {
-        let (width, height) = layout.units(self.kind);
+        let (width, height) = layout.units();
         self.area.draw(&Rectangle::new([(0, 0), (width as i32, height as i32)], WHITE.filled()))?;
         if !figure.title.is_empty() {
             let from = layout.panels.first().map_or(space::EDGE, |p| p.area.left);
@@ -877,6 +863,47 @@ impl<DB: DrawingBackend> Canvas<DB> {
         Ok(())
     }
 
+    /// The shaded stretches of a panel.
+    fn shades(&self, panel: &Panel, placed: &Placed) -> Drawn<DB> {
+        let Area { left, top, right, bottom } = placed.area;
+        let alone = panel.shades.len() == 1;
+        let (next, height, strength) =
+            if alone { (0.0, bottom - top, SHADE) } else { (STRIP_HEIGHT, STRIP_FILLED, STRIP) };
+        for (i, shade) in panel.shades.iter().enumerate() {
+            let above = top + next * i as f64;
+            for (from, to) in &shade.stretches {
+                let [from, to] =
+                    [from, to].map(|x| left + (right - left) * placed.x.share(*x).clamp(0.0, 1.0));
+                if from < to {
+                    let (low, high) = (above + height, above);
+                    self.field(
+                        &[(from, low), (from, high), (to, high), (to, low)],
+                        shade.colour(strength),
+                        1.0,
+                    )?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The band behind a curve.
+    fn band(&self, series: &Series, number: usize, placed: &Placed) -> Drawn<DB> {
+        let Area { left, top, right, bottom } = placed.area;
+        let place = |x: f64, y: f64| {
+            let (x, y) = (placed.x.share(x).clamp(0.0, 1.0), placed.y.share(y).clamp(0.0, 1.0));
+            (left + (right - left) * x, bottom - (bottom - top) * y)
+        };
+        let drawn = |(x, low, high): &&(f64, f64, f64)| drawable(&(*x, *low)) && drawable(&(*x, *high));
+        let there = || series.band.iter().filter(drawn);
+        if there().count() < 2 {
+            return Ok(());
+        }
+        let upper = there().map(|(x, _, high)| place(*x, *high));
+        let lower = there().rev().map(|(x, low, _)| place(*x, *low));
+        self.field(&upper.chain(lower).collect::<Vec<_>>(), series.colour(number), BAND)
+    }
+
     fn panel(&self, panel: &Panel, placed: &Placed) -> anyhow::Result<()>
     where
         DB::ErrorType: 'static,
@@ -893,6 +920,7 @@ impl<DB: DrawingBackend> Canvas<DB> {
         }
         let empty = panel.cells.is_none() && !panel.series.iter().any(|s| s.points.iter().any(drawable));
         let grid = !empty && panel.cells.is_none();
+        self.shades(panel, placed)?;
         for (x, _) in placed.x.ticks.iter().filter(|_| grid) {
             self.straight((column(*x), high), (column(*x), low), GRID, 1.0)?;
         }
@@ -901,13 +929,19 @@ impl<DB: DrawingBackend> Canvas<DB> {
             self.straight((near, row(*y)), (far, row(*y)), if zero { ZERO } else { GRID }, 1.0)?;
         }
 
-        for (series, color) in panel.series.iter().zip(PALETTE.iter().cycle()) {
-            let trail = Trail::new(&series.points, panel.step, placed);
+        for (number, series) in panel.series.iter().enumerate() {
+            self.band(series, number, placed)?;
+        }
+        // What the others are held against is behind them.
+        let curves = || panel.series.iter().enumerate();
+        for (number, series) in curves().filter(|c| c.1.guide).chain(curves().filter(|c| !c.1.guide)) {
+            let (step, color) = (panel.step && !series.guide, series.colour(number));
+            let trail = Trail::new(&series.points, step, placed);
             for line in &trail.lines {
-                self.line(line, *color, 1.25)?;
+                self.line(line, color, 1.25)?;
             }
             for dot in &trail.dots {
-                self.dot(*dot, *color)?;
+                self.dot(*dot, color)?;
             }
         }
         if empty {
@@ -951,10 +985,16 @@ impl<DB: DrawingBackend> Canvas<DB> {
             self.text(&factor, (left, top - 8.0), HPos::Left, (TICK, INK), false)?;
         }
         let (swatch, gap, _) = space::SWATCH;
-        for Entry { number, label, line, left: from } in &placed.entries {
+        for Entry { swatch: sign, label, line, left: from } in &placed.entries {
             let (from, baseline) = (left + from, placed.legend + space::LINE * *line as f64);
-            let (color, y) = (PALETTE[number % PALETTE.len()], middle(baseline - 0.3 * TICK));
-            self.straight((from, y), (from + swatch, y), color, 2.0)?;
+            let (to, y) = (from + swatch, middle(baseline - 0.3 * TICK));
+            match *sign {
+                Swatch::Line(color) => self.straight((from, y), (to, y), color, 2.0)?,
+                Swatch::Field(color) => {
+                    let (above, below) = (y - 6.0, y + 6.0);
+                    self.field(&[(from, above), (to, above), (to, below), (from, below)], color, 1.0)?;
+                }
+            }
             self.text(label, (from + swatch + gap, baseline), HPos::Left, (TICK, INK), false)?;
         }
         Ok(())
@@ -966,7 +1006,7 @@ mod tests {
     use super::*;
 
     fn series(label: &str, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
-        Series { label: label.to_owned(), points: points.into_iter().collect() }
+        Series::new(label, points.into_iter().collect())
     }
 
     fn panel(series: Vec<Series>) -> Panel {
@@ -980,7 +1020,7 @@ mod tests {
     }
 
     fn figure(panels: Vec<Panel>) -> Figure {
-        Figure { title: "Figure 8 <&> \"e\" & θ̇".to_owned(), columns: 2, panels }
+        Figure { title: "Figure 8 <&> \"e\" & θ̇".to_owned(), columns: 2, panels, ..Figure::default() }
     }
 
     fn wave(n: u32) -> impl Iterator<Item = (f64, f64)> {
@@ -1032,25 +1072,6 @@ mod tests {
         assert_eq!(pixels[..3], [255; 3]);
         let blue = pixels.chunks(3).filter(|p| *p == [0x00, 0x72, 0xb2]).count();
         assert!(blue > 10_000, "{blue}");
-    }
-
-    #[test]
-    fn a_line_in_pixels_is_as_wide_as_it_should_be() {
-        for (dx, dy) in [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8), (-0.8, 0.6), (0.96, -0.28)] {
-            let mut pixels = vec![255; 3 * 400 * 400];
-            let canvas = Canvas {
-                area: BitMapBackend::with_buffer(&mut pixels, (400, 400)).into_drawing_area(),
-                kind: Kind::Raster,
-            };
-            let (from, to) = ((100.0 - 50.0 * dx, 100.0 - 50.0 * dy), (100.0 + 50.0 * dx, 100.0 + 50.0 * dy));
-            canvas.stroke(from, to, BLACK, 2.0, true).unwrap();
-            canvas.area.present().unwrap();
-            drop(canvas);
-            let ink: f64 = pixels.iter().map(|p| f64::from(255 - p)).sum::<f64>() / (3.0 * 255.0);
-            // 200 × 4 pixels and two half discs of radius 2.
-            let area = 800.0 + 4.0 * std::f64::consts::PI;
-            assert!((ink / area - 1.0).abs() < 0.02, "{dx} {dy}: {ink} of {area}");
-        }
     }
 
     #[test]
@@ -1167,6 +1188,61 @@ mod tests {
         let [line] = trail.lines.as_slice() else { panic!("{trail:?}") };
         assert_eq!(line.len(), 5);
         assert!(line.windows(2).all(|w| w[0].0 == w[1].0 || w[0].1 == w[1].1));
+    }
+
+    #[test]
+    fn a_band_a_guide_and_shades_are_drawn_in_their_colours_and_named_once() {
+        let time: Vec<f64> = (0..1000).map(f64::from).collect();
+        let values: Vec<f64> = time.iter().map(|t| (0.9 * t).sin()).collect();
+        let whole = Series::envelope("mean", &Envelope::new(&time, &values, 50), 2.0);
+        let guide = |label: &str| Series { guide: true, ..series(label, [(0.0, 0.0), (999.0, 1.0)]) };
+        let rest = Shade {
+            label: "at rest".to_owned(),
+            stretches: vec![(-50.0, 100.0), (300.0, 400.0)],
+            of: Some(0),
+        };
+        let panel = Panel { shades: vec![rest], ..panel(vec![whole, guide("path"), guide("")]) };
+        let svg = figure(vec![panel.clone()]).svg().unwrap();
+        let seen = texts(&svg);
+        assert_eq!(seen.iter().filter(|t| *t == "path").count(), 2, "its element and its text: {seen:?}");
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let fields: Vec<_> = document.descendants().filter(|n| n.has_tag_name("polygon")).collect();
+        let of = |n: &roxmltree::Node<'_, '_>| {
+            (n.attribute("fill").unwrap().to_owned(), n.attribute("opacity").is_some())
+        };
+        // Two stretches and their swatch, pale; the band, through which the grid is seen.
+        let (pale, band): (Vec<_>, Vec<_>) = fields.iter().map(of).partition(|(_, through)| !through);
+        assert_eq!((pale.len(), band), (3, vec![("#0072B2".to_owned(), true)]));
+        let layout = Layout::new(&figure(vec![panel])).unwrap();
+        let Area { left, right, top, bottom } = layout.panels[0].area;
+        for field in &fields {
+            for corner in field.attribute("points").unwrap().split_whitespace() {
+                let (x, y) = corner.split_once(',').unwrap();
+                let [x, y] = [x, y].map(|v| v.parse::<f64>().unwrap() / f64::from(UNITS));
+                assert!(x >= left - 0.2 && x <= right + 0.2 && y <= bottom + 0.2, "{corner}");
+                assert!(y >= top - 40.0, "a swatch is above the axes, not more");
+            }
+        }
+        // Twice the sine, at most 2: no peak is lost.
+        let (low, high) = heights(&Panel {
+            series: vec![Series::envelope("", &Envelope::new(&time, &values, 50), 2.0)],
+            ..Panel::default()
+        })
+        .unwrap();
+        assert!(low < -1.99 && high > 1.99);
+    }
+
+    #[test]
+    fn the_panels_of_a_row_share_a_scale_and_keep_it_alone() {
+        let of = |scale: f64| panel(vec![series("e", wave(500).map(|(x, y)| (x, scale * y)))]);
+        let both = Figure { share_y: true, ..figure(vec![of(1.0), of(5.0), of(0.1)]) };
+        let y = |figure: &Figure| figure.axes().into_iter().map(|(_, y)| (y.lo, y.hi)).collect::<Vec<_>>();
+        let together = y(&both);
+        assert_eq!(together[0], together[1]);
+        assert!(together[2].1 < together[0].1, "another row has its own");
+        let alone: Vec<_> = both.split().iter().map(|one| y(one)[0]).collect();
+        assert_eq!(alone, together);
+        assert!(y(&Figure { share_y: false, ..both })[0].1 < together[0].1);
     }
 
     #[test]

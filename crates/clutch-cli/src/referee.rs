@@ -1,6 +1,6 @@
 //! `clutch referee`.
 
-use crate::output::{Exit, json, print};
+use crate::output::{Exit, beside, json, print, tell};
 use anyhow::Context;
 use clap::Args;
 use clutch_sim::referee::{BUILT_IN, Case, ENGINES, RefereeEngine, RefereeError, Verdict, run};
@@ -91,7 +91,7 @@ impl Referee {
         if self.list {
             for (name, text) in BUILT_IN {
                 let case = Case::parse(name, text)?;
-                print(&format!("{:18} {}\n", case.id, case.title))?;
+                print(&beside(&format!("{:18}", case.id), &case.title))?;
             }
             return Ok(Exit::Done);
         }
@@ -114,14 +114,14 @@ impl Referee {
         for case in &cases {
             let results = results(case, &engines);
             if !self.json {
-                print(&table(case, &results))?;
+                tell(&table(case, &results))?;
             }
             all.push(results);
         }
         if self.json {
             print(&json(&as_json(&cases, &all))?)?;
         } else {
-            print(&summary(&engines, &all))?;
+            tell(&summary(&engines, &all))?;
         }
         let missed: usize = all.iter().flatten().map(Outcome::missed).sum();
         // A comparison without a figure shows nothing.

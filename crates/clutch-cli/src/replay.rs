@@ -1,7 +1,7 @@
 //! `clutch replay`.
 
 use crate::args::key_value;
-use crate::output::{BUILD, Exit, print};
+use crate::output::{BUILD, Exit, tell, wrote};
 use crate::plot::{self, Figure, Panel, Series};
 use crate::table::{number, quantities};
 use clap::Args;
@@ -47,7 +47,7 @@ impl Replay {
             figure(&log, &replayed.commands).save(file)?;
         }
         let n = replayed.commands.len();
-        let mut text = String::new();
+        let mut text = wrote(&self.plot.iter().map(PathBuf::as_path).collect::<Vec<_>>());
         if log.tail != Tail::Finished {
             text += &format!("the log ended early ({}); its readable part is replayed\n", log.tail);
         }
@@ -67,7 +67,7 @@ impl Replay {
         let done = if whole { Exit::Done } else { Exit::Incomplete };
         if !self.set.is_empty() {
             text += &compare(&log.commands, &replayed.commands);
-            print(&text)?;
+            tell(&text)?;
             return Ok(done);
         }
         let outcome = match &replayed.first {
@@ -89,7 +89,7 @@ impl Replay {
                 Exit::Fault
             }
         };
-        print(&text)?;
+        tell(&text)?;
         Ok(outcome)
     }
 }
@@ -128,11 +128,9 @@ fn compare(logged: &[CommandRecord], replayed: &[CommandRecord]) -> String {
 }
 
 fn figure(log: &Log, replayed: &[CommandRecord]) -> Figure {
-    let series = |label: &str, of: &dyn Fn(usize) -> f64| Series {
-        label: label.to_owned(),
-        points: (0..replayed.len().min(log.commands.len()))
-            .map(|i| (log.commands[i].time_ns as f64 / 1e9, of(i)))
-            .collect(),
+    let series = |label: &str, of: &dyn Fn(usize) -> f64| {
+        let n = replayed.len().min(log.commands.len());
+        Series::new(label, (0..n).map(|i| (log.commands[i].time_ns as f64 / 1e9, of(i))).collect())
     };
     let panel = |title: &str, y_label: &str, series| Panel {
         title: title.to_owned(),
@@ -165,5 +163,6 @@ fn figure(log: &Log, replayed: &[CommandRecord]) -> Figure {
                 vec![series("logged", &|i| log.commands[i].error.to_degrees())],
             ),
         ],
+        ..Figure::default()
     }
 }

@@ -1,7 +1,7 @@
 //! `clutch scenario`.
 
 use crate::c_header::HeaderVerb;
-use crate::output::{Exit, json, print};
+use crate::output::{Exit, beside, json, print, tell};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use clutch_sim::scenario::{BUILT_IN, BuiltIn, schema};
@@ -48,7 +48,8 @@ enum Verb {
 fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
     BUILT_IN.iter().find(|b| b.name == name).with_context(|| {
         let names: Vec<&str> = BUILT_IN.iter().map(|b| b.name).collect();
-        format!("no built-in scenario is called {name}; expected one of: {}", names.join(", "))
+        let like = BuiltIn::like(name);
+        format!("no built-in scenario is called {name}{like}; expected one of: {}", names.join(", "))
     })
 }
 
@@ -56,14 +57,11 @@ impl ScenarioVerb {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
         match self.verb {
             Verb::List => {
-                let lines: Vec<String> = BUILT_IN
-                    .iter()
-                    .map(|b| {
-                        let title = b.toml.lines().find_map(|l| l.strip_prefix("name = "));
-                        format!("{:20} {}", b.name, title.unwrap_or_default().trim_matches('"'))
-                    })
-                    .collect();
-                print(&(lines.join("\n") + "\n"))?;
+                let line = |b: &BuiltIn| {
+                    let title = b.toml.lines().find_map(|l| l.strip_prefix("name = "));
+                    beside(&format!("{:20}", b.name), title.unwrap_or_default().trim_matches('"'))
+                };
+                print(&BUILT_IN.iter().map(line).collect::<String>())?;
             }
             Verb::Schema => print(&json(&schema())?)?,
             Verb::Header(verb) => return verb.run(),
@@ -75,7 +73,7 @@ impl ScenarioVerb {
                 let mut out = std::fs::File::create_new(&file)
                     .with_context(|| format!("{shown}: cannot be created"))?;
                 out.write_all(text.as_bytes()).with_context(|| format!("{shown}: cannot be written"))?;
-                print(&format!("wrote {shown}; run it with: clutch sim {shown}\n"))?;
+                tell(&format!("wrote {shown}; run it with: clutch sim {shown}\n"))?;
             }
         }
         Ok(Exit::Done)

@@ -1,8 +1,9 @@
 //! `clutch sim`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{BUILD, Exit, json, new_log, paragraph, print, with_progress};
-use crate::plot::{self, Figure, Panel, Series};
+use crate::output::{BUILD, Exit, bars, json, new_log, paragraph, report, with_progress, wrote};
+use crate::plot;
+use crate::run_figure::{Drawn, figure};
 use crate::sampled;
 use crate::table::{number, quantities, row};
 use anyhow::Context;
@@ -11,6 +12,7 @@ use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
 use clutch_sim::friction_map::MapInRun;
 use clutch_sim::metrics::Detected;
+use clutch_sim::picture::Envelope;
 use clutch_sim::reaching::Reaching;
 use clutch_sim::rig::Rig;
 use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario};
@@ -33,13 +35,13 @@ pub(crate) struct Sim {
     /// Writes every sample, command and the shaft's true motion to an MCAP log.
     #[arg(long, value_name = "FILE.mcap")]
     log: Option<PathBuf>,
-    /// Draws error, velocity and voltage over time.
+    /// Draws position and velocity closely around a stick, error and voltage of the whole run.
     #[arg(long, value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
-struct Summary<'a> {
+pub(crate) struct Summary<'a> {
     scenario: &'a str,
     version: &'static str,
     engine: &'static str,
@@ -92,7 +94,6 @@ impl Sim {
             new_log(log)?;
         }
         let scenario = self.scenario.load()?;
-        let plan = scenario.plan()?;
         let run = with_progress("samples", |progress| scenario.run(Keep::Trace, progress))?;
         if let Some(file) = &self.csv {
             csv(&run, file)?;
@@ -101,10 +102,23 @@ impl Sim {
             to_log::save_simulation(file, &scenario, &run, BUILD, None)?;
         }
         if let Some(file) = &self.plot {
-            figure(&scenario, &run).save(file)?;
+            let label = scenario.name().to_owned();
+            figure(scenario.name(), &[Drawn { label, scenario: &scenario, run: &run }]).save(file)?;
         }
+        let summary = Summary::of(&scenario, &run)?;
+        let files: Vec<&std::path::Path> =
+            [&self.csv, &self.log, &self.plot].into_iter().flatten().map(PathBuf::as_path).collect();
+        report(self.json, || json(&summary), || text(&summary, &run) + &wrote(&files))?;
+        Ok(Exit::Done)
+    }
+}
+
+impl<'a> Summary<'a> {
+    /// The summary of a run.
+    pub(crate) fn of(scenario: &'a Scenario, run: &'a Run) -> anyhow::Result<Summary<'a>> {
+        let plan = scenario.plan()?;
         let as_sampled = scenario.sampled(&plan.bounds);
-        let summary = Summary {
+        Ok(Summary {
             scenario: scenario.name(),
             version: env!("CARGO_PKG_VERSION"),
             engine: run.engine.name(),
@@ -128,9 +142,7 @@ impl Sim {
             friction_map: scenario.map_grid().and_then(|_| MapInRun::of(&run.trace)),
             bristles_lack_nm_s_rad: Rig::new(&scenario.spec().rig, scenario.spec().run.seed)?
                 .lacks_damping(run.trace.start_voltage),
-        };
-        print(&if self.json { json(&summary)? } else { text(&summary, &run) })?;
-        Ok(Exit::Done)
+        })
     }
 }
 
@@ -152,7 +164,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         EngineKind::DormandPrince | EngineKind::Auto => "Dormand–Prince",
     };
     let title = format!(
-        "{}\n{} ticks, seed {}, servo in {}, engine {engine}; figures over {} s after settling",
+        "{}\n{} ticks, seed {}, servo in {}, engine {engine}\nfigures over {} s after settling",
         s.scenario,
         run.trace.time.len(),
         s.seed,
@@ -177,7 +189,10 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     };
     let jump = s.path.velocity_jump_rad_s;
     let mut text = quantities(&title, &rows);
-    text += &format!("gains, continuous time: {certified}\n");
+    let largest = largest_errors(run);
+    let most = largest.iter().copied().fold(0.0, f64::max);
+    text += &format!("   |error| of the whole run, up to {} °:\n   {}\n", number(most), bars(&largest, most));
+    text += &paragraph(&format!("gains, continuous time: {certified}"));
     text += &paragraph(&format!("gains, as sampled: {}", s.as_sampled));
     if let Some(reason) = s.detected.reason() {
         text += &paragraph(&format!("stick-slip: {reason}"));
@@ -201,19 +216,28 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         text += &paragraph(&format!("map of the disc: {told}"));
     }
     if jump > 1e-9 {
-        text += &format!(
-            "note: the path's velocity jumps by {} °/s, which no shaft follows at once; the shaft catches up\n",
+        text += &paragraph(&format!(
+            "note: the path's velocity jumps by {} °/s, which no shaft follows at once; the shaft catches up",
             number(jump.to_degrees())
-        );
+        ));
     }
     if let Some(lacks) = s.bristles_lack_nm_s_rad {
-        text += &format!(
+        text += &paragraph(&format!(
             "note: at the voltage of the start the bristles of the friction can give energy: they are passive with \
-             {} N m s/rad more of rig.viscous_damping_nm_s_rad, or with a lower damping_s_rad\n",
+             {} N m s/rad more of rig.viscous_damping_nm_s_rad, or with a lower damping_s_rad",
             number(lacks)
-        );
+        ));
     }
     text
+}
+
+/// Parts of a line of bars.
+const BARS: usize = 72;
+
+/// The largest magnitude of the error in each part of the run, °.
+pub(crate) fn largest_errors(run: &Run) -> Vec<f64> {
+    let errors = Envelope::new(&run.trace.time, &run.trace.error, BARS);
+    errors.low.iter().zip(&errors.high).map(|(low, high)| low.abs().max(high.abs()).to_degrees()).collect()
 }
 
 fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
@@ -244,38 +268,4 @@ fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
         out.write_record(&row).with_context(wrong)?;
     }
     out.flush().with_context(wrong)
-}
-
-fn figure(scenario: &Scenario, run: &Run) -> Figure {
-    let t = &run.trace;
-    let over_time = |label: &str, values: &[f64], factor: f64| Series {
-        label: label.to_owned(),
-        points: t.time.iter().zip(values).map(|(t, y)| (*t, y * factor)).collect(),
-    };
-    let degrees = 1.0_f64.to_degrees();
-    let panel = |title: &str, y_label: &str, series: Vec<Series>, step: bool| Panel {
-        title: title.to_owned(),
-        x_label: "time (s)".to_owned(),
-        y_label: y_label.to_owned(),
-        series,
-        step,
-        ..Panel::default()
-    };
-    Figure {
-        title: scenario.name().to_owned(),
-        columns: 1,
-        panels: vec![
-            panel("Position error", "error (°)", vec![over_time("error", &t.error, degrees)], false),
-            panel(
-                "Velocity",
-                "velocity (°/s)",
-                vec![
-                    over_time("shaft", &t.velocity, degrees),
-                    over_time("target", &t.target_velocity, degrees),
-                ],
-                false,
-            ),
-            panel("Voltage", "voltage (V)", vec![over_time("voltage", &t.voltage, 1.0)], true),
-        ],
-    }
 }

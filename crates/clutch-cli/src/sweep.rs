@@ -2,7 +2,7 @@
 
 use crate::args::ScenarioArgs;
 use crate::map;
-use crate::output::{Exit, print, with_progress};
+use crate::output::{Exit, tell, with_progress};
 use crate::signals::stop_flag;
 use anyhow::{Context, bail, ensure};
 use clap::Args;
@@ -247,7 +247,7 @@ impl SweepVerb {
         if !done {
             text += "; stopped: --resume goes on";
         }
-        print(&(text + "\n"))?;
+        tell(&(text + "\n"))?;
         Ok(if done { Exit::Done } else { Exit::Stopped })
     }
 }

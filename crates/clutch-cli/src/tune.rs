@@ -4,10 +4,11 @@ use crate::args::{ScenarioArgs, read_rig_file};
 use crate::map::{List, values};
 use crate::output::{Exit, Forms, json, paragraph, with_progress, write};
 use crate::plot::{Figure, Panel, Series};
-use crate::report::{self, ReportFigure, ReportTable};
+use crate::report::{Page, ReportFigure, ReportTable};
 use crate::table::number;
 use clap::Args;
 use clutch_certificate::file;
+use clutch_sim::picture::{Envelope, PARTS};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::Value;
 use clutch_sim::smooth_speed::RATE;
@@ -264,11 +265,13 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
             title,
             x_label: "t, s".to_owned(),
             y_label: "error, °".to_owned(),
-            series: vec![Series { label: String::new(), points: errors(scenario, tuned.rates_deg_s[0])? }],
+            series: vec![errors(scenario, tuned.rates_deg_s[0])?],
             ..Panel::default()
         });
     }
-    let most = |p: &Panel| p.series.iter().flat_map(|s| &s.points).map(|(_, e)| e.abs()).fold(0.0, f64::max);
+    let most = |p: &Panel| {
+        p.series.iter().flat_map(|s| &s.band).map(|(_, low, high)| low.abs().max(*high)).fold(0.0, f64::max)
+    };
     // One scale for all that follow their path.
     let scale = panels.iter().map(most).filter(|e| *e < 2.0).fold(0.02, f64::max);
     for panel in &mut panels {
@@ -282,10 +285,11 @@ fn figure(tuned: &Tuned) -> anyhow::Result<Figure> {
         ),
         columns: 2,
         panels,
+        ..Figure::default()
     })
 }
 
-fn errors(scenario: &Scenario, rate: f64) -> Result<Vec<(f64, f64)>, ScenarioError> {
+fn errors(scenario: &Scenario, rate: f64) -> Result<Series, ScenarioError> {
     let set = [
         (RATE.to_owned(), Value::Float(rate)),
         ("run.seed".to_owned(), Value::Integer(DRAWN)),
@@ -294,7 +298,8 @@ fn errors(scenario: &Scenario, rate: f64) -> Result<Vec<(f64, f64)>, ScenarioErr
     ];
     let here = Scenario::from_table(scenario.name(), scenario.table().clone(), &set)?;
     let trace = here.run(Keep::Trace, UNWATCHED)?.trace;
-    Ok(trace.time.iter().zip(&trace.error).map(|(t, e)| (*t, e.to_degrees())).collect())
+    let errors = Envelope::new(&trace.time, &trace.error, PARTS);
+    Ok(Series::envelope("error", &errors, 1.0_f64.to_degrees()))
 }
 
 fn page(tuned: &Tuned, figure: &Figure) -> anyhow::Result<String> {
@@ -335,9 +340,17 @@ fn page(tuned: &Tuned, figure: &Figure) -> anyhow::Result<String> {
             1,
         ),
     ];
-    let caption =
-        "Error of the best gains of each law, from rest, on a disc that no gain was chosen on.".to_owned();
-    let figure = ReportFigure { id: "tune".to_owned(), caption, svg: figure.svg()? };
+    let caption = "Error of the best gains of each law, from rest, on a disc that no gain was chosen on: lowest to highest and mean of each 1/120 of the run.";
+    let figures = [ReportFigure::new("tune", caption, figure)?];
     let settings = tuned.winner().and_then(|w| w.scenario.as_ref()).unwrap_or(&tuned.believed).parameters();
-    Ok(report::html(&title, &[verdict(tuned), about(tuned)], &[], &tables, &[figure], &settings))
+    let page = Page {
+        title: &title,
+        lead: &[verdict(tuned)],
+        figures: &figures,
+        tables: &tables,
+        about: &[about(tuned)],
+        settings: &settings,
+        ..Page::default()
+    };
+    page.html()
 }

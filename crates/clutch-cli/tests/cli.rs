@@ -15,6 +15,11 @@ fn err(o: &Output) -> String {
     String::from_utf8(o.stderr.clone()).expect("UTF-8")
 }
 
+/// True if a terminal of 80 columns holds the text; a file's name may be as long as it is.
+fn narrow(text: &str) -> bool {
+    text.lines().filter(|line| !line.starts_with("wrote ")).all(|line| line.chars().count() <= 80)
+}
+
 /// A folder of this test's own.
 fn folder(name: &str) -> PathBuf {
     let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -28,6 +33,7 @@ fn the_help_of_every_verb_has_an_example() {
     for verb in [
         &["--help"][..],
         &["sim", "--help"],
+        &["compare", "--help"],
         &["sweep", "--help"],
         &["scenario", "--help"],
         &["scenario", "list", "--help"],
@@ -49,6 +55,9 @@ fn the_help_of_every_verb_has_an_example() {
         assert!(o.status.success());
         let text = out(&o).replace("Examples:", "Example:");
         assert!(text.contains("Example:\n  clutch "), "{verb:?}:\n{}", out(&o));
+        // The line of usage is clap's, which does not break it.
+        let long = text.lines().find(|line| line.chars().count() > 80 && !line.starts_with("Usage:"));
+        assert_eq!(long, None, "{verb:?}: a line is longer than a terminal");
     }
 }
 
@@ -154,6 +163,161 @@ fn a_run_writes_its_samples_and_its_figure() {
     assert!(err(&o).starts_with("clutch: no/such/folder/run.csv: cannot be written"), "{}", err(&o));
 }
 
+/// Texts and curves of a drawing.
+fn drawing(svg: &Path) -> (Vec<String>, usize) {
+    let text = std::fs::read_to_string(svg).expect("a drawing");
+    let document = roxmltree::Document::parse(&text).expect("well-formed");
+    let texts =
+        document.descendants().filter(|n| n.is_text()).filter_map(|n| n.text().map(|t| t.trim().to_owned()));
+    let bands = document.descendants().filter(|n| {
+        n.has_tag_name("polygon") && n.attribute("opacity").is_some_and(|o| o.starts_with("0.2"))
+    });
+    (texts.filter(|t| !t.is_empty()).collect(), bands.count())
+}
+
+#[test]
+fn a_run_is_drawn_closely_around_a_stick_and_whole_as_an_envelope() {
+    let svg = folder("sim_plot").join("run.svg");
+    let o = clutch(&["sim", "bench_pd_2", "--plot", svg.to_str().unwrap()]);
+    assert!(o.status.success(), "{}", err(&o));
+    assert!(out(&o).lines().last().is_some_and(|l| l == format!("wrote {}", svg.display())), "{}", out(&o));
+    let (texts, bands) = drawing(&svg);
+    for text in
+        ["position (counts)", "velocity (°/s)", "error (°)", "voltage (V)", "path", "at rest", "the window"]
+    {
+        assert!(texts.iter().any(|t| t == text), "lacks {text}: {texts:?}");
+    }
+    assert!(texts.iter().any(|t| t.starts_with("216 ms around the stick at ")), "{texts:?}");
+    assert_eq!(bands, 2, "error and voltage");
+    // A run that does not stick is shown around its largest error.
+    assert!(clutch(&["sim", "bench_glide_2", "--plot", svg.to_str().unwrap()]).status.success());
+    let (texts, _) = drawing(&svg);
+    assert!(texts.iter().any(|t| t.contains("around the largest error, at ")), "{texts:?}");
+}
+
+#[test]
+fn runs_are_compared_in_a_table_of_80_columns_and_on_common_axes() {
+    let svg = folder("compare").join("laws.svg");
+    let two = ["bench_pd_2", "bench_smc_2"];
+    let o = clutch(&[&["compare"][..], &two, &["--plot", svg.to_str().unwrap()]].concat());
+    let text = out(&o);
+    assert!(o.status.success(), "{}", err(&o));
+    assert!(narrow(&text), "{text}");
+    let cells = |name: &str| {
+        let line = text.lines().find(|l| l.trim_start().starts_with(name)).expect(name);
+        line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+    };
+    // The figures of `clutch sim`.
+    for (column, name) in two.iter().enumerate() {
+        let one = out(&clutch(&["sim", name]));
+        let line = one.lines().find(|l| l.trim_start().starts_with("max |error|")).expect("a figure");
+        assert_eq!(line.split_whitespace().nth(2), cells("max |error|").get(2 + column).map(String::as_str));
+    }
+    assert_eq!(cells("A "), ["A", "B"]);
+    let (texts, bands) = drawing(&svg);
+    assert_eq!(bands, 4);
+    let path = texts.iter().filter(|t| *t == "path").count();
+    assert_eq!(path, 2, "one path in each of two panels: {texts:?}");
+    for law in ["A: PD at 2 °/s, bench", "B: SMC at 2 °/s, bench"] {
+        assert_eq!(texts.iter().filter(|t| *t == law).count(), 4, "{texts:?}");
+    }
+
+    let set = ["--set", "reference.ramp.rate_deg_s=6", "--json"];
+    let all = ["pd_2", "smc_2", "ctc_2", "pid_2", "observer_smc_2"];
+    let o = clutch(&[&["compare"][..], &all, &set].concat());
+    let value: serde_json::Value = serde_json::from_slice(&o.stdout).expect("only JSON");
+    let runs = value["runs"].as_array().expect("runs");
+    assert_eq!(runs.len(), 5);
+    for run in runs {
+        let rate = run["path"]["highest_velocity_rad_s"].as_f64().expect("a rate");
+        assert!((rate.to_degrees() - 6.0).abs() < 1e-9, "{rate}");
+    }
+    assert!(value["window"]["from_s"].as_f64() < value["window"]["to_s"].as_f64());
+    let text = out(&clutch(&[&["compare"][..], &all].concat()));
+    assert!(narrow(&text) && text.matches("max |error|").count() == 2, "five columns are two tables: {text}");
+
+    assert_eq!(clutch(&["compare", "pd_2"]).status.code(), Some(64));
+    let o = clutch(&[&["compare"][..], &["pd_2"; 8]].concat());
+    assert!(err(&o).contains("8 scenarios: expected 2 to 7"), "{}", err(&o));
+}
+
+#[test]
+fn what_every_built_in_run_prints_fits_a_terminal() {
+    let list = out(&clutch(&["scenario", "list"]));
+    for name in list.lines().filter_map(|line| line.split_whitespace().next()) {
+        let text = out(&clutch(&["sim", name]));
+        assert!(narrow(&text), "{text}");
+        let bars = text.lines().skip_while(|l| !l.contains("|error| of the whole run")).nth(1).expect("bars");
+        assert!(bars.trim().chars().all(|c| ('▁'..='█').contains(&c)) && bars.contains('█'), "{text}");
+    }
+}
+
+#[test]
+fn a_quiet_command_tells_nothing_but_what_was_asked_for() {
+    let svg = folder("quiet").join("run.svg");
+    let o = clutch(&["--quiet", "sim", "smc_2", "--plot", svg.to_str().unwrap()]);
+    assert!(o.status.success() && out(&o).is_empty() && err(&o).is_empty(), "{}{}", out(&o), err(&o));
+    assert!(svg.exists());
+    assert!(out(&clutch(&["sim", "smc_2", "--json", "-q"])).starts_with('{'));
+    assert!(out(&clutch(&["scenario", "list", "-q"])).contains("smc_2"));
+    assert!(err(&clutch(&["-q", "sim", "missing.toml"])).contains("no such file"));
+    // That nothing was started is no chatter.
+    let refused = clutch(&["-q", "loop", "board_smc_2", "--set", "law.smc.kp_v=1"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        out(&refused).contains("--uncertified runs it all the same"),
+        "{}{}",
+        out(&refused),
+        err(&refused)
+    );
+}
+
+/// Output of a command on a terminal, made by `script`; none where that program is missing.
+fn on_a_terminal(command: &str, environment: &[(&str, &str)]) -> Option<String> {
+    let line = format!("'{}' {command}", env!("CARGO_BIN_EXE_clutch"));
+    let mut script = Command::new("script");
+    script.args(["-qec", &line, "/dev/null"]).env_remove("NO_COLOR").env("TERM", "xterm-256color");
+    script.envs(environment.iter().copied());
+    let o = script.output().ok()?;
+    Some(out(&o))
+}
+
+#[test]
+fn verdicts_have_colours_on_a_terminal_alone() {
+    let escape = '\u{1b}';
+    assert!(!out(&clutch(&["sim", "bench_pd_2"])).contains(escape), "no terminal");
+    let Some(text) = on_a_terminal("sim bench_pd_2", &[]) else {
+        eprintln!("skipped: no program `script`");
+        return;
+    };
+    assert!(text.contains(&format!("{escape}[1m{escape}[31mUNSTABLE{escape}[0m")), "{text:?}");
+    for plain in [("NO_COLOR", "1"), ("TERM", "dumb")] {
+        let text = on_a_terminal("sim bench_pd_2", &[plain]).expect("it was there");
+        assert!(text.contains("UNSTABLE") && !text.contains(&format!("{escape}[31m")), "{plain:?}: {text:?}");
+    }
+}
+
+#[test]
+fn a_name_in_other_letters_is_recognised() {
+    for (args, meant) in [
+        (&["sim", "SMC_2"][..], "did you mean smc_2?"),
+        (&["scenario", "show", "Bench_PD_2"], "did you mean bench_pd_2?"),
+        (&["sim", "smc_2", "--set", "law.smc.KP_V=3"], "did you mean kp_v?"),
+        (&["sim", "smc_2", "--set", "law.smc.Kp=3"], "did you mean kp_v?"),
+        (&["sim", "smc_2", "--set", "RUN.seed=3"], "did you mean run?"),
+        (&["sim", "smc_2", "--set", "rig.base=Bench"], "did you mean bench?"),
+    ] {
+        let o = clutch(args);
+        assert_eq!(o.status.code(), Some(1), "{args:?}");
+        assert!(err(&o).contains(meant), "{args:?}: {}", err(&o));
+    }
+    for (verb, meant) in [("SIM", "sim"), ("Reproduce", "reproduce"), ("comprae", "compare")] {
+        let o = clutch(&[verb]);
+        assert_eq!(o.status.code(), Some(64));
+        assert!(err(&o).contains(&format!("similar subcommand exists: '{meant}'")), "{}", err(&o));
+    }
+}
+
 #[test]
 fn a_new_scenario_never_overwrites_a_file() {
     let file = folder("new").join("mine.toml");
@@ -188,6 +352,35 @@ fn reproduce_names_a_folder_that_it_cannot_make() {
     let o = clutch(&["reproduce", "--out", file.join("below").to_str().unwrap()]);
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).contains("a_file/below: cannot be made"), "{}", err(&o));
+}
+
+#[test]
+fn the_report_begins_with_three_sentences_and_the_figures_and_prints_80_columns() {
+    let dir = folder("report");
+    let o = clutch(&["reproduce", "--out", dir.to_str().unwrap()]);
+    assert!(o.status.success(), "{}", err(&o));
+    let lines = out(&o);
+    assert!(narrow(lines.split("figures, table3.csv").next().unwrap()), "{lines}");
+    let page = std::fs::read_to_string(dir.join("report.html")).unwrap();
+    let at = |text: &str| page.find(text).expect(text);
+    let (figures, claims) = (at("<h2 id=\"figures\">"), at("<h2 id=\"claims\">"));
+    assert_eq!(page[..figures].matches("<p class=\"lead\">").count(), 3);
+    assert!(at("<svg") > figures && at("<svg") < claims);
+    // The sentences tell what was computed.
+    let report = std::fs::read_to_string(dir.join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let slowest = &report["table3"][2];
+    for (name, after) in
+        [("pd_cycles_per_s", " times a second under PD"), ("reduction_percent", " % less, where")]
+    {
+        let told = format!("{:.1}{after}", slowest[name].as_f64().unwrap());
+        assert!(page[..figures].contains(&told), "lacks {told}");
+    }
+    for name in ["laws", "fig8", "fig9", "fig10"] {
+        assert!(std::fs::read(dir.join(name).with_extension("png")).unwrap().starts_with(b"\x89PNG"));
+        drawing(&dir.join(name).with_extension("svg"));
+        assert!(page.contains(&format!("<figure id=\"figure-{name}\">")));
+    }
 }
 
 #[test]
@@ -266,7 +459,7 @@ fn the_referee_prints_a_table_of_80_columns_and_fails_where_a_case_is_missed() {
     let o = clutch(&["referee", "P3", "X1"]);
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
     assert!(out(&o).contains("P3  A brake that closes at 0.1 s stops a sliding mass"), "{}", out(&o));
-    assert!(out(&o).lines().all(|line| line.chars().count() <= 80), "{}", out(&o));
+    assert!(narrow(&out(&o)), "{}", out(&o));
     let text = out(&clutch(&["referee", "--show", "P3"]));
     let file = folder("referee").join("mine.toml");
     std::fs::write(&file, text.replace("value = 1.1", "value = 1.2")).expect("the folder is there");
@@ -289,7 +482,7 @@ fn tuning_prints_who_lost_and_why_in_80_columns_and_writes_what_the_other_verbs_
     let o = clutch(&[&["tune", "board_smc_2", "--candidates", "2"][..], &files].concat());
     let text = out(&o);
     assert!(o.status.success(), "{}", err(&o));
-    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    assert!(narrow(&text), "{text}");
     for words in [
         "glide in a shell: chosen",
         "PD: rougher",
@@ -325,7 +518,7 @@ fn the_map_has_80_columns_a_legend_and_the_cause_of_each_cell() {
     let o = clutch(&[&["map", "bench_pd_2"][..], &gains, &few, &files].concat());
     let text = out(&o);
     assert!(o.status.success(), "{}", err(&o));
-    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    assert!(narrow(&text), "{text}");
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "PD at 2 °/s, bench: lowest rate without a stick, °/s");
     let row = lines.iter().find(|line| line.starts_with("     50 ")).expect(&text);
@@ -403,7 +596,7 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
     assert!(out(&o).contains("T/J  ") && out(&o).contains("lag: not told; "), "{}", out(&o));
     // All that is printed fits a terminal.
-    assert!(out(&o).lines().all(|line| line.chars().count() <= 80), "{}", out(&o));
+    assert!(narrow(&out(&o)), "{}", out(&o));
 
     let o = clutch(&[&["certify", "board_smc_2", "--json", "--identified", &rig][..], &hold].concat());
     let certificate: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");

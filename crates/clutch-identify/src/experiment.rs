@@ -95,7 +95,7 @@ impl Programme {
                 .map(|(rate, seconds)| format!("ride        {rate} °/s under glide, {seconds} s")),
         );
         lines.push(format!(
-            "limits      {:.0}° in all; each part ends {FOLLOWING_DEG}° off its path, and by every other check",
+            "limits      {:.0}° in all; a part ends {FOLLOWING_DEG}° off its path, and by any other check",
             self.way_deg()
         ));
         lines

@@ -29,7 +29,6 @@ use clutch_node::{ControllerNode, HostNode, present_code};
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Scenario, ScenarioError, number};
 use clutch_wire::{Actuate, ControllerHello, Hello, Sample, Telemetry};
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -200,16 +199,6 @@ pub struct Announcement {
     pub rows: Vec<(&'static str, String)>,
     /// Further remarks, a line each.
     pub remarks: Vec<String>,
-}
-
-impl fmt::Display for Announcement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", self.title)?;
-        for (name, value) in &self.rows {
-            writeln!(f, "  {name:<12}{value}")?;
-        }
-        self.remarks.iter().try_for_each(|line| writeln!(f, "{line}"))
-    }
 }
 
 /// The progress of a run.

@@ -37,7 +37,7 @@ mod _clutch {
     #[pymodule_export]
     use super::referee::{RefereeCase, referee_cases};
     #[pymodule_export]
-    use super::run::{Run, lowest_smooth_speed, simulate};
+    use super::run::{Run, envelope, lowest_smooth_speed, simulate};
     #[pymodule_export]
     use super::scenario::{Scenario, brake_gain, check, friction_lab, rig, scenarios, steady_friction};
     #[pymodule_export]

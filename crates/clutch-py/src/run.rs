@@ -8,9 +8,11 @@ use clutch_core::{ParamError, Servo};
 use clutch_loop::to_log::{SaveError, save_simulation};
 use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::columns;
+use clutch_sim::picture::{Around, Envelope, PARTS, Stick, Window, sticks};
 use clutch_sim::progress::Progress;
 use clutch_sim::smooth_speed::{self, Trials};
 use clutch_sim::{Keep, RunError, ScenarioError, simulate_servo};
+use numpy::PyReadonlyArray1;
 use pyo3::exceptions::{PyFileExistsError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -106,6 +108,17 @@ pub(crate) fn lowest_smooth_speed<'py>(
     from_json(py, &found.map_err(|e| PyRuntimeError::new_err(e.to_string()))?)
 }
 
+/// A curve over time in parts of equal length: the middle of each, s, its lowest and highest value, and its mean.
+#[pyfunction]
+pub(crate) fn envelope(
+    time: PyReadonlyArray1<'_, f64>,
+    values: PyReadonlyArray1<'_, f64>,
+) -> PyResult<Table> {
+    let e = Envelope::new(time.as_slice()?, values.as_slice()?, PARTS);
+    let columns = [("time_s", e.time), ("low", e.low), ("high", e.high), ("mean", e.mean)];
+    Ok(Table::of(columns.map(|(name, values)| (name, Column::own(values)))))
+}
+
 /// Samples as columns, the memory shared with the run.
 pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)> {
     let limit = Column::own(run.trace.limit.iter().map(|l| *l as u16).collect::<Vec<u16>>());
@@ -145,6 +158,22 @@ impl Run {
     #[getter]
     fn events(&self) -> Table {
         event_table(&self.run.events)
+    }
+
+    /// Times at rest: from a stick to its break-away, or to the end of the run.
+    #[getter]
+    fn sticks(&self) -> Table {
+        let sticks = sticks(&self.run.events, self.scenario.0.spec().run.duration);
+        let column = |of: fn(&Stick) -> f64| Column::own(sticks.iter().map(of).collect::<Vec<f64>>());
+        Table::of([("from_s", column(|s| s.from)), ("to_s", column(|s| s.to))])
+    }
+
+    /// The stretch that a picture shows closely: its begin and end, s; what is in its middle, in words; true if that is a
+    /// stick.
+    #[getter]
+    fn window(&self) -> Option<(f64, f64, String, bool)> {
+        let window = Window::of(&self.scenario.0, &self.run)?;
+        Some((window.from, window.to, window.words(), matches!(window.around, Around::Stick(_))))
     }
 
     /// Figures by name.

@@ -135,7 +135,7 @@ pub(crate) fn run_loop<'py>(
     let (mut announced, mut interrupt) = (String::new(), None);
     let ran = py.detach(|| {
         session.run(&stop, &mut |event| match event {
-            Event::Announced(announcement) => announced = announcement.to_string(),
+            Event::Announced(announcement) => announced = clutch_cli::plan(&announcement),
             // A signal waits, as Ctrl-C: the run ends in the safe state, and then the exception is raised.
             Event::Progress(_) => {
                 if interrupt.is_none()

@@ -11,6 +11,7 @@ pub mod metrics;
 pub mod moving_rig;
 mod number;
 pub mod paper;
+pub mod picture;
 pub mod progress;
 pub mod reaching;
 pub mod referee;

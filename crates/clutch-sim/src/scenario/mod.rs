@@ -23,7 +23,7 @@ use crate::progress::Report;
 use crate::rig::{Rig, RigBase, RigParams};
 use crate::ripple::Ripple;
 use crate::run::{Keep, Run, RunError, RunSpec, Start, simulate_watched};
-use crate::tables::{self, check, checked, complete, find, lookup, read, row_at, shown};
+use crate::tables::{self, check, checked, complete, find, lookup, nearest, read, row_at, shown};
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::friction::FrictionModel;
 use clutch_core::law::{Asked, Law, Output, Shell};
@@ -45,6 +45,15 @@ pub struct BuiltIn {
     pub name: &'static str,
     /// Its file.
     pub toml: &'static str,
+}
+
+impl BuiltIn {
+    /// Asks for the built-in scenario whose name is much like this one, as `: did you mean smc_2?`; empty if none is.
+    #[must_use]
+    pub fn like(name: &str) -> String {
+        let names: Vec<&str> = BUILT_IN.iter().map(|b| b.name).collect();
+        nearest(name, &names)
+    }
 }
 
 macro_rules! built_in {
@@ -96,7 +105,7 @@ pub struct Scenario {
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The system's answer.
-    #[error("{name}: {}", io_text(error))]
+    #[error("{name}: {}", io_text(name, error))]
     Io {
         /// The file.
         name: String,
@@ -108,13 +117,13 @@ pub enum LoadError {
     Scenario(#[from] ScenarioError),
 }
 
-fn io_text(e: &std::io::Error) -> String {
+fn io_text(name: &str, e: &std::io::Error) -> String {
     match e.kind() {
-        ErrorKind::NotFound => {
+        ErrorKind::NotFound => format!(
             "no such file, and no built-in scenario of that name; `clutch scenario list` shows those, \
-             `clutch scenario new FILE` writes one to begin with"
-                .to_owned()
-        }
+             `clutch scenario new FILE` writes one to begin with{}",
+            BuiltIn::like(name)
+        ),
         ErrorKind::InvalidData => "not a text file: expected TOML in UTF-8".to_owned(),
         _ => e.to_string(),
     }
@@ -792,10 +801,14 @@ fn merge_base(origin: &str, table: &mut Table) -> Result<(), ScenarioError> {
     let names: Vec<&str> = RigBase::ALL.iter().map(|base| base.name()).collect();
     let expected = format!("the name of a rig: {}", names.join(", "));
     let base = match own.get("base") {
-        Some(Value::String(name)) => RigBase::named(name).ok_or_else(|| format!("\"{name}\"")),
-        other => Err(other.map_or("missing".to_owned(), shown)),
+        Some(Value::String(name)) => {
+            RigBase::named(name).ok_or_else(|| (format!("\"{name}\""), nearest(name, &names)))
+        }
+        other => Err((other.map_or("missing".to_owned(), shown), String::new())),
     };
-    let base = base.map_err(|value| ScenarioError::value(origin, "rig.base", &value, &expected))?;
+    let base = base.map_err(|(value, like)| {
+        ScenarioError::value(origin, "rig.base", &value, &format!("{expected}{like}"))
+    })?;
     let mut merged = RigParams::base_table(base);
     // Alternatives: naming one drops the base's other.
     for choice in ["actuator", "drive", "friction"] {

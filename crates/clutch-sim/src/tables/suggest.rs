@@ -6,7 +6,12 @@ use toml::Value;
 /// The probable meaning: the same key in another unit, with the value in it, or the nearest name.
 pub(super) fn correction(unknown: &str, value: Option<&Value>, known: &[String]) -> String {
     let number = value.and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)));
-    if let Some((stem, unit)) = unit_of(unknown) {
+    // Where letters are large or small does not make another word.
+    let lower = unknown.to_lowercase();
+    if known.contains(&lower) {
+        return format!(": did you mean {lower}?");
+    }
+    if let Some((stem, unit)) = unit_of(&lower) {
         let same = known.iter().find_map(|k| {
             let (other, own) = unit_of(k)?;
             (other == stem && own.quantity == unit.quantity).then_some((k, own))
@@ -22,7 +27,7 @@ pub(super) fn correction(unknown: &str, value: Option<&Value>, known: &[String])
         }
     }
     if let Some(key) =
-        known.iter().find(|k| k.strip_prefix(unknown).is_some_and(|rest| rest.starts_with('_')))
+        known.iter().find(|k| k.strip_prefix(&*lower).is_some_and(|rest| rest.starts_with('_')))
     {
         return format!(": did you mean {key}? (keys end with their unit)");
     }
@@ -35,11 +40,12 @@ fn unit_of(key: &str) -> Option<(&str, &'static Unit)> {
     Some((key.strip_suffix(unit.suffix)?.strip_suffix('_')?, unit))
 }
 
-/// The most alike of the known names, if one is much alike.
-pub(super) fn nearest(unknown: &str, known: &[impl AsRef<str>]) -> String {
+/// The most alike of the known names, if one is much alike; large and small letters are alike.
+pub(crate) fn nearest(unknown: &str, known: &[impl AsRef<str>]) -> String {
+    let unknown = unknown.to_lowercase();
     let near = known
         .iter()
-        .map(|k| (strsim::jaro_winkler(unknown, k.as_ref()), k.as_ref()))
+        .map(|k| (strsim::jaro_winkler(&unknown, &k.as_ref().to_lowercase()), k.as_ref()))
         .filter(|(likeness, _)| *likeness > 0.8)
         .max_by(|a, b| a.0.total_cmp(&b.0));
     near.map_or(String::new(), |(_, k)| format!(": did you mean {k}?"))
