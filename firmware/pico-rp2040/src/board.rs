@@ -44,8 +44,8 @@ const _: () = assert!(PARAMS.check().is_ok(), "a number above is out of range: s
 /// Baud rate of the line to the host.
 const BAUD: u32 = 921_600;
 
-/// Time constant of the filter behind the converter's pin, µs: 3.3 kΩ · 100 nF.
-const FILTER_US: u64 = 330;
+/// Periods of 1 ms until the filter behind the converter's pin, 3.3 kΩ · 100 nF, is within 0.1 % of its voltage.
+const FILTER_PERIODS: u32 = 3;
 
 /// Pins, by their number on the chip. The converter's is output A of PWM slice 0.
 const LINE: [usize; 2] = [0, 1];
@@ -83,6 +83,14 @@ fn PWM_IRQ_WRAP() {
     BEGUN.store(true, Ordering::Relaxed);
 }
 
+/// True once for each period that has begun.
+fn begun() -> bool {
+    let begun = BEGUN.load(Ordering::Relaxed);
+    // An interrupt in between is the same period's, or one that nobody has time for.
+    BEGUN.store(false, Ordering::Relaxed);
+    begun
+}
+
 /// The hardware as the node sees it.
 pub struct Board {
     encoder: Quadrature,
@@ -97,7 +105,9 @@ pub struct Board {
 }
 
 /// For a program that cannot continue: lets the switch fall back, puts the safe output out behind it, and waits for
-/// the reset. Trusts none of the contents of memory.
+/// the reset. Trusts none of the contents of memory: it runs from flash.
+#[unsafe(link_section = ".HardFault.stop")]
+#[inline(never)]
 pub fn stop() -> ! {
     cortex_m::interrupt::disable();
     pac::SIO.gpio_out(0).value_clr().write_value(1 << CONNECTED);
@@ -194,16 +204,19 @@ pub fn start() -> Board {
         told: BOOT_CODE,
         boot: random(),
     };
-    // The filter has the boot code's voltage: the brake may see it.
-    while board.now_us() < 8 * FILTER_US {}
+    pac::PWM.inte().write(|w| w.0 = 1 << PERIOD);
+    line::unmask(pac::Interrupt::PWM_IRQ_WRAP);
+    // Until the filter has the boot code's voltage, and the brake may see it.
+    for _ in 0..FILTER_PERIODS {
+        while !begun() {
+            cortex_m::asm::wfi();
+        }
+    }
     pac::SIO.gpio_out(0).value_set().write_value(1 << CONNECTED | 1 << REGULATOR);
     pac::SIO.gpio_oe(0).value_set().write_value(1 << CONNECTED | 1 << REGULATOR);
     for pin in [CONNECTED, REGULATOR] {
         function(pin, 5);
     }
-
-    pac::PWM.inte().write(|w| w.0 = 1 << PERIOD);
-    line::unmask(pac::Interrupt::PWM_IRQ_WRAP);
     board
 }
 
@@ -245,9 +258,7 @@ impl Board {
             self.period_us = period_us;
             pac::PWM.ch(PERIOD).top().write(|w| w.set_top((period_us - 1) as u16));
         }
-        let begun = BEGUN.load(Ordering::Relaxed);
-        BEGUN.store(false, Ordering::Relaxed);
-        begun
+        begun()
     }
 
     /// Moves bytes that have come to `bytes`; their number. Sleeps first if there is nothing to do.
