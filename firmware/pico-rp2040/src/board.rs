@@ -83,11 +83,12 @@ fn PWM_IRQ_WRAP() {
     BEGUN.store(true, Ordering::Relaxed);
 }
 
-/// True once for each period that has begun.
+/// True once for each period that has begun; for several that have begun since, too.
 fn begun() -> bool {
     let begun = BEGUN.load(Ordering::Relaxed);
-    // An interrupt in between is the same period's, or one that nobody has time for.
-    BEGUN.store(false, Ordering::Relaxed);
+    if begun {
+        BEGUN.store(false, Ordering::Relaxed);
+    }
     begun
 }
 
@@ -186,6 +187,7 @@ pub fn start() -> Board {
 
     for pin in [ENCODER_A, ENCODER_B] {
         pac::PADS_BANK0.gpio(pin).modify(|w| {
+            w.set_ie(true);
             w.set_pue(true);
             w.set_pde(false);
         });

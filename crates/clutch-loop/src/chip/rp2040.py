@@ -487,7 +487,8 @@ class Serial(Registers):
         if self.chip.faults & Fault.OVERRUN and not self.chip.overrun:
             self.chip.overrun = True
             self.overrun = self.OE
-            data = data[:-1]  # it found the FIFO full
+            at = len(data) // 2  # one that found the FIFO full
+            data = data[:at] + data[at + 1 :]
         self.received += data
         self.chip.attend()
 
