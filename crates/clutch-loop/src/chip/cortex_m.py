@@ -263,7 +263,7 @@ class Chip:
         self.sources: list[Source] = []
         self.map_registers()
         self.hooks(image)
-        self.run = 0  # number of the stretch of code that runs
+        self.run, self.counted = 0, False  # number of the stretch of code that runs; its instructions have a limit
         threading.Thread(target=self.watch, daemon=True).start()
         self.clear()
 
@@ -507,6 +507,7 @@ class Chip:
                 return
             budget = AGAIN if self.spinning else BUDGET if suspect else 0
             self.asleep = entered = False
+            self.counted = budget > 0
             self.run += 1
             try:
                 uc.emu_start(self.pc | 1, WORD, count=budget)
@@ -536,11 +537,12 @@ class Chip:
                 suspect = True
 
     def watch(self) -> None:
-        """Stops code that runs for long, on a thread of its own; whether it spins a number of instructions decides."""
+        """Stops code that runs for long, on a thread of its own; whether it spins a number of instructions decides,
+        however long that takes."""
         while True:
             run = self.run
             time.sleep(PATIENCE_S)
-            if run == self.run:
+            if run == self.run and not self.counted:
                 self.uc.emu_stop()
 
     def next_ns(self) -> int:
