@@ -156,6 +156,9 @@ fn start_clocks() {
 /// Starts the board, its output first.
 pub fn start() -> Board {
     guard_stack();
+    // A debugger's reset leaves the clocks as they are: the core must not run from the PLL that is reset below.
+    pac::CLOCKS.clk_sys_ctrl().modify(|w| w.set_src(pac::clocks::vals::ClkSysCtrlSrc::CLK_REF));
+    while pac::CLOCKS.clk_sys_selected().read() != 1 {}
     let needed = |w: &mut pac::resets::regs::Peripherals, reset: bool| {
         w.set_io_bank0(reset);
         w.set_pads_bank0(reset);
