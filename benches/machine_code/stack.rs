@@ -73,6 +73,8 @@ impl<'a> Stacks<'a> {
             }
             entered.insert(b, depth);
             let block = &graph.blocks[b];
+            // What a register had in another block it need not have in this one.
+            registers = Registers { frame: registers.frame, ..Registers::default() };
             for i in &block.instructions {
                 let by_register = registers.moved(self.image, i, depth);
                 depth = by_register.or_else(|| moved(i, depth)).ok_or_else(|| Fault::StackPointer {
@@ -120,11 +122,11 @@ impl Registers {
     fn moved(&mut self, image: &Image, i: &Instruction, depth: i64) -> Option<i64> {
         let operand = |n: usize| i.operands.get(n).map_or("", String::as_str);
         let (first, second) = (operand(0), operand(1));
-        let last = i.operands.last().and_then(number);
+        let last = i.operands.last().and_then(|o| number(o));
         match (i.name.as_str(), first, second) {
             ("add", "r7", "sp") => self.frame = Some(depth - last?),
             ("ldr", _, "[pc") => {
-                let at = (i.address + 4 & !3).checked_add_signed(i32::try_from(last?).ok()?)?;
+                let at = ((i.address + 4) & !3).checked_add_signed(i32::try_from(last?).ok()?)?;
                 self.constants.insert(first.to_owned(), image.word(at)?.cast_signed().into());
             }
             ("sub" | "subs", _, "r7") => drop(self.depths.insert(first.to_owned(), self.frame? + last?)),
@@ -146,7 +148,7 @@ impl Registers {
 }
 
 /// The number of an operand.
-fn number(operand: &String) -> Option<i64> {
+fn number(operand: &str) -> Option<i64> {
     let digits = operand.trim_end_matches(']').strip_prefix('#')?;
     digits.strip_prefix("0x").map_or_else(|| digits.parse().ok(), |h| i64::from_str_radix(h, 16).ok())
 }
@@ -154,7 +156,7 @@ fn number(operand: &String) -> Option<i64> {
 /// The depth after an instruction, bytes; none if the code does not show it.
 fn moved(i: &Instruction, depth: i64) -> Option<i64> {
     let first = i.operands.first().map_or("", String::as_str);
-    let number = |o: Option<&String>| o.and_then(number);
+    let number = |o: Option<&String>| o.and_then(|o| number(o));
     let words = |from: usize| -> i64 {
         let list = i.operands.get(from..).unwrap_or_default();
         list.iter().map(|o| if o.starts_with('d') { 8 } else { 4 }).sum()

@@ -507,6 +507,8 @@ class Chip:
                 return
             budget = AGAIN if self.spinning else BUDGET if suspect else 0
             self.asleep = entered = False
+            if budget and not self.counted:
+                uc.ctl_flush_tb()  # code that is translated already would not be counted
             self.counted = budget > 0
             self.run += 1
             try:
@@ -537,8 +539,7 @@ class Chip:
                 suspect = True
 
     def watch(self) -> None:
-        """Stops code that runs for long, on a thread of its own; whether it spins a number of instructions decides,
-        however long that takes."""
+        """Stops code that runs for long, on a thread of its own; whether it spins a number of instructions decides."""
         while True:
             run = self.run
             time.sleep(PATIENCE_S)
