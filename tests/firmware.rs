@@ -4,46 +4,52 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
 
-const TARGET: &str = "thumbv7em-none-eabihf";
+/// The targets of the boards' cores.
+const CORTEX_M4F: &str = "thumbv7em-none-eabihf";
+const CORTEX_M0_PLUS: &str = "thumbv6m-none-eabi";
 
 /// The reason why there can be no emulated board here; else the folder of its images, built once.
 static IMAGES: LazyLock<Result<PathBuf, &str>> = LazyLock::new(|| {
     if !Command::new("qemu-system-arm").arg("--version").output().is_ok_and(|o| o.status.success()) {
         return Err("qemu-system-arm is not installed (Debian and Ubuntu: qemu-system-arm)");
     }
-    built("clutch-qemu-mps2")
+    built("clutch-qemu-mps2", CORTEX_M4F)
 });
 
 /// The same for the images that run on the model of their chip.
-static NUCLEO: LazyLock<Result<PathBuf, &str>> = LazyLock::new(|| {
+static NUCLEO: LazyLock<Result<PathBuf, &str>> =
+    LazyLock::new(|| modelled("clutch-nucleo-g474re", CORTEX_M4F));
+static PICO: LazyLock<Result<PathBuf, &str>> =
+    LazyLock::new(|| modelled("clutch-pico-rp2040", CORTEX_M0_PLUS));
+
+fn modelled(package: &str, target: &str) -> Result<PathBuf, &'static str> {
     let python = std::env::var_os("CLUTCH_PYTHON").unwrap_or_else(|| "python3".into());
     if !Command::new(python).args(["-c", "import unicorn"]).output().is_ok_and(|o| o.status.success()) {
         return Err(
             "no Python with the module unicorn (pip install unicorn; CLUTCH_PYTHON names the interpreter)",
         );
     }
-    built("clutch-nucleo-g474re")
-});
+    built(package, target)
+}
 
 /// Builds the images of a board.
-fn built(package: &str) -> Result<PathBuf, &'static str> {
-    let libraries =
-        Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().ok();
+fn built(package: &str, goal: &str) -> Result<PathBuf, &'static str> {
+    let libraries = Command::new("rustc").args(["--print", "target-libdir", "--target", goal]).output().ok();
     let libraries = libraries.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_default();
     if !Path::new(libraries.trim()).is_dir() {
-        return Err("the target is not installed (rustup target add thumbv7em-none-eabihf)");
+        return Err("a target is not installed (rustup target add thumbv7em-none-eabihf thumbv6m-none-eabi)");
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let target = root.join("target/firmware");
     // From within its folder: cargo looks there for the file with its flags.
     let done = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["build", "--release", "--locked", "--package", package, "--target-dir"])
+        .args(["build", "--release", "--locked", "--package", package, "--target", goal, "--target-dir"])
         .arg(&target)
         .current_dir(root.join("firmware"))
         .output()
         .expect("cargo starts");
     assert!(done.status.success(), "the images do not build:\n{}", String::from_utf8_lossy(&done.stderr));
-    Ok(target.join(TARGET).join("release"))
+    Ok(target.join(goal).join("release"))
 }
 
 /// An image of a board; none, with a message, where emulator or target are missing. CI has
@@ -53,7 +59,12 @@ fn built(package: &str) -> Result<PathBuf, &'static str> {
 /// The image does not build; or in CI, where there is none.
 #[must_use]
 pub fn image(name: &str) -> Option<PathBuf> {
-    match if name.starts_with("nucleo-") { &*NUCLEO } else { &*IMAGES } {
+    let images = match name.split('-').next() {
+        Some("nucleo") => &*NUCLEO,
+        Some("pico") => &*PICO,
+        _ => &*IMAGES,
+    };
+    match images {
         Ok(folder) => Some(folder.join(name)),
         Err(why) => {
             assert!(std::env::var_os("CI").is_none(), "{why}: CI must not skip this test");

@@ -7,7 +7,8 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-const TARGET: &str = "thumbv7em-none-eabihf";
+/// The targets of the boards' cores: a Cortex-M4F, and a Cortex-M0+.
+pub(crate) const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi"];
 const QEMU: &str = "qemu-system-arm";
 const BOARD: [&str; 9] = [
     "-machine",
@@ -56,13 +57,15 @@ pub(crate) fn no_emulator() -> Option<String> {
 
 /// A message if images cannot be built.
 pub(crate) fn no_target() -> Option<String> {
-    let asked = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().ok()?;
-    let folder = PathBuf::from(String::from_utf8_lossy(&asked.stdout).trim());
-    (!folder.is_dir()).then(|| format!("the target is not there: rustup target add {TARGET}"))
+    let missing = TARGETS.into_iter().find(|target| {
+        let asked = Command::new("rustc").args(["--print", "target-libdir", "--target", target]).output();
+        asked.is_ok_and(|asked| !Path::new(String::from_utf8_lossy(&asked.stdout).trim()).is_dir())
+    })?;
+    Some(format!("a target is not there: rustup target add {missing}"))
 }
 
 /// Builds the images of a board; the folder that they are in.
-pub(crate) fn build(firmware: &Path, package: &str, peer: bool) -> Result<PathBuf> {
+pub(crate) fn build(firmware: &Path, (package, goal): (&str, &str), peer: bool) -> Result<PathBuf> {
     // With laws in C the emulated board's are others than those that are tested: they may have a folder of their own.
     let own = std::env::var_os("CLUTCH_FIRMWARE_TARGET_DIR").filter(|_| peer).map(PathBuf::from);
     let target = own.unwrap_or(firmware.join("../target/firmware"));
@@ -74,6 +77,8 @@ pub(crate) fn build(firmware: &Path, package: &str, peer: bool) -> Result<PathBu
         "--locked",
         "--package",
         package,
+        "--target",
+        goal,
         "--target-dir",
     ]);
     command.arg(&target).args(if peer { &["--features", "peer"][..] } else { &[] });
@@ -84,7 +89,7 @@ pub(crate) fn build(firmware: &Path, package: &str, peer: bool) -> Result<PathBu
     if !command.status().context("cargo cannot be started")?.success() {
         bail!("the images cannot be built");
     }
-    Ok(target.join(TARGET).join("release"))
+    Ok(target.join(goal).join("release"))
 }
 
 /// The option that makes the emulator stop after each instruction; it has changed its name.

@@ -18,9 +18,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// The packages whose images are examined: that of the emulated board, and that of the board that is flashed.
-const EMULATED: &str = "clutch-qemu-mps2";
-const FLASHED: &str = "clutch-nucleo-g474re";
+/// The packages whose images are examined, and their targets: that of the emulated board, those of boards that are
+/// flashed. Cycles are bounded on a Cortex-M4F alone.
+const EMULATED: (&str, &str) = ("clutch-qemu-mps2", emulator::TARGETS[0]);
+const FLASHED: (&str, &str) = ("clutch-nucleo-g474re", emulator::TARGETS[0]);
+const WITHOUT_FPU: (&str, &str) = ("clutch-pico-rp2040", emulator::TARGETS[1]);
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
@@ -62,17 +64,23 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
     }
     let images = emulator::build(&firmware, EMULATED, no_gcc.is_none())?;
     let flashed = emulator::build(&firmware, FLASHED, false)?;
+    let without_fpu = emulator::build(&firmware, WITHOUT_FPU, false)?;
     let controller = Image::read(&images.join("mps2-controller"))?;
     let mut over = Vec::new();
+    let [first, rest @ ..] = &plan.memory[..] else { bail!("firmware/budget.toml has no [[memory]]") };
     if part.is_none_or(|p| p == "size") {
-        over.extend(memory::size(&controller, &plan.memory));
+        over.extend(memory::size(&controller, first));
     }
     if part.is_none_or(|p| p == "stack") {
-        over.extend(memory::stack(&controller, &plan.memory)?);
+        over.extend(memory::stack(&controller, first)?);
     }
     if part.is_none_or(|p| p != "loops") {
-        for name in ["nucleo-controller", "nucleo-daq"] {
-            memory::flashed(name, &Image::read(&flashed.join(name))?)?;
+        for budget in rest {
+            let folder = if budget.image.starts_with("pico-") { &without_fpu } else { &flashed };
+            let image = Image::read(&folder.join(&budget.image))?;
+            let double = image.double_precision();
+            over.extend(double.iter().map(|s| format!("{}: double precision: {s}", budget.image)));
+            over.extend(memory::flashed(&image, budget)?);
         }
     }
     if part.is_some_and(|p| p != "loops") {
@@ -87,10 +95,6 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
     let mut others = BTreeMap::new();
     for name in plan.items.iter().filter_map(|i| i.image.as_ref()) {
         others.insert(name.as_str(), Image::read(&flashed.join(name))?);
-    }
-    for (name, image) in &others {
-        let found = image.double_precision();
-        over.extend(found.iter().map(|s| format!("{name}: double precision: {s}")));
     }
     let bounds = all_bounds(&image, &others, &plan, part == Some("loops"))?;
     if part == Some("loops") {

@@ -13,21 +13,28 @@ const EXCEPTION: u64 = 104 + 4;
 /// A period, in the images that are flashed. What polls the task calls through registers, and has no bound.
 const PERIOD: &str = "clutch_node::hardware::tick";
 
-/// Prints flash, static RAM and a period's stack of an image that is flashed.
+/// Prints flash, static RAM and a period's stack of an image that is flashed; gives the values over budget.
 ///
 /// # Errors
 /// The stack cannot be followed.
-pub(crate) fn flashed(name: &str, image: &Image) -> Result<(), Fault> {
+pub(crate) fn flashed(image: &Image, budget: &Memory) -> Result<Vec<String>, Fault> {
     let (mut flash, mut ram) = (0, 0);
     for s in image.sections() {
         flash += if s.stored { u64::from(s.size) } else { 0 };
         ram += if s.address >= RAM { u64::from(s.size) } else { 0 };
     }
+    let name = &budget.image;
     println!("\nImage `{name}`, bytes: flash {flash}, static RAM {ram}");
     let stack = Stacks::new(image).of(PERIOD)?;
     println!("\n| stack of a period | {} |\n|---|---|", stack.bytes);
     stack.path.iter().for_each(|(function, bytes)| println!("| `{function}` | {bytes} |"));
-    Ok(())
+    let values = [
+        ("flash", flash, budget.flash),
+        ("static RAM", ram, budget.ram),
+        ("stack of a period", stack.bytes, budget.stack),
+    ];
+    let over = values.iter().filter(|(_, is, may)| is > may);
+    Ok(over.map(|(what, is, may)| format!("{name}: {what}: {is} bytes of {may}")).collect())
 }
 
 /// Prints the sections with their sizes; gives the values over budget.

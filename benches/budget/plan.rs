@@ -14,7 +14,8 @@ pub(crate) struct Plan {
     pub(crate) items: Vec<Item>,
     #[serde(rename = "peer")]
     pub(crate) peers: Vec<Peer>,
-    pub(crate) memory: Memory,
+    /// The emulated board's first, whose stack is bounded as a whole; of those that are flashed, that of a period.
+    pub(crate) memory: Vec<Memory>,
     #[serde(rename = "loop")]
     loops: Vec<LoopFact>,
     #[serde(rename = "call")]
@@ -90,10 +91,11 @@ pub(crate) struct Limit {
     pub(crate) cycles: u64,
 }
 
-/// Budgets of the controller's image, bytes.
+/// Budgets of an image, bytes.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Memory {
+    pub(crate) image: String,
     pub(crate) flash: u64,
     pub(crate) ram: u64,
     pub(crate) stack: u64,

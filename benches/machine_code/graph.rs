@@ -30,9 +30,18 @@ pub(super) struct Graph {
 impl Graph {
     /// The blocks of a function that its entry reaches.
     pub(super) fn new(image: &Image, function: &Function) -> Result<Graph, Fault> {
-        let code: BTreeMap<u32, Instruction> =
-            image.instructions(function)?.into_iter().map(|i| (i.address, i)).collect();
         let inside = |a: u32| (function.address..function.address + function.size).contains(&a);
+        let mut code: BTreeMap<u32, Instruction> =
+            image.instructions(function)?.into_iter().map(|i| (i.address, i)).collect();
+        // On a Cortex-M0+ a jump that is too far for one is a call into the same function.
+        for i in code.values_mut() {
+            if let Flow::Call(t) = i.flow
+                && inside(t)
+                && t != function.address
+            {
+                i.flow = Flow::Jump(t);
+            }
+        }
         let mut starts = BTreeSet::from([function.address]);
         for i in code.values() {
             let after = i.address + i.size;

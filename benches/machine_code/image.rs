@@ -234,6 +234,12 @@ impl Image {
         Ok(all)
     }
 
+    /// The constant at an address between instructions.
+    pub(super) fn word(&self, address: u32) -> Option<u32> {
+        let bytes = self.bytes(address, address.checked_add(4)?)?;
+        Some(u32::from_le_bytes(bytes.try_into().ok()?))
+    }
+
     fn is_code(&self, address: u32) -> bool {
         self.marks.range(..=address).next_back().is_none_or(|(_, code)| *code)
     }

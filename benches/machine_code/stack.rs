@@ -60,6 +60,7 @@ impl<'a> Stacks<'a> {
         let graph = Graph::new(self.image, function)?;
         let mut entered: BTreeMap<usize, i64> = BTreeMap::new();
         let mut deepest = Stack { bytes: 0, path: vec![(function.name.clone(), 0)] };
+        let mut registers = Registers::default();
         let mut open = vec![(0, 0)];
         while let Some((b, mut depth)) = open.pop() {
             // Once more only if it is deeper than before.
@@ -72,8 +73,11 @@ impl<'a> Stacks<'a> {
             }
             entered.insert(b, depth);
             let block = &graph.blocks[b];
+            // What a register had in another block it need not have in this one.
+            registers = Registers { frame: registers.frame, ..Registers::default() };
             for i in &block.instructions {
-                depth = moved(i, depth).ok_or_else(|| Fault::StackPointer {
+                let by_register = registers.moved(self.image, i, depth);
+                depth = by_register.or_else(|| moved(i, depth)).ok_or_else(|| Fault::StackPointer {
                     function: function.name.clone(),
                     address: i.address,
                     text: i.text.clone(),
@@ -104,13 +108,55 @@ impl<'a> Stacks<'a> {
     }
 }
 
+/// Registers by which a Cortex-M0+ moves the stack pointer: its instructions have room for small numbers alone.
+#[derive(Default)]
+struct Registers {
+    /// The depth to which r7 points: the frame's end, for the whole function.
+    frame: Option<i64>,
+    constants: BTreeMap<String, i64>,
+    depths: BTreeMap<String, i64>,
+}
+
+impl Registers {
+    /// The depth after an instruction that takes the stack pointer from a register, bytes; none for any other.
+    fn moved(&mut self, image: &Image, i: &Instruction, depth: i64) -> Option<i64> {
+        let operand = |n: usize| i.operands.get(n).map_or("", String::as_str);
+        let (first, second) = (operand(0), operand(1));
+        let last = i.operands.last().and_then(|o| number(o));
+        match (i.name.as_str(), first, second) {
+            ("add", "r7", "sp") => self.frame = Some(depth - last?),
+            ("ldr", _, "[pc") => {
+                let at = ((i.address + 4) & !3).checked_add_signed(i32::try_from(last?).ok()?)?;
+                self.constants.insert(first.to_owned(), image.word(at)?.cast_signed().into());
+            }
+            ("sub" | "subs", _, "r7") => drop(self.depths.insert(first.to_owned(), self.frame? + last?)),
+            ("sub" | "subs", _, _) if i.operands.len() == 2 && self.depths.contains_key(first) => {
+                self.depths.entry(first.to_owned()).and_modify(|depth| *depth += last.unwrap_or(0));
+            }
+            ("add", "sp", register) if i.operands.len() == 2 && last.is_none() => {
+                return self.constants.get(register).map(|constant| depth - constant);
+            }
+            ("mov", "sp", register) => return self.depths.get(register).copied(),
+            ("cmp" | "str" | "strb" | "strh" | "push", _, _) => {}
+            _ => {
+                self.constants.remove(first);
+                self.depths.remove(first);
+            }
+        }
+        None
+    }
+}
+
+/// The number of an operand.
+fn number(operand: &str) -> Option<i64> {
+    let digits = operand.trim_end_matches(']').strip_prefix('#')?;
+    digits.strip_prefix("0x").map_or_else(|| digits.parse().ok(), |h| i64::from_str_radix(h, 16).ok())
+}
+
 /// The depth after an instruction, bytes; none if the code does not show it.
 fn moved(i: &Instruction, depth: i64) -> Option<i64> {
     let first = i.operands.first().map_or("", String::as_str);
-    let number = |o: Option<&String>| {
-        let digits = o?.strip_prefix('#')?;
-        digits.strip_prefix("0x").map_or_else(|| digits.parse().ok(), |h| i64::from_str_radix(h, 16).ok())
-    };
+    let number = |o: Option<&String>| o.and_then(|o| number(o));
     let words = |from: usize| -> i64 {
         let list = i.operands.get(from..).unwrap_or_default();
         list.iter().map(|o| if o.starts_with('d') { 8 } else { 4 }).sum()
@@ -123,9 +169,7 @@ fn moved(i: &Instruction, depth: i64) -> Option<i64> {
         "ldm" | "vldmia" if first == "sp" && writes_back => depth - words(1),
         "sub" | "subw" if first == "sp" => depth + number(i.operands.last())?,
         "add" | "addw" if first == "sp" => depth - number(i.operands.last())?,
-        "str" | "strd" if writes_back => {
-            depth - number(i.operands.last().map(|o| o.trim_end_matches(']').to_owned()).as_ref())?
-        }
+        "str" | "strd" if writes_back => depth - number(i.operands.last())?,
         "ldr" | "ldrd" if writes_back => depth - number(i.operands.last())?,
         _ if first == "sp" && !matches!(i.name.as_str(), "cmp" | "stm" | "vstmia") => return None,
         _ => depth,

@@ -215,6 +215,21 @@ fn a_fact_tells_whether_it_was_needed() {
 }
 
 #[test]
+fn a_stack_pointer_that_a_small_core_moves_by_a_constant_is_followed() {
+    // push {r7, lr}; add r7, sp, #0; ldr r6, 1f; add sp, r6; subs r6, r7, #0; mov sp, r6; pop {r7, pc}; 1: .word -1024
+    let code = [0xb580, 0xaf00, 0x4e02, 0x44b5, 0x1e3e, 0x46b5, 0xbd80, 0xbf00, 0xfc00, 0xffff];
+    let image = image(&[("f", &code[..7]), ("constant", &code[7..])]);
+    assert_eq!(Stacks::new(&image).of("f").map(|s| s.bytes), Ok(8 + 1024));
+}
+
+#[test]
+fn a_jump_that_is_a_call_into_the_same_function_is_a_jump() {
+    // push {lr}; bl 1f; udf; 1: pop {pc}
+    let image = image(&[("f", &[0xb500, 0xf000, 0xf801, 0xde00, 0xbd00])]);
+    assert_eq!(Stacks::new(&image).of("f").map(|s| s.bytes), Ok(4));
+}
+
+#[test]
 fn a_stack_pointer_from_a_register_is_an_error() {
     // mov sp, r7; bx lr
     let image = image(&[("f", &[0x46bd, BX_LR])]);

@@ -5,19 +5,25 @@ use anyhow::{Context, Result, bail};
 use clap::{Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 
-/// The programs of the boards.
+/// The compiler's target for a Cortex-M4F.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
-/// Packages of the boards. One by one: together each would get the library features that the other
+/// Packages of the boards, and their targets. One by one: together each would get the library features that the other
 /// wants.
-pub(crate) const BOARDS: [&str; 2] = ["clutch-qemu-mps2", "clutch-nucleo-g474re"];
-const CHIP: &str = "STM32G474RETx";
+pub(crate) const BOARDS: [(&str, &str); 3] = [
+    ("clutch-qemu-mps2", TARGET),
+    ("clutch-nucleo-g474re", TARGET),
+    ("clutch-pico-rp2040", "thumbv6m-none-eabi"),
+];
 
 #[derive(Subcommand)]
 pub(crate) enum Verb {
-    /// Builds the images of all boards, in target/firmware; adds the Rust target.
+    /// Builds the images of all boards, in target/firmware; adds the Rust targets.
     Build,
-    /// Builds the NUCLEO-G474RE's image and flashes it, with probe-rs.
+    /// Builds a board's image and flashes it, with probe-rs.
     Flash {
+        /// The board.
+        #[arg(long, value_enum, default_value = "nucleo")]
+        board: Flashed,
         /// The role of the board.
         #[arg(long, value_enum)]
         role: Role,
@@ -32,6 +38,14 @@ pub(crate) enum Verb {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum Flashed {
+    /// A NUCLEO-G474RE.
+    Nucleo,
+    /// A Raspberry Pi Pico, with a probe at its debug pins.
+    Pico,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 pub(crate) enum Role {
     /// The board closes the loop itself: clutch loop --board.
     Controller,
@@ -41,23 +55,23 @@ pub(crate) enum Role {
 
 pub(crate) fn run(verb: &Verb) -> Result<()> {
     match verb {
-        Verb::Build => build().map(drop),
-        Verb::Flash { role } => flash(*role),
+        Verb::Build => build(),
+        Verb::Flash { board, role } => flash(*board, *role),
         Verb::Size => report("size"),
         Verb::Budget => report("budget"),
         Verb::Stack => report("stack"),
     }
 }
 
-/// True if the boards' Rust target is installed.
-pub(crate) fn has_target() -> bool {
-    let libraries = program("rustc").args(["--print", "target-libdir", "--target", TARGET]).quietly();
+/// True if the Rust target is installed.
+pub(crate) fn has(target: &str) -> bool {
+    let libraries = program("rustc").args(["--print", "target-libdir", "--target", target]).quietly();
     libraries.is_ok_and(|(known, text)| known && Path::new(text.trim()).is_dir())
 }
 
 /// Builds a board's images.
-pub(crate) fn image(board: &str) -> Program {
-    in_firmware(["build", "--release", "--locked", "--package", board])
+pub(crate) fn image((board, target): (&str, &str)) -> Program {
+    in_firmware(["build", "--release", "--locked", "--package", board, "--target", target])
 }
 
 /// A cargo in the folder of the images, where a file has the flags.
@@ -65,29 +79,45 @@ pub(crate) fn in_firmware<const N: usize>(args: [&str; N]) -> Program {
     cargo(args).within(&root().join("firmware")).env("CARGO_TARGET_DIR", root().join("target/firmware"))
 }
 
-/// Builds all images; gives their folder.
-fn build() -> Result<PathBuf> {
-    program("rustup").args(["target", "add", TARGET]).run().context(
-        "the boards' Rust target is missing, and there is no rustup to add it: install thumbv7em-none-eabihf",
-    )?;
-    for board in BOARDS {
-        image(board).run()?;
-    }
-    let images = root().join("target/firmware").join(TARGET).join("release");
-    println!("\nimages: {}", images.display());
-    Ok(images)
+/// Where the images of a target are.
+fn folder(target: &str) -> PathBuf {
+    root().join("target/firmware").join(target).join("release")
 }
 
-fn flash(role: Role) -> Result<()> {
+/// Builds all images.
+fn build() -> Result<()> {
+    for board in BOARDS {
+        build_one(board)?;
+    }
+    for (board, target) in BOARDS {
+        println!("images of {board}: {}", folder(target).display());
+    }
+    Ok(())
+}
+
+fn build_one(board: (&str, &str)) -> Result<()> {
+    program("rustup").args(["target", "add", board.1]).run().with_context(|| {
+        format!("the board's Rust target is missing, and there is no rustup to add it: install {}", board.1)
+    })?;
+    image(board).run()
+}
+
+fn flash(board: Flashed, role: Role) -> Result<()> {
     if program("probe-rs").args(["--version"]).quietly().is_err() {
         bail!("probe-rs is not installed: `cargo install probe-rs-tools --locked`, or see https://probe.rs");
     }
-    let image = build()?.join(match role {
-        Role::Controller => "nucleo-controller",
-        Role::Daq => "nucleo-daq",
-    });
-    program("probe-rs").args(["download", "--chip", CHIP, "--verify"]).arg(&image).run()?;
-    program("probe-rs").args(["reset", "--chip", CHIP]).run()
+    let (package, name, chip) = match board {
+        Flashed::Nucleo => (BOARDS[1], "nucleo", "STM32G474RETx"),
+        Flashed::Pico => (BOARDS[2], "pico", "RP2040"),
+    };
+    build_one(package)?;
+    let role = match role {
+        Role::Controller => "controller",
+        Role::Daq => "daq",
+    };
+    let image = folder(package.1).join(format!("{name}-{role}"));
+    program("probe-rs").args(["download", "--chip", chip, "--verify"]).arg(&image).run()?;
+    program("probe-rs").args(["reset", "--chip", chip]).run()
 }
 
 fn report(what: &str) -> Result<()> {

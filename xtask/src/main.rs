@@ -303,21 +303,10 @@ fn check() -> Result<()> {
         cargo(["clippy", "--package", "clutch-core", "--features", features, "--", "-D", "warnings"])
             .run()?;
     }
-    // The images, where their target is; tests build them in any case.
-    if firmware::has_target() {
-        for board in firmware::BOARDS {
-            firmware::in_firmware([
-                "clippy",
-                "--release",
-                "--locked",
-                "--package",
-                board,
-                "--",
-                "-D",
-                "warnings",
-            ])
-            .run()?;
-        }
+    // The images, where their targets are; tests build them in any case.
+    for (board, target) in firmware::BOARDS.into_iter().filter(|(_, target)| firmware::has(target)) {
+        let lint = ["clippy", "--release", "--locked", "--package", board, "--target", target];
+        firmware::in_firmware(lint).args(["--", "-D", "warnings"]).run()?;
     }
     docs()
 }

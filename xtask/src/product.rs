@@ -10,6 +10,7 @@ const PRODUCT: &[(&str, &[&str])] = &[
     ("crates/clutch-sim/rigs/", &["toml"]),
     ("crates/clutch-sim/scenarios/", &["toml"]),
     ("firmware/*/src/", &["rs"]),
+    ("firmware/shared/", &["rs"]),
     ("python/clutch/", &["py"]),
 ];
 

@@ -7,7 +7,7 @@ use crate::table::{number, quantities};
 use clap::{Args, ValueEnum};
 use clutch_core::Micros;
 use clutch_core::supervisor::Cause;
-use clutch_loop::chip::{ChipFault, ChipOptions, ChipReport, ChipRole, ChipSession};
+use clutch_loop::chip::{ChipFault, ChipKind, ChipOptions, ChipReport, ChipRole, ChipSession};
 use clutch_loop::clearance::ClearanceError;
 use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::lockstep_session::{LockstepOptions, LockstepSession};
@@ -22,15 +22,16 @@ use std::path::{Path, PathBuf};
 /// Runs the loop on an emulated board, with the simulated rig as its encoder and converter.
 ///
 /// This is hardware in the loop, without the hardware: the board's own image runs, on a Cortex-M4F
-/// in qemu-system-arm or, for a NUCLEO-G474RE, on a register model of its chip; it takes a step, and
-/// waits for the simulation to take one. Time is computed, so that a run is the same each time, bit
+/// in qemu-system-arm or, for a NUCLEO-G474RE or a Raspberry Pi Pico, on a register model of its chip;
+/// it takes a step, and waits for the simulation to take one. Time is computed, so that a run is the same each time, bit
 /// for bit, however long it takes; the figures are those of `clutch sim` in single precision.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  cargo xtask firmware build && clutch hil\n  clutch hil board_smc_2 --log run.mcap && \
     clutch replay run.mcap\n  clutch hil --fault silence:at=2\n  \
     clutch hil examples/nucleo_smc_2.toml --image nucleo-controller\n  \
-    clutch hil examples/nucleo_smc_2.toml --image nucleo-daq --chip-fault hang:at=2\n\n\
+    clutch hil examples/nucleo_smc_2.toml --image nucleo-daq --chip-fault hang:at=2\n  \
+    clutch hil examples/pico_smc_2.toml --image pico-controller\n\n\
     The chip's model needs Python with the module unicorn (pip install unicorn); CLUTCH_PYTHON names another\n\
     interpreter than python3. Images are in $CLUTCH_IMAGES if it is set, else in target/firmware.\n\n\
     Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run. docs/firmware.md is the guide."
@@ -42,8 +43,9 @@ pub(crate) struct Hil {
     /// Overrides a key of the scenario; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
-    /// The board's image: a file, or mps2-controller, nucleo-controller or nucleo-daq. One whose name
-    /// begins with nucleo- runs on the chip's model, in the role daq if its name says so.
+    /// The board's image: a file, or mps2-controller, nucleo-controller, nucleo-daq, pico-controller or
+    /// pico-daq. One whose name begins with nucleo- or pico- runs on the chip's model, in the role daq
+    /// if its name says so.
     #[arg(long, value_name = "IMAGE", default_value = "mps2-controller")]
     image: PathBuf,
     /// Link to the board in qemu.
@@ -55,14 +57,15 @@ pub(crate) struct Hil {
     /// Runs a law that is not certified for the scenario's bounds.
     #[arg(long)]
     uncertified: bool,
-    /// Injects a fault on line or rig, with a nucleo image on the line; see `clutch daq --help`.
+    /// Injects a fault on line or rig, on the chip's model on the line; see `clutch daq --help`.
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
-    /// Injects a fault into the chip of a nucleo image: converter-stuck, crystal, overrun, hang,
-    /// undefined, nmi, unexpected or supply-low; :at=SECONDS after arming, else from power-up on.
+    /// Injects a fault into the chip: converter-stuck, crystal, overrun, hang, undefined, nmi,
+    /// unexpected, supply-low (nucleo) or encoder-skip (pico); :at=SECONDS after arming, else from
+    /// power-up on.
     #[arg(long, value_name = "KIND[:at=S]")]
     chip_fault: Vec<ChipFault>,
-    /// Counts the instructions of a nucleo image, and writes the numbers as JSON; takes several
+    /// Counts the instructions on the chip's model, and writes the numbers as JSON; takes several
     /// times as long.
     #[arg(long, value_name = "FILE.json")]
     count: Option<PathBuf>,
@@ -86,31 +89,37 @@ enum Link {
     Uart,
 }
 
-/// The names of images that are found without a path.
-const NAMES: [&str; 3] = ["mps2-controller", "nucleo-controller", "nucleo-daq"];
-
-/// The folder in which `cargo xtask firmware build` leaves them.
-const BUILT: &str = "target/firmware/thumbv7em-none-eabihf/release";
+/// The images that are found without a path, and their targets: `cargo xtask firmware build` leaves them in the folder
+/// of their target.
+const NAMES: [(&str, &str); 5] = [
+    ("mps2-controller", "thumbv7em-none-eabihf"),
+    ("nucleo-controller", "thumbv7em-none-eabihf"),
+    ("nucleo-daq", "thumbv7em-none-eabihf"),
+    ("pico-controller", "thumbv6m-none-eabi"),
+    ("pico-daq", "thumbv6m-none-eabi"),
+];
 
 /// A file, or where the image of that name should be.
 fn image(named: PathBuf) -> PathBuf {
-    if !NAMES.iter().any(|name| Path::new(name) == named) || named.is_file() {
+    let Some((_, target)) = NAMES.iter().find(|(name, _)| Path::new(name) == named && !named.is_file())
+    else {
         return named;
-    }
+    };
     // Not both: an image of another build than the one that was asked for would run unseen.
-    std::env::var_os("CLUTCH_IMAGES").map_or_else(|| BUILT.into(), PathBuf::from).join(named)
+    let built = || Path::new("target/firmware").join(target).join("release");
+    std::env::var_os("CLUTCH_IMAGES").map_or_else(built, PathBuf::from).join(named)
 }
 
 impl Hil {
     pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
         self.image = image(self.image);
-        if self.image.file_name().is_some_and(|name| name.to_string_lossy().starts_with("nucleo-")) {
-            return self.on_chip();
+        if let Some(kind) = ChipKind::of(&self.image) {
+            return self.on_chip(kind);
         }
         if !self.chip_fault.is_empty() || self.count.is_some() {
             anyhow::bail!(
-                "--chip-fault and --count: {} does not run on the chip's model; use --image nucleo-controller or \
-                 nucleo-daq",
+                "--chip-fault and --count: {} does not run on a chip's model; use --image nucleo-controller, \
+                 nucleo-daq, pico-controller or pico-daq",
                 self.image.display()
             );
         }
@@ -137,7 +146,7 @@ impl Hil {
     }
 
     /// On the model of the chip.
-    fn on_chip(self) -> anyhow::Result<Exit> {
+    fn on_chip(self, kind: ChipKind) -> anyhow::Result<Exit> {
         let chip = ChipOptions {
             faults: self.chip_fault.clone(),
             count: self.count.clone(),
@@ -175,7 +184,7 @@ impl Hil {
             json(&all)
         };
         report(self.json, all, || {
-            self.text(scenario, ran, "the model of the chip", took) + &chip_text(&on_chip)
+            self.text(scenario, ran, &format!("the model of an {}", kind.name()), took) + &chip_text(&on_chip)
         })?;
         Ok(exit(ran))
     }
@@ -264,7 +273,7 @@ fn chip_text(report: &ChipReport) -> String {
         text += "the chip's program does not run any more\n";
     }
     if report.floating {
-        text += "the converter's pin floats: the divider at the driver's input holds\n";
+        text += "the converter decides nothing: divider or switch at the driver's input hold\n";
     }
     text
 }

@@ -5,3 +5,5 @@
 pub mod board;
 pub mod fault;
 pub mod run;
+#[path = "../../shared/stack_guard.rs"]
+mod stack_guard;

@@ -187,7 +187,7 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     tally.check_quiet("the example with friction numbers of one's own builds for a Cortex-M4F", example);
     tally.stage("images");
     for board in firmware::BOARDS {
-        tally.check_quiet(&format!("the images of {board} build"), firmware::image(board).quietly()?);
+        tally.check_quiet(&format!("the images of {} build", board.0), firmware::image(board).quietly()?);
     }
     tally.stage("budgets");
     // As a test, not as a benchmark: the figures are the machine code's, not this machine's.

@@ -21,11 +21,13 @@ pub enum ChipFaultKind {
     Unexpected,
     /// The supply is below the threshold of the chip's monitor, and the converter's reference with it.
     SupplyLow,
+    /// Both signals of the encoder change at once.
+    EncoderSkip,
 }
 
 impl ChipFaultKind {
     /// All, by name.
-    pub const ALL: [(&'static str, ChipFaultKind); 8] = [
+    pub const ALL: [(&'static str, ChipFaultKind); 9] = [
         ("converter-stuck", ChipFaultKind::ConverterStuck),
         ("crystal", ChipFaultKind::Crystal),
         ("overrun", ChipFaultKind::Overrun),
@@ -34,7 +36,13 @@ impl ChipFaultKind {
         ("nmi", ChipFaultKind::Nmi),
         ("unexpected", ChipFaultKind::Unexpected),
         ("supply-low", ChipFaultKind::SupplyLow),
+        ("encoder-skip", ChipFaultKind::EncoderSkip),
     ];
+
+    /// Its name.
+    pub(super) fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+    }
 
     /// Its bit, as `Fault` in the model of the chip has it.
     pub(super) const fn bit(self) -> u32 {
@@ -47,6 +55,7 @@ impl ChipFaultKind {
             ChipFaultKind::Nmi => 1 << 5,
             ChipFaultKind::Unexpected => 1 << 6,
             ChipFaultKind::SupplyLow => 1 << 7,
+            ChipFaultKind::EncoderSkip => 1 << 8,
         }
     }
 }

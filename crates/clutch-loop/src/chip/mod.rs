@@ -2,16 +2,20 @@
 //!
 //! | file | is |
 //! |---|---|
-//! | `stm32g474.py` | the chip: registers and exceptions around the core of the Unicorn engine; its head has the protocol |
+//! | `cortex_m.py` | exceptions and time around the core of the Unicorn engine; its head has the protocol |
+//! | `stm32g474.py`, `rp2040.py` | a chip each: its registers |
+//! | `kind` | the chips |
 //! | `process` | the process that carries it |
 //! | `faults` | faults of the chip |
 //! | `session` | a session with it |
 
 mod faults;
+mod kind;
 mod process;
 mod session;
 
 pub use faults::{ChipFault, ChipFaultError, ChipFaultKind};
+pub use kind::ChipKind;
 pub use process::{ChipError, Counted, MODULE};
 pub use session::{ChipOptions, ChipReport, ChipRole, ChipSession};
 
@@ -33,7 +37,7 @@ pub struct ChipBoard {
     scenario: Scenario,
     rig: MovingRig,
     dac: Dac<f64>,
-    /// Voltage at the brake while the converter's pin floats, V: the divider's, which holds.
+    /// Voltage at the brake while the wiring alone decides, V: that of divider or switch, which holds.
     pull: f64,
     faults: Vec<ChipFault>,
     decoder: Decoder,
@@ -81,7 +85,7 @@ impl ChipBoard {
         let start = start * rig.encoder.radians_per_count::<f64>();
         let rig = MovingRig::new(rig, engine, spec.run.seed, (start, 0.0), pull);
         let mut board = ChipBoard {
-            chip: Chip::start(image, count)?,
+            chip: Chip::start(image, faults, count)?,
             scenario: scenario.clone(),
             rig,
             dac,
@@ -115,7 +119,7 @@ impl ChipBoard {
         self.resets
     }
 
-    /// True if the converter is off, and its pin floats.
+    /// True if the converter is off, and its pin floats; or the switch behind it is not set.
     #[must_use]
     pub fn floating(&self) -> bool {
         self.last.flags.has(Flags::FLOATING)

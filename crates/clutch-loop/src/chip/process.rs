@@ -1,5 +1,6 @@
 //! The process that carries the chip: Python with the module Unicorn.
 
+use super::{ChipFault, ChipKind};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -11,8 +12,17 @@ pub const MODULE: &str = "unicorn";
 /// The variable that names another interpreter than `python3`.
 const INTERPRETER: &str = "CLUTCH_PYTHON";
 
-/// The model of the chip.
-const MODEL: &str = include_str!("stm32g474.py");
+/// The half of the models that is the same for all chips.
+const CORE: &str = include_str!("cortex_m.py");
+
+/// Runs a model without a file: the core's half is a module for the chip's.
+const LOADER: &str = "import sys, types
+core, chip = sys.argv[1:3]
+del sys.argv[1:3]
+module = sys.modules['cortex_m'] = types.ModuleType('cortex_m')
+exec(compile(core, 'cortex_m.py', 'exec'), module.__dict__)
+exec(compile(chip, 'chip.py', 'exec'))
+";
 
 /// Longest time for an answer: it takes milliseconds, but a machine may stall.
 const PATIENCE_S: u32 = 60;
@@ -41,6 +51,23 @@ pub enum ChipError {
     NoImage {
         /// The path at which it was looked for.
         path: PathBuf,
+    },
+    /// The image has another name than those of the boards.
+    #[error(
+        "{}: expected a file whose name begins with nucleo- or pico-: the name tells on which chip's model it runs",
+        path.display()
+    )]
+    NoModel {
+        /// The image.
+        path: PathBuf,
+    },
+    /// The chip cannot have this fault.
+    #[error("chip fault \"{fault}\": an {chip} cannot have it")]
+    NoFault {
+        /// The fault's name.
+        fault: &'static str,
+        /// The chip's.
+        chip: &'static str,
     },
     /// The system.
     #[error("the model of the chip could not be {what}: {error}")]
@@ -117,13 +144,17 @@ pub(super) struct Chip {
 }
 
 impl Chip {
-    /// Starts one with an image; instructions are counted into a file, if one is named.
-    pub(super) fn start(image: &Path, count: Option<&Path>) -> Result<Chip, ChipError> {
+    /// Starts one with an image, for a run with these faults; instructions are counted into a file, if one is named.
+    pub(super) fn start(image: &Path, faults: &[ChipFault], count: Option<&Path>) -> Result<Chip, ChipError> {
+        let kind = ChipKind::of(image).ok_or_else(|| ChipError::NoModel { path: image.to_owned() })?;
+        if let Some(fault) = faults.iter().find(|fault| !kind.has(fault.kind)) {
+            return Err(ChipError::NoFault { fault: fault.kind.name(), chip: kind.name() });
+        }
         let image = image.canonicalize().map_err(|_| ChipError::NoImage { path: image.to_owned() })?;
         let program = std::env::var(INTERPRETER).unwrap_or_else(|_| "python3".to_owned());
         let mut command = Command::new(&program);
         // -P: a file in the working directory is no module.
-        command.args(["-P", "-c", MODEL]).arg(image);
+        command.args(["-P", "-c", LOADER, CORE, kind.model()]).arg(image);
         if let Some(file) = count {
             // Before the run, not after it.
             std::fs::File::create(file)

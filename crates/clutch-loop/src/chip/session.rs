@@ -1,6 +1,6 @@
 //! A session with a board whose image runs on the model of its chip, in virtual time.
 
-use super::{ChipBoard, ChipFault, Counted};
+use super::{ChipBoard, ChipFault, ChipKind, Counted};
 use crate::clearance::check;
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_session::{LockstepError, LockstepOptions};
@@ -53,7 +53,7 @@ pub struct ChipReport {
     pub resets: u32,
     /// True if the chip's core spins, has no clock or has locked up at the end.
     pub dead: bool,
-    /// True if the converter's pin floats at the end.
+    /// True if the wiring alone decides the output at the end.
     pub floating: bool,
     /// Numbers of instructions, if they were asked for.
     pub counted: Option<Counted>,
@@ -177,7 +177,9 @@ impl ChipSession {
         let mut on_chip = VirtualLoop::with_board(board?, params, station);
         let ran = on_chip.run(path)?;
         let certified = self.certified;
-        o.write_log(&self.scenario, &built.servo, ("model of an STM32G474RE", certified), &ran)?;
+        let chip =
+            ChipKind::of(image).map_or_else(String::new, |kind| format!("model of an {}", kind.name()));
+        o.write_log(&self.scenario, &built.servo, (&chip, certified), &ran)?;
         Ok((ran, on_chip.into_board()))
     }
 }

@@ -6,7 +6,7 @@
 
 #[path = "../files.rs"]
 mod files;
-#[path = "../panic.rs"]
+#[path = "../../../shared/panic.rs"]
 mod panic;
 
 use clutch_bits::{HEADER, Job, RECORD, SETTING, Workload, hash, setting_from_bytes};

@@ -5,7 +5,7 @@
 #![no_std]
 #![no_main]
 
-#[path = "../panic.rs"]
+#[path = "../../../shared/panic.rs"]
 mod panic;
 
 #[path = "../budget/inputs.rs"]

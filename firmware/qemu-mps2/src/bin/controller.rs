@@ -18,7 +18,7 @@ mod files;
 mod last_word;
 #[path = "../lockstep.rs"]
 mod lockstep;
-#[path = "../panic.rs"]
+#[path = "../../../shared/panic.rs"]
 mod panic;
 #[path = "../serial.rs"]
 mod serial;
