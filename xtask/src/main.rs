@@ -2,6 +2,7 @@
 
 mod ablate;
 mod coverage;
+mod elsewhere;
 mod firmware;
 mod fmu;
 mod fuzz;
@@ -308,6 +309,7 @@ fn check() -> Result<()> {
         let lint = ["clippy", "--release", "--locked", "--package", board, "--target", target];
         firmware::in_firmware(lint).args(["--", "-D", "warnings"]).run()?;
     }
+    elsewhere::check()?;
     docs()
 }
 

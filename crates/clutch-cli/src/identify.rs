@@ -2,23 +2,27 @@
 
 use crate::args::{ScenarioArgs, key_value};
 use crate::output::{self, BUILD, Exit, json, paragraph, quiet, shown, write};
-use crate::signals::stop_flag;
 use crate::table::number;
 use anyhow::{Context, bail};
 use clap::Args;
-use clutch_identify::experiment::{ExperimentError, Programme, REMEDY, VirtualBoard, experiment};
+use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
 use clutch_identify::rig_file::{rig_file, rows};
 use clutch_identify::{Finding, Recording, Report, identify, map_as_believed, map_file};
 use clutch_log::Limits;
-use clutch_loop::port::Address;
-use clutch_loop::session::{Board, Session, SessionOptions};
-use clutch_loop::summary::Verdict;
 use clutch_sim::Scenario;
 use serde_json::{Value, json as value};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+#[cfg(target_os = "linux")]
+use {
+    crate::signals::stop_flag,
+    clutch_identify::experiment::{ExperimentError, REMEDY},
+    clutch_loop::port::Address,
+    clutch_loop::session::{Board, Session, SessionOptions},
+    clutch_loop::summary::Verdict,
+    std::sync::Arc,
+    std::sync::atomic::AtomicBool,
+};
 
 /// Finds out what a rig is: T/J, delay, friction, ripple, damping, each with an interval.
 ///
@@ -39,19 +43,22 @@ pub(crate) struct Identify {
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
     /// The board's port; without it the scenario's board is simulated, in virtual time.
-    #[arg(long, value_name = "PATH|tcp://HOST:PORT|unix:///PATH", requires = "log")]
+    #[cfg(target_os = "linux")]
+    #[arg(long, value_name = "PATH|tcp://HOST:PORT|unix:///PATH", requires = "log", conflicts_with = "from")]
     port: Option<Address>,
     /// Consent to laws without a certificate on a board at --port: the experiment's have none.
+    #[cfg(target_os = "linux")]
     #[arg(long)]
     uncertified: bool,
     /// The board at the port is a simulated one whose clock waits (`clutch daq --patient`).
+    #[cfg(target_os = "linux")]
     #[arg(long, requires = "port")]
     patient: bool,
     /// Folder for a log of each part; it may not hold them yet.
     #[arg(long, value_name = "FOLDER")]
     log: Option<PathBuf>,
     /// Reads these logs instead: MCAP, or CSV with --columns.
-    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["port", "log"])]
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "log")]
     from: Vec<PathBuf>,
     /// Columns of a CSV that hold counts and volts, one sample a row.
     #[arg(
@@ -109,11 +116,7 @@ impl Identify {
     /// Runs the experiment, and says before what it does.
     fn experiment(&self, scenario: &Scenario) -> anyhow::Result<Vec<Recording>> {
         let programme = Programme::default();
-        let place = match &self.port {
-            Some(port) => format!("the board at {port}"),
-            None => "the simulated board, in virtual time".to_owned(),
-        };
-        let mut plan = format!("{:.0} s of experiment on {place}\n", programme.seconds());
+        let mut plan = format!("{:.0} s of experiment on {}\n", programme.seconds(), self.place());
         programme.plan().iter().for_each(|line| plan += &format!("  {line}\n"));
         if !quiet() {
             let _ = std::io::stderr().write_all(shown(&plan).as_bytes());
@@ -122,11 +125,32 @@ impl Identify {
             std::fs::create_dir_all(folder)
                 .with_context(|| format!("{}: cannot be made", folder.display()))?;
         }
-        let Some(port) = &self.port else {
-            let logging = |folder: &PathBuf| VirtualBoard::logging(folder.clone(), BUILD);
-            let mut board = self.log.as_ref().map_or_else(VirtualBoard::default, logging);
-            return Ok(experiment(scenario, &programme, &mut |name, part| board.run(name, part))?);
-        };
+        #[cfg(target_os = "linux")]
+        if let Some(port) = &self.port {
+            return self.at_port(port, scenario, &programme);
+        }
+        let logging = |folder: &PathBuf| VirtualBoard::logging(folder.clone(), BUILD);
+        let mut board = self.log.as_ref().map_or_else(VirtualBoard::default, logging);
+        Ok(experiment(scenario, &programme, &mut |name, part| board.run(name, part))?)
+    }
+
+    /// The board of the experiment, in words.
+    fn place(&self) -> String {
+        #[cfg(target_os = "linux")]
+        if let Some(port) = &self.port {
+            return format!("the board at {port}");
+        }
+        "the simulated board, in virtual time".to_owned()
+    }
+
+    /// The experiment on the board at the port.
+    #[cfg(target_os = "linux")]
+    fn at_port(
+        &self,
+        port: &Address,
+        scenario: &Scenario,
+        programme: &Programme,
+    ) -> anyhow::Result<Vec<Recording>> {
         if !self.uncertified {
             bail!(
                 "nothing was started: the laws above have no certificate; --uncertified is your consent to them on the \
@@ -138,10 +162,11 @@ impl Identify {
         let run = &mut |name: &str, part: &Scenario| {
             self.on_board(port, &folder.join(format!("{name}.mcap")), name, part, &stop)
         };
-        Ok(experiment(scenario, &programme, run)?)
+        Ok(experiment(scenario, programme, run)?)
     }
 
     /// One run of the loop on the board at the port, read from its log.
+    #[cfg(target_os = "linux")]
     fn on_board(
         &self,
         port: &Address,

@@ -6,11 +6,14 @@ mod args;
 mod c_header;
 pub mod certify;
 mod compare;
+#[cfg(target_os = "linux")]
 mod daq;
 mod friction;
+#[cfg(target_os = "linux")]
 mod hil;
 pub mod identify;
 mod log;
+#[cfg(target_os = "linux")]
 mod loop_verb;
 mod map;
 mod output;
@@ -34,6 +37,7 @@ use output::Exit;
 use std::ffi::OsString;
 use std::io::Write;
 
+#[cfg(target_os = "linux")]
 pub use loop_verb::{plan, summary};
 pub use output::BUILD;
 
@@ -64,8 +68,11 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Verb {
+    #[cfg(target_os = "linux")]
     Loop(loop_verb::Loop),
+    #[cfg(target_os = "linux")]
     Daq(daq::Daq),
+    #[cfg(target_os = "linux")]
     Hil(hil::Hil),
     Identify(identify::Identify),
     Tune(tune::Tune),
@@ -107,8 +114,11 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     };
     output::set_quiet(cli.quiet);
     let outcome = match cli.verb {
+        #[cfg(target_os = "linux")]
         Verb::Loop(v) => v.run(),
+        #[cfg(target_os = "linux")]
         Verb::Daq(v) => v.run(),
+        #[cfg(target_os = "linux")]
         Verb::Hil(v) => v.run(),
         Verb::Identify(v) => v.run(),
         Verb::Tune(v) => v.run(),

@@ -9,6 +9,7 @@
 //! | `session`, `summary` | a scenario and options in; refusals, events and a summary out |
 //! | `release` | the test of encoder and brake that comes before a run |
 //! | `control_loop` | the run on its control thread |
+//! | `clearance`, `words` | whether a scenario may run on a board; refusals and causes in words |
 //! | `drift` | friction over load against the bounds, from counts and voltages |
 //! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
 //! | `virtual_time` | the same run with a computed clock |
@@ -19,6 +20,8 @@
 //! | `qemu_board` | such a board, emulated |
 //! | `chip` | a board's own image on a register model of its chip |
 //! | `to_log`, `replay` | what a log gets; a log's counts to the law again |
+//!
+//! Ports, real time and emulators are of Linux; what computes its clock runs everywhere.
 
 pub mod campaign;
 #[cfg(target_os = "linux")]
@@ -46,7 +49,6 @@ pub mod preflight;
 pub mod qemu_board;
 #[cfg(target_os = "linux")]
 pub mod realtime;
-mod refusal;
 pub mod release;
 pub mod replay;
 #[cfg(target_os = "linux")]
@@ -60,3 +62,4 @@ pub mod summary;
 pub mod to_log;
 pub mod virtual_time;
 pub mod watch;
+pub mod words;

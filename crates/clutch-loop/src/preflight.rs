@@ -3,8 +3,8 @@
 use crate::from_scenario::BuildError;
 use crate::port::{Port, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
-use crate::refusal::why;
 use crate::station::{HostStation, Station, StationNotice};
+use crate::words::why;
 use clutch_node::{Notice, Outbox, Settings};
 use clutch_wire::{Hello, Refusal, Refused};
 use rustix::fd::AsFd;

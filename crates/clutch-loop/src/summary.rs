@@ -3,8 +3,8 @@
 use crate::clearance::Cleared;
 use crate::control_loop::LoopReport;
 use crate::realtime::CycleSummary;
-use crate::refusal::why;
 use crate::sim_board_server::ServeReport;
+use crate::words::{cause_text, why};
 use clutch_core::supervisor::{Cause, State};
 use clutch_sim::number;
 use serde_json::{Value, json};
@@ -247,57 +247,5 @@ impl Summary {
             "port_error": r.port_error,
             "notes": r.notes,
         })
-    }
-}
-
-/// The cause of the end of control, in words; `v` is what the check saw, `stopped` is true if somebody here has
-/// stopped it.
-#[must_use]
-pub fn cause_text(cause: Cause, v: f64, on_the_board: bool, stopped: bool) -> String {
-    let envelope =
-        |what: &str| format!("{what} ({} ° outside of what a shaft can do)", number(v.to_degrees()));
-    match cause {
-        Cause::Done => "the path is done".into(),
-        Cause::Operator if on_the_board && !stopped => {
-            "the board has not heard this machine for too long, and has ended the run".into()
-        }
-        Cause::Operator => "stopped by the operator".into(),
-        Cause::Lost => format!("{v} samples lost within 128 cycles"),
-        Cause::Late => "too many samples or answers came late".into(),
-        Cause::Duplicated => format!("{v} samples came twice within 128 cycles"),
-        Cause::Reordered => format!("{v} samples came out of order within 128 cycles"),
-        Cause::Jump => format!("the encoder jumped, by {v} counts at last"),
-        Cause::StandStill => envelope("the encoder shows no movement: encoder frozen, or shaft blocked"),
-        Cause::Channel => envelope("the counts go to and fro: a channel of the encoder is dead, or loose"),
-        Cause::Reversed => {
-            envelope("the counts go backwards, where no shaft goes: encoder or converter the wrong way round")
-        }
-        Cause::TooSlow => envelope(
-            "the counts are behind the slowest shaft of [bounds]: counts missing, a brake that drags, or bounds too narrow",
-        ),
-        Cause::TooFast => envelope(
-            "the counts are ahead of the fastest shaft of [bounds]: brake open, converter, lever or pad broken, or bounds too narrow",
-        ),
-        Cause::FollowingError => format!("following error of {} °", number(v.to_degrees())),
-        Cause::Saturation => "the voltage was at its limit for too long".into(),
-        Cause::NotFinite => "the law's demand was not a number".into(),
-        Cause::Deadline => format!("answers came too late, the last after {v} µs"),
-        // The board's own supervisor tells for how many periods.
-        Cause::Clock => format!(
-            "the board's clock and its periods, or this machine's clock, are apart by {} ms: a wrong prescaler or crystal",
-            number(v / 1000.0)
-        ),
-        Cause::Silence if on_the_board && v > 0.0 => "the board's encoder and converter fell silent".into(),
-        Cause::Silence => "the board fell silent".into(),
-        Cause::Board => match v as u8 {
-            1 => "the board's watchdog went off: it got no valid answer in time".into(),
-            2 => "the board sees no encoder".into(),
-            3 => "the board's converter does not follow".into(),
-            _ => "the board went to its safe state by itself".into(),
-        },
-        Cause::Target => {
-            "the path's target is not a number, or moves faster than rig.speed_limit_deg_s".into()
-        }
-        Cause::None => "control did not begin".into(),
     }
 }

@@ -7,10 +7,10 @@
 use crate::chip::ChipError;
 use crate::faults::{Direction, Fault};
 use crate::faulty_line::FaultyLine;
-use crate::refusal::why;
 use crate::sim_board::{SimBoard, SimBoardError};
 use crate::station::{Station, StationNotice};
 use crate::to_log;
+use crate::words::why;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{DacCode, Micros, Planned, Real};
 use clutch_log::{CommandRecord, Record, SampleRecord};

@@ -9,6 +9,7 @@ mod path;
 mod referee;
 mod run;
 mod scenario;
+#[cfg_attr(not(target_os = "linux"), path = "session_elsewhere.rs")]
 mod session;
 mod stepping;
 mod sweep;

@@ -1,0 +1,34 @@
+//! Command and wheel for other systems: checked, neither linked nor run.
+
+use crate::run::{cargo, program, root};
+use anyhow::{Context, Result};
+
+const TARGETS: [&str; 2] = ["aarch64-apple-darwin", "x86_64-pc-windows-gnu"];
+
+/// A compiler for C that compiles nothing: what it would compile is linked nowhere.
+const NO_COMPILER: &str =
+    "#!/bin/sh\nwhile [ $# -gt 0 ]; do [ \"$1\" = -o ] && : > \"$2\"; shift; done\nexit 0\n";
+
+pub(crate) fn check() -> Result<()> {
+    program("rustup").args(["target", "add"]).args(TARGETS).run().context("rustup cannot add the targets")?;
+    let folder = root().join("target/elsewhere");
+    std::fs::create_dir_all(&folder)?;
+    let compiler = folder.join("cc");
+    std::fs::write(&compiler, NO_COMPILER)?;
+    program("chmod").arg("+x").arg(&compiler).run()?;
+    for target in TARGETS {
+        let check = cargo([
+            "check",
+            "--locked",
+            "--package",
+            "clutch-cli",
+            "--package",
+            "clutch-py",
+            "--target",
+            target,
+        ]);
+        let key = |tool: &str| format!("{tool}_{}", target.replace('-', "_"));
+        check.args(["--target-dir"]).arg(&folder).env(&key("CC"), &compiler).env(&key("AR"), "true").run()?;
+    }
+    Ok(())
+}
