@@ -203,6 +203,9 @@ impl BoardController {
     }
 
     /// A message of encoder and converter by value, other than a sample. [`BoardController::follow`] comes after it.
+    // A function of its own in machine code: in most periods there is none.
+    #[cold]
+    #[inline(never)]
     pub(crate) fn hear(&mut self, message: &Message, host: &mut Outbox, daq: &mut impl Sink) {
         let Some(run) = &mut self.run else { return introduction(&mut self.hello, message, host) };
         let mut report = report!(self, run, host);

@@ -327,8 +327,9 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         if self.state.state() == State::Armed {
             self.origin = FixedCounts::from_counts(i64::from(sample.counts));
         }
-        let from_here = BeginningAt { planned, origin: self.origin };
-        let cycle = self.supervisor.sample(&self.servo, &mut self.state, &seen, from_here);
+        let origin = self.origin;
+        let from_here = || BeginningAt { planned, origin };
+        let cycle = self.supervisor.sample(&self.servo, &mut self.state, &seen, from_here());
         if let Some(code) = cycle.answer {
             out.actuate(&Actuate {
                 run: self.params.run,
@@ -345,7 +346,8 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
                 self.send_stop(reason, out);
             }
         }
-        // Control first: whoever is told of the cycle takes his time.
+        // Control first: whoever is told of the cycle takes his time, and the next period waits for what is known of it.
+        self.supervisor.expect(&mut self.state, &from_here());
         self.count(cycle.arrival);
         notices(Notice::Cycle(CycleNotice { sample: *sample, superseded, lateness, cycles: 0, cycle }));
     }

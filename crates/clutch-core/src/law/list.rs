@@ -107,6 +107,13 @@ macro_rules! laws {
                     $(LawTerms::$law(terms) => Terms::values(terms),)+
                 }
             }
+
+            #[inline]
+            fn are_finite(&self) -> bool {
+                match self {
+                    $(LawTerms::$law(terms) => Terms::are_finite(terms),)+
+                }
+            }
         }
 
         const _: () = {
@@ -138,6 +145,16 @@ macro_rules! laws {
             pub fn surface(&self, asked: &Asked<'_, T>) -> Option<Surface<T>> {
                 match self {
                     $(Law::$law(law) => Listed::surface(law, asked),)+
+                }
+            }
+
+            /// A state of another law becomes this one's, at rest.
+            // A function of its own in machine code: a servo's state is its law's, and a bound leaves it out.
+            #[cold]
+            #[inline(never)]
+            fn begin_anew(&self, state: &mut LawState<T>) {
+                match self {
+                    $(Law::$law(_) => *state = LawState::$law(Default::default()),)+
                 }
             }
 
@@ -190,7 +207,7 @@ macro_rules! laws {
                 match self {
                     $(Law::$law(law) => {
                         if !matches!(state, LawState::$law(_)) {
-                            *state = LawState::$law(Default::default());
+                            self.begin_anew(state);
                         }
                         let Command { voltage, limit, terms } = match state {
                             LawState::$law(own) => law.update(own, tick),

@@ -85,6 +85,16 @@ pub const MAX_TERMS: usize = 8;
 pub trait Terms<T>: Copy + Default {
     /// The values, in the order of [`ControlLaw::TERMS`].
     fn values(&self) -> &[T];
+
+    /// True if each is a number.
+    #[inline]
+    fn are_finite(&self) -> bool
+    where
+        T: Real,
+    {
+        // 0 for numbers, however large; NaN if one of them is none.
+        self.values().iter().fold(T::ZERO, |sum, x| sum + T::ZERO * *x) == T::ZERO
+    }
 }
 
 impl<T: Copy, const N: usize> Terms<T> for [T; N]
