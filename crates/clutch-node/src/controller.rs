@@ -363,6 +363,9 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         *counter = counter.wrapping_add(1);
     }
 
+    // A function of its own in machine code: a run that goes on has none.
+    #[cold]
+    #[inline(never)]
     fn after_fault(
         &mut self,
         from: State,
@@ -381,6 +384,9 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         Ending { from, state: s.state(), cause: s.cause(), value: s.value(), tick: s.tick() }
     }
 
+    // A function of its own in machine code: the run is over then.
+    #[cold]
+    #[inline(never)]
     fn send_stop(&mut self, reason: StopReason, out: &mut impl Sink) {
         self.stopping = Some(reason);
         out.push(&Message::Stop(Stop { run: self.params.run, reason: reason as u8 }));
