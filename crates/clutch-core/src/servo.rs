@@ -196,26 +196,45 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
     /// is at `applied` volts and the shaft moves with the target.
     #[must_use]
     pub fn start(&self, counts: Counts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
-        let position = FixedCounts::from_counts(i64::from(counts.0));
-        ServoState { last: counts, ..self.start_at(position, target, applied) }
+        let mut state = ServoState::default();
+        self.restart(&mut state, counts, target, applied);
+        state
     }
 
     /// As [`Servo::start`], for [`Servo::tick_at`].
-    // A function of its own in machine code: it runs once, and a period's bound leaves it out.
-    #[inline(never)]
     #[must_use]
     pub fn start_at(&self, position: FixedCounts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
-        let tick = self.measure(position, target, T::ZERO);
-        let mut law = self.law.start(&tick, applied);
-        self.law.sees(&mut law, &Seen { position, applied, place: Place::default() });
-        ServoState {
-            position,
-            last: Counts::default(),
-            error: FixedCounts(target.position.0.wrapping_sub(position.0)),
-            velocity: self.velocity.start(position, target, applied),
-            law,
-            applied,
-        }
+        let mut state = ServoState::default();
+        self.restart_at(&mut state, position, target, applied);
+        state
+    }
+
+    /// As [`Servo::start`], in place: a board has no room for a second state.
+    pub(crate) fn restart(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        counts: Counts,
+        target: &Target<T>,
+        applied: T,
+    ) {
+        self.restart_at(state, FixedCounts::from_counts(i64::from(counts.0)), target, applied);
+        state.last = counts;
+    }
+
+    fn restart_at(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        position: FixedCounts,
+        target: &Target<T>,
+        applied: T,
+    ) {
+        state.position = position;
+        state.last = Counts::default();
+        state.error = FixedCounts(target.position.0.wrapping_sub(position.0));
+        state.velocity = self.velocity.start(position, target, applied);
+        self.law.restart(&mut state.law, &self.measure(position, target, T::ZERO), applied);
+        self.law.sees(&mut state.law, &Seen { position, applied, place: Place::default() });
+        state.applied = applied;
     }
 
     /// One period.

@@ -191,6 +191,15 @@ macro_rules! laws {
                 }
             }
 
+            // A function of its own, here and for what else a state is begun with: a board's stack holds one of them at a
+            // time.
+            #[inline(never)]
+            fn restart(&self, state: &mut Self::State, tick: &Tick<T>, applied: T) {
+                match self {
+                    $(Law::$law(law) => *state = LawState::$law(ControlLaw::start(law, tick, applied)),)+
+                }
+            }
+
             #[inline]
             fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
                 match self {

@@ -124,6 +124,11 @@ pub trait ControlLaw<T: Arithmetic> {
     /// The state for a start at `tick` while the brake is at `applied` volts.
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State;
 
+    /// The same where the state is to stay.
+    fn restart(&self, state: &mut Self::State, tick: &Tick<T>, applied: T) {
+        *state = self.start(tick, applied);
+    }
+
     /// Told before each period, and once after [`ControlLaw::start`]: what lies behind the measurement. Most laws need none
     /// of it.
     #[inline]

@@ -103,6 +103,12 @@ impl<T: Real> Envelope<T> {
         }
     }
 
+    /// The same where the state is to stay.
+    #[inline(never)]
+    pub(super) fn restart(&self, s: &mut EnvelopeState<T>, applied: T) {
+        *s = self.start(applied);
+    }
+
     /// The envelope of a shaft of which nothing is known but a count, and the voltage `applied`.
     pub(super) fn start(&self, applied: T) -> EnvelopeState<T> {
         let (fastest, edge) = (self.fastest, self.edge);

@@ -442,12 +442,7 @@ impl<T: Real> Supervisor<T> {
         goal: &Target<T>,
         planned: &impl Planned<T>,
     ) {
-        let Some(served) = s.served else {
-            let applied = servo.dac().volts(s.code);
-            s.servo = servo.start(counts, goal, applied);
-            s.envelope = self.limits.envelope.start(applied);
-            return;
-        };
+        let Some(served) = s.served else { return self.begin(servo, s, counts, goal) };
         let steps = s.tick.saturating_sub(served);
         // More than that is silence.
         let steps = u32::try_from(steps).unwrap_or(1).min(self.limits.silence_cycles.saturating_add(8));
@@ -455,6 +450,19 @@ impl<T: Real> Supervisor<T> {
             let passed = planned.target(served.wrapping_add(u64::from(step)));
             servo.bridge(&mut s.servo, (counts, goal), &passed, (step, steps));
         }
+    }
+
+    #[inline(never)]
+    fn begin<C: ControlLaw<T>>(
+        &self,
+        servo: &Servo<T, C>,
+        s: &mut SupervisorState<T, C::State>,
+        counts: Counts,
+        goal: &Target<T>,
+    ) {
+        let applied = servo.dac().volts(s.code);
+        servo.restart(&mut s.servo, counts, goal, applied);
+        self.limits.envelope.restart(&mut s.envelope, applied);
     }
 
     /// [`Cause::NotFinite`], [`Cause::FollowingError`] and [`Cause::Saturation`].
