@@ -146,7 +146,7 @@ impl<T: Real> Glide<T> {
         let filter = self.filters.plain();
         let Seen { position, applied, place } = state.seen;
         if !begun {
-            state.filters = self.filters.start(position, applied, tick.target_velocity);
+            self.begin(&mut state.filters, &state.seen, tick.target_velocity);
         }
         let pace = filter.per_period(tick.target_velocity);
         if !state.steps.active() {

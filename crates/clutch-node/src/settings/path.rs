@@ -1,7 +1,7 @@
 //! The path of a run, with the points of a table kept elsewhere.
 
 use super::MAX_KNOTS;
-use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
+use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Steepness, Table};
 use clutch_core::{Encoder, FixedCounts, Micros, ParamError, Target};
 
 /// A path, without the points of a table.
@@ -41,22 +41,51 @@ impl Path {
             formula => Kind::Formula(Reference::new(formula, start, encoder, period)?),
         };
         let path = Path { kind, encoder, period, start, first: FixedCounts(0) };
-        let first = path.target(knots, 0).position.0 >> FixedCounts::FRACTION_BITS;
+        // No interval has begun, however steep it is.
+        let first = path.from_first(0, knots, |table| table.at_with(&[], 0, encoder, period));
+        let first = first.position.0 >> FixedCounts::FRACTION_BITS;
         Ok(Path { first: FixedCounts::from_counts(first), ..path })
     }
 
     /// The target of the shaft at a tick, from the count on which the run begins; `knots` are the settings'.
     #[must_use]
     pub fn target(&self, knots: &[Knot; MAX_KNOTS], tick: u64) -> Target<f32> {
+        self.from_first(tick, knots, |table| table.at(tick, self.encoder, self.period))
+    }
+
+    /// The same, with the steepness of each interval of a table: [`Path::prepare`].
+    pub(crate) fn target_with(&self, knots: &[Knot; MAX_KNOTS], steepness: &Prepared, tick: u64) -> Target<f32> {
+        self.from_first(tick, knots, |table| table.at_with(steepness, tick, self.encoder, self.period))
+    }
+
+    /// Computes the steepness of each interval of a table.
+    pub(crate) fn prepare(&self, knots: &[Knot; MAX_KNOTS], steepness: &mut Prepared) {
+        if let Kind::Table(interpolation, points) = self.kind {
+            let table = Table { knots: knots.get(..points).unwrap_or(&[]), interpolation };
+            for (point, of) in steepness.iter_mut().enumerate().take(points) {
+                *of = table.steepness(point);
+            }
+        }
+    }
+
+    #[inline]
+    fn from_first(
+        &self,
+        tick: u64,
+        knots: &[Knot; MAX_KNOTS],
+        on: impl Fn(&Table<'_>) -> Target<f32>,
+    ) -> Target<f32> {
         let target = match &self.kind {
             Kind::Formula(reference) => reference.at(tick),
             Kind::Table(interpolation, points) => {
                 let knots = knots.get(..*points).unwrap_or(&[]);
-                let table = Table { knots, interpolation: *interpolation };
-                let target = table.at(tick, self.encoder, self.period);
+                let target = on(&Table { knots, interpolation: *interpolation });
                 Target { position: target.position.plus(self.start), ..target }
             }
         };
         Target { position: FixedCounts(target.position.0.wrapping_sub(self.first.0)), ..target }
     }
 }
+
+/// The steepness behind each point of a table.
+pub(crate) type Prepared = [Steepness; MAX_KNOTS];
