@@ -400,7 +400,7 @@ impl<'a> Bounds<'a> {
             match (known, stated) {
                 (Some(known), Some(f)) if handed_on.is_some() => {
                     self.used.insert((false, f.name()));
-                    Some(known.min(f.most))
+                    Some(if f.rest { known % (f.most + 1) } else { known.min(f.most) })
                 }
                 (Some(known), _) => Some(known),
                 (None, stated) => {

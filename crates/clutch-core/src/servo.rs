@@ -308,9 +308,9 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         let before = (state.position, state.last, state.applied);
         let moved = FixedCounts::from_counts(i64::from(next.0.since(state.last)));
         let end = next.1.position.0.wrapping_sub(state.position.plus(moved).0);
-        let left = i64::from(steps.saturating_sub(step).saturating_add(1).max(1));
+        let left = u16::try_from(steps.saturating_sub(step).saturating_add(1)).unwrap_or(u16::MAX);
         // Each step closes its share of what is left.
-        let share = end.wrapping_sub(state.error.0).checked_div(left).unwrap_or(0);
+        let share = divided(end.wrapping_sub(state.error.0), left.max(1));
         let error = state.error.0.wrapping_add(share);
         // An edge that nobody saw says nothing of a map.
         let _ = self.tick_at(state, FixedCounts(target.position.0.wrapping_sub(error)), target, off_map);
@@ -327,6 +327,19 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
             target_acceleration: target.acceleration,
         }
     }
+}
+
+/// `n / by`, the fraction cut off; digit by digit, since a board divides 32 bits at a time. 0 by 0.
+fn divided(n: i64, by: u16) -> i64 {
+    let (size, by) = (n.unsigned_abs(), u32::from(by));
+    let (mut quotient, mut rest) = (0_u64, 0_u32);
+    for shift in [48, 32, 16, 0] {
+        let digits = rest << 16 | (size >> shift) as u32 & 0xffff;
+        let digit = digits.checked_div(by).unwrap_or(0);
+        rest = digits.wrapping_sub(digit.wrapping_mul(by));
+        quotient = quotient << 16 | u64::from(digit);
+    }
+    if n < 0 { (quotient as i64).wrapping_neg() } else { quotient as i64 }
 }
 
 #[cfg(test)]
@@ -457,6 +470,13 @@ mod tests {
     }
 
     proptest::proptest! {
+        #[test]
+        fn division_by_digits_is_division(n: i64, shift in 0..63_u32, by in 1..u16::MAX) {
+            for n in [n, n >> shift, i64::MIN, i64::MAX, 0] {
+                proptest::prop_assert_eq!(divided(n, by), n / i64::from(by));
+            }
+        }
+
         #[test]
         fn no_step_of_a_bridge_is_too_odd_to_take(
             last: i32, next: i32, at: i64, goal: i64, step: u32, steps: u32,

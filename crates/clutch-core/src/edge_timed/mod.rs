@@ -570,13 +570,7 @@ impl<T: Real> EdgeTimed<T> {
     // A function of its own: the second state is not on the stack of a period that goes on.
     #[cold]
     #[inline(never)]
-    fn restart(
-        &self,
-        state: &mut EdgeTimedState<T>,
-        position: FixedCounts,
-        applied: T,
-        target_velocity: T,
-    ) {
+    fn restart(&self, state: &mut EdgeTimedState<T>, position: FixedCounts, applied: T, target_velocity: T) {
         *state = self.start(position, applied, target_velocity);
     }
 

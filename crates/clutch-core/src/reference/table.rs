@@ -107,11 +107,16 @@ impl<T: Real> Interval<T> {
         let (high, low) = (rate.0 >> 64, rate.0 & u128::from(u64::MAX));
         // Of a number rounded down, this is the quotient or one less.
         let least = us.wrapping_mul(high).wrapping_add(us.wrapping_mul(low) >> 64);
-        let rest = us.wrapping_mul(u128::from(self.rise.0.unsigned_abs())).wrapping_sub(least.wrapping_mul(length));
+        let rest =
+            us.wrapping_mul(u128::from(self.rise.0.unsigned_abs())).wrapping_sub(least.wrapping_mul(length));
         let more = rest >= length;
         let whole = (least as i64).wrapping_add(i64::from(more));
         let exact = rest == if more { length } else { 0 };
-        FixedCounts(if self.rise.0 < 0 { whole.wrapping_neg().wrapping_sub(i64::from(!exact)) } else { whole })
+        FixedCounts(if self.rise.0 < 0 {
+            whole.wrapping_neg().wrapping_sub(i64::from(!exact))
+        } else {
+            whole
+        })
     }
 }
 

@@ -54,7 +54,14 @@ impl Path {
     }
 
     /// The same, with the steepness of each interval of a table: [`Path::prepare`].
-    pub(crate) fn target_with(&self, knots: &[Knot; MAX_KNOTS], steepness: &Prepared, tick: u64) -> Target<f32> {
+    // A function of its own in machine code: it is called from many places.
+    #[inline(never)]
+    pub(crate) fn target_with(
+        &self,
+        knots: &[Knot; MAX_KNOTS],
+        steepness: &Prepared,
+        tick: u64,
+    ) -> Target<f32> {
         self.from_first(tick, knots, |table| table.at_with(steepness, tick, self.encoder, self.period))
     }
 
