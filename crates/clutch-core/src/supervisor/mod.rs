@@ -244,7 +244,8 @@ impl<T: Real> Supervisor<T> {
         };
         cycle.target = goal;
         // Nothing was served before the first.
-        let since_served = s.served.map_or(0, |served| s.tick.saturating_sub(served));
+        let since_served =
+            s.served.map_or(0, |served| u32::try_from(s.tick.saturating_sub(served)).unwrap_or(u32::MAX));
         if !self.plausible_target(s, &goal, since_served.max(1)) {
             return;
         }
@@ -420,7 +421,7 @@ impl<T: Real> Supervisor<T> {
 
     /// True if a path can have this target so many periods after the last; if not, [`Cause::Target`].
     #[inline]
-    fn plausible_target<S>(&self, s: &mut SupervisorState<T, S>, goal: &Target<T>, periods: u64) -> bool {
+    fn plausible_target<S>(&self, s: &mut SupervisorState<T, S>, goal: &Target<T>, periods: u32) -> bool {
         let plausible = self.limits.believes(s.last_target, goal, periods);
         if plausible {
             s.last_target = Some(goal.position);
@@ -472,7 +473,7 @@ impl<T: Real> Supervisor<T> {
         s: &mut SupervisorState<T, S>,
         out: &ServoOutput<T, X>,
         goal: &Target<T>,
-        since_served: u64,
+        since_served: u32,
     ) {
         let l = &self.limits;
         if !finite(out) {
@@ -490,8 +491,7 @@ impl<T: Real> Supervisor<T> {
             Limit::Lowest | Limit::Invalid => true,
         };
         // More than that is silence.
-        let passed =
-            u32::try_from(since_served).unwrap_or(1).min(self.limits.silence_cycles.saturating_add(8));
+        let passed = since_served.min(self.limits.silence_cycles.saturating_add(8));
         s.saturated = if saturated { s.saturated.saturating_add(passed) } else { 0 };
         if s.saturated >= l.saturation_cycles {
             self.check(s, Cause::Saturation, out.command.voltage);

@@ -195,7 +195,7 @@ impl<T: Real> Limits<T> {
 
     /// True if a path can have a target: numbers, within the speed limit, and near the last, so many periods ago.
     #[inline]
-    pub(super) fn believes(&self, last: Option<FixedCounts>, goal: &Target<T>, periods: u64) -> bool {
+    pub(super) fn believes(&self, last: Option<FixedCounts>, goal: &Target<T>, periods: u32) -> bool {
         let speed = goal.velocity.abs();
         if !(goal.acceleration.is_finite() && speed <= self.speed_limit) {
             return false;
@@ -204,6 +204,6 @@ impl<T: Real> Limits<T> {
         // A difference that wraps is farther than any path goes in a period.
         let wraps = goal.position.0.checked_sub(last.0).is_none();
         let moved: T = goal.position.minus::<T>(last).abs();
-        !wraps && moved <= self.speed_counts * T::from_u64(periods)
+        !wraps && moved <= self.speed_counts * T::from_u64(u64::from(periods))
     }
 }
