@@ -42,7 +42,7 @@ impl Path {
         };
         let path = Path { kind, encoder, period, start, first: FixedCounts(0) };
         // No interval has begun, however steep it is.
-        let first = path.from_first(0, knots, |table| table.at_with(&[], 0, encoder, period));
+        let first = path.since_first(0, knots, |table| table.at_with(&[], 0, encoder, period));
         let first = first.position.0 >> FixedCounts::FRACTION_BITS;
         Ok(Path { first: FixedCounts::from_counts(first), ..path })
     }
@@ -50,7 +50,7 @@ impl Path {
     /// The target of the shaft at a tick, from the count on which the run begins; `knots` are the settings'.
     #[must_use]
     pub fn target(&self, knots: &[Knot; MAX_KNOTS], tick: u64) -> Target<f32> {
-        self.from_first(tick, knots, |table| table.at(tick, self.encoder, self.period))
+        self.since_first(tick, knots, |table| table.at(tick, self.encoder, self.period))
     }
 
     /// The same, with the steepness of each interval of a table: [`Path::prepare`].
@@ -62,7 +62,7 @@ impl Path {
         steepness: &Prepared,
         tick: u64,
     ) -> Target<f32> {
-        self.from_first(tick, knots, |table| table.at_with(steepness, tick, self.encoder, self.period))
+        self.since_first(tick, knots, |table| table.at_with(steepness, tick, self.encoder, self.period))
     }
 
     /// Computes the steepness of each interval of a table.
@@ -76,7 +76,7 @@ impl Path {
     }
 
     #[inline]
-    fn from_first(
+    fn since_first(
         &self,
         tick: u64,
         knots: &[Knot; MAX_KNOTS],
