@@ -11,7 +11,7 @@ mod memory;
 mod plan;
 
 use anyhow::{Context, Result, bail};
-use clutch_benches::machine_code::{Bounds, CallFact, Cost, Fault, Image, traced};
+use clutch_benches::machine_code::{Bounds, Cost, Fault, Image, traced};
 use emulator::Measured;
 use plan::{Item, Plan};
 use std::collections::{BTreeMap, BTreeSet};
@@ -157,15 +157,8 @@ fn all_bounds(
             );
             for (f, length, cost) in bounds.functions() {
                 let of = length.map_or(String::new(), |n| format!(" of {n} bytes"));
-                let without = CallFact {
-                    function: String::new(),
-                    of: format!("{}$", f.name),
-                    most: 0,
-                    why: "to see its share".to_owned(),
-                };
-                let mut case = item.case();
-                case.calls.insert(0, without);
-                let rest = self::bound(item, &mut Bounds::new(image, &facts, &case)).unwrap_or_default();
+                let mut without = Bounds::new(image, &facts, &case).without(&f.name);
+                let rest = self::bound(item, &mut without).unwrap_or_default();
                 let share = bound.cycles.saturating_sub(rest.cycles);
                 println!("| {}{of} | {} | {} | {share} |", f.name, cost.instructions, cost.cycles);
             }

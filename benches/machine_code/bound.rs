@@ -60,6 +60,8 @@ pub struct Bounds<'a> {
     facts: &'a Facts,
     /// Facts that hold in this case only; they are asked first.
     case: &'a Facts,
+    /// A function that costs nothing.
+    free: Option<&'a str>,
     known: BTreeMap<(u32, Option<u64>), Cost>,
     /// Functions under examination, the outermost first.
     within: Vec<u32>,
@@ -93,6 +95,7 @@ impl<'a> Bounds<'a> {
             image,
             facts,
             case,
+            free: None,
             known: BTreeMap::new(),
             within: Vec::new(),
             faults: BTreeSet::new(),
@@ -100,6 +103,12 @@ impl<'a> Bounds<'a> {
             told: BTreeMap::new(),
             used: BTreeSet::new(),
         }
+    }
+
+    /// The same as if calls of the function of this name cost nothing, to see its share.
+    #[must_use]
+    pub fn without(self, name: &'a str) -> Self {
+        Bounds { free: Some(name), ..self }
     }
 
     /// The bound of the function of this name, from its first instruction to its return.
@@ -175,9 +184,9 @@ impl<'a> Bounds<'a> {
                     _ => None,
                 };
                 let Some(callee) = target.and_then(|t| self.image.function_at(t)) else { continue };
-                // A call that the case rules out is none.
-                if self.cap(&function.name, &callee.name).is_some_and(|c| c.most == 0) {
-                    continue;
+                // A call that the case rules out is none, and nothing behind it is reached.
+                if self.never(function, callee) {
+                    break;
                 }
                 if let Some(rest) = self.up_to(callee, end, known) {
                     ends.insert(n, (k, rest + Cost::cycles(refill(i))));
@@ -228,6 +237,11 @@ impl<'a> Bounds<'a> {
             .find(|(_, f)| means(&f.function, function) && means(&f.of, callee));
         self.used.extend(cap.map(|(case, f)| (case, f.name())));
         cap.map(|(_, f)| f)
+    }
+
+    /// True if one function is stated never to call another.
+    fn never(&mut self, function: &Function, callee: &Function) -> bool {
+        self.cap(&function.name, &callee.name).is_some_and(|c| c.most == 0)
     }
 
     /// The functions examined so far, with the bound of each; a function that works on memory has
@@ -307,6 +321,15 @@ impl<'a> Bounds<'a> {
     ) -> Ways {
         let mut ways = Ways::new();
         for (n, block) in graph.blocks.iter().enumerate() {
+            // A block with a call that is stated never to be made is never executed, but up to an end before it.
+            let barred = block.instructions.iter().position(|i| match i.flow {
+                Flow::Call(target) => self.image.function_at(target).is_some_and(|f| self.never(function, f)),
+                _ => false,
+            });
+            let reached = ends.and_then(|e| e.get(&n)).is_some_and(|(k, _)| barred.is_none_or(|b| *k < b));
+            if barred.is_some() && !reached {
+                continue;
+            }
             let mut cost = Cost::default();
             for (k, i) in block.instructions.iter().enumerate() {
                 let Some(c) = cycles(i) else {
@@ -319,7 +342,7 @@ impl<'a> Bounds<'a> {
                 if let Some((_, rest)) = ends.and_then(|e| e.get(&n)).filter(|(at, _)| *at == k) {
                     or_longer(&mut ways, (n, None), cost + *rest);
                     // The last block of all: nothing of it is called as a whole.
-                    if block.next.is_empty() {
+                    if block.next.is_empty() || barred.is_some() {
                         break;
                     }
                 }
@@ -329,7 +352,9 @@ impl<'a> Bounds<'a> {
                     cost = cost + self.call(function, (n, i), target, so_far, length, capped);
                 }
             }
-            let Some((last, so_far)) = block.instructions.split_last() else { continue };
+            let Some((last, so_far)) = block.instructions.split_last().filter(|_| barred.is_none()) else {
+                continue;
+            };
             for &to in &block.next {
                 let first = &graph.blocks[to].instructions[0];
                 let jumped = if first.address == last.address + last.size { 0 } else { refill(last) };
@@ -338,7 +363,8 @@ impl<'a> Bounds<'a> {
             if block.returns {
                 or_longer(&mut ways, (n, None), cost + Cost::cycles(refill(last)));
             }
-            if let Some(target) = block.tail_call {
+            let mut never = |target| self.image.function_at(target).is_some_and(|f| self.never(function, f));
+            if let Some(target) = block.tail_call.filter(|target| !never(*target)) {
                 let callee = self.call(function, (n, last), target, so_far, length, capped);
                 or_longer(&mut ways, (n, None), cost + Cost::cycles(refill(last)) + callee);
             }
@@ -362,7 +388,7 @@ impl<'a> Bounds<'a> {
             return self.fault(Fault::NoTarget { function, address, target });
         };
         let cap = self.cap(&function.name, &callee.name);
-        if cap.is_some_and(|c| c.most == 0) {
+        if self.free == Some(callee.name.as_str()) {
             return Cost::default();
         }
         let bytes = length_register(&callee.name).and_then(|register| {
@@ -374,7 +400,7 @@ impl<'a> Bounds<'a> {
             match (known, stated) {
                 (Some(known), Some(f)) if handed_on.is_some() => {
                     self.used.insert((false, f.name()));
-                    Some(known.min(f.most))
+                    Some(if f.rest { known % (f.most + 1) } else { known.min(f.most) })
                 }
                 (Some(known), _) => Some(known),
                 (None, stated) => {

@@ -96,6 +96,9 @@ pub struct LengthFact {
     pub of: String,
     /// Bytes at most.
     pub most: u64,
+    /// True if they are what is left of a longer copy in pieces of one byte more.
+    #[serde(default)]
+    pub rest: bool,
     /// Reason why that holds.
     pub why: String,
 }

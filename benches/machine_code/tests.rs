@@ -204,6 +204,22 @@ fn a_length_that_depends_on_a_condition_is_not_known() {
 }
 
 #[test]
+fn a_way_through_a_call_that_is_stated_never_to_be_made_is_never_gone() {
+    // cmp r0, #0; beq 1f; nop; nop; bl g; 1: bx lr
+    let f = [0x2800, 0xd003, 0xbf00, 0xbf00, 0xf000, 0xf801, BX_LR];
+    let image = image(&[("f", &f), ("g", &[BX_LR])]);
+    let why = "it is not".to_owned();
+    let never = CallFact { function: "f".to_owned(), of: "g".to_owned(), most: 0, why };
+    let facts = Facts { calls: vec![never], ..Facts::default() };
+    // Six instructions and one; of those, what is left is cmp, beq, taken, and bx lr.
+    assert_eq!(bound(&image).unwrap().instructions, 7);
+    assert_eq!(bound_with(&image, &facts), Ok(cost(3, 9)));
+    // A call that costs nothing is gone through.
+    let none = Facts::default();
+    assert_eq!(Bounds::new(&image, &none, &none).without("g").of("f").unwrap().instructions, 6);
+}
+
+#[test]
 fn a_fact_tells_whether_it_was_needed() {
     let image = image(&[("f", &[0x2105, COUNT, 0xd1fd, BX_LR])]);
     let (facts, none) = (round(5, None), Facts::default());

@@ -626,7 +626,7 @@ typedef struct {
  * Memory of an axis.
  */
 typedef struct CLUTCH_ALIGNED(16) {
-  uint64_t opaque[360];
+  uint64_t opaque[384];
 } clutch_axis;
 
 /**

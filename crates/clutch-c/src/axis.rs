@@ -83,7 +83,7 @@ pub(crate) struct Kept {
 /// Memory of an axis.
 #[repr(C, align(16))]
 pub struct clutch_axis {
-    opaque: [u64; 360],
+    opaque: [u64; 384],
 }
 
 kept!(clutch_axis, Kept, b"cl_axis ");

@@ -188,7 +188,7 @@ impl<T: Real> Dac<T> {
     /// The first parameter out of range.
     pub fn new(p: &DacParams<T>) -> Result<Self, ParamError<T>> {
         p.check_rows()?;
-        let codes = 1_i32 << p.bits;
+        let codes = 1_i32.wrapping_shl(p.bits.into());
         let step = (p.highest - p.lowest) / T::from_i32(codes);
         DacParams::DIVISIBLE.require(p.highest, step > T::ZERO && step.is_finite())?;
         Ok(Dac {

@@ -263,7 +263,8 @@ const WORDS_OF_32_BITS: bool = cfg!(target_pointer_width = "32");
 fn nearest(n: i64) -> f32 {
     match i32::try_from(n) {
         Ok(small) => small as f32,
-        Err(_) => n as f32,
+        Err(_) if n < 0 => -nearest_wide(n.unsigned_abs()),
+        Err(_) => nearest_wide(n.unsigned_abs()),
     }
 }
 
@@ -272,8 +273,30 @@ fn nearest(n: i64) -> f32 {
 fn nearest_unsigned(n: u64) -> f32 {
     match u32::try_from(n) {
         Ok(small) => small as f32,
-        Err(_) => n as f32,
+        Err(_) => nearest_wide(n),
     }
+}
+
+/// The nearest number to one above 0: its highest 32 bits, of which 24 are kept; the rest decides a tie by being there.
+// A function of its own: inlined, the compiler computes it each time, and then selects.
+#[cold]
+#[inline(never)]
+fn nearest_wide(n: u64) -> f32 {
+    let zeros = n.leading_zeros() & 63;
+    let bits = n << zeros;
+    let highest = (bits >> 32) as u32 | u32::from(bits as u32 != 0);
+    highest as f32 * f32::from_bits((127 + 32 - zeros) << 23)
+}
+
+/// The integer part, saturating, of a number that is nearly always within 32 bits; NaN gives 0.
+#[inline]
+fn integer_part(x: f32) -> i64 {
+    #[cold]
+    #[inline(never)]
+    fn wide(x: f32) -> i64 {
+        x as i64
+    }
+    if x.abs() < 2_147_483_648.0 { i64::from(x as i32) } else { wide(x) }
 }
 
 impl Real for f32 {
@@ -303,7 +326,7 @@ impl Real for f32 {
     }
     #[inline]
     fn to_i64(self) -> i64 {
-        self as i64
+        if WORDS_OF_32_BITS { integer_part(self) } else { self as i64 }
     }
     #[inline]
     fn to_u16(self) -> u16 {
@@ -389,6 +412,15 @@ mod tests {
                 assert_eq!(nearest(n.wrapping_neg()), n.wrapping_neg() as f32, "-{n}");
                 assert_eq!(nearest_unsigned(n as u64), n as u64 as f32, "{n} unsigned");
             }
+        }
+    }
+
+    #[test]
+    fn numbers_become_the_same_integer_on_every_board() {
+        let ends = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN_POSITIVE, -0.0];
+        let all = (0..=u32::MAX).step_by(65_537).map(f32::from_bits);
+        for x in all.chain(ends).chain([2_147_483_648.0, -2_147_483_648.0, 2_147_483_520.0]) {
+            assert_eq!(integer_part(x), x as i64, "{x}");
         }
     }
 

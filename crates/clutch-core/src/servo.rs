@@ -196,26 +196,45 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
     /// is at `applied` volts and the shaft moves with the target.
     #[must_use]
     pub fn start(&self, counts: Counts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
-        let position = FixedCounts::from_counts(i64::from(counts.0));
-        ServoState { last: counts, ..self.start_at(position, target, applied) }
+        let mut state = ServoState::default();
+        self.restart(&mut state, counts, target, applied);
+        state
     }
 
     /// As [`Servo::start`], for [`Servo::tick_at`].
-    // A function of its own in machine code: it runs once, and a period's bound leaves it out.
-    #[inline(never)]
     #[must_use]
     pub fn start_at(&self, position: FixedCounts, target: &Target<T>, applied: T) -> ServoState<T, C::State> {
-        let tick = self.measure(position, target, T::ZERO);
-        let mut law = self.law.start(&tick, applied);
-        self.law.sees(&mut law, &Seen { position, applied, place: Place::default() });
-        ServoState {
-            position,
-            last: Counts::default(),
-            error: FixedCounts(target.position.0.wrapping_sub(position.0)),
-            velocity: self.velocity.start(position, target, applied),
-            law,
-            applied,
-        }
+        let mut state = ServoState::default();
+        self.restart_at(&mut state, position, target, applied);
+        state
+    }
+
+    /// As [`Servo::start`], in place: a board has no room for a second state.
+    pub(crate) fn restart(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        counts: Counts,
+        target: &Target<T>,
+        applied: T,
+    ) {
+        self.restart_at(state, FixedCounts::from_counts(i64::from(counts.0)), target, applied);
+        state.last = counts;
+    }
+
+    fn restart_at(
+        &self,
+        state: &mut ServoState<T, C::State>,
+        position: FixedCounts,
+        target: &Target<T>,
+        applied: T,
+    ) {
+        state.position = position;
+        state.last = Counts::default();
+        state.error = FixedCounts(target.position.0.wrapping_sub(position.0));
+        state.velocity = self.velocity.start(position, target, applied);
+        self.law.restart(&mut state.law, &self.measure(position, target, T::ZERO), applied);
+        self.law.sees(&mut state.law, &Seen { position, applied, place: Place::default() });
+        state.applied = applied;
     }
 
     /// One period.
@@ -289,9 +308,9 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         let before = (state.position, state.last, state.applied);
         let moved = FixedCounts::from_counts(i64::from(next.0.since(state.last)));
         let end = next.1.position.0.wrapping_sub(state.position.plus(moved).0);
-        let left = i64::from(steps.saturating_sub(step).saturating_add(1).max(1));
+        let left = u16::try_from(steps.saturating_sub(step).saturating_add(1)).unwrap_or(u16::MAX);
         // Each step closes its share of what is left.
-        let share = end.wrapping_sub(state.error.0).checked_div(left).unwrap_or(0);
+        let share = divided(end.wrapping_sub(state.error.0), left.max(1));
         let error = state.error.0.wrapping_add(share);
         // An edge that nobody saw says nothing of a map.
         let _ = self.tick_at(state, FixedCounts(target.position.0.wrapping_sub(error)), target, off_map);
@@ -308,6 +327,19 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
             target_acceleration: target.acceleration,
         }
     }
+}
+
+/// `n / by`, the fraction cut off; digit by digit, since a board divides 32 bits at a time. 0 by 0.
+fn divided(n: i64, by: u16) -> i64 {
+    let (size, by) = (n.unsigned_abs(), u32::from(by));
+    let (mut quotient, mut rest) = (0_u64, 0_u32);
+    for shift in [48, 32, 16, 0] {
+        let digits = rest << 16 | (size >> shift) as u32 & 0xffff;
+        let digit = digits.checked_div(by).unwrap_or(0);
+        rest = digits.wrapping_sub(digit.wrapping_mul(by));
+        quotient = quotient << 16 | u64::from(digit);
+    }
+    if n < 0 { (quotient as i64).wrapping_neg() } else { quotient as i64 }
 }
 
 #[cfg(test)]
@@ -438,6 +470,13 @@ mod tests {
     }
 
     proptest::proptest! {
+        #[test]
+        fn division_by_digits_is_division(n: i64, shift in 0..63_u32, by in 1..u16::MAX) {
+            for n in [n, n >> shift, i64::MIN, i64::MAX, 0] {
+                proptest::prop_assert_eq!(divided(n, by), n / i64::from(by));
+            }
+        }
+
         #[test]
         fn no_step_of_a_bridge_is_too_odd_to_take(
             last: i32, next: i32, at: i64, goal: i64, step: u32, steps: u32,

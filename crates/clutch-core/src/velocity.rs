@@ -73,6 +73,7 @@ impl<T: Real> VelocitySource<T> {
     }
 
     /// On the path: the shaft moves at the target's velocity, with `applied` volts on the actuator since long.
+    #[inline(never)]
     #[must_use]
     pub fn start(&self, position: FixedCounts, target: &Target<T>, applied: T) -> VelocityState<T> {
         let _ = applied;

@@ -320,6 +320,9 @@ impl BoardNode {
         bites.then(|| self.fault(now_us, BoardFault::Watchdog, silent))
     }
 
+    // A function of its own in machine code: it ends control, and the bound of a period that goes on leaves it out.
+    #[cold]
+    #[inline(never)]
     fn fault(&mut self, now_us: u32, cause: BoardFault, value: u32) -> Fault {
         self.make_safe(BoardState::Faulted);
         let sequence = self.sequence.wrapping_sub(1);

@@ -16,9 +16,10 @@ use crate::board::misunderstood;
 use crate::controller::{ControllerNode, ControllerParams};
 use crate::notice::{Ending, Notice};
 use crate::outbox::{Outbox, Sink};
-use crate::settings::{Built, MAX_KNOTS, Misfit, Path, SETTINGS_HASH, Settings};
+use crate::settings::{Built, MAX_KNOTS, Misfit, Path, Prepared, SETTINGS_HASH, Settings};
 use crate::telemetry::{frame, states};
 use clutch_core::law::LawTerms;
+use clutch_core::reference::Steepness;
 use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Micros};
 use clutch_wire::{
@@ -61,6 +62,8 @@ pub struct BoardController {
     settings: Settings,
     /// The run that the settings are for.
     settings_run: u16,
+    /// What the path's targets are computed with.
+    prepared: Prepared,
     /// Hears encoder and converter while there is no run.
     introduced: Decoder,
     /// Encoder and converter, once they have answered.
@@ -100,6 +103,7 @@ impl BoardController {
             decoder: Decoder::new(),
             settings: Settings::default(),
             settings_run: 0,
+            prepared: [Steepness::default(); MAX_KNOTS],
             introduced: Decoder::new(),
             hello: None,
             run: None,
@@ -195,14 +199,17 @@ impl BoardController {
             return;
         };
         let drove = run.driving();
-        let (path, knots) = (&run.path, self.settings.knots());
-        let at = |tick: u64| path.target(knots, tick);
+        let (path, knots, prepared) = (&run.path, self.settings.knots(), &self.prepared);
+        let at = |tick: u64| path.target_with(knots, prepared, tick);
         let mut report = report!(self, run, host);
         run.control.receive(now_ns, bytes, &at, daq, &mut |n| report.notice(n));
         self.follow(now_ns, drove, host, daq);
     }
 
     /// A message of encoder and converter by value, other than a sample. [`BoardController::follow`] comes after it.
+    // A function of its own in machine code: in most periods there is none.
+    #[cold]
+    #[inline(never)]
     pub(crate) fn hear(&mut self, message: &Message, host: &mut Outbox, daq: &mut impl Sink) {
         let Some(run) = &mut self.run else { return introduction(&mut self.hello, message, host) };
         let mut report = report!(self, run, host);
@@ -212,8 +219,8 @@ impl BoardController {
     /// A sample by value. [`BoardController::follow`] comes after it.
     pub(crate) fn sample(&mut self, now_ns: u64, sample: &Sample, host: &mut Outbox, daq: &mut impl Sink) {
         let Some(run) = &mut self.run else { return };
-        let (path, knots) = (&run.path, self.settings.knots());
-        let at = |tick: u64| path.target(knots, tick);
+        let (path, knots, prepared) = (&run.path, self.settings.knots(), &self.prepared);
+        let at = |tick: u64| path.target_with(knots, prepared, tick);
         let mut report = report!(self, run, host);
         run.control.sample(now_ns, sample, false, &at, daq, &mut |n| report.notice(n));
     }
@@ -366,6 +373,7 @@ impl BoardController {
         if control.configuration() != *m {
             return Err((Refusal::Differs, 0));
         }
+        built.path.prepare(self.settings.knots(), &mut self.prepared);
         control.configure(present_code(&hello, built.supervisor.safe_codes().hold), daq);
         self.run = Some(Run {
             control,

@@ -327,8 +327,9 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         if self.state.state() == State::Armed {
             self.origin = FixedCounts::from_counts(i64::from(sample.counts));
         }
-        let from_here = BeginningAt { planned, origin: self.origin };
-        let cycle = self.supervisor.sample(&self.servo, &mut self.state, &seen, from_here);
+        let origin = self.origin;
+        let from_here = || BeginningAt { planned, origin };
+        let cycle = self.supervisor.sample(&self.servo, &mut self.state, &seen, from_here());
         if let Some(code) = cycle.answer {
             out.actuate(&Actuate {
                 run: self.params.run,
@@ -345,7 +346,8 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
                 self.send_stop(reason, out);
             }
         }
-        // Control first: whoever is told of the cycle takes his time.
+        // Control first: whoever is told of the cycle takes his time, and the next period waits for what is known of it.
+        self.supervisor.expect(&mut self.state, &from_here());
         self.count(cycle.arrival);
         notices(Notice::Cycle(CycleNotice { sample: *sample, superseded, lateness, cycles: 0, cycle }));
     }
@@ -361,6 +363,9 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         *counter = counter.wrapping_add(1);
     }
 
+    // A function of its own in machine code: a run that goes on has none.
+    #[cold]
+    #[inline(never)]
     fn after_fault(
         &mut self,
         from: State,
@@ -379,6 +384,9 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         Ending { from, state: s.state(), cause: s.cause(), value: s.value(), tick: s.tick() }
     }
 
+    // A function of its own in machine code: the run is over then.
+    #[cold]
+    #[inline(never)]
     fn send_stop(&mut self, reason: StopReason, out: &mut impl Sink) {
         self.stopping = Some(reason);
         out.push(&Message::Stop(Stop { run: self.params.run, reason: reason as u8 }));

@@ -1,6 +1,6 @@
 //! Messages on their way out.
 
-use clutch_wire::{Actuate, Message, encode_into};
+use clutch_wire::{Actuate, MAX_FRAME, Message, encode_into};
 
 /// The way of a node's messages to its other end: frames on a line, or the other end itself.
 pub trait Sink {
@@ -19,7 +19,8 @@ const CAPACITY: usize = 512;
 /// so far behind that its frames would be of no use.
 #[derive(Clone, Copy, Debug)]
 pub struct Outbox {
-    bytes: [u8; CAPACITY],
+    /// Behind the capacity is room for a frame that does not fit.
+    bytes: [u8; CAPACITY + MAX_FRAME],
     used: usize,
     dropped: u32,
 }
@@ -34,7 +35,7 @@ impl Outbox {
     /// Nothing to be written.
     #[must_use]
     pub const fn new() -> Outbox {
-        Outbox { bytes: [0; CAPACITY], used: 0, dropped: 0 }
+        Outbox { bytes: [0; CAPACITY + MAX_FRAME], used: 0, dropped: 0 }
     }
 
     /// Adds a frame.
@@ -42,20 +43,22 @@ impl Outbox {
     #[inline(never)]
     pub fn push(&mut self, message: &Message) {
         let free = self.bytes.get_mut(self.used..).unwrap_or_default();
-        match encode_into(message, free) {
-            Some(length) => self.used = self.used.wrapping_add(length),
-            None => self.dropped = self.dropped.saturating_add(1),
-        }
+        let Some(free) = free.first_chunk_mut() else { return };
+        let length = encode_into(message, free);
+        self.take(length);
     }
 
     /// Adds whole frames that have been made before.
     pub fn append(&mut self, frame: &[u8]) {
-        let end = self.used.saturating_add(frame.len());
-        match self.bytes.get_mut(self.used..end) {
-            Some(free) => {
-                free.iter_mut().zip(frame).for_each(|(to, from)| *to = *from);
-                self.used = end;
-            }
+        let free = self.bytes.get_mut(self.used..).unwrap_or_default();
+        free.iter_mut().zip(frame).for_each(|(to, from)| *to = *from);
+        self.take(frame.len());
+    }
+
+    /// Takes so many bytes that were written behind the others, or drops them.
+    fn take(&mut self, length: usize) {
+        match self.used.checked_add(length).filter(|end| *end <= CAPACITY) {
+            Some(end) => self.used = end,
             None => self.dropped = self.dropped.saturating_add(1),
         }
     }
@@ -114,6 +117,9 @@ impl Mail {
 
 impl Sink for Mail {
     /// A message without room is lost, as on a line; the ends bear that.
+    // A function of its own in machine code: in most periods there is none.
+    #[cold]
+    #[inline(never)]
     fn push(&mut self, message: &Message) {
         let at = usize::from(self.first.wrapping_add(self.count)) % Mail::MOST;
         if usize::from(self.count) < Mail::MOST

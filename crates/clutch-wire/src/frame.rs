@@ -37,65 +37,34 @@ impl Frame {
 #[must_use]
 pub fn encode(message: &Message) -> Frame {
     let mut bytes = [0; MAX_FRAME];
-    let length = encode_into(message, &mut bytes).unwrap_or(0);
+    let length = encode_into(message, &mut bytes);
     Frame { bytes, length }
 }
 
-/// Writes the frame of a message to the start of a buffer; its length, or nothing if the buffer is too short. What a
-/// short buffer holds then is no frame.
+/// Writes the frame of a message to the start of a place for any; its length. What is behind it then is of no meaning.
 #[must_use]
-pub fn encode_into(message: &Message, buffer: &mut [u8]) -> Option<usize> {
-    let mut body = [0; MAX_BODY];
-    let length = message.put(&mut Put::new(&mut body));
-    // Checksum, stuffing and copy in one pass: on a board this is most of the time that a period takes.
-    let mut out = Stuffing { buffer, at: 1, code: 0 };
-    let mut digest = CRC.digest();
-    for byte in body.get(..length)? {
-        digest.update(core::slice::from_ref(byte));
-        out.push(*byte)?;
-    }
-    for byte in digest.finalize().to_le_bytes() {
-        out.push(byte)?;
-    }
-    out.end()
-}
-
-/// COBS, byte by byte: each zero, and the place in front of the first byte, gets the distance to the next zero; the
-/// end counts as one.
-struct Stuffing<'a> {
-    buffer: &'a mut [u8],
-    /// Place of the next byte.
-    at: usize,
-    /// Place of the last zero, which waits for its distance.
-    code: usize,
-}
-
-impl Stuffing<'_> {
-    #[inline]
-    fn push(&mut self, byte: u8) -> Option<()> {
-        if byte == 0 {
-            self.close()?;
-        } else {
-            *self.buffer.get_mut(self.at)? = byte;
+pub fn encode_into(message: &Message, frame: &mut [u8; MAX_FRAME]) -> usize {
+    let [code, rest @ ..] = frame;
+    // The fields are written where they are sent from.
+    let length = message.put(&mut Put::new(rest));
+    let Some((body, rest)) = rest.split_at_mut_checked(length) else { return 0 };
+    let Some((checksum, [delimiter, ..])) = rest.split_first_chunk_mut() else { return 0 };
+    *checksum = CRC.checksum(body).to_le_bytes();
+    *delimiter = 0;
+    // COBS, from the end: each zero, and the place in front of the first byte, gets the distance to the next zero, below
+    // 254 (see `MAX_FRAME`); the delimiter is one.
+    let mut distance = 1_u8;
+    for bytes in [&mut checksum[..], body] {
+        for byte in bytes.iter_mut().rev() {
+            if *byte == 0 {
+                (*byte, distance) = (distance, 0);
+            }
+            distance = distance.wrapping_add(1);
         }
-        self.at = self.at.wrapping_add(1);
-        Some(())
     }
-
-    /// The distance from the last zero to here: below 254, see `MAX_FRAME`.
-    #[inline]
-    fn close(&mut self) -> Option<()> {
-        *self.buffer.get_mut(self.code)? = self.at.wrapping_sub(self.code) as u8;
-        self.code = self.at;
-        Some(())
-    }
-
-    /// The delimiter; the length of all.
-    fn end(mut self) -> Option<usize> {
-        self.close()?;
-        *self.buffer.get_mut(self.at)? = 0;
-        Some(self.at.wrapping_add(1))
-    }
+    *code = distance;
+    // The code, the checksum and the delimiter.
+    length.wrapping_add(1 + 4 + 1)
 }
 
 /// The reason why bytes were dropped.

@@ -162,12 +162,12 @@ pub fn start() -> (Board, Line) {
 
 /// The line to the host: frames leave it by DMA, without an interrupt and without the processor.
 struct ToHost {
-    bytes: &'static mut [u8; LINE],
+    words: &'static mut [u32; LINE / 4],
 }
 
 impl ToHost {
     fn new(request: dma::Request) -> ToHost {
-        static BYTES: ConstStaticCell<[u8; LINE]> = ConstStaticCell::new([0; LINE]);
+        static WORDS: ConstStaticCell<[u32; LINE / 4]> = ConstStaticCell::new([0; LINE / 4]);
         pac::DMAMUX1.ccr(TO_HOST).write(|w| w.set_dmareq_id(request));
         pac::LPUART1.cr3().modify(|w| w.set_dmat(true));
         let channel = pac::DMA1.ch(TO_HOST);
@@ -176,20 +176,31 @@ impl ToHost {
             w.set_dir(pac::bdma::vals::Dir::FROM_MEMORY);
             w.set_minc(true);
         });
-        ToHost { bytes: BYTES.take() }
+        ToHost { words: WORDS.take() }
     }
 
     /// True if it takes the frames; false while it is still sending earlier ones.
     fn send(&mut self, frames: &[u8]) -> bool {
         let channel = pac::DMA1.ch(TO_HOST);
-        let Some(bytes) = self.bytes.get_mut(..frames.len()) else { return false };
+        if frames.len() > LINE {
+            return false;
+        }
         // An error of the transfer switches the channel off: the rest of those frames is given up.
         if channel.cr().read().en() && channel.ndtr().read().ndt() != 0 {
             return false;
         }
-        bytes.copy_from_slice(frames);
+        // Word by word: a copy of so many bytes as only the frames know would be bounded by that from any place to any.
+        let (words, rest) = frames.as_chunks();
+        for (to, from) in self.words.iter_mut().zip(words) {
+            // SAFETY: of a reference; volatile, so that it stays a loop over words.
+            unsafe { (&raw mut *to).write_volatile(u32::from_le_bytes(*from)) };
+        }
+        if let Some(to) = self.words.get_mut(words.len()) {
+            let byte = |k: usize| rest.get(k).map_or(0, |byte| u32::from(*byte) << (8 * k));
+            *to = byte(0) | byte(1) | byte(2);
+        }
         channel.cr().modify(|w| w.set_en(false));
-        channel.mar().write_value(bytes.as_ptr() as u32);
+        channel.mar().write_value(self.words.as_ptr() as u32);
         channel.ndtr().write(|w| w.set_ndt(frames.len() as u16));
         // The bytes are in memory before the transfer begins.
         cortex_m::asm::dmb();

@@ -563,8 +563,15 @@ impl<T: Real> EdgeTimed<T> {
         }
         self.look_for_rest(state, self.per_period(target_velocity), place);
         if !state.belief.is_finite() {
-            *state = self.start(position, applied, target_velocity);
+            self.restart(state, position, applied, target_velocity);
         }
+    }
+
+    // A function of its own: the second state is not on the stack of a period that goes on.
+    #[cold]
+    #[inline(never)]
+    fn restart(&self, state: &mut EdgeTimedState<T>, position: FixedCounts, applied: T, target_velocity: T) {
+        *state = self.start(position, applied, target_velocity);
     }
 
     /// An edge was crossed in the period that has passed, at most its way ago.

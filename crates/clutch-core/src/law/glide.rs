@@ -146,7 +146,7 @@ impl<T: Real> Glide<T> {
         let filter = self.filters.plain();
         let Seen { position, applied, place } = state.seen;
         if !begun {
-            state.filters = self.filters.start(position, applied, tick.target_velocity);
+            self.begin(&mut state.filters, &state.seen, tick.target_velocity);
         }
         let pace = filter.per_period(tick.target_velocity);
         if !state.steps.active() {
@@ -214,9 +214,15 @@ impl<T: Real> Glide<T> {
             }
             self.filters.update(filters, (position, place), applied, tick.target_velocity);
         } else {
-            *filters = self.filters.start(position, applied, tick.target_velocity);
+            self.begin(filters, &state.seen, tick.target_velocity);
         }
         self.demand(filters, tick)
+    }
+
+    // A function of its own: the second state is not on the stack of a period that goes on.
+    #[inline(never)]
+    fn begin(&self, filters: &mut BesideMapState<T>, seen: &Seen<T>, target_velocity: T) {
+        *filters = self.filters.start(seen.position, seen.applied, target_velocity);
     }
 
     /// Demand of a period, V, and terms.

@@ -107,6 +107,13 @@ macro_rules! laws {
                     $(LawTerms::$law(terms) => Terms::values(terms),)+
                 }
             }
+
+            #[inline]
+            fn are_finite(&self) -> bool {
+                match self {
+                    $(LawTerms::$law(terms) => Terms::are_finite(terms),)+
+                }
+            }
         }
 
         #[cfg(feature = "defmt")]
@@ -152,6 +159,16 @@ macro_rules! laws {
                 }
             }
 
+            /// A state of another law becomes this one's, at rest.
+            // A function of its own in machine code: a servo's state is its law's, and a bound leaves it out.
+            #[cold]
+            #[inline(never)]
+            fn begin_anew(&self, state: &mut LawState<T>) {
+                match self {
+                    $(Law::$law(_) => *state = LawState::$law(Default::default()),)+
+                }
+            }
+
             /// Terms of this law from their values; what is missing is 0, what is too much is left out.
             #[must_use]
             pub fn terms_of(&self, values: &[T]) -> LawTerms<T> {
@@ -185,6 +202,15 @@ macro_rules! laws {
                 }
             }
 
+            // A function of its own, here and for what else a state is begun with: a board's stack holds one of them at a
+            // time.
+            #[inline(never)]
+            fn restart(&self, state: &mut Self::State, tick: &Tick<T>, applied: T) {
+                match self {
+                    $(Law::$law(law) => *state = LawState::$law(ControlLaw::start(law, tick, applied)),)+
+                }
+            }
+
             #[inline]
             fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
                 match self {
@@ -201,7 +227,7 @@ macro_rules! laws {
                 match self {
                     $(Law::$law(law) => {
                         if !matches!(state, LawState::$law(_)) {
-                            *state = LawState::$law(Default::default());
+                            self.begin_anew(state);
                         }
                         let Command { voltage, limit, terms } = match state {
                             LawState::$law(own) => law.update(own, tick),

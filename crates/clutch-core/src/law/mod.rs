@@ -86,6 +86,16 @@ pub const MAX_TERMS: usize = 8;
 pub trait Terms<T>: Copy + Default {
     /// The values, in the order of [`ControlLaw::TERMS`].
     fn values(&self) -> &[T];
+
+    /// True if each is a number.
+    #[inline]
+    fn are_finite(&self) -> bool
+    where
+        T: Real,
+    {
+        // 0 for numbers, however large; NaN if one of them is none.
+        self.values().iter().fold(T::ZERO, |sum, x| sum + T::ZERO * *x) == T::ZERO
+    }
 }
 
 impl<T: Copy, const N: usize> Terms<T> for [T; N]
@@ -114,6 +124,11 @@ pub trait ControlLaw<T: Arithmetic> {
 
     /// The state for a start at `tick` while the brake is at `applied` volts.
     fn start(&self, tick: &Tick<T>, applied: T) -> Self::State;
+
+    /// The same where the state is to stay.
+    fn restart(&self, state: &mut Self::State, tick: &Tick<T>, applied: T) {
+        *state = self.start(tick, applied);
+    }
 
     /// Told before each period, and once after [`ControlLaw::start`]: what lies behind the measurement. Most laws need none
     /// of it.

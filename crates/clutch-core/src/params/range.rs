@@ -66,10 +66,7 @@ impl Range {
     #[inline(always)]
     pub fn holds<T: Real>(&self, unit: &Unit, x: T) -> bool {
         let (low, high) = (T::from_f64(unit.to_si(self.low)), T::from_f64(unit.to_si(self.high)));
-        x.is_finite()
-            && (x > low || (self.low_in && x == low))
-            && (x < high || (self.high_in && x == high))
-            && (!self.divides || (T::ONE / x).is_finite())
+        within(x, low, high, (self.low_in, self.high_in, self.divides))
     }
 
     /// `true` if a whole number is within the range, whose ends are whole numbers or infinite.
@@ -86,6 +83,16 @@ impl Range {
     pub fn words(&self, kind: Kind, unit: &Unit, si: bool) -> Words {
         Words { range: *self, kind, unit: *unit, si }
     }
+}
+
+/// A range's answer, whose ends are taken or not.
+// A function of its own: a board has its code once, and not for each of its parameters.
+#[inline(never)]
+fn within<T: Real>(x: T, low: T, high: T, (low_in, high_in, divides): (bool, bool, bool)) -> bool {
+    x.is_finite()
+        && (x > low || (low_in && x == low))
+        && (x < high || (high_in && x == high))
+        && (!divides || (T::ONE / x).is_finite())
 }
 
 /// A [`Range`] in words: `a finite number of at least 0 V/rad`.

@@ -23,7 +23,7 @@ mod tests;
 mod wave;
 
 pub use profile::{JerkLimited, MinimumJerk, Trapezoid};
-pub use table::{Interpolation, Knot, Table};
+pub use table::{Interpolation, Knot, Steepness, Table};
 pub use wave::{Chirp, Sine};
 
 use crate::params::{Range, Table as _};
@@ -212,7 +212,36 @@ impl<T: Real> Scale<T> {
 }
 
 /// `rate · ticks`, exact.
+#[inline]
 fn advance(rate: i64, ticks: u64) -> FixedCounts {
-    let product = i128::from(rate).wrapping_mul(i128::from(ticks));
-    FixedCounts((product >> (RATE_BITS - FixedCounts::FRACTION_BITS)) as i64)
+    const EXTRA: u32 = RATE_BITS - FixedCounts::FRACTION_BITS;
+    #[cold]
+    #[inline(never)]
+    fn wide(rate: i64, ticks: u64) -> i64 {
+        (i128::from(rate).wrapping_mul(i128::from(ticks)) >> EXTRA) as i64
+    }
+    FixedCounts(match u32::try_from(ticks) {
+        // 49 days at 1 kHz: the halves of the rate one by one, without products of 128 bits.
+        Ok(ticks) => {
+            let (high, low) = (rate >> 32, rate as u32);
+            let high = high.wrapping_mul(i64::from(ticks)) << (32 - EXTRA);
+            high.wrapping_add((u64::from(low).wrapping_mul(u64::from(ticks)) >> EXTRA) as i64)
+        }
+        Err(_) => wide(rate, ticks),
+    })
+}
+
+#[cfg(test)]
+mod advance_tests {
+    use super::*;
+
+    proptest::proptest! {
+        #[test]
+        fn a_rate_over_any_ticks_is_the_product_of_128_bits(rate: i64, ticks: u64, short: u32) {
+            for ticks in [ticks, short.into(), u32::MAX.into(), 0] {
+                let product = i128::from(rate) * i128::from(ticks);
+                proptest::prop_assert_eq!(advance(rate, ticks).0, (product >> 24) as i64);
+            }
+        }
+    }
 }

@@ -199,10 +199,10 @@ impl<T: Real> Profile<T> {
 
     pub(super) fn at(&self, tick: u64) -> Target<T> {
         // Of the pieces that have begun, the last; pieces shorter than a tick are passed over.
-        let begun = |p: &Piece<T>| Some((*p, tick.checked_sub(p.first_tick)?));
-        let Some((piece, ticks)) = self.pieces.iter().rev().find_map(begun) else {
+        let Some(piece) = self.pieces.iter().rev().find(|p| p.first_tick <= tick) else {
             return Target::default();
         };
+        let ticks = tick.wrapping_sub(piece.first_tick);
         let tau = self.scale.seconds(ticks);
         Target {
             position: piece.position(ticks, T::ZERO, &self.scale),

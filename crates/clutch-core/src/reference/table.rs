@@ -100,7 +100,30 @@ impl<T: Real> Interval<T> {
         let product = i128::from(self.rise.0).wrapping_mul(i128::from(us));
         FixedCounts(product.checked_div_euclid(i128::from(self.length_us)).unwrap_or(0) as i64)
     }
+
+    /// The same without a division.
+    fn along_at(&self, us: u64, rate: Steepness) -> FixedCounts {
+        let (us, length) = (u128::from(us), u128::from(self.length_us));
+        let (high, low) = (rate.0 >> 64, rate.0 & u128::from(u64::MAX));
+        // Of a number rounded down, this is the quotient or one less.
+        let least = us.wrapping_mul(high).wrapping_add(us.wrapping_mul(low) >> 64);
+        let rest =
+            us.wrapping_mul(u128::from(self.rise.0.unsigned_abs())).wrapping_sub(least.wrapping_mul(length));
+        let more = rest >= length;
+        let whole = (least as i64).wrapping_add(i64::from(more));
+        let exact = rest == if more { length } else { 0 };
+        FixedCounts(if self.rise.0 < 0 {
+            whole.wrapping_neg().wrapping_sub(i64::from(!exact))
+        } else {
+            whole
+        })
+    }
 }
+
+/// The rise of a table's interval for each µs, without its sign, in 2⁻⁶⁴ of a position's unit; rounded down. Computed
+/// before a run, it saves a board the division of 128 bits in each period.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Steepness(u128);
 
 impl<'a> Table<'a> {
     /// The same: points are whole numbers.
@@ -155,7 +178,54 @@ impl<'a> Table<'a> {
         self.scaled(tick, &Scale::new(encoder, period))
     }
 
+    /// The steepness of the interval behind a point; 0 behind the last.
+    #[must_use]
+    pub fn steepness(&self, point: usize) -> Steepness {
+        // The intervals are the same in any scalar.
+        let Some(Interval { rise, length_us, .. }) = self.interval::<f32>(point) else {
+            return Steepness::default();
+        };
+        let rise = rise.0.unsigned_abs();
+        let whole = rise.checked_div(length_us).unwrap_or(0);
+        let (mut rest, mut part) = (rise.wrapping_sub(whole.wrapping_mul(length_us)), 0_u64);
+        // Bit by bit: a board has no division of 128 bits, and one for it alone takes 8 kB.
+        for _ in 0..64 {
+            let carry = rest >> 63 != 0;
+            (rest, part) = (rest << 1, part << 1);
+            if carry || rest >= length_us {
+                (rest, part) = (rest.wrapping_sub(length_us), part | 1);
+            }
+        }
+        Steepness(u128::from(whole) << 64 | u128::from(part))
+    }
+
+    /// [`Table::at`] for who has the steepness behind each point.
+    // A function of its own in machine code, as the other: the bound of a period with another path leaves it out.
+    #[inline(never)]
+    #[must_use]
+    pub fn at_with<T: Real>(
+        &self,
+        steepness: &[Steepness],
+        tick: u64,
+        encoder: Encoder,
+        period: Micros,
+    ) -> Target<T> {
+        let of = |point: usize| steepness.get(point).copied().unwrap_or_default();
+        self.on(tick, &Scale::new(encoder, period), |point, interval, us| interval.along_at(us, of(point)))
+    }
+
+    #[inline(never)]
     pub(super) fn scaled<T: Real>(&self, tick: u64, scale: &Scale<T>) -> Target<T> {
+        self.on(tick, scale, |_, interval, us| interval.along(us))
+    }
+
+    #[inline]
+    fn on<T: Real>(
+        &self,
+        tick: u64,
+        scale: &Scale<T>,
+        along: impl Fn(usize, &Interval<T>, u64) -> FixedCounts,
+    ) -> Target<T> {
         let time = tick.saturating_mul(scale.period_us);
         let after = self.knots.partition_point(|k| k.time_us <= time);
         let Some(last) = after.checked_sub(1) else {
@@ -170,7 +240,7 @@ impl<'a> Table<'a> {
         let h = interval.length;
         let chord = interval.slope();
         // The straight line in integers; a cubic adds its deviation, which vanishes at the points.
-        let line = knot.position.plus(interval.along(since));
+        let line = knot.position.plus(along(last, &interval, since));
         let (deviation, velocity, acceleration) = match self.interpolation {
             Interpolation::Linear => (T::ZERO, chord, T::ZERO),
             Interpolation::Cubic => {

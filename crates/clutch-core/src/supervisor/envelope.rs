@@ -103,18 +103,26 @@ impl<T: Real> Envelope<T> {
         }
     }
 
+    /// The same where the state is to stay.
+    #[inline(never)]
+    pub(super) fn restart(&self, s: &mut EnvelopeState<T>, applied: T) {
+        *s = self.start(applied);
+    }
+
     /// The envelope of a shaft of which nothing is known but a count, and the voltage `applied`.
     pub(super) fn start(&self, applied: T) -> EnvelopeState<T> {
         let (fastest, edge) = (self.fastest, self.edge);
         let from = |position, other: T, velocity| {
             let window = Window { from: -other, age: T::ZERO, moment: T::ZERO };
-            Side { position, velocity, old: window, young: window }
+            Side { position, velocity, way: T::ZERO, old: window, young: window }
         };
         let back = if self.one_way { T::ZERO } else { fastest };
         EnvelopeState {
-            sides: [from(T::ONE + edge, edge, fastest), from(edge, T::ONE + edge, back)],
+            sides: [[from(T::ONE + edge, edge, fastest), from(edge, T::ONE + edge, back)]; 2],
+            swapped: false,
+            expected: None,
             applied,
-            sent: [applied; SENT],
+            sent: [applied; 2 * SENT],
             last: 0,
             turns: 0,
             still: 0,
@@ -160,9 +168,9 @@ impl<T: Real> Envelope<T> {
             // Older than those that are kept: any of the output, or what was there before the first.
             return [self.output[0].min(s.applied), self.output[1].max(s.applied)];
         }
-        let mut range = [s.newest(0); 2];
-        for back in 1..reach {
-            let volts = s.newest(back);
+        let (newest, others) = s.newest(reach);
+        let mut range = [newest; 2];
+        for &volts in others {
             // Not `min`, `max`: these are numbers, and a comparison is cheaper.
             if volts < range[0] {
                 range[0] = volts;
@@ -174,24 +182,52 @@ impl<T: Real> Envelope<T> {
         range
     }
 
+    /// Computes before a sample comes, so many periods after the last one that passed, what it will be judged by.
+    #[inline]
+    fn expect_after(&self, s: &mut EnvelopeState<T>, losses: bool, periods: u32) {
+        let (volts, time) = (self.in_force(s, losses), T::from_u64(u64::from(periods)));
+        let [first, second] = &mut s.sides;
+        let ([up, down], expected) = if s.swapped { (second, first) } else { (first, second) };
+        let [rise, fall] = self.rates(volts, [up.velocity, down.velocity]);
+        // A shaft at rest stays there, however hard a brake holds it.
+        let steepest = if self.one_way { rise.onward.max(T::ZERO) } else { rise.back };
+        *expected = [up.after(&rise, steepest, time), down.after(&fall, fall.back, time)];
+        s.expected = Some(losses);
+    }
+
+    /// The same for the next period.
+    pub(super) fn expect(&self, s: &mut EnvelopeState<T>, losses: bool) {
+        self.expect_after(s, losses, 1);
+    }
+
+    // A function of its own in machine code: where each period is expected, its bound leaves it out.
+    #[cold]
+    #[inline(never)]
+    fn unexpected(&self, s: &mut EnvelopeState<T>, losses: bool, periods: u32) {
+        self.expect_after(s, losses, periods);
+    }
+
     /// A sample that has passed the gate: `moved` counts in so many periods. What no shaft of the bounds can have done, and
-    /// by how many counts.
+    /// by how many counts. `losses`: the line has lost samples of late.
     pub(super) fn judge(
         &self,
         s: &mut EnvelopeState<T>,
-        volts: [T; 2],
+        losses: bool,
         moved: i32,
         periods: u32,
     ) -> Option<(Cause, T)> {
         s.note(moved, periods);
-        let (counts, time) = (T::from_i32(moved), T::from_u64(u64::from(periods)));
+        let counts = T::from_i32(moved);
         let one_way = self.one_way;
-        let [up, down] = &mut s.sides;
-        let [rise, fall] = self.rates(volts, [up.velocity, down.velocity]);
-        // A shaft at rest stays there, however hard a brake holds it.
-        let steepest = if one_way { rise.onward.max(T::ZERO) } else { rise.back };
-        up.pass(&rise, steepest, counts, time);
-        down.pass(&fall, fall.back, -counts, time);
+        if periods != 1 || s.expected != Some(losses) {
+            self.unexpected(s, losses, periods);
+        }
+        s.expected = None;
+        s.swapped = !s.swapped;
+        let [first, second] = &mut s.sides;
+        let [up, down] = if s.swapped { second } else { first };
+        up.arrive(counts);
+        down.arrive(-counts);
         let ahead = up.position - down.position;
         up.position = up.position.min(T::ONE + self.edge);
         down.position = down.position.min(self.edge);
@@ -235,13 +271,16 @@ struct Window<T> {
 struct Side<T> {
     position: T,
     velocity: T,
+    /// Its way since the last sample.
+    way: T,
     old: Window<T>,
     young: Window<T>,
 }
 
 impl<T: Real> Side<T> {
-    /// Time passes.
-    fn pass(&mut self, rates: &Rates<T>, steepest: T, moved: T, time: T) {
+    /// The same after some time, but for the counts.
+    #[inline]
+    fn after(&self, rates: &Rates<T>, steepest: T, time: T) -> Self {
         let half = T::from_f64(0.5);
         let before = self.velocity;
         let (after, mean) = if before > T::ZERO || (before == T::ZERO && rates.onward > T::ZERO) {
@@ -257,13 +296,20 @@ impl<T: Real> Side<T> {
                 (after, half * (before + after))
             }
         };
-        self.velocity = after;
-        self.position += mean * time - moved;
-        for window in [&mut self.old, &mut self.young] {
-            window.from -= moved;
-            window.moment += steepest * time * (window.age + half * time);
-            window.age += time;
-        }
+        let older = |window: &Window<T>| Window {
+            from: window.from,
+            age: window.age + time,
+            moment: window.moment + steepest * time * (window.age + half * time),
+        };
+        let (old, young) = (older(&self.old), older(&self.young));
+        Side { position: self.position, velocity: after, way: mean * time, old, young }
+    }
+
+    /// The counts come.
+    fn arrive(&mut self, moved: T) {
+        self.position += self.way - moved;
+        self.old.from -= moved;
+        self.young.from -= moved;
     }
 
     /// The way over the window; `from` is where the shaft is at least.
@@ -281,13 +327,17 @@ impl<T: Real> Side<T> {
 /// Memory of the envelope.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct EnvelopeState<T> {
-    /// The fastest shaft, and the slowest with the axis turned round.
-    sides: [Side<T>; 2],
+    /// The fastest shaft, and the slowest with the axis turned round; and what is expected of them.
+    sides: [[Side<T>; 2]; 2],
+    /// What is expected are the first, and not the second.
+    swapped: bool,
+    /// True if it is expected after losses; none where nothing is expected.
+    expected: Option<bool>,
     /// Voltage before the first that was sent, V.
     applied: T,
-    /// Voltages that were sent, V, in a ring.
-    sent: [T; SENT],
-    /// Place of the newest in it.
+    /// Voltages that were sent, V: a ring, and the same once more, so that those of any span are in a row.
+    sent: [T; 2 * SENT],
+    /// Place of the newest in the first.
     last: usize,
     /// A bit for each of the last periods: the counts turned round in it.
     turns: u16,
@@ -301,14 +351,19 @@ impl<T: Real> EnvelopeState<T> {
     /// A voltage is sent.
     pub(super) fn sends(&mut self, volts: T) {
         self.last = self.last.wrapping_add(1) % SENT;
-        if let Some(place) = self.sent.get_mut(self.last) {
-            *place = volts;
+        let (ring, again) = self.sent.split_at_mut(SENT);
+        for places in [ring, again] {
+            if let Some(place) = places.get_mut(self.last) {
+                *place = volts;
+            }
         }
     }
 
-    /// The voltage that was sent so many codes ago; before the first, the one that was there.
-    fn newest(&self, back: usize) -> T {
-        self.sent.get(self.last.wrapping_sub(back) % SENT).copied().unwrap_or(self.applied)
+    /// The newest voltage of so many that were sent, and the others; before the first, the one that was there.
+    fn newest(&self, count: usize) -> (T, &[T]) {
+        let end = (self.last % SENT).wrapping_add(SENT);
+        let others = self.sent.get(end.wrapping_add(1).wrapping_sub(count)..end);
+        (self.sent.get(end).copied().unwrap_or(self.applied), others.unwrap_or(&[]))
     }
 
     /// Remembers the way of the counts, for the name of a suspect.

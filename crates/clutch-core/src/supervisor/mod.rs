@@ -150,7 +150,7 @@ impl<T: Real> Supervisor<T> {
 
     /// Answers that came too late explain a watchdog that bit.
     fn why_safe<S>(s: &SupervisorState<T, S>) -> Cause {
-        if s.late.count() > 0 { Cause::Late } else { Cause::Board }
+        if s.late.any(s.periods) { Cause::Late } else { Cause::Board }
     }
 
     /// No sample for `cycles` periods.
@@ -193,6 +193,24 @@ impl<T: Real> Supervisor<T> {
         cycle
     }
 
+    /// Computes what the next sample will most likely be judged by, so that its answer comes sooner. Whoever does not call
+    /// it gets the same answers later.
+    pub fn expect<S>(&self, s: &mut SupervisorState<T, S>, planned: &impl Planned<T>) {
+        if s.state == State::Running {
+            let tick = s.tick.wrapping_add(1);
+            s.expected = Some((tick, planned.target(tick)));
+            let losses = s.losses(s.periods.wrapping_add(1));
+            self.limits.envelope.expect(&mut s.envelope, losses);
+        }
+    }
+
+    // A function of its own in machine code: where each period is expected, its bound leaves it out.
+    #[cold]
+    #[inline(never)]
+    fn unexpected(planned: &impl Planned<T>, tick: u64) -> Target<T> {
+        planned.target(tick)
+    }
+
     /// The gates one after another. A sample that one of them stops is not answered.
     fn judge<C: ControlLaw<T>>(
         &self,
@@ -204,7 +222,9 @@ impl<T: Real> Supervisor<T> {
     ) {
         let Some(periods) = self.in_sequence(s, sample, cycle) else { return };
         self.check_clock(s, sample.time, periods);
-        self.count_lost(s, periods);
+        if periods > 1 {
+            self.count_lost(s, u32::from(periods) - 1);
+        }
         self.count_late(s, sample);
         self.check_board(s, sample);
         let Some((moved, elapsed)) = self.plausible_counts(s, sample, periods, cycle) else { return };
@@ -218,16 +238,24 @@ impl<T: Real> Supervisor<T> {
         if s.state != State::Running {
             return;
         }
-        let goal = planned.target(s.tick);
+        let goal = match s.expected.take() {
+            Some((tick, target)) if tick == s.tick => target,
+            _ => Self::unexpected(planned, s.tick),
+        };
         cycle.target = goal;
-        if !self.plausible_target(s, &goal) {
+        // Nothing was served before the first.
+        let since_served =
+            s.served.map_or(0, |served| u32::try_from(s.tick.saturating_sub(served)).unwrap_or(u32::MAX));
+        if !self.plausible_target(s, &goal, since_served.max(1)) {
             return;
         }
-        let since_served = self.bridge(servo, s, sample.counts, &goal, planned);
+        if since_served != 1 {
+            self.begin_or_bridge(servo, s, sample.counts, &goal, planned);
+        }
         let out = servo.tick_on(&mut s.servo, sample.counts, &goal, |position| planned.place(position));
         s.served = Some(s.tick);
         cycle.output = Some(out);
-        self.check_output(s, &out, &goal, since_served);
+        self.check_output(s, &out, &goal, since_served.max(1));
         if s.state == State::Running && !sample.superseded {
             s.code = out.code;
             s.envelope.sends(out.voltage);
@@ -252,9 +280,8 @@ impl<T: Real> Supervisor<T> {
                 (&mut s.reordered, Cause::Reordered, Arrival::Reordered)
             };
             cycle.arrival = arrival;
-            history.mark();
-            if history.count() >= self.limits.disorder {
-                let count = history.count();
+            let count = history.mark(s.periods);
+            if count >= self.limits.disorder {
                 self.check(s, cause, T::from_u64(u64::from(count)));
             }
             return None;
@@ -265,7 +292,7 @@ impl<T: Real> Supervisor<T> {
         }
         s.started = true;
         s.sequence = sample.sequence;
-        s.pass_time(periods);
+        s.periods = s.periods.wrapping_add(u64::from(periods));
         if s.state == State::Running {
             s.tick = s.tick.wrapping_add(u64::from(periods));
             cycle.tick = s.tick;
@@ -286,20 +313,18 @@ impl<T: Real> Supervisor<T> {
     }
 
     /// [`Cause::Silence`] and [`Cause::Lost`]: samples that are missing before this one.
-    #[inline]
-    fn count_lost<S>(&self, s: &mut SupervisorState<T, S>, periods: u16) {
+    // A function of its own in machine code: where none is missing, a period's bound leaves it out.
+    #[cold]
+    #[inline(never)]
+    fn count_lost<S>(&self, s: &mut SupervisorState<T, S>, lost: u32) {
         let l = &self.limits;
-        if periods > 1 {
-            let lost = u32::from(periods) - 1;
-            s.lost_total = s.lost_total.wrapping_add(u64::from(lost));
-            s.lost.mark_many(lost);
-            if lost >= l.silence_cycles {
-                self.check(s, Cause::Silence, T::from_u64(u64::from(lost)));
-            }
-            if s.lost.count() >= l.lost {
-                let count = s.lost.count();
-                self.check(s, Cause::Lost, T::from_u64(u64::from(count)));
-            }
+        s.lost_total = s.lost_total.wrapping_add(u64::from(lost));
+        let count = s.lost.mark_many(lost, s.periods);
+        if lost >= l.silence_cycles {
+            self.check(s, Cause::Silence, T::from_u64(u64::from(lost)));
+        }
+        if count >= l.lost {
+            self.check(s, Cause::Lost, T::from_u64(u64::from(count)));
         }
     }
 
@@ -308,16 +333,14 @@ impl<T: Real> Supervisor<T> {
     fn count_late<S>(&self, s: &mut SupervisorState<T, S>, sample: &Sample) {
         let l = &self.limits;
         if sample.superseded || sample.command_late {
-            s.late.mark();
-            if s.late.count() >= l.late {
-                let count = s.late.count();
+            let count = s.late.mark(s.periods);
+            if count >= l.late {
                 self.check(s, Cause::Late, T::from_u64(u64::from(count)));
             }
         }
         if sample.lateness > l.deadline {
             s.deadline_misses = s.deadline_misses.wrapping_add(1);
-            s.overrun.mark();
-            if s.overrun.count() >= l.overruns {
+            if s.overrun.mark(s.periods) >= l.overruns {
                 self.check(s, Cause::Deadline, T::from_u64(u64::from(sample.lateness.0)));
             }
         }
@@ -359,8 +382,7 @@ impl<T: Real> Supervisor<T> {
                 cycle.arrival = Arrival::Implausible;
                 s.rejected_total = s.rejected_total.wrapping_add(1);
                 s.recovering = l.good_samples;
-                s.jump.mark();
-                if s.jump.count() >= l.jumps {
+                if s.jump.mark(s.periods) >= l.jumps {
                     self.check(s, Cause::Jump, T::from_u64(u64::from(off)));
                 }
                 return None;
@@ -397,36 +419,31 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// True if a path can have this target; if not, [`Cause::Target`].
+    /// True if a path can have this target so many periods after the last; if not, [`Cause::Target`].
     #[inline]
-    fn plausible_target<S>(&self, s: &mut SupervisorState<T, S>, goal: &Target<T>) -> bool {
-        let plausible =
-            self.limits.believes(s.last_target.as_ref(), goal, s.tick, s.served.unwrap_or(s.tick));
+    fn plausible_target<S>(&self, s: &mut SupervisorState<T, S>, goal: &Target<T>, periods: u32) -> bool {
+        let plausible = self.limits.believes(s.last_target, goal, periods);
         if plausible {
-            s.last_target = Some(*goal);
+            s.last_target = Some(goal.position);
         } else {
             self.check(s, Cause::Target, goal.velocity);
         }
         plausible
     }
 
-    /// Starts the servo, or takes it over the ticks that had no sample. The ticks since it was
-    /// last asked.
-    #[inline]
-    fn bridge<C: ControlLaw<T>>(
+    /// Starts the servo, or takes it over the ticks that had no sample.
+    // A function of its own in machine code: where each sample is served, a period's bound leaves it out.
+    #[cold]
+    #[inline(never)]
+    fn begin_or_bridge<C: ControlLaw<T>>(
         &self,
         servo: &Servo<T, C>,
         s: &mut SupervisorState<T, C::State>,
         counts: Counts,
         goal: &Target<T>,
         planned: &impl Planned<T>,
-    ) -> u32 {
-        let Some(served) = s.served else {
-            let applied = servo.dac().volts(s.code);
-            s.servo = servo.start(counts, goal, applied);
-            s.envelope = self.limits.envelope.start(applied);
-            return 1;
-        };
+    ) {
+        let Some(served) = s.served else { return self.begin(servo, s, counts, goal) };
         let steps = s.tick.saturating_sub(served);
         // More than that is silence.
         let steps = u32::try_from(steps).unwrap_or(1).min(self.limits.silence_cycles.saturating_add(8));
@@ -434,7 +451,19 @@ impl<T: Real> Supervisor<T> {
             let passed = planned.target(served.wrapping_add(u64::from(step)));
             servo.bridge(&mut s.servo, (counts, goal), &passed, (step, steps));
         }
-        steps
+    }
+
+    #[inline(never)]
+    fn begin<C: ControlLaw<T>>(
+        &self,
+        servo: &Servo<T, C>,
+        s: &mut SupervisorState<T, C::State>,
+        counts: Counts,
+        goal: &Target<T>,
+    ) {
+        let applied = servo.dac().volts(s.code);
+        servo.restart(&mut s.servo, counts, goal, applied);
+        self.limits.envelope.restart(&mut s.envelope, applied);
     }
 
     /// [`Cause::NotFinite`], [`Cause::FollowingError`] and [`Cause::Saturation`].
@@ -461,7 +490,9 @@ impl<T: Real> Supervisor<T> {
             Limit::Highest => !resting || l.drives_above_0(),
             Limit::Lowest | Limit::Invalid => true,
         };
-        s.saturated = if saturated { s.saturated.saturating_add(since_served) } else { 0 };
+        // More than that is silence.
+        let passed = since_served.min(self.limits.silence_cycles.saturating_add(8));
+        s.saturated = if saturated { s.saturated.saturating_add(passed) } else { 0 };
         if s.saturated >= l.saturation_cycles {
             self.check(s, Cause::Saturation, out.command.voltage);
         }
@@ -470,12 +501,16 @@ impl<T: Real> Supervisor<T> {
     /// Causes of the envelope: counts that no shaft of the bounds can have given under the volts that were sent.
     fn within_envelope<S>(&self, s: &mut SupervisorState<T, S>, moved: i32, periods: u32) {
         let l = &self.limits;
-        let volts = l.envelope.in_force(&s.envelope, s.lost.count() > 0 || s.late.count() > 0);
-        if let Some((cause, counts)) = l.envelope.judge(&mut s.envelope, volts, moved, periods) {
+        let losses = s.losses(s.periods);
+        if let Some((cause, counts)) = l.envelope.judge(&mut s.envelope, losses, moved, periods) {
             self.check(s, cause, counts * l.radians_per_count);
         }
     }
 
+    /// A check has failed.
+    // A function of its own in machine code: it ends control, and the bound of a period that goes on leaves it out.
+    #[cold]
+    #[inline(never)]
     fn check<S>(&self, s: &mut SupervisorState<T, S>, cause: Cause, value: T) {
         let watched = matches!(s.state, State::Ready | State::Armed | State::Running);
         // The first cause is the one that is told.
@@ -484,8 +519,6 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    // Once in a run, and called by every check: inlined into each it takes 1.7 kB of flash.
-    #[cold]
     fn fault<S>(&self, s: &mut SupervisorState<T, S>, cause: Cause, value: T) {
         self.make_safe(s);
         self.advance_safe(s);
@@ -508,11 +541,11 @@ impl<T: Real> Supervisor<T> {
     }
 }
 
+#[inline]
 fn finite<T: Real, X: Terms<T>>(out: &ServoOutput<T, X>) -> bool {
     let t = &out.tick;
     let rest = [t.error, t.error_rate, out.command.voltage, out.voltage];
-    let terms = out.command.terms.values();
-    out.command.limit != Limit::Invalid && terms.iter().chain(&rest).all(|x| x.is_finite())
+    out.command.limit != Limit::Invalid && rest.are_finite() && out.command.terms.are_finite()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::envelope::Envelope;
 use crate::params::{Range, Table};
 use crate::safe_state::SafeState;
-use crate::{ActuatorKind, Bounds, Interval, Micros, ParamError, Real, ServoParams, Target};
+use crate::{ActuatorKind, Bounds, FixedCounts, Interval, Micros, ParamError, Real, ServoParams, Target};
 
 crate::params! {
     /// Limits that the supervisor watches. The defaults are for the paper's shaft at 1 kHz.
@@ -193,23 +193,17 @@ impl<T: Real> Limits<T> {
         self.actuator.drives_above_0()
     }
 
-    /// True if a path can have a target: numbers, within the speed limit, and near the last.
-    pub(super) fn believes(
-        &self,
-        last: Option<&Target<T>>,
-        goal: &Target<T>,
-        tick: u64,
-        served: u64,
-    ) -> bool {
+    /// True if a path can have a target: numbers, within the speed limit, and near the last, so many periods ago.
+    #[inline]
+    pub(super) fn believes(&self, last: Option<FixedCounts>, goal: &Target<T>, periods: u32) -> bool {
         let speed = goal.velocity.abs();
         if !(goal.acceleration.is_finite() && speed <= self.speed_limit) {
             return false;
         }
         let Some(last) = last else { return true };
-        let periods = T::from_u64(tick.saturating_sub(served).max(1));
-        let moved: T = goal.position.minus::<T>(last.position).abs();
         // A difference that wraps is farther than any path goes in a period.
-        let wraps = goal.position.0.checked_sub(last.position.0).is_none();
-        !wraps && moved <= self.speed_counts * periods
+        let wraps = goal.position.0.checked_sub(last.0).is_none();
+        let moved: T = goal.position.minus::<T>(last).abs();
+        !wraps && moved <= self.speed_counts * T::from_u64(u64::from(periods))
     }
 }

@@ -4,7 +4,7 @@ use super::envelope::EnvelopeState;
 use super::pace::Pace;
 use crate::law::LawTerms;
 use crate::safe_state::SafeRun;
-use crate::{Arithmetic, Counts, DacCode, Micros, Real, ServoOutput, ServoState, Target};
+use crate::{Arithmetic, Counts, DacCode, FixedCounts, Micros, Real, ServoOutput, ServoState, Target};
 
 /// The state of control; see the [module](super)'s diagram.
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -266,33 +266,45 @@ pub struct Cycle<T: Arithmetic, Terms = LawTerms<T>> {
     pub output: Option<ServoOutput<T, Terms>>,
 }
 
-/// The periods, of the last 128, in which something happened.
+/// The periods, of the last 128, in which something happened. `now` is the number of the present period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct History(u128);
+pub(super) struct History {
+    /// A bit for each period, the lowest for the newest with a mark.
+    marks: u128,
+    /// The number of that one. So a period in which nothing happens costs nothing.
+    newest: u64,
+}
 
 impl History {
-    /// Marks the present period.
-    pub(super) fn mark(&mut self) {
+    /// The marks, the lowest bit that of the present period.
+    fn seen(&self, now: u64) -> u128 {
+        let passed = u32::try_from(now.wrapping_sub(self.newest)).unwrap_or(u32::MAX);
+        self.marks.checked_shl(passed).unwrap_or(0)
+    }
+
+    /// Marks the present period; the number of marks.
+    // A function of its own in machine code: there are six of them, and they are called seldom.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn mark(&mut self, now: u64) -> u32 {
+        let seen = self.seen(now);
         // A period that has a mark already marks one before it: each event counts.
-        self.0 |= self.0.wrapping_add(1);
+        *self = History { marks: seen | seen.wrapping_add(1), newest: now };
+        self.marks.count_ones()
     }
 
-    pub(super) fn mark_many(&mut self, events: u32) {
-        for _ in 0..events.min(128) {
-            self.mark();
-        }
+    /// Marks the present period and those before it, so many in all, none of which has a mark; the number of marks.
+    pub(super) fn mark_many(&mut self, periods: u32, now: u64) -> u32 {
+        let many = 1_u128.checked_shl(periods).unwrap_or(0).wrapping_sub(1);
+        *self = History { marks: self.seen(now) | many, newest: now };
+        self.marks.count_ones()
     }
 
-    pub(super) fn pass(&mut self, periods: u16) {
-        self.0 = match periods {
-            // Nearly always: a shift by any number takes a board of 32 bits six times as long.
-            1 => self.0 << 1,
-            more => self.0.checked_shl(u32::from(more)).unwrap_or(0),
-        };
-    }
-
-    pub(super) fn count(self) -> u32 {
-        self.0.count_ones()
+    /// True if there is a mark.
+    #[inline]
+    pub(super) fn any(&self, now: u64) -> bool {
+        // The newest period with a mark has the lowest bit.
+        self.marks as u32 & 1 != 0 && now.wrapping_sub(self.newest) < 128
     }
 }
 
@@ -306,11 +318,16 @@ pub struct SupervisorState<T, S> {
     pub(super) safe: SafeRun,
     pub(super) servo: ServoState<T, S>,
     pub(super) tick: u64,
+    /// The next tick, and its target, computed before its sample comes.
+    pub(super) expected: Option<(u64, Target<T>)>,
     /// The tick that the law was last asked for.
     pub(super) served: Option<u64>,
-    pub(super) last_target: Option<Target<T>>,
+    /// Position of the last target.
+    pub(super) last_target: Option<FixedCounts>,
     pub(super) started: bool,
     pub(super) sequence: u16,
+    /// Periods that have passed.
+    pub(super) periods: u64,
     pub(super) time: Micros,
     pub(super) pace: Pace,
     pub(super) counts: Counts,
@@ -334,17 +351,10 @@ pub struct SupervisorState<T, S> {
 }
 
 impl<T: Real, S> SupervisorState<T, S> {
-    pub(super) fn pass_time(&mut self, periods: u16) {
-        for history in [
-            &mut self.lost,
-            &mut self.late,
-            &mut self.duplicated,
-            &mut self.reordered,
-            &mut self.jump,
-            &mut self.overrun,
-        ] {
-            history.pass(periods);
-        }
+    /// True if the line has lost codes or samples, as seen from this period.
+    #[inline]
+    pub(super) fn losses(&self, now: u64) -> bool {
+        self.lost.any(now) || self.late.any(now)
     }
 
     /// The state of control.

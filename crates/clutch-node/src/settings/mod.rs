@@ -12,6 +12,7 @@ mod walk;
 
 pub use declared::{Declared, Name, RunSettings, RunTimes, SETTINGS, SETTINGS_HASH, Setting};
 pub use path::Path;
+pub(crate) use path::Prepared;
 pub use refused::Refusing;
 
 use clutch_core::params::{Params, Table as _};

@@ -1,6 +1,6 @@
 //! The path of a run, with the points of a table kept elsewhere.
 
-use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
+use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Steepness, Table};
 use clutch_core::{Encoder, FixedCounts, Micros, ParamError, Target};
 
 /// A path, without the points of a table.
@@ -39,7 +39,9 @@ impl Path {
             formula => Kind::Formula(Reference::new(formula, start, encoder, period)?),
         };
         let path = Path { kind, encoder, period, start, first: FixedCounts(0) };
-        let first = path.target(knots, 0).position.0 >> FixedCounts::FRACTION_BITS;
+        // No interval has begun, however steep it is.
+        let first = path.since_first(0, knots, |table| table.at_with(&[], 0, encoder, period));
+        let first = first.position.0 >> FixedCounts::FRACTION_BITS;
         Ok(Path { first: FixedCounts::from_counts(first), ..path })
     }
 
@@ -47,15 +49,39 @@ impl Path {
     /// points of a table, and may have more behind them.
     #[must_use]
     pub fn target(&self, knots: &[Knot], tick: u64) -> Target<f32> {
+        self.since_first(tick, knots, |table| table.at(tick, self.encoder, self.period))
+    }
+
+    /// The same, with the steepness of each interval of a table: [`Path::prepare`].
+    // A function of its own in machine code: it is called from many places.
+    #[inline(never)]
+    pub(crate) fn target_with(&self, knots: &[Knot], steepness: &Prepared, tick: u64) -> Target<f32> {
+        self.since_first(tick, knots, |table| table.at_with(steepness, tick, self.encoder, self.period))
+    }
+
+    /// Computes the steepness of each interval of a table.
+    pub(crate) fn prepare(&self, knots: &[Knot], steepness: &mut Prepared) {
+        if let Kind::Table(interpolation, points) = self.kind {
+            let table = Table { knots: knots.get(..points).unwrap_or(&[]), interpolation };
+            for (point, of) in steepness.iter_mut().enumerate().take(points) {
+                *of = table.steepness(point);
+            }
+        }
+    }
+
+    #[inline]
+    fn since_first(&self, tick: u64, knots: &[Knot], on: impl Fn(&Table<'_>) -> Target<f32>) -> Target<f32> {
         let target = match &self.kind {
             Kind::Formula(reference) => reference.at(tick),
             Kind::Table(interpolation, points) => {
                 let knots = knots.get(..*points).unwrap_or(&[]);
-                let table = Table { knots, interpolation: *interpolation };
-                let target = table.at(tick, self.encoder, self.period);
+                let target = on(&Table { knots, interpolation: *interpolation });
                 Target { position: target.position.plus(self.start), ..target }
             }
         };
         Target { position: FixedCounts(target.position.0.wrapping_sub(self.first.0)), ..target }
     }
 }
+
+/// The steepness behind each point of a table.
+pub(crate) type Prepared = [Steepness; super::MAX_KNOTS];
