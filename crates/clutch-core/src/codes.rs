@@ -195,7 +195,7 @@ impl<T: Real> Dac<T> {
             lowest: p.lowest,
             step,
             per_volt: T::from_i32(codes) / (p.highest - p.lowest),
-            top: (codes - 1) as u16,
+            top: codes.wrapping_sub(1) as u16,
         })
     }
 

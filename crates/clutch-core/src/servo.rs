@@ -334,7 +334,7 @@ fn divided(n: i64, by: u16) -> i64 {
     let (size, by) = (n.unsigned_abs(), u32::from(by));
     let (mut quotient, mut rest) = (0_u64, 0_u32);
     for shift in [48, 32, 16, 0] {
-        let digits = rest << 16 | (size >> shift) as u32 & 0xffff;
+        let digits = rest << 16 | size.wrapping_shr(shift) as u32 & 0xffff;
         let digit = digits.checked_div(by).unwrap_or(0);
         rest = digits.wrapping_sub(digit.wrapping_mul(by));
         quotient = quotient << 16 | u64::from(digit);

@@ -44,7 +44,7 @@ use clutch_core::{
 use clutch_node::lockstep::Exchange;
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
-    DaqBoard, Hardware, HostNode, MAX_KNOTS, OneChip, Outbox, Outboxes, Path, Role, RunParams, Settings,
+    DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Path, Role, RunParams, Settings,
     WideCounter, present_code, receive, tick,
 };
 use clutch_wire::{BoardState, Configure, Decoder, Hello, StopReason, encode};
@@ -749,7 +749,7 @@ fn board_controller() {
     }
 }
 
-fn host_node(path: &Path, knots: &[Knot; MAX_KNOTS]) {
+fn host_node(path: &Path, knots: &[Knot]) {
     let Some(servo) = made(Servo::new(&servo_params())) else { return };
     let configure = Configure {
         run: word() as u16,

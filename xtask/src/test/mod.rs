@@ -17,9 +17,9 @@ use tally::Tally;
 /// and RISC-V.
 const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
 
-/// Checks that need the targets: three builds of the core and one of the parts of boards each, the two link tests, the
+/// Checks that need the targets: three builds of the core and one of the parts of boards each, the three link tests, the
 /// libraries with their control, the example, two boards, the budgets.
-const SKIPPED_WITHOUT_TARGETS: u64 = 4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 7;
+const SKIPPED_WITHOUT_TARGETS: u64 = 4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 8;
 
 /// The packages that are built for this machine. Always the same selection: with another one cargo gives libraries
 /// other features, and compiles them once more. The wheel's module only links inside of Python.
@@ -199,21 +199,61 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// The core links without a reachable panic; the same with one put in does not.
+/// The core links without a reachable panic, at both levels that firmware is built at; with one put in it does not, and the
+/// function that has it is named.
 fn no_panic(tally: &mut Tally) -> Result<()> {
-    let image = || {
-        cargo(["build", "--release", "--manifest-path", "tests/no_panic/Cargo.toml"]).args([
-            "--target",
-            "thumbv7em-none-eabihf",
-            "--target-dir",
-            "target/no_panic",
-        ])
+    let image = |args: &[&str], folder: &str| {
+        cargo(["build", "--release", "--manifest-path", "tests/no_panic/Cargo.toml"])
+            .args(["--target", firmware::TARGET, "--target-dir", folder])
+            .args(args)
     };
-    tally.check_quiet("no panic is reachable in clutch-core (link test)", image().quietly()?);
-    let (links, text) = image().args(["--features", "control"]).quietly()?;
+    let small = ["--config", "profile.release.opt-level=\"s\""];
+    for (level, args) in [("3", &[][..]), ("s", &small[..])] {
+        let (links, text) = image(args, "target/no_panic").quietly()?;
+        let text = if links { text } else { text + &panicking(&|folder| image(args, folder))? };
+        tally.check_quiet(
+            &format!("no panic is reachable in clutch-core at opt-level {level} (link test)"),
+            (links, text),
+        );
+    }
+    let with_one = ["--features", "control"];
+    let (links, text) = image(&with_one, "target/no_panic").quietly()?;
     let refused = !links && text.contains("__panic_path_survived");
-    tally.check("the link test sees a panic that is put in (control)", refused);
+    let named = panicking(&|folder| image(&with_one, folder))?;
+    // The one that is put in is compiled into its caller.
+    tally.check(
+        "the link test sees a panic that is put in, and names its function (control)",
+        refused && named.contains("_start"),
+    );
     Ok(())
+}
+
+/// The functions of the link test's image that call for a panic: the image is linked all the same, and read.
+fn panicking(image: &dyn Fn(&str) -> Program) -> Result<String> {
+    let folder = "target/no_panic_linked";
+    let (built, text) =
+        image(folder).env("RUSTFLAGS", "-C link-arg=--defsym=__panic_path_survived=0").silently()?;
+    if !built {
+        return Ok(text);
+    }
+    let linked = root().join(folder).join(firmware::TARGET).join("release/no-panic");
+    let Ok((true, code)) = program("arm-none-eabi-objdump").args(["-d", "-C"]).arg(linked).silently() else {
+        return Ok(
+            "arm-none-eabi-objdump would name the functions that panic; it is not installed".to_owned()
+        );
+    };
+    let (mut function, mut found) = ("", Vec::new());
+    for line in code.lines() {
+        if line.ends_with(">:") {
+            function = line;
+        } else if line.contains("<core::panicking")
+            && !function.contains("<core::panicking")
+            && !found.contains(&function)
+        {
+            found.push(function);
+        }
+    }
+    Ok(format!("functions with a path to a panic:\n{}", found.join("\n")))
 }
 
 /// The libraries for C, and the check that no panic can be reached in them.
