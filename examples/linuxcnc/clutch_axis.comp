@@ -15,6 +15,7 @@ pin out float target "Position of the target, counts.";
 param r bit refused "The settings make no run, or the thread has another period.";
 variable clutch_axis axis;
 variable uint32_t number;
+variable uint32_t last_us;
 variable int consented;
 variable int built;
 option singleton yes;
@@ -34,17 +35,18 @@ FUNCTION(_)
     uint8_t state, cause;
     uint16_t code;
     float volts;
+    const uint32_t now_us = (uint32_t)(rtapi_get_time() / 1000);
+    uint32_t passed;
 
     if (!own->built) {
         own->built = 1;
         own->refused = period != 1000L * run_period_us
             || clutch_axis_build(&own->axis, run_settings, run_settings_count, run_knots, run_knots_count, 0) != CLUTCH_OK;
-        if (!own->refused) {
-            /* Before anybody has consented the converter holds what the safe state holds. */
-            clutch_safe_codes safe;
-            clutch_axis_safe(&own->axis, &safe);
-            *own->code = safe.hold;
-        }
+        /* Before anybody has consented the converter holds what the safe state holds. */
+        *own->code = run_safe_code;
+        *own->volts = run_safe_v;
+        own->consented = *own->consent;
+        own->last_us = now_us - run_period_us;
     }
     if (own->refused)
         return;
@@ -56,14 +58,18 @@ FUNCTION(_)
     }
     own->consented = *own->consent;
 
+    /* A period that the thread left out is a sample that was lost. */
+    passed = (now_us - own->last_us + run_period_us / 2) / run_period_us;
+    own->number += passed < 1 ? 1 : passed < 0x7fff ? passed : 0x7fff;
+    own->last_us = now_us;
     sample.sequence = (uint16_t)own->number;
-    sample.time_us = own->number * run_period_us;
+    sample.time_us = now_us;
     sample.board = CLUTCH_BOARD_DRIVING;
     sample.counts = *own->counts;
     sample.encoder_fault = *own->encoder_fault;
     sample.converter_fault = *own->converter_fault;
-    own->number++;
-    clutch_axis_sample(&own->axis, &sample, &cycle);
+    if (clutch_axis_sample(&own->axis, &sample, &cycle) != CLUTCH_OK)
+        return;
     if (cycle.asked) {
         *own->error = cycle.output.tick.error;
         *own->target = (double)cycle.target.position_x65536 / 65536.0;

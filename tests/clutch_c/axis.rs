@@ -145,3 +145,49 @@ fn a_shaft_that_jumps_and_a_silence_end_in_the_safe_state() {
         }
     }
 }
+
+#[test]
+fn a_safe_state_that_is_a_ramp_reaches_its_voltage_with_samples_and_without() {
+    let ramp = ("safety.on_fault", "{ramp={rate_v_s=20.0,volts_v=4.5}}");
+    let (settings, trace) = scenario(&[ramp]);
+    for with_samples in [true, false] {
+        let mut axis = MaybeUninit::uninit();
+        assert_eq!(build(&mut axis, &settings).0, clutch_result::CLUTCH_OK);
+        // SAFETY: it has been built.
+        unsafe { clutch_axis_consent(axis.as_mut_ptr(), 2970) };
+        for tick in 0..100 {
+            sample(&mut axis, tick, trace.counts[tick as usize]);
+        }
+        // SAFETY: it has been built.
+        unsafe { clutch_axis_stop(axis.as_mut_ptr()) };
+        let (_, _, first) = state(&mut axis);
+        // 20 V/s are 0.02 V or 4.1 codes a period.
+        for period in 100..400 {
+            if with_samples {
+                assert_eq!(sample(&mut axis, period, trace.counts[99]).answered, 0);
+            } else {
+                // SAFETY: it has been built.
+                unsafe { clutch_axis_silence(axis.as_mut_ptr(), period - 99) };
+            }
+        }
+        let (now, cause, code) = state(&mut axis);
+        assert_eq!((now, cause, code), (HOLDING, 14, 2970), "from {first}");
+        assert!(first < 2900, "the ramp began at {first}");
+    }
+}
+
+#[test]
+fn a_sample_without_a_place_for_its_answer_changes_nothing() {
+    let (settings, _) = scenario(&[]);
+    let mut axis = MaybeUninit::uninit();
+    build(&mut axis, &settings);
+    // SAFETY: it has been built; the pointer that is none is what is tested.
+    unsafe {
+        clutch_axis_consent(axis.as_mut_ptr(), 2970);
+        let before = state(&mut axis);
+        let sample: clutch_sample = std::mem::zeroed();
+        let told = clutch_axis_sample(axis.as_mut_ptr(), &raw const sample, std::ptr::null_mut());
+        assert_eq!(told, clutch_result::CLUTCH_BAD_POINTER);
+        assert_eq!(state(&mut axis), before);
+    }
+}

@@ -92,11 +92,8 @@ fn null_and_misaligned_pointers_and_memory_that_was_not_built_are_refused() {
     let (settings, _) = scenario(&[]);
     let list = (settings.as_ptr(), settings.len());
     let mut room = [0_u64; 1000];
-    // A memory begins on 16 bytes.
-    let begin = room.as_mut_ptr();
-    let aligned = if begin.cast::<clutch_axis>().is_aligned() { begin } else { begin.wrapping_add(1) };
-    let odd = aligned.wrapping_add(1).cast::<clutch_axis>();
-    let axis = aligned.cast::<clutch_axis>();
+    let axis = room.as_mut_ptr().cast::<clutch_axis>();
+    let odd = axis.wrapping_byte_add(4);
     let bad = clutch_result::CLUTCH_BAD_POINTER;
     // SAFETY: pointers that are none are what is tested; the others have their memory.
     unsafe {
@@ -112,7 +109,9 @@ fn null_and_misaligned_pointers_and_memory_that_was_not_built_are_refused() {
         assert_eq!(clutch_axis_safe(axis, null_mut()), bad);
         assert_eq!(clutch_axis_stop(axis), clutch_result::CLUTCH_OK);
         // An object of another kind.
-        assert_eq!(clutch_law_update(axis.cast(), null(), null_mut()), clutch_result::CLUTCH_NOT_BUILT);
+        let mut command = MaybeUninit::uninit();
+        let told = clutch_law_update(axis.cast(), null(), command.as_mut_ptr());
+        assert_eq!(told, clutch_result::CLUTCH_NOT_BUILT);
     }
 }
 

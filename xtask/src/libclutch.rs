@@ -26,7 +26,7 @@ pub(crate) fn run(targets: &[String]) -> Result<()> {
     }
     add(&targets)?;
     for target in &targets {
-        println!("{}", built(target, "staticlib")?.display());
+        println!("{}", built(target)?.display());
     }
     let header = folder().join("include/clutch.h");
     std::fs::create_dir_all(folder().join("include"))?;
@@ -72,17 +72,26 @@ fn folder() -> PathBuf {
 }
 
 /// Builds the library of a target; its path. One in which a panic can be reached is refused.
-pub(crate) fn built(target: &str, features: &str) -> Result<PathBuf> {
-    let args = ["rustc", "--locked", "--package", "clutch-c", "--profile", "c", "--crate-type", "staticlib"];
-    let cache = folder().join("build");
-    let build = cargo(args).args(["--features", features, "--target", target, "--target-dir"]).arg(&cache);
-    let (done, text) = build.silently()?;
-    ensure!(done, "libclutch does not build for {target}:\n{text}");
+pub(crate) fn built(target: &str) -> Result<PathBuf> {
+    let built = compiled(target, "staticlib", &folder().join("build"))?;
+    ensure!(!names(&built, SURVIVED)?, "a panic can be reached in libclutch for {target}");
     let library = folder().join(target).join("libclutch.a");
     std::fs::create_dir_all(folder().join(target))?;
-    std::fs::copy(cache.join(target).join("c/libclutch.a"), &library)?;
-    ensure!(!names(&library, SURVIVED)?, "a panic can be reached in libclutch for {target}");
+    std::fs::copy(&built, &library)?;
     Ok(library)
+}
+
+/// True if a panic that is put in is seen. Built where nobody takes it for a library.
+pub(crate) fn sees_a_panic(target: &str) -> Result<bool> {
+    names(&compiled(target, "staticlib,control", &root().join("target/libclutch_control"))?, SURVIVED)
+}
+
+fn compiled(target: &str, features: &str, cache: &Path) -> Result<PathBuf> {
+    let args = ["rustc", "--locked", "--package", "clutch-c", "--profile", "c", "--crate-type", "staticlib"];
+    let build = cargo(args).args(["--features", features, "--target", target, "--target-dir"]).arg(cache);
+    let (done, text) = build.silently()?;
+    ensure!(done, "libclutch does not build for {target}:\n{text}");
+    Ok(cache.join(target).join("c/libclutch.a"))
 }
 
 /// True if a file has this text in it.

@@ -1,7 +1,7 @@
 /* libclutch: slow, smooth motion of shafts restrained by friction. Written by `cargo run -p clutch-c --example header`.
  *
  * Units are SI and radians; positions are in 2^-16 counts of the encoder. A call never allocates, never blocks and never ends
- * the program. Objects live in memory of yours: do not copy them, and do not share one between threads.
+ * the program. Objects live in memory of yours, and one is not used by two threads at once.
  *
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
@@ -12,15 +12,6 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-/* What an object's memory begins at. */
-#if defined(__cplusplus)
-#define CLUTCH_ALIGNED(n) alignas(n)
-#elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L && !defined(__GNUC__)
-#define CLUTCH_ALIGNED(n) _Alignas(n)
-#else
-#define CLUTCH_ALIGNED(n) __attribute__((aligned(n)))
-#endif
 
 /* States of control. */
 enum {
@@ -71,7 +62,7 @@ enum {
 /* What the keys of a list of settings mean: compare it with clutch_settings_hash(). */
 #define CLUTCH_SETTINGS_HASH UINT64_C(0xa68784e5b2366286)
 
-/* Settings: those of the options that are chosen are needed, and no others. */
+/* Settings: those of the options that are chosen are needed; others are not looked at. */
 enum {
     CLUTCH_KEY_TICKS = 0, /* whole, periods */
     CLUTCH_KEY_START_COUNTS_X65536 = 1, /* whole */
@@ -262,7 +253,7 @@ enum {
     CLUTCH_KEY_REFERENCE_CHIRP_TO_HZ = 186, /* f32, Hz */
     CLUTCH_KEY_REFERENCE_CHIRP_DURATION_S = 187, /* f32, s */
     CLUTCH_KEY_REFERENCE_CHIRP_PHASE_TURNS = 188, /* f32, turns */
-    CLUTCH_KEY_REFERENCE_TABLE_POINTS_S_DEG = 189, /* points, s, rad */
+    CLUTCH_KEY_REFERENCE_TABLE_POINTS = 189, /* points, s, rad */
     CLUTCH_KEY_REFERENCE_TABLE_INTERPOLATION = 190, /* linear/cubic */
 };
 
@@ -422,7 +413,7 @@ typedef struct {
 /**
  * Memory of a path.
  */
-typedef struct CLUTCH_ALIGNED(16) {
+typedef struct {
   uint64_t opaque[64];
 } clutch_path;
 
@@ -453,7 +444,7 @@ typedef struct {
    */
   uint8_t relation;
   /**
-   * The key of the setting; 65535 if it is no setting.
+   * The key of the setting; from 4096 on that of a number of a table's points, two each; 65535 if it is no setting.
    */
   uint16_t key;
   /**
@@ -483,7 +474,7 @@ typedef struct {
 /**
  * Memory of a law.
  */
-typedef struct CLUTCH_ALIGNED(16) {
+typedef struct {
   uint64_t opaque[160];
 } clutch_law;
 
@@ -534,7 +525,7 @@ typedef struct {
 /**
  * Memory of a servo.
  */
-typedef struct CLUTCH_ALIGNED(16) {
+typedef struct {
   uint64_t opaque[224];
 } clutch_servo;
 
@@ -563,7 +554,7 @@ typedef struct {
 /**
  * Memory of a detector of stick-slip.
  */
-typedef struct CLUTCH_ALIGNED(16) {
+typedef struct {
   uint64_t opaque[16];
 } clutch_stick_slip;
 
@@ -592,7 +583,7 @@ typedef struct {
 /**
  * Memory of a safe state under way.
  */
-typedef struct CLUTCH_ALIGNED(16) {
+typedef struct {
   uint64_t opaque[4];
 } clutch_safe_run;
 
@@ -625,7 +616,7 @@ typedef struct {
 /**
  * Memory of an axis.
  */
-typedef struct CLUTCH_ALIGNED(16) {
+typedef struct {
   uint64_t opaque[384];
 } clutch_axis;
 
@@ -847,24 +838,28 @@ clutch_result clutch_axis_consent(clutch_axis *axis,
                                   uint16_t present);
 
 /**
- * One period: a sample in, what to do out. After the last tick of the run the axis ends in its safe state, as if stopped.
+ * One period: a sample in, what to do out. The law answers the run's last tick, too; the axis has ended then, as if stopped, and
+ * `clutch_axis_state` and the next sample say so.
  */
 clutch_result clutch_axis_sample(clutch_axis *axis,
                                  const clutch_sample *sample,
                                  clutch_cycle *cycle);
 
 /**
- * No sample has come for so many periods. Ask for the state with `clutch_axis_state`.
+ * A period without a sample, once each: `cycles` periods, this one among them, since the last sample came. Where control has
+ * ended the safe state takes its next step. `clutch_axis_state` has the code to write.
  */
-clutch_result clutch_axis_silence(clutch_axis *axis, uint32_t cycles);
+clutch_result clutch_axis_silence(clutch_axis *axis,
+                                  uint32_t cycles);
 
 /**
- * An operator's stop: the safe state, without a fault.
+ * An operator's stop: the safe state, without a fault. Its steps come with the samples, or with `clutch_axis_silence`.
  */
 clutch_result clutch_axis_stop(clutch_axis *axis);
 
 /**
- * Consent to leave the safe state: the axis is ready, everything is forgotten. The converter keeps its code.
+ * Consent to leave the safe state: the axis is ready, everything is forgotten. The converter keeps its code, that of a ramp under
+ * way, too.
  * `CLUTCH_WRONG_STATE` if control has not ended.
  */
 clutch_result clutch_axis_acknowledge(clutch_axis *axis);

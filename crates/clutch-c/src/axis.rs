@@ -1,6 +1,6 @@
 //! Servo, supervisor and path of a shaft: what a program of one's own calls once a period.
 
-use crate::memory::{clutch_result, input, kept, object, outcome, output, put};
+use crate::memory::{clutch_result, input, kept, object, outcome, output, put, room};
 use crate::path::{Planned, clutch_target};
 use crate::safe::clutch_safe_codes;
 use crate::servo::clutch_output;
@@ -81,7 +81,7 @@ pub(crate) struct Kept {
 }
 
 /// Memory of an axis.
-#[repr(C, align(16))]
+#[repr(C)]
 pub struct clutch_axis {
     opaque: [u64; 384],
 }
@@ -128,7 +128,8 @@ pub unsafe extern "C" fn clutch_axis_consent(axis: *mut clutch_axis, present: u1
     })
 }
 
-/// One period: a sample in, what to do out. After the last tick of the run the axis ends in its safe state, as if stopped.
+/// One period: a sample in, what to do out. The law answers the run's last tick, too; the axis has ended then, as if stopped, and
+/// `clutch_axis_state` and the next sample say so.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_axis_sample(
     axis: *mut clutch_axis,
@@ -136,6 +137,7 @@ pub unsafe extern "C" fn clutch_axis_sample(
     cycle: *mut clutch_cycle,
 ) -> clutch_result {
     outcome(|| {
+        room(cycle)?;
         // SAFETY: the caller's promise.
         let (kept, sample) = unsafe { (object::<Kept>(axis)?, input(sample)?) };
         let done = kept.sample(&sample.sample());
@@ -144,18 +146,20 @@ pub unsafe extern "C" fn clutch_axis_sample(
     })
 }
 
-/// No sample has come for so many periods. Ask for the state with `clutch_axis_state`.
+/// A period without a sample, once each: `cycles` periods, this one among them, since the last sample came. Where control has
+/// ended the safe state takes its next step. `clutch_axis_state` has the code to write.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_axis_silence(axis: *mut clutch_axis, cycles: u32) -> clutch_result {
     outcome(|| {
         // SAFETY: the caller's promise.
         let kept = unsafe { object::<Kept>(axis)? };
+        kept.supervisor.pass(&mut kept.state);
         kept.supervisor.silence(&mut kept.state, cycles);
         Ok(())
     })
 }
 
-/// An operator's stop: the safe state, without a fault.
+/// An operator's stop: the safe state, without a fault. Its steps come with the samples, or with `clutch_axis_silence`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_axis_stop(axis: *mut clutch_axis) -> clutch_result {
     outcome(|| {
@@ -166,7 +170,8 @@ pub unsafe extern "C" fn clutch_axis_stop(axis: *mut clutch_axis) -> clutch_resu
     })
 }
 
-/// Consent to leave the safe state: the axis is ready, everything is forgotten. The converter keeps its code.
+/// Consent to leave the safe state: the axis is ready, everything is forgotten. The converter keeps its code, that of a ramp under
+/// way, too.
 /// `CLUTCH_WRONG_STATE` if control has not ended.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_axis_acknowledge(axis: *mut clutch_axis) -> clutch_result {

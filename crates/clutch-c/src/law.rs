@@ -1,6 +1,6 @@
 //! The law by itself: errors in, voltage out.
 
-use crate::memory::{clutch_result, input, kept, object, outcome, output, put};
+use crate::memory::{clutch_result, input, kept, object, outcome, output, put, room};
 use crate::settings::{built, clutch_knot, clutch_misfit, clutch_setting};
 use clutch_core::law::{Command, ControlLaw, Law, LawState, LawTerms, MAX_TERMS, Terms, Tick};
 
@@ -76,7 +76,7 @@ pub(crate) struct Kept {
 }
 
 /// Memory of a law.
-#[repr(C, align(16))]
+#[repr(C)]
 pub struct clutch_law {
     opaque: [u64; 160],
 }
@@ -129,6 +129,7 @@ pub unsafe extern "C" fn clutch_law_update(
     command: *mut clutch_command,
 ) -> clutch_result {
     outcome(|| {
+        room(command)?;
         // SAFETY: the caller's promise.
         let (kept, tick) = unsafe { (object::<Kept>(law)?, input(tick)?) };
         let answer = kept.law.update(&mut kept.state, &tick.tick());

@@ -47,7 +47,12 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 
 // Where programs unwind, the compiler's own functions name this. Weak, so that a program may have another Rust library.
 #[cfg(all(feature = "staticlib", not(target_os = "none")))]
-core::arch::global_asm!(".weak rust_eh_personality", "rust_eh_personality:", "ret");
+core::arch::global_asm!(
+    ".weak rust_eh_personality",
+    ".hidden rust_eh_personality",
+    "rust_eh_personality:",
+    "ret"
+);
 
 /// A panic that can be reached: with it a program must not link, or the check proves nothing.
 #[cfg(feature = "control")]

@@ -95,11 +95,14 @@ pub(crate) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Result<&'a 
     Ok(unsafe { core::slice::from_raw_parts(pointer, count) })
 }
 
+/// Looks at a place for a value before anything is done.
+pub(crate) fn room<T>(pointer: *mut T) -> Result<(), clutch_result> {
+    if pointer.is_null() || !pointer.is_aligned() { Err(clutch_result::CLUTCH_BAD_POINTER) } else { Ok(()) }
+}
+
 /// Hands a value to C.
 pub(crate) unsafe fn output<T>(pointer: *mut T, value: T) -> Result<(), clutch_result> {
-    if pointer.is_null() || !pointer.is_aligned() {
-        return Err(clutch_result::CLUTCH_BAD_POINTER);
-    }
+    room(pointer)?;
     // SAFETY: that there is room for it is the caller's promise.
     unsafe { pointer.write(value) };
     Ok(())

@@ -49,7 +49,7 @@ impl Planned {
 }
 
 /// Memory of a path.
-#[repr(C, align(16))]
+#[repr(C)]
 pub struct clutch_path {
     opaque: [u64; 64],
 }

@@ -1,6 +1,6 @@
 //! The safe state, code by code: for a watchdog that has to go there without an axis.
 
-use crate::memory::{clutch_result, input, kept, object, outcome, output, put};
+use crate::memory::{clutch_result, input, kept, object, outcome, output, put, room};
 use clutch_core::{DacCode, SafeCodes, SafeKind, SafeRun};
 
 /// A safe state in the converter's codes. `clutch_axis_safe` gives that of an axis.
@@ -58,7 +58,7 @@ impl clutch_safe_codes {
 }
 
 /// Memory of a safe state under way.
-#[repr(C, align(16))]
+#[repr(C)]
 pub struct clutch_safe_run {
     opaque: [u64; 4],
 }
@@ -80,6 +80,7 @@ pub unsafe extern "C" fn clutch_safe_next(
     code: *mut u16,
 ) -> clutch_result {
     outcome(|| {
+        room(code)?;
         // SAFETY: the caller's promise.
         let (run, codes) = unsafe { (object::<SafeRun>(run)?, input(codes)?) };
         // SAFETY: the caller's promise.

@@ -1,7 +1,7 @@
 //! The servo by itself: counts and target in, code for the converter out. No check, no safe state.
 
 use crate::law::{clutch_command, clutch_tick};
-use crate::memory::{clutch_result, input, kept, object, outcome, output, put};
+use crate::memory::{clutch_result, input, kept, object, outcome, output, put, room};
 use crate::path::clutch_target;
 use crate::settings::{built, clutch_knot, clutch_misfit, clutch_setting};
 use clutch_core::law::{LawState, LawTerms};
@@ -40,7 +40,7 @@ pub(crate) struct Kept {
 }
 
 /// Memory of a servo.
-#[repr(C, align(16))]
+#[repr(C)]
 pub struct clutch_servo {
     opaque: [u64; 224],
 }
@@ -90,6 +90,7 @@ pub unsafe extern "C" fn clutch_servo_tick(
     out: *mut clutch_output,
 ) -> clutch_result {
     outcome(|| {
+        room(out)?;
         // SAFETY: the caller's promise.
         let (kept, target) = unsafe { (object::<Kept>(servo)?, input(target)?) };
         let state = kept.state.as_mut().ok_or(clutch_result::CLUTCH_WRONG_STATE)?;

@@ -1,6 +1,8 @@
 //! A run as numbers, and what is wrong with them.
 
 use crate::memory::{clutch_result, list, outcome, output};
+use core::mem::offset_of;
+
 use clutch_core::FixedCounts;
 use clutch_core::reference::Knot;
 use clutch_node::{Built, MAX_KNOTS, Misfit, SETTINGS_HASH};
@@ -33,7 +35,7 @@ pub struct clutch_misfit {
     pub kind: u8,
     /// The number, from 1, of the relation with other settings that does not hold; 0 for the number's own range.
     pub relation: u8,
-    /// The key of the setting; 65535 if it is no setting.
+    /// The key of the setting; from 4096 on that of a number of a table's points, two each; 65535 if it is no setting.
     pub key: u16,
     /// Its value, SI; 0 for a setting that is missing or unknown.
     pub value: f32,
@@ -82,6 +84,7 @@ impl Knots {
         const {
             assert!(size_of::<Knot>() == size_of::<clutch_knot>());
             assert!(align_of::<Knot>() == align_of::<clutch_knot>());
+            assert!(offset_of!(Knot, position) == offset_of!(clutch_knot, position_x65536));
         }
         if self.count == 0 {
             return &[];

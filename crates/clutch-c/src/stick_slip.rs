@@ -1,6 +1,6 @@
 //! Sticks that the encoder shows.
 
-use crate::memory::{clutch_result, kept, object, outcome, output, put};
+use crate::memory::{clutch_result, kept, object, outcome, output, put, room};
 use crate::settings::{built, clutch_knot, clutch_misfit, clutch_setting};
 use clutch_core::{Counts, StickSlip, StickSlipParams, StickSlipState};
 
@@ -25,7 +25,7 @@ pub(crate) struct Kept {
 }
 
 /// Memory of a detector of stick-slip.
-#[repr(C, align(16))]
+#[repr(C)]
 pub struct clutch_stick_slip {
     opaque: [u64; 16],
 }
@@ -63,6 +63,7 @@ pub unsafe extern "C" fn clutch_stick_slip_update(
     sticks: *mut clutch_sticks,
 ) -> clutch_result {
     outcome(|| {
+        room(sticks)?;
         // SAFETY: the caller's promise.
         let kept = unsafe { object::<Kept>(detector)? };
         kept.detector.update(&mut kept.state, Counts(counts), target_velocity);

@@ -1,7 +1,7 @@
 //! `clutch scenario header`: a scenario's settings for libclutch.
 
 use crate::args::ScenarioArgs;
-use crate::output::{BUILD, Exit, not_certified, print, warn};
+use crate::output::{BUILD, Exit, print, warn};
 use anyhow::ensure;
 use clap::Args;
 use clutch_core::Micros;
@@ -37,8 +37,13 @@ impl HeaderVerb {
         let scenario = self.scenario.load()?;
         match check(&scenario, None, self.uncertified, None) {
             Ok(_) => {}
-            Err(refusal @ ClearanceError::NotCertified { .. }) => {
-                warn(&not_certified(&refusal, &self.scenario.scenario))?;
+            Err(ClearanceError::NotCertified { .. }) => {
+                let file = self.scenario.scenario.display();
+                warn(&format!(
+                    "{}: the gains are not certified, in continuous time, for these bounds and this path, so nothing was printed.\n\
+                     `clutch certify {file}` says why; --uncertified prints them all the same.\n",
+                    scenario.name()
+                ))?;
                 return Ok(Exit::NotCertified);
             }
             Err(refusal) => return Err(refusal.into()),
@@ -47,12 +52,12 @@ impl HeaderVerb {
         let run = BuiltRun::new(&single, 0)?;
         // Nobody but the program itself looks on.
         let settings = from_scenario::settings(&single, &run, Micros(0), run.ticks)?;
-        print(&header(&self.name, &single, &settings))?;
+        print(&header(&self.name, &single, &settings, &run))?;
         Ok(Exit::Done)
     }
 }
 
-fn header(name: &str, scenario: &Scenario, settings: &Settings) -> String {
+fn header(name: &str, scenario: &Scenario, settings: &Settings, run: &BuiltRun<f32>) -> String {
     let guard = name.to_ascii_uppercase();
     let mut out = format!(
         "/* {}: written by `clutch scenario header`, {BUILD}. */\n\
@@ -82,10 +87,22 @@ fn header(name: &str, scenario: &Scenario, settings: &Settings) -> String {
     } else {
         let _ = writeln!(out, "static const clutch_knot {name}_knots[] = {{\n{knots}}};");
     }
+    let safe = run.supervisor.safe_codes().hold;
+    let of_run = [
+        ("settings_count", count),
+        ("knots_count", of_points),
+        ("period_us", scenario.spec().period.0 as usize),
+        ("counts_per_rev", scenario.spec().rig.encoder.sensor.counts_per_rev as usize),
+        // For a program that has no axis yet, or none with these settings.
+        ("safe_code", safe.0.into()),
+    ];
+    out += "\nenum {\n";
+    for (what, number) in of_run {
+        let _ = writeln!(out, "    {name}_{what} = {number},");
+    }
     out + &format!(
-        "\nenum {{ {name}_settings_count = {count}, {name}_knots_count = {of_points}, {name}_period_us = {}, {name}_counts_per_rev = {} }};\n\n#endif\n",
-        scenario.spec().period.0,
-        scenario.spec().rig.encoder.sensor.counts_per_rev
+        "}};\n\n/* What {name}_safe_code stands for, V. */\n#define {name}_safe_v {:?}\n\n#endif\n",
+        run.servo.dac().volts(safe)
     )
 }
 

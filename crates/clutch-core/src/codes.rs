@@ -25,6 +25,7 @@ impl Counts {
 /// A position in 2⁻¹⁶ counts, unwrapped: ±1.4e14 counts, exact over any run.
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(transparent)]
 pub struct FixedCounts(pub i64);
 
 impl FixedCounts {

@@ -34,7 +34,7 @@ extern "C" fn fmi3GetVersion() -> *const c_char {
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn fmi3SetDebugLogging(_: *mut Instance, _: bool, _: usize, _: *const *const c_char) -> Status {
+extern "C" fn fmi3SetDebugLogging(_: *mut Instance, _: u8, _: usize, _: *const *const c_char) -> Status {
     Status::Ok
 }
 
@@ -43,10 +43,10 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
     _name: *const c_char,
     token: *const c_char,
     resources: *const c_char,
-    _visible: bool,
-    _logging: bool,
-    _event_mode: bool,
-    _early_return: bool,
+    _visible: u8,
+    _logging: u8,
+    _event_mode: u8,
+    _early_return: u8,
     _required: *const Reference,
     _required_count: usize,
     environment: *mut c_void,
@@ -86,10 +86,10 @@ unsafe fn of<'a>(instance: *mut Instance) -> Option<&'a mut Instance> {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi3EnterInitializationMode(
     instance: *mut Instance,
-    _tolerance_defined: bool,
+    _tolerance_defined: u8,
     _tolerance: f64,
     start: f64,
-    _stop_defined: bool,
+    _stop_defined: u8,
     _stop: f64,
 ) -> Status {
     // SAFETY: the simulator's.
@@ -111,7 +111,7 @@ unsafe extern "C" fn fmi3DoStep(
     instance: *mut Instance,
     now: f64,
     step: f64,
-    _final: bool,
+    _final: u8,
     event: *mut bool,
     terminate: *mut bool,
     early: *mut bool,
@@ -270,8 +270,8 @@ unsafe extern "C" fn fmi3SetFMUState(instance: *mut Instance, state: *mut Kept) 
     let (Some(instance), Some(state)) = (unsafe { (of(instance), state.as_ref()) }) else {
         return Status::Error;
     };
-    instance.kept.clone_from(state);
-    Status::Ok
+    let restored = instance.restore(state);
+    instance.told(restored)
 }
 
 #[unsafe(no_mangle)]

@@ -14,11 +14,15 @@ pub(crate) enum Status {
     Error = 3,
 }
 
+/// The longest step, s.
+const LONGEST: f64 = 3600.0;
+
 pub(crate) type LogMessage = Option<extern "C" fn(*mut c_void, Status, *const c_char, *const c_char)>;
 
 /// The part that a simulator saves and restores.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub(crate) struct Kept {
+    part: Part,
     scenario: String,
     set: String,
     time: f64,
@@ -39,9 +43,23 @@ pub(crate) struct Instance {
     pub(crate) texts: Vec<CString>,
 }
 
+impl Kept {
+    fn new(part: Part) -> Kept {
+        Kept {
+            part,
+            scenario: String::new(),
+            set: String::new(),
+            time: 0.0,
+            unit: None,
+            volts: None,
+            counts: None,
+        }
+    }
+}
+
 impl Instance {
     pub(crate) fn new(part: Part, resources: PathBuf, environment: *mut c_void, log: LogMessage) -> Instance {
-        Instance { part, resources, environment, log, kept: Kept::default(), texts: Vec::new() }
+        Instance { part, resources, environment, log, kept: Kept::new(part), texts: Vec::new() }
     }
 
     /// Says why to whoever listens, and that it failed.
@@ -62,7 +80,20 @@ impl Instance {
 
     /// Everything as it was at instantiation.
     pub(crate) fn reset(&mut self) {
-        self.kept = Kept::default();
+        self.kept = Kept::new(self.part);
+    }
+
+    /// Goes back to a state of such a unit.
+    pub(crate) fn restore(&mut self, kept: &Kept) -> Result<(), String> {
+        if kept.part != self.part {
+            return Err(format!(
+                "the state of clutch.{}: expected one of clutch.{}",
+                kept.part.name(),
+                self.part.name()
+            ));
+        }
+        self.kept.clone_from(kept);
+        Ok(())
     }
 
     /// Reads the scenario and begins.
@@ -94,8 +125,10 @@ impl Instance {
     }
 
     pub(crate) fn step(&mut self, now: f64, step: f64) -> Result<(), String> {
-        if !(step > 0.0 && step.is_finite() && now.is_finite()) {
-            return Err(format!("a step of {step} s from {now} s: expected one above 0"));
+        if !(step > 0.0 && step <= LONGEST && now.is_finite()) {
+            return Err(format!(
+                "a step of {step} s from {now} s: expected one above 0 and at most {LONGEST} s"
+            ));
         }
         let unit = self.kept.unit.as_mut().ok_or("a step before initialisation")?;
         unit.step(now, step)?;

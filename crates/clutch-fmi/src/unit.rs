@@ -8,8 +8,10 @@ use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{MovingRig, Scenario};
 use std::sync::Arc;
 
-/// Times that differ by less, in periods, are the same.
-const SAME: f64 = 1e-6;
+/// A simulator's time, a sum of many steps, may differ from ours by so many periods.
+const SAME: f64 = 1e-3;
+/// A rest of a step that is none, in periods: what rounding leaves.
+const NOTHING: f64 = 1e-9;
 
 /// A unit that has begun; a clone goes its own way.
 #[derive(Clone)]
@@ -118,14 +120,14 @@ impl RigUnit {
             return Err(format!("a step from {now} s: expected one from {here} s, where the last one ended"));
         }
         let end = here + step;
-        while end - (self.periods as f64 * self.period + self.within) > SAME * self.period {
+        while end - (self.periods as f64 * self.period + self.within) > NOTHING * self.period {
             if self.within == 0.0 {
                 let dac: Dac<f64> = self.moving.rig().dac;
                 let volts = if self.rounds { dac.volts(dac.code(self.volts)) } else { self.volts };
                 self.moving.command(volts);
             }
             let begin = self.periods as f64 * self.period;
-            let whole = end - begin > (1.0 - SAME) * self.period;
+            let whole = end - begin > (1.0 - NOTHING) * self.period;
             let to = if whole { self.period } else { end - begin };
             self.moving.advance(to - self.within).map_err(|e| e.to_string())?;
             if whole {

@@ -79,7 +79,14 @@ const RIG: &[Variable] = &[
     TIME_S,
     SCENARIO_FILE,
     SET_KEYS,
-    variable(VOLTAGE, "voltage_v", Kind::Float64, "input", "V", "Voltage that the converter is to give."),
+    variable(
+        VOLTAGE,
+        "voltage_v",
+        Kind::Float64,
+        "input",
+        "V",
+        "Voltage that the converter is to give; that of the run's start until it is set.",
+    ),
     variable(COUNTS, "counts", Kind::Int32, "output", "", "Counts of the encoder."),
     variable(POSITION, "position_rad", Kind::Float64, "output", "rad", "Position of the shaft."),
     variable(
@@ -97,7 +104,14 @@ const LAW: &[Variable] = &[
     TIME_S,
     SCENARIO_FILE,
     SET_KEYS,
-    variable(COUNTS, "counts", Kind::Int32, "input", "", "Counts of the encoder."),
+    variable(
+        COUNTS,
+        "counts",
+        Kind::Int32,
+        "input",
+        "",
+        "Counts of the encoder; those of the run's start until they are set.",
+    ),
     variable(VOLTAGE, "voltage_v", Kind::Float64, "output", "V", "Voltage that the converter gives."),
     variable(CODE, "code", Kind::Int32, "output", "", "Code for the converter."),
     variable(

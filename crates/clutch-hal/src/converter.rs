@@ -29,10 +29,7 @@ pub struct CoarsePwm {
 impl core::fmt::Display for CoarsePwm {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let CoarsePwm { steps, bits } = self;
-        write!(
-            f,
-            "a period of {steps} steps: expected at least 2^{bits} - 1, one for each code of {bits} bits"
-        )
+        write!(f, "a period of {steps} steps: expected at least 2^{bits}, one for each code of {bits} bits")
     }
 }
 
@@ -45,7 +42,7 @@ impl<P: SetDutyCycle> Pwm<P> {
     /// A timer that has not a step for each code.
     pub fn new(pwm: P, bits: u8) -> Result<Self, CoarsePwm> {
         let steps = pwm.max_duty_cycle();
-        if bits == 0 || bits > 16 || u32::from(steps) < (1 << u32::from(bits)) - 1 {
+        if bits == 0 || bits > 15 || u32::from(steps) < 1 << u32::from(bits) {
             return Err(CoarsePwm { steps, bits });
         }
         Ok(Pwm { pwm, bits })

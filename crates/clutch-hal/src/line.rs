@@ -34,13 +34,16 @@ impl<S: Read + ReadReady + Write + WriteReady, const ROOM: usize> Line<S, ROOM> 
     /// Writes what the port takes at once. Call it as often as you like, and once a period at least.
     pub fn pump(&mut self) {
         while let Some(rest) = self.frames.get(self.gone..self.filled).filter(|rest| !rest.is_empty()) {
-            // An error of the port loses a frame, as the line may lose it: the protocol lives with that.
-            if !matches!(self.port.write_ready(), Ok(true)) {
-                return;
-            }
-            match self.port.write(rest) {
-                Ok(0) | Err(_) => return,
+            let written = match self.port.write_ready() {
+                Ok(true) => self.port.write(rest),
+                Ok(false) => return,
+                Err(error) => Err(error),
+            };
+            match written {
+                Ok(0) => return,
                 Ok(count) => self.gone += count,
+                // An error of the port loses frames, as the line may lose them: the protocol lives with that.
+                Err(_) => self.gone = self.filled,
             }
         }
     }

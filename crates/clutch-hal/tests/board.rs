@@ -15,9 +15,9 @@ use std::rc::Rc;
 
 #[test]
 fn a_pulse_is_as_long_as_its_code_and_the_code_above_the_last_one_has_no_end() {
-    // 12 bit on a timer of 4095, 5000 and 65535 steps.
+    // 12 bit on a timer of 4096, 5000 and 65535 steps.
     for (steps, pulses) in [
-        (4095, [(0, 0), (1, 1), (2048, 2048), (4095, 4094)]),
+        (4096, [(0, 0), (1, 1), (2047, 2047), (4095, 4095)]),
         (5000, [(0, 0), (1, 1), (2048, 2500), (4095, 4999)]),
         (65535, [(0, 0), (1, 16), (2048, 32768), (4095, 65519)]),
     ] {
@@ -38,14 +38,14 @@ fn a_pulse_is_as_long_as_its_code_and_the_code_above_the_last_one_has_no_end() {
 
 #[test]
 fn a_timer_that_is_too_coarse_is_no_converter() {
-    for (steps, bits) in [(4094, 12), (255, 9), (1000, 0), (u16::MAX, 17)] {
+    for (steps, bits) in [(4095, 12), (511, 9), (1000, 0), (u16::MAX, 16)] {
         let mut timer = PwmMock::new(&[Duty::max_duty_cycle(steps)]);
         assert_eq!(Pwm::new(timer.clone(), bits).unwrap_err(), CoarsePwm { steps, bits });
         timer.done();
     }
     assert_eq!(
-        CoarsePwm { steps: 4094, bits: 12 }.to_string(),
-        "a period of 4094 steps: expected at least 2^12 - 1, one for each code of 12 bits"
+        CoarsePwm { steps: 4095, bits: 12 }.to_string(),
+        "a period of 4095 steps: expected at least 2^12, one for each code of 12 bits"
     );
 }
 

@@ -10,7 +10,7 @@ use crate::python;
 use crate::run::{Program, beside, cargo, program, root};
 use crate::stubs;
 use anyhow::{Result, bail};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tally::Tally;
 
 /// Targets for which the core must compile: a core without atomics, one with a floating-point unit,
@@ -19,7 +19,8 @@ const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "risc
 
 /// Checks that need the targets: three builds of the core and one of the parts of boards each, the three link tests, the
 /// libraries with their control, the example, two boards, the budgets.
-const SKIPPED_WITHOUT_TARGETS: u64 = 4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 8;
+const SKIPPED_WITHOUT_TARGETS: u64 =
+    4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + firmware::BOARDS.len() as u64 + 6;
 
 /// The packages that are built for this machine. Always the same selection: with another one cargo gives libraries
 /// other features, and compiles them once more. The wheel's module only links inside of Python.
@@ -67,13 +68,21 @@ fn programs() -> Result<()> {
     // The program, and the Debian package that has it.
     let needed = [
         ("gcc", "gcc"),
+        ("g++", "g++"),
+        ("make", "make"),
         ("strace", "strace"),
         ("qemu-system-arm", "qemu-system-arm"),
         ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ("arm-none-eabi-g++", "gcc-arm-none-eabi"),
     ];
     let is_missing = |name: &str| program(name).args(["--version"]).quietly().is_err();
-    let missing: Vec<&str> =
+    let mut missing: Vec<&str> =
         needed.iter().filter(|(name, _)| is_missing(name)).map(|(_, package)| *package).collect();
+    // The C library of boards, which the compiler only recommends: asked for by a file of it.
+    let library = program("arm-none-eabi-gcc").args(["-print-file-name=rdimon.specs"]).silently();
+    if !library.is_ok_and(|(_, path)| Path::new(path.trim()).is_absolute()) {
+        missing.push("libnewlib-arm-none-eabi");
+    }
     if !missing.is_empty() {
         python::install_debian(&missing)?;
     }
@@ -258,18 +267,23 @@ fn panicking(image: &dyn Fn(&str) -> Program) -> Result<String> {
 
 /// The libraries for C, and the check that no panic can be reached in them.
 fn libraries(tally: &mut Tally) -> Result<()> {
-    libclutch::add(&libclutch::TARGETS)?;
+    if libclutch::add(&libclutch::TARGETS).is_err() && std::env::var_os("CI").is_none() {
+        println!("skipped: libclutch, because rustup cannot add its targets");
+        tally.skip(libclutch::TARGETS.len() as u64 + 1);
+        return Ok(());
+    }
     for target in libclutch::TARGETS {
-        let built = libclutch::built(target, "staticlib").map(|path| path.display().to_string());
-        let (holds, text) = built.map_or_else(|why| (false, why.to_string()), |path| (true, path));
+        let (holds, text) = match libclutch::built(target) {
+            Ok(path) => (true, path.display().to_string()),
+            Err(why) => (false, why.to_string()),
+        };
         tally.check_quiet(
             &format!("libclutch builds for {target}, without a panic that can be reached"),
             (holds, text),
         );
     }
-    let control = libclutch::built(firmware::TARGET, "staticlib,control");
-    let refused = control.is_err_and(|why| why.to_string().contains("a panic can be reached"));
-    tally.check("a panic that is put into libclutch is seen (control)", refused);
+    let seen = libclutch::sees_a_panic(firmware::TARGET)?;
+    tally.check("a panic that is put into libclutch is seen (control)", seen);
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! The header: types and functions from the sources of this crate, names of numbers from their declarations.
 
-use cbindgen::{Builder, Config, Language, LayoutConfig, Style};
+use cbindgen::{Builder, Config, Language, Style};
 use clutch_core::params::Kind;
 use clutch_core::supervisor::{Arrival, Cause, State};
 use clutch_node::{Declared, SETTINGS_HASH, Setting};
@@ -11,21 +11,10 @@ const HEAD: &str = "\
 /* libclutch: slow, smooth motion of shafts restrained by friction. Written by `cargo run -p clutch-c --example header`.
  *
  * Units are SI and radians; positions are in 2^-16 counts of the encoder. A call never allocates, never blocks and never ends
- * the program. Objects live in memory of yours: do not copy them, and do not share one between threads.
+ * the program. Objects live in memory of yours, and one is not used by two threads at once.
  *
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */";
-
-const ALIGNED: &str = "
-/* What an object's memory begins at. */
-#if defined(__cplusplus)
-#define CLUTCH_ALIGNED(n) alignas(n)
-#elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L && !defined(__GNUC__)
-#define CLUTCH_ALIGNED(n) _Alignas(n)
-#else
-#define CLUTCH_ALIGNED(n) __attribute__((aligned(n)))
-#endif
-";
 
 /// The header.
 pub(crate) fn text() -> String {
@@ -37,10 +26,9 @@ pub(crate) fn text() -> String {
         include_guard: Some("CLUTCH_H".to_owned()),
         no_includes: true,
         sys_includes: ["stdbool.h", "stddef.h", "stdint.h"].map(String::from).to_vec(),
-        after_includes: Some(format!("{ALIGNED}{}", numbers())),
+        after_includes: Some(numbers()),
         usize_is_size_t: true,
         line_length: 120,
-        layout: LayoutConfig { aligned_n: Some("CLUTCH_ALIGNED".to_owned()), ..LayoutConfig::default() },
         ..Config::default()
     };
     let mut builder = Builder::new().with_config(config);
@@ -62,7 +50,7 @@ fn numbers() -> String {
         out,
         "\n/* What the keys of a list of settings mean: compare it with clutch_settings_hash(). */\n\
          #define CLUTCH_SETTINGS_HASH UINT64_C({SETTINGS_HASH:#018x})\n\n\
-         /* Settings: those of the options that are chosen are needed, and no others. */\nenum {{"
+         /* Settings: those of the options that are chosen are needed; others are not looked at. */\nenum {{"
     );
     for setting in Setting::all() {
         let name = setting.constant();

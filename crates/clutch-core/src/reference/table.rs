@@ -6,6 +6,7 @@ use crate::{Encoder, FixedCounts, Micros, ParamError, Real};
 
 /// A point of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)] // C has it, too: clutch-c
 pub struct Knot {
     /// Time from the start, µs.
     pub time_us: u64,

@@ -160,6 +160,13 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
+    /// A period goes by without a sample: where control has ended, the safe state takes its next step all the same.
+    pub fn pass<S>(&self, s: &mut SupervisorState<T, S>) {
+        if matches!(s.state, State::Faulted | State::Holding | State::Released) {
+            self.advance_safe(s);
+        }
+    }
+
     /// The board's periods and the host's clock are apart by so many µs: [`Pace`].
     pub fn off_pace<S>(&self, s: &mut SupervisorState<T, S>, micros: i32) {
         self.check(s, Cause::Clock, T::from_i32(micros));

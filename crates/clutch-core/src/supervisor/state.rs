@@ -269,8 +269,9 @@ pub struct Cycle<T: Arithmetic, Terms = LawTerms<T>> {
 /// The periods, of the last 128, in which something happened. `now` is the number of the present period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct History {
-    /// A bit for each period, the lowest for the newest with a mark.
-    marks: u128,
+    /// A bit for each period, the lowest for the newest with a mark; in two words, the lower one first, so that no state needs
+    /// more alignment than a word of 64 bits has.
+    marks: [u64; 2],
     /// The number of that one. So a period in which nothing happens costs nothing.
     newest: u64,
 }
@@ -279,7 +280,14 @@ impl History {
     /// The marks, the lowest bit that of the present period.
     fn seen(&self, now: u64) -> u128 {
         let passed = u32::try_from(now.wrapping_sub(self.newest)).unwrap_or(u32::MAX);
-        self.marks.checked_shl(passed).unwrap_or(0)
+        let [low, high] = self.marks;
+        (u128::from(high) << 64 | u128::from(low)).checked_shl(passed).unwrap_or(0)
+    }
+
+    /// Keeps marks, the lowest bit that of the present period; their number.
+    fn keep(&mut self, marks: u128, now: u64) -> u32 {
+        *self = History { marks: [marks as u64, (marks >> 64) as u64], newest: now };
+        marks.count_ones()
     }
 
     /// Marks the present period; the number of marks.
@@ -289,22 +297,20 @@ impl History {
     pub(super) fn mark(&mut self, now: u64) -> u32 {
         let seen = self.seen(now);
         // A period that has a mark already marks one before it: each event counts.
-        *self = History { marks: seen | seen.wrapping_add(1), newest: now };
-        self.marks.count_ones()
+        self.keep(seen | seen.wrapping_add(1), now)
     }
 
     /// Marks the present period and those before it, so many in all, none of which has a mark; the number of marks.
     pub(super) fn mark_many(&mut self, periods: u32, now: u64) -> u32 {
         let many = 1_u128.checked_shl(periods).unwrap_or(0).wrapping_sub(1);
-        *self = History { marks: self.seen(now) | many, newest: now };
-        self.marks.count_ones()
+        self.keep(self.seen(now) | many, now)
     }
 
     /// True if there is a mark.
     #[inline]
     pub(super) fn any(&self, now: u64) -> bool {
         // The newest period with a mark has the lowest bit.
-        self.marks as u32 & 1 != 0 && now.wrapping_sub(self.newest) < 128
+        self.marks[0] as u32 & 1 != 0 && now.wrapping_sub(self.newest) < 128
     }
 }
 

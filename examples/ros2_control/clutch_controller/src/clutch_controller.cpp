@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 #include "clutch_controller/clutch_controller.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "pluginlib/class_list_macros.hpp"
@@ -41,6 +42,10 @@ CallbackReturn ClutchController::on_configure(const rclcpp_lifecycle::State &)
   if (joint_.empty() || !built || clutch_axis_safe(&axis_, &safe) != CLUTCH_OK) {
     return CallbackReturn::ERROR;
   }
+  // After a deactivation nobody calls update(): a safe state that goes on step by step would stop after its first.
+  if (safe.kind != CLUTCH_SAFE_HOLD && safe.kind != CLUTCH_SAFE_RELEASE) {
+    return CallbackReturn::ERROR;
+  }
   code_ = safe.hold;
   return CallbackReturn::SUCCESS;
 }
@@ -49,6 +54,7 @@ CallbackReturn ClutchController::on_activate(const rclcpp_lifecycle::State &)
 {
   // After an end that was wanted, or a fault that somebody has seen.
   clutch_axis_acknowledge(&axis_);
+  started_ = false;
   const bool driving = clutch_axis_consent(&axis_, code_) == CLUTCH_OK;
   return driving ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
 }
@@ -62,16 +68,22 @@ CallbackReturn ClutchController::on_deactivate(const rclcpp_lifecycle::State &)
 
 return_type ClutchController::update(const rclcpp::Time & time, const rclcpp::Duration &)
 {
-  const double position = state_interfaces_[0].get_value();
+  constexpr double turn = 6.283185307179586;
+  const double counts = std::floor(state_interfaces_[0].get_value() * run_counts_per_rev / turn);
+  const std::uint64_t now_us = static_cast<std::uint64_t>(time.nanoseconds() / 1000);
+  // A period that the manager left out is a sample that was lost.
+  const std::uint64_t passed = started_ ? (now_us - last_us_ + run_period_us / 2) / run_period_us : 1;
+  sequence_ = static_cast<std::uint16_t>(sequence_ + std::min<std::uint64_t>(passed, 0x7fff));
+  last_us_ = now_us;
+  started_ = true;
   clutch_sample sample = {};
-  // The manager calls once a period; what it leaves out shows in the time.
-  sample.sequence = sequence_++;
-  sample.time_us = static_cast<std::uint32_t>(time.nanoseconds() / 1000);
-  sample.encoder_fault = !std::isfinite(position);
-  if (std::isfinite(position)) {
-    constexpr double turn = 6.283185307179586;
-    const double counts = std::floor(position * run_counts_per_rev / turn);
-    sample.counts = static_cast<std::int32_t>(static_cast<std::int64_t>(counts));
+  sample.sequence = sequence_;
+  sample.time_us = static_cast<std::uint32_t>(now_us);
+  // Counts wrap; a position that is none, or that no shaft has, is a fault of the encoder.
+  if (std::isfinite(counts) && std::abs(counts) < 1e15) {
+    sample.counts = static_cast<std::int32_t>(static_cast<std::uint32_t>(static_cast<std::int64_t>(counts)));
+  } else {
+    sample.encoder_fault = 1;
   }
   sample.board = CLUTCH_BOARD_DRIVING;
   clutch_cycle cycle;
@@ -84,7 +96,8 @@ return_type ClutchController::update(const rclcpp::Time & time, const rclcpp::Du
   if (cycle.answered || state >= CLUTCH_STATE_HOLDING) {
     code_ = code;
   }
-  return write(code_) ? return_type::OK : return_type::ERROR;
+  // The manager deactivates a controller that reports an error: after a fault the output stays in the safe state.
+  return write(code_) && state != CLUTCH_STATE_FAULTED ? return_type::OK : return_type::ERROR;
 }
 
 bool ClutchController::write(std::uint16_t code)

@@ -17,7 +17,6 @@ const int PIN_A = 2, PIN_B = 3, PIN_CONSENT = 4;
 ClutchAxis axis;
 volatile int32_t counts = 0;
 uint32_t next = 0;
-uint16_t code = 0;
 bool consented = false;
 
 void edge()
@@ -36,7 +35,9 @@ void setup()
     pinMode(PIN_A, INPUT_PULLUP);
     pinMode(PIN_B, INPUT_PULLUP);
     pinMode(PIN_CONSENT, INPUT_PULLUP);
+    /* Before anything that takes time: the brake holds. Until here the output floats; a resistor has to hold it where the brake is on. */
     analogWriteResolution(12);
+    analogWrite(A0, run_safe_code);
     if (!axis.begin(run_settings, run_settings_count, run_knots, run_knots_count, run_period_us)) {
         Serial.print("the settings make no run: key ");
         Serial.println(axis.misfit().key);
@@ -45,6 +46,8 @@ void setup()
     }
     attachInterrupt(digitalPinToInterrupt(PIN_A), edge, CHANGE);
     attachInterrupt(digitalPinToInterrupt(PIN_B), edge, CHANGE);
+    /* A switch that is closed already is no consent: somebody has to open it first, and to close it. */
+    consented = digitalRead(PIN_CONSENT) == LOW;
     next = micros();
 }
 
@@ -57,7 +60,7 @@ void loop()
     const bool wanted = digitalRead(PIN_CONSENT) == LOW;
     if (wanted && !consented) {
         axis.acknowledge();
-        axis.consent(code);
+        axis.consent(axis.code());
     } else if (!wanted && consented) {
         axis.stop();
     }
@@ -65,6 +68,5 @@ void loop()
     noInterrupts();
     const int32_t now = counts;
     interrupts();
-    code = axis.update(now, micros());
-    analogWrite(A0, code);
+    analogWrite(A0, axis.update(now, micros()));
 }
