@@ -22,6 +22,7 @@ mod reproduce;
 mod run_figure;
 mod sampled;
 mod scenario;
+mod shell;
 mod signals;
 mod sim;
 mod sweep;
@@ -80,6 +81,8 @@ enum Verb {
     Friction(friction::FrictionVerb),
     Referee(referee::Referee),
     Reproduce(reproduce::Reproduce),
+    Completion(shell::Completion),
+    Man(shell::Man),
 }
 
 /// A verb written in other letters is the verb: clap compares them as they are.
@@ -123,6 +126,8 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Friction(v) => v.run(),
         Verb::Referee(v) => v.run(),
         Verb::Reproduce(v) => v.run(),
+        Verb::Completion(v) => v.run(Cli::command()),
+        Verb::Man(v) => v.run(Cli::command()),
     };
     match outcome {
         Ok(Exit::Done) => 0,

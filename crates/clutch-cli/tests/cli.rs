@@ -50,6 +50,8 @@ fn the_help_of_every_verb_has_an_example() {
         &["log", "info", "--help"],
         &["log", "recover", "--help"],
         &["referee", "--help"],
+        &["completion", "--help"],
+        &["man", "--help"],
     ] {
         let o = clutch(verb);
         assert!(o.status.success());
@@ -775,4 +777,64 @@ fn rows_that_a_sweep_refuses_say_why_and_a_sweep_without_any_other_leaves_no_fil
     assert!(err(&o).contains("none of the first 2 rows is a scenario that runs: "), "{}", err(&o));
     assert!(err(&o).contains("did you mean kp_v_rad?"), "{}", err(&o));
     assert!(!none.exists());
+}
+
+/// The verbs, as the help lists them.
+fn verbs() -> Vec<String> {
+    let help = out(&clutch(&["--help"]));
+    let (_, list) = help.split_once("Commands:\n").expect("a list of verbs");
+    let list = list.lines().take_while(|line| !line.is_empty());
+    let names = list.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
+    names.filter(|name| !name.is_empty() && *name != "help").map(str::to_owned).collect()
+}
+
+#[test]
+fn every_shell_completes_every_verb_and_bash_can_read_its_script() {
+    let verbs = verbs();
+    assert!(verbs.len() >= 18 && verbs.iter().any(|verb| verb == "completion"), "{verbs:?}");
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let o = clutch(&["--quiet", "completion", shell]);
+        assert!(o.status.success(), "{}", err(&o));
+        let script = out(&o);
+        let words: Vec<&str> =
+            script.split(|c: char| !(c.is_alphanumeric() || c == '-' || c == '_')).collect();
+        for word in verbs.iter().map(String::as_str).chain(["--quiet", "--resume"]) {
+            // fish writes an option without its hyphens.
+            let found =
+                words.contains(&word) || (shell == "fish" && words.contains(&word.trim_start_matches('-')));
+            assert!(found, "{shell} does not know {word}");
+        }
+        if shell == "bash" {
+            let file = folder("completion").join("clutch.bash");
+            std::fs::write(&file, &script).expect("a file");
+            let read = Command::new("bash").arg("-n").arg(&file).output().expect("bash");
+            assert!(read.status.success() && read.stderr.is_empty(), "{}", err(&read));
+        }
+    }
+    assert_eq!(clutch(&["completion", "csh"]).status.code(), Some(64));
+}
+
+#[test]
+fn the_manual_has_a_page_for_every_verb() {
+    let dir = folder("man").join("man1");
+    let name = dir.to_str().expect("UTF-8");
+    for _ in 0..2 {
+        // The second time over the first, as an upgrade does.
+        let o = clutch(&["--quiet", "man", "--out", name]);
+        assert!(o.status.success() && out(&o).is_empty(), "{}{}", out(&o), err(&o));
+    }
+    let page = |name: &str| std::fs::read_to_string(dir.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let start = page("clutch.1");
+    for verb in verbs() {
+        let text = page(&format!("clutch-{verb}.1"));
+        for part in
+            [format!(".TH clutch-{verb} 1 "), ".SH NAME".into(), ".SH SYNOPSIS".into(), ".SH OPTIONS".into()]
+        {
+            assert!(text.contains(&part), "{verb}: no {part}:\n{text}");
+        }
+        assert!(start.contains(&format!("clutch\\-{verb}(1)")), "clutch.1 does not name {verb}");
+    }
+    let o = clutch(&["man", "--out", dir.join("clutch.1").to_str().expect("UTF-8")]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("clutch.1: pages cannot be written"), "{}", err(&o));
 }
