@@ -7,6 +7,7 @@ mod c_header;
 pub mod certify;
 mod compare;
 mod daq;
+mod export;
 mod friction;
 mod hil;
 pub mod identify;

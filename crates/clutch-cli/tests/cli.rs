@@ -49,6 +49,7 @@ fn the_help_of_every_verb_has_an_example() {
         &["replay", "--help"],
         &["log", "info", "--help"],
         &["log", "recover", "--help"],
+        &["log", "export", "--help"],
         &["referee", "--help"],
         &["completion", "--help"],
         &["man", "--help"],
@@ -834,7 +835,89 @@ fn the_manual_has_a_page_for_every_verb() {
         }
         assert!(start.contains(&format!("clutch\\-{verb}(1)")), "clutch.1 does not name {verb}");
     }
+    assert!(page("clutch-log-export.1").contains("\\-\\-channel"));
     let o = clutch(&["man", "--out", dir.join("clutch.1").to_str().expect("UTF-8")]);
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).contains("clutch.1: pages cannot be written"), "{}", err(&o));
+}
+
+/// Columns and rows of a table.
+fn rows_of(file: &Path) -> (Vec<String>, Vec<Vec<String>>) {
+    let text = std::fs::read_to_string(file).expect("a table");
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    (lines.next().expect("a header"), lines.collect())
+}
+
+#[test]
+fn a_table_of_a_log_reads_back_as_the_logs_records_bit_for_bit() {
+    use clutch_log::{InChannel, Kind, Limits, Value, names::name_of};
+
+    fn compare<R: InChannel>(records: &[R], terms: &[String], file: &Path) {
+        let (header, rows) = rows_of(file);
+        let columns = R::CHANNEL.columns(terms);
+        let names: Vec<&str> =
+            ["time_s"].into_iter().chain(columns.iter().map(|(name, _)| name.as_str())).collect();
+        assert_eq!(header, names);
+        assert_eq!(rows.len(), records.len());
+        for (row, record) in rows.iter().zip(records) {
+            let time: f64 = row[0].parse().expect("a time");
+            assert_eq!((time * 1e9).round() as u64, record.time_ns());
+            let values: Vec<Value> = record.values().collect();
+            assert_eq!(row.len(), 1 + values.len());
+            for ((text, value), (name, kind)) in row[1..].iter().zip(values).zip(&columns) {
+                let same = match (value, kind) {
+                    (Value::Real(x), _) => {
+                        text.parse::<f64>().is_ok_and(|found| found.to_bits() == x.to_bits())
+                    }
+                    (Value::Flag(x), _) => *text == u8::from(x).to_string(),
+                    (Value::Whole(x), Kind::Enum(_, names)) => text == name_of(names, x as u8),
+                    (Value::Whole(x), _) => text.parse() == Ok(x),
+                };
+                assert!(same, "{name}: {text} for {value:?}");
+            }
+        }
+    }
+
+    let dir = folder("log_export");
+    let path = |name: &str| dir.join(name).display().to_string();
+    let log = path("run.mcap");
+    let o = clutch(&["sim", "smc_2", "--set", "run.duration_s=1.2", "--log", &log]);
+    assert!(o.status.success(), "{}", err(&o));
+    let read = clutch_log::read(&log, &Limits::default()).expect("a log");
+    assert!(read.samples.len() > 900 && read.truths.len() > 900 && !read.header.term_names.is_empty());
+    for channel in ["sample", "command", "truth"] {
+        let table = dir.join(format!("{channel}.csv"));
+        let o =
+            clutch(&["log", "export", &log, "--channel", channel, "--out", table.to_str().expect("UTF-8")]);
+        assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+        assert!(narrow(&out(&o)) && out(&o).contains(" rows\nwrote "), "{}", out(&o));
+        match channel {
+            "sample" => compare(&read.samples, &read.header.term_names, &table),
+            "command" => compare(&read.commands, &read.header.term_names, &table),
+            _ => compare(&read.truths, &read.header.term_names, &table),
+        }
+    }
+
+    // What is there stays; what is no table is refused, and nothing is left behind.
+    let before = std::fs::read(dir.join("command.csv")).expect("a table");
+    let again = clutch(&["log", "export", &log, "--out", &path("command.csv")]);
+    assert_eq!(again.status.code(), Some(1));
+    assert!(err(&again).contains("command.csv: exists already"), "{}", err(&again));
+    assert!(std::fs::read(dir.join("command.csv")).expect("a table") == before);
+    let parquet = clutch(&["log", "export", &log, "--out", &path("run.parquet")]);
+    assert!(err(&parquet).contains("ends with .csv; for Parquet, in Python:"), "{}", err(&parquet));
+    let none = clutch(&["log", "export", &path("sample.csv"), "--out", &path("none.csv")]);
+    assert_eq!(none.status.code(), Some(1), "{}", out(&none));
+    assert!(!dir.join("none.csv").exists() && !dir.join("run.parquet").exists());
+    let other = clutch(&["log", "export", &log, "--channel", "commands", "--out", &path("none.csv")]);
+    assert_eq!(other.status.code(), Some(64));
+
+    // A log that was cut gives its part.
+    let bytes = std::fs::read(&log).expect("a log");
+    std::fs::write(path("cut.mcap"), &bytes[..bytes.len() * 3 / 4]).expect("a file");
+    let o = clutch(&["-q", "log", "export", &path("cut.mcap"), "--out", &path("cut.csv")]);
+    assert_eq!(o.status.code(), Some(5), "{}", err(&o));
+    let (_, part) = rows_of(&dir.join("cut.csv"));
+    let (_, whole) = rows_of(&dir.join("command.csv"));
+    assert!(!part.is_empty() && part.len() < whole.len() && part == whole[..part.len()]);
 }
