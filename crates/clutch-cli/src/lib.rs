@@ -8,6 +8,7 @@ pub mod certify;
 mod compare;
 #[cfg(target_os = "linux")]
 mod daq;
+mod export;
 mod friction;
 #[cfg(target_os = "linux")]
 mod hil;
@@ -25,6 +26,7 @@ mod reproduce;
 mod run_figure;
 mod sampled;
 mod scenario;
+mod shell;
 mod signals;
 mod sim;
 mod sweep;
@@ -87,6 +89,8 @@ enum Verb {
     Friction(friction::FrictionVerb),
     Referee(referee::Referee),
     Reproduce(reproduce::Reproduce),
+    Completion(shell::Completion),
+    Man(shell::Man),
 }
 
 /// A verb written in other letters is the verb: clap compares them as they are.
@@ -133,6 +137,8 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Friction(v) => v.run(),
         Verb::Referee(v) => v.run(),
         Verb::Reproduce(v) => v.run(),
+        Verb::Completion(v) => v.run(Cli::command()),
+        Verb::Man(v) => v.run(Cli::command()),
     };
     match outcome {
         Ok(Exit::Done) => 0,

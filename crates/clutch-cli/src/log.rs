@@ -1,11 +1,12 @@
 //! `clutch log`.
 
+use crate::export::Export;
 use crate::output::{Exit, print};
 use clap::{Args, Subcommand};
 use clutch_log::Limits;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Inspects logs, and recovers those that were cut.
+/// Inspects logs, recovers those that were cut, and makes tables of them.
 #[derive(Args)]
 pub(crate) struct Log {
     #[command(subcommand)]
@@ -33,6 +34,22 @@ enum Verb {
         #[arg(value_name = "NEW.mcap")]
         to: PathBuf,
     },
+    /// Writes a channel as a table in CSV: a row a record, units in the columns' names.
+    ///
+    /// Each number reads back as the same number. Exit code 5: the log ended early, or is damaged;
+    /// the table has what can be read.
+    #[command(
+        after_help = "Example:\n  clutch log export run.mcap --out run.csv\n  clutch log export run.mcap --channel sample --out samples.csv"
+    )]
+    Export(Export),
+}
+
+/// A file is never written over: it may be the only record of a run.
+pub(crate) fn new_file(path: &Path) -> anyhow::Result<()> {
+    if path.exists() {
+        anyhow::bail!("{}: exists already; name a new file", path.display());
+    }
+    Ok(())
 }
 
 impl Log {
@@ -44,11 +61,10 @@ impl Log {
                 return Ok(if info.complete { Exit::Done } else { Exit::Incomplete });
             }
             Verb::Recover { from, to } => {
-                if to.exists() {
-                    anyhow::bail!("{}: exists already; name a new file", to.display());
-                }
+                new_file(&to)?;
                 clutch_log::recover(&from, &to, &Limits::default())?.to_string()
             }
+            Verb::Export(export) => return export.run(),
         };
         print(&(text.trim_end().to_owned() + "\n"))?;
         Ok(Exit::Done)

@@ -49,7 +49,10 @@ fn the_help_of_every_verb_has_an_example() {
         &["replay", "--help"],
         &["log", "info", "--help"],
         &["log", "recover", "--help"],
+        &["log", "export", "--help"],
         &["referee", "--help"],
+        &["completion", "--help"],
+        &["man", "--help"],
     ] {
         let o = clutch(verb);
         assert!(o.status.success());
@@ -775,4 +778,146 @@ fn rows_that_a_sweep_refuses_say_why_and_a_sweep_without_any_other_leaves_no_fil
     assert!(err(&o).contains("none of the first 2 rows is a scenario that runs: "), "{}", err(&o));
     assert!(err(&o).contains("did you mean kp_v_rad?"), "{}", err(&o));
     assert!(!none.exists());
+}
+
+/// The verbs, as the help lists them.
+fn verbs() -> Vec<String> {
+    let help = out(&clutch(&["--help"]));
+    let (_, list) = help.split_once("Commands:\n").expect("a list of verbs");
+    let list = list.lines().take_while(|line| !line.is_empty());
+    let names = list.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
+    names.filter(|name| !name.is_empty() && *name != "help").map(str::to_owned).collect()
+}
+
+#[test]
+fn every_shell_completes_every_verb_and_bash_can_read_its_script() {
+    let verbs = verbs();
+    assert!(verbs.len() >= 18 && verbs.iter().any(|verb| verb == "completion"), "{verbs:?}");
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let o = clutch(&["--quiet", "completion", shell]);
+        assert!(o.status.success(), "{}", err(&o));
+        let script = out(&o);
+        let words: Vec<&str> =
+            script.split(|c: char| !(c.is_alphanumeric() || c == '-' || c == '_')).collect();
+        for word in verbs.iter().map(String::as_str).chain(["--quiet", "--resume"]) {
+            // fish writes an option without its hyphens.
+            let found =
+                words.contains(&word) || (shell == "fish" && words.contains(&word.trim_start_matches('-')));
+            assert!(found, "{shell} does not know {word}");
+        }
+        if shell == "bash" {
+            let file = folder("completion").join("clutch.bash");
+            std::fs::write(&file, &script).expect("a file");
+            let read = Command::new("bash").arg("-n").arg(&file).output().expect("bash");
+            assert!(read.status.success() && read.stderr.is_empty(), "{}", err(&read));
+        }
+    }
+    assert_eq!(clutch(&["completion", "csh"]).status.code(), Some(64));
+}
+
+#[test]
+fn the_manual_has_a_page_for_every_verb() {
+    let dir = folder("man").join("man1");
+    let name = dir.to_str().expect("UTF-8");
+    for _ in 0..2 {
+        // The second time over the first, as an upgrade does.
+        let o = clutch(&["--quiet", "man", "--out", name]);
+        assert!(o.status.success() && out(&o).is_empty(), "{}{}", out(&o), err(&o));
+    }
+    let page = |name: &str| std::fs::read_to_string(dir.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let start = page("clutch.1");
+    for verb in verbs() {
+        let text = page(&format!("clutch-{verb}.1"));
+        for part in
+            [format!(".TH clutch-{verb} 1 "), ".SH NAME".into(), ".SH SYNOPSIS".into(), ".SH OPTIONS".into()]
+        {
+            assert!(text.contains(&part), "{verb}: no {part}:\n{text}");
+        }
+        assert!(start.contains(&format!("clutch\\-{verb}(1)")), "clutch.1 does not name {verb}");
+    }
+    assert!(page("clutch-log-export.1").contains("\\-\\-channel"));
+    let o = clutch(&["man", "--out", dir.join("clutch.1").to_str().expect("UTF-8")]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(err(&o).contains("clutch.1: pages cannot be written"), "{}", err(&o));
+}
+
+/// Columns and rows of a table.
+fn rows_of(file: &Path) -> (Vec<String>, Vec<Vec<String>>) {
+    let text = std::fs::read_to_string(file).expect("a table");
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    (lines.next().expect("a header"), lines.collect())
+}
+
+#[test]
+fn a_table_of_a_log_reads_back_as_the_logs_records_bit_for_bit() {
+    use clutch_log::{InChannel, Kind, Limits, Value, names::name_of};
+
+    fn compare<R: InChannel>(records: &[R], terms: &[String], file: &Path) {
+        let (header, rows) = rows_of(file);
+        let columns = R::CHANNEL.columns(terms);
+        let names: Vec<&str> =
+            ["time_s"].into_iter().chain(columns.iter().map(|(name, _)| name.as_str())).collect();
+        assert_eq!(header, names);
+        assert_eq!(rows.len(), records.len());
+        for (row, record) in rows.iter().zip(records) {
+            let time: f64 = row[0].parse().expect("a time");
+            assert_eq!((time * 1e9).round() as u64, record.time_ns());
+            let values: Vec<Value> = record.values().collect();
+            assert_eq!(row.len(), 1 + values.len());
+            for ((text, value), (name, kind)) in row[1..].iter().zip(values).zip(&columns) {
+                let same = match (value, kind) {
+                    (Value::Real(x), _) => {
+                        text.parse::<f64>().is_ok_and(|found| found.to_bits() == x.to_bits())
+                    }
+                    (Value::Flag(x), _) => *text == u8::from(x).to_string(),
+                    (Value::Whole(x), Kind::Enum(_, names)) => text == name_of(names, x as u8),
+                    (Value::Whole(x), _) => text.parse() == Ok(x),
+                };
+                assert!(same, "{name}: {text} for {value:?}");
+            }
+        }
+    }
+
+    let dir = folder("log_export");
+    let path = |name: &str| dir.join(name).display().to_string();
+    let log = path("run.mcap");
+    let o = clutch(&["sim", "smc_2", "--set", "run.duration_s=1.2", "--log", &log]);
+    assert!(o.status.success(), "{}", err(&o));
+    let read = clutch_log::read(&log, &Limits::default()).expect("a log");
+    assert!(read.samples.len() > 900 && read.truths.len() > 900 && !read.header.term_names.is_empty());
+    for channel in ["sample", "command", "truth"] {
+        let table = dir.join(format!("{channel}.csv"));
+        let o =
+            clutch(&["log", "export", &log, "--channel", channel, "--out", table.to_str().expect("UTF-8")]);
+        assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+        assert!(narrow(&out(&o)) && out(&o).contains(" rows\nwrote "), "{}", out(&o));
+        match channel {
+            "sample" => compare(&read.samples, &read.header.term_names, &table),
+            "command" => compare(&read.commands, &read.header.term_names, &table),
+            _ => compare(&read.truths, &read.header.term_names, &table),
+        }
+    }
+
+    // What is there stays; what is no table is refused, and nothing is left behind.
+    let before = std::fs::read(dir.join("command.csv")).expect("a table");
+    let again = clutch(&["log", "export", &log, "--out", &path("command.csv")]);
+    assert_eq!(again.status.code(), Some(1));
+    assert!(err(&again).contains("command.csv: exists already"), "{}", err(&again));
+    assert!(std::fs::read(dir.join("command.csv")).expect("a table") == before);
+    let parquet = clutch(&["log", "export", &log, "--out", &path("run.parquet")]);
+    assert!(err(&parquet).contains("ends with .csv; for Parquet, in Python:"), "{}", err(&parquet));
+    let none = clutch(&["log", "export", &path("sample.csv"), "--out", &path("none.csv")]);
+    assert_eq!(none.status.code(), Some(1), "{}", out(&none));
+    assert!(!dir.join("none.csv").exists() && !dir.join("run.parquet").exists());
+    let other = clutch(&["log", "export", &log, "--channel", "commands", "--out", &path("none.csv")]);
+    assert_eq!(other.status.code(), Some(64));
+
+    // A log that was cut gives its part.
+    let bytes = std::fs::read(&log).expect("a log");
+    std::fs::write(path("cut.mcap"), &bytes[..bytes.len() * 3 / 4]).expect("a file");
+    let o = clutch(&["-q", "log", "export", &path("cut.mcap"), "--out", &path("cut.csv")]);
+    assert_eq!(o.status.code(), Some(5), "{}", err(&o));
+    let (_, part) = rows_of(&dir.join("cut.csv"));
+    let (_, whole) = rows_of(&dir.join("command.csv"));
+    assert!(!part.is_empty() && part.len() < whole.len() && part == whole[..part.len()]);
 }
