@@ -15,9 +15,9 @@ if os.environ.get("CI"):
     import fmpy
 else:
     fmpy = pytest.importorskip("fmpy")
-from fmpy.fmi1 import FMICallException  # noqa: E402
-from fmpy.fmi3 import FMU3Slave  # noqa: E402
-from fmpy.validation import validate_fmu  # noqa: E402
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Slave
+from fmpy.validation import validate_fmu
 
 
 @pytest.fixture(scope="module")
