@@ -123,7 +123,7 @@ pub(crate) unsafe fn built(
         let at = settings.binary_search_by_key(&key, |setting| setting.key).ok()?;
         settings.get(at).map(|setting| setting.value)
     };
-    match Built::new(&number, knots.get()) {
+    match Built::new(number, knots.get()) {
         Ok(built) => {
             if !misfit.is_null() {
                 // SAFETY: the caller's promise.

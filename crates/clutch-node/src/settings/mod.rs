@@ -240,15 +240,14 @@ impl Settings {
     /// As [`Built::new`].
     pub fn build(&self) -> Result<Built, Misfit> {
         let whole = usize::from(self.set_knots / 2);
-        Built::new(&|key| self.get(key), self.knots.get(..whole).unwrap_or(&[])).map_err(
-            |misfit| match misfit {
-                // Of a point whose time is set, the position is what is missing.
-                Misfit::Missing(key) if key >= FIRST_KNOT => {
-                    Misfit::Missing(FIRST_KNOT.wrapping_add(self.set_knots))
-                }
-                misfit => misfit,
-            },
-        )
+        Built::new(|key| self.get(key), self.knots.get(..whole).unwrap_or(&[])).map_err(|misfit| match misfit
+        {
+            // Of a point whose time is set, the position is what is missing.
+            Misfit::Missing(key) if key >= FIRST_KNOT => {
+                Misfit::Missing(FIRST_KNOT.wrapping_add(self.set_knots))
+            }
+            misfit => misfit,
+        })
     }
 }
 
@@ -258,9 +257,9 @@ impl Built {
     ///
     /// # Errors
     /// A setting or a point that is missing, a choice that is not known, a number that a constructor refuses.
-    pub fn new(number: &dyn Fn(u16) -> Option<u64>, knots: &[Knot]) -> Result<Built, Misfit> {
+    pub fn new<F: Fn(u16) -> Option<u64>>(number: F, knots: &[Knot]) -> Result<Built, Misfit> {
         let mut run = <RunSettings<'static> as Params<f32>>::blank();
-        let mut reader = Reader::new(number);
+        let mut reader = Reader::new(&number);
         let points = reader.walk(&mut run, 0).min(MAX_KNOTS as u64);
         // The parameters now hold the values that were sent, or they cannot hold them.
         reader.read = true;
@@ -324,8 +323,8 @@ impl Visit for Writer<'_> {
 }
 
 /// Gives settings to a run's parameters.
-struct Reader<'a> {
-    number: &'a dyn Fn(u16) -> Option<u64>,
+struct Reader<'a, F> {
+    number: &'a F,
     /// The parameters have been read before.
     read: bool,
     /// The next one is a real number.
@@ -338,8 +337,8 @@ struct Reader<'a> {
     exact: bool,
 }
 
-impl<'a> Reader<'a> {
-    fn new(number: &'a dyn Fn(u16) -> Option<u64>) -> Self {
+impl<'a, F: Fn(u16) -> Option<u64>> Reader<'a, F> {
+    fn new(number: &'a F) -> Self {
         Reader { number, read: false, real: false, misfit: None, error: None, key: None, exact: false }
     }
 
@@ -352,7 +351,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-impl Visit for &mut Reader<'_> {
+impl<F: Fn(u16) -> Option<u64>> Visit for &mut Reader<'_, F> {
     fn real(&mut self) {
         self.real = true;
     }
