@@ -240,14 +240,8 @@ impl Settings {
     /// As [`Built::new`].
     pub fn build(&self) -> Result<Built, Misfit> {
         let whole = usize::from(self.set_knots / 2);
-        Built::new(|key| self.get(key), self.knots.get(..whole).unwrap_or(&[])).map_err(|misfit| match misfit
-        {
-            // Of a point whose time is set, the position is what is missing.
-            Misfit::Missing(key) if key >= FIRST_KNOT => {
-                Misfit::Missing(FIRST_KNOT.wrapping_add(self.set_knots))
-            }
-            misfit => misfit,
-        })
+        let lacks = FIRST_KNOT.wrapping_add(self.set_knots);
+        Built::from_numbers(|key| self.get(key), self.knots.get(..whole).unwrap_or(&[]), lacks)
     }
 }
 
@@ -258,6 +252,16 @@ impl Built {
     /// # Errors
     /// A setting or a point that is missing, a choice that is not known, a number that a constructor refuses.
     pub fn new<F: Fn(u16) -> Option<u64>>(number: F, knots: &[Knot]) -> Result<Built, Misfit> {
+        let lacks = FIRST_KNOT.wrapping_add((knots.len() as u16).wrapping_mul(2));
+        Built::from_numbers(number, knots, lacks)
+    }
+
+    /// The same; `lacks` is the key of the first number of a point that is not there.
+    fn from_numbers<F: Fn(u16) -> Option<u64>>(
+        number: F,
+        knots: &[Knot],
+        lacks: u16,
+    ) -> Result<Built, Misfit> {
         let mut run = <RunSettings<'static> as Params<f32>>::blank();
         let mut reader = Reader::new(&number);
         let points = reader.walk(&mut run, 0).min(MAX_KNOTS as u64);
@@ -268,7 +272,7 @@ impl Built {
             return Err(misfit);
         }
         let Some(knots) = knots.get(..points as usize) else {
-            return Err(Misfit::Missing(FIRST_KNOT.wrapping_add((knots.len() as u16).wrapping_mul(2))));
+            return Err(Misfit::Missing(lacks));
         };
         Built::from(&run, knots).map_err(|error| {
             reader.error = Some(error);
