@@ -33,7 +33,7 @@ int main(void)
 {
     static clutch_axis axis;
     clutch_misfit misfit;
-    if (clutch_axis_build(&axis, run_settings, run_settings_count, run_knots, run_knots_count, &misfit) != CLUTCH_OK) {
+    if (clutch_axis_build(&axis, &run, &misfit) != CLUTCH_OK) {
         printf("the settings make no run: key %u, value %g\n", misfit.key, (double)misfit.value);
         return 1;
     }

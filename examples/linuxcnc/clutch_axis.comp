@@ -41,7 +41,7 @@ FUNCTION(_)
     if (!own->built) {
         own->built = 1;
         own->refused = period != 1000L * run_period_us
-            || clutch_axis_build(&own->axis, run_settings, run_settings_count, run_knots, run_knots_count, 0) != CLUTCH_OK;
+            || clutch_axis_build(&own->axis, &run, NULL) != CLUTCH_OK;
         /* Before anybody has consented the converter holds what the safe state holds. */
         *own->code = run_safe_code;
         *own->volts = run_safe_v;

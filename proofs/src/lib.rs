@@ -35,7 +35,7 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     core::arch::wasm32::unreachable()
 }
 
-/// What must hold.
+/// The property.
 #[inline(always)]
 fn claim(holds: bool) {
     if !holds {

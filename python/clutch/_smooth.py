@@ -74,7 +74,7 @@ class SmoothSpeed:
 
     @dataclass(frozen=True, kw_only=True)
     class Evidence:
-        """What the causes follow from, at a rate. The theory is in docs/theory.md, section 15.
+        """The ground from which the causes follow, at a rate. The theory is in docs/theory.md, section 15.
 
         Attributes
         ----------

@@ -1,4 +1,4 @@
-"""What a rig is, and the gains for it."""
+"""Identification of a rig, and the gains for it."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Estimate:
 
 
 class Identified:
-    """What a rig was found to be, as :func:`clutch.identify` returns it.
+    """A rig as it was found to be, as :func:`clutch.identify` returns it.
 
     Attributes
     ----------

@@ -56,7 +56,7 @@ class Shaft:
 
 @dataclass
 class Lie:
-    """What a board says or does from an onset on; each takes what is true, and its own memory."""
+    """The words and deeds of a board from an onset on; each takes what is true, and its own memory."""
 
     name: str
     counts: object = None  # (true counts, those at the onset, memory) -> said
@@ -142,7 +142,7 @@ volts_v = {hold}
 
 @dataclass
 class Outcome:
-    """How a trial went."""
+    """The course of a trial."""
 
     code: int | None = None
     text: str = ""
@@ -169,7 +169,7 @@ class Board:
         self.outcome, self.received, self.failure = Outcome(), bytearray(), None
 
     def volts(self):
-        """What the converter gives."""
+        """The voltage of the converter."""
         asked = -10.0 + 20.0 * self.code / 4096
         if self.lied_from is None or self.lie.volts is None:
             return asked
@@ -218,7 +218,7 @@ class Board:
                 continue
 
     def message(self, name, m):
-        """What docs/wire.md asks of a board."""
+        """The duties of a board by docs/wire.md."""
         if name == "Discover":
             hello = {"board": 0, "boot": 77, "counts_per_rev": COUNTS, "dac_bits": 12, "dac_lowest_mv": -10_000}
             hello |= {"dac_highest_mv": 10_000, "period_min_us": 100, "period_max_us": 1_000_000}
@@ -304,7 +304,7 @@ def trial(clutch, lie, seed):
 
 
 def wrong(lie, outcome):
-    """What is wrong with an outcome, if something is."""
+    """The fault of an outcome, if it has one."""
     if lie.boot:
         armed = outcome.lied is not None or outcome.ended is not None
         return "it was armed" if armed or outcome.code == 0 else None

@@ -27,22 +27,20 @@ fn list(settings: &Settings) -> Vec<clutch_setting> {
     list
 }
 
+/// A run on a ramp, as C has it.
+pub(super) fn run(settings: &[clutch_setting]) -> clutch_run {
+    clutch_run { settings: settings.as_ptr(), settings_count: settings.len(), knots: null(), knots_count: 0 }
+}
+
 /// Builds an axis.
 pub(super) fn build(
     axis: &mut MaybeUninit<clutch_axis>,
     settings: &[clutch_setting],
 ) -> (clutch_result, clutch_misfit) {
-    let mut misfit = MaybeUninit::uninit();
+    let (run, mut misfit) = (run(settings), MaybeUninit::uninit());
     // SAFETY: the memory is there for the time of the call.
     unsafe {
-        let result = clutch_axis_build(
-            axis.as_mut_ptr(),
-            settings.as_ptr(),
-            settings.len(),
-            null(),
-            0,
-            misfit.as_mut_ptr(),
-        );
+        let result = clutch_axis_build(axis.as_mut_ptr(), &raw const run, misfit.as_mut_ptr());
         (result, misfit.assume_init())
     }
 }

@@ -60,7 +60,7 @@ static void put_real(float value)
 }
 
 /* One run; 0 at the end of the file. */
-static int run(void)
+static int one_run(void)
 {
     uint8_t header[32], bytes[10];
     static clutch_setting settings[MAX_SETTINGS];
@@ -90,10 +90,11 @@ static int run(void)
                 knots[knots_count - 1].position_x65536 = (int64_t)value;
         }
     }
+    const clutch_run run = {settings, settings_count, knots, knots_count};
     clutch_misfit misfit;
-    require(clutch_servo_build(&servo, settings, settings_count, knots, knots_count, &misfit) == CLUTCH_OK, "a servo");
-    require(clutch_path_build(&path, settings, settings_count, knots, knots_count, &misfit) == CLUTCH_OK, "a path");
-    require(clutch_stick_slip_build(&detector, settings, settings_count, knots, knots_count, &misfit) == CLUTCH_OK,
+    require(clutch_servo_build(&servo, &run, &misfit) == CLUTCH_OK, "a servo");
+    require(clutch_path_build(&path, &run, &misfit) == CLUTCH_OK, "a path");
+    require(clutch_stick_slip_build(&detector, &run, &misfit) == CLUTCH_OK,
             "a detector");
     crc = 0xffffffffu;
     for (uint32_t k = 0; k < ticks; k++) {
@@ -134,7 +135,7 @@ int main(void)
 {
     in = fopen("bits.in", "rb");
     require(in != NULL, "bits.in");
-    while (run())
+    while (one_run())
         ;
     return 0;
 }

@@ -1,6 +1,6 @@
 //! A caller's mistakes: each is told, and nothing is touched.
 
-use crate::axis::{build, scenario};
+use crate::axis::{build, run, scenario};
 use clutch::*;
 use clutch_node::Setting;
 use std::mem::MaybeUninit;
@@ -60,17 +60,10 @@ fn a_path_from_a_table_says_which_point_it_lacks() {
     let mut path = MaybeUninit::uninit();
     let mut misfit = MaybeUninit::uninit();
     let mut built = |count: usize| {
+        let run = clutch_run { knots: knots.as_ptr(), knots_count: count, ..run(&settings) };
         // SAFETY: the memory is there for the time of the call.
         unsafe {
-            let list = (settings.as_ptr(), settings.len());
-            let result = clutch_path_build(
-                path.as_mut_ptr(),
-                list.0,
-                list.1,
-                knots.as_ptr(),
-                count,
-                misfit.as_mut_ptr(),
-            );
+            let result = clutch_path_build(path.as_mut_ptr(), &raw const run, misfit.as_mut_ptr());
             (result, misfit.assume_init())
         }
     };
@@ -90,21 +83,26 @@ fn a_path_from_a_table_says_which_point_it_lacks() {
 #[test]
 fn null_and_misaligned_pointers_and_memory_that_was_not_built_are_refused() {
     let (settings, _) = scenario(&[]);
-    let list = (settings.as_ptr(), settings.len());
+    let run = run(&settings);
+    let no_settings = clutch_run { settings: null(), settings_count: 3, ..run };
+    let no_knots = clutch_run { knots_count: 3, ..run };
+    let endless = clutch_run { settings_count: usize::MAX, ..run };
+    let run = &raw const run;
     let mut room = [0_u64; 1000];
     let axis = room.as_mut_ptr().cast::<clutch_axis>();
     let odd = axis.wrapping_byte_add(4);
     let bad = clutch_result::CLUTCH_BAD_POINTER;
     // SAFETY: pointers that are none are what is tested; the others have their memory.
     unsafe {
-        assert_eq!(clutch_axis_build(null_mut(), list.0, list.1, null(), 0, null_mut()), bad);
-        assert_eq!(clutch_axis_build(odd, list.0, list.1, null(), 0, null_mut()), bad);
-        assert_eq!(clutch_axis_build(axis, null(), 3, null(), 0, null_mut()), bad);
-        assert_eq!(clutch_axis_build(axis, list.0, list.1, null(), 3, null_mut()), bad);
-        assert_eq!(clutch_axis_build(axis, list.0, usize::MAX, null(), 0, null_mut()), bad);
+        assert_eq!(clutch_axis_build(null_mut(), run, null_mut()), bad);
+        assert_eq!(clutch_axis_build(odd, run, null_mut()), bad);
+        assert_eq!(clutch_axis_build(axis, null(), null_mut()), bad);
+        for run in [no_settings, no_knots, endless] {
+            assert_eq!(clutch_axis_build(axis, &raw const run, null_mut()), bad);
+        }
         assert_eq!(clutch_axis_stop(null_mut()), bad);
         assert_eq!(clutch_axis_stop(axis), clutch_result::CLUTCH_NOT_BUILT);
-        assert_eq!(clutch_axis_build(axis, list.0, list.1, null(), 0, null_mut()), clutch_result::CLUTCH_OK);
+        assert_eq!(clutch_axis_build(axis, run, null_mut()), clutch_result::CLUTCH_OK);
         assert_eq!(clutch_axis_sample(axis, null(), null_mut()), bad);
         assert_eq!(clutch_axis_safe(axis, null_mut()), bad);
         assert_eq!(clutch_axis_stop(axis), clutch_result::CLUTCH_OK);
@@ -118,7 +116,7 @@ fn null_and_misaligned_pointers_and_memory_that_was_not_built_are_refused() {
 #[test]
 fn a_servo_that_was_not_started_answers_nothing_and_a_law_alone_answers_as_within_it() {
     let (settings, trace) = scenario(&[]);
-    let list = (settings.as_ptr(), settings.len());
+    let run = run(&settings);
     let (mut servo, mut law) = (MaybeUninit::uninit(), MaybeUninit::uninit());
     let (mut out, mut command) =
         (MaybeUninit::<clutch_output>::uninit(), MaybeUninit::<clutch_command>::uninit());
@@ -126,12 +124,12 @@ fn a_servo_that_was_not_started_answers_nothing_and_a_law_alone_answers_as_withi
         clutch_target { position_x65536: i64::from(trace.counts[0]) << 16, velocity: 0.0, acceleration: 0.0 };
     // SAFETY: the memory is there for the time of the calls.
     unsafe {
-        let built = clutch_servo_build(servo.as_mut_ptr(), list.0, list.1, null(), 0, null_mut());
+        let built = clutch_servo_build(servo.as_mut_ptr(), &raw const run, null_mut());
         assert_eq!(built, clutch_result::CLUTCH_OK);
         let early = clutch_servo_tick(servo.as_mut_ptr(), 0, &raw const target, out.as_mut_ptr());
         assert_eq!(early, clutch_result::CLUTCH_WRONG_STATE);
         clutch_servo_start(servo.as_mut_ptr(), trace.counts[0], &raw const target, 4.5);
-        clutch_law_build(law.as_mut_ptr(), list.0, list.1, null(), 0, null_mut());
+        clutch_law_build(law.as_mut_ptr(), &raw const run, null_mut());
         let rest =
             clutch_tick { error: 0.0, error_rate: 0.0, target_velocity: 0.0, target_acceleration: 0.0 };
         clutch_law_start(law.as_mut_ptr(), &raw const rest, 4.5);

@@ -22,7 +22,7 @@ const SEEDS: std::ops::Range<u64> = 1..3001;
 /// Runs that have failed once, in their minimal form: each line has one, and the reason.
 const FAILED_ONCE: &str = include_str!("failed_once.txt");
 
-/// What is wrong with a run, if something is.
+/// The fault of a run, if it has one.
 fn wrong(run: &RunId, checks: Checks) -> Option<String> {
     let draw = run.draw();
     let report = draw.run(run.seed, checks, false).expect("the grammar makes scenarios");

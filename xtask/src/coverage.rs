@@ -48,7 +48,7 @@ pub(crate) fn run() -> Result<()> {
     Ok(())
 }
 
-/// What is covered of a package's code without its tests, and the places that are not.
+/// The covered part of a package's code without its tests, and the places that are not.
 fn counted(report: &str, package: &str) -> Result<(Count, Vec<String>)> {
     let (mut count, mut missed) = (Count::default(), Vec::new());
     let folder = root().join("crates").join(package).join("src");

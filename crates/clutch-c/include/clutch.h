@@ -432,6 +432,28 @@ typedef struct {
 } clutch_knot;
 
 /**
+ * A run: its settings, in order of their keys, and the points of its path if that is a table.
+ */
+typedef struct {
+  /**
+   * Its settings.
+   */
+  const clutch_setting *settings;
+  /**
+   * Number of its settings.
+   */
+  size_t settings_count;
+  /**
+   * Points of its path; null if there are none.
+   */
+  const clutch_knot *knots;
+  /**
+   * Number of these points.
+   */
+  size_t knots_count;
+} clutch_run;
+
+/**
  * The reason why settings make no run.
  */
 typedef struct {
@@ -479,7 +501,7 @@ typedef struct {
 } clutch_law;
 
 /**
- * What a law sees in each period.
+ * The input of a law in each period.
  */
 typedef struct {
   /**
@@ -509,7 +531,7 @@ typedef struct {
    */
   float voltage;
   /**
-   * What decided it: 0 the law, 1 the lowest voltage, 2 the highest, 3 an invalid demand.
+   * The limit that decided it: 0 none, the law did, 1 the lowest voltage, 2 the highest, 3 an invalid demand.
    */
   uint8_t limit;
   /**
@@ -534,11 +556,11 @@ typedef struct {
  */
 typedef struct {
   /**
-   * What the law saw.
+   * The law's input.
    */
   clutch_tick tick;
   /**
-   * What the law answered.
+   * The law's answer.
    */
   clutch_command command;
   /**
@@ -559,7 +581,7 @@ typedef struct {
 } clutch_stick_slip;
 
 /**
- * What the encoder has shown so far.
+ * Sticks that the encoder has shown so far.
  */
 typedef struct {
   /**
@@ -737,12 +759,7 @@ clutch_result clutch_settings_number(clutch_setting *settings, size_t count, uin
 /**
  * Builds the path of a run. The points of a table are borrowed: they stay where they are.
  */
-clutch_result clutch_path_build(clutch_path *path,
-                                const clutch_setting *settings,
-                                size_t settings_count,
-                                const clutch_knot *knots,
-                                size_t knots_count,
-                                clutch_misfit *misfit);
+clutch_result clutch_path_build(clutch_path *path, const clutch_run *run, clutch_misfit *misfit);
 
 /**
  * The target at a tick. The path begins within the count 0: add the counts of your start, times 65536, to its position.
@@ -752,12 +769,7 @@ clutch_result clutch_path_at(clutch_path *path, uint64_t tick, clutch_target *ta
 /**
  * Builds the law of a run, at rest.
  */
-clutch_result clutch_law_build(clutch_law *law,
-                               const clutch_setting *settings,
-                               size_t settings_count,
-                               const clutch_knot *knots,
-                               size_t knots_count,
-                               clutch_misfit *misfit);
+clutch_result clutch_law_build(clutch_law *law, const clutch_run *run, clutch_misfit *misfit);
 
 /**
  * Starts it while the converter is at `applied` volts.
@@ -775,12 +787,7 @@ clutch_result clutch_law_update(clutch_law *law,
 /**
  * Builds the servo of a run.
  */
-clutch_result clutch_servo_build(clutch_servo *servo,
-                                 const clutch_setting *settings,
-                                 size_t settings_count,
-                                 const clutch_knot *knots,
-                                 size_t knots_count,
-                                 clutch_misfit *misfit);
+clutch_result clutch_servo_build(clutch_servo *servo, const clutch_run *run, clutch_misfit *misfit);
 
 /**
  * Starts it at `counts`, with `applied` volts at the converter and a shaft that moves with the target.
@@ -795,12 +802,7 @@ clutch_result clutch_servo_tick(clutch_servo *servo, int32_t counts, const clutc
 /**
  * Builds a detector for the encoder and the period of a run.
  */
-clutch_result clutch_stick_slip_build(clutch_stick_slip *detector,
-                                      const clutch_setting *settings,
-                                      size_t settings_count,
-                                      const clutch_knot *knots,
-                                      size_t knots_count,
-                                      clutch_misfit *misfit);
+clutch_result clutch_stick_slip_build(clutch_stick_slip *detector, const clutch_run *run, clutch_misfit *misfit);
 
 /**
  * One period: the counts, and the velocity of the target (rad/s).
@@ -823,12 +825,7 @@ clutch_result clutch_safe_next(clutch_safe_run *run, const clutch_safe_codes *co
 /**
  * Builds the axis of a run, without consent to drive it. The points of a table are borrowed: they stay where they are.
  */
-clutch_result clutch_axis_build(clutch_axis *axis,
-                                const clutch_setting *settings,
-                                size_t settings_count,
-                                const clutch_knot *knots,
-                                size_t knots_count,
-                                clutch_misfit *misfit);
+clutch_result clutch_axis_build(clutch_axis *axis, const clutch_run *run, clutch_misfit *misfit);
 
 /**
  * Consent: the next sample starts the law. `present` is the code that the converter has now. `CLUTCH_WRONG_STATE` if the axis

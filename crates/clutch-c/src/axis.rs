@@ -1,10 +1,10 @@
 //! Servo, supervisor and path of a shaft: what a program of one's own calls once a period.
 
-use crate::memory::{clutch_result, input, kept, object, outcome, output, put, room};
+use crate::memory::{clutch_result, input, kept, object, outcome, output, room};
 use crate::path::{Planned, clutch_target};
 use crate::safe::clutch_safe_codes;
 use crate::servo::clutch_output;
-use crate::settings::{built, clutch_knot, clutch_misfit, clutch_setting};
+use crate::settings::{build, clutch_misfit, clutch_run};
 use clutch_core::law::LawState;
 use clutch_core::supervisor::{BoardMode, Cause, Cycle, Sample, State, SupervisorState};
 use clutch_core::{BeginningAt, Counts, DacCode, FixedCounts, Micros, Servo, Supervisor};
@@ -92,28 +92,24 @@ kept!(clutch_axis, Kept, b"cl_axis ");
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_axis_build(
     axis: *mut clutch_axis,
-    settings: *const clutch_setting,
-    settings_count: usize,
-    knots: *const clutch_knot,
-    knots_count: usize,
+    run: *const clutch_run,
     misfit: *mut clutch_misfit,
 ) -> clutch_result {
     // SAFETY: the caller's promise.
-    let (built, knots) = match unsafe { built((settings, settings_count), (knots, knots_count), misfit) } {
-        Ok(built) => built,
-        Err(result) => return result,
-    };
-    let mut kept = Kept {
-        servo: built.servo,
-        supervisor: built.supervisor,
-        planned: Planned { path: built.path, knots },
-        state: SupervisorState::default(),
-        origin: FixedCounts(0),
-        ticks: built.ticks,
-    };
-    kept.supervisor.connect(&mut kept.state);
-    // SAFETY: the caller's promise.
-    unsafe { put(axis, kept) }
+    unsafe {
+        build(axis, run, misfit, |built, knots| {
+            let mut kept = Kept {
+                servo: built.servo,
+                supervisor: built.supervisor,
+                planned: Planned { path: built.path, knots },
+                state: SupervisorState::default(),
+                origin: FixedCounts(0),
+                ticks: built.ticks,
+            };
+            kept.supervisor.connect(&mut kept.state);
+            Ok(kept)
+        })
+    }
 }
 
 /// Consent: the next sample starts the law. `present` is the code that the converter has now. `CLUTCH_WRONG_STATE` if the axis

@@ -1,10 +1,10 @@
 //! The law by itself: errors in, voltage out.
 
-use crate::memory::{clutch_result, input, kept, object, outcome, output, put, room};
-use crate::settings::{built, clutch_knot, clutch_misfit, clutch_setting};
+use crate::memory::{clutch_result, input, kept, object, outcome, output, room};
+use crate::settings::{build, clutch_misfit, clutch_run};
 use clutch_core::law::{Command, ControlLaw, Law, LawState, LawTerms, MAX_TERMS, Terms, Tick};
 
-/// What a law sees in each period.
+/// The input of a law in each period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct clutch_tick {
@@ -48,7 +48,7 @@ const _: () = assert!(CLUTCH_MAX_TERMS == MAX_TERMS);
 pub struct clutch_command {
     /// Voltage within the limits, V.
     pub voltage: f32,
-    /// What decided it: 0 the law, 1 the lowest voltage, 2 the highest, 3 an invalid demand.
+    /// The limit that decided it: 0 none, the law did, 1 the lowest voltage, 2 the highest, 3 an invalid demand.
     pub limit: u8,
     /// Number of its terms.
     pub terms_count: u8,
@@ -87,21 +87,15 @@ kept!(clutch_law, Kept, b"cl_law  ");
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_law_build(
     law: *mut clutch_law,
-    settings: *const clutch_setting,
-    settings_count: usize,
-    knots: *const clutch_knot,
-    knots_count: usize,
+    run: *const clutch_run,
     misfit: *mut clutch_misfit,
 ) -> clutch_result {
     // SAFETY: the caller's promise.
-    match unsafe { built((settings, settings_count), (knots, knots_count), misfit) } {
-        Ok((built, _)) => {
+    unsafe {
+        build(law, run, misfit, |built, _| {
             let own = *built.servo.law();
-            let state = own.start(&Tick::default(), 0.0);
-            // SAFETY: the caller's promise.
-            unsafe { put(law, Kept { law: own, state }) }
-        }
-        Err(result) => result,
+            Ok(Kept { state: own.start(&Tick::default(), 0.0), law: own })
+        })
     }
 }
 

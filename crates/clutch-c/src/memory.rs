@@ -50,21 +50,15 @@ macro_rules! kept {
 }
 pub(crate) use kept;
 
-/// Puts an object into its memory.
-pub(crate) unsafe fn put<T: Kept>(memory: *mut T::Memory, object: T) -> clutch_result {
-    if memory.is_null() || !memory.is_aligned() {
-        return clutch_result::CLUTCH_BAD_POINTER;
-    }
+/// Puts an object into its memory, for which there is room.
+pub(crate) unsafe fn put<T: Kept>(memory: *mut T::Memory, object: T) {
     // SAFETY: the memory is large enough and aligned; that it is the caller's own is his promise.
     unsafe { memory.cast::<Marked<T>>().write(Marked { mark: T::MARK, object }) };
-    clutch_result::CLUTCH_OK
 }
 
 /// The object in a memory.
 pub(crate) unsafe fn object<'a, T: Kept>(memory: *mut T::Memory) -> Result<&'a mut T, clutch_result> {
-    if memory.is_null() || !memory.is_aligned() {
-        return Err(clutch_result::CLUTCH_BAD_POINTER);
-    }
+    room(memory)?;
     // SAFETY: as above; the mark is a number, whatever the memory holds.
     let mark = unsafe { (&raw const (*memory.cast::<Marked<MaybeUninit<T>>>()).mark).read() };
     if mark != T::MARK {
@@ -76,9 +70,7 @@ pub(crate) unsafe fn object<'a, T: Kept>(memory: *mut T::Memory) -> Result<&'a m
 
 /// A value of C's to read.
 pub(crate) unsafe fn input<'a, T>(pointer: *const T) -> Result<&'a T, clutch_result> {
-    if pointer.is_null() || !pointer.is_aligned() {
-        return Err(clutch_result::CLUTCH_BAD_POINTER);
-    }
+    room(pointer.cast_mut())?;
     // SAFETY: that it points to such a value is the caller's promise.
     Ok(unsafe { &*pointer })
 }

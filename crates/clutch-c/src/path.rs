@@ -1,7 +1,7 @@
 //! Targets along a path.
 
-use crate::memory::{clutch_result, kept, object, outcome, output, put};
-use crate::settings::{Knots, built, clutch_knot, clutch_misfit, clutch_setting, fixed};
+use crate::memory::{clutch_result, kept, object, outcome, output};
+use crate::settings::{Knots, build, clutch_misfit, clutch_run, fixed};
 use clutch_core::Target;
 use clutch_node::Path;
 
@@ -60,18 +60,11 @@ kept!(clutch_path, Planned, b"cl_path ");
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_path_build(
     path: *mut clutch_path,
-    settings: *const clutch_setting,
-    settings_count: usize,
-    knots: *const clutch_knot,
-    knots_count: usize,
+    run: *const clutch_run,
     misfit: *mut clutch_misfit,
 ) -> clutch_result {
     // SAFETY: the caller's promise.
-    match unsafe { built((settings, settings_count), (knots, knots_count), misfit) } {
-        // SAFETY: the caller's promise.
-        Ok((built, knots)) => unsafe { put(path, Planned { path: built.path, knots }) },
-        Err(result) => result,
-    }
+    unsafe { build(path, run, misfit, |built, knots| Ok(Planned { path: built.path, knots })) }
 }
 
 /// The target at a tick. The path begins within the count 0: add the counts of your start, times 65536, to its position.

@@ -68,8 +68,12 @@ kept!(clutch_safe_run, SafeRun, b"cl_safe ");
 /// Begins at the code that the converter has now.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_safe_begin(run: *mut clutch_safe_run, present: u16) -> clutch_result {
-    // SAFETY: the caller's promise.
-    unsafe { put(run, SafeRun::begin(DacCode(present))) }
+    outcome(|| {
+        room(run)?;
+        // SAFETY: there is room for it.
+        unsafe { put(run, SafeRun::begin(DacCode(present))) };
+        Ok(())
+    })
 }
 
 /// The code of the next period; the first one is the safe state's own already.

@@ -1,9 +1,9 @@
 //! The servo by itself: counts and target in, code for the converter out. No check, no safe state.
 
 use crate::law::{clutch_command, clutch_tick};
-use crate::memory::{clutch_result, input, kept, object, outcome, output, put, room};
+use crate::memory::{clutch_result, input, kept, object, outcome, output, room};
 use crate::path::clutch_target;
-use crate::settings::{built, clutch_knot, clutch_misfit, clutch_setting};
+use crate::settings::{build, clutch_misfit, clutch_run};
 use clutch_core::law::{LawState, LawTerms};
 use clutch_core::{Counts, Servo, ServoOutput, ServoState};
 
@@ -11,9 +11,9 @@ use clutch_core::{Counts, Servo, ServoOutput, ServoState};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct clutch_output {
-    /// What the law saw.
+    /// The law's input.
     pub tick: clutch_tick,
-    /// What the law answered.
+    /// The law's answer.
     pub command: clutch_command,
     /// Voltage that the code stands for, V.
     pub voltage: f32,
@@ -51,18 +51,11 @@ kept!(clutch_servo, Kept, b"cl_servo");
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_servo_build(
     servo: *mut clutch_servo,
-    settings: *const clutch_setting,
-    settings_count: usize,
-    knots: *const clutch_knot,
-    knots_count: usize,
+    run: *const clutch_run,
     misfit: *mut clutch_misfit,
 ) -> clutch_result {
     // SAFETY: the caller's promise.
-    match unsafe { built((settings, settings_count), (knots, knots_count), misfit) } {
-        // SAFETY: the caller's promise.
-        Ok((built, _)) => unsafe { put(servo, Kept { servo: built.servo, state: None }) },
-        Err(result) => result,
-    }
+    unsafe { build(servo, run, misfit, |built, _| Ok(Kept { servo: built.servo, state: None })) }
 }
 
 /// Starts it at `counts`, with `applied` volts at the converter and a shaft that moves with the target.

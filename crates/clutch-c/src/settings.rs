@@ -1,10 +1,10 @@
 //! A run as numbers, and what is wrong with them.
 
-use crate::memory::{clutch_result, list, outcome, output};
+use crate::memory::{Kept, clutch_result, input, list, outcome, output, put, room};
 use core::mem::offset_of;
 
-use clutch_core::FixedCounts;
 use clutch_core::reference::Knot;
+use clutch_core::{FixedCounts, ParamError};
 use clutch_node::{Built, MAX_KNOTS, Misfit, SETTINGS_HASH};
 
 /// A number of a run, under its key. `clutch scenario header FILE` prints those of a scenario, in order of their keys.
@@ -94,45 +94,66 @@ impl Knots {
     }
 }
 
-/// A run from its settings, with the points of its path.
-pub(crate) unsafe fn built(
-    settings: (*const clutch_setting, usize),
-    knots: (*const clutch_knot, usize),
+/// A run: its settings, in order of their keys, and the points of its path if that is a table.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct clutch_run {
+    /// Its settings.
+    pub settings: *const clutch_setting,
+    /// Number of its settings.
+    pub settings_count: usize,
+    /// Points of its path; null if there are none.
+    pub knots: *const clutch_knot,
+    /// Number of these points.
+    pub knots_count: usize,
+}
+
+/// Builds an object of a run into its memory. `misfit` may be null.
+pub(crate) unsafe fn build<T: Kept>(
+    memory: *mut T::Memory,
+    run: *const clutch_run,
     misfit: *mut clutch_misfit,
-) -> Result<(Built, Knots), clutch_result> {
-    // SAFETY: the caller's promise.
-    let (settings, _) = unsafe { (list(settings.0, settings.1)?, list(knots.0, knots.1)?) };
-    let knots = Knots { first: knots.0, count: knots.1 };
-    let refuse = |why: clutch_misfit| {
-        // SAFETY: the caller's promise.
-        if misfit.is_null() || unsafe { output(misfit, why) }.is_ok() {
-            clutch_result::CLUTCH_MISFIT
-        } else {
-            clutch_result::CLUTCH_BAD_POINTER
+    make: impl FnOnce(Built, Knots) -> Result<T, ParamError<f32>>,
+) -> clutch_result {
+    outcome(|| {
+        room(memory)?;
+        if !misfit.is_null() {
+            room(misfit)?;
         }
-    };
+        // SAFETY: the caller's promise.
+        let made = unsafe { made(input(run)?, make)? };
+        let why = made.as_ref().err().copied().unwrap_or(clutch_misfit::NONE);
+        if !misfit.is_null() {
+            // SAFETY: the caller's promise.
+            unsafe { output(misfit, why)? };
+        }
+        // SAFETY: there is room for it.
+        made.map(|object| unsafe { put(memory, object) }).map_err(|_| clutch_result::CLUTCH_MISFIT)
+    })
+}
+
+unsafe fn made<T>(
+    run: &clutch_run,
+    make: impl FnOnce(Built, Knots) -> Result<T, ParamError<f32>>,
+) -> Result<Result<T, clutch_misfit>, clutch_result> {
+    // SAFETY: the caller's promise.
+    let (settings, _) =
+        unsafe { (list(run.settings, run.settings_count)?, list(run.knots, run.knots_count)?) };
+    let knots = Knots { first: run.knots, count: run.knots_count };
     let mut pairs = settings.iter().zip(settings.iter().skip(1));
     if let Some((_, twice)) = pairs.find(|(a, b)| a.key >= b.key) {
-        return Err(refuse(clutch_misfit {
-            kind: CLUTCH_MISFIT_ORDER,
-            key: twice.key,
-            ..clutch_misfit::NONE
-        }));
+        let (kind, key) = (CLUTCH_MISFIT_ORDER, twice.key);
+        return Ok(Err(clutch_misfit { kind, key, ..clutch_misfit::NONE }));
     }
     let number = |key| {
         let at = settings.binary_search_by_key(&key, |setting| setting.key).ok()?;
         settings.get(at).map(|setting| setting.value)
     };
-    match Built::new(number, knots.get()) {
-        Ok(built) => {
-            if !misfit.is_null() {
-                // SAFETY: the caller's promise.
-                unsafe { output(misfit, clutch_misfit::NONE)? };
-            }
-            Ok((built, knots))
-        }
-        Err(why) => Err(refuse(clutch_misfit::of(why))),
-    }
+    // What is no setting has no key.
+    let unfit = |e: ParamError<f32>| Misfit::Unfit { key: u16::MAX, relation: e.relation, value: e.value };
+    Ok(Built::new(number, knots.get())
+        .and_then(|built| make(built, knots).map_err(unfit))
+        .map_err(clutch_misfit::of))
 }
 
 /// The hash of all keys with their types and units: equal to `CLUTCH_SETTINGS_HASH` of the header with which a list of settings

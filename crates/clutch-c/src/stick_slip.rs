@@ -1,10 +1,10 @@
 //! Sticks that the encoder shows.
 
-use crate::memory::{clutch_result, kept, object, outcome, output, put, room};
-use crate::settings::{built, clutch_knot, clutch_misfit, clutch_setting};
+use crate::memory::{clutch_result, kept, object, outcome, output, room};
+use crate::settings::{build, clutch_misfit, clutch_run};
 use clutch_core::{Counts, StickSlip, StickSlipParams, StickSlipState};
 
-/// What the encoder has shown so far.
+/// Sticks that the encoder has shown so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct clutch_sticks {
@@ -36,21 +36,16 @@ kept!(clutch_stick_slip, Kept, b"cl_stick");
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_stick_slip_build(
     detector: *mut clutch_stick_slip,
-    settings: *const clutch_setting,
-    settings_count: usize,
-    knots: *const clutch_knot,
-    knots_count: usize,
+    run: *const clutch_run,
     misfit: *mut clutch_misfit,
 ) -> clutch_result {
     // SAFETY: the caller's promise.
-    let servo = match unsafe { built((settings, settings_count), (knots, knots_count), misfit) } {
-        Ok((built, _)) => built.servo,
-        Err(result) => return result,
-    };
-    match StickSlip::new(&StickSlipParams::default(), servo.encoder(), servo.period()) {
-        // SAFETY: the caller's promise.
-        Ok(own) => unsafe { put(detector, Kept { detector: own, state: StickSlipState::default() }) },
-        Err(_) => clutch_result::CLUTCH_MISFIT,
+    unsafe {
+        build(detector, run, misfit, |built, _| {
+            let (encoder, period) = (built.servo.encoder(), built.servo.period());
+            let own = StickSlip::new(&StickSlipParams::default(), encoder, period)?;
+            Ok(Kept { detector: own, state: StickSlipState::default() })
+        })
     }
 }
 

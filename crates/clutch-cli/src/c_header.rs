@@ -83,7 +83,7 @@ fn header(name: &str, scenario: &Scenario, settings: &Settings, run: &BuiltRun<f
     });
     if knots.is_empty() {
         // C has no empty lists.
-        let _ = writeln!(out, "#define {name}_knots ((const clutch_knot *)0)");
+        let _ = writeln!(out, "#define {name}_knots NULL");
     } else {
         let _ = writeln!(out, "static const clutch_knot {name}_knots[] = {{\n{knots}}};");
     }
@@ -101,7 +101,9 @@ fn header(name: &str, scenario: &Scenario, settings: &Settings, run: &BuiltRun<f
         let _ = writeln!(out, "    {name}_{what} = {number},");
     }
     out + &format!(
-        "}};\n\n/* What {name}_safe_code stands for, V. */\n#define {name}_safe_v {:?}\n\n#endif\n",
+        "}};\n\nstatic const clutch_run {name} = \
+         {{{name}_settings, {name}_settings_count, {name}_knots, {name}_knots_count}};\n\n\
+         /* The voltage of {name}_safe_code, V. */\n#define {name}_safe_v {:?}\n\n#endif\n",
         run.servo.dac().volts(safe)
     )
 }

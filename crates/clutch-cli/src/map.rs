@@ -192,7 +192,7 @@ fn causes(marks: impl Fn(char) -> bool) -> Vec<(String, String)> {
     .collect()
 }
 
-/// Of a run: its length and what of it counts.
+/// The length of a run, and what of it counts.
 fn length(scenario: &Scenario) -> String {
     let run = scenario.params().run;
     format!("{} s each, the first {} s not counted", number(run.duration), number(run.settle))

@@ -69,7 +69,7 @@ impl<T: Real> ServoParams<T> {
         }
     }
 
-    /// What its law is built beside.
+    /// The parts beside which its law is built.
     #[must_use]
     pub fn beside(&self) -> Beside<'_, T> {
         Beside { model: &self.model, output: &self.output, encoder: self.encoder, period: self.period }

@@ -4,7 +4,7 @@
 
 use crate::instance::{Instance, Kept, LogMessage, Status};
 use crate::variables::Part;
-use std::ffi::{CStr, CString, c_char, c_void};
+use std::ffi::{CStr, c_char, c_void};
 use std::path::PathBuf;
 use std::slice::from_raw_parts;
 
@@ -135,9 +135,53 @@ unsafe extern "C" fn fmi3DoStep(
     instance.told(stepped)
 }
 
-/// Reads variables of a type.
-macro_rules! get {
-    ($name:ident, $type:ty, $of:ident) => {
+/// Why a list of values is refused.
+const FEWER: &str = "fewer values than variables";
+
+/// Reads variables.
+unsafe fn get<T>(
+    instance: *mut Instance,
+    (references, count): (*const Reference, usize),
+    (values, values_count): (*mut T, usize),
+    mut value: impl FnMut(&mut Instance, Reference) -> Result<T, String>,
+) -> Status {
+    // SAFETY: the simulator's.
+    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+    if values_count < count || (count > 0 && values.is_null()) {
+        return instance.fail(FEWER);
+    }
+    // SAFETY: the simulator says how many there are.
+    for (i, reference) in unsafe { list(references, count) }.iter().enumerate() {
+        match value(instance, *reference) {
+            // SAFETY: there is room for as many.
+            Ok(value) => unsafe { values.add(i).write(value) },
+            Err(why) => return instance.fail(&why),
+        }
+    }
+    Status::Ok
+}
+
+/// Writes variables.
+unsafe fn set<T>(
+    instance: *mut Instance,
+    (references, count): (*const Reference, usize),
+    (values, values_count): (*const T, usize),
+    mut take: impl FnMut(&mut Instance, Reference, &T) -> Result<(), String>,
+) -> Status {
+    // SAFETY: the simulator's.
+    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
+    // SAFETY: the simulator says how many there are.
+    let (references, values) = unsafe { (list(references, count), list(values, values_count)) };
+    if values.len() < references.len() {
+        return instance.fail(FEWER);
+    }
+    let taken = references.iter().zip(values).try_for_each(|(r, value)| take(instance, *r, value));
+    instance.told(taken)
+}
+
+/// The function by which a simulator reads variables of a type.
+macro_rules! getter {
+    ($name:ident, $type:ty, $value:expr) => {
         #[unsafe(no_mangle)]
         unsafe extern "C" fn $name(
             instance: *mut Instance,
@@ -147,26 +191,14 @@ macro_rules! get {
             values_count: usize,
         ) -> Status {
             // SAFETY: the simulator's.
-            let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
-            if values_count < count || (count > 0 && values.is_null()) {
-                return instance.fail("fewer values than variables");
-            }
-            // SAFETY: the simulator says how many there are.
-            for (i, reference) in unsafe { list(references, count) }.iter().enumerate() {
-                match instance.$of(*reference) {
-                    // SAFETY: there is room for as many.
-                    Ok(value) => unsafe { values.add(i).write(value) },
-                    Err(why) => return instance.fail(&why),
-                }
-            }
-            Status::Ok
+            unsafe { get(instance, (references, count), (values, values_count), $value) }
         }
     };
 }
 
-/// Writes variables of a type.
-macro_rules! set {
-    ($name:ident, $type:ty, $of:ident) => {
+/// The function by which it writes them.
+macro_rules! setter {
+    ($name:ident, $type:ty, $take:expr) => {
         #[unsafe(no_mangle)]
         unsafe extern "C" fn $name(
             instance: *mut Instance,
@@ -176,74 +208,23 @@ macro_rules! set {
             values_count: usize,
         ) -> Status {
             // SAFETY: the simulator's.
-            let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
-            // SAFETY: the simulator says how many there are.
-            let (references, values) = unsafe { (list(references, count), list(values, values_count)) };
-            if values.len() < references.len() {
-                return instance.fail("fewer values than variables");
-            }
-            let set = references.iter().zip(values).try_for_each(|(r, value)| instance.$of(*r, *value));
-            instance.told(set)
+            unsafe { set(instance, (references, count), (values, values_count), $take) }
         }
     };
 }
 
-get!(fmi3GetFloat64, f64, real);
-get!(fmi3GetInt32, i32, whole);
-get!(fmi3GetBoolean, bool, truth);
-set!(fmi3SetFloat64, f64, set_real);
-set!(fmi3SetInt32, i32, set_whole);
+getter!(fmi3GetFloat64, f64, |unit, r| unit.real(r));
+getter!(fmi3GetInt32, i32, |unit, r| unit.whole(r));
+getter!(fmi3GetBoolean, bool, |unit, r| unit.truth(r));
+getter!(fmi3GetString, *const c_char, |unit, r| unit.lent_text(r));
+setter!(fmi3SetFloat64, f64, |unit, r, value| unit.set_real(r, *value));
+setter!(fmi3SetInt32, i32, |unit, r, value| unit.set_whole(r, *value));
+setter!(fmi3SetString, *const c_char, take_text);
 
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3GetString(
-    instance: *mut Instance,
-    references: *const Reference,
-    count: usize,
-    values: *mut *const c_char,
-    values_count: usize,
-) -> Status {
-    // SAFETY: the simulator's.
-    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
-    if values_count < count || (count > 0 && values.is_null()) {
-        return instance.fail("fewer values than variables");
-    }
-    let mut texts = Vec::new();
-    // SAFETY: the simulator says how many there are.
-    for reference in unsafe { list(references, count) } {
-        match instance.text(*reference) {
-            Ok(text) => texts.push(CString::new(text).unwrap_or_default()),
-            Err(why) => return instance.fail(&why),
-        }
-    }
-    for (i, text) in texts.iter().enumerate() {
-        // SAFETY: there is room for as many; the texts live on in the instance.
-        unsafe { values.add(i).write(text.as_ptr()) };
-    }
-    instance.texts = texts;
-    Status::Ok
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3SetString(
-    instance: *mut Instance,
-    references: *const Reference,
-    count: usize,
-    values: *const *const c_char,
-    values_count: usize,
-) -> Status {
-    // SAFETY: the simulator's.
-    let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
-    // SAFETY: the simulator says how many there are.
-    let (references, values) = unsafe { (list(references, count), list(values, values_count)) };
-    if values.len() < references.len() {
-        return instance.fail("fewer values than variables");
-    }
-    let set = references.iter().zip(values).try_for_each(|(reference, value)| {
-        // SAFETY: the simulator's text.
-        let text = unsafe { text(*value) }.ok_or("a text that is none, or not UTF-8")?;
-        instance.set_text(*reference, text)
-    });
-    instance.told(set)
+fn take_text(unit: &mut Instance, reference: Reference, value: &*const c_char) -> Result<(), String> {
+    // SAFETY: the simulator's text.
+    let text = unsafe { text(*value) }.ok_or("a text that is none, or not UTF-8")?;
+    unit.set_text(reference, text)
 }
 
 #[unsafe(no_mangle)]

@@ -3,6 +3,7 @@
 use crate::unit::Unit;
 use crate::variables::{self as is, Kind, Part};
 use clutch_sim::Scenario;
+use std::collections::HashMap;
 use std::ffi::{CString, c_char, c_void};
 use std::path::PathBuf;
 
@@ -39,8 +40,8 @@ pub(crate) struct Instance {
     environment: *mut c_void,
     log: LogMessage,
     pub(crate) kept: Kept,
-    /// Texts that were handed out: they live until the next are.
-    pub(crate) texts: Vec<CString>,
+    /// Texts that were lent, by their variables.
+    texts: HashMap<u32, CString>,
 }
 
 impl Kept {
@@ -59,7 +60,7 @@ impl Kept {
 
 impl Instance {
     pub(crate) fn new(part: Part, resources: PathBuf, environment: *mut c_void, log: LogMessage) -> Instance {
-        Instance { part, resources, environment, log, kept: Kept::new(part), texts: Vec::new() }
+        Instance { part, resources, environment, log, kept: Kept::new(part), texts: HashMap::new() }
     }
 
     /// Says why to whoever listens, and that it failed.
@@ -165,9 +166,12 @@ impl Instance {
         Ok(self.begun()?.stuck())
     }
 
-    pub(crate) fn text(&self, reference: u32) -> Result<&str, String> {
+    /// A text, lent: it lives until its variable is read again.
+    pub(crate) fn lent_text(&mut self, reference: u32) -> Result<*const c_char, String> {
         self.known(reference, Kind::String, false)?;
-        Ok(if reference == is::SCENARIO { &self.kept.scenario } else { &self.kept.set })
+        let text = if reference == is::SCENARIO { &self.kept.scenario } else { &self.kept.set };
+        let text = CString::new(text.as_str()).unwrap_or_default();
+        Ok(self.texts.entry(reference).insert_entry(text).get().as_ptr())
     }
 
     pub(crate) fn set_real(&mut self, reference: u32, value: f64) -> Result<(), String> {

@@ -91,7 +91,7 @@ impl Unit {
 #[derive(Clone)]
 pub(crate) struct RigUnit {
     moving: MovingRig,
-    /// Of a sampling period, s: at the begin of each the converter takes the voltage.
+    /// Sampling period, s: at the begin of each the converter takes the voltage.
     period: f64,
     /// Periods that are over.
     periods: u64,

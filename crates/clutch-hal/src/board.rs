@@ -47,14 +47,7 @@ pub struct Board<Q, C, S, K, W, const ROOM: usize = 768> {
     refused: bool,
 }
 
-impl<Q, C, S, K, W, const ROOM: usize> Board<Q, C, S, K, W, ROOM>
-where
-    Q: Quadrature,
-    C: Converter,
-    S: Read + ReadReady + Write + WriteReady,
-    K: Clock,
-    W: Watchdog,
-{
+impl<Q, C: Converter, S, K, W, const ROOM: usize> Board<Q, C, S, K, W, ROOM> {
     /// A board. `boot` goes out at once: the code that the brake is to have while nobody controls.
     pub fn new(
         encoder: Q,

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 mod random_rig;
 use random_rig::{Outcome, Truth, truth};
 
-/// How an error is told.
+/// The form in which an error is told.
 #[derive(Clone, Copy)]
 enum As {
     Percent,

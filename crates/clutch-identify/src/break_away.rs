@@ -13,7 +13,7 @@ use crate::filter::{Belief, Shaft};
 use crate::recording::Recording;
 use crate::ride;
 
-/// What a break-away needs to be one.
+/// Conditions of a break-away.
 const RESTED: usize = 50; // samples
 const LONGEST: usize = 80; // samples
 const SILENT: usize = 14; // samples without an edge, after the first
@@ -252,7 +252,7 @@ fn late(r: &Recording, known: &Known, ratio: f64, velocity: f64, threshold: f64,
     time - ideal
 }
 
-/// What a break-away tells of the time at which it set off: times (periods) with their weights, and the steps of the voltage
+/// The word of a break-away on the time at which it set off: times (periods) with their weights, and the steps of the voltage
 /// that may have triggered it.
 struct SetOff<'a> {
     recording: &'a Recording,

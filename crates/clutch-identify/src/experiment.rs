@@ -22,7 +22,7 @@ use clutch_sim::{Scenario, ScenarioError};
 use std::path::PathBuf;
 use toml::{Table, Value};
 
-/// What the experiment does.
+/// The parts of the experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Programme {
     /// Releases.
@@ -111,7 +111,7 @@ pub enum ExperimentError {
     /// A part makes no run.
     #[error(transparent)]
     Build(#[from] BuildError),
-    /// What was recorded.
+    /// The recordings.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// A run in virtual time.
@@ -130,7 +130,7 @@ pub enum ExperimentError {
         part: String,
         /// The cause, in words.
         cause: String,
-        /// What may help.
+        /// The remedy.
         remedy: &'static str,
     },
     /// Something else that runs a part.
@@ -138,7 +138,7 @@ pub enum ExperimentError {
     Runs(String),
 }
 
-/// What makes one run of the loop, given the part's name and its scenario, and says what was recorded.
+/// A function that makes one run of the loop, given the part's name and its scenario, and gives the recordings.
 pub type Runs<'a> = dyn FnMut(&str, &Scenario) -> Result<Vec<Recording>, ExperimentError> + 'a;
 
 /// For a part that a check ended.

@@ -34,7 +34,7 @@ pub struct Shaft {
 /// Standard deviations beyond which a measurement is far from what is believed.
 const FAR: f64 = 5.0;
 
-/// What is believed at a time.
+/// The belief at a time.
 #[derive(Clone, Copy, Debug)]
 pub struct Belief {
     /// Means.

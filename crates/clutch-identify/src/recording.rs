@@ -1,4 +1,4 @@
-//! What the estimators read: counts and the voltage given after each, from a log or a table.
+//! Input of the estimators: counts and the voltage given after each, from a log or a table.
 
 use clutch_core::supervisor::{Arrival, State};
 use clutch_core::{ActuatorKind, Dac, DacCode};

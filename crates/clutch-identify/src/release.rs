@@ -42,7 +42,7 @@ pub struct Release {
     units: (f64, f64),
 }
 
-/// What the releases tell.
+/// Findings of the releases.
 #[derive(Clone, Debug)]
 pub struct Fall {
     /// T/J, rad/s².

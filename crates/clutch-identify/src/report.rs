@@ -1,4 +1,4 @@
-//! What recordings tell of a shaft, and what they cannot.
+//! Findings of recordings on a shaft, and what they cannot tell.
 
 use crate::break_away::{self, BreakAway, Known, break_aways};
 use crate::recording::Recording;
@@ -25,7 +25,7 @@ const LEAST_RIPPLE: f64 = 0.03;
 /// Normalised innovation of an edge that no ride has: one in millions.
 const UNEXPLAINED: f64 = 7.0;
 
-/// What is known of a parameter.
+/// The finding on a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Finding {
@@ -187,7 +187,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
     }
 }
 
-/// What the rides tell, the slowest first: a fast one does not see the ripple, and takes its size from that.
+/// Findings of the rides, the slowest first: a fast one does not see the ripple, and takes its size from that.
 fn tell(mut rides: Vec<Ride<'_>>, fall: &Fall) -> Vec<Told> {
     rides.sort_by(|a, b| a.rate.total_cmp(&b.rate));
     let mut share = None;

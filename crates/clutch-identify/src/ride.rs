@@ -7,7 +7,7 @@
 use crate::filter::{Belief, Passed, Shaft, Spread, smooth};
 use crate::recording::Recording;
 
-/// What a ride needs to be one.
+/// Conditions of a ride.
 const LONGEST_SILENCE: f64 = 6.0; // times the median time between edges
 const SETTLING_S: f64 = 0.5;
 const SHORTEST_S: f64 = 1.0;
@@ -26,7 +26,7 @@ const MAP_SETTLING_S: f64 = 0.25;
 /// Times that the ripple's size is estimated, and what it is taken to be before.
 const ROUNDS: usize = 8;
 const FIRST_SHARE: f64 = 0.15;
-/// What is left of a ripple in the mean over a way, as a multiple of its size over the wave's radians of that way.
+/// The rest of a ripple in the mean over a way, as a multiple of its size over the wave's radians of that way.
 const LEFT_OVER: f64 = 2.0;
 /// Part of the ripple's square that the filter may miss in a mean.
 const UNSEEN: f64 = 0.04;
@@ -56,7 +56,7 @@ pub struct Place {
     pub factor: f64,
 }
 
-/// What a ride tells.
+/// Findings of a ride.
 #[derive(Clone, Debug)]
 pub struct Told {
     /// Rate, rad/s.

@@ -1,4 +1,4 @@
-//! What was identified, as a file: `[model]` and `[bounds]` for scenarios, and the intervals behind them.
+//! An identified rig as a file: `[model]` and `[bounds]` for scenarios, and the intervals behind them.
 
 use crate::Estimate;
 use crate::report::{Finding, Report};
@@ -187,7 +187,7 @@ pub struct Row<'a> {
     pub label: &'static str,
     /// Unit for readers, and what SI is multiplied by for it.
     pub unit: (&'static str, f64),
-    /// What is known.
+    /// The finding.
     pub finding: &'a Finding,
 }
 

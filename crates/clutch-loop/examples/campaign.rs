@@ -54,7 +54,7 @@ fn main() -> Failure {
     if failed.is_empty() { Ok(()) } else { Err("the campaign failed".into()) }
 }
 
-/// What is wrong with a run, if something is.
+/// The fault of a run, if it has one.
 fn outcome(run: &RunId) -> Option<String> {
     let draw = run.draw();
     match draw.run(run.seed, Checks::ALL, false) {

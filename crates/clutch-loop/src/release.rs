@@ -94,7 +94,7 @@ impl ReleaseTest {
         })
     }
 
-    /// What it tells: the test in virtual time, on the corners of the bounds, with each lie.
+    /// Its power to tell: the test in virtual time, on the corners of the bounds, with each lie.
     ///
     /// # Errors
     /// None for a checked scenario.
@@ -111,7 +111,7 @@ impl ReleaseTest {
         Ok(tells)
     }
 
-    /// What it does and tells, for people.
+    /// Its course and its word, for people.
     ///
     /// # Errors
     /// As [`ReleaseTest::tells`].

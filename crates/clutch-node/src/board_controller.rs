@@ -62,7 +62,7 @@ pub struct BoardController {
     settings: Settings,
     /// The run that the settings are for.
     settings_run: u16,
-    /// What the path's targets are computed with.
+    /// The steepness of a table, with which targets are computed.
     prepared: Prepared,
     /// Hears encoder and converter while there is no run.
     introduced: Decoder,

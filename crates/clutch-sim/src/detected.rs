@@ -11,7 +11,7 @@ pub(crate) const STAIR: StickSlipParams<f64> = StickSlipParams { gap: 2.0, ticks
 /// Width of the bounds within which a number of cycles is told: this share of the upper one, and so many cycles.
 const TOLD_WITHIN: (f64, f64) = (0.2, 2.0);
 
-/// What a run's counts and voltages say of its stick-slip cycles.
+/// The word of a run's counts and voltages on its stick-slip cycles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     /// So many a second, within 20 % and two cycles of the run.
@@ -23,7 +23,7 @@ pub enum Verdict {
 }
 
 impl Detected {
-    /// What it says.
+    /// Its words.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         match self.told_cycles_per_s {

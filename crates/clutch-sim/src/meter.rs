@@ -137,7 +137,7 @@ impl Meter {
 
     /// Sample number `tick`: its counts, and the voltage that was given in answer to it, V. A gap that it ends is judged.
     ///
-    /// Of a gap with a lost sample nothing is known: it can hold a stick, and need not.
+    /// A gap with a lost sample says nothing: it can hold a stick, and need not.
     pub fn sample(&mut self, tick: u64, counts: Counts, volts: f64) -> Option<Gap> {
         self.broken |= tick != self.next;
         let moved = self.last.map(|last| counts.since(last));

@@ -50,7 +50,7 @@ struct Course {
     told: String,
 }
 
-/// What tuning is given: the hidden rig's bounds and safe state, and of its rig nothing.
+/// The input of tuning: the hidden rig's bounds and safe state, and of its rig nothing.
 fn known(truth: &Truth) -> Outcome<Scenario> {
     let mut table = truth.scenario.table().clone();
     table.insert(
@@ -189,7 +189,7 @@ fn told(truth: &Truth, tuned: &Tuned, run: Option<&(Metrics, f64, Option<String>
     text
 }
 
-/// What is done is kept beside this program, under a name of its bytes: started anew it goes on, and a program that was built
+/// Rigs that are done are kept beside this program, under a name of its bytes: started anew it goes on, and a program that was built
 /// anew begins anew.
 struct Kept {
     file: File,

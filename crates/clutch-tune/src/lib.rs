@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use trial::{Trial, scores};
 
-/// What is asked for.
+/// The request.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Rates at which gains are to be smooth, °/s; none: the scenario's own.
@@ -67,12 +67,12 @@ pub enum Standing {
     },
     /// It has no certificate, and one that has is chosen, or none without one was asked for.
     Uncertified {
-        /// What limits.
+        /// The limit.
         why: String,
     },
     /// On discs that it was not chosen on it sticks, or leaves its path.
     Refused {
-        /// What it does.
+        /// Its behaviour.
         why: String,
     },
     /// On the discs on which candidates are judged it leaves its path.
@@ -81,7 +81,7 @@ pub enum Standing {
     Unstable,
 }
 
-/// What is proven of a candidate.
+/// The proof of a candidate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "is")]
 pub enum Verdict {
@@ -96,7 +96,7 @@ pub enum Verdict {
     },
     /// Nothing is.
     Uncertified {
-        /// What limits.
+        /// The limit.
         why: String,
     },
     /// No proof was looked for: a smoother candidate was chosen before.
@@ -112,7 +112,7 @@ pub struct Candidate {
     pub gains: Vec<(String, f64)>,
     /// Its score on discs that no gain was chosen on.
     pub score: Score,
-    /// What is proven.
+    /// The proof.
     pub verdict: Verdict,
     /// Chosen, or why not.
     pub standing: Standing,

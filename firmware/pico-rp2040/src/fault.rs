@@ -1,4 +1,4 @@
-//! What runs from flash, and before or after all else: the copy of the program into memory, and the end of a processor
+//! Code that runs from flash, and before or after all else: the copy of the program into memory, and the end of a processor
 //! that cannot continue. [`stop`] puts the safe output out and feeds the watchdog no more, which then resets the board
 //! into its power-up state. A panic has no path to it: the image would not link.
 

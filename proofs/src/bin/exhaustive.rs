@@ -188,7 +188,7 @@ fn table(bold: bool) -> Tried {
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// What a decoder makes of a frame with a right checksum: nothing, or the one message that is encoded so. Every kind with
+/// The answer of a decoder to a frame with a right checksum: nothing, or the one message that is encoded so. Every kind with
 /// every content of up to two bytes; and every stream of three bytes, after which the next frame is heard.
 fn frames(bold: bool) -> Tried {
     let good = encode(&Message::Ping(Ping { run: 0x00FF, nonce: 0x0100_0000 }));
@@ -241,7 +241,7 @@ fn rig() -> Result<Rig, String> {
     })
 }
 
-/// What may happen to a supervisor.
+/// An event for a supervisor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Event {
     /// A sample: periods since the newest, counts, the board's mode, and flags.

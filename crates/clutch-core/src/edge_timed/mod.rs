@@ -452,7 +452,7 @@ impl<T: Real> EdgeTimed<T> {
         (mean, end)
     }
 
-    /// What a sample says by itself: the counts since the last, and the mean voltage at the pad.
+    /// The word of a sample by itself: the counts since the last, and the mean voltage at the pad.
     fn hear(&self, state: &mut EdgeTimedState<T>, position: FixedCounts, applied: T) -> (T, T) {
         let moved = self.place(state, position);
         let [newest, middle, oldest] = state.line;

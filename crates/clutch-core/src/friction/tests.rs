@@ -1,4 +1,4 @@
-//! What is asked of every model, and how bristles bend.
+//! Properties of every model, and of bristles that bend.
 
 use super::*;
 use crate::params::{Choice, Params};

@@ -23,7 +23,7 @@ const LONGEST: f64 = 64.0;
 const FALL: f64 = 3.0;
 /// Share of a new measurement in the way of a step.
 const LEARNT: f64 = 0.3;
-/// What the way of a step may become, as a multiple of the model's.
+/// Limits of the way of a step, as a multiple of the model's.
 const WAYS: (f64, f64) = (0.05, 5.0);
 /// Way of the shortest step above which a motor pushes less, counts.
 const COARSE: f64 = 0.6;

@@ -329,7 +329,7 @@ impl<T: Real> Side<T> {
 pub(super) struct EnvelopeState<T> {
     /// The fastest shaft, and the slowest with the axis turned round; and what is expected of them.
     sides: [[Side<T>; 2]; 2],
-    /// What is expected are the first, and not the second.
+    /// Expected are the first, and not the second.
     swapped: bool,
     /// True if it is expected after losses; none where nothing is expected.
     expected: Option<bool>,

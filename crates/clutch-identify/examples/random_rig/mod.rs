@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::error::Error;
 
-/// What a campaign makes of a rig.
+/// A rig, and a campaign's findings of it.
 pub(crate) type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
 /// A rig, as nobody knows it.

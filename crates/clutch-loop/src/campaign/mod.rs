@@ -31,7 +31,7 @@ use std::str::FromStr;
 pub struct RunId {
     /// Seed of the draw.
     pub seed: u64,
-    /// What is left out, of [`PLAIN`].
+    /// The part that is left out, of [`PLAIN`].
     pub without: Vec<&'static str>,
 }
 

@@ -63,7 +63,7 @@ fn by_the_way(s: &Setting) -> f64 {
 }
 
 impl Promise {
-    /// What one trouble in a setting may come to.
+    /// The outcome that one trouble in a setting may have.
     #[must_use]
     pub fn of(s: &Setting, t: &Trouble) -> Promise {
         let watchdog = f64::from(s.cycles) * PERIOD;

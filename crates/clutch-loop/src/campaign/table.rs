@@ -24,7 +24,7 @@ pub struct Row {
     beyond: u64,
 }
 
-/// What the runs of each kind came to.
+/// The outcome of the runs of each kind.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     rows: BTreeMap<String, Row>,

@@ -33,6 +33,7 @@ import struct
 import sys
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -214,8 +215,12 @@ class System(Block):
         return self[at & ~3] >> 8 * (at & 3) >> 4 & 15
 
 
+class NotModelled(Exception):
+    """A function of the chip that the model does not have."""
+
+
 class Source(Protocol):
-    """What may raise interrupts."""
+    """A source of interrupts."""
 
     def lines(self) -> list[int]:
         """The numbers of those that it raises now."""
@@ -236,7 +241,7 @@ class Line(Protocol):
         """Bytes come over it."""
 
 
-class Chip:
+class Chip(ABC):
     """A chip, with an image in its flash."""
 
     # What a kind of chip has.
@@ -267,33 +272,33 @@ class Chip:
         threading.Thread(target=self.watch, daemon=True).start()
         self.clear()
 
+    @abstractmethod
     def map_memory(self, image: bytes) -> None:
         """Maps flash with the image, memory, and the chip's own ROM."""
-        raise NotImplementedError
 
+    @abstractmethod
     def map_registers(self) -> None:
         """Maps registers; fills `blocks`, `sources`, `watchdog` and `serial`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def begin(self) -> None:
         """After a reset: memory that is no block of registers, and the first instruction."""
-        raise NotImplementedError
 
+    @abstractmethod
     def core_hz(self) -> int:
         """The core's clock, Hz; 0 if it stands still."""
-        raise NotImplementedError
 
+    @abstractmethod
     def timers_ns(self) -> int:
         """Time at which a timer of the chip wants to run next."""
-        raise NotImplementedError
 
+    @abstractmethod
     def code(self) -> int:
         """Output of the converter."""
-        raise NotImplementedError
 
+    @abstractmethod
     def floats(self) -> bool:
         """True if the converter leaves its output to the wiring."""
-        raise NotImplementedError
 
     def share(self, size: int, rights: int, *where: int) -> Any:
         memory = (ctypes.c_char * size)()
@@ -614,7 +619,7 @@ def statics_end(image: bytes) -> int:
     return max([at + size for kind, _, at, _, _, size in headers if kind == 1 and at >> 28 == 2], default=0x2000_0000)
 
 
-class Meter:
+class Meter(ABC):
     """Counts instructions, and estimates their cycles. What an instruction costs, and a wait for the flash, is the
     chip's own."""
 
@@ -636,17 +641,17 @@ class Meter:
         chip.uc.hook_add(uc_const.UC_HOOK_CODE, self.instruction)
         chip.uc.hook_add(uc_const.UC_HOOK_MEM_READ, self.load, None, chip.FLASH.start, chip.FLASH.stop - 1)
 
+    @abstractmethod
     def cycles_of(self, code: bytes) -> int:
         """Cycles of an instruction without waits."""
-        raise NotImplementedError
 
+    @abstractmethod
     def fetched(self, at: int) -> None:
         """An instruction is fetched."""
-        raise NotImplementedError
 
+    @abstractmethod
     def loaded(self, at: int) -> None:
         """A datum in flash is loaded."""
-        raise NotImplementedError
 
     def instruction(self, uc: Uc, at: int, size: int, _data: Any) -> None:
         self.executed += 1

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
 
-from cortex_m import NEVER, WORD, Block, Chip, Fault, Meter, Page, segments, serve
+from cortex_m import NEVER, WORD, Block, Chip, Fault, Meter, NotModelled, Page, segments, serve
 from unicorn import Uc
 from unicorn import arm_const as arm
 from unicorn import unicorn_const as uc_const
@@ -220,7 +220,7 @@ class Slice(Registers):
 
 
 class Pwm(Registers):
-    """What the slices of the PWM have in common: their interrupt."""
+    """The part that the slices of the PWM have in common: their interrupt."""
 
     INTR, INTE, INTS = 0xA4, 0xA8, 0xB0
 
@@ -340,7 +340,7 @@ class Machine(Registers):
     def execute(self, instruction: int) -> None:
         kind, argument, low = instruction >> 13, instruction >> 5 & 7, instruction & 31
         if instruction >> 8 & 31:
-            raise NotImplementedError(f"PIO: instruction {instruction:#06x} with a delay or side-set")
+            raise NotModelled(f"PIO: instruction {instruction:#06x} with a delay or side-set")
         if kind == 0 and argument in (0, 2, 4):  # JMP: always, X--, Y--
             jumps = True
             if argument == 2:
@@ -364,7 +364,7 @@ class Machine(Registers):
         elif kind == 6 and instruction & 0xFFF8 == 0xC000:  # IRQ
             self.irq |= 1 << (low & 7)
         else:
-            raise NotImplementedError(f"PIO: instruction {instruction:#06x}")
+            raise NotModelled(f"PIO: instruction {instruction:#06x}")
 
     def source(self, number: int) -> int:
         base = self[self.PINCTRL] >> 15 & 31
@@ -378,7 +378,7 @@ class Machine(Registers):
             7: lambda: self.osr,
         }
         if number not in sources:
-            raise NotImplementedError(f"PIO: source {number}")
+            raise NotModelled(f"PIO: source {number}")
         return sources[number]()
 
     def move(self, to: int, value: int) -> None:
@@ -387,7 +387,7 @@ class Machine(Registers):
         elif to in (1, 2, 6, 7):
             setattr(self, {1: "x", 2: "y", 6: "isr", 7: "osr"}[to], value)
         else:
-            raise NotImplementedError(f"PIO: MOV to {to}")
+            raise NotModelled(f"PIO: MOV to {to}")
 
 
 class Watchdog(Registers):
@@ -510,7 +510,7 @@ class Dma(Registers):
             return
         # One byte at a time, the next address, at the pace of UART0, which asks for it.
         if value >> 15 & 63 != Serial.REQUEST_TX or value & 0x3C != 0x10 or not serial[Serial.DMACR] & 2:
-            raise NotImplementedError(f"DMA: a transfer with CTRL = {value:#010x}")
+            raise NotModelled(f"DMA: a transfer with CTRL = {value:#010x}")
         serial.sent += self.chip.uc.mem_read(self[at + self.READ], self[at + self.COUNT])
         self[at + self.READ] += self[at + self.COUNT]
         self[at + self.COUNT] = 0

@@ -47,7 +47,7 @@ pub(crate) struct Adversary {
     pub(crate) slope: f64,
 }
 
-/// What a bad law remembers.
+/// The memory of a bad law.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {
     draws: u64,

@@ -23,7 +23,7 @@ pub enum Cause {
     SampledLoop,
     /// Friction falls faster with the speed than the law brakes.
     StribeckEdge,
-    /// What is unstable grows too much between two edges of the encoder.
+    /// An instability grows too much between two edges of the encoder.
     EncoderEdge,
     /// An edge of the encoder, through the law's derivative gain, takes more speed than there is.
     EdgeJolt,
@@ -35,7 +35,7 @@ impl Cause {
         [Cause::SampledLoop, Cause::StribeckEdge, Cause::EncoderEdge, Cause::EdgeJolt];
 }
 
-/// What the causes follow from, at a rate.
+/// The ground from which the causes follow, at a rate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evidence {
     /// The rate, °/s.

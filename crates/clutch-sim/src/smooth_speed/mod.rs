@@ -51,7 +51,7 @@ impl Trials {
     /// Ramps at `rates_deg_s` (°/s), in any order, each on the discs of the seeds 1 to `discs`.
     ///
     /// # Errors
-    /// What is wrong, with `origin` before it.
+    /// The fault, with `origin` before it.
     pub fn new(origin: &str, rates_deg_s: &[f64], discs: i64) -> Result<Trials, ScenarioError> {
         let wrong =
             |key, value: String, expected: &str| Err(ScenarioError::value(origin, key, &value, expected));
@@ -97,7 +97,7 @@ impl Trials {
     }
 }
 
-/// What keeps a run from being smooth.
+/// The reasons why a run is not smooth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Failing {
@@ -116,7 +116,7 @@ pub struct Failure {
     pub seed: u64,
     /// Time at which it showed, s.
     pub time_s: f64,
-    /// What it does.
+    /// Its behaviour.
     pub failing: Failing,
 }
 
@@ -131,7 +131,7 @@ pub struct SmoothSpeed {
     pub below: Option<Failure>,
     /// Rates above the lowest smooth one that are not smooth, with the first run that showed it.
     pub holes: Vec<Failure>,
-    /// What the causes follow from, at the rate below; at the lowest if that is smooth.
+    /// The ground from which the causes follow, at the rate below; at the lowest if that is smooth.
     pub evidence: Evidence,
     /// Discs that each rate up to the lowest smooth one was tried on.
     pub discs: u32,

@@ -12,12 +12,11 @@ class ClutchAxis {
 public:
     /* Builds the axis; false if the settings make no run, and misfit() says which. Until somebody consents the code is that with which
      * the safe state holds: write it first of all. */
-    bool begin(const clutch_setting *settings, size_t count, const clutch_knot *knots, size_t knots_count,
-               uint32_t period_us)
+    bool begin(const clutch_run &run, uint32_t period_us)
     {
         period = period_us;
         clutch_safe_codes safe;
-        if (clutch_axis_build(&axis, settings, count, knots, knots_count, &why) != CLUTCH_OK ||
+        if (clutch_axis_build(&axis, &run, &why) != CLUTCH_OK ||
             clutch_axis_safe(&axis, &safe) != CLUTCH_OK)
             return false;
         now_code = safe.hold;

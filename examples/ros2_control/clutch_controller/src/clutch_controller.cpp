@@ -36,8 +36,7 @@ CallbackReturn ClutchController::on_configure(const rclcpp_lifecycle::State &)
   joint_ = get_node()->get_parameter("joint").as_string();
   command_ = get_node()->get_parameter("command_interface").as_string();
   clutch_misfit misfit;
-  const bool built = clutch_axis_build(
-    &axis_, run_settings, run_settings_count, run_knots, run_knots_count, &misfit) == CLUTCH_OK;
+  const bool built = clutch_axis_build(&axis_, &run, &misfit) == CLUTCH_OK;
   clutch_safe_codes safe;
   if (joint_.empty() || !built || clutch_axis_safe(&axis_, &safe) != CLUTCH_OK) {
     return CallbackReturn::ERROR;

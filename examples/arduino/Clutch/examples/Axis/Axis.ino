@@ -38,7 +38,7 @@ void setup()
     /* Before anything that takes time: the brake holds. Until here the output floats; a resistor has to hold it where the brake is on. */
     analogWriteResolution(12);
     analogWrite(A0, run_safe_code);
-    if (!axis.begin(run_settings, run_settings_count, run_knots, run_knots_count, run_period_us)) {
+    if (!axis.begin(run, run_period_us)) {
         Serial.print("the settings make no run: key ");
         Serial.println(axis.misfit().key);
         for (;;)
