@@ -6,12 +6,9 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use clutch_log::names::name_of;
-use clutch_log::{CHANNELS, Header, InChannel, Kind, Limits, LogError, Record, Value};
+use clutch_log::{CHANNELS, Header, InChannel, Kind, Limits, LogError, Record, TIME, Value};
 use std::fs::File;
 use std::path::{Path, PathBuf};
-
-/// The column before a channel's fields, as in Python.
-const TIME: &str = "time_s";
 
 #[derive(Args)]
 pub(crate) struct Export {
@@ -99,11 +96,7 @@ impl Table<'_> {
             none => {
                 let columns = R::CHANNEL.columns(&header.term_names);
                 let csv = none.insert(csv::Writer::from_writer(File::create_new(self.out).map_err(io)?));
-                // A law's term must not hide the time.
-                let names = columns.iter().map(|(name, _)| match name.as_str() {
-                    TIME => "time_s_term",
-                    name => name,
-                });
+                let names = columns.iter().map(|(name, _)| name.as_str());
                 csv.write_record(std::iter::once(TIME).chain(names)).map_err(|e| io(e.into()))?;
                 self.kinds = columns.iter().map(|(_, kind)| *kind).collect();
                 csv

@@ -19,7 +19,7 @@ pub use header::{Header, Source};
 pub use info::{ChannelInfo, Info, info};
 pub use names::{Arrival, CommandSource, EventKind};
 pub use printable::printable;
-pub use proto::{CHANNELS, Channel, Field, Kind, Value, channel_table};
+pub use proto::{CHANNELS, Channel, Field, Kind, TIME, Value, channel_table};
 pub use read::{Log, read, read_bytes};
 pub use record::{
     CommandRecord, EventRecord, InChannel, LinkRecord, MAX_TERMS, Record, SampleRecord, Terms, TruthRecord,

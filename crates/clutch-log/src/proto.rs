@@ -76,15 +76,18 @@ pub struct Channel {
     pub terms: usize,
 }
 
+/// Column of a table before a channel's fields: the time of a record, s.
+pub const TIME: &str = "time_s";
+
 impl Channel {
-    /// Names and types of the fields as a table shows them: with the law's terms under their own names, and no more
-    /// than there are. A term that is called as another field gets its number behind its name.
+    /// Names and types of the fields as a table shows them behind [`TIME`]: with the law's terms under their own names, and no more
+    /// than there are. A term that is called as another column gets its number behind its name.
     #[must_use]
     pub fn columns(&self, terms: &[String]) -> Vec<(String, Kind)> {
         let (fields, of_terms) = self.fields.split_at(self.fields.len() - self.terms);
         let mut columns: Vec<_> = fields.iter().map(|f| (f.name.to_owned(), f.kind)).collect();
         for (i, (term, field)) in terms.iter().zip(of_terms).enumerate() {
-            let taken = columns.iter().any(|(name, _)| name == term);
+            let taken = term == TIME || columns.iter().any(|(name, _)| name == term);
             columns.push((if taken { format!("{term}_{i}") } else { term.clone() }, field.kind));
         }
         columns
@@ -287,6 +290,14 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_term_that_is_called_as_another_column_hides_none() {
+        let terms = ["p_v", TIME, "tick"].map(String::from);
+        let columns = CommandRecord::CHANNEL.columns(&terms);
+        let names: Vec<&str> = columns[columns.len() - 3..].iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["p_v", "time_s_1", "tick_2"]);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::scenario::Scenario;
 use crate::stepping::PythonLaw;
 use crate::table::{Column, Table, pairs};
 use clutch_log::names::{Names, name_of};
-use clutch_log::{InChannel, Kind, Limits, Value};
+use clutch_log::{InChannel, Kind, Limits, TIME, Value};
 use clutch_loop::replay;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -79,8 +79,6 @@ impl Growing {
 fn table<R: InChannel>(records: &[R], terms: &[String]) -> Table {
     let mut columns: Vec<(String, Growing)> =
         R::CHANNEL.columns(terms).into_iter().map(|(name, kind)| (name, Growing::of(kind))).collect();
-    // A law's term must not hide the time.
-    columns.iter_mut().filter(|(name, _)| name == TIME).for_each(|(name, _)| name.push_str("_term"));
     for record in records {
         let mut values = record.values();
         columns.iter_mut().for_each(|(_, column)| column.push(values.next()));
@@ -89,9 +87,6 @@ fn table<R: InChannel>(records: &[R], terms: &[String]) -> Table {
     let columns = columns.into_iter().map(|(name, column)| (name, column.column()));
     Table::of(iter::once((TIME.to_owned(), Column::own(time))).chain(columns))
 }
-
-/// The column before a channel's fields.
-const TIME: &str = "time_s";
 
 impl Log {
     fn tables(&self) -> Vec<(&'static str, Table)> {
