@@ -179,26 +179,25 @@ pub fn start() -> Board {
     converter.top().write(|w| w.set_top(4095));
     converter.cc().write(|w| w.set_a(BOOT_CODE.0));
     converter.csr().write(|w| w.set_en(true));
-    function(CONVERTER, 4);
+    function::<CONVERTER>(4);
     start_watchdog();
-    for (slice, top) in [(CLOCK, u16::MAX), (PERIOD, 999)] {
-        let slice = pac::PWM.ch(slice);
+    for (slice, top) in [(pac::PWM.ch(CLOCK), u16::MAX), (pac::PWM.ch(PERIOD), 999)] {
         slice.div().write(|w| w.set_int((CORE_HZ / 1_000_000) as u8));
         slice.top().write(|w| w.set_top(top));
         slice.csr().write(|w| w.set_en(true));
     }
 
-    for pin in [ENCODER_A, ENCODER_B] {
-        pac::PADS_BANK0.gpio(pin).modify(|w| {
+    for pad in [pac::PADS_BANK0.gpio(ENCODER_A), pac::PADS_BANK0.gpio(ENCODER_B)] {
+        pad.modify(|w| {
             w.set_ie(true);
             w.set_pue(true);
             w.set_pde(false);
         });
-        function(pin, 6);
     }
-    for pin in LINE {
-        function(pin, 2);
-    }
+    function::<ENCODER_A>(6);
+    function::<ENCODER_B>(6);
+    function::<{ LINE[0] }>(2);
+    function::<{ LINE[1] }>(2);
     let mut encoder = Quadrature::start(ENCODER_A as u8);
     let board = Board {
         counter: WideCounter::new(encoder.read()),
@@ -219,15 +218,14 @@ pub fn start() -> Board {
     }
     pac::SIO.gpio_out(0).value_set().write_value(1 << CONNECTED | 1 << REGULATOR);
     pac::SIO.gpio_oe(0).value_set().write_value(1 << CONNECTED | 1 << REGULATOR);
-    for pin in [CONNECTED, REGULATOR] {
-        function(pin, 5);
-    }
+    function::<CONNECTED>(5);
+    function::<REGULATOR>(5);
     board
 }
 
-/// Connects a pin to a peripheral, by the number of the chip's table.
-fn function(pin: usize, number: u8) {
-    pac::IO_BANK0.gpio(pin).ctrl().write(|w| w.set_funcsel(number));
+/// Connects a pin to a peripheral, by the number of the chip's table. The pin is known when it is compiled: no check of it is left.
+fn function<const PIN: usize>(number: u8) {
+    pac::IO_BANK0.gpio(PIN).ctrl().write(|w| w.set_funcsel(number));
 }
 
 fn start_watchdog() {

@@ -97,7 +97,8 @@ impl Quadrature {
     /// Starts at A's pin; B is on the next one.
     pub(crate) fn start(a: u8) -> Quadrature {
         let (pio, machine) = (pac::PIO0, pac::PIO0.sm(0));
-        for (at, instruction) in PROGRAM.iter().enumerate() {
+        const { assert!(PROGRAM.len() <= 32, "the machine's memory") };
+        for (at, instruction) in (0..32).zip(&PROGRAM) {
             pio.instr_mem(at).write(|w| w.set_instr_mem(*instruction));
         }
         machine.clkdiv().write(|w| w.set_int(1));

@@ -1,8 +1,7 @@
 //! Files of the machine that runs the emulator.
 
 use core::ffi::CStr;
-use core::mem::forget;
-use semihosting::fd::{AsFd as _, BorrowedFd, RawFd};
+use semihosting::fd::{BorrowedFd, OwnedFd, RawFd};
 use semihosting::{fs::File, sys};
 
 /// An open file, which is never closed: the image ends with the emulator.
@@ -12,18 +11,16 @@ pub struct HostFile(RawFd);
 impl HostFile {
     /// Opens a file to read.
     pub fn open(path: &CStr) -> Option<HostFile> {
-        HostFile::keep(File::open(path).ok()?)
+        Some(HostFile::keep(File::open(path).ok()?))
     }
 
     /// Creates a file to write; opening one for writing without creating it is refused.
     pub fn create(path: &CStr) -> Option<HostFile> {
-        HostFile::keep(File::create(path).ok()?)
+        Some(HostFile::keep(File::create(path).ok()?))
     }
 
-    fn keep(file: File) -> Option<HostFile> {
-        let fd = file.as_fd().as_raw_fd();
-        forget(file);
-        Some(HostFile(fd))
+    fn keep(file: File) -> HostFile {
+        HostFile(OwnedFd::from(file).into_raw_fd())
     }
 
     /// Borrowing asserts the condition that is checked here first, so that no panic is left.

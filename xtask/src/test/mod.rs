@@ -20,7 +20,7 @@ const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "risc
 /// Checks that need the targets: three builds of the core and one of the parts of boards each, the three link tests, the
 /// libraries with their control, the example, two boards, the budgets.
 const SKIPPED_WITHOUT_TARGETS: u64 =
-    4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + firmware::BOARDS.len() as u64 + 6;
+    4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 2 * firmware::BOARDS.len() as u64 + 6;
 
 /// The packages that are built for this machine. Always the same selection: with another one cargo gives libraries
 /// other features, and compiles them once more. The wheel's module only links inside of Python.
@@ -197,6 +197,8 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     tally.stage("images");
     for board in firmware::BOARDS {
         tally.check_quiet(&format!("the images of {} build", board.0), firmware::image(board).quietly()?);
+        let small = firmware::image(board).args(SMALL).args(["--target-dir", "../target/firmware_small"]);
+        tally.check_quiet(&format!("they build at opt-level s ({})", board.0), small.quietly()?);
     }
     tally.stage("budgets");
     // As a test, not as a benchmark: the figures are the machine code's, not this machine's.
@@ -208,6 +210,9 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     Ok(())
 }
 
+/// Builds for size.
+const SMALL: [&str; 2] = ["--config", "profile.release.opt-level=\"s\""];
+
 /// The core links without a reachable panic, at both levels that firmware is built at; with one put in it does not, and the
 /// function that has it is named.
 fn no_panic(tally: &mut Tally) -> Result<()> {
@@ -216,8 +221,7 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
             .args(["--target", firmware::TARGET, "--target-dir", folder])
             .args(args)
     };
-    let small = ["--config", "profile.release.opt-level=\"s\""];
-    for (level, args) in [("3", &[][..]), ("s", &small[..])] {
+    for (level, args) in [("3", &[][..]), ("s", &SMALL[..])] {
         let (links, text) = image(args, "target/no_panic").quietly()?;
         let text = if links { text } else { text + &panicking(&|folder| image(args, folder))? };
         tally.check_quiet(
