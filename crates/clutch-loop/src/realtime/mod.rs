@@ -221,9 +221,12 @@ fn stay_awake() -> Option<String> {
 }
 
 fn set_fifo(priority: u8) -> Option<String> {
-    let param = libc::sched_param { sched_priority: libc::c_int::from(priority) };
+    // The system's `sched_param` is the priority alone. Its call and not the C library's, which musl always refuses.
+    let param = libc::c_int::from(priority);
+    let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
     // SAFETY: `param` lives through the call, which only reads it; 0 names the calling thread.
-    let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, &param) };
+    let result =
+        unsafe { libc::syscall(libc::SYS_sched_setscheduler, 0 as libc::pid_t, policy, &raw const param) };
     if result == 0 {
         return None;
     }
