@@ -28,7 +28,8 @@ pub(crate) fn check() -> Result<()> {
             target,
         ]);
         let key = |tool: &str| format!("{tool}_{}", target.replace('-', "_"));
-        check.args(["--target-dir"]).arg(&folder).env(&key("CC"), &compiler).env(&key("AR"), "true").run()?;
+        let check = check.arg("--target-dir").arg(&folder).env("RUSTFLAGS", "-D warnings");
+        check.env(&key("CC"), &compiler).env(&key("AR"), "true").run()?;
     }
     Ok(())
 }

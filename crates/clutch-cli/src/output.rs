@@ -5,7 +5,6 @@ use anstyle::{AnsiColor, Style};
 use anyhow::Context;
 use clap::Args;
 use clutch_log::printable;
-use clutch_loop::clearance::ClearanceError;
 use clutch_sim::progress::Report;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::borrow::Cow;
@@ -49,7 +48,8 @@ pub(crate) enum Exit {
 pub const BUILD: &str = env!("CLUTCH_BUILD");
 
 /// That nothing was started, and what to do.
-pub(crate) fn not_certified(refusal: &ClearanceError, file: &Path) -> String {
+#[cfg(target_os = "linux")]
+pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, file: &Path) -> String {
     format!("{refusal}\n`clutch certify {}` says why; --uncertified runs it all the same.\n", file.display())
 }
 
