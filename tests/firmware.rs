@@ -32,11 +32,18 @@ fn modelled(package: &str, target: &str) -> Result<PathBuf, &'static str> {
     built(package, target)
 }
 
+/// True if a target of the compiler is installed.
+#[must_use]
+pub fn has(target: &str) -> bool {
+    let libraries =
+        Command::new("rustc").args(["--print", "target-libdir", "--target", target]).output().ok();
+    let libraries = libraries.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_default();
+    Path::new(libraries.trim()).is_dir()
+}
+
 /// Builds the images of a board.
 fn built(package: &str, goal: &str) -> Result<PathBuf, &'static str> {
-    let libraries = Command::new("rustc").args(["--print", "target-libdir", "--target", goal]).output().ok();
-    let libraries = libraries.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_default();
-    if !Path::new(libraries.trim()).is_dir() {
+    if !has(goal) {
         return Err("a target is not installed (rustup target add thumbv7em-none-eabihf thumbv6m-none-eabi)");
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -56,7 +63,7 @@ fn built(package: &str, goal: &str) -> Result<PathBuf, &'static str> {
 /// all.
 ///
 /// # Panics
-/// The image does not build; or in CI, where there is none.
+/// The image does not build; or as [`skipped`].
 #[must_use]
 pub fn image(name: &str) -> Option<PathBuf> {
     let images = match name.split('-').next() {
@@ -66,10 +73,17 @@ pub fn image(name: &str) -> Option<PathBuf> {
     };
     match images {
         Ok(folder) => Some(folder.join(name)),
-        Err(why) => {
-            assert!(std::env::var_os("CI").is_none(), "{why}: CI must not skip this test");
-            println!("skipped: {why}");
-            None
-        }
+        Err(why) => skipped(why),
     }
+}
+
+/// Nothing, and a message that says why.
+///
+/// # Panics
+/// In CI, which has all that tests need.
+#[must_use]
+pub fn skipped<T>(why: &str) -> Option<T> {
+    assert!(std::env::var_os("CI").is_none(), "{why}: CI must not skip this test");
+    println!("skipped: {why}");
+    None
 }

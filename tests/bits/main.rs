@@ -1,13 +1,14 @@
-//! The same bits on every machine: more than a million ticks here and in the emulator. The wheel repeats them in
+//! The same bits on every machine: more than a million ticks here and in two emulators. The wheel repeats them in
 //! `python/tests/test_bits.py`.
 
-mod emulator;
+mod machine;
 
 use clutch_bits::{Job, Kind, RECORD};
 use clutch_core::law::LawParams;
 use clutch_core::params::Choice;
 use clutch_core::reference::ReferenceParams;
 use clutch_tests::bits::{Run, fields, first_difference, table, value};
+use machine::Machine;
 use std::sync::LazyLock;
 
 /// The runs, simulated once for all tests.
@@ -88,30 +89,45 @@ fn the_hashes_are_those_of_the_page() {
 
 #[test]
 fn the_emulated_board_gives_the_same_bits() {
-    let Some(board) = emulator::board() else { return };
+    let Some(board) = machine::board() else { return };
+    assert_same(&board);
+}
+
+#[test]
+fn an_emulated_processor_of_64_bit_gives_the_same_bits() {
+    let Some(arm64) = machine::arm64() else { return };
+    assert_same(&arm64);
+}
+
+fn assert_same(machine: &Machine) {
     let inputs: Vec<u8> = ALL.iter().flat_map(|run| run.input(run.job)).collect();
-    let (hashes, _) = board.run("same", &inputs);
+    let (hashes, _) = machine.run("same", &inputs);
     assert_eq!(hashes.len(), ALL.len(), "{hashes:08x?}");
     let wrong: Vec<String> = ALL
         .iter()
         .zip(hashes)
         .filter(|(run, hash)| run.hash != *hash)
-        .map(|(run, _)| format!("{}: {}", run.name, told(&board, run, run.job)))
+        .map(|(run, _)| format!("{}: {}", run.name, told(machine, run, run.job)))
         .collect();
-    assert!(wrong.is_empty(), "the board differs:\n{}", wrong.join("\n"));
+    assert!(wrong.is_empty(), "{} differs:\n{}", machine.name, wrong.join("\n"));
 }
 
 #[test]
-fn one_bit_that_the_board_spoils_is_found_and_named() {
-    let Some(board) = emulator::board() else { return };
+fn one_bit_that_a_machine_spoils_is_found_and_named() {
+    for machine in [machine::board(), machine::arm64()].iter().flatten() {
+        assert_found(machine);
+    }
+}
+
+fn assert_found(machine: &Machine) {
     let run = ALL.iter().find(|run| run.name == "pd_table_cubic").unwrap();
     let spoiled = Job { spoil: Some((31_415, lowest_bit("error_rate"))), ..run.job };
-    let (hashes, _) = board.run("spoiled", &run.input(spoiled));
+    let (hashes, _) = machine.run("spoiled", &run.input(spoiled));
     assert_ne!(hashes, [run.hash]);
-    let told = told(&board, run, spoiled);
+    let told = told(machine, run, spoiled);
     assert!(told.starts_with("tick 31415, error_rate: "), "{told}");
     let first = Job { spoil: Some((0, lowest_bit("target_counts_x65536"))), ..run.job };
-    let told = self::told(&board, run, first);
+    let told = self::told(machine, run, first);
     assert!(told.starts_with("tick 0, target_counts_x65536: "), "{told}");
 }
 
@@ -122,8 +138,8 @@ fn lowest_bit(name: &str) -> u32 {
 }
 
 /// Runs once more with every record written, and reports the first that differs.
-fn told(board: &emulator::Board, run: &Run, job: Job) -> String {
-    let (_, theirs) = board.run("told", &run.input(Job { dump: true, ..job }));
+fn told(machine: &Machine, run: &Run, job: Job) -> String {
+    let (_, theirs) = machine.run(&format!("told-{}", run.name), &run.input(Job { dump: true, ..job }));
     match first_difference(&run.records, &theirs) {
         Some(difference) => difference.to_string(),
         None => "the hash differs, and no record does".to_owned(),

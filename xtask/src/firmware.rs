@@ -80,12 +80,12 @@ pub(crate) fn in_firmware<const N: usize>(args: [&str; N]) -> Program {
 }
 
 /// Where the images of a target are.
-fn folder(target: &str) -> PathBuf {
+pub(crate) fn folder(target: &str) -> PathBuf {
     root().join("target/firmware").join(target).join("release")
 }
 
 /// Builds all images.
-fn build() -> Result<()> {
+pub(crate) fn build() -> Result<()> {
     for board in BOARDS {
         build_one(board)?;
     }

@@ -67,7 +67,8 @@ pub(crate) fn add(targets: &[&str]) -> Result<()> {
     program("rustup").args(["target", "add"]).args(targets).run().context("rustup cannot add the targets")
 }
 
-fn folder() -> PathBuf {
+/// Where the libraries are.
+pub(crate) fn folder() -> PathBuf {
     root().join("target/libclutch")
 }
 

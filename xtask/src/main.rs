@@ -2,6 +2,8 @@
 
 mod ablate;
 mod coverage;
+mod debian;
+mod dist;
 mod elsewhere;
 mod firmware;
 mod fmu;
@@ -61,6 +63,12 @@ enum Verb {
     Libclutch {
         /// Only these targets.
         targets: Vec<String>,
+    },
+    /// Builds the files of a release, in target/dist, checks and runs them: here, on an emulated 64-bit Arm processor, and on
+    /// an emulated Windows. Installs what that needs: packages of Debian as root, Rust targets, Python packages in .venv.
+    Dist {
+        /// Only these parts.
+        parts: Vec<dist::Part>,
     },
     /// Packs rig and law as FMI 3.0 co-simulation units, in target/fmu.
     Fmu {
@@ -263,6 +271,7 @@ fn main() -> Result<()> {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
         Verb::Fmu { scenario } => fmu::pack(scenario.as_deref(), true).map(drop),
+        Verb::Dist { parts } => dist::run(&parts),
         Verb::Libclutch { targets } => libclutch::run(&targets),
         Verb::Stubs => stubs::generate(&python::interpreter()?),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),

@@ -1,5 +1,6 @@
 //! Python: a private environment for tools, and the wheel in one of its own.
 
+use crate::debian;
 use crate::run::{Program, program, root};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
@@ -19,6 +20,11 @@ pub(crate) fn checkers() -> Result<impl Fn(&str) -> Program> {
     Ok(move |name: &str| program(beside(&python, name)))
 }
 
+/// The interpreter of the environment with what builds and checks a release, made and filled if need be.
+pub(crate) fn packers() -> Result<PathBuf> {
+    environment("xtask/dist-requirements.txt")
+}
+
 fn environment(requirements: &str) -> Result<PathBuf> {
     let venv = root().join(".venv");
     let python = venv.join("bin/python");
@@ -31,12 +37,12 @@ fn environment(requirements: &str) -> Result<PathBuf> {
     Ok(python)
 }
 
-fn make_environment(python: &Path, venv: &Path, args: &[&str]) -> Result<()> {
+pub(crate) fn make_environment(python: &Path, venv: &Path, args: &[&str]) -> Result<()> {
     let make = || program(python).args(["-m", "venv"]).args(args).arg(venv).quietly();
     let (made, text) = make().context("the tests need Python 3.11 or later as `python3`")?;
     if !made {
         // Debian keeps ensurepip in a package of its own.
-        install_debian(&["python3-venv"]).with_context(|| format!("python3 -m venv failed:\n{text}"))?;
+        debian::install(&["python3-venv"]).with_context(|| format!("python3 -m venv failed:\n{text}"))?;
         let (made, text) = make()?;
         if !made {
             bail!("python3 -m venv failed:\n{text}");
@@ -70,17 +76,12 @@ impl Wheel {
     /// Builds the source distribution, from it the wheel, and installs that. The test tools are
     /// visible from `tools`, the environment of [`interpreter`].
     pub(crate) fn install(tools: &Path) -> Result<Wheel> {
-        let dist = root().join("target/dist");
+        let dist = root().join("target/wheel");
         let _ = std::fs::remove_dir_all(&dist);
         let folder = std::env::temp_dir().join(format!("clutch-wheel-{}", std::process::id()));
         let environment = folder.join("environment");
         let _ = std::fs::remove_dir_all(&folder);
-        let unpacked = folder.join("unpacked");
-        std::fs::create_dir_all(&unpacked).with_context(|| folder.display().to_string())?;
-        program(beside(tools, "maturin")).args(["sdist", "--out"]).arg(&dist).run()?;
-        // With the time of now (-m): maturin packs each file with one date, and cargo would not see a change.
-        program("tar").arg("-xmf").arg(the_one(&dist, ".tar.gz")?).arg("-C").arg(&unpacked).run()?;
-        let source = the_one(&unpacked, "")?;
+        let (_, source) = source_distribution(tools, &dist, &folder.join("unpacked"))?;
         let wheel = Wheel { folder, source, python: environment.join("bin/python") };
         let pip = |python: &Path| program(python).args(["-m", "pip", "--disable-pip-version-check"]);
         // A separate build environment would download maturin once more.
@@ -126,8 +127,18 @@ impl Wheel {
     }
 }
 
+/// Packs the source distribution into `out`, and unpacks it again; gives the archive, and the unpacked source.
+pub(crate) fn source_distribution(tools: &Path, out: &Path, unpacked: &Path) -> Result<(PathBuf, PathBuf)> {
+    std::fs::create_dir_all(unpacked).with_context(|| unpacked.display().to_string())?;
+    program(beside(tools, "maturin")).args(["sdist", "--out"]).arg(out).run()?;
+    let archive = the_one(out, ".tar.gz")?;
+    // With the time of now (-m): maturin packs each file with one date, and cargo would not see a change.
+    program("tar").arg("-xmf").arg(&archive).arg("-C").arg(unpacked).run()?;
+    Ok((archive, the_one(unpacked, "")?))
+}
+
 /// The search path with an interpreter's folder first.
-fn path_with(python: &Path) -> Result<std::ffi::OsString> {
+pub(crate) fn path_with(python: &Path) -> Result<std::ffi::OsString> {
     let mut path = python.parent().context("an interpreter's folder")?.as_os_str().to_owned();
     path.push(":");
     path.push(std::env::var_os("PATH").unwrap_or_default());
@@ -135,7 +146,7 @@ fn path_with(python: &Path) -> Result<std::ffi::OsString> {
 }
 
 /// The only entry of a folder with that ending.
-fn the_one(folder: &Path, ending: &str) -> Result<PathBuf> {
+pub(crate) fn the_one(folder: &Path, ending: &str) -> Result<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
@@ -147,19 +158,4 @@ fn the_one(folder: &Path, ending: &str) -> Result<PathBuf> {
         [one] => Ok(one.clone()),
         _ => bail!("{}: expected one *{ending}, found {}", folder.display(), found.len()),
     }
-}
-
-/// Installs packages of Debian, as root.
-pub(crate) fn install_debian(packages: &[&str]) -> Result<()> {
-    let (root, id) = program("id").arg("-u").quietly()?;
-    if !root || id.trim() != "0" {
-        let names = packages.join(" ");
-        bail!("please install {names} (Debian and Ubuntu: sudo apt-get install {names})");
-    }
-    program("apt-get").args(["update", "-q"]).run()?;
-    program("apt-get")
-        .env("DEBIAN_FRONTEND", "noninteractive")
-        .args(["install", "-y", "-q"])
-        .args(packages)
-        .run()
 }

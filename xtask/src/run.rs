@@ -116,7 +116,18 @@ impl Program {
         self.silently()
     }
 
-    /// The same, without a word of it.
+    /// Runs it unseen; gives its standard output, an error with both streams if it fails.
+    pub(crate) fn output(mut self) -> Result<Vec<u8>> {
+        let shown = self.shown();
+        let output = self.0.output().with_context(|| format!("cannot start: {shown}"))?;
+        if !output.status.success() {
+            let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+            bail!("failed ({}): {shown}\n{text}", output.status);
+        }
+        Ok(output.stdout)
+    }
+
+    /// As [`Program::quietly`], without a word of it.
     pub(crate) fn silently(mut self) -> Result<(bool, String)> {
         let shown = self.shown();
         let output = self.0.output().with_context(|| format!("cannot start: {shown}"))?;

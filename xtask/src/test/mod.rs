@@ -2,6 +2,7 @@
 
 mod tally;
 
+use crate::debian;
 use crate::firmware;
 use crate::fmu;
 use crate::fuzz;
@@ -72,19 +73,15 @@ fn programs() -> Result<()> {
         ("make", "make"),
         ("strace", "strace"),
         ("qemu-system-arm", "qemu-system-arm"),
+        ("qemu-aarch64", "qemu-user"),
         ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
         ("arm-none-eabi-g++", "gcc-arm-none-eabi"),
     ];
-    let is_missing = |name: &str| program(name).args(["--version"]).quietly().is_err();
-    let mut missing: Vec<&str> =
-        needed.iter().filter(|(name, _)| is_missing(name)).map(|(_, package)| *package).collect();
+    debian::need(&needed)?;
     // The C library of boards, which the compiler only recommends: asked for by a file of it.
     let library = program("arm-none-eabi-gcc").args(["-print-file-name=rdimon.specs"]).silently();
     if !library.is_ok_and(|(_, path)| Path::new(path.trim()).is_absolute()) {
-        missing.push("libnewlib-arm-none-eabi");
-    }
-    if !missing.is_empty() {
-        python::install_debian(&missing)?;
+        debian::install(&["libnewlib-arm-none-eabi"])?;
     }
     linuxcnc()
 }
@@ -116,9 +113,10 @@ fn linuxcnc() -> Result<()> {
     Ok(())
 }
 
-/// Adds the embedded targets. Without rustup they are skipped on a user's machine, not in CI.
+/// Adds the embedded targets, and that of another 64-bit processor. Without rustup they are skipped on a user's machine,
+/// not in CI.
 pub(crate) fn targets() -> Result<&'static [&'static str]> {
-    match program("rustup").args(["target", "add"]).args(TARGETS).quietly() {
+    match program("rustup").args(["target", "add", "aarch64-unknown-linux-musl"]).args(TARGETS).quietly() {
         Ok((true, _)) => Ok(&TARGETS),
         other if std::env::var_os("CI").is_none() => {
             let why = other.map_or_else(|e| e.to_string(), |(_, text)| text);

@@ -4,8 +4,10 @@
 
 mod job;
 mod record;
+mod repeat;
 mod workload;
 
 pub use job::{HEADER, Job, SETTING, setting_from_bytes, setting_to_bytes};
 pub use record::{FIELDS, Field, Kind, RECORD, hash, hashed};
+pub use repeat::{Failed, Files, repeat};
 pub use workload::Workload;

@@ -1,0 +1,77 @@
+//! The command, with its manual.
+
+use super::machine::{Machine, Results};
+use super::tools::{STATIC, STATIC_ARM64, Tools, WINDOWS};
+use super::{Made, VERSION, copy, folder, licences, name, tar, wheels, work};
+use crate::run::{program, root};
+use anyhow::{Context, Result, ensure};
+use std::path::{Path, PathBuf};
+
+/// What cargo builds.
+const COMMAND: [&str; 4] = ["--package", "clutch-cli", "--bin", "clutch"];
+
+/// The one that runs here.
+pub(super) fn here(tools: &Tools) -> Result<PathBuf> {
+    Ok(tools.build(STATIC, &COMMAND)?.join("clutch"))
+}
+
+pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
+    let build = |target: &str| tools.build(target, &COMMAND);
+    let linux = here(tools)?;
+    let arm64 = build(STATIC_ARM64)?.join("clutch");
+    let windows = build(WINDOWS)?.join("clutch.exe");
+
+    // A program that is linked to a C library would not begin: neither machine has musl's.
+    let here = Machine::here().results(&[&linux], "command")?;
+    let on_arm64 = Machine::arm64(None).results(&[&arm64], "command-arm64")?;
+    let on_windows = Machine::windows()?.results(&[&windows], "command-windows")?;
+    let same = |results: &Results| results.same_as(&here);
+    let libraries = wheels::libraries(&windows)?.len();
+    let libraries = format!("asks for {libraries} libraries of Windows alone");
+    Ok(vec![
+        Made { file: packed(&linux, &linux, "x86_64-linux")?, checked: vec![here.told()] },
+        Made {
+            file: packed(&arm64, &linux, "aarch64-linux")?,
+            checked: vec![same(&on_arm64)?, bits(tools)?],
+        },
+        Made {
+            file: packed(&windows, &linux, "x86_64-windows")?,
+            checked: vec![libraries, same(&on_windows)?],
+        },
+    ])
+}
+
+/// Packs the command for a system, with what the one that runs here prints: manual and completions.
+fn packed(command: &Path, here: &Path, system: &str) -> Result<PathBuf> {
+    let whole = format!("clutch-{VERSION}-{system}");
+    let packed = work(system)?.join(&whole);
+    copy(command, &packed)?;
+    licences(&packed)?;
+    if !system.ends_with("windows") {
+        program(here).args(["man", "--quiet", "--out"]).arg(packed.join("man")).run()?;
+        std::fs::create_dir_all(packed.join("completion"))?;
+        for shell in ["bash", "zsh", "fish"] {
+            let script = program(here).args(["completion", shell]).output()?;
+            std::fs::write(packed.join("completion").join(format!("clutch.{shell}")), script)?;
+        }
+        return tar(&packed, &format!("{whole}.tar.gz"));
+    }
+    let archive = folder().join(format!("{whole}.zip"));
+    let within = packed.parent().context("a folder within another")?;
+    program("python3").within(within).args(["-m", "zipfile", "-c"]).arg(&archive).arg(name(&packed)).run()?;
+    Ok(archive)
+}
+
+/// That a 64-bit Arm processor simulates the runs of docs/bits.md, more than a million ticks, with the hashes there.
+fn bits(tools: &Tools) -> Result<String> {
+    let built = tools.build(STATIC_ARM64, &["--package", "clutch-tests", "--example", "bits"])?;
+    let table = Machine::arm64(None).program(&built.join("examples/bits")).arg(work("bits")?).output()?;
+    let table = String::from_utf8_lossy(&table).into_owned();
+    let page = std::fs::read_to_string(root().join("docs/bits.md"))?;
+    ensure!(
+        page.contains(table.trim()),
+        "docs/bits.md has another table than a 64-bit Arm processor:\n{table}"
+    );
+    let runs = table.lines().count() - 2;
+    Ok(format!("on {}: the hashes of the {runs} runs of docs/bits.md", Machine::arm64(None).name))
+}

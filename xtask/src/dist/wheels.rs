@@ -1,0 +1,143 @@
+//! The Python package: source distribution and wheels.
+
+use super::machine::{Machine, python_arm64};
+use super::tools::{GLIBC, LINUX, LINUX_ARM64, Tools, WINDOWS};
+use super::{Made, folder, name, work};
+use crate::python;
+use crate::run::{program, root};
+use anyhow::{Context, Result, ensure};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// The longest time from `pip install` of a wheel to the first picture, s.
+const FIRST_PICTURE_S: f64 = 60.0;
+
+pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
+    let (packed, source) = python::source_distribution(&tools.python, &work("sdist")?, &work("source")?)?;
+    let manylinux = format!("manylinux_{}", GLIBC.replace('.', "_"));
+    let zig = ["--zig", "--compatibility", &manylinux, "--auditwheel", "check"];
+    // From the source distribution, which thereby is complete. Its lock file lacks what is not in it: not `locked`.
+    let linux = wheel(tools, &source, LINUX, &zig)?;
+    let locked = |more: &[&str], target| wheel(tools, &root(), target, &[&["--locked"], more].concat());
+    let (arm64, windows) = (locked(&zig, LINUX_ARM64)?, locked(&[], WINDOWS)?);
+
+    let archive = kept(&packed)?;
+    let (clean, picture) = first_picture(tools, &linux)?;
+    let here = Machine::here().results(&[&clean.join("bin/clutch")], "wheel")?;
+    let on_arm64 = arm64_results(tools, &arm64)?;
+    let checked = vec![audited(tools, &linux)?, picture, here.told()];
+    Ok(vec![
+        Made { checked: vec![format!("{} is built from it", name(&linux))], file: archive },
+        Made { checked, file: linux },
+        Made { checked: vec![audited(tools, &arm64)?, on_arm64.same_as(&here)?], file: arm64 },
+        Made { checked: vec![imports(tools, &windows)?], file: windows },
+    ])
+}
+
+/// Builds the wheel for a target.
+fn wheel(tools: &Tools, source: &Path, target: &str, options: &[&str]) -> Result<PathBuf> {
+    let out = work(&format!("wheel-{target}"))?;
+    let build = tools.program("maturin").within(source).args(["build", "--release", "--target", target]);
+    build.args(options).arg("--out").arg(&out).env("CARGO_TARGET_DIR", root().join("target")).run()?;
+    kept(&python::the_one(&out, ".whl")?)
+}
+
+/// Copies a file into the folder of the release; gives its path there.
+fn kept(file: &Path) -> Result<PathBuf> {
+    super::copy(file, &folder())?;
+    Ok(folder().join(name(file)))
+}
+
+/// That a wheel needs no later C library than it says, as auditwheel reads its symbols.
+fn audited(tools: &Tools, wheel: &Path) -> Result<String> {
+    let text = tools.program("auditwheel").arg("show").arg(wheel).output()?;
+    let text = String::from_utf8_lossy(&text).split_whitespace().collect::<Vec<_>>().join(" ");
+    let tag = text.split_once("platform tag: \"").and_then(|(_, rest)| Some(rest.split_once('"')?.0));
+    let tag = tag.with_context(|| format!("auditwheel names no tag: {text}"))?;
+    let version = |tag: &str| tag.strip_prefix("manylinux_2_")?.split('_').next()?.parse::<u32>().ok();
+    let allowed = GLIBC.strip_prefix("2.").and_then(|minor| minor.parse().ok());
+    ensure!(version(tag).is_some() && version(tag) <= allowed, "{}: auditwheel says {tag}", wheel.display());
+    Ok(format!("auditwheel: {tag}"))
+}
+
+/// Installs a wheel as a user does, in an environment of its own, and draws a picture; gives the environment, and the time
+/// of both. Only pip may know packages from before.
+fn first_picture(tools: &Tools, wheel: &Path) -> Result<(PathBuf, String)> {
+    let folder = work("clean")?;
+    let clean = folder.join("environment");
+    python::make_environment(&tools.python, &clean, &[])?;
+    let begin = Instant::now();
+    let install = program(clean.join("bin/pip")).within(&folder).args(["install", "--quiet"]);
+    install.arg("--disable-pip-version-check").arg(format!("{}[plot]", wheel.display())).run()?;
+    let installed = begin.elapsed().as_secs_f64();
+    let picture = folder.join("first.png");
+    program(clean.join("bin/clutch")).within(&folder).args(["sim", "smc_2", "--plot", "first.png"]).run()?;
+    let drawn = begin.elapsed().as_secs_f64();
+    is_picture(&picture)?;
+    let plot = "import clutch; clutch.simulate('smc_2').plot().savefig('second.png')";
+    program(clean.join("bin/python")).within(&folder).args(["-c", plot]).env("MPLBACKEND", "agg").run()?;
+    is_picture(&folder.join("second.png"))?;
+    let all = begin.elapsed().as_secs_f64();
+    ensure!(
+        all <= FIRST_PICTURE_S,
+        "{all:.0} s from pip install to pictures: {FIRST_PICTURE_S} s is the most"
+    );
+    let told = format!(
+        "from pip install with matplotlib to the picture of clutch sim {drawn:.1} s, of Result.plot {all:.1} s \
+         (pip {installed:.1} s)"
+    );
+    Ok((clean, told))
+}
+
+fn is_picture(file: &Path) -> Result<()> {
+    let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
+    ensure!(bytes.starts_with(b"\x89PNG") && bytes.len() > 10_000, "{} is no picture", file.display());
+    Ok(())
+}
+
+/// Installs a wheel for a 64-bit Arm processor beside a Python for it, and computes with it.
+fn arm64_results(tools: &Tools, wheel: &Path) -> Result<super::machine::Results> {
+    let root = python_arm64()?;
+    let (machine, python) = (Machine::arm64(Some(&root)), root.join("usr/bin/python3"));
+    let version = "import sys; print('%d.%d' % sys.version_info[:2])";
+    let version = machine.program(&python).args(["-c", version]).output()?;
+    let site = root.join("site");
+    let install =
+        program(&tools.python).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+    install
+        .args(["--only-binary", ":all:", "--python-version"])
+        .arg(String::from_utf8_lossy(&version).trim())
+        .args(["--platform", "manylinux_2_28_aarch64", "--platform", "manylinux_2_27_aarch64"])
+        .args(["--platform", "manylinux2014_aarch64", "--target"])
+        .args([&site, wheel])
+        .run()?;
+    // The command of the package, by its interpreter: the script's first line names another.
+    let run = format!(
+        "import sys; sys.path.insert(0, {:?}); sys.argv[0] = 'clutch'; from clutch._cli import main; sys.exit(main())",
+        site.display().to_string()
+    );
+    machine.results(&[&python, "-c".as_ref(), run.as_ref()], "wheel-arm64")
+}
+
+/// That the module of a wheel for Windows asks for nothing but libraries that Windows and Python have.
+fn imports(tools: &Tools, wheel: &Path) -> Result<String> {
+    let folder = work("wheel-windows")?;
+    program(&tools.python).args(["-m", "zipfile", "-e"]).args([wheel, &folder]).run()?;
+    let libraries = libraries(&folder.join("clutch/_clutch.pyd"))?;
+    ensure!(libraries.iter().any(|name| name == "python3.dll"), "no python3.dll among {libraries:?}");
+    let others = libraries.len() - 1;
+    Ok(format!("asks for python3.dll and {others} libraries of Windows; not run"))
+}
+
+/// The libraries that a file for Windows asks for; an error if one comes with a compiler.
+pub(super) fn libraries(file: &Path) -> Result<Vec<String>> {
+    let text = program("x86_64-w64-mingw32-objdump").arg("-p").arg(file).output()?;
+    let text = String::from_utf8_lossy(&text).into_owned();
+    let named = text.lines().filter_map(|line| line.trim().strip_prefix("DLL Name: "));
+    let mut libraries: Vec<String> = named.map(str::to_lowercase).collect();
+    libraries.sort();
+    libraries.dedup();
+    let brought = libraries.iter().find(|name| name.starts_with("lib"));
+    ensure!(brought.is_none() && !libraries.is_empty(), "{} asks for {libraries:?}", file.display());
+    Ok(libraries)
+}
