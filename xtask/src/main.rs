@@ -9,6 +9,7 @@ mod fuzz;
 mod libclutch;
 mod miri;
 mod mutants;
+mod playground;
 mod product;
 mod proof;
 mod python;
@@ -67,6 +68,8 @@ enum Verb {
         /// The scenario within them; smc_2 if none is given.
         scenario: Option<PathBuf>,
     },
+    /// Builds the page that simulates in a browser, target/playground/stick-slip.html, and tells its size; adds its Rust target.
+    Playground,
     /// Builds the API documentation, in target/doc.
     Docs,
     /// Packs the libraries that others build on, and checks them as they were packed.
@@ -263,6 +266,7 @@ fn main() -> Result<()> {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
         Verb::Fmu { scenario } => fmu::pack(scenario.as_deref(), true).map(drop),
+        Verb::Playground => test::playground(),
         Verb::Libclutch { targets } => libclutch::run(&targets),
         Verb::Stubs => stubs::generate(&python::interpreter()?),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),
