@@ -230,6 +230,21 @@ def test_a_link_brings_the_settings_back(page):
     assert page.run("document.getElementById('law-glide-kp_1_s').getAttribute('aria-valuetext')") == "20 1/s"
 
 
+def test_slow_motion_goes_along_the_curves(page):
+    open_page(page)
+    page.run("document.getElementById('play').click()")
+    where = "[...document.querySelectorAll('#position circle')].map((dot) => dot.getAttribute('cx'))"
+    first = page.run(where)
+    assert len(first) == 3
+    for _ in range(500):
+        if page.run(where) != first:
+            break
+        time.sleep(0.01)
+    assert page.run(where) != first
+    page.run("document.getElementById('play').click()")
+    assert page.run(where) == []
+
+
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_both_sizes_and_both_schemes(page, size, scheme, tmp_path):

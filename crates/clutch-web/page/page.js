@@ -108,7 +108,9 @@ function show() {
     at("steps").children[i].firstChild.setAttribute("aria-pressed", here);
     if (here) at("sentence").textContent = step.says;
   });
-  at("command").textContent = command();
+  // A line ends before a setting, not within.
+  const parts = (line) => line.split(/(?= --set )/).map((part) => make("span", { textContent: part }));
+  at("command").replaceChildren(...command().split("\n").flatMap((line, i) => [i > 0 ? "\n" : "", ...parts(line)]));
 }
 
 // ---- questions: one at a time, the latest first
@@ -146,7 +148,7 @@ function start() {
       if (waiting === null && answer.runs?.length === answer.laws.length) draw();
       const step = performance.now() - asked;
       Object.assign(document.body.dataset, { answers: Number(document.body.dataset.answers ?? 0) + 1, step, took: data.took_ms, memory: data.memory });
-      at("status").textContent = `${answer.laws.length} runs of 5000 periods each, simulated and drawn in ${Math.round(step)} ms; memory of the simulator ${(data.memory / 2 ** 20).toFixed(1)} MiB.`;
+      at("status").textContent = `Simulated and drawn in ${Math.round(step)} ms; memory of the simulator ${(data.memory / 2 ** 20).toFixed(1)} MiB.`;
     }
     ask();
   };
@@ -226,7 +228,30 @@ function chart(place, { label, unit, from, to, curves, strips = [], mark }) {
     const way = points(c.y).map(([x, y], i) => (i === 0 ? `M${f(x)},${f(y)}` : c.step ? `H${f(x)}V${f(y)}` : `L${f(x)},${f(y)}`));
     root.append(svg("path", { d: way.join(""), fill: "none", stroke: c.colour, "stroke-width": c.dashed ? 1.2 : 1.8, "stroke-dasharray": c.dashed ? "5 4" : "none", "stroke-linejoin": "round" }));
   }
+  const cursor = svg("g", {});
+  root.append(cursor);
   at(place).replaceChildren(root);
+  /** Shows where the curves are at a time: a line, and a dot on each. */
+  return (t) => {
+    const dots = curves.filter((c) => !c.dashed).map((c) => {
+      const i = Math.max(0, c.x.findLastIndex((x) => x <= t));
+      return svg("circle", { cx: f(px(t)), cy: f(py(c.y[i])), r: 4.5, fill: c.colour, stroke: "var(--paper)" });
+    });
+    cursor.replaceChildren(svg("line", { x1: f(px(t)), x2: f(px(t)), y1: top, y2: bottom, stroke: "var(--quiet)" }), ...dots);
+  };
+}
+
+// ---- slow motion: the window's time goes by so many times more slowly than in truth.
+const SLOWER = 50;
+let cursors = [], playing = null;
+
+function play() {
+  if (playing === null) return;
+  const { from_s, to_s } = answer.window ?? { from_s: 0, to_s: 0 }, length = SLOWER * (to_s - from_s);
+  const now = performance.now() / 1e3;
+  const t = from_s + (length > 0 ? ((now - playing) % length) / SLOWER : 0);
+  cursors.forEach((show) => show(t));
+  requestAnimationFrame(play);
 }
 
 function draw() {
@@ -245,8 +270,10 @@ function draw() {
     });
     return make("tr", {}, make("th", { scope: "row", title: meaning }, `${label} `, make("small", { textContent: unit })), ...cells);
   }));
-  for (const place of ["position", "error", "velocity", "voltage"]) if (!window) at(place).replaceChildren();
-  if (!window) return;
+  if (!window) {
+    cursors = [];
+    return ["position", "error", "velocity", "voltage"].forEach((place) => at(place).replaceChildren());
+  }
   at("position-title").textContent = `${Math.round(1e3 * (window.to_s - window.from_s))} ms ${window.words}; strips on top: at rest; dashed: the path`;
   const strips = runs.map((run) => ({ colour: run.colour, rests: run.window.rests_s }));
   const close = (y, path, step) => [
@@ -255,8 +282,9 @@ function draw() {
   ];
   const spoken = (what) => `${what}: ${runs.map((run) => `${run.title}, ${run.window.rests_s.length} sticks in the window`).join("; ")}`;
   const span = { from: window.from_s, to: window.to_s, strips };
-  chart("position", { ...span, unit: "encoder (counts)", label: spoken("Position"), curves: close("counts", "path_counts", true) });
-  chart("velocity", { ...span, unit: "velocity (°/s)", label: spoken("Velocity"), curves: close("velocity_deg_s", "path_velocity_deg_s", false) });
+  const position = chart("position", { ...span, unit: "encoder (counts)", label: spoken("Position"), curves: close("counts", "path_counts", true) });
+  const velocity = chart("velocity", { ...span, unit: "velocity (°/s)", label: spoken("Velocity"), curves: close("velocity_deg_s", "path_velocity_deg_s", false) });
+  cursors = [position, velocity];
   const whole = (field) => ({
     from: 0, to: Math.max(...runs.map((run) => run[field].time_s.at(-1))), mark: [window.from_s, window.to_s],
     curves: runs.map((run) => ({ colour: run.colour, x: run[field].time_s, low: run[field].low, high: run[field].high, y: run[field].mean })),
@@ -295,6 +323,13 @@ for (const { title, law, keys } of DECLARED.groups) {
 at("reset").addEventListener("click", () => {
   set = {};
   changed();
+});
+at("play").addEventListener("click", () => {
+  playing = playing === null ? performance.now() / 1e3 : null;
+  at("play").setAttribute("aria-pressed", playing !== null);
+  at("play").textContent = playing === null ? "Slow motion" : "Stop";
+  if (playing === null) draw();
+  else play();
 });
 at("disc").addEventListener("click", () => {
   set["run.seed"] = String(Number(set["run.seed"] ?? 1) + 1);
