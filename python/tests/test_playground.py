@@ -230,6 +230,21 @@ def test_a_link_brings_the_settings_back(page):
     assert page.run("document.getElementById('law-glide-kp_1_s').getAttribute('aria-valuetext')") == "20 1/s"
 
 
+def test_the_picture_follows_a_slider_that_is_dragged(page):
+    open_page(page)
+    drag = """(async () => {
+        const pictures = new Set(), slider = document.getElementById("reference-ramp-rate_deg_s");
+        for (let i = 0; i < 300 && pictures.size < 4; i++) {
+            slider.value = 60 + (i % 80);
+            slider.dispatchEvent(new Event("input"));
+            pictures.add(document.querySelector("#position svg").outerHTML);
+            await new Promise((done) => setTimeout(done, 10));
+        }
+        return pictures.size;
+    })()"""
+    assert page.run(drag) == 4  # while it moves, not once it rests
+
+
 def test_slow_motion_goes_along_the_curves(page):
     open_page(page)
     page.run("document.getElementById('play').click()")

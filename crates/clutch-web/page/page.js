@@ -114,7 +114,7 @@ function show() {
 }
 
 // ---- questions: one at a time, the latest first
-let worker, busy = true, waiting = null, asked = 0, answer = null;
+let worker, busy = true, waiting = null, asked = null, answer = null;
 
 function changed() {
   toFragment();
@@ -125,8 +125,9 @@ function changed() {
 
 function ask() {
   if (busy || waiting === null) return;
-  [asked, waiting, busy] = [waiting, null, true];
-  const runs = active().map((law) => [law.scenario, setOf(law)]);
+  asked = { at: waiting, laws: active() };
+  [waiting, busy] = [null, true];
+  const runs = asked.laws.map((law) => [law.scenario, setOf(law)]);
   worker.postMessage({ question: `runs = ${JSON.stringify(runs)}` });
 }
 
@@ -143,10 +144,10 @@ function start() {
       return start();
     }
     if (data.answer) {
-      answer = { laws: active(), ...JSON.parse(data.answer) };
-      // A law may have been switched off meanwhile: then its answer is not this one.
-      if (waiting === null && answer.runs?.length === answer.laws.length) draw();
-      const step = performance.now() - asked;
+      // Drawn also where another is waiting: whoever drags a slider sees the way.
+      answer = { laws: asked.laws, ...JSON.parse(data.answer) };
+      draw();
+      const step = performance.now() - asked.at;
       Object.assign(document.body.dataset, { answers: Number(document.body.dataset.answers ?? 0) + 1, step, took: data.took_ms, memory: data.memory });
       at("status").textContent = `Simulated and drawn in ${Math.round(step)} ms; memory of the simulator ${(data.memory / 2 ** 20).toFixed(1)} MiB.`;
     }
@@ -310,8 +311,8 @@ for (const law of LAWS) {
     laws = new Set(LAWS.map((l) => l.name).filter((name) => at(`law-${name}`).checked));
     changed();
   });
-  const label = make("label", {}, box, law.title);
-  label.style.color = `var(--${law.name})`;
+  const label = make("label", {}, box, make("span", { textContent: law.title }));
+  label.lastChild.style.borderColor = `var(--${law.name})`;
   at("laws").append(make("th", { scope: "col" }, label));
 }
 for (const { title, law, keys } of DECLARED.groups) {
