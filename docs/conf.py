@@ -2,6 +2,7 @@
 
 Build it in the folder above, with the package installed::
 
+    cargo xtask playground
     pip install . -r docs/requirements.txt
     sphinx-build -W --keep-going -b html docs target/docs-html
 """
@@ -20,6 +21,13 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 html_theme = "furo"
 html_title = f"clutch {release}"
 html_show_copyright = False
+
+# The playground is a page of its own, which is copied as it is.
+_playground = Path(__file__).parents[1] / "target" / "playground"
+if _playground.exists():
+    html_extra_path = [str(_playground)]
+else:
+    print("skipped: the playground, which `cargo xtask playground` builds; docs/playground.md links to it")
 
 # Pages link to headings of each other as GitHub names them, down to the third level.
 myst_heading_anchors = 3

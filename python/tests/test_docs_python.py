@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 import re
 import subprocess
 import sys
@@ -66,3 +67,5 @@ def test_the_documentation_builds_without_a_warning(tmp_path):
     command = [sys.executable, "-m", "sphinx", *options, DOCS, tmp_path / "html"]
     built = subprocess.run(command, capture_output=True, encoding="utf-8")
     assert built.returncode == 0, built.stderr
+    if "CLUTCH_PLAYGROUND" in os.environ:
+        assert (tmp_path / "html" / Path(os.environ["CLUTCH_PLAYGROUND"]).name).is_file()

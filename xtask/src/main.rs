@@ -11,6 +11,7 @@ mod fuzz;
 mod libclutch;
 mod miri;
 mod mutants;
+mod playground;
 mod product;
 mod proof;
 mod python;
@@ -75,6 +76,8 @@ enum Verb {
         /// The scenario within them; smc_2 if none is given.
         scenario: Option<PathBuf>,
     },
+    /// Builds the page that simulates in a browser, target/playground/stick-slip.html, and tells its size; adds its Rust target.
+    Playground,
     /// Builds the API documentation, in target/doc.
     Docs,
     /// Packs the libraries that others build on, and checks them as they were packed.
@@ -272,6 +275,7 @@ fn main() -> Result<()> {
         }
         Verb::Fmu { scenario } => fmu::pack(scenario.as_deref(), true).map(drop),
         Verb::Dist { parts } => dist::run(&parts),
+        Verb::Playground => test::playground(),
         Verb::Libclutch { targets } => libclutch::run(&targets),
         Verb::Stubs => stubs::generate(&python::interpreter()?),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),
@@ -308,8 +312,8 @@ fn check() -> Result<()> {
         tool("cargo-deny").args(deny).run()?;
     }
     cargo(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]).run()?;
-    // Each set of features of the core by itself: the workspace turns them all on.
-    for features in ["", "linalg"] {
+    // Each feature of the core by itself: the workspace turns on what its crates ask for.
+    for features in ["", "linalg", "terse"] {
         cargo(["clippy", "--package", "clutch-core", "--features", features, "--", "-D", "warnings"])
             .run()?;
     }

@@ -2,7 +2,7 @@
 
 use crate::plot::{Figure, Panel, Series, Shade};
 use crate::table::number;
-use clutch_sim::picture::{Around, Envelope, PARTS, Window, sticks};
+use clutch_sim::picture::{Envelope, PARTS, Window};
 use clutch_sim::{Run, Scenario};
 
 /// A run to be drawn.
@@ -12,34 +12,31 @@ pub(crate) struct Drawn<'a> {
     pub(crate) run: &'a Run,
 }
 
-/// The window that the runs are shown in: of the first that sticks, else of the first. None without samples.
+/// The window that the runs are shown in.
 pub(crate) fn window(runs: &[Drawn<'_>]) -> Option<Window> {
-    let windows = || runs.iter().filter_map(|d| Window::of(d.scenario, d.run));
-    windows().find(|w| matches!(w.around, Around::Stick(_))).or_else(|| windows().next())
+    Window::shared(runs.iter().map(|d| (d.scenario, d.run)))
 }
 
 impl Drawn<'_> {
     /// Values over the time of the window.
-    fn within(&self, window: Window, value: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
-        let time = &self.run.trace.time;
-        let place = |t: f64| time.partition_point(|x| *x < t);
-        (place(window.from)..place(window.to)).map(|i| (time[i], value(i))).collect()
+    fn within(&self, window: Window, values: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
+        let time = &self.run.trace.time[window.samples(&self.run.trace)];
+        time.iter().copied().zip(values).collect()
+    }
+
+    /// An angle or its rate over the time of the window, in degrees.
+    fn degrees(&self, window: Window, values: &[f64]) -> Vec<(f64, f64)> {
+        self.within(window, values[window.samples(&self.run.trace)].iter().map(|x| x.to_degrees()))
     }
 
     fn counts_per_rev(&self) -> u32 {
         self.scenario.spec().rig.encoder.sensor.counts_per_rev
     }
 
-    /// The path from where it is at the window's begin, counts, and the encoder's counts from there.
+    /// The path and the encoder's counts, from where the path is at the window's begin.
     fn staircase(&self, window: Window, unit: f64) -> [Vec<(f64, f64)>; 2] {
-        let trace = &self.run.trace;
-        let path = |i: usize| trace.target_fixed[i].0 as f64 / 65536.0;
-        let begin = trace.time.partition_point(|t| *t < window.from);
-        let origin = if begin < trace.time.len() { path(begin).floor() } else { 0.0 };
-        [
-            self.within(window, |i| (path(i) - origin) * unit),
-            self.within(window, |i| (f64::from(trace.counts[i]) - origin) * unit),
-        ]
+        let counts = window.staircase(&self.run.trace);
+        counts.map(|counts| self.within(window, counts.into_iter().map(|x| x * unit)))
     }
 
     fn envelope(&self, values: &[f64], factor: f64) -> Series {
@@ -68,10 +65,10 @@ pub(crate) fn figure(title: &str, runs: &[Drawn<'_>]) -> Figure {
         let shades = || {
             let one = |(i, d): (usize, &Drawn<'_>)| Shade {
                 label: if alone { "at rest".to_owned() } else { String::new() },
-                stretches: sticks(&d.run.events, d.scenario.spec().run.duration)
+                stretches: window
+                    .sticks(&d.run.events, d.scenario.spec().run.duration)
                     .into_iter()
-                    .map(|s| (s.from.max(window.from), s.to.min(window.to)))
-                    .filter(|(from, to)| from < to)
+                    .map(|s| (s.from, s.to))
                     .collect(),
                 of: Some(i),
             };
@@ -106,12 +103,11 @@ pub(crate) fn figure(title: &str, runs: &[Drawn<'_>]) -> Figure {
             guides("path", paths),
             true,
         ));
-        let degrees = |of: fn(&Run) -> &[f64], d: &Drawn<'_>| d.within(window, |i| of(d.run)[i].to_degrees());
         let velocities = runs.iter().map(|d| {
             let label = if alone { "shaft".to_owned() } else { d.label.clone() };
-            Series::new(label, degrees(|r| &r.trace.velocity, d))
+            Series::new(label, d.degrees(window, &d.run.trace.velocity))
         });
-        let targets = runs.iter().map(|d| degrees(|r| &r.trace.target_velocity, d)).collect();
+        let targets = runs.iter().map(|d| d.degrees(window, &d.run.trace.target_velocity)).collect();
         let at_rest = if alone { "The same: velocity" } else { "The same: velocity; strips on top: at rest" };
         let velocity =
             close(at_rest.to_owned(), "velocity (°/s)", velocities.collect(), guides("path", targets), false);

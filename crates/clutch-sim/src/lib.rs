@@ -5,6 +5,10 @@ pub mod drive;
 pub mod engine;
 pub mod friction_lab;
 pub mod friction_map;
+#[cfg_attr(
+    target_family = "wasm",
+    allow(dead_code, unused_variables, reason = "it has no vectors for lanes")
+)]
 mod lanes;
 pub mod meter;
 pub mod metrics;

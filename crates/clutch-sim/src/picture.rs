@@ -6,6 +6,7 @@
 use crate::engine::{Event, EventKind};
 use crate::run::{Run, Trace};
 use crate::scenario::Scenario;
+use std::ops::Range;
 
 /// Counts of the encoder by which the path goes on in a window.
 const STAIRS: f64 = 24.0;
@@ -97,6 +98,41 @@ impl Window {
         // Within the run, also where its middle is near an end.
         let from = (middle - 0.5 * length).clamp(0.0, duration - length);
         Some(Window { from, to: from + length, around })
+    }
+
+    /// The window that several runs are shown in together: of the first that sticks, else of the first. None without samples.
+    #[must_use]
+    pub fn shared<'a>(runs: impl Iterator<Item = (&'a Scenario, &'a Run)>) -> Option<Window> {
+        let mut windows = runs.filter_map(|(scenario, run)| Window::of(scenario, run));
+        let first = windows.next()?;
+        let sticks = |w: &Window| matches!(w.around, Around::Stick(_));
+        Some(if sticks(&first) { first } else { windows.find(sticks).unwrap_or(first) })
+    }
+
+    /// The samples within it.
+    #[must_use]
+    pub fn samples(&self, trace: &Trace) -> Range<usize> {
+        let place = |t: f64| trace.time.partition_point(|x| *x < t);
+        place(self.from)..place(self.to)
+    }
+
+    /// The sticks of a run of that length (s) within it, cut at its ends.
+    #[must_use]
+    pub fn sticks(&self, events: &[Event], duration: f64) -> Vec<Stick> {
+        let cut = |s: Stick| Stick { from: s.from.max(self.from), to: s.to.min(self.to) };
+        sticks(events, duration).into_iter().map(cut).filter(|s| s.from < s.to).collect()
+    }
+
+    /// The path and the encoder in it, in counts from the one that the path is on at its begin.
+    #[must_use]
+    pub fn staircase(&self, trace: &Trace) -> [Vec<f64>; 2] {
+        let path = |i: usize| trace.target_fixed[i].0 as f64 / 65536.0;
+        let samples = self.samples(trace);
+        let origin = if samples.start < trace.time.len() { path(samples.start).floor() } else { 0.0 };
+        [
+            samples.clone().map(|i| path(i) - origin).collect(),
+            samples.map(|i| f64::from(trace.counts[i]) - origin).collect(),
+        ]
     }
 
     /// The event in its middle, in words.
@@ -201,6 +237,26 @@ mod tests {
         assert!(window.from <= at && at <= window.to);
         let i = run.trace.time.iter().position(|t| *t == at).expect("a sample's time");
         assert_eq!(run.trace.error[i].abs(), run.metrics.max_error_rad);
+    }
+
+    #[test]
+    fn runs_share_the_window_of_the_first_that_sticks_and_are_all_within_it() {
+        let [glide, pd] = ["bench_glide_2", "bench_pd_2"].map(|name| run_of(name, &[]));
+        let shared = |runs: &[&(Scenario, Run)]| Window::shared(runs.iter().map(|(s, r)| (s, r)));
+        let window = shared(&[&glide, &pd]).expect("samples");
+        assert_eq!(Some(window), Window::of(&pd.0, &pd.1));
+        assert_eq!(shared(&[&glide]), Window::of(&glide.0, &glide.1));
+        assert_eq!(shared(&[]), None);
+        for (scenario, run) in [&glide, &pd] {
+            let [path, counts] = window.staircase(&run.trace);
+            assert_eq!(path.len(), window.samples(&run.trace).len());
+            assert!((0.0..1.0).contains(&path[0]), "it begins on a count: {}", path[0]);
+            // By the error of the run, which is smaller than twenty counts.
+            assert!(path.iter().zip(&counts).all(|(p, c)| (p - c).abs() < 20.0));
+            let rests = window.sticks(&run.events, scenario.spec().run.duration);
+            assert!(rests.iter().all(|s| window.from <= s.from && s.from < s.to && s.to <= window.to));
+            assert_eq!(rests.is_empty(), run.metrics.stick_slip_cycles_per_s == 0.0);
+        }
     }
 
     #[test]

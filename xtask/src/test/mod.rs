@@ -7,6 +7,7 @@ use crate::firmware;
 use crate::fmu;
 use crate::fuzz;
 use crate::libclutch;
+use crate::playground;
 use crate::python;
 use crate::run::{Program, beside, cargo, program, root};
 use crate::stubs;
@@ -64,6 +65,12 @@ pub(crate) fn wheel() -> Result<()> {
     tally.end(sound)
 }
 
+/// Builds the playground alone.
+pub(crate) fn playground() -> Result<()> {
+    cargo(["build"]).args(WORKSPACE).args(["--example", "page"]).run()?;
+    playground::build()?.as_ref().map_or(Ok(()), playground::sizes)
+}
+
 /// Installs the programs without which tests skip themselves on a user's machine.
 fn programs() -> Result<()> {
     // The program, and the Debian package that has it.
@@ -76,6 +83,8 @@ fn programs() -> Result<()> {
         ("qemu-aarch64", "qemu-user"),
         ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
         ("arm-none-eabi-g++", "gcc-arm-none-eabi"),
+        ("node", "nodejs"),
+        ("chromium", "chromium"),
     ];
     debian::need(&needed)?;
     // The C library of boards, which the compiler only recommends: asked for by a file of it.
@@ -153,7 +162,7 @@ fn host(tally: &mut Tally) -> Result<bool> {
 }
 
 /// The examples that the tests of the wheel run beside it.
-const EXAMPLES: [&str; 3] = ["write_demo", "bits", "intervals"];
+const EXAMPLES: [&str; 5] = ["write_demo", "bits", "intervals", "ask", "page"];
 
 /// Builds what the wheel is compared with, and the command that tests run: with few optimisations, as the tests.
 /// The wheel, with all of them, must give the same bits.
@@ -161,6 +170,11 @@ fn compared() -> Result<()> {
     let mut programs = vec!["--bin", "clutch"];
     EXAMPLES.iter().for_each(|name| programs.extend(["--example", name]));
     cargo(["build"]).args(WORKSPACE).args(programs).run()
+}
+
+/// An example as [`compared`] builds it.
+fn example(name: &str) -> PathBuf {
+    root().join("target/debug/examples").join(name)
 }
 
 /// The command as [`compared`] builds it.
@@ -327,18 +341,26 @@ fn wheel_of(tally: &mut Tally) -> Result<bool> {
     tally.check_quiet("the type stub agrees with the module at run time", stubtest.quietly()?);
     tally.stage("what the wheel is compared with");
     compared()?;
-    let built = |name: &str| root().join("target/debug/examples").join(name);
     let bits = root().join("target/bits");
-    program(built("bits")).arg(&bits).run()?;
+    program(example("bits")).arg(&bits).run()?;
     let units = fmu::pack(None, false)?;
+    tally.stage("build of the playground");
+    let playground = playground::build()?;
     tally.stage("tests of the wheel");
-    python(&["pytest", "--color=no", "-q"])?
-        .arg(root().join("python/tests"))
+    let tests = python(&["pytest", "--color=no", "-q"])?.arg(root().join("python/tests"));
+    let tests = match &playground {
+        Some(built) => tests
+            .env("CLUTCH_PLAYGROUND", &built.page)
+            .env("CLUTCH_PLAYGROUND_MODULE", &built.module)
+            .env("CLUTCH_PLAYGROUND_HERE", example("ask")),
+        None => tests,
+    };
+    tests
         .env("CLUTCH_BIN", command())
-        .env("CLUTCH_LOG_DEMO", built("write_demo"))
+        .env("CLUTCH_LOG_DEMO", example("write_demo"))
         .env("CLUTCH_BITS", bits)
         .env("CLUTCH_FMU", units)
-        .env("CLUTCH_INTERVALS", built("intervals"))
+        .env("CLUTCH_INTERVALS", example("intervals"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .lines(|l| tally.read(l))
 }

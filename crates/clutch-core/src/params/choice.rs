@@ -45,6 +45,26 @@ macro_rules! choice {
     };
 }
 
+/// The text of a declaration, from the lines of its comment.
+#[doc(hidden)]
+#[cfg(not(feature = "terse"))]
+#[macro_export]
+macro_rules! __text {
+    ($($line:literal)+) => {
+        concat!($($line, "\n"),+).trim_ascii()
+    };
+}
+
+/// Nothing of it.
+#[doc(hidden)]
+#[cfg(feature = "terse")]
+#[macro_export]
+macro_rules! __text {
+    ($($line:literal)+) => {
+        ""
+    };
+}
+
 /// The same choice in another scalar.
 #[doc(hidden)]
 #[macro_export]
@@ -97,11 +117,11 @@ macro_rules! __choice {
         impl<$($bound)*> $crate::params::Choice<$t> for $name<$($arg)*> {
             const CHOICE: $crate::params::ChoiceInfo = $crate::params::ChoiceInfo {
                 name: stringify!($name),
-                doc: concat!($($doc, "\n"),+).trim_ascii(),
+                doc: $crate::__text!($($doc)+),
                 has_default: !concat!($(stringify!($default))?).is_empty(),
                 options: &[$($(#[cfg($cfg)])? $crate::params::OptionInfo {
                     key: $key,
-                    doc: concat!($($option_doc, "\n"),+).trim_ascii(),
+                    doc: $crate::__text!($($option_doc)+),
                     table: $crate::__table_of!($t $(, $table)?),
                 },)+],
             };
@@ -208,7 +228,7 @@ macro_rules! words {
             pub const ALL: &'static [$name] = &[$($name::$word),+];
             const WORDS: &'static [$crate::params::Word] = &[$($crate::params::Word {
                 name: $text,
-                doc: concat!($($word_doc, "\n"),+).trim_ascii(),
+                doc: $crate::__text!($($word_doc)+),
             }),+];
 
             /// The word.

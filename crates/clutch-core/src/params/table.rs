@@ -204,13 +204,13 @@ macro_rules! __params {
                 range: $range,
                 default: concat!($(stringify!($default))?),
                 optional: <$ty as $crate::params::Leaf<$t>>::OPTIONAL,
-                doc: concat!($($row_doc, "\n"),+).trim_ascii(),
+                doc: $crate::__text!($($row_doc)+),
             },)*];
             const RELATIONS: &'static [&'static str] = &[$($(stringify!($rel),)+)?];
             const TABLE: $crate::params::TableInfo = $crate::params::TableInfo {
                 name: stringify!($name),
                 id: $crate::params::TableInfo::id_of(stringify!($name)),
-                doc: concat!($($doc, "\n"),+).trim_ascii(),
+                doc: $crate::__text!($($doc)+),
                 rows: <Self as $crate::params::Table<$t>>::ROWS,
                 relations: &[$($($crate::params::RelationInfo {
                     row: $crate::params::TableInfo::row_of(
@@ -224,21 +224,21 @@ macro_rules! __params {
                         field: stringify!($nested),
                         key: $nested_key,
                         optional: false,
-                        doc: concat!($($nested_doc, "\n"),+).trim_ascii(),
+                        doc: $crate::__text!($($nested_doc)+),
                         info: &<$nested_ty as $crate::params::Params<$t>>::INFO,
                     },)+)?
                     $($($crate::params::Nested {
                         field: stringify!($opt),
                         key: $opt_key,
                         optional: true,
-                        doc: concat!($($opt_doc, "\n"),+).trim_ascii(),
+                        doc: $crate::__text!($($opt_doc)+),
                         info: &<$opt_ty as $crate::params::Params<$t>>::INFO,
                     },)+)?
                     $($($crate::params::Nested {
                         field: stringify!($flat),
                         key: "",
                         optional: false,
-                        doc: concat!($($flat_doc, "\n"),+).trim_ascii(),
+                        doc: $crate::__text!($($flat_doc)+),
                         info: &<$flat_ty as $crate::params::Params<$t>>::INFO,
                     },)+)?
                 ],
