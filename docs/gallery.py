@@ -37,6 +37,7 @@ def main():
     runs = [clutch.simulate(name) for name in laws.values()]
     pd, _, smc = runs
     keep(plot.tracking(runs, labels=list(laws)), "tracking")
+    keep(plot.tracking(pd, stretch=pd.window), "tracking_stretch")
     keep(plot.phase_plane(smc), "phase_plane")
     keep(plot.run_overview(clutch.simulate("bench_pd_2")), "run_overview")
 
@@ -65,7 +66,7 @@ def main():
 
     with TemporaryDirectory() as folder:
         log = Path(folder) / "run.mcap"
-        clutch.simulate("board_minimum_jerk").save(log)
+        clutch.simulate("bench_pd_2").save(log)
         keep(plot.log_overview(clutch.read_log(log)), "log_overview")
 
     for figure in clutch.reproduce(progress=False).figures:

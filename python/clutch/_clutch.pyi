@@ -18,7 +18,7 @@ from typing_extensions import CapsuleType
 from clutch import _model, _run
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "as_identified", "brake_gain", "check", "envelope", "friction_lab", "identify", "lowest_smooth_speed", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction", "tune"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "Shafts", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "as_identified", "brake_gain", "check", "envelope", "friction_lab", "identify", "lowest_smooth_speed", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction", "tune"]
 
 BUILD: Final[str]
 """
@@ -58,6 +58,10 @@ class Log:
     def metadata(self, /) -> dict[str, str]:
         """
         The log's description of itself, as texts.
+        """
+    def pictured(self, /) -> tuple[tuple[float, float, str, bool] | None, Table]:
+        """
+        The stretch that a picture shows closely, as `Run.window`, and the times at rest, as `Run.sticks`.
         """
     def replay(self, /, scenario: Scenario | None = None, law: Callable[[Tick], float] | _run.SteppedLaw | None = None) -> tuple[Table, int, tuple[int, str, float, float] | None, Any]:
         """
@@ -317,6 +321,10 @@ class Scenario:
         """
         Reads a scenario from a file or, if there is none, the built-in one of that name.
         """
+    def meaning(self, /, key: str) -> str | None:
+        """
+        The meaning of a dotted key, in a few words; none of one that is no parameter.
+        """
     @staticmethod
     def parse(origin: str, text: str, overrides: Mapping[str, object] | None = None) -> Scenario:
         """
@@ -429,6 +437,31 @@ class Servo:
     def terms(self, /) -> dict[str, float]:
         """
         The law's intermediate terms at the last step, by name with unit.
+        """
+
+@final
+class Shafts:
+    """
+    Rigs with their laws, which agents step together.
+
+    A period of all takes one call, on all processors and without Python's lock.
+    """
+    QUANTITIES: Final[list[str]]
+    """
+    Names of the rows of what is seen.
+    """
+    def __new__(cls, /, scenarios: Sequence[_model.Scenario | Scenario]) -> Shafts: ...
+    def reset(self, /, index: int, scenario: _model.Scenario | Scenario) -> None:
+        """
+        Begins one of them anew.
+        """
+    def seen(self, /) -> NDArray[np.float64]:
+        """
+        A row for each quantity, a column for each shaft.
+        """
+    def step(self, /, volts: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """
+        A period of those shafts that are chosen, each under its voltage, V; then as `seen`.
         """
 
 @final
@@ -546,11 +579,13 @@ class Table:
     ----------
     columns : dict
         Name to one-dimensional array of numbers, bools or texts, all of one length.
+    meanings : dict, optional
+        Name of a column to its meaning in a few words, which xarray and Arrow get as `long_name`.
 
     Raises
     ------
     ValueError
-        Columns of unequal length, of more than one dimension, or of another type.
+        Columns of unequal length, of more than one dimension, or of another type; the meaning of none.
 
     Examples
     --------
@@ -576,10 +611,15 @@ class Table:
     def __iter__(self, /) -> Iterator[str]: ...
     def __len__(self, /) -> int: ...
     def __ne__(self, value: object, /) -> bool: ...
-    def __new__(cls, /, columns: Mapping[str, ArrayLike]) -> Table: ...
-    def __reduce__(self, /) -> tuple[Any, tuple[dict[str, Any]]]: ...
+    def __new__(cls, /, columns: Mapping[str, ArrayLike], meanings: dict[str, str] | None = None) -> Table: ...
+    def __reduce__(self, /) -> tuple[Any, tuple[dict[str, Any], dict[str, str]]]: ...
     def __repr__(self, /) -> str: ...
     def _repr_html_(self, /) -> str: ...
+    def attributes(self, /, name: str) -> dict[str, str]:
+        """
+        Unit and meaning of a column, as xarray's attributes and Arrow's metadata have them: `units`, `long_name`; those
+        that are known.
+        """
     @property
     def columns(self, /) -> list[str]:
         """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from typing import TYPE_CHECKING, Any
 
-from clutch._units import attributes
+from clutch._extras import needed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,36 +18,41 @@ if TYPE_CHECKING:
 
 def to_pandas(table: Table) -> pd.DataFrame:
     """Make a data frame; its numbers stay in the table's memory."""
-    import pandas as pd
+    with needed("pandas", "to_pandas"):
+        import pandas as pd
 
     return pd.DataFrame(table.to_dict(), copy=False)
 
 
 def to_polars(table: Table) -> pl.DataFrame:
     """Make a data frame; its numbers stay in the table's memory."""
-    import polars as pl
+    with needed("polars", "to_polars"):
+        import polars as pl
 
     return pl.DataFrame(table)
 
 
 def to_arrow(table: Table) -> pa.Table:
     """Make an Arrow table; its numbers stay in the table's memory."""
-    import pyarrow as pa
+    with needed("pyarrow", "to_arrow"):
+        import pyarrow as pa
 
     return pa.table(table)
 
 
 def to_xarray(table: Table, index: str | None = None) -> xr.Dataset:
-    """Make a dataset of one dimension, the column `index` or the row's number; each column knows its unit."""
+    """Make a dataset of one dimension, the column `index` or the row's number; each column with its attributes."""
     import numpy as np
-    import xarray as xr
+
+    with needed("xarray", "to_xarray"):
+        import xarray as xr
 
     columns: dict[str, Any] = {name: np.asarray(values) for name, values in table.to_dict().items()}
     if index is not None and index not in columns:
         raise ValueError(f"index = {index!r}: expected one of the columns {', '.join(columns)}")
 
     def variable(name: str) -> tuple[str, Any, dict[str, str]]:
-        return index or "row", columns[name], attributes(name)
+        return index or "row", columns[name], table.attributes(name)
 
     data = {name: variable(name) for name in columns if name != index}
     return xr.Dataset(data, coords={} if index is None else {index: variable(index)})

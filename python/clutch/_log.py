@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import pathlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from clutch import _clutch
 from clutch._clutch import Table
+from clutch._extras import needed
 from clutch._model import Scenario
 from clutch._run import as_law
 
@@ -52,9 +54,90 @@ class Log:
         self._log = log
         self.channels: dict[str, Table] = log.channels()
         self.metadata: dict[str, str] = log.metadata
-        self.scenario = Scenario.from_toml(log.scenario_toml)
+        self._toml: str = log.scenario_toml
+        self.scenario = Scenario.from_toml(self._toml)
         self.complete: bool = log.complete
         self.damaged: int = log.damaged
+
+        self._pictured: tuple[tuple[float, float, str, bool] | None, Table] | None = None
+
+    def _picture(self) -> tuple[tuple[float, float, str, bool] | None, Table]:
+        """The stretch that a picture shows closely, and the times at rest."""
+        if self._pictured is None:
+            self._pictured = self._log.pictured()
+        return self._pictured
+
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """Begin and end of the stretch that :meth:`plot` shows closely, s: around a stick, else the largest error."""
+        window = self._picture()[0]
+        return None if window is None else window[:2]
+
+    @property
+    def sticks(self) -> Table:
+        """Times at rest, from_s and to_s: the shaft's own in a simulation's log, in a loop's the encoder's silences."""
+        return self._picture()[1]
+
+    def export(self, path: str | os.PathLike[str], channel: str = "command") -> None:
+        """Write a channel as Parquet or Arrow: every number as it is in the log, each column with unit and meaning.
+
+        Columns are those of ``channels``; a term that a record does not have is NaN. The fields' metadata are
+        ``units`` and ``long_name``, the file's the log's own description and its scenario. For CSV there is
+        ``clutch log export``.
+
+        Parameters
+        ----------
+        path : str or path
+            A new file; ``.parquet`` is compressed with zstd, ``.arrow`` is Arrow's own format, to be mapped into
+            memory.
+        channel : str, default "command"
+            Name of the channel.
+
+        Raises
+        ------
+        ValueError
+            Another ending, or a channel without records.
+        OSError
+            The file is there already, or cannot be written.
+        ModuleNotFoundError
+            pyarrow is not installed: ``pip install 'clutch-control[pandas]'``.
+
+        Examples
+        --------
+        >>> import clutch, pathlib, pyarrow.parquet, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder)
+        ...     clutch.simulate("smc_2").save(path / "run.mcap")
+        ...     clutch.read_log(path / "run.mcap").export(path / "run.parquet")
+        ...     schema = pyarrow.parquet.read_schema(path / "run.parquet")
+        >>> schema.field("voltage_v").metadata
+        {b'units': b'V', b'long_name': b'Voltage of the code'}
+        """
+        with needed("pyarrow", "Log.export"):
+            import pyarrow as pa
+            import pyarrow.parquet as parquet
+
+        file = pathlib.Path(path)
+        ending = file.suffix.lower()
+        if ending not in (".parquet", ".arrow"):
+            raise ValueError(f"{file}: expected a name that ends with .parquet or .arrow; for CSV: clutch log export")
+        if channel not in self.channels:
+            raise ValueError(f"channel = {channel!r}: expected one with records, {', '.join(self.channels)}")
+        if file.exists():
+            raise FileExistsError(f"{file}: exists already")
+        table = self.channels[channel].to_arrow()
+        table = table.replace_schema_metadata({**self.metadata, "channel": channel, "scenario.toml": self._toml})
+        # What was begun has another name: half a table is none.
+        part = file.with_name(file.name + ".part")
+        try:
+            if ending == ".parquet":
+                parquet.write_table(table, part, compression="zstd")
+            else:
+                with pa.OSFile(os.fspath(part), "wb") as sink, pa.ipc.new_file(sink, table.schema) as writer:
+                    writer.write_table(table)
+            part.replace(file)
+        finally:
+            part.unlink(missing_ok=True)
 
     def plot(self) -> Figure:
         """Draw an overview: :func:`clutch.plot.log_overview`."""

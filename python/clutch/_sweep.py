@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from clutch import _clutch, executors
 from clutch._clutch import Table
 from clutch._errors import ParamError
+from clutch._extras import needed
 from clutch._metrics import FIGURES
 from clutch._model import Scenario
 from clutch._record import _Params, _Record, _slots
@@ -209,7 +210,7 @@ def sobol(ranges: Mapping[str, Range], n: int, *, seed: int = 1) -> Samples:
     >>> len(points), all(2 <= kp <= 6 and 0.01 <= layer <= 1 for kp, layer in points.rows)
     (4, True)
     """
-    return _spread("Sobol", ranges, n, seed)
+    return _spread("sobol", "Sobol", ranges, n, seed)
 
 
 def latin_hypercube(ranges: Mapping[str, Range], n: int, *, seed: int = 1) -> Samples:
@@ -241,11 +242,12 @@ def latin_hypercube(ranges: Mapping[str, Range], n: int, *, seed: int = 1) -> Sa
     >>> sorted(points.rows)
     [(0,), (1,), (2,), (3,)]
     """
-    return _spread("LatinHypercube", ranges, n, seed)
+    return _spread("latin_hypercube", "LatinHypercube", ranges, n, seed)
 
 
-def _spread(name: str, ranges: Mapping[str, Range], n: int, seed: int) -> Samples:
-    qmc = importlib.import_module("scipy.stats.qmc")
+def _spread(by: str, name: str, ranges: Mapping[str, Range], n: int, seed: int) -> Samples:
+    with needed("scipy", f"clutch.{by}"):
+        qmc = importlib.import_module("scipy.stats.qmc")
     scales = [_scale(key, limits) for key, limits in ranges.items()]
     _room("n", n)
     points = getattr(qmc, name)(d=len(ranges), rng=seed).random(n).tolist()
@@ -1008,15 +1010,17 @@ class SweepResult:
         {'law.smc.kp_v': 2, 'run.seed': 3}
         """
         import numpy as np
-        import xarray
+
+        with needed("xarray", "to_xarray"):
+            import xarray
 
         def described(name: str) -> dict[str, str]:
-            figure = FIGURES.get(name)
-            return {"long_name": figure.label, "units": figure.unit} if figure else {}
+            meaning = self.base._native.meaning(name)
+            return attributes(name) | ({} if meaning is None else {"long_name": meaning})
 
         runs, names = self.table["row"], [*self.metrics, "error"]
         if self.samples.axes is None:
-            coords = {key: ("row", np.asarray(self.table[key]), attributes(key)) for key in self.keys}
+            coords = {key: ("row", np.asarray(self.table[key]), described(key)) for key in self.keys}
             columns = {name: ("row", np.asarray(self.table[name]), described(name)) for name in names}
             return xarray.Dataset(columns, coords={"row": runs} | coords)
         axes = [np.asarray(_column(list(axis))) for axis in self.samples.axes]
@@ -1028,5 +1032,5 @@ class SweepResult:
                 some, column = column, np.full(self.total, "" if name == "error" else math.nan, dtype=column.dtype)
                 column[runs] = some
             values[name] = (self.keys, column.reshape(shape), described(name))
-        coords = {key: (key, axis, attributes(key)) for key, axis in zip(self.keys, axes, strict=True)}
+        coords = {key: (key, axis, described(key)) for key, axis in zip(self.keys, axes, strict=True)}
         return xarray.Dataset(values, coords=coords)

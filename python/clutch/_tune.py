@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from clutch import _clutch
+from clutch._extras import needed
 from clutch._model import Scenario
 from clutch._run import ScenarioLike, as_scenario, simulate
 
@@ -348,7 +349,8 @@ class Tuned:
         >>> clutch.tune("board_smc_2", candidates=2).to_pandas()["standing"].iloc[0] in ("chosen", "uncertified")
         True
         """
-        import pandas as pd
+        with needed("pandas", "to_pandas"):
+            import pandas as pd
 
         left_out = ("gains", "scenario")
         rows = [{k: v for k, v in vars(c).items() if k not in left_out} for c in self.candidates]

@@ -21,6 +21,8 @@ def split(name: str) -> tuple[str, str]:
 
 
 def attributes(name: str) -> dict[str, str]:
-    """Attributes of a column: xarray writes them on the axes of its plots, Arrow keeps them with the field."""
+    """Attributes by a column's name: xarray writes them on the axes of its plots, Arrow keeps them with the field."""
     _, unit = split(name)
-    return {"units": unit} if unit else {}
+    known = {"units": unit} if unit else {}
+    figure = FIGURES.get(name)
+    return known if figure is None else known | {"units": figure.unit, "long_name": figure.label}

@@ -13,6 +13,8 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError
 from typing import Any, Protocol
 
+from clutch._extras import needed
+
 __all__ = ["Executor", "Future", "RayExecutor"]
 
 #: Times that a chunk is submitted before it runs in this process.
@@ -109,7 +111,7 @@ class RayExecutor:
     Raises
     ------
     ImportError
-        Ray is not installed.
+        Ray is not installed: ``pip install 'clutch-control[ray]'``.
 
     Examples
     --------
@@ -119,7 +121,8 @@ class RayExecutor:
     """
 
     def __init__(self, **ray_init: Any) -> None:
-        self._ray: Any = importlib.import_module("ray")
+        with needed("ray", "RayExecutor"):
+            self._ray: Any = importlib.import_module("ray")
         self._started = not self._ray.is_initialized()
         if self._started:
             self._ray.init(**ray_init)

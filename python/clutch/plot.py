@@ -24,6 +24,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
+from clutch._extras import needed
 from clutch._metrics import FIGURES
 from clutch._units import split
 
@@ -118,7 +119,8 @@ def _styled(draw: Callable[P, T]) -> Callable[P, T]:
 
     @functools.wraps(draw)
     def styled(*args: P.args, **kwargs: P.kwargs) -> T:
-        import matplotlib
+        with needed("matplotlib", f"clutch.plot.{draw.__name__}"):
+            import matplotlib
 
         with matplotlib.rc_context(STYLE):
             drawn = draw(*args, **kwargs)
@@ -250,9 +252,16 @@ def _bars(spans: NDArray[np.float64]) -> list[tuple[float, float]]:
 
 @_styled
 def tracking(
-    results: Result | Iterable[Result], *, labels: Sequence[str] | None = None, ax: Axes | None = None
+    results: Result | Iterable[Result],
+    *,
+    labels: Sequence[str] | None = None,
+    stretch: tuple[float, float] | None = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Draw the position error over time, as the paper's figures 8 to 10 do.
+
+    The whole run is an envelope: a band from the lowest to the highest error in each of 120 parts, and the mean as a
+    line. A stretch is drawn sample by sample, with the times at rest of a single run shaded.
 
     Parameters
     ----------
@@ -261,6 +270,8 @@ def tracking(
         is ahead.
     labels : sequence of str, optional
         A name for each run; by default the scenarios' names, with the seeds if these are alike.
+    stretch : tuple of float, optional
+        Begin and end of what is drawn, s, as :attr:`clutch.Result.window` around a stick; by default the whole.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; by default a new figure.
 
@@ -272,7 +283,7 @@ def tracking(
     Raises
     ------
     ValueError
-        There is no result, or the number of labels differs from that of the results.
+        There is no result, the number of labels differs from that of the results, or no sample is in the stretch.
     TypeError
         Something is not a Result.
 
@@ -282,15 +293,28 @@ def tracking(
     >>> ax = plot.tracking([simulate("pd_2"), simulate("smc_2")], labels=["PD", "sliding mode"])
     >>> ax.get_ylabel()
     'error (°)'
+    >>> run = simulate("bench_pd_2")
+    >>> ax = plot.tracking(run, stretch=run.window)
     """
+    import numpy as np
+
     runs, names = _runs("tracking", results, labels)
     ax = _one(ax)
     _zero(ax)
+    start, end = (0.0, _end(runs)) if stretch is None else stretch
     for i, (run, name) in enumerate(zip(runs, names, strict=True)):
-        colour = _COLOURS[i % len(_COLOURS)]
-        dash = _DASHES[i // len(_COLOURS) % len(_DASHES)]
-        _line(ax, run.samples["time_s"], _error_deg(run), color=colour, linestyle=dash, label=name)
-    ax.set(xlabel="time (s)", ylabel="error (°)", xlim=(0.0, _end(runs)))
+        look: dict[str, Any] = {"color": _COLOURS[i % len(_COLOURS)], "linestyle": _DASHES[i // len(_COLOURS) % 4]}
+        time, error = run.samples["time_s"], _error_deg(run)
+        if stretch is None:
+            _envelope(ax, time, error, look, label=name)
+            continue
+        part = slice(*np.searchsorted(time, [start, end]))
+        if not len(time[part]):
+            raise ValueError(f"tracking: stretch = {stretch}: expected times within the run, 0 to {_end(runs):g} s")
+        ax.plot(time[part], error[part], label=name, linewidth=0.8, **look)
+    if stretch is not None and len(runs) == 1:
+        _rest(ax, _sticks(runs[0]), start, end, _COLOURS[0])
+    ax.set(xlabel="time (s)", ylabel="error (°)", xlim=(start, end))
     if labels is not None or len(runs) > 1:
         _legend_above(ax)
     return ax
@@ -1016,7 +1040,18 @@ def _overview(runs: list[Result], names: list[str]) -> Figure:
     return figure
 
 
-def _envelope(ax: Axes, time: NDArray[Any], values: NDArray[Any], look: dict[str, Any]) -> None:
+def _rest(ax: Axes, sticks: NDArray[np.float64], start: float, end: float, colour: str) -> None:
+    """Shade the times at rest in a stretch."""
+    import numpy as np
+
+    within = np.clip(sticks[(sticks[:, 1] > start) & (sticks[:, 0] < end)], start, end)
+    place: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "linewidth": 0, "zorder": 0, "snap": False}
+    ax.broken_barh(_bars(within), (0, 1), facecolor=colour, alpha=0.2, label="at rest", **place)
+
+
+def _envelope(
+    ax: Axes, time: NDArray[Any], values: NDArray[Any], look: dict[str, Any], label: str | None = None
+) -> None:
     """The means of a curve's parts, and the band from their lowest to their highest."""
     import numpy as np
 
@@ -1024,7 +1059,7 @@ def _envelope(ax: Axes, time: NDArray[Any], values: NDArray[Any], look: dict[str
 
     parts = _clutch.envelope(np.ascontiguousarray(time), np.ascontiguousarray(values))
     ax.fill_between(parts["time_s"], parts["low"], parts["high"], color=look["color"], alpha=0.22, linewidth=0)
-    ax.plot(parts["time_s"], parts["mean"], linewidth=0.8, **look)
+    ax.plot(parts["time_s"], parts["mean"], linewidth=0.8, label=label, **look)
 
 
 _STATES = ("Disconnected", "Ready", "Armed", "Running", "Holding", "Released", "Faulted")
@@ -1042,10 +1077,12 @@ _COUNTERS = (
 
 @_styled
 def log_overview(log: Log) -> Figure:
-    """Draw a log of a simulation or a loop: measurements, commands, faults.
+    """Draw a log of a simulation or a loop: a stick closely, then measurements, commands and faults of the whole.
 
-    Panels without records are left out, so a simulation has no latency and no link. Target and error are
-    drawn where the law answered: a safe state has none. Events are marked through all panels, faults in red.
+    On top is the stretch around a stick, :attr:`clutch.Log.window`: the encoder's stairs and the path. Below it is the
+    whole; error and voltage are bands from the lowest to the highest of each of 120 parts, with the mean. Panels
+    without records are left out, so a simulation has no latency and no link. Target and error are drawn where the law
+    answered: a safe state has none. Events are marked through all panels of the whole, faults in red.
 
     Parameters
     ----------
@@ -1055,8 +1092,8 @@ def log_overview(log: Log) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Panels over time in s: position in °, by the encoder; error in °, as the law saw it; voltage in V; the
-        supervisor's state; the time that answers took in µs; the link's counters.
+        Panels over time in s: position closely, in counts; position in °, by the encoder; error in °, as the law saw
+        it; voltage in V; the supervisor's state; the time that answers took in µs; the link's counters.
 
     Raises
     ------
@@ -1071,7 +1108,7 @@ def log_overview(log: Log) -> Figure:
     ...     simulate("smc_2").save(f"{folder}/run.mcap")
     ...     figure = plot.log_overview(read_log(f"{folder}/run.mcap"))
     >>> [ax.get_ylabel() for ax in figure.axes]
-    ['position (°)', 'error (°)', 'voltage (V)', 'state']
+    ['position (counts)', 'position (°)', 'error (°)', 'voltage (V)', 'state']
     """
     import numpy as np
 
@@ -1080,9 +1117,15 @@ def log_overview(log: Log) -> Figure:
         raise ValueError("log_overview: the log has no records of commands: there is nothing to draw")
     sample, event, link = (log.channels.get(name) for name in ("sample", "event", "link"))
     answered = sample is not None and bool(np.any(sample["lateness_us"]))
-    heights = [2.0, 2.0, 2.0, 1.1] + [1.2] * (answered + (link is not None))
-    figure, axes = _panels(len(heights), height_mm=12 + 15 * sum(heights), sharex=True, height_ratios=heights)
-    position, error, voltage, state, *others = (row[0] for row in axes)
+    window, _ = log._picture()
+    closely = window is not None and sample is not None
+    heights = [2.4] * closely + [1.6, 2.0, 2.0, 1.1] + [1.2] * (answered + (link is not None))
+    figure, rows = _panels(len(heights), height_mm=12 + 15 * sum(heights), height_ratios=heights)
+    close, whole = [row[0] for row in rows[:closely]], [row[0] for row in rows[closely:]]
+    for ax in whole[:-1]:
+        ax.sharex(whole[-1])
+        ax.tick_params(labelbottom=False)
+    position, error, voltage, state, *others = whole
 
     time = command["time_s"]
     law = np.array(command["source"]) == "Law"
@@ -1092,15 +1135,20 @@ def log_overview(log: Log) -> Figure:
         seen = np.array(sample["arrival"]) != "Missing"
         counts = np.unwrap(np.asarray(sample["counts"], dtype=np.int64)[seen], period=2**32)
         _line(position, sample["time_s"][seen], counts * degrees, color=_BLUE, label="encoder")
+        for ax in close:
+            _closely(ax, log, sample["time_s"][seen], counts, np.where(law, command["target_counts_x65536"], np.nan))
     target = np.where(law, command["target_counts_x65536"] / 65536 * degrees, np.nan)
     _line(position, time, target, color=_RED, label="target")
     position.set_ylabel("position (°)")
     _legend_above(position)
     _zero(error)
-    _line(error, time, np.where(law, np.degrees(command["error_rad"]), np.nan), color=_BLUE)
+    _envelope(error, time, np.where(law, np.degrees(command["error_rad"]), np.nan), {"color": _BLUE})
     error.set_ylabel("error (°)")
-    _line(voltage, time, command["voltage_v"], color=_BLUE)
+    _envelope(voltage, time, np.asarray(command["voltage_v"]), {"color": _BLUE})
     voltage.set_ylabel("voltage (V)")
+    if window is not None and closely:
+        for ax in (position, error, voltage):
+            ax.axvspan(*window[:2], color="0.85", linewidth=0, zorder=0)
     _states(state, command, event)
     if answered and sample is not None:
         ax = others.pop(0)
@@ -1115,11 +1163,31 @@ def log_overview(log: Log) -> Figure:
     if link is not None:
         _counters(others.pop(0), link)
     if event is not None:
-        _events([row[0] for row in axes], event)
-    end = axes[-1][0].get_xlim()[1]
-    axes[-1][0].set(xlabel="time (s)", xlim=(0.0, 1.02 * end))
+        _events(whole, event)
+    end = whole[-1].get_xlim()[1]
+    whole[-1].set(xlabel="time (s)", xlim=(0.0, 1.02 * end))
     figure.align_ylabels()
     return figure
+
+
+def _closely(ax: Axes, log: Log, time: NDArray[Any], counts: NDArray[Any], target: NDArray[Any]) -> None:
+    """The encoder's stairs and the path, 2⁻¹⁶ counts, in the window of a log."""
+    import numpy as np
+
+    window, sticks = log._picture()
+    if window is None:
+        return
+    start, end, words, _ = window
+    command = log.channels["command"]["time_s"]
+    within, path = (slice(*np.searchsorted(t, [start, end])) for t in (time, command))
+    target = target[path] / 65536
+    origin = np.floor(target[0]) if len(target) else 0.0
+    ax.step(time[within], counts[within] - origin, where="post", color=_BLUE, linewidth=0.8, label="encoder")
+    ax.plot(command[path], target - origin, color="0.1", linewidth=0.6, zorder=1.5, label="path")
+    _rest(ax, np.stack([sticks["from_s"], sticks["to_s"]], axis=1), start, end, _BLUE)
+    ax.set(xlim=(start, end), xlabel="time (s)", ylabel="position (counts)")
+    ax.set_title(f"{1e3 * (end - start):.0f} ms {words}".replace(", ", ",\n"), pad=18)
+    _legend_above(ax)
 
 
 def _states(ax: Axes, command: Table, event: Table | None) -> None:
@@ -1243,7 +1311,7 @@ def identified(found: Identified) -> Figure:
 
 @_styled
 def candidates(runs: Mapping[str, Result], chosen: str | None = None) -> Figure:
-    """Draw the error of several runs below one another, on one scale.
+    """Draw the error of several runs below one another, on one scale: lowest to highest and mean of each part.
 
     Parameters
     ----------
@@ -1271,7 +1339,7 @@ def candidates(runs: Mapping[str, Result], chosen: str | None = None) -> Figure:
     most = max((float(np.max(np.abs(_error_deg(run)))) for run in runs.values()), default=1.0)
     scale = min(most, 0.5)
     for ax, (name, run) in zip(grid[:, 0], runs.items(), strict=False):
-        _line(ax, np.asarray(run.samples["time_s"]), _error_deg(run))
+        _envelope(ax, np.asarray(run.samples["time_s"]), _error_deg(run), {"color": _BLUE})
         ax.set_ylim(-1.05 * scale, 1.05 * scale)
         marked = f"{name} (chosen)" if name == chosen else name
         ax.set_title(marked, loc="left", fontweight="bold" if name == chosen else "normal", pad=2)

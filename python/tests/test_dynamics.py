@@ -165,3 +165,57 @@ def test_python_control_finds_the_voltage_that_keeps_a_velocity(control):
     point = control.find_operating_point(shaft, target, [2.0], target, ix=[0], iy=[1], idx=[1], dx0=[0.0, 0.0])
     volts = float(np.ravel(point.inputs)[0])
     assert volts == pytest.approx((0.047088 - 0.001 * 0.0349) / (0.15 * 0.14), rel=1e-9)
+
+
+# --- Discrete blocks over the exact engine -------------------------------------------------------
+
+
+def closed(control, scenario):
+    """Rig and law closed, with the path as input."""
+    rig, law = clutch.dynamics.sampled_rig(scenario), clutch.dynamics.sampled_law(scenario)
+    inputs = ["target_counts", "target_velocity", "target_acceleration"]
+    outputs = ["position", "velocity", "counts", "stuck", "voltage"]
+    return control.interconnect([rig, law], inputs=inputs, outputs=outputs, name="loop")
+
+
+@pytest.mark.parametrize(
+    "name", ["smc_2", "pd_2", "f32_smc_2", "bench_smc_2", "bench_glide_2", "motor_pid", "minimum_jerk"]
+)
+def test_blocks_of_rig_and_law_closed_in_python_control_are_the_simulators_run_bit_for_bit(control, name):
+    scenario = clutch.Scenario.load(name, {"run.duration_s": 1.2, "run.settle_s": 0.0})
+    loop = closed(control, scenario)
+    assert loop.dt == pytest.approx(scenario.sampling.period_us * 1e-6)
+    time, targets = clutch.dynamics.targets(scenario)
+    response = control.input_output_response(loop, time, targets)
+    samples = clutch.simulate(scenario).samples
+    for row, column in enumerate(["position_rad", "velocity_rad_s", "counts", "stuck", "voltage_v"]):
+        np.testing.assert_array_equal(response.outputs[row], samples[column], err_msg=column)
+
+
+def test_a_block_that_is_asked_twice_answers_the_same_and_goes_on_where_it_was(control):
+    rig = clutch.dynamics.sampled_rig("bench_smc_2")
+    time, volts = rig.dt * np.arange(200), np.linspace(2.0, 3.0, 200)
+    first, again = (control.input_output_response(rig, time, volts) for _ in range(2))
+    np.testing.assert_array_equal(first.outputs, again.outputs)
+    # The second half from the state that the first half ended in.
+    rest = control.input_output_response(rig, time[:100], volts[100:], first.states[:, 100])
+    np.testing.assert_array_equal(rest.outputs, first.outputs[:, 100:])
+    # In two ways from the same state: the block itself does not change.
+    x = first.states[:, 100]
+    fast = slow = x
+    for _ in range(3):  # the rig has a delay
+        fast, slow = rig.dynamics(0.0, fast, [0.0]), rig.dynamics(0.0, slow, [9.0])
+    assert rig.output(0.0, fast, [0.0])[2] > rig.output(0.0, slow, [0.0])[2]
+    np.testing.assert_array_equal(rig.output(0.0, x, [0.0]), first.outputs[:, 100])
+
+
+def test_a_state_that_is_none_is_refused(control):
+    rig = clutch.dynamics.sampled_rig("smc_2")
+    for x in (0.5, 7.0, -1.0, math.nan):
+        with pytest.raises(ValueError, match="rig: state"):
+            rig.output(0.0, [x], [2.0])
+    # What lies long back is forgotten, but for the beginning.
+    response = control.input_output_response(rig, rig.dt * np.arange(1500), np.full(1500, 2.3))
+    with pytest.raises(ValueError, match="last 1024"):
+        rig.output(0.0, response.states[:, 10], [2.0])
+    assert rig.output(0.0, [0.0], [2.0])[0] == response.outputs[0, 0]

@@ -13,18 +13,18 @@ gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import clutch.gym  # noqa: E402
-from clutch.gym import TrackingEnv  # noqa: E402
+from clutch.gym import TrackingEnv, TrackingVectorEnv  # noqa: E402
 
 IDS = ["clutch/Ramp-v0", "clutch/RampBench-v0", "clutch/MinimumJerk-v0"]
 
 
 def run(env, seed, agent):
-    """An episode: observations, rewards, infos, and how it ended."""
+    """An episode under an agent that answers a voltage: observations, rewards, infos, and how it ended."""
     observation, info = env.reset(seed=seed)
     observations, rewards, infos = [observation], [], [info]
     ended = (False, False)
     while not any(ended):
-        observation, reward, *ended, info = env.step(np.array([agent(observation, info)], np.float32))
+        observation, reward, *ended, info = env.step(env.scales.action([agent(observation, info)]))
         observations.append(observation)
         rewards.append(reward)
         infos.append(info)
@@ -34,25 +34,42 @@ def run(env, seed, agent):
 @pytest.mark.parametrize("name", IDS)
 def test_gymnasiums_checks_pass(name):
     with warnings.catch_warnings():
-        # Its advice on normalised actions and infinite bounds: ours are volts and radians.
-        warnings.simplefilter("ignore", UserWarning)
-        check_env(gymnasium.make(name).unwrapped)
+        # Its advice, too: scaled actions, finite bounds.
+        warnings.simplefilter("error")
+        check_env(gymnasium.make(name, render_mode="rgb_array").unwrapped)
+
+
+def test_observations_are_about_one_and_scales_take_them_into_units_and_back():
+    env = TrackingEnv("bench_smc_2", overrides={"run.duration_s": 1.1})
+    observations, _, infos, _ = run(env, 1, lambda _, info: info["law_voltage_v"])
+    assert np.abs(observations[:, [0, 2, 3, 4]]).max() <= 1.0 and 0.5 < np.abs(observations[:, 1]).max() < 10.0
+    physical = env.scales.physical(observations)
+    for i, key in enumerate(clutch.gym._SEEN):
+        np.testing.assert_allclose(physical[:, i], [info[key] for info in infos], rtol=1e-6, atol=1e-6, err_msg=key)
+    scales = env.scales
+    assert scales.velocity_rad_s == pytest.approx(math.radians(2.0))
+    assert (scales.error_rad, scales.highest_v) == (math.radians(0.5), 10.0)
+    # A law's voltage survives an action of single precision: the converter gives the same code.
+    volts = np.arange(4096) * 20 / 4096 - 10
+    back = scales.volts(scales.action(volts[volts >= 0]))
+    assert np.abs(back - volts[volts >= 0]).max() < 1e-6
+    # A motor pulls, too.
+    assert TrackingEnv("motor_pid").scales.lowest_v < 0.0
+    np.testing.assert_array_equal(scales.observation(np.array([9.0, 0, 0, 0, 5.0])), [100, 0, 0, 0, 0])
 
 
 @pytest.mark.parametrize("scenario", ["smc_2", "bench_smc_2", "pd_2", "f32_smc_2"])
 def test_an_agent_that_plays_the_law_moves_the_shaft_as_simulate_does(scenario):
     env = TrackingEnv(scenario, overrides={"run.duration_s": 1.5, "run.settle_s": 0.0})
-    observations, _, infos, ended = run(env, 5, lambda _, info: info["law_voltage_v"])
+    _, _, infos, ended = run(env, 5, lambda _, info: info["law_voltage_v"])
     result = clutch.simulate(env.scenario.override({"run.seed": 5}))
     samples = result.samples
     assert ended == (False, True) and len(infos) == len(samples)
     for key in ("position_rad", "velocity_rad_s", "counts", "time_s", "stuck", "error_rad"):
         np.testing.assert_array_equal([info[key] for info in infos], samples[key], err_msg=key)
-    for i, key in enumerate(
-        ["measured_error_rad", "error_rate_rad_s", "target_velocity_rad_s", "target_acceleration_rad_s2"]
-    ):
-        np.testing.assert_array_equal(observations[:, i], samples[key], err_msg=key)
-    np.testing.assert_array_equal(observations[1:, 4], samples["voltage_v"][:-1])
+    for key in ("measured_error_rad", "error_rate_rad_s", "target_velocity_rad_s", "target_acceleration_rad_s2"):
+        np.testing.assert_array_equal([info[key] for info in infos], samples[key], err_msg=key)
+    np.testing.assert_array_equal([info["voltage_v"] for info in infos[1:]], samples["voltage_v"][:-1])
     sticks = [t for t, kind in zip(result.events["time_s"], result.events["kind"], strict=True) if kind == "stick"]
     assert infos[-1]["sticks"] == sum(t <= infos[-1]["time_s"] for t in sticks)
 
@@ -92,9 +109,9 @@ def test_without_a_seed_each_episode_is_another_one_and_the_series_repeats():
 
 def test_the_reward_is_what_its_formula_says():
     env = TrackingEnv("smc_2", error_weight=0.5, variation_weight=2.0, overrides={"run.duration_s": 1.01})
-    observations, rewards, infos, _ = run(env, 1, lambda _, info: info["law_voltage_v"])
+    _, rewards, infos, _ = run(env, 1, lambda _, info: info["law_voltage_v"])
     counts = np.array([i["error_rad"] for i in infos[1:]]) * 20_000 / math.tau
-    variation = np.abs(np.diff(observations[:, 4]))
+    variation = np.abs(np.diff([info["voltage_v"] for info in infos]))
     np.testing.assert_allclose(rewards, -0.5 * counts**2 - 2.0 * variation, rtol=1e-12)
 
 
@@ -114,8 +131,9 @@ def test_a_shaft_let_go_ends_the_episode_and_giving_up_never_pays():
 def test_voltages_beyond_the_limits_are_cut_and_those_that_are_no_numbers_refused():
     env = TrackingEnv("smc_2", overrides={"output.highest_v": 5.0, "output.on_invalid_v": 5.0})
     env.reset(seed=1)
-    assert env.action_space.high[0] == 5.0
-    assert env.step([50.0])[0][4] == 5.0 and env.step([-3.0])[0][4] == 0.0
+    assert env.scales.highest_v == 5.0
+    assert env.step([10.0])[4]["voltage_v"] == 5.0 and env.step([-3.0])[4]["voltage_v"] == 0.0
+    assert env.step([0.0])[4]["voltage_v"] == pytest.approx(2.5, abs=0.0025)
     with pytest.raises(ValueError):
         env.step([math.nan])
 
@@ -124,7 +142,7 @@ def test_observations_are_new_arrays_of_the_space():
     env = TrackingEnv("minimum_jerk")
     first, _ = env.reset(seed=1)
     kept = first.copy()
-    second = env.step([2.0])[0]
+    second = env.step([0.2])[0]
     assert first is not second and np.array_equal(first, kept)
     assert first in env.observation_space and second in env.observation_space
 
@@ -136,6 +154,12 @@ def test_bad_arguments_are_named():
         TrackingEnv("smc_2", max_error_deg=0.0)
     with pytest.raises(ValueError, match="weights"):
         TrackingEnv("smc_2", error_weight=-1.0)
+    with pytest.raises(ValueError, match="render_mode = 'human'"):
+        TrackingEnv("smc_2", render_mode="human")
+    with pytest.raises(ValueError, match="num_envs = 0"):
+        TrackingVectorEnv(0)
+    with pytest.raises(ValueError, match="expected 2 seeds, got 1"):
+        TrackingVectorEnv(2).reset(seed=[1])
     with pytest.raises(clutch.ParamError):
         TrackingEnv("smc_2", overrides={"law.smc.kp_v": -1})
 
@@ -147,12 +171,13 @@ def test_vectors_of_environments_run(mode):
         observations, infos = envs.reset(seed=3)
         assert observations.shape == (2, 5) and infos["seed"].tolist() == [3, 4]
         for _ in range(50):
-            observations, _, terminated, _, infos = envs.step(infos["law_voltage_v"][:, None].astype(np.float32))
+            actions = TrackingEnv("smc_2").scales.action(infos["law_voltage_v"])[:, None]
+            observations, _, terminated, _, infos = envs.step(actions)
         assert not terminated.any()
         alone = TrackingEnv("smc_2")
         _, info = alone.reset(seed=4)
         for _ in range(50):
-            observation, *_, info = alone.step([info["law_voltage_v"]])
+            observation, *_, info = alone.step(alone.scales.action([info["law_voltage_v"]]))
         np.testing.assert_array_equal(observations[1], observation)
     finally:
         envs.close()
@@ -169,9 +194,76 @@ def test_registering_twice_changes_nothing():
 def test_a_step_outside_of_an_episode_asks_for_a_reset():
     env = TrackingEnv("smc_2")
     with pytest.raises(gymnasium.error.ResetNeeded):
-        env.step([2.0])
+        env.step([0.2])
     env.reset(seed=1)
-    while not env.step([0.0])[2]:
+    while not env.step([-1.0])[2]:
         pass
     with pytest.raises(gymnasium.error.ResetNeeded):
-        env.step([2.0])
+        env.step([0.2])
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        TrackingVectorEnv(2).step(np.zeros((2, 1), np.float32))
+
+
+def test_many_shafts_in_one_call_go_each_as_one_alone_and_begin_anew():
+    """More than fit on one thread; some agents let go, and their episodes end early."""
+    n, short = 40, {"run.duration_s": 1.2, "run.settle_s": 0.0}
+    envs = gymnasium.make_vec("clutch.gym:clutch/RampBench-v0", num_envs=n, overrides=short)
+    assert isinstance(envs, TrackingVectorEnv)
+    observations, infos = envs.reset(seed=7)
+    assert observations in envs.observation_space and observations.shape == (n, 5)
+    lets_go = np.arange(n) % 3 == 0
+    seen, paid, seeds = [observations], [], [infos["seed"]]
+    for _ in range(1300):
+        volts = np.where(lets_go & (infos["time_s"] > 0.2), 0.0, infos["law_voltage_v"])
+        before = infos
+        observations, rewards, terminated, truncated, infos = envs.step(envs.scales.action(volts)[:, None])
+        seen.append(observations)
+        paid.append(rewards)
+        seeds.append(infos["seed"])
+        assert not (terminated & truncated).any()
+        again = infos["time_s"] < before["time_s"]
+        assert (rewards[again] == 0.0).all() and (infos["sticks"][again] == 0).all()
+    seen, paid, seeds = np.array(seen), np.array(paid), np.array(seeds)
+    alone = TrackingEnv("bench_smc_2", overrides=short)
+    for i in (0, 1, n - 1):
+        tick = 0
+        for _ in range(2):  # two episodes, one after the other
+            observation, info = alone.reset(seed=int(seeds[tick, i]))
+            np.testing.assert_array_equal(seen[tick, i], observation)
+            ended = False
+            while not ended and tick < 1300:
+                volts = 0.0 if lets_go[i] and info["time_s"] > 0.2 else info["law_voltage_v"]
+                observation, reward, *ends, info = alone.step(alone.scales.action([volts]))
+                np.testing.assert_array_equal(seen[tick + 1, i], observation)
+                assert paid[tick, i] == reward
+                tick, ended = tick + 1, any(ends)
+            tick += 1
+    assert len(np.unique(seeds[-1])) == n
+
+
+def test_an_environment_is_drawn_and_told():
+    env = TrackingEnv("bench_smc_2", overrides={"run.duration_s": 1.1}, render_mode="rgb_array")
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.render()
+    run(env, 1, lambda _, info: info["law_voltage_v"])
+    frame = env.render()
+    assert frame.shape == (480, 640, 3) and frame.dtype == np.uint8 and len(np.unique(frame)) > 20
+    told = TrackingEnv("smc_2", render_mode="ansi")
+    told.reset(seed=1)
+    told.step([-1.0])
+    assert told.render() == "0.001 s  error -0.001°  0.00 V  slides     0 sticks"
+    assert TrackingEnv("smc_2").render() is None
+
+
+def test_the_smooth_law_is_a_yardstick_that_others_do_not_reach():
+    def returns(scenario):
+        envs = TrackingVectorEnv(6, scenario, overrides={"run.duration_s": 2.0})
+        _, infos = envs.reset(seed=1)
+        total, ended = np.zeros(6), False
+        while not ended:
+            _, rewards, _, truncated, infos = envs.step(envs.scales.action(infos["law_voltage_v"])[:, None])
+            total, ended = total + rewards, truncated.all()
+        return total
+
+    glide, pd, smc = map(returns, ("bench_glide_2", "bench_pd_2", "bench_smc_2"))
+    assert glide.min() > 5 * pd.max() and pd.min() > smc.max()

@@ -88,12 +88,30 @@ def test_importing_clutch_and_its_plots_imports_no_matplotlib():
 def test_a_tracking_plot_is_the_error_in_degrees_over_the_time_of_the_run(pd, tmp_path):
     ax = plot.tracking(pd)
     drawn(ax, tmp_path, "tracking")
-    curve = line(ax, pd.scenario.name)
-    assert np.array_equal(curve.get_xdata(), pd.samples["time_s"])
-    assert np.array_equal(curve.get_ydata(), np.degrees(pd.samples["error_rad"]))
+    # Of each part the mean is a line; the band reaches as far as the samples do.
+    error = np.degrees(pd.samples["error_rad"])
+    mean = line(ax, pd.scenario.name).get_ydata()
+    assert len(mean) == 120 and error.min() < mean.min() and mean.max() < error.max()
+    assert mean.mean() == pytest.approx(error.mean(), abs=1e-4)
+    band = ax.collections[0].get_paths()[0].vertices[:, 1]
+    assert (band.min(), band.max()) == (error.min(), error.max())
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("time (s)", "error (°)")
     assert ax.get_xlim() == (0.0, 1.0)
     assert ax.get_legend() is None
+
+
+def test_a_stretch_of_a_tracking_plot_is_drawn_sample_by_sample_with_its_sticks(tmp_path):
+    bench = simulate("bench_pd_2", overrides=SHORT)
+    start, end = bench.window
+    ax = plot.tracking(bench, stretch=bench.window)
+    drawn(ax, tmp_path, "stretch")
+    time, error = line(ax, bench.scenario.name).get_data()
+    within = (bench.samples["time_s"] >= start) & (bench.samples["time_s"] < end)
+    assert np.array_equal(time, bench.samples["time_s"][within])
+    assert np.array_equal(error, np.degrees(bench.samples["error_rad"][within]))
+    assert len(ax.collections[0].get_paths()) > 2  # sticks
+    with pytest.raises(ValueError, match="stretch"):
+        plot.tracking(bench, stretch=(5.0, 6.0))
 
 
 def test_several_runs_have_a_colour_and_a_label_each(pd, smc, tmp_path):
@@ -150,11 +168,12 @@ def test_a_figure_is_one_column_wide_with_text_that_can_be_read_there(pd):
 # --- Long runs ---------------------------------------------------------------------------------
 
 
-def test_a_long_run_is_thinned_and_keeps_the_smallest_and_largest_sample_of_each_column(tmp_path):
+def test_a_long_line_is_thinned_and_keeps_the_smallest_and_largest_sample_of_each_column(tmp_path):
     long = simulate("pd_2", overrides={"run.duration_s": 40.0})
-    ax = plot.tracking(long)
+    ax = plot._one(None)
+    plot._line(ax, long.samples["time_s"], np.degrees(long.samples["error_rad"]))
     drawn(ax, tmp_path, "long")
-    x, y = line(ax, long.scenario.name).get_data()
+    x, y = ax.lines[0].get_data()
     time, error = long.samples["time_s"], np.degrees(long.samples["error_rad"])
     columns = int(85 / 25.4 * 600)
     assert len(x) <= 2 * columns + 2 < len(time)
@@ -592,17 +611,24 @@ def log(smc, tmp_path_factory):
 def test_a_simulations_log_shows_what_was_measured_and_commanded(log, smc, tmp_path):
     figure = plot.log_overview(log)
     drawn(figure, tmp_path, "log")
-    labels = ["position (°)", "error (°)", "voltage (V)", "state"]
+    labels = ["position (counts)", "position (°)", "error (°)", "voltage (V)", "state"]
     assert [ax.get_ylabel() for ax in figure.axes] == labels
-    position, error, voltage, state = figure.axes
+    close, position, error, voltage, state = figure.axes
+    start, end = log.window
+    assert close.get_xlim() == (start, end) and end - start < 0.5
+    time, stairs = line(close, "encoder").get_data()
+    assert time[0] >= start and time[-1] < end and 10 < np.ptp(stairs) < 200
+    assert names(close) == ["encoder", "path", "at rest"]
     assert state.get_xlabel() == "time (s)"
     counts = np.asarray(smc.samples["counts"])
     assert line(position, "encoder").get_ydata() == pytest.approx(counts * 0.018)
     assert line(position, "target").get_ydata() == pytest.approx(
         np.degrees(smc.samples["target_position_rad"]), abs=0.018 * 2**-15
     )
-    assert error.lines[-1].get_ydata() == pytest.approx(np.degrees(smc.samples["measured_error_rad"]))
-    assert np.array_equal(voltage.lines[-1].get_ydata(), smc.samples["voltage_v"])
+    for ax, seen in ((error, np.degrees(smc.samples["measured_error_rad"])), (voltage, smc.samples["voltage_v"])):
+        band = ax.collections[0].get_paths()[0].vertices[:, 1]
+        assert (band.min(), band.max()) == pytest.approx((seen.min(), seen.max()))
+        assert ax.lines[-1].get_ydata().mean() == pytest.approx(seen.mean(), rel=1e-2, abs=1e-4)
     assert [text.get_text() for text in state.get_yticklabels()] == ["Running"]
 
 
@@ -627,15 +653,16 @@ def loop_log(log, lost=0):
     link = {name: [0, lost] for name in plot._COUNTERS}
     channels["link"] = {"time_s": [0.5, 0.999], "tick": [500, 999], "received": [500, 999], **link}
     safe = Scenario.load("board_smc_2")
-    return SimpleNamespace(channels={k: Table(v) for k, v in channels.items()}, scenario=safe)
+    tables = {k: Table(v) for k, v in channels.items()}
+    return SimpleNamespace(channels=tables, scenario=safe, _picture=log._picture)
 
 
 def test_a_loops_log_shows_answers_link_and_the_fault_that_ended_it(log, tmp_path):
     figure = plot.log_overview(loop_log(log))
     drawn(figure, tmp_path, "loop")
     labels = ["position (°)", "error (°)", "voltage (V)", "state", "answer (µs)", "link (count)"]
-    assert [ax.get_ylabel() for ax in figure.axes] == labels
-    position, error, _, state, answer, link = figure.axes
+    assert [ax.get_ylabel() for ax in figure.axes] == ["position (counts)", *labels]
+    position, error, _, state, answer, link = figure.axes[1:]
     assert [text.get_text() for text in state.get_yticklabels()] == ["Running", "Faulted"]
     assert [text.get_text() for text in state.texts] == ["stand still"]
     assert names(answer) == ["answer", "deadline"]
@@ -643,8 +670,7 @@ def test_a_loops_log_shows_answers_link_and_the_fault_that_ended_it(log, tmp_pat
     n = len(log.channels["sample"])
     assert len(line(position, "encoder").get_xdata()) == n - 1
     assert np.flatnonzero(np.isnan(line(position, "target").get_ydata())).tolist() == [n - 1]
-    curves = [one for one in error.lines if len(one.get_xdata()) == n]
-    assert np.isnan(curves[0].get_ydata()[-1])
+    assert not np.isnan(error.lines[-1].get_ydata()).any()  # what is no number does not count
 
 
 def test_what_went_wrong_on_the_link_is_drawn_by_name(log, tmp_path):
@@ -658,7 +684,8 @@ def test_counts_that_wrap_are_drawn_without_a_jump(log):
     channels = {name: dict(table.to_dict()) for name, table in log.channels.items()}
     counts = np.asarray(channels["sample"]["counts"], dtype=np.int64)
     channels["sample"]["counts"] = (counts + 2**31 - 50 + 2**31) % 2**32 - 2**31
-    wrapped = SimpleNamespace(channels={k: Table(v) for k, v in channels.items()}, scenario=log.scenario)
+    tables = {k: Table(v) for k, v in channels.items()}
+    wrapped = SimpleNamespace(channels=tables, scenario=log.scenario, _picture=lambda: (None, None))
     shown = line(plot.log_overview(wrapped).axes[0], "encoder").get_ydata()
     assert np.diff(shown) == pytest.approx(np.diff(counts) * 0.018)
 

@@ -45,10 +45,10 @@ def test_an_engine_whose_package_is_missing_is_skipped_with_a_word(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     results = referee.compare([CASES["P3"]], [MuJoCo(), MuJoCoLuGre(), Kamino(), SciPy()])
     assert [r.refused for r in results] == [
-        "mujoco is not installed",
-        "mujoco is not installed",
-        "newton is not installed",
-        "scipy is not installed",
+        "mujoco is not installed: pip install mujoco",
+        "mujoco is not installed: pip install mujoco",
+        "newton is not installed: pip install newton",
+        "scipy is not installed: pip install 'clutch-control[sweep]'",
     ]
     assert "mujoco           skipped: mujoco is not installed" in referee.table([CASES["P3"]], results)
 

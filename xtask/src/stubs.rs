@@ -76,15 +76,15 @@ const NAMED: &[(&str, &str)] = &[
     ("def table3(self, /) -> Any:", "def table3(self, /) -> list[dict[str, float]]:"),
     ("def certificate(self, /) -> Any:", "def certificate(self, /) -> dict[str, Any]:"),
     ("def __iter__(self, /) -> Any: ...", "def __iter__(self, /) -> Iterator[str]: ..."),
-    ("columns: Mapping) -> Table", "columns: Mapping[str, ArrayLike]) -> Table"),
+    ("columns: Mapping, meanings", "columns: Mapping[str, ArrayLike], meanings"),
     ("def to_dict(self, /) -> dict:", "def to_dict(self, /) -> dict[str, Any]:"),
     ("def to_pandas(self, /) -> Any:", "def to_pandas(self, /) -> pd.DataFrame:"),
     ("def to_polars(self, /) -> Any:", "def to_polars(self, /) -> pl.DataFrame:"),
     ("def to_arrow(self, /) -> Any:", "def to_arrow(self, /) -> pa.Table:"),
     ("index: str | None = None) -> Any:", "index: str | None = None) -> xr.Dataset:"),
     (
-        "def __reduce__(self, /) -> tuple[Any, tuple[dict]]: ...",
-        "def __reduce__(self, /) -> tuple[Any, tuple[dict[str, Any]]]: ...",
+        "def __reduce__(self, /) -> tuple[Any, tuple[dict, dict[str, str]]]: ...",
+        "def __reduce__(self, /) -> tuple[Any, tuple[dict[str, Any], dict[str, str]]]: ...",
     ),
     (
         "def reproduce(progress: Any | None = None)",
@@ -110,10 +110,24 @@ const NAMED: &[(&str, &str)] = &[
     ("-> tuple[Any, str, str, str | None]:", "-> tuple[dict[str, Any], str, str, str | None]:"),
     ("velocity: Incomplete) -> Incomplete", "velocity: NDArray[np.float64]) -> NDArray[np.float64]"),
     ("time: Incomplete, values: Incomplete)", "time: NDArray[np.float64], values: NDArray[np.float64])"),
+    (
+        "scenarios: SupportsGetItem[int, Any]) -> Shafts",
+        "scenarios: Sequence[_model.Scenario | Scenario]) -> Shafts",
+    ),
+    ("index: SupportsIndex, scenario: Any)", "index: int, scenario: _model.Scenario | Scenario)"),
+    ("def seen(self, /) -> Incomplete", "def seen(self, /) -> NDArray[np.float64]"),
+    (
+        "volts: Incomplete, chosen: Incomplete) -> Incomplete",
+        "volts: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]",
+    ),
     ("table: dict", "table: dict[str, Any]"),
     ("tables: dict,", "tables: dict[str, Any],"),
     ("overrides: dict |", "overrides: Mapping[str, object] |"),
     (") -> dict:", ") -> dict[str, Any]:"),
+    (
+        "def attributes(self, /, name: str) -> dict[str, Any]",
+        "def attributes(self, /, name: str) -> dict[str, str]",
+    ),
 ];
 
 /// Writes the stub, from this tree.

@@ -34,9 +34,12 @@ impl Export {
         let Export { log, out, channel } = self;
         if !out.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
             bail!(
-                "{}: expected a name that ends with .csv; for Parquet, in Python:\n  \
-                 clutch.read_log(log).channels[\"{channel}\"].to_pandas().to_parquet(file)",
-                out.display()
+                "{}: expected a name that ends with .csv; Parquet and Arrow, with units, are written by\n\
+                 Python (pip install 'clutch-control[pandas]'):\n  \
+                 clutch.read_log({:?}).export({:?}, {channel:?})",
+                out.display(),
+                log.display().to_string(),
+                out.display().to_string()
             );
         }
         new_file(&out)?;

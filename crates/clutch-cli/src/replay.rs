@@ -2,12 +2,16 @@
 
 use crate::args::key_value;
 use crate::output::{BUILD, Exit, tell, wrote};
-use crate::plot::{self, Figure, Panel, Series};
+use crate::plot::{self, Figure, Panel, Series, Shade};
 use crate::table::{number, quantities};
 use clap::Args;
-use clutch_log::{CommandRecord, Limits, Log, Tail};
+use clutch_core::supervisor::Arrival;
+use clutch_log::{CommandRecord, Limits, Log, SampleRecord, Tail};
+use clutch_loop::picture::{Pictured, pictured};
 use clutch_loop::replay::{drift, replay};
 use clutch_sim::Scenario;
+use clutch_sim::picture::{Envelope, PARTS};
+use clutch_sim::progress::UNWATCHED;
 use std::path::PathBuf;
 
 /// Feeds a log's encoder counts to its law again and compares every output bit for bit.
@@ -29,7 +33,7 @@ pub(crate) struct Replay {
     /// Overrides a key of the log's scenario; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
-    /// Draws both commands and their difference over time.
+    /// Draws both commands and their difference, closely around a stick and whole.
     #[arg(long, value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
 }
@@ -42,9 +46,9 @@ impl Replay {
         let log = clutch_log::read(&self.log, &Limits::default())?;
         let origin = format!("{}: its scenario", self.log.display());
         let scenario = Scenario::parse(&origin, &log.header.scenario_toml, &self.set)?;
-        let replayed = replay(&log, &scenario)?;
+        let replayed = replay(&log, &scenario, UNWATCHED)?;
         if let Some(file) = &self.plot {
-            figure(&log, &replayed.commands).save(file)?;
+            figure(&log, &scenario, &replayed.commands)?.save(file)?;
         }
         let n = replayed.commands.len();
         let mut text = wrote(&self.plot.iter().map(PathBuf::as_path).collect::<Vec<_>>());
@@ -60,7 +64,7 @@ impl Replay {
         if replayed.behind_gap > 0 {
             text += &format!("a gap: {} ticks behind it are not comparable\n", replayed.behind_gap);
         }
-        let drift = drift(&log, &scenario)?;
+        let drift = drift(&log, &scenario, UNWATCHED)?;
         text += &format!("{}: {}\n", drift.label(), drift.words());
         text.extend(drift.alarm_line().map(|line| line + "\n"));
         let whole = log.complete && replayed.behind_gap == 0 && replayed.dropped == 0;
@@ -127,42 +131,80 @@ fn compare(logged: &[CommandRecord], replayed: &[CommandRecord]) -> String {
     text
 }
 
-fn figure(log: &Log, replayed: &[CommandRecord]) -> Figure {
-    let series = |label: &str, of: &dyn Fn(usize) -> f64| {
-        let n = replayed.len().min(log.commands.len());
-        Series::new(label, (0..n).map(|i| (log.commands[i].time_ns as f64 / 1e9, of(i))).collect())
+/// Left the window around a stick, right the whole: the voltage, what of it is other, position and error.
+fn figure(log: &Log, scenario: &Scenario, replayed: &[CommandRecord]) -> anyhow::Result<Figure> {
+    let n = replayed.len().min(log.commands.len());
+    let logged = &log.commands[..n];
+    let time: Vec<f64> = logged.iter().map(|c| c.time_ns as f64 / 1e9).collect();
+    let Pictured { window, sticks } = pictured(log, scenario)?;
+    let (from, to, words) = match window {
+        Some(w) => (w.from, w.to, w.words()),
+        None => (0.0, time.last().copied().unwrap_or(0.0), String::new()),
     };
-    let panel = |title: &str, y_label: &str, series| Panel {
+    let place = |at: f64| time.partition_point(|t| *t < at);
+    let within = place(from)..place(to);
+    let rest = sticks.iter().map(|s| (s.from.max(from), s.to.min(to))).filter(|(a, b)| a < b).collect();
+    let close = |title: &str, y_label: &str, series: Vec<Series>| Panel {
         title: title.to_owned(),
         x_label: "time (s)".to_owned(),
         y_label: y_label.to_owned(),
         series,
+        shades: vec![Shade { label: "at rest".to_owned(), stretches: Vec::clone(&rest), of: None }],
         step: true,
         ..Panel::default()
     };
-    Figure {
+    let whole = |title: &str, y_label: &str, series: Vec<Series>| Panel {
+        title: title.to_owned(),
+        x_label: "time (s)".to_owned(),
+        y_label: y_label.to_owned(),
+        series,
+        shades: vec![Shade { label: "the window".to_owned(), stretches: vec![(from, to)], of: None }],
+        ..Panel::default()
+    };
+    let volts = [
+        ("logged", logged.iter().map(|c| c.voltage).collect::<Vec<f64>>()),
+        ("replayed", replayed[..n].iter().map(|c| c.voltage).collect()),
+    ];
+    let other: Vec<f64> = volts[1].1.iter().zip(&volts[0].1).map(|(b, a)| b - a).collect();
+    let error: Vec<f64> = logged.iter().map(|c| c.error).collect();
+    let points = |values: &[f64]| within.clone().map(|i| (time[i], values[i])).collect::<Vec<_>>();
+    let line = |label: &str, values: &[f64]| Series::new(label, points(values));
+    let band = |label: &str, values: &[f64], factor| {
+        Series::envelope(label, &Envelope::new(&time, values, PARTS), factor)
+    };
+    let target = |c: &CommandRecord| c.target_fixed as f64 / 65536.0;
+    let origin = within.clone().next().map_or(0.0, |i| target(&logged[i]).floor());
+    let path = within.clone().map(|i| (time[i], target(&logged[i]) - origin)).collect();
+    let seen = |s: &&SampleRecord| s.arrival != Arrival::Missing as u8;
+    let counts =
+        log.samples.iter().filter(seen).map(|s| (s.time_ns as f64 / 1e9, f64::from(s.counts) - origin));
+    let counts = counts.filter(|(t, _)| (from..to).contains(t)).collect();
+    let title = format!("{} ms {words}: voltage", number((1e3 * (to - from)).round()));
+    let both = "lowest to highest and mean";
+    let stairs = vec![Series::new("encoder", counts), Series { guide: true, ..Series::new("path", path) }];
+    Ok(Figure {
         title: format!("Replay of {}", log.header.scenario_name),
-        columns: 1,
+        columns: 2,
         panels: vec![
-            panel(
-                "Voltage",
+            close(&title, "voltage (V)", volts.iter().map(|(label, v)| line(label, v)).collect()),
+            whole(
+                &format!("The whole run: voltage, {both}"),
                 "voltage (V)",
-                vec![
-                    series("logged", &|i| log.commands[i].voltage),
-                    series("replayed", &|i| replayed[i].voltage),
-                ],
+                volts.iter().map(|(label, v)| band(label, v, 1.0)).collect(),
             ),
-            panel(
-                "Difference",
+            close("The same: replayed − logged", "voltage (V)", vec![line("replayed − logged", &other)]),
+            whole(
+                &format!("The whole run: replayed − logged, {both}"),
                 "voltage (V)",
-                vec![series("replayed − logged", &|i| replayed[i].voltage - log.commands[i].voltage)],
+                vec![band("mean", &other, 1.0)],
             ),
-            panel(
-                "Position error",
+            close("The same: position, as logged", "position (counts)", stairs),
+            whole(
+                &format!("The whole run: error, as logged, {both}"),
                 "error (°)",
-                vec![series("logged", &|i| log.commands[i].error.to_degrees())],
+                vec![band("mean", &error, 1.0_f64.to_degrees())],
             ),
         ],
         ..Figure::default()
-    }
+    })
 }

@@ -13,6 +13,7 @@ use clutch_sim::engine::EngineKind;
 use clutch_sim::friction_map::MapInRun;
 use clutch_sim::metrics::Detected;
 use clutch_sim::picture::Envelope;
+use clutch_sim::progress::UNWATCHED;
 use clutch_sim::reaching::Reaching;
 use clutch_sim::rig::Rig;
 use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario};
@@ -99,7 +100,7 @@ impl Sim {
             csv(&run, file)?;
         }
         if let Some(file) = &self.log {
-            to_log::save_simulation(file, &scenario, &run, BUILD, None)?;
+            to_log::save_simulation(file, &scenario, &run, BUILD, None, UNWATCHED)?;
         }
         if let Some(file) = &self.plot {
             let label = scenario.name().to_owned();
@@ -244,7 +245,7 @@ fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {
     let t = &run.trace;
     let wrong = || format!("{}: cannot be written", file.display());
     let mut out = csv::Writer::from_path(file).with_context(wrong)?;
-    let mut header: Vec<String> = SAMPLE_COLUMNS.map(str::to_owned).into();
+    let mut header: Vec<String> = SAMPLE_COLUMNS.map(|(name, _)| name.to_owned()).into();
     header.extend(t.term_columns().map(|(name, _)| name));
     out.write_record(&header).with_context(wrong)?;
     for i in 0..t.time.len() {

@@ -910,7 +910,8 @@ fn a_table_of_a_log_reads_back_as_the_logs_records_bit_for_bit() {
     assert!(err(&again).contains("command.csv: exists already"), "{}", err(&again));
     assert!(std::fs::read(dir.join("command.csv")).expect("a table") == before);
     let parquet = clutch(&["log", "export", &log, "--out", &path("run.parquet")]);
-    assert!(err(&parquet).contains("ends with .csv; for Parquet, in Python:"), "{}", err(&parquet));
+    let advice = format!("clutch.read_log({log:?}).export({:?}, \"command\")", path("run.parquet"));
+    assert!(err(&parquet).contains(&advice), "{}", err(&parquet));
     let none = clutch(&["log", "export", &path("sample.csv"), "--out", &path("none.csv")]);
     assert_eq!(none.status.code(), Some(1), "{}", out(&none));
     assert!(!dir.join("none.csv").exists() && !dir.join("run.parquet").exists());

@@ -99,6 +99,12 @@ pub enum LogError {
         /// The fault, and the expectation.
         what: String,
     },
+    /// The caller ended the reading.
+    #[error("{}: reading was ended", path.display())]
+    Stopped {
+        /// The file.
+        path: PathBuf,
+    },
     /// A log cannot be recovered into itself.
     #[error("{}: source and destination are the same file: expected two", path.display())]
     SameFile {

@@ -20,7 +20,7 @@ pub use info::{ChannelInfo, Info, info};
 pub use names::{Arrival, CommandSource, EventKind};
 pub use printable::printable;
 pub use proto::{CHANNELS, Channel, Field, Kind, TIME, Value, channel_table};
-pub use read::{Log, read, read_bytes};
+pub use read::{Log, read, read_bytes, read_while};
 pub use record::{
     CommandRecord, EventRecord, InChannel, LinkRecord, MAX_TERMS, Record, SampleRecord, Terms, TruthRecord,
     encode,

@@ -4,7 +4,11 @@ use crate::error::LogError;
 use crate::header::Header;
 use crate::record::{CommandRecord, EventRecord, LinkRecord, Record, SampleRecord, TruthRecord};
 use crate::scan::{Damage, Each, Limits, Scanned, Tail, scan_bytes, scan_file};
+use std::ops::ControlFlow;
 use std::path::Path;
+
+/// Records between two questions whether reading goes on: a millisecond or two.
+const ASK_EVERY: u64 = 4096;
 
 /// A log, each channel in the order of the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +54,20 @@ impl Log {
 /// # Errors
 /// No such file, or no log; more than `limits` allow; a header that cannot be read.
 pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Log, LogError> {
+    read_while(path, limits, || ControlFlow::Continue(()))
+}
+
+/// The same for as long as `go_on`, which is asked every few thousand records, does not break.
+///
+/// # Errors
+/// As for [`read`]; [`LogError::Stopped`] after a break.
+pub fn read_while(
+    path: impl AsRef<Path>,
+    limits: &Limits,
+    go_on: impl FnMut() -> ControlFlow<()>,
+) -> Result<Log, LogError> {
     let path = path.as_ref();
-    collect(path, limits, |each| scan_file(path, limits, false, each))
+    collect(path, limits, go_on, |each| scan_file(path, limits, false, each))
 }
 
 /// Reads a log in memory.
@@ -60,12 +76,13 @@ pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Log, LogError> {
 /// As for [`read`], except those of the system.
 pub fn read_bytes(bytes: &[u8], limits: &Limits) -> Result<Log, LogError> {
     let path = Path::new("<memory>");
-    collect(path, limits, |each| scan_bytes(bytes, path, limits, each))
+    collect(path, limits, || ControlFlow::Continue(()), |each| scan_bytes(bytes, path, limits, each))
 }
 
 fn collect(
     path: &Path,
     limits: &Limits,
+    mut go_on: impl FnMut() -> ControlFlow<()>,
     scan: impl FnOnce(Each<'_>) -> Result<Scanned, LogError>,
 ) -> Result<Log, LogError> {
     let (mut samples, mut commands, mut events, mut links, mut truths) =
@@ -76,6 +93,9 @@ fn collect(
         if records > limits.max_records {
             let (path, limit) = (path.into(), limits.max_records);
             return Err(LogError::Limit { path, what: "records", value: records, limit });
+        }
+        if records % ASK_EVERY == 0 && go_on().is_break() {
+            return Err(LogError::Stopped { path: path.into() });
         }
         match record {
             Record::Sample(r) => samples.push(r),

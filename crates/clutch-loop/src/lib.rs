@@ -20,6 +20,7 @@
 //! | `qemu_board` | such a board, emulated |
 //! | `chip` | a board's own image on a register model of its chip |
 //! | `to_log`, `replay` | what a log gets; a log's counts to the law again |
+//! | `picture` | what of a log a picture shows |
 //!
 //! Ports, real time and emulators are of Linux; what computes its clock runs everywhere.
 
@@ -41,6 +42,7 @@ pub mod lockstep_host;
 #[cfg(target_os = "linux")]
 pub mod lockstep_session;
 pub mod log_thread;
+pub mod picture;
 #[cfg(target_os = "linux")]
 pub mod port;
 #[cfg(target_os = "linux")]

@@ -10,9 +10,13 @@ use clutch_core::{
 };
 use clutch_log::{CommandRecord, EventKind, EventRecord, InChannel, Kind, Log, SampleRecord, Source, Value};
 use clutch_sim::detected::Detector;
+use clutch_sim::progress::{Progress, Report};
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Keep, Scenario};
 use clutch_wire::{BoardState, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE};
+
+/// Ticks between two reports of progress: milliseconds.
+const REPORT_EVERY: usize = 4096;
 
 /// A log could not be replayed.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +43,9 @@ pub enum ReplayError {
         "the log is of a run with an ideal sensor (rig.encoder.quantised = false), and holds whole counts only; it cannot be replayed"
     )]
     Ideal,
+    /// The caller ended the replay.
+    #[error("the replay was ended")]
+    Stopped,
     /// Samples and commands do not belong together.
     #[error(
         "the log has {samples} samples and {commands} commands, where each sample has one: it is damaged"
@@ -77,6 +84,21 @@ pub struct Replay {
     pub behind_gap: usize,
 }
 
+/// Ticks in order; every few thousand the caller is told, and may end the work.
+fn ticks<'a, R>(
+    ticks: &'a [R],
+    report: Report<'a>,
+) -> impl Iterator<Item = Result<&'a R, ReplayError>> + use<'a, R> {
+    let total = ticks.len() as u64;
+    ticks.iter().enumerate().map(move |(i, tick)| {
+        let finished = REPORT_EVERY.min(ticks.len() - i) as u64;
+        if i % REPORT_EVERY == 0 && report(Progress { total, finished }).is_break() {
+            return Err(ReplayError::Stopped);
+        }
+        Ok(tick)
+    })
+}
+
 /// The first field in which two commands differ, in its bits; times may.
 fn difference(
     columns: &[(String, Kind)],
@@ -109,56 +131,64 @@ fn difference(
 /// Replays a log under a scenario: its own, or one with other parameters.
 ///
 /// # Errors
-/// The scenario is not one for a run like the log's.
-pub fn replay(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayError> {
+/// The scenario is not one for a run like the log's; `report` ended it.
+pub fn replay(log: &Log, scenario: &Scenario, report: Report<'_>) -> Result<Replay, ReplayError> {
     if let Some(name) = extra(log, FOREIGN_LAW) {
         return Err(ReplayError::Foreign(name.to_owned()));
     }
     match scenario.scalar() {
-        ScalarKind::F32 => replay_in::<f32>(log, scenario),
-        ScalarKind::F64 => replay_in::<f64>(log, scenario),
+        ScalarKind::F32 => replay_in::<f32>(log, scenario, report),
+        ScalarKind::F64 => replay_in::<f64>(log, scenario, report),
     }
 }
 
 /// Replays a simulation's log with a law that is none of clutch's, in double precision; the scenario's own is not used.
 ///
 /// # Errors
-/// The log is of no simulation; the scenario is not one for a run like it.
-pub fn replay_law<C: ControlLaw<f64>>(log: &Log, scenario: &Scenario, law: C) -> Result<Replay, ReplayError> {
+/// The log is of no simulation; the scenario is not one for a run like it; `report` ended it.
+pub fn replay_law<C: ControlLaw<f64>>(
+    log: &Log,
+    scenario: &Scenario,
+    law: C,
+    report: Report<'_>,
+) -> Result<Replay, ReplayError> {
     if log.header.source != Source::Simulation {
         return Err(ReplayError::NoSimulation);
     }
     let samples = paired(log)?;
     let servo = Servo::with_law(&scenario.spec().servo().map_err(BuildError::from)?, law);
     let servo = servo.map_err(BuildError::from)?;
-    Ok(compared(log, simulated(log, samples, scenario, &servo)?))
+    compared(log, simulated(log, samples, scenario, &servo, report)?, report)
 }
 
 /// The drift of friction over load in a log, by a scenario's model and bounds: its own, or others. Lost samples and gaps of
 /// the log interrupt it.
 ///
 /// # Errors
-/// The scenario is none for a run like the log's; samples and commands do not belong together.
-pub fn drift(log: &Log, scenario: &Scenario) -> Result<DriftReport, ReplayError> {
+/// The scenario is none for a run like the log's; samples and commands do not belong together;
+/// `report` ended it.
+pub fn drift(log: &Log, scenario: &Scenario, report: Report<'_>) -> Result<DriftReport, ReplayError> {
     let samples = paired(log)?;
     let plan = scenario.plan().map_err(BuildError::from)?;
     let mut detector = Detector::new(&scenario.spec(), Keep::Trace).map_err(BuildError::from)?;
     let mut drift = Drift::new(scenario, &plan.bounds)?;
-    drift.watch_log(&mut detector, samples.iter().zip(&log.commands));
+    for (sample, command) in ticks(samples, report).zip(&log.commands) {
+        drift.watch_log(&mut detector, [(sample?, command)]);
+    }
     Ok(*drift.report())
 }
 
-fn replay_in<T: Real>(log: &Log, scenario: &Scenario) -> Result<Replay, ReplayError> {
+fn replay_in<T: Real>(log: &Log, scenario: &Scenario, report: Report<'_>) -> Result<Replay, ReplayError> {
     let samples = paired(log)?;
     let commands = match log.header.source {
         Source::Simulation => {
             let params = scenario.spec().servo().map_err(BuildError::from)?.cast::<T>();
             let servo = Servo::<T>::new(&params).map_err(|e| BuildError::from(e.cast::<f64>()))?;
-            simulated(log, samples, scenario, &servo)?
+            simulated(log, samples, scenario, &servo, report)?
         }
-        Source::Loop | Source::Replay => looped::<T>(log, samples, scenario)?,
+        Source::Loop | Source::Replay => looped::<T>(log, samples, scenario, report)?,
     };
-    Ok(compared(log, commands))
+    compared(log, commands, report)
 }
 
 /// Samples that have a command, up to the first gap.
@@ -176,14 +206,19 @@ fn paired(log: &Log) -> Result<&[SampleRecord], ReplayError> {
     Ok(log.samples.get(..pairs).unwrap_or(&[]))
 }
 
-fn compared(log: &Log, commands: Vec<CommandRecord>) -> Replay {
+fn compared(log: &Log, commands: Vec<CommandRecord>, report: Report<'_>) -> Result<Replay, ReplayError> {
     let columns = CommandRecord::CHANNEL.columns(&log.header.term_names);
-    let mut ticks = log.commands.iter().zip(&commands);
-    let first = ticks.find_map(|(logged, replayed)| difference(&columns, logged, replayed));
+    let mut first = None;
+    for (logged, replayed) in ticks(&log.commands, report).zip(&commands) {
+        first = difference(&columns, logged?, replayed);
+        if first.is_some() {
+            break;
+        }
+    }
     let dropped = log.links.iter().map(|l| l.log_dropped).max().unwrap_or(0);
     // A log that was cut may have one sample more than it has commands, or the other way round.
     let behind_gap = log.samples.len().min(log.commands.len()).saturating_sub(commands.len());
-    Replay { commands, first, dropped, behind_gap }
+    Ok(Replay { commands, first, dropped, behind_gap })
 }
 
 fn extra<'a>(log: &'a Log, key: &str) -> Option<&'a str> {
@@ -212,6 +247,7 @@ fn looped<T: Real>(
     log: &Log,
     samples: &[SampleRecord],
     scenario: &Scenario,
+    report: Report<'_>,
 ) -> Result<Vec<CommandRecord>, ReplayError> {
     let present = extra(log, PRESENT_CODE).and_then(|v| v.parse().ok());
     let present = present.ok_or(ReplayError::Lacks("the code at arming"))?;
@@ -227,7 +263,8 @@ fn looped<T: Real>(
     let ended = EventKind::Ended as u8;
     let mut ends = log.events.iter().filter(|e| e.kind == ended).peekable();
     let mut commands = Vec::with_capacity(samples.len());
-    for sample in samples {
+    for sample in ticks(samples, report) {
+        let sample = sample?;
         let safe = seen(sample).board == BoardMode::Safe;
         // The board's own report comes just before the first sample that shows its safe state;
         // what else ended control came between two wake-ups.
@@ -258,6 +295,7 @@ fn simulated<T: Real, C: ControlLaw<T>>(
     samples: &[SampleRecord],
     scenario: &Scenario,
     servo: &Servo<T, C>,
+    report: Report<'_>,
 ) -> Result<Vec<CommandRecord>, ReplayError> {
     let spec = scenario.spec();
     if !spec.rig.encoder.quantised {
@@ -269,16 +307,16 @@ fn simulated<T: Real, C: ControlLaw<T>>(
     let radians = servo.encoder().radians_per_count::<f64>();
     let Some(first) = samples.first() else { return Ok(Vec::new()) };
     let mut state = servo.start(Counts(first.counts), &path.at(0), T::from_f64(volts));
-    Ok(samples
-        .iter()
+    ticks(samples, report)
         .map(|sample| {
+            let sample = sample?;
             let target = path.at(sample.tick);
             let map = |position| spec.friction_map.map_or_else(Place::default, |map| map.at(position));
             let output = servo.tick_on(&mut state, Counts(sample.counts), &target, map);
             let cycle = simulated_cycle(sample.tick, target, output);
-            to_log::command(sample.time_ns, &cycle, servo.dac(), radians)
+            Ok(to_log::command(sample.time_ns, &cycle, servo.dac(), radians))
         })
-        .collect())
+        .collect()
 }
 
 /// A tick of a simulation, in the form of a loop's.

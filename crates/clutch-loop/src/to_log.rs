@@ -11,6 +11,7 @@ use clutch_log::{
 };
 use clutch_node::{CycleNotice, Ending, LinkCounts};
 use clutch_sim::engine::Motion;
+use clutch_sim::progress::{Progress, Report};
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{MovingRig, Scenario};
 use std::path::Path;
@@ -163,22 +164,28 @@ fn of_simulation<T: Real>(
     })
 }
 
+/// Samples of a simulation between two reports of progress: milliseconds.
+const REPORT_EVERY: usize = 4096;
+
 /// Writes a simulation as a log, with the channels that a loop writes and the shaft's true motion;
 /// `version` is the build's, `foreign_law` the name of the law that ran if it is none of clutch's.
 ///
 /// # Errors
-/// The file cannot be written.
+/// The file cannot be written; `report` ended the writing, and the file is gone.
 pub fn save_simulation(
     path: &Path,
     scenario: &Scenario,
     run: &clutch_sim::Run,
     version: &str,
     foreign_law: Option<&str>,
+    report: Report<'_>,
 ) -> Result<(), SaveError> {
     match (scenario.scalar(), foreign_law) {
-        (ScalarKind::F32, None) => save_in::<f32>(path, scenario, run, version, foreign_law),
+        (ScalarKind::F32, None) => save_in::<f32>(path, scenario, run, version, foreign_law, report),
         // A foreign law has double precision.
-        (ScalarKind::F64, _) | (_, Some(_)) => save_in::<f64>(path, scenario, run, version, foreign_law),
+        (ScalarKind::F64, _) | (_, Some(_)) => {
+            save_in::<f64>(path, scenario, run, version, foreign_law, report)
+        }
     }
 }
 
@@ -191,6 +198,9 @@ pub enum SaveError {
     /// The scenario.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// The caller ended the writing.
+    #[error("the writing was ended")]
+    Stopped,
 }
 
 fn save_in<T: Real>(
@@ -199,6 +209,7 @@ fn save_in<T: Real>(
     run: &clutch_sim::Run,
     version: &str,
     foreign_law: Option<&str>,
+    report: Report<'_>,
 ) -> Result<(), SaveError> {
     let spec = scenario.spec();
     let params = spec.servo().map_err(BuildError::from)?;
@@ -212,7 +223,18 @@ fn save_in<T: Real>(
         (header.law_hash, header.scalar) = (0, "f64".to_owned());
     }
     let mut log = LogWriter::create(path, &header)?;
-    for tick in of_simulation(run, servo.dac(), spec.period) {
+    let total = run.trace.time.len();
+    for (i, tick) in of_simulation(run, servo.dac(), spec.period).enumerate() {
+        let finished = REPORT_EVERY.min(total - i) as u64;
+        if i % REPORT_EVERY == 0 && report(Progress { total: total as u64, finished }).is_break() {
+            drop(log);
+            // It would read as a log that was cut; nobody wants it.
+            let removed = std::fs::remove_file(path);
+            removed.map_err(|source| {
+                SaveError::Log(LogError::Io { path: path.into(), action: "cannot be removed", source })
+            })?;
+            return Err(SaveError::Stopped);
+        }
         for record in &tick {
             log.write(record)?;
         }

@@ -12,6 +12,7 @@ use clutch_loop::replay;
 use clutch_loop::session::{Board, Event, Release, Session, SessionError, SessionOptions};
 use clutch_loop::summary::{Summary, Verdict};
 use clutch_sim::Scenario;
+use clutch_sim::progress::UNWATCHED;
 use clutch_sim::scenario::ScalarKind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -210,6 +211,6 @@ fn a_drift_is_told_at_once_logged_replayed_and_ends_the_run_where_that_was_asked
     let event = written.events.iter().find(|e| e.kind == EventKind::Drift as u8).unwrap();
     assert_eq!((event.tick, event.value), (first.tick, first.seen.friction));
     // A log has every sample that the loop had.
-    assert_eq!(replay::drift(&written, session.scenario()).unwrap(), report.drift);
+    assert_eq!(replay::drift(&written, session.scenario(), UNWATCHED).unwrap(), report.drift);
     std::fs::remove_file(&log).unwrap();
 }

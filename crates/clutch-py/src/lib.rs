@@ -11,6 +11,7 @@ mod run;
 mod scenario;
 #[cfg_attr(not(target_os = "linux"), path = "session_elsewhere.rs")]
 mod session;
+mod shafts;
 mod stepping;
 mod sweep;
 mod table;
@@ -43,6 +44,8 @@ mod _clutch {
     use super::scenario::{Scenario, brake_gain, check, friction_lab, rig, scenarios, steady_friction};
     #[pymodule_export]
     use super::session::run_loop;
+    #[pymodule_export]
+    use super::shafts::Shafts;
     #[pymodule_export]
     use super::stepping::{_plant, Plant, Servo, StickSlip, Tick};
     #[pymodule_export]

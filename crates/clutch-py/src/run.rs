@@ -31,6 +31,11 @@ pub(crate) struct Run {
 
 /// Ends the work when a signal waits, as Ctrl-C.
 pub(crate) fn unless_interrupted(_: Progress) -> ControlFlow<()> {
+    go_on()
+}
+
+/// The same for work that reports no progress.
+pub(crate) fn go_on() -> ControlFlow<()> {
     match Python::attach(|py| py.check_signals()) {
         Ok(()) => ControlFlow::Continue(()),
         Err(e) => {
@@ -119,6 +124,17 @@ pub(crate) fn envelope(
     Ok(Table::of(columns.map(|(name, values)| (name, Column::own(values)))))
 }
 
+/// Times at rest as a table.
+pub(crate) fn stick_table(sticks: &[Stick]) -> Table {
+    let column = |of: fn(&Stick) -> f64| Column::own(sticks.iter().map(of).collect::<Vec<f64>>());
+    Table::of([("from_s", column(|s| s.from)), ("to_s", column(|s| s.to))])
+}
+
+/// A window's begin and end, s; what is in its middle, in words; true if that is a stick.
+pub(crate) fn window_parts(window: &Window) -> (f64, f64, String, bool) {
+    (window.from, window.to, window.words(), matches!(window.around, Around::Stick(_)))
+}
+
 /// Samples as columns, the memory shared with the run.
 pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)> {
     let limit = Column::own(run.trace.limit.iter().map(|l| *l as u16).collect::<Vec<u16>>());
@@ -142,7 +158,7 @@ pub(crate) fn sample_columns(run: &Arc<clutch_sim::Run>) -> Vec<(String, Column)
     for (i, (name, _)) in run.trace.term_columns().enumerate() {
         columns.push((name, Column::part(run, |r| r.trace.terms[i].1.as_slice())));
     }
-    debug_assert!(columns.iter().zip(clutch_sim::SAMPLE_COLUMNS).all(|((ours, _), name)| ours == name));
+    debug_assert!(columns.iter().zip(clutch_sim::SAMPLE_COLUMNS).all(|((ours, _), (name, _))| ours == name));
     columns
 }
 
@@ -151,7 +167,7 @@ impl Run {
     /// A row for each sample.
     #[getter]
     fn samples(&self) -> Table {
-        Table::of(sample_columns(&self.run))
+        Table::of(sample_columns(&self.run)).meaning(clutch_sim::SAMPLE_COLUMNS)
     }
 
     /// Sticks and break-aways.
@@ -163,17 +179,14 @@ impl Run {
     /// Times at rest: from a stick to its break-away, or to the end of the run.
     #[getter]
     fn sticks(&self) -> Table {
-        let sticks = sticks(&self.run.events, self.scenario.0.spec().run.duration);
-        let column = |of: fn(&Stick) -> f64| Column::own(sticks.iter().map(of).collect::<Vec<f64>>());
-        Table::of([("from_s", column(|s| s.from)), ("to_s", column(|s| s.to))])
+        stick_table(&sticks(&self.run.events, self.scenario.0.spec().run.duration))
     }
 
     /// The stretch that a picture shows closely: its begin and end, s; what is in its middle, in words; true if that is a
     /// stick.
     #[getter]
     fn window(&self) -> Option<(f64, f64, String, bool)> {
-        let window = Window::of(&self.scenario.0, &self.run)?;
-        Some((window.from, window.to, window.words(), matches!(window.around, Around::Stick(_))))
+        Window::of(&self.scenario.0, &self.run).as_ref().map(window_parts)
     }
 
     /// Figures by name.
@@ -203,10 +216,15 @@ impl Run {
             return Err(PyFileExistsError::new_err(text));
         }
         let (scenario, run, law) = (&self.scenario.0, &self.run, self.python_law.as_deref());
-        let written = py.detach(|| save_simulation(&path, scenario, run, clutch_cli::BUILD, law));
+        let build = clutch_cli::BUILD;
+        let written = py.detach(|| save_simulation(&path, scenario, run, build, law, &unless_interrupted));
+        // The signal's exception is set already.
+        if let Some(e) = PyErr::take(py) {
+            return Err(e);
+        }
         written.map_err(|e| match e {
             SaveError::Log(e) => crate::convert::log_error(py, &e),
-            SaveError::Build(e) => {
+            SaveError::Build(_) | SaveError::Stopped => {
                 let source = std::io::Error::other(e.to_string());
                 os_error(py, &path, &e.to_string(), &source)
             }

@@ -83,8 +83,13 @@ impl Scenario {
     }
 
     /// The path, sampled.
-    fn path(&self, py: Python<'_>) -> PyResult<Path> {
+    pub(crate) fn path(&self, py: Python<'_>) -> PyResult<Path> {
         Path::new(py, &self.0, |e| self.error(py, &self.0.run_error(&e.into())))
+    }
+
+    /// The meaning of a dotted key, in a few words; none of one that is no parameter.
+    fn meaning(&self, key: &str) -> Option<String> {
+        Some(self.0.meaning(key)?.trim_end_matches('.').to_owned())
     }
 
     /// The number of ticks in a run.

@@ -12,7 +12,7 @@ use clutch_core::{
     StickSlipParams, StickSlipState, law, off_map,
 };
 use clutch_sim::MovingRig;
-use clutch_sim::engine::{Event, EventKind, Motion};
+use clutch_sim::engine::{EngineError, Event, EventKind, Motion};
 use clutch_sim::friction_map::MapGrid;
 use clutch_sim::scenario::ScalarKind;
 use pyo3::exceptions::{PyAttributeError, PyOverflowError, PyRuntimeError, PyTypeError, PyValueError};
@@ -149,7 +149,7 @@ fn checked_counts(counts: f64, whole: bool) -> PyResult<f64> {
 #[pymethods]
 impl Servo {
     #[new]
-    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Servo> {
+    pub(crate) fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Servo> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         Ok(Servo {
@@ -190,11 +190,7 @@ impl Servo {
     /// float
     ///     The voltage to command, V, as the converter gives it.
     fn step(&mut self, counts: f64, target: &Target) -> PyResult<f64> {
-        let whole = self.whole;
-        let counts = checked_counts(counts, whole)?;
-        let map = self.map.as_ref().and_then(|grid| grid.map());
-        let (code, volts) = either!(&mut self.running, r => r.step(counts, whole, target, map));
-        Ok(if self.rounds { self.dac.volts(clutch_core::DacCode(code)) } else { volts })
+        Ok(self.answer(checked_counts(counts, self.whole)?, target))
     }
 
     /// Code for the converter at the last step.
@@ -255,6 +251,22 @@ impl Servo {
 
     fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Servo {
         self.copy()
+    }
+}
+
+impl Servo {
+    /// One sampling period: counts that are known to be good and the target in, the voltage as the converter gives it
+    /// out, V.
+    pub(crate) fn answer(&mut self, counts: f64, target: &Target) -> f64 {
+        let whole = self.whole;
+        let map = self.map.as_ref().and_then(|grid| grid.map());
+        let (code, volts) = either!(&mut self.running, r => r.step(counts, whole, target, map));
+        if self.rounds { self.dac.volts(clutch_core::DacCode(code)) } else { volts }
+    }
+
+    /// Position error, rad, and its rate, rad/s, as the law saw them at the last step.
+    pub(crate) fn seen(&self) -> [f64; 2] {
+        [self.error(), self.error_rate()]
     }
 }
 
@@ -413,7 +425,7 @@ pub(crate) struct Plant {
 #[pymethods]
 impl Plant {
     #[new]
-    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Plant> {
+    pub(crate) fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Plant> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         let begun = match scenario.0.scalar() {
@@ -450,23 +462,7 @@ impl Plant {
                 "the plant broke in an earlier step; place it, or make a new one",
             ));
         }
-        let (period, moving) = (self.period, &mut self.moving);
-        let dac = moving.rig().dac;
-        let volts = if self.rounds { dac.volts(dac.code(voltage)) } else { voltage };
-        moving.command(volts);
-        let seen = match moving.advance(period) {
-            Ok(seen) => seen,
-            Err(e) => {
-                self.broken = true;
-                return Err(PyRuntimeError::new_err(e.to_string()));
-            }
-        };
-        self.sticks += seen.iter().filter(|e| e.kind == EventKind::Stick).count();
-        self.events.extend_from_slice(seen);
-        self.voltage = volts;
-        self.tick += 1;
-        moving.set_time(self.tick as f64 * period);
-        moving.begin_period();
+        self.advance(voltage).map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
         self.counts(py)
     }
 
@@ -597,6 +593,49 @@ impl Plant {
         words.extend(plant.moving.state());
         let rebuild = slf.py().import("clutch._clutch")?.getattr("_plant")?;
         Ok((rebuild, (plant.scenario.0.canonical(), words)))
+    }
+}
+
+impl Plant {
+    /// One sampling period with a finite voltage commanded.
+    pub(crate) fn advance(&mut self, voltage: f64) -> Result<(), EngineError> {
+        let (period, moving) = (self.period, &mut self.moving);
+        let dac = moving.rig().dac;
+        let volts = if self.rounds { dac.volts(dac.code(voltage)) } else { voltage };
+        moving.command(volts);
+        let seen = match moving.advance(period) {
+            Ok(seen) => seen,
+            Err(e) => {
+                self.broken = true;
+                return Err(e);
+            }
+        };
+        self.sticks += seen.iter().filter(|e| e.kind == EventKind::Stick).count();
+        self.events.extend_from_slice(seen);
+        self.voltage = volts;
+        self.tick += 1;
+        moving.set_time(self.tick as f64 * period);
+        moving.begin_period();
+        Ok(())
+    }
+
+    /// Counts of the encoder; a fraction if the sensor is ideal.
+    pub(crate) fn seen(&self) -> f64 {
+        if self.whole { f64::from(self.moving.counts().0) } else { self.fine_counts() }
+    }
+
+    /// Time, s; position, rad; velocity, rad/s; counts; 1 at rest; sticks so far; voltage as the converter gives it, V.
+    pub(crate) fn told(&self) -> [f64; 7] {
+        let at_rest = f64::from(u8::from(self.stuck()));
+        [
+            self.time(),
+            self.position(),
+            self.velocity(),
+            self.seen(),
+            at_rest,
+            self.sticks as f64,
+            self.voltage,
+        ]
     }
 }
 

@@ -245,11 +245,13 @@ struct Kept(#[allow(dead_code)] Owner);
 /// ----------
 /// columns : dict
 ///     Name to one-dimensional array of numbers, bools or texts, all of one length.
+/// meanings : dict, optional
+///     Name of a column to its meaning in a few words, which xarray and Arrow get as `long_name`.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Columns of unequal length, of more than one dimension, or of another type.
+///     Columns of unequal length, of more than one dimension, or of another type; the meaning of none.
 ///
 /// Examples
 /// --------
@@ -265,6 +267,8 @@ struct Kept(#[allow(dead_code)] Owner);
 pub(crate) struct Table {
     names: Vec<String>,
     columns: Vec<Column>,
+    /// Of each column, in a few words; empty where nothing is known.
+    meanings: Vec<String>,
     rows: usize,
 }
 
@@ -280,7 +284,17 @@ impl Table {
         let (names, columns): (Vec<_>, Vec<_>) = columns.into_iter().map(|(n, c)| (n.into(), c)).unzip();
         let rows = columns.first().map_or(0, Column::len);
         debug_assert!(columns.iter().all(|c| c.len() == rows));
-        Table { names, columns, rows }
+        Table { meanings: vec![String::new(); names.len()], names, columns, rows }
+    }
+
+    /// The same with the meanings of those columns that have these names.
+    pub(crate) fn meaning<'a>(mut self, meanings: impl IntoIterator<Item = (&'a str, &'a str)>) -> Table {
+        for (name, meaning) in meanings {
+            if let Some(i) = self.names.iter().position(|n| n == name) {
+                self.meanings[i] = meaning.to_owned();
+            }
+        }
+        self
     }
 
     /// The number of rows.
@@ -318,7 +332,8 @@ fn made_elsewhere<'py>(
 #[pymethods]
 impl Table {
     #[new]
-    fn new(columns: &Bound<'_, PyMapping>) -> PyResult<Table> {
+    #[pyo3(signature = (columns, meanings=None))]
+    fn new(columns: &Bound<'_, PyMapping>, meanings: Option<HashMap<String, String>>) -> PyResult<Table> {
         let mut read = Vec::new();
         for item in columns.items()? {
             let (name, values): (String, Bound<'_, PyAny>) = item.extract()?;
@@ -336,7 +351,30 @@ impl Table {
                 first.0
             )));
         }
-        Ok(Table::of(read))
+        let meanings = meanings.unwrap_or_default();
+        let table = Table::of(read);
+        if let Some(name) = meanings.keys().find(|name| !table.names.contains(name)) {
+            let columns = table.names.join(", ");
+            return Err(PyValueError::new_err(format!(
+                "meanings: {name}: expected one of the columns {columns}"
+            )));
+        }
+        Ok(table.meaning(meanings.iter().map(|(name, meaning)| (name.as_str(), meaning.as_str()))))
+    }
+
+    /// Unit and meaning of a column, as xarray's attributes and Arrow's metadata have them: `units`, `long_name`; those
+    /// that are known.
+    fn attributes<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
+        let Some(i) = self.names.iter().position(|n| n == name) else {
+            let text = format!("{name}: expected one of the columns {}", self.names.join(", "));
+            return Err(PyKeyError::new_err(text));
+        };
+        let known = py.import("clutch._units")?.call_method1("attributes", (name,))?;
+        let known = known.cast_into::<PyDict>()?;
+        if !self.meanings[i].is_empty() {
+            known.set_item("long_name", &self.meanings[i])?;
+        }
+        Ok(known)
     }
 
     /// Names of the columns, in order.
@@ -407,8 +445,7 @@ impl Table {
     ) -> PyResult<Bound<'py, PyCapsule>> {
         let _ = requested_schema; // a hint, which a producer may ignore
         let wrong = |e: ArrowError| PyValueError::new_err(e.to_string());
-        let units = py.import("clutch._units")?;
-        let of = |name| units.call_method1("attributes", (name,))?.extract();
+        let of = |name: &String| self.attributes(py, name)?.extract();
         let attributes = self.names.iter().map(of).collect::<PyResult<_>>()?;
         let batch = self.batch(attributes).map_err(wrong)?;
         let schema = batch.schema();
@@ -417,7 +454,10 @@ impl Table {
         PyCapsule::new_with_value(py, stream, c"arrow_array_stream")
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>,))> {
+    #[allow(clippy::type_complexity, reason = "pickle's form")]
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>, HashMap<String, String>))> {
         let dict = Table::to_dict(slf)?;
         for (name, column) in slf.get().names.iter().zip(&slf.get().columns) {
             if let Column::Text(texts) = column {
@@ -427,7 +467,10 @@ impl Table {
                 dict.set_item(name, array)?;
             }
         }
-        Ok((slf.get_type().into_any(), (dict,)))
+        let table = slf.get();
+        let meanings = table.names.iter().cloned().zip(table.meanings.iter().cloned());
+        let meanings = meanings.filter(|(_, meaning)| !meaning.is_empty()).collect();
+        Ok((slf.get_type().into_any(), (dict, meanings)))
     }
 
     fn __repr__(&self) -> String {

@@ -1,13 +1,13 @@
 //! Identification and tuning: `clutch.identify`, `clutch.tune`.
 
 use crate::convert::{from_json, log_error, loop_error, os_error, scenario_error};
+use crate::log::read_unless_interrupted;
 use crate::run::unless_interrupted;
 use crate::stepping::native;
 use clutch_identify::experiment::{ExperimentError, Programme, VirtualBoard, experiment};
 use clutch_identify::recording::ReadError;
 use clutch_identify::rig_file::rig_file;
 use clutch_identify::{Recording, RigFile, believed};
-use clutch_log::Limits;
 use clutch_tune::Options;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -52,7 +52,7 @@ pub(crate) fn identify<'py>(
             let read = Recording::from_csv(&name, &text, (&columns.0, &columns.1), scale);
             recordings.push(read.map_err(|e| read_error(py, &e))?);
         } else {
-            let whole = clutch_log::read(path, &Limits::default()).map_err(|e| log_error(py, &e))?;
+            let whole = read_unless_interrupted(py, path)?;
             recordings.extend(Recording::from_log(&name, &whole).map_err(|e| read_error(py, &e))?);
         }
     }

@@ -4,7 +4,7 @@
 //! short enough to tell one stair from the next; an [`Envelope`] shows how far the whole goes, and its mean.
 
 use crate::engine::{Event, EventKind};
-use crate::run::{Run, Trace};
+use crate::run::Run;
 use crate::scenario::Scenario;
 use std::ops::Range;
 
@@ -52,6 +52,25 @@ pub enum Around {
     LargestError(f64),
 }
 
+/// The curves by which a window is chosen, at samples in order; those that are not of one length end with the shortest.
+#[derive(Clone, Copy, Debug)]
+pub struct Curves<'a> {
+    /// Time of each sample, s.
+    pub time: &'a [f64],
+    /// Target position, rad.
+    pub target: &'a [f64],
+    /// Target velocity, rad/s.
+    pub target_velocity: &'a [f64],
+    /// Error, rad.
+    pub error: &'a [f64],
+    /// Angle of a count of the encoder, rad.
+    pub count: f64,
+    /// Time from which on a stick counts, s.
+    pub settled: f64,
+    /// End of the run, s.
+    pub end: f64,
+}
+
 /// A stretch of a run that shows single stairs of the encoder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
@@ -64,39 +83,52 @@ pub struct Window {
 }
 
 impl Window {
-    /// The window of a run whose samples were kept: around the stick of middle length of those after settling during which
-    /// the path goes on; where there is none, around the largest error. None for a run without samples.
+    /// The window of a run whose samples were kept. None for a run without samples.
     #[must_use]
     pub fn of(scenario: &Scenario, run: &Run) -> Option<Window> {
-        let spec = scenario.spec();
-        let count = std::f64::consts::TAU / f64::from(spec.rig.encoder.sensor.counts_per_rev);
-        let (trace, settle, duration) = (&run.trace, spec.run.settle, spec.run.duration);
-        let index = |time: f64| trace.time.partition_point(|t| *t < time).min(trace.time.len() - 1);
-        if trace.time.is_empty() {
-            return None;
-        }
+        let (spec, trace) = (scenario.spec(), &run.trace);
+        let curves = Curves {
+            time: &trace.time,
+            target: &trace.target_position,
+            target_velocity: &trace.target_velocity,
+            error: &trace.error,
+            count: std::f64::consts::TAU / f64::from(spec.rig.encoder.sensor.counts_per_rev),
+            settled: spec.run.settle,
+            end: spec.run.duration,
+        };
+        Window::chosen(&curves, sticks(&run.events, spec.run.duration))
+    }
+
+    /// The window around the stick of middle length of those after settling during which the path goes on; where there is
+    /// none, around the largest error. None without samples.
+    #[must_use]
+    pub fn chosen(curves: &Curves<'_>, sticks: Vec<Stick>) -> Option<Window> {
+        let Curves { time, target, target_velocity, error, count, settled, end } = *curves;
+        let n = [time, target, target_velocity, error].map(<[f64]>::len).into_iter().min().unwrap_or(0);
+        let index = |at: f64| time[..n].partition_point(|t| *t < at).min(n - 1);
+        let begin = *time[..n].first()?;
         // Where the path rests, a shaft at rest is where it should be.
         let goes_on = |s: &Stick| {
-            let (target, end) = (&trace.target_position, index(s.to));
+            let end = index(s.to);
             let way = target[end] - target[index(s.from)];
-            way.abs() >= 0.5 * count && trace.target_velocity[end] != 0.0
+            way.abs() >= 0.5 * count && target_velocity[end] != 0.0
         };
-        let mut those = sticks(&run.events, duration);
-        those.retain(|s| s.from >= settle && goes_on(s));
+        let mut those = sticks;
+        those.retain(|s| s.from >= settled && goes_on(s));
         those.sort_by(|a, b| (a.to - a.from).total_cmp(&(b.to - b.from)));
         let (around, middle, least) = match those.get(those.len() / 2) {
             Some(s) => (Around::Stick(*s), 0.5 * (s.from + s.to), STICKS * (s.to - s.from)),
             None => {
-                let at = (index(settle)..trace.time.len())
-                    .max_by(|a, b| trace.error[*a].abs().total_cmp(&trace.error[*b].abs()))
-                    .map_or(0.0, |i| trace.time[i]);
+                let at = (index(settled)..n)
+                    .max_by(|a, b| error[*a].abs().total_cmp(&error[*b].abs()))
+                    .map_or(begin, |i| time[i]);
                 (Around::LargestError(at), at, 0.0)
             }
         };
-        let (first, last) = stretch(trace, index(middle), STAIRS * count);
-        let length = (trace.time[last] - trace.time[first]).max(least).min(duration);
+        let (first, last) = stretch(&target[..n], index(middle), STAIRS * count);
+        let length = (time[last] - time[first]).max(least).min(end - begin);
         // Within the run, also where its middle is near an end.
-        let from = (middle - 0.5 * length).clamp(0.0, duration - length);
+        let from = (middle - 0.5 * length).min(end - length).max(begin);
         Some(Window { from, to: from + length, around })
     }
 
@@ -148,9 +180,8 @@ impl Window {
 }
 
 /// The shortest stretch around a sample in which the path goes so far (rad), both ways counted: its first and last sample.
-fn stretch(trace: &Trace, middle: usize, way: f64) -> (usize, usize) {
+fn stretch(target: &[f64], middle: usize, way: f64) -> (usize, usize) {
     let (mut first, mut last, mut gone) = (middle, middle, 0.0);
-    let target = &trace.target_position;
     while (gone < way || last - first < SAMPLES) && (first > 0 || last + 1 < target.len()) {
         if first > 0 {
             first -= 1;
@@ -205,7 +236,7 @@ impl Envelope {
 mod tests {
     use super::*;
     use crate::progress::UNWATCHED;
-    use crate::run::Keep;
+    use crate::run::{Keep, Trace};
 
     fn run_of(name: &str, set: &[(&str, &str)]) -> (Scenario, Run) {
         let set: Vec<(String, String)> = set.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();

@@ -315,30 +315,33 @@ pub struct Trace {
     pub terms: Vec<(&'static str, Vec<f64>)>,
 }
 
-/// Columns of a table of samples, beside those of the law's terms.
-pub const SAMPLE_COLUMNS: [&str; 15] = [
-    "time_s",
-    "target_position_rad",
-    "target_velocity_rad_s",
-    "target_acceleration_rad_s2",
-    "position_rad",
-    "velocity_rad_s",
-    "error_rad",
-    "counts",
-    "measured_error_rad",
-    "error_rate_rad_s",
-    "code",
-    "voltage_v",
-    "demand_v",
-    "limit",
-    "stuck",
+/// Columns of a table of samples, beside those of the law's terms, with their meanings.
+pub const SAMPLE_COLUMNS: [(&str, &str); 15] = [
+    ("time_s", "time of the sample"),
+    ("target_position_rad", "target position, from the encoder's zero"),
+    ("target_velocity_rad_s", "target velocity"),
+    ("target_acceleration_rad_s2", "target acceleration"),
+    ("position_rad", "true position"),
+    ("velocity_rad_s", "true velocity; exactly 0 when stuck"),
+    ("error_rad", "true error, target less position"),
+    ("counts", "the encoder's counts"),
+    ("measured_error_rad", "error as the law saw it"),
+    ("error_rate_rad_s", "its rate as the law saw it"),
+    ("code", "code given to the converter"),
+    ("voltage_v", "voltage commanded at this sample, before delay and lag"),
+    ("demand_v", "the law's answer, before the converter"),
+    (
+        "limit",
+        "limit of the output that decided it: 0 none, 1 the lowest, 2 the highest, 3 the demand was no number",
+    ),
+    ("stuck", "the shaft is stuck at the sample"),
 ];
 
 impl Trace {
     /// The law's terms as columns of a table of samples; a name that a sample has already gets `law_` before it.
     pub fn term_columns(&self) -> impl Iterator<Item = (String, &[f64])> {
         self.terms.iter().map(|(name, values)| {
-            let taken = SAMPLE_COLUMNS.contains(name);
+            let taken = SAMPLE_COLUMNS.iter().any(|(column, _)| column == name);
             (if taken { format!("law_{name}") } else { (*name).to_owned() }, values.as_slice())
         })
     }

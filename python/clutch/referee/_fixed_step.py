@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from clutch._extras import install
 from clutch.referee._case import Case, Mechanism
 
 __all__ = ["Level", "OneLevel", "frame", "missing", "refuses_length", "substeps", "version"]
@@ -37,7 +38,7 @@ class OneLevel:
 def missing(*packages: str) -> str | None:
     """The first package that is not installed."""
     absent = [name for name in packages if importlib.util.find_spec(name) is None]
-    return f"{absent[0]} is not installed" if absent else None
+    return f"{absent[0]} is not installed: {install(absent[0])}" if absent else None
 
 
 def version(package: str) -> str:

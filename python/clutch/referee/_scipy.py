@@ -6,7 +6,6 @@ Rows without bristles: DOP853 between events, which `solve_ivp` finds; at an eve
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from collections.abc import Callable
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clutch.referee._case import Case, Mechanism, Row, Trajectory
+from clutch.referee._fixed_step import missing
 
 __all__ = ["SciPy", "level", "sampled"]
 
@@ -52,7 +52,7 @@ class SciPy:
 
     def missing(self) -> str | None:
         """The package that is not here."""
-        return None if importlib.util.find_spec("scipy") else "scipy is not installed"
+        return missing("scipy")
 
     def refuses(self, case: Case) -> str | None:
         """Why it does not take a case."""

@@ -6,7 +6,6 @@ costs, and are no models of this package. All have the case's coefficients of re
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from abc import ABC, abstractmethod
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clutch.referee._case import Case, Row, Trajectory
+from clutch.referee._fixed_step import missing
 from clutch.referee._scipy import level, sampled
 
 __all__ = ["Armstrong", "Karnopp", "Makkar", "Tanh"]
@@ -50,7 +50,7 @@ class _Smooth(ABC):
 
     def missing(self) -> str | None:
         """The package that is not here."""
-        return None if importlib.util.find_spec("scipy") else "scipy is not installed"
+        return missing("scipy")
 
     def refuses(self, case: Case) -> str | None:
         """Why it does not take a case."""

@@ -226,6 +226,12 @@ impl Scenario {
         self.with(set).unwrap_or_else(anew)
     }
 
+    /// The meaning of a parameter; none of a key that is no parameter of the scenario.
+    #[must_use]
+    pub fn meaning(&self, key: &str) -> Option<String> {
+        self.row(key).map(describe::meaning)
+    }
+
     /// The declaration of a parameter.
     pub(crate) fn row(&self, key: &str) -> Option<&'static Row> {
         row_at(&self.params, key)
