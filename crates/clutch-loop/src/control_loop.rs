@@ -140,6 +140,8 @@ pub struct ConfiguredRun<'a, S> {
     pub port: &'a mut Port,
     /// The ring into which records go, if they go anywhere.
     pub ring: Option<Ring>,
+    /// The ring of one that looks on.
+    pub shown: Option<Ring>,
     /// The values that a watcher sees.
     pub watch: &'a Watch,
     /// Ticks of the run; a board that is the controller has been told, and ends it by itself.
@@ -203,6 +205,7 @@ struct Control<'a, S: Station> {
     station: &'a mut S,
     port: &'a mut Port,
     ring: Option<Ring>,
+    shown: Option<Ring>,
     watch: &'a Watch,
     out: Outbox,
     ticks: u64,
@@ -257,6 +260,7 @@ impl<'a, S: Station> Control<'a, S> {
         let seconds: f64 = period.seconds();
         Control {
             ring: configured.ring,
+            shown: configured.shown,
             watch: configured.watch,
             out: Outbox::default(),
             ticks: configured.ticks,
@@ -297,6 +301,12 @@ impl<'a, S: Station> Control<'a, S> {
     }
 
     fn push(&mut self, records: &[Record]) {
+        if let Some(shown) = &mut self.shown {
+            // One that does not fit is not seen.
+            for record in records {
+                let _ = shown.push(*record);
+            }
+        }
         let Some(ring) = &mut self.ring else { return };
         // A sample and its command together or not at all; after a gap its event comes first.
         let gap = self.dropped - self.dropped_told;

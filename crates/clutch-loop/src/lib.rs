@@ -12,6 +12,7 @@
 //! | `clearance`, `words` | whether a scenario may run on a board; refusals and causes in words |
 //! | `drift` | friction over load against the bounds, from counts and voltages |
 //! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
+//! | `onlooker` | one that looks on while a run goes |
 //! | `virtual_time` | the same run with a computed clock |
 //! | `sim_board`, `sim_board_server` | a board on a rig, both simulated; the same in real time behind a port |
 //! | `faults`, `faulty_line`, `campaign` | what breaks, a line on which it breaks, and the campaign over all of it |
@@ -41,6 +42,7 @@ pub mod lockstep_host;
 #[cfg(target_os = "linux")]
 pub mod lockstep_session;
 pub mod log_thread;
+pub mod onlooker;
 #[cfg(target_os = "linux")]
 pub mod port;
 #[cfg(target_os = "linux")]

@@ -1,0 +1,312 @@
+//! From the records of a run to the frames that a page draws.
+
+use crate::kept::Kept;
+use clutch_core::supervisor::Cause;
+use clutch_core::{Counts, Encoder};
+use clutch_log::{
+    CommandRecord, CommandSource, EventKind, EventRecord, Header, LinkRecord, Record, SampleRecord, Source,
+    names,
+};
+use clutch_loop::words::cause_text;
+use clutch_sim::detected::Detector;
+use clutch_sim::{Keep, Scenario, number};
+use rtrb::Consumer;
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Time between two frames.
+const FRAME: Duration = Duration::from_millis(33);
+/// Time of a point of the curves, s: more samples than one within it become a span.
+const POINT: f64 = 1e-3;
+/// Time over which cycles are counted, s.
+const LATELY: f64 = 2.0;
+/// Upper ends of the histogram's classes, µs; the last class has none.
+const CLASSES: [u32; 13] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000];
+
+/// Starts the thread that makes frames of what comes through a ring, until that is abandoned; none if the system gives no
+/// thread.
+pub(crate) fn start(
+    header: &Header,
+    scenario: &Scenario,
+    mut records: Consumer<Record>,
+    kept: Arc<Kept>,
+) -> Option<JoinHandle<()>> {
+    let mut feed = Feed::new(scenario)?;
+    kept.begin(json(&Opening::new(header, scenario)));
+    let make = move || {
+        loop {
+            // Asked before the ring is emptied: what was pushed before the end is seen.
+            let last = records.is_abandoned();
+            while let Ok(record) = records.pop() {
+                feed.take(&record).into_iter().for_each(|note| kept.event(json(&note)));
+            }
+            if let Some(frame) = feed.frame() {
+                kept.frame(json(&frame));
+            }
+            if last {
+                return;
+            }
+            std::thread::sleep(FRAME);
+        }
+    };
+    std::thread::Builder::new().name("clutch-feed".into()).spawn(make).ok()
+}
+
+fn json(value: &impl Serialize) -> String {
+    // Numbers, texts and lists of them: there is nothing that JSON cannot say.
+    serde_json::to_string(value).unwrap_or_default()
+}
+
+/// The beginning of a run, as a page hears of it.
+#[derive(Serialize)]
+struct Opening<'a> {
+    scenario: &'a str,
+    law: &'a str,
+    version: &'a str,
+    place: &'a str,
+    simulated: bool,
+    duration_s: f64,
+    period_us: u32,
+    settle_s: f64,
+    count_deg: f64,
+    volts: [f64; 2],
+    classes_us: &'static [u32],
+}
+
+impl<'a> Opening<'a> {
+    fn new(header: &'a Header, scenario: &'a Scenario) -> Self {
+        let spec = scenario.spec();
+        let output = spec.output;
+        Opening {
+            scenario: &header.scenario_name,
+            law: spec.law.title(),
+            version: &header.version,
+            place: &header.port,
+            simulated: header.source == Source::Simulation,
+            duration_s: spec.run.duration,
+            period_us: header.period_us,
+            settle_s: spec.run.settle,
+            count_deg: 360.0 / f64::from(spec.rig.encoder.sensor.counts_per_rev),
+            volts: [output.lowest, output.highest],
+            classes_us: &CLASSES,
+        }
+    }
+}
+
+/// The points of a curve, as spans: at rates up to 1 kHz both ends of a span are the sample.
+#[derive(Default, Serialize)]
+struct Spans {
+    low: Vec<f64>,
+    high: Vec<f64>,
+}
+
+impl Spans {
+    /// A new value, in a new point or in the one that is under way.
+    fn take(&mut self, value: f64, new: bool) {
+        match (self.low.last_mut(), self.high.last_mut()) {
+            (Some(low), Some(high)) if !new => (*low, *high) = (low.min(value), high.max(value)),
+            _ => {
+                self.low.push(value);
+                self.high.push(value);
+            }
+        }
+    }
+}
+
+/// A thirtieth of a second of a run.
+#[derive(Default, Serialize)]
+struct Frame {
+    /// Time of each point, s.
+    time_s: Vec<f64>,
+    target_deg: Vec<f64>,
+    position_deg: Spans,
+    /// Null where no law was asked.
+    error_deg: Spans,
+    volts: Spans,
+    /// Times at which the encoder fell silent for as long as a stick takes, s.
+    sticks_s: Vec<f64>,
+    tick: u64,
+    state: &'static str,
+    cycles: u64,
+    cycles_per_s: f64,
+    largest_error_deg: f64,
+    lost: u64,
+    deadline_misses: u64,
+    /// Answers by the time they took, by [`CLASSES`]; wake-ups by their lateness.
+    answers: Histogram,
+    wake_ups: Histogram,
+}
+
+#[derive(Clone, Copy, Default, Serialize)]
+struct Histogram([u64; CLASSES.len() + 1]);
+
+impl Histogram {
+    fn take(&mut self, us: u32) {
+        let class = CLASSES.partition_point(|end| us >= *end);
+        if let Some(count) = self.0.get_mut(class) {
+            *count += 1;
+        }
+    }
+}
+
+/// Something that has happened.
+#[derive(Debug, PartialEq, Serialize)]
+struct Note {
+    time_s: f64,
+    text: String,
+    /// True if control ended otherwise than it should.
+    bad: bool,
+}
+
+/// The state of the feed.
+struct Feed {
+    encoder: Encoder,
+    detector: Detector,
+    settle: f64,
+    /// Samples of a point.
+    per_point: u64,
+    /// The position so far, and the counts that were its last.
+    position: Option<(i64, i32)>,
+    sample: Option<SampleRecord>,
+    taken: u64,
+    lately: VecDeque<f64>,
+    all: Frame,
+}
+
+impl Feed {
+    fn new(scenario: &Scenario) -> Option<Feed> {
+        let spec = scenario.spec();
+        // A checked scenario has all of these.
+        let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev).ok()?;
+        let detector = Detector::new(&spec, Keep::Figures).ok()?;
+        let period = spec.period.seconds::<f64>();
+        let per_point = ((POINT / period).round() as u64).max(1);
+        let all = Frame { state: "Ready", ..Frame::default() };
+        let (settle, lately) = (spec.run.settle, VecDeque::new());
+        Some(Feed {
+            encoder,
+            detector,
+            settle,
+            per_point,
+            position: None,
+            sample: None,
+            taken: 0,
+            lately,
+            all,
+        })
+    }
+
+    /// A record; something has happened if it says so.
+    fn take(&mut self, record: &Record) -> Option<Note> {
+        match record {
+            Record::Sample(sample) => self.sample = Some(*sample),
+            Record::Command(command) => self.command(command),
+            Record::Link(LinkRecord { lost, deadline_misses, .. }) => {
+                (self.all.lost, self.all.deadline_misses) = (*lost, *deadline_misses);
+            }
+            Record::Event(event) => return Some(self.event(event)),
+            Record::Truth(_) => {}
+        }
+        None
+    }
+
+    fn command(&mut self, command: &CommandRecord) {
+        // A view that missed the sample leaves the command out.
+        let Some(sample) = self.sample.take().filter(|s| s.tick == command.tick) else { return };
+        let counts = sample.counts;
+        let (at, last) = self.position.unwrap_or((i64::from(counts), counts));
+        let at = at + i64::from(counts.wrapping_sub(last));
+        self.position = Some((at, counts));
+        let time = command.time_ns as f64 / 1e9;
+        let new = self.taken.is_multiple_of(self.per_point) || self.all.time_s.is_empty();
+        self.taken += 1;
+        let all = &mut self.all;
+        if new {
+            all.time_s.push(rounded(time, 1e5));
+            all.target_deg.push(rounded(command.target_position.to_degrees(), 1e6));
+        }
+        let degrees = at as f64 * self.encoder.radians_per_count::<f64>().to_degrees();
+        all.position_deg.take(rounded(degrees, 1e6), new);
+        let by_law = command.source == CommandSource::Law as u8;
+        let error = if by_law { command.error.to_degrees() } else { f64::NAN };
+        all.error_deg.take(rounded(error, 1e6), new);
+        all.volts.take(rounded(command.voltage, 1e4), new);
+        all.tick = command.tick;
+        all.state = names::name_of(names::STATES, command.state);
+        if sample.lateness_us > 0 {
+            all.answers.take(sample.lateness_us);
+        }
+        if sample.wake_us > 0 {
+            all.wake_ups.take(sample.wake_us);
+        }
+        if !by_law {
+            return;
+        }
+        if time >= self.settle {
+            all.largest_error_deg = all.largest_error_deg.max(error.abs());
+        }
+        let velocity = command.target_velocity;
+        if self.detector.sample(command.tick, Counts(counts), velocity, command.voltage).begins {
+            all.cycles += 1;
+            all.sticks_s.push(rounded(time, 1e5));
+            self.lately.push_back(time);
+        }
+        while self.lately.front().is_some_and(|t| *t < time - LATELY) {
+            self.lately.pop_front();
+        }
+        all.cycles_per_s = self.lately.len() as f64 / LATELY.min(time.max(0.1));
+    }
+
+    fn event(&mut self, event: &EventRecord) -> Note {
+        let (from, to) = (names::name_of(names::STATES, event.from), names::name_of(names::STATES, event.to));
+        self.all.state = to;
+        let cause = Cause::from_u8(event.cause).unwrap_or(Cause::None);
+        let why = || cause_text(cause, event.value, false, true);
+        let at_rest = matches!(cause, Cause::None | Cause::Done | Cause::Operator);
+        let (text, bad) = match EventKind::from_number(event.kind) {
+            Some(EventKind::StateChange | EventKind::Ended) if cause == Cause::None => {
+                (format!("{} → {}", from.to_lowercase(), to.to_lowercase()), false)
+            }
+            Some(EventKind::StateChange | EventKind::Ended) => {
+                (format!("{} → {}: {}", from.to_lowercase(), to.to_lowercase(), why()), !at_rest)
+            }
+            Some(EventKind::LogDropped) => (format!("the log has lost {} records", event.value), true),
+            Some(EventKind::PortLost) => ("the port is gone".to_owned(), true),
+            Some(EventKind::Drift) => {
+                let seen = number(event.value);
+                (format!("friction over load is {seen} times the model's: outside of [bounds]"), true)
+            }
+            None => (format!("event {}", event.kind), true),
+        };
+        Note { time_s: rounded(event.time_ns as f64 / 1e9, 1e3), text, bad }
+    }
+
+    /// The frame since the last one; none if nothing has come.
+    fn frame(&mut self) -> Option<Frame> {
+        if self.all.time_s.is_empty() {
+            return None;
+        }
+        let all = &self.all;
+        let next = Frame {
+            tick: all.tick,
+            state: all.state,
+            cycles: all.cycles,
+            cycles_per_s: all.cycles_per_s,
+            largest_error_deg: all.largest_error_deg,
+            lost: all.lost,
+            deadline_misses: all.deadline_misses,
+            answers: all.answers,
+            wake_ups: all.wake_ups,
+            ..Frame::default()
+        };
+        Some(std::mem::replace(&mut self.all, next))
+    }
+}
+
+/// A number with as many digits as a picture needs.
+fn rounded(value: f64, parts: f64) -> f64 {
+    (value * parts).round() / parts
+}
