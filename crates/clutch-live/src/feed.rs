@@ -165,6 +165,8 @@ struct Note {
 struct Feed {
     encoder: Encoder,
     detector: Detector,
+    /// The sampling period, s: time is the run's, which a board's clock that waits does not tear.
+    period: f64,
     settle: f64,
     /// Samples of a point.
     per_point: u64,
@@ -189,6 +191,7 @@ impl Feed {
         Some(Feed {
             encoder,
             detector,
+            period,
             settle,
             per_point,
             position: None,
@@ -220,7 +223,7 @@ impl Feed {
         let (at, last) = self.position.unwrap_or((i64::from(counts), counts));
         let at = at + i64::from(counts.wrapping_sub(last));
         self.position = Some((at, counts));
-        let time = command.time_ns as f64 / 1e9;
+        let time = command.tick as f64 * self.period;
         let new = self.taken.is_multiple_of(self.per_point) || self.all.time_s.is_empty();
         self.taken += 1;
         let all = &mut self.all;
@@ -281,7 +284,7 @@ impl Feed {
             }
             None => (format!("event {}", event.kind), true),
         };
-        Note { time_s: rounded(event.time_ns as f64 / 1e9, 1e3), text, bad }
+        Note { time_s: rounded(event.tick as f64 * self.period, 1e3), text, bad }
     }
 
     /// The frame since the last one; none if nothing has come.
