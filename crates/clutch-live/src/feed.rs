@@ -4,9 +4,10 @@ use crate::kept::Kept;
 use clutch_core::supervisor::Cause;
 use clutch_core::{Counts, Encoder};
 use clutch_log::{
-    CommandRecord, CommandSource, EventKind, EventRecord, Header, LinkRecord, Record, SampleRecord, Source,
-    names,
+    ChangeRecord, CommandRecord, CommandSource, EventKind, EventRecord, Header, LinkRecord, Record,
+    SampleRecord, Source, names,
 };
+use clutch_loop::live_gains::{Gain, LiveGains};
 use clutch_loop::words::cause_text;
 use clutch_sim::detected::Detector;
 use clutch_sim::{Keep, Scenario, number};
@@ -31,11 +32,13 @@ const CLASSES: [u32; 13] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000
 pub(crate) fn start(
     header: &Header,
     scenario: &Scenario,
+    gains: Option<Arc<dyn LiveGains>>,
     mut records: Consumer<Record>,
     kept: Arc<Kept>,
 ) -> Option<JoinHandle<()>> {
-    let mut feed = Feed::new(scenario)?;
-    kept.begin(json(&Opening::new(header, scenario)));
+    let mut feed = Feed::new(header, scenario)?;
+    let listed = gains.as_ref().map(|gains| gains.gains()).unwrap_or_default();
+    kept.begin(json(&Opening::new(header, scenario, &listed)), gains);
     let make = move || {
         loop {
             // Asked before the ring is emptied: what was pushed before the end is seen.
@@ -74,10 +77,19 @@ struct Opening<'a> {
     count_deg: f64,
     volts: [f64; 2],
     classes_us: &'static [u32],
+    gains: Vec<ListedGain<'a>>,
+}
+
+/// A gain that may be changed.
+#[derive(Serialize)]
+struct ListedGain<'a> {
+    key: &'a str,
+    value: f64,
+    meaning: &'a str,
 }
 
 impl<'a> Opening<'a> {
-    fn new(header: &'a Header, scenario: &'a Scenario) -> Self {
+    fn new(header: &'a Header, scenario: &'a Scenario, gains: &'a [Gain]) -> Self {
         let spec = scenario.spec();
         let output = spec.output;
         Opening {
@@ -92,6 +104,10 @@ impl<'a> Opening<'a> {
             count_deg: 360.0 / f64::from(spec.rig.encoder.sensor.counts_per_rev),
             volts: [output.lowest, output.highest],
             classes_us: &CLASSES,
+            gains: gains
+                .iter()
+                .map(|g| ListedGain { key: &g.key, value: g.value, meaning: &g.meaning })
+                .collect(),
         }
     }
 }
@@ -159,10 +175,14 @@ struct Note {
     text: String,
     /// True if control ended otherwise than it should.
     bad: bool,
+    /// The gain that was changed, and its value.
+    gain: Option<(String, f64)>,
 }
 
 /// The state of the feed.
 struct Feed {
+    /// Keys of the run's parameters.
+    keys: Vec<String>,
     encoder: Encoder,
     detector: Detector,
     /// The sampling period, s: time is the run's, which a board's clock that waits does not tear.
@@ -179,16 +199,18 @@ struct Feed {
 }
 
 impl Feed {
-    fn new(scenario: &Scenario) -> Option<Feed> {
+    fn new(header: &Header, scenario: &Scenario) -> Option<Feed> {
         let spec = scenario.spec();
         // A checked scenario has all of these.
         let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev).ok()?;
         let detector = Detector::new(&spec, Keep::Figures).ok()?;
         let period = spec.period.seconds::<f64>();
         let per_point = ((POINT / period).round() as u64).max(1);
+        let keys = header.parameters.iter().map(|(key, _)| key.clone()).collect();
         let all = Frame { state: "Ready", ..Frame::default() };
         let (settle, lately) = (spec.run.settle, VecDeque::new());
         Some(Feed {
+            keys,
             encoder,
             detector,
             period,
@@ -211,6 +233,7 @@ impl Feed {
                 (self.all.lost, self.all.deadline_misses) = (*lost, *deadline_misses);
             }
             Record::Event(event) => return Some(self.event(event)),
+            Record::Change(change) => return Some(self.change(change)),
             Record::Truth(_) => {}
         }
         None
@@ -263,6 +286,13 @@ impl Feed {
         all.cycles_per_s = self.lately.len() as f64 / LATELY.min(time.max(0.1));
     }
 
+    fn change(&self, change: &ChangeRecord) -> Note {
+        let key = self.keys.get(usize::from(change.parameter)).cloned().unwrap_or_default();
+        let text = format!("{key} = {}", number(change.value));
+        let time_s = rounded(change.tick as f64 * self.period, 1e3);
+        Note { time_s, text, bad: false, gain: Some((key, change.value)) }
+    }
+
     fn event(&mut self, event: &EventRecord) -> Note {
         let (from, to) = (names::name_of(names::STATES, event.from), names::name_of(names::STATES, event.to));
         self.all.state = to;
@@ -284,7 +314,7 @@ impl Feed {
             }
             None => (format!("event {}", event.kind), true),
         };
-        Note { time_s: rounded(event.tick as f64 * self.period, 1e3), text, bad }
+        Note { time_s: rounded(event.tick as f64 * self.period, 1e3), text, bad, gain: None }
     }
 
     /// The frame since the last one; none if nothing has come.

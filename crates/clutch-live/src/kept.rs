@@ -1,5 +1,6 @@
 //! The frames that a page gets: those of the last seconds, for one that comes late, and each new one as it is made.
 
+use clutch_loop::live_gains::LiveGains;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -23,6 +24,8 @@ pub(crate) struct Message {
 struct State {
     /// The run that goes on.
     run: Option<Message>,
+    /// Its gains, if they may be changed.
+    gains: Option<Arc<dyn LiveGains>>,
     /// What has happened in it.
     events: VecDeque<Message>,
     frames: VecDeque<Message>,
@@ -57,9 +60,15 @@ impl Kept {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The gains of the run that goes on, if they may be changed.
+    pub(crate) fn gains(&self) -> Option<Arc<dyn LiveGains>> {
+        self.state().gains.clone()
+    }
+
     /// A run begins: the frames of the one before are of the past.
-    pub(crate) fn begin(&self, json: String) {
+    pub(crate) fn begin(&self, json: String, gains: Option<Arc<dyn LiveGains>>) {
         let mut state = self.state();
+        state.gains = gains;
         state.first += state.frames.len() as u64;
         state.frames.clear();
         state.events.clear();
@@ -193,7 +202,7 @@ mod tests {
     #[test]
     fn a_page_that_comes_late_gets_the_run_its_frames_and_its_events() {
         let kept = Arc::new(Kept::default());
-        kept.begin("1".into());
+        kept.begin("1".into(), None);
         kept.frame("a".into());
         kept.event("x".into());
         let mut late = kept.reader(1).unwrap();
@@ -201,7 +210,7 @@ mod tests {
         assert!(texts(&mut late).is_empty());
         kept.frame("b".into());
         assert_eq!(texts(&mut late), ["frame b"]);
-        kept.begin("2".into());
+        kept.begin("2".into(), None);
         kept.frame("c".into());
         assert_eq!(texts(&mut late), ["run 2", "frame c"], "nothing of the run before");
     }
@@ -209,7 +218,7 @@ mod tests {
     #[test]
     fn a_slow_page_misses_the_oldest_frames_and_memory_is_bounded() {
         let kept = Arc::new(Kept::default());
-        kept.begin("1".into());
+        kept.begin("1".into(), None);
         let mut slow = kept.reader(1).unwrap();
         let _ = texts(&mut slow);
         for i in 0..FRAMES + 5 {

@@ -22,6 +22,7 @@ mod request;
 mod server;
 
 use clutch_log::Header;
+use clutch_loop::live_gains::LiveGains;
 use clutch_loop::log_thread::Ring;
 use clutch_loop::onlooker::{Onlooker, ring};
 use clutch_sim::Scenario;
@@ -77,12 +78,12 @@ impl Live {
 }
 
 impl Onlooker for Live {
-    fn begin(&self, header: &Header, scenario: &Scenario) -> Ring {
+    fn begin(&self, header: &Header, scenario: &Scenario, gains: Option<Arc<dyn LiveGains>>) -> Ring {
         let (producer, consumer) = ring();
         let mut feeds = self.feeds.lock().unwrap_or_else(PoisonError::into_inner);
         // One run after the other: the frames of the one before come first.
         feeds.drain(..).for_each(|feed| drop(feed.join()));
-        feeds.extend(feed::start(header, scenario, consumer, self.kept.clone()));
+        feeds.extend(feed::start(header, scenario, gains, consumer, self.kept.clone()));
         producer
     }
 }

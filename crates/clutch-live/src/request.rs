@@ -12,13 +12,20 @@ const HEADERS: usize = 64;
 
 /// The thing that is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Asked {
+pub enum Asked<'a> {
     /// The page.
     Page,
     /// The stream of frames.
     Events,
     /// The operator's stop.
     Stop,
+    /// Another value of a gain.
+    Set {
+        /// Its key in a scenario.
+        key: &'a str,
+        /// The value, as it was written.
+        value: &'a str,
+    },
 }
 
 /// The reason why it is not given.
@@ -83,7 +90,7 @@ pub struct Gate {
 ///
 /// # Errors
 /// The reason why it is not given.
-pub fn asked(head: &[u8], gate: &Gate) -> Result<Option<Asked>, Denied> {
+pub fn asked<'a>(head: &'a [u8], gate: &Gate) -> Result<Option<Asked<'a>>, Denied> {
     let mut headers = [EMPTY_HEADER; HEADERS];
     let mut request = Request::new(&mut headers);
     match request.parse(head) {
@@ -112,14 +119,22 @@ pub fn asked(head: &[u8], gate: &Gate) -> Result<Option<Asked>, Denied> {
         _ => return Err(Denied::Origin),
     }
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
-    let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
-    if token.is_none_or(|token| !same(token, &gate.token)) {
+    let field = |name: &str| {
+        query
+            .split('&')
+            .find_map(|pair| pair.split_once('=').filter(|(n, _)| *n == name).map(|(_, value)| value))
+    };
+    if field("token").is_none_or(|token| !same(token, &gate.token)) {
         return Err(Denied::Token);
     }
     let (asked, by) = match path {
         "/" => (Asked::Page, "GET"),
         "/events" => (Asked::Events, "GET"),
         "/stop" => (Asked::Stop, "POST"),
+        "/set" => match (field("key"), field("value")) {
+            (Some(key), Some(value)) => (Asked::Set { key, value }, "POST"),
+            _ => return Err(Denied::Malformed),
+        },
         _ => return Err(Denied::Unknown),
     };
     if method == by { Ok(Some(asked)) } else { Err(Denied::Method) }
@@ -134,10 +149,10 @@ fn same(a: &str, b: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn ask(first: &str, headers: &[&str]) -> Result<Option<Asked>, Denied> {
+    fn ask(first: &str, headers: &[&str]) -> Result<Option<Asked<'static>>, Denied> {
         let gate = Gate { port: 4242, token: "secret".into() };
         let head = format!("{first} HTTP/1.1\r\n{}\r\n\r\n", headers.join("\r\n"));
-        asked(head.as_bytes(), &gate)
+        asked(head.leak().as_bytes(), &gate)
     }
 
     const HOST: &str = "Host: 127.0.0.1:4242";
@@ -149,6 +164,15 @@ mod tests {
         let origin = "Origin: http://127.0.0.1:4242";
         assert_eq!(ask("GET /events?token=secret", &[HOST, origin]), Ok(Some(Asked::Events)));
         assert_eq!(ask("POST /stop?token=secret", &[HOST, origin]), Ok(Some(Asked::Stop)));
+        let set = Asked::Set { key: "law.pd.kp_v_rad", value: "4e1" };
+        assert_eq!(
+            ask("POST /set?token=secret&key=law.pd.kp_v_rad&value=4e1", &[HOST, origin]),
+            Ok(Some(set))
+        );
+        assert_eq!(
+            ask("POST /set?token=secret&key=law.pd.kp_v_rad", &[HOST, origin]),
+            Err(Denied::Malformed)
+        );
     }
 
     #[test]

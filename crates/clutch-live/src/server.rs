@@ -2,6 +2,7 @@
 
 use crate::kept::Kept;
 use crate::request::{Asked, Denied, Gate, LONGEST, asked};
+use clutch_loop::live_gains::Refusal;
 use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
@@ -16,7 +17,7 @@ const PAGES: usize = 8;
 /// Connections at a time, each with a thread.
 const CONNECTIONS: usize = 32;
 /// Stack of such a thread, bytes: a loop keeps all its memory in RAM.
-const STACK: usize = 128 * 1024;
+const STACK: usize = 512 * 1024;
 /// Time that a browser may take for a request, or to take what it gets.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Silence after which a stream says that it is still there, so that one whose page has gone ends.
@@ -108,7 +109,12 @@ fn serve(mut stream: TcpStream, gate: &Gate, kept: &Arc<Kept>, stop: &AtomicBool
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     stream.set_nodelay(true)?;
-    match read(&mut stream, gate)? {
+    let mut head = [0; LONGEST];
+    match read(&mut stream, &mut head, gate)? {
+        Ok(Asked::Set { key, value }) => match change(kept, key, value) {
+            Ok(verdict) => answer(&mut stream, "200 OK", "text/plain", "", &verdict),
+            Err(refusal) => answer(&mut stream, "409 Conflict", "text/plain", "", &refusal.to_string()),
+        },
         Ok(Asked::Page) => {
             let nonce = random()?;
             let rules = format!(
@@ -131,8 +137,11 @@ fn serve(mut stream: TcpStream, gate: &Gate, kept: &Arc<Kept>, stop: &AtomicBool
 }
 
 /// The request on a connection.
-fn read(stream: &mut TcpStream, gate: &Gate) -> io::Result<Result<Asked, Denied>> {
-    let mut head = [0; LONGEST];
+fn read<'a>(
+    stream: &mut TcpStream,
+    head: &'a mut [u8; LONGEST],
+    gate: &Gate,
+) -> io::Result<Result<Asked<'a>, Denied>> {
     let mut used = 0;
     loop {
         let Some(room) = head.get_mut(used..).filter(|room| !room.is_empty()) else {
@@ -145,10 +154,21 @@ fn read(stream: &mut TcpStream, gate: &Gate) -> io::Result<Result<Asked, Denied>
         used += count;
         match asked(&head[..used], gate) {
             Ok(None) => {}
-            Ok(Some(asked)) => return Ok(Ok(asked)),
+            Ok(Some(_)) => break,
             Err(denied) => return Ok(Err(denied)),
         }
     }
+    // Once more, as what is asked for borrows from the head.
+    Ok(asked(&head[..used], gate).and_then(|asked| asked.ok_or(Denied::Malformed)))
+}
+
+/// Changes a gain of the run that goes on.
+fn change(kept: &Kept, key: &str, value: &str) -> Result<String, Refusal> {
+    let gains = kept.gains().ok_or_else(|| {
+        Refusal("gains are not changed in this run: safety.live_gains = true allows it where `clutch loop` closes the loop".into())
+    })?;
+    let number = value.parse().map_err(|_| Refusal(format!("{key} = {value}: expected a number")))?;
+    gains.change(key, number)
 }
 
 fn deny(stream: &mut TcpStream, denied: Denied) -> io::Result<()> {

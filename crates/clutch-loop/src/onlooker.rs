@@ -3,6 +3,7 @@
 //! Whoever runs a loop copies its records into a ring, and does nothing else for those who look on: a view that is slow
 //! misses records, and the loop does not notice.
 
+use crate::live_gains::LiveGains;
 use crate::log_thread::Ring;
 use clutch_log::{Header, Record};
 use clutch_sim::Scenario;
@@ -22,8 +23,9 @@ pub fn ring() -> (Ring, rtrb::Consumer<Record>) {
 
 /// One that looks on.
 pub trait Onlooker: fmt::Debug + Send + Sync {
-    /// A run begins, with the header that its log has or would have. Its records go into the ring until that is dropped.
-    fn begin(&self, header: &Header, scenario: &Scenario) -> Ring;
+    /// A run begins, with the header that its log has or would have, and the gains that may be changed while it goes on. Its
+    /// records go into the ring until that is dropped.
+    fn begin(&self, header: &Header, scenario: &Scenario, gains: Option<Arc<dyn LiveGains>>) -> Ring;
 }
 
 /// One that looks on at runs in computed time, which then go no faster than a clock, and may be ended by it.
@@ -39,7 +41,7 @@ impl Looking {
     /// A run begins.
     #[must_use]
     pub fn begin(&self, header: &Header, scenario: &Scenario) -> Played {
-        Played { ring: self.onlooker.begin(header, scenario), stop: self.stop.clone(), started: None }
+        Played { ring: self.onlooker.begin(header, scenario, None), stop: self.stop.clone(), started: None }
     }
 }
 

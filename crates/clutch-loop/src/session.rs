@@ -10,6 +10,7 @@ use crate::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, OnDrift,
 use crate::drift::DriftReport;
 use crate::faults::Fault;
 use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::live_gains::{Changes, LiveGains, Tuning};
 use crate::log_thread::{LogThread, Ring};
 use crate::onlooker::Onlooker;
 use crate::port::{Address, DeviceKind, Endpoint, Port, PortError, PseudoTerminal, SerialOptions};
@@ -25,7 +26,9 @@ use crate::watch::Watch;
 use crate::words::cause_text;
 use clutch_core::law::Law;
 use clutch_core::supervisor::Cause;
-use clutch_core::{ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState};
+use clutch_core::{
+    ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState, Servo,
+};
 use clutch_log::{LogError, Source};
 use clutch_node::{ControllerNode, HostNode, present_code};
 use clutch_sim::scenario::ScalarKind;
@@ -432,7 +435,8 @@ impl Course<'_> {
         let built = self.built::<T>(scenario, hello)?;
         let mut station = controller(&built, from_scenario::path(scenario)?);
         let present = present_code(hello, built.supervisor.safe_codes().hold);
-        let log = self.log(&built, present, &board_text(hello), receivers)?;
+        let (gains, changes) = self.tuning(scenario, &built, receivers);
+        let log = self.log(&built, present, &board_text(hello), receivers, gains)?;
         let mut talk = Talk::new(port, &mut station);
         talk.configure(present)?;
         let clock = talk.clock()?;
@@ -441,6 +445,7 @@ impl Course<'_> {
             port,
             ring: log.ring,
             shown: log.shown,
+            changes,
             watch: &log.watch,
             patient: self.session.patient(),
             ticks: built.ticks,
@@ -491,7 +496,7 @@ impl Course<'_> {
         }
         let hold = built.supervisor.safe_codes().hold;
         let board = met.map_or_else(String::new, controller_text);
-        let log = self.log(&built, present_code(hello, hold), &board, receivers)?;
+        let log = self.log(&built, present_code(hello, hold), &board, receivers, None)?;
         let mut talk = Talk::new(port, &mut station);
         talk.upload(&settings)?;
         talk.configure(hold)?;
@@ -501,6 +506,7 @@ impl Course<'_> {
             port,
             ring: log.ring,
             shown: log.shown,
+            changes: None,
             watch: &log.watch,
             patient,
             ticks: built.ticks,
@@ -651,6 +657,22 @@ impl Course<'_> {
         Ok(Announcement { title: scenario.name().to_owned(), rows, remarks })
     }
 
+    /// The gains that one who looks on may change, and the control thread's end; none where the scenario allows none.
+    #[expect(clippy::type_complexity, reason = "two ends of one thing")]
+    fn tuning<T: Real>(
+        &self,
+        scenario: &Scenario,
+        built: &BuiltRun<T>,
+        receivers: Receivers<'_>,
+    ) -> (Option<Arc<dyn LiveGains>>, Option<Changes<Servo<T>>>) {
+        let allowed = scenario.safety().is_ok_and(|safety| safety.live_gains);
+        if !allowed || receivers.onlooker.is_none() {
+            return (None, None);
+        }
+        let (tuning, changes) = Tuning::new(scenario, built, self.session.options.uncertified);
+        (Some(Arc::new(tuning)), Some(changes))
+    }
+
     /// Begins the log, and the view.
     fn log<T: Real>(
         &self,
@@ -658,6 +680,7 @@ impl Course<'_> {
         present: DacCode,
         board: &str,
         receivers: Receivers<'_>,
+        gains: Option<Arc<dyn LiveGains>>,
     ) -> Result<Logging, SessionError> {
         let Session { scenario, options, .. } = self.session;
         let watch = Arc::new(Watch { stop: self.stop.clone(), ..Watch::default() });
@@ -669,7 +692,7 @@ impl Course<'_> {
         header.extra.push(("as_sampled".to_owned(), self.session.cleared.bound_line()));
         let started = receivers.log.map(|path| LogThread::start(path, &header, watch.clone())).transpose()?;
         let (thread, ring) = started.unzip();
-        let shown = receivers.onlooker.map(|onlooker| onlooker.begin(&header, scenario));
+        let shown = receivers.onlooker.map(|onlooker| onlooker.begin(&header, scenario, gains));
         Ok(Logging { thread, ring, shown, watch })
     }
 
