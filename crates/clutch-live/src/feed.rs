@@ -343,3 +343,84 @@ impl Feed {
 fn rounded(value: f64, parts: f64) -> f64 {
     (value * parts).round() / parts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn feed(period_us: &str) -> Feed {
+        let set = [("sampling.period_us".to_owned(), period_us.to_owned())];
+        let scenario = Scenario::load("board_smc_2".as_ref(), &set).unwrap();
+        let header = Header { parameters: vec![("law.smc.kp_v".into(), "3".into())], ..Header::default() };
+        Feed::new(&header, &scenario).unwrap()
+    }
+
+    fn tick(feed: &mut Feed, tick: u64, counts: i32, source: CommandSource) {
+        let sample = SampleRecord { tick, counts, lateness_us: 7, ..SampleRecord::default() };
+        assert_eq!(feed.take(&Record::Sample(sample)), None);
+        let error = 1e-3 * tick as f64;
+        let command =
+            CommandRecord { tick, source: source as u8, error, voltage: 2.0, ..CommandRecord::default() };
+        assert_eq!(feed.take(&Record::Command(command)), None);
+    }
+
+    #[test]
+    fn a_fast_loops_samples_become_spans_of_a_millisecond() {
+        let mut feed = feed("250");
+        (0..9).for_each(|i| tick(&mut feed, i, i as i32, CommandSource::Law));
+        let frame = feed.frame().unwrap();
+        assert_eq!(frame.time_s, [0.0, 0.001, 0.002]);
+        assert_eq!(frame.position_deg.low, [0.0, 0.072, 0.144]);
+        assert_eq!(frame.position_deg.high, [0.054, 0.126, 0.144]);
+        // The point under way goes on in the next frame as one of its own.
+        tick(&mut feed, 9, 9, CommandSource::Law);
+        assert_eq!(feed.frame().unwrap().time_s, [0.00225]);
+        assert!(feed.frame().is_none());
+    }
+
+    #[test]
+    fn a_tick_without_the_law_has_no_error_and_counts_wrap() {
+        let mut feed = feed("1000");
+        tick(&mut feed, 0, i32::MAX, CommandSource::Law);
+        tick(&mut feed, 1, i32::MIN, CommandSource::Safe);
+        let frame = feed.frame().unwrap();
+        let moved = frame.position_deg.low[1] - frame.position_deg.low[0];
+        assert!((moved - 0.018).abs() < 1e-5, "{moved}");
+        let told: serde_json::Value = serde_json::from_str(&json(&frame)).unwrap();
+        assert_eq!(told["error_deg"]["low"][0], 0.0);
+        assert!(told["error_deg"]["low"][1].is_null());
+        assert_eq!(told["answers"][3], 2, "7 µs are from 5 to 10");
+    }
+
+    #[test]
+    fn a_command_whose_sample_was_missed_is_left_out() {
+        let mut feed = feed("1000");
+        let alone = CommandRecord { tick: 5, ..CommandRecord::default() };
+        assert_eq!(feed.take(&Record::Command(alone)), None);
+        let other = SampleRecord { tick: 6, ..SampleRecord::default() };
+        assert_eq!(feed.take(&Record::Sample(other)), None);
+        assert_eq!(feed.take(&Record::Command(CommandRecord { tick: 7, ..CommandRecord::default() })), None);
+        assert!(feed.frame().is_none());
+    }
+
+    #[test]
+    fn what_happens_is_told_in_words_and_faults_are_marked() {
+        let mut feed = feed("1000");
+        let mut told = |kind: EventKind, to: u8, cause: Cause| {
+            let (kind, cause) = (kind as u8, cause as u8);
+            let event =
+                EventRecord { tick: 2500, kind, from: 3, to, cause, value: 2.0, ..EventRecord::default() };
+            let note = feed.take(&Record::Event(event)).unwrap();
+            (note.time_s, note.text, note.bad)
+        };
+        let done = "running → holding: the path is done".to_owned();
+        assert_eq!(told(EventKind::Ended, 4, Cause::Done), (2.5, done, false));
+        let lost = "running → faulted: 2 samples lost within 128 cycles".to_owned();
+        assert_eq!(told(EventKind::StateChange, 6, Cause::Lost), (2.5, lost, true));
+        assert!(told(EventKind::Drift, 3, Cause::None).2);
+        let change = ChangeRecord { tick: 3000, parameter: 0, value: 4.0, ..ChangeRecord::default() };
+        let note = feed.take(&Record::Change(change)).unwrap();
+        assert_eq!((note.time_s, note.text.as_str()), (3.0, "law.smc.kp_v = 4"));
+        assert_eq!(note.gain, Some(("law.smc.kp_v".to_owned(), 4.0)));
+    }
+}
