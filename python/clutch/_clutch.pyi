@@ -833,7 +833,7 @@ def rig(name: str) -> dict[str, Any]:
     The table of a built-in rig: `ideal`, `paper`, `bench`.
     """
 
-def run_loop(scenario: _model.Scenario | Scenario, *, port: str | None, board: str | None, baud: SupportsIndex | None, log: str | PathLike[str] | None, uncertified: bool, certificate: str | PathLike[str] | None, release_test: str, release_deg: SupportsFloat | SupportsIndex, on_drift: str, patient: bool, faults: Sequence[str], fault_seed: SupportsIndex, strict: bool, pace: str, wait: str, spin_us: SupportsIndex, thread_priority: SupportsIndex, lock_memory: bool, cpu_affinity: SupportsIndex | None) -> tuple[dict[str, Any], str, str, str | None]:
+def run_loop(scenario: _model.Scenario | Scenario, *, port: str | None, board: str | None, baud: SupportsIndex | None, log: str | PathLike[str] | None, uncertified: bool, certificate: str | PathLike[str] | None, release_test: str, release_deg: SupportsFloat | SupportsIndex, on_drift: str, patient: bool, faults: Sequence[str], fault_seed: SupportsIndex, strict: bool, pace: str, wait: str, spin_us: SupportsIndex, thread_priority: SupportsIndex, lock_memory: bool, cpu_affinity: SupportsIndex | None, live: SupportsIndex | None) -> tuple[dict[str, Any], str, str, str | None]:
     """
     Runs a session; its summary, the same in words, what it had said it would do, and the scenario's text if that was
     changed for the board's sake.

@@ -66,6 +66,8 @@ class LoopResult:
         Number of times that the simulated board's clock waited for this machine.
     port_error : str or None
         The port's error, if it ended the run.
+    gains_changed : int
+        Changes of gains from the live view while it ran.
     notes : list of str
         Refusals of the system (priority, memory), and what to do about them.
     log : Path or None
@@ -108,6 +110,7 @@ class LoopResult:
     board_safe: bool
     board_waits: int | None
     port_error: str | None
+    gains_changed: int
     notes: list[str]
     log: Path | None
     announcement: str = field(repr=False)
@@ -149,6 +152,7 @@ def loop(
     thread_priority: int = _clutch.DEFAULT_PRIORITY,
     lock_memory: bool = False,
     cpu_affinity: int | None = None,
+    live: bool | int = False,
 ) -> LoopResult:
     """Close the loop on a board, simulated or real: the session of ``clutch loop``.
 
@@ -207,6 +211,9 @@ def loop(
         asked first.
     cpu_affinity : int, optional
         The core on which the loop's thread stays.
+    live : bool or int, default False
+        Show the run in a browser while it goes on, at an address of this machine that is printed: at this port, or with
+        True at a free one. The page's button stops the run, and changes gains where ``safety.live_gains`` allows it.
 
     Returns
     -------
@@ -260,6 +267,7 @@ def loop(
         thread_priority=thread_priority,
         lock_memory=lock_memory,
         cpu_affinity=cpu_affinity,
+        live=0 if live is True else (live or None),
     )
     figures: dict[str, Any] = dict(summary)
     del figures["scenario"]

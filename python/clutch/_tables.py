@@ -2369,6 +2369,8 @@ class Safety(_Params):
     reason : str
         The reason that this safe state is the right one for this rig, in the operator's words; printed before
         each run.
+    live_gains : bool, default False
+        Gains may be changed while a loop runs, from its live view.
     on_fault : HoldVoltage, RampVoltage, Release or HoldThenRelease
         Safe state: what the brake does when control has ended.
     limits : Limits
@@ -2389,6 +2391,7 @@ class Safety(_Params):
     _key: ClassVar[str] = "safety"
 
     reason: str
+    live_gains: bool = False
     on_fault: SafeState
     limits: Limits = field(default_factory=Limits)
 

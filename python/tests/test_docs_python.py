@@ -1,4 +1,4 @@
-"""README and docs/python are true: their code runs and prints what they say; no public name is left out."""
+"""README, docs/python and docs/start are true: their code runs and prints what they say; no public name is left out."""
 
 import contextlib
 import io
@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", DOCS / "index.md", DOCS / "referee.md", *sorted((DOCS / "python").glob("*.md"))]
+PAGES = [ROOT / "README.md", DOCS / "index.md", DOCS / "referee.md", *sorted((DOCS / "python").glob("*.md")), *sorted((DOCS / "start").glob("*.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # A block that needs what a test machine has not: the comment names the file whose tests run it.
 ELSEWHERE = re.compile(r"<!-- not run here: (\S+) -->\n\Z")

@@ -2,7 +2,9 @@
 
 import contextlib
 import json
+import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -283,3 +285,16 @@ def test_a_shaft_that_stands_has_no_friction_to_be_told():
 def test_an_effect_of_a_drift_that_there_is_none_is_refused():
     with pytest.raises(ValueError, match="on_drift"):
         package.loop(on_drift="perhaps")
+
+
+def test_a_loop_is_seen_in_a_browser(package, capsys):
+    result = package.loop(duration=1.2, live=True)
+    printed = capsys.readouterr().out
+    assert re.fullmatch(r"live view: http://127\.0\.0\.1:\d+/\?token=[0-9a-f]{32}\n", printed)
+    assert (result.verdict, result.gains_changed) == ("done", 0)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(OSError, match=f"live = {port}: no view can be served at this port"):
+            package.loop(duration=1.2, live=port)

@@ -8,6 +8,7 @@ mod crash;
 mod endings;
 mod faults;
 mod harness;
+mod live;
 mod logs;
 mod ports;
 mod refusals;

@@ -44,6 +44,8 @@ fn traced(pace: &str) -> Option<Vec<String>> {
     command.args(["--set", "safety.limits.overruns=128", "--set", "safety.limits.late=128"]);
     let log = trace.with_file_name("run.mcap");
     command.arg("--log").arg(log);
+    // One that looks on costs no call.
+    command.arg("--live");
     let _ = start(command).done().expect(0);
     Some(cycles(&trace))
 }

@@ -5,7 +5,9 @@ use clutch_core::{DacCode, Target};
 use clutch_log::Source;
 use clutch_loop::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, OnDrift, Pace};
 use clutch_loop::from_scenario::{self, BuiltRun};
+use clutch_loop::live_gains::Change;
 use clutch_loop::log_thread::LogThread;
+use clutch_loop::onlooker;
 use clutch_loop::port::{Endpoint, Port, PseudoTerminal, SerialOptions};
 use clutch_loop::preflight::Talk;
 use clutch_loop::realtime::{RealtimeOptions, WaitMode};
@@ -83,7 +85,7 @@ struct Watched {
     given_back: u64,
 }
 
-/// Two seconds of the loop against the simulated board on a pseudo-terminal, with a log. In tick
+/// Two seconds of the loop against the simulated board on a pseudo-terminal, with a log and one that looks on. In tick
 /// `spoilt` the path, which the control thread asks, allocates.
 fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let built_in = BUILT_IN.iter().find(|b| b.name == "board_smc_2").expect("a built-in scenario");
@@ -125,6 +127,11 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let watch = Arc::new(Watch::default());
     let header = from_scenario::header(&scenario, &built.servo, Source::Loop, &address.to_string(), "test");
     let (log_thread, ring) = LogThread::start(&log, &header, watch.clone()).unwrap();
+    // One that looks on, and a change of gains that is on its way.
+    let (shown, seen) = onlooker::ring();
+    let (mut tuning, changes) = rtrb::RingBuffer::new(1);
+    let change = Change { servo: built.servo, parameter: 7, value: 3.0 };
+    tuning.push(change).expect("there is room for one");
     let options = LoopOptions {
         // The machine's settings are not the subject, and locked memory would stay locked.
         realtime: RealtimeOptions { thread_priority: 0, lock_memory: false, ..RealtimeOptions::default() },
@@ -139,14 +146,28 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let (ticks, detector, drift) = (built.ticks, built.detector, built.drift);
     let report = std::thread::scope(|scope| {
         let (station, port, watch) = (&mut station, &mut port, &*watch);
-        let (ring, patient) = (Some(ring), true);
-        let configured = ConfiguredRun { station, port, ring, watch, ticks, clock, detector, drift, patient };
+        let (ring, shown, changes, patient) = (Some(ring), Some(shown), Some(changes), true);
+        let configured = ConfiguredRun {
+            station,
+            port,
+            ring,
+            shown,
+            changes,
+            watch,
+            ticks,
+            clock,
+            detector,
+            drift,
+            patient,
+        };
         scope.spawn(move || control_loop::run(configured, &options)).join().unwrap()
     });
     stop.store(true, Ordering::Relaxed);
     let _ = board.join().unwrap().unwrap();
     let logged = log_thread.finish().unwrap();
     assert!(logged.records > 2 * report.ticks, "the log was not written: {logged:?}");
+    assert!(seen.slots() as u64 > 2 * report.ticks, "{} records were shown", seen.slots());
+    assert_eq!(report.changed, 1);
     let taken = TAKEN.load(Ordering::Relaxed);
     let given_back = GIVEN_BACK.load(Ordering::Relaxed);
     println!("{name}: {} ticks, {taken} taken, {given_back} given back", report.ticks);

@@ -50,6 +50,7 @@ impl Export {
             Record::Command(r) => table.add(header, &r),
             Record::Event(r) => table.add(header, &r),
             Record::Link(r) => table.add(header, &r),
+            Record::Change(r) => table.add(header, &r),
             Record::Truth(r) => table.add(header, &r),
         });
         let Table { csv, rows, .. } = table;

@@ -1,7 +1,9 @@
 //! `clutch hil`.
 
 use crate::args::{ScenarioArgs, key_value};
+use crate::live::LiveArg;
 use crate::output::{BUILD, Exit, json, not_certified, report, warn};
+use crate::signals::stop_flag;
 use crate::sim;
 use crate::table::{number, quantities};
 use clap::{Args, ValueEnum};
@@ -75,6 +77,8 @@ pub(crate) struct Hil {
     /// Time that a frame takes between board and rig, µs.
     #[arg(long, default_value_t = 0, value_name = "US", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     latency_us: u32,
+    #[command(flatten)]
+    live: LiveArg,
     /// Prints the summary as JSON, and nothing else, on standard output.
     #[arg(long)]
     json: bool,
@@ -126,7 +130,7 @@ impl Hil {
         if self.link == Link::Uart {
             self.set.push(("safety.limits.deadline_us".to_owned(), "1000000".to_owned()));
         }
-        let Some(session) = self.checked(LockstepSession::new(self.load()?, self.options()))? else {
+        let Some(session) = self.checked(LockstepSession::new(self.load()?, self.options()?))? else {
             return Ok(Exit::NotCertified);
         };
         tell(session.note());
@@ -165,7 +169,7 @@ impl Hil {
                  --chip-fault those of the chip"
             );
         }
-        let session = ChipSession::new(self.load()?, self.options(), chip, role);
+        let session = ChipSession::new(self.load()?, self.options()?, chip, role);
         let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };
         tell(session.note());
         let started = std::time::Instant::now();
@@ -206,8 +210,10 @@ impl Hil {
         }
     }
 
-    fn options(&self) -> LockstepOptions {
-        LockstepOptions {
+    fn options(&self) -> anyhow::Result<LockstepOptions> {
+        // Ctrl-C ends it at once, unless a view is to see the end.
+        let looking = if self.live.asked_for() { self.live.looking(&stop_flag()?)? } else { None };
+        Ok(LockstepOptions {
             log: self.log.clone(),
             uncertified: self.uncertified,
             faults: self.fault.clone(),
@@ -215,8 +221,9 @@ impl Hil {
             latency_ns: u64::from(self.latency_us) * 1000,
             // The board's own clock runs on while this machine computes.
             silence: (self.link == Link::Uart).then_some(Micros(10_000_000)),
+            looking,
             version: BUILD.to_owned(),
-        }
+        })
     }
 
     fn text(&self, scenario: &Scenario, ran: &Ran, board: &str, took: f64) -> String {

@@ -1,7 +1,9 @@
 //! `clutch identify`.
 
 use crate::args::{ScenarioArgs, key_value};
+use crate::live::LiveArg;
 use crate::output::{self, BUILD, Exit, json, paragraph, quiet, shown, write};
+use crate::signals::stop_flag;
 use crate::table::number;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -15,8 +17,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 #[cfg(target_os = "linux")]
 use {
-    crate::signals::stop_flag,
     clutch_identify::experiment::{ExperimentError, REMEDY},
+    clutch_loop::onlooker::Onlooker,
     clutch_loop::port::Address,
     clutch_loop::session::{Board, Session, SessionOptions},
     clutch_loop::summary::Verdict,
@@ -76,6 +78,8 @@ pub(crate) struct Identify {
     /// as the scenario has them.
     #[arg(long, value_name = "FILE.toml")]
     map: Option<PathBuf>,
+    #[command(flatten)]
+    live: LiveArg,
     /// Prints the result as JSON, and nothing else, on standard output.
     #[arg(long)]
     json: bool,
@@ -130,7 +134,10 @@ impl Identify {
             return self.at_port(port, scenario, &programme);
         }
         let logging = |folder: &PathBuf| VirtualBoard::logging(folder.clone(), BUILD);
-        let mut board = self.log.as_ref().map_or_else(VirtualBoard::default, logging);
+        let board = self.log.as_ref().map_or_else(VirtualBoard::default, logging);
+        // Ctrl-C ends it at once, unless a view is to see the end.
+        let looking = if self.live.asked_for() { self.live.looking(&stop_flag()?)? } else { None };
+        let mut board = board.looked_at(looking, BUILD);
         Ok(experiment(scenario, &programme, &mut |name, part| board.run(name, part))?)
     }
 
@@ -159,8 +166,10 @@ impl Identify {
         }
         let folder = self.log.clone().unwrap_or_default();
         let stop = stop_flag()?;
+        let live = self.live.start(&stop)?;
         let run = &mut |name: &str, part: &Scenario| {
-            self.on_board(port, &folder.join(format!("{name}.mcap")), name, part, &stop)
+            let onlooker = live.clone().map(|live| live as Arc<dyn Onlooker>);
+            self.on_board(port, &folder.join(format!("{name}.mcap")), (name, part), &stop, onlooker)
         };
         Ok(experiment(scenario, programme, run)?)
     }
@@ -171,9 +180,9 @@ impl Identify {
         &self,
         port: &Address,
         log: &Path,
-        name: &str,
-        part: &Scenario,
+        (name, part): (&str, &Scenario),
         stop: &Arc<AtomicBool>,
+        onlooker: Option<Arc<dyn Onlooker>>,
     ) -> Result<Vec<Recording>, ExperimentError> {
         let runs = |e: &dyn std::fmt::Display| ExperimentError::Runs(e.to_string());
         let options = SessionOptions {
@@ -181,6 +190,7 @@ impl Identify {
             log: Some(log.to_owned()),
             patient: self.patient,
             uncertified: true,
+            onlooker,
             version: BUILD.to_owned(),
             ..SessionOptions::default()
         };

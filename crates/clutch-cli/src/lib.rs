@@ -13,6 +13,7 @@ mod friction;
 #[cfg(target_os = "linux")]
 mod hil;
 pub mod identify;
+mod live;
 mod log;
 #[cfg(target_os = "linux")]
 mod loop_verb;

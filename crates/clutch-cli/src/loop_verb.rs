@@ -1,6 +1,7 @@
 //! `clutch loop`.
 
 use crate::args::{ScenarioArgs, key_value};
+use crate::live::LiveArg;
 use crate::output::{BUILD, Exit, beside, json, not_certified, paragraph, quiet, report, shown, warn};
 use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
@@ -9,6 +10,7 @@ use clap::{Args, ValueEnum};
 use clutch_loop::clearance::ClearanceError;
 use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
+use clutch_loop::onlooker::Onlooker;
 use clutch_loop::port::Address;
 use clutch_loop::realtime::{CycleSummary, RealtimeOptions, WaitMode};
 use clutch_loop::session::{
@@ -160,6 +162,8 @@ pub(crate) struct Loop {
     /// Keeps the simulated board's clock running when this machine stalls, as on hardware.
     #[arg(long, conflicts_with = "port")]
     strict: bool,
+    #[command(flatten)]
+    live: LiveArg,
     /// Prints the summary as JSON, and nothing else, on standard output.
     #[arg(long)]
     json: bool,
@@ -177,7 +181,10 @@ impl Loop {
         {
             bail!("{}: is the scenario; name another file for the log", log.display());
         }
-        let session = match Session::new(scenario, self.options()) {
+        let stop = stop_flag()?;
+        let live = self.live.start(&stop)?;
+        let onlooker = live.map(|live| live as Arc<dyn Onlooker>);
+        let session = match Session::new(scenario, SessionOptions { onlooker, ..self.options() }) {
             Ok(session) => session,
             Err(SessionError::Clearance(refusal @ ClearanceError::NotCertified { .. })) => {
                 self.say(&not_certified(&refusal, &self.scenario))?;
@@ -185,7 +192,6 @@ impl Loop {
             }
             Err(refusal) => return Err(refusal.into()),
         };
-        let stop = stop_flag()?;
         // A log on a limited disk must end the log and not the loop.
         let ignored = Arc::new(AtomicBool::new(false));
         signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
@@ -294,6 +300,7 @@ impl Loop {
                 OnDriftArg::Tell => OnDrift::Tell,
                 OnDriftArg::Stop => OnDrift::Stop,
             },
+            onlooker: None,
             version: BUILD.to_owned(),
         }
     }

@@ -1,9 +1,8 @@
 //! Verdicts on the sampled loop: the error bound, linear stability, sticks; each with its scope.
 
 use crate::output::paragraph;
-use anyhow::Context;
-use clutch_certificate::{Options, checker, file, search};
-use clutch_sim::scenario::{CertificateError, Proven, Sampled};
+use clutch_certificate::file;
+use clutch_sim::scenario::{CertificateError, Proven, Sampled, Unproven};
 use serde_json::{Value, json as value};
 use std::path::Path;
 
@@ -24,31 +23,17 @@ pub(crate) enum Bound {
 impl Bound {
     /// Looks for a proof, checks it, and saves it if asked.
     pub(crate) fn search(sampled: &Sampled, save: Option<&Path>) -> anyhow::Result<Bound> {
-        let setup = match &sampled.setup {
-            Ok(setup) => setup,
-            Err(why) => return Ok(Bound::NotCovered(why.to_string())),
+        let (proven, certificate) = match sampled.prove() {
+            Ok(found) => found,
+            Err(Unproven::NotCovered(why)) => return Ok(Bound::NotCovered(why.to_string())),
+            Err(Unproven::Unstable) => return Ok(Bound::Unstable),
+            Err(Unproven::Open(cell)) => return Ok(Bound::Open(cell)),
+            Err(defect @ Unproven::Refused(_)) => return Err(defect.into()),
         };
-        // A shell holds whatever law is within, stable or not.
-        if sampled.stable() == Some(false) && !sampled.any_law() {
-            return Ok(Bound::Unstable);
-        }
-        let found = search(setup, &Options::default(), false);
-        if let Some(open) = found.open.first() {
-            let how = if open.grew {
-                "the set grew beyond all limits"
-            } else {
-                "the search ended before the set was closed"
-            };
-            let [low, high] = open.sliding;
-            return Ok(Bound::Open(format!("for mu_d {low:.4} … {high:.4} {how}")));
-        }
-        // Nothing is believed that the checker does not pass.
-        let checked = checker::check(&found.certificate)
-            .context("the proof that was found does not pass its check; please report this as a defect")?;
         if let Some(path) = save {
-            file::write(path, &found.certificate)?;
+            file::write(path, &certificate)?;
         }
-        Ok(Bound::Proven(Proven { checked, cells: found.certificate.cells.len() }))
+        Ok(Bound::Proven(proven))
     }
 
     /// Checks the proof of a file, and that it is this scenario's.

@@ -1,13 +1,16 @@
 //! `clutch sim`.
 
 use crate::args::ScenarioArgs;
+use crate::live::LiveArg;
 use crate::output::{BUILD, Exit, bars, json, new_log, paragraph, report, with_progress, wrote};
 use crate::plot;
 use crate::run_figure::{Drawn, figure};
 use crate::sampled;
+use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::Context;
 use clap::Args;
+use clutch_loop::onlooker::Looking;
 use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
 use clutch_sim::friction_map::MapInRun;
@@ -18,6 +21,7 @@ use clutch_sim::reaching::Reaching;
 use clutch_sim::rig::Rig;
 use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario};
 use serde::Serialize;
+use std::io::Write;
 use std::path::PathBuf;
 
 /// Simulates a scenario and prints figures of the shaft's motion along its path.
@@ -39,6 +43,8 @@ pub(crate) struct Sim {
     /// Draws position and velocity closely around a stick, error and voltage of the whole run.
     #[arg(long, value_name = "FILE.svg|png")]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    live: LiveArg,
 }
 
 #[derive(Serialize)]
@@ -110,7 +116,22 @@ impl Sim {
         let files: Vec<&std::path::Path> =
             [&self.csv, &self.log, &self.plot].into_iter().flatten().map(PathBuf::as_path).collect();
         report(self.json, || json(&summary), || text(&summary, &run) + &wrote(&files))?;
+        if self.live.asked_for() {
+            self.play(&scenario, &run)?;
+        }
         Ok(Exit::Done)
+    }
+
+    /// Plays the run at its own pace, once a page looks on.
+    fn play(&self, scenario: &Scenario, run: &Run) -> anyhow::Result<()> {
+        let stop = stop_flag()?;
+        let Some(live) = self.live.start(&stop)? else { return Ok(()) };
+        let _ = writeln!(std::io::stderr(), "it plays once the page is open; Ctrl-C ends it");
+        if live.wait_for_page(&stop) {
+            let looking = Looking { onlooker: live, stop };
+            to_log::play_simulation(&looking, scenario, run, BUILD)?;
+        }
+        Ok(())
     }
 }
 

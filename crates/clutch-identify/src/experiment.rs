@@ -8,10 +8,11 @@
 
 use crate::recording::{ReadError, Recording};
 use crate::release;
-use clutch_core::supervisor::State;
+use clutch_core::supervisor::{Cause, State};
 use clutch_core::{DacCode, Real};
 use clutch_log::{LogWriter, Source};
 use clutch_loop::from_scenario::{self, BuildError, BuiltRun};
+use clutch_loop::onlooker::Looking;
 use clutch_loop::station::ControllerStation;
 use clutch_loop::to_log::PRESENT_CODE;
 use clutch_loop::virtual_time::{VirtualError, VirtualLoop, VirtualOptions};
@@ -270,6 +271,8 @@ fn glide(
 pub struct VirtualBoard {
     /// Folder for a log of each run, and the version that it tells.
     logs: Option<(PathBuf, String)>,
+    /// One that looks on, and the version that it is told.
+    looking: Option<(Looking, String)>,
     /// Counts at which the shaft rests.
     rests_at: Option<f64>,
 }
@@ -278,7 +281,13 @@ impl VirtualBoard {
     /// A board whose runs leave a log each in a folder, which tells this version.
     #[must_use]
     pub fn logging(folder: PathBuf, version: &str) -> Self {
-        VirtualBoard { logs: Some((folder, version.to_owned())), rests_at: None }
+        VirtualBoard { logs: Some((folder, version.to_owned())), ..VirtualBoard::default() }
+    }
+
+    /// The same, looked at if somebody looks on, who is told this version.
+    #[must_use]
+    pub fn looked_at(self, looking: Option<Looking>, version: &str) -> Self {
+        VirtualBoard { looking: looking.map(|looking| (looking, version.to_owned())), ..self }
     }
 
     /// One run, and what was recorded.
@@ -311,12 +320,19 @@ impl VirtualBoard {
         };
         let (dac, servo) = (*built.servo.dac(), built.servo);
         let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
-        let mut on_rig = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })
+        let on_rig = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })
             .map_err(VirtualError::from)?;
+        let header = |version: &str| {
+            from_scenario::header(scenario, &servo, Source::Loop, "simulated, in virtual time", version)
+        };
+        let played =
+            self.looking.as_ref().map(|(looking, version)| looking.begin(&header(version), scenario));
+        let mut on_rig = on_rig.played(played);
         let report = on_rig.run(&path)?;
         let rig = on_rig.rig();
         self.rests_at = Some(rig.shaft().position * rig.rig().encoder.counts_per_radian::<f64>());
-        if report.standing.state == State::Faulted || report.cause.is_some() {
+        let stopped = report.standing.cause == Cause::Operator;
+        if report.standing.state == State::Faulted || report.cause.is_some() || stopped {
             let cause = report.cause.unwrap_or(report.standing.cause);
             return Err(ExperimentError::Ended {
                 part: name.to_owned(),
@@ -325,8 +341,7 @@ impl VirtualBoard {
             });
         }
         if let Some((folder, version)) = &self.logs {
-            let mut header =
-                from_scenario::header(scenario, &servo, Source::Loop, "simulated, in virtual time", version);
+            let mut header = header(version);
             header.extra.push((PRESENT_CODE.to_owned(), report.present.to_string()));
             let mut log = LogWriter::create(folder.join(format!("{name}.mcap")), &header)?;
             for record in &report.records {

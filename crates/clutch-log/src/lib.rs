@@ -22,8 +22,8 @@ pub use printable::printable;
 pub use proto::{CHANNELS, Channel, Field, Kind, TIME, Value, channel_table};
 pub use read::{Log, read, read_bytes, read_while};
 pub use record::{
-    CommandRecord, EventRecord, InChannel, LinkRecord, MAX_TERMS, Record, SampleRecord, Terms, TruthRecord,
-    encode,
+    ChangeRecord, CommandRecord, EventRecord, InChannel, LinkRecord, MAX_TERMS, Record, SampleRecord, Terms,
+    TruthRecord, encode,
 };
 pub use recover::{Recovered, recover};
 pub use scan::{Damage, Limits, Scanned, Tail, scan};

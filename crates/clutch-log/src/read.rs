@@ -2,7 +2,9 @@
 
 use crate::error::LogError;
 use crate::header::Header;
-use crate::record::{CommandRecord, EventRecord, LinkRecord, Record, SampleRecord, TruthRecord};
+use crate::record::{
+    ChangeRecord, CommandRecord, EventRecord, LinkRecord, Record, SampleRecord, TruthRecord,
+};
 use crate::scan::{Damage, Each, Limits, Scanned, Tail, scan_bytes, scan_file};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -23,6 +25,8 @@ pub struct Log {
     pub events: Vec<EventRecord>,
     /// Channel `/link`.
     pub links: Vec<LinkRecord>,
+    /// Channel `/change`.
+    pub changes: Vec<ChangeRecord>,
     /// Channel `/truth`.
     pub truths: Vec<TruthRecord>,
     /// Finished by its writer and without damage. If not, see `end` and `damage`.
@@ -45,7 +49,8 @@ impl Log {
     /// Records of all channels.
     #[must_use]
     pub fn records(&self) -> usize {
-        self.samples.len() + self.commands.len() + self.events.len() + self.links.len() + self.truths.len()
+        let told = self.events.len() + self.links.len() + self.changes.len();
+        self.samples.len() + self.commands.len() + told + self.truths.len()
     }
 }
 
@@ -85,8 +90,8 @@ fn collect(
     mut go_on: impl FnMut() -> ControlFlow<()>,
     scan: impl FnOnce(Each<'_>) -> Result<Scanned, LogError>,
 ) -> Result<Log, LogError> {
-    let (mut samples, mut commands, mut events, mut links, mut truths) =
-        (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut samples, mut commands, mut events) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut links, mut changes, mut truths) = (Vec::new(), Vec::new(), Vec::new());
     let mut records = 0;
     let seen = scan(&mut |_, record| {
         records += 1;
@@ -102,6 +107,7 @@ fn collect(
             Record::Command(r) => commands.push(r),
             Record::Event(r) => events.push(r),
             Record::Link(r) => links.push(r),
+            Record::Change(r) => changes.push(r),
             Record::Truth(r) => truths.push(r),
         }
         Ok(())
@@ -114,6 +120,7 @@ fn collect(
         commands,
         events,
         links,
+        changes,
         truths,
         complete,
         tail,

@@ -376,6 +376,13 @@ records! {
         /// Records that the full ring dropped.
         10 log_dropped = log_dropped: u64, uint64;
     }
+    /// A parameter that was changed while the loop ran.
+    Change = ChangeRecord, "/change", "A parameter that was changed while the loop ran." {
+        /// Number of the parameter in the file's list of parameters, from 0.
+        2 parameter = parameter: u16, uint32;
+        /// Its value from this tick on.
+        3 value = value: f64, double (optional);
+    }
     /// The plant's true state, which only a simulation knows.
     Truth = TruthRecord, "/truth", "The plant's true state, which only a simulation knows." {
         /// Angle of the shaft, rad.

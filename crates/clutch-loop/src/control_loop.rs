@@ -12,6 +12,7 @@
 //! makes no system call but the wait for the next sample, the read and the write.
 
 use crate::drift::{Drift, DriftReport};
+use crate::live_gains::Changes;
 use crate::log_thread::Ring;
 use crate::port::Port;
 use crate::preflight::ClockOffset;
@@ -24,7 +25,7 @@ use crate::to_log;
 use crate::watch::Watch;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Arithmetic, Micros, Real};
-use clutch_log::{CommandRecord, EventKind, EventRecord, Record, SampleRecord};
+use clutch_log::{ChangeRecord, CommandRecord, EventKind, EventRecord, Record, SampleRecord};
 use clutch_node::{CycleNotice, Ending, LinkCounts, Notice, Outbox, Standing};
 use clutch_sim::Metrics;
 use clutch_sim::detected::Detector;
@@ -111,6 +112,8 @@ pub struct LoopReport {
     pub tick_cycles: CycleSummary,
     /// Telemetry of the board that did not come.
     pub untold: u64,
+    /// Changes of gains while it ran.
+    pub changed: u64,
     /// The requests that the system refused.
     pub notes: Vec<String>,
     /// Records that did not fit into the ring.
@@ -133,13 +136,17 @@ pub struct LoopReport {
 const FAREWELL: Duration = Duration::from_millis(300);
 
 /// Everything that a run needs, after the pre-flight: the board is configured.
-pub struct ConfiguredRun<'a, S> {
+pub struct ConfiguredRun<'a, S: Station> {
     /// This machine's station.
     pub station: &'a mut S,
     /// The open port.
     pub port: &'a mut Port,
     /// The ring into which records go, if they go anywhere.
     pub ring: Option<Ring>,
+    /// The ring of one that looks on.
+    pub shown: Option<Ring>,
+    /// Changes of gains, if there may be any.
+    pub changes: Option<Changes<S::Servo>>,
     /// The values that a watcher sees.
     pub watch: &'a Watch,
     /// Ticks of the run; a board that is the controller has been told, and ends it by itself.
@@ -203,6 +210,9 @@ struct Control<'a, S: Station> {
     station: &'a mut S,
     port: &'a mut Port,
     ring: Option<Ring>,
+    shown: Option<Ring>,
+    changes: Option<Changes<S::Servo>>,
+    changed: u64,
     watch: &'a Watch,
     out: Outbox,
     ticks: u64,
@@ -257,6 +267,9 @@ impl<'a, S: Station> Control<'a, S> {
         let seconds: f64 = period.seconds();
         Control {
             ring: configured.ring,
+            shown: configured.shown,
+            changes: configured.changes,
+            changed: 0,
             watch: configured.watch,
             out: Outbox::default(),
             ticks: configured.ticks,
@@ -297,6 +310,12 @@ impl<'a, S: Station> Control<'a, S> {
     }
 
     fn push(&mut self, records: &[Record]) {
+        if let Some(shown) = &mut self.shown {
+            // One that does not fit is not seen.
+            for record in records {
+                let _ = shown.push(*record);
+            }
+        }
         let Some(ring) = &mut self.ring else { return };
         // A sample and its command together or not at all; after a gap its event comes first.
         let gap = self.dropped - self.dropped_told;
@@ -518,6 +537,19 @@ impl<'a, S: Station> Control<'a, S> {
         self.ping_sent = Some((self.pings, now));
     }
 
+    /// Takes over the gains that somebody has changed, before the sample that has come.
+    fn tune(&mut self) {
+        while let Some(change) = self.changes.as_mut().and_then(|changes| changes.pop().ok()) {
+            self.station.tune(change.servo);
+            self.changed += 1;
+            let Standing { state, tick, .. } = self.station.standing();
+            let tick = if state == State::Running { tick + 1 } else { tick };
+            let time_ns = monotonic_ns().saturating_sub(self.start_ns);
+            let (parameter, value) = (change.parameter, change.value);
+            self.push(&[Record::Change(ChangeRecord { tick, time_ns, parameter, value })]);
+        }
+    }
+
     fn stop(&mut self, reason: StopReason) {
         let from = self.station.standing().state;
         self.station.stop(reason, &mut self.out);
@@ -548,6 +580,7 @@ impl<'a, S: Station> Control<'a, S> {
                 Pace::Sample => self.wait_for_sample(options.realtime.wait)?,
                 Pace::Clock => self.wait_for_clock(&mut due, options.realtime.wait),
             };
+            self.tune();
             self.cycle(arrived, &mut buffer)?;
             if self.is_over(&mut due) {
                 return Ok(());
@@ -679,6 +712,7 @@ impl<'a, S: Station> Control<'a, S> {
             clock_hz: 0,
             tick_cycles: self.tick_cycles.summary(),
             untold: standing.untold,
+            changed: self.changed,
             notes,
             log_dropped: self.dropped.saturating_sub(2 * self.untold),
             cut_writes: self.cut,

@@ -12,6 +12,7 @@
 //! | `clearance`, `words` | whether a scenario may run on a board; refusals and causes in words |
 //! | `drift` | friction over load against the bounds, from counts and voltages |
 //! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
+//! | `onlooker`, `live_gains` | one that looks on while a run goes; gains that are changed meanwhile |
 //! | `virtual_time` | the same run with a computed clock |
 //! | `sim_board`, `sim_board_server` | a board on a rig, both simulated; the same in real time behind a port |
 //! | `faults`, `faulty_line`, `campaign` | what breaks, a line on which it breaks, and the campaign over all of it |
@@ -37,11 +38,13 @@ pub mod from_scenario;
 #[cfg(target_os = "linux")]
 mod greeting;
 pub mod healthy;
+pub mod live_gains;
 pub mod lockstep_board;
 pub mod lockstep_host;
 #[cfg(target_os = "linux")]
 pub mod lockstep_session;
 pub mod log_thread;
+pub mod onlooker;
 pub mod picture;
 #[cfg(target_os = "linux")]
 pub mod port;

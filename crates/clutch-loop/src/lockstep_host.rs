@@ -9,6 +9,7 @@ use clutch_node::lockstep::Exchange;
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Settings, Standing};
 use clutch_sim::Scenario;
 use clutch_wire::{Arm, Configure, Refused, StopReason};
+use std::convert::Infallible;
 
 /// A board controller that is asked in lockstep, and its host.
 pub struct LockstepHost<L, P> {
@@ -127,6 +128,7 @@ impl<L: LockstepBoard, P: Planned<f32>> LockstepHost<L, P> {
 impl<L: LockstepBoard, P: Planned<f32>> Station for LockstepHost<L, P> {
     type Scalar = f32;
     type Terms = LawTerms<f32>;
+    type Servo = Infallible;
     const LOOKS_ON: bool = true;
 
     fn discover(&mut self, nonce: u32, out: &mut Outbox) {
@@ -175,6 +177,9 @@ impl<L: LockstepBoard, P: Planned<f32>> Station for LockstepHost<L, P> {
     ) {
         self.now_ns = now_ns;
         self.turn(bytes, out, notices);
+    }
+    fn tune(&mut self, never: Infallible) {
+        match never {}
     }
     fn standing(&self) -> Standing<f32> {
         *self.host.standing()

@@ -6,12 +6,13 @@ use crate::faults::Fault;
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_board::LockstepBoard;
 use crate::lockstep_host::lockstep_host;
+use crate::onlooker::{Looking, Played};
 use crate::qemu_board::QemuError;
 use crate::session::SessionError;
 use crate::to_log::PRESENT_CODE;
 use crate::virtual_time::{VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
 use clutch_core::{Micros, Real, Servo};
-use clutch_log::{LogWriter, Source};
+use clutch_log::{Header, LogWriter, Source};
 use clutch_sim::Scenario;
 use std::path::PathBuf;
 
@@ -30,11 +31,27 @@ pub struct LockstepOptions {
     pub latency_ns: u64,
     /// Silence of encoder and converter that the board bears, if its clock runs on while this machine computes.
     pub silence: Option<Micros>,
+    /// One that looks on.
+    pub looking: Option<Looking>,
     /// Version and commit of the build, for the log.
     pub version: String,
 }
 
 impl LockstepOptions {
+    fn header<T: Real>(&self, scenario: &Scenario, servo: &Servo<T>, board: &str) -> Header {
+        from_scenario::header(scenario, servo, Source::Loop, board, &self.version)
+    }
+
+    /// The view of a run on a kind of board, if one is wanted.
+    pub(crate) fn played<T: Real>(
+        &self,
+        scenario: &Scenario,
+        servo: &Servo<T>,
+        board: &str,
+    ) -> Option<Played> {
+        self.looking.as_ref().map(|looking| looking.begin(&self.header(scenario, servo, board), scenario))
+    }
+
     /// Writes the log of a run, if one is wanted: `on` is the kind of board, and whether the gains are certified.
     pub(crate) fn write_log<T: Real>(
         &self,
@@ -44,7 +61,7 @@ impl LockstepOptions {
         report: &VirtualReport,
     ) -> Result<(), SessionError> {
         let Some(file) = &self.log else { return Ok(()) };
-        let mut header = from_scenario::header(scenario, servo, Source::Loop, board, &self.version);
+        let mut header = self.header(scenario, servo, board);
         header.extra.push((PRESENT_CODE.to_owned(), report.present.to_string()));
         header.extra.push(("board".to_owned(), "emulated".to_owned()));
         header.extra.push(("certified".to_owned(), certified.to_string()));
@@ -135,7 +152,8 @@ impl LockstepSession {
         let station = lockstep_host(scenario, &built, start()?, ticks).map_err(SessionError::from)?;
         let path = from_scenario::path::<f32>(scenario).map_err(SessionError::from)?;
         let on_rig = VirtualLoop::new(scenario, params, station).map_err(VirtualError::from);
-        let report = on_rig?.run(&path)?;
+        let played = o.played(scenario, &built.servo, "emulated board");
+        let report = on_rig?.played(played).run(&path)?;
         self.options.write_log(scenario, &built.servo, ("emulated board", self.certified), &report)?;
         Ok(report)
     }

@@ -2,6 +2,7 @@
 
 use crate::drift::{Drift, DriftReport};
 use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::live_gains;
 use crate::to_log::{self, FOREIGN_LAW, PRESENT_CODE, START_VOLTAGE};
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Cycle, Sample, State};
@@ -252,7 +253,8 @@ fn looped<T: Real>(
     let present = extra(log, PRESENT_CODE).and_then(|v| v.parse().ok());
     let present = present.ok_or(ReplayError::Lacks("the code at arming"))?;
     let built = BuiltRun::<T>::new(scenario, 0)?;
-    let (servo, supervisor) = (&built.servo, &built.supervisor);
+    let (mut servo, supervisor) = (built.servo, &built.supervisor);
+    let mut changed = Changed::new(log, scenario);
     let path = from_scenario::path::<T>(scenario)?;
     let radians = servo.encoder().radians_per_count::<f64>();
     let mut state = SupervisorState::default();
@@ -283,11 +285,45 @@ fn looped<T: Real>(
         if state.state() == State::Armed {
             origin = FixedCounts::from_counts(i64::from(sample.counts));
         }
+        if let Some(scenario) = changed.by(sample.time_ns)? {
+            servo = BuiltRun::<T>::new(scenario, 0)?.servo;
+        }
         let planned = BeginningAt { planned: &path, origin };
-        let cycle = supervisor.sample(servo, &mut state, &seen(sample), planned);
+        let cycle = supervisor.sample(&servo, &mut state, &seen(sample), planned);
         commands.push(to_log::command(sample.time_ns, &cycle, servo.dac(), radians));
     }
     Ok(commands)
+}
+
+/// The changes of gains that a log has, one after the other. A parameter that a replay has its own value of keeps that.
+struct Changed<'a> {
+    log: &'a Log,
+    scenario: Scenario,
+    /// Values of the replay's parameters, as they were at its start.
+    asked: Vec<(String, String)>,
+    next: usize,
+}
+
+impl<'a> Changed<'a> {
+    fn new(log: &'a Log, scenario: &Scenario) -> Self {
+        Changed { log, scenario: scenario.clone(), asked: scenario.parameters(), next: 0 }
+    }
+
+    /// The scenario with what was changed before a sample at this time; none if nothing was since the last call.
+    fn by(&mut self, time_ns: u64) -> Result<Option<&Scenario>, ReplayError> {
+        let mut any = false;
+        while let Some(change) = self.log.changes.get(self.next).filter(|change| change.time_ns <= time_ns) {
+            self.next += 1;
+            let logged = self.log.header.parameters.get(usize::from(change.parameter));
+            let (key, value) = logged.ok_or(ReplayError::Lacks("the parameter that was changed"))?;
+            if self.asked.iter().any(|(k, v)| k == key && v == value) {
+                self.scenario =
+                    live_gains::with(&self.scenario, key, change.value).map_err(BuildError::from)?;
+                any = true;
+            }
+        }
+        Ok(any.then_some(&self.scenario))
+    }
 }
 
 fn simulated<T: Real, C: ControlLaw<T>>(

@@ -10,7 +10,9 @@ use crate::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, OnDrift,
 use crate::drift::DriftReport;
 use crate::faults::Fault;
 use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::live_gains::{Changes, LiveGains, Tuning};
 use crate::log_thread::{LogThread, Ring};
+use crate::onlooker::Onlooker;
 use crate::port::{Address, DeviceKind, Endpoint, Port, PortError, PseudoTerminal, SerialOptions};
 use crate::preflight::{PreflightError, Talk};
 use crate::realtime::{RealtimeOptions, WaitMode, describe_system};
@@ -24,7 +26,9 @@ use crate::watch::Watch;
 use crate::words::cause_text;
 use clutch_core::law::Law;
 use clutch_core::supervisor::Cause;
-use clutch_core::{ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState};
+use clutch_core::{
+    ActuatorKind, DacCode, Micros, Real, SafeHold, SafeHoldThenRelease, SafeRamp, SafeState, Servo,
+};
 use clutch_log::{LogError, Source};
 use clutch_node::{ControllerNode, HostNode, present_code};
 use clutch_sim::scenario::ScalarKind;
@@ -101,6 +105,8 @@ pub struct SessionOptions {
     pub pace: Pace,
     /// The effect of friction over load that leaves the bounds.
     pub on_drift: OnDrift,
+    /// One that looks on at the run, and not at a release test before it.
+    pub onlooker: Option<Arc<dyn Onlooker>>,
     /// Version and commit of the build, for log and summary.
     pub version: String,
 }
@@ -120,6 +126,7 @@ impl Default for SessionOptions {
             realtime: RealtimeOptions::default(),
             pace: Pace::default(),
             on_drift: OnDrift::default(),
+            onlooker: None,
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }
     }
@@ -294,6 +301,11 @@ impl Session {
         self.release.as_ref().ok().filter(|_| wanted)
     }
 
+    /// The receivers of the run's records.
+    fn receivers(&self) -> Receivers<'_> {
+        Receivers { log: self.options.log.as_deref(), onlooker: self.options.onlooker.as_deref() }
+    }
+
     /// The scenario as it will run.
     #[must_use]
     pub fn scenario(&self) -> &Scenario {
@@ -373,7 +385,15 @@ impl SimulatedBoard {
 struct Logging {
     thread: Option<LogThread>,
     ring: Option<Ring>,
+    shown: Option<Ring>,
     watch: Arc<Watch>,
+}
+
+/// The receivers of a run's records: none in a release test.
+#[derive(Clone, Copy, Default)]
+struct Receivers<'a> {
+    log: Option<&'a Path>,
+    onlooker: Option<&'a dyn Onlooker>,
 }
 
 /// A session on its way.
@@ -397,11 +417,11 @@ impl Course<'_> {
         let first = self.session.first(&port);
         self.announce(&hello, &port, &notes, None)?;
         if let Some(test) = first {
-            let (report, _) = self.daq_run::<T>(&test.scenario, &mut port, &hello, None)?;
+            let (report, _) = self.daq_run::<T>(&test.scenario, &mut port, &hello, Receivers::default())?;
             self.passed(&report)?;
             hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
         }
-        self.daq_run::<T>(scenario, &mut port, &hello, self.session.options.log.as_deref())
+        self.daq_run::<T>(scenario, &mut port, &hello, self.session.receivers())
     }
 
     /// A run on a board that has said who it is.
@@ -410,12 +430,13 @@ impl Course<'_> {
         scenario: &Scenario,
         port: &mut Port,
         hello: &Hello,
-        log: Option<&Path>,
+        receivers: Receivers<'_>,
     ) -> Result<Ran, SessionError> {
         let built = self.built::<T>(scenario, hello)?;
         let mut station = controller(&built, from_scenario::path(scenario)?);
         let present = present_code(hello, built.supervisor.safe_codes().hold);
-        let log = self.log(&built, present, &board_text(hello), log)?;
+        let (gains, changes) = self.tuning(scenario, &built, receivers);
+        let log = self.log(&built, present, &board_text(hello), receivers, gains)?;
         let mut talk = Talk::new(port, &mut station);
         talk.configure(present)?;
         let clock = talk.clock()?;
@@ -423,6 +444,8 @@ impl Course<'_> {
             station: &mut station,
             port,
             ring: log.ring,
+            shown: log.shown,
+            changes,
             watch: &log.watch,
             patient: self.session.patient(),
             ticks: built.ticks,
@@ -446,11 +469,12 @@ impl Course<'_> {
         let first = self.session.first(&port);
         self.announce(&hello, &port, &notes, Some(&board))?;
         if let Some(test) = first {
-            let (report, _) = self.controller_run(&test.scenario, &mut port, &hello, met.as_ref(), None)?;
+            let (report, _) =
+                self.controller_run(&test.scenario, &mut port, &hello, met.as_ref(), Receivers::default())?;
             self.passed(&report)?;
             hello = Talk::new(&mut port, &mut station).discover(GREETING)?;
         }
-        self.controller_run(scenario, &mut port, &hello, met.as_ref(), self.session.options.log.as_deref())
+        self.controller_run(scenario, &mut port, &hello, met.as_ref(), self.session.receivers())
     }
 
     /// A run on a board that closes the loop, and that has said who it is.
@@ -460,7 +484,7 @@ impl Course<'_> {
         port: &mut Port,
         hello: &Hello,
         met: Option<&ControllerHello>,
-        log: Option<&Path>,
+        receivers: Receivers<'_>,
     ) -> Result<Ran, SessionError> {
         let patient = self.session.patient();
         let built = self.built::<f32>(scenario, hello)?;
@@ -472,7 +496,7 @@ impl Course<'_> {
         }
         let hold = built.supervisor.safe_codes().hold;
         let board = met.map_or_else(String::new, controller_text);
-        let log = self.log(&built, present_code(hello, hold), &board, log)?;
+        let log = self.log(&built, present_code(hello, hold), &board, receivers, None)?;
         let mut talk = Talk::new(port, &mut station);
         talk.upload(&settings)?;
         talk.configure(hold)?;
@@ -481,6 +505,8 @@ impl Course<'_> {
             station: &mut station,
             port,
             ring: log.ring,
+            shown: log.shown,
+            changes: None,
             watch: &log.watch,
             patient,
             ticks: built.ticks,
@@ -631,25 +657,43 @@ impl Course<'_> {
         Ok(Announcement { title: scenario.name().to_owned(), rows, remarks })
     }
 
-    /// Begins the log.
+    /// The gains that one who looks on may change, and the control thread's end; none where the scenario allows none.
+    #[expect(clippy::type_complexity, reason = "two ends of one thing")]
+    fn tuning<T: Real>(
+        &self,
+        scenario: &Scenario,
+        built: &BuiltRun<T>,
+        receivers: Receivers<'_>,
+    ) -> (Option<Arc<dyn LiveGains>>, Option<Changes<Servo<T>>>) {
+        let allowed = scenario.safety().is_ok_and(|safety| safety.live_gains);
+        if !allowed || receivers.onlooker.is_none() {
+            return (None, None);
+        }
+        let (tuning, changes) = Tuning::new(scenario, built, self.session.options.uncertified);
+        (Some(Arc::new(tuning)), Some(changes))
+    }
+
+    /// Begins the log, and the view.
     fn log<T: Real>(
         &self,
         built: &BuiltRun<T>,
         present: DacCode,
         board: &str,
-        path: Option<&Path>,
+        receivers: Receivers<'_>,
+        gains: Option<Arc<dyn LiveGains>>,
     ) -> Result<Logging, SessionError> {
         let Session { scenario, options, .. } = self.session;
         let watch = Arc::new(Watch { stop: self.stop.clone(), ..Watch::default() });
-        let Some(path) = path else { return Ok(Logging { thread: None, ring: None, watch }) };
         let port = self.address.to_string();
         let mut header = from_scenario::header(scenario, &built.servo, Source::Loop, &port, &options.version);
         header.extra.push((PRESENT_CODE.to_owned(), present.0.to_string()));
         header.extra.push(("board".to_owned(), board.to_owned()));
         header.extra.push(("certified".to_owned(), self.session.certified().to_string()));
         header.extra.push(("as_sampled".to_owned(), self.session.cleared.bound_line()));
-        let (thread, ring) = LogThread::start(path, &header, watch.clone())?;
-        Ok(Logging { thread: Some(thread), ring: Some(ring), watch })
+        let started = receivers.log.map(|path| LogThread::start(path, &header, watch.clone())).transpose()?;
+        let (thread, ring) = started.unzip();
+        let shown = receivers.onlooker.map(|onlooker| onlooker.begin(&header, scenario, gains));
+        Ok(Logging { thread, ring, shown, watch })
     }
 
     /// Runs it on a thread of its own, and looks at it from this one.

@@ -5,10 +5,11 @@
 
 use crate::words::why;
 use clutch_core::law::{ControlLaw, LawTerms, Terms};
-use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned, Real};
+use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned, Real, Servo};
 use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Settings, Standing};
 use clutch_wire::{Set, StopReason};
 use std::collections::VecDeque;
+use std::convert::Infallible;
 
 /// The interval at which the host shows that it lives, ns; [`HOST_SILENCE`] is the silence after which the board ends
 /// a run.
@@ -27,6 +28,8 @@ pub trait Station {
     type Scalar: Real;
     /// The terms of its law.
     type Terms: Terms<Self::Scalar>;
+    /// The servo that takes over where gains are changed while it runs.
+    type Servo: Send;
     /// True if a board closes the loop, and this machine looks on. Then what comes over the line are reports, each with
     /// a time of its own, and the board ends the run by itself; samples are heard together, as the newest of them
     /// counts.
@@ -59,6 +62,8 @@ pub trait Station {
         notices: &mut impl FnMut(StationNotice<Self>),
     );
 
+    /// A servo with other gains takes over from the next sample on.
+    fn tune(&mut self, servo: Self::Servo);
     /// The state of control.
     fn standing(&self) -> Standing<Self::Scalar>;
     /// Counts of what the line to encoder and converter has carried.
@@ -85,9 +90,10 @@ pub struct ControllerStation<T: Real, C: ControlLaw<T>, P> {
     pub path: P,
 }
 
-impl<T: Real, C: ControlLaw<T>, P: Planned<T>> Station for ControllerStation<T, C, P> {
+impl<T: Real, C: ControlLaw<T> + Send, P: Planned<T>> Station for ControllerStation<T, C, P> {
     type Scalar = T;
     type Terms = C::Terms;
+    type Servo = Servo<T, C>;
     const LOOKS_ON: bool = false;
 
     fn discover(&mut self, nonce: u32, out: &mut Outbox) {
@@ -125,6 +131,9 @@ impl<T: Real, C: ControlLaw<T>, P: Planned<T>> Station for ControllerStation<T, 
         notices: &mut impl FnMut(StationNotice<Self>),
     ) {
         self.node.receive(now_ns, bytes, &self.path, out, notices);
+    }
+    fn tune(&mut self, servo: Servo<T, C>) {
+        self.node.tune(servo);
     }
     fn standing(&self) -> Standing<T> {
         let s = self.node.state();
@@ -199,6 +208,7 @@ impl<P> HostStation<P> {
 impl<P: Planned<f32>> Station for HostStation<P> {
     type Scalar = f32;
     type Terms = LawTerms<f32>;
+    type Servo = Infallible;
     const LOOKS_ON: bool = true;
 
     fn discover(&mut self, nonce: u32, out: &mut Outbox) {
@@ -257,6 +267,9 @@ impl<P: Planned<f32>> Station for HostStation<P> {
             }
             self.set_up(out);
         }
+    }
+    fn tune(&mut self, never: Infallible) {
+        match never {}
     }
     fn standing(&self) -> Standing<f32> {
         *self.node.standing()

@@ -139,6 +139,10 @@ impl Summary {
                 us(c.max_ns)
             ));
         }
+        if r.changed > 0 {
+            let times = if r.changed == 1 { "once".to_owned() } else { format!("{} times", r.changed) };
+            lines.push(format!("gains were changed {times} while it ran"));
+        }
         if r.untold > 0 {
             lines.push(format!(
                 "{} cycles of the board did not reach this machine; they are missing in the log",
@@ -240,6 +244,7 @@ impl Summary {
                 "max": r.tick_cycles.max_ns,
             })),
             "untold": r.untold,
+            "gains_changed": r.changed,
             "log_dropped": r.log_dropped,
             "cut_writes": r.cut_writes,
             "board_safe": r.board_safe,

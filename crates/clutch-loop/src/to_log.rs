@@ -2,11 +2,12 @@
 
 use crate::drift::Alarm;
 use crate::from_scenario::{self, BuildError};
+use crate::onlooker::Looking;
 use clutch_core::law::Terms;
 use clutch_core::supervisor::{Cause, Cycle, State};
 use clutch_core::{Dac, FixedCounts, Real, Servo};
 use clutch_log::{
-    CommandRecord, CommandSource, EventKind, EventRecord, LinkRecord, LogError, LogWriter, Record,
+    CommandRecord, CommandSource, EventKind, EventRecord, Header, LinkRecord, LogError, LogWriter, Record,
     SampleRecord, Source, TruthRecord,
 };
 use clutch_node::{CycleNotice, Ending, LinkCounts};
@@ -116,7 +117,7 @@ fn event<T: Real>(kind: EventKind, time_ns: u64, e: &Ending<T>) -> Record {
 /// Records of a simulation: every sample with its command and the shaft's true state.
 fn of_simulation<T: Real>(
     run: &clutch_sim::Run,
-    dac: &Dac<T>,
+    dac: Dac<T>,
     period: clutch_core::Micros,
 ) -> impl Iterator<Item = [Record; 3]> {
     let t = &run.trace;
@@ -203,17 +204,44 @@ pub enum SaveError {
     Stopped,
 }
 
-fn save_in<T: Real>(
-    path: &Path,
+/// Plays a simulation at its own pace to one that looks on, with the records that a log of it has; until its end, or a
+/// stop.
+///
+/// # Errors
+/// The scenario.
+pub fn play_simulation(
+    looking: &Looking,
     scenario: &Scenario,
     run: &clutch_sim::Run,
     version: &str,
+) -> Result<(), BuildError> {
+    match scenario.scalar() {
+        ScalarKind::F32 => play_in::<f32>(looking, scenario, run, version),
+        ScalarKind::F64 => play_in::<f64>(looking, scenario, run, version),
+    }
+}
+
+fn play_in<T: Real>(
+    looking: &Looking,
+    scenario: &Scenario,
+    run: &clutch_sim::Run,
+    version: &str,
+) -> Result<(), BuildError> {
+    let (header, mut ticks) = simulation::<T>(scenario, run, version, None)?;
+    let mut played = looking.begin(&header, scenario);
+    ticks.all(|tick| tick.iter().all(|record| played.show(record)));
+    Ok(())
+}
+
+/// The header and the records of a simulation.
+fn simulation<'a, T: Real>(
+    scenario: &Scenario,
+    run: &'a clutch_sim::Run,
+    version: &str,
     foreign_law: Option<&str>,
-    report: Report<'_>,
-) -> Result<(), SaveError> {
+) -> Result<(Header, impl Iterator<Item = [Record; 3]> + use<'a, T>), BuildError> {
     let spec = scenario.spec();
-    let params = spec.servo().map_err(BuildError::from)?;
-    let servo = Servo::<T>::new(&params.cast()).map_err(|e| BuildError::from(e.cast::<f64>()))?;
+    let servo = Servo::<T>::new(&spec.servo()?.cast()).map_err(|e| e.cast::<f64>())?;
     let mut header = from_scenario::header(scenario, &servo, Source::Simulation, "", version);
     let bits = format!("{:016x}", run.trace.start_voltage.to_bits());
     header.extra.push((START_VOLTAGE.to_owned(), bits));
@@ -222,9 +250,21 @@ fn save_in<T: Real>(
         header.term_names = run.trace.terms.iter().map(|(name, _)| (*name).to_owned()).collect();
         (header.law_hash, header.scalar) = (0, "f64".to_owned());
     }
+    Ok((header, of_simulation(run, *servo.dac(), spec.period)))
+}
+
+fn save_in<T: Real>(
+    path: &Path,
+    scenario: &Scenario,
+    run: &clutch_sim::Run,
+    version: &str,
+    foreign_law: Option<&str>,
+    report: Report<'_>,
+) -> Result<(), SaveError> {
+    let (header, ticks) = simulation::<T>(scenario, run, version, foreign_law)?;
     let mut log = LogWriter::create(path, &header)?;
     let total = run.trace.time.len();
-    for (i, tick) in of_simulation(run, servo.dac(), spec.period).enumerate() {
+    for (i, tick) in ticks.enumerate() {
         let finished = REPORT_EVERY.min(total - i) as u64;
         if i % REPORT_EVERY == 0 && report(Progress { total: total as u64, finished }).is_break() {
             drop(log);

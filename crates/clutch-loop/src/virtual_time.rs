@@ -7,6 +7,7 @@
 use crate::chip::ChipError;
 use crate::faults::{Direction, Fault};
 use crate::faulty_line::FaultyLine;
+use crate::onlooker::Played;
 use crate::sim_board::{SimBoard, SimBoardError};
 use crate::station::{Station, StationNotice};
 use crate::to_log;
@@ -234,6 +235,7 @@ pub struct VirtualLoop<S, B = SimBoard> {
     down: FaultyLine,
     params: VirtualOptions,
     now_ns: u64,
+    played: Option<Played>,
 }
 
 impl<S: Station> VirtualLoop<S> {
@@ -252,7 +254,13 @@ impl<S: Station, B: VirtualBoard> VirtualLoop<S, B> {
     pub fn with_board(board: B, params: VirtualOptions, station: S) -> Self {
         let line = |way| FaultyLine::new(way, params.latency_ns, &params.faults, params.seed);
         let (up, down) = (line(Direction::Up), line(Direction::Down));
-        VirtualLoop { board, station, up, down, params, now_ns: 0 }
+        VirtualLoop { board, station, up, down, params, now_ns: 0, played: None }
+    }
+
+    /// The same, looked at: no faster than a clock, and ended by an operator's stop.
+    #[must_use]
+    pub fn played(self, played: Option<Played>) -> Self {
+        VirtualLoop { played, ..self }
     }
 
     /// Discovers, configures, arms, and runs to the end; `path` is the one that the controller follows.
@@ -477,6 +485,12 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
         }
         heard.records.extend(heard.ended.map(|ending| to_log::ended(time_ns, &ending)));
         heard.records.extend(self.follow(time_ns, armed_for));
+        let ended =
+            self.on.played.as_mut().is_some_and(|p| !heard.records.iter().all(|record| p.show(record)));
+        if ended {
+            self.on.played = None;
+            heard.records.extend(self.end(time_ns, StopReason::Operator));
+        }
         if self.on.params.record {
             self.report.records.append(&mut heard.records);
         }
@@ -536,9 +550,15 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
         if S::LOOKS_ON || state != State::Running || tick + 1 < self.on.params.ticks {
             return None;
         }
-        self.on.station.stop(StopReason::Done, &mut self.out);
-        let Standing { state: to, cause, value, .. } = self.on.station.standing();
-        Some(to_log::ended(time_ns, &Ending { from: state, state: to, cause, value, tick }))
+        self.end(time_ns, StopReason::Done)
+    }
+
+    /// Ends control. A board that closes the loop says itself when it has ended.
+    fn end(&mut self, time_ns: u64, reason: StopReason) -> Option<Record> {
+        let from = self.on.station.standing().state;
+        self.on.station.stop(reason, &mut self.out);
+        let Standing { state, cause, value, tick, .. } = self.on.station.standing();
+        (!S::LOOKS_ON).then(|| to_log::ended(time_ns, &Ending { from, state, cause, value, tick }))
     }
 
     /// Sends what there is to send, as late as the stall that was asked for makes it.

@@ -93,6 +93,12 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         self.origin
     }
 
+    /// Another servo takes over from the next sample on, with the state that this one has left: one that differs in its law's
+    /// gains alone.
+    pub fn tune(&mut self, servo: Servo<T, C>) {
+        self.servo = servo;
+    }
+
     /// The servo.
     #[must_use]
     pub fn servo(&self) -> &Servo<T, C> {

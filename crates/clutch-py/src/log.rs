@@ -148,6 +148,7 @@ impl Log {
             named(&log.commands, terms)?,
             named(&log.events, terms)?,
             named(&log.links, terms)?,
+            named(&log.changes, terms)?,
             named(&log.truths, terms)?,
         ])
     }

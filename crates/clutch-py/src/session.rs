@@ -3,15 +3,17 @@
 use crate::convert::{core_error, from_json, log_error, loop_error};
 use crate::scenario::Scenario;
 use crate::stepping::native;
+use clutch_live::Live;
 use clutch_loop::clearance::ClearanceError;
 use clutch_loop::control_loop::{OnDrift, Pace};
 use clutch_loop::faults::Fault;
 use clutch_loop::from_scenario::BuildError;
+use clutch_loop::onlooker::Onlooker;
 use clutch_loop::port::Address;
 use clutch_loop::preflight::PreflightError;
 use clutch_loop::realtime::{RealtimeOptions, WaitMode};
 use clutch_loop::session::{Board, Event, Release, Session, SessionError, SessionOptions};
-use pyo3::exceptions::{PyFileExistsError, PyValueError};
+use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -59,7 +61,7 @@ fn error(py: Python<'_>, scenario: &Scenario, e: &SessionError) -> PyErr {
 #[pyo3(signature = (
     scenario, *, port, board, baud, log, uncertified, certificate, release_test, release_deg,
     on_drift, patient, faults, fault_seed, strict, pace, wait, spin_us, thread_priority,
-    lock_memory, cpu_affinity
+    lock_memory, cpu_affinity, live
 ))]
 #[allow(
     clippy::too_many_arguments,
@@ -87,6 +89,7 @@ pub(crate) fn run_loop<'py>(
     thread_priority: u8,
     lock_memory: bool,
     cpu_affinity: Option<usize>,
+    live: Option<u16>,
 ) -> PyResult<(Bound<'py, PyAny>, String, String, Option<String>)> {
     let scenario = native(scenario)?;
     if thread_priority > 99 {
@@ -99,6 +102,8 @@ pub(crate) fn run_loop<'py>(
         ));
     }
     let faults = faults.iter().map(|text| parsed::<Fault>(text)).collect::<PyResult<_>>()?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let onlooker = live.map(|port| view(py, port, &stop)).transpose()?;
     let options = SessionOptions {
         board: match (port, board) {
             (Some(port), _) => Board::Daq(parsed::<Address>(port)?),
@@ -128,10 +133,10 @@ pub(crate) fn run_loop<'py>(
         },
         on_drift: chosen("on_drift", on_drift, [("tell", OnDrift::Tell), ("stop", OnDrift::Stop)])?,
         pace: chosen("pace", pace, [("sample", Pace::Sample), ("clock", Pace::Clock)])?,
+        onlooker,
         version: clutch_cli::BUILD.to_owned(),
     };
     let session = Session::new((*scenario.0).clone(), options).map_err(|e| error(py, &scenario, &e))?;
-    let stop = Arc::new(AtomicBool::new(false));
     let (mut announced, mut interrupt) = (String::new(), None);
     let ran = py.detach(|| {
         session.run(&stop, &mut |event| match event {
@@ -158,4 +163,13 @@ pub(crate) fn run_loop<'py>(
     let ran_as = session.scenario();
     let changed = (ran_as.scalar() != scenario.0.scalar()).then(|| ran_as.canonical());
     Ok((from_json(py, &summary.to_json())?, clutch_cli::summary(&summary), announced, changed))
+}
+
+/// A live view, whose address is printed as Python prints.
+fn view(py: Python<'_>, port: u16, stop: &Arc<AtomicBool>) -> PyResult<Arc<dyn Onlooker>> {
+    let live = Live::start(port, stop.clone()).map_err(|e| {
+        PyOSError::new_err(format!("live = {port}: no view can be served at this port of 127.0.0.1: {e}"))
+    })?;
+    py.import("builtins")?.call_method1("print", (format!("live view: {}", live.address()),))?;
+    Ok(Arc::new(live))
 }

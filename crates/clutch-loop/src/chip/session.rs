@@ -174,11 +174,12 @@ impl ChipSession {
             ..VirtualOptions::default()
         };
         let board = ChipBoard::start(image, &self.scenario, &self.chip.faults, self.chip.count.as_deref());
-        let mut on_chip = VirtualLoop::with_board(board?, params, station);
-        let ran = on_chip.run(path)?;
-        let certified = self.certified;
         let chip =
             ChipKind::of(image).map_or_else(String::new, |kind| format!("model of an {}", kind.name()));
+        let played = o.played(&self.scenario, &built.servo, &chip);
+        let mut on_chip = VirtualLoop::with_board(board?, params, station).played(played);
+        let ran = on_chip.run(path)?;
+        let certified = self.certified;
         o.write_log(&self.scenario, &built.servo, (&chip, certified), &ran)?;
         Ok((ran, on_chip.into_board()))
     }

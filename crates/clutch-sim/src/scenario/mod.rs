@@ -16,7 +16,7 @@ pub use params::{Safety, ScalarKind, ScenarioBounds, ScenarioLimits, ScenarioPar
 pub use sampled::{NOISE_ROOTS, NotCovered};
 pub use schema::schema;
 pub use section::check_section;
-pub use verdict::{CertificateError, Proven, Sampled};
+pub use verdict::{CertificateError, Proven, Sampled, Unproven};
 
 use crate::friction_map::MapGrid;
 use crate::progress::Report;

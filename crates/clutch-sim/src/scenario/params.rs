@@ -113,6 +113,8 @@ params! {
         /// The reason that this safe state is the right one for this rig, in the operator's words; printed before each
         /// run.
         reason: Text, "reason" "" NONE, Range::ANY;
+        /// Gains may be changed while a loop runs, from its live view.
+        live_gains: bool = false, "live_gains" "" NONE, Range::ANY;
     }
     nested {
         /// Safe state: what the brake does when control has ended.

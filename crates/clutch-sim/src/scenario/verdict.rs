@@ -5,7 +5,7 @@ use super::sampled::{NotCovered, gains};
 use crate::number;
 use clutch_certificate::checker::{self, Checked, Refused};
 use clutch_certificate::file::{self, FileError};
-use clutch_certificate::{Gains, Setup, Stability, largest, stability};
+use clutch_certificate::{Certificate, Gains, Options, Setup, Stability, largest, search, stability};
 use clutch_core::Bounds;
 use std::path::Path;
 
@@ -54,7 +54,49 @@ pub enum CertificateError {
     },
 }
 
+/// There is no proof of a bound, which does not mean that the loop is unsafe.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Unproven {
+    /// The scenario has no sampled certificate.
+    #[error(transparent)]
+    NotCovered(#[from] NotCovered),
+    /// The loop is linearly unstable.
+    #[error("not looked for: the sampled loop is linearly unstable")]
+    Unstable,
+    /// The search left a cell open, which is named.
+    #[error("not certified (not shown unsafe): {0}")]
+    Open(String),
+    /// A defect of the search.
+    #[error("the proof that was found does not pass its check: {0}; please report this as a defect")]
+    Refused(Refused),
+}
+
 impl Sampled {
+    /// Looks for a proof of a bound on the error, and checks it: seconds.
+    ///
+    /// # Errors
+    /// There is none, or none was found.
+    pub fn prove(&self) -> Result<(Proven, Certificate), Unproven> {
+        let setup = self.setup.as_ref().map_err(NotCovered::clone)?;
+        // A shell holds whatever law is within, stable or not.
+        if self.stable() == Some(false) && !self.any_law() {
+            return Err(Unproven::Unstable);
+        }
+        let found = search(setup, &Options::default(), false);
+        if let Some(open) = found.open.first() {
+            let how = if open.grew {
+                "the set grew beyond all limits"
+            } else {
+                "the search ended before the set was closed"
+            };
+            let [low, high] = open.sliding;
+            return Err(Unproven::Open(format!("for mu_d {low:.4} … {high:.4} {how}")));
+        }
+        // Nothing is believed that the checker does not pass.
+        let checked = checker::check(&found.certificate).map_err(Unproven::Refused)?;
+        Ok((Proven { checked, cells: found.certificate.cells.len() }, found.certificate))
+    }
+
     /// Small deviations die out, with the weakest, a middle and the strongest brake; none where nothing is known.
     #[must_use]
     pub fn stable(&self) -> Option<bool> {

@@ -1,0 +1,426 @@
+//! From the records of a run to the frames that a page draws.
+
+use crate::kept::Kept;
+use clutch_core::supervisor::Cause;
+use clutch_core::{Counts, Encoder};
+use clutch_log::{
+    ChangeRecord, CommandRecord, CommandSource, EventKind, EventRecord, Header, LinkRecord, Record,
+    SampleRecord, Source, names,
+};
+use clutch_loop::live_gains::{Gain, LiveGains};
+use clutch_loop::words::cause_text;
+use clutch_sim::detected::Detector;
+use clutch_sim::{Keep, Scenario, number};
+use rtrb::Consumer;
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Time between two frames.
+const FRAME: Duration = Duration::from_millis(33);
+/// Time of a point of the curves, s: more samples than one within it become a span.
+const POINT: f64 = 1e-3;
+/// Time over which cycles are counted, s.
+const LATELY: f64 = 2.0;
+/// Upper ends of the histogram's classes, µs; the last class has none.
+const CLASSES: [u32; 13] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000];
+
+/// Starts the thread that makes frames of what comes through a ring, until that is abandoned; none if the system gives no
+/// thread.
+pub(crate) fn start(
+    header: &Header,
+    scenario: &Scenario,
+    gains: Option<Arc<dyn LiveGains>>,
+    mut records: Consumer<Record>,
+    kept: Arc<Kept>,
+) -> Option<JoinHandle<()>> {
+    let mut feed = Feed::new(header, scenario)?;
+    let listed = gains.as_ref().map(|gains| gains.gains()).unwrap_or_default();
+    kept.begin(json(&Opening::new(header, scenario, &listed)), gains);
+    let make = move || {
+        loop {
+            // Asked before the ring is emptied: what was pushed before the end is seen.
+            let last = records.is_abandoned();
+            while let Ok(record) = records.pop() {
+                feed.take(&record).into_iter().for_each(|note| kept.event(json(&note)));
+            }
+            if let Some(frame) = feed.frame() {
+                kept.frame(json(&frame));
+            }
+            if last {
+                return;
+            }
+            std::thread::sleep(FRAME);
+        }
+    };
+    std::thread::Builder::new().name("clutch-feed".into()).spawn(make).ok()
+}
+
+fn json(value: &impl Serialize) -> String {
+    // Numbers, texts and lists of them: there is nothing that JSON cannot say.
+    serde_json::to_string(value).unwrap_or_default()
+}
+
+/// The beginning of a run, as a page hears of it.
+#[derive(Serialize)]
+struct Opening<'a> {
+    scenario: &'a str,
+    law: &'a str,
+    version: &'a str,
+    place: &'a str,
+    simulated: bool,
+    duration_s: f64,
+    period_us: u32,
+    settle_s: f64,
+    count_deg: f64,
+    volts: [f64; 2],
+    classes_us: &'static [u32],
+    gains: Vec<ListedGain<'a>>,
+}
+
+/// A gain that may be changed.
+#[derive(Serialize)]
+struct ListedGain<'a> {
+    key: &'a str,
+    value: f64,
+    meaning: &'a str,
+}
+
+impl<'a> Opening<'a> {
+    fn new(header: &'a Header, scenario: &'a Scenario, gains: &'a [Gain]) -> Self {
+        let spec = scenario.spec();
+        let output = spec.output;
+        Opening {
+            scenario: &header.scenario_name,
+            law: spec.law.title(),
+            version: &header.version,
+            place: &header.port,
+            simulated: header.source == Source::Simulation,
+            duration_s: spec.run.duration,
+            period_us: header.period_us,
+            settle_s: spec.run.settle,
+            count_deg: 360.0 / f64::from(spec.rig.encoder.sensor.counts_per_rev),
+            volts: [output.lowest, output.highest],
+            classes_us: &CLASSES,
+            gains: gains
+                .iter()
+                .map(|g| ListedGain { key: &g.key, value: g.value, meaning: &g.meaning })
+                .collect(),
+        }
+    }
+}
+
+/// The points of a curve, as spans: at rates up to 1 kHz both ends of a span are the sample.
+#[derive(Default, Serialize)]
+struct Spans {
+    low: Vec<f64>,
+    high: Vec<f64>,
+}
+
+impl Spans {
+    /// A new value, in a new point or in the one that is under way.
+    fn take(&mut self, value: f64, new: bool) {
+        match (self.low.last_mut(), self.high.last_mut()) {
+            (Some(low), Some(high)) if !new => (*low, *high) = (low.min(value), high.max(value)),
+            _ => {
+                self.low.push(value);
+                self.high.push(value);
+            }
+        }
+    }
+}
+
+/// A thirtieth of a second of a run.
+#[derive(Default, Serialize)]
+struct Frame {
+    /// Time of each point, s.
+    time_s: Vec<f64>,
+    target_deg: Vec<f64>,
+    position_deg: Spans,
+    /// Null where no law was asked.
+    error_deg: Spans,
+    volts: Spans,
+    /// Times at which the encoder fell silent for as long as a stick takes, s.
+    sticks_s: Vec<f64>,
+    tick: u64,
+    state: &'static str,
+    cycles: u64,
+    cycles_per_s: f64,
+    largest_error_deg: f64,
+    lost: u64,
+    deadline_misses: u64,
+    /// Answers by the time they took, by [`CLASSES`]; wake-ups by their lateness.
+    answers: Histogram,
+    wake_ups: Histogram,
+}
+
+#[derive(Clone, Copy, Default, Serialize)]
+struct Histogram([u64; CLASSES.len() + 1]);
+
+impl Histogram {
+    fn take(&mut self, us: u32) {
+        let class = CLASSES.partition_point(|end| us >= *end);
+        if let Some(count) = self.0.get_mut(class) {
+            *count += 1;
+        }
+    }
+}
+
+/// Something that has happened.
+#[derive(Debug, PartialEq, Serialize)]
+struct Note {
+    time_s: f64,
+    text: String,
+    /// True if control ended otherwise than it should.
+    bad: bool,
+    /// The gain that was changed, and its value.
+    gain: Option<(String, f64)>,
+}
+
+/// The state of the feed.
+struct Feed {
+    /// Keys of the run's parameters.
+    keys: Vec<String>,
+    encoder: Encoder,
+    detector: Detector,
+    /// The sampling period, s: time is the run's, which a board's clock that waits does not tear.
+    period: f64,
+    settle: f64,
+    /// Samples of a point.
+    per_point: u64,
+    /// The position so far, and the counts that were its last.
+    position: Option<(i64, i32)>,
+    sample: Option<SampleRecord>,
+    taken: u64,
+    lately: VecDeque<f64>,
+    all: Frame,
+}
+
+impl Feed {
+    fn new(header: &Header, scenario: &Scenario) -> Option<Feed> {
+        let spec = scenario.spec();
+        // A checked scenario has all of these.
+        let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev).ok()?;
+        let detector = Detector::new(&spec, Keep::Figures).ok()?;
+        let period = spec.period.seconds::<f64>();
+        let per_point = ((POINT / period).round() as u64).max(1);
+        let keys = header.parameters.iter().map(|(key, _)| key.clone()).collect();
+        let all = Frame { state: "Ready", ..Frame::default() };
+        let (settle, lately) = (spec.run.settle, VecDeque::new());
+        Some(Feed {
+            keys,
+            encoder,
+            detector,
+            period,
+            settle,
+            per_point,
+            position: None,
+            sample: None,
+            taken: 0,
+            lately,
+            all,
+        })
+    }
+
+    /// A record; something has happened if it says so.
+    fn take(&mut self, record: &Record) -> Option<Note> {
+        match record {
+            Record::Sample(sample) => self.sample = Some(*sample),
+            Record::Command(command) => self.command(command),
+            Record::Link(LinkRecord { lost, deadline_misses, .. }) => {
+                (self.all.lost, self.all.deadline_misses) = (*lost, *deadline_misses);
+            }
+            Record::Event(event) => return Some(self.event(event)),
+            Record::Change(change) => return Some(self.change(change)),
+            Record::Truth(_) => {}
+        }
+        None
+    }
+
+    fn command(&mut self, command: &CommandRecord) {
+        // A view that missed the sample leaves the command out.
+        let Some(sample) = self.sample.take().filter(|s| s.tick == command.tick) else { return };
+        let counts = sample.counts;
+        let (at, last) = self.position.unwrap_or((i64::from(counts), counts));
+        let at = at + i64::from(counts.wrapping_sub(last));
+        self.position = Some((at, counts));
+        let time = command.tick as f64 * self.period;
+        let new = self.taken.is_multiple_of(self.per_point) || self.all.time_s.is_empty();
+        self.taken += 1;
+        let all = &mut self.all;
+        if new {
+            all.time_s.push(rounded(time, 1e5));
+            all.target_deg.push(rounded(command.target_position.to_degrees(), 1e6));
+        }
+        let degrees = at as f64 * self.encoder.radians_per_count::<f64>().to_degrees();
+        all.position_deg.take(rounded(degrees, 1e6), new);
+        let by_law = command.source == CommandSource::Law as u8;
+        let error = if by_law { command.error.to_degrees() } else { f64::NAN };
+        all.error_deg.take(rounded(error, 1e6), new);
+        all.volts.take(rounded(command.voltage, 1e4), new);
+        all.tick = command.tick;
+        all.state = names::name_of(names::STATES, command.state);
+        if sample.lateness_us > 0 {
+            all.answers.take(sample.lateness_us);
+        }
+        if sample.wake_us > 0 {
+            all.wake_ups.take(sample.wake_us);
+        }
+        if !by_law {
+            return;
+        }
+        if time >= self.settle {
+            all.largest_error_deg = all.largest_error_deg.max(error.abs());
+        }
+        let velocity = command.target_velocity;
+        if self.detector.sample(command.tick, Counts(counts), velocity, command.voltage).begins {
+            all.cycles += 1;
+            all.sticks_s.push(rounded(time, 1e5));
+            self.lately.push_back(time);
+        }
+        while self.lately.front().is_some_and(|t| *t < time - LATELY) {
+            self.lately.pop_front();
+        }
+        all.cycles_per_s = self.lately.len() as f64 / LATELY.min(time.max(0.1));
+    }
+
+    fn change(&self, change: &ChangeRecord) -> Note {
+        let key = self.keys.get(usize::from(change.parameter)).cloned().unwrap_or_default();
+        let text = format!("{key} = {}", number(change.value));
+        let time_s = rounded(change.tick as f64 * self.period, 1e3);
+        Note { time_s, text, bad: false, gain: Some((key, change.value)) }
+    }
+
+    fn event(&mut self, event: &EventRecord) -> Note {
+        let (from, to) = (names::name_of(names::STATES, event.from), names::name_of(names::STATES, event.to));
+        self.all.state = to;
+        let cause = Cause::from_u8(event.cause).unwrap_or(Cause::None);
+        let why = || cause_text(cause, event.value, false, true);
+        let at_rest = matches!(cause, Cause::None | Cause::Done | Cause::Operator);
+        let (text, bad) = match EventKind::from_number(event.kind) {
+            Some(EventKind::StateChange | EventKind::Ended) if cause == Cause::None => {
+                (format!("{} → {}", from.to_lowercase(), to.to_lowercase()), false)
+            }
+            Some(EventKind::StateChange | EventKind::Ended) => {
+                (format!("{} → {}: {}", from.to_lowercase(), to.to_lowercase(), why()), !at_rest)
+            }
+            Some(EventKind::LogDropped) => (format!("the log has lost {} records", event.value), true),
+            Some(EventKind::PortLost) => ("the port is gone".to_owned(), true),
+            Some(EventKind::Drift) => {
+                let seen = number(event.value);
+                (format!("friction over load is {seen} times the model's: outside of [bounds]"), true)
+            }
+            None => (format!("event {}", event.kind), true),
+        };
+        Note { time_s: rounded(event.tick as f64 * self.period, 1e3), text, bad, gain: None }
+    }
+
+    /// The frame since the last one; none if nothing has come.
+    fn frame(&mut self) -> Option<Frame> {
+        if self.all.time_s.is_empty() {
+            return None;
+        }
+        let all = &self.all;
+        let next = Frame {
+            tick: all.tick,
+            state: all.state,
+            cycles: all.cycles,
+            cycles_per_s: all.cycles_per_s,
+            largest_error_deg: all.largest_error_deg,
+            lost: all.lost,
+            deadline_misses: all.deadline_misses,
+            answers: all.answers,
+            wake_ups: all.wake_ups,
+            ..Frame::default()
+        };
+        Some(std::mem::replace(&mut self.all, next))
+    }
+}
+
+/// A number with as many digits as a picture needs.
+fn rounded(value: f64, parts: f64) -> f64 {
+    (value * parts).round() / parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn feed(period_us: &str) -> Feed {
+        let set = [("sampling.period_us".to_owned(), period_us.to_owned())];
+        let scenario = Scenario::load("board_smc_2".as_ref(), &set).unwrap();
+        let header = Header { parameters: vec![("law.smc.kp_v".into(), "3".into())], ..Header::default() };
+        Feed::new(&header, &scenario).unwrap()
+    }
+
+    fn tick(feed: &mut Feed, tick: u64, counts: i32, source: CommandSource) {
+        let sample = SampleRecord { tick, counts, lateness_us: 7, ..SampleRecord::default() };
+        assert_eq!(feed.take(&Record::Sample(sample)), None);
+        let error = 1e-3 * tick as f64;
+        let command =
+            CommandRecord { tick, source: source as u8, error, voltage: 2.0, ..CommandRecord::default() };
+        assert_eq!(feed.take(&Record::Command(command)), None);
+    }
+
+    #[test]
+    fn a_fast_loops_samples_become_spans_of_a_millisecond() {
+        let mut feed = feed("250");
+        (0..9).for_each(|i| tick(&mut feed, i, i as i32, CommandSource::Law));
+        let frame = feed.frame().unwrap();
+        assert_eq!(frame.time_s, [0.0, 0.001, 0.002]);
+        assert_eq!(frame.position_deg.low, [0.0, 0.072, 0.144]);
+        assert_eq!(frame.position_deg.high, [0.054, 0.126, 0.144]);
+        // The point under way goes on in the next frame as one of its own.
+        tick(&mut feed, 9, 9, CommandSource::Law);
+        assert_eq!(feed.frame().unwrap().time_s, [0.00225]);
+        assert!(feed.frame().is_none());
+    }
+
+    #[test]
+    fn a_tick_without_the_law_has_no_error_and_counts_wrap() {
+        let mut feed = feed("1000");
+        tick(&mut feed, 0, i32::MAX, CommandSource::Law);
+        tick(&mut feed, 1, i32::MIN, CommandSource::Safe);
+        let frame = feed.frame().unwrap();
+        let moved = frame.position_deg.low[1] - frame.position_deg.low[0];
+        assert!((moved - 0.018).abs() < 1e-5, "{moved}");
+        let told: serde_json::Value = serde_json::from_str(&json(&frame)).unwrap();
+        assert_eq!(told["error_deg"]["low"][0], 0.0);
+        assert!(told["error_deg"]["low"][1].is_null());
+        assert_eq!(told["answers"][3], 2, "7 µs are from 5 to 10");
+    }
+
+    #[test]
+    fn a_command_whose_sample_was_missed_is_left_out() {
+        let mut feed = feed("1000");
+        let alone = CommandRecord { tick: 5, ..CommandRecord::default() };
+        assert_eq!(feed.take(&Record::Command(alone)), None);
+        let other = SampleRecord { tick: 6, ..SampleRecord::default() };
+        assert_eq!(feed.take(&Record::Sample(other)), None);
+        assert_eq!(feed.take(&Record::Command(CommandRecord { tick: 7, ..CommandRecord::default() })), None);
+        assert!(feed.frame().is_none());
+    }
+
+    #[test]
+    fn what_happens_is_told_in_words_and_faults_are_marked() {
+        let mut feed = feed("1000");
+        let mut told = |kind: EventKind, to: u8, cause: Cause| {
+            let (kind, cause) = (kind as u8, cause as u8);
+            let event =
+                EventRecord { tick: 2500, kind, from: 3, to, cause, value: 2.0, ..EventRecord::default() };
+            let note = feed.take(&Record::Event(event)).unwrap();
+            (note.time_s, note.text, note.bad)
+        };
+        let done = "running → holding: the path is done".to_owned();
+        assert_eq!(told(EventKind::Ended, 4, Cause::Done), (2.5, done, false));
+        let lost = "running → faulted: 2 samples lost within 128 cycles".to_owned();
+        assert_eq!(told(EventKind::StateChange, 6, Cause::Lost), (2.5, lost, true));
+        assert!(told(EventKind::Drift, 3, Cause::None).2);
+        let change = ChangeRecord { tick: 3000, parameter: 0, value: 4.0, ..ChangeRecord::default() };
+        let note = feed.take(&Record::Change(change)).unwrap();
+        assert_eq!((note.time_s, note.text.as_str()), (3.0, "law.smc.kp_v = 4"));
+        assert_eq!(note.gain, Some(("law.smc.kp_v".to_owned(), 4.0)));
+    }
+}

@@ -1,0 +1,186 @@
+//! Gains that are changed while a loop runs: each change is checked and certified before it comes into force.
+//!
+//! A change is made beside the control thread, as a servo that takes over with the state that the old one has left. It has
+//! to be of the law that runs and to change nothing else, above all nothing that the supervisor watches. The error of
+//! the sampled loop with the new gains has to have a proven bound; that is a bound of a run with these gains from its
+//! start. The change-over itself is covered by no certificate: the supervisor watches it as it watches everything.
+
+use crate::from_scenario::BuiltRun;
+use clutch_core::law::LawParams;
+use clutch_core::params::{Choice, Kind};
+use clutch_core::{Real, Servo, Supervisor};
+use clutch_sim::scenario::Value;
+use clutch_sim::scenario::describe::{Entry, description, entries};
+use clutch_sim::{Scenario, number};
+use std::fmt;
+use std::sync::{Mutex, PoisonError};
+
+/// Changes that may wait for the control thread.
+const WAITING: usize = 16;
+
+/// A gain of the law that runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gain {
+    /// Its key in a scenario.
+    pub key: String,
+    /// Its value, in the unit of the key.
+    pub value: f64,
+    /// Its meaning and range.
+    pub meaning: String,
+}
+
+/// A change was refused: nothing has changed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Refusal(
+    /// The reason, with key, value and what is expected.
+    pub String,
+);
+
+/// Gains that may be changed.
+pub trait LiveGains: fmt::Debug + Send + Sync {
+    /// The gains as they are now.
+    fn gains(&self) -> Vec<Gain>;
+
+    /// Changes one. Gives what is certified of the loop with it, in words. It takes seconds.
+    ///
+    /// # Errors
+    /// The value is out of range, has no certificate, or the run is over.
+    fn change(&self, key: &str, value: f64) -> Result<String, Refusal>;
+}
+
+/// A change on its way to the control thread.
+#[derive(Clone, Copy, Debug)]
+pub struct Change<V> {
+    /// The servo that takes over.
+    pub servo: V,
+    /// Number of the parameter in the scenario's list.
+    pub parameter: u16,
+    /// Its new value.
+    pub value: f64,
+}
+
+/// The control thread's end.
+pub type Changes<V> = rtrb::Consumer<Change<V>>;
+
+/// The gains of a run in the scalar `T`.
+pub(crate) struct Tuning<T: Real> {
+    state: Mutex<State<T>>,
+    /// True if gains without a certificate may run.
+    uncertified: bool,
+}
+
+struct State<T: Real> {
+    /// The scenario as it is now.
+    scenario: Scenario,
+    supervisor: Supervisor<T>,
+    ring: rtrb::Producer<Change<Servo<T>>>,
+}
+
+impl<T: Real> fmt::Debug for Tuning<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Tuning").field("uncertified", &self.uncertified).finish_non_exhaustive()
+    }
+}
+
+impl<T: Real> Tuning<T> {
+    /// For a run that is built, and the end for its control thread.
+    pub(crate) fn new(
+        scenario: &Scenario,
+        built: &BuiltRun<T>,
+        uncertified: bool,
+    ) -> (Self, Changes<Servo<T>>) {
+        let (ring, changes) = rtrb::RingBuffer::new(WAITING);
+        let state = State { scenario: scenario.clone(), supervisor: built.supervisor, ring };
+        (Tuning { state: Mutex::new(state), uncertified }, changes)
+    }
+}
+
+/// The gains of a scenario's law: real numbers that stand in its own table.
+fn gains(scenario: &Scenario) -> Vec<Gain> {
+    let law = &scenario.params().law;
+    let choice = <LawParams<f64> as Choice<f64>>::CHOICE;
+    let name = Choice::<f64>::name(law);
+    let Some(option) = choice.options.get(Choice::<f64>::chosen(law)) else { return Vec::new() };
+    let values = scenario.table().get("law").and_then(|t| t.get(name));
+    let value = |key: &str| match values?.get(key)? {
+        Value::Float(x) => Some(*x),
+        Value::Integer(x) => Some(*x as f64),
+        _ => None,
+    };
+    let gain = |entry| match entry {
+        Entry::Row(row, table) if row.kind == Kind::Real => {
+            let (key, meaning) = (format!("law.{name}.{}", row.key), description(row, table));
+            value(row.key).map(|value| Gain { key, value, meaning })
+        }
+        _ => None,
+    };
+    entries(option.table).into_iter().filter_map(gain).collect()
+}
+
+/// The number of a key in a scenario's list of parameters.
+fn number_of(scenario: &Scenario, key: &str) -> Option<u16> {
+    let place = scenario.parameters().iter().position(|(k, _)| k == key)?;
+    u16::try_from(place).ok()
+}
+
+/// A scenario with another value of a key.
+///
+/// # Errors
+/// As those of a file.
+pub(crate) fn with(
+    scenario: &Scenario,
+    key: &str,
+    value: f64,
+) -> Result<Scenario, clutch_sim::ScenarioError> {
+    let set = [(key.to_owned(), format!("{value:?}"))];
+    Scenario::parse(scenario.name(), &scenario.canonical(), &set)
+}
+
+impl<T: Real> LiveGains for Tuning<T> {
+    fn gains(&self) -> Vec<Gain> {
+        gains(&self.state.lock().unwrap_or_else(PoisonError::into_inner).scenario)
+    }
+
+    fn change(&self, key: &str, value: f64) -> Result<String, Refusal> {
+        let refuse = |why: String| Refusal(why);
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = gains(&state.scenario);
+        if !known.iter().any(|gain| gain.key == key) {
+            let keys: Vec<&str> = known.iter().map(|gain| gain.key.as_str()).collect();
+            return Err(refuse(format!("{key}: expected a gain of the law that runs: {}", keys.join(", "))));
+        }
+        let changed = with(&state.scenario, key, value).map_err(|e| refuse(e.to_string()))?;
+        let plan = changed.plan().map_err(|e| refuse(e.to_string()))?;
+        let sampled = changed.sampled(&plan.bounds);
+        let verdict = match sampled.prove() {
+            Ok((proven, _)) if sampled.bound_suffices() => {
+                format!(
+                    "certified as sampled: |e| stays below {} °",
+                    number(proven.checked.error_bound.to_degrees())
+                )
+            }
+            Ok(_) => "the bound of the error holds, but linear stability is not known".to_owned(),
+            Err(why) if self.uncertified => format!("UNCERTIFIED, as asked: {why}"),
+            Err(why) => return Err(refuse(format!("{key} = {value}: not certified as sampled: {why}"))),
+        };
+        let built = BuiltRun::<T>::new(&changed, 0).map_err(|e| refuse(e.to_string()))?;
+        if built.supervisor != state.supervisor {
+            return Err(refuse(format!(
+                "{key} = {value}: changes what the supervisor watches; end the run first"
+            )));
+        }
+        let parameter = number_of(&changed, key)
+            .ok_or_else(|| refuse(format!("{key}: expected a key of the scenario's list of parameters")))?;
+        if state.ring.is_abandoned() {
+            return Err(refuse("the run is over".to_owned()));
+        }
+        let change = Change { servo: built.servo, parameter, value };
+        state
+            .ring
+            .push(change)
+            .map_err(|_| refuse("the loop has not taken the last changes yet".to_owned()))?;
+        state.scenario = changed;
+        Ok(verdict)
+    }
+}

@@ -1,0 +1,62 @@
+"""Pages for those who begin: every command of a page runs, in its order, and prints the lines that the page has."""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from test_docs_python import DOCS, ELSEWHERE, FENCE, ROOT
+
+PAGES = sorted((DOCS / "start").glob("*.md"))
+
+
+def steps(text):
+    """A page's commands in order: line of the page, script, lines that it prints."""
+    found, end_of_last = [], None
+    for fence in FENCE.finditer(text):
+        language, body = fence.groups()
+        if language == "sh":
+            elsewhere = ELSEWHERE.search(text[: fence.start()])
+            if elsewhere:
+                assert (ROOT / elsewhere[1]).is_file(), elsewhere[1]
+                end_of_last = None
+                continue
+            found.append([text[: fence.start()].count("\n") + 1, body, []])
+            end_of_last = fence.end()
+        elif language == "text" and end_of_last and not text[end_of_last : fence.start()].strip():
+            found[-1][2] = body.splitlines()
+    return found
+
+
+def plain(text):
+    """A text without what depends on the width of a terminal."""
+    return re.sub(r"\s+", " ", text)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_commands_of_a_page_run_and_print_what_the_page_says(page, clutch, tmp_path):
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "clutch").symlink_to(clutch.binary)
+    environment = {**os.environ, "PATH": f"{tmp_path / 'bin'}{os.pathsep}{os.environ['PATH']}"}
+    for line, script, prints in steps(page.read_text(encoding="utf-8")):
+        done = subprocess.run(
+            ["bash", "-euo", "pipefail", "-c", script],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            encoding="utf-8",
+            timeout=180,
+        )
+        assert done.returncode == 0, f"{page.name}:{line}: {done.stdout}{done.stderr}"
+        rest = plain(done.stdout + done.stderr)
+        for expected in map(plain, prints):
+            assert expected in rest, f"{page.name}:{line}: no {expected!r} in {rest}"
+            rest = rest.split(expected, 1)[1]
+
+
+def test_each_reader_of_the_start_page_has_a_page():
+    start = (DOCS / "index.md").read_text(encoding="utf-8")
+    assert len(PAGES) == 5
+    assert all(f"start/{page.stem}" in start for page in PAGES)
