@@ -81,7 +81,12 @@ impl Wheel {
         let folder = std::env::temp_dir().join(format!("clutch-wheel-{}", std::process::id()));
         let environment = folder.join("environment");
         let _ = std::fs::remove_dir_all(&folder);
-        let (_, source) = source_distribution(tools, &dist, &folder.join("unpacked"))?;
+        let unpacked = folder.join("unpacked");
+        std::fs::create_dir_all(&unpacked).with_context(|| folder.display().to_string())?;
+        program(beside(tools, "maturin")).args(["sdist", "--out"]).arg(&dist).run()?;
+        // With the time of now (-m): maturin packs each file with one date, and cargo would not see a change.
+        program("tar").arg("-xmf").arg(the_one(&dist, ".tar.gz")?).arg("-C").arg(&unpacked).run()?;
+        let source = the_one(&unpacked, "")?;
         let wheel = Wheel { folder, source, python: environment.join("bin/python") };
         let pip = |python: &Path| program(python).args(["-m", "pip", "--disable-pip-version-check"]);
         // A separate build environment would download maturin once more.
@@ -125,16 +130,6 @@ impl Wheel {
             path
         }))
     }
-}
-
-/// Packs the source distribution into `out`, and unpacks it again; gives the archive, and the unpacked source.
-pub(crate) fn source_distribution(tools: &Path, out: &Path, unpacked: &Path) -> Result<(PathBuf, PathBuf)> {
-    std::fs::create_dir_all(unpacked).with_context(|| unpacked.display().to_string())?;
-    program(beside(tools, "maturin")).args(["sdist", "--out"]).arg(out).run()?;
-    let archive = the_one(out, ".tar.gz")?;
-    // With the time of now (-m): maturin packs each file with one date, and cargo would not see a change.
-    program("tar").arg("-xmf").arg(&archive).arg("-C").arg(unpacked).run()?;
-    Ok((archive, the_one(unpacked, "")?))
 }
 
 /// The search path with an interpreter's folder first.

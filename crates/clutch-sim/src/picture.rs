@@ -4,7 +4,7 @@
 //! short enough to tell one stair from the next; an [`Envelope`] shows how far the whole goes, and its mean.
 
 use crate::engine::{Event, EventKind};
-use crate::run::Run;
+use crate::run::{Run, Trace};
 use crate::scenario::Scenario;
 use std::ops::Range;
 

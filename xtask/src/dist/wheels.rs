@@ -4,30 +4,26 @@ use super::machine::{Machine, python_arm64};
 use super::tools::{GLIBC, LINUX, LINUX_ARM64, Tools, WINDOWS};
 use super::{Made, folder, name, work};
 use crate::python;
-use crate::run::{program, root};
+use crate::run::program;
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The longest time from `pip install` of a wheel to the first picture, s.
-const FIRST_PICTURE_S: f64 = 60.0;
-
 pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
-    let (packed, source) = python::source_distribution(&tools.python, &work("sdist")?, &work("source")?)?;
     let manylinux = format!("manylinux_{}", GLIBC.replace('.', "_"));
     let zig = ["--zig", "--compatibility", &manylinux, "--auditwheel", "check"];
-    // From the source distribution, which thereby is complete. Its lock file lacks what is not in it: not `locked`.
-    let linux = wheel(tools, &source, LINUX, &zig)?;
-    let locked = |more: &[&str], target| wheel(tools, &root(), target, &[&["--locked"], more].concat());
-    let (arm64, windows) = (locked(&zig, LINUX_ARM64)?, locked(&[], WINDOWS)?);
+    let linux = wheel(tools, LINUX, &zig)?;
+    let (arm64, windows) = (wheel(tools, LINUX_ARM64, &zig)?, wheel(tools, WINDOWS, &[])?);
+    let source = work("sdist")?;
+    tools.program("maturin").args(["sdist", "--out"]).arg(&source).run()?;
+    let archive = kept(&python::the_one(&source, ".tar.gz")?)?;
 
-    let archive = kept(&packed)?;
     let (clean, picture) = first_picture(tools, &linux)?;
     let here = Machine::here().results(&[&clean.join("bin/clutch")], "wheel")?;
     let on_arm64 = arm64_results(tools, &arm64)?;
     let checked = vec![audited(tools, &linux)?, picture, here.told()];
     Ok(vec![
-        Made { checked: vec![format!("{} is built from it", name(&linux))], file: archive },
+        Made { checked: vec!["not tried here: the tests build from it".to_owned()], file: archive },
         Made { checked, file: linux },
         Made { checked: vec![audited(tools, &arm64)?, on_arm64.same_as(&here)?], file: arm64 },
         Made { checked: vec![imports(tools, &windows)?], file: windows },
@@ -35,10 +31,10 @@ pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
 }
 
 /// Builds the wheel for a target.
-fn wheel(tools: &Tools, source: &Path, target: &str, options: &[&str]) -> Result<PathBuf> {
+fn wheel(tools: &Tools, target: &str, options: &[&str]) -> Result<PathBuf> {
     let out = work(&format!("wheel-{target}"))?;
-    let build = tools.program("maturin").within(source).args(["build", "--release", "--target", target]);
-    build.args(options).arg("--out").arg(&out).env("CARGO_TARGET_DIR", root().join("target")).run()?;
+    let build = tools.program("maturin").args(["build", "--release", "--locked", "--target", target]);
+    build.args(options).arg("--out").arg(&out).run()?;
     kept(&python::the_one(&out, ".whl")?)
 }
 
@@ -78,10 +74,6 @@ fn first_picture(tools: &Tools, wheel: &Path) -> Result<(PathBuf, String)> {
     program(clean.join("bin/python")).within(&folder).args(["-c", plot]).env("MPLBACKEND", "agg").run()?;
     is_picture(&folder.join("second.png"))?;
     let all = begin.elapsed().as_secs_f64();
-    ensure!(
-        all <= FIRST_PICTURE_S,
-        "{all:.0} s from pip install to pictures: {FIRST_PICTURE_S} s is the most"
-    );
     let told = format!(
         "from pip install with matplotlib to the picture of clutch sim {drawn:.1} s, of Result.plot {all:.1} s \
          (pip {installed:.1} s)"
