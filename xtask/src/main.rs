@@ -188,6 +188,8 @@ enum Verb {
     },
     /// Regenerates the type stub of the Python package's native module.
     Stubs,
+    /// Builds the wheel, runs the notebooks with it, and keeps their outputs in them.
+    Notebooks,
     /// Counts the files and places in which a fact of each kind is written: a law, a metric, … Two revisions
     /// stand side by side.
     Touch {
@@ -265,6 +267,7 @@ fn main() -> Result<()> {
         Verb::Fmu { scenario } => fmu::pack(scenario.as_deref(), true).map(drop),
         Verb::Libclutch { targets } => libclutch::run(&targets),
         Verb::Stubs => stubs::generate(&python::interpreter()?),
+        Verb::Notebooks => notebooks(),
         Verb::Touch { revisions, list } => touch::print(&revisions, list),
         Verb::Size { revisions } => size::print(&revisions),
         Verb::Generate { check } => generate(if check { &["--check"] } else { &[] }),
@@ -315,6 +318,12 @@ fn check() -> Result<()> {
 
 fn docs() -> Result<()> {
     cargo(["doc", "--workspace", "--no-deps", "--exclude", "xtask"]).env("RUSTDOCFLAGS", "-D warnings").run()
+}
+
+fn notebooks() -> Result<()> {
+    let tools = python::interpreter()?;
+    let wheel = python::Wheel::install(&tools)?;
+    wheel.program(&tools)?.arg(root().join("docs/notebooks.py")).run()
 }
 
 fn figures() -> Result<()> {
