@@ -204,7 +204,7 @@ fn the_boards_log_replays_bit_for_bit_on_this_machine() {
         ran.records.iter().for_each(|r| log.write(r).expect("room for it"));
         log.finish().expect("room for it");
         let log = clutch_log::read(&file, &Limits::default()).expect("a log");
-        let replayed = replay(&log, &scenario, clutch_sim::progress::UNWATCHED).expect("its own scenario");
+        let replayed = replay(&log, &scenario, UNWATCHED).expect("its own scenario");
         assert_eq!(replayed.first, None, "{law}");
         assert!(replayed.commands.len() > 10_000, "{law}: {} ticks", replayed.commands.len());
     }
