@@ -148,7 +148,7 @@ fn the_button_is_the_operators_stop() {
 #[test]
 fn a_foreign_page_a_foreign_name_and_one_without_the_token_get_nothing() {
     let _beside = beside_others();
-    let viewed = Viewed::start(&["sim", "pd_2", "--set", "run.duration_s=1"]);
+    let viewed = Viewed::start(&["sim", "pd_2", "--set", "run.duration_s=2"]);
     for target in ["/", "/events", "/stop"] {
         let of_us = format!("{target}?{}", viewed.query);
         let method = if target == "/stop" { "POST" } else { "GET" };
@@ -164,7 +164,7 @@ fn a_foreign_page_a_foreign_name_and_one_without_the_token_get_nothing() {
     assert_eq!(outside, None, "the page needs nothing but itself");
     // It has waited for a page; now it plays.
     let last = viewed.events().filter(|(kind, _)| kind == "frame").last().expect("frames");
-    assert_eq!(last.1["tick"], 999);
+    assert_eq!(last.1["tick"], 1999);
     assert_eq!(viewed.done().0, Some(0));
 }
 

@@ -77,6 +77,7 @@ fn every_record_and_the_header_come_back_bit_for_bit() {
             "/command" => log.commands.len(),
             "/event" => log.events.len(),
             "/link" => log.links.len(),
+            "/change" => log.changes.len(),
             "/truth" => log.truths.len(),
             other => panic!("{other}"),
         };
@@ -125,7 +126,7 @@ fn a_log_is_a_valid_mcap_file_with_index_times_and_named_channels() {
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     let stats = summary.stats.unwrap();
     assert_eq!(stats.message_count, 60 + 3);
-    assert_eq!((stats.attachment_count, stats.metadata_count, stats.channel_count), (1, 2, 6));
+    assert_eq!((stats.attachment_count, stats.metadata_count, stats.channel_count), (1, 2, 7));
     assert_eq!(summary.attachment_indexes[0].name, "scenario.toml");
 }
 

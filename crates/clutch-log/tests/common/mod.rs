@@ -2,7 +2,8 @@
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses its own part")]
 
 use clutch_log::{
-    CommandRecord, EventRecord, Header, LinkRecord, LogWriter, Record, SampleRecord, Source, TruthRecord,
+    ChangeRecord, CommandRecord, EventRecord, Header, LinkRecord, LogWriter, Record, SampleRecord, Source,
+    TruthRecord,
 };
 use std::path::{Path, PathBuf};
 
@@ -88,7 +89,7 @@ pub fn record(n: &mut Numbers, tick: u64, time_ns: u64) -> Record {
             _ => n.next() >> n.below(64),
         }
     }
-    match n.below(5) {
+    match n.below(6) {
         0 => Record::Sample(SampleRecord {
             tick,
             time_ns,
@@ -141,6 +142,7 @@ pub fn record(n: &mut Numbers, tick: u64, time_ns: u64) -> Record {
             deadline_misses: whole(n),
             log_dropped: whole(n),
         }),
+        4 => Record::Change(ChangeRecord { tick, time_ns, parameter: whole(n) as u16, value: real(n) }),
         _ => Record::Truth(TruthRecord {
             tick,
             time_ns,
@@ -212,6 +214,7 @@ pub fn bits(record: &Record) -> Vec<u64> {
             r.deadline_misses,
             r.log_dropped,
         ],
+        Record::Change(r) => vec![5, r.tick, r.time_ns, r.parameter.into(), r.value.to_bits()],
         Record::Truth(r) => {
             vec![4, r.tick, r.time_ns, r.position.to_bits(), r.velocity.to_bits(), r.stuck.into()]
         }
