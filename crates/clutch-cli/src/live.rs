@@ -1,13 +1,13 @@
-//! `--live`: the view of a run in a browser.
+//! `--live`, `--foxglove`: views of a run while it goes on.
 
 use crate::output::shown;
 use anyhow::Context;
 use clap::Args;
-use clutch_live::Live;
+use clutch_live::{Live, foxglove};
 use clutch_loop::onlooker::Looking;
-use std::io::Write;
-use std::sync::Arc;
+use std::io::{self, Write};
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, LazyLock};
 
 #[derive(Args)]
 pub(crate) struct LiveArg {
@@ -15,21 +15,31 @@ pub(crate) struct LiveArg {
     /// (docs/live.md).
     #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
     live: Option<u16>,
+    /// Serves the run's records to Foxglove while it goes on, at an address of this machine that is printed: PORT, 0 for a
+    /// free one (docs/foxglove.md).
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true,
+        default_missing_value = PORT.as_str())]
+    foxglove: Option<u16>,
 }
+
+/// The port that Foxglove proposes, as the command line has it.
+static PORT: LazyLock<String> = LazyLock::new(|| foxglove::PORT.to_string());
 
 impl LiveArg {
     pub(crate) fn asked_for(&self) -> bool {
-        self.live.is_some()
+        self.live.is_some() || self.foxglove.is_some()
     }
 
-    /// Serves the view, if it was asked for, and prints its address; the page's button sets `stop`.
+    /// Serves the views that were asked for, if any, and prints their addresses; the page's button sets `stop`.
     pub(crate) fn start(&self, stop: &Arc<AtomicBool>) -> anyhow::Result<Option<Arc<Live>>> {
-        let Some(port) = self.live else { return Ok(None) };
-        let live = Live::start(port, stop.clone())
-            .with_context(|| format!("--live={port}: no view can be served at this port of 127.0.0.1"))?;
-        let text = format!("live view: {}\n", live.address());
-        let _ = std::io::stderr().write_all(shown(&text).as_bytes()); // a terminal that has gone away
-        Ok(Some(Arc::new(live)))
+        let mut live = Live::default();
+        if let Some(port) = self.live {
+            tell("live view", "live", port, live.page(port, stop.clone()))?;
+        }
+        if let Some(port) = self.foxglove {
+            tell("Foxglove", "foxglove", port, live.foxglove(port))?;
+        }
+        Ok(self.asked_for().then(|| Arc::new(live)))
     }
 
     /// The same for runs in computed time.
@@ -37,4 +47,12 @@ impl LiveArg {
         let live = self.start(stop)?;
         Ok(live.map(|onlooker| Looking { onlooker, stop: stop.clone() }))
     }
+}
+
+/// Prints the address of a view.
+fn tell(view: &str, option: &str, port: u16, address: io::Result<String>) -> anyhow::Result<()> {
+    let address = address
+        .with_context(|| format!("--{option}={port}: no view can be served at this port of 127.0.0.1"))?;
+    let _ = io::stderr().write_all(shown(&format!("{view}: {address}\n")).as_bytes()); // a terminal that has gone away
+    Ok(())
 }

@@ -79,6 +79,21 @@ pub struct Gate {
     pub token: String,
 }
 
+impl Gate {
+    /// True if a value names this machine's loopback at the port, as a host, or behind a scheme as an origin.
+    pub(crate) fn is_ours(&self, value: &[u8], scheme: &str) -> bool {
+        ["127.0.0.1", "localhost"]
+            .iter()
+            .any(|host| value == format!("{scheme}{host}:{}", self.port).as_bytes())
+    }
+
+    /// True if a query has the token.
+    pub(crate) fn is_known(&self, query: &str) -> bool {
+        let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
+        token.is_some_and(|token| same(token, &self.token))
+    }
+}
+
 /// The thing that a browser asks for, in the head of its request; none if the head has not ended yet.
 ///
 /// # Errors
@@ -97,23 +112,17 @@ pub fn asked(head: &[u8], gate: &Gate) -> Result<Option<Asked>, Denied> {
             request.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name)).map(|h| h.value);
         (values.next(), values.next().is_some())
     };
-    let ours = |value: &[u8], scheme: &str| {
-        ["127.0.0.1", "localhost"]
-            .iter()
-            .any(|host| value == format!("{scheme}{host}:{}", gate.port).as_bytes())
-    };
-    if !matches!(named("host"), (Some(host), false) if ours(host, "")) {
+    if !matches!(named("host"), (Some(host), false) if gate.is_ours(host, "")) {
         return Err(Denied::Host);
     }
     // A browser sends none with a page that a person has opened.
     match named("origin") {
         (None, _) => {}
-        (Some(origin), false) if ours(origin, "http://") => {}
+        (Some(origin), false) if gate.is_ours(origin, "http://") => {}
         _ => return Err(Denied::Origin),
     }
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
-    let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
-    if token.is_none_or(|token| !same(token, &gate.token)) {
+    if !gate.is_known(query) {
         return Err(Denied::Token);
     }
     let (asked, by) = match path {
