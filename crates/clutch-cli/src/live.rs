@@ -1,4 +1,4 @@
-//! `--live`, `--foxglove`: views of a run while it goes on.
+//! `--live`, `--foxglove`, `--scope`: views of a run while it goes on.
 
 use crate::output::shown;
 use anyhow::Context;
@@ -20,6 +20,10 @@ pub(crate) struct LiveArg {
     #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true,
         default_missing_value = PORT.as_str())]
     foxglove: Option<u16>,
+    /// Draws the run in the terminal while it goes on; q or Esc ends it as Ctrl-C does.
+    #[cfg(feature = "scope")]
+    #[arg(long)]
+    scope: bool,
 }
 
 /// The port that Foxglove proposes, as the command line has it.
@@ -27,7 +31,15 @@ static PORT: LazyLock<String> = LazyLock::new(|| foxglove::PORT.to_string());
 
 impl LiveArg {
     pub(crate) fn asked_for(&self) -> bool {
-        self.live.is_some() || self.foxglove.is_some()
+        self.live.is_some() || self.foxglove.is_some() || self.has_terminal()
+    }
+
+    /// True if the terminal is the scope's while a run goes on.
+    pub(crate) fn has_terminal(&self) -> bool {
+        #[cfg(feature = "scope")]
+        return self.scope;
+        #[cfg(not(feature = "scope"))]
+        false
     }
 
     /// Serves the views that were asked for, if any, and prints their addresses; the page's button sets `stop`.
@@ -38,6 +50,11 @@ impl LiveArg {
         }
         if let Some(port) = self.foxglove {
             tell("Foxglove", "foxglove", port, live.foxglove(port))?;
+        }
+        #[cfg(feature = "scope")]
+        if self.scope {
+            let instead = "--live shows the run in a browser, --foxglove in Foxglove";
+            live.scope(stop.clone()).with_context(|| format!("--scope: no terminal; {instead}"))?;
         }
         Ok(self.asked_for().then(|| Arc::new(live)))
     }

@@ -139,7 +139,7 @@ pub(crate) struct Frame {
     pub(crate) wake_ups: Histogram,
 }
 
-#[derive(Clone, Copy, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 pub(crate) struct Histogram(pub(crate) [u64; CLASSES.len() + 1]);
 
 impl Histogram {

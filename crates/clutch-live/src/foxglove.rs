@@ -31,6 +31,9 @@ const ORIGINS: [&str; 2] = ["https://app.foxglove.dev", "file://"];
 const CLIENTS: usize = 8;
 /// Bytes of the longest message that a client sends.
 const LONGEST: usize = 1 << 16;
+/// Time from a client's first subscription to its first message: it subscribes channel by channel, and what is kept of the
+/// run goes to all of them.
+const SETTLE: Duration = Duration::from_millis(200);
 /// Time for which a client is listened to before it is told what is new.
 const NAP: Duration = Duration::from_millis(15);
 /// Time that a client has to hear that nothing more comes.
@@ -151,6 +154,8 @@ struct Client {
     socket: WebSocket<TcpStream>,
     place: Place,
     run: Option<Arc<Run>>,
+    /// The time from which it takes messages.
+    begins: Option<Instant>,
     /// The client's number of its subscription to each channel.
     subscriptions: [Option<u32>; CHANNELS.len()],
     /// The last time that it was told, ns.
@@ -165,7 +170,17 @@ struct Client {
 impl Client {
     fn new(socket: WebSocket<TcpStream>, place: Place) -> Client {
         let subscriptions = [None; CHANNELS.len()];
-        Client { socket, place, run: None, subscriptions, clock: 0, missed: 0, complained: None, full: false }
+        Client {
+            socket,
+            place,
+            run: None,
+            begins: None,
+            subscriptions,
+            clock: 0,
+            missed: 0,
+            complained: None,
+            full: false,
+        }
     }
 
     fn serve(mut self, session: &str) -> Result<(), Error> {
@@ -244,7 +259,7 @@ impl Client {
             return self.status(Level::Warning, &format!("{topic} has a subscription already"));
         }
         self.subscriptions[row] = Some(id);
-        self.place.begin();
+        self.begins.get_or_insert_with(|| Instant::now() + SETTLE);
         if row == PARAMETER_CHANNEL {
             for data in &run.parameters {
                 self.data(id, run.started_unix_ns, data)?;
@@ -255,6 +270,9 @@ impl Client {
 
     /// Tells what is new; true if there is nothing more to come.
     fn tell(&mut self) -> Result<bool, Error> {
+        if self.begins.is_some_and(|at| at <= Instant::now()) || self.place.closed() {
+            self.place.begin();
+        }
         let news = self.place.news();
         if let Some(run) = news.run {
             self.begin(run)?;

@@ -1,9 +1,9 @@
-//! Views of a running loop, served on this machine alone: a page in a browser, and Foxglove.
+//! Views of a running loop, on this machine alone: a page in a browser, Foxglove, a terminal.
 //!
 //! ```text
 //!   control thread ──ring──► feed ─┬─ frames, 30 a second ──► kept: the last of them ──► one thread for each page
 //!         ▲                        └─ records ──► backlog: the last of them ──► one thread for each client of Foxglove
-//!         └───────────────────────────── the operator's stop, from a page
+//!         └───────────────────────────── the operator's stop, from a page or a terminal
 //! ```
 //!
 //! | file | is |
@@ -14,6 +14,7 @@
 //! | `request` | the things that a browser asks for, and whether it may |
 //! | `kept`, `server`, `page.html` | the frames that a page gets, also one that comes late; its connection; the page, in one file |
 //! | `backlog`, `foxglove` | the messages that Foxglove gets; its protocol |
+//! | `figures`, `scope` | the figures as characters; the terminal's screen, and its keys. Feature `scope` |
 //!
 //! The thread that controls copies records into a ring and does nothing else. A view that is slow misses frames, or records.
 //! Nobody gets anything without the token in the address that is printed, and no page of a foreign origin gets anything at
@@ -21,10 +22,14 @@
 
 mod backlog;
 mod feed;
+#[cfg(feature = "scope")]
+mod figures;
 pub mod foxglove;
 mod kept;
 mod listener;
 mod request;
+#[cfg(feature = "scope")]
+mod scope;
 mod server;
 mod view;
 
@@ -77,6 +82,16 @@ impl Live {
         let backlog = Arc::new(Backlog::default());
         let listener = foxglove::start(port, backlog.clone())?;
         Ok(self.add(backlog, listener, "ws"))
+    }
+
+    /// Draws runs on the terminal of standard error; keys set `stop`.
+    ///
+    /// # Errors
+    /// There is no terminal, or none that it can be drawn on.
+    #[cfg(feature = "scope")]
+    pub fn scope(&mut self, stop: Arc<AtomicBool>) -> io::Result<()> {
+        self.views.push(Arc::new(scope::Scope::new(stop)?));
+        Ok(())
     }
 
     fn add(&mut self, view: Arc<dyn View>, listener: Listener, scheme: &str) -> String {

@@ -47,7 +47,7 @@ fn open(address: &str, headers: &[(&'static str, &str)]) -> Result<WebSocket<Tcp
     }
 }
 
-/// A client that subscribes to all channels, each under its number + 100.
+/// A client that subscribes to each channel, one after the other, under its row + 100.
 struct Client {
     socket: WebSocket<TcpStream>,
     channels: Vec<Value>,
@@ -71,9 +71,10 @@ impl Client {
         let Told::Text(channels) = client.next() else { panic!("then what there is") };
         assert_eq!(channels["op"], "advertise");
         client.channels = channels["channels"].as_array().unwrap().clone();
-        let each = client.channels.iter().map(|c| json!({ "id": client.row(c) + 100, "channelId": c["id"] }));
-        let all = json!({ "op": "subscribe", "subscriptions": each.collect::<Vec<_>>() });
-        client.say(&all);
+        for channel in client.channels.clone() {
+            let one = json!({ "id": client.row(&channel) + 100, "channelId": channel["id"] });
+            client.say(&json!({ "op": "subscribe", "subscriptions": [one] }));
+        }
         client
     }
 
