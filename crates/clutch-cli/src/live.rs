@@ -3,11 +3,11 @@
 use crate::output::shown;
 use anyhow::Context;
 use clap::Args;
-use clutch_live::{Live, foxglove};
+use clutch_live::Live;
 use clutch_loop::onlooker::Looking;
 use std::io::{self, Write};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, LazyLock};
 
 #[derive(Args)]
 pub(crate) struct LiveArg {
@@ -17,6 +17,7 @@ pub(crate) struct LiveArg {
     live: Option<u16>,
     /// Serves the run's records to Foxglove while it goes on, at an address of this machine that is printed: PORT, 0 for a
     /// free one (docs/foxglove.md).
+    #[cfg(feature = "foxglove")]
     #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true,
         default_missing_value = PORT.as_str())]
     foxglove: Option<u16>,
@@ -27,11 +28,20 @@ pub(crate) struct LiveArg {
 }
 
 /// The port that Foxglove proposes, as the command line has it.
-static PORT: LazyLock<String> = LazyLock::new(|| foxglove::PORT.to_string());
+#[cfg(feature = "foxglove")]
+static PORT: std::sync::LazyLock<String> =
+    std::sync::LazyLock::new(|| clutch_live::foxglove::PORT.to_string());
 
 impl LiveArg {
     pub(crate) fn asked_for(&self) -> bool {
-        self.live.is_some() || self.foxglove.is_some() || self.has_terminal()
+        self.live.is_some() || self.has_foxglove() || self.has_terminal()
+    }
+
+    fn has_foxglove(&self) -> bool {
+        #[cfg(feature = "foxglove")]
+        return self.foxglove.is_some();
+        #[cfg(not(feature = "foxglove"))]
+        false
     }
 
     /// True if the terminal is the scope's while a run goes on.
@@ -48,12 +58,13 @@ impl LiveArg {
         if let Some(port) = self.live {
             tell("live view", "live", port, live.page(port, stop.clone()))?;
         }
+        #[cfg(feature = "foxglove")]
         if let Some(port) = self.foxglove {
             tell("Foxglove", "foxglove", port, live.foxglove(port))?;
         }
         #[cfg(feature = "scope")]
         if self.scope {
-            let instead = "--live shows the run in a browser, --foxglove in Foxglove";
+            let instead = "--live shows the run in a browser";
             live.scope(stop.clone()).with_context(|| format!("--scope: no terminal; {instead}"))?;
         }
         Ok(self.asked_for().then(|| Arc::new(live)))

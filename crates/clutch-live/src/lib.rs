@@ -13,17 +13,19 @@
 //! | `listener` | a port, its connections, its token |
 //! | `request` | the things that a browser asks for, and whether it may |
 //! | `kept`, `server`, `page.html` | the frames that a page gets, also one that comes late; its connection; the page, in one file |
-//! | `backlog`, `foxglove` | the messages that Foxglove gets; its protocol |
+//! | `backlog`, `foxglove` | the messages that Foxglove gets; its protocol. Feature `foxglove` |
 //! | `figures`, `scope` | the figures as characters; the terminal's screen, and its keys. Feature `scope` |
 //!
 //! The thread that controls copies records into a ring and does nothing else. A view that is slow misses frames, or records.
 //! Nobody gets anything without the token in the address that is printed, and no page of a foreign origin gets anything at
 //! all.
 
+#[cfg(feature = "foxglove")]
 mod backlog;
 mod feed;
 #[cfg(feature = "scope")]
 mod figures;
+#[cfg(feature = "foxglove")]
 pub mod foxglove;
 mod kept;
 mod listener;
@@ -33,7 +35,6 @@ mod scope;
 mod server;
 mod view;
 
-use backlog::Backlog;
 use clutch_log::Header;
 use clutch_loop::log_thread::Ring;
 use clutch_loop::onlooker::{Onlooker, ring};
@@ -78,8 +79,9 @@ impl Live {
     ///
     /// # Errors
     /// As for [`page`](Live::page).
+    #[cfg(feature = "foxglove")]
     pub fn foxglove(&mut self, port: u16) -> io::Result<String> {
-        let backlog = Arc::new(Backlog::default());
+        let backlog = Arc::new(backlog::Backlog::default());
         let listener = foxglove::start(port, backlog.clone())?;
         Ok(self.add(backlog, listener, "ws"))
     }
