@@ -3,6 +3,8 @@
 //! The protocol: <https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>, of which a client gets channels, their
 //! messages and their time. What a client sends changes nothing but what it gets.
 
+#![allow(clippy::result_large_err, reason = "the type of tungstenite's callback")]
+
 use crate::backlog::{BATCH, Backlog, Message, Place, Run};
 use crate::listener::{Listener, PATIENCE};
 use crate::request::{Denied, Gate};

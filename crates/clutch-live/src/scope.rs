@@ -8,7 +8,7 @@ use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::crossterm::terminal::{
-    EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
+    Clear, ClearType, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
 };
 use ratatui::crossterm::{cursor, execute};
 use std::io::{self, BufWriter, IsTerminal, Stderr};
@@ -125,7 +125,6 @@ impl Inner {
     fn draw(&self) -> io::Result<()> {
         let _screen = Screen::enter()?;
         let mut terminal = Terminal::new(CrosstermBackend::new(BufWriter::new(io::stderr())))?;
-        terminal.clear()?;
         while !self.state().closed && SHOWN.load(Ordering::Relaxed) {
             // The figures are free again before anything goes to the terminal, which may be slow.
             terminal.draw(|frame| self.figures().render(frame))?;
@@ -164,7 +163,8 @@ impl Screen {
         SHOWN.store(true, Ordering::Relaxed);
         let screen = Screen;
         enable_raw_mode()?;
-        execute!(io::stderr(), EnterAlternateScreen, cursor::Hide)?;
+        // A terminal without a second screen still shows what was there.
+        execute!(io::stderr(), EnterAlternateScreen, Clear(ClearType::All), cursor::Hide)?;
         Ok(screen)
     }
 }
