@@ -140,7 +140,8 @@ impl Hil {
             Link::Uart => session.run(|| QemuSerialBoard::start(&self.image))?,
         };
         let took = started.elapsed().as_secs_f64();
-        let scenario = session.scenario();
+        let scenario = &session.scenario().clone();
+        drop(session); // its views have seen the end of it, and the terminal is free
         report(
             self.json,
             || json(&summary(scenario, &ran, took)),
@@ -175,7 +176,8 @@ impl Hil {
         let started = std::time::Instant::now();
         let on_chip = session.run(&self.image)?;
         let took = started.elapsed().as_secs_f64();
-        let (scenario, ran) = (session.scenario(), &on_chip.ran);
+        let (scenario, ran) = (&session.scenario().clone(), &on_chip.ran);
+        drop(session);
         let all = || {
             let mut all = summary(scenario, ran, took);
             all["chip"] = serde_json::json!({

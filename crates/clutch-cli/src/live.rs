@@ -1,11 +1,11 @@
-//! `--live`: the view of a run in a browser.
+//! `--live`, `--foxglove`, `--scope`: views of a run while it goes on.
 
 use crate::output::shown;
 use anyhow::Context;
 use clap::Args;
 use clutch_live::Live;
 use clutch_loop::onlooker::Looking;
-use std::io::Write;
+use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -15,21 +15,59 @@ pub(crate) struct LiveArg {
     /// (docs/live.md).
     #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
     live: Option<u16>,
+    /// Serves the run's records to Foxglove while it goes on, at an address of this machine that is printed: PORT, 0 for a
+    /// free one (docs/foxglove.md).
+    #[cfg(feature = "foxglove")]
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true,
+        default_missing_value = PORT.as_str())]
+    foxglove: Option<u16>,
+    /// Draws the run in the terminal while it goes on; q or Esc ends it as Ctrl-C does.
+    #[cfg(feature = "scope")]
+    #[arg(long)]
+    scope: bool,
 }
+
+/// The port that Foxglove proposes, as the command line has it.
+#[cfg(feature = "foxglove")]
+static PORT: std::sync::LazyLock<String> =
+    std::sync::LazyLock::new(|| clutch_live::foxglove::PORT.to_string());
 
 impl LiveArg {
     pub(crate) fn asked_for(&self) -> bool {
-        self.live.is_some()
+        self.live.is_some() || self.has_foxglove() || self.has_terminal()
     }
 
-    /// Serves the view, if it was asked for, and prints its address; the page's button sets `stop`.
+    fn has_foxglove(&self) -> bool {
+        #[cfg(feature = "foxglove")]
+        return self.foxglove.is_some();
+        #[cfg(not(feature = "foxglove"))]
+        false
+    }
+
+    /// True if the terminal is the scope's while a run goes on.
+    pub(crate) fn has_terminal(&self) -> bool {
+        #[cfg(feature = "scope")]
+        return self.scope;
+        #[cfg(not(feature = "scope"))]
+        false
+    }
+
+    /// Serves the views that were asked for, if any, and prints their addresses; the page's button sets `stop`.
     pub(crate) fn start(&self, stop: &Arc<AtomicBool>) -> anyhow::Result<Option<Arc<Live>>> {
-        let Some(port) = self.live else { return Ok(None) };
-        let live = Live::start(port, stop.clone())
-            .with_context(|| format!("--live={port}: no view can be served at this port of 127.0.0.1"))?;
-        let text = format!("live view: {}\n", live.address());
-        let _ = std::io::stderr().write_all(shown(&text).as_bytes()); // a terminal that has gone away
-        Ok(Some(Arc::new(live)))
+        let mut live = Live::default();
+        if let Some(port) = self.live {
+            tell("live view", "live", port, live.page(port, stop.clone()))?;
+        }
+        #[cfg(feature = "foxglove")]
+        if let Some(port) = self.foxglove {
+            tell("Foxglove", "foxglove", port, live.foxglove(port))?;
+        }
+        #[cfg(feature = "scope")]
+        if self.scope {
+            let instead = "--live shows the run in a browser";
+            live.scope(stop.clone()).with_context(|| format!("--scope: no terminal; {instead}"))?;
+        }
+        Ok(self.asked_for().then(|| Arc::new(live)))
     }
 
     /// The same for runs in computed time.
@@ -37,4 +75,12 @@ impl LiveArg {
         let live = self.start(stop)?;
         Ok(live.map(|onlooker| Looking { onlooker, stop: stop.clone() }))
     }
+}
+
+/// Prints the address of a view.
+fn tell(view: &str, option: &str, port: u16, address: io::Result<String>) -> anyhow::Result<()> {
+    let address = address
+        .with_context(|| format!("--{option}={port}: no view can be served at this port of 127.0.0.1"))?;
+    let _ = io::stderr().write_all(shown(&format!("{view}: {address}\n")).as_bytes()); // a terminal that has gone away
+    Ok(())
 }

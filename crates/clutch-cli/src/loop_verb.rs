@@ -196,7 +196,18 @@ impl Loop {
         let ignored = Arc::new(AtomicBool::new(false));
         signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
             .context("signals could not be caught")?;
-        let show = std::io::stderr().is_terminal() && !quiet();
+        let scope = self.live.has_terminal();
+        let show = std::io::stderr().is_terminal() && !quiet() && !scope;
+        // What happens while a scope has the terminal is told after it.
+        let mut later = Vec::new();
+        let mut tell = |text: &str| {
+            if scope {
+                later.push(text.to_owned());
+                return;
+            }
+            let clear = if show { "\r\x1b[K" } else { "" };
+            let _ = writeln!(std::io::stderr(), "{clear}{text}"); // a terminal that has gone away
+        };
         let mut said = Ok(());
         let ran = session.run(&stop, &mut |event| match event {
             // What cannot be said is not done: nothing has moved yet.
@@ -207,14 +218,14 @@ impl Loop {
             Event::Progress(progress) if show => status(&progress),
             Event::Progress(_) => {}
             // A terminal that has gone away does not stop a loop.
-            Event::LogEnded => {
-                let _ = writeln!(std::io::stderr(), "\nthe log has ended early; the loop continues");
-            }
-            Event::Drift(text) => {
-                let clear = if show { "\r\x1b[K" } else { "" };
-                let _ = writeln!(std::io::stderr(), "{clear}{text}");
-            }
+            Event::LogEnded => tell("the log has ended early; the loop continues"),
+            Event::Drift(text) => tell(&text),
         });
+        // The views have seen the end of it; the terminal is free.
+        drop(session);
+        for text in later {
+            let _ = writeln!(std::io::stderr(), "{text}");
+        }
         if show {
             let _ = write!(std::io::stderr(), "\r\x1b[K");
         }

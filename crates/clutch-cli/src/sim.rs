@@ -122,12 +122,12 @@ impl Sim {
         Ok(Exit::Done)
     }
 
-    /// Plays the run at its own pace, once a page looks on.
+    /// Plays the run at its own pace, once somebody looks on.
     fn play(&self, scenario: &Scenario, run: &Run) -> anyhow::Result<()> {
         let stop = stop_flag()?;
         let Some(live) = self.live.start(&stop)? else { return Ok(()) };
-        let _ = writeln!(std::io::stderr(), "it plays once the page is open; Ctrl-C ends it");
-        if live.wait_for_page(&stop) {
+        let _ = writeln!(std::io::stderr(), "it plays once somebody looks on; Ctrl-C ends it");
+        if live.wait_for_reader(&stop) {
             let looking = Looking { onlooker: live, stop };
             to_log::play_simulation(&looking, scenario, run, BUILD)?;
         }

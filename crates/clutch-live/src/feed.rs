@@ -1,6 +1,6 @@
-//! From the records of a run to the frames that a page draws.
+//! From the records of a run to the frames that views draw.
 
-use crate::kept::Kept;
+use crate::view::View;
 use clutch_core::supervisor::Cause;
 use clutch_core::{Counts, Encoder};
 use clutch_log::{
@@ -34,20 +34,23 @@ pub(crate) fn start(
     scenario: &Scenario,
     gains: Option<Arc<dyn LiveGains>>,
     mut records: Consumer<Record>,
-    kept: Arc<Kept>,
+    views: Vec<Arc<dyn View>>,
 ) -> Option<JoinHandle<()>> {
     let mut feed = Feed::new(header, scenario)?;
-    let listed = gains.as_ref().map(|gains| gains.gains()).unwrap_or_default();
-    kept.begin(json(&Opening::new(header, scenario, &listed)), gains);
+    let opening = Opening::new(header, scenario, gains);
+    views.iter().for_each(|view| view.begin(header, &opening));
     let make = move || {
         loop {
             // Asked before the ring is emptied: what was pushed before the end is seen.
             let last = records.is_abandoned();
             while let Ok(record) = records.pop() {
-                feed.take(&record).into_iter().for_each(|note| kept.event(json(&note)));
+                views.iter().for_each(|view| view.record(&record));
+                if let Some(note) = feed.take(&record) {
+                    views.iter().for_each(|view| view.note(&note));
+                }
             }
             if let Some(frame) = feed.frame() {
-                kept.frame(json(&frame));
+                views.iter().for_each(|view| view.frame(&frame));
             }
             if last {
                 return;
@@ -58,38 +61,28 @@ pub(crate) fn start(
     std::thread::Builder::new().name("clutch-feed".into()).spawn(make).ok()
 }
 
-fn json(value: &impl Serialize) -> String {
-    // Numbers, texts and lists of them: there is nothing that JSON cannot say.
-    serde_json::to_string(value).unwrap_or_default()
-}
-
-/// The beginning of a run, as a page hears of it.
+/// The beginning of a run, as a view hears of it.
 #[derive(Serialize)]
-struct Opening<'a> {
-    scenario: &'a str,
-    law: &'a str,
-    version: &'a str,
-    place: &'a str,
-    simulated: bool,
-    duration_s: f64,
-    period_us: u32,
-    settle_s: f64,
-    count_deg: f64,
-    volts: [f64; 2],
-    classes_us: &'static [u32],
-    gains: Vec<ListedGain<'a>>,
-}
-
-/// A gain that may be changed.
-#[derive(Serialize)]
-struct ListedGain<'a> {
-    key: &'a str,
-    value: f64,
-    meaning: &'a str,
+pub(crate) struct Opening<'a> {
+    pub(crate) scenario: &'a str,
+    pub(crate) law: &'a str,
+    pub(crate) version: &'a str,
+    pub(crate) place: &'a str,
+    pub(crate) simulated: bool,
+    pub(crate) duration_s: f64,
+    pub(crate) period_us: u32,
+    pub(crate) settle_s: f64,
+    pub(crate) count_deg: f64,
+    pub(crate) volts: [f64; 2],
+    pub(crate) classes_us: &'static [u32],
+    pub(crate) gains: Vec<Gain>,
+    /// The gains, if they may be changed.
+    #[serde(skip)]
+    pub(crate) live_gains: Option<Arc<dyn LiveGains>>,
 }
 
 impl<'a> Opening<'a> {
-    fn new(header: &'a Header, scenario: &'a Scenario, gains: &'a [Gain]) -> Self {
+    fn new(header: &'a Header, scenario: &'a Scenario, live_gains: Option<Arc<dyn LiveGains>>) -> Self {
         let spec = scenario.spec();
         let output = spec.output;
         Opening {
@@ -104,19 +97,17 @@ impl<'a> Opening<'a> {
             count_deg: 360.0 / f64::from(spec.rig.encoder.sensor.counts_per_rev),
             volts: [output.lowest, output.highest],
             classes_us: &CLASSES,
-            gains: gains
-                .iter()
-                .map(|g| ListedGain { key: &g.key, value: g.value, meaning: &g.meaning })
-                .collect(),
+            gains: live_gains.as_ref().map(|gains| gains.gains()).unwrap_or_default(),
+            live_gains,
         }
     }
 }
 
 /// The points of a curve, as spans: at rates up to 1 kHz both ends of a span are the sample.
 #[derive(Default, Serialize)]
-struct Spans {
-    low: Vec<f64>,
-    high: Vec<f64>,
+pub(crate) struct Spans {
+    pub(crate) low: Vec<f64>,
+    pub(crate) high: Vec<f64>,
 }
 
 impl Spans {
@@ -134,30 +125,30 @@ impl Spans {
 
 /// A thirtieth of a second of a run.
 #[derive(Default, Serialize)]
-struct Frame {
+pub(crate) struct Frame {
     /// Time of each point, s.
-    time_s: Vec<f64>,
-    target_deg: Vec<f64>,
-    position_deg: Spans,
+    pub(crate) time_s: Vec<f64>,
+    pub(crate) target_deg: Vec<f64>,
+    pub(crate) position_deg: Spans,
     /// Null where no law was asked.
-    error_deg: Spans,
-    volts: Spans,
+    pub(crate) error_deg: Spans,
+    pub(crate) volts: Spans,
     /// Times at which the encoder fell silent for as long as a stick takes, s.
-    sticks_s: Vec<f64>,
-    tick: u64,
-    state: &'static str,
-    cycles: u64,
-    cycles_per_s: f64,
-    largest_error_deg: f64,
-    lost: u64,
-    deadline_misses: u64,
+    pub(crate) sticks_s: Vec<f64>,
+    pub(crate) tick: u64,
+    pub(crate) state: &'static str,
+    pub(crate) cycles: u64,
+    pub(crate) cycles_per_s: f64,
+    pub(crate) largest_error_deg: f64,
+    pub(crate) lost: u64,
+    pub(crate) deadline_misses: u64,
     /// Answers by the time they took, by [`CLASSES`]; wake-ups by their lateness.
-    answers: Histogram,
-    wake_ups: Histogram,
+    pub(crate) answers: Histogram,
+    pub(crate) wake_ups: Histogram,
 }
 
-#[derive(Clone, Copy, Default, Serialize)]
-struct Histogram([u64; CLASSES.len() + 1]);
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub(crate) struct Histogram(pub(crate) [u64; CLASSES.len() + 1]);
 
 impl Histogram {
     fn take(&mut self, us: u32) {
@@ -170,13 +161,13 @@ impl Histogram {
 
 /// Something that has happened.
 #[derive(Debug, PartialEq, Serialize)]
-struct Note {
-    time_s: f64,
-    text: String,
+pub(crate) struct Note {
+    pub(crate) time_s: f64,
+    pub(crate) text: String,
     /// True if control ended otherwise than it should.
-    bad: bool,
+    pub(crate) bad: bool,
     /// The gain that was changed, and its value.
-    gain: Option<(String, f64)>,
+    pub(crate) gain: Option<(String, f64)>,
 }
 
 /// The state of the feed.
@@ -386,7 +377,7 @@ mod tests {
         let frame = feed.frame().unwrap();
         let moved = frame.position_deg.low[1] - frame.position_deg.low[0];
         assert!((moved - 0.018).abs() < 1e-5, "{moved}");
-        let told: serde_json::Value = serde_json::from_str(&json(&frame)).unwrap();
+        let told: serde_json::Value = serde_json::to_value(&frame).unwrap();
         assert_eq!(told["error_deg"]["low"][0], 0.0);
         assert!(told["error_deg"]["low"][1].is_null());
         assert_eq!(told["answers"][3], 2, "7 µs are from 5 to 10");

@@ -1,8 +1,11 @@
 //! The frames that a page gets: those of the last seconds, for one that comes late, and each new one as it is made.
 
+use crate::feed::{Frame, Note, Opening};
+use crate::view::View;
+use clutch_log::Header;
 use clutch_loop::live_gains::LiveGains;
+use serde::Serialize;
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -66,7 +69,7 @@ impl Kept {
     }
 
     /// A run begins: the frames of the one before are of the past.
-    pub(crate) fn begin(&self, json: String, gains: Option<Arc<dyn LiveGains>>) {
+    fn begin(&self, json: String, gains: Option<Arc<dyn LiveGains>>) {
         let mut state = self.state();
         state.gains = gains;
         state.first += state.frames.len() as u64;
@@ -78,7 +81,7 @@ impl Kept {
     }
 
     /// A new frame.
-    pub(crate) fn frame(&self, json: String) {
+    fn frame(&self, json: String) {
         let mut state = self.state();
         state.frames.push_back(Message { kind: "frame", json: json.into() });
         while state.frames.len() > FRAMES {
@@ -89,7 +92,7 @@ impl Kept {
     }
 
     /// Something has happened.
-    pub(crate) fn event(&self, json: String) {
+    fn event(&self, json: String) {
         let mut state = self.state();
         state.events.push_back(Message { kind: "note", json: json.into() });
         state.told += 1;
@@ -97,38 +100,6 @@ impl Kept {
             state.events.pop_front();
         }
         self.changed.notify_all();
-    }
-
-    /// Nothing more comes. Waits until those who read know, but not for long.
-    pub(crate) fn close(&self, at_most: Duration) {
-        let mut state = self.state();
-        state.closed = true;
-        self.changed.notify_all();
-        let until = Instant::now() + at_most;
-        while state.readers > 0 {
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return;
-            }
-            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
-        }
-    }
-
-    pub(crate) fn readers(&self) -> usize {
-        self.state().readers
-    }
-
-    /// Waits for a first reader; false if `stop` was set before.
-    pub(crate) fn wait_for_reader(&self, stop: &AtomicBool) -> bool {
-        let mut state = self.state();
-        while state.readers == 0 {
-            if stop.load(Ordering::Relaxed) {
-                return false;
-            }
-            let nap = Duration::from_millis(50);
-            state = self.changed.wait_timeout(state, nap).unwrap_or_else(PoisonError::into_inner).0;
-        }
-        true
     }
 
     /// A reader, from the beginning of what is kept; none if there are `most` already.
@@ -141,6 +112,43 @@ impl Kept {
         self.changed.notify_all();
         Some(Reader { kept: self.clone(), runs: 0, told: 0, next: 0 })
     }
+}
+
+impl View for Kept {
+    fn begin(&self, _: &Header, run: &Opening<'_>) {
+        Kept::begin(self, json(run), run.live_gains.clone());
+    }
+
+    fn note(&self, note: &Note) {
+        self.event(json(note));
+    }
+
+    fn frame(&self, frame: &Frame) {
+        Kept::frame(self, json(frame));
+    }
+
+    fn readers(&self) -> usize {
+        self.state().readers
+    }
+
+    fn close(&self, at_most: Duration) {
+        let mut state = self.state();
+        state.closed = true;
+        self.changed.notify_all();
+        let until = Instant::now() + at_most;
+        while state.readers > 0 {
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return;
+            }
+            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+}
+
+fn json(value: &impl Serialize) -> String {
+    // Numbers, texts and lists of them: there is nothing that JSON cannot say.
+    serde_json::to_string(value).unwrap_or_default()
 }
 
 impl Reader {

@@ -86,6 +86,25 @@ pub struct Gate {
     pub token: String,
 }
 
+impl Gate {
+    /// True if a value names this machine's loopback at the port, as a host, or behind a scheme as an origin.
+    pub(crate) fn is_ours(&self, value: &[u8], scheme: &str) -> bool {
+        ["127.0.0.1", "localhost"]
+            .iter()
+            .any(|host| value == format!("{scheme}{host}:{}", self.port).as_bytes())
+    }
+
+    /// True if a query has the token.
+    pub(crate) fn is_known(&self, query: &str) -> bool {
+        field(query, "token").is_some_and(|token| same(token, &self.token))
+    }
+}
+
+/// The value of a field in a query, as it is written there.
+fn field<'a>(query: &'a str, name: &str) -> Option<&'a str> {
+    query.split('&').find_map(|pair| pair.split_once('=').filter(|(n, _)| *n == name).map(|(_, value)| value))
+}
+
 /// The thing that a browser asks for, in the head of its request; none if the head has not ended yet.
 ///
 /// # Errors
@@ -104,34 +123,24 @@ pub fn asked<'a>(head: &'a [u8], gate: &Gate) -> Result<Option<Asked<'a>>, Denie
             request.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name)).map(|h| h.value);
         (values.next(), values.next().is_some())
     };
-    let ours = |value: &[u8], scheme: &str| {
-        ["127.0.0.1", "localhost"]
-            .iter()
-            .any(|host| value == format!("{scheme}{host}:{}", gate.port).as_bytes())
-    };
-    if !matches!(named("host"), (Some(host), false) if ours(host, "")) {
+    if !matches!(named("host"), (Some(host), false) if gate.is_ours(host, "")) {
         return Err(Denied::Host);
     }
     // A browser sends none with a page that a person has opened.
     match named("origin") {
         (None, _) => {}
-        (Some(origin), false) if ours(origin, "http://") => {}
+        (Some(origin), false) if gate.is_ours(origin, "http://") => {}
         _ => return Err(Denied::Origin),
     }
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
-    let field = |name: &str| {
-        query
-            .split('&')
-            .find_map(|pair| pair.split_once('=').filter(|(n, _)| *n == name).map(|(_, value)| value))
-    };
-    if field("token").is_none_or(|token| !same(token, &gate.token)) {
+    if !gate.is_known(query) {
         return Err(Denied::Token);
     }
     let (asked, by) = match path {
         "/" => (Asked::Page, "GET"),
         "/events" => (Asked::Events, "GET"),
         "/stop" => (Asked::Stop, "POST"),
-        "/set" => match (field("key"), field("value")) {
+        "/set" => match (field(query, "key"), field(query, "value")) {
             (Some(key), Some(value)) => (Asked::Set { key, value }, "POST"),
             _ => return Err(Denied::Malformed),
         },

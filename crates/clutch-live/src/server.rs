@@ -1,107 +1,27 @@
 //! The pages' connections.
 
 use crate::kept::Kept;
+use crate::listener::{Listener, PATIENCE, random};
 use crate::request::{Asked, Denied, Gate, LONGEST, asked};
 use clutch_loop::live_gains::Refusal;
 use std::io::{self, Read, Write};
-use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::net::TcpStream;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::thread::JoinHandle;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// The page; `NONCE` stands where the one of an answer goes.
 const PAGE: &str = include_str!("page.html");
 /// Pages that may look on at a time.
 const PAGES: usize = 8;
-/// Connections at a time, each with a thread.
-const CONNECTIONS: usize = 32;
-/// Stack of such a thread, bytes: a loop keeps all its memory in RAM.
-const STACK: usize = 512 * 1024;
-/// Time that a browser may take for a request, or to take what it gets.
-const PATIENCE: Duration = Duration::from_secs(5);
 /// Silence after which a stream says that it is still there, so that one whose page has gone ends.
 const ALIVE: Duration = Duration::from_secs(2);
 
-/// A server on this machine's loopback.
-#[derive(Debug)]
-pub(crate) struct Server {
-    gate: Arc<Gate>,
-    closing: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Server {
-    pub(crate) fn start(port: u16, kept: Arc<Kept>, stop: Arc<AtomicBool>) -> io::Result<Server> {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
-        let gate = Arc::new(Gate { port: listener.local_addr()?.port(), token: random()? });
-        let closing = Arc::new(AtomicBool::new(false));
-        let (ours, flag) = (gate.clone(), closing.clone());
-        let thread =
-            std::thread::Builder::new().name("clutch-live".into()).stack_size(STACK).spawn(move || {
-                let open = Arc::new(AtomicUsize::new(0));
-                for stream in listener.incoming() {
-                    if flag.load(Ordering::Relaxed) {
-                        return;
-                    }
-                    // One that is over the limit is closed without a word, as what fails here is.
-                    let Ok(stream) = stream else { continue };
-                    if open.load(Ordering::Relaxed) >= CONNECTIONS {
-                        continue;
-                    }
-                    let (gate, kept, stop) = (ours.clone(), kept.clone(), stop.clone());
-                    let guard = Open::new(&open);
-                    let _ = std::thread::Builder::new().name("clutch-page".into()).stack_size(STACK).spawn(
-                        move || {
-                            let _ = serve(stream, &gate, &kept, &stop);
-                            drop(guard);
-                        },
-                    );
-                }
-            })?;
-        Ok(Server { gate, closing, thread: Some(thread) })
-    }
-
-    /// The address, with its token.
-    pub(crate) fn address(&self) -> String {
-        format!("http://127.0.0.1:{}/?token={}", self.gate.port, self.gate.token)
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        self.closing.store(true, Ordering::Relaxed);
-        // The listener waits for a connection: here is one.
-        let here = SocketAddr::from((Ipv4Addr::LOCALHOST, self.gate.port));
-        if TcpStream::connect_timeout(&here, PATIENCE).is_ok()
-            && let Some(thread) = self.thread.take()
-        {
-            let _ = thread.join();
-        }
-    }
-}
-
-/// An open connection, counted.
-struct Open(Arc<AtomicUsize>);
-
-impl Open {
-    fn new(count: &Arc<AtomicUsize>) -> Open {
-        count.fetch_add(1, Ordering::Relaxed);
-        Open(count.clone())
-    }
-}
-
-impl Drop for Open {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
-/// 128 random bits, in hex.
-fn random() -> io::Result<String> {
-    let mut bytes = [0; 16];
-    getrandom::fill(&mut bytes).map_err(|error| io::Error::other(format!("no random numbers: {error}")))?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+/// Serves pages on a port; their button sets `stop`.
+pub(crate) fn start(port: u16, kept: Arc<Kept>, stop: Arc<AtomicBool>) -> io::Result<Listener> {
+    Listener::start(port, move |stream, gate| {
+        let _ = serve(stream, gate, &kept, &stop);
+    })
 }
 
 /// A connection: one request, one answer.

@@ -19,11 +19,13 @@ pub use header::{Header, Source};
 pub use info::{ChannelInfo, Info, info};
 pub use names::{Arrival, CommandSource, EventKind};
 pub use printable::printable;
-pub use proto::{CHANNELS, Channel, Field, Kind, TIME, Value, channel_table};
+pub use proto::{
+    CHANNELS, Channel, Field, Kind, PARAMETER_CHANNEL, TIME, Value, channel_table, parameters, schema,
+};
 pub use read::{Log, read, read_bytes, read_while};
 pub use record::{
     ChangeRecord, CommandRecord, EventRecord, InChannel, LinkRecord, MAX_TERMS, Record, SampleRecord, Terms,
-    TruthRecord, encode,
+    TruthRecord, channel_of, encode,
 };
 pub use recover::{Recovered, recover};
 pub use scan::{Damage, Limits, Scanned, Tail, scan};

@@ -1,5 +1,6 @@
 //! The channel table: topics, protobuf messages, their fields; and the schemas made from it.
 
+use crate::header::Header;
 use crate::names::Names;
 use crate::record::RECORDS;
 use prost::Message;
@@ -131,7 +132,13 @@ const PARAMETERS: Channel = Channel {
 };
 
 /// Row of `/parameters` in [`CHANNELS`].
-pub(crate) const PARAMETER_CHANNEL: usize = RECORDS.len();
+pub const PARAMETER_CHANNEL: usize = RECORDS.len();
+
+/// Messages of `/parameters`: one for each parameter of the header, in its order.
+pub fn parameters(header: &Header) -> impl Iterator<Item = Vec<u8>> + '_ {
+    let message = |(key, value): &(String, String)| Parameter { key: key.clone(), value: value.clone() };
+    header.parameters.iter().map(move |parameter| message(parameter).encode_to_vec())
+}
 
 /// The channel table: those of the records, and the parameters.
 pub const CHANNELS: [Channel; PARAMETER_CHANNEL + 1] = {
@@ -172,7 +179,8 @@ pub fn channel_table() -> String {
 }
 
 /// The schema of a channel: a `FileDescriptorSet`. `terms` name the last fields of `/command`, which has as many.
-pub(crate) fn schema(channel: &Channel, terms: &[String]) -> Vec<u8> {
+#[must_use]
+pub fn schema(channel: &Channel, terms: &[String]) -> Vec<u8> {
     let short = channel.message.trim_start_matches("clutch.");
     let mut names: Vec<String> = channel.fields.iter().map(|f| f.name.to_owned()).collect();
     if channel.terms > 0 {

@@ -161,8 +161,9 @@ macro_rules! records {
         /// The channels that hold records, in the order of the table.
         pub(crate) const RECORDS: [Channel; [$($topic),*].len()] = [$($record::CHANNEL),*];
 
-        /// Row of the record's channel in [`RECORDS`].
-        pub(crate) fn channel_of(record: &Record) -> usize {
+        /// Row of the record's channel in [`CHANNELS`](crate::CHANNELS).
+        #[must_use]
+        pub fn channel_of(record: &Record) -> usize {
             enum Row { $($variant),* }
             match record { $(Record::$variant(_) => Row::$variant as usize),* }
         }

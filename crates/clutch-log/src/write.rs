@@ -8,7 +8,6 @@ use crate::scan::CRC;
 use crate::sync::Syncer;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
-use prost::Message;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -333,8 +332,7 @@ fn begin(
             let schema = writer.add_schema(channel.message, "protobuf", &schema)?;
             *id = writer.add_channel(schema, channel.topic, "protobuf", &BTreeMap::new())?;
         }
-        for (i, (key, value)) in header.parameters.iter().enumerate() {
-            let message = proto::Parameter { key: key.clone(), value: value.clone() }.encode_to_vec();
+        for (i, message) in proto::parameters(header).enumerate() {
             let header = MessageHeader {
                 channel_id: channels[PARAMETER_CHANNEL],
                 sequence: i as u32,

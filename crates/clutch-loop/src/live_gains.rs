@@ -19,7 +19,7 @@ use std::sync::{Mutex, PoisonError};
 const WAITING: usize = 16;
 
 /// A gain of the law that runs.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Gain {
     /// Its key in a scenario.
     pub key: String,

@@ -167,9 +167,10 @@ pub(crate) fn run_loop<'py>(
 
 /// A live view, whose address is printed as Python prints.
 fn view(py: Python<'_>, port: u16, stop: &Arc<AtomicBool>) -> PyResult<Arc<dyn Onlooker>> {
-    let live = Live::start(port, stop.clone()).map_err(|e| {
+    let mut live = Live::default();
+    let address = live.page(port, stop.clone()).map_err(|e| {
         PyOSError::new_err(format!("live = {port}: no view can be served at this port of 127.0.0.1: {e}"))
     })?;
-    py.import("builtins")?.call_method1("print", (format!("live view: {}", live.address()),))?;
+    py.import("builtins")?.call_method1("print", (format!("live view: {address}"),))?;
     Ok(Arc::new(live))
 }
