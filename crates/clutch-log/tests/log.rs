@@ -277,7 +277,7 @@ fn a_damaged_chunk_is_skipped_and_told() {
     assert_eq!(log.records(), records.len() - (ends[2].1 - ends[1].1));
     assert!(!log.complete && log.tail == Tail::Finished);
     assert_eq!(log.damaged, 2, "the chunk and the data's checksum: {:?}", log.damage);
-    let damage = log.damage.unwrap();
+    let damage = log.damage.as_ref().unwrap();
     assert!((ends[1].0 as u64..ends[2].0 as u64).contains(&damage.at), "{damage}");
     let shown = info(&path, &Limits::default()).unwrap().to_string();
     assert!(shown.contains(&damage.to_string()), "{shown}");
