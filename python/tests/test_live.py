@@ -116,7 +116,7 @@ def test_it_fits_both_sizes_and_both_schemes_and_asks_for_nothing_else(clutch, p
                 }})()"""
                 assert page.run(inked) > 3, name
             stop = page.run("document.getElementById('stop').getBoundingClientRect().toJSON()")
-            assert 0 <= stop["top"] and stop["bottom"] < size[1] and stop["height"] >= 44
+            assert stop["top"] >= 0 and stop["bottom"] < size[1] and stop["height"] >= 44
         base = address.split("?")[0]
         asked = {each.split("?")[0] for each in page.requests if not each.startswith(("data:", "about:"))}
         assert asked == {base, f"{base}events"}
