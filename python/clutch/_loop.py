@@ -66,8 +66,8 @@ class LoopResult:
         Number of times that the simulated board's clock waited for this machine.
     port_error : str or None
         The port's error, if it ended the run.
-    gains_changed : int
-        Changes of gains from the live view while it ran.
+    gains_changed, gains_changed_uncertified : int
+        Changes of gains from the live view while it ran, and those of them without a certificate.
     notes : list of str
         Refusals of the system (priority, memory), and what to do about them.
     log : Path or None
@@ -111,6 +111,7 @@ class LoopResult:
     board_waits: int | None
     port_error: str | None
     gains_changed: int
+    gains_changed_uncertified: int
     notes: list[str]
     log: Path | None
     announcement: str = field(repr=False)
@@ -213,7 +214,7 @@ def loop(
         The core on which the loop's thread stays.
     live : bool or int, default False
         Show the run in a browser while it goes on, at an address of this machine that is printed: at this port, or with
-        True at a free one. The page's button stops the run, and changes gains where ``safety.live_gains`` allows it.
+        True at a free one; False and 0 show nothing. The page's button stops the run, and changes gains where ``safety.live_gains`` allows it.
 
     Returns
     -------
@@ -267,7 +268,7 @@ def loop(
         thread_priority=thread_priority,
         lock_memory=lock_memory,
         cpu_affinity=cpu_affinity,
-        live=0 if live is True else (live or None),
+        live=_port(live),
     )
     figures: dict[str, Any] = dict(summary)
     del figures["scenario"]
@@ -287,3 +288,11 @@ def loop(
 
 def _text(path: str | os.PathLike[str] | None) -> str | None:
     return None if path is None else os.fspath(path)
+
+
+def _port(live: bool | int) -> int | None:
+    if live is True or live is False:
+        return 0 if live else None
+    if not 0 <= live <= 65535:
+        raise ValueError(f"live = {live}: expected True, False, or a port from 1 to 65535")
+    return live or None

@@ -130,7 +130,7 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     // One that looks on, and a change of gains that is on its way.
     let (shown, seen) = onlooker::ring();
     let (mut tuning, changes) = rtrb::RingBuffer::new(1);
-    let change = Change { servo: built.servo, parameter: 7, value: 3.0 };
+    let change = Change { servo: built.servo, parameter: 7, value: 3.0, error_bound: None };
     tuning.push(change).expect("there is room for one");
     let options = LoopOptions {
         // The machine's settings are not the subject, and locked memory would stay locked.

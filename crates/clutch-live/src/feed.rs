@@ -1,4 +1,4 @@
-//! From the records of a run to the frames that views draw.
+//! Frames that a view draws, made of the records of a run.
 
 use crate::view::View;
 use clutch_core::supervisor::Cause;
@@ -186,6 +186,8 @@ struct Feed {
     sample: Option<SampleRecord>,
     taken: u64,
     lately: VecDeque<f64>,
+    /// The state of the last frame.
+    told: &'static str,
     all: Frame,
 }
 
@@ -211,6 +213,7 @@ impl Feed {
             sample: None,
             taken: 0,
             lately,
+            told: "Ready",
             all,
         })
     }
@@ -281,7 +284,11 @@ impl Feed {
         let key = self.keys.get(usize::from(change.parameter)).cloned().unwrap_or_default();
         let text = format!("{key} = {}", number(change.value));
         let time_s = rounded(change.tick as f64 * self.period, 1e3);
-        Note { time_s, text, bad: false, gain: Some((key, change.value)) }
+        let (bad, bound) = match change.error_bound {
+            bound if bound.is_nan() => (true, "UNCERTIFIED".to_owned()),
+            bound => (false, format!("|e| certified below {} °", number(bound.to_degrees()))),
+        };
+        Note { time_s, text: format!("{text}: {bound}"), bad, gain: Some((key, change.value)) }
     }
 
     fn event(&mut self, event: &EventRecord) -> Note {
@@ -310,9 +317,11 @@ impl Feed {
 
     /// The frame since the last one; none if nothing has come.
     fn frame(&mut self) -> Option<Frame> {
-        if self.all.time_s.is_empty() {
+        // A change of state is told also where no sample follows it.
+        if self.all.time_s.is_empty() && self.all.state == self.told {
             return None;
         }
+        self.told = self.all.state;
         let all = &self.all;
         let next = Frame {
             tick: all.tick,
@@ -409,9 +418,18 @@ mod tests {
         let lost = "running → faulted: 2 samples lost within 128 cycles".to_owned();
         assert_eq!(told(EventKind::StateChange, 6, Cause::Lost), (2.5, lost, true));
         assert!(told(EventKind::Drift, 3, Cause::None).2);
-        let change = ChangeRecord { tick: 3000, parameter: 0, value: 4.0, ..ChangeRecord::default() };
+        let change = ChangeRecord {
+            tick: 3000,
+            parameter: 0,
+            value: 4.0,
+            error_bound: 1e-3,
+            ..ChangeRecord::default()
+        };
         let note = feed.take(&Record::Change(change)).unwrap();
-        assert_eq!((note.time_s, note.text.as_str()), (3.0, "law.smc.kp_v = 4"));
+        assert_eq!(
+            (note.time_s, note.text.as_str()),
+            (3.0, "law.smc.kp_v = 4: |e| certified below 0.057296 °")
+        );
         assert_eq!(note.gain, Some(("law.smc.kp_v".to_owned(), 4.0)));
     }
 }

@@ -29,7 +29,7 @@ struct State {
     run: Option<Message>,
     /// Its gains, if they may be changed.
     gains: Option<Arc<dyn LiveGains>>,
-    /// What has happened in it.
+    /// Notes of events in it.
     events: VecDeque<Message>,
     frames: VecDeque<Message>,
     /// Number of the first of the frames.
@@ -42,7 +42,7 @@ struct State {
     closed: bool,
 }
 
-/// What is kept.
+/// The frames that are kept, and who reads them.
 #[derive(Debug, Default)]
 pub(crate) struct Kept {
     state: Mutex<State>,

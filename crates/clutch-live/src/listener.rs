@@ -40,7 +40,11 @@ impl Listener {
                     return;
                 }
                 // One that is over the limit is closed without a word, as what fails here is.
-                let Ok(stream) = stream else { continue };
+                let Ok(stream) = stream else {
+                    // None to be had, perhaps for long: no reason to spin beside a loop.
+                    std::thread::sleep(Duration::from_millis(50));
+                    continue;
+                };
                 if open.load(Ordering::Relaxed) >= CONNECTIONS {
                     continue;
                 }

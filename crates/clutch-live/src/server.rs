@@ -8,12 +8,15 @@ use std::io::{self, Read, Write};
 use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// The page; `NONCE` stands where the one of an answer goes.
 const PAGE: &str = include_str!("page.html");
 /// Pages that may look on at a time.
-const PAGES: usize = 8;
+/// A browser opens six connections to one place, and a stop needs one of them.
+const PAGES: usize = 4;
+/// Stack for the search of a certificate, bytes.
+const SEARCH_STACK: usize = 8 << 20;
 /// Silence after which a stream says that it is still there, so that one whose page has gone ends.
 const ALIVE: Duration = Duration::from_secs(2);
 
@@ -26,7 +29,6 @@ pub(crate) fn start(port: u16, kept: Arc<Kept>, stop: Arc<AtomicBool>) -> io::Re
 
 /// A connection: one request, one answer.
 fn serve(mut stream: TcpStream, gate: &Gate, kept: &Arc<Kept>, stop: &AtomicBool) -> io::Result<()> {
-    stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     stream.set_nodelay(true)?;
     let mut head = [0; LONGEST];
@@ -62,8 +64,11 @@ fn read<'a>(
     head: &'a mut [u8; LONGEST],
     gate: &Gate,
 ) -> io::Result<Result<Asked<'a>, Denied>> {
-    let mut used = 0;
+    let (mut used, until) = (0, Instant::now() + PATIENCE);
     loop {
+        // A request has so long as a whole: one that trickles in does not keep its connection.
+        let left = until.saturating_duration_since(Instant::now());
+        stream.set_read_timeout(Some(left.max(Duration::from_millis(1))))?;
         let Some(room) = head.get_mut(used..).filter(|room| !room.is_empty()) else {
             return Ok(Err(Denied::Malformed));
         };
@@ -88,7 +93,14 @@ fn change(kept: &Kept, key: &str, value: &str) -> Result<String, Refusal> {
         Refusal("gains are not changed in this run: safety.live_gains = true allows it where `clutch loop` closes the loop".into())
     })?;
     let number = value.parse().map_err(|_| Refusal(format!("{key} = {value}: expected a number")))?;
-    gains.change(key, number)
+    let key = key.to_owned();
+    // A thread of its own: a search takes more stack than a connection.
+    let certifying = std::thread::Builder::new().name("clutch-certify".into()).stack_size(SEARCH_STACK);
+    let certifying = certifying.spawn(move || gains.change(&key, number));
+    let done = certifying.map_err(|e| Refusal(format!("no thread for the certificate: {e}")))?.join();
+    done.unwrap_or_else(|_| {
+        Err(Refusal("the certificate's search came to a bad end; please report this as a defect".into()))
+    })
 }
 
 fn deny(stream: &mut TcpStream, denied: Denied) -> io::Result<()> {

@@ -383,6 +383,8 @@ records! {
         2 parameter = parameter: u16, uint32;
         /// Its value from this tick on.
         3 value = value: f64, double (optional);
+        /// Bound on the error of the sampled loop with it, rad; NaN of one without a certificate.
+        4 error_bound_rad = error_bound: f64, double (optional);
     }
     /// The plant's true state, which only a simulation knows.
     Truth = TruthRecord, "/truth", "The plant's true state, which only a simulation knows." {

@@ -114,6 +114,8 @@ pub struct LoopReport {
     pub untold: u64,
     /// Changes of gains while it ran.
     pub changed: u64,
+    /// Those of them that have no certificate.
+    pub changed_uncertified: u64,
     /// The requests that the system refused.
     pub notes: Vec<String>,
     /// Records that did not fit into the ring.
@@ -213,6 +215,7 @@ struct Control<'a, S: Station> {
     shown: Option<Ring>,
     changes: Option<Changes<S::Servo>>,
     changed: u64,
+    uncertified: u64,
     watch: &'a Watch,
     out: Outbox,
     ticks: u64,
@@ -270,6 +273,7 @@ impl<'a, S: Station> Control<'a, S> {
             shown: configured.shown,
             changes: configured.changes,
             changed: 0,
+            uncertified: 0,
             watch: configured.watch,
             out: Outbox::default(),
             ticks: configured.ticks,
@@ -539,14 +543,20 @@ impl<'a, S: Station> Control<'a, S> {
 
     /// Takes over the gains that somebody has changed, before the sample that has come.
     fn tune(&mut self) {
+        let Standing { state, tick, .. } = self.station.standing();
+        // What comes later has no effect any more.
+        if !matches!(state, State::Armed | State::Running) {
+            return;
+        }
         while let Some(change) = self.changes.as_mut().and_then(|changes| changes.pop().ok()) {
             self.station.tune(change.servo);
             self.changed += 1;
-            let Standing { state, tick, .. } = self.station.standing();
+            self.uncertified += u64::from(change.error_bound.is_none());
             let tick = if state == State::Running { tick + 1 } else { tick };
             let time_ns = monotonic_ns().saturating_sub(self.start_ns);
             let (parameter, value) = (change.parameter, change.value);
-            self.push(&[Record::Change(ChangeRecord { tick, time_ns, parameter, value })]);
+            let error_bound = change.error_bound.unwrap_or(f64::NAN);
+            self.push(&[Record::Change(ChangeRecord { tick, time_ns, parameter, value, error_bound })]);
         }
     }
 
@@ -713,6 +723,7 @@ impl<'a, S: Station> Control<'a, S> {
             tick_cycles: self.tick_cycles.summary(),
             untold: standing.untold,
             changed: self.changed,
+            changed_uncertified: self.uncertified,
             notes,
             log_dropped: self.dropped.saturating_sub(2 * self.untold),
             cut_writes: self.cut,

@@ -13,7 +13,7 @@ use clutch_sim::scenario::Value;
 use clutch_sim::scenario::describe::{Entry, description, entries};
 use clutch_sim::{Scenario, number};
 use std::fmt;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError, TryLockError};
 
 /// Changes that may wait for the control thread.
 const WAITING: usize = 16;
@@ -42,7 +42,7 @@ pub trait LiveGains: fmt::Debug + Send + Sync {
     /// The gains as they are now.
     fn gains(&self) -> Vec<Gain>;
 
-    /// Changes one. Gives what is certified of the loop with it, in words. It takes seconds.
+    /// Changes one. Gives what is certified of the loop with it, in words. It takes from a second to more than a minute.
     ///
     /// # Errors
     /// The value is out of range, has no certificate, or the run is over.
@@ -58,6 +58,8 @@ pub struct Change<V> {
     pub parameter: u16,
     /// Its new value.
     pub value: f64,
+    /// Bound on the error of the sampled loop with it, rad; none of gains without a certificate.
+    pub error_bound: Option<f64>,
 }
 
 /// The control thread's end.
@@ -84,7 +86,7 @@ impl<T: Real> fmt::Debug for Tuning<T> {
 }
 
 impl<T: Real> Tuning<T> {
-    /// For a run that is built, and the end for its control thread.
+    /// The tuning of a run that is built, and the end for its control thread.
     pub(crate) fn new(
         scenario: &Scenario,
         built: &BuiltRun<T>,
@@ -143,43 +145,49 @@ impl<T: Real> LiveGains for Tuning<T> {
     }
 
     fn change(&self, key: &str, value: f64) -> Result<String, Refusal> {
-        let refuse = |why: String| Refusal(why);
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = match self.state.try_lock() {
+            Ok(state) => state,
+            Err(TryLockError::Poisoned(state)) => state.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                return Err(Refusal(
+                    "another change is being certified; try again when its answer is there".to_owned(),
+                ));
+            }
+        };
+        if state.ring.is_abandoned() {
+            return Err(Refusal("the run is over".to_owned()));
+        }
         let known = gains(&state.scenario);
         if !known.iter().any(|gain| gain.key == key) {
             let keys: Vec<&str> = known.iter().map(|gain| gain.key.as_str()).collect();
-            return Err(refuse(format!("{key}: expected a gain of the law that runs: {}", keys.join(", "))));
+            return Err(Refusal(format!("{key}: expected a gain of the law that runs: {}", keys.join(", "))));
         }
-        let changed = with(&state.scenario, key, value).map_err(|e| refuse(e.to_string()))?;
-        let plan = changed.plan().map_err(|e| refuse(e.to_string()))?;
+        let changed = with(&state.scenario, key, value).map_err(|e| Refusal(e.to_string()))?;
+        let plan = changed.plan().map_err(|e| Refusal(e.to_string()))?;
         let sampled = changed.sampled(&plan.bounds);
-        let verdict = match sampled.prove() {
-            Ok((proven, _)) if sampled.bound_suffices() => {
-                format!(
-                    "certified as sampled: |e| stays below {} °",
-                    number(proven.checked.error_bound.to_degrees())
-                )
-            }
-            Ok(_) => "the bound of the error holds, but linear stability is not known".to_owned(),
-            Err(why) if self.uncertified => format!("UNCERTIFIED, as asked: {why}"),
-            Err(why) => return Err(refuse(format!("{key} = {value}: not certified as sampled: {why}"))),
+        let proven = match sampled.prove() {
+            Ok((proven, _)) if sampled.bound_suffices() => Ok(proven.checked.error_bound),
+            Ok(_) => Err("the bound of the error holds, but linear stability is not known".to_owned()),
+            Err(why) => Err(why.to_string()),
         };
-        let built = BuiltRun::<T>::new(&changed, 0).map_err(|e| refuse(e.to_string()))?;
+        let verdict = match &proven {
+            Ok(bound) => format!("certified as sampled: |e| stays below {} °", number(bound.to_degrees())),
+            Err(why) if self.uncertified => format!("UNCERTIFIED, as asked: {why}"),
+            Err(why) => return Err(Refusal(format!("{key} = {value}: not certified as sampled: {why}"))),
+        };
+        let built = BuiltRun::<T>::new(&changed, 0).map_err(|e| Refusal(e.to_string()))?;
         if built.supervisor != state.supervisor {
-            return Err(refuse(format!(
+            return Err(Refusal(format!(
                 "{key} = {value}: changes what the supervisor watches; end the run first"
             )));
         }
         let parameter = number_of(&changed, key)
-            .ok_or_else(|| refuse(format!("{key}: expected a key of the scenario's list of parameters")))?;
-        if state.ring.is_abandoned() {
-            return Err(refuse("the run is over".to_owned()));
-        }
-        let change = Change { servo: built.servo, parameter, value };
+            .ok_or_else(|| Refusal(format!("{key}: expected a key of the scenario's list of parameters")))?;
+        let change = Change { servo: built.servo, parameter, value, error_bound: proven.ok() };
         state
             .ring
             .push(change)
-            .map_err(|_| refuse("the loop has not taken the last changes yet".to_owned()))?;
+            .map_err(|_| Refusal("the loop has not taken the last changes yet".to_owned()))?;
         state.scenario = changed;
         Ok(verdict)
     }

@@ -41,7 +41,12 @@ impl Looking {
     /// A run begins.
     #[must_use]
     pub fn begin(&self, header: &Header, scenario: &Scenario) -> Played {
-        Played { ring: self.onlooker.begin(header, scenario, None), stop: self.stop.clone(), started: None }
+        Played {
+            ring: self.onlooker.begin(header, scenario, None),
+            stop: self.stop.clone(),
+            started: None,
+            told: false,
+        }
     }
 }
 
@@ -52,29 +57,35 @@ pub struct Played {
     stop: Arc<AtomicBool>,
     /// The clock's time at the run's time 0.
     started: Option<Instant>,
+    /// True if the stop has been told.
+    told: bool,
 }
 
-/// The longest sleep after which a stop is looked for, ms.
-const NAP_MS: u64 = 20;
+/// The longest sleep after which a stop is looked for.
+const NAP: Duration = Duration::from_millis(20);
 
 impl Played {
-    /// Shows a record, not before its time has come. False once somebody has ended the run.
-    pub fn show(&mut self, record: &Record) -> bool {
+    /// Shows a record, not before its time has come; at once where the run has been stopped.
+    pub fn show(&mut self, record: &Record) {
         let at = Duration::from_nanos(record.time_ns());
-        let started =
-            *self.started.get_or_insert_with(|| Instant::now().checked_sub(at).unwrap_or_else(Instant::now));
-        loop {
-            if self.stop.load(Ordering::Relaxed) {
-                return false;
-            }
+        let begun = || Instant::now().checked_sub(at).unwrap_or_else(Instant::now);
+        let started = *self.started.get_or_insert_with(begun);
+        while !self.stop.load(Ordering::Relaxed) {
             let early = at.saturating_sub(started.elapsed());
             if early.is_zero() {
                 break;
             }
-            std::thread::sleep(early.min(Duration::from_millis(NAP_MS)));
+            std::thread::sleep(early.min(NAP));
         }
         // One that finds the ring full is not seen.
         let _ = self.ring.push(*record);
-        true
+    }
+
+    /// True once, when somebody has stopped the run.
+    pub fn stopped(&mut self) -> bool {
+        !self.told && self.stop.load(Ordering::Relaxed) && {
+            self.told = true;
+            true
+        }
     }
 }

@@ -7,7 +7,7 @@ use clutch_sim::Scenario;
 use clutch_sim::picture::{Curves, Stick, Window};
 use std::collections::HashMap;
 
-/// What a picture of a log shows closely.
+/// The parts of a log that a picture shows closely.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pictured {
     /// The stretch around a stick, or the largest error; none where no law answered.

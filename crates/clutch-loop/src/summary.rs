@@ -141,7 +141,11 @@ impl Summary {
         }
         if r.changed > 0 {
             let times = if r.changed == 1 { "once".to_owned() } else { format!("{} times", r.changed) };
-            lines.push(format!("gains were changed {times} while it ran"));
+            let how = match r.changed_uncertified {
+                0 => "each certified as sampled".to_owned(),
+                some => format!("{some} of them UNCERTIFIED"),
+            };
+            lines.push(format!("gains were changed {times} while it ran, {how}; what is said above of the gains is of those at the start"));
         }
         if r.untold > 0 {
             lines.push(format!(
@@ -244,7 +248,7 @@ impl Summary {
                 "max": r.tick_cycles.max_ns,
             })),
             "untold": r.untold,
-            "gains_changed": r.changed,
+            "gains_changed": r.changed, "gains_changed_uncertified": r.changed_uncertified,
             "log_dropped": r.log_dropped,
             "cut_writes": r.cut_writes,
             "board_safe": r.board_safe,

@@ -229,7 +229,10 @@ fn play_in<T: Real>(
 ) -> Result<(), BuildError> {
     let (header, mut ticks) = simulation::<T>(scenario, run, version, None)?;
     let mut played = looking.begin(&header, scenario);
-    ticks.all(|tick| tick.iter().all(|record| played.show(record)));
+    ticks.all(|tick| {
+        tick.iter().for_each(|record| played.show(record));
+        !played.stopped()
+    });
     Ok(())
 }
 

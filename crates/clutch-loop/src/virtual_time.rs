@@ -485,11 +485,14 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
         }
         heard.records.extend(heard.ended.map(|ending| to_log::ended(time_ns, &ending)));
         heard.records.extend(self.follow(time_ns, armed_for));
-        let ended =
-            self.on.played.as_mut().is_some_and(|p| !heard.records.iter().all(|record| p.show(record)));
-        if ended {
-            self.on.played = None;
-            heard.records.extend(self.end(time_ns, StopReason::Operator));
+        if let Some(mut played) = self.on.played.take() {
+            heard.records.iter().for_each(|record| played.show(record));
+            if played.stopped() {
+                let end = self.end(time_ns, StopReason::Operator);
+                end.iter().for_each(|record| played.show(record));
+                heard.records.extend(end);
+            }
+            self.on.played = Some(played);
         }
         if self.on.params.record {
             self.report.records.append(&mut heard.records);

@@ -142,7 +142,13 @@ pub fn record(n: &mut Numbers, tick: u64, time_ns: u64) -> Record {
             deadline_misses: whole(n),
             log_dropped: whole(n),
         }),
-        4 => Record::Change(ChangeRecord { tick, time_ns, parameter: whole(n) as u16, value: real(n) }),
+        4 => Record::Change(ChangeRecord {
+            tick,
+            time_ns,
+            parameter: whole(n) as u16,
+            value: real(n),
+            error_bound: real(n),
+        }),
         _ => Record::Truth(TruthRecord {
             tick,
             time_ns,
@@ -214,7 +220,9 @@ pub fn bits(record: &Record) -> Vec<u64> {
             r.deadline_misses,
             r.log_dropped,
         ],
-        Record::Change(r) => vec![5, r.tick, r.time_ns, r.parameter.into(), r.value.to_bits()],
+        Record::Change(r) => {
+            vec![5, r.tick, r.time_ns, r.parameter.into(), r.value.to_bits(), r.error_bound.to_bits()]
+        }
         Record::Truth(r) => {
             vec![4, r.tick, r.time_ns, r.position.to_bits(), r.velocity.to_bits(), r.stuck.into()]
         }
