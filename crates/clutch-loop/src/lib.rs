@@ -12,7 +12,7 @@
 //! | `clearance`, `words` | whether a scenario may run on a board; refusals and causes in words |
 //! | `drift` | friction over load against the bounds, from counts and voltages |
 //! | `log_thread`, `watch` | what runs beside it: the log; what may be seen of it |
-//! | `onlooker`, `live_gains` | one that looks on while a run goes; gains that are changed meanwhile |
+//! | `onlooker`, `live_gains`, `tuning` | one that looks on while a run goes; gains that are changed meanwhile |
 //! | `virtual_time` | the same run with a computed clock |
 //! | `sim_board`, `sim_board_server` | a board on a rig, both simulated; the same in real time behind a port |
 //! | `faults`, `faulty_line`, `campaign` | what breaks, a line on which it breaks, and the campaign over all of it |
@@ -65,6 +65,8 @@ pub mod station;
 #[cfg(target_os = "linux")]
 pub mod summary;
 pub mod to_log;
+#[cfg(target_os = "linux")]
+mod tuning;
 pub mod virtual_time;
 pub mod watch;
 pub mod words;

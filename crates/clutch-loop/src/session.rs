@@ -10,7 +10,7 @@ use crate::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, OnDrift,
 use crate::drift::DriftReport;
 use crate::faults::Fault;
 use crate::from_scenario::{self, BuildError, BuiltRun};
-use crate::live_gains::{Changes, LiveGains, Tuning};
+use crate::live_gains::{Changes, LiveGains};
 use crate::log_thread::{LogThread, Ring};
 use crate::onlooker::Onlooker;
 use crate::port::{Address, DeviceKind, Endpoint, Port, PortError, PseudoTerminal, SerialOptions};
@@ -22,6 +22,7 @@ use crate::sim_board_server::{ServeError, ServeOptions, ServeReport, serve};
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, ControllerStation, HOST_SILENCE, HostStation, Station};
 use crate::summary::{LogSummary, SampledSummary, Summary};
 use crate::to_log::PRESENT_CODE;
+use crate::tuning::Tuning;
 use crate::watch::Watch;
 use crate::words::cause_text;
 use clutch_core::law::Law;
