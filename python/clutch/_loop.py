@@ -214,7 +214,8 @@ def loop(
         The core on which the loop's thread stays.
     live : bool or int, default False
         Show the run in a browser while it goes on, at an address of this machine that is printed: at this port, or with
-        True at a free one; False and 0 show nothing. The page's button stops the run, and changes gains where ``safety.live_gains`` allows it.
+        True at a free one; False and 0 show nothing. The page's button stops the run; gains are changed there where
+        ``safety.live_gains`` allows it.
 
     Returns
     -------

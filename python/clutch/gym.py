@@ -145,8 +145,9 @@ class _Tracking:
             raise ValueError("velocity.observer: expected velocity.smoothed_derivative in an environment")
         if not max_error_deg > 0.0:
             raise ValueError(f"max_error_deg = {max_error_deg}: expected an angle above 0°")
-        if not (error_weight >= 0.0 and variation_weight >= 0.0):
-            raise ValueError(f"weights of {error_weight} and {variation_weight}: expected at least 0")
+        for key, value in (("error_weight", error_weight), ("variation_weight", variation_weight)):
+            if not value >= 0.0:
+                raise ValueError(f"{key} = {value}: expected at least 0")
         # The last sample is seen and not answered.
         self.steps = len(self.scenario.path()) - 1
         if self.steps < 1:
@@ -489,6 +490,8 @@ class TrackingVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
         >>> TrackingVectorEnv(3).reset(seed=5)[1]["seed"].tolist()
         [5, 6, 7]
         """
+        if isinstance(seed, np.integer):
+            seed = int(seed)
         super().reset(seed=seed if isinstance(seed, int) else None)
         if seed is None or isinstance(seed, int):
             seeds: list[int | None] = [None if seed is None else seed + i for i in range(self.num_envs)]
@@ -540,10 +543,13 @@ class TrackingVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
         if self._shafts is None:
             raise gymnasium.error.ResetNeeded("call reset before the first step")
         problem, begins = self._problem, self._ended
+        volts = self.scales.volts(actions).reshape(self.num_envs)
+        # Before anything is drawn or reset: a refused step changes nothing.
+        if np.isnan(volts).any():
+            raise ValueError("actions: expected numbers, got NaN")
         for i in np.flatnonzero(begins):
             self._seeds[i] = self._drawn()
             self._shafts.reset(int(i), problem.seeded(int(self._seeds[i])))
-        volts = self.scales.volts(actions).reshape(self.num_envs)
         before, self._seen = self._seen, self._shafts.step(volts, ~begins)
         self._tick = np.where(begins, 0, self._tick + 1)
         rewards, terminated = problem.judged(before, self._seen, self._tick)

@@ -4,6 +4,7 @@ import base64
 import contextlib
 import json
 import os
+import select
 import shutil
 import subprocess
 import sys
@@ -54,6 +55,7 @@ class Page:
 
     def _next(self):
         while b"\0" not in self._rest:
+            assert select.select([self._read], [], [], 60)[0], "the browser said nothing for 60 s"
             more = os.read(self._read, 1 << 20)
             assert more, "the browser ended"
             self._rest += more
@@ -117,4 +119,8 @@ def page():
             os.close(write)
             os.close(read)
             browser.terminate()
-            browser.wait(timeout=20)
+            try:
+                browser.wait(timeout=20)
+            except subprocess.TimeoutExpired:
+                browser.kill()
+                browser.wait()

@@ -298,3 +298,9 @@ def test_a_loop_is_seen_in_a_browser(package, capsys):
         port = taken.getsockname()[1]
         with pytest.raises(OSError, match=f"live = {port}: no view can be served at this port"):
             package.loop(duration=1.2, live=port)
+
+
+@pytest.mark.parametrize("port", [-1, 70000])
+def test_a_port_that_is_none_is_refused(port):
+    with pytest.raises(ValueError, match=f"live = {port}: expected True, False, or a port from 1 to 65535"):
+        package.loop(duration=1.2, live=port)

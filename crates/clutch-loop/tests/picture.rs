@@ -12,8 +12,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-fn saved(name: &str) -> (Scenario, Run, Log, PathBuf) {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("picture_{name}"));
+fn saved(name: &str, test: &str) -> (Scenario, Run, Log, PathBuf) {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("picture_{test}"));
     std::fs::create_dir_all(&folder).expect("a folder");
     let file = folder.join("run.mcap");
     let scenario = Scenario::load(Path::new(name), &[]).expect("it is built in");
@@ -25,7 +25,7 @@ fn saved(name: &str) -> (Scenario, Run, Log, PathBuf) {
 
 #[test]
 fn a_simulations_log_shows_the_sticks_of_the_run() {
-    let (scenario, run, log, _) = saved("bench_pd_2");
+    let (scenario, run, log, _) = saved("bench_pd_2", "sticks");
     let shown = pictured(&log, &scenario).expect("a log of the scenario");
     // Of the run those that a sample fell into, to a period.
     let of_run: Vec<Stick> = sticks(&run.events, 5.0);
@@ -45,7 +45,7 @@ fn a_simulations_log_shows_the_sticks_of_the_run() {
 
 #[test]
 fn without_the_shafts_own_motion_silences_of_the_encoder_count() {
-    let (scenario, _, mut log, _) = saved("bench_pd_2");
+    let (scenario, _, mut log, _) = saved("bench_pd_2", "silences");
     let truly = pictured(&log, &scenario).expect("a log of the scenario").sticks;
     log.truths.clear();
     let shown = pictured(&log, &scenario).expect("a log of the scenario");
@@ -56,7 +56,7 @@ fn without_the_shafts_own_motion_silences_of_the_encoder_count() {
 
 #[test]
 fn a_log_in_which_no_law_answered_has_no_window() {
-    let (scenario, _, mut log, _) = saved("pd_2");
+    let (scenario, _, mut log, _) = saved("pd_2", "gap");
     log.commands.clear();
     let shown = pictured(&log, &scenario).expect("a log of the scenario");
     assert_eq!(shown.window, None);
@@ -64,7 +64,7 @@ fn a_log_in_which_no_law_answered_has_no_window() {
 
 #[test]
 fn work_on_a_log_ends_when_its_caller_says_so_and_half_a_log_is_not_kept() {
-    let (scenario, run, log, folder) = saved("smc_2");
+    let (scenario, run, log, folder) = saved("smc_2", "drawn");
     // The second question, in the middle of the work, is answered with no.
     let asked = AtomicU32::new(0);
     let second = |_| match asked.fetch_add(1, Ordering::Relaxed) {

@@ -135,14 +135,17 @@ function start() {
   const code = new Blob([at("worker").textContent], { type: "text/javascript" });
   worker = new Worker(URL.createObjectURL(code));
   worker.onerror = (event) => say(`The simulator could not be started: ${event.message}`);
+  let ready = false;
   worker.onmessage = ({ data }) => {
     busy = false;
     if (data.broken) {
       say(`The simulator stopped: ${data.broken}`);
       worker.terminate();
       busy = true;
-      return start();
+      // One that never answered would break again, for ever.
+      return ready ? start() : undefined;
     }
+    ready = true;
     if (data.answer) {
       // Drawn also where another is waiting: whoever drags a slider sees the way.
       answer = { laws: asked.laws, ...JSON.parse(data.answer) };
@@ -247,7 +250,7 @@ const SLOWER = 50;
 let cursors = [], playing = null;
 
 function play() {
-  if (playing === null) return;
+  if (playing === null || !answer) return;
   const { from_s, to_s } = answer.window ?? { from_s: 0, to_s: 0 }, length = SLOWER * (to_s - from_s);
   const now = performance.now() / 1e3;
   const t = from_s + (length > 0 ? ((now - playing) % length) / SLOWER : 0);
@@ -256,6 +259,11 @@ function play() {
 }
 
 function draw() {
+  if (!answer) return;
+  if (answer.error) {
+    cursors = [];
+    return say(answer.error);
+  }
   const all = answer.laws.map((law, i) => ({ ...law, ...answer.runs[i], colour: `var(--${law.name})` }));
   const wrong = all.filter((run) => run.error), runs = all.filter((run) => !run.error), window = answer.window;
   // The same words of several laws are said once.
