@@ -34,8 +34,8 @@ pub(crate) fn columns(heads: &[String], rows: &[(&str, Vec<String>, &str)]) -> S
     for from in (0..heads.len()).step_by(BESIDE) {
         let these = from..heads.len().min(from + BESIDE);
         let line = |name: &str, cells: &[String], unit: &str| {
-            let cells: String = cells.iter().map(|cell| format!("{cell:>11}")).collect();
-            format!("   {name:<32}{cells}  {unit}").trim_end().to_owned() + "\n"
+            let cells: String = cells.iter().map(|cell| format!(" {cell:>11}")).collect();
+            format!("   {name:<30}{cells}  {unit}").trim_end().to_owned() + "\n"
         };
         text += &line("", &heads[these.clone()], "");
         rows.iter().for_each(|(name, cells, unit)| text += &line(name, &cells[these.clone()], unit));
