@@ -70,11 +70,15 @@ def test_the_page_follows_a_loop_and_its_button_stops_it(clutch, page, tmp_path)
     exported = clutch("log", "export", log, "--out", tmp_path / "run.csv", "--channel", "command")
     assert exported.returncode == 0
     names, *rows = [line.split(",") for line in (tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()]
-    volts = {int(row[names.index("tick")]): float(row[names.index("voltage_v")]) for row in rows}
+    # On a busy machine two samples come in one wake-up: then both have the tick of the one that was answered.
+    volts: dict[int, list[float]] = {}
+    for row in rows:
+        volts.setdefault(int(row[names.index("tick")]), []).append(float(row[names.index("voltage_v")]))
     tick, cycles, points, drawn, times = figures
     assert tick in volts and points > 1500
     assert cycles > 5
-    wrong = [(t, v) for t, v in zip(times, drawn, strict=True) if abs(volts[round(t * 1000)] - v) > 1e-4]
+    pairs = zip(times, drawn, strict=True)
+    wrong = [(t, v) for t, v in pairs if min(abs(logged - v) for logged in volts[round(t * 1000)]) > 1e-4]
     assert wrong == []
 
 
