@@ -110,8 +110,8 @@ class Log:
         ...     clutch.simulate("smc_2").save(path / "run.mcap")
         ...     clutch.read_log(path / "run.mcap").export(path / "run.parquet")
         ...     schema = pyarrow.parquet.read_schema(path / "run.parquet")
-        >>> schema.field("voltage_v").metadata
-        {b'units': b'V', b'long_name': b'Voltage of the code'}
+        >>> sorted(schema.field("voltage_v").metadata.items())
+        [(b'long_name', b'Voltage of the code'), (b'units', b'V')]
         """
         with needed("pyarrow", "Log.export"):
             import pyarrow as pa

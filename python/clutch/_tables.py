@@ -2385,7 +2385,7 @@ class Safety(_Params):
     --------
     >>> import clutch
     >>> clutch.Safety(reason="a weight drives the shaft", on_fault=clutch.HoldVoltage(volts_v=4.5))
-    Safety(reason='a weight drives the shaft', on_fault=HoldVoltage(volts_v=4.5))
+    Safety(reason='a weight drives the shaft', live_gains=False, on_fault=HoldVoltage(volts_v=4.5))
     """
 
     _key: ClassVar[str] = "safety"

@@ -300,8 +300,8 @@ def sampled_law(scenario: ScenarioLike, *, name: str = "law") -> Any:
     >>> law = clutch.dynamics.sampled_law("pd_2")
     >>> time, targets = clutch.dynamics.targets("pd_2")
     >>> response = control.input_output_response(law, time[:50], [np.floor(targets[0, :50]), *targets[:, :50]])
-    >>> response.outputs.shape
-    (50,)
+    >>> response.outputs.size
+    50
     """
     given = as_scenario(scenario)
     moments = _Moments(name, _clutch.Servo(given))

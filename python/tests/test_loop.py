@@ -287,7 +287,7 @@ def test_an_effect_of_a_drift_that_there_is_none_is_refused():
         package.loop(on_drift="perhaps")
 
 
-def test_a_loop_is_seen_in_a_browser(package, capsys):
+def test_a_loop_is_seen_in_a_browser(capsys):
     result = package.loop(duration=1.2, live=True)
     printed = capsys.readouterr().out
     assert re.fullmatch(r"live view: http://127\.0\.0\.1:\d+/\?token=[0-9a-f]{32}\n", printed)

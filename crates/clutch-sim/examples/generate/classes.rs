@@ -326,7 +326,7 @@ HoldThenRelease(volts_v=4.5, after_s=2.0)",
         "Safety",
         false,
         r#">>> clutch.Safety(reason="a weight drives the shaft", on_fault=clutch.HoldVoltage(volts_v=4.5))
-Safety(reason='a weight drives the shaft', on_fault=HoldVoltage(volts_v=4.5))"#,
+Safety(reason='a weight drives the shaft', live_gains=False, on_fault=HoldVoltage(volts_v=4.5))"#,
     ),
 ];
 
