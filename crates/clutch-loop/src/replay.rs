@@ -3,7 +3,7 @@
 use crate::drift::{Drift, DriftReport};
 use crate::from_scenario::{self, BuildError, BuiltRun};
 use crate::live_gains;
-use crate::to_log::{self, FOREIGN_LAW, PRESENT_CODE, START_VOLTAGE};
+use crate::to_log::{self, FOREIGN_LAW, PRESENT_CODE, REPORT_EVERY, START_VOLTAGE};
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Cycle, Sample, State};
 use clutch_core::{
@@ -15,9 +15,6 @@ use clutch_sim::progress::{Progress, Report};
 use clutch_sim::scenario::ScalarKind;
 use clutch_sim::{Keep, Scenario};
 use clutch_wire::{BoardState, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE};
-
-/// Ticks between two reports of progress: milliseconds.
-const REPORT_EVERY: usize = 4096;
 
 /// A log could not be replayed.
 #[derive(Debug, thiserror::Error)]

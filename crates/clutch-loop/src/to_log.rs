@@ -165,8 +165,8 @@ fn of_simulation<T: Real>(
     })
 }
 
-/// Samples of a simulation between two reports of progress: milliseconds.
-const REPORT_EVERY: usize = 4096;
+/// Samples between two reports of progress, of a replay, too: milliseconds.
+pub(crate) const REPORT_EVERY: usize = 4096;
 
 /// Writes a simulation as a log, with the channels that a loop writes and the shaft's true motion;
 /// `version` is the build's, `foreign_law` the name of the law that ran if it is none of clutch's.
