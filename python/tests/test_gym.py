@@ -152,7 +152,7 @@ def test_bad_arguments_are_named():
         TrackingEnv("observer_smc_2")
     with pytest.raises(ValueError, match="max_error_deg"):
         TrackingEnv("smc_2", max_error_deg=0.0)
-    with pytest.raises(ValueError, match="error_weight = -1.0: expected at least 0"):
+    with pytest.raises(ValueError, match=r"error_weight = -1\.0: expected at least 0"):
         TrackingEnv("smc_2", error_weight=-1.0)
     with pytest.raises(ValueError, match="render_mode = 'human'"):
         TrackingEnv("smc_2", render_mode="human")
