@@ -92,13 +92,6 @@ pub(crate) fn build(firmware: &Path, (package, goal): (&str, &str), peer: bool) 
     Ok(target.join(goal).join("release"))
 }
 
-/// The option that makes the emulator stop after each instruction; it has changed its name.
-fn one_instruction_at_a_time() -> Result<&'static [&'static str]> {
-    let help = Command::new(QEMU).arg("-help").output()?;
-    let old = String::from_utf8_lossy(&help.stdout).contains("-singlestep");
-    Ok(if old { &["-singlestep"] } else { &["-accel", "tcg,one-insn-per-tb=on"] })
-}
-
 fn qemu(image: &Path) -> Command {
     let mut command = Command::new(QEMU);
     command.args(BOARD).args(["enable=on,target=native", "-kernel"]).arg(image);
@@ -139,25 +132,55 @@ pub(crate) fn measure(image: &Path) -> Result<Measured> {
     Ok(measured)
 }
 
-/// Runs the image one instruction at a time; the addresses executed within the given ranges.
+/// Runs the image; the addresses executed within the given ranges, in their order.
 pub(crate) fn trace(image: &Path, ranges: &[(u32, u32)]) -> Result<Vec<u32>> {
     let log = image.with_extension("trace");
     let filter: Vec<String> = ranges.iter().map(|(a, n)| format!("{a:#x}+{n:#x}")).collect();
     let run = qemu(image)
-        .args(one_instruction_at_a_time()?)
-        .args(["-d", "exec,nochain", "-dfilter", &filter.join(","), "-D"])
+        .args(["-d", "in_asm,exec,nochain", "-dfilter", &filter.join(","), "-D"])
         .arg(&log)
         .output()?;
     if !run.status.success() {
         bail!("the traced image ended with {}: {}", run.status, String::from_utf8_lossy(&run.stderr));
     }
-    let mut addresses = Vec::new();
-    for line in BufReader::new(std::fs::File::open(&log)?).lines() {
-        // Trace 0: 0x7f… [00400000/00007da0/00000b01/ff000200] step_pd
-        let line = line?;
-        let address = line.split('/').nth(1).and_then(|a| u32::from_str_radix(a, 16).ok());
-        addresses.push(address.with_context(|| format!("not a line of a trace: {line}"))?);
-    }
+    let addresses = executed(BufReader::new(std::fs::File::open(&log)?))?;
     std::fs::remove_file(&log)?;
+    Ok(addresses)
+}
+
+/// The executed addresses of a log, which has a block's instructions when it is translated, and a line whenever it is
+/// executed:
+///
+/// ```text
+/// IN: step_pd
+/// 0x00007da0:  b580       push     {r7, lr}
+///
+/// Trace 0: 0x7f821c000240 [00400000/00007da0/00000b01/ff000200] step_pd
+/// ```
+fn executed(log: impl BufRead) -> Result<Vec<u32>> {
+    let (mut addresses, mut translated) = (Vec::new(), Vec::new());
+    // By the place of their translation, which another block may take later.
+    let mut blocks: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+    for line in log.lines() {
+        let line = line?;
+        let hex = |text: &str| u32::from_str_radix(text, 16).ok();
+        if let Some(rest) = line.strip_prefix("Trace 0: ") {
+            let place = rest.split(' ').next().unwrap_or_default();
+            let begin = rest.split('/').nth(1).and_then(hex);
+            if translated.first().copied() == begin {
+                blocks.insert(place.to_owned(), std::mem::take(&mut translated));
+            }
+            let block = blocks.get(place).filter(|block| block.first().copied() == begin);
+            addresses.extend(block.with_context(|| format!("no block for {line}"))?);
+        } else if let Some((address, _)) = line.strip_prefix("0x").and_then(|rest| rest.split_once(": ")) {
+            // Without a disassembler a block is one line of bytes.
+            let one = !line.contains("OBJD");
+            translated.push(hex(address).filter(|_| one).with_context(|| format!("no instruction: {line}"))?);
+        } else if line.starts_with("IN: ") {
+            translated.clear();
+        } else if !line.trim_matches('-').is_empty() {
+            bail!("not a line of a trace: {line}");
+        }
+    }
     Ok(addresses)
 }

@@ -32,7 +32,7 @@ impl Graph {
     pub(super) fn new(image: &Image, function: &Function) -> Result<Graph, Fault> {
         let inside = |a: u32| (function.address..function.address + function.size).contains(&a);
         let mut code: BTreeMap<u32, Instruction> =
-            image.instructions(function)?.into_iter().map(|i| (i.address, i)).collect();
+            image.instructions(function)?.iter().map(|i| (i.address, i.clone())).collect();
         // On a Cortex-M0+ a jump that is too far for one is a call into the same function.
         for i in code.values_mut() {
             if let Flow::Call(t) = i.flow

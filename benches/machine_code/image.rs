@@ -4,8 +4,10 @@ use super::Fault;
 use super::decode::{Decoder, Instruction};
 use addr2line::Loader;
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 
 /// A function of the image.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -44,6 +46,8 @@ pub struct Image {
     vectors: Vec<u32>,
     lines: Option<Loader>,
     decoder: Decoder,
+    /// Instructions by the function's address, of those that were asked for: many bounds ask for the same.
+    decoded: RefCell<BTreeMap<u32, Rc<[Instruction]>>>,
 }
 
 impl Image {
@@ -134,6 +138,7 @@ impl Image {
             vectors: Vec::new(),
             lines: None,
             decoder: Decoder::new(),
+            decoded: RefCell::default(),
         }
     }
 
@@ -213,7 +218,16 @@ impl Image {
     ///
     /// # Errors
     /// Bytes that are not an instruction.
-    pub(super) fn instructions(&self, function: &Function) -> Result<Vec<Instruction>, Fault> {
+    pub(super) fn instructions(&self, function: &Function) -> Result<Rc<[Instruction]>, Fault> {
+        if let Some(known) = self.decoded.borrow().get(&function.address) {
+            return Ok(known.clone());
+        }
+        let all: Rc<[Instruction]> = self.decoded(function)?.into();
+        self.decoded.borrow_mut().insert(function.address, all.clone());
+        Ok(all)
+    }
+
+    fn decoded(&self, function: &Function) -> Result<Vec<Instruction>, Fault> {
         let end = function.address + function.size;
         // Constants between the instructions are left out.
         let mut from = (function.address, self.is_code(function.address));

@@ -19,7 +19,8 @@ pub fn traced(
     let mut code: BTreeMap<u32, Instruction> = BTreeMap::new();
     for f in image.functions() {
         // Code outside the examined functions is skipped.
-        code.extend(image.instructions(f).unwrap_or_default().into_iter().map(|i| (i.address, i)));
+        let known = image.instructions(f).unwrap_or_default();
+        code.extend(known.iter().map(|i| (i.address, i.clone())));
     }
     let mut calls: BTreeMap<u32, Vec<Cost>> = entries.iter().map(|e| (*e, Vec::new())).collect();
     // The call that goes on: its entry, its cost so far, and how many calls deep it is.
