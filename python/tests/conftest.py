@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import browser
+
 ROOT = Path(__file__).resolve().parents[2]
 
 # A shell that starts the tests in the background makes them ignore Ctrl-C; some wait for one.
@@ -67,3 +69,12 @@ def clutch(tmp_path_factory):
             returncode=2,
         )
     return Clutch(binary.resolve(), tmp_path_factory.mktemp("clutch"))
+
+
+@pytest.fixture(scope="module")
+def page():
+    """A page in a browser."""
+    if not browser.program():
+        pytest.skip("needs Chromium")
+    with browser.page() as opened:
+        yield opened

@@ -8,17 +8,7 @@ import time
 
 import pytest
 
-import browser
-
 DESKTOP, PHONE = (1280, 800), (390, 844)
-
-
-@pytest.fixture(scope="module")
-def page():
-    if not browser.program():
-        pytest.skip("needs Chromium")
-    with browser.page() as opened:
-        yield opened
 
 
 @contextlib.contextmanager

@@ -15,8 +15,6 @@ from pathlib import Path
 
 import pytest
 
-import browser
-
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = os.environ.get("CLUTCH_PLAYGROUND")
 MOST_BYTES = 250_000
@@ -81,15 +79,6 @@ def questions(clutch):
     # f32_smc_2 is smc_2 in another scalar, and no run is another otherwise.
     assert len(set(hashes)) == len(hashes) - 2
     return asked, answers
-
-
-@pytest.fixture(scope="module")
-def page():
-    """The page in a browser, from a file, as from a stick."""
-    if not browser.program():
-        pytest.skip("needs Chromium")
-    with browser.page() as opened:
-        yield opened
 
 
 def settle(page, script):

@@ -1,6 +1,7 @@
 //! The live view, by a client that reads the protocol from a socket.
 
 use crate::harness::{alone, beside_others, folder, program, read_log, replays_identically};
+use clutch_tests::firmware::image;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -11,7 +12,8 @@ use std::time::Duration;
 /// A command with `--live`, and where its view is.
 struct Viewed {
     child: Child,
-    out: std::thread::JoinHandle<String>,
+    /// What it prints, on standard output and, after the view's address, on standard error.
+    printed: [std::thread::JoinHandle<String>; 2],
     host: String,
     query: String,
 }
@@ -29,14 +31,9 @@ impl Viewed {
         }
         let (host, query) = line.trim().split_once("http://").unwrap().1.split_once("/?").unwrap();
         let (host, query) = (host.to_owned(), query.to_owned());
-        std::thread::spawn(move || std::io::copy(&mut err, &mut std::io::sink()));
-        let mut pipe = child.stdout.take().expect("piped");
-        let out = std::thread::spawn(move || {
-            let mut text = String::new();
-            let _ = pipe.read_to_string(&mut text);
-            text
-        });
-        Viewed { child, out, host, query }
+        let out = child.stdout.take().expect("piped");
+        let printed = [read_to_end(out), read_to_end(err)];
+        Viewed { child, printed, host, query }
     }
 
     /// A request; the connection, of which nothing has been read.
@@ -68,8 +65,16 @@ impl Viewed {
 
     fn done(mut self) -> (Option<i32>, String) {
         let code = self.child.wait().expect("a child").code();
-        (code, self.out.join().unwrap())
+        (code, self.printed.map(|text| text.join().unwrap()).concat())
     }
+}
+
+fn read_to_end(mut pipe: impl Read + Send + 'static) -> std::thread::JoinHandle<String> {
+    std::thread::spawn(move || {
+        let mut text = String::new();
+        let _ = pipe.read_to_string(&mut text);
+        text
+    })
 }
 
 /// Server-Sent Events.
@@ -231,4 +236,47 @@ fn forgotten(log: &Path) {
     writer.finish().unwrap();
     let done = crate::harness::run(&["replay", without.to_str().unwrap()]);
     assert_eq!(done.code, Some(3), "{}", done.out);
+}
+
+#[test]
+fn an_image_on_its_emulated_board_is_seen_as_its_log_has_it() {
+    let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside_others();
+    let log = folder("live-hil").join("run.mcap");
+    let (image, path) = (image.to_str().unwrap(), log.to_str().unwrap());
+    let hil = ["hil", "board_smc_2", "--image", image, "--set", "run.duration_s=2", "--log", path];
+    let viewed = Viewed::start(&hil);
+    let begun = std::time::Instant::now();
+    let all: Vec<(String, Value)> = viewed.events().collect();
+    assert_eq!(viewed.done().0, Some(0));
+    assert!(begun.elapsed() > Duration::from_millis(1900), "no faster than a clock");
+    assert_eq!((all[0].0.as_str(), all.last().unwrap().0.as_str()), ("run", "end"));
+    let frames: Vec<Value> = all.iter().filter(|(kind, _)| kind == "frame").map(|(_, f)| f.clone()).collect();
+    let volts = column(&frames, "/volts/low");
+    let read = read_log(&log);
+    assert_eq!(volts.len(), read.commands.len());
+    assert!(read.commands.iter().zip(&volts).all(|(c, v)| (c.voltage - v).abs() < 1e-4));
+    replays_identically(&log);
+}
+
+#[test]
+fn runs_in_computed_time_hear_the_button() {
+    let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside_others();
+    let hil = ["hil", "board_smc_2", "--image", image.to_str().unwrap(), "--set", "run.duration_s=60"];
+    let folder = folder("live-identify");
+    let identify = ["identify", "--log", folder.to_str().unwrap()];
+    for args in [&hil[..], &identify] {
+        let viewed = Viewed::start(args);
+        let mut events = viewed.events();
+        assert!(events.any(|(kind, f)| kind == "frame" && f["state"] == "Running"), "{args:?}");
+        let begun = std::time::Instant::now();
+        assert_eq!(viewed.post("/stop").0, 200);
+        let (ended, out) = viewed.done();
+        assert!(begun.elapsed() < Duration::from_secs(10), "{args:?}");
+        assert_eq!(ended, Some(4), "{args:?}: {out}");
+        assert!(out.contains("stopped by the operator") && !out.contains("FAULT"), "{args:?}: {out}");
+    }
+    // The part that was stopped is kept.
+    replays_identically(&folder.join("releases.mcap"));
 }

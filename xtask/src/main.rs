@@ -298,6 +298,7 @@ fn check() -> Result<()> {
     firmware::in_firmware(["fmt", "--all", "--check"]).run()?;
     let tool = python::checkers()?;
     tool("ruff").args(["format", "--check"]).args(python::SOURCES).run()?;
+    tool("ruff").arg("check").args(python::SOURCES).run()?;
     tool("typos").run()?;
     for manifest in ["Cargo.toml", "firmware/Cargo.toml"] {
         // A permission that nothing needs any more is an error, too.

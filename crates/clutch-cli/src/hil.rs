@@ -248,8 +248,8 @@ impl Hil {
                 format!("control did not end: the board is {state}, encoder and converter are {board}\n")
             }
             cause => {
-                let fault = if cause == Cause::Done { "" } else { "FAULT: " };
-                let what = cause_text(cause, standing.value, true, false);
+                let fault = if cause == Cause::Done || ran.stopped { "" } else { "FAULT: " };
+                let what = cause_text(cause, standing.value, true, ran.stopped);
                 format!("{fault}{what}; encoder and converter are {board}\n")
             }
         };
@@ -268,6 +268,7 @@ fn exit(ran: &Ran) -> Exit {
     match ran.standing.cause {
         Cause::Done => Exit::Done,
         Cause::None => Exit::Failed,
+        Cause::Operator if ran.stopped => Exit::Stopped,
         _ => Exit::Fault,
     }
 }
@@ -297,7 +298,7 @@ fn summary(scenario: &Scenario, ran: &Ran, took: f64) -> serde_json::Value {
         "metrics": ran.metrics,
         "state": format!("{:?}", ran.standing.state),
         "cause": format!("{:?}", ran.standing.cause),
-        "cause_text": cause_text(ran.standing.cause, ran.standing.value, true, false),
+        "cause_text": cause_text(ran.standing.cause, ran.standing.value, true, ran.stopped),
         "value": ran.standing.value,
         "board": ran.board.map(|s| format!("{s:?}")),
         "lost": ran.standing.lost,

@@ -91,7 +91,13 @@ impl Identify {
         let args = ScenarioArgs { scenario, set, identified: None, map: None };
         let scenario = args.load()?;
         let recordings = if self.from.is_empty() {
-            self.experiment(&scenario)?
+            match self.experiment(&scenario) {
+                Err(why) if matches!(why.downcast_ref(), Some(ExperimentError::Stopped(_))) => {
+                    let _ = std::io::stderr().write_all(shown(&format!("{why}\n")).as_bytes());
+                    return Ok(Exit::Stopped);
+                }
+                recordings => recordings?,
+            }
         } else {
             let read = self.from.iter().map(|file| self.read(file, &scenario));
             read.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten().collect()
@@ -196,6 +202,9 @@ impl Identify {
         };
         let session = Session::new(part.clone(), options).map_err(|e| runs(&e))?;
         let summary = session.run(stop, &mut |_| ()).map_err(|e| runs(&e))?;
+        if summary.verdict() == Verdict::Stopped {
+            return Err(ExperimentError::Stopped(name.to_owned()));
+        }
         if summary.verdict() != Verdict::Done {
             let (part, cause) = (name.to_owned(), summary.cause_text());
             return Err(ExperimentError::Ended { part, cause, remedy: REMEDY });

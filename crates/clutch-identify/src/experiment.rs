@@ -8,7 +8,7 @@
 
 use crate::recording::{ReadError, Recording};
 use crate::release;
-use clutch_core::supervisor::{Cause, State};
+use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Real};
 use clutch_log::{LogWriter, Source};
 use clutch_loop::from_scenario::{self, BuildError, BuiltRun};
@@ -134,6 +134,9 @@ pub enum ExperimentError {
         /// The remedy.
         remedy: &'static str,
     },
+    /// Somebody here stopped a part.
+    #[error("the part \"{0}\" was stopped by the operator; it is in its safe state")]
+    Stopped(String),
     /// Something else that runs a part.
     #[error("{0}")]
     Runs(String),
@@ -331,15 +334,6 @@ impl VirtualBoard {
         let report = on_rig.run(&path)?;
         let rig = on_rig.rig();
         self.rests_at = Some(rig.shaft().position * rig.rig().encoder.counts_per_radian::<f64>());
-        let stopped = report.standing.cause == Cause::Operator;
-        if report.standing.state == State::Faulted || report.cause.is_some() || stopped {
-            let cause = report.cause.unwrap_or(report.standing.cause);
-            return Err(ExperimentError::Ended {
-                part: name.to_owned(),
-                cause: cause_text(cause, report.standing.value, false, false),
-                remedy: REMEDY,
-            });
-        }
         if let Some((folder, version)) = &self.logs {
             let mut header = header(version);
             header.extra.push((PRESENT_CODE.to_owned(), report.present.to_string()));
@@ -348,6 +342,17 @@ impl VirtualBoard {
                 log.write(record)?;
             }
             log.finish()?;
+        }
+        if report.stopped {
+            return Err(ExperimentError::Stopped(name.to_owned()));
+        }
+        if report.standing.state == State::Faulted || report.cause.is_some() {
+            let cause = report.cause.unwrap_or(report.standing.cause);
+            return Err(ExperimentError::Ended {
+                part: name.to_owned(),
+                cause: cause_text(cause, report.standing.value, false, false),
+                remedy: REMEDY,
+            });
         }
         let (samples, commands) = report.samples_and_commands();
         let before = dac.volts(DacCode(report.present)).to_f64();

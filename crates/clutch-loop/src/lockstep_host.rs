@@ -148,9 +148,9 @@ impl<L: LockstepBoard, P: Planned<f32>> Station for LockstepHost<L, P> {
         self.host.ping(nonce, &mut self.to_board);
         self.turn(&[], out, &mut |_| ());
     }
-    fn stop(&mut self, reason: StopReason, out: &mut Outbox) {
+    fn stop(&mut self, reason: StopReason, _: &mut Outbox) {
+        // It goes with the next turn, whose notices are heard: the board itself says that control has ended.
         self.host.stop(reason, &mut self.to_board);
-        self.turn(&[], out, &mut |_| ());
     }
     fn disconnect(&mut self) {
         self.host.disconnect();

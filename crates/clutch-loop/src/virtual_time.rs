@@ -73,6 +73,9 @@ impl Default for VirtualOptions {
     }
 }
 
+/// Periods from an operator's stop to the end of the run: the board tells its end, and is seen in its safe state.
+const STOPPING: u64 = 10;
+
 /// The outcome of a run.
 #[derive(Clone, Debug, Default)]
 pub struct VirtualReport {
@@ -108,6 +111,8 @@ pub struct VirtualReport {
     pub present: u16,
     /// True errors, one per sample from arming on, rad.
     pub errors: Vec<f64>,
+    /// True if one that looked on has stopped it, as an operator does.
+    pub stopped: bool,
     /// The board's state at the end.
     pub board: Option<BoardState>,
     /// Figures of the shaft's true motion under control, as a simulation has them; the last period of the
@@ -488,6 +493,8 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
         if let Some(mut played) = self.on.played.take() {
             heard.records.iter().for_each(|record| played.show(record));
             if played.stopped() {
+                self.report.stopped = true;
+                self.end_ns = self.end_ns.min(now + STOPPING * self.period_ns);
                 let end = self.end(time_ns, StopReason::Operator);
                 end.iter().for_each(|record| played.show(record));
                 heard.records.extend(end);

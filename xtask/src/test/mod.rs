@@ -327,8 +327,6 @@ fn fuzzing(tally: &mut Tally) -> Result<()> {
 fn wheel_of(tally: &mut Tally) -> Result<bool> {
     tally.stage("Python packages");
     let tools = python::interpreter()?;
-    let ruff = program(python::beside(&tools, "ruff")).arg("check").args(python::SOURCES);
-    tally.check_quiet("ruff finds nothing in the Python sources", ruff.quietly()?);
     tally.stage("build of the wheel");
     let wheel = python::Wheel::install(&tools)?;
     tally.stage("types of the wheel");
