@@ -7,7 +7,7 @@ use crate::signals::stop_flag;
 use crate::table::number;
 use anyhow::{Context, bail};
 use clap::Args;
-use clutch_identify::experiment::{Programme, VirtualBoard, experiment};
+use clutch_identify::experiment::{ExperimentError, Programme, VirtualBoard, experiment};
 use clutch_identify::rig_file::{rig_file, rows};
 use clutch_identify::{Finding, Recording, Report, identify, map_as_believed, map_file};
 use clutch_log::Limits;
@@ -17,7 +17,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 #[cfg(target_os = "linux")]
 use {
-    clutch_identify::experiment::{ExperimentError, REMEDY},
+    clutch_identify::experiment::REMEDY,
     clutch_loop::onlooker::Onlooker,
     clutch_loop::port::Address,
     clutch_loop::session::{Board, Session, SessionOptions},

@@ -1,7 +1,7 @@
 //! The command, with its manual.
 
 use super::machine::{Machine, Results};
-use super::tools::{STATIC, STATIC_ARM64, Tools, WINDOWS};
+use super::tools::{STATIC, STATIC_ARM64, Tools, WINDOWS, names_no_folder};
 use super::{Made, VERSION, copy, folder, licences, name, tar, wheels, work};
 use crate::run::{program, root};
 use anyhow::{Context, Result, ensure};
@@ -45,6 +45,7 @@ pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
 fn packed(command: &Path, here: &Path, system: &str) -> Result<PathBuf> {
     let whole = format!("clutch-{VERSION}-{system}");
     let packed = work(system)?.join(&whole);
+    names_no_folder(command)?;
     copy(command, &packed)?;
     licences(&packed)?;
     if !system.ends_with("windows") {

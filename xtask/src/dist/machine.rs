@@ -53,6 +53,12 @@ impl Machine {
         Ok(machine)
     }
 
+    /// The same with a setting more.
+    pub(super) fn with(mut self, key: &'static str, value: OsString) -> Machine {
+        self.settings.push((key, value));
+        self
+    }
+
     /// A program on it.
     pub(super) fn program(&self, file: &Path) -> Program {
         let mut words = self.emulator.iter().map(OsString::as_os_str).chain([file.as_os_str()]);
@@ -146,4 +152,45 @@ pub(super) fn python_arm64() -> Result<PathBuf> {
         }
     }
     Ok(root)
+}
+
+/// A Python for Windows, of the packages for Java: address, and sum.
+const PYTHON_WINDOWS: (&str, &str) = (
+    "https://repo1.maven.org/maven2/org/bytedeco/cpython/3.11.3-1.5.9/cpython-3.11.3-1.5.9-windows-x86_64.jar",
+    "3263a50b256447bb7b9e604d6587627e419891370fc33b94469e6a06ff4de834",
+);
+
+/// Its version.
+pub(super) const PYTHON_WINDOWS_VERSION: &str = "3.11";
+
+/// A Python for Windows, fetched and unpacked; gives its interpreter. It has no python3.dll, by which modules for each
+/// version ask for the library of one: here is that of `module`.
+pub(super) fn python_windows(module: &Path) -> Result<PathBuf> {
+    let folder = work("python-windows")?;
+    let (address, sum) = PYTHON_WINDOWS;
+    program("curl").args(["-sSf", "-L", "-o", "python.jar", address]).within(&folder).run()?;
+    std::fs::write(folder.join("python.sum"), format!("{sum}  python.jar\n"))?;
+    program("sha256sum").args(["--check", "--quiet", "python.sum"]).within(&folder).run()?;
+    program("python3").args(["-m", "zipfile", "-e", "python.jar", "."]).within(&folder).run()?;
+    let home = folder.join("org/bytedeco/cpython/windows-x86_64");
+
+    let imports = program("x86_64-w64-mingw32-objdump").arg("-p").arg(module).output()?;
+    let imports = String::from_utf8_lossy(&imports);
+    let library = PYTHON_WINDOWS_VERSION.replace('.', "");
+    let mut definition = "LIBRARY python3\nEXPORTS\n".to_owned();
+    let mut of_python = false;
+    for line in imports.lines() {
+        if let Some((_, name)) = line.split_once("DLL Name: ") {
+            of_python = name == "python3.dll";
+        }
+        let name =
+            line.split_whitespace().nth(2).filter(|name| name.trim_start_matches('_').starts_with("Py"));
+        if let Some(name) = name.filter(|_| of_python) {
+            definition += &format!("{name} = python{library}.{name}\n");
+        }
+    }
+    std::fs::write(folder.join("python3.def"), definition)?;
+    let link = program("x86_64-w64-mingw32-gcc").args(["-shared", "-nostdlib", "-Wl,-e,0", "-o"]);
+    link.arg(home.join("python3.dll")).arg("python3.def").within(&folder).run()?;
+    Ok(home.join("python.exe"))
 }

@@ -11,7 +11,7 @@ use crate::{firmware, fmu, libclutch};
 use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
-use tools::{LINUX, LINUX_ARM64, Tools, WINDOWS};
+use tools::{LINUX, LINUX_ARM64, Tools, WINDOWS, names_no_folder};
 
 /// A part of a release.
 #[derive(Clone, Copy, ValueEnum)]
@@ -207,6 +207,7 @@ fn units(tools: &Tools) -> Result<Vec<Made>> {
         ("aarch64-linux", tools.build(LINUX_ARM64, &library)?.join("libclutch_fmi.so")),
         ("x86_64-windows", tools.build(WINDOWS, &library)?.join("clutch_fmi.dll")),
     ];
+    libraries.iter().try_for_each(|(_, library)| names_no_folder(library))?;
     let packed = work("fmu")?;
     fmu::packed(None, &linux.join("examples/describe"), &libraries, &packed)?;
     fmu::UNITS.iter().map(|name| unit(tools, &packed.join(name))).collect()

@@ -28,7 +28,8 @@ sys.exit(str(wrong)) if wrong else print(len(json.loads(text)['components']))
 ";
 
 pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
-    if !cargo(["cyclonedx", "--version"]).quietly()?.0 {
+    let (found, version) = cargo(["cyclonedx", "--version"]).quietly()?;
+    if !found || !version.contains(TOOL.1) {
         cargo(["install", TOOL.0, "--locked", "--version", TOOL.1]).run()?;
     }
     // It lays a bill beside each manifest of a workspace: under a name that nothing else has.

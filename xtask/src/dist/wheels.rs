@@ -1,7 +1,7 @@
 //! The Python package: source distribution and wheels.
 
-use super::machine::{Machine, python_arm64};
-use super::tools::{GLIBC, LINUX, LINUX_ARM64, Tools, WINDOWS};
+use super::machine::{Machine, PYTHON_WINDOWS_VERSION, Results, python_arm64, python_windows};
+use super::tools::{GLIBC, LINUX, LINUX_ARM64, Tools, WINDOWS, names_no_folder};
 use super::{Made, folder, name, work};
 use crate::python;
 use crate::run::program;
@@ -21,12 +21,13 @@ pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
     let (clean, picture) = first_picture(tools, &linux)?;
     let here = Machine::here().results(&[&clean.join("bin/clutch")], "wheel")?;
     let on_arm64 = arm64_results(tools, &arm64)?;
+    let (imported, on_windows) = windows_results(tools, &windows)?;
     let checked = vec![audited(tools, &linux)?, picture, here.told()];
     Ok(vec![
         Made { checked: vec!["not tried here: the tests build from it".to_owned()], file: archive },
         Made { checked, file: linux },
         Made { checked: vec![audited(tools, &arm64)?, on_arm64.same_as(&here)?], file: arm64 },
-        Made { checked: vec![imports(tools, &windows)?], file: windows },
+        Made { checked: vec![imported, on_windows.same_as(&here)?], file: windows },
     ])
 }
 
@@ -35,7 +36,12 @@ fn wheel(tools: &Tools, target: &str, options: &[&str]) -> Result<PathBuf> {
     let out = work(&format!("wheel-{target}"))?;
     let build = tools.program("maturin").args(["build", "--release", "--locked", "--target", target]);
     build.args(options).arg("--out").arg(&out).run()?;
-    kept(&python::the_one(&out, ".whl")?)
+    let wheel = python::the_one(&out, ".whl")?;
+    let unpacked = out.join("unpacked");
+    program(&tools.python).args(["-m", "zipfile", "-e"]).args([&wheel, &unpacked]).run()?;
+    let ending = if target == WINDOWS { ".pyd" } else { ".so" };
+    names_no_folder(&python::the_one(&unpacked.join("clutch"), ending)?)?;
+    kept(&wheel)
 }
 
 /// Copies a file into the folder of the release; gives its path there.
@@ -88,37 +94,55 @@ fn is_picture(file: &Path) -> Result<()> {
 }
 
 /// Installs a wheel for a 64-bit Arm processor beside a Python for it, and computes with it.
-fn arm64_results(tools: &Tools, wheel: &Path) -> Result<super::machine::Results> {
+fn arm64_results(tools: &Tools, wheel: &Path) -> Result<Results> {
     let root = python_arm64()?;
     let (machine, python) = (Machine::arm64(Some(&root)), root.join("usr/bin/python3"));
     let version = "import sys; print('%d.%d' % sys.version_info[:2])";
     let version = machine.program(&python).args(["-c", version]).output()?;
     let site = root.join("site");
+    let platforms = ["manylinux_2_28_aarch64", "manylinux_2_27_aarch64", "manylinux2014_aarch64"];
+    installed(tools, wheel, &site, String::from_utf8_lossy(&version).trim(), &platforms)?;
+    machine.results(&[&python, "-c".as_ref(), run(&site).as_ref()], "wheel-arm64-results")
+}
+
+/// The same for Windows; before, what its module asks for.
+fn windows_results(tools: &Tools, wheel: &Path) -> Result<(String, Results)> {
+    let site = work("wheel-windows-site")?;
+    installed(tools, wheel, &site, PYTHON_WINDOWS_VERSION, &["win_amd64"])?;
+    let module = site.join("clutch/_clutch.pyd");
+    let python = python_windows(&module)?;
+    let home = format!("Z:{}", python.with_file_name("").display());
+    let machine = Machine::windows()?.with("PYTHONHOME", home.into());
+    let results = machine.results(&[&python, "-c".as_ref(), run(&site).as_ref()], "wheel-windows-results")?;
+    Ok((imports(&module)?, results))
+}
+
+/// Installs a wheel and what it needs for another system into a folder.
+fn installed(tools: &Tools, wheel: &Path, site: &Path, version: &str, platforms: &[&str]) -> Result<()> {
     let install =
         program(&tools.python).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
     install
-        .args(["--only-binary", ":all:", "--python-version"])
-        .arg(String::from_utf8_lossy(&version).trim())
-        .args(["--platform", "manylinux_2_28_aarch64", "--platform", "manylinux_2_27_aarch64"])
-        .args(["--platform", "manylinux2014_aarch64", "--target"])
-        .args([&site, wheel])
-        .run()?;
-    // The command of the package, by its interpreter: the script's first line names another.
-    let run = format!(
+        .args(["--only-binary", ":all:", "--python-version", version])
+        .args(platforms.iter().flat_map(|platform| ["--platform", platform]))
+        .arg("--target")
+        .args([site, wheel])
+        .run()
+}
+
+/// The command of the package in a folder, by an interpreter: the script's first line names another.
+fn run(site: &Path) -> String {
+    format!(
         "import sys; sys.path.insert(0, {:?}); sys.argv[0] = 'clutch'; from clutch._cli import main; sys.exit(main())",
         site.display().to_string()
-    );
-    machine.results(&[&python, "-c".as_ref(), run.as_ref()], "wheel-arm64")
+    )
 }
 
 /// That the module of a wheel for Windows asks for nothing but libraries that Windows and Python have.
-fn imports(tools: &Tools, wheel: &Path) -> Result<String> {
-    let folder = work("wheel-windows")?;
-    program(&tools.python).args(["-m", "zipfile", "-e"]).args([wheel, &folder]).run()?;
-    let libraries = libraries(&folder.join("clutch/_clutch.pyd"))?;
+fn imports(module: &Path) -> Result<String> {
+    let libraries = libraries(module)?;
     ensure!(libraries.iter().any(|name| name == "python3.dll"), "no python3.dll among {libraries:?}");
     let others = libraries.len() - 1;
-    Ok(format!("asks for python3.dll and {others} libraries of Windows; not run"))
+    Ok(format!("asks for python3.dll and {others} libraries of Windows"))
 }
 
 /// The libraries that a file for Windows asks for; an error if one comes with a compiler.

@@ -345,7 +345,9 @@ fn wheel_of(tally: &mut Tally) -> Result<bool> {
     tally.stage("build of the playground");
     let playground = playground::build()?;
     tally.stage("tests of the wheel");
-    let tests = python(&["pytest", "--color=no", "-q"])?.arg(root().join("python/tests"));
+    // Two at a time: most wait for a process or a clock now and then.
+    let pytest = ["pytest", "--color=no", "-q", "-n", "2", "--dist", "loadfile"];
+    let tests = python(&pytest)?.arg(root().join("python/tests"));
     let tests = match &playground {
         Some(built) => tests
             .env("CLUTCH_PLAYGROUND", &built.page)
