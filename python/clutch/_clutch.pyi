@@ -400,7 +400,7 @@ class Servo:
     @property
     def error_rate(self, /) -> float:
         """
-        Its rate as the law saw it, rad/s.
+        Rate of the error as the law saw it, rad/s.
         """
     @property
     def limit(self, /) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -127,8 +128,8 @@ class Log:
             raise FileExistsError(f"{file}: exists already")
         table = self.channels[channel].to_arrow()
         table = table.replace_schema_metadata({**self.metadata, "channel": channel, "scenario.toml": self._toml})
-        # What was begun has another name: half a table is none.
-        part = file.with_name(file.name + ".part")
+        # What was begun has another name, which nothing else has: half a table is none.
+        part = file.with_name(f"{file.name}.{secrets.token_hex(4)}.part")
         try:
             if ending == ".parquet":
                 parquet.write_table(table, part, compression="zstd")

@@ -46,7 +46,8 @@ def test_an_exported_channel_has_every_number_with_its_unit_and_its_meaning(smc_
 
 def test_units_and_meanings_of_columns_come_from_the_tables_that_declare_them(smc_log):
     command = clutch.read_log(smc_log).channels["command"]
-    assert command.attributes("error_rate_rad_s") == {"units": "rad/s", "long_name": "Its rate as the law saw it"}
+    rate = {"units": "rad/s", "long_name": "Rate of the error as the law saw it"}
+    assert command.attributes("error_rate_rad_s") == rate
     assert command.attributes("time_s") == {"units": "s", "long_name": "time since the start of the run"}
     assert command.to_xarray("time_s")["voltage_v"].attrs == {"units": "V", "long_name": "Voltage of the code"}
     samples = clutch.simulate("smc_2").samples

@@ -51,7 +51,6 @@ fn session(scenario: &Scenario, role: ChipRole, chip: ChipOptions) -> ChipSessio
         seed: 1,
         latency_ns: 0,
         silence: None,
-        looking: None,
         version: String::new(),
     };
     ChipSession::new(scenario.clone(), options, chip, role).expect("a session")

@@ -220,6 +220,36 @@ fn a_gain_that_is_certified_comes_into_force_is_logged_and_is_replayed() {
     forgotten(&log);
 }
 
+#[test]
+fn changes_one_after_the_other_certified_or_not_are_replayed() {
+    let _alone = alone();
+    let log = folder("live-two-gains").join("run.mcap");
+    let allowed = ["--set", "safety.live_gains=true", "--uncertified"];
+    let begin = ["loop", "--duration", "60", "--log", log.to_str().unwrap()];
+    let viewed = Viewed::start(&[&begin[..], &allowed].concat());
+    let mut events = viewed.events();
+    assert_eq!(events.next().unwrap().0, "run");
+    for (change, verdict) in [
+        ("law.smc.kp_v&value=4", "certified as sampled: "),
+        ("law.smc.kp_v&value=400", "UNCERTIFIED, as asked: "),
+        ("law.smc.kd_v_s_rad&value=390", "UNCERTIFIED, as asked: "),
+    ] {
+        let (status, text) = viewed.post(&format!("/set?key={change}"));
+        assert_eq!(status, 200, "{change}: {text}");
+        assert!(text.starts_with(verdict), "{change}: {text}");
+        assert!(events.any(|(kind, note)| kind == "note" && !note["gain"].is_null()), "{change} is in force");
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    assert_eq!(viewed.post("/stop").0, 200);
+    let (code, out) = viewed.done();
+    assert_eq!(code, Some(4), "{out}");
+    assert!(out.contains("gains were changed 3 times while it ran"), "{out}");
+    let changes = read_log(&log).changes;
+    let bounded: Vec<bool> = changes.iter().map(|change| change.error_bound.is_finite()).collect();
+    assert_eq!(bounded, [true, false, false]);
+    replays_identically(&log);
+}
+
 /// Without its change the log does not replay: the change is what explains it.
 fn forgotten(log: &Path) {
     let without = log.with_file_name("without.mcap");

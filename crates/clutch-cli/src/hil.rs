@@ -13,6 +13,7 @@ use clutch_loop::chip::{ChipFault, ChipKind, ChipOptions, ChipReport, ChipRole, 
 use clutch_loop::clearance::ClearanceError;
 use clutch_loop::faults::{Fault, FaultKind};
 use clutch_loop::lockstep_session::{LockstepOptions, LockstepSession};
+use clutch_loop::onlooker::Looking;
 use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_loop::session::SessionError;
 use clutch_loop::virtual_time::VirtualReport as Ran;
@@ -130,9 +131,10 @@ impl Hil {
         if self.link == Link::Uart {
             self.set.push(("safety.limits.deadline_us".to_owned(), "1000000".to_owned()));
         }
-        let Some(session) = self.checked(LockstepSession::new(self.load()?, self.options()?))? else {
+        let Some(session) = self.checked(LockstepSession::new(self.load()?, self.options()))? else {
             return Ok(Exit::NotCertified);
         };
+        let session = session.looked_at(self.looking()?);
         tell(session.note());
         let started = std::time::Instant::now();
         let ran = match self.link {
@@ -170,8 +172,9 @@ impl Hil {
                  --chip-fault those of the chip"
             );
         }
-        let session = ChipSession::new(self.load()?, self.options()?, chip, role);
+        let session = ChipSession::new(self.load()?, self.options(), chip, role);
         let Some(session) = self.checked(session)? else { return Ok(Exit::NotCertified) };
+        let session = session.looked_at(self.looking()?);
         tell(session.note());
         let started = std::time::Instant::now();
         let on_chip = session.run(&self.image)?;
@@ -212,10 +215,14 @@ impl Hil {
         }
     }
 
-    fn options(&self) -> anyhow::Result<LockstepOptions> {
+    /// The views that were asked for.
+    fn looking(&self) -> anyhow::Result<Option<Looking>> {
         // Ctrl-C ends it at once, unless a view is to see the end.
-        let looking = if self.live.asked_for() { self.live.looking(&stop_flag()?)? } else { None };
-        Ok(LockstepOptions {
+        if self.live.asked_for() { self.live.looking(&stop_flag()?) } else { Ok(None) }
+    }
+
+    fn options(&self) -> LockstepOptions {
+        LockstepOptions {
             log: self.log.clone(),
             uncertified: self.uncertified,
             faults: self.fault.clone(),
@@ -223,9 +230,8 @@ impl Hil {
             latency_ns: u64::from(self.latency_us) * 1000,
             // The board's own clock runs on while this machine computes.
             silence: (self.link == Link::Uart).then_some(Micros(10_000_000)),
-            looking,
             version: BUILD.to_owned(),
-        })
+        }
     }
 
     fn text(&self, scenario: &Scenario, ran: &Ran, board: &str, took: f64) -> String {

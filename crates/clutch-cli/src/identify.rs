@@ -196,11 +196,10 @@ impl Identify {
             log: Some(log.to_owned()),
             patient: self.patient,
             uncertified: true,
-            onlooker,
             version: BUILD.to_owned(),
             ..SessionOptions::default()
         };
-        let session = Session::new(part.clone(), options).map_err(|e| runs(&e))?;
+        let session = Session::new(part.clone(), options).map_err(|e| runs(&e))?.looked_at(onlooker);
         let summary = session.run(stop, &mut |_| ()).map_err(|e| runs(&e))?;
         if summary.verdict() == Verdict::Stopped {
             return Err(ExperimentError::Stopped(name.to_owned()));

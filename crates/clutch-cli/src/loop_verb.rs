@@ -181,10 +181,7 @@ impl Loop {
         {
             bail!("{}: is the scenario; name another file for the log", log.display());
         }
-        let stop = stop_flag()?;
-        let live = self.live.start(&stop)?;
-        let onlooker = live.map(|live| live as Arc<dyn Onlooker>);
-        let session = match Session::new(scenario, SessionOptions { onlooker, ..self.options() }) {
+        let session = match Session::new(scenario, self.options()) {
             Ok(session) => session,
             Err(SessionError::Clearance(refusal @ ClearanceError::NotCertified { .. })) => {
                 self.say(&not_certified(&refusal, &self.scenario))?;
@@ -192,6 +189,9 @@ impl Loop {
             }
             Err(refusal) => return Err(refusal.into()),
         };
+        let stop = stop_flag()?;
+        let live = self.live.start(&stop)?;
+        let session = session.looked_at(live.map(|live| live as Arc<dyn Onlooker>));
         // A log on a limited disk must end the log and not the loop.
         let ignored = Arc::new(AtomicBool::new(false));
         signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
@@ -311,7 +311,6 @@ impl Loop {
                 OnDriftArg::Tell => OnDrift::Tell,
                 OnDriftArg::Stop => OnDrift::Stop,
             },
-            onlooker: None,
             version: BUILD.to_owned(),
         }
     }

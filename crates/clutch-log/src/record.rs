@@ -322,7 +322,7 @@ records! {
         11 target_acceleration_rad_s2 = target_acceleration: f64, double (optional);
         /// Position error as the law saw it, rad.
         12 error_rad = error: f64, double (optional);
-        /// Its rate as the law saw it, rad/s.
+        /// Rate of the error as the law saw it, rad/s.
         13 error_rate_rad_s = error_rate: f64, double (optional);
         terms {
             /// The law's first term; the file has the law's name for it, and as many terms as the law.

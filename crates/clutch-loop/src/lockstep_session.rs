@@ -31,8 +31,6 @@ pub struct LockstepOptions {
     pub latency_ns: u64,
     /// Silence of encoder and converter that the board bears, if its clock runs on while this machine computes.
     pub silence: Option<Micros>,
-    /// One that looks on.
-    pub looking: Option<Looking>,
     /// Version and commit of the build, for the log.
     pub version: String,
 }
@@ -45,11 +43,12 @@ impl LockstepOptions {
     /// The view of a run on a kind of board, if one is wanted.
     pub(crate) fn played<T: Real>(
         &self,
+        looking: Option<&Looking>,
         scenario: &Scenario,
         servo: &Servo<T>,
         board: &str,
     ) -> Option<Played> {
-        self.looking.as_ref().map(|looking| looking.begin(&self.header(scenario, servo, board), scenario))
+        looking.map(|looking| looking.begin(&self.header(scenario, servo, board), scenario))
     }
 
     /// Writes the log of a run, if one is wanted: `on` is the kind of board, and whether the gains are certified.
@@ -95,6 +94,7 @@ pub struct LockstepSession {
     options: LockstepOptions,
     certified: bool,
     changed: bool,
+    looking: Option<Looking>,
 }
 
 impl LockstepSession {
@@ -108,7 +108,13 @@ impl LockstepSession {
         let scenario = single.unwrap_or(scenario);
         let cleared = check(&scenario, None, options.uncertified, options.log.as_deref())?;
         let certified = cleared.plan.certificate.certified();
-        Ok(LockstepSession { scenario, options, certified, changed })
+        Ok(LockstepSession { scenario, options, certified, changed, looking: None })
+    }
+
+    /// The same with one that looks on.
+    #[must_use]
+    pub fn looked_at(self, looking: Option<Looking>) -> Self {
+        LockstepSession { looking, ..self }
     }
 
     /// The scenario as it will run.
@@ -152,7 +158,7 @@ impl LockstepSession {
         let station = lockstep_host(scenario, &built, start()?, ticks).map_err(SessionError::from)?;
         let path = from_scenario::path::<f32>(scenario).map_err(SessionError::from)?;
         let on_rig = VirtualLoop::new(scenario, params, station).map_err(VirtualError::from);
-        let played = o.played(scenario, &built.servo, "emulated board");
+        let played = o.played(self.looking.as_ref(), scenario, &built.servo, "emulated board");
         let report = on_rig?.played(played).run(&path)?;
         self.options.write_log(scenario, &built.servo, ("emulated board", self.certified), &report)?;
         Ok(report)

@@ -106,8 +106,6 @@ pub struct SessionOptions {
     pub pace: Pace,
     /// The effect of friction over load that leaves the bounds.
     pub on_drift: OnDrift,
-    /// One that looks on at the run, and not at a release test before it.
-    pub onlooker: Option<Arc<dyn Onlooker>>,
     /// Version and commit of the build, for log and summary.
     pub version: String,
 }
@@ -127,7 +125,6 @@ impl Default for SessionOptions {
             realtime: RealtimeOptions::default(),
             pace: Pace::default(),
             on_drift: OnDrift::default(),
-            onlooker: None,
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }
     }
@@ -250,6 +247,7 @@ pub struct Session {
     release: Result<ReleaseTest, NoRelease>,
     /// The change made in the scenario for the board's sake.
     note: Option<String>,
+    onlooker: Option<Arc<dyn Onlooker>>,
 }
 
 impl Session {
@@ -274,7 +272,13 @@ impl Session {
         if let (Release::Always, Err(why)) = (options.release, &release) {
             return Err(SessionError::NoRelease { scenario: scenario.name().to_owned(), why: *why });
         }
-        Ok(Session { scenario, options, cleared, release, note })
+        Ok(Session { scenario, options, cleared, release, note, onlooker: None })
+    }
+
+    /// The same with one that looks on at the run, and not at a release test before it.
+    #[must_use]
+    pub fn looked_at(self, onlooker: Option<Arc<dyn Onlooker>>) -> Session {
+        Session { onlooker, ..self }
     }
 
     /// True if the gains are certified, in continuous time, for the scenario's bounds.
@@ -304,7 +308,7 @@ impl Session {
 
     /// The receivers of the run's records.
     fn receivers(&self) -> Receivers<'_> {
-        Receivers { log: self.options.log.as_deref(), onlooker: self.options.onlooker.as_deref() }
+        Receivers { log: self.options.log.as_deref(), onlooker: self.onlooker.as_deref() }
     }
 
     /// The scenario as it will run.

@@ -103,7 +103,6 @@ pub(crate) fn run_loop<'py>(
     }
     let faults = faults.iter().map(|text| parsed::<Fault>(text)).collect::<PyResult<_>>()?;
     let stop = Arc::new(AtomicBool::new(false));
-    let onlooker = live.map(|port| view(py, port, &stop)).transpose()?;
     let options = SessionOptions {
         board: match (port, board) {
             (Some(port), _) => Board::Daq(parsed::<Address>(port)?),
@@ -133,10 +132,10 @@ pub(crate) fn run_loop<'py>(
         },
         on_drift: chosen("on_drift", on_drift, [("tell", OnDrift::Tell), ("stop", OnDrift::Stop)])?,
         pace: chosen("pace", pace, [("sample", Pace::Sample), ("clock", Pace::Clock)])?,
-        onlooker,
         version: clutch_cli::BUILD.to_owned(),
     };
     let session = Session::new((*scenario.0).clone(), options).map_err(|e| error(py, &scenario, &e))?;
+    let session = session.looked_at(live.map(|port| view(py, port, &stop)).transpose()?);
     let (mut announced, mut interrupt) = (String::new(), None);
     let ran = py.detach(|| {
         session.run(&stop, &mut |event| match event {

@@ -205,7 +205,7 @@ impl Servo {
         either!(&self.running, r => r.last.tick.error.to_f64())
     }
 
-    /// Its rate as the law saw it, rad/s.
+    /// Rate of the error as the law saw it, rad/s.
     #[getter]
     fn error_rate(&self) -> f64 {
         either!(&self.running, r => r.last.tick.error_rate.to_f64())

@@ -326,7 +326,7 @@ pub const SAMPLE_COLUMNS: [(&str, &str); 15] = [
     ("error_rad", "true error, target less position"),
     ("counts", "the encoder's counts"),
     ("measured_error_rad", "error as the law saw it"),
-    ("error_rate_rad_s", "its rate as the law saw it"),
+    ("error_rate_rad_s", "rate of the error as the law saw it"),
     ("code", "code given to the converter"),
     ("voltage_v", "voltage commanded at this sample, before delay and lag"),
     ("demand_v", "the law's answer, before the converter"),

@@ -4,7 +4,7 @@ use clutch_sim::Run;
 use clutch_sim::metrics::columns;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-/// That of zlib, over little-endian numbers: the samples column by column, the law's terms, the events, the figures.
+/// Hash of zlib (CRC-32), over little-endian numbers: the samples column by column, the law's terms, the events, the figures.
 pub(crate) fn bits(run: &Run) -> u32 {
     let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
     let mut digest = crc.digest();

@@ -7,7 +7,7 @@ use crate::run::{program, root};
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 
-/// What cargo builds.
+/// The program, as cargo's options name it.
 const COMMAND: [&str; 4] = ["--package", "clutch-cli", "--bin", "clutch"];
 
 /// The one that runs here.
@@ -63,7 +63,7 @@ fn packed(command: &Path, here: &Path, system: &str) -> Result<PathBuf> {
     Ok(archive)
 }
 
-/// That a 64-bit Arm processor simulates the runs of docs/bits.md, more than a million ticks, with the hashes there.
+/// Check of the runs of docs/bits.md, more than a million ticks: a 64-bit Arm processor gives the hashes there.
 fn bits(tools: &Tools) -> Result<String> {
     let built = tools.build(STATIC_ARM64, &["--package", "clutch-tests", "--example", "bits"])?;
     let table = Machine::arm64(None).program(&built.join("examples/bits")).arg(work("bits")?).output()?;

@@ -14,7 +14,7 @@ const SCENARIOS: [&str; 6] = ["pd_2", "ctc_2", "smc_2", "f32_smc_2", "bench_glid
 /// A machine.
 pub(super) struct Machine {
     pub(super) name: &'static str,
-    /// What runs a program on it, with arguments; nothing on this one.
+    /// The program that runs another's, with arguments; nothing on this one.
     emulator: Vec<OsString>,
     settings: Vec<(&'static str, OsString)>,
 }
@@ -85,7 +85,7 @@ impl Machine {
     }
 }
 
-/// What a command computed on a machine.
+/// Results of a command on a machine.
 pub(super) struct Results {
     machine: &'static str,
     files: BTreeMap<String, Vec<u8>>,
@@ -93,7 +93,7 @@ pub(super) struct Results {
 }
 
 impl Results {
-    /// That they are these, byte for byte, in a line of the summary; an error that names what differs.
+    /// A line of the summary, where they are these byte for byte; an error that names what differs.
     pub(super) fn same_as(&self, reference: &Results) -> Result<String> {
         let names: Vec<&String> = reference.files.keys().chain(self.files.keys()).collect();
         let differing: Vec<&&String> =

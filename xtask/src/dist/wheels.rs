@@ -50,7 +50,7 @@ fn kept(file: &Path) -> Result<PathBuf> {
     Ok(folder().join(name(file)))
 }
 
-/// That a wheel needs no later C library than it says, as auditwheel reads its symbols.
+/// Check that a wheel needs no later C library than it says, as auditwheel reads its symbols.
 fn audited(tools: &Tools, wheel: &Path) -> Result<String> {
     let text = tools.program("auditwheel").arg("show").arg(wheel).output()?;
     let text = String::from_utf8_lossy(&text).split_whitespace().collect::<Vec<_>>().join(" ");
@@ -137,7 +137,7 @@ fn run(site: &Path) -> String {
     )
 }
 
-/// That the module of a wheel for Windows asks for nothing but libraries that Windows and Python have.
+/// Check that the module of a wheel for Windows asks for nothing but libraries that Windows and Python have.
 fn imports(module: &Path) -> Result<String> {
     let libraries = libraries(module)?;
     ensure!(libraries.iter().any(|name| name == "python3.dll"), "no python3.dll among {libraries:?}");

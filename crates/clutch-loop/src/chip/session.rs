@@ -4,6 +4,7 @@ use super::{ChipBoard, ChipFault, ChipKind, Counted};
 use crate::clearance::check;
 use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_session::{LockstepError, LockstepOptions};
+use crate::onlooker::Looking;
 use crate::session::SessionError;
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, ControllerStation, HOST_SILENCE, HostStation, Station};
 use crate::virtual_time::{VirtualError, VirtualLoop, VirtualOptions, VirtualReport};
@@ -68,6 +69,7 @@ pub struct ChipSession {
     role: ChipRole,
     certified: bool,
     changed: bool,
+    looking: Option<Looking>,
 }
 
 impl ChipSession {
@@ -89,7 +91,13 @@ impl ChipSession {
         let scenario = single.unwrap_or(scenario);
         let cleared = check(&scenario, None, options.uncertified, options.log.as_deref())?;
         let certified = cleared.plan.certificate.certified();
-        Ok(ChipSession { scenario, options, chip, role, certified, changed })
+        Ok(ChipSession { scenario, options, chip, role, certified, changed, looking: None })
+    }
+
+    /// The same with one that looks on.
+    #[must_use]
+    pub fn looked_at(self, looking: Option<Looking>) -> Self {
+        ChipSession { looking, ..self }
     }
 
     /// The scenario as it will run.
@@ -176,7 +184,7 @@ impl ChipSession {
         let board = ChipBoard::start(image, &self.scenario, &self.chip.faults, self.chip.count.as_deref());
         let chip =
             ChipKind::of(image).map_or_else(String::new, |kind| format!("model of an {}", kind.name()));
-        let played = o.played(&self.scenario, &built.servo, &chip);
+        let played = o.played(self.looking.as_ref(), &self.scenario, &built.servo, &chip);
         let mut on_chip = VirtualLoop::with_board(board?, params, station).played(played);
         let ran = on_chip.run(path)?;
         let certified = self.certified;
