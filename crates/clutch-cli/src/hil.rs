@@ -254,7 +254,8 @@ impl Hil {
                 format!("control did not end: the board is {state}, encoder and converter are {board}\n")
             }
             cause => {
-                let fault = if cause == Cause::Done || ran.stopped { "" } else { "FAULT: " };
+                let asked_for = cause == Cause::Done || cause == Cause::Operator && ran.stopped;
+                let fault = if asked_for { "" } else { "FAULT: " };
                 let what = cause_text(cause, standing.value, true, ran.stopped);
                 format!("{fault}{what}; encoder and converter are {board}\n")
             }

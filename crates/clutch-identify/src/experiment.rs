@@ -343,9 +343,6 @@ impl VirtualBoard {
             }
             log.finish()?;
         }
-        if report.stopped {
-            return Err(ExperimentError::Stopped(name.to_owned()));
-        }
         if report.standing.state == State::Faulted || report.cause.is_some() {
             let cause = report.cause.unwrap_or(report.standing.cause);
             return Err(ExperimentError::Ended {
@@ -353,6 +350,9 @@ impl VirtualBoard {
                 cause: cause_text(cause, report.standing.value, false, false),
                 remedy: REMEDY,
             });
+        }
+        if report.stopped {
+            return Err(ExperimentError::Stopped(name.to_owned()));
         }
         let (samples, commands) = report.samples_and_commands();
         let before = dac.volts(DacCode(report.present)).to_f64();
