@@ -86,7 +86,8 @@ impl<T: Real> Pid<T> {
             params: *p,
             integral_step: p.ki * seconds,
             newest: seconds / (p.derivative_time + seconds),
-            tracking: seconds / p.tracking_time,
+            // Without an integral nothing would ever bring back what a limit has taken.
+            tracking: if p.ki > T::ZERO { seconds / p.tracking_time } else { T::ZERO },
             fastest: if p.kd > T::ZERO { span / p.kd } else { T::ZERO },
             output: Output::new(output, period)?,
         })
@@ -243,6 +244,17 @@ mod tests {
         assert!(integral < 1.1 && cut_off < -90.0, "{integral} V, {cut_off} V");
         let ticks = (0..).take_while(|_| law.update(&mut state, &behind(0.02)).voltage >= 10.0).count();
         assert!(ticks <= 1, "{ticks} ms at the limit after the error has turned");
+    }
+
+    #[test]
+    fn without_an_integral_a_limit_leaves_nothing_behind() {
+        let law = pid(PidParams { ki: 0.0, kd: 0.0, bias: 2.25, ..PidParams::default() });
+        let mut state = law.start(&Tick::default(), 2.25);
+        for error in [-0.1, 0.1] {
+            let limit = (0..1000).map(|_| law.update(&mut state, &behind(error)).voltage).next_back();
+            assert_eq!(limit, Some(if error < 0.0 { 10.0 } else { 0.0 }));
+            assert_eq!(law.update(&mut state, &Tick::default()).voltage, 2.25, "after {error} rad");
+        }
     }
 
     #[test]
