@@ -10,12 +10,14 @@ const SYSTEM: &str = if cfg!(target_arch = "aarch64") { "aarch64-linux" } else {
 /// The units.
 pub(crate) const UNITS: [&str; 2] = ["clutch_rig.fmu", "clutch_law.fmu"];
 
-/// Packs both units around a scenario for this machine, in target/fmu; gives their folder.
-pub(crate) fn pack(scenario: Option<&Path>, optimised: bool) -> Result<PathBuf> {
-    let (profile, folder) = if optimised { ("release", "release") } else { ("dev", "debug") };
-    let library =
-        cargo(["build", "--package", "clutch-fmi", "--lib", "--example", "describe", "--profile", profile]);
-    library.run()?;
+/// Builds both units and packs them around a scenario for this machine, in target/fmu; gives their folder.
+pub(crate) fn pack(scenario: Option<&Path>) -> Result<PathBuf> {
+    cargo(["build", "--release", "--package", "clutch-fmi", "--lib", "--example", "describe"]).run()?;
+    of_built(scenario, "release")
+}
+
+/// Packs them of what is built already, in that folder of target.
+pub(crate) fn of_built(scenario: Option<&Path>, folder: &str) -> Result<PathBuf> {
     let built = root().join("target").join(folder);
     let out = root().join("target/fmu");
     let libraries = [(SYSTEM, built.join("libclutch_fmi.so"))];

@@ -11,6 +11,7 @@ mod fuzz;
 mod libclutch;
 mod miri;
 mod mutants;
+mod neon;
 mod playground;
 mod product;
 mod proof;
@@ -122,6 +123,8 @@ enum Verb {
     },
     /// Runs the tests of core, wire and node in Miri, as on a machine of the other byte order; adds a row to docs/proof.md.
     Miri,
+    /// Runs the tests of lanes with NEON, on an emulated 64-bit Arm processor: five minutes.
+    Neon,
     /// Runs the fault campaign on all cores, and rewrites its table in docs/safety.md: a million runs, half an hour.
     Campaign {
         /// Runs.
@@ -257,6 +260,7 @@ fn main() -> Result<()> {
         Verb::Prove { names } => proof::prove(&names),
         Verb::Mutants { shard } => mutants::run(&shard),
         Verb::Miri => miri::run(),
+        Verb::Neon => neon::run(),
         Verb::Certified { runs } => certified(runs),
         Verb::Smooth => smooth(),
         Verb::Meter => meter(),
@@ -275,7 +279,7 @@ fn main() -> Result<()> {
         Verb::Latency { rest } => {
             run::program(python::interpreter()?).arg("benches/latency/lateness.py").args(rest).run()
         }
-        Verb::Fmu { scenario } => fmu::pack(scenario.as_deref(), true).map(drop),
+        Verb::Fmu { scenario } => fmu::pack(scenario.as_deref()).map(drop),
         Verb::Dist { parts } => dist::run(&parts),
         Verb::Playground => test::playground(),
         Verb::Libclutch { targets } => libclutch::run(&targets),

@@ -162,12 +162,12 @@ fn host(tally: &mut Tally) -> Result<bool> {
 }
 
 /// The examples that the tests of the wheel run beside it.
-const EXAMPLES: [&str; 5] = ["write_demo", "bits", "intervals", "ask", "page"];
+const EXAMPLES: [&str; 6] = ["write_demo", "bits", "intervals", "ask", "page", "describe"];
 
 /// Builds what the wheel is compared with, and the command that tests run: with few optimisations, as the tests.
 /// The wheel, with all of them, must give the same bits.
 fn compared() -> Result<()> {
-    let mut programs = vec!["--bin", "clutch"];
+    let mut programs = vec!["--lib", "--bin", "clutch"];
     EXAMPLES.iter().for_each(|name| programs.extend(["--example", name]));
     cargo(["build"]).args(WORKSPACE).args(programs).run()
 }
@@ -341,7 +341,7 @@ fn wheel_of(tally: &mut Tally) -> Result<bool> {
     compared()?;
     let bits = root().join("target/bits");
     program(example("bits")).arg(&bits).run()?;
-    let units = fmu::pack(None, false)?;
+    let units = fmu::of_built(None, "debug")?;
     tally.stage("build of the playground");
     let playground = playground::build()?;
     tally.stage("tests of the wheel");
