@@ -212,12 +212,17 @@ fn values(s: &Setup) -> Result<(), Refused> {
         }
     }
     let gains = match s.law {
-        Gains::Pd { kp, kd } => [kp, kd, 1.0, 1.0],
+        Gains::Pd { kp, kd, .. } => [kp, kd, 1.0, 1.0],
         Gains::Smc { kp, kd, slope, boundary } => [kp, kd, slope, boundary],
         Gains::Shell { slope, boundary } => [0.0, 0.0, slope, boundary],
     };
-    if gains.iter().any(|g| !(*g >= 0.0 && g.is_finite())) || gains[3] <= 0.0 {
-        return refuse("law", format!("{:?}", s.law), "finite gains of at least 0, and a boundary above 0");
+    let forward = if let Gains::Pd { forward, .. } = s.law { forward } else { 0.0 };
+    if gains.iter().any(|g| !(*g >= 0.0 && g.is_finite())) || gains[3] <= 0.0 || !forward.is_finite() {
+        return refuse(
+            "law",
+            format!("{:?}", s.law),
+            "finite gains of at least 0, a finite voltage beside them, and a boundary above 0",
+        );
     }
     Ok(())
 }

@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn a_simulated_tick_goes_no_further_than_its_mode_allows() {
         let laws = [
-            Gains::Pd { kp: 5000.0, kd: 50.0 },
+            Gains::Pd { kp: 5000.0, kd: 50.0, forward: 0.0 },
             Gains::Smc { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 },
             Gains::Shell { slope: 100.0, boundary: 0.1 },
         ];

@@ -55,7 +55,7 @@ fn error(u: &Units) -> Line {
 /// All pieces of the law.
 pub(crate) fn pieces(u: &Units, strips: &[Strip]) -> Vec<Piece> {
     match u.law {
-        Gains::Pd { kp, kd } => pd(u, kp, kd),
+        Gains::Pd { kp, kd, forward } => pd(u, kp, kd, forward),
         Gains::Smc { slope, .. } => smc(u, slope, strips),
         Gains::Shell { slope, boundary } => shell(u, slope, boundary),
     }
@@ -66,8 +66,8 @@ fn constant(u: &Units, id: u32, volts: f64, within: Vec<Line>) -> Piece {
     Piece { id, within, volts: [Line::constant(low), Line::constant(volts + u.volts_off)] }
 }
 
-fn pd(u: &Units, kp: f64, kd: f64) -> Vec<Piece> {
-    let demand = error(u).times(-kp).plus(rate(u), -kd);
+fn pd(u: &Units, kp: f64, kd: f64, forward: f64) -> Vec<Piece> {
+    let demand = Line::constant(forward).plus(error(u), -kp).plus(rate(u), -kd);
     let [low, high] = u.volts;
     let below = |limit: f64| demand.plus(Line::constant(1.0), -limit);
     let above = |limit: f64| below(limit).times(-1.0);
@@ -201,7 +201,7 @@ pub(crate) mod tests {
         let (e, d) = (m * u.count, u.kappa * (m - z) * u.speed);
         let sat = |x: f64| x.clamp(-1.0, 1.0);
         let demand = match u.law {
-            Gains::Pd { kp, kd } => -(kp * e + kd * d),
+            Gains::Pd { kp, kd, forward } => forward - (kp * e + kd * d),
             Gains::Smc { kp, kd, slope, boundary } => {
                 let sigma = slope * e + d;
                 -(kp * sat(sigma / boundary) + kd * sat(sigma * d / boundary) * d)
@@ -219,7 +219,9 @@ pub(crate) mod tests {
     #[test]
     fn wherever_the_measurement_lies_a_piece_holds_it_and_the_laws_voltage() {
         let laws = [
-            Gains::Pd { kp: 5000.0, kd: 50.0 },
+            Gains::Pd { kp: 5000.0, kd: 50.0, forward: 0.0 },
+            Gains::Pd { kp: 1660.0, kd: 12.9, forward: 2.24 },
+            Gains::Pd { kp: 1660.0, kd: 12.9, forward: -1.5 },
             Gains::Smc { kp: 3.0, kd: 400.0, slope: 70.0, boundary: 0.1 },
             Gains::Smc { kp: 5.0, kd: 50.0, slope: 70.0, boundary: 0.2 },
             Gains::Smc { kp: 12.0, kd: 3.0, slope: 50.0, boundary: 0.3 },

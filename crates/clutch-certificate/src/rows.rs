@@ -25,7 +25,7 @@ pub(crate) struct Fineness {
 /// The law near its steady voltage: volts per count, and per count per tick.
 fn linear(u: &Units) -> (f64, f64) {
     match u.law {
-        Gains::Pd { kp, kd } => (kp * u.count, kd * u.speed),
+        Gains::Pd { kp, kd, .. } => (kp * u.count, kd * u.speed),
         Gains::Smc { kp, slope, boundary, .. } => (kp * slope / boundary * u.count, kp / boundary * u.speed),
         // As if it went in a straight line from one end to the other.
         Gains::Shell { slope, boundary } => {

@@ -111,12 +111,15 @@ impl Setup {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Gains {
-    /// (4).
+    /// (4), with a voltage beside it: `u = u_f − (K_p e + K_d ė)`.
     Pd {
         /// `K_p`, V/rad.
         kp: f64,
         /// `K_d`, V s/rad.
         kd: f64,
+        /// `u_f`, V.
+        #[serde(default)]
+        forward: f64,
     },
     /// (31).
     Smc {

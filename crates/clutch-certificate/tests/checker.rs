@@ -11,7 +11,7 @@ fn setup(law: Gains, smoothing: f64, delay_ticks: u32, rate_deg_s: f64) -> Setup
 }
 
 fn paper_pd() -> Setup {
-    setup(Gains::Pd { kp: 5000.0, kd: 50.0 }, 0.2, 0, 2.0)
+    setup(Gains::Pd { kp: 5000.0, kd: 50.0, forward: 0.0 }, 0.2, 0, 2.0)
 }
 
 fn found(setup: &Setup) -> Certificate {
@@ -33,7 +33,7 @@ fn degrees(certificate: &Certificate) -> f64 {
 #[test]
 fn bounds_lie_between_the_worst_error_seen_and_three_times_it() {
     // Seen in 200 runs each: docs/certified.md.
-    let pd = |kp, kd, kappa, delay, rate| setup(Gains::Pd { kp, kd }, kappa, delay, rate);
+    let pd = |kp, kd, kappa, delay, rate| setup(Gains::Pd { kp, kd, forward: 0.0 }, kappa, delay, rate);
     for (setup, seen) in [(pd(5000.0, 50.0, 1.0, 0, 2.0), 0.0518), (pd(1660.0, 12.9, 0.712, 1, 20.0), 0.1006)]
     {
         let bound = degrees(&found(&setup));
@@ -44,6 +44,16 @@ fn bounds_lie_between_the_worst_error_seen_and_three_times_it() {
     let smc = Gains::Smc { kp: 3.0, kd: 400.0, slope: 70.0, boundary: 0.1 };
     let bound = degrees(&found(&setup(smc, 0.2, 0, 2.0)));
     assert!((0.0784..0.2).contains(&bound), "{bound}°");
+}
+
+#[test]
+fn a_voltage_that_holds_the_shaft_beside_the_gains_takes_the_offset_from_the_bound() {
+    let pd = |forward| setup(Gains::Pd { kp: 1660.0, kd: 12.9, forward }, 0.712, 1, 2.0);
+    // T_u/(μ_d K), without which the error alone has to ask for it.
+    let holds: f64 = 0.047_088 / (0.15 * 0.14);
+    let offset = (holds / 1660.0).to_degrees();
+    let (without, with) = (degrees(&found(&pd(0.0))), degrees(&found(&pd(holds))));
+    assert!(with < without - 0.6 * offset && with > 0.02, "{with}° for {without}°, of which {offset}°");
 }
 
 #[test]
@@ -138,8 +148,9 @@ fn another_gain_period_brake_path_or_delay_is_refused() {
         assert!(!bad.setup.differences(&good.setup).is_empty());
         assert!(check(&bad).is_err(), "{:?}", bad.setup.differences(&good.setup));
     };
-    change(&|s| s.law = Gains::Pd { kp: 5050.0, kd: 50.0 });
-    change(&|s| s.law = Gains::Pd { kp: 5000.0, kd: 49.0 });
+    change(&|s| s.law = Gains::Pd { kp: 5050.0, kd: 50.0, forward: 0.0 });
+    change(&|s| s.law = Gains::Pd { kp: 5000.0, kd: 49.0, forward: 0.0 });
+    change(&|s| s.law = Gains::Pd { kp: 5000.0, kd: 50.0, forward: 0.05 });
     change(&|s| s.period_s = 0.00101);
     change(&|s| s.inertia = [0.0016, 0.0017]);
     change(&|s| s.drive_torque[1] *= 1.02);
@@ -258,7 +269,7 @@ fn a_noise_that_turns_the_drive_round_is_refused_whatever_the_proofs_say() {
 
 #[test]
 fn a_start_with_more_volts_than_the_set_holds_is_refused() {
-    let proven = found(&setup(Gains::Pd { kp: 1660.0, kd: 12.9 }, 0.712, 1, 2.0));
+    let proven = found(&setup(Gains::Pd { kp: 1660.0, kd: 12.9, forward: 0.0 }, 0.712, 1, 2.0));
     let mut higher = proven.clone();
     higher.setup.start_volts[1] = 2.0 * higher.setup.volts[1];
     assert!(check(&proven).is_ok() && check(&higher).is_err());

@@ -33,11 +33,11 @@ pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Pi
     let off = shaft.volts_off;
     let let_go = [fixed((low - off).positive()), fixed(low + off)];
     match setup.law {
-        Gains::Pd { kp, kd } => {
+        Gains::Pd { kp, kd, forward } => {
             if !cell.strips.is_empty() {
                 return Err("PD has none".into());
             }
-            let demand = sum(&sum(&fixed(at(0.0)), at(-kp), &error), at(-kd), &rate);
+            let demand = sum(&sum(&fixed(at(forward)), at(-kp), &error), at(-kd), &rate);
             let below = |limit: Interval| sum(&demand, at(-1.0), &fixed(limit));
             let above = |limit: Interval| sum(&fixed(limit), at(-1.0), &demand);
             Ok(vec![

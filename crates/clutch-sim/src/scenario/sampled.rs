@@ -36,7 +36,7 @@ fn not(key: &'static str, what: impl Into<String>, covered: &'static str) -> Not
 /// Gains of a law that has a sampled certificate of its own.
 pub(super) fn gains(law: &LawParams) -> Option<Gains> {
     match *law {
-        LawParams::Pd(g) => Some(Gains::Pd { kp: g.kp, kd: g.kd }),
+        LawParams::Pd(g) => Some(Gains::Pd { kp: g.kp, kd: g.kd, forward: 0.0 }),
         LawParams::Smc(g) => Some(Gains::Smc { kp: g.kp, kd: g.kd, slope: g.slope, boundary: g.boundary }),
         _ => None,
     }
