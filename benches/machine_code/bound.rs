@@ -396,7 +396,7 @@ impl<'a> Bounds<'a> {
             let stated =
                 self.facts.lengths.iter().find(|f| means(&f.function, &function.name) && callee.name == f.of);
             let known = handed_on.or_else(|| constant(before, register));
-            // What is left of a longer copy may be stated, too.
+            // The rest of a longer copy may be stated, too.
             match (known, stated) {
                 (Some(known), Some(f)) if handed_on.is_some() => {
                     self.used.insert((false, f.name()));

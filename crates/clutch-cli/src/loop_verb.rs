@@ -198,7 +198,7 @@ impl Loop {
             .context("signals could not be caught")?;
         let scope = self.live.has_terminal();
         let show = std::io::stderr().is_terminal() && !quiet() && !scope;
-        // What happens while a scope has the terminal is told after it.
+        // Events that come while a scope has the terminal are printed after it.
         let mut later = Vec::new();
         let mut tell = |text: &str| {
             if scope {
@@ -210,7 +210,7 @@ impl Loop {
         };
         let mut said = Ok(());
         let ran = session.run(&stop, &mut |event| match event {
-            // What cannot be said is not done: nothing has moved yet.
+            // A run that cannot be announced does not begin: nothing has moved yet.
             Event::Announced(announcement) => {
                 said = if quiet() { Ok(()) } else { self.say(&plan(&announcement)) };
                 stop.fetch_or(said.is_err(), Ordering::Relaxed);

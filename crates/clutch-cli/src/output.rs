@@ -47,7 +47,7 @@ pub(crate) enum Exit {
 /// Version and commit, as logs tell it.
 pub const BUILD: &str = env!("CLUTCH_BUILD");
 
-/// That nothing was started, and what to do.
+/// Says that nothing was started, and what to do.
 #[cfg(target_os = "linux")]
 pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, file: &Path) -> String {
     format!("{refusal}\n`clutch certify {}` says why; --uncertified runs it all the same.\n", file.display())

@@ -400,7 +400,7 @@ impl Drift {
         let mut alarm = None;
         for left in (0..periods).rev() {
             self.act();
-            // Of lost samples nobody knows: the last has it all.
+            // The way during lost samples is not known: the last has it all.
             self.position += if left == 0 { i64::from(moved) } else { 0 };
             self.past.rotate_right(1);
             self.past[0] = self.position;

@@ -68,7 +68,7 @@ pub enum Board {
     Controller(Address),
 }
 
-/// Whether a release test comes before the run: see [`crate::release`].
+/// Says if a release test comes before the run: see [`crate::release`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Release {
     /// On a serial device, where the scenario allows one; a simulated board is wired as it says.

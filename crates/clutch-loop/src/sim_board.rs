@@ -243,7 +243,7 @@ impl SimBoard {
         // Periods that a slow machine has left out stay out: a board does not catch up.
         self.samples += 1;
         let period_ns = f64::from(period_us) * 1000.0;
-        // Of periods, and of the time that is told.
+        // Factor on the period; share of it by which the reported time falls behind.
         let (mut longer, mut behind) = (1.0, 0.0);
         self.rig.set_time((due - self.started_ns) as f64 / 1e9);
         self.rig.begin_period();

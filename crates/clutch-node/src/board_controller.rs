@@ -253,7 +253,7 @@ impl BoardController {
 
     fn message(&mut self, now_ns: u64, message: &Message, host: &mut Outbox, daq: &mut impl Sink) {
         match message {
-            // What only a host says shows that it lives; an echo of this board's own words does not.
+            // Messages that only a host sends show that it lives; an echo of this board's own words does not.
             Message::Discover(_)
             | Message::Set(_)
             | Message::Configure(_)
@@ -369,7 +369,7 @@ impl BoardController {
             silence: times.silence,
         };
         let mut control = ControllerNode::new(params, built.servo, built.supervisor);
-        // What the host asks for and what the settings say is one run, or none.
+        // The run that the host asks for is the one of the settings, or there is none.
         if control.configuration() != *m {
             return Err((Refusal::Differs, 0));
         }

@@ -288,7 +288,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             | Message::Stop(_)
             | Message::Ping(_)
             | Message::Set(_) => notices(Notice::Echo),
-            // Of another run.
+            // A message of another run.
             _ => {}
         }
     }

@@ -317,7 +317,7 @@ impl HostNode {
             | Message::Stop(_)
             | Message::Ping(_)
             | Message::Set(_) => notices(Notice::Echo),
-            // Of another run.
+            // A message of another run.
             _ => {}
         }
     }

@@ -111,7 +111,7 @@ impl Meter {
         let per_torque = seconds * seconds / (plant.params().inertia * count);
         let sliding = plant.friction().sliding();
         let rise = plant.friction().at_rest() / sliding - 1.0;
-        // What friction carries when the shaft slides: the drive, and what a disc or a gear drags.
+        // The load that friction carries when the shaft slides: the drive, and the drag of a disc or a gear.
         let carried = plant.params().drive_torque.abs().max(sliding * plant.actuator().normal(0.0));
         let told = match (law, velocity) {
             (LawParams::Glide(p), _) => p.filter.delay,

@@ -73,12 +73,12 @@ pub(crate) fn run(parts: &[Part]) -> Result<()> {
     Ok(())
 }
 
-/// Where all of it is put.
+/// The folder of all of it.
 fn folder() -> PathBuf {
     root().join("target/dist")
 }
 
-/// Where it is put together and tried.
+/// A folder in which it is put together and tried.
 fn work(name: &str) -> Result<PathBuf> {
     let folder = root().join("target/dist-work").join(name);
     let _ = std::fs::remove_dir_all(&folder);

@@ -318,8 +318,8 @@ impl<T: Real> EdgeTimed<T> {
     /// an actuator to give way, a quarter of a second at most. A law then releases the actuator while
     /// [`EdgeTimedState::lets_go`].
     ///
-    /// Where two starts in a row brought no edge, a brake lets go until one comes: no shaft falls for longer than a count, so
-    /// that one of which nothing comes is a broken encoder, which a supervisor then sees.
+    /// A brake lets go until an edge comes, after two starts in a row that brought none: no shaft falls for longer than a
+    /// count, so that a fall of which nothing comes is a broken encoder, which a supervisor then sees.
     pub fn let_go(&self, state: &mut EdgeTimedState<T>, target_velocity: T) {
         let pull = self.forces(T::ZERO).0.abs().max(T::splat(1e-6));
         let needed = if state.unmoved >= T::splat(2.0) && self.actuator.kind() == ActuatorKind::Brake {
@@ -348,7 +348,7 @@ impl<T: Real> EdgeTimed<T> {
         let back = Self::back(state);
         let mut pad = state.pad;
         let [newest, middle, oldest] = state.line;
-        // What is on its way, the oldest first.
+        // The voltages on their way, the oldest first.
         for (left, arrived) in [(3, oldest), (2, middle), (1, newest)] {
             if left <= self.delay {
                 let (volts, end) = self.at_pad(pad, arrived);
@@ -398,7 +398,7 @@ impl<T: Real> EdgeTimed<T> {
 
     fn place(&self, state: &mut EdgeTimedState<T>, position: FixedCounts) -> T {
         let read = position.0 >> FixedCounts::FRACTION_BITS;
-        // What only resists turns no shaft round: a single count back is the edge's own, or a broken channel's.
+        // A brake that only resists turns no shaft round: a single count back is the edge's own, or a broken channel's.
         let back = !self.actuator.kind().two_sided() && read == state.counts.wrapping_sub(1);
         let counts = if back { state.counts } else { read };
         let moved = counts.wrapping_sub(state.counts);
@@ -437,7 +437,7 @@ impl<T: Real> EdgeTimed<T> {
     /// believed to have stopped loses none.
     fn shape_and_fall(&self, velocity: T) -> (T, T) {
         let shape = self.shape(velocity);
-        // Where the curve has ended, it falls no more.
+        // The curve falls no more where it has ended.
         if velocity == T::ZERO || shape == T::ONE {
             return (shape, T::ZERO);
         }
@@ -557,7 +557,7 @@ impl<T: Real> EdgeTimed<T> {
                 state.belief.keep_within(end, side, self.blur);
             }
         }
-        // What only resists turns no shaft round.
+        // A brake that only resists turns no shaft round.
         if !self.actuator.kind().two_sided() {
             state.belief.velocity = state.belief.velocity.max(T::ZERO);
         }
@@ -610,7 +610,7 @@ impl<T: Real> EdgeTimed<T> {
         match state.phase {
             Phase::Resting => {}
             Phase::Sliding if self.too_long(state.silent, pace) => {
-                // What was learnt since the last edge is the friction of a shaft at rest.
+                // All learnt since the last edge is the friction of a shaft at rest.
                 state.belief = state.at_edge;
                 state.belief.rest();
                 // The more so, the less the last ones have helped.

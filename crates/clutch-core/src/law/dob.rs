@@ -295,7 +295,7 @@ mod tests {
             let mut state = DobState::default();
             let volts = law.update(&mut state, &path).voltage;
             assert!((volts - way * 0.0375 / (0.05 * 0.97)).abs() < 1e-12, "{volts} V");
-            // That is what moves it: nothing else does.
+            // This voltage moves it, and nothing else does.
             told(&law, &mut state, &path, volts);
             let mut state = DobState { velocity: path.velocity(), ..DobState::default() };
             told(&law, &mut state, &path, volts);

@@ -188,7 +188,7 @@ impl<T: Real> Glide<T> {
         let at_rest = T::splat(PUSHED) * friction * self.plant.friction().at_rest() / self.filters.plain().mu();
         let still = way * self.volts(T::ZERO, at_rest, way);
         let moved = way * self.volts(self.torque * pace, friction, way);
-        // What resists above 0 V drives below it.
+        // An actuator that resists above 0 V drives below it.
         let drives = if self.plant.actuator().kind().drives_above_0() { still.max(moved) } else { still.min(moved) };
         way * drives
     }

@@ -108,7 +108,7 @@ impl<T: Real> MicroStepState<T> {
             scale: if known { self.scale } else { T::ONE },
             push: if known { self.push } else { T::splat(PUSHED) },
             least: self.least.max(T::ONE),
-            // What is on its way has to arrive, and the shaft to stop.
+            // The voltages on their way have to arrive, and the shaft has to stop.
             hold: T::ONE + delay,
             ..MicroStepState::default()
         };
@@ -210,7 +210,7 @@ impl<T: Real> MicroStep<T> {
         }
     }
 
-    /// Whether a step begins, with the path `error` counts ahead.
+    /// Decides whether a step begins, with the path `error` counts ahead.
     fn decide(&self, state: &mut MicroStepState<T>, error: T, pace: T) {
         let way = if error < T::ZERO { -T::ONE } else { T::ONE };
         // The way of a step tells how long it takes to stop; a place with less friction has a whole period.

@@ -32,7 +32,7 @@ struct Edges<T> {
     boundary: T,
     /// Voltage and its limit where the shaft is ahead, `σ ≤ −S`.
     ahead: (T, Limit),
-    /// Where it is behind, `σ ≥ S`.
+    /// The same for a shaft that is behind, `σ ≥ S`.
     behind: (T, Limit),
 }
 

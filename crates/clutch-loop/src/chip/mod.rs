@@ -160,7 +160,7 @@ impl ChipBoard {
         if bits != 0 && armed.is_some() {
             self.first_hit_ns.get_or_insert(now_ns);
         }
-        // What the chip does under control is counted, and nothing else.
+        // The chip's work under control is counted, and nothing else.
         bits | if self.state == BoardState::Running { METERED } else { 0 }
     }
 

@@ -290,7 +290,7 @@ fn open_serial(
         let refused = device::set_low_latency(&fd).err();
         notes.extend(found.latency_note(&address.to_string(), refused.as_ref(), found.latency_timer_ms()));
     }
-    // What came before, from a board nobody listened to, is too old to be acted on.
+    // Bytes of before, from a board nobody listened to, are too old to be acted on.
     tcflush(&fd, QueueSelector::IOFlush).map_err(fail)?;
     let port = Port { fd, kind: found.kind, address: address.clone(), baud, fresh: false };
     Ok(Opened { port, notes })

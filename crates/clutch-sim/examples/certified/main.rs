@@ -243,7 +243,7 @@ fn table(of: &str) -> Outcome<()> {
                     ("reference.ramp.rate_deg_s", rate),
                     ("bounds.friction_percent", 40.0),
                 ];
-                // What is unstable is refused by that.
+                // Unstable gains are refused for that.
                 let row = measure(&scenario(*gains, &keys)?, 200)?;
                 let certified = row.certified.map_or_else(|| row.open.clone(), |c| format!("{c:.4}"));
                 let ratio = row.certified.map(|c| c / row.seen);

@@ -133,7 +133,7 @@ fn damping(scenario: &Scenario, rig: &Rig) -> Option<f64> {
         LawParams::SuperTwisting(g) if g.boundary > 0.0 => Some(g.k1 / libm::sqrt(g.boundary) * per_volt),
         // These ask for an acceleration, of the inertia that they believe in.
         LawParams::Ctc(g) => Some(g.outer_gain * g.kd * p.model.inertia),
-        // Of an observer's bandwidth, too: together they are PID's.
+        // The observer's bandwidth damps, too: together they are PID's.
         LawParams::Dob(g) => Some((g.kd + g.bandwidth) * p.model.inertia),
         LawParams::Glide(g) => Some(g.kd * p.model.inertia),
         LawParams::SuperTwisting(_) | LawParams::SmcSign(_) | LawParams::Voltage(_) | LawParams::Hold(_) => {
