@@ -1,6 +1,6 @@
 """README, docs/python and docs/start are true: their code runs and prints what they say; no public name is left out.
 
-On every page, the tests and cases that it cites exist.
+On every page, the tests and cases that it cites exist; so do the names in the glossary.
 """
 
 import contextlib
@@ -78,9 +78,13 @@ def tracked(*endings):
     return {name: (ROOT / name).read_text(encoding="utf-8") for name in names if (ROOT / name).is_file()}
 
 
+def words_of(*endings):
+    """The words of the code in these files, without comments."""
+    return set(re.findall(r"\w+", "\n".join(COMMENT.sub("", text) for text in tracked(*endings).values())))
+
+
 def test_the_tests_and_cases_that_a_page_cites_exist():
-    code = "\n".join(COMMENT.sub("", text) for text in tracked(".rs", ".py").values())
-    words = set(re.findall(r"\w+", code))
+    words = words_of(".rs", ".py")
     cases = {Path(name).stem for name in tracked(".toml") if name.startswith("crates/clutch-sim/cases/")}
     assert len(cases) >= 40
     cited, missing = 0, []
@@ -93,6 +97,15 @@ def test_the_tests_and_cases_that_a_page_cites_exist():
                 missing += [f"{page}:{number}: {name}" for name in names if name not in known]
     assert cited > 100
     assert not missing, "\n".join(missing)
+
+
+def test_the_names_in_the_glossary_are_those_of_the_code():
+    rows = [line.split("|") for line in tracked("docs/glossary.md")["docs/glossary.md"].split("\n")]
+    names = [name for row in rows if len(row) == 5 for name in re.findall("`([^`]+)`", row[3])]
+    assert len(names) > 60
+    words = words_of(".rs", ".py", ".toml")
+    missing = [name for name in names if not words.issuperset(re.findall(r"\w+", name))]
+    assert not missing, missing
 
 
 def test_the_documentation_builds_without_a_warning(tmp_path):
