@@ -122,7 +122,7 @@ impl<'a> Bounds<'a> {
     }
 
     /// The bound from the first instruction of a function to any call of another, in it or in what it calls: also
-    /// to the last of several. What runs after that, and the other function itself, cost nothing.
+    /// to the last of several. The code after that, and the other function itself, cost nothing.
     ///
     /// # Errors
     /// Everything that prevents a bound; the second function is not called.

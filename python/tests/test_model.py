@@ -633,7 +633,7 @@ def each(**fields):
     return st.fixed_dictionaries(fields)
 
 
-#: Of LuGre's and elasto-plastic bristles.
+#: The keys of LuGre's and elasto-plastic bristles.
 BRISTLES = {
     "mu_static": st.floats(0.1, 2),
     "mu_dynamic": st.floats(0.1, 2),

@@ -51,7 +51,7 @@ impl Series {
     }
 }
 
-/// Stretches of the horizontal axis, shaded behind the curves. Of several shades in a panel each is a strip at its top.
+/// Stretches of the horizontal axis, shaded behind the curves. Each of several shades in a panel is a strip at its top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shade {
     /// Name in the legend.

@@ -1,7 +1,7 @@
 //! The records of a run by Foxglove's WebSocket protocol, as the log has them.
 //!
 //! The protocol: <https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>, of which a client gets channels, their
-//! messages and their time. What a client sends changes nothing but what it gets.
+//! messages and their time. A client's messages change nothing but its own share.
 
 #![allow(clippy::result_large_err, reason = "the type of tungstenite's callback")]
 

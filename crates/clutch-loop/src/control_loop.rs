@@ -1,4 +1,4 @@
-//! The loop: control thread, log thread, and what they tell each other.
+//! The loop: control thread, log thread, and the messages between them.
 //!
 //! ```text
 //!   port ◄──► control thread ──ring──► log thread ──► file
@@ -49,7 +49,7 @@ pub enum Pace {
 /// The effect of a drift out of the bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnDrift {
-    /// It is told and logged, and the run goes on.
+    /// It is reported and logged, and the run goes on.
     #[default]
     Tell,
     /// It ends the run in the safe state, as an operator would.

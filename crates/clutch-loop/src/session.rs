@@ -90,7 +90,7 @@ pub struct SessionOptions {
     /// A new file for a log.
     pub log: Option<PathBuf>,
     /// True if the board is one whose clock waits for this machine, and may be silent for as long: a simulated board of
-    /// another process. Of a session's own board it knows that itself.
+    /// another process. A session knows it of its own board.
     pub patient: bool,
     /// True if gains may run that are not certified for the scenario's bounds.
     pub uncertified: bool,
@@ -287,7 +287,7 @@ impl Session {
         self.cleared.plan.certificate.certified()
     }
 
-    /// True if the board's clock waits for this machine. What the board says of itself decides nothing here: a real one
+    /// True if the board's clock waits for this machine. The board's own words decide nothing here: a real one
     /// that says it would be allowed seconds of silence.
     fn patient(&self) -> bool {
         match &self.options.board {
@@ -729,7 +729,7 @@ impl Course<'_> {
         Ok((report, log))
     }
 
-    /// Tells where the run stands until it is over.
+    /// Reports where the run stands until it is over.
     fn look_on(
         &mut self,
         control: &ScopedJoinHandle<'_, LoopReport>,
@@ -759,7 +759,7 @@ impl Course<'_> {
         self.tell_drift(watch, drift, &mut alarms);
     }
 
-    /// Tells an alarm of drift that is new.
+    /// Reports an alarm of drift that is new.
     fn tell_drift(&mut self, watch: &Watch, drift: &DriftReport, told: &mut u64) {
         let (number, alarm) = watch.drift.last();
         if number > *told {

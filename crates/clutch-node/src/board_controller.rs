@@ -404,7 +404,7 @@ impl Run {
         matches!(self.control.state().state(), State::Armed | State::Running)
     }
 
-    /// Ends control as wanted and tells the host; whether there was anything to end.
+    /// Ends control as wanted and reports so to the host; whether there was anything to end.
     fn end(&mut self, reason: StopReason, host: &mut Outbox, daq: &mut impl Sink) -> bool {
         let from = self.control.state().state();
         self.control.stop(reason, daq);

@@ -112,7 +112,7 @@ impl HostNode {
         out.push(&Message::Set(Set { run: self.configure.run, key, value }));
     }
 
-    /// Tells the board of the run, whose settings it has.
+    /// Sends the run to the board, which has its settings.
     pub fn configure(&mut self, out: &mut Outbox) {
         out.push(&Message::Configure(self.configure));
     }

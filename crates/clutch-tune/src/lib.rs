@@ -158,7 +158,7 @@ impl Tuned {
 
 /// Looks for the law and the gains that move a shaft most smoothly on the worst corner of its bounds, and that are certified.
 /// `file` is what was identified; without it corners, delay and ripple are the scenario's. The same comes again, on any
-/// number of cores. `report` is told of each run.
+/// number of cores. `report` gets each run.
 ///
 /// # Errors
 /// A path that is no ramp, a rig without a brake, an option out of range; the end of `report`'s patience.

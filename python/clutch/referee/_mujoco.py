@@ -17,7 +17,7 @@ __all__ = ["MuJoCo", "MuJoCoLuGre"]
 
 #: A run of more steps is refused.
 MOST_STEPS = 200_000
-#: What MuJoCo takes for a mass, kg: it refuses less than 1e-15.
+#: Least mass for MuJoCo, kg: it refuses less than 1e-15.
 LEAST_MASS = 1e-14
 
 Vector = NDArray[np.float64]

@@ -5,9 +5,9 @@
 //! d̂ = Q(s) [T(u) − J θ̈],     Q(s) = g/(s + g)
 //! ```
 //!
-//! `T(u)` is the torque of a voltage as the model has it: what drives, less friction at the speed of a sliding shaft. What the
-//! shaft gives away from the model's inertia, friction and load, is a disturbance; the observer (Ohnishi, Shibata and Murakami
-//! 1996) finds it from voltage and velocity, and the law adds it to its demand. Neither load nor friction has to be known.
+//! `T(u)` is the torque of a voltage as the model has it: what drives, less friction at the speed of a sliding shaft. The
+//! difference from the model's inertia, friction and load is a disturbance; the observer (Ohnishi, Shibata and Murakami 1996)
+//! finds it from voltage and velocity, and the law adds it to its demand. Neither load nor friction has to be known.
 //!
 //! The observer is told of the voltage that went out, so that a limit winds nothing up. A run begins with the disturbance at
 //! which the law demands the voltage that the brake has.

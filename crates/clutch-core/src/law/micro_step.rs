@@ -6,7 +6,7 @@
 //!
 //! `a` is the acceleration of the shaft that is let go, `b` the one that stops it again. A step is taken when the path
 //! is half a step ahead of where the steps before have brought the shaft, so that the error is half a step and what is
-//! not known of `k`. That is learnt: the steps from edge to edge make a count. A fall from rest needs no knowledge of
+//! not known of `k`. `k` is learnt: the steps from edge to edge make a count. A fall from rest needs no knowledge of
 //! friction, and the way to its end hardly any; where steps that should have made two counts made none, an actuator
 //! that lags lets go for longer and a motor, which has to break its friction first, pushes harder.
 
@@ -99,7 +99,7 @@ impl<T: Real> MicroStepState<T> {
         self.position
     }
 
-    /// Begins at a position, counts above the last edge. What was learnt stays.
+    /// Begins at a position, counts above the last edge. The learnt numbers stay.
     pub(super) fn begin(&mut self, position: T, delay: T) {
         let known = self.scale > T::ZERO;
         *self = MicroStepState {

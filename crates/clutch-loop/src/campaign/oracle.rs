@@ -413,7 +413,7 @@ fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> 
     None
 }
 
-/// True if line or board tell when it first showed.
+/// True if line or board report when it first showed.
 fn hits(t: &Trouble) -> bool {
     matches!(t.what, What::Fault(..))
 }

@@ -1,6 +1,6 @@
 //! Reasons why a rate is not smooth, each in a closed form; docs/theory.md, section 15, derives them.
 //!
-//! They are of the rig as it is, not of the plant that the law believes in. That none holds does not make a rate smooth: it
+//! They are of the rig as it is, not of the plant that the law believes in. A rate at which none holds need not be smooth: it
 //! may stick for another reason.
 
 use crate::rig::Rig;

@@ -161,7 +161,7 @@ fn bare<T: Real>() -> LimitParams<T> {
     }
 }
 
-/// The volts of a period: `late` of it is the code before still in force. What the envelope says at its end.
+/// The volts of a period: `late` of it is the code before still in force. Gives the envelope's verdict at its end.
 fn follow<T: Real>(
     envelope: &Envelope<T>,
     shaft: &mut Shaft,
