@@ -43,7 +43,7 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Width of the summary.
 const COLUMNS: usize = 80;
 
-/// Builds and checks these parts, all unless some are given. What an earlier call built is gone.
+/// Builds and checks these parts, all unless some are given. The files of an earlier call are gone.
 pub(crate) fn run(parts: &[Part]) -> Result<()> {
     ensure!(
         cfg!(all(target_os = "linux", target_arch = "x86_64")),
