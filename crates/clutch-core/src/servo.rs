@@ -248,7 +248,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         self.tick_on(state, counts, target, off_map)
     }
 
-    /// One period on a disc of which a map tells friction around a position.
+    /// One period on a disc of which a map has the friction around a position.
     #[inline]
     pub fn tick_on(
         &self,

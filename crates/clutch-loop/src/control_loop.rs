@@ -151,7 +151,7 @@ pub struct ConfiguredRun<'a, S: Station> {
     pub changes: Option<Changes<S::Servo>>,
     /// The values that a watcher sees.
     pub watch: &'a Watch,
-    /// Ticks of the run; a board that is the controller has been told, and ends it by itself.
+    /// Ticks of the run; a board that is the controller has the number, and ends it by itself.
     pub ticks: u64,
     /// The board's clock.
     pub clock: ClockOffset,
@@ -673,7 +673,7 @@ impl<'a, S: Station> Control<'a, S> {
         false
     }
 
-    /// The line is gone: the station and the log are told. Gives the reason in words.
+    /// The line is gone: reports it to the station and the log. Gives the reason in words.
     fn port_lost(&mut self, error: &std::io::Error) -> String {
         let from = self.station.standing().state;
         self.station.disconnect();

@@ -94,7 +94,7 @@ impl ReleaseTest {
         })
     }
 
-    /// Its power to tell: the test in virtual time, on the corners of the bounds, with each lie.
+    /// Its power to find faults: the test in virtual time, on the corners of the bounds, with each lie.
     ///
     /// # Errors
     /// None for a checked scenario.

@@ -82,7 +82,7 @@ pub struct Replay {
     pub behind_gap: usize,
 }
 
-/// Ticks in order; every few thousand the caller is told, and may end the work.
+/// Ticks in order; every few thousand the caller gets a report, and may end the work.
 fn ticks<'a, R>(
     ticks: &'a [R],
     report: Report<'a>,

@@ -145,7 +145,7 @@ pub enum SessionError {
     /// The way of the release test.
     #[error("way of the release test = {}°: expected above 0 and at most {}", number(.0.to_degrees()), number(release::LONGEST_WAY.to_degrees()))]
     ReleaseWay(f64),
-    /// The power of a release test to tell could not be found.
+    /// The power of a release test to find faults could not be calculated.
     #[error(transparent)]
     Tells(#[from] CampaignError),
     /// There is no release test for the scenario, and one was asked for.

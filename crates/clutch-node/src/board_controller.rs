@@ -38,7 +38,7 @@ pub struct BoardControllerParams {
     pub clock_hz: u32,
 }
 
-/// Interval at which the host is told what the line has carried.
+/// Interval of the reports to the host on what the line has carried.
 const LINK_EVERY_NS: u64 = 1_000_000_000;
 
 /// A run that the host has configured.

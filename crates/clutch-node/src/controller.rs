@@ -47,7 +47,7 @@ pub struct ControllerNode<T: Real, C: ControlLaw<T> = Law<T>> {
     /// The position at which the path begins: the counts of the first sample that is answered.
     origin: FixedCounts,
     last_sample_ns: Option<u64>,
-    /// The supervisor has been told of this silence.
+    /// This silence has been reported to the supervisor.
     silence_told: bool,
     lateness: Micros,
     stopping: Option<StopReason>,

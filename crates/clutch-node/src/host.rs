@@ -35,7 +35,7 @@ pub struct HostNode {
     stopping: Option<StopReason>,
     /// The board's converter has said that it is in its safe output.
     stopped: bool,
-    /// It has been silent for too long: what it tells later does not bring the run back.
+    /// It has been silent for too long: a later report does not bring the run back.
     given_up: bool,
     pace: HostPace,
 }

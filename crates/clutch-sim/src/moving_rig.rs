@@ -296,7 +296,7 @@ impl MovingRig {
         true
     }
 
-    /// Time is told anew, s: a sum of many periods drifts, a product does not.
+    /// Sets the time anew, s: a sum of many periods drifts, a product does not.
     pub fn set_time(&mut self, time: f64) {
         self.time = time;
     }

@@ -4,10 +4,10 @@
 //! At 2 °/s a count of the paper's encoder takes 9 ms. A difference of counts knows the velocity only as a mean over
 //! several of them; but a crossed edge is a position that is known to a fraction of a count, at a time known to a
 //! period, and a count that does not come says that the shaft has not got there. A Kalman filter that takes both, and
-//! knows the voltage, tells velocity and friction within a count. It has five states: position, velocity, the mean
+//! knows the voltage, finds velocity and friction within a count. It has five states: position, velocity, the mean
 //! friction as a multiple of the model's (whose curve over the velocity stays, if it is Stribeck's with the exponent
 //! 1), and its ripple along the disc as a damped wave of random phase with its slope ([`EdgeTimedParams`] has the
-//! wave's numbers). Friction is smooth along the way, not in time: that is why it can be told ahead.
+//! wave's numbers). Friction is smooth along the way, not in time: that is why it can be foreseen.
 //!
 //! An edge that was crossed in the last period lies at most the way of that period behind, with the variance of a
 //! uniform distribution. Silence cuts the belief off at the edges of the count. A shaft without an edge for longer
@@ -287,7 +287,7 @@ impl<T: Real> EdgeTimed<T> {
         self.radians_per_count
     }
 
-    /// The model's sliding friction, of which friction is told as a multiple.
+    /// The model's sliding friction, of which friction is given as a multiple.
     #[must_use]
     pub fn mu(&self) -> T {
         self.mu
@@ -410,7 +410,7 @@ impl<T: Real> EdgeTimed<T> {
         T::from_i32(i32::try_from(moved).unwrap_or(if moved < 0 { i32::MIN } else { i32::MAX }))
     }
 
-    /// Count from the edge that positions are told from down to the one of the last sample: 1 of a count back that is none.
+    /// Count from the edge that positions begin at down to the one of the last sample: 1 of a count back that is none.
     fn back(state: &EdgeTimedState<T>) -> T {
         if state.fraction < T::ZERO { T::ONE } else { T::ZERO }
     }
@@ -473,7 +473,7 @@ impl<T: Real> EdgeTimed<T> {
         self.hear(state, position, applied).0
     }
 
-    /// The shaft rests at a known position above the lower edge of its count, with a friction that steps have told; from
+    /// The shaft rests at a known position above the lower edge of its count, with a friction that steps have shown; from
     /// here the filter goes on.
     pub(crate) fn take_over(&self, state: &mut EdgeTimedState<T>, position: T, friction: T) {
         let belief = &mut state.belief;

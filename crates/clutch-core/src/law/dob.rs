@@ -9,7 +9,7 @@
 //! difference from the model's inertia, friction and load is a disturbance; the observer (Ohnishi, Shibata and Murakami 1996)
 //! finds it from voltage and velocity, and the law adds it to its demand. Neither load nor friction has to be known.
 //!
-//! The observer is told of the voltage that went out, so that a limit winds nothing up. A run begins with the disturbance at
+//! The observer gets the voltage that went out, so that a limit winds nothing up. A run begins with the disturbance at
 //! which the law demands the voltage that the brake has.
 
 use super::{Beside, Command, ControlLaw, Listed, Output, OutputState, Seen, Tick};

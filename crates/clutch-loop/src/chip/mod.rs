@@ -210,7 +210,7 @@ impl ChipBoard {
         self.listen(now_ns, out)
     }
 
-    /// Hears what the chip has said: to whom it goes, and what state it tells of.
+    /// Takes the chip's frames: hands each to its line, and notes the state that it reports.
     fn listen(&mut self, now_ns: u64, out: &mut Outbox) -> Result<(), VirtualError> {
         for frame in self.last.sent.split_inclusive(|byte| *byte == 0) {
             out.append(frame);

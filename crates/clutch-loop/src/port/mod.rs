@@ -394,7 +394,7 @@ pub trait Endpoint {
     /// The address at which clients reach it, as they write it.
     fn address(&self) -> Address;
 
-    /// Closes the connection to the present client, which [`Endpoint::service`] then tells to have left. False where
+    /// Closes the connection to the present client, which [`Endpoint::service`] then reports to have left. False where
     /// there is no connection to close: on a pseudo-terminal, whose clients are programs of this user.
     fn dismiss(&mut self) -> bool {
         false

@@ -109,7 +109,7 @@ pub enum LoadError {
     Io {
         /// The file.
         name: String,
-        /// The system's error; told in words, so not a source to be told again.
+        /// The system's error; given in words, so not a source to be given again.
         error: std::io::Error,
     },
     /// The contents of the file.

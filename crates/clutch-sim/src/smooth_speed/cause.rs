@@ -30,7 +30,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// Every cause, in the order in which they are told.
+    /// Every cause, in the order in which they are reported.
     pub const ALL: [Cause; 4] =
         [Cause::SampledLoop, Cause::StribeckEdge, Cause::EncoderEdge, Cause::EdgeJolt];
 }
