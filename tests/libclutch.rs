@@ -16,7 +16,7 @@ pub fn libclutch(target: &str) -> Option<PathBuf> {
         return skipped(&format!("the target is not installed (rustup target add {target})"));
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    // Where `cargo xtask libclutch` builds it, too.
+    // The folder in which `cargo xtask libclutch` builds it, too.
     let folder = root.join("target/libclutch/build");
     let done = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .args(["rustc", "--locked", "--package", "clutch-c", "--profile", "c", "--crate-type", "staticlib"])

@@ -122,7 +122,7 @@ impl<'a> Bounds<'a> {
     }
 
     /// The bound from the first instruction of a function to any call of another, in it or in what it calls: also
-    /// to the last of several. What runs after that, and the other function itself, cost nothing.
+    /// to the last of several. The code after that, and the other function itself, cost nothing.
     ///
     /// # Errors
     /// Everything that prevents a bound; the second function is not called.
@@ -396,7 +396,7 @@ impl<'a> Bounds<'a> {
             let stated =
                 self.facts.lengths.iter().find(|f| means(&f.function, &function.name) && callee.name == f.of);
             let known = handed_on.or_else(|| constant(before, register));
-            // What is left of a longer copy may be stated, too.
+            // The rest of a longer copy may be stated, too.
             match (known, stated) {
                 (Some(known), Some(f)) if handed_on.is_some() => {
                     self.used.insert((false, f.name()));

@@ -1,7 +1,7 @@
 //! Cycles of each instruction on a Cortex-M4F whose memory has no wait states.
 //!
 //! From the tables of the Cortex-M4 Technical Reference Manual (also printed as tables 3-25 and 3-27
-//! of TI's SWCU192). Where a table gives a range, the upper end counts; an instruction that depends
+//! of TI's SWCU192). The upper end counts where a table gives a range; an instruction that depends
 //! on a condition is charged as if it were executed. Not in the tables and not charged: savings by
 //! back-to-back loads.
 

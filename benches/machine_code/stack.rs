@@ -73,7 +73,7 @@ impl<'a> Stacks<'a> {
             }
             entered.insert(b, depth);
             let block = &graph.blocks[b];
-            // What a register had in another block it need not have in this one.
+            // A register need not have in this block what it had in another.
             registers = Registers { frame: registers.frame, ..Registers::default() };
             for i in &block.instructions {
                 let by_register = registers.moved(self.image, i, depth);

@@ -128,7 +128,7 @@ class Log:
             raise FileExistsError(f"{file}: exists already")
         table = self.channels[channel].to_arrow()
         table = table.replace_schema_metadata({**self.metadata, "channel": channel, "scenario.toml": self._toml})
-        # What was begun has another name, which nothing else has: half a table is none.
+        # A table that is begun has another name, which nothing else has: half a table is none.
         part = file.with_name(f"{file.name}.{secrets.token_hex(4)}.part")
         try:
             if ending == ".parquet":

@@ -184,13 +184,13 @@ def loop(
         Certificate of the sampled loop, as ``clutch certify --sampled --save`` writes it: it is checked, and that it is
         this scenario's, before anything starts.
     release_test : {"auto", "always", "never"}
-        Before the run, let the brake go for some milliseconds and grip again: the way tells wrong signs and scales of
+        Before the run, let the brake go for some milliseconds and grip again: the way shows wrong signs and scales of
         encoder and converter. "auto" does so on a serial device, where the scenario allows it.
     release_deg : float, default 0.1
-        The longest way in that test of any shaft within the bounds, above 0 and up to 10°: a longer one tells more.
+        The longest way in that test of any shaft within the bounds, above 0 and up to 10°: a longer one finds more.
     on_drift : {"tell", "stop"}
-        Effect of friction over load that leaves the bounds: the result and the log tell, or the run ends in the safe
-        state as well.
+        Effect of friction over load that leaves the bounds: the result and the log report it, or the run also ends in
+        the safe state.
     patient : bool, default False
         The board at the port is a simulated one whose clock waits when this machine stalls, and so does the loop.
     strict : bool, default False

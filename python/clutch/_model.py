@@ -14,7 +14,7 @@ from clutch import _clutch, _tables
 from clutch._certificate import Certificate
 from clutch._record import _plain, _Record, _slots, _Tree, _written
 
-# What is pickled, or written by hand, looks for every class of a scenario here.
+# Pickles, and code written by hand, look for every class of a scenario here.
 from clutch._tables import *  # noqa: F403
 
 

@@ -43,7 +43,7 @@ class Estimate:
     high: float
 
     def holds(self, value: float) -> bool:
-        """Tell whether a value lies in the interval.
+        """Say whether a value lies in the interval.
 
         Parameters
         ----------
@@ -70,10 +70,10 @@ class Identified:
     Attributes
     ----------
     parameters : dict of str to Estimate
-        What is told: ``pull_rad_s2`` (T/J), ``delay_s``, ``hold_v`` (T/(μ_d K)), ``ripple_rms``, ``ratio`` (μ_s/μ_d),
+        The findings: ``pull_rad_s2`` (T/J), ``delay_s``, ``hold_v`` (T/(μ_d K)), ``ripple_rms``, ``ratio`` (μ_s/μ_d),
         ``stribeck_velocity_rad_s``, ``damping_1_s`` (C/J).
     refused : dict of str to str
-        What is not, by name, with the experiment that would tell it.
+        The parameters not found, by name, with the experiment that would find them.
     unexplained : tuple of str
         Ticks and recordings that the model does not explain.
     map : list of tuple of float
@@ -114,7 +114,7 @@ class Identified:
         Raises
         ------
         ValueError
-            A parameter that the file needs is not told; the message names it.
+            A parameter that the file needs is not found; the message names it.
 
         Examples
         --------

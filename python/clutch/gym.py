@@ -37,7 +37,7 @@ _IDS = {
     "clutch/MinimumJerk-v0": "minimum_jerk",
 }
 _ROW = {name: i for i, name in enumerate(_clutch.Shafts.QUANTITIES)}
-#: What an agent sees, in this order.
+#: The observation of an agent, in this order.
 _SEEN = (
     "measured_error_rad",
     "error_rate_rad_s",
@@ -354,7 +354,7 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return info | whole | {"counts": int(counts) if counts.is_integer() else counts}
 
     def render(self) -> Any:
-        """Draw the last 0.3 s, or tell the present sample in a line.
+        """Draw the last 0.3 s, or give the present sample in a line.
 
         Returns
         -------

@@ -138,7 +138,7 @@ def compare(program: str | Path, engine: str, cases: list[Case], truths: list[tu
         if case.velocity == velocity == truth[1] == 0:
             row["stuck"] += 1  # and says nothing of an error
             continue
-        # What moves: of a break-away that has only begun, however little that is.
+        # The way that moves: even of a break-away that has only begun, however little that is.
         fastest = max(abs(truth[1]), abs(case.velocity), 1e-12 * case.stribeck_velocity)
         way = abs(position - truth[0]) / (fastest * case.seconds)
         row["errors"].append(max(way, abs(velocity - truth[1]) / fastest))

@@ -1,4 +1,7 @@
-"""README, docs/python and docs/start are true: their code runs and prints what they say; no public name is left out."""
+"""README, docs/python and docs/start are true: their code runs and prints what they say; no public name is left out.
+
+On every page, the tests and cases that it cites exist; so do the names in the glossary.
+"""
 
 import contextlib
 import io
@@ -60,6 +63,49 @@ def test_every_public_name_is_in_the_reference():
     reference = (DOCS / "api.md").read_text(encoding="utf-8")
     missing = [name for name in clutch.__all__ if not re.search(rf"\bclutch\.{name}\b", reference)]
     assert not missing, f"docs/api.md does not have {missing}"
+
+
+# A test is cited by its name, and so is a key or a figure: four words or more. A case of the referee is a file's name.
+CITED = re.compile(r"`(?:\w+::|\w+\.)*([a-z][a-z0-9]*(?:_[a-z0-9]+){3,})`")
+CASE = re.compile(r"`([A-Z][0-9](?:_[a-z0-9_]+)?)`")
+COMMENT = re.compile(r"^\s*(?://|#(?!\[)).*$", re.MULTILINE)
+
+
+def tracked(*endings):
+    """The files of the repository that end so, but not the list of changes: it cites what was."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, encoding="utf-8", check=True)
+    names = [name for name in listed.stdout.split("\0") if name.endswith(endings) and name != "CHANGELOG.md"]
+    return {name: (ROOT / name).read_text(encoding="utf-8") for name in names if (ROOT / name).is_file()}
+
+
+def words_of(*endings):
+    """The words of the code in these files, without comments."""
+    return set(re.findall(r"\w+", "\n".join(COMMENT.sub("", text) for text in tracked(*endings).values())))
+
+
+def test_the_tests_and_cases_that_a_page_cites_exist():
+    words = words_of(".rs", ".py")
+    cases = {Path(name).stem for name in tracked(".toml") if name.startswith("crates/clutch-sim/cases/")}
+    assert len(cases) >= 40
+    cited, missing = 0, []
+    for page, text in tracked(".md").items():
+        for number, line in enumerate(text.split("\n"), 1):
+            for pattern, known in ((CITED, words), (CASE, cases)):
+                # The code itself puts `law_` before a term that has a column's name.
+                names = [name.removeprefix("law_") for name in pattern.findall(line)]
+                cited += len(names)
+                missing += [f"{page}:{number}: {name}" for name in names if name not in known]
+    assert cited > 100
+    assert not missing, "\n".join(missing)
+
+
+def test_the_names_in_the_glossary_are_those_of_the_code():
+    rows = [line.split("|") for line in tracked("docs/glossary.md")["docs/glossary.md"].split("\n")]
+    names = [name for row in rows if len(row) == 5 for name in re.findall("`([^`]+)`", row[3])]
+    assert len(names) > 60
+    words = words_of(".rs", ".py", ".toml")
+    missing = [name for name in names if not words.issuperset(re.findall(r"\w+", name))]
+    assert not missing, missing
 
 
 def test_the_documentation_builds_without_a_warning(tmp_path):

@@ -214,7 +214,7 @@ def test_a_state_that_is_none_is_refused(control):
     for x in (0.5, 7.0, -1.0, math.nan):
         with pytest.raises(ValueError, match="rig: state"):
             rig.output(0.0, [x], [2.0])
-    # What lies long back is forgotten, but for the beginning.
+    # Samples that lie long back are forgotten, but for the beginning.
     response = control.input_output_response(rig, rig.dt * np.arange(1500), np.full(1500, 2.3))
     with pytest.raises(ValueError, match="last 1024"):
         rig.output(0.0, response.states[:, 10], [2.0])

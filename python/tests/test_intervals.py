@@ -8,7 +8,7 @@ import pytest
 from intervals import ENGINES, KINDS, compare, draw, reference
 
 PROGRAM = os.environ.get("CLUTCH_INTERVALS")
-# What the whole campaign found, with room: docs/theory.md, section 10.
+# The whole campaign's errors, with room: docs/theory.md, section 10.
 MOST = {
     "exact_flow": {"motion": 1e-9, "break-away": 1e-9, "soft break-away": 1e-6},
     "dormand_prince": {"motion": 1e-6, "break-away": 1e-6, "soft break-away": 3e-2},

@@ -133,7 +133,7 @@ def test_a_scenario_that_is_refused_is_a_param_error_with_the_text_of_the_comman
     command = said(clutch("loop", scenario, *args, code=1))
     with pytest.raises(package.ParamError) as caught:
         package.loop(scenario, overrides=dict([setting]) if setting else None)
-    # What is checked when it runs begins with the class, as everywhere in the package; the command has the file's name.
+    # An error found when it runs begins with the class, as everywhere in the package; the command has the file's name.
     assert str(caught.value).removeprefix("Scenario: ") == command.removeprefix("pd_2: ")
     if setting:
         assert caught.value.field in (setting[0], "run.settle_s")

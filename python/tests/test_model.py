@@ -346,7 +346,7 @@ def beyond(row):
     return values if whole else [*values, math.nan, math.inf, -math.inf]
 
 
-# What a range cannot say: values that do not fit the object's other ones, lists, texts.
+# Errors that a range cannot say: values that do not fit the object's other ones, lists, texts.
 DEPENDENT = {
     clutch.Ripple: {
         "rms": [0.3],
@@ -633,7 +633,7 @@ def each(**fields):
     return st.fixed_dictionaries(fields)
 
 
-#: Of LuGre's and elasto-plastic bristles.
+#: The keys of LuGre's and elasto-plastic bristles.
 BRISTLES = {
     "mu_static": st.floats(0.1, 2),
     "mu_dynamic": st.floats(0.1, 2),
@@ -1125,7 +1125,7 @@ def test_examples_in_the_documentation_are_true(module):
 def test_every_class_method_and_field_is_documented():
     nested = [c for c in vars(clutch.Certificate).values() if inspect.isclass(c)]
     for cls in [*CLASSES, clutch.Scenario, clutch.Certificate, *nested]:
-        # What must be given cannot be made up: an example shows it where there is one.
+        # A value that must be given cannot be made up: an example shows it where there is one.
         assert ">>>" in cls.__doc__ or REQUIRED.get(cls), cls
         for f in dataclasses.fields(cls):
             assert f"\n{f.name} : " in inspect.getdoc(cls), (cls, f.name)

@@ -51,7 +51,7 @@ def test_a_notebook_runs_and_its_assertions_hold(path, tmp_path):
         if "plot." in cell.source or ".plot(" in cell.source:
             shown = [output for output in cell.outputs if "image/png" in output.get("data", {})]
             assert shown or "import " in cell.source, f"{cell.id} draws and shows nothing"
-    # What it prints is what is kept.
+    # The notebook's output is what is kept.
     kept = nbformat.read(path, as_version=4)
     for ours, theirs in zip(code_cells(notebook), code_cells(kept), strict=True):
         assert printed(ours) == printed(theirs), ours.id

@@ -201,7 +201,7 @@ def test_the_lesson_says_what_is_to_be_seen(page):
     assert figures[2][glide]["control_variation_v_s"] < figures[2][pd]["control_variation_v_s"] / 20
     assert cycles[3] == {glide: 0}
     assert set(cycles[4].values()) == {0}
-    # What its steps invite to.
+    # The changes that its steps invite to.
     settle(page, "laws = new Set(['smc']); set = {'law.smc.boundary_rad_s': '0.02'}; changed()")
     assert shown(page)[smc]["stick_slip_cycles_per_s"] > 2 * cycles[1][smc]
     settle(page, "laws = new Set(['glide']); set = {'rig.delay_ticks': '3'}; changed()")

@@ -88,7 +88,7 @@ def test_importing_clutch_and_its_plots_imports_no_matplotlib():
 def test_a_tracking_plot_is_the_error_in_degrees_over_the_time_of_the_run(pd, tmp_path):
     ax = plot.tracking(pd)
     drawn(ax, tmp_path, "tracking")
-    # Of each part the mean is a line; the band reaches as far as the samples do.
+    # The mean of each part is a line; the band reaches as far as the samples do.
     error = np.degrees(pd.samples["error_rad"])
     mean = line(ax, pd.scenario.name).get_ydata()
     assert len(mean) == 120 and error.min() < mean.min() and mean.max() < error.max()

@@ -83,7 +83,7 @@ class Layout:
 
 def _layout(kind, name, fields):
     names, codes = zip(*(field.split(":") for field in fields.split()), strict=True)
-    # Of a list the number of its numbers.
+    # A list begins with the number of its numbers.
     form = struct.Struct("<" + "".join(codes).replace("L", "B"))
     return Layout(kind, name, names, form, codes[-1] == "L")
 

@@ -1,4 +1,4 @@
-/* What comes before main on the emulated Cortex-M4F: the vectors, and the floating-point unit.
+/* The code before main on the emulated Cortex-M4F: the vectors, and the floating-point unit.
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
 #include <stdint.h>

@@ -68,7 +68,7 @@ fn a_board_that_closes_the_loop_is_set_up_armed_logged_and_stopped_over_a_line()
     let (_board, address) = board(&image, Some(&rig));
     let log = scratch("serial.mcap");
     let log = log.to_str().expect("a path");
-    // A slow machine's late answers are not the subject. Of a byte the emulator makes tens of microseconds:
+    // A slow machine's late answers are not the subject. The emulator takes tens of microseconds for a byte:
     // at 1 kHz a slow machine would get ever later samples while the board is at rest and nothing waits for it.
     let slow =
         ["--patient", "--set", "safety.limits.deadline_us=1000000", "--set", "sampling.period_us=4000"];

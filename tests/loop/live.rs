@@ -12,7 +12,7 @@ use std::time::Duration;
 /// A command with `--live`, and where its view is.
 struct Viewed {
     child: Child,
-    /// What it prints, on standard output and, after the view's address, on standard error.
+    /// Its output, on standard output and, after the view's address, on standard error.
     printed: [std::thread::JoinHandle<String>; 2],
     host: String,
     query: String,

@@ -38,7 +38,7 @@ fn an_unstable_sampled_loop_is_the_cause_and_what_makes_it_stable_makes_it_slowe
         assert!(found.evidence.spectral_radius.unwrap() < 1.0, "{stable:?} {found:?}");
         assert!(rate(&found) <= 8.0 && found.cause != Some(Cause::SampledLoop), "{stable:?} {found:?}");
     }
-    // What is no cause takes nothing away: the sticks at 6 and 10 °/s stay.
+    // The removal of what is no cause takes nothing away: the sticks at 6 and 10 °/s stay.
     for other in [EVEN, IDEAL] {
         let found = lowest("bench_pd_2", &[other], &rates);
         assert!(rate(&found) > 10.0 && found.cause == Some(Cause::SampledLoop), "{other:?} {found:?}");

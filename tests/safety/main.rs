@@ -82,7 +82,7 @@ fn the_name_of_a_run_says_what_it_leaves_out() {
     assert!(run.draw().troubles.len() <= 1);
     let error = "17-cake".parse::<RunId>().expect_err("no such part").to_string();
     assert!(error.contains("\"17-cake\": expected a seed") && error.contains("second, first"), "{error}");
-    // What does not matter is left out, what matters is not.
+    // Trouble that does not matter is left out, trouble that matters is not.
     let two = (1..).map(RunId::from).find(|run| run.draw().troubles.len() == 2).expect("some have two");
     let minimal = two.minimal(|run| run.draw().troubles.contains(&two.draw().troubles[1]));
     assert_eq!(minimal.draw().troubles, two.draw().troubles[1..]);

@@ -206,7 +206,7 @@ pub(crate) fn all(runs: u64) -> Result<()> {
     let listed = ["ls-files", "-z", "--cached", "--others", "--exclude-standard"];
     let (done, tree) = program("git").args(listed).silently()?;
     ensure!(done, "git ls-files: {tree}");
-    // What is deleted and not yet committed is listed, too.
+    // Files that are deleted, and not yet committed so, are listed, too.
     for file in tree.split('\0').filter(|f| !f.is_empty() && root().join(f).is_file()) {
         let to = copy.join(file);
         std::fs::create_dir_all(to.parent().unwrap_or(&copy))?;

@@ -79,7 +79,7 @@ pub(crate) fn in_firmware<const N: usize>(args: [&str; N]) -> Program {
     cargo(args).within(&root().join("firmware")).env("CARGO_TARGET_DIR", root().join("target/firmware"))
 }
 
-/// Where the images of a target are.
+/// The folder of a target's images.
 pub(crate) fn folder(target: &str) -> PathBuf {
     root().join("target/firmware").join(target).join("release")
 }

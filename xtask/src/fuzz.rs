@@ -42,7 +42,7 @@ fn counted(target: &str, executions: u64) -> Result<()> {
 
 /// Fuzzes one target until `end`, options of libFuzzer; true if it held.
 pub(crate) fn one(target: &str, end: &[&str]) -> Result<bool> {
-    // Of its two folders libFuzzer fills the first; the one in the tree is only read.
+    // The first of its two folders is what libFuzzer fills; the one in the tree is only read.
     let (found, seeds) = (format!("target/corpus/{target}"), format!("fuzz/corpus/{target}"));
     std::fs::create_dir_all(root().join(&found))?;
     // A target need not have any.

@@ -67,7 +67,7 @@ pub(crate) fn add(targets: &[&str]) -> Result<()> {
     program("rustup").args(["target", "add"]).args(targets).run().context("rustup cannot add the targets")
 }
 
-/// Where the libraries are.
+/// The folder of the libraries.
 pub(crate) fn folder() -> PathBuf {
     root().join("target/libclutch")
 }

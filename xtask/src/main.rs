@@ -77,7 +77,7 @@ enum Verb {
         /// The scenario within them; smc_2 if none is given.
         scenario: Option<PathBuf>,
     },
-    /// Builds the page that simulates in a browser, target/playground/stick-slip.html, and tells its size; adds its Rust target.
+    /// Builds the page that simulates in a browser, target/playground/stick-slip.html, and prints its size; adds its Rust target.
     Playground,
     /// Builds the API documentation, in target/doc.
     Docs,
@@ -136,7 +136,7 @@ enum Verb {
         /// File in which it keeps how far it is; it goes on from there.
         #[arg(long, value_name = "FILE")]
         resume: Option<PathBuf>,
-        /// Only these runs, by the names that a failure has, and tells about them.
+        /// Only these runs, by the names that a failure has, and reports on them.
         #[arg(long, value_name = "RUN", num_args = 1.., conflicts_with_all = ["runs", "seed", "resume"])]
         only: Vec<String>,
     },

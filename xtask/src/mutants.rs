@@ -15,7 +15,7 @@ pub(crate) fn run(shard: &str) -> Result<()> {
     let tree = root().join("target/mutants/tree");
     let tar = root().join("target/mutants/tree.tar");
     std::fs::create_dir_all(&tree)?;
-    // What was built there stays.
+    // The products of a build there stay.
     for entry in std::fs::read_dir(&tree)?.flatten().filter(|e| e.file_name() != "target") {
         let path = entry.path();
         if path.is_dir() { std::fs::remove_dir_all(path)? } else { std::fs::remove_file(path)? }

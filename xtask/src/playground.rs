@@ -25,7 +25,7 @@ pub(crate) fn build() -> Result<Option<Playground>> {
         }
         other => bail!("rustup cannot add the target {TARGET}: {other:?}"),
     }
-    // In a folder of its own, or it would wait for other builds. Of texts the page has those that it shows.
+    // In a folder of its own, or it would wait for other builds. The page has only texts that it shows.
     let folder = root().join("target/web");
     let packages = ["--package", "clutch-web", "--package", "clutch-core", "--features", "clutch-core/terse"];
     let build = cargo(["build", "--lib", "--locked", "--profile", "web", "--target", TARGET]).args(packages);

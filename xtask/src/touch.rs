@@ -9,16 +9,12 @@ use std::collections::BTreeMap;
 struct Fact {
     kind: &'static str,
     of: &'static str,
-    /// Its identifiers, whole words. No other fact has one of them.
+    /// Its identifiers, whole words. No other fact has one of them, at any revision that is counted.
     names: &'static [&'static str],
 }
 
 const FACTS: &[Fact] = &[
-    Fact {
-        kind: "a law's parameter",
-        of: "boundary layer of SMC",
-        names: &["boundary", "boundary_rad_s", "inverse_boundary"],
-    },
+    Fact { kind: "a law's parameter", of: "outer gain of CTC", names: &["outer_gain"] },
     Fact {
         kind: "a law",
         of: "SMC with the sign function",

@@ -59,7 +59,7 @@ enum {
     CLUTCH_ARRIVAL_IMPLAUSIBLE = 5,
 };
 
-/* What the keys of a list of settings mean: compare it with clutch_settings_hash(). */
+/* The meaning of the keys of a list of settings: compare it with clutch_settings_hash(). */
 #define CLUTCH_SETTINGS_HASH UINT64_C(0xa68784e5b2366286)
 
 /* Settings: those of the options that are chosen are needed; others are not looked at. */
@@ -843,11 +843,10 @@ clutch_result clutch_axis_sample(clutch_axis *axis,
                                  clutch_cycle *cycle);
 
 /**
- * A period without a sample, once each: `cycles` periods, this one among them, since the last sample came. Where control has
- * ended the safe state takes its next step. `clutch_axis_state` has the code to write.
+ * A period without a sample, once each: `cycles` periods, this one among them, since the last sample came. The safe
+ * state takes its next step where control has ended. `clutch_axis_state` has the code to write.
  */
-clutch_result clutch_axis_silence(clutch_axis *axis,
-                                  uint32_t cycles);
+clutch_result clutch_axis_silence(clutch_axis *axis, uint32_t cycles);
 
 /**
  * An operator's stop: the safe state, without a fault. Its steps come with the samples, or with `clutch_axis_silence`.

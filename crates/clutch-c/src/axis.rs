@@ -142,8 +142,8 @@ pub unsafe extern "C" fn clutch_axis_sample(
     })
 }
 
-/// A period without a sample, once each: `cycles` periods, this one among them, since the last sample came. Where control has
-/// ended the safe state takes its next step. `clutch_axis_state` has the code to write.
+/// A period without a sample, once each: `cycles` periods, this one among them, since the last sample came. The safe
+/// state takes its next step where control has ended. `clutch_axis_state` has the code to write.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clutch_axis_silence(axis: *mut clutch_axis, cycles: u32) -> clutch_result {
     outcome(|| {

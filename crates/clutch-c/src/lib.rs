@@ -45,7 +45,7 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     unsafe { clutch_panic_path_survived() }
 }
 
-// Where programs unwind, the compiler's own functions name this. Weak, so that a program may have another Rust library.
+// The compiler's own functions name this where programs unwind. Weak, so that a program may have another Rust library.
 #[cfg(all(feature = "staticlib", not(target_os = "none")))]
 core::arch::global_asm!(
     ".weak rust_eh_personality",

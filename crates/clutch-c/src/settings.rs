@@ -149,7 +149,7 @@ unsafe fn made<T>(
         let at = settings.binary_search_by_key(&key, |setting| setting.key).ok()?;
         settings.get(at).map(|setting| setting.value)
     };
-    // What is no setting has no key.
+    // A value that is no setting has no key.
     let unfit = |e: ParamError<f32>| Misfit::Unfit { key: u16::MAX, relation: e.relation, value: e.value };
     Ok(Built::new(number, knots.get())
         .and_then(|built| make(built, knots).map_err(unfit))

@@ -371,7 +371,7 @@ fn walls(cell: &Cell, n: usize) -> Result<Vec<(f64, f64)>, Flaw> {
 /// Every state in which a run may begin lies in the set.
 fn starts_inside(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<(), Flaw> {
     let path = shaft.path;
-    // What the shaft's velocity may differ from the path's by rounding, in either scalar.
+    // The shaft's velocity may differ so far from the path's by rounding, in either scalar.
     let near = at(1e-6) * (at(1.0) + path);
     let step = Interval { low: -shaft::TARGET_STEP, high: shaft::TARGET_STEP };
     let rate = Interval { low: -near.high, high: if setup.from_rest { path.high } else { near.high } };

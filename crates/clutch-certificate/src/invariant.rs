@@ -186,7 +186,7 @@ impl<'a, const N: usize> Search<'a, N> {
     /// Modes that cannot happen, with what shows it.
     fn impossible(&self, mode: usize) -> Option<Contradiction> {
         let program = Program { set: &self.set, mode: &self.modes[mode].within };
-        // Of the rows' rays the one that contradicts itself most, for its size.
+        // The row's ray that contradicts itself most, for its size.
         let rays = (0..self.set.len())
             .filter_map(|row| program.contradiction(&self.duals[row * self.modes.len() + mode]));
         let (by, weights) = rays.max_by(|a, b| a.0.total_cmp(&b.0))?;

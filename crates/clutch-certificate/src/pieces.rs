@@ -87,7 +87,7 @@ fn shell(u: &Units, slope: f64, boundary: f64) -> Vec<Piece> {
     let sigma = error(u).times(slope).plus(rate(u), 1.0);
     let one = Line::constant(1.0);
     let [low, high] = u.volts;
-    // Where the law rounds `σ` to the other side of an edge, either piece holds.
+    // Either piece holds where the law rounds `σ` to the other side of an edge.
     let (least, most) = (boundary - SURFACE_ROUNDING, boundary + SURFACE_ROUNDING);
     let behind = sigma.times(-1.0).plus(one, least);
     let ahead = sigma.plus(one, least);

@@ -99,7 +99,7 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
             plain.push(row);
         }
     }
-    // What a saturated loop, or a steeper part of the law, leaves of the gains.
+    // Shares of the gains that a saturated loop, or a steeper part of the law, leaves.
     let shares: &[f64] = match (u.law, form) {
         (Gains::Pd { .. } | Gains::Shell { .. }, Form::Noise) => &[1.0, 0.8, 0.65, 0.5, 0.35, 0.25, 0.12],
         (Gains::Pd { .. } | Gains::Shell { .. }, Form::Exact) => &[1.0, 0.7, 0.5, 0.35, 0.25],

@@ -152,7 +152,7 @@ fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
     };
     let tried = |(form, (fineness, growth)): &(Form, (Fineness, f64))| {
         let cell = attempt(setup, sliding, *form, *fineness, *growth, options)?;
-        // What rounding has spoilt is no proof.
+        // A cell that rounding has spoilt proves nothing.
         let alone =
             Certificate { version: VERSION, setup: Setup { sliding, ..setup.clone() }, cells: vec![cell] };
         if checker::check(&alone).is_err() {
@@ -252,7 +252,7 @@ fn hopeless(u: &Units) -> f64 {
     let volts_per_count = match u.law {
         Gains::Pd { kp, .. } => kp * u.count,
         Gains::Smc { kp, slope, boundary, .. } => kp * slope / boundary * u.count,
-        // What a law within may do at its worst takes a wider set.
+        // A law within a shell takes a wider set for its worst.
         Gains::Shell { slope, boundary } => u.volts[1] * slope / (6.0 * boundary) * u.count,
     };
     12.0 + 6.0 * u.drive[1] / u.brake[0] / volts_per_count.max(1e-6)

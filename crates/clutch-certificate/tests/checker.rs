@@ -196,7 +196,7 @@ fn a_shell_with_another_slope_or_a_wider_boundary_is_refused() {
     let shell = |slope, boundary| Gains::Shell { slope, boundary };
     let good = found(&setup(shell(100.0, 0.1), 1.0, 0, 2.0));
     let bound = degrees(&good);
-    // Of the laws that do their worst, in 210 runs: docs/certified.md.
+    // Found with laws that do their worst, in 210 runs: docs/certified.md.
     assert!((0.0971..=0.115).contains(&bound), "{bound}°");
     for law in [shell(95.0, 0.1), shell(105.0, 0.1), shell(100.0, 0.105), shell(100.0, 0.0)] {
         let mut bad = good.clone();

@@ -52,7 +52,7 @@ impl ScenarioArgs {
 /// The table of a scenario that is the map of its disc.
 const MAP: &str = "friction_map";
 
-/// That table in a file that `clutch identify --map` has written.
+/// Reads that table from a file that `clutch identify --map` has written.
 fn read_map(file: &Path) -> anyhow::Result<Value> {
     let name = file.display().to_string();
     let text = std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"))?;

@@ -64,7 +64,7 @@ impl Daq {
         let mut endpoint: Box<dyn Endpoint> = match &self.listen {
             None => match PseudoTerminal::open() {
                 Ok((terminal, _)) => Box::new(terminal),
-                // Where the system has none: what is open to this user alone, too.
+                // If the system has none: a socket that, too, is open to this user alone.
                 Err(_) => Box::new(Listener::bind_unix(&own_socket())?),
             },
             Some(Address::Tcp(address)) => Box::new(Listener::bind(*address)?),

@@ -29,14 +29,14 @@ use {
 /// Finds out what a rig is: T/J, delay, friction, ripple, damping, each with an interval.
 ///
 /// Runs an experiment of less than a minute through the loop, with all its checks: on the scenario's simulated board, in
-/// virtual time, or with --port on a real one. With --from it reads logs instead. What cannot be told is refused, with the
-/// experiment that would tell it.
+/// virtual time, or with --port on a real one. With --from it reads logs instead. A parameter that cannot be found is
+/// refused, with the experiment that would find it.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  clutch identify board_smc_2\n  \
     clutch identify mine.toml --port /dev/ttyACM0 --log logs --uncertified --out rig.toml\n  \
     clutch identify --from logs/releases.mcap logs/crawl.mcap logs/ride_5.mcap\n  \
     clutch certify mine.toml --identified rig.toml\n\n\
-    docs/identify.md tells what is measured, how well, and what cannot be.")]
+    docs/identify.md says what is measured, how well, and what cannot be.")]
 pub(crate) struct Identify {
     /// Scenario of the rig, with [safety]: file, or name of a built-in one.
     #[arg(value_name = "SCENARIO.toml", default_value = "board_smc_2")]

@@ -62,7 +62,7 @@ pub use output::BUILD;
     after_help = "Example:\n  clutch loop                        # the loop on a simulated board\n  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario"
 )]
 struct Cli {
-    /// Tells nothing but errors and what was asked for: JSON, lists, files.
+    /// Prints nothing but errors and what was asked for: JSON, lists, files.
     #[arg(long, short, global = true)]
     quiet: bool,
     #[command(subcommand)]

@@ -42,7 +42,7 @@ enum OverrunsArg {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum OnDriftArg {
-    /// It is told and logged, and the run goes on.
+    /// It is reported and logged, and the run goes on.
     Tell,
     /// The run ends in the safe state.
     Stop,
@@ -118,11 +118,11 @@ pub(crate) struct Loop {
     /// scenario's, before anything starts.
     #[arg(long, value_name = "FILE.json")]
     certificate: Option<PathBuf>,
-    /// Release test before the run: the brake lets go for some milliseconds and grips again; the way tells wrong signs and
+    /// Release test before the run: the brake lets go for some milliseconds and grips again; the way shows wrong signs and
     /// scales of encoder and converter.
     #[arg(long, value_enum, value_name = "WHEN", default_value = "auto")]
     release_test: ReleaseArg,
-    /// The longest way in that test of any shaft within the bounds, °, up to 10: a longer one tells more.
+    /// The longest way in that test of any shaft within the bounds, °, up to 10: a longer one finds more.
     #[arg(long, value_name = "DEG", default_value_t = 0.1)]
     release_deg: f64,
     /// Cycles per second instead of sampling.period_us, Hz.
@@ -198,7 +198,7 @@ impl Loop {
             .context("signals could not be caught")?;
         let scope = self.live.has_terminal();
         let show = std::io::stderr().is_terminal() && !quiet() && !scope;
-        // What happens while a scope has the terminal is told after it.
+        // Events that come while a scope has the terminal are printed after it.
         let mut later = Vec::new();
         let mut tell = |text: &str| {
             if scope {
@@ -210,7 +210,7 @@ impl Loop {
         };
         let mut said = Ok(());
         let ran = session.run(&stop, &mut |event| match event {
-            // What cannot be said is not done: nothing has moved yet.
+            // A run that cannot be announced does not begin: nothing has moved yet.
             Event::Announced(announcement) => {
                 said = if quiet() { Ok(()) } else { self.say(&plan(&announcement)) };
                 stop.fetch_or(said.is_err(), Ordering::Relaxed);
@@ -392,7 +392,7 @@ fn us(ns: u64) -> String {
     format!("{us:.digits$}")
 }
 
-/// Plan of a loop, told before anything moves, in lines of a terminal.
+/// Plan of a loop, printed before anything moves, in lines of a terminal.
 #[must_use]
 pub fn plan(a: &Announcement) -> String {
     let rows = a.rows.iter().map(|(name, value)| beside(&format!("  {name:<11}"), value));

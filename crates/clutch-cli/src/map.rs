@@ -22,7 +22,7 @@ use serde_json::json as value;
 #[command(after_help = "Example:\n  clutch map bench_pd_2\n  \
     clutch map bench_pd_2 --x law.pd.kp_v_rad=500:5000:8 --y law.pd.kd_v_s_rad=5,10,20,50 --plot map.png\n  \
     clutch map bench_pd_2 --x law.pd.kd_v_s_rad=5:50:14 --rates 1:20:10\n\n\
-    docs/map.md tells how to read it.")]
+    docs/map.md says how to read it.")]
 pub(crate) struct Map {
     #[command(flatten)]
     scenario: ScenarioArgs,

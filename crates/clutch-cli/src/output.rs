@@ -19,7 +19,7 @@ pub(crate) const WIDTH: usize = 80;
 /// True if the command line has `--quiet`.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
-/// Sets whether a text is told that was not asked for in so many words.
+/// Sets whether a text is printed that was not asked for in so many words.
 pub(crate) fn set_quiet(quiet: bool) {
     QUIET.store(quiet, Ordering::Relaxed);
 }
@@ -44,10 +44,10 @@ pub(crate) enum Exit {
     Incomplete,
 }
 
-/// Version and commit, as logs tell it.
+/// Version and commit, as logs have them.
 pub const BUILD: &str = env!("CLUTCH_BUILD");
 
-/// That nothing was started, and what to do.
+/// Says that nothing was started, and what to do.
 #[cfg(target_os = "linux")]
 pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, file: &Path) -> String {
     format!("{refusal}\n`clutch certify {}` says why; --uncertified runs it all the same.\n", file.display())
@@ -191,7 +191,7 @@ fn whole_word(text: &str, word: &str) -> Option<usize> {
         .find(|at| !text[..*at].ends_with(part) && !text[*at + word.len()..].starts_with(part))
 }
 
-/// The lines that tell which files were written.
+/// The lines that name the files that were written.
 pub(crate) fn wrote(files: &[&Path]) -> String {
     files.iter().map(|file| format!("wrote {}\n", file.display())).collect()
 }

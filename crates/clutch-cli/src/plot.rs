@@ -51,7 +51,7 @@ impl Series {
     }
 }
 
-/// Stretches of the horizontal axis, shaded behind the curves. Of several shades in a panel each is a strip at its top.
+/// Stretches of the horizontal axis, shaded behind the curves. Each of several shades in a panel is a strip at its top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shade {
     /// Name in the legend.
@@ -932,7 +932,7 @@ impl<DB: DrawingBackend> Canvas<DB> {
         for (number, series) in panel.series.iter().enumerate() {
             self.band(series, number, placed)?;
         }
-        // What the others are held against is behind them.
+        // A guide, which the others are held against, lies behind them.
         let curves = || panel.series.iter().enumerate();
         for (number, series) in curves().filter(|c| c.1.guide).chain(curves().filter(|c| !c.1.guide)) {
             let (step, color) = (panel.step && !series.guide, series.colour(number));

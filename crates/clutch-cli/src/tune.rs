@@ -27,7 +27,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  clutch tune board_smc_2 --identified rig.toml --out tuned.toml\n  \
     clutch tune mine.toml --rates 1,2,6 --html tuned.html\n  \
     clutch loop tuned.toml --certificate proof.json   # after --save proof.json\n\n\
-    docs/tune.md tells what is tried, on what, and what is proven.")]
+    docs/tune.md says what is tried, on what, and what is proven.")]
 pub(crate) struct Tune {
     #[command(flatten)]
     scenario: ScenarioArgs,

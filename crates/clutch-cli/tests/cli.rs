@@ -264,7 +264,7 @@ fn a_quiet_command_tells_nothing_but_what_was_asked_for() {
     assert!(out(&clutch(&["sim", "smc_2", "--json", "-q"])).starts_with('{'));
     assert!(out(&clutch(&["scenario", "list", "-q"])).contains("smc_2"));
     assert!(err(&clutch(&["-q", "sim", "missing.toml"])).contains("no such file"));
-    // That nothing was started is no chatter.
+    // The message that nothing was started is no chatter.
     let refused = clutch(&["-q", "loop", "board_smc_2", "--set", "law.smc.kp_v=1"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(
@@ -903,7 +903,7 @@ fn a_table_of_a_log_reads_back_as_the_logs_records_bit_for_bit() {
         }
     }
 
-    // What is there stays; what is no table is refused, and nothing is left behind.
+    // A file that is there stays; a channel that is no table is refused, and nothing is left behind.
     let before = std::fs::read(dir.join("command.csv")).expect("a table");
     let again = clutch(&["log", "export", &log, "--out", &path("command.csv")]);
     assert_eq!(again.status.code(), Some(1));

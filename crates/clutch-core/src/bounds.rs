@@ -253,7 +253,7 @@ mod tests {
         near(b.torque(true, 2.0), 0.08 - high, 0.12 - low);
         near(b.torque(false, 2.0), 0.08 + low, 0.12 + high);
         near(b.torque(true, -2.0), -0.12 - high, -0.08 - low);
-        // What drive and motor leave: −0.13 − 0.12 N m on the least friction.
+        // Drive and motor leave −0.13 − 0.12 N m on the least friction.
         assert!((b.left_over(-2.0) - (0.25 - low)).abs() < 1e-12);
         assert!((b.left_over(2.0) - (0.05 - low)).abs() < 1e-12);
         near(b.authority(true, -2.0, 2.0), -0.08 - low, 0.08 - high);

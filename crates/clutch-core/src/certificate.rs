@@ -158,7 +158,7 @@ pub fn certify<T: Real>(
     let sides = sides(bounds, demand, (law.output().lowest(), law.output().highest()));
     let surface = |asked: &Asked<'_, T>| shell.surface().or_else(|| law.surface(asked));
     if bounds.actuator == ActuatorKind::Both {
-        // Where the drive catches the shaft up by itself, the motor need not.
+        // The motor need not catch the shaft up where the drive does by itself.
         let released = Side { gain: T::ZERO, highest: T::ZERO, ..sides.behind };
         let alone = certify_sides(&surface, bounds, demand, Sides { behind: released, ..sides });
         if alone.certified() {
@@ -288,7 +288,7 @@ fn sides<T: Real>(bounds: &Bounds<T>, demand: &Demand<T>, (lowest, highest): (T,
     let preload = bounds.friction.high * bounds.preload;
     let motor = bounds.motor_gain.low * (T::ONE - bounds.friction.high * bounds.load_share);
     let brake = Side { gain: bounds.weakest_brake(), load: drive.high, highest };
-    // What never lets go is against the shaft that is behind.
+    // A force that never lets go is against the shaft that is behind.
     let released = drag - (drive.low - bounds.strongest_brake() * lowest.max(T::ZERO) - preload);
     match bounds.actuator {
         ActuatorKind::Brake => {

@@ -156,7 +156,7 @@ pub fn check_path<T: Real>(
             }
         }
         let volts = if resting {
-            // What a motor need not give, friction does.
+            // Friction gives what a motor need not.
             let holding = envelope.holding_voltage;
             let holding = if reverses { holding.max(limits.0).min(limits.1) } else { holding };
             Interval { low: holding, high: holding }

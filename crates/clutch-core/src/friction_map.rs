@@ -3,7 +3,7 @@
 use crate::{FixedCounts, Real};
 use core::fmt;
 
-/// Least friction that a map tells, over its mean.
+/// Least friction in a map, over its mean.
 const LEAST: f64 = 0.1;
 
 /// Friction at points of the disc, at even distances: each a multiple of the mean, in parts of [`FrictionMap::ONE`].

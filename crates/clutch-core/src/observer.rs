@@ -308,7 +308,7 @@ fn design(walk: f64, inertia: f64, damping: f64, count: f64, period: f64) -> Opt
     let (g1, g2) = decay_integrals(x);
     let torque_unit = count * inertia / (period * period);
     let rho = walk * walk * period / (torque_unit * torque_unit);
-    // What a step of the torque, s before the end of the period, has made of the state then;
+    // The state that a step of the torque, s before the end of the period, has made by then;
     // integrated over the period by Gauss and Legendre's three points, exact without damping.
     let mut q = Matrix3::zeros();
     let off_centre = Real::sqrt(0.15_f64);

@@ -4,7 +4,7 @@
 //! J θ̈ = T_u + T(v_a) − μ(θ̇) N(v_a) − C_d θ̇,   T_u = M g R_p       (1): T = 0, N = K_COF max(v_a, 0)
 //! ```
 //!
-//! At rest the shaft stays at rest while `|T_u + T| ≤ μ_s N`. What a voltage does is the [`Actuator`]'s.
+//! At rest the shaft stays at rest while `|T_u + T| ≤ μ_s N`. The effect of a voltage is the [`Actuator`]'s.
 
 use crate::actuator::{Actuator, ActuatorKind, ActuatorParams};
 use crate::friction::{Friction, FrictionModel, FrictionParams};

@@ -144,7 +144,7 @@ impl<T: Real> Servo<T> {
     /// the converter's range, at which it would clip unseen.
     pub fn new(p: &ServoParams<T>) -> Result<Self, ParamError<T>> {
         let servo = Servo::with_law(p, Law::new(&p.law, &p.beside())?)?;
-        // Of numbers that output and converter have taken by themselves.
+        // Output and converter have taken these numbers by themselves: now both together.
         p.check_output()?;
         Ok(servo)
     }
@@ -248,7 +248,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         self.tick_on(state, counts, target, off_map)
     }
 
-    /// One period on a disc of which a map tells friction around a position.
+    /// One period on a disc of which a map has the friction around a position.
     #[inline]
     pub fn tick_on(
         &self,
@@ -275,7 +275,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         self.step(state, position, target, map(position))
     }
 
-    // Of no closure's own: a board has its code once.
+    // Not generic over a closure: a board has its code once.
     fn step(
         &self,
         state: &mut ServoState<T, C::State>,
@@ -304,7 +304,7 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         target: &Target<T>,
         (step, steps): (u32, u32),
     ) {
-        // What the encoder said and what the brake got: neither is of this step's making.
+        // The encoder's word and the brake's voltage: neither is of this step's making.
         let before = (state.position, state.last, state.applied);
         let moved = FixedCounts::from_counts(i64::from(next.0.since(state.last)));
         let end = next.1.position.0.wrapping_sub(state.position.plus(moved).0);

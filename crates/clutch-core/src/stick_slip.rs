@@ -7,7 +7,7 @@
 //! one stick-slip cycle, as in the paper's Table 3.
 //!
 //! Sticks that come once in each count show no silence: edges are as even as in even motion. And a shaft that nearly stops
-//! is silent for as long as one that does. `docs/meter.md` has precision and recall, and what the voltage tells besides.
+//! is silent for as long as one that does. `docs/meter.md` has precision and recall, and what the voltage shows besides.
 
 use crate::params::{Range, Table};
 use crate::{Counts, Encoder, Micros, ParamError, Real};

@@ -1,4 +1,4 @@
-//! The functions that a simulator calls. What these units do not have answers with an error; the standard wants the
+//! The functions that a simulator calls. A function that these units do not have answers with an error; the standard wants the
 //! function all the same.
 #![allow(non_snake_case, reason = "the names are the standard's")]
 

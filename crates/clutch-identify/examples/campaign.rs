@@ -114,7 +114,7 @@ fn main() -> Outcome<()> {
             values
         };
         let errors = sorted(known.iter().map(|(e, truth)| how.error(e.value, *truth)).collect());
-        // Of a factor: the larger end over the value.
+        // The half of a factor is the larger end over the value.
         let half = |e: &Estimate| match how {
             As::Factor => e.high / e.value,
             As::Percent => 50.0 * (e.high - e.low) / e.value,

@@ -71,7 +71,7 @@ pub fn believed(scenario: &Scenario, file: Option<&RigFile>) -> Result<Believed,
     let period: f64 = spec.period.seconds();
     let mut delay_between = None;
     let mut set = vec![("run.start".to_owned(), Value::String("rest".to_owned()))];
-    // What holds for a Stribeck velocity holds for all below it: the slow speeds are those of the largest.
+    // A bound for one Stribeck velocity holds for all below it: the slow speeds are those of the largest.
     if let (Some(file), FrictionParams::Stribeck(_)) = (file, spec.model.friction) {
         let most = file.stribeck.map_or(UNKNOWN_STRIBECK, |stribeck| stribeck.high);
         for section in ["model", "rig"] {

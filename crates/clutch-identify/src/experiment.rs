@@ -209,7 +209,7 @@ fn checked(base: &Scenario, name: &str, table: Table) -> Result<Scenario, Scenar
 fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, ScenarioError> {
     let spec = base.spec();
     let rate = STEP_RATE * spec.rig.speed.speed_limit; // rad/s
-    // What holds the shaft while it waits.
+    // The voltage that holds the shaft while it waits.
     let wait = base.safety()?.on_fault.holding_voltage().unwrap_or(0.8 * spec.output.highest);
     let wait = wait.min(spec.output.highest);
     // The first period of a step takes all of it away.

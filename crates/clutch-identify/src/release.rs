@@ -135,8 +135,8 @@ impl Release {
     }
 }
 
-/// The set of T/J and delay that explains every count of all releases, with C/J between two values, 1/s. Where there is none
-/// with one delay, each release has its own, as with a lag of the actuator; where there is none with sharp edges, they may be
+/// The set of T/J and delay that explains every count of all releases, with C/J between two values, 1/s. If there is none
+/// with one delay, each release has its own, as with a lag of the actuator; if there is none with sharp edges, they may be
 /// off by more.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Findings of recordings on a shaft, and what they cannot tell.
+//! Findings of recordings on a shaft, and what they cannot show.
 
 use crate::break_away::{self, BreakAway, Known, break_aways};
 use crate::recording::Recording;
@@ -31,7 +31,7 @@ const UNEXPLAINED: f64 = 7.0;
 pub enum Finding {
     /// A value with its interval.
     Known(Estimate),
-    /// Why it cannot be told, and the experiment that would tell.
+    /// Why it cannot be found, and the experiment that would find it.
     Refused(String),
 }
 
@@ -50,7 +50,7 @@ fn refused(why: &str) -> Finding {
     Finding::Refused(why.to_owned())
 }
 
-/// All that recordings tell.
+/// All that recordings show.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// T/J, rad/s².

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Messages that are kept: some seconds of them at 1 kHz. What a slow client costs in memory is not more.
+/// Messages that are kept: some seconds of them at 1 kHz. A slow client costs no more in memory.
 const MESSAGES: usize = 1 << 14;
 /// Bytes that a client takes at a time, and a message more.
 pub(crate) const BATCH: usize = 1 << 18;

@@ -1,7 +1,7 @@
 //! The records of a run by Foxglove's WebSocket protocol, as the log has them.
 //!
 //! The protocol: <https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>, of which a client gets channels, their
-//! messages and their time. What a client sends changes nothing but what it gets.
+//! messages and their time. A client's messages change nothing but its own share.
 
 #![allow(clippy::result_large_err, reason = "the type of tungstenite's callback")]
 
@@ -198,7 +198,7 @@ impl Client {
         loop {
             self.flush()?;
             if self.full {
-                // What it does not take it does not get: it is neither heard nor told more.
+                // A viewer that takes no more gets no more, and is not heard.
                 if self.place.closed() {
                     return Ok(());
                 }
@@ -354,7 +354,7 @@ impl Client {
         self.socket.flush().or_else(|error| self.early(error))
     }
 
-    /// What is not sent stays with the socket, for the next time.
+    /// The unsent rest stays with the socket, for the next time.
     fn early(&mut self, error: Error) -> Result<(), Error> {
         self.full = true;
         if is_early(&error) { Ok(()) } else { Err(error) }

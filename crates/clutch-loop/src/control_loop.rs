@@ -1,4 +1,4 @@
-//! The loop: control thread, log thread, and what they tell each other.
+//! The loop: control thread, log thread, and the messages between them.
 //!
 //! ```text
 //!   port ◄──► control thread ──ring──► log thread ──► file
@@ -49,7 +49,7 @@ pub enum Pace {
 /// The effect of a drift out of the bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnDrift {
-    /// It is told and logged, and the run goes on.
+    /// It is reported and logged, and the run goes on.
     #[default]
     Tell,
     /// It ends the run in the safe state, as an operator would.
@@ -151,7 +151,7 @@ pub struct ConfiguredRun<'a, S: Station> {
     pub changes: Option<Changes<S::Servo>>,
     /// The values that a watcher sees.
     pub watch: &'a Watch,
-    /// Ticks of the run; a board that is the controller has been told, and ends it by itself.
+    /// Ticks of the run; a board that is the controller has the number, and ends it by itself.
     pub ticks: u64,
     /// The board's clock.
     pub clock: ClockOffset,
@@ -376,7 +376,7 @@ impl<'a, S: Station> Control<'a, S> {
                         *slot = Some(n);
                         batch.used += 1;
                     }
-                    // What came before consent is not logged.
+                    // Cycles before consent are not logged.
                     None => lost_records += if n.cycle.from == State::Ready { 0 } else { 2 },
                 },
                 Notice::Ended(ending) => batch.ended = Some(ending),
@@ -432,7 +432,7 @@ impl<'a, S: Station> Control<'a, S> {
     fn after(&mut self, (woke, now): (u64, u64), batch: &Batch<S::Scalar, S::Terms>) {
         let time_ns = now.saturating_sub(self.start_ns);
         self.refused = self.refused.or(batch.refused);
-        // What came before consent is not of the run.
+        // Cycles before consent are not of the run.
         let of_run = |n: &&CycleNotice<S::Scalar, S::Terms>| n.cycle.from != State::Ready;
         let late = self.wake_lateness(woke, batch.cycles.iter().take(batch.used).flatten().find(of_run));
         for n in batch.cycles.iter().take(batch.used).flatten().filter(of_run) {
@@ -464,7 +464,7 @@ impl<'a, S: Station> Control<'a, S> {
                 let counts = clutch_core::Counts(n.sample.counts);
                 let path_velocity = n.cycle.target.velocity.to_f64();
                 let noticed = self.detector.sample(n.cycle.tick, counts, path_velocity, voltage);
-                // What the log has of it, so that a replay sees the same.
+                // The watch is given what the log has, so that a replay sees the same.
                 self.look_for_drift(&sample, &command, noticed.gap);
                 self.watch.error_nrad.store((error * 1e9) as i64, Ordering::Relaxed);
                 self.watch.millivolts.store((voltage * 1e3) as i64, Ordering::Relaxed);
@@ -544,7 +544,7 @@ impl<'a, S: Station> Control<'a, S> {
     /// Takes over the gains that somebody has changed, before the sample that has come.
     fn tune(&mut self) {
         let Standing { state, tick, .. } = self.station.standing();
-        // What comes later has no effect any more.
+        // A change that comes later has no effect any more.
         if !matches!(state, State::Armed | State::Running) {
             return;
         }
@@ -673,7 +673,7 @@ impl<'a, S: Station> Control<'a, S> {
         false
     }
 
-    /// The line is gone: the station and the log are told. Gives the reason in words.
+    /// The line is gone: reports it to the station and the log. Gives the reason in words.
     fn port_lost(&mut self, error: &std::io::Error) -> String {
         let from = self.station.standing().state;
         self.station.disconnect();

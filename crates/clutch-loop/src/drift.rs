@@ -1,7 +1,7 @@
 //! Drift: mean friction over load, as counts and voltages show it, against the bounds that a certificate assumes.
 //!
 //! A shaft that slides balances: over a time the pulls of drive and motor, less friction and damping, are what it has gained
-//! in momentum. So the voltage that holds it tells its friction, as a multiple of the model's, while drive, motor and
+//! in momentum. So the voltage that holds it shows its friction, as a multiple of the model's, while drive, motor and
 //! inertia are the model's:
 //!
 //! ```text
@@ -9,8 +9,8 @@
 //! ```
 //!
 //! It is one number. With a brake, friction or gain up by a tenth and load down by a tenth give the same counts at the same
-//! voltages: what is told is friction over load. A time between two edges, a slice, gives one `h`; slices differ, as friction
-//! is uneven along the disc, and sixteen of them give a mean with a standard error. What the bounds leave of `h` follows
+//! voltages: the number is friction over load. A time between two edges, a slice, gives one `h`; slices differ, as friction
+//! is uneven along the disc, and sixteen of them give a mean with a standard error. The bounds of `h` follow
 //! from the same sums, at their corners.
 //!
 //! A shaft that may have stuck within a gap between two edges ([`clutch_sim::meter`]) leaves an interval. Friction at rest
@@ -400,7 +400,7 @@ impl Drift {
         let mut alarm = None;
         for left in (0..periods).rev() {
             self.act();
-            // Of lost samples nobody knows: the last has it all.
+            // The way during lost samples is not known: the last has it all.
             self.position += if left == 0 { i64::from(moved) } else { 0 };
             self.past.rotate_right(1);
             self.past[0] = self.position;

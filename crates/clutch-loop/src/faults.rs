@@ -120,9 +120,9 @@ pub enum FaultKind {
     DacScale(f64),
     /// The board's time passes this much faster than its periods.
     Clock(f64),
-    /// The board's periods are longer by this factor, and its time tells.
+    /// The board's periods are longer by this factor, and its time shows it.
     Prescaler(f64),
-    /// The board's whole clock is slower by this factor: periods, and the time that it tells.
+    /// The board's whole clock is slower by this factor: periods, and the time that it reports.
     Crystal(f64),
     /// The board starts anew.
     Reset,

@@ -57,7 +57,7 @@ pub struct Played {
     stop: Arc<AtomicBool>,
     /// The clock's time at the run's time 0.
     started: Option<Instant>,
-    /// True if the stop has been told.
+    /// True if the stop has been reported.
     told: bool,
 }
 

@@ -275,7 +275,7 @@ impl<'a, S: Station> Talk<'a, S> {
         }
     }
 
-    /// Tells the board of the run.
+    /// Sends the run to the board.
     ///
     /// # Errors
     /// The board refuses, or is silent.

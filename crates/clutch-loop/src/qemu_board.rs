@@ -290,7 +290,7 @@ impl QemuSerialBoard {
             let barrier = |m: &Message| matches!(m, Message::Refused(r) if r.request == Set::KIND);
             self.hear(1, barrier)?;
         }
-        // What it told the host of it said to the other line before.
+        // It wrote to the other line before it told the host of it.
         read(&mut self.daq, &mut self.said_to_daq)?;
         Ok(Exchange { time_ns: u64::MAX, lateness_us: 0, host: &self.said_to_host, daq: &self.said_to_daq })
     }

@@ -1,8 +1,8 @@
 //! The release test: before a run the brake lets go for some milliseconds and grips again, and the envelope of the
 //! supervisor judges the way of the shaft: its acceleration, its sign, its scale, and what the brake does to it.
 //!
-//! It is a run like any other, under the open-loop law: the same checks, frames and safe state. What it would not see
-//! is found by running it in virtual time on the corners of the bounds, with each lie.
+//! It is a run like any other, under the open-loop law: the same checks, frames and safe state. The faults that it would
+//! not see are found by running it in virtual time on the corners of the bounds, with each lie.
 
 use crate::campaign::CampaignError;
 use crate::faults::{Fault, FaultKind};
@@ -63,7 +63,7 @@ pub struct ReleaseTest {
     bounds: Bounds,
 }
 
-/// The lies that a test tells wherever in the bounds the shaft is, and those that it may not see.
+/// The lies that a test finds wherever in the bounds the shaft is, and those that it may not see.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tells {
     /// Seen at each corner.
@@ -94,7 +94,7 @@ impl ReleaseTest {
         })
     }
 
-    /// Its power to tell: the test in virtual time, on the corners of the bounds, with each lie.
+    /// Its power to find faults: the test in virtual time, on the corners of the bounds, with each lie.
     ///
     /// # Errors
     /// None for a checked scenario.

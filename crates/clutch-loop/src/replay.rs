@@ -82,7 +82,7 @@ pub struct Replay {
     pub behind_gap: usize,
 }
 
-/// Ticks in order; every few thousand the caller is told, and may end the work.
+/// Ticks in order; every few thousand the caller gets a report, and may end the work.
 fn ticks<'a, R>(
     ticks: &'a [R],
     report: Report<'a>,
@@ -197,7 +197,7 @@ fn paired(log: &Log) -> Result<&[SampleRecord], ReplayError> {
         let (samples, commands) = (log.samples.len(), log.commands.len());
         return Err(ReplayError::Unpaired { samples, commands });
     }
-    // What the law has behind a gap, in its filters and integrals, is not known.
+    // The law's filters and integrals behind a gap are not known.
     let before = |time_ns: u64| gap.is_none_or(|from| time_ns < from);
     let pairs = log.samples.iter().zip(&log.commands);
     let pairs = pairs.take_while(|(s, c)| before(s.time_ns) && before(c.time_ns)).count();

@@ -68,7 +68,7 @@ pub enum Board {
     Controller(Address),
 }
 
-/// Whether a release test comes before the run: see [`crate::release`].
+/// Says if a release test comes before the run: see [`crate::release`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Release {
     /// On a serial device, where the scenario allows one; a simulated board is wired as it says.
@@ -90,7 +90,7 @@ pub struct SessionOptions {
     /// A new file for a log.
     pub log: Option<PathBuf>,
     /// True if the board is one whose clock waits for this machine, and may be silent for as long: a simulated board of
-    /// another process. Of a session's own board it knows that itself.
+    /// another process. A session knows it of its own board.
     pub patient: bool,
     /// True if gains may run that are not certified for the scenario's bounds.
     pub uncertified: bool,
@@ -145,7 +145,7 @@ pub enum SessionError {
     /// The way of the release test.
     #[error("way of the release test = {}°: expected above 0 and at most {}", number(.0.to_degrees()), number(release::LONGEST_WAY.to_degrees()))]
     ReleaseWay(f64),
-    /// The power of a release test to tell could not be found.
+    /// The power of a release test to find faults could not be calculated.
     #[error(transparent)]
     Tells(#[from] CampaignError),
     /// There is no release test for the scenario, and one was asked for.
@@ -287,7 +287,7 @@ impl Session {
         self.cleared.plan.certificate.certified()
     }
 
-    /// True if the board's clock waits for this machine. What the board says of itself decides nothing here: a real one
+    /// True if the board's clock waits for this machine. The board's own words decide nothing here: a real one
     /// that says it would be allowed seconds of silence.
     fn patient(&self) -> bool {
         match &self.options.board {
@@ -729,7 +729,7 @@ impl Course<'_> {
         Ok((report, log))
     }
 
-    /// Tells where the run stands until it is over.
+    /// Reports where the run stands until it is over.
     fn look_on(
         &mut self,
         control: &ScopedJoinHandle<'_, LoopReport>,
@@ -759,7 +759,7 @@ impl Course<'_> {
         self.tell_drift(watch, drift, &mut alarms);
     }
 
-    /// Tells an alarm of drift that is new.
+    /// Reports an alarm of drift that is new.
     fn tell_drift(&mut self, watch: &Watch, drift: &DriftReport, told: &mut u64) {
         let (number, alarm) = watch.drift.last();
         if number > *told {

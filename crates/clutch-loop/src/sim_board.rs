@@ -69,14 +69,14 @@ pub struct SimBoard {
 /// Events that wait to be asked for.
 const MAX_EVENTS: usize = 1 << 12;
 
-/// The converter in whole millivolts, as the wire tells it.
+/// The converter in whole millivolts, as the wire carries it.
 fn millivolts(volts: f64) -> i32 {
     (volts * 1000.0).round() as i32
 }
 
 impl SimBoard {
     /// A board at power-up on the scenario's rig, its shaft at rest under the safe state's
-    /// voltage. A patient one tells the controller that its clock may wait.
+    /// voltage. A patient one reports to the controller that its clock may wait.
     ///
     /// # Errors
     /// The scenario has no safe state, or its rig cannot be simulated.
@@ -243,7 +243,7 @@ impl SimBoard {
         // Periods that a slow machine has left out stay out: a board does not catch up.
         self.samples += 1;
         let period_ns = f64::from(period_us) * 1000.0;
-        // Of periods, and of the time that is told.
+        // Factor on the period; share of it by which the reported time falls behind.
         let (mut longer, mut behind) = (1.0, 0.0);
         self.rig.set_time((due - self.started_ns) as f64 / 1e9);
         self.rig.begin_period();

@@ -37,7 +37,7 @@ pub trait Station {
 
     /// Asks who is there.
     fn discover(&mut self, nonce: u32, out: &mut Outbox);
-    /// Tells the board of the run; `present` is the code that its converter has now.
+    /// Sends the run to the board; `present` is the code that its converter has now.
     fn configure(&mut self, present: DacCode, out: &mut Outbox);
     /// Consent.
     fn arm(&mut self, out: &mut Outbox);

@@ -73,7 +73,7 @@ impl Default for VirtualOptions {
     }
 }
 
-/// Periods from an operator's stop to the end of the run: the board tells its end, and is seen in its safe state.
+/// Periods from an operator's stop to the end of the run: the board reports its end, and is seen in its safe state.
 const STOPPING: u64 = 10;
 
 /// The outcome of a run.
@@ -93,7 +93,7 @@ pub struct VirtualReport {
     pub overrun: f64,
     /// Largest distance between shaft and path until the end or the safe output, rad.
     pub largest_error: f64,
-    /// Lowest and highest voltage that the board was told, V.
+    /// Lowest and highest voltage of the codes sent to the board, V.
     pub volts: (f64, f64),
     /// Ticks in which the law answered.
     pub answers: u64,
@@ -159,7 +159,7 @@ struct Sampled {
     shaft: Shaft,
     /// Its time by the rig's clock, s.
     rig_time: f64,
-    /// The run's tick, once the controller has told.
+    /// The run's tick, once the controller has reported it.
     tick: Option<u64>,
 }
 

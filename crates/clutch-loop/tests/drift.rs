@@ -173,7 +173,7 @@ fn a_motor_axis_is_watched_both_ways_and_one_without_friction_says_so() {
     assert_eq!(alarms.len(), 1, "{alarms:?}");
     assert!((report.last.unwrap().friction - 1.0 / 0.75).abs() < 0.02, "{report:?}");
     assert!(report.alarm_line().unwrap().contains("friction, with drive and motor as in the model is"));
-    // What is known of motor and drive no closer leaves more room.
+    // A motor and a drive that are known no closer leave more room.
     let wide = [bounds[0], bounds[1], ("bounds.motor_gain_percent", "40.0")];
     let (alarms, _) = run(&built_in("motor_pid", &wide), &["dac-scale:at=8,factor=0.75"]);
     assert!(alarms.is_empty(), "{alarms:?}");

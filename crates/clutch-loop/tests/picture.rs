@@ -1,4 +1,4 @@
-//! What a picture of a log shows closely, against the run that wrote it; and work on logs that its caller ends.
+//! A picture of a log: the stretch that it shows closely, against the run that wrote it; and work on logs that its caller ends.
 
 use clutch_log::{Limits, Log, LogError};
 use clutch_loop::picture::pictured;
@@ -27,7 +27,7 @@ fn saved(name: &str, test: &str) -> (Scenario, Run, Log, PathBuf) {
 fn a_simulations_log_shows_the_sticks_of_the_run() {
     let (scenario, run, log, _) = saved("bench_pd_2", "sticks");
     let shown = pictured(&log, &scenario).expect("a log of the scenario");
-    // Of the run those that a sample fell into, to a period.
+    // Those sticks of the run that a sample fell into, to a period.
     let of_run: Vec<Stick> = sticks(&run.events, 5.0);
     let seen = |s: &&Stick| {
         run.trace.time.iter().zip(&run.trace.stuck).any(|(t, stuck)| *stuck && (s.from..=s.to).contains(t))

@@ -38,7 +38,7 @@ pub struct BoardControllerParams {
     pub clock_hz: u32,
 }
 
-/// Interval at which the host is told what the line has carried.
+/// Interval of the reports to the host on what the line has carried.
 const LINK_EVERY_NS: u64 = 1_000_000_000;
 
 /// A run that the host has configured.
@@ -253,7 +253,7 @@ impl BoardController {
 
     fn message(&mut self, now_ns: u64, message: &Message, host: &mut Outbox, daq: &mut impl Sink) {
         match message {
-            // What only a host says shows that it lives; an echo of this board's own words does not.
+            // Messages that only a host sends show that it lives; an echo of this board's own words does not.
             Message::Discover(_)
             | Message::Set(_)
             | Message::Configure(_)
@@ -369,7 +369,7 @@ impl BoardController {
             silence: times.silence,
         };
         let mut control = ControllerNode::new(params, built.servo, built.supervisor);
-        // What the host asks for and what the settings say is one run, or none.
+        // The run that the host asks for is the one of the settings, or there is none.
         if control.configuration() != *m {
             return Err((Refusal::Differs, 0));
         }
@@ -404,7 +404,7 @@ impl Run {
         matches!(self.control.state().state(), State::Armed | State::Running)
     }
 
-    /// Ends control as wanted and tells the host; whether there was anything to end.
+    /// Ends control as wanted and reports so to the host; whether there was anything to end.
     fn end(&mut self, reason: StopReason, host: &mut Outbox, daq: &mut impl Sink) -> bool {
         let from = self.control.state().state();
         self.control.stop(reason, daq);

@@ -47,7 +47,7 @@ pub struct ControllerNode<T: Real, C: ControlLaw<T> = Law<T>> {
     /// The position at which the path begins: the counts of the first sample that is answered.
     origin: FixedCounts,
     last_sample_ns: Option<u64>,
-    /// The supervisor has been told of this silence.
+    /// This silence has been reported to the supervisor.
     silence_told: bool,
     lateness: Micros,
     stopping: Option<StopReason>,
@@ -110,13 +110,13 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
         out.push(&Message::Discover(Discover { nonce, version: VERSION, schema: SCHEMA }));
     }
 
-    /// Tells the board of the run; `present` is the code that its converter has now. The pre-flight has taken place.
+    /// Sends the run to the board; `present` is the code that its converter has now. The pre-flight has taken place.
     pub fn configure(&mut self, present: DacCode, out: &mut impl Sink) {
         self.present = present;
         out.push(&Message::Configure(self.configuration()));
     }
 
-    /// The message that tells the board of the run.
+    /// The message that brings the run to the board.
     #[must_use]
     pub fn configuration(&self) -> Configure {
         let safe = self.supervisor.safe_codes();
@@ -288,7 +288,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             | Message::Stop(_)
             | Message::Ping(_)
             | Message::Set(_) => notices(Notice::Echo),
-            // Of another run.
+            // A message of another run.
             _ => {}
         }
     }

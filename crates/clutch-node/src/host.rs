@@ -35,7 +35,7 @@ pub struct HostNode {
     stopping: Option<StopReason>,
     /// The board's converter has said that it is in its safe output.
     stopped: bool,
-    /// It has been silent for too long: what it tells later does not bring the run back.
+    /// It has been silent for too long: a later report does not bring the run back.
     given_up: bool,
     pace: HostPace,
 }
@@ -112,7 +112,7 @@ impl HostNode {
         out.push(&Message::Set(Set { run: self.configure.run, key, value }));
     }
 
-    /// Tells the board of the run, whose settings it has.
+    /// Sends the run to the board, which has its settings.
     pub fn configure(&mut self, out: &mut Outbox) {
         out.push(&Message::Configure(self.configure));
     }
@@ -317,7 +317,7 @@ impl HostNode {
             | Message::Stop(_)
             | Message::Ping(_)
             | Message::Set(_) => notices(Notice::Echo),
-            // Of another run.
+            // A message of another run.
             _ => {}
         }
     }

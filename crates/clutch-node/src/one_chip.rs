@@ -132,7 +132,7 @@ impl Role for OneChip {
         }
         controller.follow(now_ns, drove, to_host, daq);
         controller.poll(now_ns, to_host, daq);
-        // One a period: that it has stopped, or that it refuses. What follows from it does so a period later.
+        // One a period: that it has stopped, or that it refuses. Its consequences come a period later.
         if let Some(message) = daq.up.take() {
             controller.hear(&message, to_host, daq);
         }

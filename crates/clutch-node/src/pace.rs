@@ -13,7 +13,7 @@ const UNCONSENTED_US: u32 = 1_000_000;
 pub(crate) struct HostPace {
     /// Arrival of the sample that the next one is held against, ns, and its number.
     last: Option<(u64, u16)>,
-    /// The newest of those that came at once: a burst makes up for a stall, and its last one tells by how much.
+    /// The newest of those that came at once: a burst makes up for a stall, and its last one shows by how much.
     newest: Option<(u64, u16)>,
     pace: Pace,
     consented: bool,

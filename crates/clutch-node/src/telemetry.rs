@@ -73,7 +73,7 @@ pub(crate) fn notice(
     if asked && m.terms.numbers().len() != names.len() {
         return None;
     }
-    // What the law asked for; the frame's code is what the converter has, which may be another.
+    // The law's demand; the frame's code is the converter's, which may be another.
     let given = dac.code(real(m.demand));
     let target = if m.flags & TELEMETRY_TARGETED != 0 { target } else { Target::default() };
     let command = Command {

@@ -622,7 +622,7 @@ fn a_new_run_needs_a_new_number_and_begins_anew() {
         assert_eq!((bench.state(), bench.code()), (BoardState::Ready, HOLD), "the safe output stays");
         assert_eq!(bench.hears(Message::Arm(ARM)), refused(Arm::KIND, Refusal::Run, 6));
         assert_eq!(bench.hears(Message::Arm(Arm { run: 6, ..ARM })).len(), 1);
-        // What the old run has on the line reaches nobody.
+        // Frames of the old run that are on the line reach nobody.
         assert_eq!(bench.actuates(0, 2600, u16::MAX), []);
         // By number the last sample before 0 is 65535, in whose place the old run's is kept.
         for sequence in [65_535, 65_530, 1] {

@@ -34,7 +34,7 @@ fn configure(plan: &Plan) -> Configure {
     plan.control().configuration()
 }
 
-// Who is there.
+// Discovery of controller and board.
 
 #[test]
 fn discover_is_answered_by_the_controller_and_then_by_its_board() {
@@ -129,7 +129,7 @@ fn settings_that_make_no_run_are_refused_with_the_reason() {
         let heard = answer_to(&plan, &changed(&plan, name, value.to_bits().into()));
         assert_eq!(heard, refused(request, Refusal::Unfit, u32::from(key(name))), "{name}");
     }
-    // Of a condition between several its number.
+    // A condition between several is reported by its number.
     let heard = answer_to(&plan, &changed(&plan, "output.on_invalid_v", 10.5_f32.to_bits().into()));
     assert_eq!(heard, refused(request, Refusal::Unfit, 2 << 16 | u32::from(key("output.on_invalid_v"))));
 }
@@ -143,7 +143,7 @@ fn configure_has_to_say_what_the_settings_say() {
     }
     let heard = answer_to(&plan, &changed(&plan, "safety.on_fault.hold.volts_v", 6.0_f32.to_bits().into()));
     assert_eq!(heard, refused(Configure::KIND, Refusal::Differs, 0));
-    // What encoder and converter need not know cannot differ.
+    // Settings that encoder and converter need not know cannot differ.
     let heard = answer_to(&plan, &changed(&plan, "law.pd.kp_v_rad", 1.0_f32.to_bits().into()));
     assert!(matches!(heard[..], [Message::Configured(_)]), "{heard:?}");
 }
@@ -279,7 +279,7 @@ fn consent_needs_the_run_and_the_configuration_that_were_configured() {
         let heard = desk.says(Message::Arm(Arm { run, config, boot: BOARD_CONTROLLER.boot }));
         assert_eq!(heard, refused(Arm::KIND, Refusal::Run, 5));
     }
-    // That of encoder and converter, for one, is not the controller's.
+    // The boot number of encoder and converter, for one, is not the controller's.
     for boot in [0, BOARD.boot] {
         let heard = desk.says(Message::Arm(Arm { run: 5, config: CONFIG, boot }));
         assert_eq!(heard, refused(Arm::KIND, Refusal::Boot, 0));
@@ -619,7 +619,7 @@ fn what_the_line_has_carried_is_told_each_second() {
     assert!(desk.host.counts().received.abs_diff(1000) < 8, "{:?}", desk.host.counts());
 }
 
-// What gets lost on the way to the host.
+// Frames that get lost on the way to the host.
 
 /// A host's view of frames: how often it was told of a sample, and where it thinks control stands.
 fn replay(desk: &Desk, bytes: &[u8]) -> (Vec<desk::Heard>, clutch_node::HostNode) {
@@ -654,7 +654,7 @@ proptest! {
         let (some, host) = replay(&desk, &bytes(&kept));
         prop_assert_eq!(host.standing().untold, lost.len() as u64);
         prop_assert_eq!(some.len() + lost.len(), all.len());
-        // What did come is what it was.
+        // The frames that did come are as they were sent.
         let (some, all) = (words(&some), words(&all));
         prop_assert!(some.iter().all(|n| all.contains(n)));
         prop_assert_eq!(host.standing().tick, desk.twin.state().tick());

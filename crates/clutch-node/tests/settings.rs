@@ -337,7 +337,7 @@ fn settings_are_found_by_their_keys_in_the_order_of_the_declarations() {
     for (i, name) in names.iter().enumerate() {
         assert!(!names[..i].contains(name), "{name} twice");
     }
-    // What the host sends is named as a scenario names it.
+    // The host's settings are named as a scenario names them.
     let plan = Plan::new();
     let sent: Vec<String> = plan.pairs().iter().map(|(key, _)| names[usize::from(*key)].clone()).collect();
     for name in ["ticks", "sampling.period_us", "law", "law.pd.kd_v_s_rad", "safety.on_fault.hold.volts_v"] {

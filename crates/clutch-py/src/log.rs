@@ -123,7 +123,7 @@ fn plain_meaning(field: &Field) -> &str {
     words.strip_suffix(unit).and_then(|words| words.strip_suffix(", ")).unwrap_or(words)
 }
 
-/// What was made, or the signal's exception.
+/// The result of the work, or the signal's exception.
 fn made<T>(py: Python<'_>, work: impl FnOnce() -> ControlFlow<(), T> + Send) -> PyResult<T>
 where
     T: Send,

@@ -18,7 +18,7 @@ struct Shaft {
     servo: Servo,
     path: Path,
     tick: usize,
-    /// What stands in the array for it now.
+    /// Its numbers in the array now.
     told: [f64; Shaft::QUANTITIES.len()],
 }
 

@@ -267,7 +267,7 @@ struct Kept(#[allow(dead_code)] Owner);
 pub(crate) struct Table {
     names: Vec<String>,
     columns: Vec<Column>,
-    /// Of each column, in a few words; empty where nothing is known.
+    /// The meaning of each column, in a few words; empty where nothing is known.
     meanings: Vec<String>,
     rows: usize,
 }

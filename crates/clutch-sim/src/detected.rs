@@ -8,7 +8,7 @@ use clutch_core::{Counts, Encoder, ParamError, Plant, StickSlip, StickSlipParams
 
 /// Way of the path in a silence that is a stair: in even motion it goes one count, in a stair at least one more.
 pub(crate) const STAIR: StickSlipParams<f64> = StickSlipParams { gap: 2.0, ticks: 1 };
-/// Width of the bounds within which a number of cycles is told: this share of the upper one, and so many cycles.
+/// Width of the bounds within which a number of cycles is given: this share of the upper one, and so many cycles.
 const TOLD_WITHIN: (f64, f64) = (0.2, 2.0);
 
 /// The word of a run's counts and voltages on its stick-slip cycles.

@@ -165,8 +165,8 @@ const HAND_SINES: u32 = 48;
 pub enum Drive {
     /// Constant, N m.
     Constant(f64),
-    /// `stiffness · (rest + speed t − θ) + damping · (speed − θ̇)`. What the damping takes from the shaft's own velocity
-    /// is the plant's viscous damping: [`Drive::damping`].
+    /// `stiffness · (rest + speed t − θ) + damping · (speed − θ̇)`. The damping of the shaft's own velocity is the
+    /// plant's viscous damping: [`Drive::damping`].
     Spring {
         /// N m/rad.
         stiffness: f64,

@@ -1,9 +1,9 @@
 //! The meter of stick-slip: between which bounds counts and voltage leave the cycles of a shaft.
 //!
-//! A shaft that sticks once in each count crosses its edges as evenly as one that slides: by the edges alone nobody can
-//! tell. But the voltage is known. A shaft that slides answers it with its velocity, and one that sticks breaks away only
-//! after the voltage has fallen by as much as friction at rest is above that in motion. Between two edges, where the
-//! shaft went one count, the meter therefore asks twice, for all frictions `h` that there may be:
+//! A shaft that sticks once in each count crosses its edges as evenly as one that slides: the edges alone do not
+//! distinguish them. But the voltage is known. A shaft that slides answers it with its velocity, and one that sticks
+//! breaks away only after the voltage has fallen by as much as friction at rest is above that in motion. Between two
+//! edges, where the shaft went one count, the meter therefore asks twice, for all frictions `h` that there may be:
 //!
 //! * Can it have slid all the way? If not, it has stuck: a *sure* stick.
 //! * Can it have stopped and broken away? If not, it has slid.
@@ -31,7 +31,7 @@ pub const RISE_BELIEVED: f64 = 0.5;
 /// Share by which friction changes along the disc, 1/rad: a ripple of 15 % with 340 waves per turn, as
 /// the defaults of the edge-timed filter have it.
 pub const ROUGHNESS: f64 = 0.15 * 340.0;
-/// Periods from a voltage to its effect: from 0 to this, or to what a filter was told if that is more.
+/// Periods from a voltage to its effect: from 0 to this, or to the delay of a filter if that is more.
 const DELAY: u32 = 1;
 /// Points of a gap that are kept; of a longer one, every second, fourth and so on.
 const POINTS: usize = 256;
@@ -98,7 +98,7 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// A meter that believes `plant`. Delays are tried from 0 to one period, or to what law and velocity source were told.
+    /// A meter that believes `plant`. Delays are tried from 0 to one period, or to the delay of law and velocity source.
     #[must_use]
     pub fn new(
         plant: Plant<f64>,
@@ -111,7 +111,7 @@ impl Meter {
         let per_torque = seconds * seconds / (plant.params().inertia * count);
         let sliding = plant.friction().sliding();
         let rise = plant.friction().at_rest() / sliding - 1.0;
-        // What friction carries when the shaft slides: the drive, and what a disc or a gear drags.
+        // The load that friction carries when the shaft slides: the drive, and the drag of a disc or a gear.
         let carried = plant.params().drive_torque.abs().max(sliding * plant.actuator().normal(0.0));
         let told = match (law, velocity) {
             (LawParams::Glide(p), _) => p.filter.delay,

@@ -285,7 +285,7 @@ impl MovingRig {
             Moves::InSteps(engine) => *engine = DormandPrince::with_steps([*step, *from_rest]),
             Moves::Bending(engine) => *engine = Bristle::with_step(*step),
         }
-        // What was drawn is drawn again.
+        // The numbers drawn so far are drawn again.
         (self.noise, self.torque_noise, self.begun) = (noise(self.seed), 0.0, *begun);
         if self.rig.params.torque_noise > 0.0 {
             for _ in 0..*begun {
@@ -296,7 +296,7 @@ impl MovingRig {
         true
     }
 
-    /// Time is told anew, s: a sum of many periods drifts, a product does not.
+    /// Sets the time anew, s: a sum of many periods drifts, a product does not.
     pub fn set_time(&mut self, time: f64) {
         self.time = time;
     }

@@ -107,12 +107,12 @@ impl Window {
         let n = [time, target, target_velocity, error].map(<[f64]>::len).into_iter().min().unwrap_or(0);
         let index = |at: f64| time[..n].partition_point(|t| *t < at).min(n - 1);
         let begin = *time[..n].first()?;
-        // Where the path rests, a shaft at rest is where it should be.
+        // A shaft at rest is where it should be while the path rests.
         let goes_on = |s: &Stick| target_velocity[index(s.to)] != 0.0;
         let shows = |s: &Stick| (target[index(s.to)] - target[index(s.from)]).abs() >= 0.5 * count;
         let mut those = sticks;
         those.retain(|s| s.from >= settled && goes_on(s));
-        // The shortest ones hardly show in a picture: only where there are no others.
+        // The shortest hardly show in a picture: they are taken only if there are no others.
         if those.iter().any(shows) {
             those.retain(shows);
         }
@@ -297,7 +297,7 @@ mod tests {
         let window = Window::of(&scenario, &run).expect("samples");
         let Around::Stick(stick) = window.around else { panic!("{window:?}") };
         assert!(stick.to < 6.0, "it ends on the way, not with the run: {window:?}");
-        // Of all its sticks but the last, at the path's end.
+        // The run with the last of its sticks alone, at the path's end.
         let stop = run.events.iter().rev().find(|e| e.kind == EventKind::Stick).copied();
         let stopped = Run { events: stop.into_iter().collect(), ..run };
         assert_eq!(sticks(&stopped.events, 8.0).len(), 1);

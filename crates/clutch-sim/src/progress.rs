@@ -11,7 +11,7 @@ pub struct Progress {
     pub finished: u64,
 }
 
-/// The listener that is told of progress; its answer `Break` ends the work with [`crate::RunError::Stopped`].
+/// The listener that gets the progress; its answer `Break` ends the work with [`crate::RunError::Stopped`].
 pub type Report<'a> = &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync);
 
 /// For work whose progress nobody watches.

@@ -417,7 +417,7 @@ pub fn simulate<T: Real>(spec: &RunSpec<'_>) -> Result<Run, RunError> {
     simulate_watched::<T>(spec, Keep::Trace, UNWATCHED)
 }
 
-/// As [`simulate`], keeps what is asked for, and tells of its progress, in samples.
+/// As [`simulate`], keeps what is asked for, and reports its progress, in samples.
 ///
 /// # Errors
 /// As [`simulate`]; [`RunError::Stopped`].

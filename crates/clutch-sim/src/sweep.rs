@@ -96,7 +96,7 @@ impl Sweep {
     }
 
     /// Runs all rows on so many threads. `done` is called from these, with each finished row,
-    /// in no order. Once `stop` is set, runs under way end within milliseconds and are not told.
+    /// in no order. Once `stop` is set, runs under way end within milliseconds and are not reported.
     pub fn run(
         &self,
         threads: usize,

@@ -213,7 +213,7 @@ fn around(row: &Row) -> (Vec<Value>, Vec<Value>) {
 /// True if a message speaks of a row's own range, or of the kind of its value.
 fn speaks_of_the_range(row: &Row, message: &str) -> bool {
     match row.kind {
-        // Of a base it says what the words are.
+        // The message about a base lists its words.
         Kind::Word(words) => words.iter().all(|word| message.contains(word.name)),
         kind => message.starts_with(&format!("expected {}", row.range.words(kind, &row.unit, false))),
     }
@@ -437,7 +437,7 @@ fn an_angle_of_the_supervisor_is_refused_in_degrees() {
     let set = [("safety.limits.jump_deg".to_owned(), "-1".to_owned())];
     let error = Scenario::parse("board", &place.base.to_string(), &set).unwrap_err().to_string();
     assert_eq!(error, "board: safety.limits.jump_deg = -1: expected a finite number above 0 °");
-    // What depends on the encoder is told in degrees, too.
+    // A limit that depends on the encoder is given in degrees, too.
     let set = [("safety.limits.jump_deg".to_owned(), "0.001".to_owned())];
     let error = Scenario::parse("board", &place.base.to_string(), &set).unwrap_err().to_string();
     assert_eq!(

@@ -121,7 +121,7 @@ impl Family {
         self.gains.iter().zip(&BASES).map(drawn).collect()
     }
 
-    /// The scenario with this law and these gains. What identification tells a law goes with it.
+    /// The scenario with this law and these gains. The law's share of an identification goes with it.
     pub(crate) fn scenario(&self, base: &Scenario, gains: &Gains) -> Result<Scenario, ScenarioError> {
         let mut table = base.table().clone();
         let own = Choice::<f64>::name(&base.params().law) == self.key;

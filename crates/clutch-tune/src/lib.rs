@@ -54,7 +54,7 @@ const SHORT_S: f64 = 2.0;
 const LONG_S: f64 = 4.0;
 const ACCEPT_S: f64 = 6.0;
 
-/// Where a candidate stands.
+/// The standing of a candidate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "is")]
 pub enum Standing {
@@ -158,7 +158,7 @@ impl Tuned {
 
 /// Looks for the law and the gains that move a shaft most smoothly on the worst corner of its bounds, and that are certified.
 /// `file` is what was identified; without it corners, delay and ripple are the scenario's. The same comes again, on any
-/// number of cores. `report` is told of each run.
+/// number of cores. `report` gets each run.
 ///
 /// # Errors
 /// A path that is no ramp, a rig without a brake, an option out of range; the end of `report`'s patience.
@@ -488,7 +488,7 @@ fn refs(of: &[(Scenario, Gains)]) -> Vec<&Scenario> {
     of.iter().map(|(scenario, _)| scenario).collect()
 }
 
-/// Where the spectral radius is known, with every brake of the bounds, it decides; where it is not, trials do.
+/// The spectral radius decides where it is known, with every brake of the bounds; where it is not, trials do.
 fn is_stable(scenario: &Scenario) -> bool {
     scenario.plan().is_ok_and(|plan| scenario.sampled(&plan.bounds).stable() != Some(false))
 }

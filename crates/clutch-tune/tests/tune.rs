@@ -61,7 +61,7 @@ fn without_a_certificate_nothing_is_given_out_unless_that_is_asked_for() {
     let found = tuned(&lag, &few());
     assert!(found.winner().is_none() && found.certificate.is_none());
     assert!(found.open_shells.iter().any(|(_, why)| why.contains("a lag")), "{:?}", found.open_shells);
-    // What sticks where it is judged is refused before anything is proven of it.
+    // A candidate that sticks where it is judged is refused before anything is proven of it.
     for c in &found.candidates {
         let refused = matches!(&c.standing, Standing::Refused { why } if why.contains("it sticks in"));
         assert_eq!(refused, c.score.runs_with_sticks > 0, "{}: {:?}", c.name, c.standing);

@@ -41,7 +41,7 @@ pub fn encode(message: &Message) -> Frame {
     Frame { bytes, length }
 }
 
-/// Writes the frame of a message to the start of a place for any; its length. What is behind it then is of no meaning.
+/// Writes the frame of a message to the start of a place for any; its length. Bytes behind it then are of no meaning.
 #[must_use]
 pub fn encode_into(message: &Message, frame: &mut [u8; MAX_FRAME]) -> usize {
     let [code, rest @ ..] = frame;

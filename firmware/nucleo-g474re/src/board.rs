@@ -315,7 +315,7 @@ impl Hardware for Board {
         self.counter.read(self.encoder.count())
     }
 
-    /// The bare pins cannot tell a broken wire from a shaft at rest. A receiver with a fault output
+    /// The bare pins cannot distinguish a broken wire from a shaft at rest. A receiver with a fault output
     /// would be read here.
     fn encoder_fault(&self) -> bool {
         false

@@ -106,7 +106,7 @@ impl Quadrature {
             w.set_wrap_top(LAST);
             w.set_wrap_bottom(LOOK);
         });
-        // What is shifted in comes from the right, so that the newest bits are the lowest.
+        // Bits are shifted in from the right, so that the newest are the lowest.
         machine.shiftctrl().write(|w| {
             w.set_in_shiftdir(false);
             w.set_out_shiftdir(true);

@@ -16,7 +16,7 @@ __all__ = ["Level", "OneLevel", "frame", "missing", "refuses_length", "substeps"
 
 #: The step that a run takes where a case's samples are not nearer to each other, s.
 STEP = 1e-3
-#: Which of the two levels of a case's friction the one of an engine is, and its words.
+#: The one of a case's two levels of friction that an engine has, and its words.
 Level = Literal["mu_static", "mu_dynamic"]
 _LEVELS: dict[Level, str] = {"mu_static": "that of rest", "mu_dynamic": "that of sliding"}
 

@@ -122,7 +122,7 @@ def _tree(m: Mechanism) -> _Tree | None:
 def _simulate(case: Case, m: Mechanism, base: Vector, tree: _Tree, level: Level) -> Trajectory:
     """Run a model through a case."""
     wp: Any = importlib.import_module("warp")
-    # What it says of devices and of the kernels that it compiles is no part of a report.
+    # Its words on devices and on the kernels that it compiles are no part of a report.
     wp.config.log_level = wp.LOG_ERROR
     newton: Any = importlib.import_module("newton")
     many = substeps(case)

@@ -17,7 +17,7 @@ __all__ = ["MuJoCo", "MuJoCoLuGre"]
 
 #: A run of more steps is refused.
 MOST_STEPS = 200_000
-#: What MuJoCo takes for a mass, kg: it refuses less than 1e-15.
+#: Least mass for MuJoCo, kg: it refuses less than 1e-15.
 LEAST_MASS = 1e-14
 
 Vector = NDArray[np.float64]
@@ -133,7 +133,7 @@ class MuJoCoLuGre:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where the model has the friction of a row: a tendon or a joint, and how fast the row slips per rate of that."""
+    """The model's place for the friction of a row: a tendon or a joint, and how fast the row slips per rate of it."""
 
     tendon: bool
     index: int
@@ -215,7 +215,7 @@ def _simulate(case: Case, m: Mechanism, base: Vector, xml: str, friction: Any, t
     model = mujoco.MjModel.from_xml_string(xml)
     many = substeps(case)
     step = model.opt.timestep = case.sample / many
-    # What the joints damp is -damping (v - base): the rest of it is for the applied forces.
+    # The joints damp by -damping (v - base): the rest of it is for the applied forces.
     native = np.maximum(np.diag(m.damping), 0.0)
     applied = Mechanism(m.inertia, m.stiffness, m.damping - np.diag(native), m.position, m.velocity, m.load, m.rows)
     drag = native * base

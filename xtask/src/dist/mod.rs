@@ -43,7 +43,7 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Width of the summary.
 const COLUMNS: usize = 80;
 
-/// Builds and checks these parts, all unless some are given. What an earlier call built is gone.
+/// Builds and checks these parts, all unless some are given. The files of an earlier call are gone.
 pub(crate) fn run(parts: &[Part]) -> Result<()> {
     ensure!(
         cfg!(all(target_os = "linux", target_arch = "x86_64")),
@@ -73,12 +73,12 @@ pub(crate) fn run(parts: &[Part]) -> Result<()> {
     Ok(())
 }
 
-/// Where all of it is put.
+/// The folder of all of it.
 fn folder() -> PathBuf {
     root().join("target/dist")
 }
 
-/// Where it is put together and tried.
+/// A folder in which it is put together and tried.
 fn work(name: &str) -> Result<PathBuf> {
     let folder = root().join("target/dist-work").join(name);
     let _ = std::fs::remove_dir_all(&folder);

@@ -189,7 +189,7 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
         return Ok(());
     }
     tally.stage("builds of the core for boards");
-    // Of its own, or they would wait while the wheel is built.
+    // A folder of their own, or they would wait while the wheel is built.
     let folder = ["build", "--release", "--target-dir", "target/embedded", "--package", "clutch-core"];
     let core = |args: &[&str]| cargo(folder).args(args).quietly();
     for target in embedded {

@@ -48,7 +48,7 @@ fn numbers() -> String {
     enumerated(&mut out, "Fates of a sample.", "ARRIVAL", Arrival::from_u8);
     let _ = writeln!(
         out,
-        "\n/* What the keys of a list of settings mean: compare it with clutch_settings_hash(). */\n\
+        "\n/* The meaning of the keys of a list of settings: compare it with clutch_settings_hash(). */\n\
          #define CLUTCH_SETTINGS_HASH UINT64_C({SETTINGS_HASH:#018x})\n\n\
          /* Settings: those of the options that are chosen are needed; others are not looked at. */\nenum {{"
     );

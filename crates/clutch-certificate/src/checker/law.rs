@@ -60,7 +60,7 @@ pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Pi
             }
             let sigma = sum(&rate, at(slope), &error);
             let minus = sum(&fixed(at(0.0)), at(-1.0), &sigma);
-            // Where the law's σ is rounded to the other side of an edge, either piece holds.
+            // Either piece holds where the law's σ is rounded to the other side of an edge.
             let (least, most) =
                 (fixed(at(boundary) - at(SURFACE_ROUNDING)), fixed(at(boundary) + at(SURFACE_ROUNDING)));
             let full = [fixed((high - off).positive()), fixed(high + off)];
@@ -111,7 +111,7 @@ fn complete(strips: &[Strip]) -> Result<(), String> {
         loop {
             let column: Vec<&Strip> =
                 strips.iter().filter(|s| s.leads == leads && s.rate_from <= rate).collect();
-            // Of the strips that begin here or earlier, those that reach beyond.
+            // Strips that begin here or earlier, and reach beyond.
             let column: Vec<&&Strip> =
                 column.iter().filter(|s| s.rate_to.is_none_or(|to| to > rate)).collect();
             let mut surface = 0.0;

@@ -294,7 +294,7 @@ impl<T: Arithmetic> Actuator<T> {
             ActuatorKind::Both => {
                 let drives = resists.less(T::ZERO);
                 let volts = resists / T::select(drives, -self.below, mu * self.brake);
-                // What drives, drives forwards.
+                // An actuator that drives, drives forwards.
                 T::select(drives & way.less(T::ZERO), T::ZERO, volts)
             }
         }
@@ -370,7 +370,7 @@ mod tests {
         ) {
             let way = if forward { 1.0 } else { -1.0 };
             for a in [motor(share), both()] {
-                // What resists and drives forwards is for a shaft that goes forwards.
+                // An actuator that resists and drives forwards is for a shaft that goes forwards.
                 let way = if a.kind() == ActuatorKind::Both { 1.0 } else { way };
                 let volts = a.volts_for(torque, mu, way);
                 let given = a.torque(volts) - way * a.friction(mu, volts);

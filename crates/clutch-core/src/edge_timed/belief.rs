@@ -125,7 +125,7 @@ impl<T: Real> Belief<T> {
             let (lambda, _) = cut_off(-lacks / deviation);
             self.velocity = -(sign * lacks);
             let column = [self.tw, self.ww, self.wh, self.wr, self.ws];
-            // Of the means alone: a period in which it went on is no measurement, and a thousand of them are not a
+            // This cuts the means alone: a period in which it went on is no measurement, and a thousand of them are not a
             // thousand.
             self.take(column, self.ww, sign * deviation * lambda, T::ZERO);
         }
@@ -206,7 +206,7 @@ impl<T: Real> Belief<T> {
         self.rr -= kr * r;
         self.rs -= kr * slope;
         self.ss -= ks * slope;
-        // What rounding would make of a variance that is all but gone.
+        // Rounding would make a variance negative that is all but gone.
         for variance in [&mut self.tt, &mut self.ww, &mut self.hh, &mut self.rr, &mut self.ss] {
             *variance = variance.max(T::ZERO);
         }

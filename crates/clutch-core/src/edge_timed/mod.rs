@@ -4,10 +4,10 @@
 //! At 2 °/s a count of the paper's encoder takes 9 ms. A difference of counts knows the velocity only as a mean over
 //! several of them; but a crossed edge is a position that is known to a fraction of a count, at a time known to a
 //! period, and a count that does not come says that the shaft has not got there. A Kalman filter that takes both, and
-//! knows the voltage, tells velocity and friction within a count. It has five states: position, velocity, the mean
+//! knows the voltage, finds velocity and friction within a count. It has five states: position, velocity, the mean
 //! friction as a multiple of the model's (whose curve over the velocity stays, if it is Stribeck's with the exponent
 //! 1), and its ripple along the disc as a damped wave of random phase with its slope ([`EdgeTimedParams`] has the
-//! wave's numbers). Friction is smooth along the way, not in time: that is why it can be told ahead.
+//! wave's numbers). Friction is smooth along the way, not in time: that is why it can be foreseen.
 //!
 //! An edge that was crossed in the last period lies at most the way of that period behind, with the variance of a
 //! uniform distribution. Silence cuts the belief off at the edges of the count. A shaft without an edge for longer
@@ -287,7 +287,7 @@ impl<T: Real> EdgeTimed<T> {
         self.radians_per_count
     }
 
-    /// The model's sliding friction, of which friction is told as a multiple.
+    /// The model's sliding friction, of which friction is given as a multiple.
     #[must_use]
     pub fn mu(&self) -> T {
         self.mu
@@ -318,8 +318,8 @@ impl<T: Real> EdgeTimed<T> {
     /// an actuator to give way, a quarter of a second at most. A law then releases the actuator while
     /// [`EdgeTimedState::lets_go`].
     ///
-    /// Where two starts in a row brought no edge, a brake lets go until one comes: no shaft falls for longer than a count, so
-    /// that one of which nothing comes is a broken encoder, which a supervisor then sees.
+    /// A brake lets go until an edge comes, after two starts in a row that brought none: no shaft falls for longer than a
+    /// count, so that a fall of which nothing comes is a broken encoder, which a supervisor then sees.
     pub fn let_go(&self, state: &mut EdgeTimedState<T>, target_velocity: T) {
         let pull = self.forces(T::ZERO).0.abs().max(T::splat(1e-6));
         let needed = if state.unmoved >= T::splat(2.0) && self.actuator.kind() == ActuatorKind::Brake {
@@ -348,7 +348,7 @@ impl<T: Real> EdgeTimed<T> {
         let back = Self::back(state);
         let mut pad = state.pad;
         let [newest, middle, oldest] = state.line;
-        // What is on its way, the oldest first.
+        // The voltages on their way, the oldest first.
         for (left, arrived) in [(3, oldest), (2, middle), (1, newest)] {
             if left <= self.delay {
                 let (volts, end) = self.at_pad(pad, arrived);
@@ -398,7 +398,7 @@ impl<T: Real> EdgeTimed<T> {
 
     fn place(&self, state: &mut EdgeTimedState<T>, position: FixedCounts) -> T {
         let read = position.0 >> FixedCounts::FRACTION_BITS;
-        // What only resists turns no shaft round: a single count back is the edge's own, or a broken channel's.
+        // A brake that only resists turns no shaft round: a single count back is the edge's own, or a broken channel's.
         let back = !self.actuator.kind().two_sided() && read == state.counts.wrapping_sub(1);
         let counts = if back { state.counts } else { read };
         let moved = counts.wrapping_sub(state.counts);
@@ -410,7 +410,7 @@ impl<T: Real> EdgeTimed<T> {
         T::from_i32(i32::try_from(moved).unwrap_or(if moved < 0 { i32::MIN } else { i32::MAX }))
     }
 
-    /// Count from the edge that positions are told from down to the one of the last sample: 1 of a count back that is none.
+    /// Count from the edge that positions begin at down to the one of the last sample: 1 of a count back that is none.
     fn back(state: &EdgeTimedState<T>) -> T {
         if state.fraction < T::ZERO { T::ONE } else { T::ZERO }
     }
@@ -437,7 +437,7 @@ impl<T: Real> EdgeTimed<T> {
     /// believed to have stopped loses none.
     fn shape_and_fall(&self, velocity: T) -> (T, T) {
         let shape = self.shape(velocity);
-        // Where the curve has ended, it falls no more.
+        // The curve falls no more where it has ended.
         if velocity == T::ZERO || shape == T::ONE {
             return (shape, T::ZERO);
         }
@@ -473,7 +473,7 @@ impl<T: Real> EdgeTimed<T> {
         self.hear(state, position, applied).0
     }
 
-    /// The shaft rests at a known position above the lower edge of its count, with a friction that steps have told; from
+    /// The shaft rests at a known position above the lower edge of its count, with a friction that steps have shown; from
     /// here the filter goes on.
     pub(crate) fn take_over(&self, state: &mut EdgeTimedState<T>, position: T, friction: T) {
         let belief = &mut state.belief;
@@ -557,7 +557,7 @@ impl<T: Real> EdgeTimed<T> {
                 state.belief.keep_within(end, side, self.blur);
             }
         }
-        // What only resists turns no shaft round.
+        // A brake that only resists turns no shaft round.
         if !self.actuator.kind().two_sided() {
             state.belief.velocity = state.belief.velocity.max(T::ZERO);
         }
@@ -610,7 +610,7 @@ impl<T: Real> EdgeTimed<T> {
         match state.phase {
             Phase::Resting => {}
             Phase::Sliding if self.too_long(state.silent, pace) => {
-                // What was learnt since the last edge is the friction of a shaft at rest.
+                // All learnt since the last edge is the friction of a shaft at rest.
                 state.belief = state.at_edge;
                 state.belief.rest();
                 // The more so, the less the last ones have helped.

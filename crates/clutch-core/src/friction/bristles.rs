@@ -232,7 +232,7 @@ impl<T: Real> Bristles<T> {
     }
 
     /// Viscous damping for each N m of normal force (as torque per unit of μ) from which on the friction takes energy out of
-    /// any motion, s/rad. Of one bristle `σ_1 (μ_s − μ_d)/μ_d`, after Barabanov and Ortega (IEEE Trans. Automat. Control
+    /// any motion, s/rad. For one bristle it is `σ_1 (μ_s − μ_d)/μ_d`, after Barabanov and Ortega (IEEE Trans. Automat. Control
     /// 45, 2000). Elements need none: what a held one takes is in its spring, and a sliding one bends by no more than
     /// the motion.
     #[must_use]

@@ -8,7 +8,7 @@
 //! Automat. Control 40 (1995) 419–425, whose values for a mass of 1 kg on 1 N of friction are `σ_0` = 10⁵ 1/m,
 //! `σ_1` = √10⁵ s/m, 1 and 1.5 N, 1 mm/s. It has what Stribeck's curve lacks: a spring before the break-away, friction that
 //! lags behind the velocity, a break-away that depends on the rate of force. It creeps: under a load that trembles a little
-//! below break-away it drifts, and steady loads are held. Where a load has to be held, take the elasto-plastic model, or
+//! below break-away it drifts, and steady loads are held. If a load has to be held, take the elasto-plastic model, or
 //! Stribeck's curve. It is stiff: a run takes some times as long as with Stribeck's curve.
 
 use super::StribeckParams;

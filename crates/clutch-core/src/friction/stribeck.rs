@@ -59,7 +59,7 @@ impl<T: Real> Stribeck<T> {
     /// The first parameter out of range.
     pub fn new(p: &StribeckParams<T>) -> Result<Self, ParamError<T>> {
         p.check_rows()?;
-        // Where the exponential's part is ε μ_d / 8: the next number to μ_d is at least ε μ_d / 2 away,
+        // There the exponential's part is ε μ_d / 8: the next number to μ_d is at least ε μ_d / 2 away,
         // and half of that decides how a sum is rounded.
         let drop = p.mu_static - p.mu_dynamic;
         let vanishes_at = (T::from_i32(8) * drop.abs() / (T::EPSILON * p.mu_dynamic)).ln();

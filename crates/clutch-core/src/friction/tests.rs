@@ -37,7 +37,7 @@ fn every_model_lies_in_its_envelope_and_ends_at_its_sliding_level() {
             let level = f.level(v);
             assert!(low <= level && level <= high, "{}: {level} at {v} rad/s", p.name());
             assert_eq!(f.coefficient(v), level * v.sgn(), "{}", p.name());
-            // What a model says of its curve is its curve.
+            // The curve that a model names is its curve.
             if let Some(quick) = f.quick() {
                 assert_eq!(quick.level(v), level, "{}", p.name());
             }

@@ -5,11 +5,11 @@
 //! d̂ = Q(s) [T(u) − J θ̈],     Q(s) = g/(s + g)
 //! ```
 //!
-//! `T(u)` is the torque of a voltage as the model has it: what drives, less friction at the speed of a sliding shaft. What the
-//! shaft gives away from the model's inertia, friction and load, is a disturbance; the observer (Ohnishi, Shibata and Murakami
-//! 1996) finds it from voltage and velocity, and the law adds it to its demand. Neither load nor friction has to be known.
+//! `T(u)` is the torque of a voltage as the model has it: what drives, less friction at the speed of a sliding shaft. The
+//! difference from the model's inertia, friction and load is a disturbance; the observer (Ohnishi, Shibata and Murakami 1996)
+//! finds it from voltage and velocity, and the law adds it to its demand. Neither load nor friction has to be known.
 //!
-//! The observer is told of the voltage that went out, so that a limit winds nothing up. A run begins with the disturbance at
+//! The observer gets the voltage that went out, so that a limit winds nothing up. A run begins with the disturbance at
 //! which the law demands the voltage that the brake has.
 
 use super::{Beside, Command, ControlLaw, Listed, Output, OutputState, Seen, Tick};
@@ -295,7 +295,7 @@ mod tests {
             let mut state = DobState::default();
             let volts = law.update(&mut state, &path).voltage;
             assert!((volts - way * 0.0375 / (0.05 * 0.97)).abs() < 1e-12, "{volts} V");
-            // That is what moves it: nothing else does.
+            // This voltage moves it, and nothing else does.
             told(&law, &mut state, &path, volts);
             let mut state = DobState { velocity: path.velocity(), ..DobState::default() };
             told(&law, &mut state, &path, volts);

@@ -5,7 +5,7 @@
 //! T_a = J (K_d (ω_c − ω̂) + θ̈_d) + C_d ω̂ − T_u,     u: T(u) − μ̂ N(u) sgn θ̇_d = T_a
 //! ```
 //!
-//! `ẽ`, `ω̂` and `μ̂` are those of the [`EdgeTimed`] filter, told ahead to the time at which the voltage takes effect. The floor is
+//! `ẽ`, `ω̂` and `μ̂` are those of the [`EdgeTimed`] filter, carried on to the time at which the voltage takes effect. The floor is
 //! what keeps a slow shaft smooth: a law that brakes a shaft below it to let the path catch up has it stick, and a stuck
 //! shaft says nothing. A shaft that rests is let go, which needs no knowledge of friction; up to
 //! the first edge it is then held with less than the believed friction asks for, `optimism` standard deviations: too
@@ -188,7 +188,7 @@ impl<T: Real> Glide<T> {
         let at_rest = T::splat(PUSHED) * friction * self.plant.friction().at_rest() / self.filters.plain().mu();
         let still = way * self.volts(T::ZERO, at_rest, way);
         let moved = way * self.volts(self.torque * pace, friction, way);
-        // What resists above 0 V drives below it.
+        // An actuator that resists above 0 V drives below it.
         let drives = if self.plant.actuator().kind().drives_above_0() { still.max(moved) } else { still.min(moved) };
         way * drives
     }

@@ -6,7 +6,7 @@
 //!
 //! `a` is the acceleration of the shaft that is let go, `b` the one that stops it again. A step is taken when the path
 //! is half a step ahead of where the steps before have brought the shaft, so that the error is half a step and what is
-//! not known of `k`. That is learnt: the steps from edge to edge make a count. A fall from rest needs no knowledge of
+//! not known of `k`. `k` is learnt: the steps from edge to edge make a count. A fall from rest needs no knowledge of
 //! friction, and the way to its end hardly any; where steps that should have made two counts made none, an actuator
 //! that lags lets go for longer and a motor, which has to break its friction first, pushes harder.
 
@@ -99,7 +99,7 @@ impl<T: Real> MicroStepState<T> {
         self.position
     }
 
-    /// Begins at a position, counts above the last edge. What was learnt stays.
+    /// Begins at a position, counts above the last edge. The learnt numbers stay.
     pub(super) fn begin(&mut self, position: T, delay: T) {
         let known = self.scale > T::ZERO;
         *self = MicroStepState {
@@ -108,7 +108,7 @@ impl<T: Real> MicroStepState<T> {
             scale: if known { self.scale } else { T::ONE },
             push: if known { self.push } else { T::splat(PUSHED) },
             least: self.least.max(T::ONE),
-            // What is on its way has to arrive, and the shaft to stop.
+            // The voltages on their way have to arrive, and the shaft has to stop.
             hold: T::ONE + delay,
             ..MicroStepState::default()
         };
@@ -210,7 +210,7 @@ impl<T: Real> MicroStep<T> {
         }
     }
 
-    /// Whether a step begins, with the path `error` counts ahead.
+    /// Decides whether a step begins, with the path `error` counts ahead.
     fn decide(&self, state: &mut MicroStepState<T>, error: T, pace: T) {
         let way = if error < T::ZERO { -T::ONE } else { T::ONE };
         // The way of a step tells how long it takes to stop; a place with less friction has a whole period.

@@ -130,8 +130,8 @@ pub trait ControlLaw<T: Arithmetic> {
         *state = self.start(tick, applied);
     }
 
-    /// Told before each period, and once after [`ControlLaw::start`]: what lies behind the measurement. Most laws need none
-    /// of it.
+    /// Called before each period, and once after [`ControlLaw::start`], with the facts behind the measurement. Most laws need
+    /// none of them.
     #[inline]
     fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
         let _ = (state, seen);

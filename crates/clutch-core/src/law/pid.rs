@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn feed_forward_carries_a_path_without_an_error() {
-        // What (1) needs on an accelerated path with the friction of a fast shaft.
+        // The voltage by (1) on an accelerated path with the friction of a fast shaft.
         let (mu_k, j, c, torque) = (0.15 * 0.14, 0.0017, 0.001, 0.047088);
         let p = PidParams {
             bias: torque / mu_k,

@@ -32,7 +32,7 @@ struct Edges<T> {
     boundary: T,
     /// Voltage and its limit where the shaft is ahead, `σ ≤ −S`.
     ahead: (T, Limit),
-    /// Where it is behind, `σ ≥ S`.
+    /// The same for a shaft that is behind, `σ ≥ S`.
     behind: (T, Limit),
 }
 
@@ -55,7 +55,7 @@ impl<T: Real> Shell<T> {
         Ok(Shell(Some(Edges { slope: p.slope, boundary: p.boundary, ahead, behind })))
     }
 
-    /// A law's answer in, what goes out. A demand that is no number is still told as one.
+    /// A law's answer in, the shell's out. A demand that is no number is still reported as one.
     #[inline]
     #[must_use]
     pub fn around<Terms>(&self, command: Command<T, Terms>, tick: &Tick<T>) -> Command<T, Terms> {

@@ -91,7 +91,7 @@ macro_rules! whole {
     )+ };
 }
 
-// What does not fit saturates: a range that every type holds refuses it.
+// A number that does not fit saturates: a range that every type holds refuses it.
 whole! {
     u8: (|n: u64| u8::try_from(n).unwrap_or(u8::MAX)), u64::from;
     u32: (|n: u64| u32::try_from(n).unwrap_or(u32::MAX)), u64::from;

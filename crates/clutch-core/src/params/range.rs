@@ -136,7 +136,7 @@ impl fmt::Display for Words {
             }
         };
         let whole = matches!(kind, Kind::Whole);
-        // What has two ends needs no "finite"; a whole number is.
+        // A range with two ends needs no "finite"; a whole number is.
         let finite = if whole || (has_low && has_high) { "" } else { "finite " };
         write!(f, "a {finite}{what}")?;
         match (has_low, has_high) {

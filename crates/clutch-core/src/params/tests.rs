@@ -19,7 +19,7 @@ struct Seen {
     others: usize,
     words: usize,
     tables: usize,
-    /// Whether what may be absent is to be there.
+    /// True if a part that may be absent is to be there.
     present: Option<bool>,
     /// Option to choose.
     choose: Option<usize>,

@@ -198,7 +198,7 @@ impl<T: Real> Profile<T> {
     }
 
     pub(super) fn at(&self, tick: u64) -> Target<T> {
-        // Of the pieces that have begun, the last; pieces shorter than a tick are passed over.
+        // The last of the pieces that have begun; pieces shorter than a tick are passed over.
         let Some(piece) = self.pieces.iter().rev().find(|p| p.first_tick <= tick) else {
             return Target::default();
         };

@@ -106,7 +106,7 @@ impl<T: Real> Interval<T> {
     fn along_at(&self, us: u64, rate: Steepness) -> FixedCounts {
         let (us, length) = (u128::from(us), u128::from(self.length_us));
         let (high, low) = (rate.0 >> 64, rate.0 & u128::from(u64::MAX));
-        // Of a number rounded down, this is the quotient or one less.
+        // This is the quotient of a number rounded down, or one less.
         let least = us.wrapping_mul(high).wrapping_add(us.wrapping_mul(low) >> 64);
         let rest =
             us.wrapping_mul(u128::from(self.rise.0.unsigned_abs())).wrapping_sub(least.wrapping_mul(length));

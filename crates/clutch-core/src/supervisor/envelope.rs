@@ -11,7 +11,7 @@
 //! v ≤ (x − x₀ + ∫ (t − t₀) a₊ dt)/(t − t₀)                          the way since t₀: earlier it was no slower than a₊ allows
 //! ```
 //!
-//! The slowest shaft is the fastest of the axis turned round. Where the fastest is behind the slowest, in position or in
+//! The slowest shaft is the fastest of the axis turned round. If the fastest is behind the slowest, in position or in
 //! velocity, no shaft of the bounds can have given the counts. No count that comes back sets anything back. The proof is in
 //! `docs/theory.md`.
 //!
@@ -207,8 +207,8 @@ impl<T: Real> Envelope<T> {
         self.expect_after(s, losses, periods);
     }
 
-    /// A sample that has passed the gate: `moved` counts in so many periods. What no shaft of the bounds can have done, and
-    /// by how many counts. `losses`: the line has lost samples of late.
+    /// A sample that has passed the gate: `moved` counts in so many periods. Gives the motion that no shaft of the bounds can
+    /// have made, and by how many counts. `losses`: the line has lost samples of late.
     pub(super) fn judge(
         &self,
         s: &mut EnvelopeState<T>,

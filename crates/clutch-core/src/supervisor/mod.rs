@@ -38,7 +38,7 @@
 //! | [`Cause::Clock`] | the board's time does not pass as its periods do, or its periods not as its host's time |
 //! | [`Cause::Board`] | the board reports a fault, or is not driving although it should |
 //!
-//! The supervisor owns no clock. A log records all that it is told, so a replay decides the
+//! The supervisor owns no clock. A log records all of its input, so a replay decides the
 //! same at every tick.
 
 mod envelope;
@@ -520,7 +520,7 @@ impl<T: Real> Supervisor<T> {
     #[inline(never)]
     fn check<S>(&self, s: &mut SupervisorState<T, S>, cause: Cause, value: T) {
         let watched = matches!(s.state, State::Ready | State::Armed | State::Running);
-        // The first cause is the one that is told.
+        // The first cause is the one that is reported.
         if watched && self.checks.has(cause) {
             self.fault(s, cause, value);
         }

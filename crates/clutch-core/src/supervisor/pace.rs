@@ -7,7 +7,7 @@ const MEMORY: i32 = 1 << 22;
 
 /// Time that should have passed, and how much more has, µs.
 ///
-/// Quartz differs by less than 0.01 %, a wrong prescaler by more than 5 %. What a machine that stalls makes of the time of a
+/// Quartz differs by less than 0.01 %, a wrong prescaler by more than 5 %. The time that a machine that stalls adds to a
 /// single sample is slack, once, and not a share.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pace {

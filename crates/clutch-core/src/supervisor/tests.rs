@@ -840,7 +840,7 @@ in_both_scalars! {
     }
 }
 
-// What reaches the law.
+// Samples that reach the law.
 
 in_both_scalars! {
     fn a_sample_that_a_newer_one_has_overtaken_feeds_the_law_and_is_not_answered<T>() {

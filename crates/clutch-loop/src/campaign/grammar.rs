@@ -300,7 +300,7 @@ fn setting(rng: &mut Pcg64) -> Setting {
     }
 }
 
-/// Where trouble may be.
+/// Number of the places at which trouble may be.
 const PLACES: usize = 6;
 
 fn trouble(rng: &mut Pcg64, setting: &Setting) -> Trouble {

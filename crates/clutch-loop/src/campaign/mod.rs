@@ -282,7 +282,7 @@ impl Draw {
             duration: last + after,
             watched: WATCHED,
             faults: self.troubles.iter().filter_map(|t| t.fault(period)).collect(),
-            // Of two the one that takes longer.
+            // The longer one of two.
             stall: self.troubles.iter().filter_map(stall).max_by(|a, b| a.answer.total_cmp(&b.answer)),
             ..VirtualOptions::default()
         }

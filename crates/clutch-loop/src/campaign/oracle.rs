@@ -363,7 +363,7 @@ fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> 
         if !alone && (trouble.often < 1.0 || draw.troubles.iter().any(Trouble::needs_time)) {
             continue;
         }
-        // What a board refuses aloud stands between its samples, and changes places with them.
+        // The refusals of a board stand between its samples, and change places with them.
         let swapped = matches!(trouble.what, What::Fault(FaultKind::Reorder, _));
         if !alone && swapped {
             continue;
@@ -413,7 +413,7 @@ fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> 
     None
 }
 
-/// True if line or board tell when it first showed.
+/// True if line or board report when it first showed.
 fn hits(t: &Trouble) -> bool {
     matches!(t.what, What::Fault(..))
 }

@@ -244,7 +244,7 @@ class Line(Protocol):
 class Chip(ABC):
     """A chip, with an image in its flash."""
 
-    # What a kind of chip has.
+    # Parts of a kind of chip.
     CORE: ClassVar[int]
     CPUID: ClassVar[int]
     FLASH: ClassVar[range]

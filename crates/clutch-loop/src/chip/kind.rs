@@ -6,9 +6,9 @@ use std::path::Path;
 /// A chip with a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChipKind {
-    /// That of the NUCLEO-G474RE.
+    /// The chip of the NUCLEO-G474RE.
     Stm32g474,
-    /// That of the Raspberry Pi Pico.
+    /// The chip of the Raspberry Pi Pico.
     Rp2040,
 }
 

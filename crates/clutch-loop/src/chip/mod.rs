@@ -160,7 +160,7 @@ impl ChipBoard {
         if bits != 0 && armed.is_some() {
             self.first_hit_ns.get_or_insert(now_ns);
         }
-        // What the chip does under control is counted, and nothing else.
+        // The chip's work under control is counted, and nothing else.
         bits | if self.state == BoardState::Running { METERED } else { 0 }
     }
 
@@ -210,7 +210,7 @@ impl ChipBoard {
         self.listen(now_ns, out)
     }
 
-    /// Hears what the chip has said: to whom it goes, and what state it tells of.
+    /// Takes the chip's frames: hands each to its line, and notes the state that it reports.
     fn listen(&mut self, now_ns: u64, out: &mut Outbox) -> Result<(), VirtualError> {
         for frame in self.last.sent.split_inclusive(|byte| *byte == 0) {
             out.append(frame);

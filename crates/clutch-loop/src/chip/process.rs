@@ -54,7 +54,7 @@ pub enum ChipError {
     },
     /// The image has another name than those of the boards.
     #[error(
-        "{}: expected a file whose name begins with nucleo- or pico-: the name tells on which chip's model it runs",
+        "{}: expected a file whose name begins with nucleo- or pico-: the name says on which chip's model it runs",
         path.display()
     )]
     NoModel {

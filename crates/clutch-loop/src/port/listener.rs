@@ -45,7 +45,7 @@ pub struct Listener {
     heard_ns: u64,
     /// The one that takes an idle client's place.
     next: Option<OwnedFd>,
-    /// The client's end was seen; not yet told by [`Endpoint::service`].
+    /// The client's end was seen; not yet reported by [`Endpoint::service`].
     ended: bool,
     /// Connections that are told "busy", and until when they are kept, ns.
     refused: [Option<(OwnedFd, u64)>; REFUSED],
@@ -57,7 +57,7 @@ impl Listener {
     }
 
     /// Listens on a loopback address: only programs on this machine can connect. Port 0 takes any
-    /// free one; [`Endpoint::address`] tells which.
+    /// free one; [`Endpoint::address`] says which.
     ///
     /// # Errors
     /// [`PortError::NotLoopback`], [`PortError::CannotListen`].

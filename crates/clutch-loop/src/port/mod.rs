@@ -290,7 +290,7 @@ fn open_serial(
         let refused = device::set_low_latency(&fd).err();
         notes.extend(found.latency_note(&address.to_string(), refused.as_ref(), found.latency_timer_ms()));
     }
-    // What came before, from a board nobody listened to, is too old to be acted on.
+    // Bytes of before, from a board nobody listened to, are too old to be acted on.
     tcflush(&fd, QueueSelector::IOFlush).map_err(fail)?;
     let port = Port { fd, kind: found.kind, address: address.clone(), baud, fresh: false };
     Ok(Opened { port, notes })
@@ -394,7 +394,7 @@ pub trait Endpoint {
     /// The address at which clients reach it, as they write it.
     fn address(&self) -> Address;
 
-    /// Closes the connection to the present client, which [`Endpoint::service`] then tells to have left. False where
+    /// Closes the connection to the present client, which [`Endpoint::service`] then reports to have left. False where
     /// there is no connection to close: on a pseudo-terminal, whose clients are programs of this user.
     fn dismiss(&mut self) -> bool {
         false

@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 pub struct PseudoTerminal {
     master: OwnedFd,
     path: PathBuf,
-    /// As last told by [`Endpoint::service`].
+    /// As last reported by [`Endpoint::service`].
     present: bool,
 }
 

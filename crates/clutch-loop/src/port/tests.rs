@@ -163,7 +163,7 @@ fn a_full_line_takes_a_part_then_nothing_and_never_waits() {
     while port.write(b"x").unwrap() == 1 {
         count += 1;
     }
-    // What was counted as taken is what arrives, no byte more.
+    // As many bytes arrive as were counted as taken, no byte more.
     let got = read_board(&mut board, count);
     assert_eq!(got.len(), count);
     thread::sleep(Duration::from_millis(20));
@@ -248,7 +248,7 @@ fn a_pseudo_terminal_can_be_opened_again_after_its_client_was_killed() {
         let path = path.clone();
         without_rights(move || try_open(&path).map(|_| ()))
             .expect("the port is free again, also for non-root");
-        // That client was too short to be certain to be seen, and a program that another test
+        // The client was there too short to be certain to be seen, and a program that another test
         // starts may have a copy of its descriptor for a moment.
         while board.service().unwrap().is_some() || board.client_present() {}
     }

@@ -262,7 +262,7 @@ impl Setting {
                         Declared::Row(row, _) if i + 1 == name.used => row.unit,
                         _ => NONE,
                     };
-                    // Of points their number goes over the wire.
+                    // The wire carries the number of points.
                     let points = matches!(self.0.declared, Declared::Row(row, _) if row.kind == Kind::Points);
                     match (part.strip_suffix(unit.suffix), unit.conversion) {
                         (Some(stem), _) if points && i + 1 == name.used => write(stem.trim_end_matches('_'))?,

@@ -243,7 +243,7 @@ fn table(of: &str) -> Outcome<()> {
                     ("reference.ramp.rate_deg_s", rate),
                     ("bounds.friction_percent", 40.0),
                 ];
-                // What is unstable is refused by that.
+                // Unstable gains are refused for that.
                 let row = measure(&scenario(*gains, &keys)?, 200)?;
                 let certified = row.certified.map_or_else(|| row.open.clone(), |c| format!("{c:.4}"));
                 let ratio = row.certified.map(|c| c / row.seen);
@@ -392,8 +392,8 @@ const TALLY: &str = "\
 | sets drawn | refused as unstable | not closed | certified | of these shells | runs | with sticks | broken bounds | nearest to its bound |
 |---|---|---|---|---|---|---|---|---|";
 
-/// Random sets; those that are certified, and linearly stable or a shell, are run with random plants of their boxes. What stands
-/// on the error output after each set is a share of its own, which goes on at the seed that is told.
+/// Random sets; those that are certified, and linearly stable or a shell, are run with random plants of their boxes. The
+/// line on the error output after each set is a result by itself; a campaign goes on from it at the seed that it names.
 fn campaign(wanted: u64, first: u64) -> Outcome<()> {
     let mut tally = Tally::default();
     let mut seed = first;

@@ -353,7 +353,7 @@ pub(crate) fn classes(places: &[Place]) -> Result<Vec<Class<'_>>, String> {
         match all.iter_mut().find(|class| class.name == name) {
             None => {}
             Some(class) if same(class.place, place) => {
-                // Where it is an option, the class has its key.
+                // The class has its key where it is an option.
                 class.place = if class.place.option.is_some() { class.place } else { place };
                 continue;
             }

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Each step of the Rosenbrock method holds the error that its embedded pair sees to [`RELATIVE`] of speed and deflection.
-//! Where the velocity changes its sign the model has a corner: there the steps become short by themselves.
+//! The model has a corner where the velocity changes its sign: there the steps become short by themselves.
 //!
 //! Bristles never hold a shaft still, so that sticking is a matter of words: a shaft counts as stuck from the step on at
 //! whose end its bristles bend less than [`STICKS_BELOW`] of steady sliding and it is slower than the Stribeck velocity,

@@ -83,7 +83,7 @@ struct Targets<V> {
 
 /// Runs in the lanes of one vector.
 struct Chunk<'a, V: Lane> {
-    // What stays.
+    // Kept for the whole run.
     paths: Paths<'a>,
     /// Beginning of each path, in fixed point.
     start: V,
@@ -95,7 +95,7 @@ struct Chunk<'a, V: Lane> {
     plant: Plant<V>,
     bed: Bed<V>,
     drive: V,
-    // What changes.
+    // Changed by each tick.
     law: LawInLanes<V>,
     /// Error of the last sample in fixed point, and its rate by (5).
     error: V,
@@ -108,7 +108,7 @@ struct Chunk<'a, V: Lane> {
     /// Voltages on their way to the actuator.
     line: Vec<V>,
     arriving: V,
-    // What comes of it.
+    // Results.
     sampled: Sampled<V>,
     silences: Silence<V>,
     stairs: Silence<V>,
@@ -316,7 +316,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
         if common.delay == 0 {
             self.arriving = commanded;
         } else {
-            // What was commanded so many ticks ago.
+            // The voltage that was commanded so many ticks ago.
             let slot = &mut self.line[(k % common.delay as u64) as usize];
             self.arriving = *slot;
             *slot = commanded;
@@ -346,7 +346,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let flow = self.bed.flow(&pushed, sign, rest);
         let v_s = self.bed.velocity();
         let begin = State::at(sign * self.velocity / v_s);
-        // What no exponential here has room for.
+        // Motions that no exponential here has room for.
         self.lost |= V::bits(!flow.edge.less(V::splat(700.0)) & !stuck);
         let Piece { done, stops, state } = flow.first(&begin, rest);
         // Its event is for what finds it.

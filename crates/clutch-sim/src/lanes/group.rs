@@ -94,9 +94,9 @@ impl<'a> Candidate<'a> {
     }
 }
 
-/// Runs in lanes what can be, by the instructions of a level. `runs` are the specifications by their places; `done` is told
-/// the figures of a run by its place, as they come. What it is not told of has to go alone. False once `stop`, which is
-/// asked every few milliseconds, says so; nothing is told any more then.
+/// Runs in lanes what can be, by the instructions of a level. `runs` are the specifications by their places; `done` gets
+/// the figures of a run by its place, as they come. A run that it gets none of has to go alone. False once `stop`, which is
+/// asked every few milliseconds, says so; no more figures come then.
 pub(crate) fn run_all(
     level: Level,
     runs: &[(usize, RunSpec<'_>)],

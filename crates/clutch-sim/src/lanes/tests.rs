@@ -138,7 +138,7 @@ fn around(name: &str, keys: &[(&str, f64, f64)], more: &[(&str, &str)], n: u64) 
             ((*key).to_owned(), format!("{}", low + (high - low) * rng.random::<f64>()))
         }));
         set.push(("run.seed".into(), (i + 1).to_string()));
-        // What drives a run in lanes is a weight.
+        // The drive of a run in lanes is a weight.
         let weight = "[rig.drive.weight]\nmass_kg = 0.001\n";
         let toml = built_in
             .toml

@@ -72,7 +72,7 @@ pub struct Outcome {
     pub claims: Vec<Claim>,
 }
 
-/// Runs everything, on all cores; `progress` is told of each finished run.
+/// Runs everything, on all cores; `progress` gets each finished run.
 ///
 /// # Errors
 /// [`RunError::Stopped`]; no other with the built-in rigs.

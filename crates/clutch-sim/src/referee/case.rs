@@ -41,7 +41,7 @@ pub struct Case {
     pub id: String,
     /// One line that says what it shows.
     pub title: String,
-    /// Where the expected values come from.
+    /// The source of the expected values.
     pub source: String,
     /// The moving part.
     pub model: Model,

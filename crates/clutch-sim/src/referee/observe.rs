@@ -220,7 +220,7 @@ impl Observe {
         if let Some(weights) = &self.torque {
             add(weights, trajectory.torque.as_ref()?, &mut values);
         }
-        // Of a position the slopes are known.
+        // The slopes of a position are known.
         let slopes = match (&self.position, &self.velocity, &self.torque) {
             (Some(weights), None, None) => {
                 let mut slopes = vec![0.0; count];

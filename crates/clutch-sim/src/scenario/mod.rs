@@ -109,7 +109,7 @@ pub enum LoadError {
     Io {
         /// The file.
         name: String,
-        /// The system's error; told in words, so not a source to be told again.
+        /// The system's error; given in words, so not a source to be given again.
         error: std::io::Error,
     },
     /// The contents of the file.
@@ -361,7 +361,7 @@ impl Scenario {
         spec.engine(&rig).map_err(|e| self.message("run.engine", e.to_string()))?;
         self.path().map_err(|e| self.at("reference", &e))?;
         if self.scalar() == ScalarKind::F32 {
-            // What is in range in f64 can be nothing, or beyond everything, in f32.
+            // A number in range in f64 can be nothing, or beyond everything, in f32.
             spec.path::<f32>().map_err(|e| self.single("reference", &e))?;
         }
         Ok(())
@@ -392,7 +392,7 @@ impl Scenario {
         let supervisor = self.supervisor(safety);
         let bounds = self.supervised_bounds(&plan.bounds)?;
         Supervisor::new(&supervisor, &servo, &bounds).map_err(|e| self.at("safety", &e))?;
-        // What is to hold must hold the strongest drive with the weakest actuator.
+        // A voltage that is to hold must hold the strongest drive with the weakest actuator.
         let b = &plan.bounds;
         let Some(volts) = safety.on_fault.holding_voltage() else { return Ok(()) };
         let left = b.left_over(volts);

@@ -47,8 +47,8 @@ impl Scenario {
     /// linear stability decides whether a motion along the path is smooth.
     ///
     /// # Errors
-    /// As [`Scenario::sampled_setup`]. Of a sensor without steps, torque noise, and a bumpless start, which a linear loop
-    /// knows nothing of, and of a shell, within which the law stands, none.
+    /// As [`Scenario::sampled_setup`]. None for a sensor without steps, torque noise, and a bumpless start, which a
+    /// linear loop knows nothing of, nor for a shell, within which the law stands.
     pub fn setup_as_it_is(&self) -> Result<Setup, NotCovered> {
         let mut own = self.clone();
         let p = &mut own.params;

@@ -30,7 +30,7 @@ pub fn check_section(origin: &str, key: &str, table: Table) -> Result<Table, Sce
         At::Option(info) => crate::tables::complete_table(origin, key, info, &mut table)?,
     }
     error::set(origin, &mut whole, key, Value::Table(table.clone()))?;
-    // What is not in the table stays blank, and is not looked at.
+    // Values that are not in the table stay blank, and are not looked at.
     let params: ScenarioParams = read(&whole);
     match check(&params, key) {
         None => Ok(table),

@@ -1,6 +1,6 @@
 //! Reasons why a rate is not smooth, each in a closed form; docs/theory.md, section 15, derives them.
 //!
-//! They are of the rig as it is, not of the plant that the law believes in. That none holds does not make a rate smooth: it
+//! They are of the rig as it is, not of the plant that the law believes in. A rate at which none holds need not be smooth: it
 //! may stick for another reason.
 
 use crate::rig::Rig;
@@ -30,7 +30,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// Every cause, in the order in which they are told.
+    /// Every cause, in the order in which they are reported.
     pub const ALL: [Cause; 4] =
         [Cause::SampledLoop, Cause::StribeckEdge, Cause::EncoderEdge, Cause::EdgeJolt];
 }
@@ -133,7 +133,7 @@ fn damping(scenario: &Scenario, rig: &Rig) -> Option<f64> {
         LawParams::SuperTwisting(g) if g.boundary > 0.0 => Some(g.k1 / libm::sqrt(g.boundary) * per_volt),
         // These ask for an acceleration, of the inertia that they believe in.
         LawParams::Ctc(g) => Some(g.outer_gain * g.kd * p.model.inertia),
-        // Of an observer's bandwidth, too: together they are PID's.
+        // The observer's bandwidth damps, too: together they are PID's.
         LawParams::Dob(g) => Some((g.kd + g.bandwidth) * p.model.inertia),
         LawParams::Glide(g) => Some(g.kd * p.model.inertia),
         LawParams::SuperTwisting(_) | LawParams::SmcSign(_) | LawParams::Voltage(_) | LawParams::Hold(_) => {

@@ -125,7 +125,7 @@ fn set(scenario: &Scenario, axis: &Axis, value: f64) -> (String, Value) {
     (axis.key.clone(), value)
 }
 
-/// Tells of a finished cell.
+/// Reports a finished cell.
 fn told<T>(report: Report<'_>, total: u64, cell: Result<T, ScenarioError>) -> Result<T, ScenarioError> {
     let _ = report(Progress { total, finished: 1 });
     cell

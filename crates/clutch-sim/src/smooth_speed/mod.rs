@@ -3,7 +3,7 @@
 //! A rate is smooth if on each disc the shaft goes with the path from the settling time to the end of the run and never
 //! comes to rest. Rates are tried from the lowest up: a rate that is not smooth shows it soon, on its hardest disc, while one
 //! that is costs a whole run of every disc. Nothing says that a rate above a smooth one is smooth, too: the rates above are
-//! tried as well, and those that are not are told as holes.
+//! tried as well, and those that are not are reported as holes.
 
 mod cause;
 mod map;
@@ -143,7 +143,7 @@ pub struct SmoothSpeed {
     pub runs: u64,
 }
 
-/// Finds the lowest smooth rate. The scenario's own rate and seed do not matter. `report` is told of each run.
+/// Finds the lowest smooth rate. The scenario's own rate and seed do not matter. `report` gets each run.
 ///
 /// # Errors
 /// The path is no ramp, the law follows none, or the scenario refuses a rate; the end of `report`'s patience.

@@ -66,7 +66,7 @@ where
         (SVector::from_fn(|i, _| state[i]), SVector::from_fn(|i, _| state[N + i]))
     }
 
-    /// Where it is.
+    /// The state that it is in.
     #[must_use]
     pub fn state(&self) -> State<N> {
         let (position, velocity) = Self::split(&self.state);

@@ -6,7 +6,7 @@
 //!
 //! A row is a place where something rubs: its slip rate `w_i` is a combination of velocities, its normal force an input. The
 //! shaft of the rest of this crate is the system of one inertia and one row; here several rows may hold one joint, and be
-//! redundant. Which rows hold and which slip is one strictly convex problem ([`hold`]); between events the motion is
+//! redundant. One strictly convex problem says which rows hold and which slip ([`hold`]); between events the motion is
 //! smooth and taken by Dormand and Prince's pair, events are located to [`INSTANT`]; what holds stands still exactly.
 //!
 //! Rows with bristles never hold exactly; a system of such has an engine of its own, [`BristledMotion`].

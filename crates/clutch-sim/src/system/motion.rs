@@ -176,7 +176,7 @@ impl<const N: usize> Span<N> {
                 y -= inverse * d * ((d.transpose() * y)[0] - moves * rate);
             }
         }
-        // What is rounding of a number that is gone is 0.
+        // A rest that is rounding of a number that is gone is 0.
         let least = 8.0 * f64::EPSILON * x.amax();
         if !least.is_finite() {
             return y;
@@ -200,7 +200,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         Ok(motion)
     }
 
-    /// Where it is.
+    /// The state that it is in.
     #[must_use]
     pub fn state(&self) -> &State<N> {
         &self.state
@@ -268,7 +268,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         (hold(&a, &b, &e.bound, stuck).acceleration, STILL * largest)
     }
 
-    /// Whether a row that slipped has come to rest, or one that is stuck is no longer held.
+    /// True if a row that slipped has come to rest, or one that is stuck is no longer held.
     fn happened(&self, e: &Equations<N, B>) -> bool {
         if self.margin(&e.slip) < 0.0 {
             return true;

@@ -6,7 +6,7 @@ use toml::Value;
 /// The probable meaning: the same key in another unit, with the value in it, or the nearest name.
 pub(super) fn correction(unknown: &str, value: Option<&Value>, known: &[String]) -> String {
     let number = value.and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)));
-    // Where letters are large or small does not make another word.
+    // Large and small letters do not make another word.
     let lower = unknown.to_lowercase();
     if known.contains(&lower) {
         return format!(": did you mean {lower}?");

@@ -83,7 +83,7 @@ public:
     /* Target minus position, rad, as the law saw it. */
     float error() const { return seen; }
 
-    /* What was wrong with the settings. */
+    /* The error in the settings. */
     const clutch_misfit &misfit() const { return why; }
 
 private:

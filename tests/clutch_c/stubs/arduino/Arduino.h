@@ -1,4 +1,4 @@
-/* What the sketch takes of Arduino's core, declared: to compile it where no core is. */
+/* The part of Arduino's core that the sketch takes, declared: to compile it where no core is. */
 #ifndef ARDUINO_H
 #define ARDUINO_H
 #include <stdint.h>

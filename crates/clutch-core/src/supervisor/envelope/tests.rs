@@ -60,8 +60,8 @@ impl Shaft {
     }
 }
 
-/// Where each value of a shaft lies between its bounds, from 0 to 1; the volts of each period, and when in the period
-/// they come.
+/// The place of each value of a shaft between its bounds, from 0 to 1; the volts of each period, and the time in it at
+/// which they come.
 #[derive(Clone, Debug)]
 struct Drawn {
     kind: u8,
@@ -155,13 +155,13 @@ fn bare<T: Real>() -> LimitParams<T> {
     LimitParams {
         friction_margin: T::ONE,
         grip_margin: T::ONE,
-        // What single precision and small steps round.
+        // Single precision and small steps round as much.
         edge_counts: T::from_f64(0.01),
         ..LimitParams::default()
     }
 }
 
-/// The volts of a period: `late` of it is the code before still in force. What the envelope says at its end.
+/// The volts of a period: `late` of it is the code before still in force. Gives the envelope's verdict at its end.
 fn follow<T: Real>(
     envelope: &Envelope<T>,
     shaft: &mut Shaft,
@@ -174,7 +174,7 @@ fn follow<T: Real>(
     let mut s = envelope.start(T::from_f64(first));
     let lossy = d.lost != [0; 2];
     let lost = |k: usize, which: usize, one_in: u64| lossy && (d.lost[which] >> (k % 61)) & one_in == one_in;
-    // What the board took of late, and what is on its way to the pad.
+    // The voltage that the board took last, and those on their way to the pad.
     let (mut taken, mut missed, mut way) = (first, 0, std::collections::VecDeque::new());
     way.resize(usize::from(d.delay) + 1, first);
     let (mut seen, mut elapsed) = (see(0, shaft.counts()), 0);
@@ -197,7 +197,7 @@ fn follow<T: Real>(
             continue;
         }
         let counts = see(k + 1, shaft.counts());
-        // What was computed before the sample came changes nothing, be it for what came, for another sample, or missing.
+        // The work done before the sample came changes nothing, be it for the one that came, for another, or missing.
         let mut late = s;
         if k % 3 > 0 {
             envelope.expect(&mut s, lossy == (k % 3 == 1));
@@ -313,7 +313,7 @@ fn a_frozen_encoder_of_a_resting_shaft_is_found_as_soon_as_the_brake_has_been_op
         let count = Encoder::PAPER.radians_per_count::<f64>();
         let p = PlantParams::<f64>::default();
         let must = (2.0 * (1.0 + 2.0 * edge) * count * p.inertia / p.drive_torque).sqrt() / PERIOD;
-        // Of the first sample's velocity nothing is known, so that drag may take all of it.
+        // Nothing is known of the first sample's velocity, so that drag may take all of it.
         let seen = f64::from(seen);
         assert!(seen <= must + 2.0 && seen > 0.6 * must, "edge {edge}: {seen} ms, {must:.2} ms computed");
     }

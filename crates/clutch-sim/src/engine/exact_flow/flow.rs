@@ -170,7 +170,7 @@ impl<V: Lane> Flow<V> {
 
     /// The outside of the layer, where `q` is below [`FRINGE`] of the rest: linear, and what `q` does beside that to first
     /// order, `δ̇ = −G δ − K e^(−l)` with `l` the linear motion. With `dl = φ dt` its integrals are those of `e^(−l)`
-    /// over `φ²`, which is all but constant where `e^(−l)` is not small. Where the mask is true the motion is of this kind,
+    /// over `φ²`, which is all but constant where `e^(−l)` is not small. The motion is of this kind where the mask is true,
     /// and the state is the one after it.
     #[inline(always)]
     fn fringe(&self, at: &State<V>, from: V, slip: V, rest: V) -> (V::Mask, State<V>) {

@@ -1,4 +1,4 @@
-// What the controller takes of ros2_control (Humble to Jazzy), as little as it needs: to compile and drive it where no ROS is.
+// The part of ros2_control (Humble to Jazzy) that the controller takes, as little as it needs: to compile and drive it where no ROS is.
 #pragma once
 #include <cstdint>
 #include <map>
