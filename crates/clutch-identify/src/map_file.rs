@@ -2,7 +2,6 @@
 
 use crate::recording::Recording;
 use crate::ride::{Place, rides};
-use clutch_core::law::LawParams;
 use clutch_sim::Scenario;
 
 /// Friction along the disc where the slowest ride of the recordings went, with T/J and delay as the scenario believes them to
@@ -12,9 +11,9 @@ pub fn map_as_believed(recordings: &[Recording], scenario: &Scenario) -> Vec<Pla
     let spec = scenario.spec();
     let period: f64 = spec.period.seconds();
     // A lag is, for a voltage that follows the ripple, a delay.
-    let delay = match spec.law {
-        LawParams::Glide(p) => f64::from(p.filter.delay) * period + p.filter.lag,
-        _ => f64::from(spec.rig.delay_ticks) * period + spec.rig.actuator_time_constant.unwrap_or(0.0),
+    let delay = match spec.law.filter() {
+        Some(filter) => f64::from(filter.delay) * period + filter.lag,
+        None => f64::from(spec.rig.delay_ticks) * period + spec.rig.actuator_time_constant.unwrap_or(0.0),
     };
     let pull = (spec.model.drive_torque / spec.model.inertia).abs();
     let slowest = recordings.iter().flat_map(rides).min_by(|a, b| a.rate.total_cmp(&b.rate));

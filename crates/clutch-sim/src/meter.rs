@@ -113,11 +113,8 @@ impl Meter {
         let rise = plant.friction().at_rest() / sliding - 1.0;
         // The load that friction carries when the shaft slides: the drive, and the drag of a disc or a gear.
         let carried = plant.params().drive_torque.abs().max(sliding * plant.actuator().normal(0.0));
-        let told = match (law, velocity) {
-            (LawParams::Glide(p), _) => p.filter.delay,
-            (_, VelocityParams::EdgeTimed(p)) => p.delay,
-            _ => 0,
-        };
+        let source = if let VelocityParams::EdgeTimed(filter) = velocity { Some(filter) } else { None };
+        let told = law.filter().or(source).map_or(0, |filter| filter.delay);
         let step = 2.0 * libm::log(FRICTION_RANGE) / (FRICTIONS - 1) as f64;
         Meter {
             plant,

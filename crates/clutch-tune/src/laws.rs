@@ -13,8 +13,21 @@ pub(crate) struct Family {
     /// Name for readers.
     pub(crate) name: &'static str,
     gains: &'static [Gain],
-    /// It has a sampled certificate of its own.
-    pub(crate) certified_alone: bool,
+    /// Keys of the law for what is known of the rig.
+    told: &'static [(&'static str, Told)],
+}
+
+/// Something known of the rig that a law is told.
+#[derive(Clone, Copy)]
+enum Told {
+    /// Friction along the disc: the root mean square of its ripple, as a share.
+    Ripple,
+    /// Time constant of the actuator, where it has one, s.
+    Lag,
+    /// Periods from a sample to its voltage.
+    Delay,
+    /// Voltage that holds the believed shaft while it slides, V.
+    Holding,
 }
 
 /// A gain, and between which ends it is drawn, evenly in ratio.
@@ -34,14 +47,9 @@ const fn volts(key: &'static str, low: f64, high: f64) -> Gain {
     Gain { key, low, high, volts: true }
 }
 
-/// A law with a sampled certificate of its own.
-const fn alone(key: &'static str, name: &'static str, gains: &'static [Gain]) -> Family {
-    Family { key, name, gains, certified_alone: true }
-}
-
-/// A law that is certified in a shell only.
-const fn in_a_shell(key: &'static str, name: &'static str, gains: &'static [Gain]) -> Family {
-    Family { key, name, gains, certified_alone: false }
+/// A law that is told nothing.
+const fn family(key: &'static str, name: &'static str, gains: &'static [Gain]) -> Family {
+    Family { key, name, gains, told: &[] }
 }
 
 /// Key of the smoothing of (5).
@@ -50,27 +58,33 @@ const SMOOTHED: Gain = plain(SMOOTHING, 0.2, 1.0);
 
 /// Every law that is tried. Ends were chosen so that the sets of docs/smooth.md and docs/certified.md lie within.
 pub(crate) const FAMILIES: [Family; 5] = [
-    in_a_shell(
-        "glide",
-        "glide",
-        &[plain("law.glide.kp_1_s", 20.0, 60.0), plain("law.glide.kd_1_s", 80.0, 220.0)],
-    ),
-    in_a_shell(
-        "pid",
-        "PI with feed-forward",
-        &[
+    Family {
+        key: "glide",
+        name: "glide",
+        gains: &[plain("law.glide.kp_1_s", 20.0, 60.0), plain("law.glide.kd_1_s", 80.0, 220.0)],
+        told: &[
+            ("law.glide.filter.ripple_share", Told::Ripple),
+            ("law.glide.filter.lag_s", Told::Lag),
+            ("law.glide.filter.delay_ticks", Told::Delay),
+        ],
+    },
+    Family {
+        key: "pid",
+        name: "PI with feed-forward",
+        gains: &[
             volts("law.pid.kp_v_rad", 150.0, 1600.0),
             volts("law.pid.ki_v_rad_s", 1000.0, 16_000.0),
             volts("law.pid.kd_v_s_rad", 1.5, 16.0),
             SMOOTHED,
         ],
-    ),
-    alone(
+        told: &[("law.pid.bias_v", Told::Holding)],
+    },
+    family(
         "pd",
         "PD",
         &[volts("law.pd.kp_v_rad", 150.0, 2500.0), volts("law.pd.kd_v_s_rad", 1.5, 24.0), SMOOTHED],
     ),
-    alone(
+    family(
         "smc",
         "SMC (31)",
         &[
@@ -81,7 +95,7 @@ pub(crate) const FAMILIES: [Family; 5] = [
             SMOOTHED,
         ],
     ),
-    in_a_shell(
+    family(
         "ctc",
         "CTC",
         &[plain("law.ctc.kp_1_s2", 20.0, 400.0), plain("law.ctc.kd_1_s", 0.2, 3.0), SMOOTHED],
@@ -105,7 +119,30 @@ const BASES: [u32; 5] = [2, 3, 5, 7, 11];
 /// The gains of a candidate, by their keys.
 pub(crate) type Gains = Vec<(String, f64)>;
 
+impl Told {
+    /// Its value, as a key takes it; none where the rig has nothing to be told.
+    fn value(self, base: &Scenario) -> Option<Value> {
+        let rig = &base.params().rig;
+        Some(match self {
+            Told::Ripple => Value::Float(rig.ripple.as_ref().map_or(0.03, |ripple| ripple.rms.max(0.03))),
+            Told::Lag => Value::Float(rig.actuator_time_constant?),
+            Told::Delay => Value::Integer(rig.delay_ticks.min(3).into()),
+            Told::Holding => Value::Float(holding(base)),
+        })
+    }
+}
+
 impl Family {
+    /// The law with its defaults.
+    fn law(&self) -> Option<LawParams> {
+        LawParams::named(self.key)
+    }
+
+    /// True if it has a sampled certificate of its own, without a shell.
+    pub(crate) fn certified_alone(&self) -> bool {
+        self.law().is_some_and(|law| law.sampled().is_some())
+    }
+
     /// Gains of candidate `n`; with `hold` the voltage that holds the sliding shaft, V. Candidate 0 has the scenario's own,
     /// where the law is the scenario's, else the law's defaults.
     pub(crate) fn gains(&self, n: u32, hold: f64) -> Gains {
@@ -131,27 +168,14 @@ impl Family {
             table.remove("velocity");
         }
         table.remove("shell");
-        let mut set: Vec<(String, Value)> = Vec::new();
-        let mut float = |key: &str, value: f64| set.push((key.to_owned(), Value::Float(value)));
-        match self.key {
-            "glide" => {
-                let ripple = base.params().rig.ripple.as_ref().map_or(0.03, |ripple| ripple.rms.max(0.03));
-                float("law.glide.filter.ripple_share", ripple);
-                if let Some(lag) = base.params().rig.actuator_time_constant {
-                    float("law.glide.filter.lag_s", lag);
-                }
-                let delay = base.params().rig.delay_ticks.min(3);
-                set.push(("law.glide.filter.delay_ticks".to_owned(), Value::Integer(delay.into())));
-                table.remove("velocity");
-            }
-            "pid" => {
-                float("law.pid.bias_v", holding(base));
-                float("output.bumpless_time_s", 0.0);
-            }
-            _ => float("output.bumpless_time_s", 0.0),
+        let told = self.told.iter().filter_map(|(key, told)| Some(((*key).to_owned(), told.value(base)?)));
+        let mut set: Vec<(String, Value)> = told.collect();
+        let filters = self.law().is_some_and(|law| law.filter().is_some());
+        if !filters {
+            set.push(("output.bumpless_time_s".to_owned(), Value::Float(0.0)));
         }
         set.extend(gains.iter().map(|(key, value)| (key.clone(), Value::Float(*value))));
-        if self.key != "glide" && !gains.is_empty() {
+        if filters || !gains.is_empty() {
             table.remove("velocity");
         }
         Scenario::from_table(base.name(), table, &set)

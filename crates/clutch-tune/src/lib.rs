@@ -298,7 +298,7 @@ impl Job<'_> {
             shells.open.extend(SHELLS.first().map(|shell| (*shell, why.clone())));
             return Ok(shells);
         }
-        let Some(inner) = FAMILIES.iter().find(|family| !family.certified_alone) else { return Ok(shells) };
+        let Some(inner) = FAMILIES.iter().find(|family| !family.certified_alone()) else { return Ok(shells) };
         let inner = inner.scenario(&self.base, &Gains::new())?;
         let one = |shell: &ShellTried| {
             let within = within(&inner, shell)?;
@@ -324,7 +324,7 @@ impl Job<'_> {
     fn shelled(&self, all: &mut Vec<Finalist>, shells: &Shells) -> Result<(), ScenarioError> {
         let Some((shell, _)) = &shells.proven else { return Ok(()) };
         let mut more = Vec::new();
-        for f in all.iter().filter(|f| !f.family.certified_alone) {
+        for f in all.iter().filter(|f| !f.family.certified_alone()) {
             let Some(scenario) = &f.scenario else { continue };
             let scenario = Some(within(scenario, shell)?);
             let (gains, score) = (f.gains.clone(), Score::default());

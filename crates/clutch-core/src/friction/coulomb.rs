@@ -8,7 +8,7 @@
 //! closed forms: the drop from rest to motion is at once, so that a shaft which breaks away leaps as far as it can. A shaft
 //! that sticks and slips does it more than with Stribeck's curve.
 
-use super::{Exponential, FrictionModel};
+use super::{Exponential, Fall, FrictionModel};
 use crate::params::{Range, Table};
 use crate::{Arithmetic, Each, Interval, ParamError, Real};
 
@@ -79,6 +79,10 @@ impl<T: Arithmetic> FrictionModel<T> for Coulomb<T> {
     fn exponential(&self) -> Option<Exponential<T>> where T: Real {
         let level = self.params.mu_dynamic;
         Some(Exponential { at_rest: level, sliding: level, velocity: T::ONE })
+    }
+
+    fn falls(&self) -> Option<Fall<T>> where T: Real {
+        Some(Fall { velocity: T::ZERO, exponent: T::ONE })
     }
 
     fn check_divisor(&self) -> Result<(), ParamError<T>> where T: Real {

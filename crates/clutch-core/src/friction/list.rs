@@ -97,6 +97,11 @@ macro_rules! frictions {
                     $(Friction::$model(f) => f.exponential(),)+
                 }
             }
+            fn falls(&self) -> Option<Fall<T>> where T: Real {
+                match self {
+                    $(Friction::$model(f) => f.falls(),)+
+                }
+            }
             fn bristles(&self) -> Option<Bristles<T>> where T: Real {
                 match self {
                     $(Friction::$model(f) => f.bristles(),)+

@@ -68,6 +68,14 @@ pub trait FrictionModel<T: Arithmetic>: Sized {
         None
     }
 
+    /// The way in which it falls from rest to a fast shaft, if it is Stribeck's.
+    fn falls(&self) -> Option<Fall<T>>
+    where
+        T: Real,
+    {
+        None
+    }
+
     /// The bristles of a friction that bends before it slides. All else that a friction is asked is of its steady sliding.
     fn bristles(&self) -> Option<Bristles<T>>
     where
@@ -89,6 +97,15 @@ pub trait FrictionModel<T: Arithmetic>: Sized {
     fn coefficient(&self, velocity: T) -> T {
         self.level(velocity) * velocity.sgn()
     }
+}
+
+/// `|μ|(θ̇) = sliding + (at_rest − sliding) exp(−(|θ̇|/velocity)^exponent)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fall<T> {
+    /// Stribeck velocity, rad/s; 0 of a friction that falls at once.
+    pub velocity: T,
+    /// `δ`.
+    pub exponent: T,
 }
 
 /// `|μ|(θ̇) = sliding + (at_rest − sliding) exp(−|θ̇|/velocity)`.

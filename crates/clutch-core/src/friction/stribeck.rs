@@ -4,7 +4,7 @@
 //! μ(θ̇) = [μ_d + (μ_s − μ_d) exp(−|θ̇/θ̇_s|^δ)] sgn(θ̇)          (2)
 //! ```
 
-use super::{Exponential, FrictionModel};
+use super::{Exponential, Fall, FrictionModel};
 use crate::params::{Range, Table};
 use crate::{Arithmetic, Each, Interval, ParamError, Real};
 
@@ -157,6 +157,10 @@ impl<T: Arithmetic> FrictionModel<T> for Stribeck<T> {
     fn exponential(&self) -> Option<Exponential<T>> where T: Real {
         let StribeckParams { mu_static: at_rest, mu_dynamic: sliding, stribeck_velocity: velocity, .. } = self.params;
         self.exponent_is_one.then_some(Exponential { at_rest, sliding, velocity })
+    }
+
+    fn falls(&self) -> Option<Fall<T>> where T: Real {
+        Some(Fall { velocity: self.params.stribeck_velocity, exponent: self.params.stribeck_exponent })
     }
 
     fn check_divisor(&self) -> Result<(), ParamError<T>> where T: Real {

@@ -45,6 +45,12 @@ fn every_model_lies_in_its_envelope_and_ends_at_its_sliding_level() {
                 let curve = e.sliding + (e.at_rest - e.sliding) * (-v.abs() / e.velocity).exp();
                 assert!((curve - level).abs() < 1e-15, "{}", p.name());
             }
+            if let Some(Fall { velocity, exponent }) = f.falls() {
+                // At once: at rest alone it is another.
+                let share = if velocity > 0.0 { (-(v.abs() / velocity).powf(exponent)).exp() } else { 0.0 };
+                let curve = f.sliding() + (f.at_rest() - f.sliding()) * share;
+                assert!((curve - level).abs() < 1e-15, "{}", p.name());
+            }
         }
         assert!(f.check_divisor().is_ok());
         assert_eq!(p.cast::<f32>().cast::<f32>(), p.cast::<f32>());
@@ -54,6 +60,7 @@ fn every_model_lies_in_its_envelope_and_ends_at_its_sliding_level() {
     };
     assert_eq!(named(|f| f.quick().is_some()), ["stribeck", "dahl"]);
     assert_eq!(named(|f| f.exponential().is_some()), ["stribeck", "coulomb"]);
+    assert_eq!(named(|f| f.falls().is_some()), ["stribeck", "coulomb"]);
     assert_eq!(named(|f| f.bristles().is_some()), ["lugre", "dahl", "elasto_plastic", "maxwell"]);
 }
 

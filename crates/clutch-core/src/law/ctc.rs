@@ -9,7 +9,7 @@
 //! rest is about to move, so `μ = μ_s` there. A brake that drags drags in (11), too. With a motor the torque
 //! `J (θ̈_d − τ) + C_d θ̇ − T_u`, and the friction of a shaft that goes the path's way, are what the motor gives.
 
-use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
+use super::{Asked, Beside, Command, ControlLaw, Damping, Listed, Output, OutputParams, OutputState, Surface, Tick};
 use crate::friction::{FrictionModel, Stribeck, StribeckParams};
 use crate::params::{Range, Table};
 use crate::{ActuatorKind, Arithmetic, Each, Micros, ParamError, Plant, PlantParams, Real};
@@ -175,6 +175,10 @@ impl<T: Real> Listed<T> for Ctc<T> {
 
     fn output(&self) -> &Output<T> {
         &self.output
+    }
+
+    fn damping(p: &CtcParams<T>) -> Option<Damping<T>> {
+        Some(Damping::Acceleration(p.outer_gain * p.kd))
     }
 
     fn surface(&self, asked: &Asked<'_, T>) -> Option<Surface<T>> {

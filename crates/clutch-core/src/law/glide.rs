@@ -12,7 +12,7 @@
 //! little voltage costs an overshoot of parts of a count, too much a stick.
 
 use super::micro_step::{MicroStep, MicroStepState, Stepping};
-use super::{Beside, Command, ControlLaw, Listed, Output, OutputState, Seen, Tick};
+use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputState, Seen, Tick};
 use crate::edge_timed::{BesideMap, BesideMapState, EdgeTimedParams};
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
@@ -323,6 +323,14 @@ impl<T: Real> Listed<T> for Glide<T> {
 
     fn output(&self) -> &Output<T> {
         &self.output
+    }
+
+    fn filter(p: &GlideParams<T>) -> Option<&EdgeTimedParams<T>> {
+        Some(&p.filter)
+    }
+
+    fn damping(p: &GlideParams<T>) -> Option<Damping<T>> {
+        Some(Damping::Acceleration(p.kd))
     }
 }
 

@@ -1,13 +1,22 @@
 //! Items that follow from the list of laws.
 
 macro_rules! laws {
-    (@with ($dollar:tt) $($module:ident $law:ident $params:ident $doc:literal;)+) => {
+    (@with ($dollar:tt) $($module:ident $law:ident $params:ident $doc:literal $(in $lanes:ident)?;)+) => {
         /// Calls a macro with the list of laws, for code that has an item for each: `name Law;` and so on.
         #[doc(hidden)]
         #[macro_export]
         macro_rules! each_law {
             ($dollar callback:ident) => {
                 $dollar callback! { $($module $law;)+ }
+            };
+        }
+
+        /// Calls a macro with the laws that run in lanes: `lanes Law;` and so on.
+        #[doc(hidden)]
+        #[macro_export]
+        macro_rules! each_law_in_lanes {
+            ($dollar callback:ident) => {
+                $dollar callback! { $($($lanes $law;)?)+ }
             };
         }
 
@@ -38,6 +47,12 @@ macro_rules! laws {
                 [$(LawParams::$law($params::default())),+]
             }
 
+            /// The law of a name in scenarios, with its defaults.
+            #[must_use]
+            pub fn named(name: &str) -> Option<Self> {
+                Self::all().into_iter().find(|law| <Self as Choice<T>>::name(law) == name)
+            }
+
             /// `true` if the law follows a path; `false` for an open-loop law.
             #[must_use]
             pub fn follows(&self) -> bool {
@@ -51,6 +66,30 @@ macro_rules! laws {
             pub fn title(&self) -> &'static str {
                 match self {
                     $(LawParams::$law(_) => <$law<T> as Listed<T>>::TITLE,)+
+                }
+            }
+
+            /// The law's own filter of the encoder's counts, if it has one.
+            #[must_use]
+            pub fn filter(&self) -> Option<&EdgeTimedParams<T>> {
+                match self {
+                    $(LawParams::$law(p) => <$law<T> as Listed<T>>::filter(p),)+
+                }
+            }
+
+            /// The law's answer to a departure from the speed, if it has one.
+            #[must_use]
+            pub fn damping(&self) -> Option<Damping<T>> {
+                match self {
+                    $(LawParams::$law(p) => <$law<T> as Listed<T>>::damping(p),)+
+                }
+            }
+
+            /// The law as a certificate of the sampled loop takes it, if it is of such a form.
+            #[must_use]
+            pub fn sampled(&self) -> Option<SampledForm<T>> {
+                match self {
+                    $(LawParams::$law(p) => <$law<T> as Listed<T>>::sampled(p),)+
                 }
             }
         }

@@ -2,7 +2,8 @@
 //! observer, glide; open-loop voltages.
 //!
 //! A law is a file of this folder and a line in the list below: its parameters (`Default` = Table 2), what it
-//! remembers, its terms, and what it has, as a sliding surface. Three tiers: parameters → `new`, the only step
+//! remembers, its terms, and what it has, as a sliding surface, a damping or a filter of its own ([`Listed`]). A line that
+//! ends with `in lanes` says that the law runs in the lanes of a vector, too. Three tiers: parameters → `new`, the only step
 //! that can fail → the law, with its state apart. `self` never changes in a tick, so one law serves many runs,
 //! and a clone of the state is a snapshot.
 //!
@@ -18,20 +19,22 @@ mod shell;
 pub use output::{Limit, Output, OutputParams, OutputState};
 pub use shell::{Shell, ShellParams};
 
+use crate::edge_timed::EdgeTimedParams;
+use crate::params::Choice;
 use crate::{Arithmetic, Encoder, FixedCounts, Micros, ParamError, Place, PlantParams, Real};
 
 list::laws! {
-    pd Pd PdParams "Proportional–derivative control (4).";
-    ctc Ctc CtcParams "Computed torque (11).";
-    smc Smc SmcParams "Sliding mode with the boundary layer (31).";
-    smc_sign SmcSign SmcSignParams "Sliding mode with the sign function (29).";
-    pid Pid PidParams "Proportional–integral–derivative control with feed-forward.";
-    super_twisting SuperTwisting SuperTwistingParams "Super-twisting: sliding mode of second order.";
-    smc_integral SmcIntegral SmcIntegralParams "Sliding mode with a boundary layer and an integral in its surface.";
-    dob Dob DobParams "Proportional–derivative control with a disturbance observer.";
+    pd Pd PdParams "Proportional–derivative control (4)." in lanes;
+    ctc Ctc CtcParams "Computed torque (11)." in lanes;
+    smc Smc SmcParams "Sliding mode with the boundary layer (31)." in lanes;
+    smc_sign SmcSign SmcSignParams "Sliding mode with the sign function (29)." in lanes;
+    pid Pid PidParams "Proportional–integral–derivative control with feed-forward." in lanes;
+    super_twisting SuperTwisting SuperTwistingParams "Super-twisting: sliding mode of second order." in lanes;
+    smc_integral SmcIntegral SmcIntegralParams "Sliding mode with a boundary layer and an integral in its surface." in lanes;
+    dob Dob DobParams "Proportional–derivative control with a disturbance observer." in lanes;
     glide Glide GlideParams "Friction inverted by an edge-timed filter: smooth at low rates.";
-    voltage Voltage VoltageParams "Open-loop voltage.";
-    hold Hold HoldParams "Open-loop voltage that holds the resting shaft.";
+    voltage Voltage VoltageParams "Open-loop voltage." in lanes;
+    hold Hold HoldParams "Open-loop voltage that holds the resting shaft." in lanes;
 }
 
 /// Input of a law in each period.
@@ -57,7 +60,8 @@ impl<T: Arithmetic> Tick<T> {
     }
 }
 
-/// Measurements behind a law's input, for a law that wants more than errors.
+/// Measurements behind a law's input, for a law that wants more than errors. In the lanes of a vector there is the voltage
+/// alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seen<T> {
     /// Position of the shaft, unwrapped.
@@ -217,11 +221,72 @@ pub trait Listed<T: Real>: ControlLaw<T> + Sized {
     /// Its output stage.
     fn output(&self) -> &Output<T>;
 
+    /// Its own filter of the encoder's counts, if it has one: the law then takes its velocity from there, and delay and
+    /// lag of the loop are what the filter was told.
+    #[must_use]
+    fn filter(p: &Self::Params) -> Option<&EdgeTimedParams<T>> {
+        let _ = p;
+        None
+    }
+
+    /// Its answer to a departure from the speed, near its path and while nothing saturates; none of a law that switches,
+    /// or follows no path.
+    #[must_use]
+    fn damping(p: &Self::Params) -> Option<Damping<T>> {
+        let _ = p;
+        None
+    }
+
+    /// The law in a form that a certificate of the sampled loop takes; none of a law of another form.
+    #[must_use]
+    fn sampled(p: &Self::Params) -> Option<SampledForm<T>> {
+        let _ = p;
+        None
+    }
+
     /// Its sliding surface, if it has one: what a certificate speaks of.
     fn surface(&self, asked: &Asked<'_, T>) -> Option<Surface<T>> {
         let _ = asked;
         None
     }
+}
+
+/// A law's answer to a departure from the speed, as parameters have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Damping<T> {
+    /// A voltage, V s/rad.
+    Voltage(T),
+    /// An acceleration, of the inertia that the law believes in, 1/s.
+    Acceleration(T),
+}
+
+/// A law without memory whose sampled loop can be certified, in the units of its parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SampledForm<T> {
+    /// (4) with feed-forward: `u = u_0 − (K_p e + K_d ė + K_c sgn θ̇_d + K_v θ̇_d)` with a brake, `u_0 + (…)` with a motor.
+    Linear {
+        /// `K_p`, V/rad.
+        kp: T,
+        /// `K_d`, V s/rad.
+        kd: T,
+        /// `u_0`, V.
+        bias: T,
+        /// `K_c`, V.
+        coulomb: T,
+        /// `K_v`, V s/rad.
+        velocity: T,
+    },
+    /// (31): `u = −{K_p sat(σ/ε) + K_d sat(σ ė/ε) ė}` with a brake, `σ = f e + ė`.
+    Layer {
+        /// `K_p`, V.
+        kp: T,
+        /// `K_d`, V s/rad.
+        kd: T,
+        /// `f`, 1/s.
+        slope: T,
+        /// `ε`, rad/s.
+        boundary: T,
+    },
 }
 
 /// Requirements of a path on a law with a sliding surface.
@@ -269,8 +334,8 @@ impl<T> Surface<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::Choice;
     use crate::{FixedCounts, MotorActuator};
+    use std::vec::Vec;
 
     const OUTPUT: OutputParams<f64> =
         OutputParams { lowest: 0.0, highest: 9.0, on_invalid: 4.0, bumpless_time: 0.0 };
@@ -316,6 +381,7 @@ mod tests {
     fn every_law_has_a_title_its_limits_and_a_busiest_period_that_is_valid() {
         for p in LawParams::<f64>::all() {
             assert!(!p.title().is_empty());
+            assert_eq!(LawParams::named(p.name()), Some(p));
             let law = built(&p);
             assert_eq!(law.output().limits(), (0.0, 9.0), "{}", p.title());
             assert_eq!(law.output().on_invalid(), 4.0);
@@ -326,6 +392,7 @@ mod tests {
             };
         }
         let busiest = each_law!(busiest);
+        assert_eq!(LawParams::<f64>::named("bang_bang"), None);
         assert!(busiest.iter().all(|p| built(p).output().limits() == (0.0, 9.0)));
     }
 
@@ -379,6 +446,82 @@ mod tests {
         let law = Ctc::new(&p, &PlantParams::default(), &OUTPUT, PERIOD).unwrap();
         assert_eq!(law.model().params(), &PlantParams::default());
         assert_eq!(ControlLaw::<f64>::term_names(&law), <Ctc<f64> as ControlLaw<f64>>::TERMS);
+    }
+
+    /// The laws of the list that have something.
+    fn those_with(has: impl Fn(&LawParams<f64>) -> bool) -> Vec<&'static str> {
+        LawParams::<f64>::all().iter().filter(|p| has(p)).map(Choice::<f64>::name).collect()
+    }
+
+    #[test]
+    fn laws_say_what_they_have() {
+        assert_eq!(those_with(|p| p.sampled().is_some()), ["pd", "smc"]);
+        assert_eq!(those_with(|p| p.filter().is_some()), ["glide"]);
+        let damped = ["pd", "ctc", "smc", "pid", "smc_integral", "dob", "glide"];
+        assert_eq!(
+            those_with(|p| p.damping().is_some()),
+            damped,
+            "super-twisting has a layer, by default of 0"
+        );
+        let layer = SuperTwistingParams::<f64> { boundary: 0.04, ..SuperTwistingParams::default() };
+        assert_eq!(LawParams::from(layer).damping(), Some(Damping::Voltage(layer.k1 / 0.2)));
+    }
+
+    #[test]
+    fn a_damping_is_the_slope_of_the_voltage_over_the_error_rate() {
+        // No drag of the shaft, and beyond its Stribeck velocity.
+        let model = PlantParams { viscous_damping: 0.0, ..PlantParams::default() };
+        let grip = 0.15 * 0.14;
+        let layer = SuperTwistingParams { boundary: 0.04, ..SuperTwistingParams::default() };
+        // The answer of an observer comes over the periods, and a filter has its own rate.
+        let at_once = |p: &LawParams<f64>| p.filter().is_none() && !matches!(p, LawParams::Dob(_));
+        let all = LawParams::<f64>::all().into_iter().chain([LawParams::from(layer)]);
+        let mut seen = 0;
+        for p in all.filter(at_once) {
+            let Some(damping) = p.damping() else { continue };
+            let law = Law::new(&p, &Beside::paper(&model, &OUTPUT)).unwrap();
+            let path = Tick { target_velocity: 10.0, ..Tick::default() };
+            let volts = |error_rate| {
+                let tick = Tick { error_rate, error: -1e-4, ..path };
+                law.update(&mut law.start(&Tick { error: -1e-4, ..path }, 3.0), &tick).voltage
+            };
+            let slope = (volts(-1e-5) - volts(1e-5)) / 2e-5;
+            let told = match damping {
+                Damping::Voltage(volts) => volts,
+                Damping::Acceleration(rate) => rate * model.inertia / grip,
+            };
+            assert!((slope / told - 1.0).abs() < 1e-3, "{}: {slope} and {told} V s/rad", p.title());
+            seen += 1;
+        }
+        assert_eq!(seen, 6);
+    }
+
+    #[test]
+    fn a_sampled_form_is_the_law() {
+        let proportional =
+            PidParams { ki: 0.0, bias: 2.2, coulomb: 0.3, velocity: 0.5, ..PidParams::default() };
+        for p in LawParams::<f64>::all().into_iter().chain([proportional.into()]) {
+            let Some(form) = p.sampled() else { continue };
+            let wide = OutputParams { lowest: -1e6, highest: 1e6, on_invalid: 0.0, bumpless_time: 0.0 };
+            let motor = MotorActuator { gain: 0.05, preload: 0.3, load_share: 0.0 };
+            let model = PlantParams { actuator: motor.into(), ..PlantParams::default() };
+            let law = Law::new(&p, &Beside::paper(&model, &wide)).unwrap();
+            for (error, error_rate) in [(1e-4, 1e-3), (-2e-3, 0.05), (3e-3, -0.4), (-1e-5, 2e-2)] {
+                let tick = Tick { error, error_rate, target_velocity: 0.3, ..Tick::default() };
+                let volts = law.update(&mut law.start(&tick, 0.0), &tick).voltage;
+                let sat = |x: f64| x.clamp(-1.0, 1.0);
+                let told = match form {
+                    SampledForm::Linear { kp, kd, bias, coulomb, velocity } => {
+                        bias + kp * error + kd * error_rate + coulomb + velocity * 0.3
+                    }
+                    SampledForm::Layer { kp, kd, slope, boundary } => {
+                        let surface = slope * error + error_rate;
+                        kp * sat(surface / boundary) + kd * sat(surface * error_rate / boundary) * error_rate
+                    }
+                };
+                assert!((volts - told).abs() < 1e-9 * told.abs(), "{}: {volts} and {told} V", p.title());
+            }
+        }
     }
 
     #[test]

@@ -7,7 +7,9 @@
 //! The paper prints (4) without the minus. With `e = θ_d − θ > 0` the shaft lags and the brake
 //! has to let go; as printed it holds harder and the shaft never comes back.
 
-use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
+use super::{
+    Asked, Beside, Command, ControlLaw, Damping, Listed, Output, OutputParams, OutputState, SampledForm, Surface, Tick,
+};
 use crate::params::{Range, Table};
 use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
@@ -85,6 +87,15 @@ impl<T: Real> Listed<T> for Pd<T> {
 
     fn output(&self) -> &Output<T> {
         &self.output
+    }
+
+    fn damping(p: &PdParams<T>) -> Option<Damping<T>> {
+        Some(Damping::Voltage(p.kd))
+    }
+
+    fn sampled(p: &PdParams<T>) -> Option<SampledForm<T>> {
+        let none = T::ZERO;
+        Some(SampledForm::Linear { kp: p.kp, kd: p.kd, bias: none, coulomb: none, velocity: none })
     }
 
     fn surface(&self, _: &Asked<'_, T>) -> Option<Surface<T>> {

@@ -10,7 +10,7 @@
 //! Åström and Hägglund 2006): it holds what the actuator gives and not what it was asked for. A run begins with
 //! the integral at which the law demands the voltage that the brake has, so that the start is bumpless.
 
-use super::{Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Tick};
+use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputParams, OutputState, SampledForm, Tick};
 use crate::params::{Range, Table};
 use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
@@ -200,6 +200,17 @@ impl<T: Real> Listed<T> for Pid<T> {
 
     fn output(&self) -> &Output<T> {
         &self.output
+    }
+
+    fn damping(p: &PidParams<T>) -> Option<Damping<T>> {
+        Some(Damping::Voltage(p.kd))
+    }
+
+    /// Of a law that remembers nothing.
+    fn sampled(p: &PidParams<T>) -> Option<SampledForm<T>> {
+        let PidParams { kp, kd, bias, coulomb, velocity, .. } = *p;
+        let forgets = p.ki == T::ZERO && p.derivative_time == T::ZERO;
+        forgets.then_some(SampledForm::Linear { kp, kd, bias, coulomb, velocity })
     }
 }
 

@@ -7,7 +7,9 @@
 //!
 //! `ε` divides `σ` (rad/s) and `σ ė` (rad²/s²) alike; the paper gives it no unit.
 
-use super::{Asked, Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Surface, Tick};
+use super::{
+    Asked, Beside, Command, ControlLaw, Damping, Listed, Output, OutputParams, OutputState, SampledForm, Surface, Tick,
+};
 use crate::params::{Range, Table};
 use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
@@ -114,6 +116,14 @@ impl<T: Real> Listed<T> for Smc<T> {
 
     fn output(&self) -> &Output<T> {
         &self.output
+    }
+
+    fn damping(p: &SmcParams<T>) -> Option<Damping<T>> {
+        Some(Damping::Voltage(p.kp / p.boundary))
+    }
+
+    fn sampled(p: &SmcParams<T>) -> Option<SampledForm<T>> {
+        Some(SampledForm::Layer { kp: p.kp, kd: p.kd, slope: p.slope, boundary: p.boundary })
     }
 
     fn surface(&self, _: &Asked<'_, T>) -> Option<Surface<T>> {

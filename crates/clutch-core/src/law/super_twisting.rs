@@ -12,9 +12,9 @@
 //! The integral stands still while a limit of the output decides and it would go further that way. A run begins with the
 //! integral at which the law demands the voltage that the brake has.
 
-use super::{Beside, Command, ControlLaw, Listed, Output, OutputParams, OutputState, Tick};
+use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputParams, OutputState, Tick};
 use crate::params::{Range, Table};
-use crate::{Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
     /// Super-twisting, a sliding mode of second order: a root and the integral of a sign, which switches behind an integral and
@@ -66,22 +66,35 @@ impl<T: Real> SuperTwisting<T> {
         let seconds = period.period::<T>()?;
         Ok(SuperTwisting { params: *p, twist: p.k2 * seconds, output: Output::new(output, period)? })
     }
+}
+
+impl<T: Arithmetic> SuperTwisting<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> SuperTwisting<L> {
+        let params = SuperTwistingParams {
+            k1: each(&|law| law.params.k1),
+            k2: each(&|law| law.params.k2),
+            slope: each(&|law| law.params.slope),
+            boundary: each(&|law| law.params.boundary),
+        };
+        let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
+        SuperTwisting { params, twist: each(&|law| law.twist), output }
+    }
 
     /// `σ`, `√|σ| sgn σ` and `sgn σ`, both linear within the layer.
     #[inline]
     fn surface(&self, tick: &Tick<T>) -> (T, T, T) {
         let surface = self.params.slope * tick.error + tick.error_rate;
         let size = surface.abs().max(self.params.boundary);
-        if size > T::ZERO {
-            (surface, surface / size.sqrt(), surface / size)
-        } else {
-            // 0, or no number.
-            (surface, surface, surface)
-        }
+        let some = T::ZERO.less(size);
+        // Else 0, or no number.
+        let over = |size: T| T::select(some, surface / size, surface);
+        (surface, over(size.sqrt()), over(size))
     }
 }
 
-impl<T: Real> ControlLaw<T> for SuperTwisting<T> {
+impl<T: Arithmetic> ControlLaw<T> for SuperTwisting<T> {
     type State = SuperTwistingState<T>;
     type Terms = [T; 3];
     const TERMS: &'static [&'static str] = &["surface_rad_s", "root_v", "integral_v"];
@@ -90,7 +103,7 @@ impl<T: Real> ControlLaw<T> for SuperTwisting<T> {
         let (_, root, _) = self.surface(tick);
         let root = -(self.params.k1 * root);
         let integral = applied - root;
-        let integral = if integral.is_finite() { integral } else { T::ZERO };
+        let integral = T::select(integral.is_finite(), integral, T::ZERO);
         SuperTwistingState { integral, output: self.output.start(root + integral, applied) }
     }
 
@@ -103,10 +116,10 @@ impl<T: Real> ControlLaw<T> for SuperTwisting<T> {
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
         let step = -(self.twist * sign);
         let (lowest, highest) = self.output.limits();
-        let further = (demand >= highest && step > T::ZERO) || (demand <= lowest && step < T::ZERO);
-        if !further && step.is_finite() {
-            state.integral = (integral + step).limit(lowest, highest);
-        }
+        let further = (highest.less_or_equal(demand) & T::ZERO.less(step))
+            | (demand.less_or_equal(lowest) & step.less(T::ZERO));
+        let next = (integral + step).max(lowest).min(highest);
+        state.integral = T::select(!further & step.is_finite(), next, integral);
         Command { voltage, limit, terms: [surface, root, integral] }
     }
 }
@@ -124,6 +137,11 @@ impl<T: Real> Listed<T> for SuperTwisting<T> {
 
     fn output(&self) -> &Output<T> {
         &self.output
+    }
+
+    fn damping(p: &SuperTwistingParams<T>) -> Option<Damping<T>> {
+        // The root is as steep as you like without a layer.
+        (p.boundary > T::ZERO).then(|| Damping::Voltage(p.k1 / p.boundary.sqrt()))
     }
 }
 

@@ -3,6 +3,7 @@
 //! A trouble is where × what × from when × how long × how often. The tables below say which there are.
 
 use crate::faults::{Channel, Direction, Fault, FaultKind, Forgery, Lie, StuckAt};
+use clutch_core::law::LawParams;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -249,6 +250,16 @@ fn pick<T: Copy>(rng: &mut Pcg64, from: &[T], otherwise: T) -> T {
     from.choose(rng).copied().unwrap_or(otherwise)
 }
 
+/// True of a law that follows a path.
+pub(super) fn follows(law: &str) -> bool {
+    LawParams::<f64>::named(law).is_some_and(|law| law.follows())
+}
+
+/// True of a law with a filter of its own, which asks no observer.
+fn filters(law: &str) -> bool {
+    LawParams::<f64>::named(law).is_some_and(|law| law.filter().is_some())
+}
+
 fn setting(rng: &mut Pcg64) -> Setting {
     let rig = [RigName::Paper, RigName::Paper, RigName::Paper, RigName::Bench, RigName::Motor];
     let rig = pick(rng, &rig, RigName::Paper);
@@ -258,14 +269,15 @@ fn setting(rng: &mut Pcg64) -> Setting {
         RigName::Bench => &["pd", "ctc", "smc", "glide"],
     };
     let law = pick(rng, laws, "pd");
+    let follows = follows(law);
     let speed = match rig {
         RigName::Motor => pick(rng, &[1.0, 2.0, 4.0], 2.0),
-        _ if law == "hold" => 0.2,
+        _ if !follows => 0.2,
         _ => pick(rng, &[2.0, 5.0, 10.0, 20.0, 20.0, 28.0, 40.0], 20.0),
     };
     let path = match rng.random_range(0..4) {
-        0 if law != "hold" => PathKind::MinimumJerk(speed),
-        1 if law != "hold" => PathKind::Sine(speed),
+        0 if follows => PathKind::MinimumJerk(speed),
+        1 if follows => PathKind::Sine(speed),
         _ => PathKind::Ramp(speed),
     };
     let weakest = if rig == RigName::Bench { 6.7 } else { 4.5 };
@@ -274,7 +286,7 @@ fn setting(rng: &mut Pcg64) -> Setting {
         _ if rig == RigName::Motor => Safe::Release,
         0 => Safe::Ramp(pick(rng, &[200.0, 500.0, 2000.0], 500.0), volts),
         // A board lets go from power-up on, and to hold does not catch a shaft.
-        1 if law != "hold" => Safe::Release,
+        1 if follows => Safe::Release,
         2 => Safe::HoldThenRelease(volts, rng.random_range(0.3..0.6)),
         _ => Safe::Hold(volts),
     };
@@ -290,8 +302,7 @@ fn setting(rng: &mut Pcg64) -> Setting {
         path,
         wide: rng.random_bool(0.25),
         safe,
-        // Glide has a filter of its own.
-        observer: rig != RigName::Motor && law != "glide" && rng.random_bool(0.2),
+        observer: rig != RigName::Motor && !filters(law) && rng.random_bool(0.2),
         single: rng.random_bool(0.5),
         delay,
         latency_ns: rng.random_range(20_000..300_000),

@@ -3,7 +3,7 @@
 //! It shares nothing with the supervisor: the rig's physics are a few lines of its own, and the times are the promises of
 //! `docs/safety.md`.
 
-use super::grammar::{Draw, PathKind, RigName, Safe, Setting, Trouble, What};
+use super::grammar::{Draw, PathKind, RigName, Safe, Setting, Trouble, What, follows};
 use crate::faults::{Direction, FaultKind, Forgery, Lie, StuckAt};
 use crate::virtual_time::VirtualReport;
 use clutch_core::supervisor::Cause;
@@ -90,7 +90,7 @@ impl Promise {
             What::Slow(answer) if answer < 0.0005 => goes_on,
             What::Slow(_) => ends(0.045, &[Cause::Deadline]),
             What::ControllerDies => ends(watchdog + s.latency_ns as f64 / 1e9 + 1e-5, &[]),
-            What::LawNotFinite if s.law == "hold" => base,
+            What::LawNotFinite if !follows(s.law) => base,
             What::LawNotFinite => ends(3.0 * PERIOD, &[Cause::NotFinite]),
             // The error is that of the broken path.
             What::TargetNotFinite | What::TargetHuge => {
@@ -165,7 +165,7 @@ fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promis
     let (stays, always) = (t.periods.is_none() && t.often >= 1.0, t.often >= 1.0);
     // A shaft that a brake controls, and that moves.
     let waits = s.law == "pid" && (s.path.top_deg_s() < 10.0 || t.at == 0.0);
-    let moves = s.rig != RigName::Motor && s.law != "hold" && !waits;
+    let moves = s.rig != RigName::Motor && follows(s.law) && !waits;
     // A law lets go so little of a shaft that is slow, computed torque most of all, that friction of the bounds might still
     // hold it.
     let ctc = s.law == "ctc";

@@ -10,7 +10,7 @@ use crate::engine::exact_flow::{Bed, Flow, PIECE_LIMIT, Piece, Pushed, State};
 use crate::engine::{Event, EventKind, Motion, Shaft};
 use crate::metrics::{Detected, Metrics, MetricsBuilder, Sampled, Sticks};
 use crate::run::REPORT_EVERY;
-use clutch_core::law::{ControlLaw, Ctc, Hold, Law, Pd, Pid, Smc, SmcSign, Tick, Voltage};
+use clutch_core::law::{self, ControlLaw, Law, Seen, Tick};
 use clutch_core::reference::Reference;
 use clutch_core::{FixedCounts, Plant, SmoothedDerivative, StickSlipParams, Target};
 
@@ -20,11 +20,11 @@ const FARTHEST: f64 = (1 << 30) as f64;
 const FIXED: f64 = (1 << FixedCounts::FRACTION_BITS) as f64;
 
 macro_rules! laws {
-    ($($law:ident)+) => {
+    ($(lanes $law:ident;)+) => {
         /// A law of several runs, and its memory.
         #[derive(Clone)]
         enum LawInLanes<V: Lane> {
-            $($law($law<V>, <$law<V> as ControlLaw<V>>::State),)+
+            $($law(law::$law<V>, <law::$law<V> as ControlLaw<V>>::State),)+
         }
 
         impl<V: Lane> LawInLanes<V> {
@@ -33,8 +33,9 @@ macro_rules! laws {
                 match laws.first()? {
                     $(Law::$law(_) => {
                         let own = |law: &&Law<f64>| if let Law::$law(law) = law { Some(*law) } else { None };
-                        let own: Vec<$law<f64>> = laws.iter().map(own).collect::<Option<_>>()?;
-                        let law: Option<$law<V>> = $law::in_lanes(&|get| V::of(|i| get(&own[i]))).into();
+                        let own: Vec<law::$law<f64>> = laws.iter().map(own).collect::<Option<_>>()?;
+                        let law: Option<law::$law<V>> =
+                            law::$law::in_lanes(&|get| V::of(|i| get(&own[i]))).into();
                         Some(LawInLanes::$law(law?, Default::default()))
                     })+
                     _ => None,
@@ -48,12 +49,17 @@ macro_rules! laws {
                 }
             }
 
+            /// A period, with so many volts on the actuator since the last one.
             #[inline(always)]
-            fn update(&mut self, tick: &Tick<V>) -> V {
+            fn update(&mut self, tick: &Tick<V>, applied: V) -> V {
+                let seen = Seen { applied, ..Seen::default() };
                 match self {
                     $(LawInLanes::$law(law, state) => V::apart(
                         #[inline(always)]
-                        || law.update(state, tick).voltage,
+                        || {
+                            law.sees(state, &seen);
+                            law.update(state, tick).voltage
+                        },
                     ),)+
                 }
             }
@@ -65,7 +71,7 @@ macro_rules! laws {
         }
     };
 }
-laws! { Pd Ctc Smc SmcSign Pid Voltage Hold }
+clutch_core::each_law_in_lanes!(laws);
 
 /// The paths of a chunk's runs.
 enum Paths<'a> {
@@ -105,6 +111,8 @@ struct Chunk<'a, V: Lane> {
     velocity: V,
     /// Way in which the shaft moves: 1, −1, or 0 while it is stuck.
     sign: V,
+    /// Voltage since the last sample, as the law is told.
+    applied: V,
     /// Voltages on their way to the actuator.
     line: Vec<V>,
     arriving: V,
@@ -220,6 +228,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
             position: of(&|r| r.prepared.moving.shaft().position),
             velocity: of(&|r| r.prepared.moving.shaft().velocity),
             sign: of(&|r| r.prepared.moving.shaft().motion.sign()),
+            applied: volts,
             line: vec![volts; common.delay],
             arriving: volts,
             sampled: Sampled::new(common.period, common.settle),
@@ -298,14 +307,12 @@ impl<'a, V: Lane> Chunk<'a, V> {
         self.error = error;
         self.rate = self.filter.smooth(self.rate, difference);
         let tick = self.tick(&targets, self.rate);
-        let demand = self.law.update(&tick);
-        let commanded = if common.whole_codes {
-            let [lowest, step, per_volt, top] = self.dac;
-            let code = ((demand - lowest) * per_volt + V::splat(0.5)).floor();
-            lowest + step * code.max(V::ZERO).min(top)
-        } else {
-            demand
-        };
+        let demand = self.law.update(&tick, self.applied);
+        let [lowest, step, per_volt, top] = self.dac;
+        let code = ((demand - lowest) * per_volt + V::splat(0.5)).floor();
+        // A law is told of the converter's voltage, though a rig's may round nothing.
+        self.applied = lowest + step * code.max(V::ZERO).min(top);
+        let commanded = if common.whole_codes { self.applied } else { demand };
         let target = targets.position * V::splat(1.0 / FIXED) * self.radians_per_count;
         self.sampled.sample(time, target - self.position, self.velocity, commanded);
         let rests = if k == 0 { V::none() } else { V::same(counts, self.counts) };

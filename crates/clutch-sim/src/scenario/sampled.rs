@@ -5,11 +5,11 @@ use crate::rig::Rig;
 use crate::ripple::Ripple;
 use crate::run::Start;
 use clutch_certificate::{Gains, Setup};
-use clutch_core::friction::{FrictionModel, FrictionParams};
-use clutch_core::law::LawParams;
+use clutch_core::friction::FrictionModel;
+use clutch_core::law::{LawParams, SampledForm};
 use clutch_core::params::Choice;
 use clutch_core::reference::ReferenceParams;
-use clutch_core::{ActuatorKind, Bounds, Plant, Tolerances, VelocityParams};
+use clutch_core::{ActuatorKind, Bounds, Dac, Interval, Plant, Tolerances, VelocityParams};
 
 /// Torque noise of the rig is normal: a certificate covers this many times its root mean square.
 pub const NOISE_ROOTS: f64 = 4.0;
@@ -33,13 +33,19 @@ fn not(key: &'static str, what: impl Into<String>, covered: &'static str) -> Not
     NotCovered { key, what: what.into(), covered }
 }
 
-/// Gains of a law that has a sampled certificate of its own.
-pub(super) fn gains(law: &LawParams) -> Option<Gains> {
-    match *law {
-        LawParams::Pd(g) => Some(Gains::Pd { kp: g.kp, kd: g.kd, forward: 0.0 }),
-        LawParams::Smc(g) => Some(Gains::Smc { kp: g.kp, kd: g.kd, slope: g.slope, boundary: g.boundary }),
-        _ => None,
-    }
+/// Gains, on a ramp forwards, of a law that has a sampled certificate of its own.
+pub(super) fn gains(law: &LawParams, rate: f64) -> Option<Gains> {
+    Some(match law.sampled()? {
+        SampledForm::Linear { kp, kd, bias, coulomb, velocity } => {
+            Gains::Pd { kp, kd, forward: bias - (coulomb + velocity * rate) }
+        }
+        SampledForm::Layer { kp, kd, slope, boundary } => Gains::Smc { kp, kd, slope, boundary },
+    })
+}
+
+/// Lower and upper end.
+fn ends(i: &Interval) -> [f64; 2] {
+    [i.low, i.high]
 }
 
 impl Scenario {
@@ -69,13 +75,63 @@ impl Scenario {
     /// A part of the scenario that the sampled-data certificate does not cover, by its key.
     pub fn sampled_setup(&self, bounds: &Bounds) -> Result<Setup, NotCovered> {
         let p = &self.params;
-        let shell = p.shell;
-        let law = if shell.boundary > 0.0 {
-            Gains::Shell { slope: shell.slope, boundary: shell.boundary }
-        } else {
-            gains(&p.law)
-                .ok_or_else(|| not("law", p.law.title(), "PD (4), SMC (31), and any law in a [shell]"))?
-        };
+        let law = self.law_of_the_loop()?;
+        let (smoothing, rate) = self.smoothing_and_rate()?;
+        let (plant, stribeck) = self.shaft_of_the_loop(bounds)?;
+        self.check_sensor_and_delay()?;
+        let rig = Rig::new(&p.rig, p.run.seed)
+            .map_err(|_| not("rig", "a rig out of range", "rigs that can be built"))?;
+        let torque_noise = self.torque_noise(bounds)?;
+        let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+        let (_, ripple) = p.bounds.friction_shares(swing);
+        let friction = plant.friction();
+        Ok(Setup {
+            period_s: p.sampling.sampling.period.seconds(),
+            counts_per_rev: p.rig.encoder.sensor.counts_per_rev,
+            inertia: ends(&bounds.inertia),
+            drive_torque: ends(&bounds.drive_torque),
+            viscous_damping: ends(&bounds.viscous_damping),
+            brake_gain: ends(&bounds.brake_gain),
+            sliding: ends(&p.bounds.mean_of(&bounds.friction_sliding)),
+            at_rest: ends(&p.bounds.mean_of(&bounds.friction_at_rest)),
+            rest_not_below_sliding: friction.at_rest() >= friction.sliding(),
+            stribeck,
+            ripple,
+            torque_noise,
+            delay_ticks: p.rig.delay_ticks,
+            converter_step: if p.rig.dac.quantised { rig.dac.step() } else { 0.0 },
+            volts: self.volts_given(&rig.dac),
+            rate,
+            smoothing,
+            law,
+            from_rest: p.run.start == Start::Rest,
+            start_volts: self.start_volts(bounds, rate, ripple),
+        })
+    }
+
+    /// The gains of the law, or the shell within which it stands.
+    fn law_of_the_loop(&self) -> Result<Gains, NotCovered> {
+        let (law, shell) = (&self.params.law, self.params.shell);
+        if shell.boundary > 0.0 {
+            return Ok(Gains::Shell { slope: shell.slope, boundary: shell.boundary });
+        }
+        // Other paths are refused, whatever the law gives on them.
+        let rate = if let ReferenceParams::Ramp(ramp) = self.params.reference { ramp.rate } else { 0.0 };
+        let covered = "PD (4), PID without integral and filter, SMC (31), and any law in a [shell]";
+        let gains = gains(law, rate).ok_or_else(|| not("law", law.title(), covered))?;
+        // The law takes back what a limit cuts off such a voltage.
+        let output = &self.params.output;
+        match gains {
+            Gains::Pd { forward, .. } if !(output.lowest..=output.highest).contains(&forward) => {
+                Err(not("law.pid", "a feed-forward beyond the output's limits", "one within them"))
+            }
+            gains => Ok(gains),
+        }
+    }
+
+    /// Smoothing of the difference (5), and rate of the ramp, rad/s.
+    fn smoothing_and_rate(&self) -> Result<(f64, f64), NotCovered> {
+        let p = &self.params;
         let VelocityParams::SmoothedDerivative(filter) = p.velocity else {
             let source = Choice::<f64>::name(&p.velocity);
             return Err(not("velocity", source, "smoothed_derivative, the difference (5)"));
@@ -86,6 +142,11 @@ impl Scenario {
         if ramp.rate <= 0.0 {
             return Err(not("reference.ramp.rate_deg_s", "a path that rests", "ramps forwards"));
         }
+        Ok((filter.smoothing, ramp.rate))
+    }
+
+    /// The believed shaft, and velocity (rad/s) and exponent of Stribeck's with which its friction falls.
+    fn shaft_of_the_loop(&self, bounds: &Bounds) -> Result<(Plant<f64>, [f64; 2]), NotCovered> {
         if bounds.actuator != ActuatorKind::Brake {
             return Err(not("model.actuator", "an actuator that drives", "brakes"));
         }
@@ -96,11 +157,18 @@ impl Scenario {
                 "brakes without preload",
             ));
         }
-        let stribeck = match p.model.friction {
-            FrictionParams::Stribeck(f) => [f.stribeck_velocity, f.stribeck_exponent],
-            FrictionParams::Coulomb(_) => [AT_ONCE, 1.0],
-            _ => return Err(not("model.friction", "bristles", "Stribeck's and Coulomb's friction")),
+        let plant = Plant::new(&self.params.model)
+            .map_err(|_| not("model", "a plant out of range", "plants that can be built"))?;
+        let Some(fall) = plant.friction().falls() else {
+            return Err(not("model.friction", "bristles", "Stribeck's and Coulomb's friction"));
         };
+        let velocity = if fall.velocity > 0.0 { fall.velocity } else { AT_ONCE };
+        Ok((plant, [velocity, fall.exponent]))
+    }
+
+    /// Refuses a lag, a sensor without steps, a bumpless start and a long delay.
+    fn check_sensor_and_delay(&self) -> Result<(), NotCovered> {
+        let p = &self.params;
         if p.rig.actuator_time_constant.is_some() {
             return Err(not(
                 "rig.actuator_time_constant_s",
@@ -112,7 +180,7 @@ impl Scenario {
             return Err(not("rig.encoder.quantised", "an ideal sensor", "encoders that give whole counts"));
         }
         // A shell asks nothing of the law's beginning.
-        if p.output.bumpless_time > 0.0 && shell.boundary <= 0.0 {
+        if p.output.bumpless_time > 0.0 && p.shell.boundary <= 0.0 {
             return Err(not(
                 "output.bumpless_time_s",
                 "a bumpless start",
@@ -126,9 +194,12 @@ impl Scenario {
                 "up to 3 ticks of delay",
             ));
         }
-        let rig = Rig::new(&p.rig, p.run.seed)
-            .map_err(|_| not("rig", "a rig out of range", "rigs that can be built"))?;
-        let noise = NOISE_ROOTS * p.rig.torque_noise;
+        Ok(())
+    }
+
+    /// Largest torque of the noise, N m.
+    fn torque_noise(&self, bounds: &Bounds) -> Result<f64, NotCovered> {
+        let noise = NOISE_ROOTS * self.params.rig.torque_noise;
         if noise >= bounds.drive_torque.low {
             return Err(not(
                 "rig.torque_noise_nm",
@@ -138,50 +209,32 @@ impl Scenario {
                 "noise below the weakest drive",
             ));
         }
-        let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
-        let (_, ripple) = p.bounds.friction_shares(swing);
-        let ends = |i: &clutch_core::Interval| [i.low, i.high];
-        let dac = &rig.dac;
+        Ok(noise)
+    }
+
+    /// Lowest and highest voltage that output and converter give, V.
+    fn volts_given(&self, dac: &Dac<f64>) -> [f64; 2] {
+        let p = &self.params;
         // A converter that rounds nothing gives all that it is asked for.
         let (bottom, top) = if p.rig.dac.quantised {
             (dac.volts(dac.code(f64::MIN)), dac.volts(dac.code(f64::MAX)))
         } else {
             (f64::NEG_INFINITY, f64::INFINITY)
         };
-        let volts = [p.output.lowest.max(bottom), p.output.highest.min(top)];
+        [p.output.lowest.max(bottom), p.output.highest.min(top)]
+    }
+
+    /// Voltages between which the brake's is before the first tick, at a rate (rad/s) and with so much ripple, V: as
+    /// [`Rig::resting_voltage`] and [`Rig::sliding_voltage`], for each plant of the box.
+    fn start_volts(&self, bounds: &Bounds, rate: f64, ripple: f64) -> [f64; 2] {
+        let p = &self.params;
         // Before the first tick the brake has what the rig gives it, beyond the output's limits, too.
         let reached = p.rig.dac.converter.highest;
-        let plant = Plant::new(&p.model)
-            .map_err(|_| not("model", "a plant out of range", "plants that can be built"))?;
-        let friction = plant.friction();
-        let from_rest = p.run.start == Start::Rest;
         let (torque, gain) = (ends(&bounds.drive_torque), ends(&bounds.brake_gain));
-        let drag = bounds.viscous_damping.high * ramp.rate;
+        let drag = bounds.viscous_damping.high * rate;
         let least = (torque[0] - drag).max(0.0) / (bounds.friction.high * gain[1]);
         let most = torque[1] / (bounds.friction.low * gain[0]);
-        // As [`Rig::resting_voltage`] and [`Rig::sliding_voltage`], for each plant of the box.
-        let most = if from_rest { 1.25 * most / (1.0 - ripple) } else { most };
-        Ok(Setup {
-            period_s: p.sampling.sampling.period.seconds(),
-            counts_per_rev: p.rig.encoder.sensor.counts_per_rev,
-            inertia: ends(&bounds.inertia),
-            drive_torque: torque,
-            viscous_damping: ends(&bounds.viscous_damping),
-            brake_gain: gain,
-            sliding: ends(&p.bounds.mean_of(&bounds.friction_sliding)),
-            at_rest: ends(&p.bounds.mean_of(&bounds.friction_at_rest)),
-            rest_not_below_sliding: friction.at_rest() >= friction.sliding(),
-            stribeck,
-            ripple,
-            torque_noise: noise,
-            delay_ticks: p.rig.delay_ticks,
-            converter_step: if p.rig.dac.quantised { dac.step() } else { 0.0 },
-            volts,
-            rate: ramp.rate,
-            smoothing: filter.smoothing,
-            law,
-            from_rest,
-            start_volts: [least.min(reached), most.min(reached)],
-        })
+        let most = if p.run.start == Start::Rest { 1.25 * most / (1.0 - ripple) } else { most };
+        [least.min(reached), most.min(reached)]
     }
 }

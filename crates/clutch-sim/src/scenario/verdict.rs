@@ -234,8 +234,9 @@ impl Scenario {
     pub fn sampled(&self, bounds: &Bounds) -> Sampled {
         let setup = self.sampled_setup(bounds);
         // A shell has no gains: the law within has, where it is one of these.
-        let law = gains(&self.params.law);
-        let within = |s: &Setup| law.and_then(|law| stability(&Setup { law, ..s.clone() }));
+        let within = |s: &Setup| {
+            gains(&self.params.law, s.rate).and_then(|law| stability(&Setup { law, ..s.clone() }))
+        };
         let stability = setup.as_ref().ok().and_then(within);
         Sampled { setup, stability }
     }

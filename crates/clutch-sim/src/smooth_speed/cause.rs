@@ -8,7 +8,7 @@ use crate::ripple::Ripple;
 use crate::scenario::{Scenario, ScenarioError};
 use clutch_certificate::{Setup, stability};
 use clutch_core::friction::FrictionModel;
-use clutch_core::law::LawParams;
+use clutch_core::law::Damping;
 use clutch_core::{ActuatorKind, VelocityParams};
 use serde::Serialize;
 
@@ -90,8 +90,7 @@ impl Evidence {
             falls.map(|(steepest, velocity)| (steepest / inertia).max(0.0) * libm::exp(-rate / velocity));
         let count = p.rig.encoder.quantised.then(|| rig.encoder.radians_per_count::<f64>());
         let edge_time = count.map(|count| count / rate);
-        let differs = matches!(p.velocity, VelocityParams::SmoothedDerivative(_))
-            && !matches!(p.law, LawParams::Glide(_));
+        let differs = matches!(p.velocity, VelocityParams::SmoothedDerivative(_)) && p.law.filter().is_none();
         let jolt = count.zip(damping).filter(|_| differs).map(|(count, damping)| damping * count / inertia);
         let between = falling.zip(edge_time).map(|(falling, time)| (falling + along) * time);
         let holds = |cause: &Cause| match cause {
@@ -124,20 +123,8 @@ fn damping(scenario: &Scenario, rig: &Rig) -> Option<f64> {
         ActuatorKind::Motor => actuator.motor_gain(),
         ActuatorKind::Brake | ActuatorKind::Both => plant.friction().sliding() * actuator.brake_gain(),
     };
-    match p.law {
-        LawParams::Pd(g) => Some(g.kd * per_volt),
-        LawParams::Pid(g) => Some(g.kd * per_volt),
-        LawParams::Smc(g) => Some(g.kp / g.boundary * per_volt),
-        LawParams::SmcIntegral(g) => Some(g.kp / g.boundary * per_volt),
-        // The root is as steep as you like without a layer.
-        LawParams::SuperTwisting(g) if g.boundary > 0.0 => Some(g.k1 / libm::sqrt(g.boundary) * per_volt),
-        // These ask for an acceleration, of the inertia that they believe in.
-        LawParams::Ctc(g) => Some(g.outer_gain * g.kd * p.model.inertia),
-        // The observer's bandwidth damps, too: together they are PID's.
-        LawParams::Dob(g) => Some((g.kd + g.bandwidth) * p.model.inertia),
-        LawParams::Glide(g) => Some(g.kd * p.model.inertia),
-        LawParams::SuperTwisting(_) | LawParams::SmcSign(_) | LawParams::Voltage(_) | LawParams::Hold(_) => {
-            None
-        }
-    }
+    Some(match p.law.damping()? {
+        Damping::Voltage(volts) => volts * per_volt,
+        Damping::Acceleration(rate) => rate * p.model.inertia,
+    })
 }
