@@ -64,6 +64,21 @@ fn no_plant_of_a_box_breaks_its_certified_bound() {
                 ("bounds.friction_percent", "5.0"),
             ],
         ),
+        // PD that is fed forward what a sliding shaft of the model needs.
+        (
+            "pid_2",
+            &[
+                ("rig.base", "paper"),
+                ("law.pid.kp_v_rad", "1660.0"),
+                ("law.pid.ki_v_rad_s", "0.0"),
+                ("law.pid.kd_v_s_rad", "12.9"),
+                ("law.pid.bias_v", "2.2423"),
+                ("law.pid.velocity_v_s_rad", "0.0476"),
+                ("velocity.smoothed_derivative.smoothing", "0.712"),
+                ("rig.delay_ticks", "1"),
+                ("bounds.friction_percent", "5.0"),
+            ],
+        ),
         (
             "smc_2",
             &[
@@ -143,6 +158,9 @@ fn what_the_sampled_certificate_does_not_cover_is_said_by_name() {
         let why = scenario.sampled_setup(&scenario.plan().unwrap().bounds).unwrap_err().to_string();
         assert!(why.contains(key), "{name}: {why}");
     }
+    let fed = scenario("pid_2", &[("law.pid.ki_v_rad_s", "0.0"), ("law.pid.bias_v", "20.0")]);
+    let why = fed.sampled_setup(&fed.plan().unwrap().bounds).unwrap_err().to_string();
+    assert!(why.contains("a feed-forward beyond the output's limits (law.pid)"), "{why}");
     let delayed = scenario("pd_2", &[("rig.delay_ticks", "4")]);
     assert!(
         delayed.sampled_setup(&delayed.plan().unwrap().bounds).unwrap_err().to_string().contains("4 ticks")
