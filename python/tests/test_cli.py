@@ -4,6 +4,7 @@ import csv
 import html.parser
 import json
 import struct
+import time
 import xml.etree.ElementTree as ElementTree
 import zlib
 
@@ -169,6 +170,23 @@ def test_table_3_is_the_reduction_that_the_papers_example_means(reproduced):
 def test_figures_are_valid_files(reproduced, figure):
     check_svg(reproduced[0] / f"{figure}.svg")
     check_png(reproduced[0] / f"{figure}.png")
+
+
+def test_the_first_figure_of_the_report_is_on_a_phones_first_screen(reproduced, page):
+    width, height = 390, 844
+    for scheme in ("light", "dark"):
+        page.size(width, height, scheme)
+        page.call("Page.navigate", url="about:blank")
+        page.call("Page.navigate", url=(reproduced[0] / "report.html").as_uri())
+        for _ in range(500):
+            if page.run("document.readyState == 'complete' && document.querySelector('figure svg') != null"):
+                break
+            time.sleep(0.02)
+        figure = page.run("document.querySelector('figure svg').getBoundingClientRect().toJSON()")
+        # Enough of it that one sees what it is.
+        assert figure["top"] < height - 100 and figure["height"] > 200, (scheme, figure)
+        assert figure["left"] >= 0 and figure["right"] <= width
+        assert page.run("document.documentElement.scrollWidth") <= width
 
 
 def test_the_report_is_one_page_that_needs_no_network(reproduced):

@@ -55,6 +55,18 @@ def test_the_commands_of_a_page_run_and_print_what_the_page_says(page, clutch, t
             rest = rest.split(expected, 1)[1]
 
 
+# A picture that leads to a page: its words, its file, the page.
+LINKED = re.compile(r"\[!\[([^\]]+)\]\(([^)]+)\)\]\(([^)#]+)(?:#[^)]*)?\)")
+
+
+def test_the_start_page_shows_pictures_that_lead_to_their_pages():
+    found = LINKED.findall((DOCS / "index.md").read_text(encoding="utf-8"))
+    assert len({picture for _, picture, _ in found}) >= 6
+    for words, picture, page in found:
+        assert (DOCS / picture).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n", picture
+        assert (DOCS / page).is_file() and len(words.split()) > 4, page
+
+
 def test_each_reader_of_the_start_page_has_a_page():
     start = (DOCS / "index.md").read_text(encoding="utf-8")
     assert len(PAGES) == 5

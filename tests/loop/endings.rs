@@ -121,9 +121,10 @@ fn a_drift_is_told_on_standard_error_and_ends_the_run_on_request() {
         "DRIFT at ",
         "stopped as friction over load left the bounds; the board is in its safe state",
     ]);
-    // At the time in one line, in the summary broken between words.
-    let told = done.err.lines().find(|line| line.starts_with("DRIFT at ")).expect("the line").to_owned();
-    let told = told.as_str();
+    // The same at the time and in the summary, in lines of a terminal.
+    assert!(done.err.lines().all(|line| line.chars().count() <= 80), "{}", done.err);
+    let told = done.err.find("DRIFT at ").map(|at| done.err[at..].to_owned()).expect("the line");
+    let told = told.split_inclusive("the bound of 1").next().expect("its end");
     let _ = done.prints(&[told]);
     let _ = run(&["replay", log]).expect(0).prints(&["identical over ", told]);
     let wide = ["replay", log, "--set", "bounds.friction_percent=40"];

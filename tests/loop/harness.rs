@@ -36,6 +36,11 @@ pub(crate) fn folder(name: &str) -> PathBuf {
     path
 }
 
+/// A text without its lines, which are broken between words.
+fn flat(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// The end of a command.
 #[derive(Debug)]
 pub(crate) struct Done {
@@ -55,8 +60,9 @@ impl Done {
     /// Fails unless the message on standard error has all these words.
     #[track_caller]
     pub(crate) fn says(self, words: &[&str]) -> Done {
+        let err = flat(&self.err);
         for word in words {
-            assert!(self.err.contains(word), "expected \"{word}\" in:\n{}\n{}", self.err, self.out);
+            assert!(err.contains(&flat(word)), "expected \"{word}\" in:\n{}\n{}", self.err, self.out);
         }
         self
     }
@@ -64,8 +70,6 @@ impl Done {
     /// Fails unless standard output has all these words.
     #[track_caller]
     pub(crate) fn prints(self, words: &[&str]) -> Done {
-        // Lines are broken between words.
-        let flat = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
         let out = flat(&self.out);
         for word in words {
             assert!(out.contains(&flat(word)), "expected \"{word}\" in:\n{}\n{}", self.out, self.err);

@@ -17,6 +17,8 @@ pub(crate) fn check() -> Result<()> {
     std::fs::write(&compiler, NO_COMPILER)?;
     program("chmod").arg("+x").arg(&compiler).run()?;
     for target in TARGETS {
+        // The command as a release has it.
+        let options = ["--features", "clutch-cli/foxglove,clutch-cli/scope"];
         let check = cargo([
             "check",
             "--locked",
@@ -27,6 +29,7 @@ pub(crate) fn check() -> Result<()> {
             "--target",
             target,
         ]);
+        let check = check.args(options);
         let key = |tool: &str| format!("{tool}_{}", target.replace('-', "_"));
         let check = check.arg("--target-dir").arg(&folder).env("RUSTFLAGS", "-D warnings");
         check.env(&key("CC"), &compiler).env(&key("AR"), "true").run()?;

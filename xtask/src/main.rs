@@ -320,6 +320,9 @@ fn check() -> Result<()> {
         tool("cargo-deny").args(deny).run()?;
     }
     cargo(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]).run()?;
+    // The command as a release has it.
+    let released = ["--package", "clutch-cli", "--all-targets", "--features", "foxglove,scope"];
+    cargo(["clippy"]).args(released).args(["--", "-D", "warnings"]).run()?;
     // Each feature of the core by itself: the workspace turns on what its crates ask for.
     for features in ["", "linalg", "terse"] {
         cargo(["clippy", "--package", "clutch-core", "--features", features, "--", "-D", "warnings"])

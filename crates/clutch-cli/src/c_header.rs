@@ -1,7 +1,7 @@
 //! `clutch scenario header`: a scenario's settings for libclutch.
 
 use crate::args::ScenarioArgs;
-use crate::output::{BUILD, Exit, print, warn};
+use crate::output::{BUILD, Exit, paragraph, print, warn};
 use anyhow::ensure;
 use clap::Args;
 use clutch_core::Micros;
@@ -39,11 +39,13 @@ impl HeaderVerb {
             Ok(_) => {}
             Err(ClearanceError::NotCertified { .. }) => {
                 let file = self.scenario.scenario.display();
-                warn(&format!(
-                    "{}: the gains are not certified, in continuous time, for these bounds and this path, so nothing was printed.\n\
-                     `clutch certify {file}` says why; --uncertified prints them all the same.\n",
+                let refusal = format!(
+                    "{}: the gains are not certified, in continuous time, for these bounds and this path, so nothing was printed.",
                     scenario.name()
-                ))?;
+                );
+                let advice =
+                    format!("`clutch certify {file}` says why; --uncertified prints them all the same.");
+                warn(&(paragraph(&refusal) + &paragraph(&advice)))?;
                 return Ok(Exit::NotCertified);
             }
             Err(refusal) => return Err(refusal.into()),

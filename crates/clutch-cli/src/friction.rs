@@ -7,8 +7,8 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 use clutch_core::friction::FrictionParams;
 use clutch_core::params::Choice;
-use clutch_sim::Scenario;
 use clutch_sim::friction_lab::{Lab, examine};
+use clutch_sim::{Scenario, nearest};
 use std::path::PathBuf;
 
 /// Lists the friction models, and draws them side by side.
@@ -48,7 +48,8 @@ fn friction(name: &str, set: &[(String, String)]) -> anyhow::Result<FrictionPara
     let options = <FrictionParams as Choice<f64>>::CHOICE.options;
     let names: Vec<&str> = options.iter().map(|option| option.key).collect();
     options.iter().find(|option| option.key == name).with_context(|| {
-        format!("no friction model is called {name}; expected one of: {}", names.join(", "))
+        let meant = nearest(name, &names);
+        format!("no friction model is called {name}; expected one of: {}{meant}", names.join(", "))
     })?;
     let text = format!(
         "name = \"friction\"\n[rig]\nbase = \"paper\"\n[rig.friction.{name}]\n[law.pd]\n[reference.ramp]\nrate_deg_s = 2.0\n"

@@ -2,7 +2,7 @@
 
 use crate::args::{ScenarioArgs, key_value};
 use crate::live::LiveArg;
-use crate::output::{BUILD, Exit, json, not_certified, report, warn};
+use crate::output::{BUILD, Exit, json, not_certified, paragraph, remark, report, warn};
 use crate::signals::stop_flag;
 use crate::sim;
 use crate::table::{number, quantities};
@@ -18,8 +18,7 @@ use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_loop::session::SessionError;
 use clutch_loop::virtual_time::VirtualReport as Ran;
 use clutch_loop::words::cause_text;
-use clutch_sim::Scenario;
-use std::io::Write;
+use clutch_sim::{Scenario, nearest};
 use std::path::{Path, PathBuf};
 
 /// Runs the loop on an emulated board, with the simulated rig as its encoder and converter.
@@ -105,19 +104,25 @@ const NAMES: [(&str, &str); 5] = [
 ];
 
 /// A file, or where the image of that name should be.
-fn image(named: PathBuf) -> PathBuf {
-    let Some((_, target)) = NAMES.iter().find(|(name, _)| Path::new(name) == named && !named.is_file())
-    else {
-        return named;
+fn image(named: PathBuf) -> anyhow::Result<PathBuf> {
+    if named.is_file() {
+        return Ok(named);
+    }
+    let Some((_, target)) = NAMES.iter().find(|(name, _)| Path::new(name) == named) else {
+        let name = named.display().to_string();
+        let meant = nearest(&name, &NAMES.map(|(name, _)| name));
+        // A file that is missing is told by what would have read it.
+        anyhow::ensure!(meant.is_empty(), "--image {name}: no such file, and no image of that name{meant}");
+        return Ok(named);
     };
     // Not both: an image of another build than the one that was asked for would run unseen.
     let built = || Path::new("target/firmware").join(target).join("release");
-    std::env::var_os("CLUTCH_IMAGES").map_or_else(built, PathBuf::from).join(named)
+    Ok(std::env::var_os("CLUTCH_IMAGES").map_or_else(built, PathBuf::from).join(named))
 }
 
 impl Hil {
     pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
-        self.image = image(self.image);
+        self.image = image(self.image)?;
         if let Some(kind) = ChipKind::of(&self.image) {
             return self.on_chip(kind);
         }
@@ -251,13 +256,15 @@ impl Hil {
         text += &match standing.cause {
             Cause::None => {
                 let state = format!("{:?}", standing.state).to_lowercase();
-                format!("control did not end: the board is {state}, encoder and converter are {board}\n")
+                paragraph(&format!(
+                    "control did not end: the board is {state}, encoder and converter are {board}"
+                ))
             }
             cause => {
                 let asked_for = cause == Cause::Done || cause == Cause::Operator && ran.stopped;
                 let fault = if asked_for { "" } else { "FAULT: " };
                 let what = cause_text(cause, standing.value, true, ran.stopped);
-                format!("{fault}{what}; encoder and converter are {board}\n")
+                paragraph(&format!("{fault}{what}; encoder and converter are {board}"))
             }
         };
         text
@@ -267,7 +274,7 @@ impl Hil {
 /// A remark, on standard error.
 fn tell(note: Option<&str>) {
     if let Some(note) = note {
-        let _ = writeln!(std::io::stderr(), "note: {note}"); // a terminal that has gone away
+        remark(&paragraph(&format!("note: {note}")));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::args::{ScenarioArgs, key_value};
 use crate::live::LiveArg;
-use crate::output::{self, BUILD, Exit, json, paragraph, quiet, shown, write};
+use crate::output::{self, BUILD, Exit, folded, json, paragraph, remark, shown, tell, write, wrote};
 use crate::signals::stop_flag;
 use crate::table::number;
 use anyhow::{Context, bail};
@@ -93,7 +93,7 @@ impl Identify {
         let recordings = if self.from.is_empty() {
             match self.experiment(&scenario) {
                 Err(why) if matches!(why.downcast_ref(), Some(ExperimentError::Stopped(_))) => {
-                    let _ = std::io::stderr().write_all(shown(&format!("{why}\n")).as_bytes());
+                    let _ = std::io::stderr().write_all(shown(&paragraph(&why.to_string())).as_bytes());
                     return Ok(Exit::Stopped);
                 }
                 recordings => recordings?,
@@ -119,6 +119,10 @@ impl Identify {
             }
             write(path, map_file(&map, scenario.name()))?;
         }
+        if !self.json {
+            let files = [&self.out, &self.map].into_iter().flatten();
+            tell(&wrote(&files.map(PathBuf::as_path).collect::<Vec<_>>()))?;
+        }
         let told = rows(&report).iter().any(|row| row.finding.known().is_some());
         Ok(if told || (self.map.is_some() && self.out.is_none()) { Exit::Done } else { Exit::Failed })
     }
@@ -128,9 +132,7 @@ impl Identify {
         let programme = Programme::default();
         let mut plan = format!("{:.0} s of experiment on {}\n", programme.seconds(), self.place());
         programme.plan().iter().for_each(|line| plan += &format!("  {line}\n"));
-        if !quiet() {
-            let _ = std::io::stderr().write_all(shown(&plan).as_bytes());
-        }
+        remark(&folded(&plan));
         if let Some(folder) = &self.log {
             std::fs::create_dir_all(folder)
                 .with_context(|| format!("{}: cannot be made", folder.display()))?;

@@ -8,6 +8,8 @@ pub mod certify;
 mod compare;
 #[cfg(target_os = "linux")]
 mod daq;
+#[cfg(any(not(target_os = "linux"), test))]
+mod elsewhere;
 mod export;
 mod friction;
 #[cfg(target_os = "linux")]
@@ -38,11 +40,17 @@ use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser, Subcommand};
 use output::Exit;
 use std::ffi::OsString;
-use std::io::Write;
 
 #[cfg(target_os = "linux")]
 pub use loop_verb::{plan, summary};
 pub use output::BUILD;
+
+/// Examples for every system.
+macro_rules! everywhere {
+    () => {
+        "  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario"
+    };
+}
 
 /// Slow, smooth motion of shafts restrained by friction.
 ///
@@ -58,9 +66,10 @@ pub use output::BUILD;
 /// line could not be understood.
 #[derive(Parser)]
 #[command(name = "clutch", version, max_term_width = 80)]
-#[command(
-    after_help = "Example:\n  clutch loop                        # the loop on a simulated board\n  clutch reproduce --out reproduce   # the paper, end to end\n  clutch sim smc_2                   # one built-in scenario"
-)]
+#[cfg_attr(target_os = "linux", command(after_help = concat!(
+    "Example:\n  clutch loop                        # the loop on a simulated board\n", everywhere!()
+)))]
+#[cfg_attr(not(target_os = "linux"), command(after_help = concat!("Example:\n", everywhere!())))]
 struct Cli {
     /// Prints nothing but errors and what was asked for: JSON, lists, files.
     #[arg(long, short, global = true)]
@@ -77,6 +86,9 @@ enum Verb {
     Daq(daq::Daq),
     #[cfg(target_os = "linux")]
     Hil(hil::Hil),
+    #[cfg(not(target_os = "linux"))]
+    #[command(flatten)]
+    NotHere(elsewhere::NotHere),
     Identify(identify::Identify),
     Tune(tune::Tune),
     Replay(replay::Replay),
@@ -94,27 +106,44 @@ enum Verb {
     Man(shell::Man),
 }
 
-/// A verb written in other letters is the verb: clap compares them as they are.
-fn suggest_verb(e: &mut clap::Error) {
-    let Some(ContextValue::String(unknown)) = e.get(ContextKind::InvalidSubcommand) else { return };
-    let meant = unknown.to_lowercase();
-    if e.get(ContextKind::SuggestedSubcommand).is_none()
-        && Cli::command().get_subcommands().any(|verb| verb.get_name() == meant)
-    {
-        e.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![meant]));
+/// A verb or an option written in other letters is that one: clap compares them as they are.
+fn suggest(e: &mut clap::Error, args: &[OsString]) {
+    let mut command = Cli::command();
+    command.build(); // options of all verbs are options of each
+    if let Some(ContextValue::String(unknown)) = e.get(ContextKind::InvalidSubcommand) {
+        let meant = unknown.to_lowercase();
+        if e.get(ContextKind::SuggestedSubcommand).is_none() && command.find_subcommand(&meant).is_some() {
+            e.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![meant]));
+        }
+    } else if let Some(ContextValue::String(unknown)) = e.get(ContextKind::InvalidArg) {
+        let meant = unknown.to_lowercase();
+        let verbs = args.iter().skip(1).filter(|arg| !arg.to_string_lossy().starts_with('-'));
+        let verb = verbs.map_while(|arg| arg.to_str()).try_fold(&command, |verb, name| {
+            // The first word that is no verb is an argument of the last that was one.
+            verb.find_subcommand(name).map_or(Err(verb), Ok)
+        });
+        let verb = verb.unwrap_or_else(|last| last);
+        let known = |name: &str| verb.get_arguments().any(|arg| arg.get_long() == Some(name));
+        if e.get(ContextKind::SuggestedArg).is_none() && meant.strip_prefix("--").is_some_and(known) {
+            e.insert(ContextKind::SuggestedArg, ContextValue::String(meant));
+        }
     }
 }
 
 /// Runs the command with its arguments, the program's name first; its exit code.
 #[must_use]
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
-    let cli = match Cli::try_parse_from(args) {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let cli = match Cli::try_parse_from(&args) {
         Ok(cli) => cli,
         Err(mut e) => {
-            suggest_verb(&mut e);
-            let asked_for = !e.use_stderr(); // --help, --version
-            let _ = e.print(); // nobody is left to receive it
-            return if asked_for { 0 } else { 64 };
+            suggest(&mut e, &args);
+            if e.use_stderr() {
+                output::complain_of(&e);
+                return 64;
+            }
+            let _ = e.print(); // --help, --version; nobody is left to receive it
+            return 0;
         }
     };
     output::set_quiet(cli.quiet);
@@ -125,6 +154,8 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Daq(v) => v.run(),
         #[cfg(target_os = "linux")]
         Verb::Hil(v) => v.run(),
+        #[cfg(not(target_os = "linux"))]
+        Verb::NotHere(v) => v.run(),
         Verb::Identify(v) => v.run(),
         Verb::Tune(v) => v.run(),
         Verb::Replay(v) => v.run(),
@@ -156,7 +187,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
                     text += &format!(": {source}");
                 }
             }
-            let _ = writeln!(std::io::stderr(), "clutch: {}", output::shown(&text));
+            output::complain(&format!("clutch: {text}"));
             1
         }
     }

@@ -2,7 +2,9 @@
 
 use crate::args::{ScenarioArgs, key_value};
 use crate::live::LiveArg;
-use crate::output::{BUILD, Exit, beside, json, not_certified, paragraph, quiet, report, shown, warn};
+use crate::output::{
+    BUILD, Exit, beside, coloured, folded, json, not_certified, paragraph, quiet, report, shown, warn,
+};
 use crate::signals::stop_flag;
 use crate::table::{number, quantities, row};
 use anyhow::{Context, bail};
@@ -206,7 +208,7 @@ impl Loop {
                 return;
             }
             let clear = if show { "\r\x1b[K" } else { "" };
-            let _ = writeln!(std::io::stderr(), "{clear}{text}"); // a terminal that has gone away
+            tell_aside(clear, text);
         };
         let mut said = Ok(());
         let ran = session.run(&stop, &mut |event| match event {
@@ -224,7 +226,7 @@ impl Loop {
         // The views have seen the end of it; the terminal is free.
         drop(session);
         for text in later {
-            let _ = writeln!(std::io::stderr(), "{text}");
+            tell_aside("", &text);
         }
         if show {
             let _ = write!(std::io::stderr(), "\r\x1b[K");
@@ -233,7 +235,7 @@ impl Loop {
             Ok(ran) => ran,
             Err(ended @ SessionError::Released { .. }) => {
                 said?;
-                self.say(&format!("{ended}\n"))?;
+                self.say(&folded(&ended.to_string()))?;
                 return Ok(Exit::Fault);
             }
             Err(obstacle) => return Err(obstacle.into()),
@@ -323,6 +325,13 @@ impl Loop {
         }
         warn(text)
     }
+}
+
+/// Prints what has happened, on standard error, after `clear`, with verdicts in colour on a terminal.
+fn tell_aside(clear: &str, text: &str) {
+    // What clears a line is no colour: it stays where colours are left out.
+    let _ = std::io::stderr().write_all(clear.as_bytes());
+    let _ = anstream::stderr().write_all(coloured(&shown(&paragraph(text))).as_bytes()); // a terminal that has gone away
 }
 
 fn status(p: &Progress) {

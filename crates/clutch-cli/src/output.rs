@@ -1,6 +1,7 @@
 //! The results of verbs: text, files, an exit code.
 
 use crate::plot::{self, Figure};
+use anstream::adapter::strip_str;
 use anstyle::{AnsiColor, Style};
 use anyhow::Context;
 use clap::Args;
@@ -8,7 +9,7 @@ use clutch_log::printable;
 use clutch_sim::progress::Report;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::borrow::Cow;
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -50,7 +51,8 @@ pub const BUILD: &str = env!("CLUTCH_BUILD");
 /// Says that nothing was started, and what to do.
 #[cfg(target_os = "linux")]
 pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, file: &Path) -> String {
-    format!("{refusal}\n`clutch certify {}` says why; --uncertified runs it all the same.\n", file.display())
+    let advice = format!("`clutch certify {}` says why; --uncertified runs it all the same.", file.display());
+    paragraph(&refusal.to_string()) + &paragraph(&advice)
 }
 
 /// A log is never written over: it may be the only record of a run.
@@ -73,9 +75,9 @@ pub(crate) fn beside(head: &str, text: &str) -> String {
 
 fn flow(head: &str, text: &str, indent: usize) -> String {
     let mut out = head.to_owned();
-    let mut column = head.chars().count();
+    let mut column = columns(head);
     for word in text.split_whitespace() {
-        let length = word.chars().count();
+        let length = columns(word);
         if column > 0 && column + 1 + length > WIDTH {
             out += &format!("\n{:1$}", "", indent);
             column = indent;
@@ -88,6 +90,54 @@ fn flow(head: &str, text: &str, indent: usize) -> String {
     }
     out.push('\n');
     out
+}
+
+/// Columns of a text, which may have colours.
+fn columns(text: &str) -> usize {
+    strip_str(text).to_string().chars().count()
+}
+
+/// A text in whose lines a terminal of 80 columns breaks no word. Shorter ones stay as they are, and so does a file's line
+/// that an error shows.
+pub(crate) fn folded(text: &str) -> String {
+    let fold = |line: &str| {
+        if columns(line) <= WIDTH || shows_source(line) {
+            return format!("{line}\n");
+        }
+        let words = line.trim_start();
+        let indent = line.chars().count() - words.chars().count();
+        // The space before the first word is put there with it.
+        flow(&" ".repeat(indent.saturating_sub(1)), words, indent + 4)
+    };
+    text.lines().map(fold).collect()
+}
+
+/// True for a line that shows a place in a file, as errors of TOML do: `3 | kp_v = `, `  |        ^`.
+fn shows_source(line: &str) -> bool {
+    line.trim_start().trim_start_matches(|c: char| c.is_ascii_digit()).trim_start().starts_with('|')
+}
+
+/// Prints an error; a terminal gets it in lines of its own. What else reads it may look for a line as it is.
+pub(crate) fn complain(text: &str) {
+    let text = shown(text);
+    let text = if std::io::stderr().is_terminal() { folded(&text) } else { format!("{text}\n") };
+    let _ = std::io::stderr().write_all(text.as_bytes()); // nobody is left to receive it
+}
+
+/// Prints why a command line is not understood, as [`complain`] does.
+pub(crate) fn complain_of(line: &clap::Error) {
+    let _ = if std::io::stderr().is_terminal() {
+        anstream::stderr().write_all(folded(&line.render().ansi().to_string()).as_bytes())
+    } else {
+        line.print()
+    };
+}
+
+/// Prints a remark on standard error, unless the command is to be quiet.
+pub(crate) fn remark(text: &str) {
+    if !quiet() {
+        let _ = std::io::stderr().write_all(shown(text).as_bytes()); // a terminal that has gone away
+    }
 }
 
 /// Runs long work under a progress bar; the bar shows on a terminal only.
@@ -153,6 +203,8 @@ const GOOD: Style = AnsiColor::Green.on_default();
 
 /// Words of verdicts. The first that stands at a place counts.
 const VERDICTS: &[(&str, Style)] = &[
+    ("FAULT", BAD),
+    ("DRIFT", BAD),
     ("NOT certified", BAD),
     ("not certified", BAD),
     ("UNCERTIFIED", BAD),
@@ -168,7 +220,7 @@ const VERDICTS: &[(&str, Style)] = &[
 ];
 
 /// The text with its verdicts in their colours.
-fn coloured(text: &str) -> String {
+pub(crate) fn coloured(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 64);
     let mut rest = text;
     let first = |rest: &str| {
@@ -268,7 +320,7 @@ mod tests {
     fn verdicts_have_a_colour_and_names_that_hold_their_words_have_none() {
         let text = "gains: NOT certified; `clutch certify not_certified.toml`, as certified-2";
         let shown = coloured(text);
-        assert_eq!(anstream::adapter::strip_str(&shown).to_string(), text);
+        assert_eq!(strip_str(&shown).to_string(), text);
         assert_eq!(shown, text.replace("NOT certified", &format!("{BAD}NOT certified{BAD:#}")));
         assert_eq!(coloured("UNCERTIFIED, then certified").matches('\u{1b}').count(), 4 + 1);
     }
@@ -294,6 +346,25 @@ mod tests {
         assert_eq!(paragraph(&long), long.clone() + "\n");
         assert_eq!(paragraph(&format!("about {long}")), format!("about\n    {long}\n"));
         assert_eq!(paragraph(""), "\n");
+    }
+
+    #[test]
+    fn an_error_is_folded_between_words_and_what_it_shows_of_a_file_is_not() {
+        let long = "a key that was not expected ".repeat(5);
+        let source = format!("12 | kp_v = \"{long}\"");
+        let text = format!("clutch: {long}\n{source}\n   |        ^\n  {long}\nshort,   and as it is");
+        let told = folded(&text);
+        let lines: Vec<&str> = told.lines().collect();
+        assert!(lines.contains(&source.as_str()) && lines.contains(&"short,   and as it is"), "{told}");
+        assert!(lines.iter().all(|l| l.chars().count() <= WIDTH || *l == source), "{told}");
+        assert!(lines[1].starts_with("    ") && !lines[1].starts_with("     "), "{told}");
+        let indented = lines.iter().position(|l| l.starts_with("  a key")).expect("the indented line");
+        assert!(lines[indented + 1].starts_with("      ") && !lines[indented + 1].starts_with("       "));
+        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(words(&told), words(&text));
+        // Colours take no columns.
+        let red = format!("{BAD}red{BAD:#} ").repeat(20);
+        assert_eq!(folded(&red), format!("{red}\n"));
     }
 
     #[test]

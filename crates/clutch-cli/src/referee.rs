@@ -3,6 +3,7 @@
 use crate::output::{Exit, beside, json, print, tell};
 use anyhow::Context;
 use clap::Args;
+use clutch_sim::nearest;
 use clutch_sim::referee::{BUILT_IN, Case, ENGINES, RefereeEngine, RefereeError, Verdict, run};
 use serde_json::json;
 use std::path::Path;
@@ -37,12 +38,17 @@ pub(crate) struct Referee {
 fn engine(name: &str) -> Result<RefereeEngine, String> {
     RefereeEngine::named(name).ok_or_else(|| {
         let names: Vec<&str> = ENGINES.iter().map(|e| e.name()).collect();
-        format!("expected one of: {}", names.join(", "))
+        format!("expected one of: {}{}", names.join(", "), nearest(name, &names))
     })
 }
 
 fn built_in(name: &str) -> Option<&'static str> {
     BUILT_IN.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
+}
+
+/// Asks for the built-in case that was probably meant.
+fn like(name: &str) -> String {
+    nearest(name, &BUILT_IN.iter().map(|(n, _)| *n).collect::<Vec<_>>())
 }
 
 fn load(name: &str) -> anyhow::Result<Case> {
@@ -51,7 +57,10 @@ fn load(name: &str) -> anyhow::Result<Case> {
         (_, true) => clutch_sim::scenario::read_text(Path::new(name))
             .with_context(|| format!("{name}: cannot be read"))?,
         (None, false) => {
-            anyhow::bail!("{name}: no such file, and no built-in case; `clutch referee --list` shows those")
+            anyhow::bail!(
+                "{name}: no such file, and no built-in case; `clutch referee --list` shows those{}",
+                like(name)
+            )
         }
     };
     Ok(Case::parse(name, &text)?)
@@ -97,7 +106,8 @@ impl Referee {
         }
         if let Some(name) = &self.show {
             let text = built_in(name).with_context(|| {
-                format!("{name}: no built-in case of that name; `clutch referee --list` shows those")
+                let like = like(name);
+                format!("{name}: no built-in case of that name; `clutch referee --list` shows those{like}")
             })?;
             print(text)?;
             return Ok(Exit::Done);

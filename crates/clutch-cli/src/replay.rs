@@ -1,7 +1,7 @@
 //! `clutch replay`.
 
 use crate::args::key_value;
-use crate::output::{BUILD, Exit, tell, wrote};
+use crate::output::{BUILD, Exit, paragraph, tell, wrote};
 use crate::plot::{self, Figure, Panel, Series, Shade};
 use crate::table::{number, quantities};
 use clap::Args;
@@ -53,10 +53,10 @@ impl Replay {
         let n = replayed.commands.len();
         let mut text = wrote(&self.plot.iter().map(PathBuf::as_path).collect::<Vec<_>>());
         if log.tail != Tail::Finished {
-            text += &format!("the log ended early ({}); its readable part is replayed\n", log.tail);
+            text += &paragraph(&format!("the log ended early ({}); its readable part is replayed", log.tail));
         }
         if let Some(damage) = &log.damage {
-            text += &format!("{} damaged places in the log; the first: {damage}\n", log.damaged);
+            text += &paragraph(&format!("{} damaged places in the log; the first: {damage}", log.damaged));
         }
         if replayed.dropped > 0 {
             text += &format!("the log dropped {} records\n", replayed.dropped);
@@ -65,8 +65,8 @@ impl Replay {
             text += &format!("a gap: {} ticks behind it are not comparable\n", replayed.behind_gap);
         }
         let drift = drift(&log, &scenario, UNWATCHED)?;
-        text += &format!("{}: {}\n", drift.label(), drift.words());
-        text.extend(drift.alarm_line().map(|line| line + "\n"));
+        text += &paragraph(&format!("{}: {}", drift.label(), drift.words()));
+        text.extend(drift.alarm_line().map(|line| paragraph(&line)));
         let whole = log.complete && replayed.behind_gap == 0 && replayed.dropped == 0;
         let done = if whole { Exit::Done } else { Exit::Incomplete };
         if !self.set.is_empty() {
@@ -80,15 +80,15 @@ impl Replay {
                 done
             }
             Some(d) => {
-                text += &format!(
-                    "differs: tick {}, {}: logged {:?}, replayed {:?}\n",
+                text += &paragraph(&format!(
+                    "differs: tick {}, {}: logged {:?}, replayed {:?}",
                     d.tick, d.field, d.logged, d.replayed
-                );
+                ));
                 if log.header.version != BUILD {
-                    text += &format!(
-                        "the log was written by version {}, this is {}\n",
+                    text += &paragraph(&format!(
+                        "the log was written by version {}, this is {}",
                         log.header.version, BUILD
-                    );
+                    ));
                 }
                 Exit::Fault
             }

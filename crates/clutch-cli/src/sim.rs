@@ -2,7 +2,7 @@
 
 use crate::args::ScenarioArgs;
 use crate::live::LiveArg;
-use crate::output::{BUILD, Exit, bars, json, new_log, paragraph, report, with_progress, wrote};
+use crate::output::{BUILD, Exit, bars, json, new_log, paragraph, remark, report, with_progress, wrote};
 use crate::plot;
 use crate::run_figure::{Drawn, figure};
 use crate::sampled;
@@ -21,7 +21,6 @@ use clutch_sim::reaching::Reaching;
 use clutch_sim::rig::Rig;
 use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario};
 use serde::Serialize;
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Simulates a scenario and prints figures of the shaft's motion along its path.
@@ -126,7 +125,7 @@ impl Sim {
     fn play(&self, scenario: &Scenario, run: &Run) -> anyhow::Result<()> {
         let stop = stop_flag()?;
         let Some(live) = self.live.start(&stop)? else { return Ok(()) };
-        let _ = writeln!(std::io::stderr(), "it plays once somebody looks on; Ctrl-C ends it");
+        remark("it plays once somebody looks on; Ctrl-C ends it\n");
         if live.wait_for_reader(&stop) {
             let looking = Looking { onlooker: live, stop };
             to_log::play_simulation(&looking, scenario, run, BUILD)?;

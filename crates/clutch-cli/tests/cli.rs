@@ -264,6 +264,11 @@ fn a_quiet_command_tells_nothing_but_what_was_asked_for() {
     assert!(out(&clutch(&["sim", "smc_2", "--json", "-q"])).starts_with('{'));
     assert!(out(&clutch(&["scenario", "list", "-q"])).contains("smc_2"));
     assert!(err(&clutch(&["-q", "sim", "missing.toml"])).contains("no such file"));
+    // A remark is; the image is missed after it.
+    let hil = ["hil", "board_smc_2", "--image", "none.elf"];
+    assert!(err(&clutch(&hil)).starts_with("note: "), "{}", err(&clutch(&hil)));
+    let o = clutch(&[&hil[..], &["-q"]].concat());
+    assert!(o.status.code() == Some(1) && err(&o).starts_with("clutch: "), "{}", err(&o));
     // The message that nothing was started is no chatter.
     let refused = clutch(&["-q", "loop", "board_smc_2", "--set", "law.smc.kp_v=1"]);
     assert_eq!(refused.status.code(), Some(2));
@@ -275,12 +280,18 @@ fn a_quiet_command_tells_nothing_but_what_was_asked_for() {
     );
 }
 
-/// Output of a command on a terminal, made by `script`; none where that program is missing.
+/// What a command prints on a terminal, made by `script`; none where that program is missing.
 fn on_a_terminal(command: &str, environment: &[(&str, &str)]) -> Option<String> {
+    on_a_terminal_in(Path::new("."), command, environment)
+}
+
+/// The same in a folder.
+fn on_a_terminal_in(folder: &Path, command: &str, environment: &[(&str, &str)]) -> Option<String> {
     let line = format!("'{}' {command}", env!("CARGO_BIN_EXE_clutch"));
     let mut script = Command::new("script");
     // Terminals of CI are taken for ones with colour, whatever TERM says.
     script
+        .current_dir(folder)
         .args(["-qec", &line, "/dev/null"])
         .env_remove("NO_COLOR")
         .env_remove("CI")
@@ -306,6 +317,59 @@ fn verdicts_have_colours_on_a_terminal_alone() {
 }
 
 #[test]
+fn errors_fit_a_terminal_and_are_for_a_program_as_they_were() {
+    let dir = folder("terminal");
+    std::fs::write(dir.join("mine.toml"), format!("name = \"{}\" x\n", "long ".repeat(30))).unwrap();
+    let (mut folded, mut shown) = (0, 0);
+    for command in [
+        "sim smc_2 --set rig.inertia_kg_m2=-1",
+        "sim smc_2 --set rig.friction.mu_static=0.25",
+        "sim smc_2 --set reference.ramp.rate_rad_s=0.035",
+        "sim missing.toml",
+        "sim mine.toml",
+        "map bench_pd_2 --x law.pd.kp_v_rad=2:1:3",
+        "loop --fault Freeze:at=1",
+        "loop --port tcp://nowhere --update-rate 3",
+        "hil --image none.elf --fault reset:at=1 --chip-fault hang:at=1",
+        "tune minimum_jerk",
+        "identify --port /dev/none --log logs",
+        "log info mine.toml",
+    ] {
+        let words: Vec<&str> = command.split(' ').collect();
+        let mut piped = Command::new(env!("CARGO_BIN_EXE_clutch"));
+        let piped = piped.args(&words).current_dir(&dir).output().expect("the command starts");
+        let piped = out(&piped) + &err(&piped);
+        let Some(text) = on_a_terminal_in(&dir, command, &[]) else {
+            eprintln!("skipped: no program `script`");
+            return;
+        };
+        let text = anstream::adapter::strip_str(&text).to_string();
+        let flat = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(flat(&text), flat(&piped), "{command}");
+        let source =
+            |line: &&str| line.trim_start_matches(|c: char| c == ' ' || c.is_ascii_digit()).starts_with('|');
+        let prose: Vec<&str> = text.lines().filter(|line| !source(line)).collect();
+        assert!(narrow(&prose.join("\n")), "{command}:\n{text}");
+        folded += usize::from(text.lines().count() > piped.lines().count());
+        shown += text.lines().filter(source).filter(|line| line.chars().count() > 80).count();
+    }
+    // The line of the file, and the mark below its end.
+    assert!(folded >= 8 && shown == 2, "{folded} were longer than a terminal, {shown} lines of a file");
+}
+
+#[test]
+fn what_is_refused_for_its_gains_is_told_in_80_columns() {
+    let weak = ["--set", "law.smc.kp_v=1"];
+    for verb in
+        [&["loop", "board_smc_2"][..], &["hil", "board_smc_2"], &["scenario", "header", "board_smc_2"]]
+    {
+        let o = clutch(&[verb, &weak].concat());
+        assert_eq!(o.status.code(), Some(2), "{verb:?}: {}", err(&o));
+        assert!(narrow(&out(&o)) && out(&o).contains("not certified"), "{verb:?}:\n{}", out(&o));
+    }
+}
+
+#[test]
 fn a_name_in_other_letters_is_recognised() {
     for (args, meant) in [
         (&["sim", "SMC_2"][..], "did you mean smc_2?"),
@@ -323,6 +387,25 @@ fn a_name_in_other_letters_is_recognised() {
         let o = clutch(&[verb]);
         assert_eq!(o.status.code(), Some(64));
         assert!(err(&o).contains(&format!("similar subcommand exists: '{meant}'")), "{}", err(&o));
+    }
+    for (args, code, meant) in [
+        (&["friction", "plot", "Lugre"][..], 1, "did you mean lugre?"),
+        (&["friction", "plot", "lugr"], 1, "did you mean lugre?"),
+        (&["referee", "p3"], 1, "did you mean P3"),
+        (&["referee", "--show", "p3"], 1, "did you mean P3"),
+        (&["referee", "P3", "--engine", "System"], 64, "did you mean system?"),
+        (&["loop", "--fault", "Freeze:at=1"], 64, "did you mean freeze?"),
+        (&["loop", "--fault", "freeze:AT=1"], 64, "did you mean at?"),
+        (&["hil", "--image", "nucleo-daq", "--chip-fault", "Hang"], 64, "did you mean hang?"),
+        (&["hil", "--image", "Mps2-Controller"], 1, "did you mean mps2-controller?"),
+        (&["hil", "--image", "nucleo-dac"], 1, "did you mean nucleo-daq?"),
+        (&["sim", "smc_2", "--SET", "a=1"], 64, "similar argument exists: '--set'"),
+        (&["log", "export", "run.mcap", "--Channel", "sample"], 64, "similar argument exists: '--channel'"),
+        (&["--QUIET", "sim", "smc_2"], 64, "similar argument exists: '--quiet'"),
+    ] {
+        let o = clutch(args);
+        assert_eq!(o.status.code(), Some(code), "{args:?}: {}", err(&o));
+        assert!(err(&o).contains(meant), "{args:?}: {}", err(&o));
     }
 }
 
@@ -603,6 +686,8 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
     );
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
     assert!(out(&o).contains("T/J  ") && out(&o).contains("lag: not told; "), "{}", out(&o));
+    assert!(out(&o).ends_with(&format!("\nwrote {rig}\n")), "{}", out(&o));
+    assert!(narrow(&err(&o)), "{}", err(&o));
     // All that is printed fits a terminal.
     assert!(narrow(&out(&o)), "{}", out(&o));
 
@@ -659,6 +744,7 @@ fn a_map_of_one_ride_makes_the_next_smoother_and_one_of_another_disc_is_dropped(
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
     let o = clutch(&["identify", "bench_glide_2", "--from", &ride, "--map", &map]);
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+    assert!(out(&o).ends_with(&format!("\nwrote {map}\n")), "{}", out(&o));
 
     let sim = |more: &[&str]| {
         let slow = ["sim", "bench_glide_2", "--json", "--set", "reference.ramp.rate_deg_s=1.5"];

@@ -1,5 +1,6 @@
 //! Faults on request: what, when, how often.
 
+use clutch_sim::nearest;
 use std::fmt;
 use std::str::FromStr;
 
@@ -205,11 +206,44 @@ pub struct FaultError {
     problem: String,
 }
 
+/// Names of kinds, as they are written.
+const KINDS: [&str; 22] = [
+    "drop",
+    "duplicate",
+    "corrupt",
+    "reorder",
+    "silence",
+    "lie",
+    "echo",
+    "foreign",
+    "above-top",
+    "delay",
+    "jitter",
+    "freeze",
+    "jump",
+    "channel",
+    "scale",
+    "loss",
+    "dac-stuck",
+    "dac-scale",
+    "clock",
+    "prescaler",
+    "crystal",
+    "reset",
+];
+/// Keys of faults, as they are written.
+const KEYS: [&str; 11] =
+    ["at", "for", "p", "way", "ms", "counts", "volts", "factor", "periods", "says", "dead"];
+
 impl FromStr for Fault {
     type Err = FaultError;
 
     fn from_str(text: &str) -> Result<Self, FaultError> {
         let bad = |problem: String| FaultError { text: text.to_owned(), problem };
+        let unknown = |what: &str, word: &str, known: &[&str]| {
+            let meant = nearest(word, known);
+            bad(format!("unknown {what} {word}{meant}; expected one of: {}", known.join(", ")))
+        };
         let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
         let mut fault = Fault::new(FaultKind::Drop, 0.0);
         let (mut ms, mut counts, mut volts, mut when) = (None, None, None, false);
@@ -281,7 +315,7 @@ impl FromStr for Fault {
                         _ => return Err(bad(format!("dead = {value}: expected a or b"))),
                     });
                 }
-                _ => return Err(bad(format!("unknown key {key}"))),
+                _ => return Err(unknown("key", key, &KEYS)),
             }
         }
         let needs = |key: &str| bad(format!("{kind} needs {key}"));
@@ -315,7 +349,7 @@ impl FromStr for Fault {
             "prescaler" => FaultKind::Prescaler(period(factor.take())?),
             "crystal" => FaultKind::Crystal(period(factor.take())?),
             "reset" => FaultKind::Reset,
-            _ => return Err(bad(format!("unknown kind {kind}"))),
+            _ => return Err(unknown("kind", kind, &KINDS)),
         };
         let left = [ms.is_some(), counts.is_some(), volts.is_some(), factor.is_some(), dead.is_some()];
         if left.contains(&true) || says.is_some() || periods.is_some() {
@@ -392,6 +426,25 @@ mod tests {
         assert_eq!(fault.to_string(), "delay of 5 ms, p = 0.5, from the board, for 0.1 s, from 1 s");
         let stuck: Fault = "dac-stuck:at=1,volts=last".parse().unwrap();
         assert_eq!(stuck.kind, FaultKind::DacStuck(StuckAt::Last));
+    }
+
+    #[test]
+    fn what_is_proposed_is_known() {
+        let problem = |text: &str| match text.parse::<Fault>() {
+            Ok(_) => String::new(),
+            Err(e) => e.problem,
+        };
+        for kind in KINDS {
+            assert!(!problem(kind).starts_with("unknown"), "{kind}: {}", problem(kind));
+            let other = kind.to_uppercase();
+            let asked = format!("unknown kind {other}: did you mean {kind}?; expected one of: drop, ");
+            assert!(problem(&other).starts_with(&asked), "{}", problem(&other));
+        }
+        for key in KEYS {
+            assert!(!problem(&format!("drop:{key}=1")).starts_with("unknown"), "{key}");
+            let asked = format!("unknown key {}: did you mean {key}?", key.to_uppercase());
+            assert!(problem(&format!("drop:{}=1", key.to_uppercase())).starts_with(&asked), "{key}");
+        }
     }
 
     /// Against a decoder that sees every edge, as a counter does.

@@ -34,4 +34,4 @@ pub use number::number;
 pub use rig::RigParams;
 pub use run::{Keep, Run, RunError, RunParams, RunSpec, SAMPLE_COLUMNS, Start, simulate, simulate_servo};
 pub use scenario::{Scenario, ScenarioError};
-pub use tables::{Points, Text};
+pub use tables::{Points, Text, nearest};

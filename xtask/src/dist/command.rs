@@ -7,8 +7,8 @@ use crate::run::{program, root};
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 
-/// The program, as cargo's options name it.
-const COMMAND: [&str; 4] = ["--package", "clutch-cli", "--bin", "clutch"];
+/// The program, as cargo's options name it, with all its options.
+const COMMAND: [&str; 6] = ["--package", "clutch-cli", "--bin", "clutch", "--features", "foxglove,scope"];
 
 /// The one that runs here.
 pub(super) fn here(tools: &Tools) -> Result<PathBuf> {

@@ -34,10 +34,16 @@ pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
     }
     // It lays a bill beside each manifest of a workspace: under a name that nothing else has.
     let temporary = format!("bill-{}", std::process::id());
-    let described = ["Cargo.toml", "firmware/Cargo.toml"].iter().try_for_each(|workspace| {
+    // The command's bill is of the command with all its options, as a release has it.
+    let workspaces = [
+        ("Cargo.toml", &["--features", "clutch-cli/foxglove,clutch-cli/scope"][..]),
+        ("firmware/Cargo.toml", &[]),
+    ];
+    let described = workspaces.iter().try_for_each(|(workspace, features)| {
         let describe =
             ["cyclonedx", "--quiet", "--format", "json", "--spec-version", "1.5", "--target", "all"];
-        cargo(describe).args(["--override-filename", &temporary, "--manifest-path", workspace]).run()
+        let named = ["--override-filename", &temporary, "--manifest-path", workspace];
+        cargo(describe).args(named).args(*features).run()
     });
     let made = described.and_then(|()| {
         DESCRIBED

@@ -24,9 +24,10 @@ const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "risc
 const SKIPPED_WITHOUT_TARGETS: u64 =
     4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 2 * firmware::BOARDS.len() as u64 + 6;
 
-/// The packages that are built for this machine. Always the same selection: with another one cargo gives libraries
-/// other features, and compiles them once more. The wheel's module only links inside of Python.
-const WORKSPACE: [&str; 3] = ["--workspace", "--exclude", "clutch-py"];
+/// The packages that are built for this machine, the command with all its options. Always the same selection: with another
+/// one cargo gives libraries other features, and compiles them once more. The wheel's module only links inside of Python.
+const WORKSPACE: [&str; 5] =
+    ["--workspace", "--exclude", "clutch-py", "--features", "clutch-cli/foxglove,clutch-cli/scope"];
 
 /// Runs everything, counts, and fails at the end if anything failed.
 pub(crate) fn all() -> Result<()> {

@@ -1,5 +1,6 @@
 //! Faults of the chip: their kinds and times.
 
+use clutch_sim::nearest;
 use std::str::FromStr;
 
 /// A fault of the chip.
@@ -93,8 +94,8 @@ impl FromStr for ChipFault {
         let bad = |problem: String| ChipFaultError { text: text.to_owned(), problem };
         let (name, rest) = text.split_once(':').map_or((text, None), |(name, rest)| (name, Some(rest)));
         let Some((_, kind)) = ChipFaultKind::ALL.into_iter().find(|(known, _)| *known == name) else {
-            let names = ChipFaultKind::ALL.map(|(name, _)| name).join(", ");
-            return Err(bad(format!("expected one of {names}")));
+            let names = ChipFaultKind::ALL.map(|(name, _)| name);
+            return Err(bad(format!("expected one of {}{}", names.join(", "), nearest(name, &names))));
         };
         let at = rest.map(|rest| {
             let number = rest.strip_prefix("at=").and_then(|at| at.parse::<f64>().ok());

@@ -40,8 +40,10 @@ fn unit_of(key: &str) -> Option<(&str, &'static Unit)> {
     Some((key.strip_suffix(unit.suffix)?.strip_suffix('_')?, unit))
 }
 
-/// The most alike of the known names, if one is much alike; large and small letters are alike.
-pub(crate) fn nearest(unknown: &str, known: &[impl AsRef<str>]) -> String {
+/// Asks for the most alike of the known names, as `: did you mean smc_2?`; empty if none is much alike. Large and small
+/// letters are alike.
+#[must_use]
+pub fn nearest(unknown: &str, known: &[impl AsRef<str>]) -> String {
     let unknown = unknown.to_lowercase();
     let near = known
         .iter()
