@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 from clutch import _clutch
 from clutch._run import ScenarioLike, as_scenario
 
-Cause = Literal["sampled_loop", "stribeck_edge", "encoder_edge", "edge_jolt"]
+Cause = Literal["sampled_loop", "stribeck_edge", "encoder_edge", "edge_jolt", "ripple"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,8 +23,9 @@ class SmoothSpeed:
     cause : str or None
         Why the next lower rate sticks: ``"sampled_loop"``, the linear sampled loop is unstable; ``"stribeck_edge"``,
         friction falls faster with the speed than the law brakes; ``"encoder_edge"``, what is unstable grows too much
-        between two edges of the encoder; ``"edge_jolt"``, such an edge, by the gain on its rate, stops the shaft. None
-        if it is none of these, or no lower rate was tried. If several hold, the first; `evidence` has them all.
+        between two edges of the encoder; ``"edge_jolt"``, such an edge, by the gain on its rate, stops the shaft;
+        ``"ripple"``, the run is smooth if friction is even along the disc, which is asked where none of the others holds.
+        None if it is none of these, or no lower rate was tried. If several hold, the first; `evidence` has them all.
     below : SmoothSpeed.Failure or None
         The run that stuck at the next lower rate; None if the lowest rate is smooth.
     holes : tuple of SmoothSpeed.Failure
@@ -36,7 +37,8 @@ class SmoothSpeed:
     discs : int
         Number of discs that each of them was tried on: the seeds from 1 on.
     runs : int
-        Number of runs. A rate is left at the first disc that sticks, and a run at its first stick.
+        Number of runs, but for one on an even disc. A rate is left at the first disc that sticks, and a run at its
+        first stick.
 
     Examples
     --------
@@ -99,6 +101,8 @@ class SmoothSpeed:
         edge_jolt_deg_s : float or None
             Speed that the law's answer to an edge takes from the shaft, °/s: more than the rate is a cause. None if the
             velocity is no difference of counts, or the law's damping is not known.
+        even_disc_smooth : bool or None
+            True if the run `below` is smooth on an even disc; None where another cause holds.
 
         Examples
         --------
@@ -118,6 +122,7 @@ class SmoothSpeed:
         edge_time_s: float | None
         growth_between_edges: float | None
         edge_jolt_deg_s: float | None
+        even_disc_smooth: bool | None
 
     rate_deg_s: float | None
     cause: Cause | None

@@ -2132,6 +2132,8 @@ class FrictionMap(_Params):
 
     Parameters
     ----------
+    version : int, default 1
+        Version of the table: a later one may mean something else. A whole number from 1 to 1.
     rig : str
         The rig, and the ride, that it is of: any text.
     points_deg_factor : sequence of (float, float)
@@ -2154,6 +2156,7 @@ class FrictionMap(_Params):
 
     _key: ClassVar[str] = "friction_map"
 
+    version: int = 1
     rig: str
     points_deg_factor: Sequence[tuple[float, float]]
 

@@ -43,6 +43,15 @@ def test_without_its_cause_it_is_slower_and_overrides_count():
     assert ideal.evidence.edge_time_s is None and ideal.evidence.growth_between_edges is None
 
 
+def test_ripple_is_the_cause_where_an_even_disc_is_smooth():
+    soft = {"velocity.smoothed_derivative.smoothing": 0.712, "law.pd.kp_v_rad": 800, "law.pd.kd_v_s_rad": 7}
+    rates = {"rates_deg_s": [2, 10, 15], "discs": 2}
+    found = clutch.lowest_smooth_speed("bench_pd_2", overrides=soft, **rates)
+    assert (found.rate_deg_s, found.cause, found.evidence.even_disc_smooth) == (15.0, "ripple", True)
+    even = clutch.lowest_smooth_speed("bench_pd_2", overrides=soft | {"rig.ripple.rms": 0}, **rates)
+    assert even.rate_deg_s == 10.0 and even.cause is None
+
+
 def test_a_smooth_lowest_rate_has_no_cause():
     found = clutch.lowest_smooth_speed("bench_glide_2", rates_deg_s=[2.0], discs=1)
     assert (found.rate_deg_s, found.cause, found.below, found.runs) == (2.0, None, None, 1)

@@ -122,6 +122,36 @@ fn the_jolt_of_an_edge_goes_with_the_edge_and_with_the_gain() {
 }
 
 #[test]
+fn ripple_along_the_disc_is_the_cause_where_an_even_disc_is_smooth() {
+    let rates = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0];
+    let with = |kp, kd, more: &[(&str, &str)]| {
+        let gains = [
+            ("velocity.smoothed_derivative.smoothing", "0.712"),
+            ("law.pd.kp_v_rad", kp),
+            ("law.pd.kd_v_s_rad", kd),
+        ];
+        lowest("bench_pd_2", &[&gains, more].concat(), &rates)
+    };
+    let told = |found: &SmoothSpeed| (found.cause, found.evidence.even_disc_smooth);
+    let soft = with("812.3", "7.0", &[]);
+    assert_eq!(told(&soft), (Some(Cause::Ripple), Some(true)), "{soft:?}");
+    assert_eq!(soft.evidence.causes, [Cause::Ripple], "{soft:?}");
+    // The less ripple, the slower; on an even disc something else is left.
+    let (half, even) = (with("812.3", "7.0", &[("rig.ripple.rms", "0.075")]), with("812.3", "7.0", &[EVEN]));
+    assert!(rate(&even) < 0.5 * rate(&soft) && rate(&half) < rate(&soft), "{soft:?} {half:?} {even:?}");
+    assert!(even.cause != Some(Cause::Ripple), "{even:?}");
+    // A finer encoder does not help.
+    let fine = with("812.3", "7.0", &[IDEAL]);
+    assert!(rate(&fine) > 0.5 * rate(&soft) && fine.cause == Some(Cause::Ripple), "{fine:?}");
+    // A weakly damped loop sticks on an even disc, too.
+    let weak = with("3693.0", "10.0", &[]);
+    assert_eq!(told(&weak), (None, Some(false)), "{weak:?}");
+    // Where another cause holds, nothing is asked.
+    let jolt = with("2000.0", "38.0", &[]);
+    assert_eq!(told(&jolt), (Some(Cause::EdgeJolt), None), "{jolt:?}");
+}
+
+#[test]
 fn a_rate_is_smooth_where_the_runs_figures_have_no_stick_and_the_search_finds_the_lowest() {
     let rates = [1.0, 2.0, 3.0, 4.0, 6.0];
     let trials = Trials::new("test", &rates, 4).unwrap();

@@ -160,8 +160,8 @@ enum Verb {
         #[arg(default_value_t = 10_000)]
         runs: u64,
     },
-    /// Runs laws on the rig `bench` from 0.5 to 100 °/s, and glide on rigs that are not as it believes, two minutes: the tables
-    /// of docs/smooth.md.
+    /// Runs laws on the rig `bench` from 0.5 to 100 °/s, from rest, under a hand and on a motor, and glide on rigs that are not as
+    /// it believes, a quarter of an hour: the tables of docs/smooth.md and its figure.
     Smooth,
     /// Holds the meter of stick-slip against the simulator's events, laws, rates and encoders, and on rigs that are not as it
     /// believes, five minutes: the tables of docs/meter.md.
@@ -368,7 +368,13 @@ fn certified(runs: u64) -> Result<()> {
 }
 
 fn smooth() -> Result<()> {
-    for table in ["laws", "plants", "rest", "steps", "motions"] {
+    let cells = root().join("target/smooth.json");
+    let cells = cells.to_str().context("the path of this tree is no text")?;
+    write_between("docs/smooth.md", "laws", &table_of("smooth", &["laws", cells])?)?;
+    cargo(["run", "--release", "--package", "clutch-cli", "--example", "laws_figure", "--"])
+        .args([cells, "docs/figures/smooth.svg"])
+        .run()?;
+    for table in ["plants", "rest", "troubles", "steps", "motions", "motor", "bristles"] {
         write_between("docs/smooth.md", table, &table_of("smooth", &[table])?)?;
     }
     write_between("docs/smooth.md", "maps", &table_in("clutch-identify", "maps", &[])?)

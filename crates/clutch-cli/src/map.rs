@@ -165,6 +165,9 @@ struct Shown {
     hole: bool,
 }
 
+/// Letters of the causes, and of none.
+const LETTERS: &str = "USEJR.";
+
 /// Letter of the first cause that holds.
 fn letter(causes: &[Cause]) -> char {
     match causes.first() {
@@ -172,6 +175,7 @@ fn letter(causes: &[Cause]) -> char {
         Some(Cause::StribeckEdge) => 'S',
         Some(Cause::EncoderEdge) => 'E',
         Some(Cause::EdgeJolt) => 'J',
+        Some(Cause::Ripple) => 'R',
         None => '.',
     }
 }
@@ -184,7 +188,8 @@ fn causes(marks: impl Fn(char) -> bool) -> Vec<(String, String)> {
         ('S', "Stribeck: friction falls faster with the speed than the law brakes"),
         ('E', encoder.as_str()),
         ('J', "Jolt: an edge of the encoder, by the gain on its rate, stops the shaft"),
-        ('.', "none of the causes that the map knows: U, S, E, J"),
+        ('R', "Ripple: the disc that sticks does not if its friction is even along it"),
+        ('.', "none of the causes that the map knows: U, S, E, J, R"),
     ]
     .into_iter()
     .filter(|(mark, _)| marks(*mark))
@@ -224,7 +229,7 @@ fn gains(scenario: &Scenario, trials: &Trials, map: &GainMap) -> Grid {
     also(any(&|c| c.text == "--"), "--", "at every rate tried a disc sticks, or leaves its path");
     also(any(&|c| c.mark == '<'), "<", "smooth at the lowest rate tried");
     also(any(&|c| c.hole), "!", "a hole: a higher rate sticks again");
-    also(any(&|c| "USEJ.".contains(c.mark)), "", "then why the next lower rate sticks:");
+    also(any(&|c| LETTERS.contains(c.mark)), "", "then why the next lower rate sticks:");
     legend.extend(causes(|mark| any(&|c| c.mark == mark)));
     let (mut runs, mut holes) = (0, Vec::new());
     for (cell, (x, y)) in map
@@ -288,7 +293,7 @@ fn against_rates(scenario: &Scenario, trials: &Trials, map: &RateMap) -> Grid {
     let any = |mark| cells.iter().flatten().any(|c| c.mark == mark);
     let mut legend =
         vec![("1".to_owned(), format!("of {} discs sticks at this rate, or leaves its path", map.discs))];
-    if "USEJ.".chars().any(any) {
+    if LETTERS.chars().any(any) {
         legend.push((String::new(), "then why:".to_owned()));
     }
     legend.extend(causes(any));
@@ -377,7 +382,7 @@ impl Grid {
         let marks: Vec<String> = self
             .legend
             .iter()
-            .filter(|(sign, _)| ["U", "S", "E", "J", "!", "<", "--"].contains(&sign.as_str()))
+            .filter(|(sign, _)| ["U", "S", "E", "J", "R", "!", "<", "--"].contains(&sign.as_str()))
             .map(|(sign, text)| format!("{sign} {}", text.split(':').next().unwrap_or(text).to_lowercase()))
             .collect();
         Figure {

@@ -761,6 +761,22 @@ fn a_map_of_one_ride_makes_the_next_smoother_and_one_of_another_disc_is_dropped(
     let alone = sim(&["--set", "run.seed=2"]);
     assert!(rms(&other) < 1.1 * rms(&alone), "{} with another's map, {} without", rms(&other), rms(&alone));
 
+    // A file of before versions were told is of the first; one of a later is refused.
+    let text = std::fs::read_to_string(&map).expect("the map");
+    assert_eq!(text.matches("\nversion = 1\n").count(), 1, "{text}");
+    let of = |name: &str, version: &str| {
+        std::fs::write(path(name), text.replace("version = 1\n", version)).expect("a file");
+        path(name)
+    };
+    assert_eq!(sim(&["--map", &of("older.toml", "")])["metrics"], with["metrics"]);
+    let o = clutch(&["sim", "bench_glide_2", "--map", &of("later.toml", "version = 2\nwaves = 340\n")]);
+    assert_eq!(o.status.code(), Some(1));
+    assert!(
+        err(&o).contains("later.toml: friction_map.version = 2: expected a whole number from 1 to 1"),
+        "{}",
+        err(&o)
+    );
+
     // The log has the map, and so has its replay.
     let o = clutch(&["replay", &second]);
     assert_eq!(o.status.code(), Some(0), "{}{}", out(&o), err(&o));

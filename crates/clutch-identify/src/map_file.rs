@@ -34,7 +34,7 @@ pub fn map_file(map: &[Place], rig: &str) -> String {
     format!(
         "# Friction along the disc, over its mean, from the encoder's zero on: for the law glide.\n\
          # clutch sim|loop SCENARIO --map THIS_FILE.toml\n\n\
-         [friction_map]\nrig = {}\npoints_deg_factor = [\n{points}]\n",
+         [friction_map]\nversion = 1\nrig = {}\npoints_deg_factor = [\n{points}]\n",
         toml::Value::String(if rig.trim().is_empty() { "without a name" } else { rig }.to_owned())
     )
 }

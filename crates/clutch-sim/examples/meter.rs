@@ -34,6 +34,18 @@ const LAWS: &[(&str, &str)] = &[
     ("SMC", "[law.smc]"),
     ("SMC, sign", "[law.smc_sign]"),
     (
+        "SMC with an integral",
+        "[law.smc_integral]\nkp_v = 10.0\nslope_1_s = 61.0\nintegral_1_s2 = 4250.0\nboundary_rad_s = 0.51\n\n[velocity.smoothed_derivative]\nsmoothing = 0.27",
+    ),
+    (
+        "super-twisting",
+        "[law.super_twisting]\nk1_v_rt_s_rad = 4.4\nk2_v_s = 42.0\nslope_1_s = 37.0\n\n[velocity.smoothed_derivative]\nsmoothing = 0.34",
+    ),
+    (
+        "DOB",
+        "[law.dob]\nkp_1_s2 = 6700.0\nkd_1_s = 150.0\nbandwidth_rad_s = 120.0\n\n[velocity.smoothed_derivative]\nsmoothing = 0.41",
+    ),
+    (
         "PI with feed-forward",
         "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.smoothed_derivative]\nsmoothing = 0.67",
     ),

@@ -16,6 +16,8 @@ params! {
     /// Friction along the disc, as an earlier ride has shown it: `clutch identify --map` writes it. The law glide takes it
     /// where it shows to be right; other laws have no use for it.
     pub struct FrictionMapParams<f64> {
+        /// Version of the table: a later one may mean something else.
+        version: u32 = 1, "version" "" NONE, Range::within(1.0, 1.0);
         /// The rig, and the ride, that it is of: any text.
         rig: Text, "rig" "" NONE, Range::ANY;
         /// Points of angle, from the encoder's zero, and friction, over its mean; angles rise.
@@ -147,10 +149,32 @@ fn between(points: &[(f64, f64)], at: usize, degrees: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Scenario;
     use clutch_core::{FixedCounts, Place};
 
     fn map(points: Vec<(f64, f64)>) -> FrictionMapParams {
-        FrictionMapParams { rig: Text("a test".to_owned()), points: Points(points) }
+        FrictionMapParams { version: 1, rig: Text("a test".to_owned()), points: Points(points) }
+    }
+
+    #[test]
+    fn a_map_of_a_later_version_is_refused_and_one_without_is_of_the_first() {
+        let parsed = |head: &str| {
+            let points: Vec<_> = (0..30).map(|i| format!("[{}, 1.0]", 0.072 * f64::from(i))).collect();
+            let map = format!(
+                "[friction_map]\n{head}rig = \"a test\"\npoints_deg_factor = [{}]",
+                points.join(", ")
+            );
+            let law = "[law.glide]\n[reference.ramp]\nrate_deg_s = 2.0";
+            let text = format!("name = \"map\"\n[rig]\nbase = \"bench\"\n{law}\n{map}\n");
+            Scenario::parse("a file", &text, &[])
+        };
+        assert_eq!(parsed("").unwrap().table(), parsed("version = 1\n").unwrap().table());
+        for later in ["version = 2\n", "version = 2\nwaves = 340\n"] {
+            let error = parsed(later).unwrap_err().to_string();
+            assert_eq!(error, "a file: friction_map.version = 2: expected a whole number from 1 to 1");
+        }
+        let unknown = parsed("waves = 340\n").unwrap_err().to_string();
+        assert!(unknown.contains("friction_map.waves = 340: unknown key"), "{unknown}");
     }
 
     #[test]

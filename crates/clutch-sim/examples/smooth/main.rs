@@ -1,13 +1,18 @@
 //! Smooth motion on the rig `bench`, law by law and rate by rate: the tables of docs/smooth.md, by `cargo xtask smooth`.
 //!
 //! ```sh
-//! cargo run --release --package clutch-sim --example smooth -- laws    # or plants, rest, steps, motions
+//! cargo run --release --package clutch-sim --example smooth -- laws    # or plants, rest, troubles, steps, motions, motor, bristles
 //! ```
 
+mod bristles;
+mod laws;
+mod motor;
 mod steps;
+mod troubles;
 
 use clutch_sim::sweep::{Row, Sweep};
 use clutch_sim::{Keep, Metrics};
+use laws::GLIDE;
 use std::error::Error;
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
@@ -15,58 +20,8 @@ use toml::{Table, Value};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
-/// Rates of the paths, °/s.
-const RATES: [f64; 9] = [100.0, 20.0, 10.0, 6.0, 4.0, 2.0, 1.5, 1.0, 0.5];
-
-/// A law as it is told to readers, and its part of a scenario.
-const LAWS: &[(&str, &str)] = &[
-    ("glide", "[law.glide.filter]\ndelay_ticks = 1"),
-    (
-        "PI with feed-forward, (5)",
-        "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.smoothed_derivative]\nsmoothing = 0.67",
-    ),
-    (
-        "the same, edge-timed",
-        "[law.pid]\nkp_v_rad = 2370.0\nki_v_rad_s = 25000.0\nkd_v_s_rad = 14.5\nbias_v = 2.24\n\n[velocity.edge_timed]\ndelay_ticks = 1",
-    ),
-    (
-        "PD 1660/12.9, (5)",
-        "[law.pd]\nkp_v_rad = 1660.0\nkd_v_s_rad = 12.9\n\n[velocity.smoothed_derivative]\nsmoothing = 0.712",
-    ),
-    (
-        "DOB 6700/150/120, (5)",
-        "[law.dob]\nkp_1_s2 = 6700.0\nkd_1_s = 150.0\nbandwidth_rad_s = 120.0\n\n[velocity.smoothed_derivative]\nsmoothing = 0.41",
-    ),
-    (
-        "DOB 12000/400/100, edge-timed",
-        "[law.dob]\nkp_1_s2 = 12000.0\nkd_1_s = 400.0\nbandwidth_rad_s = 100.0\n\n[velocity.edge_timed]\ndelay_ticks = 1",
-    ),
-    (
-        "SMC with an integral 10/0/61/4250/0.51, (5)",
-        "[law.smc_integral]\nkp_v = 10.0\nslope_1_s = 61.0\nintegral_1_s2 = 4250.0\nboundary_rad_s = 0.51\n\n[velocity.smoothed_derivative]\nsmoothing = 0.27",
-    ),
-    (
-        "SMC with an integral 10/38/16.3/1460/0.18, edge-timed",
-        "[law.smc_integral]\nkp_v = 10.0\nkd_v_s_rad = 38.0\nslope_1_s = 16.3\nintegral_1_s2 = 1460.0\nboundary_rad_s = 0.18\n\n[velocity.edge_timed]\ndelay_ticks = 1",
-    ),
-    (
-        "super-twisting 4.4/42/37, (5)",
-        "[law.super_twisting]\nk1_v_rt_s_rad = 4.4\nk2_v_s = 42.0\nslope_1_s = 37.0\n\n[velocity.smoothed_derivative]\nsmoothing = 0.34",
-    ),
-    (
-        "super-twisting 5.35/46.8/19.3, edge-timed",
-        "[law.super_twisting]\nk1_v_rt_s_rad = 5.35\nk2_v_s = 46.8\nslope_1_s = 19.3\n\n[velocity.edge_timed]\ndelay_ticks = 1",
-    ),
-    (
-        "super-twisting 8.4/230/26, layer 0.063, edge-timed",
-        "[law.super_twisting]\nk1_v_rt_s_rad = 8.4\nk2_v_s = 230.0\nslope_1_s = 26.0\nboundary_rad_s = 0.063\n\n[velocity.edge_timed]\ndelay_ticks = 1",
-    ),
-    ("SMC of Table 2, (5)", "[law.smc]"),
-    ("the same, observer", "[law.smc]\n\n[velocity.observer]"),
-    ("the same, edge-timed", "[law.smc]\n\n[velocity.edge_timed]\ndelay_ticks = 1"),
-    ("CTC of Table 2, (5)", "[law.ctc]"),
-    ("PD of Table 2, (5)", "[law.pd]"),
-];
+/// The rate below which glide goes in micro-steps, where it does, °/s.
+const STEPS_BELOW: (&str, f64) = ("law.glide.micro_below_deg_s", 0.95);
 
 /// Departures of the rig from what it is without them, one at a time, and those that the law is told of.
 const PLANTS: &[(&str, &[(&str, f64)])] = &[
@@ -110,12 +65,12 @@ const PLANTS: &[(&str, &[(&str, f64)])] = &[
     ),
 ];
 
-/// The model's friction as a multiple of Table 1's, for starts from rest.
-const BELIEFS: &[(&str, f64)] = &[
-    ("Table 1, 1.51 times the rig's", 1.0),
-    ("0.93 times the rig's", 0.614),
-    ("1.3 times", 0.86),
-    ("0.66 times", 0.4373),
+/// The model's friction, at rest and in motion, for starts from rest. The friction of `bench` is 0.203 and 0.104.
+const BELIEFS: &[(&str, [f64; 2])] = &[
+    ("right", [0.203, 0.104]),
+    ("1.4 times the rig's", [0.2842, 0.1456]),
+    ("0.6 times the rig's", [0.1218, 0.0624]),
+    ("Table 1", [0.2, 0.15]),
 ];
 
 /// Runs of a law on `bench` along a ramp, one for each seed.
@@ -150,7 +105,7 @@ fn runs_of(scenario: &str, keys: &[(&str, f64)], seeds: std::ops::Range<i64>) ->
 }
 
 /// Figures of a set of runs: cycles per second in the mean, the most in a run, discs with a stick, the largest error and RMS
-/// error (°), travel of the voltage (V/s).
+/// error (°), travel of the voltage (V/s), share of the time stuck.
 struct Summary {
     cycles: f64,
     most: f64,
@@ -158,6 +113,7 @@ struct Summary {
     error: f64,
     rms: f64,
     travel: f64,
+    stuck: f64,
 }
 
 impl Summary {
@@ -172,6 +128,7 @@ impl Summary {
             error: most(|m| m.max_error_rad).to_degrees(),
             rms: mean(|m| m.rms_error_rad * m.rms_error_rad).sqrt().to_degrees(),
             travel: mean(|m| m.control_variation_v_s),
+            stuck: mean(|m| m.stick_time_fraction),
         }
     }
 }
@@ -189,36 +146,17 @@ fn shown(x: f64) -> String {
     }
 }
 
-fn laws() -> Outcome<()> {
-    let rates: Vec<String> = RATES.iter().map(|rate| format!("{rate} °/s")).collect();
-    println!("| law, velocity from | {} | V/s at 2 °/s |", rates.join(" | "));
-    println!("|---|{}---|", "---|".repeat(RATES.len()));
-    for (title, law) in LAWS {
-        let (mut cells, mut travel) = (Vec::new(), 0.0);
-        for rate in RATES {
-            let s = Summary::of(&runs(law, &[("reference.ramp.rate_deg_s", rate)], 1..41)?);
-            cells.push(format!("{} ({}), {:.3}°", shown(s.cycles), s.discs, s.error));
-            if rate == 2.0 {
-                travel = s.travel;
-            }
-        }
-        println!("| {title} | {} | {travel:.0} |", cells.join(" | "));
-    }
-    Ok(())
-}
-
 fn plants() -> Outcome<()> {
     println!("| the rig | cycles/s | discs of 40 | largest error | RMS | V/s |");
     println!("|---|---|---|---|---|---|");
-    let glide = LAWS[0].1;
     for (title, keys) in PLANTS {
-        print_row(title, &runs(glide, keys, 3001..3041)?);
+        print_row(title, &runs(GLIDE, keys, 3001..3041)?);
     }
     let minute = [("run.duration_s", 61.0)];
     for (title, scalar) in
         [("a minute each", ""), ("a minute each, `f32`", "\n\n[sampling]\nscalar = \"f32\"")]
     {
-        print_row(title, &runs(&format!("{glide}{scalar}"), &minute, 3001..3041)?);
+        print_row(title, &runs(&format!("{GLIDE}{scalar}"), &minute, 3001..3041)?);
     }
     Ok(())
 }
@@ -235,14 +173,14 @@ fn rest() -> Outcome<()> {
         "| friction believed | sticks in the first second, mean | most | discs of 200 that stick after 0.15 s | largest error |"
     );
     println!("|---|---|---|---|---|");
-    let glide = format!("{}\n\n[run]\nstart = \"rest\"", LAWS[0].1);
-    for (title, times) in BELIEFS {
+    let glide = format!("{GLIDE}\n\n[run]\nstart = \"rest\"");
+    for (title, [at_rest, sliding]) in BELIEFS {
         let keys = |settle| {
             [
                 ("run.duration_s", 1.0),
                 ("run.settle_s", settle),
-                ("model.friction.stribeck.mu_static", 0.2 * times),
-                ("model.friction.stribeck.mu_dynamic", 0.15 * times),
+                ("model.friction.stribeck.mu_static", *at_rest),
+                ("model.friction.stribeck.mu_dynamic", *sliding),
             ]
         };
         let all = Summary::of(&runs(&glide, &keys(0.0), 1..201)?);
@@ -253,12 +191,16 @@ fn rest() -> Outcome<()> {
 }
 
 fn main() -> Outcome<()> {
-    match std::env::args().nth(1).as_deref() {
-        Some("laws") => laws(),
+    let mut args = std::env::args().skip(1);
+    match args.next().as_deref() {
+        Some("laws") => laws::laws(args.next().as_deref()),
         Some("plants") => plants(),
         Some("rest") => rest(),
+        Some("troubles") => troubles::troubles(),
         Some("steps") => steps::steps(),
         Some("motions") => steps::motions(),
-        _ => Err("expected laws, plants, rest, steps or motions".into()),
+        Some("motor") => motor::motor(),
+        Some("bristles") => bristles::bristles(),
+        _ => Err("expected laws, plants, rest, troubles, steps, motions, motor or bristles".into()),
     }
 }

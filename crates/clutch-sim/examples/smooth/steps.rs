@@ -1,10 +1,9 @@
 //! Glide with micro-steps: the tables `steps` and `motions` of docs/smooth.md.
 
-use super::{LAWS, Outcome, Summary, runs, runs_of, shown};
+use super::laws::GLIDE;
+use super::motor::{self, Axis, TEXT_BOOK, TO_AND_FRO};
+use super::{Outcome, STEPS_BELOW, Summary, runs, runs_of, shown};
 use clutch_sim::Metrics;
-
-/// The rate below which the shaft steps.
-const BELOW: (&str, f64) = ("law.glide.micro_below_deg_s", 0.95);
 
 /// Rates of the ramps, °/s.
 const RATES: [f64; 7] = [0.9, 0.7, 0.5, 0.3, 0.1, 0.05, 0.01];
@@ -53,30 +52,29 @@ pub(super) fn steps() -> Outcome<()> {
         "| ramp on `bench` | largest error | RMS | steps/s | largest step | longest rest | V/s | without steps: sticks/s, largest error |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    let glide = LAWS[0].1;
     // A settling of two counts, and time enough for ten.
     let time =
         |rate: f64| [("run.settle_s", (0.05 / rate).max(1.0)), ("run.duration_s", (0.25 / rate).max(5.0))];
     for rate in RATES {
         let mut keys = vec![("reference.ramp.rate_deg_s", rate)];
         keys.extend(time(rate));
-        let without = runs(glide, &keys, 3001..3041)?;
-        keys.push(BELOW);
-        print_row(&format!("{rate} °/s"), &runs(glide, &keys, 3001..3041)?, Some(&without));
+        let without = runs(GLIDE, &keys, 3001..3041)?;
+        keys.push(STEPS_BELOW);
+        print_row(&format!("{rate} °/s"), &runs(GLIDE, &keys, 3001..3041)?, Some(&without));
     }
     for (title, rig) in RIGS {
         let rate = 0.5;
         let mut keys = vec![("reference.ramp.rate_deg_s", rate)];
         keys.extend(time(rate));
         keys.extend_from_slice(rig);
-        let without = runs(glide, &keys, 3001..3041)?;
-        keys.push(BELOW);
-        print_row(&format!("0.5 °/s, {title}"), &runs(glide, &keys, 3001..3041)?, Some(&without));
+        let without = runs(GLIDE, &keys, 3001..3041)?;
+        keys.push(STEPS_BELOW);
+        print_row(&format!("0.5 °/s, {title}"), &runs(GLIDE, &keys, 3001..3041)?, Some(&without));
     }
-    let single = format!("{glide}\n\n[sampling]\nscalar = \"f32\"");
+    let single = format!("{GLIDE}\n\n[sampling]\nscalar = \"f32\"");
     let rate = ("reference.ramp.rate_deg_s", 0.5);
     let without = runs(&single, &[rate], 3001..3041)?;
-    print_row("0.5 °/s, `f32`", &runs(&single, &[rate, BELOW], 3001..3041)?, Some(&without));
+    print_row("0.5 °/s, `f32`", &runs(&single, &[rate, STEPS_BELOW], 3001..3041)?, Some(&without));
     Ok(())
 }
 
@@ -92,48 +90,22 @@ const BRAKE: &[(&str, &str)] = &[
     ),
 ];
 
-/// A geared axis: 50 and 30 mN m of friction, no load.
-const MOTOR: &str = r#"
-[rig]
-base = "bench"
-actuator.motor = { gain_nm_v = 0.05, preload_nm = 0.25 }
-friction.stribeck = { mu_static = 0.2, mu_dynamic = 0.12, stribeck_velocity_rad_s = 0.003 }
-drive.table = { points_s_nm = [[0.0, 0.0]] }
-
-[model]
-drive_torque_nm = 0.0
-actuator.motor = { gain_nm_v = 0.05, preload_nm = 0.25 }
-friction.stribeck = { mu_static = 0.2, mu_dynamic = 0.12, stribeck_velocity_rad_s = 0.003 }
-
-[output]
-lowest_v = -10.0
-on_invalid_v = 0.0
-"#;
-
-/// To and fro at 0.5 °/s at most, a period of 63 s, from rest.
-const TO_AND_FRO: &str = "[reference.sine]\nrate_deg_s = 0.0\namplitude_deg = 5.0\nfrequency_hz = 0.0159155\n\n[run]\nduration_s = 66.0\nsettle_s = 2.0\nstart = \"rest\"";
-
-/// PID with feed-forward of friction, gains from a text book: 17 N m/rad, 100 N m/(rad s), 0.3 N m s/rad.
-const PID: &str = "[law.pid]\nkp_v_rad = 340.0\nki_v_rad_s = 2000.0\nkd_v_s_rad = 6.0\ncoulomb_v = 0.6";
-
 /// Motions that are no ramps, and the motor axis.
 pub(super) fn motions() -> Outcome<()> {
     println!("| motion | largest error | RMS | steps/s | largest step | longest rest | V/s |");
     println!("|---|---|---|---|---|---|---|");
-    let glide = LAWS[0].1;
     for (title, path) in BRAKE {
-        let scenario = format!("[rig]\nbase = \"bench\"\n\n{glide}\n\n{path}\n");
-        print_row(title, &runs_of(&scenario, &[BELOW], 3001..3041)?, None);
+        let scenario = format!("[rig]\nbase = \"bench\"\n\n{GLIDE}\n\n{path}\n");
+        print_row(title, &runs_of(&scenario, &[STEPS_BELOW], 3001..3041)?, None);
         print_row("the same without steps", &runs_of(&scenario, &[], 3001..3041)?, None);
     }
-    for v_s in [0.001, 0.003, 0.01] {
-        let keys = [("rig.friction.stribeck.stribeck_velocity_rad_s", v_s)];
-        let with = [keys[0], BELOW];
-        let scenario = |law: &str| format!("{MOTOR}\n{law}\n\n{TO_AND_FRO}\n");
-        let title = format!("motor, 0.5 °/s to and fro, v_s {v_s} rad/s");
-        print_row(&title, &runs_of(&scenario(glide), &with, 3001..3011)?, None);
-        print_row("the same without steps", &runs_of(&scenario(glide), &keys, 3001..3011)?, None);
-        print_row("PID with feed-forward", &runs_of(&scenario(PID), &keys, 3001..3011)?, None);
+    for stribeck in [0.001, 0.003, 0.01] {
+        let axis = Axis { counts: 20_000.0, stribeck };
+        let runs = |law, more: &[(&str, f64)]| motor::runs(&axis, law, TO_AND_FRO, more, 3001..3011);
+        let title = format!("motor, 0.5 °/s to and fro, v_s {stribeck} rad/s");
+        print_row(&title, &runs(GLIDE, &[STEPS_BELOW])?, None);
+        print_row("the same without steps", &runs(GLIDE, &[])?, None);
+        print_row("PID with feed-forward", &runs(TEXT_BOOK, &[])?, None);
     }
     Ok(())
 }

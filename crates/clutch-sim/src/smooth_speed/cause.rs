@@ -1,8 +1,10 @@
-//! Reasons why a rate is not smooth, each in a closed form; docs/theory.md, section 15, derives them.
+//! Reasons why a rate is not smooth, all but one in a closed form; docs/theory.md, section 15, derives them.
 //!
 //! They are of the rig as it is, not of the plant that the law believes in. A rate at which none holds need not be smooth: it
 //! may stick for another reason.
 
+use super::Failure;
+use crate::progress::Report;
 use crate::rig::Rig;
 use crate::ripple::Ripple;
 use crate::scenario::{Scenario, ScenarioError};
@@ -27,12 +29,14 @@ pub enum Cause {
     EncoderEdge,
     /// An edge of the encoder, through the law's derivative gain, takes more speed than there is.
     EdgeJolt,
+    /// Friction's ripple along the disc: the run is smooth if the disc is even. Asked where none of the others holds.
+    Ripple,
 }
 
 impl Cause {
     /// Every cause, in the order in which they are reported.
-    pub const ALL: [Cause; 4] =
-        [Cause::SampledLoop, Cause::StribeckEdge, Cause::EncoderEdge, Cause::EdgeJolt];
+    pub const ALL: [Cause; 5] =
+        [Cause::SampledLoop, Cause::StribeckEdge, Cause::EncoderEdge, Cause::EdgeJolt, Cause::Ripple];
 }
 
 /// The ground from which the causes follow, at a rate.
@@ -60,6 +64,8 @@ pub struct Evidence {
     /// Speed that the law's answer to an edge takes from the shaft, °/s; none where the velocity is no difference of counts,
     /// or the law's damping is not known.
     pub edge_jolt_deg_s: Option<f64>,
+    /// True if the run that failed is smooth on an even disc; none where that was not asked.
+    pub even_disc_smooth: Option<bool>,
 }
 
 impl Evidence {
@@ -98,6 +104,7 @@ impl Evidence {
             Cause::StribeckEdge => edge.is_some_and(|edge| rate < edge),
             Cause::EncoderEdge => between.is_some_and(|growth| growth > ENCODER_LIMIT),
             Cause::EdgeJolt => jolt.is_some_and(|jolt| rate < jolt),
+            Cause::Ripple => false,
         };
         Ok(Evidence {
             rate_deg_s,
@@ -110,7 +117,25 @@ impl Evidence {
             edge_time_s: edge_time,
             growth_between_edges: between,
             edge_jolt_deg_s: jolt.map(f64::to_degrees),
+            even_disc_smooth: None,
         })
+    }
+
+    /// The evidence with the run that failed, which is tried on an even disc if nothing else tells why it did.
+    pub(super) fn with(
+        mut self,
+        failed: Option<&Failure>,
+        scenario: &Scenario,
+        report: Report<'_>,
+    ) -> Result<Evidence, ScenarioError> {
+        let rig = &scenario.params().rig;
+        let uneven = rig.ripple.is_some() || rig.runout.is_some();
+        if let Some(failed) = failed.filter(|_| self.causes.is_empty() && uneven) {
+            let smooth = scenario.even_disc(failed.rate_deg_s, failed.seed, report)?.is_none();
+            self.even_disc_smooth = Some(smooth);
+            self.causes.extend(smooth.then_some(Cause::Ripple));
+        }
+        Ok(self)
     }
 }
 

@@ -106,8 +106,10 @@ pub fn rate_map(
         let run = |seed| here.disc(rate, seed, &|_| report(Progress { total, finished: 0 }));
         let failures: Vec<Option<Failure>> =
             (1..=u64::from(trials.discs())).map(run).collect::<Result<_, _>>()?;
-        let failures = failures.into_iter().flatten().collect();
-        told(report, total, Ok(Tried { failures, evidence: Evidence::new(rate, &here)? }))
+        let failures: Vec<Failure> = failures.into_iter().flatten().collect();
+        let patient: Report<'_> = &|_| report(Progress { total, finished: 0 });
+        let evidence = Evidence::new(rate, &here)?.with(failures.first(), &here, patient)?;
+        told(report, total, Ok(Tried { failures, evidence }))
     };
     let column = |a: &f64| {
         let rates = trials.rates_deg_s().par_iter().map(|rate| tried(*a, *rate)).collect::<Result<_, _>>()?;

@@ -139,7 +139,7 @@ pub struct SmoothSpeed {
     pub discs_above: u32,
     /// The rates that were to be tried, °/s.
     pub rates_deg_s: Vec<f64>,
-    /// Number of runs.
+    /// Number of runs, but for one on an even disc.
     pub runs: u64,
 }
 
@@ -175,7 +175,7 @@ pub fn lowest_smooth_speed(
             (None, Some(_)) => {}
         }
     }
-    let evidence = Evidence::new(at.0, &at.1)?;
+    let evidence = Evidence::new(at.0, &at.1)?.with(below.as_ref(), &at.1, report)?;
     Ok(SmoothSpeed {
         rate_deg_s: found,
         cause: below.and_then(|_| evidence.causes.first().copied()),
@@ -211,7 +211,27 @@ impl Scenario {
 
     /// The scenario, whose rate this is, on a disc: the first thing that is not smooth.
     fn disc(&self, rate_deg_s: f64, seed: u64, report: Report<'_>) -> Result<Option<Failure>, ScenarioError> {
+        self.ridden(self.spec(), (rate_deg_s, seed), report)
+    }
+
+    /// The same on a disc whose friction is the same all along.
+    fn even_disc(
+        &self,
+        rate_deg_s: f64,
+        seed: u64,
+        report: Report<'_>,
+    ) -> Result<Option<Failure>, ScenarioError> {
         let mut spec = self.spec();
+        (spec.rig.ripple, spec.rig.runout) = (None, None);
+        self.ridden(spec, (rate_deg_s, seed), report)
+    }
+
+    fn ridden(
+        &self,
+        mut spec: RunSpec<'_>,
+        (rate_deg_s, seed): (f64, u64),
+        report: Report<'_>,
+    ) -> Result<Option<Failure>, ScenarioError> {
         spec.run.seed = seed;
         let failure = match self.scalar() {
             ScalarKind::F32 => first_failure::<f32>(&spec, report),

@@ -51,6 +51,11 @@ pub(crate) fn complete_table(
     table: &mut Table,
 ) -> Result<(), ScenarioError> {
     let keys = keys(info);
+    // First: another version has other keys.
+    let version = keys.iter().find(|(key, _)| *key == "version");
+    if let (Some((key, Entry::Row(row))), Some(value)) = (version, table.get("version")) {
+        checked(origin, &join(path, key), row, value.clone())?;
+    }
     if let Some(unknown) = table.keys().find(|key| keys.iter().all(|(known, _)| known != key)) {
         return Err(unknown_key(origin, path, unknown, table.get(unknown), &keys));
     }
