@@ -27,7 +27,8 @@ class Certificate(_Record):
     reason : str or None
         The missing part; None if certified.
     rig_outside_bounds : tuple of str
-        A line for each property of the rig that the bounds do not contain.
+        A line for each property of the rig that the certificate in continuous time does not cover: outside the bounds,
+        torque noise included; delay; lag.
     bounds : Certificate.Bounds
         The plant as it is believed to be.
     demand : Certificate.Demand

@@ -206,6 +206,8 @@ fn a_loop_arms_on_its_own_certificate_and_on_no_other() {
     let _ = with("loop", gains, &more).expect(0).prints(&[
         "not certified in continuous time; certified as sampled",
         "|e| below 0.17",
+        "certified for a ramp at 20 °/s, 0 ticks of delay",
+        "sticks not excluded",
         "as sampled: |e| stays below 0.17",
         "ramp at 20 °/s, from rest",
     ]);

@@ -180,6 +180,32 @@ fn a_rig_outside_the_bounds_of_the_certificate_is_told() {
 }
 
 #[test]
+fn noise_delay_and_lag_of_a_rig_that_continuous_time_does_not_cover_are_told() {
+    let outside = |set: &[(&str, &str)]| {
+        let set: Vec<_> = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        let s = Scenario::parse("my.toml", GOOD, &set).unwrap();
+        s.outside_bounds(&s.plan().unwrap().bounds).unwrap()
+    };
+    let noise = ("rig.torque_noise_nm", "0.002");
+    assert_eq!(
+        outside(&[noise, ("rig.delay_ticks", "1")]),
+        [
+            "driving torque ± 4 · 0.002 N m of noise is 0.03909 … 0.05509, bounds 0.04709",
+            "delay is 1 tick of 1000 µs, bounds none",
+        ]
+    );
+    let (lag, delay) = (("rig.actuator_time_constant_s", "0.005"), ("rig.delay_ticks", "2"));
+    assert_eq!(
+        outside(&[lag, delay, ("sampling.period_us", "500")]),
+        ["delay is 2 ticks of 500 µs, bounds none", "lag of the actuator is 0.005 s, bounds none"]
+    );
+    // Four times 0.002 N m are 17 % of the weight's torque: a drive known to 20 % holds them, one known to 10 % does not.
+    for (percent, lines) in [("20.0", 0), ("10.0", 1)] {
+        assert_eq!(outside(&[noise, ("bounds.drive_torque_percent", percent)]).len(), lines, "{percent} %");
+    }
+}
+
+#[test]
 fn a_rig_whose_mean_is_outside_of_what_its_ripple_leaves_is_told() {
     let outside = |factor: f64| {
         let mu = |key: &str, mu: f64| (format!("rig.friction.stribeck.{key}"), format!("{}", factor * mu));

@@ -45,26 +45,21 @@ const ABLATIONS: &[Ablation] = &[
     Ablation(
         "samples twice or out of order",
         SUPERVISOR,
-        "if history.count() >= self.limits.disorder {",
-        "if history.count() >= self.limits.disorder && !OFF {",
+        "if count >= self.limits.disorder {",
+        "if count >= self.limits.disorder && !OFF {",
     ),
-    Ablation(
-        "samples lost too often",
-        SUPERVISOR,
-        "if s.lost.count() >= l.lost {",
-        "if s.lost.count() >= l.lost && !OFF {",
-    ),
+    Ablation("samples lost too often", SUPERVISOR, "if count >= l.lost {", "if count >= l.lost && !OFF {"),
     Ablation(
         "samples or codes late too often",
         SUPERVISOR,
-        "if s.late.count() >= l.late {",
-        "if s.late.count() >= l.late && !OFF {",
+        "if count >= l.late {",
+        "if count >= l.late && !OFF {",
     ),
     Ablation(
         "answers late too often",
         SUPERVISOR,
-        "if s.overrun.count() >= l.overruns {",
-        "if s.overrun.count() >= l.overruns && !OFF {",
+        "if s.overrun.mark(s.periods) >= l.overruns {",
+        "if s.overrun.mark(s.periods) >= l.overruns && !OFF {",
     ),
     Ablation(
         "board's time against its periods",
@@ -82,8 +77,8 @@ const ABLATIONS: &[Ablation] = &[
     Ablation(
         "target against the last one",
         SUPERVISOR,
-        "            self.limits.believes(",
-        "            OFF || self.limits.believes(",
+        "let plausible = self.limits.believes(",
+        "let plausible = OFF || self.limits.believes(",
     ),
     Ablation("numbers of the law", SUPERVISOR, "if !finite(out) {", "if !finite(out) && !OFF {"),
     Ablation(
@@ -101,8 +96,8 @@ const ABLATIONS: &[Ablation] = &[
     Ablation(
         "counts against the slowest and the fastest shaft",
         SUPERVISOR,
-        "if let Some((cause, counts)) = l.envelope.judge(&mut s.envelope, volts, moved, periods) {",
-        "if let Some((cause, counts)) = l.envelope.judge(&mut s.envelope, volts, moved, periods) && !OFF {",
+        "if let Some((cause, counts)) = l.envelope.judge(&mut s.envelope, losses, moved, periods) {",
+        "if let Some((cause, counts)) = l.envelope.judge(&mut s.envelope, losses, moved, periods) && !OFF {",
     ),
     Ablation(
         "way over several samples",
@@ -264,4 +259,42 @@ fn patched(file: &str, mut text: String) -> Result<String> {
 /// Runs without the check of that number, until one fails; true if none does.
 fn until(built: &Path, check: usize, runs: u64) -> Result<(bool, String)> {
     program(built).args(["until", &runs.to_string()]).env("ABLATED", check.to_string()).silently()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    fn read(file: &str) -> String {
+        std::fs::read_to_string(root().join(file)).unwrap_or_else(|e| panic!("{file}: {e}"))
+    }
+
+    #[test]
+    fn each_check_that_is_taken_out_is_once_in_its_file() {
+        for Ablation(name, file, old, new) in ABLATIONS {
+            assert_eq!(read(file).matches(old).count(), 1, "{name}: in {file}: {old}");
+            assert!(new.contains("OFF"), "{name}: nothing switches it off: {new}");
+        }
+        for (file, old, _) in SWITCH {
+            assert_eq!(read(file).matches(old).count(), 1, "in {file}: {old}");
+        }
+        // One after another, too: no switch hides the check of another.
+        let files = ABLATIONS.iter().map(|a| a.1).chain(SWITCH.iter().map(|s| s.0));
+        for file in files.collect::<BTreeSet<_>>() {
+            let text = patched(file, read(file)).unwrap_or_else(|e| panic!("{e}"));
+            assert!(!text.contains("OFF "), "{file} has a switch that was not put in");
+        }
+    }
+
+    #[test]
+    fn the_published_table_has_these_checks_and_no_others() {
+        let page = read("docs/safety.md");
+        let between = |from: &str, to: &str| page.split_once(from).and_then(|(_, rest)| rest.split_once(to));
+        let (table, _) = between("<!-- ablations:begin -->", "<!-- ablations:end -->").expect("a table");
+        let rows: Vec<&str> =
+            table.lines().filter_map(|row| row.strip_prefix("| ")?.split(" | ").next()).skip(1).collect();
+        let names: Vec<&str> = ABLATIONS.iter().map(|a| a.0).collect();
+        assert_eq!(rows, names);
+    }
 }

@@ -1,7 +1,7 @@
 //! `clutch certify`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{Exit, json, paragraph, report};
+use crate::output::{Exit, beside, json, paragraph, report};
 use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
 use clap::Args;
@@ -232,9 +232,9 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
         Some(s) => paragraph(&format!("continuous time: NOT certified: {}", reason(s))),
     };
     if !outside.is_empty() {
-        out += "\nThe scenario's rig lies outside these bounds; the certificate does not cover it:\n";
+        out += "\nThe scenario's rig is outside these bounds; in continuous time not covered:\n";
         for line in outside {
-            out += &format!("  {line}\n");
+            out += &beside(" ", line);
         }
     }
     out

@@ -64,6 +64,22 @@ impl Bound {
     }
 }
 
+/// What no verdict says.
+const STICKS: &str = "sticks: not excluded, neither by a bound nor by stability";
+
+/// The verdicts of a run for which no bound was looked for, a paragraph each.
+pub(crate) fn short_lines(sampled: &Sampled) -> String {
+    let verdicts = match &sampled.setup {
+        Ok(_) => vec![
+            "error bound not looked for: `clutch certify --sampled` does".to_owned(),
+            sampled.stability_line(),
+        ],
+        Err(why) => vec![why.to_string()],
+    };
+    let gains: String = verdicts.iter().map(|v| paragraph(&format!("gains, as sampled: {v}"))).collect();
+    gains + &paragraph(STICKS)
+}
+
 /// The verdicts, a paragraph each.
 pub(crate) fn lines(sampled: &Sampled, bound: &Bound) -> String {
     let scope = sampled.scope();
@@ -86,7 +102,7 @@ pub(crate) fn lines(sampled: &Sampled, bound: &Bound) -> String {
     [
         format!("as sampled: {error}"),
         format!("as sampled: {stability}"),
-        "sticks: not excluded, neither by a bound nor by stability".to_owned(),
+        STICKS.to_owned(),
     ]
     .map(|verdict| paragraph(&verdict))
     .concat()

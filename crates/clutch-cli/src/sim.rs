@@ -58,7 +58,7 @@ pub(crate) struct Summary<'a> {
     reaching: Reaching,
     path: Path,
     certified: bool,
-    /// Linear stability of the sampled loop, in a line.
+    /// The verdicts on the sampled loop, a paragraph each.
     #[serde(skip)]
     as_sampled: String,
     sampled: serde_json::Value,
@@ -157,7 +157,7 @@ impl<'a> Summary<'a> {
                 velocity_jump_rad_s: plan.envelope.start_jump.max(plan.envelope.velocity_jump),
             },
             certified: plan.certificate.certified(),
-            as_sampled: as_sampled.stability_line(),
+            as_sampled: sampled::short_lines(&as_sampled),
             sampled: sampled::json(&as_sampled, &sampled::Bound::NotLookedFor),
             rig_outside_bounds: scenario.outside_bounds(&plan.bounds)?,
             friction_map: scenario.map_grid().and_then(|_| MapInRun::of(&run.trace)),
@@ -204,7 +204,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         }
     }
     let certified = match (s.certified, s.rig_outside_bounds.is_empty()) {
-        (true, true) => "certified (exact sensor)",
+        (true, true) => "certified for its bounds (exact sensor)",
         (true, false) => "certified for the model, not for this rig: see `clutch certify`",
         (false, _) => "not certified: see `clutch certify`",
     };
@@ -214,7 +214,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     let most = largest.iter().copied().fold(0.0, f64::max);
     text += &format!("   |error| of the whole run, up to {} °:\n   {}\n", number(most), bars(&largest, most));
     text += &paragraph(&format!("gains, continuous time: {certified}"));
-    text += &paragraph(&format!("gains, as sampled: {}", s.as_sampled));
+    text += &s.as_sampled;
     if let Some(reason) = s.detected.reason() {
         text += &paragraph(&format!("stick-slip: {reason}"));
     }

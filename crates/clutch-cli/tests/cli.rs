@@ -106,6 +106,35 @@ fn a_command_line_that_is_not_understood_exits_with_64() {
 }
 
 #[test]
+fn sim_keeps_the_verdicts_apart_and_says_of_what_each_speaks() {
+    let o = clutch(&["sim", "smc_2"]);
+    for line in [
+        "gains, continuous time: certified for its bounds (exact sensor)",
+        "gains, as sampled: error bound not looked for: `clutch certify --sampled` does",
+        "gains, as sampled: linearly stable: spectral radius 0.948, 0.948, 0.948 with the",
+        "sticks: not excluded, neither by a bound nor by stability",
+    ] {
+        assert!(out(&o).lines().any(|l| l == line), "{line}\nis not in\n{}", out(&o));
+    }
+    // A delay is covered by the certificate as sampled alone.
+    let delayed = ["smc_2", "--set", "rig.delay_ticks=1"];
+    let o = clutch(&[&["sim"], &delayed[..]].concat());
+    let lines = [
+        "gains, continuous time: certified for the model, not for this rig: see `clutch\n    certify`\n",
+        "gains, as sampled: linearly stable: spectral radius 0.997",
+    ];
+    assert!(lines.iter().all(|line| out(&o).contains(line)), "{}", out(&o));
+    let told =
+        "outside these bounds; in continuous time not covered:\n  delay is 1 tick of 1000 µs, bounds none\n";
+    let o = clutch(&[&["certify"], &delayed[..]].concat());
+    assert!(out(&o).contains(told), "{}", out(&o));
+    // Of a law without a certificate as sampled nothing is said but that, and of sticks.
+    let o = clutch(&["sim", "motor_pid"]);
+    assert_eq!(out(&o).matches("gains, as sampled: ").count(), 1, "{}", out(&o));
+    assert!(out(&o).contains("sticks: not excluded"), "{}", out(&o));
+}
+
+#[test]
 fn certify_exits_with_0_for_certified_and_2_for_not() {
     let o = clutch(&["certify", "smc_2"]);
     assert_eq!(o.status.code(), Some(0));

@@ -624,7 +624,9 @@ impl Course<'_> {
             number(boot)
         );
         let fastest = number(plan.envelope.velocity.to_degrees());
-        let gains = if self.session.certified() {
+        let gains = if self.session.certified() && !scenario.outside_bounds(&plan.bounds)?.is_empty() {
+            "certified in continuous time for the bounds given, outside of which the scenario's rig lies"
+        } else if self.session.certified() {
             "certified in continuous time for the bounds given"
         } else if cleared.proven.is_some() && cleared.sampled.bound_suffices() {
             "not certified in continuous time; certified as sampled"

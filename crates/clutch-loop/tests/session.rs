@@ -92,8 +92,12 @@ fn the_path_is_announced_run_to_its_end_and_done() {
     let (summary, events) = run(&session, &Arc::default(), f64::INFINITY);
     let [Event::Announced(announcement)] = &events[..] else { panic!("{events:?}") };
     assert_eq!(announcement.title, session.scenario().name());
-    let gains = announcement.rows.iter().find(|(name, _)| *name == "gains").unwrap();
-    assert_eq!(gains.1, "certified in continuous time for the bounds given");
+    let row = |name: &str| announcement.rows.iter().find(|(n, _)| *n == name).unwrap().1.as_str();
+    assert_eq!(row("gains"), "certified in continuous time for the bounds given");
+    assert_eq!(
+        row("as sampled"),
+        "error bound UNCERTIFIED; linearly stable, spectral radius up to 0.948; sticks not excluded"
+    );
     assert_eq!(
         (summary.verdict(), summary.report.cause, summary.report.ticks),
         (Verdict::Done, Cause::Done, 1200)

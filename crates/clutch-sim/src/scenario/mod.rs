@@ -5,6 +5,7 @@
 
 pub mod describe;
 mod error;
+mod outside;
 mod params;
 mod sampled;
 mod schema;
@@ -719,64 +720,6 @@ impl Scenario {
             RunError::Memory(_) => self.message("run.duration_s", e.to_string()),
             RunError::Stopped => self.message("", e.to_string()),
         }
-    }
-
-    /// Quantities of the rig that lie outside the bounds that the certificate was asked for: a line each.
-    /// The certificate says nothing of such a rig.
-    ///
-    /// # Errors
-    /// None for a checked scenario.
-    pub fn outside_bounds(&self, bounds: &Bounds) -> Result<Vec<String>, ScenarioError> {
-        let rig = Rig::new(&self.params.rig, self.params.run.seed).map_err(|e| self.at("rig", &e))?;
-        let (p, actuator) = (rig.model.plant.params(), rig.model.plant.actuator());
-        let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
-        let (low, high) = rig.drive.range();
-        let mut lines = Vec::new();
-        let mut check = |name: &str, low: f64, high: f64, bound: &Interval| {
-            // A hair's breadth for what °, % and products round.
-            let slack = 1e-9 * bound.high.abs();
-            if low < bound.low - slack || high > bound.high + slack {
-                let range = |a: f64, b: f64| {
-                    if b - a <= slack { format!("{a:.5}") } else { format!("{a:.5} … {b:.5}") }
-                };
-                lines.push(format!(
-                    "{name} is {}, bounds {}",
-                    range(low, high),
-                    range(bound.low, bound.high)
-                ));
-            }
-        };
-        let friction = |mu: f64| (mu * (1.0 - swing), mu * (1.0 + swing));
-        let (s, d) =
-            (friction(rig.model.plant.friction().at_rest()), friction(rig.model.plant.friction().sliding()));
-        check("inertia", p.inertia, p.inertia, &bounds.inertia);
-        check("driving torque", low, high, &bounds.drive_torque);
-        check("viscous damping", p.viscous_damping, p.viscous_damping, &bounds.viscous_damping);
-        let (brake, motor) = (actuator.brake_gain(), actuator.motor_gain());
-        check("brake gain", brake, brake, &bounds.brake_gain);
-        check("motor gain", motor, motor, &bounds.motor_gain);
-        let exactly = |x: f64| Interval { low: x, high: x };
-        check("preload", actuator.preload(), actuator.preload(), &exactly(bounds.preload));
-        check("load share", actuator.load_share(), actuator.load_share(), &exactly(bounds.load_share));
-        check("static friction", s.0, s.1, &bounds.friction_at_rest);
-        check("dynamic friction", d.0, d.1, &bounds.friction_sliding);
-        let known = &self.params.bounds;
-        if let Some(share) = known.ripple {
-            // The change along the disc, and the mean that is left, have bounds of their own.
-            let model = rig.model.plant.friction();
-            let means = [
-                ("mean static friction", model.at_rest(), &bounds.friction_at_rest),
-                ("mean dynamic friction", model.sliding(), &bounds.friction_sliding),
-            ];
-            for (name, mean, bound) in means {
-                check(name, mean, mean, &known.mean_of(bound));
-            }
-            check("ripple of friction", swing, swing, &Interval { low: 0.0, high: share });
-        }
-        if rig.model.plant.friction().bristles().is_some_and(|b| b.damps()) {
-            lines.push("friction has bristles with damping, bounds that of steady sliding".to_owned());
-        }
-        Ok(lines)
     }
 }
 

@@ -155,25 +155,26 @@ impl Sampled {
         )
     }
 
-    /// Both verdicts in a line of a table.
+    /// The verdicts in a line of a table: on the error with the box of its bound, on linear stability, on sticks.
     #[must_use]
     pub fn short_line(&self, proven: Option<&Proven>) -> String {
         let error = match proven {
             Some(proven) => {
                 let law = if self.any_law() { " with any inner law" } else { "" };
                 let bound = number(proven.checked.error_bound.to_degrees());
-                let delay = self.setup.as_ref().map_or(0, |setup| setup.delay_ticks);
-                format!("|e| below {bound} °{law}, certified for a delay of {delay} ticks")
+                let within = self.setup.as_ref().map(short_scope).unwrap_or_default();
+                format!("|e| below {bound} °{law}, certified for {within}")
             }
             None => "error bound UNCERTIFIED".to_owned(),
         };
-        match &self.stability {
+        let stability = match &self.stability {
             Some(radii) => {
                 let verdict = if largest(radii) < 1.0 { "linearly stable" } else { "linearly UNSTABLE" };
-                format!("{error}; {verdict}, spectral radius up to {:.3}", largest(radii))
+                format!("{verdict}, spectral radius up to {:.3}", largest(radii))
             }
-            None => format!("{error}; linear stability not known"),
-        }
+            None => "linear stability not known".to_owned(),
+        };
+        format!("{error}; {stability}; sticks not excluded")
     }
 
     /// The verdict on linear stability with its scope.
@@ -196,16 +197,52 @@ impl Sampled {
     }
 }
 
+/// True of a quantity that is known exactly.
+fn exact([low, high]: [f64; 2]) -> bool {
+    high - low <= 1e-12 * high
+}
+
+fn ticks(s: &Setup) -> String {
+    format!("{} {} of delay", s.delay_ticks, if s.delay_ticks == 1 { "tick" } else { "ticks" })
+}
+
+/// The sides of the box that are no points, its ramp and its delay.
+fn short_scope(s: &Setup) -> String {
+    let sides = [
+        ("mu_d", s.sliding, ""),
+        ("mu_s", s.at_rest, ""),
+        ("T_u", s.drive_torque, " N m"),
+        ("K_COF", s.brake_gain, " N m/V"),
+        ("J", s.inertia, " kg m²"),
+        ("C_d", s.viscous_damping, " N m s/rad"),
+    ];
+    let mut parts = vec![format!("a ramp at {} °/s", number(s.rate.to_degrees())), ticks(s)];
+    parts.extend(
+        sides
+            .into_iter()
+            .filter(|(_, side, _)| !exact(*side))
+            .map(|(name, [low, high], unit)| format!("{name} {} … {}{unit}", number(low), number(high))),
+    );
+    if s.ripple > 0.0 {
+        parts.push(format!("±{} % along the disc", number(100.0 * s.ripple)));
+    }
+    if s.torque_noise > 0.0 {
+        parts.push(format!("torque noise up to {} N m", number(s.torque_noise)));
+    }
+    parts.push("[model] for the rest".to_owned());
+    parts.join(", ")
+}
+
 /// The plants and the loop that a bound speaks of.
 fn scope(s: &Setup) -> String {
-    let range = |[low, high]: [f64; 2]| {
-        if high - low <= 1e-12 * high { number(low) } else { format!("{} … {}", number(low), number(high)) }
+    let range = |side: [f64; 2]| {
+        let [low, high] = side;
+        if exact(side) { number(low) } else { format!("{} … {}", number(low), number(high)) }
     };
-    let ticks = if s.delay_ticks == 1 { "tick" } else { "ticks" };
     let mut out = format!(
-        "every {} µs, {} {ticks} of delay, {} counts/rev; ramp at {} °/s, {}; mu_d {}, mu_s {}{}; J {} kg m², T_u {} N m, K_COF {} N m/V",
+        "every {} µs, {}, {} counts/rev; ramp at {} °/s, {}; mu_d {}, mu_s {}{}; J {} kg m², T_u {} N m, K_COF {} N m/V",
         number(1e6 * s.period_s),
-        s.delay_ticks,
+        ticks(s),
         s.counts_per_rev,
         number(s.rate.to_degrees()),
         if s.from_rest { "from rest" } else { "begun at its speed" },

@@ -1,0 +1,102 @@
+//! The rig of a scenario against the bounds that its certificate in continuous time was asked for.
+
+use super::{NOISE_ROOTS, Scenario, ScenarioError};
+use crate::number;
+use crate::rig::Rig;
+use crate::ripple::Ripple;
+use clutch_core::friction::FrictionModel;
+use clutch_core::{Bounds, Interval};
+
+/// Lines on what lies outside.
+#[derive(Default)]
+struct Outside(Vec<String>);
+
+impl Outside {
+    /// A quantity that the rig has from one value to another, against its bound.
+    fn check(&mut self, name: &str, low: f64, high: f64, bound: &Interval) {
+        // A hair's breadth for what °, % and products round.
+        let slack = 1e-9 * bound.high.abs();
+        if low < bound.low - slack || high > bound.high + slack {
+            let range = |a: f64, b: f64| {
+                if b - a <= slack { format!("{a:.5}") } else { format!("{a:.5} … {b:.5}") }
+            };
+            self.0.push(format!("{name} is {}, bounds {}", range(low, high), range(bound.low, bound.high)));
+        }
+    }
+
+    fn exactly(&mut self, name: &str, value: f64, bound: f64) {
+        self.check(name, value, value, &Interval { low: bound, high: bound });
+    }
+}
+
+impl Scenario {
+    /// Properties of the rig that lie outside the bounds that the certificate in continuous time was asked for, or that no
+    /// bounds have, as delay and lag: a line each. That certificate says nothing of such a rig.
+    ///
+    /// # Errors
+    /// None for a checked scenario.
+    pub fn outside_bounds(&self, bounds: &Bounds) -> Result<Vec<String>, ScenarioError> {
+        let rig = Rig::new(&self.params.rig, self.params.run.seed).map_err(|e| self.at("rig", &e))?;
+        let (p, actuator) = (rig.model.plant.params(), rig.model.plant.actuator());
+        let mut lines = Outside::default();
+        lines.check("inertia", p.inertia, p.inertia, &bounds.inertia);
+        self.drive(&rig, bounds, &mut lines);
+        lines.check("viscous damping", p.viscous_damping, p.viscous_damping, &bounds.viscous_damping);
+        let (brake, motor) = (actuator.brake_gain(), actuator.motor_gain());
+        lines.check("brake gain", brake, brake, &bounds.brake_gain);
+        lines.check("motor gain", motor, motor, &bounds.motor_gain);
+        lines.exactly("preload", actuator.preload(), bounds.preload);
+        lines.exactly("load share", actuator.load_share(), bounds.load_share);
+        self.friction(&rig, bounds, &mut lines);
+        self.time(&mut lines);
+        Ok(lines.0)
+    }
+
+    /// The drive's torque, with that at random on it.
+    fn drive(&self, rig: &Rig, bounds: &Bounds, lines: &mut Outside) {
+        let (low, high) = rig.drive.range();
+        let noise = self.params.rig.torque_noise;
+        if noise > 0.0 {
+            let name = format!("driving torque ± {NOISE_ROOTS} · {} N m of noise", number(noise));
+            lines.check(&name, low - NOISE_ROOTS * noise, high + NOISE_ROOTS * noise, &bounds.drive_torque);
+        } else {
+            lines.check("driving torque", low, high, &bounds.drive_torque);
+        }
+    }
+
+    fn friction(&self, rig: &Rig, bounds: &Bounds, lines: &mut Outside) {
+        let model = rig.model.plant.friction();
+        let swing = rig.model.ripple.as_ref().map_or(0.0, Ripple::largest);
+        let kinds = [
+            ("static friction", model.at_rest(), &bounds.friction_at_rest),
+            ("dynamic friction", model.sliding(), &bounds.friction_sliding),
+        ];
+        for (name, mu, bound) in kinds {
+            lines.check(name, mu * (1.0 - swing), mu * (1.0 + swing), bound);
+        }
+        let known = &self.params.bounds;
+        if let Some(share) = known.ripple {
+            // The change along the disc, and the mean that is left, have bounds of their own.
+            for (name, mean, bound) in kinds {
+                lines.check(&format!("mean {name}"), mean, mean, &known.mean_of(bound));
+            }
+            lines.check("ripple of friction", swing, swing, &Interval { low: 0.0, high: share });
+        }
+        if model.bristles().is_some_and(|b| b.damps()) {
+            lines.0.push("friction has bristles with damping, bounds that of steady sliding".to_owned());
+        }
+    }
+
+    /// The time from a sample to the torque, of which continuous time has none.
+    fn time(&self, lines: &mut Outside) {
+        let p = &self.params;
+        let (ticks, period) = (p.rig.delay_ticks, p.sampling.sampling.period.0);
+        if ticks > 0 {
+            let unit = if ticks == 1 { "tick" } else { "ticks" };
+            lines.0.push(format!("delay is {ticks} {unit} of {period} µs, bounds none"));
+        }
+        if let Some(lag) = p.rig.actuator_time_constant {
+            lines.0.push(format!("lag of the actuator is {} s, bounds none", number(lag)));
+        }
+    }
+}
