@@ -4,8 +4,8 @@ use crate::drift::Drift;
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::Checks;
 use clutch_core::{
-    ActuatorKind, DacCode, FixedCounts, Micros, OnDisc, ParamError, Real, Servo, ServoParams, Supervisor,
-    Target,
+    ActuatorKind, DacCode, FNV_64, FixedCounts, Micros, OnDisc, ParamError, Real, Servo, ServoParams,
+    Supervisor, Target, fnv1a_64,
 };
 use clutch_log::{Header, Source};
 use clutch_node::{ControllerParams, RunParams, RunTimes, Settings, Unsupported};
@@ -14,17 +14,10 @@ use clutch_sim::scenario::{Plan, ScalarKind};
 use clutch_sim::{Keep, Scenario, ScenarioError};
 use clutch_wire::Hello;
 
-/// FNV-1a, 64 bit: for telling apart, not for secrets.
-#[must_use]
-pub fn fnv1a(text: &str) -> u64 {
-    text.bytes()
-        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
-}
-
 /// Hash of the whole scenario, defaults filled in: what the board echoes.
 #[must_use]
 pub fn config_hash(scenario: &Scenario) -> u64 {
-    fnv1a(&scenario.canonical())
+    fnv1a_64(FNV_64, scenario.canonical().as_bytes())
 }
 
 /// Hash of what decides the law's answers: law, model, velocity, output, shell, sampling, encoder,
@@ -48,7 +41,7 @@ pub fn law_hash(scenario: &Scenario) -> u64 {
             text += &format!("{key}={value}\n");
         }
     }
-    fnv1a(&text)
+    fnv1a_64(FNV_64, text.as_bytes())
 }
 
 /// A run could not be set up.
