@@ -53,6 +53,14 @@ pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, fi
     format!("{refusal}\n`clutch certify {}` says why; --uncertified runs it all the same.\n", file.display())
 }
 
+/// A file is never written over: it may be the only record of a run.
+pub(crate) fn new_file(path: &Path) -> anyhow::Result<()> {
+    if path.exists() {
+        anyhow::bail!("{}: exists already; name a new file", path.display());
+    }
+    Ok(())
+}
+
 /// A log is never written over: it may be the only record of a run.
 pub(crate) fn new_log(path: &Path) -> anyhow::Result<()> {
     if path.exists() {

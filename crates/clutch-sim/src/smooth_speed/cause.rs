@@ -5,7 +5,8 @@
 
 use crate::rig::Rig;
 use crate::ripple::Ripple;
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::Scenario;
+use crate::scenario_error::ScenarioError;
 use clutch_certificate::{Setup, stability};
 use clutch_core::friction::FrictionModel;
 use clutch_core::law::LawParams;
