@@ -18,7 +18,7 @@ from typing_extensions import CapsuleType
 from clutch import _model, _run
 from clutch._errors import ParamError
 
-__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "Shafts", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "as_identified", "brake_gain", "check", "envelope", "friction_lab", "identify", "lowest_smooth_speed", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction", "tune"]
+__all__ = ["BUILD", "DEFAULT_PRIORITY", "VERSION", "Log", "Paper", "Path", "Plant", "RefereeCase", "Run", "Scenario", "Servo", "Shafts", "StickSlip", "Sweep", "Table", "Target", "Tick", "_plant", "as_identified", "brake_gain", "check", "envelope", "friction_lab", "identified_rows", "identify", "lowest_smooth_speed", "main", "read_log", "referee_cases", "reproduce", "rig", "run_loop", "scenarios", "simulate", "steady_friction", "tune"]
 
 BUILD: Final[str]
 """
@@ -794,6 +794,12 @@ def friction_lab(scenario: Scenario) -> dict[str, Any]:
     """
     The experiments of the friction laboratory with the friction of a scenario's rig: by name, what was set and what was
     found.
+    """
+
+def identified_rows() -> list[tuple[str, str, str, float]]:
+    """
+    Key, name for readers, unit and the factor from SI to it, of each parameter that identification may tell, in the order in
+    which they are shown.
     """
 
 def identify(scenario: _model.Scenario | Scenario, logs: Sequence[str | PathLike[str]], columns: tuple[str, str], log: str | PathLike[str] | None) -> tuple[dict[str, Any], str | None, str | None]:

@@ -24,6 +24,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
+from clutch._clutch import identified_rows
 from clutch._extras import needed
 from clutch._metrics import FIGURES
 from clutch._units import split
@@ -1247,18 +1248,6 @@ def _events(axes: list[Axes], event: Table) -> None:
             )
 
 
-#: Parameters of a rig, in the order in which they are drawn: name, unit for readers, and how many of it an SI unit has.
-_TOLD = {
-    "pull_rad_s2": ("T/J", "rad/s²", 1.0),
-    "hold_v": ("T/(μ_d K)", "V", 1.0),
-    "ratio": ("μ_s/μ_d", "", 1.0),
-    "damping_1_s": ("C/J", "1/s", 1.0),
-    "ripple_rms": ("ripple, RMS", "%", 100.0),
-    "delay_s": ("delay", "ms", 1e3),
-    "stribeck_velocity_rad_s": ("Stribeck velocity", "mrad/s", 1e3),
-}
-
-
 @_styled
 def identified(found: Identified) -> Figure:
     """Draw what identification saw and what it believes.
@@ -1282,15 +1271,15 @@ def identified(found: Identified) -> Figure:
     import numpy as np
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(180 * _MM, 70 * _MM), layout="constrained")
-    told = [key for key in _TOLD if key in found.parameters]
-    for row, key in enumerate(reversed(told)):
+    told = [row for row in identified_rows() if row[0] in found.parameters]
+    for row, (key, *_) in enumerate(reversed(told)):
         e = found.parameters[key]
         scale = 100 / e.value if e.value else 0.0
         ends = [(e.low - e.value) * scale, (e.high - e.value) * scale]
         left.plot(ends, [row, row], lw=3, color=_BLUE, solid_capstyle="butt")
         left.plot([0], [row], "k|", ms=8)
-    values = {key: found.parameters[key].value * _TOLD[key][2] for key in told}
-    names = [f"{_TOLD[key][0]}\n{values[key]:.4g} {_TOLD[key][1]}".rstrip() for key in reversed(told)]
+    shown = ((label, found.parameters[key].value * factor, unit) for key, label, unit, factor in reversed(told))
+    names = [f"{label}\n{value:.4g} {unit}".rstrip() for label, value, unit in shown]
     left.set_yticks(range(len(told)), names)
     left.set_ylim(-0.6, len(told) - 0.4)
     left.set_xscale("symlog", linthresh=1)

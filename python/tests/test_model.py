@@ -393,6 +393,12 @@ def test_a_number_out_of_its_range_is_refused_with_its_key_its_value_and_its_uni
     assert unit in str(caught.value)
 
 
+@pytest.mark.parametrize("cls", CLASSES, ids=named)
+def test_each_key_has_the_unit_of_its_row(cls):
+    for name, row in declared(cls).items():
+        assert _tables.KEYS[f"{cls._key}.{name}"] == row.get("x-unit", "")
+
+
 def wrong_types(cls, name):
     """Values that are none of the field's type."""
     kind = {f.name: f.type for f in dataclasses.fields(cls)}[name]

@@ -419,7 +419,8 @@ def test_contours_are_left_out_on_request_and_where_nothing_sticks():
         ("rig.drive.weight.gravity_m_s2", "rig.drive.weight.gravity (m/s²)"),
         ("rig.inertia_kg_m2", "rig.inertia (kg m²)"),
         ("rig.viscous_damping_nm_s_rad", "rig.viscous_damping (N m s/rad)"),
-        ("rig.encoder.counts_per_rev", "rig.encoder.counts_per_rev"),
+        ("rig.encoder.counts_per_rev", "rig.encoder.counts_per_rev (counts per revolution)"),
+        ("safety.limits.jumps", "safety.limits.jumps (within 128 periods)"),
         ("velocity.observer.disturbance_walk_nm_rt_s", "velocity.observer.disturbance_walk (N m/√s)"),
         ("reference.ramp.rate_deg_s", "reference.ramp.rate (°/s)"),
         ("sampling.period_us", "sampling.period (µs)"),
@@ -427,7 +428,7 @@ def test_contours_are_left_out_on_request_and_where_nothing_sticks():
         ("run.seed", "run.seed"),
     ],
 )
-def test_a_keys_label_has_the_unit_that_its_name_ends_with(key, label):
+def test_a_keys_label_has_the_unit_of_its_row(key, label):
     assert plot._label(key) == label
 
 

@@ -20,9 +20,13 @@ def tuned(rig):
     return clutch.tune("board_smc_2", identified=rig, candidates=2)
 
 
-def command(*words):
+def printed(*words):
     ran = subprocess.run([sys.executable, "-m", "clutch", *words], capture_output=True, check=True)
-    return json.loads(ran.stdout)
+    return ran.stdout.decode("utf-8")
+
+
+def command(*words):
+    return json.loads(printed(*words))
 
 
 def test_identification_is_the_commands_and_holds_the_truth(rig):
@@ -66,6 +70,11 @@ def test_what_is_given_out_slides_is_proven_and_runs(tuned, tmp_path):
 def test_pictures_have_what_they_say(rig, tuned):
     left, right = rig.plot().axes
     assert len(left.get_yticklabels()) == len(rig.parameters) and len(right.lines) == 1
+    lines = printed("identify", "board_smc_2").splitlines()
+    for label in left.get_yticklabels():
+        name, value = label.get_text().split("\n")
+        _, _, unit = value.partition(" ")
+        assert any(line.startswith(f"  {name} ") and line.endswith(unit) for line in lines), (name, unit)
     figure = tuned.plot(duration_s=2)
     titles = [ax.get_title(loc="left") for ax in figure.axes]
     assert f"{tuned.winner.name} (chosen)" in titles

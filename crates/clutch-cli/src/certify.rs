@@ -6,6 +6,9 @@ use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
 use clap::Args;
 use clutch_core::certificate::{Certificate, PaperConditions, Shortfall};
+use clutch_core::params::{
+    DEG, DEG_S, DEG_S2, KG_M2, NM, NM_S_RAD, NM_V, NONE, PER_S, PERCENT, RAD_S, RAD_S2, Unit, V, V_S_RAD,
+};
 use clutch_core::{ActuatorKind, Bounds, Interval};
 use clutch_sim::scenario::{Plan, Sampled};
 use clutch_sim::{Scenario, ScenarioError};
@@ -128,101 +131,35 @@ impl Words {
     }
 }
 
-fn range(i: &Interval) -> String {
+/// A row of a table: a name, a value and its unit.
+type Row = (&'static str, String, &'static str);
+
+/// A value that is given in SI.
+fn row(name: &'static str, x: f64, unit: &Unit) -> Row {
+    (name, number(unit.from_si(x)), unit.text)
+}
+
+/// An interval, in SI.
+fn between(name: &'static str, i: &Interval, unit: &Unit) -> Row {
+    let (low, high) = (number(unit.from_si(i.low)), number(unit.from_si(i.high)));
     #[allow(clippy::float_cmp, reason = "an interval of one point is exactly that")]
-    if i.low == i.high { number(i.low) } else { format!("{} … {}", number(i.low), number(i.high)) }
+    (name, if i.low == i.high { low } else { format!("{low} … {high}") }, unit.text)
+}
+
+/// Rows that go on a table.
+fn more(rows: &[Row]) -> String {
+    quantities("", rows).trim_start_matches('\n').to_owned()
 }
 
 fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
-    let (c, b, d) = (&plan.certificate, &plan.bounds, &plan.demand);
-    let deg = |x: f64| number(x.to_degrees());
-    let law = scenario.spec().law;
-    let is_smc = c.kd_required > 0.0;
-    let words = Words::of(b.actuator);
-    let mut out = format!("{}\n{}\n\n", scenario.name(), law.title());
-    out += &quantities(
-        "Bounds",
-        &[
-            ("inertia J", range(&b.inertia), "kg m²"),
-            ("driving torque M g R_p", range(&b.drive_torque), "N m"),
-            ("viscous damping C_d", range(&b.viscous_damping), "N m s/rad"),
-        ],
-    );
-    let mut rows = Vec::new();
-    if b.brake_gain.high > 0.0 {
-        rows.push(("brake gain K_COF", range(&b.brake_gain), "N m/V"));
-    }
-    if b.motor_gain.high > 0.0 {
-        rows.push(("motor gain k_t", range(&b.motor_gain), "N m/V"));
-    }
-    if b.preload > 0.0 {
-        rows.push(("normal force without a voltage N_0", number(b.preload), "N m"));
-    }
-    if b.load_share > 0.0 {
-        rows.push(("share of the load that presses λ", number(b.load_share), ""));
-    }
-    rows.extend([
-        ("friction at rest", range(&b.friction_at_rest), ""),
-        ("friction, fast", range(&b.friction_sliding), ""),
-        ("path: velocity v_d", deg(d.velocity), "°/s"),
-        ("path: acceleration a_d", deg(d.acceleration), "°/s²"),
-        ("reaching rate γ wanted", number(d.reach_rate), "rad/s²"),
-    ]);
-    out += quantities("", &rows).trim_start_matches('\n');
-    out += &quantities(
-        words.ahead,
-        &[
-            ("worst corner: torque", number(c.worst_torque), "N m"),
-            ("worst corner: inertia", number(c.worst_inertia), "kg m²"),
-            (words.gain, number(c.weakest_brake), "N m/V"),
-            (if is_smc { "K_p required" } else { "voltage required" }, number(c.kp_required), "V"),
-            ("    of which for the boundary layer", number(c.kp_for_boundary), "V"),
-            (if is_smc { "K_p given" } else { words.given }, number(c.kp_given), "V"),
-            ("    margin", number(100.0 * (c.kp_given / c.kp_required - 1.0)), "%"),
-            ("reaching rate γ possible", number(c.reach_rate_possible), "rad/s²"),
-            ("holds up to an error rate of", deg(c.error_rate_ahead), "°/s"),
-        ],
-    );
-    if is_smc {
-        out += quantities(
-            "",
-            &[
-                ("K_d required", number(c.kd_required), "V s/rad"),
-                ("K_d given", number(c.kd_given), "V s/rad"),
-                ("    margin", number(100.0 * (c.kd_given / c.kd_required - 1.0)), "%"),
-            ],
-        )
-        .trim_start_matches('\n');
-    }
-    out += &quantities(
-        words.behind,
-        &[
-            ("worst corner: torque", number(c.least_torque), "N m"),
-            ("holds up to an error rate of", deg(c.error_rate_behind), "°/s"),
-            ("error rate at the start", deg(d.start_error_rate), "°/s"),
-        ],
-    );
-    out += &quantities(
-        "\nWith both",
-        &[
-            ("sliding surface: slope f", number(c.slope), "1/s"),
-            ("layer around it", number(c.layer), "rad/s"),
-            (
-                if c.certified() { "error stays below" } else { "error bound, were it certified" },
-                deg(c.error_bound),
-                "°",
-            ),
-        ],
-    );
-    if let Some(p) = &plan.paper {
-        out += &quantities(
-            "\nThe paper's own conditions, as printed (not sound: docs/theory.md)",
-            &[
-                ("(26) K_p above", number(p.kp), "V"),
-                ("(27) K_d above", number(p.kd), "V s/rad"),
-                ("(28) reaching rate γ", number(p.gamma), "rad/s²"),
-            ],
-        );
+    let (c, words) = (&plan.certificate, Words::of(plan.bounds.actuator));
+    let mut out = format!("{}\n{}\n\n", scenario.name(), scenario.spec().law.title());
+    out += &assumed(plan);
+    out += &ahead(c, &words);
+    out += &behind(c, plan.demand.start_error_rate, &words);
+    out += &with_both(c);
+    if let Some(paper) = &plan.paper {
+        out += &printed(paper);
     }
     out.push('\n');
     out += &match c.shortfall {
@@ -238,6 +175,101 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
         }
     }
     out
+}
+
+/// Bounds on the plant, and what the path asks for.
+fn assumed(plan: &Plan) -> String {
+    let (b, d) = (&plan.bounds, &plan.demand);
+    let shaft = [
+        between("inertia J", &b.inertia, &KG_M2),
+        between("driving torque M g R_p", &b.drive_torque, &NM),
+        between("viscous damping C_d", &b.viscous_damping, &NM_S_RAD),
+    ];
+    let mut rows = Vec::new();
+    if b.brake_gain.high > 0.0 {
+        rows.push(between("brake gain K_COF", &b.brake_gain, &NM_V));
+    }
+    if b.motor_gain.high > 0.0 {
+        rows.push(between("motor gain k_t", &b.motor_gain, &NM_V));
+    }
+    if b.preload > 0.0 {
+        rows.push(row("normal force without a voltage N_0", b.preload, &NM));
+    }
+    if b.load_share > 0.0 {
+        rows.push(row("share of the load that presses λ", b.load_share, &NONE));
+    }
+    rows.extend([
+        between("friction at rest", &b.friction_at_rest, &NONE),
+        between("friction, fast", &b.friction_sliding, &NONE),
+        row("path: velocity v_d", d.velocity, &DEG_S),
+        row("path: acceleration a_d", d.acceleration, &DEG_S2),
+        row("reaching rate γ wanted", d.reach_rate, &RAD_S2),
+    ]);
+    quantities("Bounds", &shaft) + &more(&rows)
+}
+
+/// A shaft ahead of its path.
+fn ahead(c: &Certificate, words: &Words) -> String {
+    let is_smc = c.kd_required > 0.0;
+    let mut out = quantities(
+        words.ahead,
+        &[
+            row("worst corner: torque", c.worst_torque, &NM),
+            row("worst corner: inertia", c.worst_inertia, &KG_M2),
+            row(words.gain, c.weakest_brake, &NM_V),
+            row(if is_smc { "K_p required" } else { "voltage required" }, c.kp_required, &V),
+            row("    of which for the boundary layer", c.kp_for_boundary, &V),
+            row(if is_smc { "K_p given" } else { words.given }, c.kp_given, &V),
+            row("    margin", c.kp_given / c.kp_required - 1.0, &PERCENT),
+            row("reaching rate γ possible", c.reach_rate_possible, &RAD_S2),
+            row("holds up to an error rate of", c.error_rate_ahead, &DEG_S),
+        ],
+    );
+    if is_smc {
+        out += &more(&[
+            row("K_d required", c.kd_required, &V_S_RAD),
+            row("K_d given", c.kd_given, &V_S_RAD),
+            row("    margin", c.kd_given / c.kd_required - 1.0, &PERCENT),
+        ]);
+    }
+    out
+}
+
+/// A shaft behind its path.
+fn behind(c: &Certificate, start_error_rate: f64, words: &Words) -> String {
+    quantities(
+        words.behind,
+        &[
+            row("worst corner: torque", c.least_torque, &NM),
+            row("holds up to an error rate of", c.error_rate_behind, &DEG_S),
+            row("error rate at the start", start_error_rate, &DEG_S),
+        ],
+    )
+}
+
+/// What follows for the error.
+fn with_both(c: &Certificate) -> String {
+    let bound = if c.certified() { "error stays below" } else { "error bound, were it certified" };
+    quantities(
+        "\nWith both",
+        &[
+            row("sliding surface: slope f", c.slope, &PER_S),
+            row("layer around it", c.layer, &RAD_S),
+            row(bound, c.error_bound, &DEG),
+        ],
+    )
+}
+
+/// The paper's conditions.
+fn printed(p: &PaperConditions) -> String {
+    quantities(
+        "\nThe paper's own conditions, as printed (not sound: docs/theory.md)",
+        &[
+            row("(26) K_p above", p.kp, &V),
+            row("(27) K_d above", p.kd, &V_S_RAD),
+            row("(28) reaching rate γ", p.gamma, &RAD_S2),
+        ],
+    )
 }
 
 /// A scenario's certificate: the object that `--json` prints, described in `docs/scenario.md`.

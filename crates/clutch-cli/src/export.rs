@@ -1,7 +1,6 @@
 //! `clutch log export`: a channel of a log as a table.
 
-use crate::log::new_file;
-use crate::output::{Exit, tell, warn, wrote};
+use crate::output::{Exit, new_file, tell, warn, wrote};
 use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;

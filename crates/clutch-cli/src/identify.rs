@@ -8,7 +8,8 @@ use crate::table::number;
 use anyhow::{Context, bail};
 use clap::Args;
 use clutch_identify::experiment::{ExperimentError, Programme, VirtualBoard, experiment};
-use clutch_identify::rig_file::{rig_file, rows};
+use clutch_identify::rig_file::rig_file;
+use clutch_identify::shown::ROWS;
 use clutch_identify::{Finding, Recording, Report, identify, map_as_believed, map_file};
 use clutch_log::Limits;
 use clutch_sim::Scenario;
@@ -123,7 +124,7 @@ impl Identify {
             let files = [&self.out, &self.map].into_iter().flatten();
             tell(&wrote(&files.map(PathBuf::as_path).collect::<Vec<_>>()))?;
         }
-        let told = rows(&report).iter().any(|row| row.finding.known().is_some());
+        let told = ROWS.iter().any(|row| row.finding(&report).known().is_some());
         Ok(if told || (self.map.is_some() && self.out.is_none()) { Exit::Done } else { Exit::Failed })
     }
 
@@ -239,18 +240,17 @@ fn text(report: &Report) -> String {
         rates.len(),
         if rates.is_empty() { String::new() } else { format!(" at {} °/s", rates.join(", ")) }
     );
-    let rows = rows(report);
-    for row in &rows {
-        if let Some(e) = row.finding.known() {
-            let e = e.times(row.unit.1);
+    for row in &ROWS {
+        if let Some(e) = row.finding(report).known() {
+            let e = e.times(row.factor);
             let interval = format!("{} … {}", number(e.low), number(e.high));
-            let line = format!("  {:<26}{:>10}  {interval:<24}{}", row.label, number(e.value), row.unit.0);
+            let line = format!("  {:<26}{:>10}  {interval:<24}{}", row.label, number(e.value), row.unit);
             out += line.trim_end();
             out.push('\n');
         }
     }
-    for row in &rows {
-        if let Finding::Refused(why) = row.finding {
+    for row in &ROWS {
+        if let Finding::Refused(why) = row.finding(report) {
             out += &paragraph(&format!("{}: not told; {why}", row.label));
         }
     }
@@ -266,7 +266,7 @@ pub fn object(report: &Report) -> Value {
         Finding::Refused(why) => value!({ "refused": why }),
     };
     let parameters: serde_json::Map<String, Value> =
-        rows(report).iter().map(|row| (row.key.to_owned(), of(row.finding))).collect();
+        ROWS.iter().map(|row| (row.key.to_owned(), of(row.finding(report)))).collect();
     let (releases, slips, rates) = &report.found;
     value!({
         "version": env!("CARGO_PKG_VERSION"),

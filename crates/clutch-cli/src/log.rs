@@ -1,10 +1,10 @@
 //! `clutch log`.
 
 use crate::export::Export;
-use crate::output::{Exit, print};
+use crate::output::{Exit, new_file, print};
 use clap::{Args, Subcommand};
 use clutch_log::Limits;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Inspects logs, recovers those that were cut, and makes tables of them.
 #[derive(Args)]
@@ -42,14 +42,6 @@ enum Verb {
         after_help = "Example:\n  clutch log export run.mcap --out run.csv\n  clutch log export run.mcap --channel sample --out samples.csv"
     )]
     Export(Export),
-}
-
-/// A file is never written over: it may be the only record of a run.
-pub(crate) fn new_file(path: &Path) -> anyhow::Result<()> {
-    if path.exists() {
-        anyhow::bail!("{}: exists already; name a new file", path.display());
-    }
-    Ok(())
 }
 
 impl Log {

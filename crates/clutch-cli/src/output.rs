@@ -55,6 +55,14 @@ pub(crate) fn not_certified(refusal: &clutch_loop::clearance::ClearanceError, fi
     paragraph(&refusal.to_string()) + &paragraph(&advice)
 }
 
+/// A file is never written over: it may be the only record of a run.
+pub(crate) fn new_file(path: &Path) -> anyhow::Result<()> {
+    if path.exists() {
+        anyhow::bail!("{}: exists already; name a new file", path.display());
+    }
+    Ok(())
+}
+
 /// A log is never written over: it may be the only record of a run.
 pub(crate) fn new_log(path: &Path) -> anyhow::Result<()> {
     if path.exists() {

@@ -11,6 +11,7 @@ pub mod release;
 pub mod report;
 pub mod ride;
 pub mod rig_file;
+pub mod shown;
 
 pub use believed::{Believed, Corner, believed};
 pub use map_file::{map_as_believed, map_file};

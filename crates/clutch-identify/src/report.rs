@@ -89,87 +89,19 @@ pub fn identify(recordings: &[Recording]) -> Report {
     let releases: Vec<Release> = recordings.iter().flat_map(release::releases).take(MOST).collect();
     let slips: Vec<BreakAway<'_>> = recordings.iter().flat_map(break_aways).take(MOST).collect();
     let rides: Vec<Ride<'_>> = recordings.iter().flat_map(rides).collect();
-    let mut unexplained = Vec::new();
-    let first = release::fall(&releases, DAMPINGS);
-    let told: Vec<Told> = match (&first, releases.is_empty()) {
-        (Ok(fall), false) => tell(rides.clone(), fall),
-        _ => Vec::new(),
-    };
-    for Told { worst: (name, tick, off), .. } in told.iter().filter(|t| t.worst.2 > UNEXPLAINED) {
-        unexplained.push(format!(
-            "{name}: the edge at tick {tick} lies {off:.1} standard deviations from where the model has it"
-        ));
-    }
-    let line = Line::through(&told);
-    let damping = match (&first, &line) {
-        (Ok(fall), Some(line)) => line.damping(fall),
-        _ => None,
-    };
-    // With C/J, releases tell T/J more closely.
-    let fall = match damping {
-        Some(c) => {
-            release::fall(&releases, (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0))).or(first)
-        }
-        None => first,
-    };
-    if let (Err(at), false) = (&fall, releases.is_empty()) {
-        unexplained.push(format!(
-            "{}: no free fall with any delay explains the counts up to tick {}",
-            at.name, at.tick
-        ));
-    }
-    let fall = fall.ok().filter(|_| !releases.is_empty());
-    if let Some(slack) = fall.as_ref().and_then(|f| f.looser) {
-        unexplained.push(format!(
-            "releases: no one delay explains their counts; one for each does, edges being off by {slack} counts: a lag of the \
-             actuator, or a torque that varies"
-        ));
-    }
-    let hold = hold(&told, line.as_ref(), fall.as_ref());
-    let slowest = told.first();
-    let known = fall.as_ref().zip(hold).zip(slowest).map(|((fall, hold), slow)| Known {
-        pull: fall.pull.value,
-        delay: fall.delay.value,
-        damping: damping.map_or(0.0, |c| c.value),
-        friction: 1.0 / hold.value,
-        // No disc is so even that a model holds to the last count.
-        ripple: slow.ripple.0.max(LEAST_RIPPLE) / hold.value,
-    });
-    let mut ratio = ratio(&slips, known.as_ref());
-    let even = slowest.is_some_and(|slow| slow.ripple.0 < LEAST_RIPPLE);
-    if let (true, Finding::Known(e)) = (even, &mut ratio) {
-        (e.low, e.high) = (e.low - EVEN * e.value, e.high + EVEN * e.value);
-    }
-    let stribeck = match fall.as_ref().and_then(|f| f.looser) {
-        _ if even => {
-            refused("on a disc so even a step of the converter says as much; no experiment here tells it")
-        }
-        None => stribeck(&slips, known.as_ref(), &ratio),
-        Some(_) => refused(
-            "it shows in parts of a millisecond, and the delay differs from release to release by more: an actuator without a \
-             lag, and a steady torque, would tell it",
-        ),
-    };
-    let no_fall = || match unexplained.last() {
-        Some(what) => refused(&format!("{what}: was it at rest before, and let go at once?")),
-        None => refused("no release: 0 V for 30 ms from rest tells it"),
-    };
+    let found = (releases.len(), slips.len(), rides.iter().map(|r| r.rate).collect());
+    let motion = Motion::of(&releases, rides);
+    let (ratio, stribeck) = motion.at_rest(&slips);
     let no_ride = "a ride at an even rate, as 5 °/s for 8 s, and releases for T/J tell it";
+    let slowest = motion.told.first();
     Report {
-        pull: fall.as_ref().map_or_else(no_fall, |f| Finding::Known(f.pull)),
-        delay: fall.as_ref().map_or_else(no_fall, |f| Finding::Known(f.delay)),
-        hold: hold.map_or_else(|| refused(no_ride), Finding::Known),
-        ripple: slowest.map_or_else(
-            || refused(no_ride),
-            |slow| {
-                let (share, deviation) = slow.ripple;
-                let off = DEVIATIONS * deviation;
-                Finding::Known(Estimate { value: share, low: (share - off).max(0.0), high: share + off })
-            },
-        ),
+        pull: motion.of_fall(|fall| fall.pull),
+        delay: motion.of_fall(|fall| fall.delay),
+        hold: motion.hold.map_or_else(|| refused(no_ride), Finding::Known),
+        ripple: slowest.map_or_else(|| refused(no_ride), |slow| Finding::Known(ripple(slow))),
         ratio,
         stribeck,
-        damping: damping.map_or_else(
+        damping: motion.damping.map_or_else(
             || refused("it takes a fast ride beside a slow one: 60 °/s beside 20 °/s tell it"),
             Finding::Known,
         ),
@@ -182,9 +114,114 @@ pub fn identify(recordings: &[Recording]) -> Report {
         ),
         map: slowest.map(|slow| slow.map.clone()).unwrap_or_default(),
         uneven: slowest.map_or(0.0, |slow| slow.uneven),
-        unexplained,
-        found: (releases.len(), slips.len(), rides.iter().map(|r| r.rate).collect()),
+        unexplained: motion.unexplained,
+        found,
     }
+}
+
+/// What releases and rides tell.
+struct Motion {
+    /// The rides, the slowest first.
+    told: Vec<Told>,
+    /// None without a release, or if no delay explains them.
+    fall: Option<Fall>,
+    damping: Option<Estimate>,
+    hold: Option<Estimate>,
+    unexplained: Vec<String>,
+}
+
+impl Motion {
+    fn of(releases: &[Release], rides: Vec<Ride<'_>>) -> Motion {
+        let first = release::fall(releases, DAMPINGS);
+        let told: Vec<Told> = match (&first, releases.is_empty()) {
+            (Ok(fall), false) => tell(rides, fall),
+            _ => Vec::new(),
+        };
+        let mut unexplained: Vec<String> = told.iter().filter_map(edge_off).collect();
+        let line = Line::through(&told);
+        let damping = match (&first, &line) {
+            (Ok(fall), Some(line)) => line.damping(fall),
+            _ => None,
+        };
+        // With C/J, releases tell T/J more closely.
+        let fall = match damping {
+            Some(c) => {
+                let within = (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0));
+                release::fall(releases, within).or(first)
+            }
+            None => first,
+        };
+        if let (Err(at), false) = (&fall, releases.is_empty()) {
+            unexplained.push(format!(
+                "{}: no free fall with any delay explains the counts up to tick {}",
+                at.name, at.tick
+            ));
+        }
+        let fall = fall.ok().filter(|_| !releases.is_empty());
+        if let Some(slack) = fall.as_ref().and_then(|f| f.looser) {
+            unexplained.push(format!(
+                "releases: no one delay explains their counts; one for each does, edges being off by {slack} counts: a lag of the \
+                 actuator, or a torque that varies"
+            ));
+        }
+        let hold = hold(&told, line.as_ref(), fall.as_ref());
+        Motion { told, fall, damping, hold, unexplained }
+    }
+
+    /// μ_s/μ_d and the Stribeck velocity, which take all that motion tells.
+    fn at_rest(&self, slips: &[BreakAway<'_>]) -> (Finding, Finding) {
+        let (fall, slowest) = (self.fall.as_ref(), self.told.first());
+        let known = fall.zip(self.hold).zip(slowest).map(|((fall, hold), slow)| Known {
+            pull: fall.pull.value,
+            delay: fall.delay.value,
+            damping: self.damping.map_or(0.0, |c| c.value),
+            friction: 1.0 / hold.value,
+            // No disc is so even that a model holds to the last count.
+            ripple: slow.ripple.0.max(LEAST_RIPPLE) / hold.value,
+        });
+        let mut ratio = ratio(slips, known.as_ref());
+        let even = slowest.is_some_and(|slow| slow.ripple.0 < LEAST_RIPPLE);
+        if let (true, Finding::Known(e)) = (even, &mut ratio) {
+            (e.low, e.high) = (e.low - EVEN * e.value, e.high + EVEN * e.value);
+        }
+        let stribeck = match fall.and_then(|f| f.looser) {
+            _ if even => {
+                refused("on a disc so even a step of the converter says as much; no experiment here tells it")
+            }
+            None => stribeck(slips, known.as_ref(), &ratio),
+            Some(_) => refused(
+                "it shows in parts of a millisecond, and the delay differs from release to release by more: an actuator without a \
+                 lag, and a steady torque, would tell it",
+            ),
+        };
+        (ratio, stribeck)
+    }
+
+    /// A finding of the releases.
+    fn of_fall(&self, value: impl Fn(&Fall) -> Estimate) -> Finding {
+        match (&self.fall, self.unexplained.last()) {
+            (Some(fall), _) => Finding::Known(value(fall)),
+            (None, Some(what)) => refused(&format!("{what}: was it at rest before, and let go at once?")),
+            (None, None) => refused("no release: 0 V for 30 ms from rest tells it"),
+        }
+    }
+}
+
+/// A ride's worst edge, if no ride has such a one.
+fn edge_off(told: &Told) -> Option<String> {
+    let (name, tick, off) = &told.worst;
+    (*off > UNEXPLAINED).then(|| {
+        format!(
+            "{name}: the edge at tick {tick} lies {off:.1} standard deviations from where the model has it"
+        )
+    })
+}
+
+/// Ripple of a ride, as a share.
+fn ripple(slow: &Told) -> Estimate {
+    let (share, deviation) = slow.ripple;
+    let off = DEVIATIONS * deviation;
+    Estimate { value: share, low: (share - off).max(0.0), high: share + off }
 }
 
 /// Findings of the rides, the slowest first: a fast one does not see the ripple, and takes its size from that.

@@ -2,6 +2,7 @@
 
 use crate::Estimate;
 use crate::report::{Finding, Report};
+use crate::shown::ROWS;
 use clutch_core::Actuator;
 use clutch_sim::Scenario;
 use toml::{Table, Value};
@@ -164,10 +165,9 @@ impl RigFile {
 
 /// The intervals, each with the unit in its key.
 fn intervals(report: &Report) -> Table {
-    rows(report)
-        .into_iter()
+    ROWS.iter()
         .map(|row| {
-            let value = match row.finding {
+            let value = match row.finding(report) {
                 Finding::Refused(why) => Value::String(why.clone()),
                 Finding::Known(e) => {
                     let ends = [("value", e.value), ("low", e.low), ("high", e.high)];
@@ -177,33 +177,4 @@ fn intervals(report: &Report) -> Table {
             (row.key.to_owned(), value)
         })
         .collect()
-}
-
-/// A parameter as it is shown.
-pub struct Row<'a> {
-    /// Key in files and JSON, SI.
-    pub key: &'static str,
-    /// Name for readers.
-    pub label: &'static str,
-    /// Unit for readers, and what SI is multiplied by for it.
-    pub unit: (&'static str, f64),
-    /// The finding.
-    pub finding: &'a Finding,
-}
-
-/// The parameters in the order in which they are shown.
-#[must_use]
-pub fn rows(report: &Report) -> Vec<Row<'_>> {
-    let row = |key, label, unit, finding| Row { key, label, unit, finding };
-    vec![
-        row("pull_rad_s2", "T/J", ("rad/s²", 1.0), &report.pull),
-        row("delay_s", "delay, dead time and lag", ("ms", 1e3), &report.delay),
-        row("hold_v", "v_hold = T/(μ_d K)", ("V", 1.0), &report.hold),
-        row("ripple_rms", "ripple, rms", ("%", 100.0), &report.ripple),
-        row("ratio", "μ_s/μ_d", ("", 1.0), &report.ratio),
-        row("stribeck_velocity_rad_s", "Stribeck velocity", ("mrad/s", 1e3), &report.stribeck),
-        row("damping_1_s", "C/J", ("1/s", 1.0), &report.damping),
-        row("lag_s", "lag", ("ms", 1e3), &report.lag),
-        row("each", "J, T, K, μ one by one", ("", 1.0), &report.each),
-    ]
 }

@@ -1,6 +1,6 @@
 //! The messages that Foxglove's clients get: one ring for all of them, in which each has its place.
 
-use crate::feed::Opening;
+use crate::view::Opening;
 use crate::view::View;
 use clutch_log::{Header, Record, channel_of, encode, parameters};
 use std::collections::VecDeque;

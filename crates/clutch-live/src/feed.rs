@@ -1,18 +1,17 @@
 //! Frames that a view draws, made of the records of a run.
 
-use crate::view::View;
+use crate::view::{Frame, Note, Opening, View};
 use clutch_core::supervisor::Cause;
 use clutch_core::{Counts, Encoder};
 use clutch_log::{
     ChangeRecord, CommandRecord, CommandSource, EventKind, EventRecord, Header, LinkRecord, Record,
-    SampleRecord, Source, names,
+    SampleRecord, names,
 };
-use clutch_loop::live_gains::{Gain, LiveGains};
+use clutch_loop::live_gains::LiveGains;
 use clutch_loop::words::cause_text;
 use clutch_sim::detected::Detector;
 use clutch_sim::{Keep, Scenario, number};
 use rtrb::Consumer;
-use serde::Serialize;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -24,8 +23,6 @@ const FRAME: Duration = Duration::from_millis(33);
 const POINT: f64 = 1e-3;
 /// Time over which cycles are counted, s.
 const LATELY: f64 = 2.0;
-/// Upper ends of the histogram's classes, µs; the last class has none.
-const CLASSES: [u32; 13] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000];
 
 /// Starts the thread that makes frames of what comes through a ring, until that is abandoned; none if the system gives no
 /// thread.
@@ -59,115 +56,6 @@ pub(crate) fn start(
         }
     };
     std::thread::Builder::new().name("clutch-feed".into()).spawn(make).ok()
-}
-
-/// The beginning of a run, as a view hears of it.
-#[derive(Serialize)]
-pub(crate) struct Opening<'a> {
-    pub(crate) scenario: &'a str,
-    pub(crate) law: &'a str,
-    pub(crate) version: &'a str,
-    pub(crate) place: &'a str,
-    pub(crate) simulated: bool,
-    pub(crate) duration_s: f64,
-    pub(crate) period_us: u32,
-    pub(crate) settle_s: f64,
-    pub(crate) count_deg: f64,
-    pub(crate) volts: [f64; 2],
-    pub(crate) classes_us: &'static [u32],
-    pub(crate) gains: Vec<Gain>,
-    /// The gains, if they may be changed.
-    #[serde(skip)]
-    pub(crate) live_gains: Option<Arc<dyn LiveGains>>,
-}
-
-impl<'a> Opening<'a> {
-    fn new(header: &'a Header, scenario: &'a Scenario, live_gains: Option<Arc<dyn LiveGains>>) -> Self {
-        let spec = scenario.spec();
-        let output = spec.output;
-        Opening {
-            scenario: &header.scenario_name,
-            law: spec.law.title(),
-            version: &header.version,
-            place: &header.port,
-            simulated: header.source == Source::Simulation,
-            duration_s: spec.run.duration,
-            period_us: header.period_us,
-            settle_s: spec.run.settle,
-            count_deg: 360.0 / f64::from(spec.rig.encoder.sensor.counts_per_rev),
-            volts: [output.lowest, output.highest],
-            classes_us: &CLASSES,
-            gains: live_gains.as_ref().map(|gains| gains.gains()).unwrap_or_default(),
-            live_gains,
-        }
-    }
-}
-
-/// The points of a curve, as spans: at rates up to 1 kHz both ends of a span are the sample.
-#[derive(Default, Serialize)]
-pub(crate) struct Spans {
-    pub(crate) low: Vec<f64>,
-    pub(crate) high: Vec<f64>,
-}
-
-impl Spans {
-    /// A new value, in a new point or in the one that is under way.
-    fn take(&mut self, value: f64, new: bool) {
-        match (self.low.last_mut(), self.high.last_mut()) {
-            (Some(low), Some(high)) if !new => (*low, *high) = (low.min(value), high.max(value)),
-            _ => {
-                self.low.push(value);
-                self.high.push(value);
-            }
-        }
-    }
-}
-
-/// A thirtieth of a second of a run.
-#[derive(Default, Serialize)]
-pub(crate) struct Frame {
-    /// Time of each point, s.
-    pub(crate) time_s: Vec<f64>,
-    pub(crate) target_deg: Vec<f64>,
-    pub(crate) position_deg: Spans,
-    /// Null where no law was asked.
-    pub(crate) error_deg: Spans,
-    pub(crate) volts: Spans,
-    /// Times at which the encoder fell silent for as long as a stick takes, s.
-    pub(crate) sticks_s: Vec<f64>,
-    pub(crate) tick: u64,
-    pub(crate) state: &'static str,
-    pub(crate) cycles: u64,
-    pub(crate) cycles_per_s: f64,
-    pub(crate) largest_error_deg: f64,
-    pub(crate) lost: u64,
-    pub(crate) deadline_misses: u64,
-    /// Answers by the time they took, by [`CLASSES`]; wake-ups by their lateness.
-    pub(crate) answers: Histogram,
-    pub(crate) wake_ups: Histogram,
-}
-
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub(crate) struct Histogram(pub(crate) [u64; CLASSES.len() + 1]);
-
-impl Histogram {
-    fn take(&mut self, us: u32) {
-        let class = CLASSES.partition_point(|end| us >= *end);
-        if let Some(count) = self.0.get_mut(class) {
-            *count += 1;
-        }
-    }
-}
-
-/// Something that has happened.
-#[derive(Debug, PartialEq, Serialize)]
-pub(crate) struct Note {
-    pub(crate) time_s: f64,
-    pub(crate) text: String,
-    /// True if control ended otherwise than it should.
-    pub(crate) bad: bool,
-    /// The gain that was changed, and its value.
-    pub(crate) gain: Option<(String, f64)>,
 }
 
 /// The state of the feed.

@@ -1,6 +1,6 @@
 //! The figures of a run, as characters.
 
-use crate::feed::{Frame as Figure, Histogram, Note, Opening};
+use crate::view::{Frame as Figure, Histogram, Note, Opening};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
@@ -290,7 +290,7 @@ fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::feed::Spans;
+    use crate::view::Spans;
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
 

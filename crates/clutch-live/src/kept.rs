@@ -1,7 +1,7 @@
 //! The frames that a page gets: those of the last seconds, for one that comes late, and each new one as it is made.
 
-use crate::feed::{Frame, Note, Opening};
 use crate::view::View;
+use crate::view::{Frame, Note, Opening};
 use clutch_log::Header;
 use clutch_loop::live_gains::LiveGains;
 use serde::Serialize;

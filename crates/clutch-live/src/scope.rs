@@ -1,8 +1,8 @@
 //! A run in a terminal: the screen, and its keys.
 
-use crate::feed::{Frame, Note, Opening};
 use crate::figures::Figures;
 use crate::view::View;
+use crate::view::{Frame, Note, Opening};
 use clutch_log::Header;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;

@@ -1,7 +1,9 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod channel;
 mod error;
+mod format;
 mod header;
 mod info;
 pub mod names;
@@ -14,14 +16,13 @@ mod scan;
 mod sync;
 mod write;
 
+pub use channel::{Channel, Field, Kind, TIME, Value};
 pub use error::LogError;
 pub use header::{Header, Source};
 pub use info::{ChannelInfo, Info, info};
 pub use names::{Arrival, CommandSource, EventKind};
 pub use printable::printable;
-pub use proto::{
-    CHANNELS, Channel, Field, Kind, PARAMETER_CHANNEL, TIME, Value, channel_table, parameters, schema,
-};
+pub use proto::{CHANNELS, PARAMETER_CHANNEL, channel_table, parameters, schema};
 pub use read::{Log, read, read_bytes, read_while};
 pub use record::{
     ChangeRecord, CommandRecord, EventRecord, InChannel, LinkRecord, MAX_TERMS, Record, SampleRecord, Terms,

@@ -2,6 +2,9 @@
 //!
 //! The schemas in the file carry these names, so viewers show `Holding`, not 4.
 
+use clutch_core::law::Limit;
+use clutch_core::supervisor::{Cause, State};
+
 /// Number and name, in the order of the numbers.
 pub type Names = &'static [(u8, &'static str)];
 
@@ -98,41 +101,52 @@ named! {
     }
 }
 
-/// States of the supervisor.
-pub const STATES: Names = &[
-    (0, "Disconnected"),
-    (1, "Ready"),
-    (2, "Armed"),
-    (3, "Running"),
-    (4, "Holding"),
-    (5, "Released"),
-    (6, "Faulted"),
-];
+/// The table of an enum of clutch-core, which owns the numbers; the log has words of its own where it says so. A value
+/// that is left out does not compile.
+macro_rules! of_core {
+    ($(#[$doc:meta])* $table:ident of $name:ident { $($value:ident $(as $word:literal)?),* $(,)? }) => {
+        $(#[$doc])*
+        pub const $table: Names = &[$(($name::$value as u8, of_core!(@ $value $($word)?))),*];
 
-/// The cause of a change of the supervisor's state.
-pub const CAUSES: Names = &[
-    (0, "None"),
-    (1, "Lost"),
-    (2, "Late"),
-    (3, "Duplicated"),
-    (4, "Reordered"),
-    (5, "Jump"),
-    (6, "StandStill"),
-    (7, "FollowingError"),
-    (8, "Saturation"),
-    (9, "NotFinite"),
-    (10, "Deadline"),
-    (11, "Silence"),
-    (12, "Board"),
-    (13, "Target"),
-    (14, "Operator"),
-    (15, "Done"),
-    (16, "Channel"),
-    (17, "Reversed"),
-    (18, "TooSlow"),
-    (19, "TooFast"),
-    (20, "Clock"),
-];
+        const _: fn($name) = |value| match value { $($name::$value => (),)* };
+    };
+    (@ $value:ident) => { stringify!($value) };
+    (@ $value:ident $word:literal) => { $word };
+}
 
-/// The limit at which the output stage changed the law's demand, if any.
-pub const LIMITS: Names = &[(0, "Unlimited"), (1, "Lowest"), (2, "Highest"), (3, "Invalid")];
+of_core! {
+    /// States of the supervisor.
+    STATES of State { Disconnected, Ready, Armed, Running, Holding, Released, Faulted }
+}
+
+of_core! {
+    /// The cause of a change of the supervisor's state.
+    CAUSES of Cause {
+        None,
+        Lost,
+        Late,
+        Duplicated,
+        Reordered,
+        Jump,
+        StandStill,
+        FollowingError,
+        Saturation,
+        NotFinite,
+        Deadline,
+        Silence,
+        Board,
+        Target,
+        Operator,
+        Done,
+        Channel,
+        Reversed,
+        TooSlow,
+        TooFast,
+        Clock,
+    }
+}
+
+of_core! {
+    /// The limit at which the output stage changed the law's demand, if any.
+    LIMITS of Limit { None as "Unlimited", Lowest, Highest, Invalid }
+}

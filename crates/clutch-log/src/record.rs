@@ -2,8 +2,8 @@
 //! the table come the record, its protobuf message, the way from one to the other, the channel table of docs/log.md
 //! and the columns of Python.
 
+use crate::channel::{Channel, Field, Kind, Value};
 use crate::names;
-use crate::proto::{Channel, Field, Kind, Value};
 use prost::Message;
 
 /// The most terms that a law has in a log.

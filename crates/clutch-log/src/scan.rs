@@ -8,11 +8,11 @@
 //! before the first record of it is believed.
 
 use crate::error::{LogError, require_file};
+use crate::format::{CHECKSUM, CRC, ENVELOPE, FORMAT, METADATA, METADATA_EXTRA, SCENARIO, checksum};
 use crate::header::{Header, Source};
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
 use crate::record::{self, Record};
-use crate::write::{CHECKSUM, ENVELOPE, FORMAT, METADATA, METADATA_EXTRA, SCENARIO, checksum};
-use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use crc::Table;
 use mcap::records::op;
 use prost::Message;
 use std::collections::BTreeMap;
@@ -21,8 +21,6 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 use std::time::{Duration, Instant};
-
-pub(crate) static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
 /// The bounds of a reader. The defaults hold for hours of logging at 1 kHz. They let a hostile file
 /// take 2.3 GB at most for records (20 million of 112 bytes) and five minutes.

@@ -1,10 +1,10 @@
 //! Writing: chunks that are whole in the file within 100 ms.
 
 use crate::error::{LogError, require_file};
+use crate::format::{CHECKSUM, ENVELOPE, FORMAT, METADATA, METADATA_EXTRA, SCENARIO, checksum};
 use crate::header::Header;
 use crate::proto::{self, CHANNELS, PARAMETER_CHANNEL};
 use crate::record::{self, MAX_TERMS, Record};
-use crate::scan::CRC;
 use crate::sync::Syncer;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
@@ -24,20 +24,6 @@ pub const CHUNK_BYTES: usize = 1 << 20;
 
 /// Most text in a header, bytes: far below the reader's limit.
 const HEADER_BYTES: u64 = 4 << 20;
-
-/// Bytes of a message in a chunk beside its payload: opcode, length, channel, sequence, two times.
-pub(crate) const ENVELOPE: usize = 31;
-
-/// Name of the metadata record that makes an MCAP file a log of clutch.
-pub(crate) const METADATA: &str = "clutch";
-/// Name of the metadata record with [`Header::extra`].
-pub(crate) const METADATA_EXTRA: &str = "clutch.extra";
-/// Name of the attachment with the scenario.
-pub(crate) const SCENARIO: &str = "scenario.toml";
-/// Key of the checksum of a metadata record, which MCAP has for chunks and attachments only.
-pub(crate) const CHECKSUM: &str = "crc32";
-/// Version of the channel table and of the metadata.
-pub(crate) const FORMAT: u32 = 1;
 
 /// Writes a log. Belongs to the log thread: it calls the system. It waits for the disk at the beginning and at the
 /// end; between them a thread of its own does, so that records reach the file however slow the disk is.
@@ -351,18 +337,6 @@ fn begin(
             Err(e)
         }
     }
-}
-
-/// CRC-32/ISO-HDLC of a metadata record: of its name and of its pairs but the checksum, in the order of the keys' bytes,
-/// each text behind its length in four bytes, little-endian.
-pub(crate) fn checksum(name: &str, pairs: &BTreeMap<String, String>) -> u32 {
-    let mut crc = CRC.digest();
-    let pairs = pairs.iter().filter(|(key, _)| *key != CHECKSUM).flat_map(|(key, value)| [key, value]);
-    for text in [name].into_iter().chain(pairs.map(String::as_str)) {
-        crc.update(&(text.len() as u32).to_le_bytes());
-        crc.update(text.as_bytes());
-    }
-    crc.finalize()
 }
 
 /// The two metadata records of a header.

@@ -17,7 +17,7 @@
 //! carries up to `μ_s N`, so that `h` may be lower than the balance; and a shaft that broke away had `h μ_s N ≤ T_u + T`, so
 //! that it is at most what the lowest load of the pad in the gap let go. A shaft that stands says nothing.
 
-use crate::from_scenario::BuildError;
+use crate::build_error::BuildError;
 use clutch_core::friction::FrictionModel;
 use clutch_core::{ActuatorKind, Bounds, Counts, Encoder, Plant};
 use clutch_log::{CommandRecord, CommandSource, SampleRecord};

@@ -239,127 +239,183 @@ impl FromStr for Fault {
     type Err = FaultError;
 
     fn from_str(text: &str) -> Result<Self, FaultError> {
-        let bad = |problem: String| FaultError { text: text.to_owned(), problem };
-        let unknown = |what: &str, word: &str, known: &[&str]| {
-            let meant = nearest(word, known);
-            bad(format!("unknown {what} {word}{meant}; expected one of: {}", known.join(", ")))
-        };
-        let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
-        let mut fault = Fault::new(FaultKind::Drop, 0.0);
-        let (mut ms, mut counts, mut volts, mut when) = (None, None, None, false);
-        let (mut factor, mut dead, mut says, mut periods) = (None, None, None, None);
-        let mut seen = Vec::new();
-        for pair in rest.split(',').filter(|p| !p.is_empty()) {
-            let (key, value) = pair.split_once('=').ok_or_else(|| bad(format!("\"{pair}\" has no =")))?;
-            if seen.contains(&key) {
-                return Err(bad(format!("{key} is given twice")));
-            }
-            seen.push(key);
-            let number = || {
-                value
-                    .parse::<f64>()
-                    .ok()
-                    .filter(|x| x.is_finite())
-                    .ok_or_else(|| bad(format!("{key} = {value} is not a number")))
-            };
-            let at_least_0 = |x: f64| {
-                if x >= 0.0 { Ok(x) } else { Err(bad(format!("{key} = {value} is below 0"))) }
-            };
-            match key {
-                "at" => (fault.at, when) = (at_least_0(number()?)?, true),
-                "for" => fault.lasting = at_least_0(number()?)?,
-                "p" => {
-                    fault.probability = number()?;
-                    when = true;
-                    if !(0.0..=1.0).contains(&fault.probability) {
-                        return Err(bad(format!("p = {value} is not a probability: expected 0 to 1")));
-                    }
-                }
-                "way" => {
-                    fault.direction = match value {
-                        "up" => Direction::Up,
-                        "down" => Direction::Down,
-                        "both" => Direction::Both,
-                        _ => return Err(bad(format!("way = {value}: expected up, down or both"))),
-                    }
-                }
-                "ms" => ms = Some(at_least_0(number()?)? / 1000.0),
-                "counts" => {
-                    let n = value.parse::<i32>();
-                    counts = Some(n.map_err(|_| bad(format!("counts = {value} is not a whole number")))?);
-                }
-                "volts" if value == "last" => volts = Some(StuckAt::Last),
-                "volts" => volts = Some(StuckAt::Volts(number()?)),
-                "factor" => factor = Some(number()?),
-                "periods" => {
-                    let n = value.parse::<u32>().ok().filter(|n| (1..=100).contains(n));
-                    periods = Some(n.ok_or_else(|| bad(format!("periods = {value}: expected 1 to 100")))?);
-                }
-                "says" => {
-                    says = Some(match value {
-                        "idle" => Lie::Idle,
-                        "encoder" => Lie::Encoder,
-                        "converter" => Lie::Converter,
-                        "run" => Lie::OtherRun,
-                        _ => {
-                            return Err(bad(format!(
-                                "says = {value}: expected idle, encoder, converter or run"
-                            )));
-                        }
-                    });
-                }
-                "dead" => {
-                    dead = Some(match value {
-                        "a" => Channel::A,
-                        "b" => Channel::B,
-                        _ => return Err(bad(format!("dead = {value}: expected a or b"))),
-                    });
-                }
-                _ => return Err(unknown("key", key, &KEYS)),
-            }
+        let (kind, keys) = text.split_once(':').unwrap_or((text, ""));
+        read(kind, keys).map_err(|problem| FaultError { text: text.to_owned(), problem })
+    }
+}
+
+/// The fault of a kind with keys and values; an error in words.
+fn read(kind: &str, keys: &str) -> Result<Fault, String> {
+    let mut given = Given::new();
+    let mut seen = Vec::new();
+    for pair in keys.split(',').filter(|p| !p.is_empty()) {
+        let (key, value) = pair.split_once('=').ok_or_else(|| format!("\"{pair}\" has no ="))?;
+        if seen.contains(&key) {
+            return Err(format!("{key} is given twice"));
         }
-        let needs = |key: &str| bad(format!("{kind} needs {key}"));
+        seen.push(key);
+        given.put(key, value)?;
+    }
+    let kind_of_fault = given.kind(kind)?;
+    if given.any_left() {
+        return Err(format!("a key that {kind} does not have"));
+    }
+    if !given.when {
+        return Err("neither at nor p is given".to_owned());
+    }
+    Ok(Fault { kind: kind_of_fault, ..given.fault })
+}
+
+/// Values by their keys, of which a kind takes its own.
+struct Given {
+    /// What every kind has.
+    fault: Fault,
+    /// It is said when the fault comes.
+    when: bool,
+    ms: Option<f64>,
+    counts: Option<i32>,
+    volts: Option<StuckAt>,
+    factor: Option<f64>,
+    dead: Option<Channel>,
+    says: Option<Lie>,
+    periods: Option<u32>,
+}
+
+impl Given {
+    fn new() -> Given {
+        Given {
+            fault: Fault::new(FaultKind::Drop, 0.0),
+            when: false,
+            ms: None,
+            counts: None,
+            volts: None,
+            factor: None,
+            dead: None,
+            says: None,
+            periods: None,
+        }
+    }
+
+    /// Reads the value of a key.
+    fn put(&mut self, key: &str, value: &str) -> Result<(), String> {
+        let expected = |what: &str| format!("{key} = {value}: expected {what}");
+        match key {
+            "at" => (self.fault.at, self.when) = (at_least_0(key, value)?, true),
+            "for" => self.fault.lasting = at_least_0(key, value)?,
+            "p" => {
+                let p = number(key, value)?;
+                if !(0.0..=1.0).contains(&p) {
+                    return Err(format!("p = {value} is not a probability: expected 0 to 1"));
+                }
+                (self.fault.probability, self.when) = (p, true);
+            }
+            "way" => {
+                self.fault.direction = match value {
+                    "up" => Direction::Up,
+                    "down" => Direction::Down,
+                    "both" => Direction::Both,
+                    _ => return Err(expected("up, down or both")),
+                }
+            }
+            "ms" => self.ms = Some(at_least_0(key, value)? / 1000.0),
+            "counts" => {
+                let n = value.parse::<i32>();
+                self.counts = Some(n.map_err(|_| format!("counts = {value} is not a whole number"))?);
+            }
+            "volts" if value == "last" => self.volts = Some(StuckAt::Last),
+            "volts" => self.volts = Some(StuckAt::Volts(number(key, value)?)),
+            "factor" => self.factor = Some(number(key, value)?),
+            "periods" => {
+                let n = value.parse::<u32>().ok().filter(|n| (1..=100).contains(n));
+                self.periods = Some(n.ok_or_else(|| expected("1 to 100"))?);
+            }
+            "says" => {
+                self.says = Some(match value {
+                    "idle" => Lie::Idle,
+                    "encoder" => Lie::Encoder,
+                    "converter" => Lie::Converter,
+                    "run" => Lie::OtherRun,
+                    _ => return Err(expected("idle, encoder, converter or run")),
+                });
+            }
+            "dead" => {
+                self.dead = Some(match value {
+                    "a" => Channel::A,
+                    "b" => Channel::B,
+                    _ => return Err(expected("a or b")),
+                });
+            }
+            _ => return Err(unknown("key", key, &KEYS)),
+        }
+        Ok(())
+    }
+
+    /// The kind of that name, which takes the values that it needs.
+    fn kind(&mut self, name: &str) -> Result<FaultKind, String> {
+        let needs = |key: &str| format!("{name} needs {key}");
         let period = |factor: Option<f64>| match factor {
             Some(x) if (0.01..=1000.0).contains(&x) => Ok(x),
-            Some(x) => Err(bad(format!("factor = {x}: expected 0.01 to 1000"))),
+            Some(x) => Err(format!("factor = {x}: expected 0.01 to 1000")),
             None => Err(needs("factor")),
         };
-        fault.kind = match kind {
+        Ok(match name {
             "drop" => FaultKind::Drop,
             "duplicate" => FaultKind::Duplicate,
             "corrupt" => FaultKind::Corrupt,
             "reorder" => FaultKind::Reorder,
             "silence" => FaultKind::Silence,
-            "lie" => FaultKind::Lie(says.take().ok_or_else(|| needs("says"))?),
-            "echo" => FaultKind::Forged(Forgery::Echo(periods.take().ok_or_else(|| needs("periods"))?)),
+            "lie" => FaultKind::Lie(self.says.take().ok_or_else(|| needs("says"))?),
+            "echo" => FaultKind::Forged(Forgery::Echo(self.periods.take().ok_or_else(|| needs("periods"))?)),
             "foreign" => {
-                FaultKind::Forged(Forgery::OtherRun(periods.take().ok_or_else(|| needs("periods"))?))
+                FaultKind::Forged(Forgery::OtherRun(self.periods.take().ok_or_else(|| needs("periods"))?))
             }
             "above-top" => FaultKind::Forged(Forgery::AboveTop),
-            "delay" => FaultKind::Delay(ms.take().ok_or_else(|| needs("ms"))?),
-            "jitter" => FaultKind::Jitter(ms.take().ok_or_else(|| needs("ms"))?),
+            "delay" => FaultKind::Delay(self.ms.take().ok_or_else(|| needs("ms"))?),
+            "jitter" => FaultKind::Jitter(self.ms.take().ok_or_else(|| needs("ms"))?),
             "freeze" => FaultKind::EncoderFreeze,
-            "jump" => FaultKind::EncoderJump(counts.take().ok_or_else(|| needs("counts"))?),
-            "channel" => FaultKind::EncoderChannel(dead.take().ok_or_else(|| needs("dead"))?),
-            "scale" => FaultKind::EncoderScale(factor.take().ok_or_else(|| needs("factor"))?),
+            "jump" => FaultKind::EncoderJump(self.counts.take().ok_or_else(|| needs("counts"))?),
+            "channel" => FaultKind::EncoderChannel(self.dead.take().ok_or_else(|| needs("dead"))?),
+            "scale" => FaultKind::EncoderScale(self.factor.take().ok_or_else(|| needs("factor"))?),
             "loss" => FaultKind::EncoderLoss,
-            "dac-stuck" => FaultKind::DacStuck(volts.take().ok_or_else(|| needs("volts"))?),
-            "dac-scale" => FaultKind::DacScale(factor.take().ok_or_else(|| needs("factor"))?),
-            "clock" => FaultKind::Clock(factor.take().ok_or_else(|| needs("factor"))?),
-            "prescaler" => FaultKind::Prescaler(period(factor.take())?),
-            "crystal" => FaultKind::Crystal(period(factor.take())?),
+            "dac-stuck" => FaultKind::DacStuck(self.volts.take().ok_or_else(|| needs("volts"))?),
+            "dac-scale" => FaultKind::DacScale(self.factor.take().ok_or_else(|| needs("factor"))?),
+            "clock" => FaultKind::Clock(self.factor.take().ok_or_else(|| needs("factor"))?),
+            "prescaler" => FaultKind::Prescaler(period(self.factor.take())?),
+            "crystal" => FaultKind::Crystal(period(self.factor.take())?),
             "reset" => FaultKind::Reset,
-            _ => return Err(unknown("kind", kind, &KINDS)),
-        };
-        let left = [ms.is_some(), counts.is_some(), volts.is_some(), factor.is_some(), dead.is_some()];
-        if left.contains(&true) || says.is_some() || periods.is_some() {
-            return Err(bad(format!("a key that {kind} does not have")));
-        }
-        if !when {
-            return Err(bad("neither at nor p is given".to_owned()));
-        }
-        Ok(fault)
+            _ => return Err(unknown("kind", name, &KINDS)),
+        })
     }
+
+    /// A value is left that the kind has not taken.
+    fn any_left(&self) -> bool {
+        let Given { fault: _, when: _, ms, counts, volts, factor, dead, says, periods } = self;
+        [
+            ms.is_some(),
+            counts.is_some(),
+            volts.is_some(),
+            factor.is_some(),
+            dead.is_some(),
+            says.is_some(),
+            periods.is_some(),
+        ]
+        .contains(&true)
+    }
+}
+
+/// A name that is none, and the probable meaning.
+fn unknown(what: &str, word: &str, known: &[&str]) -> String {
+    format!("unknown {what} {word}{}; expected one of: {}", nearest(word, known), known.join(", "))
+}
+
+fn number(key: &str, value: &str) -> Result<f64, String> {
+    let number = value.parse::<f64>().ok().filter(|x| x.is_finite());
+    number.ok_or_else(|| format!("{key} = {value} is not a number"))
+}
+
+fn at_least_0(key: &str, value: &str) -> Result<f64, String> {
+    let x = number(key, value)?;
+    if x >= 0.0 { Ok(x) } else { Err(format!("{key} = {value} is below 0")) }
 }
 
 impl fmt::Display for FaultKind {

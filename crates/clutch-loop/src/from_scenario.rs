@@ -1,30 +1,24 @@
 //! From a scenario to what runs: servo, supervisor, path, numbers for the wire and the log.
 
+use crate::build_error::BuildError;
 use crate::drift::Drift;
 use clutch_core::law::ControlLaw;
 use clutch_core::supervisor::Checks;
 use clutch_core::{
-    ActuatorKind, DacCode, FixedCounts, Micros, OnDisc, ParamError, Real, Servo, ServoParams, Supervisor,
-    Target,
+    ActuatorKind, DacCode, FNV_64, FixedCounts, Micros, OnDisc, Real, Servo, ServoParams, Supervisor, Target,
+    fnv1a_64,
 };
 use clutch_log::{Header, Source};
-use clutch_node::{ControllerParams, RunParams, RunTimes, Settings, Unsupported};
+use clutch_node::{ControllerParams, RunParams, RunTimes, Settings};
 use clutch_sim::detected::Detector;
 use clutch_sim::scenario::{Plan, ScalarKind};
 use clutch_sim::{Keep, Scenario, ScenarioError};
 use clutch_wire::Hello;
 
-/// FNV-1a, 64 bit: for telling apart, not for secrets.
-#[must_use]
-pub fn fnv1a(text: &str) -> u64 {
-    text.bytes()
-        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
-}
-
 /// Hash of the whole scenario, defaults filled in: what the board echoes.
 #[must_use]
 pub fn config_hash(scenario: &Scenario) -> u64 {
-    fnv1a(&scenario.canonical())
+    fnv1a_64(FNV_64, scenario.canonical().as_bytes())
 }
 
 /// Hash of what decides the law's answers: law, model, velocity, output, shell, sampling, encoder,
@@ -48,29 +42,7 @@ pub fn law_hash(scenario: &Scenario) -> u64 {
             text += &format!("{key}={value}\n");
         }
     }
-    fnv1a(&text)
-}
-
-/// A run could not be set up.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum BuildError {
-    /// The scenario.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// A parameter.
-    #[error(transparent)]
-    Param(#[from] ParamError),
-    /// A board cannot close such a loop.
-    #[error("{0}")]
-    Unsupported(#[from] Unsupported),
-    /// A board that closes the loop calculates in single precision.
-    #[error("sampling.scalar = \"f64\": expected \"f32\", the scalar of a board that closes the loop itself")]
-    Scalar,
-    /// A board that closes the loop has no room for a map of the disc.
-    #[error(
-        "friction_map: a board that closes the loop itself takes none: leave out [friction_map], or close the loop on this machine"
-    )]
-    Map,
+    fnv1a_64(FNV_64, text.as_bytes())
 }
 
 /// The parts of a run on a board, in the scalar `T`.

@@ -2,7 +2,7 @@
 //!
 //! | file | is |
 //! |---|---|
-//! | `from_scenario` | from a checked scenario to a run that is built |
+//! | `from_scenario`, `build_error` | from a checked scenario to a run that is built; why it cannot be |
 //! | `station` | this machine at its line: the controller, or the host of a board controller |
 //! | `port`, `realtime` | the line's device; the machine's clock, priorities and memory |
 //! | `preflight` | what station and board say to each other before consent |
@@ -25,6 +25,7 @@
 //!
 //! Ports, real time and emulators are of Linux; what computes its clock runs everywhere.
 
+pub mod build_error;
 pub mod campaign;
 #[cfg(target_os = "linux")]
 pub mod chip;

@@ -1,6 +1,7 @@
 //! The host of a board controller that is asked in lockstep.
 
-use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::build_error::BuildError;
+use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_board::LockstepBoard;
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE, Station, StationNotice};
 use clutch_core::law::LawTerms;

@@ -1,6 +1,6 @@
 //! A log as a picture shows it: its sticks, and the window around one.
 
-use crate::from_scenario::BuildError;
+use crate::build_error::BuildError;
 use clutch_core::{Counts, Encoder, StickSlip, StickSlipParams, StickSlipState};
 use clutch_log::{CommandRecord, CommandSource, Log};
 use clutch_sim::Scenario;

@@ -1,6 +1,6 @@
 //! Before a run: who is on the line, and does it fit.
 
-use crate::from_scenario::BuildError;
+use crate::build_error::BuildError;
 use crate::port::{Port, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
 use crate::station::{HostStation, Station, StationNotice};

@@ -1,7 +1,8 @@
 //! Replay: the recorded counts to the recorded law, every output compared bit for bit.
 
+use crate::build_error::BuildError;
 use crate::drift::{Drift, DriftReport};
-use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::from_scenario::{self, BuiltRun};
 use crate::live_gains;
 use crate::to_log::{self, FOREIGN_LAW, PRESENT_CODE, REPORT_EVERY, START_VOLTAGE};
 use clutch_core::law::ControlLaw;

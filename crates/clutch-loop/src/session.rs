@@ -4,12 +4,13 @@
 //! who it is, says what it will do, makes a release test where that is asked for, configures and arms the board, runs to
 //! the path's end, and leaves the board in its safe state. Starting it is the consent.
 
+use crate::build_error::BuildError;
 use crate::campaign::CampaignError;
 use crate::clearance::{ClearanceError, Cleared, check};
 use crate::control_loop::{self, ConfiguredRun, LoopOptions, LoopReport, OnDrift, Pace};
 use crate::drift::DriftReport;
 use crate::faults::Fault;
-use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::from_scenario::{self, BuiltRun};
 use crate::live_gains::{Changes, LiveGains};
 use crate::log_thread::{LogThread, Ring};
 use crate::onlooker::Onlooker;

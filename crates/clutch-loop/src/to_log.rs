@@ -1,7 +1,8 @@
 //! The records that a log gets of each sample, of the link and of the shaft.
 
+use crate::build_error::BuildError;
 use crate::drift::Alarm;
-use crate::from_scenario::{self, BuildError};
+use crate::from_scenario;
 use crate::onlooker::Looking;
 use clutch_core::law::Terms;
 use clutch_core::supervisor::{Cause, Cycle, State};

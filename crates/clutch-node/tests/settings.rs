@@ -8,7 +8,7 @@ use clutch_core::law::{
     CtcParams, DobParams, LawParams, OutputParams, PdParams, PidParams, SmcIntegralParams, SmcParams,
     SmcSignParams, SuperTwistingParams,
 };
-use clutch_core::params::{Kind, Params};
+use clutch_core::params::Params;
 use clutch_core::reference::{
     Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, ReferenceParams, Sine, Table, Trapezoid,
 };
@@ -18,8 +18,7 @@ use clutch_core::{
     SupervisorParams, VelocityParams,
 };
 use clutch_node::{
-    Built, Declared, MAX_KNOTS, Misfit, Refusing, RunSettings, SETTINGS, SETTINGS_HASH, Setting, Settings,
-    Unsupported,
+    Built, MAX_KNOTS, Misfit, Refusing, RunSettings, SETTINGS, SETTINGS_HASH, Setting, Settings, Unsupported,
 };
 use desk::{Plan, key};
 use proptest::prelude::*;
@@ -222,30 +221,6 @@ fn settings_come_in_any_order() {
     assert_eq!(built.servo, Servo::new(&Plan::new().servo).unwrap());
 }
 
-#[test]
-fn a_choice_or_a_word_that_is_not_known_is_named() {
-    for setting in Setting::all() {
-        let known = match setting.declared {
-            Declared::Choice(choice) => choice.options.len(),
-            Declared::Row(row, _) => match row.kind {
-                Kind::Word(words) => words.len(),
-                _ => continue,
-            },
-        };
-        let reference = ReferenceParams::Table(Table { knots: &KNOTS, interpolation: Interpolation::Linear });
-        for value in [known as u64, u64::from(u32::MAX), 1 << 32, u64::MAX] {
-            let mut settings = sent(&Plan { reference, ..Plan::new() }.pairs());
-            assert!(settings.set(setting.key, value));
-            assert_eq!(
-                settings.build().unwrap_err(),
-                Misfit::Unknown(setting.key),
-                "{} = {value}",
-                setting.name
-            );
-        }
-    }
-}
-
 /// The host's words on settings that a board refuses.
 fn refusal(settings: &Settings) -> String {
     let misfit = settings.build().unwrap_err();
@@ -295,25 +270,6 @@ fn a_number_that_a_constructor_refuses_is_told_with_key_value_and_expectation() 
     }
     let pairs = Plan::new().pairs();
     assert_eq!(refusal(&sent(&pairs[1..])), "ticks: missing");
-}
-
-#[test]
-fn each_row_is_refused_by_name_when_it_is_no_number() {
-    for law in LawParams::<f32>::all() {
-        let plan = Plan { servo: ServoParams { law, ..Plan::new().servo }, ..Plan::new() };
-        for (key, _) in plan.pairs() {
-            let setting = Setting::of(key).unwrap();
-            let Declared::Row(row, _) = setting.declared else { continue };
-            if row.kind != Kind::Real {
-                continue;
-            }
-            let mut settings = sent(&plan.pairs());
-            settings.set(key, u64::from(f32::NAN.to_bits()));
-            let text = refusal(&settings);
-            assert!(text.starts_with(&format!("{} = NaN: expected a ", setting.name)), "{text}");
-            assert!(text.contains(row.unit.text), "{text}");
-        }
-    }
 }
 
 #[test]

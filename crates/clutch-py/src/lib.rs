@@ -53,7 +53,7 @@ mod _clutch {
     #[pymodule_export]
     use super::table::Table;
     #[pymodule_export]
-    use super::tune::{as_identified, identify, tune};
+    use super::tune::{as_identified, identified_rows, identify, tune};
     /// Priority of the loop's control thread unless another is given.
     #[pymodule_export]
     const DEFAULT_PRIORITY: u8 = super::session::DEFAULT_PRIORITY;

@@ -7,6 +7,7 @@ use crate::stepping::native;
 use clutch_identify::experiment::{ExperimentError, Programme, VirtualBoard, experiment};
 use clutch_identify::recording::ReadError;
 use clutch_identify::rig_file::rig_file;
+use clutch_identify::shown::ROWS;
 use clutch_identify::{Recording, RigFile, believed};
 use clutch_tune::Options;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -78,6 +79,13 @@ pub(crate) fn identify<'py>(
         Err(why) => (None, Some(why.to_string())),
     };
     Ok((object, file, why))
+}
+
+/// Key, name for readers, unit and the factor from SI to it, of each parameter that identification may tell, in the order in
+/// which they are shown.
+#[pyfunction]
+pub(crate) fn identified_rows() -> Vec<(&'static str, &'static str, &'static str, f64)> {
+    ROWS.iter().map(|row| (row.key, row.label, row.unit, row.factor)).collect()
 }
 
 /// A rig file that was made by this package.

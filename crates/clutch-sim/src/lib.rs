@@ -5,6 +5,8 @@ pub mod drive;
 pub mod engine;
 pub mod friction_lab;
 pub mod friction_map;
+#[cfg_attr(target_family = "wasm", allow(dead_code, reason = "it has no vectors for lanes"))]
+mod lane;
 #[cfg_attr(
     target_family = "wasm",
     allow(dead_code, unused_variables, reason = "it has no vectors for lanes")
@@ -23,6 +25,7 @@ pub mod rig;
 pub mod ripple;
 pub mod run;
 pub mod scenario;
+mod scenario_error;
 pub mod smooth_speed;
 pub mod sweep;
 pub mod system;
@@ -33,5 +36,6 @@ pub use moving_rig::MovingRig;
 pub use number::number;
 pub use rig::RigParams;
 pub use run::{Keep, Run, RunError, RunParams, RunSpec, SAMPLE_COLUMNS, Start, simulate, simulate_servo};
-pub use scenario::{Scenario, ScenarioError};
+pub use scenario::Scenario;
+pub use scenario_error::ScenarioError;
 pub use tables::{Points, Text, nearest};

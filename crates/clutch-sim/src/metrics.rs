@@ -8,7 +8,7 @@
 //! is known (simulation), else the measured one.
 
 use crate::engine::{Event, EventKind};
-use crate::lanes::Lane;
+use crate::lane::Lane;
 use clutch_core::Arithmetic;
 use serde::Serialize;
 

@@ -6,7 +6,8 @@
 use crate::lanes;
 use crate::progress::UNWATCHED;
 use crate::run::{Keep, Run};
-use crate::scenario::{ScalarKind, Scenario, ScenarioError};
+use crate::scenario::{ScalarKind, Scenario};
+use crate::scenario_error::ScenarioError;
 use fearless_simd::Level;
 use std::ops::{ControlFlow, Range};
 use std::sync::OnceLock;

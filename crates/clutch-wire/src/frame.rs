@@ -1,6 +1,7 @@
 //! Frames: stuffing, checksum, and the decoder that finds them again in any stream of bytes.
 
-use crate::message::{LONGEST, Message, Put};
+use crate::bytes::Put;
+use crate::message::{LONGEST, Message};
 use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc};
 

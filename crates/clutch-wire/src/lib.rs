@@ -5,6 +5,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod bytes;
 mod codes;
 mod frame;
 mod list;

@@ -1,6 +1,6 @@
 //! A list of numbers at the end of a message.
 
-use crate::message::{Put, next};
+use crate::bytes::{Put, next};
 use core::fmt;
 
 /// Up to eight numbers of 32 bits, as many as there are.

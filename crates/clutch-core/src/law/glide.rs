@@ -90,6 +90,8 @@ impl<T: Real> Glide<T> {
     /// The first parameter out of range; with a brake, a friction that can be 0, by which the law divides.
     #[inline(never)]
     pub fn new(p: &GlideParams<T>, beside: &Beside<'_, T>) -> Result<Self, ParamError<T>> {
+        // Before what relates its rows to others: an error names the one that is wrong by itself.
+        p.filter.check_rows()?;
         p.check_rows()?;
         let seconds = beside.period.period::<T>()?;
         let plant = Plant::new(beside.model)?;

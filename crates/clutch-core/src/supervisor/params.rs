@@ -141,6 +141,7 @@ impl<T: Real> Limits<T> {
         let saturation = p.saturation_time / period + T::from_f64(0.5);
         let fits = saturation >= T::ONE && saturation < T::from_f64(4e9);
         LimitParams::SATURATION_COUNTED.require(p.saturation_time, fits)?;
+        bounds.check_rows()?;
         let inertia = bounds.inertia.high;
         Interval::HIGH_USABLE.require(inertia, inertia > T::ZERO)?;
         Interval::LOW_USABLE.require(bounds.inertia.low, bounds.inertia.low > T::ZERO)?;

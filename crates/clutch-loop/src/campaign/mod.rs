@@ -8,7 +8,8 @@ pub mod grammar;
 pub mod oracle;
 pub mod table;
 
-use crate::from_scenario::{self, BuildError, BuiltRun};
+use crate::build_error::BuildError;
+use crate::from_scenario::{self, BuiltRun};
 use crate::lockstep_board::LockstepBoard;
 use crate::lockstep_host::lockstep_host;
 use crate::sim_board::SimBoardError;

@@ -50,10 +50,10 @@ impl<V: Visit> Walk<V> {
         self.visit.visit(place, held)
     }
 
-    /// The next setting of 32 bits.
+    /// The next setting of 32 bits; more than they hold is none of a list.
     #[inline(never)]
     fn narrow(&mut self, held: u32) -> u32 {
-        self.wide(held.into()) as u32
+        u32::try_from(self.wide(held.into())).unwrap_or(u32::MAX)
     }
 
     /// The next setting that is a real number. A call of its own for each row: code for all of it had better be short.

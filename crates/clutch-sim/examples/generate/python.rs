@@ -33,7 +33,7 @@ from clutch._record import _Params
 "#;
 
 /// The module.
-pub(crate) fn module(classes: &[Class<'_>]) -> String {
+pub(crate) fn module(classes: &[Class<'_>], places: &[Place]) -> String {
     let mut out = HEAD.to_owned();
     let mut names: Vec<&str> = classes.iter().map(|class| class.name.as_str()).collect();
     names.retain(|name| !name.starts_with('_'));
@@ -45,11 +45,25 @@ pub(crate) fn module(classes: &[Class<'_>]) -> String {
         out += &format!("    \"{}\": \"{}\",\n", unit.suffix, unit.text);
     }
     out += "}\n";
+    out += "\n#: Units of a scenario's keys; empty for what has none.\nKEYS = {\n";
+    for (key, row) in places.iter().flat_map(rows) {
+        out += &format!("    \"{key}\": \"{}\",\n", row.unit.text);
+    }
+    out += "}\n";
     let mut written = Vec::new();
     for class in classes {
         write(class, classes, &mut written, &mut out);
     }
     out
+}
+
+/// The parameters of a table, by their keys in a file.
+fn rows(place: &Place) -> Vec<(String, &'static Row)> {
+    let row = |entry| match entry {
+        Entry::Row(row, _) => Some((join(&place.key, row.key), row)),
+        Entry::Below(_) => None,
+    };
+    entries(place.table).into_iter().filter_map(row).collect()
 }
 
 /// Writes a class after those that it is made of.

@@ -4,7 +4,7 @@
 //! a polynomial, and scale. A scalar branches; here both sides are computed and one is selected. Coefficients and the order
 //! of operations are fdlibm's, or the last bit would differ.
 
-use super::Lane;
+use crate::lane::Lane;
 
 const LN2_HI: f64 = 6.931_471_803_691_238e-1;
 const LN2_LO: f64 = 1.908_214_929_270_587_7e-10;

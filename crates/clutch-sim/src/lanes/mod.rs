@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Arithmetic, law, output stage, actuator and the pieces of the exact flow are the very functions of one run, over
-//! [`Lane`] instead of `f64`. Nothing is fused, and nothing is summed across lanes; each elementary function has the bits
+//! [`Lane`](crate::lane::Lane) instead of `f64`. Nothing is fused, and nothing is summed across lanes; each elementary function has the bits
 //! of `libm`. A run that leaves what lanes can do (a position beyond ±2³⁰ counts, a number that is none) runs again alone.
 
 mod block;
@@ -20,96 +20,3 @@ mod tests;
 mod vector;
 
 pub(crate) use group::run_all;
-
-use clutch_core::Arithmetic;
-
-/// A number, or a vector of them: what flow and figures need besides what laws need.
-pub(crate) trait Lane: Arithmetic {
-    /// Lanes.
-    const WIDTH: usize;
-    /// Magnitude of what asks an exponential, beyond which a motion goes on alone; 100 below where exponentials end here.
-    const EXPONENT: f64;
-
-    /// Does some work in a function of its own, by the same instructions: code that many call is there once.
-    fn apart<R>(work: impl FnOnce() -> R) -> R;
-    /// A vector of what each lane has.
-    fn of(each: impl FnMut(usize) -> f64) -> Self;
-    /// The number in a lane.
-    fn lane(&self, i: usize) -> f64;
-    /// Puts a number into a lane.
-    fn put(&mut self, i: usize, x: f64);
-    /// True if the mask is true in a lane.
-    fn any(mask: Self::Mask) -> bool;
-    /// The mask, lane `i` in bit `i`.
-    fn bits(mask: Self::Mask) -> u64;
-    /// Lanes in which both are one number; NaN is none.
-    #[inline(always)]
-    fn same(a: Self, b: Self) -> Self::Mask {
-        a.less_or_equal(b) & b.less_or_equal(a)
-    }
-    /// A mask that is true in no lane.
-    #[inline(always)]
-    fn none() -> Self::Mask {
-        Self::ZERO.less(Self::ZERO)
-    }
-    /// Largest whole number not above self.
-    fn floor(self) -> Self;
-    /// e to the power of self, for |self| ≤ 700.
-    fn exp(self) -> Self;
-    /// e to the power of self, less 1, for |self| ≤ 700.
-    fn expm1(self) -> Self;
-    /// Natural logarithm of a positive normal number.
-    fn log(self) -> Self;
-    /// Natural logarithm of 1 + self, for self > −1.
-    fn log1p(self) -> Self;
-}
-
-/// Does something for each lane whose bit is set.
-#[inline(always)]
-pub(crate) fn each(mut bits: u64, mut lane: impl FnMut(usize)) {
-    while bits != 0 {
-        lane(bits.trailing_zeros() as usize);
-        bits &= bits - 1;
-    }
-}
-
-/// The functions of a number that `libm` has by the same names.
-macro_rules! libm {
-    ($($f:ident)+) => { $(
-        #[inline]
-        fn $f(self) -> f64 {
-            libm::$f(self)
-        }
-    )+ };
-}
-
-impl Lane for f64 {
-    const WIDTH: usize = 1;
-    const EXPONENT: f64 = f64::INFINITY;
-
-    #[inline(always)]
-    fn apart<R>(work: impl FnOnce() -> R) -> R {
-        work()
-    }
-    #[inline]
-    fn of(mut each: impl FnMut(usize) -> f64) -> f64 {
-        each(0)
-    }
-    #[inline]
-    fn lane(&self, _: usize) -> f64 {
-        *self
-    }
-    #[inline]
-    fn put(&mut self, _: usize, x: f64) {
-        *self = x;
-    }
-    #[inline]
-    fn any(mask: bool) -> bool {
-        mask
-    }
-    #[inline]
-    fn bits(mask: bool) -> u64 {
-        mask.into()
-    }
-    libm! { floor exp expm1 log log1p }
-}

@@ -1,6 +1,6 @@
 //! Silences of an encoder in lanes: as [`clutch_core::StickSlip`] finds them one by one.
 
-use super::Lane;
+use crate::lane::Lane;
 use clutch_core::StickSlipParams;
 
 /// A detector for several runs, and its memory. Whole numbers are doubles here, exact far beyond any run.

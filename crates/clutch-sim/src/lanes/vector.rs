@@ -4,8 +4,8 @@
 //! not out of the token that proves the set to be there. [`at`] has seen the token before any vector is made. Nothing outside
 //! of this file can name a vector, and [`InLanes`] is given one by [`at`] alone; its result must hold none.
 
-use super::Lane;
 use super::elementary::{self, Powers};
+use crate::lane::Lane;
 use clutch_core::Arithmetic;
 use clutch_core::law::Limit;
 use fearless_simd::{Bytes as _, Level, Simd, SimdBase as _, SimdFloat as _, SimdMask as _};

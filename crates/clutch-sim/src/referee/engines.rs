@@ -11,7 +11,8 @@ use crate::engine::{
 use crate::metrics;
 use crate::progress::UNWATCHED;
 use crate::run::Keep;
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::Scenario;
+use crate::scenario_error::ScenarioError;
 use crate::system::{BristledMotion, Mode, Motion, State, SystemError};
 use clutch_core::friction::FrictionModel;
 use clutch_core::{ActuatorParams, ParamError, Plant, PlantParams};

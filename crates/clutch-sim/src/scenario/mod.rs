@@ -4,26 +4,27 @@
 //! its value. Unknown keys are errors. `docs/scenario.md` lists all keys.
 
 pub mod describe;
-mod error;
 mod outside;
 mod params;
 mod sampled;
 mod schema;
 mod section;
 mod verdict;
+mod written;
 
-pub use error::{ScenarioError, written_value};
 pub use params::{Safety, ScalarKind, ScenarioBounds, ScenarioLimits, ScenarioParams, ScenarioSampling};
 pub use sampled::{NOISE_ROOTS, NotCovered};
 pub use schema::schema;
 pub use section::check_section;
 pub use verdict::{CertificateError, Proven, Sampled, Unproven};
+pub use written::written_value;
 
 use crate::friction_map::MapGrid;
 use crate::progress::Report;
 use crate::rig::{Rig, RigBase, RigParams};
 use crate::ripple::Ripple;
 use crate::run::{Keep, Run, RunError, RunSpec, Start, simulate_watched};
+use crate::scenario_error::ScenarioError;
 use crate::tables::{self, check, checked, complete, find, lookup, nearest, read, row_at, shown};
 use clutch_core::certificate::{Certificate, Demand, PaperConditions, certify, paper_conditions};
 use clutch_core::friction::FrictionModel;
@@ -152,7 +153,8 @@ impl Scenario {
     /// # Errors
     /// The mistake, its place, and what is expected.
     pub fn parse(origin: &str, text: &str, set: &[(String, String)]) -> Result<Scenario, ScenarioError> {
-        let read = |(key, text): &(String, String)| Ok((key.clone(), error::read_value(origin, key, text)?));
+        let read =
+            |(key, text): &(String, String)| Ok((key.clone(), written::read_value(origin, key, text)?));
         let values = set.iter().map(read).collect::<Result<Vec<_>, ScenarioError>>()?;
         Scenario::from_table(origin, read_table(origin, text)?, &values)
     }
@@ -737,7 +739,7 @@ fn actor(kind: ActuatorKind) -> &'static str {
 /// # Errors
 /// A name that is no key, or lies below a value.
 pub fn override_keys(origin: &str, table: &mut Table, set: &[(String, Value)]) -> Result<(), ScenarioError> {
-    set.iter().try_for_each(|(key, value)| error::set(origin, table, key, value.clone()))
+    set.iter().try_for_each(|(key, value)| written::set(origin, table, key, value.clone()))
 }
 
 fn read_table(origin: &str, text: &str) -> Result<Table, ScenarioError> {

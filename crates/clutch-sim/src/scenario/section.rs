@@ -1,8 +1,8 @@
 //! One table of a scenario by itself: what is wrong with it whatever the rest may be.
 
-use super::error::{self, ScenarioError};
 use super::params::ScenarioParams;
-use super::{error_of, merge_base};
+use super::{error_of, merge_base, written};
+use crate::scenario_error::ScenarioError;
 use crate::tables::{check, complete, lookup, read};
 use clutch_core::params::{Info, Params, TableInfo};
 use toml::{Table, Value};
@@ -17,11 +17,11 @@ pub fn check_section(origin: &str, key: &str, table: Table) -> Result<Table, Sce
     let unknown = || ScenarioError::new(origin, key, "", "no table of a scenario has this name".to_owned());
     let info = info_at(key).ok_or_else(unknown)?;
     let mut whole = Table::new();
-    error::set(origin, &mut whole, key, Value::Table(table))?;
+    written::set(origin, &mut whole, key, Value::Table(table))?;
     if key == "rig" {
         // A rig without a base is the paper's, with changes.
         let base = lookup(&whole, "rig.base").cloned().unwrap_or_else(|| "paper".into());
-        error::set(origin, &mut whole, "rig.base", base)?;
+        written::set(origin, &mut whole, "rig.base", base)?;
         merge_base(origin, &mut whole)?;
     }
     let mut table = lookup(&whole, key).and_then(Value::as_table).cloned().unwrap_or_default();
@@ -29,7 +29,7 @@ pub fn check_section(origin: &str, key: &str, table: Table) -> Result<Table, Sce
         At::Info(info) => complete(origin, key, info, &mut table)?,
         At::Option(info) => crate::tables::complete_table(origin, key, info, &mut table)?,
     }
-    error::set(origin, &mut whole, key, Value::Table(table.clone()))?;
+    written::set(origin, &mut whole, key, Value::Table(table.clone()))?;
     // Values that are not in the table stay blank, and are not looked at.
     let params: ScenarioParams = read(&whole);
     match check(&params, key) {

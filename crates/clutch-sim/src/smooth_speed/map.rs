@@ -2,7 +2,8 @@
 
 use super::{Evidence, Failure, RATE, SmoothSpeed, Trials, check, lowest_smooth_speed};
 use crate::progress::{Progress, Report};
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::Scenario;
+use crate::scenario_error::ScenarioError;
 use clutch_core::params::{Choice, Kind};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -14,7 +14,8 @@ pub use map::{Axis, Column, GainMap, RateMap, Tried, gain_map, law_keys, rate_ma
 use crate::engine::{EventKind, Motion};
 use crate::progress::{Progress, Report};
 use crate::run::{ClosedLoop, REPORT_EVERY, RunError, RunSpec};
-use crate::scenario::{ScalarKind, Scenario, ScenarioError};
+use crate::scenario::{ScalarKind, Scenario};
+use crate::scenario_error::ScenarioError;
 use clutch_core::reference::ReferenceParams;
 use clutch_core::{Real, Servo};
 use serde::Serialize;

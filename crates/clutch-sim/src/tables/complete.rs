@@ -2,7 +2,7 @@
 
 use super::Points;
 use super::suggest::{correction, nearest};
-use crate::scenario::ScenarioError;
+use crate::scenario_error::ScenarioError;
 use clutch_core::params::{ChoiceInfo, Info, Kind, Row, TableInfo};
 use toml::{Table, Value};
 

@@ -1,7 +1,7 @@
 //! The pieces of a motion: linear, at the fringe of the layer, and through it.
 
 use super::series::{self, INVERSE};
-use crate::lanes::Lane;
+use crate::lane::Lane;
 
 /// Part that a piece may leave out, as a share of what it is: of a quadrature the time, of a series the rate of speed.
 pub(super) const TOLERANCE: f64 = 1e-10;

@@ -27,7 +27,7 @@ mod series;
 pub(crate) use flow::{Flow, PIECE_LIMIT, Piece, State};
 
 use super::{Engine, EngineError, Event, EventKind, Input, Model, Motion, Shaft, Volts};
-use crate::lanes::Lane;
+use crate::lane::Lane;
 use clutch_core::friction::{Exponential, FrictionModel};
 
 /// Speed, in Stribeck velocities, above which `q` is lost in rounding if `K` times the time left is below 20; else the

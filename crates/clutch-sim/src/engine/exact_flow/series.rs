@@ -1,7 +1,7 @@
 //! A piece of the motion as power series in time.
 
 use super::flow::{State, TOLERANCE};
-use crate::lanes::{Lane, each};
+use crate::lane::{Lane, each};
 
 /// Terms of a power series.
 const TERMS: usize = 18;
