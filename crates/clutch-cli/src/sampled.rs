@@ -99,13 +99,9 @@ pub(crate) fn lines(sampled: &Sampled, bound: &Bound) -> String {
         Ok(_) => sampled.stability_line(),
         Err(_) => "nothing is said of linear stability either".to_owned(),
     };
-    [
-        format!("as sampled: {error}"),
-        format!("as sampled: {stability}"),
-        STICKS.to_owned(),
-    ]
-    .map(|verdict| paragraph(&verdict))
-    .concat()
+    [format!("as sampled: {error}"), format!("as sampled: {stability}"), STICKS.to_owned()]
+        .map(|verdict| paragraph(&verdict))
+        .concat()
 }
 
 /// The same as an object.
