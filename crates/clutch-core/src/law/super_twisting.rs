@@ -87,10 +87,9 @@ impl<T: Arithmetic> SuperTwisting<T> {
     fn surface(&self, tick: &Tick<T>) -> (T, T, T) {
         let surface = self.params.slope * tick.error + tick.error_rate;
         let size = surface.abs().max(self.params.boundary);
-        let some = T::ZERO.less(size);
-        // Else 0, or no number.
-        let over = |size: T| T::select(some, surface / size, surface);
-        (surface, over(size.sqrt()), over(size))
+        // Over 1 what is 0, or no number, stays what it is.
+        let size = T::select(T::ZERO.less(size), size, T::ONE);
+        (surface, surface / size.sqrt(), surface / size)
     }
 }
 
