@@ -229,6 +229,9 @@ enum Verb {
     },
     /// Draws the README's figures again, with `clutch reproduce`.
     Figures,
+    /// Takes live view and playground in Chromium, at the sizes of a desktop and a phone, in light and in dark, into
+    /// target/screenshots; keeps the documentation's pictures of them. Needs Chromium.
+    Screenshots,
 }
 
 fn main() -> Result<()> {
@@ -281,7 +284,7 @@ fn main() -> Result<()> {
         }
         Verb::Fmu { scenario } => fmu::pack(scenario.as_deref()).map(drop),
         Verb::Dist { parts } => dist::run(&parts),
-        Verb::Playground => test::playground(),
+        Verb::Playground => test::playground().map(drop),
         Verb::Libclutch { targets } => libclutch::run(&targets),
         Verb::Stubs => stubs::generate(&python::interpreter()?),
         Verb::Notebooks => notebooks(),
@@ -289,6 +292,7 @@ fn main() -> Result<()> {
         Verb::Size { revisions } => size::print(&revisions),
         Verb::Generate { check } => generate(if check { &["--check"] } else { &[] }),
         Verb::Figures => figures(),
+        Verb::Screenshots => screenshots(),
     }
 }
 
@@ -358,6 +362,14 @@ fn figures() -> Result<()> {
         |args: &[&str], file: &str| cargo(["run", "--release", "--"]).args(args).arg(kept.join(file)).run();
     clutch(&["sim", "motor_pid", "--plot"], "motor_pid.svg")?;
     clutch(&["friction", "plot", "stribeck", "lugre", "elasto_plastic", "--out"], "friction.svg")
+}
+
+fn screenshots() -> Result<()> {
+    let page = test::playground()?.context("there is no playground to take")?;
+    cargo(["build", "--release", "--package", "clutch-cli"]).run()?;
+    let take =
+        run::program(python::interpreter()?).arg("python/tests/screenshots.py").arg("target/release/clutch");
+    take.arg(page).arg("target/screenshots").run()
 }
 
 fn certified(runs: u64) -> Result<()> {

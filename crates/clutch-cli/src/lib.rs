@@ -120,7 +120,7 @@ fn suggest(e: &mut clap::Error, args: &[OsString]) {
         let verbs = args.iter().skip(1).filter(|arg| !arg.to_string_lossy().starts_with('-'));
         let verb = verbs.map_while(|arg| arg.to_str()).try_fold(&command, |verb, name| {
             // The first word that is no verb is an argument of the last that was one.
-            verb.find_subcommand(name).map_or(Err(verb), Ok)
+            verb.find_subcommand(name).ok_or(verb)
         });
         let verb = verb.unwrap_or_else(|last| last);
         let known = |name: &str| verb.get_arguments().any(|arg| arg.get_long() == Some(name));

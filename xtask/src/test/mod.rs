@@ -66,10 +66,12 @@ pub(crate) fn wheel() -> Result<()> {
     tally.end(sound)
 }
 
-/// Builds the playground alone.
-pub(crate) fn playground() -> Result<()> {
+/// Builds the playground alone; its page, if its target is there.
+pub(crate) fn playground() -> Result<Option<PathBuf>> {
     cargo(["build"]).args(WORKSPACE).args(["--example", "page"]).run()?;
-    playground::build()?.as_ref().map_or(Ok(()), playground::sizes)
+    let Some(built) = playground::build()? else { return Ok(None) };
+    playground::sizes(&built)?;
+    Ok(Some(built.page))
 }
 
 /// Installs the programs without which tests skip themselves on a user's machine.
