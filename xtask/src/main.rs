@@ -389,7 +389,10 @@ fn smooth() -> Result<()> {
     for table in ["plants", "rest", "troubles", "steps", "motions", "motor", "bristles"] {
         write_between("docs/smooth.md", table, &table_of("smooth", &[table])?)?;
     }
-    write_between("docs/smooth.md", "maps", &table_in("clutch-identify", "maps", &[])?)
+    for table in ["identified", "maps"] {
+        write_between("docs/smooth.md", table, &table_in("clutch-identify", table, &[])?)?;
+    }
+    Ok(())
 }
 
 fn drift() -> Result<()> {
