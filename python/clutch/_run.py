@@ -219,6 +219,11 @@ def simulate(
     OSError
         The file cannot be read.
 
+    Warns
+    -----
+    UserWarning
+        The rig's friction has bristles that can give energy: docs/friction.md, passivity.
+
     Examples
     --------
     >>> import clutch

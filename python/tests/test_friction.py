@@ -1,6 +1,7 @@
 """Friction models from Python; bristles against SciPy's implicit Runge–Kutta method, which shares no code with them."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -36,6 +37,7 @@ def test_every_friction_has_a_coefficient_and_goes_through_the_laboratory(fricti
     assert 0.9 * friction.mu_dynamic < found["break_away"]["coefficient"][0] < 1.03 * most
 
 
+@pytest.mark.filterwarnings("ignore:.*bristles of the friction can give energy")
 @pytest.mark.parametrize("friction", MODELS, ids=named)
 def test_a_rig_runs_with_every_friction(friction):
     overrides = {"run.duration_s": 1.0, "run.settle_s": 0.2}
@@ -104,6 +106,18 @@ def test_bristles_move_as_scipy_says(friction):
     assert reach > 0.05, "it slides"
     assert np.abs(np.array(positions) - position).max() < 1e-5 * reach
     assert np.abs(np.array(velocities) - velocity).max() < 1e-4 * np.abs(velocity).max()
+
+
+def test_of_bristles_that_can_give_energy_a_run_warns():
+    scenario = {"law": clutch.Pd(), "reference": clutch.Ramp(rate_deg_s=20)}
+    given = r"bristles of the friction can give energy: .* more of rig\.viscous_damping_nm_s_rad"
+    with pytest.warns(UserWarning, match=given) as told:
+        clutch.simulate(clutch.Scenario(**scenario, rig=clutch.Rig(friction=clutch.LugreFriction())))
+    assert [warning.filename for warning in told] == [__file__]
+    passive = clutch.Rig(friction=clutch.LugreFriction(damping_s_rad=0.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        clutch.simulate(clutch.Scenario(**scenario, rig=passive))
 
 
 def test_an_engine_that_cannot_take_a_friction_says_which_can():

@@ -4,12 +4,12 @@
 //! with a damping of √10⁵ N s/m, a Stribeck velocity of 1 mm/s, 0.4 N s/m of viscous friction. A metre is a radian here.
 
 use clutch_core::friction::{
-    Bend, DahlParams, ELEMENTS, ElastoPlasticParams, FrictionModel, FrictionParams, LugreParams,
-    MaxwellParams,
+    Bend, CoulombParams, DahlParams, ELEMENTS, ElastoPlasticParams, FrictionModel, FrictionParams,
+    LugreParams, MaxwellParams, StribeckParams,
 };
 use clutch_core::{ActuatorParams, Bristles, Friction, Plant, PlantParams};
 use clutch_sim::drive::{Drive, DriveParams, RampDrive, SineDrive};
-use clutch_sim::engine::{Bristle, Engine, Event, EventKind, Input, Model, Shaft, Volts};
+use clutch_sim::engine::{Bristle, DormandPrince, Engine, Event, EventKind, Input, Model, Shaft, Volts};
 
 fn lugre() -> LugreParams {
     LugreParams {
@@ -80,7 +80,18 @@ fn model(friction: impl Into<FrictionParams>) -> Model {
 
 /// The motion from rest under a drive, sampled each `period` until `end`, and what happened.
 fn motion(model: &Model, drive: &Drive, period: f64, end: f64) -> (Vec<Shaft>, Vec<Event>) {
-    let (mut engine, mut shaft, mut events) = (Bristle::default(), Shaft::new(0.0, 0.0), Vec::new());
+    motion_by(&mut Bristle::default(), model, drive, period, end)
+}
+
+/// The same by an engine.
+fn motion_by(
+    engine: &mut dyn Engine,
+    model: &Model,
+    drive: &Drive,
+    period: f64,
+    end: f64,
+) -> (Vec<Shaft>, Vec<Event>) {
+    let (mut shaft, mut events) = (Shaft::new(0.0, 0.0), Vec::new());
     let steps = (end / period).round() as u32;
     let shafts = (0..steps).map(|k| {
         let time = f64::from(k) * period;
@@ -155,6 +166,44 @@ fn without_damping_and_with_one_coefficient_lugre_is_dahl() {
         assert!((a.position - b.position).abs() < 1e-9 && (a.velocity - b.velocity).abs() < 1e-7);
     }
     assert!(a[999].position.abs() > 1e-4, "it moved");
+}
+
+/// A force that swings breaks the mass away, slides it, stops it, and turns it round. The distance falls with the root of the
+/// stiffness, as the damping that belongs to it grows.
+#[test]
+fn stiff_bristles_move_as_coulombs_friction_does() {
+    let drive = sine(0.1, 2.0, 1.0);
+    let rigid = model(CoulombParams { mu_static: 1.0, mu_dynamic: 1.0 });
+    let exact = motion_by(&mut DormandPrince::default(), &rigid, &drive, 1e-3, 1.5).0;
+    let way = exact.iter().fold(0.0_f64, |most, s| most.max(s.position.abs()));
+    assert!(way > 0.05, "{way} m");
+    let mut last = f64::INFINITY;
+    for stiffness in [1e4_f64, 1e5, 1e6, 1e7, 1e8] {
+        let damping = stiffness.sqrt();
+        let p = LugreParams { mu_static: 1.0, stribeck_velocity: 0.05, stiffness, damping, ..lugre() };
+        let bent = motion(&model(p), &drive, 1e-3, 1.5).0;
+        let apart = exact.iter().zip(&bent).map(|(a, b)| (a.position - b.position).abs()).fold(0.0, f64::max);
+        assert!(apart < 0.5 / stiffness.sqrt() && apart < last / 3.0, "{stiffness} 1/m: {apart} m");
+        last = apart;
+    }
+}
+
+/// The range in which elasto-plastic bristles only bend is what holds a trembling load. As it goes to nothing they drift, and
+/// come to a limit that is not LuGre's friction: between `μ_e` and sliding they still give way by degrees.
+#[test]
+fn elasto_plastic_bristles_without_an_elastic_range_drift_and_less_than_lugres() {
+    let drive = sine(0.6, 0.2, 20.0);
+    let drift = |friction: FrictionParams| {
+        let shafts = motion(&model(friction), &drive, 1e-3, 10.0).0;
+        shafts[9_999].position - shafts[4_999].position
+    };
+    let drifts = [0.9, 0.7, 0.5, 0.3, 0.1, 1e-3, 1e-6]
+        .map(|elastic| drift(ElastoPlasticParams { elastic, ..elasto_plastic() }.into()));
+    assert!(drifts.is_sorted(), "{drifts:?}");
+    let [.., before, limit] = drifts;
+    assert!((limit / before - 1.0).abs() < 0.01, "{drifts:?}");
+    let most = drift(lugre().into());
+    assert!(limit > 0.1 * most && limit < 0.3 * most, "{limit} m, LuGre's {most} m");
 }
 
 #[test]

@@ -2,14 +2,18 @@
 //! engine.
 
 mod acceptance;
+mod auto;
 mod bristles;
 mod detector;
+mod draw;
 mod engines;
 mod errata;
 mod field_laws;
 mod glide;
 mod intervals;
 mod laws;
+mod linear;
+mod parts;
 mod pid;
 mod referee;
 mod sampled;

@@ -1,9 +1,11 @@
 //! Several inertias and rows of friction: a system written by hand, and modes against enumeration. Published systems are
 //! cases of the referee.
 
+use crate::draw::Draw;
+use crate::linear::Linear;
 use clutch_core::friction::{FrictionParams, StribeckParams};
 use clutch_core::{Friction, FrictionModel};
-use clutch_sim::system::{Motion, State, System, hold};
+use clutch_sim::system::{BristledMotion, Motion, State, System, hold};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 fn friction(p: impl Into<FrictionParams>) -> Friction<f64> {
@@ -120,4 +122,54 @@ fn modes_of_random_redundant_rows_are_those_of_enumeration() {
         worst = worst.max((ours - theirs).amax());
     }
     assert!(worst < 1e-7, "{worst}");
+}
+
+#[test]
+fn systems_of_springs_and_friction_never_gain_energy() {
+    let mut draw = Draw::new(12);
+    for n in 0..20 {
+        let system = Linear::<3, 2>::draw(&mut draw, Draw::friction).alone();
+        let (position, velocity) = (
+            SVector::from_fn(|_, _| draw.between(-1.0, 1.0)),
+            SVector::from_fn(|_, _| draw.between(-1.0, 1.0)),
+        );
+        let mut motion = Motion::new(&system, State { time: 0.0, position, velocity }).unwrap();
+        let begin = system.energy(&position, &velocity);
+        let (mut energy, mut events) = (begin, Vec::new());
+        for k in 1..=500 {
+            motion.advance(f64::from(k) * 1e-2, &mut events).unwrap();
+            let State { position, velocity, .. } = motion.state();
+            let now = system.energy(position, velocity);
+            assert!(now <= energy + 1e-10 * begin, "{n} at {k}: {now} J after {energy} J");
+            energy = now;
+        }
+        assert!(energy < 0.99 * begin, "{n}: friction took next to nothing");
+        assert!(events.len() > 1, "{n}: {events:?}");
+    }
+}
+
+/// Bristles give back what bends them, and no more: with the damping that makes them passive the energy never exceeds
+/// that of the start, at which they were not bent.
+#[test]
+fn systems_with_bristles_never_gain_energy() {
+    let mut draw = Draw::new(13);
+    for n in 0..20 {
+        let mut system = Linear::<2, 2>::draw(&mut draw, Draw::of_one_bristle).alone();
+        for i in 0..2 {
+            let row = system.rows.row(i).transpose();
+            let bristles = system.friction[i].bristles().unwrap();
+            system.damping += row * row.transpose() * (bristles.passive_from() * system.normal[i]);
+        }
+        let velocity = SVector::from_fn(|_, _| draw.between(-1.0, 1.0));
+        let begin = State { time: 0.0, position: SVector::zeros(), velocity };
+        let first = system.energy(&begin.position, &velocity);
+        let mut motion = BristledMotion::<_, 2, 2, 6>::new(&system, begin).unwrap();
+        for k in 1..=100 {
+            motion.advance(f64::from(k) * 1e-2).unwrap();
+            let State { position, velocity, .. } = motion.state();
+            let now = system.energy(&position, &velocity);
+            assert!(now <= first * (1.0 + 1e-9), "{n} at {k}: {now} J of {first} J");
+        }
+        assert!(system.energy(&motion.state().position, &motion.state().velocity) < 0.99 * first, "{n}");
+    }
 }

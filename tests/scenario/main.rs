@@ -148,11 +148,36 @@ fn a_path_that_a_brake_cannot_follow_is_refused_where_it_cannot() {
     refuses(
         parse(steep),
         "my.toml: reference.trapezoid: ",
-        &["accelerates at 3000", "the drive grants", "°/s²"],
+        &[
+            "accelerates at 3000",
+            "the drive grants",
+            "°/s²",
+            "more slowly",
+            "model.drive_torque_nm",
+            "a motor",
+        ],
     );
     // 2.5 V brake the paper's shaft with 3 rad/s² = 182 °/s².
     let weak = "name = \"x\"\n[rig]\nbase = \"paper\"\n[law.pd]\n[reference.trapezoid]\ndistance_deg = 300.0\nspeed_deg_s = 300.0\nacceleration_deg_s2 = 500.0\n[output]\nhighest_v = 2.5\non_invalid_v = 2.5\n";
-    refuses(parse(weak), "my.toml: reference.trapezoid: ", &["V of braking", "output.highest_v = 2.5"]);
+    refuses(
+        parse(weak),
+        "my.toml: reference.trapezoid: ",
+        &["V of braking", "output.highest_v = 2.5", "higher gain"],
+    );
+}
+
+#[test]
+fn a_path_that_a_motor_cannot_follow_says_what_may_change() {
+    let built_in = BUILT_IN.iter().find(|b| b.name == "motor_pid").unwrap();
+    let told = |set: &[(&str, &str)]| {
+        let set: Vec<_> = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        Scenario::parse("my.toml", built_in.toml, &set).unwrap_err().to_string()
+    };
+    let weak =
+        told(&[("output.highest_v", "0.01"), ("output.lowest_v", "-0.01"), ("output.on_invalid_v", "0")]);
+    for word in ["V, and output.highest_v = 0.01", "more slowly", "raise the limit", "higher gain_nm_v"] {
+        assert!(weak.contains(word), "{weak}");
+    }
 }
 
 #[test]

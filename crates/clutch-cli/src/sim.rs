@@ -18,7 +18,7 @@ use clutch_sim::metrics::Detected;
 use clutch_sim::picture::Envelope;
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::reaching::Reaching;
-use clutch_sim::rig::Rig;
+use clutch_sim::rig::{Rig, not_passive};
 use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -243,11 +243,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
         ));
     }
     if let Some(lacks) = s.bristles_lack_nm_s_rad {
-        text += &paragraph(&format!(
-            "note: at the voltage of the start the bristles of the friction can give energy: they are passive with \
-             {} N m s/rad more of rig.viscous_damping_nm_s_rad, or with a lower damping_s_rad",
-            number(lacks)
-        ));
+        text += &paragraph(&format!("note: {}", not_passive(lacks)));
     }
     text
 }

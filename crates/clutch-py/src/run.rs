@@ -10,12 +10,14 @@ use clutch_sim::engine::EngineKind;
 use clutch_sim::metrics::columns;
 use clutch_sim::picture::{Around, Envelope, PARTS, Stick, Window, sticks};
 use clutch_sim::progress::Progress;
+use clutch_sim::rig::{Rig, not_passive};
 use clutch_sim::smooth_speed::{self, Trials};
 use clutch_sim::{Keep, RunError, ScenarioError, simulate_servo};
 use numpy::PyReadonlyArray1;
-use pyo3::exceptions::{PyFileExistsError, PyRuntimeError};
+use pyo3::exceptions::{PyFileExistsError, PyRuntimeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::ffi::CString;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -60,6 +62,13 @@ pub(crate) fn simulate(py: Python<'_>, scenario: &Bound<'_, PyAny>, law: Option<
         return Err(e);
     }
     let run = Arc::new(run.map_err(|e| scenario.error(py, &e))?);
+    let spec = scenario.0.spec();
+    let rig = Rig::new(&spec.rig, spec.run.seed).map_err(|e| core_error(py, &e))?;
+    if let Some(lacks) = rig.lacks_damping(run.trace.start_voltage) {
+        let note = CString::new(format!("{}: {}", scenario.0.name(), not_passive(lacks)))?;
+        // Of the line that asked for the run, not of the package's own.
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &note, 2)?;
+    }
     Ok(Run { scenario, run, python_law })
 }
 

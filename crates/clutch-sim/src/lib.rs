@@ -35,7 +35,10 @@ pub use metrics::Metrics;
 pub use moving_rig::MovingRig;
 pub use number::number;
 pub use rig::RigParams;
-pub use run::{Keep, Run, RunError, RunParams, RunSpec, SAMPLE_COLUMNS, Start, simulate, simulate_servo};
+pub use run::{
+    Keep, Run, RunError, RunParams, RunSpec, SAMPLE_COLUMNS, Start, simulate, simulate_prepared,
+    simulate_servo,
+};
 pub use scenario::Scenario;
 pub use scenario_error::ScenarioError;
 pub use tables::{Points, Text, nearest};

@@ -110,6 +110,13 @@ impl MovingRig {
         }
     }
 
+    /// The same rig, moved by this engine from now on: a second opinion on the motion, at a tolerance of its own. Friction
+    /// with bristles is not for it.
+    #[must_use]
+    pub fn by(self, engine: DormandPrince) -> Self {
+        MovingRig { engine: Moves::InSteps(engine), ..self }
+    }
+
     /// The rig.
     #[must_use]
     pub fn rig(&self) -> &Rig {
@@ -206,7 +213,7 @@ impl MovingRig {
         self.shaft = begin(&self.rig, position, velocity, self.volts);
         match &mut self.engine {
             Moves::Exactly(_) => {}
-            Moves::InSteps(engine) => *engine = DormandPrince::default(),
+            Moves::InSteps(engine) => engine.begin_with([0.0; 2]),
             Moves::Bending(engine) => *engine = Bristle::default(),
         }
     }
@@ -282,7 +289,7 @@ impl MovingRig {
         self.line = line.iter().copied().collect();
         match &mut self.engine {
             Moves::Exactly(_) => {}
-            Moves::InSteps(engine) => *engine = DormandPrince::with_steps([*step, *from_rest]),
+            Moves::InSteps(engine) => engine.begin_with([*step, *from_rest]),
             Moves::Bending(engine) => *engine = Bristle::with_step(*step),
         }
         // The numbers drawn so far are drawn again.

@@ -142,6 +142,16 @@ impl Default for RigParams {
     }
 }
 
+/// The note on a rig whose bristles lack so much viscous damping, N m s/rad: [`Rig::lacks_damping`].
+#[must_use]
+pub fn not_passive(lacks: f64) -> String {
+    format!(
+        "at the voltage of the start the bristles of the friction can give energy: they are passive with {} N m s/rad more \
+         of rig.viscous_damping_nm_s_rad, or with a lower damping_s_rad",
+        crate::number(lacks)
+    )
+}
+
 /// A checked rig.
 #[derive(Clone, Debug)]
 pub struct Rig {

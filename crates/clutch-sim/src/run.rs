@@ -440,7 +440,23 @@ pub fn simulate_servo<T: Real, C: ControlLaw<T>>(
     keep: Keep,
     progress: Report<'_>,
 ) -> Result<Run, RunError> {
-    let (mut run, volts, engine) = ClosedLoop::begin(spec, servo)?;
+    simulate_prepared(spec, servo, spec.prepare::<T>()?, keep, progress)
+}
+
+/// As [`simulate_servo`], with rig and path as they are: [`RunSpec::prepare`] makes them, and [`MovingRig::by`] gives the rig
+/// another engine.
+///
+/// # Errors
+/// As [`simulate_watched`].
+pub fn simulate_prepared<T: Real, C: ControlLaw<T>>(
+    spec: &RunSpec<'_>,
+    servo: &Servo<T, C>,
+    prepared: Prepared<'_, T>,
+    keep: Keep,
+    progress: Report<'_>,
+) -> Result<Run, RunError> {
+    let (volts, engine) = (prepared.volts, prepared.engine);
+    let mut run = ClosedLoop::of(spec, servo, prepared)?;
     let p = &spec.run;
     let period: f64 = spec.period.seconds();
     let ticks = p.ticks(spec.period);
@@ -525,20 +541,20 @@ pub(crate) struct Sample<T: Real, Terms> {
 }
 
 impl<'a, 's, T: Real, C: ControlLaw<T>> ClosedLoop<'a, 's, T, C> {
-    /// The start of a run, the voltage on the brake before it (V), and the engine.
-    pub(crate) fn begin(
-        spec: &RunSpec<'a>,
-        servo: &'s Servo<T, C>,
-    ) -> Result<(Self, f64, EngineKind), RunError> {
+    /// The start of a run.
+    pub(crate) fn begin(spec: &RunSpec<'a>, servo: &'s Servo<T, C>) -> Result<Self, RunError> {
+        ClosedLoop::of(spec, servo, spec.prepare::<T>()?)
+    }
+
+    fn of(spec: &RunSpec<'a>, servo: &'s Servo<T, C>, prepared: Prepared<'a, T>) -> Result<Self, RunError> {
         let encoder = Encoder::new::<f64>(spec.rig.encoder.sensor.counts_per_rev)?;
         if servo.period() != spec.period || servo.encoder() != encoder {
             return Err(RunError::OtherServo);
         }
-        let prepared = spec.prepare::<T>()?;
         let state = prepared.servo_state(servo);
-        let Prepared { reference, moving, volts, engine } = prepared;
+        let Prepared { reference, moving, .. } = prepared;
         let period = spec.period.seconds();
-        Ok((ClosedLoop { servo, state, reference, map: spec.friction_map, moving, period }, volts, engine))
+        Ok(ClosedLoop { servo, state, reference, map: spec.friction_map, moving, period })
     }
 
     /// Tick `k` begins: sensor, law, converter.

@@ -1,6 +1,6 @@
 //! Dormand and Prince's 5(4) pair, the solver of the paper, with located events.
 //!
-//! Error per step is held to [`ABSOLUTE`] and, near rest, to [`RELATIVE`] of the speed. A step that would carry the velocity
+//! Error per step is held to [`ABSOLUTE`] and, near rest, to [`RELATIVE`] of the speed, or to a share of both. A step that would carry the velocity
 //! through zero is shortened, by root finding on the step itself, until it ends there.
 //!
 //! J. R. Dormand, P. J. Prince, A family of embedded Runge–Kutta formulae, J. Comp. Appl. Math.
@@ -23,23 +23,38 @@ const INSTANT: f64 = 1e-13;
 const STEP_LIMIT: u32 = 100_000;
 
 /// The reference engine.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct DormandPrince {
+    /// Share of the errors allowed per step.
+    share: f64,
     /// Step that the last interval ended with, s; 0 before the first.
     step: f64,
     /// First step of the last motion that began at rest, s; 0 before the first.
     from_rest: f64,
 }
 
+impl Default for DormandPrince {
+    fn default() -> Self {
+        DormandPrince { share: 1.0, step: 0.0, from_rest: 0.0 }
+    }
+}
+
 impl DormandPrince {
+    /// An engine that allows each step a share of the default's error: one that checks others, at a cost that grows with
+    /// the fifth root of `1/share`. Below 1e-4 the rounding of positions is more.
+    #[must_use]
+    pub fn with_tolerance(share: f64) -> Self {
+        DormandPrince { share, ..DormandPrince::default() }
+    }
+
     /// Steps that it begins with, s: of the next interval, and of the next motion from rest.
     pub(crate) fn steps(&self) -> [f64; 2] {
         [self.step, self.from_rest]
     }
 
-    /// An engine that begins with these steps.
-    pub(crate) fn with_steps([step, from_rest]: [f64; 2]) -> Self {
-        DormandPrince { step, from_rest }
+    /// It begins with these steps, s; 0 for one not known.
+    pub(crate) fn begin_with(&mut self, [step, from_rest]: [f64; 2]) {
+        (self.step, self.from_rest) = (step, from_rest);
     }
 }
 
@@ -51,6 +66,8 @@ struct Slip<'a> {
     input: &'a Input<'a>,
     sign: f64,
     inverse_inertia: f64,
+    /// Share of the errors allowed per step.
+    share: f64,
     /// Rounding of the acceleration, rad/s²: the torques that make it, of which next to nothing may be left.
     rounding: f64,
 }
@@ -86,9 +103,10 @@ impl Slip<'_> {
         }
         let left_out = |n: usize| (h * E.iter().zip(&k).map(|(e, k)| e * k[n]).sum::<f64>()).abs();
         let largest = |n: usize| from[n].abs().max(to[n].abs());
+        let (absolute, relative) = (self.share * ABSOLUTE, self.share * RELATIVE);
         let rounding = ROUNDING * (1.0 + largest(0));
-        let way = (ABSOLUTE * (1.0 + largest(0))).min(RELATIVE * h * largest(1) + rounding);
-        let speed = (ABSOLUTE * (1.0 + largest(1))).min(RELATIVE * largest(1) + self.rounding * h);
+        let way = (absolute * (1.0 + largest(0))).min(relative * h * largest(1) + rounding);
+        let speed = (absolute * (1.0 + largest(1))).min(relative * largest(1) + self.rounding * h);
         let error = (left_out(0) / way).max(left_out(1) / speed.max(f64::MIN_POSITIVE));
         (to, error, k[6])
     }
@@ -122,7 +140,14 @@ impl Engine for DormandPrince {
             let torques = input.torque(model, s, shaft.position).abs()
                 + model.break_away_torque(shaft.position, input.volts.at(s));
             let rounding = 2.0 * f64::EPSILON * torques * inverse_inertia;
-            let slip = Slip { model, input, sign: shaft.motion.sign(), inverse_inertia, rounding };
+            let slip = Slip {
+                model,
+                input,
+                sign: shaft.motion.sign(),
+                inverse_inertia,
+                share: self.share,
+                rounding,
+            };
             let mut state = [shaft.position, shaft.velocity];
             let mut rate = slip.rate(s, state);
             let mut at_rest = shaft.velocity == 0.0;

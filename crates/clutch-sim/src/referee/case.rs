@@ -3,6 +3,7 @@
 use super::mechanism::Mechanism;
 use super::observe::Observe;
 use super::signal::Signal;
+use super::unposed::unposed;
 use crate::tables::{complete, read};
 use clutch_core::Friction;
 use clutch_core::friction::{FrictionModel, FrictionParams};
@@ -182,6 +183,10 @@ impl Case {
     /// The key, its value, what is expected.
     pub fn parse(origin: &str, text: &str) -> Result<Case, CaseError> {
         let wrong = |message: String| CaseError::new(origin, message);
+        let asked = text.parse::<toml::Table>().ok().and_then(|table| unposed(&table));
+        if let Some((key, what)) = asked {
+            return Err(wrong(format!("{key}: cannot be posed: {what} (docs/systems.md)")));
+        }
         let file: File = toml::from_str(text).map_err(|e| wrong(format!("this is no case:\n{e}")))?;
         let positive = |key: &str, x: f64| {
             if x.is_finite() && x > 0.0 {

@@ -83,8 +83,8 @@ pub enum RefereeError {
     Case(#[from] CaseError),
 }
 
-/// Runs a case on an engine. `step` is the period in which a shaft engine is asked for the motion, s; none is the time
-/// between samples. Systems choose their steps themselves.
+/// Runs a case on an engine. `step` is the period in which the engine is asked for the motion, s; none is the time
+/// between samples. Each engine chooses its steps within it.
 ///
 /// # Errors
 /// [`RefereeError::NotForIt`] where the engine does not take the case; a motion that cannot be followed.
@@ -111,12 +111,12 @@ pub fn run(case: &Case, engine: RefereeEngine, step: Option<f64>) -> Result<Traj
     }
     let size = (mechanism.joints(), mechanism.rows.len());
     match (engine, size) {
-        (RefereeEngine::System, (1, 1)) => rigid::<1, 1>(case, mechanism),
-        (RefereeEngine::System, (..=2, ..=2)) => rigid::<2, 2>(case, mechanism),
-        (RefereeEngine::System, _) => rigid::<4, 4>(case, mechanism),
-        (RefereeEngine::BristledSystem, (1, 1)) => bristled_system::<1, 1, 3>(case, mechanism),
-        (RefereeEngine::BristledSystem, (..=2, ..=2)) => bristled_system::<2, 2, 6>(case, mechanism),
-        (RefereeEngine::BristledSystem, _) => bristled_system::<4, 4, 12>(case, mechanism),
+        (RefereeEngine::System, (1, 1)) => rigid::<1, 1>(case, mechanism, step),
+        (RefereeEngine::System, (..=2, ..=2)) => rigid::<2, 2>(case, mechanism, step),
+        (RefereeEngine::System, _) => rigid::<4, 4>(case, mechanism, step),
+        (RefereeEngine::BristledSystem, (1, 1)) => bristled_system::<1, 1, 3>(case, mechanism, step),
+        (RefereeEngine::BristledSystem, (..=2, ..=2)) => bristled_system::<2, 2, 6>(case, mechanism, step),
+        (RefereeEngine::BristledSystem, _) => bristled_system::<4, 4, 12>(case, mechanism, step),
         (RefereeEngine::DormandPrince, _) => {
             shaft(case, mechanism, &mut DormandPrince::default(), step, false)
         }
@@ -163,13 +163,38 @@ impl Trajectory {
     }
 }
 
-fn rigid<const N: usize, const B: usize>(case: &Case, m: &Mechanism) -> Result<Trajectory, RefereeError> {
+/// Periods between two samples, of a step that divides it.
+fn periods_per_sample(case: &Case, step: Option<f64>) -> Result<usize, RefereeError> {
+    let step = step.unwrap_or(case.sample);
+    let count = libm::round(case.sample / step);
+    let fits = (count * step - case.sample).abs() <= 1e-9 * case.sample;
+    if step > 0.0 && fits && count * case.samples() as f64 <= MOST_STEPS {
+        Ok(count as usize)
+    } else {
+        Err(RefereeError::Step { step, sample: case.sample })
+    }
+}
+
+/// The ends of the periods before sample `k`, the sample itself last, s.
+fn periods(case: &Case, k: usize, per_sample: usize) -> impl Iterator<Item = f64> {
+    let (sample, first) = (case.sample, if k == 0 { 0 } else { (k - 1) * per_sample + 1 });
+    (first..=k * per_sample).map(move |n| n as f64 * sample / per_sample as f64)
+}
+
+fn rigid<const N: usize, const B: usize>(
+    case: &Case,
+    m: &Mechanism,
+    step: Option<f64>,
+) -> Result<Trajectory, RefereeError> {
+    let per_sample = periods_per_sample(case, step)?;
     let system = Padded::<N, B>::new(m);
     let mut motion = Motion::new(&system, begin(m))?;
     let mut held = motion.modes().map(|mode| mode == Mode::Stuck);
     let (mut out, mut events) = (empty(case, m), Vec::new());
     for k in 0..=case.samples() {
-        motion.advance(k as f64 * case.sample, &mut events)?;
+        for end in periods(case, k, per_sample) {
+            motion.advance(end, &mut events)?;
+        }
         let state = motion.state();
         out.push(state.position.as_slice(), state.velocity.as_slice(), motion.friction()?.as_slice());
     }
@@ -188,15 +213,19 @@ fn rigid<const N: usize, const B: usize>(case: &Case, m: &Mechanism) -> Result<T
 fn bristled_system<const N: usize, const B: usize, const D: usize>(
     case: &Case,
     m: &Mechanism,
+    step: Option<f64>,
 ) -> Result<Trajectory, RefereeError>
 where
     [f64; D]: Linear,
 {
+    let per_sample = periods_per_sample(case, step)?;
     let system = Padded::<N, B>::new(m);
     let mut motion = BristledMotion::<_, N, B, D>::new(&system, begin(m))?;
     let mut out = empty(case, m);
     for k in 0..=case.samples() {
-        motion.advance(k as f64 * case.sample)?;
+        for end in periods(case, k, per_sample) {
+            motion.advance(end)?;
+        }
         let state = motion.state();
         out.push(state.position.as_slice(), state.velocity.as_slice(), motion.friction().as_slice());
     }
@@ -287,12 +316,7 @@ fn shaft(
     if constant && !drive.is_constant() {
         return Err(not_for_it("it needs a load that never changes"));
     }
-    let step = step.unwrap_or(case.sample);
-    let per_sample = libm::round(case.sample / step);
-    let fits = (per_sample * step - case.sample).abs() <= 1e-9 * case.sample;
-    if !(step > 0.0 && fits && per_sample * case.samples() as f64 <= MOST_STEPS) {
-        return Err(RefereeError::Step { step, sample: case.sample });
-    }
+    let per_sample = periods_per_sample(case, step)?;
     let mut shaft = Shaft::new(m.position[0], m.velocity[0] - base);
     let (mut out, mut events) = (empty(case, m), Vec::new());
     let row = &m.rows[0];
@@ -302,22 +326,20 @@ fn shaft(
         out.push(&[shaft.position + base * t], &[shaft.velocity + base], &[torque]);
     };
     sample(&mut out, &shaft, 0.0);
-    let steps = case.samples() * per_sample as usize;
     let mut time = 0.0;
-    for k in 1..=steps {
-        let end = k as f64 * case.sample / per_sample;
-        while time < end {
-            let jump = volts.iter().map(|(t, _)| *t).find(|t| *t > time && *t < end);
-            let now = volts.iter().rev().find(|(t, _)| *t <= time).map_or(0.0, |(_, v)| *v);
-            let until = jump.unwrap_or(end);
-            let (volts, duration) = (Volts::Held(now), until - time);
-            let input = Input { time, duration, origin: 0.0, volts, drive: &drive, noise: 0.0 };
-            engine.advance(&model, &input, &mut shaft, &mut events)?;
-            time = until;
+    for k in 1..=case.samples() {
+        for end in periods(case, k, per_sample) {
+            while time < end {
+                let jump = volts.iter().map(|(t, _)| *t).find(|t| *t > time && *t < end);
+                let now = volts.iter().rev().find(|(t, _)| *t <= time).map_or(0.0, |(_, v)| *v);
+                let until = jump.unwrap_or(end);
+                let (volts, duration) = (Volts::Held(now), until - time);
+                let input = Input { time, duration, origin: 0.0, volts, drive: &drive, noise: 0.0 };
+                engine.advance(&model, &input, &mut shaft, &mut events)?;
+                time = until;
+            }
         }
-        if k % per_sample as usize == 0 {
-            sample(&mut out, &shaft, time);
-        }
+        sample(&mut out, &shaft, time);
     }
     // Bristles hold nothing exactly: what counts as held is decided as for engines without events.
     out.events = (!bristled).then(|| {

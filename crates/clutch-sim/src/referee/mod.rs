@@ -15,6 +15,7 @@ mod mechanism;
 mod observe;
 mod signal;
 mod trajectory;
+mod unposed;
 
 pub use case::{Case, CaseError, Expect, Model, Row, ScenarioCase};
 pub use engines::{ENGINES, RefereeEngine, RefereeError, run};

@@ -664,22 +664,22 @@ impl Scenario {
                         p.output.lowest
                     ),
                     Obstacle::Acceleration => format!(
-                        "{at_time}: it accelerates at {:.5} °/s², and the drive grants {:.5} °/s²; accelerate more slowly",
+                        "{at_time}: it accelerates at {:.5} °/s², and the drive grants {:.5} °/s²; accelerate more slowly, give rig.drive and model.drive_torque_nm more torque, or give rig and model a motor",
                         asked.to_degrees(),
                         available.to_degrees()
                     ),
                     Obstacle::Voltage if bounds.actuator == ActuatorKind::Motor => format!(
-                        "{at_time}: it needs {asked:.4} V, and output.{} = {available}; accelerate more slowly, or raise the limit",
+                        "{at_time}: it needs {asked:.4} V, and output.{} = {available}; accelerate more slowly, raise the limit, or take a motor with a higher gain_nm_v",
                         if asked < 0.0 { "lowest_v" } else { "highest_v" }
                     ),
                     Obstacle::Voltage if asked < 0.0 => format!(
-                        "{at_time}: it needs {asked:.4} V of the motor, and output.lowest_v = {available}; accelerate more slowly, or lower the limit"
+                        "{at_time}: it needs {asked:.4} V of the motor, and output.lowest_v = {available}; accelerate more slowly, lower the limit, or take a motor with a higher motor_gain_nm_v"
                     ),
                     Obstacle::Voltage => format!(
-                        "{at_time}: it needs {asked:.4} V of braking, and output.highest_v = {available}; decelerate more slowly, drive it with less torque, or raise the limit"
+                        "{at_time}: it needs {asked:.4} V of braking, and output.highest_v = {available}; decelerate more slowly, drive it with less torque, raise the limit, or take a brake with a higher gain"
                     ),
                     Obstacle::Hold => format!(
-                        "{at_time}: at rest it needs {asked:.4} N m, and motor and friction hold {available:.4} N m at the worst corner of [bounds]; raise the limits of the output, or hang less on it"
+                        "{at_time}: at rest it needs {asked:.4} N m, and motor and friction hold {available:.4} N m at the worst corner of [bounds]; raise the limits of the output, hang less on it, or take a motor with a higher gain_nm_v"
                     ),
                     Obstacle::NotFinite => format!("{at_time}: its velocity or acceleration is not a number"),
                 })

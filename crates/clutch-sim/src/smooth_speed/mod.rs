@@ -249,7 +249,7 @@ fn first_failure<T: Real>(
     report: Report<'_>,
 ) -> Result<Option<(Failing, f64)>, RunError> {
     let servo = Servo::<T>::new(&spec.servo()?.cast()).map_err(|e| e.cast())?;
-    let (mut run, ..) = ClosedLoop::begin(spec, &servo)?;
+    let mut run = ClosedLoop::begin(spec, &servo)?;
     let (p, ticks) = (&spec.run, spec.run.ticks(spec.period));
     let mut settled = None;
     for k in 0..ticks {
