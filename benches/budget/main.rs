@@ -6,10 +6,12 @@
 //! all functions and loops behind the bounds. It fails when a measured value exceeds its bound, or
 //! a bound its budget.
 
+mod against_c;
 mod emulator;
 mod memory;
 mod plan;
 
+use against_c::Compared;
 use anyhow::{Context, Result, bail};
 use clutch_benches::machine_code::{Bounds, Cost, Fault, Image, traced};
 use emulator::Measured;
@@ -112,7 +114,12 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
         None => BTreeMap::new(),
     };
     over.extend(table(&plan, &image, &bounds, measured.as_ref(), &cycles));
-    peers(&plan, &image, &bounds, measured.as_ref(), &cycles)?;
+    let compared = |m: &&Measured| plan.in_c().any(|symbol| m.counts.contains_key(symbol));
+    if let Some(measured) = measured.as_ref().filter(compared) {
+        let compared = Compared { plan: &plan, image: &image, bounds: &bounds, measured, cycles: &cycles };
+        compared.laws()?;
+        compared.servos()?;
+    }
     Ok(over)
 }
 
@@ -181,7 +188,7 @@ fn gone(path: &Path, image: &Image, plan: &Plan, measured: &Measured) -> Result<
     let facts = plan.facts();
     let (mut ranges, mut entries) = (BTreeMap::new(), BTreeMap::new());
     let ours = plan.items.iter().filter(|i| i.traced).map(|i| (i.measured.as_str(), i.symbol.as_str()));
-    let theirs = plan.peers.iter().map(|p| (p.symbol.as_str(), p.symbol.as_str()));
+    let theirs = plan.in_c().map(|symbol| (symbol, symbol));
     for (name, symbol) in ours.chain(theirs) {
         let Ok(function) = image.function(symbol) else { continue };
         let none = Default::default();
@@ -257,7 +264,7 @@ fn table(
         }
     }
     let known = |name: &str| {
-        plan.items.iter().any(|i| i.measured == name) || plan.peers.iter().any(|p| p.symbol == name)
+        plan.items.iter().any(|i| i.measured == name) || plan.in_c().any(|symbol| symbol == name)
     };
     // Names that are no function's are those of a law over another friction: some laws have none.
     for name in measured.iter().flat_map(|m| &m.names) {
@@ -266,53 +273,4 @@ fn table(
         }
     }
     over
-}
-
-/// Prints the comparison of the laws with those in C.
-fn peers(
-    plan: &Plan,
-    image: &Image,
-    bounds: &[Cost],
-    measured: Option<&Measured>,
-    cycles: &BTreeMap<String, Cost>,
-) -> Result<()> {
-    let Some(measured) = measured.filter(|m| plan.peers.iter().any(|p| m.counts.contains_key(&p.symbol)))
-    else {
-        return Ok(());
-    };
-    println!(
-        "\nThe laws against C (`benches/peer_c`, gcc -O2), executed instructions (least / mean / most; ratios of mean \
-         and most) and cycles:\n"
-    );
-    println!(
-        "| law | ours | C | ratios | earlier C | ratios | bound: ours | C | earlier C | measured: ours | C |"
-    );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|");
-    let facts = plan.facts();
-    let none = Default::default();
-    for peer in &plan.peers {
-        let Some((item, ours)) = plan.items.iter().zip(bounds).find(|(i, _)| i.name == peer.name) else {
-            bail!("{}: a law in C without one of ours", peer.name);
-        };
-        let theirs = Bounds::new(image, &facts, &none).of(&peer.symbol).map_err(told)?;
-        let (a, b) = (&measured.counts[&item.measured], &measured.counts[&peer.symbol]);
-        let ratios = |mean: u64, most: u64| {
-            format!("{:.2}, {:.2}", a.mean as f64 / mean as f64, a.most as f64 / most as f64)
-        };
-        let along = |name: &String| cycles.get(name).map_or("–".to_owned(), |c| c.cycles.to_string());
-        let old = |f: &dyn Fn(plan::Limit) -> String| peer.historic.map_or("–".to_owned(), f);
-        println!(
-            "| {} | {a} | {b} | {} | {} | {} | {} | {} | {} | {} | {} |",
-            peer.name,
-            ratios(b.mean, b.most),
-            old(&|h| h.instructions.to_string()),
-            old(&|h| ratios(h.instructions, h.instructions)),
-            ours.cycles,
-            theirs.cycles,
-            old(&|h| h.cycles.to_string()),
-            along(&item.measured),
-            along(&peer.symbol),
-        );
-    }
-    Ok(())
 }

@@ -14,6 +14,8 @@ pub(crate) struct Plan {
     pub(crate) items: Vec<Item>,
     #[serde(rename = "peer")]
     pub(crate) peers: Vec<Peer>,
+    #[serde(rename = "peer_servo")]
+    pub(crate) peer_servos: Vec<PeerServo>,
     /// The emulated board's first, whose stack is bounded as a whole; of those that are flashed, that of a period.
     pub(crate) memory: Vec<Memory>,
     #[serde(rename = "loop")]
@@ -83,6 +85,18 @@ pub(crate) struct Peer {
     pub(crate) historic: Option<Limit>,
 }
 
+/// The servo around a law, in C.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PeerServo {
+    /// Name of the item it is compared with.
+    pub(crate) name: String,
+    /// Its name in the image, and in the image's output.
+    pub(crate) symbol: String,
+    /// The name under which the image prints the counts of our servo for any law, with this one.
+    pub(crate) any: String,
+}
+
 /// Instructions and cycles.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -112,6 +126,12 @@ impl Plan {
     /// The facts of every case.
     pub(crate) fn facts(&self) -> Facts {
         Facts { loops: self.loops.clone(), calls: self.calls.clone(), lengths: self.lengths.clone() }
+    }
+
+    /// The functions in C.
+    pub(crate) fn in_c(&self) -> impl Iterator<Item = &str> {
+        let servos = self.peer_servos.iter().map(|p| p.symbol.as_str());
+        self.peers.iter().map(|p| p.symbol.as_str()).chain(servos)
     }
 
     /// Cycles as a share of a period, %.

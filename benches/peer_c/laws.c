@@ -2,68 +2,24 @@
  * choice of a friction exponent, an exponential that is as good as single precision needs and that
  * knows nothing of subnormal numbers. Limits and the voltage for a demand that is not a number are
  * there, as in the Rust version, and so is the offset of a bumpless start. */
-#include "laws.h"
-
-static inline float output(const peer_output *o, float *offset, float demand)
-{
-    demand += *offset;
-    *offset *= o->decay;
-    if (demand >= o->lowest)
-        return demand <= o->highest ? demand : o->highest;
-    return demand < o->lowest ? o->lowest : o->on_invalid;
-}
-
-static inline float sat(float x)
-{
-    if (x > -1.0f)
-        return x < 1.0f ? x : 1.0f;
-    return x <= -1.0f ? -1.0f : 0.0f;
-}
-
-static inline float sgn(float x)
-{
-    return x > 0.0f ? 1.0f : x < 0.0f ? -1.0f : 0.0f;
-}
-
-/* e to the power of x, for x up to 0: 2^n times a polynomial for |r| <= ln 2 / 2; 0 below -87. */
-static inline float exp_negative(float x)
-{
-    if (!(x > -87.0f))
-        return 0.0f;
-    int n = (int)(x * 1.44269504f - 0.5f);
-    float r = x - (float)n * 0.693147181f;
-    float p = 1.0f + r * (1.0f + r * (0.5f + r * (0.166666667f + r * (0.0416666667f + r * 0.00833333333f))));
-    union { int i; float f; } scale = { (n + 127) << 23 };
-    return p * scale.f;
-}
+#include "arithmetic.h"
 
 float peer_pd(const peer_pd_law *l, float *offset, const peer_tick *t)
 {
-    return output(&l->output, offset, -(l->kp * t->error) - l->kd * t->error_rate);
+    return pd(l, offset, t);
 }
 
 float peer_ctc(const peer_ctc_law *l, float *offset, const peer_tick *t)
 {
-    float velocity = t->target_velocity - t->error_rate;
-    float speed = velocity < 0.0f ? -velocity : velocity;
-    float mu = l->mu_dynamic + (l->mu_static - l->mu_dynamic) * exp_negative(-(speed * l->inverse_velocity));
-    float tau = -(l->gain * (l->kp * t->error + l->kd * t->error_rate));
-    float torque = l->drive_torque - l->inertia * (t->target_acceleration - tau) - l->damping * velocity;
-    return output(&l->output, offset, torque / (mu * l->brake_gain));
+    return ctc(l, offset, t);
 }
 
 float peer_smc(const peer_smc_law *l, float *offset, const peer_tick *t)
 {
-    float surface = l->slope * t->error + t->error_rate;
-    float across = surface * t->error_rate;
-    float hold = l->kp * sat(surface * l->inverse_boundary);
-    float damp = l->kd * sat(across * l->inverse_boundary) * t->error_rate;
-    return output(&l->output, offset, -hold - damp);
+    return smc(l, offset, t);
 }
 
 float peer_smc_sign(const peer_smc_law *l, float *offset, const peer_tick *t)
 {
-    float surface = l->slope * t->error + t->error_rate;
-    float across = surface * t->error_rate;
-    return output(&l->output, offset, -(l->kp * sgn(surface)) - l->kd * sgn(across) * t->error_rate);
+    return smc_sign(l, offset, t);
 }

@@ -1,4 +1,4 @@
-//! Hands the linker this board's memory map, and compiles the laws in C on request.
+//! Hands the linker this board's memory map, and compiles laws and servo in C on request.
 
 fn main() {
     let dir = std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets it");
@@ -19,5 +19,6 @@ fn peer(dir: &str) {
         .flags(["-O2", "-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"])
         .flags(["-ffunction-sections", "-Wall", "-Wextra", "-Werror"])
         .file(format!("{folder}/laws.c"))
+        .file(format!("{folder}/servo.c"))
         .compile("peer");
 }

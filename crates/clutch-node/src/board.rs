@@ -223,7 +223,7 @@ impl BoardNode {
         !awaited || self.answered == Some(self.sequence.wrapping_sub(1))
     }
 
-    fn driving(&self) -> bool {
+    pub(crate) fn driving(&self) -> bool {
         matches!(self.state, BoardState::Armed | BoardState::Running)
     }
 

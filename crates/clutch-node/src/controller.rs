@@ -308,9 +308,6 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
             self.counts.foreign = self.counts.foreign.wrapping_add(1);
             return;
         }
-        self.counts.received = self.counts.received.wrapping_add(1);
-        self.last_sample_ns = Some(now_ns);
-        self.silence_told = false;
         let board = BoardState::from_u8(sample.status & 0x07);
         let seen = Seen {
             sequence: sample.sequence,
@@ -344,6 +341,10 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
                 valid_us: u16::try_from(self.params.valid.0).unwrap_or(u16::MAX),
             });
         }
+        // Control first: what follows does not change the answer.
+        self.counts.received = self.counts.received.wrapping_add(1);
+        self.last_sample_ns = Some(now_ns);
+        self.silence_told = false;
         if cycle.from != State::Faulted && cycle.state == State::Faulted {
             self.send_stop(StopReason::Fault, out);
         } else if let Some(reason) = self.stopping {
@@ -352,7 +353,7 @@ impl<T: Real, C: ControlLaw<T>> ControllerNode<T, C> {
                 self.send_stop(reason, out);
             }
         }
-        // Control first: whoever is told of the cycle takes his time, and the next period waits for what is known of it.
+        // Whoever is told of the cycle takes his time, and the next period waits for what is known of it.
         self.supervisor.expect(&mut self.state, &from_here());
         self.count(cycle.arrival);
         notices(Notice::Cycle(CycleNotice { sample: *sample, superseded, lateness, cycles: 0, cycle }));

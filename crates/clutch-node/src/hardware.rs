@@ -49,7 +49,7 @@ pub trait Role {
     fn receive(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode));
 
     /// A period begins. `put_out` gets the codes, at least one, and the last one is what this period's sample led to;
-    /// frames are made after that.
+    /// frames are made after that. A code that a sample under control leaves as it is may come after them.
     fn sample(
         &mut self,
         now_us: u64,

@@ -29,18 +29,32 @@ struct ToBoard<'a, F> {
     up: &'a mut Mail,
     now_us: u32,
     put_out: &'a mut F,
+    /// A code was put out.
+    out: bool,
+}
+
+impl<F: FnMut(DacCode)> ToBoard<'_, F> {
+    /// Puts out the code that the board has.
+    // A function of its own in machine code: on the path from a sample to its code there is nothing else to put out.
+    #[cold]
+    #[inline(never)]
+    fn put_out(&mut self) {
+        self.out = true;
+        (self.put_out)(self.board.code());
+    }
 }
 
 impl<F: FnMut(DacCode)> Sink for ToBoard<'_, F> {
     fn push(&mut self, message: &Message) {
         self.board.hear(self.now_us, message, self.up);
-        (self.put_out)(self.board.code());
+        self.put_out();
     }
 
     // A function of its own in machine code, too: the bound of the path from a sample to its code leads through it.
     #[inline(never)]
     fn actuate(&mut self, answer: &Actuate) {
         self.board.obey(self.now_us, answer, self.up);
+        self.out = true;
         (self.put_out)(self.board.code());
     }
 }
@@ -62,7 +76,7 @@ impl OneChip {
     /// Looks at the clock.
     pub fn poll(&mut self, now_us: u64, put_out: &mut impl FnMut(DacCode)) {
         let OneChip { controller, board, up, to_host } = self;
-        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out, out: false };
         controller.poll(now_us.saturating_mul(1000), to_host, daq);
         let before = self.board.code();
         self.board.poll(now_us as u32, &mut self.up);
@@ -77,7 +91,7 @@ impl OneChip {
         for _ in 0..MOST_HEARD {
             let Some(message) = self.up.take() else { return };
             let OneChip { controller, board, up, to_host } = self;
-            let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+            let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out, out: false };
             let drove = controller.driving();
             controller.hear(&message, to_host, daq);
             controller.follow(now_us.saturating_mul(1000), drove, to_host, daq);
@@ -103,7 +117,7 @@ impl Role for OneChip {
     fn receive(&mut self, now_us: u64, bytes: &[u8], put_out: &mut impl FnMut(DacCode)) {
         for frame in bytes.split_inclusive(|byte| *byte == 0) {
             let OneChip { controller, board, up, to_host } = self;
-            let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+            let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out, out: false };
             controller.host(now_us.saturating_mul(1000), frame, to_host, daq);
             self.settle(now_us, put_out);
         }
@@ -119,16 +133,22 @@ impl Role for OneChip {
         put_out: &mut impl FnMut(DacCode),
     ) {
         let (fault, sample) = self.board.begin_period(now_us as u32, counts, encoder_fault, converter_fault);
-        // The safe output goes on by itself; under control the sample's answer is the next code.
-        put_out(self.board.code());
         let OneChip { controller, board, up, to_host } = self;
-        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out };
+        let daq = &mut ToBoard { board, up, now_us: now_us as u32, put_out, out: false };
+        // The safe output goes on by itself; under control the sample's answer is the next code.
+        if !daq.board.driving() {
+            daq.put_out();
+        }
         let (now_ns, drove) = (now_us.saturating_mul(1000), controller.driving());
         if let Some(fault) = fault {
             controller.hear(&Message::Fault(fault), to_host, daq);
         }
         if let Some(sample) = sample {
             controller.sample(now_ns, &sample, to_host, daq);
+        }
+        // A sample that is not answered leaves the code as it is.
+        if !daq.out {
+            daq.put_out();
         }
         controller.follow(now_ns, drove, to_host, daq);
         controller.poll(now_ns, to_host, daq);

@@ -179,14 +179,28 @@ fn the_code_that_a_sample_gives_is_the_laws_answer_to_that_sample() {
 }
 
 #[test]
-fn each_period_repeats_the_code_that_is_out_and_then_puts_out_the_sample_s_answer() {
+fn a_period_puts_one_code_out_the_answer_to_its_sample_or_where_there_is_none_the_one_before() {
     let mut bench = Bench::running(Plan::new());
-    let (before, counts) = (bench.chip.code(), bench.shaft.counts().0 - 3);
+    let mut puts = |off: i32| {
+        let (before, counts) = (bench.chip.code(), Counts(bench.shaft.counts().0 + off));
+        let mut codes = Vec::new();
+        bench.now_us += 1000;
+        bench.chip.sample(bench.now_us, counts, false, false, &mut |code| codes.push(code));
+        (before, codes, bench.chip.code(), telemetry(&bench.hears()).flags & TELEMETRY_ANSWERED != 0)
+    };
+    let (before, codes, after, answered) = puts(0);
+    assert_eq!((codes, answered), (vec![after], true));
+    assert_ne!(before, after, "the shaft has moved");
+    let (before, codes, after, answered) = puts(100_000);
+    assert_eq!(
+        (codes, after, answered),
+        (vec![before], before, false),
+        "no shaft turns by five turns in 1 ms"
+    );
+    let mut bench = Bench::ready(Plan::new());
     let mut codes = Vec::new();
-    bench.now_us += 1000;
-    bench.chip.sample(bench.now_us, Counts(counts), false, false, &mut |code| codes.push(code));
-    assert_eq!(codes, [before, bench.chip.code()]);
-    assert_ne!(before, bench.chip.code(), "three counts are an error that is answered");
+    bench.chip.sample(bench.now_us, Counts(0), false, false, &mut |code| codes.push(code));
+    assert_eq!(codes, [DacCode(BOARD.boot_code)]);
 }
 
 #[test]

@@ -121,6 +121,8 @@ impl<T: Real> Envelope<T> {
             sides: [[from(T::ONE + edge, edge, fastest), from(edge, T::ONE + edge, back)]; 2],
             swapped: false,
             expected: None,
+            came: (0, 0),
+            sending: None,
             applied,
             sent: [applied; 2 * SENT],
             last: 0,
@@ -185,6 +187,7 @@ impl<T: Real> Envelope<T> {
     /// Computes before a sample comes, so many periods after the last one that passed, what it will be judged by.
     #[inline]
     fn expect_after(&self, s: &mut EnvelopeState<T>, losses: bool, periods: u32) {
+        s.catch_up();
         let (volts, time) = (self.in_force(s, losses), T::from_u64(u64::from(periods)));
         let [first, second] = &mut s.sides;
         let ([up, down], expected) = if s.swapped { (second, first) } else { (first, second) };
@@ -216,13 +219,13 @@ impl<T: Real> Envelope<T> {
         moved: i32,
         periods: u32,
     ) -> Option<(Cause, T)> {
-        s.note(moved, periods);
         let counts = T::from_i32(moved);
         let one_way = self.one_way;
         if periods != 1 || s.expected != Some(losses) {
             self.unexpected(s, losses, periods);
         }
         s.expected = None;
+        s.came = (moved, periods);
         s.swapped = !s.swapped;
         let [first, second] = &mut s.sides;
         let [up, down] = if s.swapped { second } else { first };
@@ -333,6 +336,10 @@ pub(super) struct EnvelopeState<T> {
     swapped: bool,
     /// True if it is expected after losses; none where nothing is expected.
     expected: Option<bool>,
+    /// Counts of the newest sample, and the periods that it took; nothing in none once that is noted.
+    came: (i32, u32),
+    /// The voltage that answered it, V, until it is kept.
+    sending: Option<T>,
     /// Voltage before the first that was sent, V.
     applied: T,
     /// Voltages that were sent, V: a ring, and the same once more, so that those of any span are in a row.
@@ -348,8 +355,22 @@ pub(super) struct EnvelopeState<T> {
 }
 
 impl<T: Real> EnvelopeState<T> {
-    /// A voltage is sent.
+    /// A voltage is sent. It is kept later: what is on its way to the converter does not wait for that.
+    #[inline]
     pub(super) fn sends(&mut self, volts: T) {
+        self.sending = Some(volts);
+    }
+
+    /// Remembers the newest sample and its answer.
+    fn catch_up(&mut self) {
+        let (moved, periods) = core::mem::take(&mut self.came);
+        self.note(moved, periods);
+        if let Some(volts) = self.sending.take() {
+            self.keep(volts);
+        }
+    }
+
+    fn keep(&mut self, volts: T) {
         self.last = self.last.wrapping_add(1) % SENT;
         let (ring, again) = self.sent.split_at_mut(SENT);
         for places in [ring, again] {
@@ -382,7 +403,11 @@ impl<T: Real> EnvelopeState<T> {
     }
 
     /// The suspect, where the counts are behind the slowest shaft or ahead of the fastest.
-    fn suspect(&self, behind: bool, one_way: bool) -> Cause {
+    // A function of its own in machine code: it ends control, and the bound of a period that goes on leaves it out.
+    #[cold]
+    #[inline(never)]
+    fn suspect(&mut self, behind: bool, one_way: bool) -> Cause {
+        self.catch_up();
         let backwards = self.run < 0;
         if self.run.unsigned_abs() < 2 && self.turns != 0 {
             Cause::Channel

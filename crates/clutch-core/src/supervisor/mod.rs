@@ -380,11 +380,11 @@ impl<T: Real> Supervisor<T> {
         let mut elapsed = u32::from(periods);
         if s.reckoned {
             s.unpassed = s.unpassed.saturating_add(u32::from(periods));
-            let n = i32::try_from(s.unpassed).unwrap_or(i32::MAX);
-            let expected = s.rate.saturating_mul(n);
+            let Reckoned { expected, allowed, rate } = match s.unpassed {
+                1 => Reckoned { expected: s.rate, allowed: l.jump.saturating_mul(8) / 8, rate: moved },
+                periods => self.reckoned_after(s.rate, moved, periods),
+            };
             let off = moved.saturating_sub(expected).unsigned_abs();
-            // The longer ago, the less dead reckoning knows: an eighth more with each period.
-            let allowed = l.jump.saturating_mul(s.unpassed.saturating_add(7)) / 8;
             if off > allowed {
                 cycle.arrival = Arrival::Implausible;
                 s.rejected_total = s.rejected_total.wrapping_add(1);
@@ -394,7 +394,7 @@ impl<T: Real> Supervisor<T> {
                 }
                 return None;
             }
-            s.rate = moved.checked_div(n).unwrap_or(0);
+            s.rate = rate;
             // With those of samples that were refused in between.
             elapsed = s.unpassed;
         } else {
@@ -404,6 +404,20 @@ impl<T: Real> Supervisor<T> {
         s.counts = sample.counts;
         s.unpassed = 0;
         Some((moved, elapsed))
+    }
+
+    /// Dead reckoning over any number of periods.
+    // A function of its own in machine code: where the sample before has passed, a period's bound leaves it out.
+    #[cold]
+    #[inline(never)]
+    fn reckoned_after(&self, rate: i32, moved: i32, periods: u32) -> Reckoned {
+        let n = i32::try_from(periods).unwrap_or(i32::MAX);
+        Reckoned {
+            expected: rate.saturating_mul(n),
+            // The longer ago, the less dead reckoning knows: an eighth more with each period.
+            allowed: self.limits.jump.saturating_mul(periods.saturating_add(7)) / 8,
+            rate: moved.checked_div(n).unwrap_or(0),
+        }
     }
 
     /// True if enough good samples have come since one that was refused.
@@ -546,6 +560,13 @@ impl<T: Real> Supervisor<T> {
             s.state = State::Released;
         }
     }
+}
+
+/// Counts by dead reckoning: the way that is expected and by how much it may be off, and the rate of the way that was gone.
+struct Reckoned {
+    expected: i32,
+    allowed: u32,
+    rate: i32,
 }
 
 #[inline]

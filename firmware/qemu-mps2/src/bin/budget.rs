@@ -19,6 +19,11 @@ mod meter;
 #[cfg(feature = "peer")]
 #[path = "../budget/peer.rs"]
 mod peer;
+#[cfg(feature = "peer")]
+#[path = "../budget/peer_servo.rs"]
+mod peer_servo;
+#[path = "../budget/servos.rs"]
+mod servos;
 #[path = "../budget/session.rs"]
 mod session;
 
@@ -33,7 +38,10 @@ fn main() -> ! {
 fn measure() -> Option<()> {
     meter::start()?;
     laws::measure()?;
+    servos::measure()?;
     #[cfg(feature = "peer")]
     peer::measure()?;
+    #[cfg(feature = "peer")]
+    peer_servo::measure()?;
     session::measure()
 }

@@ -1,7 +1,7 @@
 //! The functions that have a budget, each by itself and under its name: the calls of firmware that
 //! uses the crates.
 
-use clutch_core::law::LawState;
+use clutch_core::law::{ControlLaw, Ctc, Law, Pd, Smc};
 use clutch_core::{Counts, DacCode, Servo, ServoState, Target};
 use clutch_node::{BoardController, Hardware, OneChip, Outboxes};
 use clutch_wire::{Actuate, Decoder, Frame, MAX_FRAME, Message, encode};
@@ -63,9 +63,9 @@ macro_rules! steps {
 clutch_core::each_law!(steps);
 
 /// A servo, its state, and its target.
-pub struct Axis {
-    pub servo: Servo<f32>,
-    pub state: ServoState<f32, LawState<f32>>,
+pub struct Axis<C: ControlLaw<f32> = Law<f32>> {
+    pub servo: Servo<f32, C>,
+    pub state: ServoState<f32, C::State>,
     pub target: Target<f32>,
 }
 
@@ -74,6 +74,22 @@ pub struct Axis {
 #[unsafe(no_mangle)]
 pub extern "C" fn servo_tick(axis: &mut Axis, counts: i32) -> u16 {
     axis.servo.tick(&mut axis.state, Counts(counts), &axis.target).code.0
+}
+
+macro_rules! servos {
+    ($($function:ident $law:ident;)+) => {$(
+        /// The same around one law, which is chosen when the image is built.
+        #[inline(never)]
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $function(axis: &mut Axis<$law<f32>>, counts: i32) -> u16 {
+            axis.servo.tick(&mut axis.state, Counts(counts), &axis.target).code.0
+        }
+    )+};
+}
+servos! {
+    servo_pd Pd;
+    servo_ctc Ctc;
+    servo_smc Smc;
 }
 
 /// The bytes of one frame in, its message out.

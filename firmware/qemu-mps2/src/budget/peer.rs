@@ -14,13 +14,15 @@ struct PeerTick([f32; 4]);
 
 /// `peer_output`: lowest, highest, on_invalid, decay.
 #[repr(C)]
-struct PeerOutput([f32; 4]);
+#[derive(Clone, Copy)]
+pub struct PeerOutput(pub [f32; 4]);
 
 /// `peer_pd_law`, `peer_ctc_law`, `peer_smc_law`: gains, then the output.
 #[repr(C)]
-struct PeerLaw<const N: usize> {
-    gains: [f32; N],
-    output: PeerOutput,
+#[derive(Clone, Copy)]
+pub struct PeerLaw<const N: usize> {
+    pub gains: [f32; N],
+    pub output: PeerOutput,
 }
 
 type Step<const N: usize> = unsafe extern "C" fn(*const PeerLaw<N>, *mut f32, *const PeerTick) -> f32;
@@ -66,13 +68,17 @@ fn law<const N: usize, L: ControlLaw<f32, State = OutputState<f32>>>(
     line("differs", differs);
 }
 
-/// Measures and prints.
-pub fn measure() -> Option<()> {
-    let (plant, output) = (PlantParams::<f32>::default(), output());
+/// Those of Table 2.
+pub fn pd_gains() -> [f32; 2] {
     let p = PdParams::<f32>::default();
-    law("peer_pd", peer_pd, [p.kp, p.kd], &Pd::new(&p, &output, PERIOD).ok()?);
+    [p.kp, p.kd]
+}
+
+/// As [`pd_gains`], and the model.
+pub fn ctc_gains() -> Option<[f32; 10]> {
+    let plant = PlantParams::<f32>::default();
     let (p, f) = (CtcParams::<f32>::default(), StribeckParams::<f32>::default());
-    let gains = [
+    Some([
         p.outer_gain,
         p.kp,
         p.kd,
@@ -83,12 +89,25 @@ pub fn measure() -> Option<()> {
         f.mu_static,
         f.mu_dynamic,
         1.0 / f.stribeck_velocity,
-    ];
-    law("peer_ctc", peer_ctc, gains, &Ctc::new(&p, &plant, &output, PERIOD).ok()?);
+    ])
+}
+
+/// As [`pd_gains`].
+pub fn smc_gains() -> [f32; 4] {
     let p = SmcParams::<f32>::default();
-    let gains = [p.kp, p.kd, p.slope, 1.0 / p.boundary];
-    law("peer_smc", peer_smc, gains, &Smc::new(&p, &output, PERIOD).ok()?);
+    [p.kp, p.kd, p.slope, 1.0 / p.boundary]
+}
+
+/// Measures and prints.
+pub fn measure() -> Option<()> {
+    let (plant, output) = (PlantParams::<f32>::default(), output());
+    let p = PdParams::<f32>::default();
+    law("peer_pd", peer_pd, pd_gains(), &Pd::new(&p, &output, PERIOD).ok()?);
+    let p = CtcParams::<f32>::default();
+    law("peer_ctc", peer_ctc, ctc_gains()?, &Ctc::new(&p, &plant, &output, PERIOD).ok()?);
+    let p = SmcParams::<f32>::default();
+    law("peer_smc", peer_smc, smc_gains(), &Smc::new(&p, &output, PERIOD).ok()?);
     let p = SmcSignParams::<f32>::default();
-    law("peer_smc_sign", peer_smc_sign, gains, &SmcSign::new(&p, &output, PERIOD).ok()?);
+    law("peer_smc_sign", peer_smc_sign, smc_gains(), &SmcSign::new(&p, &output, PERIOD).ok()?);
     Some(())
 }

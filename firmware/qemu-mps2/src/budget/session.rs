@@ -14,9 +14,9 @@ use clutch_node::{
     RunParams, RunTimes, Settings,
 };
 use clutch_wire::{
-    Arm, Armed, BoardFault, BoardState, Configured, Discover, Fault, Hello, Message, Pong, Refused, SCHEMA,
-    STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Set, Stop, StopReason, Stopped, VERSION,
-    encode,
+    Arm, Armed, BoardFault, BoardState, Configured, Decoder, Discover, Fault, Hello, Message, Pong, Refused,
+    SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Set, Stop, StopReason, Stopped,
+    TELEMETRY_ANSWERED, VERSION, encode,
 };
 
 const RUN: u16 = 7;
@@ -122,6 +122,14 @@ impl Chip {
         clutch_node::receive(&mut self.node, &mut self.pins, encode(message).as_bytes());
     }
 
+    /// True if the period's telemetry says that its sample was answered.
+    fn answered(&self) -> bool {
+        let (mut decoder, line) = (Decoder::new(), self.pins.line.get(..self.pins.used).unwrap_or_default());
+        line.iter().filter_map(|byte| decoder.push(*byte)).any(
+            |frame| matches!(frame, Ok(Message::Telemetry(told)) if told.flags & TELEMETRY_ANSWERED != 0),
+        )
+    }
+
     /// A period; its instructions, and those of them up to the code, the reading of the clock among them.
     fn period(&mut self) -> (u32, u32) {
         self.pins.now_us = self.pins.now_us.wrapping_add(1000);
@@ -165,7 +173,9 @@ fn measure_chip(random: &mut Random) -> Option<()> {
             any.add(period);
             if began && chip.node.state() == BoardState::Running && periods + 8 < PERIODS {
                 goes_on.add(period);
-                code.add(to_code);
+                if chip.answered() {
+                    code.add(to_code);
+                }
             }
             began = chip.node.state() == BoardState::Running;
             periods += 1;

@@ -205,6 +205,12 @@ fn follow<T: Real>(
         let ended = envelope.judge(&mut s, lossy, counts.wrapping_sub(seen), elapsed);
         assert_eq!(envelope.judge(&mut late, lossy, counts.wrapping_sub(seen), elapsed), ended);
         assert_eq!(s.sides[usize::from(s.swapped)], late.sides[usize::from(late.swapped)]);
+        let remembered = |s: &EnvelopeState<T>| {
+            let mut s = *s;
+            s.catch_up();
+            (s.sent, s.last, s.turns, s.still, s.run)
+        };
+        assert_eq!(remembered(&s), remembered(&late));
         if let Some((cause, off)) = ended {
             assert!(off > T::ZERO);
             return Some((k, cause));
@@ -344,7 +350,7 @@ fn volts_in_force_are_the_last_two_and_more_with_a_delay_or_losses() {
         let envelope = envelope::<f64>(0, &limits);
         let mut s = envelope.start(9.5);
         // Ever lower, so that the highest is the oldest.
-        (0..20).for_each(|k| s.sends(9.0 - 0.25 * f64::from(k)));
+        (0..20).for_each(|k| s.keep(9.0 - 0.25 * f64::from(k)));
         let [low, high] = envelope.in_force(&s, losses);
         assert_eq!(low, 4.25, "the newest");
         high
@@ -366,7 +372,7 @@ fn volts_older_than_those_kept_may_be_any_of_the_output_or_what_was_there() {
     let in_force = |delay_cycles, applied: f64, losses| {
         let envelope = envelope::<f64>(0, &LimitParams { delay_cycles, ..LimitParams::default() });
         let mut s = envelope.start(applied);
-        s.sends(3.0);
+        s.keep(3.0);
         envelope.in_force(&s, losses)
     };
     // Before the first that was sent was what is there.
