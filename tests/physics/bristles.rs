@@ -5,7 +5,7 @@
 
 use clutch_core::friction::{
     Bend, CoulombParams, DahlParams, ELEMENTS, ElastoPlasticParams, FrictionModel, FrictionParams,
-    LugreParams, MaxwellParams, StribeckParams,
+    LugreParams, MaxwellParams,
 };
 use clutch_core::{ActuatorParams, Bristles, Friction, Plant, PlantParams};
 use clutch_sim::drive::{Drive, DriveParams, RampDrive, SineDrive};
