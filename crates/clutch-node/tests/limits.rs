@@ -2,7 +2,7 @@
 //! range is refused, and the host's words on it have key, value and unit; what is in range is taken, or a relation with
 //! other settings speaks against it.
 #![allow(missing_docs, reason = "the tests' names say what holds")]
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panics")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
 mod desk;
 
