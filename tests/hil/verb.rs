@@ -5,6 +5,8 @@ use clutch_sim::scenario::BUILT_IN;
 use clutch_tests::command;
 use clutch_tests::firmware::image;
 use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
 
 #[test]
 fn however_a_run_on_the_board_ends_its_exit_code_says_so_and_its_log_replays() {
@@ -40,5 +42,61 @@ fn however_a_run_on_the_board_ends_its_exit_code_says_so_and_its_log_replays() {
         let replayed = clutch(&["replay", log]);
         assert_eq!(replayed.status.code(), Some(0), "{name}: {}", shown(&replayed));
         assert!(shown(&replayed).contains("identical"), "{name}: {}", shown(&replayed));
+    }
+}
+
+/// The command and an image as an archive lays them beside each other, in `commands` and `images` of an empty folder.
+fn laid(name: &str, commands: &str, images: &str, image: &Path) -> PathBuf {
+    let whole = scratch(name);
+    let _ = std::fs::remove_dir_all(&whole); // of a test before
+    let (commands, images) = (whole.join(commands), whole.join(images));
+    for folder in [&commands, &images, &whole.join("empty")] {
+        std::fs::create_dir_all(folder).expect("a folder");
+    }
+    std::fs::copy(command(), commands.join("clutch")).expect("room for the command");
+    std::fs::copy(image, images.join("mps2-controller")).expect("room for the image");
+    whole
+}
+
+/// A short run by the command in a folder, from the empty one beside it.
+fn from_outside(whole: &Path, commands: &str) -> Command {
+    let mut run = Command::new(whole.join(commands).join("clutch"));
+    run.args(["hil", "board_smc_2", "--set", "run.duration_s=2", "--json"]);
+    run.current_dir(whole.join("empty")).stdin(Stdio::null()).env_remove("CLUTCH_IMAGES");
+    run
+}
+
+#[test]
+fn outside_of_a_checkout_the_image_beside_the_command_runs_and_without_one_all_places_are_named() {
+    let Some(image) = image("mps2-controller") else { return };
+    let _beside = beside();
+    let ran = |done: &Output| {
+        assert_eq!(done.status.code(), Some(0), "{}", shown(done));
+        let report: Value = serde_json::from_slice(&done.stdout).expect("JSON");
+        assert_eq!((&report["cause"], report["ticks"].as_u64()), (&"Done".into(), Some(2001)), "{report}");
+    };
+    for (name, commands) in [("unpacked", ""), ("installed", "bin")] {
+        let whole = laid(name, commands, "share/clutch/images", &image);
+        ran(&from_outside(&whole, commands).output().expect("the command starts"));
+        // Images that somebody names are taken alone, be there others or not.
+        let elsewhere = whole.join("elsewhere");
+        let named = || from_outside(&whole, commands).env("CLUTCH_IMAGES", &elsewhere).output();
+        let refused = named().expect("the command starts");
+        assert_eq!(refused.status.code(), Some(1), "{}", shown(&refused));
+        let missing = elsewhere.join("mps2-controller").display().to_string();
+        assert!(shown(&refused).contains(&missing), "{}", shown(&refused));
+        std::fs::rename(whole.join("share/clutch/images"), &elsewhere).expect("a folder");
+        ran(&named().expect("the command starts"));
+
+        let none = from_outside(&whole, commands).output().expect("the command starts");
+        assert_eq!(none.status.code(), Some(1), "{}", shown(&none));
+        let text = shown(&none);
+        let place = whole.join(commands).join("share/clutch/images/mps2-controller");
+        let above = whole.join(commands).join("../share/clutch/images/mps2-controller");
+        let built = "target/firmware/thumbv7em-none-eabihf/release/mps2-controller";
+        for place in [built, place.to_str().expect("a path"), above.to_str().expect("a path")] {
+            assert!(text.contains(place), "no {place} in: {text}");
+        }
+        assert!(text.contains("cargo xtask firmware build") && text.contains("CLUTCH_IMAGES"), "{text}");
     }
 }

@@ -74,6 +74,12 @@ impl Program {
         self
     }
 
+    /// Whatever was set for this process.
+    pub(crate) fn without(mut self, key: &str) -> Self {
+        self.0.env_remove(key);
+        self
+    }
+
     fn shown(&self) -> String {
         let words = std::iter::once(self.0.get_program()).chain(self.0.get_args());
         words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ")

@@ -1,6 +1,7 @@
 //! `clutch hil`.
 
 use crate::args::{ScenarioArgs, key_value};
+use crate::images::image;
 use crate::live::LiveArg;
 use crate::output::{BUILD, Exit, json, not_certified, paragraph, remark, report, warn};
 use crate::signals::stop_flag;
@@ -18,8 +19,8 @@ use clutch_loop::qemu_board::{QemuBoard, QemuSerialBoard};
 use clutch_loop::session::SessionError;
 use clutch_loop::virtual_time::VirtualReport as Ran;
 use clutch_loop::words::cause_text;
-use clutch_sim::{Scenario, nearest};
-use std::path::{Path, PathBuf};
+use clutch_sim::Scenario;
+use std::path::PathBuf;
 
 /// Runs the loop on an emulated board, with the simulated rig as its encoder and converter.
 ///
@@ -35,7 +36,8 @@ use std::path::{Path, PathBuf};
     clutch hil examples/nucleo_smc_2.toml --image nucleo-daq --chip-fault hang:at=2\n  \
     clutch hil examples/pico_smc_2.toml --image pico-controller\n\n\
     The chip's model needs Python with the module unicorn (pip install unicorn); CLUTCH_PYTHON names another\n\
-    interpreter than python3. Images are in $CLUTCH_IMAGES if it is set, else in target/firmware.\n\n\
+    interpreter than python3. Images are in $CLUTCH_IMAGES if it is set, else in target/firmware, else in\n\
+    share/clutch/images beside the command.\n\n\
     Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run. docs/firmware.md is the guide."
 )]
 pub(crate) struct Hil {
@@ -91,33 +93,6 @@ enum Link {
     /// Through the board's two serial lines, interrupts and clock: some 500 to 2000 cycles a
     /// second. Late answers are not checked, since this machine decides the lateness.
     Uart,
-}
-
-/// The images that are found without a path, and their targets: `cargo xtask firmware build` leaves them in the folder
-/// of their target.
-const NAMES: [(&str, &str); 5] = [
-    ("mps2-controller", "thumbv7em-none-eabihf"),
-    ("nucleo-controller", "thumbv7em-none-eabihf"),
-    ("nucleo-daq", "thumbv7em-none-eabihf"),
-    ("pico-controller", "thumbv6m-none-eabi"),
-    ("pico-daq", "thumbv6m-none-eabi"),
-];
-
-/// A file, or where the image of that name should be.
-fn image(named: PathBuf) -> anyhow::Result<PathBuf> {
-    if named.is_file() {
-        return Ok(named);
-    }
-    let Some((_, target)) = NAMES.iter().find(|(name, _)| Path::new(name) == named) else {
-        let name = named.display().to_string();
-        let meant = nearest(&name, &NAMES.map(|(name, _)| name));
-        // A file that is missing is told by what would have read it.
-        anyhow::ensure!(meant.is_empty(), "--image {name}: no such file, and no image of that name{meant}");
-        return Ok(named);
-    };
-    // Not both: an image of another build than the one that was asked for would run unseen.
-    let built = || Path::new("target/firmware").join(target).join("release");
-    Ok(std::env::var_os("CLUTCH_IMAGES").map_or_else(built, PathBuf::from).join(named))
 }
 
 impl Hil {

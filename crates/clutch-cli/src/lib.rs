@@ -15,6 +15,8 @@ mod friction;
 #[cfg(target_os = "linux")]
 mod hil;
 pub mod identify;
+#[cfg(target_os = "linux")]
+mod images;
 mod live;
 mod log;
 #[cfg(target_os = "linux")]

@@ -2,7 +2,7 @@
 
 use super::machine::{Machine, Results};
 use super::tools::{STATIC, STATIC_ARM64, Tools, WINDOWS, names_no_folder};
-use super::{Made, VERSION, copy, folder, licences, name, tar, wheels, work};
+use super::{Made, VERSION, copy, folder, images, licences, name, tar, wheels, work};
 use crate::run::{program, root};
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
     let libraries = wheels::libraries(&windows)?.len();
     let libraries = format!("asks for {libraries} libraries of Windows alone");
     Ok(vec![
-        Made { file: packed(&linux, &linux, "x86_64-linux")?, checked: vec![here.told()] },
+        Made { file: packed(&linux, &linux, "x86_64-linux")?, checked: vec![here.told(), hil(&linux)?] },
         Made {
             file: packed(&arm64, &linux, "aarch64-linux")?,
             checked: vec![same(&on_arm64)?, bits(tools)?],
@@ -41,7 +41,22 @@ pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
     ])
 }
 
-/// Packs the command for a system, with what the one that runs here prints: manual and completions.
+/// Where the command for Linux looks for images of boards, beside itself.
+const IMAGES: &str = "share/clutch/images";
+
+/// Check that the command drives an emulated board, as it is unpacked and outside of this tree.
+fn hil(linux: &Path) -> Result<String> {
+    let unpacked = work("hil")?;
+    copy(linux, &unpacked)?;
+    images::stripped(&unpacked.join(IMAGES))?;
+    let empty = work("hil-from")?;
+    let clutch = program(unpacked.join("clutch")).within(&empty).without("CLUTCH_IMAGES");
+    clutch.args(["hil", "board_smc_2", "--quiet"]).run()?;
+    Ok("follows the path of board_smc_2 on the emulated board, from an empty folder".to_owned())
+}
+
+/// Packs the command for a system: with what the one that runs here prints, manual and completions, and for Linux with
+/// the images of the boards.
 fn packed(command: &Path, here: &Path, system: &str) -> Result<PathBuf> {
     let whole = format!("clutch-{VERSION}-{system}");
     let packed = work(system)?.join(&whole);
@@ -49,6 +64,7 @@ fn packed(command: &Path, here: &Path, system: &str) -> Result<PathBuf> {
     copy(command, &packed)?;
     licences(&packed)?;
     if !system.ends_with("windows") {
+        images::stripped(&packed.join(IMAGES))?;
         program(here).args(["man", "--quiet", "--out"]).arg(packed.join("man")).run()?;
         std::fs::create_dir_all(packed.join("completion"))?;
         for shell in ["bash", "zsh", "fish"] {

@@ -1,13 +1,14 @@
 //! The files of a release, in target/dist: built, and checked by running them, here or in an emulator.
 
 mod command;
+mod images;
 mod machine;
 mod sbom;
 mod tools;
 mod wheels;
 
 use crate::run::{program, root};
-use crate::{firmware, fmu, libclutch};
+use crate::{fmu, libclutch};
 use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -60,7 +61,7 @@ pub(crate) fn run(parts: &[Part]) -> Result<()> {
             Part::Wheels => wheels::make(&tools)?,
             Part::Command => command::make(&tools)?,
             Part::C => vec![c()?],
-            Part::Firmware => vec![images(&tools)?],
+            Part::Firmware => vec![images::make(&tools)?],
             Part::Fmu => units(&tools)?,
             Part::Sbom => sbom::make(&tools)?,
         });
@@ -171,32 +172,6 @@ fn c() -> Result<Made> {
     let targets = libclutch::TARGETS.len();
     Ok(Made { file, checked: vec![format!("{targets} targets, in none can a panic be reached")] })
 }
-
-/// The images of the boards; the one for the emulator runs there.
-fn images(tools: &Tools) -> Result<Made> {
-    firmware::build()?;
-    let packed = work("firmware")?.join(format!("clutch-firmware-{VERSION}"));
-    std::fs::create_dir_all(&packed)?;
-    for (target, images) in IMAGES {
-        for image in images {
-            // Without lines of the source, which a board does not get.
-            let strip = program("arm-none-eabi-strip").args(["--strip-debug", "-o"]).arg(packed.join(image));
-            strip.arg(firmware::folder(target).join(image)).run()?;
-        }
-    }
-    licences(&packed)?;
-    let clutch = program(command::here(tools)?).env("CLUTCH_IMAGES", &packed);
-    clutch.args(["hil", "board_smc_2", "--quiet"]).run()?;
-    let file = tar(&packed, &format!("clutch-firmware-{VERSION}.tar.gz"))?;
-    let checked = "mps2-controller follows the path of board_smc_2 in qemu-system-arm (clutch hil)";
-    Ok(Made { file, checked: vec![checked.to_owned()] })
-}
-
-/// Images that are of use, by target.
-const IMAGES: [(&str, &[&str]); 2] = [
-    ("thumbv7em-none-eabihf", &["mps2-controller", "nucleo-controller", "nucleo-daq"]),
-    ("thumbv6m-none-eabi", &["pico-controller", "pico-daq"]),
-];
 
 /// The units for simulators, each for three systems; FMPy runs them on this one.
 fn units(tools: &Tools) -> Result<Vec<Made>> {
