@@ -43,8 +43,6 @@ pub trait Arithmetic:
     fn limit_of(limit: Limit) -> Self::Limit;
     /// `a` where the mask is true, `b` elsewhere.
     fn select_limit(mask: Self::Mask, a: Self::Limit, b: Self::Limit) -> Self::Limit;
-    /// True where a limit decided: where it is not [`Limit::None`].
-    fn limited_by(limit: Self::Limit) -> Self::Mask;
     /// `true` if the mask is true in every lane: work that no lane needs can be left out.
     fn all(mask: Self::Mask) -> bool;
     /// |self|.
@@ -56,8 +54,6 @@ pub trait Arithmetic:
     fn exp_neg(self) -> Self;
     /// self to the power of `n`.
     fn powf(self, n: Self) -> Self;
-    /// Square root; NaN for a negative argument.
-    fn sqrt(self) -> Self;
     /// The larger of the two; the other one if one is NaN.
     fn max(self, other: Self) -> Self;
     /// The smaller of the two; the other one if one is NaN.

@@ -59,6 +59,8 @@ pub trait Real:
     fn exp(self) -> Self;
     /// Natural logarithm; −∞ for 0, NaN for a negative argument.
     fn ln(self) -> Self;
+    /// Square root; NaN for a negative argument.
+    fn sqrt(self) -> Self;
     /// Largest integer not above self.
     fn floor(self) -> Self;
     /// Sine and cosine for |self| ≤ π/4, without double precision in `f32`.
@@ -80,7 +82,7 @@ fn seldom() {}
 
 /// The arithmetic of a scalar, but for what its precision decides.
 macro_rules! scalar {
-    ($scalar:ident: $abs:ident $pow:ident $sqrt:ident $max:ident $min:ident) => {
+    ($scalar:ident: $abs:ident $pow:ident $max:ident $min:ident) => {
         type Mask = bool;
         type Limit = Limit;
         const ZERO: $scalar = 0.0;
@@ -107,10 +109,6 @@ macro_rules! scalar {
             if mask { a } else { b }
         }
         #[inline]
-        fn limited_by(limit: Limit) -> bool {
-            limit != Limit::None
-        }
-        #[inline]
         fn all(mask: bool) -> bool {
             mask
         }
@@ -121,10 +119,6 @@ macro_rules! scalar {
         #[inline]
         fn powf(self, n: $scalar) -> $scalar {
             libm::$pow(self, n)
-        }
-        #[inline]
-        fn sqrt(self) -> $scalar {
-            libm::$sqrt(self)
         }
         #[inline]
         fn max(self, other: $scalar) -> $scalar {
@@ -171,7 +165,7 @@ macro_rules! scalar {
 }
 
 impl Arithmetic for f64 {
-    scalar!(f64: fabs pow sqrt fmax fmin);
+    scalar!(f64: fabs pow fmax fmin);
 
     #[inline]
     fn splat(x: f64) -> f64 {
@@ -225,6 +219,10 @@ impl Real for f64 {
         libm::log(self)
     }
     #[inline]
+    fn sqrt(self) -> f64 {
+        libm::sqrt(self)
+    }
+    #[inline]
     fn floor(self) -> f64 {
         libm::floor(self)
     }
@@ -235,7 +233,7 @@ impl Real for f64 {
 }
 
 impl Arithmetic for f32 {
-    scalar!(f32: fabsf powf sqrtf fmaxf fminf);
+    scalar!(f32: fabsf powf fmaxf fminf);
 
     #[inline]
     fn splat(x: f64) -> f32 {
@@ -341,6 +339,10 @@ impl Real for f32 {
     #[inline]
     fn ln(self) -> f32 {
         libm::logf(self)
+    }
+    #[inline]
+    fn sqrt(self) -> f32 {
+        libm::sqrtf(self)
     }
     #[inline]
     fn floor(self) -> f32 {

@@ -8,9 +8,8 @@
 )]
 
 use clutch_core::law::{
-    Beside, ControlLaw, Ctc, CtcParams, Dob, DobParams, Hold, HoldParams, Limit, OutputParams, Pd, PdParams,
-    Pid, PidParams, Seen, Smc, SmcIntegral, SmcIntegralParams, SmcParams, SmcSign, SmcSignParams,
-    SuperTwisting, SuperTwistingParams, Terms, Tick, Voltage, VoltageParams,
+    ControlLaw, Ctc, CtcParams, Hold, HoldParams, Limit, OutputParams, Pd, PdParams, Pid, PidParams, Smc,
+    SmcParams, SmcSign, SmcSignParams, Terms, Tick, Voltage, VoltageParams,
 };
 use clutch_core::{Arithmetic, Each, Micros, PlantParams, StribeckParams};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -96,9 +95,6 @@ impl Arithmetic for Lanes {
     fn select_limit(mask: Mask, a: [Limit; N], b: [Limit; N]) -> [Limit; N] {
         std::array::from_fn(|i| if mask.0[i] { a[i] } else { b[i] })
     }
-    fn limited_by(limit: [Limit; N]) -> Mask {
-        Mask(limit.map(|limit| limit != Limit::None))
-    }
     fn all(mask: Mask) -> bool {
         mask.0.iter().all(|a| *a)
     }
@@ -110,9 +106,6 @@ impl Arithmetic for Lanes {
     }
     fn powf(self, n: Lanes) -> Lanes {
         self.with(n, Arithmetic::powf)
-    }
-    fn sqrt(self) -> Lanes {
-        self.each(Arithmetic::sqrt)
     }
     fn max(self, other: Lanes) -> Lanes {
         self.with(other, Arithmetic::max)
@@ -167,12 +160,8 @@ where
     let mut limits = [0; 4];
     for k in 0..20_000 {
         let (ticks, all) = at(k);
-        // Another voltage in each lane, whatever the law asked for.
-        let applied = |i: usize| 2.0 + f64::from((k + i as u32) % 7);
-        vector.sees(&mut state, &Seen { applied: Lanes(std::array::from_fn(applied)), ..Seen::default() });
         let together = vector.update(&mut state, &all);
         for i in 0..N {
-            laws[i].sees(&mut states[i], &Seen { applied: applied(i), ..Seen::default() });
             let alone = laws[i].update(&mut states[i], &ticks[i]);
             limits[alone.limit as usize] += 1;
             assert_eq!(alone.voltage.to_bits(), together.voltage.0[i].to_bits(), "tick {k}, lane {i}");
@@ -230,40 +219,6 @@ fn each_law_has_in_each_lane_the_bits_of_the_scalar() {
             Pid::new(&p, &output(), PERIOD).unwrap()
         }),
         |each| Pid::in_lanes(each),
-    );
-    // Without a layer, and with one.
-    for boundary in [0.0, 0.02] {
-        same_bits(
-            std::array::from_fn(|i| {
-                let p = SuperTwistingParams {
-                    k1: 20.0 * scaled(i),
-                    k2: 400.0,
-                    boundary: boundary * scaled(i),
-                    ..SuperTwistingParams::default()
-                };
-                SuperTwisting::new(&p, &output(), PERIOD).unwrap()
-            }),
-            |each| SuperTwisting::in_lanes(each),
-        );
-    }
-    same_bits(
-        std::array::from_fn(|i| {
-            let p = SmcIntegralParams {
-                kp: 12.0 * scaled(i),
-                kd: 20.0,
-                integral: 30_000.0,
-                ..SmcIntegralParams::default()
-            };
-            SmcIntegral::new(&p, &output(), PERIOD).unwrap()
-        }),
-        |each| SmcIntegral::in_lanes(each),
-    );
-    same_bits(
-        std::array::from_fn(|i| {
-            let p = DobParams { kp: 20_000.0 * scaled(i), ..DobParams::default() };
-            Dob::new(&p, &Beside::paper(&PlantParams::default(), &output())).unwrap()
-        }),
-        |each| Dob::in_lanes(each).unwrap(),
     );
     // Open-loop laws, which meet no limit.
     open_loop(

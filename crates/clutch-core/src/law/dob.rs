@@ -15,7 +15,7 @@
 use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputState, Seen, Tick};
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
-use crate::{ActuatorKind, Arithmetic, Each, ParamError, Plant, Real};
+use crate::{ActuatorKind, ParamError, Plant, Real};
 
 crate::params! {
     /// Proportional–derivative control with a disturbance observer: whatever torque the model does not explain is found from
@@ -80,26 +80,6 @@ impl<T: Real> Dob<T> {
             output: Output::new(beside.output, beside.period)?,
         })
     }
-}
-
-impl<T: Arithmetic> Dob<T> {
-    /// The laws of several lanes as one; none if the plants that they believe in have no lanes together.
-    #[must_use]
-    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Option<Dob<L>> {
-        let params = DobParams {
-            kp: each(&|law| law.params.kp),
-            kd: each(&|law| law.params.kd),
-            bandwidth: each(&|law| law.params.bandwidth),
-        };
-        Some(Dob {
-            params,
-            plant: Plant::in_lanes(&|get| each(&|law| get(&law.plant)))?,
-            mu: each(&|law| law.mu),
-            newest: each(&|law| law.newest),
-            per_change: each(&|law| law.per_change),
-            output: Output::in_lanes(&|get| each(&|law| get(&law.output))),
-        })
-    }
 
     /// `T(u)` of a shaft that goes a way, N m.
     #[inline]
@@ -126,7 +106,7 @@ impl<T: Arithmetic> Dob<T> {
     }
 }
 
-impl<T: Arithmetic> ControlLaw<T> for Dob<T> {
+impl<T: Real> ControlLaw<T> for Dob<T> {
     type State = DobState<T>;
     type Terms = [T; 2];
     const TERMS: &'static [&'static str] = &["tracking_nm", "disturbance_nm"];
@@ -134,7 +114,7 @@ impl<T: Arithmetic> ControlLaw<T> for Dob<T> {
     fn start(&self, tick: &Tick<T>, applied: T) -> DobState<T> {
         let (tracking, way) = (self.tracking(tick), self.way(tick));
         let disturbance = self.torque(applied, way) - tracking;
-        let disturbance = T::select(disturbance.is_finite(), disturbance, T::ZERO);
+        let disturbance = if disturbance.is_finite() { disturbance } else { T::ZERO };
         let demand = self.plant.actuator().volts_for(tracking + disturbance, self.mu, way);
         DobState { disturbance, velocity: tick.velocity(), applied, output: self.output.start(demand, applied) }
     }
@@ -154,11 +134,14 @@ impl<T: Arithmetic> ControlLaw<T> for Dob<T> {
         let velocity = tick.velocity();
         let found = self.torque(state.applied, way) - self.per_change * (velocity - state.velocity);
         let next = disturbance + self.newest * (found - disturbance);
-        // No more than the output can answer.
-        let ends = (self.torque(self.output.lowest(), way), self.torque(self.output.highest(), way));
-        let answered = next.max(ends.0.min(ends.1)).min(ends.0.max(ends.1));
-        state.disturbance = T::select(next.is_finite(), answered, disturbance);
-        state.velocity = T::select(velocity.is_finite(), velocity, state.velocity);
+        if next.is_finite() {
+            // No more than the output can answer.
+            let ends = (self.torque(self.output.lowest(), way), self.torque(self.output.highest(), way));
+            state.disturbance = next.limit(ends.0.min(ends.1), ends.0.max(ends.1));
+        }
+        if velocity.is_finite() {
+            state.velocity = velocity;
+        }
         Command { voltage, limit, terms: [tracking, disturbance] }
     }
 }

@@ -14,7 +14,7 @@
 
 use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputParams, OutputState, Tick};
 use crate::params::{Range, Table};
-use crate::{Arithmetic, Each, Micros, ParamError, Real};
+use crate::{Micros, ParamError, Real};
 
 crate::params! {
     /// Super-twisting, a sliding mode of second order: a root and the integral of a sign, which switches behind an integral and
@@ -66,34 +66,22 @@ impl<T: Real> SuperTwisting<T> {
         let seconds = period.period::<T>()?;
         Ok(SuperTwisting { params: *p, twist: p.k2 * seconds, output: Output::new(output, period)? })
     }
-}
-
-impl<T: Arithmetic> SuperTwisting<T> {
-    /// The laws of several lanes as one.
-    #[must_use]
-    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> SuperTwisting<L> {
-        let params = SuperTwistingParams {
-            k1: each(&|law| law.params.k1),
-            k2: each(&|law| law.params.k2),
-            slope: each(&|law| law.params.slope),
-            boundary: each(&|law| law.params.boundary),
-        };
-        let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
-        SuperTwisting { params, twist: each(&|law| law.twist), output }
-    }
 
     /// `σ`, `√|σ| sgn σ` and `sgn σ`, both linear within the layer.
     #[inline]
     fn surface(&self, tick: &Tick<T>) -> (T, T, T) {
         let surface = self.params.slope * tick.error + tick.error_rate;
         let size = surface.abs().max(self.params.boundary);
-        // Over 1 what is 0, or no number, stays what it is.
-        let size = T::select(T::ZERO.less(size), size, T::ONE);
-        (surface, surface / size.sqrt(), surface / size)
+        if size > T::ZERO {
+            (surface, surface / size.sqrt(), surface / size)
+        } else {
+            // 0, or no number.
+            (surface, surface, surface)
+        }
     }
 }
 
-impl<T: Arithmetic> ControlLaw<T> for SuperTwisting<T> {
+impl<T: Real> ControlLaw<T> for SuperTwisting<T> {
     type State = SuperTwistingState<T>;
     type Terms = [T; 3];
     const TERMS: &'static [&'static str] = &["surface_rad_s", "root_v", "integral_v"];
@@ -102,7 +90,7 @@ impl<T: Arithmetic> ControlLaw<T> for SuperTwisting<T> {
         let (_, root, _) = self.surface(tick);
         let root = -(self.params.k1 * root);
         let integral = applied - root;
-        let integral = T::select(integral.is_finite(), integral, T::ZERO);
+        let integral = if integral.is_finite() { integral } else { T::ZERO };
         SuperTwistingState { integral, output: self.output.start(root + integral, applied) }
     }
 
@@ -115,10 +103,10 @@ impl<T: Arithmetic> ControlLaw<T> for SuperTwisting<T> {
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
         let step = -(self.twist * sign);
         let (lowest, highest) = self.output.limits();
-        let further = (highest.less_or_equal(demand) & T::ZERO.less(step))
-            | (demand.less_or_equal(lowest) & step.less(T::ZERO));
-        let next = (integral + step).max(lowest).min(highest);
-        state.integral = T::select(!further & step.is_finite(), next, integral);
+        let further = (demand >= highest && step > T::ZERO) || (demand <= lowest && step < T::ZERO);
+        if !further && step.is_finite() {
+            state.integral = (integral + step).limit(lowest, highest);
+        }
         Command { voltage, limit, terms: [surface, root, integral] }
     }
 }

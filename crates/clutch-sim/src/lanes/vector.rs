@@ -136,8 +136,8 @@ impl<S: Instructions> Neg for Vector<S> {
 
 impl<S: Instructions> Arithmetic for Vector<S> {
     type Mask = mask64x8<S>;
-    /// The number of a [`Limit`].
-    type Limit = Self;
+    /// Nobody asks: figures have no limits.
+    type Limit = ();
     const ZERO: Self = constant(0.0);
     const ONE: Self = constant(1.0);
 
@@ -158,17 +158,9 @@ impl<S: Instructions> Arithmetic for Vector<S> {
         Vector(mask.select(a.0, b.0))
     }
     #[inline(always)]
-    fn limit_of(limit: Limit) -> Self {
-        Self::splat(f64::from(limit as u8))
-    }
+    fn limit_of(_: Limit) {}
     #[inline(always)]
-    fn select_limit(mask: Self::Mask, a: Self, b: Self) -> Self {
-        Self::select(mask, a, b)
-    }
-    #[inline(always)]
-    fn limited_by(limit: Self) -> Self::Mask {
-        Self::ZERO.less(limit)
-    }
+    fn select_limit(_: Self::Mask, (): (), (): ()) {}
     #[inline(always)]
     fn all(mask: Self::Mask) -> bool {
         mask.all_true()
@@ -189,10 +181,6 @@ impl<S: Instructions> Arithmetic for Vector<S> {
         Self::of(|i| Arithmetic::powf(self.lane(i), n.lane(i)))
     }
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        Vector(self.0.sqrt())
-    }
-    #[inline(always)]
     fn max(self, other: Self) -> Self {
         let number = self.0.simd_eq(self.0);
         Self::select(number & !self.less(other), self, other)
@@ -207,13 +195,10 @@ impl<S: Instructions> Arithmetic for Vector<S> {
         self.abs().less_or_equal(Self::splat(f64::MAX))
     }
     #[inline(always)]
-    fn limited(self, lowest: Self, highest: Self, invalid: Self) -> (Self, Self) {
-        let (below, above, number) = (self.less(lowest), highest.less(self), self.0.simd_eq(self.0));
+    fn limited(self, lowest: Self, highest: Self, invalid: Self) -> (Self, ()) {
+        let (below, above) = (self.less(lowest), highest.less(self));
         let value = Self::select(above, highest, Self::select(below, lowest, self));
-        let of = Self::limit_of;
-        let limit = Self::select(below, of(Limit::Lowest), of(Limit::None));
-        let limit = Self::select(above, of(Limit::Highest), limit);
-        (Self::select(number, value, invalid), Self::select(number, limit, of(Limit::Invalid)))
+        (Self::select(self.0.simd_eq(self.0), value, invalid), ())
     }
     #[inline(always)]
     fn sgn(self) -> Self {
