@@ -383,6 +383,7 @@ KEYS = {
     "run.start_counts": "counts",
     "run.seed": "",
     "run.engine": "",
+    "friction_map.version": "",
     "friction_map.rig": "",
     "friction_map.points_deg_factor": "°, 1",
     "safety.reason": "",
