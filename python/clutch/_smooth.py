@@ -24,7 +24,8 @@ class SmoothSpeed:
         Why the next lower rate sticks: ``"sampled_loop"``, the linear sampled loop is unstable; ``"stribeck_edge"``,
         friction falls faster with the speed than the law brakes; ``"encoder_edge"``, what is unstable grows too much
         between two edges of the encoder; ``"edge_jolt"``, such an edge, by the gain on its rate, stops the shaft;
-        ``"ripple"``, the run is smooth if friction is even along the disc, which is asked where none of the others holds.
+        ``"ripple"``, the run is smooth if friction is even along the disc, which is asked if none of the others
+        holds.
         None if it is none of these, or no lower rate was tried. If several hold, the first; `evidence` has them all.
     below : SmoothSpeed.Failure or None
         The run that stuck at the next lower rate; None if the lowest rate is smooth.
