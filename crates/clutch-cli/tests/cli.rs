@@ -389,9 +389,11 @@ fn errors_fit_a_terminal_and_are_for_a_program_as_they_were() {
 #[test]
 fn what_is_refused_for_its_gains_is_told_in_80_columns() {
     let weak = ["--set", "law.smc.kp_v=1"];
-    for verb in
-        [&["loop", "board_smc_2"][..], &["hil", "board_smc_2"], &["scenario", "header", "board_smc_2"]]
-    {
+    for verb in [
+        &["loop", "board_smc_2"][..],
+        &["hil", "board_smc_2", "--image", "none.elf"],
+        &["scenario", "header", "board_smc_2"],
+    ] {
         let o = clutch(&[verb, &weak].concat());
         assert_eq!(o.status.code(), Some(2), "{verb:?}: {}", err(&o));
         assert!(narrow(&out(&o)) && out(&o).contains("not certified"), "{verb:?}:\n{}", out(&o));

@@ -213,8 +213,8 @@ fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, Scenario
     // The voltage that holds the shaft while it waits.
     let wait = base.safety()?.on_fault.holding_voltage().unwrap_or(0.8 * spec.output.highest);
     let wait = wait.min(spec.output.highest);
-    // The first period of a step takes all of it away.
-    let kp = 8.0 * wait / (rate * spec.period.seconds::<f64>());
+    // The first period in which the path is ahead of the shaft takes all of it away, but in one release of ten thousand.
+    let kp = 1e4 * wait / (rate * spec.period.seconds::<f64>());
     let law = table([(
         "pid",
         table([
