@@ -213,13 +213,14 @@ fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, Scenario
     // The voltage that holds the shaft while it waits.
     let wait = base.safety()?.on_fault.holding_voltage().unwrap_or(0.8 * spec.output.highest);
     let wait = wait.min(spec.output.highest);
-    // The first period in which the path is ahead of the shaft takes all of it away, but in one release of ten thousand.
-    let kp = 1e4 * wait / (rate * spec.period.seconds::<f64>());
+    // The first period of a step takes all of it away: an integral of next to nothing keeps what the limits have cut off
+    // while the shaft was held ahead of the path.
+    let kp = 8.0 * wait / (rate * spec.period.seconds::<f64>());
     let law = table([(
         "pid",
         table([
             ("kp_v_rad", Value::Float(kp)),
-            ("ki_v_rad_s", Value::Float(0.0)),
+            ("ki_v_rad_s", Value::Float(1e-30)),
             ("kd_v_s_rad", Value::Float(0.0)),
             ("bias_v", Value::Float(wait)),
         ]),
