@@ -22,6 +22,7 @@ TABLE3 = (
     "smc_cycles_per_s",
     "reduction_percent",
     "spread_points",
+    "counted_reduction_percent",
     "paper_percent",
 )
 
@@ -87,7 +88,8 @@ class Reproduction:
         A row for each statement: id, paper, measured, unit, low and high (the band in which it agrees; NaN is
         unbounded), holds, as_documented, fitted (true if the rig ``bench`` was fitted to it), note.
     table3 : Table
-        rate_deg_s, pd_cycles_per_s, smc_cycles_per_s, reduction_percent, spread_points, paper_percent.
+        rate_deg_s, pd_cycles_per_s, smc_cycles_per_s, reduction_percent, spread_points,
+        counted_reduction_percent (of the cycles that the encoder's silences show), paper_percent.
     figures : tuple of PaperFigure
         Figures 8, 9 and 10.
 

@@ -56,6 +56,10 @@ pub(crate) fn beside(python: &Path, name: &str) -> PathBuf {
     python.with_file_name(name)
 }
 
+/// The profile of the wheel that tests install: as the released one, which `cargo xtask dist` builds and tries, but for what
+/// takes long at its link.
+pub(crate) const PROFILE: &str = "tested";
+
 /// The wheel in an environment of its own, outside of this tree.
 pub(crate) struct Wheel {
     /// Holds the unpacked source distribution and the environment; gone when this is dropped.
@@ -95,6 +99,8 @@ impl Wheel {
             .args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"])
             .arg(&dist)
             .arg(&wheel.source)
+            .env("MATURIN_PEP517_ARGS", format!("--profile {PROFILE}"))
+            .giving_way()
             .run()?;
         make_environment(tools, &environment, &["--without-pip"])?;
         pip(tools)

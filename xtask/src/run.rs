@@ -30,9 +30,7 @@ pub(crate) fn cargo<const N: usize>(args: [&str; N]) -> Program {
 pub(crate) fn beside(verb: &str) -> Result<Beside> {
     let path = root().join("target").join(format!("{verb}.log"));
     let log = std::fs::File::create(&path).with_context(|| path.display().to_string())?;
-    let this = std::env::current_exe()?;
-    let mut verb =
-        if cfg!(unix) { program("nice").args(["-n", "5"]).arg(this) } else { program(this) }.arg(verb);
+    let mut verb = program(std::env::current_exe()?).arg(verb).giving_way();
     verb.announce();
     let child = verb.0.stdout(log.try_clone()?).stderr(log).spawn()?;
     Ok(Beside { child, path })
@@ -72,6 +70,22 @@ impl Program {
     pub(crate) fn env(mut self, key: &str, value: impl AsRef<OsStr>) -> Self {
         self.0.env(key, value);
         self
+    }
+
+    /// The same program, with less priority than what runs beside it.
+    pub(crate) fn giving_way(self) -> Self {
+        if !cfg!(unix) {
+            return self;
+        }
+        let mut nice = program("nice").args(["-n", "5"]).arg(self.0.get_program()).args(self.0.get_args());
+        nice.0.current_dir(self.0.get_current_dir().unwrap_or(&root()));
+        for (key, value) in self.0.get_envs() {
+            match value {
+                Some(value) => nice.0.env(key, value),
+                None => nice.0.env_remove(key),
+            };
+        }
+        nice
     }
 
     /// Whatever was set for this process.

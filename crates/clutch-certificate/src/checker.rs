@@ -211,20 +211,33 @@ fn values(s: &Setup) -> Result<(), Refused> {
             );
         }
     }
-    let gains = match s.law {
-        Gains::Pd { kp, kd, .. } => [kp, kd, 1.0, 1.0],
-        Gains::Smc { kp, kd, slope, boundary } => [kp, kd, slope, boundary],
-        Gains::Shell { slope, boundary } => [0.0, 0.0, slope, boundary],
-    };
-    let forward = if let Gains::Pd { forward, .. } = s.law { forward } else { 0.0 };
-    if gains.iter().any(|g| !(*g >= 0.0 && g.is_finite())) || gains[3] <= 0.0 || !forward.is_finite() {
+    if !sound(&s.law) {
         return refuse(
             "law",
             format!("{:?}", s.law),
-            "finite gains of at least 0, a finite voltage beside them, and a boundary above 0",
+            "finite gains of at least 0, finite voltages beside them, and a boundary and a tracking time above 0",
         );
     }
     Ok(())
+}
+
+/// Gains that a law can have.
+fn sound(law: &Gains) -> bool {
+    // Gains, what has to be above 0, and voltages.
+    let (gains, above_0, volts) = match *law {
+        Gains::Pd { kp, kd, forward } => ([kp, 0.0, kd], 1.0, [forward; 3]),
+        Gains::Pid { kp, ki, kd, forward, tracking, limits } => {
+            ([kp, ki, kd], tracking, [forward, limits[0], limits[1]])
+        }
+        Gains::Smc { kp, kd, slope, boundary } => ([kp, kd, slope], boundary, [0.0; 3]),
+        Gains::Shell { slope, boundary } => ([slope, 0.0, 0.0], boundary, [0.0; 3]),
+    };
+    let ordered = !matches!(law, Gains::Pid { limits, .. } if limits[0] > limits[1]);
+    gains.iter().all(|g| *g >= 0.0 && g.is_finite())
+        && above_0 > 0.0
+        && above_0.is_finite()
+        && volts.iter().all(|v| v.is_finite())
+        && ordered
 }
 
 /// A number is above a limit, or none.
@@ -258,7 +271,7 @@ fn covered(certificate: &Certificate) -> Result<(), Refused> {
 
 /// Bound on `|e|` of a cell, rad, and the programs it took.
 fn check_cell(setup: &Setup, cell: &Cell) -> Result<(f64, usize), Flaw> {
-    let n = 4 + setup.delay_ticks as usize;
+    let n = setup.dimension();
     shape(cell, n)?;
     let shaft = Shaft::new(setup, cell);
     let walls = walls(cell, n)?;
@@ -380,9 +393,17 @@ fn starts_inside(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<(), Flaw> 
     for (k, (row, radius)) in cell.rows.iter().zip(&cell.radii).enumerate() {
         let n = row.len();
         let (ce, cs, cz, cm) = (at(row[0]), at(row[1]), at(row[2]), at(row[n - 1]));
-        // z = m₀, m₋ = m₀ − ω_d, m₀ = e + rounding.
-        let mut start = (ce + cz + cm) * step + cs * rate + (cz + cm) * rounding - cm * path;
-        for c in &row[3..n - 1] {
+        // z = m₀, m₋ = m₀ − ω_d, m₀ = e + rounding. The first demand is the voltage that the brake has: what m₀ takes from it
+        // stands in the integral.
+        let ways = 3 + setup.delay_ticks as usize;
+        let (mut of_m0, mut rest) = (cz + cm, cs * rate - cm * path);
+        if let Gains::Pid { kp, ki, forward, .. } = setup.law {
+            let off = Interval { low: -shaft::LAW_ROUNDING, high: shaft::LAW_ROUNDING };
+            of_m0 = of_m0 + at(row[ways]) * (at(kp) + at(ki) * at(setup.period_s)) * shaft.count;
+            rest = rest + at(row[ways]) * (volts + off - at(forward));
+        }
+        let mut start = (ce + of_m0) * step + of_m0 * rounding + rest;
+        for c in &row[3..ways] {
             start = start + at(*c) * volts;
         }
         if above(start.high, *radius) {

@@ -16,8 +16,10 @@ pub(crate) struct Effort {
     pub(crate) growth: f64,
     /// Most sweeps upwards.
     pub(crate) sweeps: usize,
-    /// Sweeps downwards.
+    /// Most sweeps downwards.
     pub(crate) shrinks: usize,
+    /// They end where one makes the error smaller by a lesser share than this.
+    pub(crate) settled: f64,
     /// Largest error worth looking for, counts.
     pub(crate) error_limit: f64,
     /// Most comparisons of a point with a constraint: about 1e9 a second.
@@ -156,7 +158,7 @@ impl<'a, const N: usize> Search<'a, N> {
         for _ in 0..effort.shrinks {
             self.shrink();
             let less = self.error();
-            if less > error * (1.0 - 1e-4) || self.scratch.work > 2 * effort.work {
+            if less > error * (1.0 - effort.settled) || self.scratch.work > 2 * effort.work {
                 break;
             }
             error = less;

@@ -1,8 +1,9 @@
 //! Modes of a tick: a piece of the law, a case of the shaft, and counts that went by; all that can happen.
 //!
 //! A mode is a set of inequalities that hold in it, and what the next state can be at most along any direction. Variables are
-//! `(e, s, z, p₁ … p_d, w)`: the error, its rate, the filter's memory, voltages on the way, and last the encoder: in the exact
-//! form the last measured error `m₋`, in the noise form the rounding `φ` of this tick.
+//! `(e, s, z, p₁ … p_d, I, w)`: the error, its rate, the filter's memory, voltages on the way, the integral of a law that
+//! remembers one, and last the encoder: in the exact form the last measured error `m₋`, in the noise form the rounding `φ` of
+//! this tick.
 
 use crate::pieces::{Line, Piece};
 use crate::setup::{Case, Form, ModeId};
@@ -59,6 +60,8 @@ pub(crate) struct Mode<const N: usize> {
     answer: [Affine<N>; 2],
     /// The voltage on the brake is between these.
     applied: [Affine<N>; 2],
+    /// The next integral is between these, of a law that remembers one.
+    memory: [Affine<N>; 2],
 }
 
 /// Modes of a cell, in either form of the encoder's rounding; the exact form takes up to `most_counts` counts per tick.
@@ -93,9 +96,13 @@ fn mode<const N: usize>(u: &Units, piece: &Piece, form: Form, id: ModeId) -> Opt
     let line = |l: &Line, sign: f64| {
         let mut a = Affine::of(Z, l.z).plus(&measured, l.m);
         a.constant += l.constant + sign * l.m.abs() * measured_off;
+        if let Some(i) = u.memory() {
+            a.weights[i] += l.memory;
+        }
         a
     };
     let answer = [line(&piece.volts[0], -1.0), line(&piece.volts[1], 1.0)];
+    let memory = [line(&piece.next[0], -1.0), line(&piece.next[1], 1.0)];
     let applied = if u.delay == 0 { answer } else { [Affine::of(P, 1.0); 2] };
     let mut within = Constraints::new();
     let mut at_most = |a: &Affine<N>, limit: f64| within.push(&a.weights, limit - a.constant);
@@ -145,7 +152,7 @@ fn mode<const N: usize>(u: &Units, piece: &Piece, form: Form, id: ModeId) -> Opt
             at_most(&slowed, u.slow - slack - u.path);
         }
     }
-    possible.then_some(Mode { id, within, measured, measured_off, answer, applied })
+    possible.then_some(Mode { id, within, measured, measured_off, answer, applied, memory })
 }
 
 impl<const N: usize> Mode<N> {
@@ -193,6 +200,9 @@ impl<const N: usize> Mode<N> {
         }
         out.add(&self.measured, measured);
         out.constant += measured.abs() * self.measured_off;
+        if let Some(i) = u.memory() {
+            volts(&mut out, c[i], &self.memory);
+        }
         for k in 0..u.delay {
             if k + 1 < u.delay {
                 out.weights[P + k + 1] += c[P + k];
@@ -220,7 +230,7 @@ fn parts(a: f64, b: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pieces::tests::answer;
+    use crate::pieces::tests::{answer, remembered, with_an_integral};
     use crate::pieces::{pieces, strips};
     use crate::setup::{Gains, Setup};
     use crate::tests::uniform;
@@ -273,58 +283,83 @@ mod tests {
         let mut next = uniform(11);
         let mut seen = [0; 4];
         for (law, form) in laws.into_iter().flat_map(|law| [(law, Form::Noise), (law, Form::Exact)]) {
-            let setup = Setup {
-                sliding: [0.13, 0.17],
-                at_rest: [0.17, 0.25],
-                ripple: 0.05,
-                torque_noise: 0.002,
-                ..Setup::paper(law)
-            };
-            let u = Units::new(&setup, setup.sliding, 3.0);
-            let modes: Vec<Mode<4>> = modes(&u, &pieces(&u, &strips(&law, u.volts)), form, 6);
-            for _ in 0..400 {
-                let omega = if next(0.0, 1.0) < 0.3 { next(0.0, 0.03) } else { next(0.0, 1.0) };
-                let (e, rounding) = (next(-8.0, 4.0), next(0.0, 1.0));
-                let m = e + rounding;
-                // A filter that has seen no rate above the path's.
-                let z = m - next(-1.5, u.path) / u.kappa;
-                let mu_d = next(0.13, 0.17);
-                let mu_s = next(0.17, 0.25);
-                let volts = answer(&u, m, z) + next(-1.0, 1.0) * 0.5 * setup.converter_step;
-                let (way, after) = tick(&setup, (mu_s, mu_d), omega, volts, &mut next);
-                let gone = next(0.0, 3.0).floor();
-                let last = if form == Form::Exact { m - u.path + gone } else { rounding };
-                let y = [e, u.path - omega, z, last];
-                let x = [e + u.path - way, u.path - after, z + u.kappa * (m - z), m];
-                let fits = |mode: &&Mode<4>| {
-                    (form == Form::Noise || f64::from(mode.id.counts) == gone)
-                        && (0..mode.within.len()).all(|j| {
-                            let at: f64 = mode.within.row(j).iter().zip(y).map(|(a, y)| a * y).sum();
-                            at <= mode.within.rhs[j] + 1e-9
-                        })
-                };
-                let fitting: Vec<&Mode<4>> = modes.iter().filter(fits).collect();
-                assert!(!fitting.is_empty(), "{law:?} {form:?} {y:?}");
-                for _ in 0..20 {
-                    let mut c: [f64; 4] = std::array::from_fn(|_| next(-1.0, 1.0));
-                    if form == Form::Noise {
-                        c[3] = 0.0;
-                    }
-                    let reached: f64 = c.iter().zip(x).map(|(c, x)| c * x).sum();
-                    let most = fitting
-                        .iter()
-                        .map(|mode| {
-                            let bound = mode.next(&u, &c);
-                            bound.constant + bound.weights.iter().zip(y).map(|(w, y)| w * y).sum::<f64>()
-                        })
-                        .fold(f64::NEG_INFINITY, f64::max);
-                    assert!(reached <= most + 5e-4, "{law:?} {form:?} {y:?}: {reached} above {most}");
-                }
-                for mode in fitting {
-                    seen[mode.id.case as usize] += 1;
-                }
-            }
+            ticks::<4>(law, form, &mut next, &mut seen);
         }
         assert!(seen.iter().all(|n| *n > 20), "{seen:?}");
+        let mut seen = [0; 4];
+        for form in [Form::Noise, Form::Exact] {
+            ticks::<5>(with_an_integral(0.05, 0.0), form, &mut next, &mut seen);
+            ticks::<5>(with_an_integral(0.005, 1.5), form, &mut next, &mut seen);
+        }
+        assert!(seen.iter().all(|n| *n > 5), "{seen:?}");
+    }
+
+    /// Ticks of a law from random states, each held against every mode that allows it; counts the shaft's cases.
+    fn ticks<const N: usize>(
+        law: Gains,
+        form: Form,
+        next: &mut dyn FnMut(f64, f64) -> f64,
+        seen: &mut [i32; 4],
+    ) {
+        let setup = Setup {
+            sliding: [0.13, 0.17],
+            at_rest: [0.17, 0.25],
+            ripple: 0.05,
+            torque_noise: 0.002,
+            ..Setup::paper(law)
+        };
+        let u = Units::new(&setup, setup.sliding, 3.0);
+        let modes: Vec<Mode<N>> = modes(&u, &pieces(&u, &strips(&law, u.volts)), form, 6);
+        for _ in 0..400 {
+            let omega = if next(0.0, 1.0) < 0.3 { next(0.0, 0.03) } else { next(0.0, 1.0) };
+            let (e, rounding) = (next(-8.0, 4.0), next(0.0, 1.0));
+            let m = e + rounding;
+            // A filter that has seen no rate above the path's.
+            let z = m - next(-1.5, u.path) / u.kappa;
+            let mu_d = next(0.13, 0.17);
+            let mu_s = next(0.17, 0.25);
+            let integral = if law.remembers() { next(-1.0, 10.5) } else { 0.0 };
+            let volts = answer(&u, m, z, integral) + next(-1.0, 1.0) * 0.5 * setup.converter_step;
+            let (way, after) = tick(&setup, (mu_s, mu_d), omega, volts, next);
+            let gone = next(0.0, 3.0).floor();
+            let last = if form == Form::Exact { m - u.path + gone } else { rounding };
+            let state = |first: [f64; 3], integral: f64, last: f64| -> [f64; N] {
+                std::array::from_fn(|i| match i {
+                    0..3 => first[i],
+                    i if i == N - 1 => last,
+                    _ => integral,
+                })
+            };
+            let y = state([e, u.path - omega, z], integral, last);
+            let first = [e + u.path - way, u.path - after, z + u.kappa * (m - z)];
+            let x = state(first, remembered(&u, m, z, integral), m);
+            let fits = |mode: &&Mode<N>| {
+                (form == Form::Noise || f64::from(mode.id.counts) == gone)
+                    && (0..mode.within.len()).all(|j| {
+                        let at: f64 = mode.within.row(j).iter().zip(y).map(|(a, y)| a * y).sum();
+                        at <= mode.within.rhs[j] + 1e-9
+                    })
+            };
+            let fitting: Vec<&Mode<N>> = modes.iter().filter(fits).collect();
+            assert!(!fitting.is_empty(), "{law:?} {form:?} {y:?}");
+            for _ in 0..20 {
+                let mut c: [f64; N] = std::array::from_fn(|_| next(-1.0, 1.0));
+                if form == Form::Noise {
+                    c[N - 1] = 0.0;
+                }
+                let reached: f64 = c.iter().zip(x).map(|(c, x)| c * x).sum();
+                let most = fitting
+                    .iter()
+                    .map(|mode| {
+                        let bound = mode.next(&u, &c);
+                        bound.constant + bound.weights.iter().zip(y).map(|(w, y)| w * y).sum::<f64>()
+                    })
+                    .fold(f64::NEG_INFINITY, f64::max);
+                assert!(reached <= most + 5e-4, "{law:?} {form:?} {y:?}: {reached} above {most}");
+            }
+            for mode in fitting {
+                seen[mode.id.case as usize] += 1;
+            }
+        }
     }
 }

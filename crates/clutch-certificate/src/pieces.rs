@@ -1,16 +1,18 @@
 //! A law as finitely many pieces: where each holds, and the voltages between which it answers.
 //!
-//! With the measured error `m` and the filter's memory `z`, in counts, `d = κ (m − z)` is the rate (5). A piece is a set of
-//! inequalities in `m` and `z`, and two straight lines below and above the voltage.
+//! With the measured error `m` and the filter's memory `z`, in counts, `d = κ (m − z)` is the rate (5); a law may remember an
+//! integral `I`, in volts. A piece is a set of inequalities in these, and two straight lines below and above the voltage, and
+//! below and above the next integral.
 
 use crate::setup::{Gains, Strip};
-use crate::units::{SURFACE_ROUNDING, Units};
+use crate::units::{MEMORY_ROUNDING, SURFACE_ROUNDING, Units};
 
-/// `m·m_weight + z·z_weight + constant`.
+/// `m·m_weight + z·z_weight + I·memory + constant`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Line {
     pub(crate) m: f64,
     pub(crate) z: f64,
+    pub(crate) memory: f64,
     pub(crate) constant: f64,
 }
 
@@ -23,6 +25,7 @@ impl Line {
         Line {
             m: self.m + factor * other.m,
             z: self.z + factor * other.z,
+            memory: self.memory + factor * other.memory,
             constant: self.constant + factor * other.constant,
         }
     }
@@ -40,11 +43,13 @@ pub(crate) struct Piece {
     pub(crate) within: Vec<Line>,
     /// The voltage is between these.
     pub(crate) volts: [Line; 2],
+    /// So is the next integral, of a law that remembers one.
+    pub(crate) next: [Line; 2],
 }
 
 /// `d` in rad/s.
 fn rate(u: &Units) -> Line {
-    Line { m: u.kappa * u.speed, z: -u.kappa * u.speed, constant: 0.0 }
+    Line { m: u.kappa * u.speed, z: -u.kappa * u.speed, ..Line::default() }
 }
 
 /// The law's error in rad.
@@ -55,7 +60,10 @@ fn error(u: &Units) -> Line {
 /// All pieces of the law.
 pub(crate) fn pieces(u: &Units, strips: &[Strip]) -> Vec<Piece> {
     match u.law {
-        Gains::Pd { kp, kd, forward } => pd(u, kp, kd, forward),
+        Gains::Pd { kp, kd, forward } => {
+            linear(u, Line::constant(forward).plus(error(u), -kp).plus(rate(u), -kd))
+        }
+        Gains::Pid { .. } => pid(u),
         Gains::Smc { slope, .. } => smc(u, slope, strips),
         Gains::Shell { slope, boundary } => shell(u, slope, boundary),
     }
@@ -63,11 +71,12 @@ pub(crate) fn pieces(u: &Units, strips: &[Strip]) -> Vec<Piece> {
 
 fn constant(u: &Units, id: u32, volts: f64, within: Vec<Line>) -> Piece {
     let low = (volts - u.volts_off).max(0.0);
-    Piece { id, within, volts: [Line::constant(low), Line::constant(volts + u.volts_off)] }
+    let volts = [Line::constant(low), Line::constant(volts + u.volts_off)];
+    Piece { id, within, volts, next: [Line::default(); 2] }
 }
 
-fn pd(u: &Units, kp: f64, kd: f64, forward: f64) -> Vec<Piece> {
-    let demand = Line::constant(forward).plus(error(u), -kp).plus(rate(u), -kd);
+/// A demand, and what the output's limits leave of it.
+fn linear(u: &Units, demand: Line) -> Vec<Piece> {
     let [low, high] = u.volts;
     let below = |limit: f64| demand.plus(Line::constant(1.0), -limit);
     let above = |limit: f64| below(limit).times(-1.0);
@@ -78,9 +87,44 @@ fn pd(u: &Units, kp: f64, kd: f64, forward: f64) -> Vec<Piece> {
             id: 1,
             within: vec![above(low), below(high)],
             volts: [demand.plus(off, -1.0), demand.plus(off, 1.0)],
+            next: [Line::default(); 2],
         },
         constant(u, 2, high, vec![above(high)]),
     ]
+}
+
+/// [`linear`], with what the integral makes of each: it goes on, or ends at what the output can answer.
+fn pid(u: &Units) -> Vec<Piece> {
+    let Gains::Pid { kp, ki, kd, forward, tracking, limits } = u.law else { return Vec::new() };
+    let integral = Line { memory: 1.0, ..Line::default() }.plus(error(u), -ki * u.period);
+    let demand = integral.plus(Line::constant(forward), 1.0).plus(error(u), -kp).plus(rate(u), -kd);
+    let share = u.period / tracking;
+    // The law knows its own limits; the converter's may be a step off.
+    let apart = (limits[0] - u.volts[0]).abs().max((limits[1] - u.volts[1]).abs());
+    let off = Line::constant(MEMORY_ROUNDING + share * apart);
+    let one = Line::constant(1.0);
+    let ends = limits.map(|limit| limit - forward);
+    let mut out = Vec::new();
+    for piece in linear(u, demand) {
+        let next = match piece.id {
+            1 => integral,
+            k => integral.plus(one, share * u.volts[usize::from(k == 2)]).plus(demand, -share),
+        };
+        let (below, above) = (next.plus(one, -ends[0]), next.times(-1.0).plus(one, ends[1]));
+        let kinds = [
+            (next, vec![below.times(-1.0), above.times(-1.0)]),
+            (Line::constant(ends[0]), vec![below]),
+            (Line::constant(ends[1]), vec![above]),
+        ];
+        for ((next, more), kind) in kinds.into_iter().zip(0..) {
+            let mut piece = piece.clone();
+            piece.id += 3 * kind;
+            piece.within.extend(more);
+            piece.next = [next.plus(off, -1.0), next.plus(off, 1.0)];
+            out.push(piece);
+        }
+    }
+    out
 }
 
 fn shell(u: &Units, slope: f64, boundary: f64) -> Vec<Piece> {
@@ -95,7 +139,7 @@ fn shell(u: &Units, slope: f64, boundary: f64) -> Vec<Piece> {
     let inside = vec![sigma.plus(one, -most), sigma.times(-1.0).plus(one, -most)];
     vec![
         constant(u, 0, low, vec![behind]),
-        Piece { id: 1, within: inside, volts: any },
+        Piece { id: 1, within: inside, volts: any, next: [Line::default(); 2] },
         constant(u, 2, high, vec![ahead]),
     ]
 }
@@ -116,7 +160,7 @@ fn smc(u: &Units, slope: f64, strips: &[Strip]) -> Vec<Piece> {
         }
         let line = |[per, at]: [f64; 2], off: f64| sigma.times(-per).plus(one, at + off);
         let volts = [line(strip.least, -u.volts_off), line(strip.most, u.volts_off)];
-        out.push(Piece { id, within, volts });
+        out.push(Piece { id, within, volts, next: [Line::default(); 2] });
     }
     out
 }
@@ -197,11 +241,14 @@ pub(crate) mod tests {
     use crate::tests::uniform;
 
     /// (4) and (31) as the paper writes them, with the limits.
-    pub(crate) fn answer(u: &Units, m: f64, z: f64) -> f64 {
+    pub(crate) fn answer(u: &Units, m: f64, z: f64, integral: f64) -> f64 {
         let (e, d) = (m * u.count, u.kappa * (m - z) * u.speed);
         let sat = |x: f64| x.clamp(-1.0, 1.0);
         let demand = match u.law {
             Gains::Pd { kp, kd, forward } => forward - (kp * e + kd * d),
+            Gains::Pid { kp, ki, kd, forward, .. } => {
+                forward + integral - (kp * e + ki * u.period * e + kd * d)
+            }
             Gains::Smc { kp, kd, slope, boundary } => {
                 let sigma = slope * e + d;
                 -(kp * sat(sigma / boundary) + kd * sat(sigma * d / boundary) * d)
@@ -216,9 +263,26 @@ pub(crate) mod tests {
         demand.clamp(u.volts[0], u.volts[1])
     }
 
+    /// The next integral, as the law computes it.
+    pub(crate) fn remembered(u: &Units, m: f64, z: f64, integral: f64) -> f64 {
+        let Gains::Pid { kp, ki, kd, forward, tracking, limits } = u.law else { return 0.0 };
+        let (e, d) = (m * u.count, u.kappa * (m - z) * u.speed);
+        let gained = integral - ki * u.period * e;
+        let demand = forward + gained - kp * e - kd * d;
+        let cut_off = demand.clamp(limits[0], limits[1]) - demand;
+        (gained + u.period / tracking * cut_off).clamp(limits[0] - forward, limits[1] - forward)
+    }
+
+    /// PID, with limits of the output a step beyond the converter's.
+    pub(crate) fn with_an_integral(tracking: f64, forward: f64) -> Gains {
+        Gains::Pid { kp: 1250.0, ki: 10_000.0, kd: 12.9, forward, tracking, limits: [0.0, 10.0] }
+    }
+
     #[test]
     fn wherever_the_measurement_lies_a_piece_holds_it_and_the_laws_voltage() {
         let laws = [
+            with_an_integral(0.05, 0.0),
+            with_an_integral(0.002, 2.2),
             Gains::Pd { kp: 5000.0, kd: 50.0, forward: 0.0 },
             Gains::Pd { kp: 1660.0, kd: 12.9, forward: 2.24 },
             Gains::Pd { kp: 1660.0, kd: 12.9, forward: -1.5 },
@@ -235,8 +299,10 @@ pub(crate) mod tests {
             for _ in 0..20_000 {
                 let reach = 10.0_f64.powf(next(-1.5, 1.2));
                 let (m, z) = (next(-reach, reach), next(-reach, reach));
-                let at = |l: &Line| l.m * m + l.z * z + l.constant;
-                let volts = answer(&u, m, z);
+                let integral = if law.remembers() { next(-3.0, 11.0) } else { 0.0 };
+                let at = |l: &Line| l.m * m + l.z * z + l.memory * integral + l.constant;
+                let volts = answer(&u, m, z, integral);
+                let after = remembered(&u, m, z, integral);
                 let mut holding = 0;
                 for piece in pieces.iter().filter(|p| p.within.iter().all(|l| at(l) <= 1e-9)) {
                     holding += 1;
@@ -244,6 +310,14 @@ pub(crate) mod tests {
                     assert!(
                         at(&low) <= volts + 1e-9 && volts <= at(&high) + 1e-9,
                         "{law:?} {m} {z}: {volts} is not in {} … {} of {}",
+                        at(&low),
+                        at(&high),
+                        piece.id
+                    );
+                    let [low, high] = piece.next;
+                    assert!(
+                        at(&low) <= after && after <= at(&high),
+                        "{law:?} {m} {z} {integral}: {after} is not in {} … {} of {}",
                         at(&low),
                         at(&high),
                         piece.id

@@ -25,7 +25,7 @@ pub(crate) struct Fineness {
 /// The law near its steady voltage: volts per count, and per count per tick.
 fn linear(u: &Units) -> (f64, f64) {
     match u.law {
-        Gains::Pd { kp, kd, .. } => (kp * u.count, kd * u.speed),
+        Gains::Pd { kp, kd, .. } | Gains::Pid { kp, kd, .. } => (kp * u.count, kd * u.speed),
         Gains::Smc { kp, slope, boundary, .. } => (kp * slope / boundary * u.count, kp / boundary * u.speed),
         // As if it went in a straight line from one end to the other.
         Gains::Shell { slope, boundary } => {
@@ -35,13 +35,22 @@ fn linear(u: &Units) -> (f64, f64) {
     }
 }
 
-/// `c A` for the closed loop with `b` counts per tick² and volt; `share` is what is left of the law's gains. The state may
-/// end with the last measured error.
+/// The integral: volts that it gains per count in a tick, and share of what a limit cuts off that it takes back.
+fn integral(u: &Units) -> (f64, f64) {
+    match u.law {
+        Gains::Pid { ki, tracking, .. } => (ki * u.period * u.count, u.period / tracking),
+        _ => (0.0, 0.0),
+    }
+}
+
+/// `c A` for the closed loop with `b` counts per tick² and volt; `share` is what limits leave of the law's demand. The state
+/// may end with the last measured error.
 pub(crate) fn back(u: &Units, b: f64, share: f64, c: &[f64]) -> Vec<f64> {
-    let (kp, kd) = linear(u);
-    let (kp, kd) = (kp * share, kd * share * u.kappa);
+    let ((kp, kd), (ki, follows)) = (linear(u), integral(u));
+    let kd = kd * u.kappa;
     let mut out = vec![0.0; c.len()];
-    out[E] = c[E] + u.kappa * c[Z] + c.get(P + u.delay).unwrap_or(&0.0);
+    let last = P + u.delay + usize::from(u.memory().is_some());
+    out[E] = c[E] + u.kappa * c[Z] + c.get(last).unwrap_or(&0.0);
     out[S] = c[E] + c[S];
     out[Z] = (1.0 - u.kappa) * c[Z];
     let pushed = b * (c[S] + 0.5 * c[E]);
@@ -53,8 +62,14 @@ pub(crate) fn back(u: &Units, b: f64, share: f64, c: &[f64]) -> Vec<f64> {
         }
         answer = c[P + u.delay - 1];
     }
-    out[E] -= (kp + kd) * answer;
-    out[Z] += kd * answer;
+    let kept = u.memory().map_or(0.0, |i| c[i]);
+    // The demand goes out by its share, and the integral loses what does not.
+    let asked = share * answer - follows * (1.0 - share) * kept;
+    out[E] -= (kp + kd + ki) * asked + ki * kept;
+    out[Z] += kd * asked;
+    if let Some(i) = u.memory() {
+        out[i] = kept + asked;
+    }
     out
 }
 
@@ -88,9 +103,13 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
     for i in 0..own {
         add(unit(i), 0.0);
     }
-    let (kp, kd) = linear(u);
+    let ((kp, kd), (ki, _)) = (linear(u), integral(u));
     let mut seeds: Vec<[f64; N]> = vec![unit(E), [0.0; N]];
-    (seeds[1][E], seeds[1][Z]) = (kp + kd * u.kappa, -kd * u.kappa);
+    (seeds[1][E], seeds[1][Z]) = (kp + kd * u.kappa + ki, -kd * u.kappa);
+    if let Some(i) = u.memory() {
+        seeds[1][i] = -1.0;
+        seeds.push(unit(i));
+    }
     let mut plain = seeds.clone();
     for (i, j) in [(E, Z), (N - 1, E), (N - 1, Z)] {
         if i < own {
@@ -101,8 +120,12 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
     }
     // Shares of the gains that a saturated loop, or a steeper part of the law, leaves.
     let shares: &[f64] = match (u.law, form) {
-        (Gains::Pd { .. } | Gains::Shell { .. }, Form::Noise) => &[1.0, 0.8, 0.65, 0.5, 0.35, 0.25, 0.12],
-        (Gains::Pd { .. } | Gains::Shell { .. }, Form::Exact) => &[1.0, 0.7, 0.5, 0.35, 0.25],
+        (Gains::Pd { .. } | Gains::Pid { .. } | Gains::Shell { .. }, Form::Noise) => {
+            &[1.0, 0.8, 0.65, 0.5, 0.35, 0.25, 0.12]
+        }
+        (Gains::Pd { .. } | Gains::Pid { .. } | Gains::Shell { .. }, Form::Exact) => {
+            &[1.0, 0.7, 0.5, 0.35, 0.25]
+        }
         (Gains::Smc { .. }, _) => &[1.0, 2.0, 4.0, 0.5],
     };
     let middle = (u.brake[0] * u.brake[1]).sqrt();

@@ -6,7 +6,7 @@ use crate::modes::{E, Mode, P, S, Z, modes};
 use crate::pieces::{pieces, strips};
 use crate::rows::{Fineness, rows};
 use crate::setup::{Cell, Certificate, Contradiction, Ends, Form, Gains, Proof, Setup, VERSION};
-use crate::units::{TARGET_STEP, Units};
+use crate::units::{LAW_ROUNDING, TARGET_STEP, Units};
 
 /// Effort of a certificate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,8 +21,8 @@ pub struct Options {
     pub refinements: usize,
     /// Most comparisons of a point with a constraint per attempt, about 1e9 a second.
     pub work: u64,
-    /// Looks on with finer directions: `false` leaves it at the coarse ones, of shells, which take seconds and give a looser
-    /// bound.
+    /// Looks on with finer directions: `false` leaves it at the coarse ones, of shells and of an integral, which take seconds
+    /// and give a looser bound.
     pub patient: bool,
 }
 
@@ -136,6 +136,8 @@ fn split([low, high]: Ends, widest: f64) -> Vec<Ends> {
 const QUICK: (Fineness, f64) = (Fineness { steps: 16, apart: 0.05, spread: 1.0 }, 0.001);
 const USUAL: (Fineness, f64) = (Fineness { steps: 30, apart: 0.03, spread: 1.0 }, 0.001);
 const LONG: (Fineness, f64) = (Fineness { steps: 60, apart: 0.02, spread: 1.0 }, 0.0003);
+/// For an integral, which takes a hundred ticks.
+const SLOW: (Fineness, f64) = (Fineness { steps: 120, apart: 0.012, spread: 1.0 }, 0.0003);
 const PATIENT: (Fineness, f64) = (Fineness { steps: 40, apart: 0.02, spread: 1.0 }, 0.0001);
 
 /// For shells: few directions, of brakes far apart, which a voltage of any size asks for.
@@ -146,6 +148,8 @@ fn cell(setup: &Setup, sliding: Ends, options: &Options) -> Result<Cell, Open> {
     let (first, later): (&[_], &[_]) = match setup.law {
         Gains::Shell { .. } if !options.patient => (&[(Form::Exact, COARSE)], &[]),
         Gains::Shell { .. } => (&[(Form::Exact, COARSE), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
+        Gains::Pid { .. } if !options.patient => (&[(Form::Noise, LONG)], &[(Form::Exact, USUAL)]),
+        Gains::Pid { .. } => (&[(Form::Noise, SLOW), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
         Gains::Pd { .. } => (&[(Form::Noise, LONG), (Form::Exact, USUAL)], &[(Form::Exact, PATIENT)]),
         // (31) has hundreds of modes, times the counts of the exact form.
         Gains::Smc { .. } => (&[(Form::Noise, QUICK), (Form::Noise, USUAL)], &[(Form::Noise, PATIENT)]),
@@ -205,11 +209,12 @@ pub(crate) fn attempt(
         Err(Open::Grows)
     };
     let parts = Parts { setup, sliding, form, fineness, growth, options };
-    tried(&|cap| match 4 + setup.delay_ticks {
+    tried(&|cap| match setup.dimension() {
         4 => with_cap::<4>(&parts, cap),
         5 => with_cap::<5>(&parts, cap),
         6 => with_cap::<6>(&parts, cap),
         7 => with_cap::<7>(&parts, cap),
+        8 => with_cap::<8>(&parts, cap),
         _ => Err((Open::Slow, 0.0)),
     })
 }
@@ -231,11 +236,15 @@ fn initial<const N: usize>(setup: &Setup, u: &Units, form: Form) -> Vec<[f64; N]
     for e in [-TARGET_STEP, TARGET_STEP] {
         for s in rates {
             for rounding in [0.0, 1.0] {
-                for volts in setup.start_volts {
+                for (volts, off) in setup.start_volts.into_iter().zip([-LAW_ROUNDING, LAW_ROUNDING]) {
                     let mut x = [0.0; N];
                     (x[E], x[S], x[Z]) = (e, s, e + rounding);
                     for p in &mut x[P..P + u.delay] {
                         *p = volts;
+                    }
+                    if let (Some(i), Gains::Pid { kp, ki, forward, .. }) = (u.memory(), u.law) {
+                        // A start without a jump: the first demand is the voltage that the brake has.
+                        x[i] = volts + off - forward + (kp + ki * u.period) * u.count * (e + rounding);
                     }
                     // No count has gone by before the first sample.
                     x[N - 1] = if form == Form::Exact { e + rounding - u.path } else { 0.0 };
@@ -250,7 +259,7 @@ fn initial<const N: usize>(setup: &Setup, u: &Units, form: Form) -> Vec<[f64; N]
 /// Error beyond which a set is no more looked for, counts: several times the steady one and what a few counts make.
 fn hopeless(u: &Units) -> f64 {
     let volts_per_count = match u.law {
-        Gains::Pd { kp, .. } => kp * u.count,
+        Gains::Pd { kp, .. } | Gains::Pid { kp, .. } => kp * u.count,
         Gains::Smc { kp, slope, boundary, .. } => kp * slope / boundary * u.count,
         // A law within a shell takes a wider set for its worst.
         Gains::Shell { slope, boundary } => u.volts[1] * slope / (6.0 * boundary) * u.count,
@@ -269,10 +278,17 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
     let modes: Vec<Mode<N>> = modes(&u, &pieces(&u, &strips), p.form, most_counts);
     let rows = rows::<N>(&u, p.form, p.fineness);
     let mut search = Search::new(&u, &modes, p.form, &rows, &initial(p.setup, &u, p.form));
+    // A set of a slow loop grows and shrinks by as little per tick as the loop does.
+    let (sweeps, shrinks, settled) = match p.setup.law {
+        Gains::Pid { .. } => (1500, 400, 1e-5),
+        Gains::Shell { .. } => (600, 40, 1e-4),
+        Gains::Pd { .. } | Gains::Smc { .. } => (300, 40, 1e-4),
+    };
     let effort = Effort {
         growth: p.growth,
-        sweeps: if matches!(p.setup.law, Gains::Shell { .. }) { 600 } else { 300 },
-        shrinks: 40,
+        sweeps,
+        shrinks,
+        settled,
         error_limit: (p.options.error_limit / u.count).min(hopeless(&u)),
         work: p.options.work,
     };

@@ -54,7 +54,21 @@ pub struct Setup {
     pub start_volts: Ends,
 }
 
+impl Gains {
+    /// `true` if the law remembers an integral.
+    #[must_use]
+    pub fn remembers(&self) -> bool {
+        matches!(self, Gains::Pid { .. })
+    }
+}
+
 impl Setup {
+    /// Numbers of the state that a cell's rows speak of, the encoder's among them.
+    #[must_use]
+    pub fn dimension(&self) -> usize {
+        4 + self.delay_ticks as usize + usize::from(self.law.remembers())
+    }
+
     /// The paper's shaft, known exactly, with its converter and `K_Kal` of 0.2, on a ramp of 2 °/s that begins at its speed.
     #[must_use]
     pub fn paper(law: Gains) -> Setup {
@@ -120,6 +134,22 @@ pub enum Gains {
         /// `u_f`, V.
         #[serde(default)]
         forward: f64,
+    },
+    /// PD with an integral `I` of the error, in volts: `u = u_f + I − (K_p e + K_d ė)`. What a limit cuts off it takes back, and
+    /// it stays within what the output can answer.
+    Pid {
+        /// `K_p`, V/rad.
+        kp: f64,
+        /// `K_i`, V/(rad s).
+        ki: f64,
+        /// `K_d`, V s/rad.
+        kd: f64,
+        /// `u_f`, V.
+        forward: f64,
+        /// `T_t`: time in which the integral follows a limit, s.
+        tracking: f64,
+        /// Lowest and highest voltage that the law may ask for, V.
+        limits: Ends,
     },
     /// (31).
     Smc {
@@ -191,7 +221,7 @@ pub enum Case {
 #[serde(deny_unknown_fields)]
 pub struct ModeId {
     /// Number of the law's piece: 0 lets go; of PD 1 is straight and 2 full, of a shell 1 is any and 2 full; of SMC 1 is
-    /// the first strip.
+    /// the first strip. Of PID 0 to 2 are those of PD, 3 to 5 the same with the integral at its lower end, 6 to 8 at its upper.
     pub piece: u32,
     /// The shaft.
     pub case: Case,
@@ -236,7 +266,7 @@ pub struct Cell {
     pub strips: Vec<Strip>,
     /// Modes, in the order of their numbers.
     pub modes: Vec<ModeId>,
-    /// Rows `c` of the set `c·x ≤ r`, of the state `(e, ė, z, p₁ … p_d, m₋)` in counts, ticks and volts.
+    /// Rows `c` of the set `c·x ≤ r`, of the state `(e, ė, z, p₁ … p_d, I, m₋)` in counts, ticks and volts; `I` of PID only.
     pub rows: Vec<Vec<f64>>,
     /// Radii `r`.
     pub radii: Vec<f64>,

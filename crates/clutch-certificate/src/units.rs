@@ -1,5 +1,6 @@
 //! The box of one cell in counts, ticks and volts: what the shaft may do in a tick.
 
+use crate::modes::P;
 use crate::setup::{Ends, Gains, Setup};
 use core::f64::consts::TAU;
 
@@ -7,6 +8,8 @@ use core::f64::consts::TAU;
 pub(crate) const TARGET_STEP: f64 = 1.001 / 65536.0;
 /// Share of a law's rounding, in either scalar, in a voltage, V.
 pub(crate) const LAW_ROUNDING: f64 = 1e-4;
+/// Share of a law's rounding, in either scalar, in what its integral gains in a tick, V.
+pub(crate) const MEMORY_ROUNDING: f64 = 1e-5;
 /// Share of a shell's rounding, in either scalar, in `σ`, rad/s.
 pub(crate) const SURFACE_ROUNDING: f64 = 2e-5;
 
@@ -34,12 +37,21 @@ pub(crate) struct Units {
     /// Voltages at which the output stage ends, as the converter reaches them.
     pub(crate) volts: Ends,
     pub(crate) kappa: f64,
+    /// s.
+    pub(crate) period: f64,
     /// rad per count.
     pub(crate) count: f64,
     /// rad/s per count and tick.
     pub(crate) speed: f64,
     pub(crate) delay: usize,
     pub(crate) law: Gains,
+}
+
+impl Units {
+    /// Coordinate of the integral, of a law that remembers one.
+    pub(crate) fn memory(&self) -> Option<usize> {
+        self.law.remembers().then_some(P + self.delay)
+    }
 }
 
 impl Units {
@@ -75,6 +87,7 @@ impl Units {
             volts_off: off,
             volts: s.volts,
             kappa: s.smoothing,
+            period: s.period_s,
             count,
             speed,
             delay: s.delay_ticks as usize,

@@ -56,6 +56,45 @@ fn a_voltage_that_holds_the_shaft_beside_the_gains_takes_the_offset_from_the_bou
     assert!(with < without - 0.6 * offset && with > 0.02, "{with}° for {without}°, of which {offset}°");
 }
 
+/// PI of the paper's shaft, looked for once.
+fn integral() -> Certificate {
+    static FOUND: OnceLock<Certificate> = OnceLock::new();
+    let law = Gains::Pid { kp: 1250.0, ki: 1e4, kd: 12.9, forward: 0.0, tracking: 0.05, limits: [0.0, 10.0] };
+    let options = Options { patient: false, ..Options::default() };
+    FOUND.get_or_init(|| search(&setup(law, 0.4, 0, 20.0), &options, false).certificate).clone()
+}
+
+#[test]
+fn an_integral_leaves_no_offset_and_a_bound_well_below_that_of_its_gains_without() {
+    let with = degrees(&integral());
+    let without = degrees(&found(&setup(Gains::Pd { kp: 1250.0, kd: 12.9, forward: 0.0 }, 0.4, 0, 20.0)));
+    assert!((0.013..0.065).contains(&with) && without > 2.0 * with, "{with}° with, {without}° without");
+}
+
+#[test]
+fn another_integral_is_refused() {
+    let good = integral();
+    let Gains::Pid { kp, ki, kd, forward, tracking, limits } = good.setup.law else { panic!() };
+    let law = |kp, ki, forward, tracking, limits| Gains::Pid { kp, ki, kd, forward, tracking, limits };
+    for other in [
+        law(1.02 * kp, ki, forward, tracking, limits),
+        law(kp, 1.05 * ki, forward, tracking, limits),
+        law(kp, ki, 0.1, tracking, limits),
+        law(kp, ki, forward, 0.5 * tracking, limits),
+        law(kp, ki, forward, tracking, [0.0, 9.0]),
+        Gains::Pd { kp, kd, forward },
+    ] {
+        let mut bad = good.clone();
+        bad.setup.law = other;
+        assert!(check(&bad).is_err(), "{other:?}");
+    }
+    for nonsense in [law(kp, -ki, forward, tracking, limits), law(kp, ki, forward, 0.0, limits)] {
+        let mut bad = good.clone();
+        bad.setup.law = nonsense;
+        assert!(check(&bad).unwrap_err().to_string().contains("setup.law"), "{nonsense:?}");
+    }
+}
+
 #[test]
 fn a_wider_box_has_cells_that_cover_it_and_a_larger_bound() {
     let narrow = paper_pd();

@@ -259,8 +259,15 @@ fn bench_friction() -> String {
 }
 
 fn table3_cells(rows: &[Table3Row]) -> Vec<Vec<String>> {
-    let header =
-        ["Rate (°/s)", "PD (cycles/s)", "SMC (cycles/s)", "Reduction (%)", "Spread (points)", "Paper (%)"];
+    let header = [
+        "Rate (°/s)",
+        "PD (cycles/s)",
+        "SMC (cycles/s)",
+        "Reduction (%)",
+        "Spread (points)",
+        "By counts (%)",
+        "Paper (%)",
+    ];
     let mut cells = vec![header.map(str::to_owned).to_vec()];
     cells.extend(rows.iter().map(|r| {
         vec![
@@ -269,6 +276,7 @@ fn table3_cells(rows: &[Table3Row]) -> Vec<Vec<String>> {
             format!("{:.1}", r.smc_cycles_per_s),
             format!("{:.1}", r.reduction_percent),
             format!("{:.1}", r.spread_points),
+            format!("{:.1}", r.counted_reduction_percent),
             format!("{:.1}", r.paper_percent),
         ]
     }));

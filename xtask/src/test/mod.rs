@@ -41,8 +41,18 @@ pub(crate) fn all() -> Result<()> {
     let built = build(&mut tally)?;
     // Mostly builds, which link for long on one core, beside tests that wait. Those with a clock hold on a loaded machine.
     let boards = beside("boards")?;
+    tally.stage("Python packages");
+    let tools = python::interpreter()?;
+    let wheel = std::thread::spawn({
+        let tools = tools.clone();
+        move || python::Wheel::install(&tools)
+    });
     let host = if built { host(&mut tally) } else { Ok(false) };
-    let wheel = wheel_of(&mut tally);
+    tally.stage("build of the wheel, begun beside the tests");
+    let wheel = match wheel.join() {
+        Ok(wheel) => wheel.and_then(|wheel| wheel_of(&mut tally, &tools, &wheel)),
+        Err(_) => bail!("the build of the wheel panicked"),
+    };
     // Also where something above could not be run: what runs beside it comes to its end.
     tally.stage("boards, beside all that");
     let (ended, text) = boards.output()?;
@@ -62,7 +72,11 @@ pub(crate) fn boards() -> Result<()> {
 /// The Python part alone.
 pub(crate) fn wheel() -> Result<()> {
     let mut tally = Tally::new();
-    let sound = wheel_of(&mut tally)?;
+    tally.stage("Python packages");
+    let tools = python::interpreter()?;
+    tally.stage("build of the wheel");
+    let wheel = python::Wheel::install(&tools)?;
+    let sound = wheel_of(&mut tally, &tools, &wheel)?;
     tally.end(sound)
 }
 
@@ -326,16 +340,12 @@ fn fuzzing(tally: &mut Tally) -> Result<()> {
     Ok(())
 }
 
-/// The wheel: built from its source distribution, installed outside of this tree, tested there.
-fn wheel_of(tally: &mut Tally) -> Result<bool> {
-    tally.stage("Python packages");
-    let tools = python::interpreter()?;
-    tally.stage("build of the wheel");
-    let wheel = python::Wheel::install(&tools)?;
+/// The wheel, built from its source distribution and installed outside of this tree, tested there.
+fn wheel_of(tally: &mut Tally, tools: &Path, wheel: &python::Wheel) -> Result<bool> {
     tally.stage("types of the wheel");
-    tally.check("the type stub is what the native module gives", stubs::hold(&tools, &wheel)?);
+    tally.check("the type stub is what the native module gives", stubs::hold(tools, wheel)?);
     let settings = root().join("pyproject.toml");
-    let python = |args: &[&str]| -> Result<Program> { Ok(wheel.program(&tools)?.arg("-m").args(args)) };
+    let python = |args: &[&str]| -> Result<Program> { Ok(wheel.program(tools)?.arg("-m").args(args)) };
     let strict = python(&["mypy", "--strict", "-p", "clutch", "--config-file"])?.arg(&settings);
     tally.check_quiet("mypy --strict finds nothing in the installed package", strict.quietly()?);
     let stubtest = python(&["mypy.stubtest", "clutch._clutch", "--mypy-config-file"])?.arg(&settings);

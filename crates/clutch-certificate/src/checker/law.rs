@@ -1,11 +1,11 @@
 //! Pieces of a law, and whether they leave anything out.
 
 use super::interval::{Interval, at};
-use super::shaft::{SURFACE_ROUNDING, Shaft};
+use super::shaft::{MEMORY_ROUNDING, SURFACE_ROUNDING, Shaft};
 use crate::setup::{Cell, Gains, Setup, Strip};
 
-/// `m`·[0] + `z`·[1] + [2], of the measured error and the filter's memory in counts.
-pub(crate) type Linear = [Interval; 3];
+/// `m`·[0] + `z`·[1] + [2] + `I`·[3], of the measured error and the filter's memory in counts, and the integral in volts.
+pub(crate) type Linear = [Interval; 4];
 
 /// A piece.
 pub(crate) struct Piece {
@@ -14,22 +14,24 @@ pub(crate) struct Piece {
     pub(crate) within: Vec<Linear>,
     /// The voltage that goes out is at least the first and at most the second.
     pub(crate) volts: [Linear; 2],
+    /// The next integral is at least the first and at most the second; none of a law without.
+    pub(crate) next: Option<[Linear; 2]>,
 }
 
 fn fixed(x: Interval) -> Linear {
-    [at(0.0), at(0.0), x]
+    [at(0.0), at(0.0), x, at(0.0)]
 }
 
 fn sum(a: &Linear, factor: Interval, b: &Linear) -> Linear {
-    [a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]]
+    std::array::from_fn(|k| a[k] + factor * b[k])
 }
 
 /// The law's pieces, in the order of their numbers.
 pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Piece>, String> {
     let [low, high] = setup.volts.map(at);
     let per = shaft.kappa * shaft.speed;
-    let rate = [per, -per, at(0.0)];
-    let error = [shaft.count, at(0.0), at(0.0)];
+    let rate = [per, -per, at(0.0), at(0.0)];
+    let error = [shaft.count, at(0.0), at(0.0), at(0.0)];
     let off = shaft.volts_off;
     let let_go = [fixed((low - off).positive()), fixed(low + off)];
     match setup.law {
@@ -38,21 +40,35 @@ pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Pi
                 return Err("PD has none".into());
             }
             let demand = sum(&sum(&fixed(at(forward)), at(-kp), &error), at(-kd), &rate);
-            let below = |limit: Interval| sum(&demand, at(-1.0), &fixed(limit));
-            let above = |limit: Interval| sum(&fixed(limit), at(-1.0), &demand);
-            Ok(vec![
-                Piece { id: 0, within: vec![below(low)], volts: let_go },
-                Piece {
-                    id: 1,
-                    within: vec![above(low), below(high)],
-                    volts: [sum(&demand, at(-1.0), &fixed(off)), sum(&demand, at(1.0), &fixed(off))],
+            Ok(limited(&demand, [low, high], off))
+        }
+        Gains::Pid { kp, ki, kd, forward, tracking, limits } => {
+            if !cell.strips.is_empty() {
+                return Err("PID has none".into());
+            }
+            let kept = [at(0.0), at(0.0), at(0.0), at(1.0)];
+            let integral = sum(&kept, -(at(ki) * at(setup.period_s)), &error);
+            let demand =
+                sum(&sum(&sum(&fixed(at(forward)), at(1.0), &integral), at(-kp), &error), at(-kd), &rate);
+            let follows = at(setup.period_s) / at(tracking);
+            let ends = limits.map(|limit| at(limit) - at(forward));
+            // A limit of the law may lie beyond the converter's end.
+            let apart = (at(limits[0]) - low).abs().max((at(limits[1]) - high).abs());
+            let rounding = fixed((at(MEMORY_ROUNDING) + follows * apart).most());
+            Ok(remembering(
+                limited(&demand, [low, high], off),
+                |id| {
+                    let limit = match id {
+                        0 => low,
+                        1 => return integral,
+                        _ => high,
+                    };
+                    let cut_off = sum(&fixed(limit), at(-1.0), &demand);
+                    sum(&integral, follows, &cut_off)
                 },
-                Piece {
-                    id: 2,
-                    within: vec![above(high)],
-                    volts: [fixed((high - off).positive()), fixed(high + off)],
-                },
-            ])
+                ends,
+                &rounding,
+            ))
         }
         Gains::Shell { slope, boundary } => {
             if !cell.strips.is_empty() {
@@ -66,21 +82,26 @@ pub(crate) fn pieces(setup: &Setup, cell: &Cell, shaft: &Shaft) -> Result<Vec<Pi
             let full = [fixed((high - off).positive()), fixed(high + off)];
             let any = [let_go[0], full[1]];
             Ok(vec![
-                Piece { id: 0, within: vec![sum(&least, at(1.0), &minus)], volts: let_go },
+                Piece { id: 0, within: vec![sum(&least, at(1.0), &minus)], volts: let_go, next: None },
                 Piece {
                     id: 1,
                     within: vec![sum(&sigma, at(-1.0), &most), sum(&minus, at(-1.0), &most)],
                     volts: any,
+                    next: None,
                 },
-                Piece { id: 2, within: vec![sum(&least, at(1.0), &sigma)], volts: full },
+                Piece { id: 2, within: vec![sum(&least, at(1.0), &sigma)], volts: full, next: None },
             ])
         }
         Gains::Smc { kp, kd, slope, boundary } => {
             complete(&cell.strips)?;
             let law = [kp, kd, boundary].map(at);
             let sigma = sum(&rate, at(slope), &error);
-            let mut out =
-                vec![Piece { id: 0, within: vec![sum(&fixed(at(0.0)), at(-1.0), &sigma)], volts: let_go }];
+            let mut out = vec![Piece {
+                id: 0,
+                within: vec![sum(&fixed(at(0.0)), at(-1.0), &sigma)],
+                volts: let_go,
+                next: None,
+            }];
             for (k, strip) in cell.strips.iter().enumerate() {
                 holds(&law, [low, high], strip).map_err(|what| format!("[{k}]: {what}"))?;
                 let number = u32::try_from(k + 1).map_err(|_| "too many".to_owned())?;
@@ -101,7 +122,47 @@ fn piece(id: u32, strip: &Strip, sigma: &Linear, rate: &Linear, off: Interval) -
     within.extend(strip.surface_to.map(|most| to(&surface, most)));
     within.extend(strip.rate_to.map(|most| to(&speed, most)));
     let line = |[per, constant]: [f64; 2], off: Interval| sum(&fixed(at(constant) + off), at(per), &surface);
-    Piece { id, within, volts: [line(strip.least, -off), line(strip.most, off)] }
+    Piece { id, within, volts: [line(strip.least, -off), line(strip.most, off)], next: None }
+}
+
+/// What the output's ends leave of a demand.
+fn limited(demand: &Linear, [low, high]: [Interval; 2], off: Interval) -> Vec<Piece> {
+    let below = |limit: Interval| sum(demand, at(-1.0), &fixed(limit));
+    let above = |limit: Interval| sum(&fixed(limit), at(-1.0), demand);
+    let end = |limit: Interval| [fixed((limit - off).positive()), fixed(limit + off)];
+    let as_asked = [sum(demand, at(-1.0), &fixed(off)), sum(demand, at(1.0), &fixed(off))];
+    vec![
+        Piece { id: 0, within: vec![below(low)], volts: end(low), next: None },
+        Piece { id: 1, within: vec![above(low), below(high)], volts: as_asked, next: None },
+        Piece { id: 2, within: vec![above(high)], volts: end(high), next: None },
+    ]
+}
+
+/// Each piece with what its integral becomes: as it is computed, or held at one of its ends.
+fn remembering(
+    pieces: Vec<Piece>,
+    computed: impl Fn(u32) -> Linear,
+    [lowest, highest]: [Interval; 2],
+    rounding: &Linear,
+) -> Vec<Piece> {
+    let about = |x: &Linear| Some([sum(x, at(-1.0), rounding), sum(x, at(1.0), rounding)]);
+    let mut out = Vec::new();
+    for piece in pieces {
+        let next = computed(piece.id);
+        let too_low = sum(&next, at(-1.0), &fixed(lowest));
+        let too_high = sum(&fixed(highest), at(-1.0), &next);
+        let no_less = sum(&fixed(lowest), at(-1.0), &next);
+        let no_more = sum(&next, at(-1.0), &fixed(highest));
+        for (more, becomes, after) in [
+            (vec![no_less, no_more], next, 0),
+            (vec![too_low], fixed(lowest), 3),
+            (vec![too_high], fixed(highest), 6),
+        ] {
+            let within = piece.within.iter().copied().chain(more).collect();
+            out.push(Piece { id: piece.id + after, within, volts: piece.volts, next: about(&becomes) });
+        }
+    }
+    out
 }
 
 /// The strips hold every `|σ|` and `|ė|`, on both sides.

@@ -39,9 +39,11 @@ pub(crate) struct Mode {
     answer: [Sum; 2],
     /// So is the voltage on the brake.
     applied: [Sum; 2],
+    /// And the next integral, with its coordinate, of a law that remembers one.
+    memory: Option<(usize, [Sum; 2])>,
 }
 
-/// `(e, s, z, p …, last)`: the last is `m₋` in the exact form and the rounding in the noise form.
+/// `(e, s, z, p …, I, last)`: `I` of a law that remembers an integral; the last is `m₋` in the exact form and the rounding in the noise form.
 const E: usize = 0;
 const S: usize = 1;
 const Z: usize = 2;
@@ -67,9 +69,13 @@ impl Mode {
             sum.add(linear[0], &measured);
             sum.add(linear[1], &coordinate(Z));
             sum.constant = sum.constant + linear[2];
+            if piece.next.is_some() {
+                sum.weights[n - 2] = sum.weights[n - 2] + linear[3];
+            }
             sum
         };
         let answer = [of(&piece.volts[0]), of(&piece.volts[1])];
+        let memory = piece.next.map(|next| (n - 2, next.map(|linear| of(&linear))));
         let applied = if shaft.delay == 0 { answer.clone() } else { [coordinate(P), coordinate(P)] };
         let fixed = applied.iter().all(Sum::is_fixed);
         let (least, most) = (applied[0].constant.low, applied[1].constant.high);
@@ -126,7 +132,7 @@ impl Mode {
                 at_most(1.0, &slowed, shaft.slow - spared - shaft.path);
             }
         }
-        Some(Mode { case: id.case, form, within, measured, answer, applied })
+        Some(Mode { case: id.case, form, within, measured, answer, applied, memory })
     }
 
     /// The most that `c·x` can be after the tick.
@@ -175,6 +181,9 @@ impl Mode {
         }
         out.add(seen, &self.measured);
         out.weights[Z] = out.weights[Z] + (at(1.0) - shaft.kappa) * cz;
+        if let Some((i, between)) = &self.memory {
+            volts(&mut out, at(c[*i]), between);
+        }
         for k in 0..shaft.delay {
             let c = at(c[P + k]);
             if k + 1 == shaft.delay {

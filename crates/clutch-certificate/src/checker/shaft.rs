@@ -6,7 +6,9 @@ use crate::setup::{Cell, Setup};
 /// A step of the target may differ from the path's by one of its 2⁻¹⁶ counts.
 pub(crate) const TARGET_STEP: f64 = 1.001 / 65536.0;
 /// A law's own rounding, in single precision too, V.
-const LAW_ROUNDING: f64 = 1e-4;
+pub(crate) const LAW_ROUNDING: f64 = 1e-4;
+/// A law's own rounding, in single precision too, of what its integral gains in a tick, V.
+pub(crate) const MEMORY_ROUNDING: f64 = 1e-5;
 /// A shell's own rounding of `σ`, in single precision too, rad/s.
 pub(crate) const SURFACE_ROUNDING: f64 = 2e-5;
 /// Share by which a function of the library may be off: its authors promise a hundredth of it.

@@ -260,13 +260,18 @@ pub enum Damping<T> {
     Acceleration(T),
 }
 
-/// A law without memory whose sampled loop can be certified, in the units of its parameters.
+/// A law whose sampled loop can be certified, in the units of its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SampledForm<T> {
-    /// (4) with feed-forward: `u = u_0 − (K_p e + K_d ė + K_c sgn θ̇_d + K_v θ̇_d)` with a brake, `u_0 + (…)` with a motor.
+    /// (4) with feed-forward and an integral: `u = u_0 − (K_p e + K_i ∫ e dt + K_d ė + K_c sgn θ̇_d + K_v θ̇_d)` with a brake,
+    /// `u_0 + (…)` with a motor.
     Linear {
         /// `K_p`, V/rad.
         kp: T,
+        /// `K_i`, V/(rad s); 0 of a law that remembers nothing.
+        ki: T,
+        /// Time in which the integral follows a limit, s.
+        tracking_time: T,
         /// `K_d`, V s/rad.
         kd: T,
         /// `u_0`, V.
@@ -455,7 +460,7 @@ mod tests {
 
     #[test]
     fn laws_say_what_they_have() {
-        assert_eq!(those_with(|p| p.sampled().is_some()), ["pd", "smc"]);
+        assert_eq!(those_with(|p| p.sampled().is_some()), ["pd", "smc", "pid"]);
         assert_eq!(those_with(|p| p.filter().is_some()), ["glide"]);
         let damped = ["pd", "ctc", "smc", "pid", "smc_integral", "dob", "glide"];
         assert_eq!(
@@ -508,10 +513,18 @@ mod tests {
             let law = Law::new(&p, &Beside::paper(&model, &wide)).unwrap();
             for (error, error_rate) in [(1e-4, 1e-3), (-2e-3, 0.05), (3e-3, -0.4), (-1e-5, 2e-2)] {
                 let tick = Tick { error, error_rate, target_velocity: 0.3, ..Tick::default() };
-                let volts = law.update(&mut law.start(&tick, 0.0), &tick).voltage;
+                let mut state = law.start(&tick, 0.0);
+                let volts = law.update(&mut state, &tick).voltage;
                 let sat = |x: f64| x.clamp(-1.0, 1.0);
                 let told = match form {
-                    SampledForm::Linear { kp, kd, bias, coulomb, velocity } => {
+                    // An integral begins where the law demands the 0 V that the actuator has.
+                    SampledForm::Linear { ki, .. } if ki > 0.0 => {
+                        let gained = law.update(&mut state, &tick).voltage - volts;
+                        let told = ki * 0.001 * error;
+                        assert!((gained - told).abs() < 1e-9 * told.abs(), "{gained} and {told} V a tick");
+                        0.0
+                    }
+                    SampledForm::Linear { kp, kd, bias, coulomb, velocity, .. } => {
                         bias + kp * error + kd * error_rate + coulomb + velocity * 0.3
                     }
                     SampledForm::Layer { kp, kd, slope, boundary } => {
@@ -519,7 +532,11 @@ mod tests {
                         kp * sat(surface / boundary) + kd * sat(surface * error_rate / boundary) * error_rate
                     }
                 };
-                assert!((volts - told).abs() < 1e-9 * told.abs(), "{}: {volts} and {told} V", p.title());
+                assert!(
+                    (volts - told).abs() < 1e-9 * told.abs().max(1e-3),
+                    "{}: {volts} and {told} V",
+                    p.title()
+                );
             }
         }
     }

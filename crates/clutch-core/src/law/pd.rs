@@ -95,7 +95,15 @@ impl<T: Real> Listed<T> for Pd<T> {
 
     fn sampled(p: &PdParams<T>) -> Option<SampledForm<T>> {
         let none = T::ZERO;
-        Some(SampledForm::Linear { kp: p.kp, kd: p.kd, bias: none, coulomb: none, velocity: none })
+        Some(SampledForm::Linear {
+            kp: p.kp,
+            ki: none,
+            tracking_time: none,
+            kd: p.kd,
+            bias: none,
+            coulomb: none,
+            velocity: none,
+        })
     }
 
     fn surface(&self, _: &Asked<'_, T>) -> Option<Surface<T>> {

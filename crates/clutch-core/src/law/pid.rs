@@ -206,11 +206,11 @@ impl<T: Real> Listed<T> for Pid<T> {
         Some(Damping::Voltage(p.kd))
     }
 
-    /// Of a law that remembers nothing.
+    /// Of a derivative without filter.
     fn sampled(p: &PidParams<T>) -> Option<SampledForm<T>> {
-        let PidParams { kp, kd, bias, coulomb, velocity, .. } = *p;
-        let forgets = p.ki == T::ZERO && p.derivative_time == T::ZERO;
-        forgets.then_some(SampledForm::Linear { kp, kd, bias, coulomb, velocity })
+        let PidParams { kp, ki, tracking_time, kd, bias, coulomb, velocity, .. } = *p;
+        let form = SampledForm::Linear { kp, ki, tracking_time, kd, bias, coulomb, velocity };
+        (p.derivative_time == T::ZERO).then_some(form)
     }
 }
 

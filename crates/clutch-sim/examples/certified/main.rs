@@ -5,9 +5,10 @@
 //! cargo run --release --package clutch-sim --example certified -- campaign 10000
 //! ```
 //!
-//! `table` looks for the certificate of each set of gains of a fixed grid, checks it, and simulates plants of its box; `shell`
-//! does so for shells, with laws within that do their worst. `campaign` draws sets and shells, too, with tolerances, ripple and
-//! noise, and counts broken bounds; it begins at a seed, so that shares of it can run beside each other.
+//! `table` looks for the certificate of each set of gains of a fixed grid, checks it, and simulates plants of its box; `integral`
+//! does so for PI, `shell` for shells, with laws within that do their worst. `campaign` draws sets and shells, too, with
+//! tolerances, ripple and noise, and counts broken bounds; `campaign-integral` draws PI alone. They begin at a seed, so that
+//! shares of them can run beside each other.
 
 mod adversary;
 
@@ -28,11 +29,12 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 #[derive(Clone, Copy)]
 enum Gains {
     Pd(f64, f64, f64),
+    Pid(f64, f64, f64, f64),
     Smc(f64, f64, f64, f64, f64),
     Shell(f64, f64, f64),
 }
 
-/// PD: K_p, K_d, K_Kal. SMC: K_p, K_d, f, ε, K_Kal. Shell: f, S, K_Kal.
+/// PD: K_p, K_d, K_Kal. PID: K_p, K_i, K_d, K_Kal. SMC: K_p, K_d, f, ε, K_Kal. Shell: f, S, K_Kal.
 const GRID: &[Gains] = &[
     Gains::Pd(5000.0, 50.0, 0.2),
     Gains::Pd(5000.0, 50.0, 0.5),
@@ -58,6 +60,7 @@ impl Gains {
     fn title(self) -> String {
         match self {
             Gains::Pd(kp, kd, kappa) => format!("PD {kp}/{kd}/{kappa}"),
+            Gains::Pid(kp, ki, kd, kappa) => format!("{kp}/{ki}/{kd}/{kappa}"),
             Gains::Smc(kp, kd, f, eps, kappa) => format!("SMC {kp}/{kd}/{f}/{eps}/{kappa}"),
             Gains::Shell(f, s, kappa) => format!("{f}/{s}/{kappa}"),
         }
@@ -70,6 +73,16 @@ impl Gains {
             Gains::Pd(kp, kd, kappa) => {
                 ("pd_2", vec![key("law.pd.kp_v_rad", kp), key("law.pd.kd_v_s_rad", kd), smoothing(kappa)])
             }
+            Gains::Pid(kp, ki, kd, kappa) => (
+                "pid_2",
+                vec![
+                    ("rig.base".to_owned(), "paper".to_owned()),
+                    key("law.pid.kp_v_rad", kp),
+                    key("law.pid.ki_v_rad_s", ki),
+                    key("law.pid.kd_v_s_rad", kd),
+                    smoothing(kappa),
+                ],
+            ),
             Gains::Smc(kp, kd, f, eps, kappa) => (
                 "smc_2",
                 vec![
@@ -274,13 +287,25 @@ fn table(of: &str) -> Outcome<()> {
     Ok(())
 }
 
+/// Laws that a campaign draws.
+#[derive(Clone, Copy, PartialEq)]
+enum Drawn {
+    /// PD, SMC (31) and shells.
+    Any,
+    /// PID.
+    Integral,
+}
+
 /// Gains, loop and box at random.
-fn draw(rng: &mut Pcg64) -> Outcome<Scenario> {
+fn draw(drawn: Drawn, rng: &mut Pcg64) -> Outcome<Scenario> {
     let delayed = rng.random::<bool>();
     let delay = f64::from(u8::from(delayed));
     let mut between = |low: f64, high: f64| low * libm::pow(high / low, rng.random::<f64>());
     let kind = between(1.0, 4.0);
-    let gains = if kind < 1.4 {
+    let gains = if drawn == Drawn::Integral {
+        let kp = between(800.0, 4000.0);
+        Gains::Pid(kp, kp * between(2.0, 15.0), kp * between(0.005, 0.012), between(0.3, 1.0))
+    } else if kind < 1.4 {
         // With delay a shell closes where it is thick for its slope.
         let f = if delayed { between(20.0, 60.0) } else { between(30.0, 150.0) };
         Gains::Shell(f, between(0.06, 0.2), between(0.5, 1.0))
@@ -341,12 +366,25 @@ const SHELLS: [(Gains, f64, f64, f64); 8] = [
     (Gains::Shell(50.0, 0.1, 1.0), 1.0, 2.0, 40.0),
 ];
 
-fn shells() -> Outcome<()> {
+/// PID on the paper's rig: delay in ticks, rate in °/s, tolerance of friction in %.
+const INTEGRALS: [(Gains, f64, f64, f64); 8] = [
+    (Gains::Pid(1250.0, 10_000.0, 12.9, 0.4), 0.0, 2.0, 0.0),
+    (Gains::Pid(1250.0, 10_000.0, 12.9, 0.4), 0.0, 20.0, 0.0),
+    (Gains::Pid(1250.0, 10_000.0, 12.9, 0.4), 0.0, 2.0, 40.0),
+    (Gains::Pid(1250.0, 10_000.0, 12.9, 0.4), 1.0, 2.0, 0.0),
+    (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 0.0, 2.0, 0.0),
+    (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 0.0, 20.0, 0.0),
+    (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 0.0, 2.0, 40.0),
+    (Gains::Pid(2370.0, 25_000.0, 14.5, 0.67), 1.0, 2.0, 0.0),
+];
+
+/// Sets of one kind, each with its delay, rate and tolerance.
+fn sets(sets: &[(Gains, f64, f64, f64)], columns: &str) -> Outcome<()> {
     println!(
-        "| f, S, K_Kal | delay | °/s | friction | certified, ° | seen, ° | ratio | cells | CPU s per cell |"
+        "| {columns} | delay | °/s | friction | certified, ° | seen, ° | ratio | cells | CPU s per cell |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    for (gains, delay, rate, friction) in SHELLS {
+    for &(gains, delay, rate, friction) in sets {
         let keys = [
             ("rig.delay_ticks", delay),
             ("reference.ramp.rate_deg_s", rate),
@@ -394,12 +432,12 @@ const TALLY: &str = "\
 
 /// Random sets; those that are certified, and linearly stable or a shell, are run with random plants of their boxes. The
 /// line on the error output after each set is a result by itself; a campaign goes on from it at the seed that it names.
-fn campaign(wanted: u64, first: u64) -> Outcome<()> {
+fn campaign(drawn: Drawn, wanted: u64, first: u64) -> Outcome<()> {
     let mut tally = Tally::default();
     let mut seed = first;
     while tally.runs < wanted {
         seed += 1;
-        a_set(seed, &mut tally)?;
+        a_set(drawn, seed, &mut tally)?;
         eprintln!("{tally} next seed {seed}");
     }
     println!("{TALLY}\n{tally}");
@@ -410,10 +448,11 @@ fn campaign(wanted: u64, first: u64) -> Outcome<()> {
 const RUNS_OF_A_SET: u64 = 200;
 
 /// Draws a set; if it is certified, runs it with random plants of its box.
-fn a_set(seed: u64, tally: &mut Tally) -> Outcome<()> {
-    let options = Options { refinements: 0, work: 300_000_000, ..Options::default() };
+fn a_set(drawn: Drawn, seed: u64, tally: &mut Tally) -> Outcome<()> {
+    let work = if drawn == Drawn::Integral { Options::default().work } else { 300_000_000 };
+    let options = Options { refinements: 0, work, ..Options::default() };
     tally.sets += 1;
-    let scenario = draw(&mut Pcg64::seed_from_u64(seed))?;
+    let scenario = draw(drawn, &mut Pcg64::seed_from_u64(seed))?;
     let sampled = scenario.sampled(&scenario.plan()?.bounds);
     if !sampled.bound_suffices() {
         tally.unstable += 1;
@@ -447,11 +486,16 @@ fn main() -> Outcome<()> {
     let verb = words.next();
     match verb.as_deref() {
         Some("table") => table(&words.next().unwrap_or_default()),
-        Some("shell") => shells(),
-        Some("campaign") => {
+        Some("integral") => sets(&INTEGRALS, "K_p, K_i, K_d, K_Kal"),
+        Some("shell") => sets(&SHELLS, "f, S, K_Kal"),
+        Some(name @ ("campaign" | "campaign-integral")) => {
+            let drawn = if name == "campaign" { Drawn::Any } else { Drawn::Integral };
             let mut number = |default: u64| words.next().map_or(Ok(default), |word| word.parse());
-            campaign(number(10_000)?, number(0)?)
+            campaign(drawn, number(10_000)?, number(0)?)
         }
-        _ => Err("expected table [SET], shell, or campaign [RUNS] [FIRST_SEED]".into()),
+        _ => {
+            Err("expected table [SET], integral, shell, or campaign or campaign-integral [RUNS] [FIRST_SEED]"
+                .into())
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! The runs behind figures, table and statements.
 
 use super::{PaperLaw, SEEDS};
-use crate::metrics::{Figure, Metrics};
+use crate::metrics::{Detected, Figure, Metrics};
 use crate::progress::{Progress, Report};
 use crate::rig::RigParams;
 use crate::run::{RunError, RunSpec, simulate};
@@ -81,6 +81,8 @@ pub(super) struct ErrorTrace {
 struct Done {
     /// One for each seed.
     metrics: Vec<Metrics>,
+    /// Stick-slip as the encoder shows it, of each seed, cycles/s.
+    counted: Vec<f64>,
     /// Trace of the first seed.
     first: ErrorTrace,
 }
@@ -103,7 +105,7 @@ impl Runs {
                 error_deg: run.trace.error.iter().map(|e| e.to_degrees()).collect(),
                 time_s: run.trace.time,
             });
-            Ok((run.metrics, trace))
+            Ok((run.metrics, run.detected, trace))
         };
         let jobs: Vec<_> = cases.iter().flat_map(|case| SEEDS.map(|seed| (*case, seed))).collect();
         let results: Vec<_> =
@@ -112,9 +114,11 @@ impl Runs {
         Ok(Runs(
             of_case
                 .filter_map(|(case, seeds)| {
-                    let metrics = seeds.iter().map(|(metrics, _)| *metrics).collect();
-                    let first = seeds.iter().find_map(|(_, trace)| trace.clone())?;
-                    Some((*case, Done { metrics, first }))
+                    let metrics = seeds.iter().map(|(metrics, ..)| *metrics).collect();
+                    let counted =
+                        seeds.iter().filter_map(|(_, seen, _)| Detected::STICK_SLIP.shown(seen)).collect();
+                    let first = seeds.iter().find_map(|(.., trace)| trace.clone())?;
+                    Some((*case, Done { metrics, counted, first }))
                 })
                 .collect(),
         ))
@@ -128,6 +132,11 @@ impl Runs {
     pub(super) fn seeds(&self, case: Case, figure: &Figure<Metrics>) -> Vec<f64> {
         let done = self.0.get(&case).map_or(&[][..], |done| &done.metrics);
         done.iter().filter_map(|m| figure.shown(m)).collect()
+    }
+
+    /// Stick-slip as the encoder shows it, mean of the seeds, cycles/s.
+    pub(super) fn counted(&self, case: Case) -> f64 {
+        mean(self.0.get(&case).map_or(&[][..], |done| &done.counted))
     }
 
     /// Its mean over the seeds.

@@ -33,11 +33,16 @@ fn not(key: &'static str, what: impl Into<String>, covered: &'static str) -> Not
     NotCovered { key, what: what.into(), covered }
 }
 
-/// Gains, on a ramp forwards, of a law that has a sampled certificate of its own.
-pub(super) fn gains(law: &LawParams, rate: f64) -> Option<Gains> {
+/// Gains, on a ramp forwards, of a law that has a sampled certificate of its own, within an output's limits, V.
+pub(super) fn gains(law: &LawParams, rate: f64, limits: [f64; 2]) -> Option<Gains> {
     Some(match law.sampled()? {
-        SampledForm::Linear { kp, kd, bias, coulomb, velocity } => {
-            Gains::Pd { kp, kd, forward: bias - (coulomb + velocity * rate) }
+        SampledForm::Linear { kp, ki, tracking_time, kd, bias, coulomb, velocity } => {
+            let forward = bias - (coulomb + velocity * rate);
+            if ki > 0.0 {
+                Gains::Pid { kp, ki, kd, forward, tracking: tracking_time, limits }
+            } else {
+                Gains::Pd { kp, kd, forward }
+            }
         }
         SampledForm::Layer { kp, kd, slope, boundary } => Gains::Smc { kp, kd, slope, boundary },
     })
@@ -117,16 +122,23 @@ impl Scenario {
         }
         // Other paths are refused, whatever the law gives on them.
         let rate = if let ReferenceParams::Ramp(ramp) = self.params.reference { ramp.rate } else { 0.0 };
-        let covered = "PD (4), PID without integral and filter, SMC (31), and any law in a [shell]";
-        let gains = gains(law, rate).ok_or_else(|| not("law", law.title(), covered))?;
+        let covered = "PD (4), PID without derivative_time_s, SMC (31), and any law in a [shell]";
+        let limits = self.limits();
+        let gains = gains(law, rate, limits).ok_or_else(|| not("law", law.title(), covered))?;
         // The law takes back what a limit cuts off such a voltage.
-        let output = &self.params.output;
         match gains {
-            Gains::Pd { forward, .. } if !(output.lowest..=output.highest).contains(&forward) => {
+            Gains::Pd { forward, .. } | Gains::Pid { forward, .. }
+                if !(limits[0]..=limits[1]).contains(&forward) =>
+            {
                 Err(not("law.pid", "a feed-forward beyond the output's limits", "one within them"))
             }
             gains => Ok(gains),
         }
+    }
+
+    /// Lowest and highest voltage that the law may ask for, V.
+    pub(super) fn limits(&self) -> [f64; 2] {
+        [self.params.output.lowest, self.params.output.highest]
     }
 
     /// Smoothing of the difference (5), and rate of the ramp, rad/s.

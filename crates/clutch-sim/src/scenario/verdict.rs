@@ -272,7 +272,8 @@ impl Scenario {
         let setup = self.sampled_setup(bounds);
         // A shell has no gains: the law within has, where it is one of these.
         let within = |s: &Setup| {
-            gains(&self.params.law, s.rate).and_then(|law| stability(&Setup { law, ..s.clone() }))
+            let gains = gains(&self.params.law, s.rate, self.limits());
+            gains.and_then(|law| stability(&Setup { law, ..s.clone() }))
         };
         let stability = setup.as_ref().ok().and_then(within);
         Sampled { setup, stability }
