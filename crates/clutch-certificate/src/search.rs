@@ -19,7 +19,7 @@ pub struct Options {
     pub error_limit: f64,
     /// Times that the cell with the largest bound is split, in the hope of a smaller one.
     pub refinements: usize,
-    /// Most comparisons of a point with a constraint per attempt, about 1e9 a second.
+    /// Most comparisons of a point with a constraint per attempt, about 1e9 a second; of an integral six times as many.
     pub work: u64,
     /// Looks on with finer directions: `false` leaves it at the coarse ones, of shells and of an integral, which take seconds
     /// and give a looser bound.
@@ -279,10 +279,10 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
     let rows = rows::<N>(&u, p.form, p.fineness);
     let mut search = Search::new(&u, &modes, p.form, &rows, &initial(p.setup, &u, p.form));
     // A set of a slow loop grows and shrinks by as little per tick as the loop does.
-    let (sweeps, shrinks, settled) = match p.setup.law {
-        Gains::Pid { .. } => (1500, 400, 1e-5),
-        Gains::Shell { .. } => (600, 40, 1e-4),
-        Gains::Pd { .. } | Gains::Smc { .. } => (300, 40, 1e-4),
+    let (sweeps, shrinks, settled, work) = match p.setup.law {
+        Gains::Pid { .. } => (1500, 400, 1e-5, 6 * p.options.work),
+        Gains::Shell { .. } => (600, 40, 1e-4, p.options.work),
+        Gains::Pd { .. } | Gains::Smc { .. } => (300, 40, 1e-4, p.options.work),
     };
     let effort = Effort {
         growth: p.growth,
@@ -290,7 +290,7 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
         shrinks,
         settled,
         error_limit: (p.options.error_limit / u.count).min(hopeless(&u)),
-        work: p.options.work,
+        work,
     };
     let result = search.run(&effort);
     result.map_err(|why| (why, 0.0))?;
