@@ -5,7 +5,7 @@ use crate::draw::Draw;
 use crate::linear::Linear;
 use clutch_core::friction::{FrictionParams, StribeckParams};
 use clutch_core::{Friction, FrictionModel};
-use clutch_sim::system::{BristledMotion, Motion, State, System, hold};
+use clutch_sim::system::{BristledMotion, Motion, State, System, SystemError, hold};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 fn friction(p: impl Into<FrictionParams>) -> Friction<f64> {
@@ -66,6 +66,21 @@ fn a_system_of_one_inertia_and_one_row_is_the_shaft() {
     }
     assert!((motion.state().position[0] - shaft.position).abs() < 1e-8);
     assert_eq!(motion.state().velocity[0], shaft.velocity, "both rest at the end");
+}
+
+#[test]
+fn a_motion_is_given_up_after_the_steps_that_it_is_allowed_and_each_call_has_them_anew() {
+    let system = Shaft(friction(StribeckParams::default()));
+    let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
+    let moved = |steps: u32, calls: u32| {
+        let (mut motion, mut events) = (Motion::new(&system, begin).unwrap().with_limit(steps), Vec::new());
+        let done = (1..=calls).try_for_each(|k| motion.advance(f64::from(k) / f64::from(calls), &mut events));
+        (done, motion.state().time)
+    };
+    let (done, time) = moved(100, 1);
+    assert_eq!(done, Err(SystemError::TooManySteps(0.0)));
+    assert!(time > 0.0 && time < 1.0, "{time}");
+    assert_eq!(moved(100, 1000), (Ok(()), 1.0));
 }
 
 /// The accelerations of each set of rows at their bounds, one of which is the right one.

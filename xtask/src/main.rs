@@ -189,7 +189,8 @@ enum Verb {
         #[arg(default_value_t = 30_001)]
         seed: u64,
     },
-    /// Compares the engines with SciPy over random single intervals: the table of docs/theory.md, section 10.
+    /// Compares the engines with SciPy over random single intervals: the tables of docs/theory.md, section 10. Fails beyond the
+    /// errors that these state.
     Intervals {
         /// Intervals, half of them of extreme parameters.
         #[arg(default_value_t = 12_000)]

@@ -10,7 +10,7 @@ use nalgebra::{SMatrix, SVector};
 pub const INSTANT: f64 = 1e-12;
 /// Error allowed per step, in rad and rad/s, and as a share of both.
 const TOLERANCE: f64 = 1e-11;
-/// Steps and events before the motion is given up.
+/// Steps and events of one call before the motion is given up.
 const LIMIT: u32 = 50_000_000;
 /// Slip rate below which a row counts as at rest after an event, as a share of the fastest, and rad/s.
 const AT_REST: f64 = 1e-9;
@@ -102,6 +102,8 @@ pub struct Motion<'a, S, const N: usize, const B: usize> {
     known: Option<Rates<N>>,
     /// Nothing moves, and nothing can until a row lets go.
     at_rest: bool,
+    /// Steps and events of one call.
+    limit: u32,
 }
 
 /// Velocity and acceleration.
@@ -194,10 +196,24 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
         if let Some(row) = (0..B).find(|row| system.friction(*row).bristles().is_some()) {
             return Err(SystemError::Bristles(row));
         }
-        let mut motion =
-            Motion { system, state, modes: [Mode::Stuck; B], step: 1e-6, known: None, at_rest: false };
+        let mut motion = Motion {
+            system,
+            state,
+            modes: [Mode::Stuck; B],
+            step: 1e-6,
+            known: None,
+            at_rest: false,
+            limit: LIMIT,
+        };
         motion.choose([false; B])?;
         Ok(motion)
+    }
+
+    /// The same, given up after so many steps and events in one call of [`advance`](Self::advance): where that many are
+    /// needed, something is out of all proportion. Without it, it is given up after 50 million, a minute or so.
+    #[must_use]
+    pub fn with_limit(self, steps: u32) -> Self {
+        Motion { limit: steps, ..self }
     }
 
     /// The state that it is in.
@@ -373,7 +389,7 @@ impl<'a, S: System<N, B>, const N: usize, const B: usize> Motion<'a, S, N, B> {
     /// A motion that cannot be followed; the state is then where it was last sure.
     pub fn advance(&mut self, to: f64, events: &mut Vec<SystemEvent>) -> Result<(), SystemError> {
         let begin = self.state.time;
-        for _ in 0..LIMIT {
+        for _ in 0..self.limit {
             let now = self.state.time;
             if now >= to {
                 return Ok(());
