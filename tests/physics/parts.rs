@@ -11,12 +11,12 @@ use clutch_sim::system::{BristledMotion, Motion, State};
 use nalgebra::SVector;
 
 /// A shaft, what drives it, and its voltage over an interval.
-struct Interval {
-    model: Model,
-    drive: Drive,
+pub(crate) struct Interval {
+    pub(crate) model: Model,
+    pub(crate) drive: Drive,
     volts: Volts,
-    velocity: f64,
-    seconds: f64,
+    pub(crate) velocity: f64,
+    pub(crate) seconds: f64,
 }
 
 impl Interval {
@@ -60,6 +60,24 @@ impl Interval {
         }
     }
 
+    /// One without lag, with an even disc and a torque without corners: what a system of one inertia and one row can say.
+    pub(crate) fn draw_smooth(draw: &mut Draw, friction: FrictionParams, constant: bool) -> Interval {
+        loop {
+            let drawn = Interval::draw(draw, friction, constant);
+            let smooth = !matches!(drawn.drive, Drive::Table(_) | Drive::Chirp(_));
+            if smooth && drawn.model.ripple.is_none() && matches!(drawn.volts, Volts::Held(_)) {
+                return drawn;
+            }
+        }
+    }
+
+    /// Its voltage, V; of one on its way the last.
+    pub(crate) fn held(&self) -> f64 {
+        match self.volts {
+            Volts::Held(volts) | Volts::Lag { to: volts, .. } => volts,
+        }
+    }
+
     /// The part between two shares of it.
     fn part(&self, from: f64, to: f64) -> Input<'_> {
         let (from, to) = (from * self.seconds, to * self.seconds);
@@ -73,7 +91,7 @@ impl Interval {
     }
 
     /// Its end in so many parts.
-    fn end(&self, engine: &mut dyn Engine, parts: u32) -> (Shaft, Vec<Event>) {
+    pub(crate) fn end(&self, engine: &mut dyn Engine, parts: u32) -> (Shaft, Vec<Event>) {
         let (mut shaft, mut events) = (Shaft::new(0.0, self.velocity), Vec::new());
         for k in 0..parts {
             let share = |k| f64::from(k) / f64::from(parts);

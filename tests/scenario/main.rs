@@ -44,7 +44,13 @@ fn every_built_in_scenario_is_good_and_runs() {
         // CTC saturates too far off its surface; PID and glide have none: docs/theory.md.
         let certified = !matches!(
             b.name,
-            "ctc_2" | "pid_2" | "motor_ctc" | "motor_pid" | "motor_pid_coulomb" | "bench_glide_2"
+            "ctc_2"
+                | "pid_2"
+                | "motor_ctc"
+                | "motor_pid"
+                | "motor_pid_coulomb"
+                | "slide_pid"
+                | "bench_glide_2"
         );
         assert_eq!(s.plan().unwrap().certificate.certified(), certified, "{}", b.name);
     }
@@ -177,6 +183,13 @@ fn a_path_that_a_motor_cannot_follow_says_what_may_change() {
         told(&[("output.highest_v", "0.01"), ("output.lowest_v", "-0.01"), ("output.on_invalid_v", "0")]);
     for word in ["V, and output.highest_v = 0.01", "more slowly", "raise the limit", "higher gain_nm_v"] {
         assert!(weak.contains(word), "{weak}");
+    }
+    // 5 kg on the drum drive it forwards with 1.18 N m, which no voltage within the limits holds back.
+    let loaded = told(&[("rig.drive", "{weight = {mass_kg = 5.0}}"), ("model.drive_torque_nm", "1.1772")]);
+    for word in
+        ["needs -22.9", "output.lowest_v = -10;", "lower the limit", "hang less on it", "higher gain_nm_v"]
+    {
+        assert!(loaded.contains(word), "{loaded}");
     }
 }
 

@@ -560,7 +560,7 @@ fn the_runs_of_the_motor_that_the_docs_show_are_the_runs_that_come() {
         }
         checked += 1;
     }
-    assert_eq!(checked, 6);
+    assert_eq!(checked, 7);
 }
 
 #[test]

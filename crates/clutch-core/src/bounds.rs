@@ -100,11 +100,11 @@ impl<T: Real> Bounds<T> {
         let (actuator, friction) = (checked.actuator(), checked.friction());
         tolerance.check_rows()?;
         let t = tolerance;
-        if actuator.kind() != ActuatorKind::Motor {
-            let still = actuator.kind() == ActuatorKind::Both && plant.drive_torque == T::ZERO;
+        if !actuator.kind().drives_above_0() {
+            let still = actuator.kind().two_sided() && plant.drive_torque == T::ZERO;
             PlantParams::DRIVES.require(plant.drive_torque, plant.drive_torque > T::ZERO || still)?;
-            friction.check_divisor()?;
         }
+        checked.check_solvable()?;
         let envelope = friction.envelope().widened(t.friction);
         actuator.check_share(envelope.high)?;
         Ok(Bounds {
@@ -148,6 +148,14 @@ impl<T: Real> Bounds<T> {
                 Interval { low: k.low * pulled, high: k.high * pulled }
             }
         }
+    }
+
+    /// The part of the authority that drives, friction apart: the torques that the actuator gives by itself at some voltage
+    /// of the output, whichever corner is the true one, N m. With a brake 0 … 0, with a motor `−k_t u_max … k_t u_max`.
+    #[must_use]
+    pub fn drives(&self, lowest: T, highest: T) -> Interval<T> {
+        let [a, b, c] = [lowest, T::ZERO.max(lowest).min(highest), highest].map(|u| self.driving(u));
+        Interval { low: a.high.min(b.high).min(c.high), high: a.low.max(b.low).max(c.low) }
     }
 
     /// Torque of friction with coefficients in an interval, without its sign, at a voltage, over all corners, N m.
@@ -237,6 +245,7 @@ mod tests {
         near(b.torque(false, 3.0), 3.0 * b.weakest_brake(), 3.0 * b.strongest_brake());
         near(b.torque(true, -3.0), 0.0, 0.0);
         near(b.authority(true, 0.0, 10.0), -10.0 * b.weakest_brake(), 0.0);
+        near(b.drives(0.0, 10.0), 0.0, 0.0);
         // At rest with 10 V the friction holds either way: 0.18 … 0.22 of it.
         let held = 10.0 * 0.18 * 0.112;
         near(b.authority_at_rest(0.0, 10.0), -held, held);
@@ -257,6 +266,9 @@ mod tests {
         assert!((b.left_over(-2.0) - (0.25 - low)).abs() < 1e-12);
         assert!((b.left_over(2.0) - (0.05 - low)).abs() < 1e-12);
         near(b.authority(true, -2.0, 2.0), -0.08 - low, 0.08 - high);
+        near(b.drives(-1.0, 2.0), -0.04, 0.08);
+        // An output that never goes below 0.5 V never drives it backwards.
+        near(b.drives(0.5, 2.0), 0.03, 0.08);
         let rest = 0.18 * (0.3 + 0.5 * 0.04 * 2.0);
         near(b.authority_at_rest(-2.0, 2.0), -0.08 - rest, 0.08 + rest);
     }
@@ -268,6 +280,7 @@ mod tests {
         near(b.torque(true, -2.0), 0.08 - high, 0.12 - low);
         near(b.torque(true, 2.0), -0.22 * (0.3 + 0.168 * 2.0), -0.135 * (0.3 + 0.112 * 2.0));
         assert!((b.left_over(-2.0) - (0.065 + 0.12 - low)).abs() < 1e-12);
+        near(b.drives(-2.0, 10.0), 0.0, 0.08);
         // It may stand without a drive, and a brake alone may not.
         assert_eq!(bounds(BOTH, 0.0).drive_torque, Interval { low: 0.0, high: 0.0 });
         for (actuator, drive_torque) in [(ActuatorParams::brake(0.14), 0.0), (BOTH.into(), -0.1)] {

@@ -174,7 +174,7 @@ fn certify_sides<T: Real>(
     demand: &Demand<T>,
     sides: Sides<T>,
 ) -> Certificate<T> {
-    let Sides { ahead: Side { gain: brake, load: torque, highest }, behind } = sides;
+    let Sides { ahead: Side { gain: brake, load: torque, highest }, behind, reverses } = sides;
     let inertia = bounds.inertia.high;
     let base = (torque + inertia * (demand.acceleration + demand.reach_rate)) / brake;
     let per_rate = |left: T, slope: T| if slope > T::ZERO { left / slope } else { T::ZERO };
@@ -217,8 +217,8 @@ fn certify_sides<T: Real>(
     // The region that is never left.
     let follows = |region: T| {
         let rate = region + region;
-        // Nothing drives a brake's shaft backwards.
-        let caught = if bounds.actuator == ActuatorKind::Motor { rate } else { rate.min(demand.velocity) };
+        // A shaft that nothing drives backwards falls behind by no more than the path's velocity.
+        let caught = if reverses { rate } else { rate.min(demand.velocity) };
         rate <= error_rate_ahead && caught <= error_rate_behind
     };
     let region = layer.max(demand.start_error_rate);
@@ -280,6 +280,8 @@ struct Side<T> {
 struct Sides<T> {
     ahead: Side<T>,
     behind: Side<T>,
+    /// The actuator drives the shaft backwards, too.
+    reverses: bool,
 }
 
 fn sides<T: Real>(bounds: &Bounds<T>, demand: &Demand<T>, (lowest, highest): (T, T)) -> Sides<T> {
@@ -290,18 +292,15 @@ fn sides<T: Real>(bounds: &Bounds<T>, demand: &Demand<T>, (lowest, highest): (T,
     let brake = Side { gain: bounds.weakest_brake(), load: drive.high, highest };
     // A force that never lets go is against the shaft that is behind.
     let released = drag - (drive.low - bounds.strongest_brake() * lowest.max(T::ZERO) - preload);
-    match bounds.actuator {
-        ActuatorKind::Brake => {
-            Sides { ahead: brake, behind: Side { gain: T::ZERO, load: released, highest: T::ZERO } }
-        }
-        ActuatorKind::Both => {
-            Sides { ahead: brake, behind: Side { gain: motor, load: released, highest: -lowest } }
-        }
-        ActuatorKind::Motor => Sides {
-            ahead: Side { gain: motor, load: drive.high + preload + drag, highest: -lowest },
-            behind: Side { gain: motor, load: drag + preload - drive.low, highest },
-        },
-    }
+    let (ahead, behind) = match bounds.actuator {
+        ActuatorKind::Brake => (brake, Side { gain: T::ZERO, load: released, highest: T::ZERO }),
+        ActuatorKind::Both => (brake, Side { gain: motor, load: released, highest: -lowest }),
+        ActuatorKind::Motor => (
+            Side { gain: motor, load: drive.high + preload + drag, highest: -lowest },
+            Side { gain: motor, load: drag + preload - drive.low, highest },
+        ),
+    };
+    Sides { ahead, behind, reverses: bounds.drives(lowest, highest).low < T::ZERO }
 }
 
 impl<T: Real> Certificate<T> {

@@ -124,8 +124,9 @@ pub fn check_path<T: Real>(
 ) -> Result<Envelope<T>, Infeasible<T>> {
     let period: T = period.seconds();
     let still = T::from_f64(STANDSTILL);
-    let reverses = bounds.actuator == ActuatorKind::Motor;
     let limits = (output.lowest(), output.highest());
+    let drives = bounds.drives(limits.0, limits.1);
+    let reverses = drives.low < T::ZERO;
     let mut envelope = Envelope { holding_voltage: holding_voltage(bounds), ..Envelope::default() };
     let (mut last_velocity, mut last_acceleration) = (start_velocity, T::ZERO);
     for tick in 0..ticks {
@@ -164,7 +165,7 @@ pub fn check_path<T: Real>(
             volts_for(bounds, &needed, forwards)
         };
         let granted = a + (authority.high - needed.high) / bounds.inertia.high;
-        if bounds.actuator == ActuatorKind::Brake && needed.high > authority.high {
+        if drives.high <= T::ZERO && needed.high > authority.high {
             return Err(refuse(Obstacle::Acceleration, a, granted));
         }
         if volts.high > limits.1 {

@@ -118,6 +118,14 @@ impl<T> Plant<T> {
 }
 
 impl<T: Real> Plant<T> {
+    /// Checks that the equation can be solved for the voltage: that of an actuator which presses is divided by a friction.
+    ///
+    /// # Errors
+    /// With such an actuator, a friction that can be 0.
+    pub fn check_solvable(&self) -> Result<(), ParamError<T>> {
+        if self.actuator.kind().drives_above_0() { Ok(()) } else { self.friction.check_divisor() }
+    }
+
     /// Torque of friction at a velocity and a voltage, against the motion, N m.
     #[inline]
     #[must_use]

@@ -41,6 +41,8 @@ const ROOM: usize = POINTS + 2;
 const FRICTIONS: usize = 40;
 /// Steps of a search by golden section: friction to a millionth.
 const SEARCH: usize = 30;
+/// Counts, and counts per period, that no rounding makes: a bound that decides by more than this decides as the search does.
+const ROUNDING: f64 = 1e-9;
 
 /// A gap between two edges, judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,6 +89,8 @@ pub struct Meter {
     frictions: [f64; FRICTIONS],
     /// One for each delay.
     tracks: Vec<Track>,
+    /// For [`Meter::stops`]: ways from rest at a point to the end of a gap.
+    scratch: Vec<f64>,
     last: Option<Counts>,
     /// Counts by which the gap was entered; 0 before the first edge.
     entered: i32,
@@ -124,6 +128,7 @@ impl Meter {
             slack: (ROUGHNESS * count).min(1.0) * carried * per_torque,
             frictions: std::array::from_fn(|i| libm::exp(step * i as f64) / FRICTION_RANGE),
             tracks: (0..=told.max(DELAY)).map(Track::new).collect(),
+            scratch: vec![0.0; ROOM],
             last: None,
             entered: 0,
             begin: 0,
@@ -172,7 +177,10 @@ impl Meter {
         let sign = f64::from(left.signum());
         self.tracks.iter_mut().for_each(Track::leave);
         let sure = self.tracks.iter().all(|track| !self.slides(track, sign));
-        let possible = sure || self.tracks.iter().any(|track| self.stops(track, sign));
+        // Apart from what it reads: filled anew for each friction, and cleared for none.
+        let mut after = std::mem::take(&mut self.scratch);
+        let possible = sure || self.tracks.iter().any(|track| self.stops(track, sign, &mut after));
+        self.scratch = after;
         Gap { sure, possible, ..gap }
     }
 
@@ -189,59 +197,76 @@ impl Meter {
             let span = 0.381_966 * (high - low);
             let (left, right) = (low + span, high - span);
             let missing = [left, right].map(|h| self.missing(track, sign, h));
-            if missing[0] <= 0.0 || missing[1] <= 0.0 {
+            if missing[0].value <= 0.0 || missing[1].value <= 0.0 {
                 return true;
             }
-            if missing[0] < missing[1] { high = right } else { low = left }
+            if least_of(missing, [low, high]) > ROUNDING {
+                return false;
+            }
+            if missing[0].value < missing[1].value { high = right } else { low = left }
         }
         false
     }
 
     /// The least velocity at the beginning that has the shaft go on to the edge, less the most that does not bring it
     /// there too early, counts per period.
-    fn missing(&self, track: &Track, sign: f64, friction: f64) -> f64 {
+    fn missing(&self, track: &Track, sign: f64, friction: f64) -> Tangent {
         let gain = 1.0 - GAIN_DOUBT;
         let (end, slack) = (&track.now, self.slack);
-        let mut least = 0.0_f64;
+        let (mut least, mut slope) = (0.0_f64, 0.0_f64);
         for x in track.points() {
-            least = least.max(-gain * x.speed(sign, friction) - slack * x.time);
+            let asked = -gain * x.speed(sign, friction) - slack * x.time;
+            if asked > least {
+                (least, slope) = (asked, gain * x.loaded);
+            }
         }
         // Over one count from the sample before the first to the last.
         let (pull, load) = track.before;
         let whole = end.time + 1.0;
         let outside = gain * (end.way(sign, friction) - 0.5 * (sign * pull - friction * load));
-        least = least.max((1.0 - outside - 0.5 * slack * whole * whole) / whole);
+        let asked = (1.0 - outside - 0.5 * slack * whole * whole) / whole;
+        if asked > least {
+            (least, slope) = (asked, gain * (end.loaded_far - 0.5 * load) / whole);
+        }
         // Below one count from the first sample in it to the last.
         let inner = &track.inner;
         let inside = gain * inner.way(sign, friction);
-        least - (1.0 - inside + 0.5 * slack * inner.time * inner.time) / inner.time
+        Tangent {
+            at: friction,
+            value: least - (1.0 - inside + 0.5 * slack * inner.time * inner.time) / inner.time,
+            slope: slope - gain * inner.loaded_far / inner.time,
+        }
     }
 
     /// True if there is a friction with which the shaft came to rest and broke away, one count further in all.
-    fn stops(&self, track: &Track, sign: f64) -> bool {
+    fn stops(&self, track: &Track, sign: f64, after: &mut [f64]) -> bool {
         let (slack, ratio) = (self.slack, self.ratio);
         let lets_go = |x: &Point, h: f64| ratio * h * x.load <= sign * x.pull + slack;
         // Friction has to be so high that it slows the shaft somewhere, and so low that it lets it go somewhere.
         let (pull, load) = track.before;
         let (mut low, mut high) = ((sign * pull - slack) / load, 0.0_f64);
-        let (mut pulls, mut loads) = (pull.abs(), load);
         for x in track.points() {
             low = low.min((sign * x.pull - slack) / x.load);
             high = high.max((sign * x.pull + slack) / (ratio * x.load));
-            pulls = pulls.max(x.pull.abs());
-            loads = loads.max(x.load);
         }
+        let tried =
+            self.frictions.partition_point(|h| *h < low)..self.frictions.partition_point(|h| *h <= high);
+        let (Some(frictions), true) = (self.frictions.get(tried), low <= high) else { return false };
         let gain = 1.0 + GAIN_DOUBT;
         let end = &track.now;
-        // No acceleration is more than this; a way to a rest and on from it is at most what it makes of the whole time.
-        let most = gain * (pulls + high.min(FRICTION_RANGE) * loads) + slack;
-        let time = end.time + 1.0;
-        if low > high || 0.5 * most * time * time < 1.0 {
+        let bowed = |time: f64| 0.5 * slack * time * time;
+        // A way to a rest and on from it is at most what the largest acceleration makes of the whole time; that is convex in
+        // friction.
+        let comes_so_far = |h: f64| {
+            let of = |pull: f64, load: f64| (sign * pull - h * load).abs();
+            let most = track.points().iter().map(|x| of(x.pull, x.load)).fold(of(pull, load), f64::max);
+            0.5 * (gain * most + slack) * (end.time + 1.0) * (end.time + 1.0) > 1.0 - ROUNDING
+        };
+        let ends = [frictions.first(), frictions.last()];
+        if !ends.into_iter().flatten().any(|&h| comes_so_far(h)) {
             return false;
         }
-        let mut after = [0.0; ROOM];
-        let bowed = |time: f64| 0.5 * slack * time * time;
-        self.frictions.iter().filter(|h| low <= **h && **h <= high).any(|&h| {
+        frictions.iter().filter(|h| comes_so_far(**h)).any(|&h| {
             // From rest at a point to the end: it goes on if nowhere later the velocity is lower.
             let mut lowest = f64::INFINITY;
             for (x, way) in track.points().iter().zip(after.iter_mut()).rev() {
@@ -269,6 +294,26 @@ impl Meter {
     }
 }
 
+/// A convex function of friction at a friction, and its slope there.
+#[derive(Clone, Copy, Debug)]
+struct Tangent {
+    at: f64,
+    value: f64,
+    slope: f64,
+}
+
+/// A value below which a convex function does not fall between two frictions: its tangents there, at two others.
+fn least_of(tangents: [Tangent; 2], [low, high]: [f64; 2]) -> f64 {
+    let [a, b] = tangents;
+    let above = |h: f64| {
+        let [a, b] = tangents.map(|t| t.value + t.slope * (h - t.at));
+        a.max(b)
+    };
+    let crossing = (b.value - a.value + a.slope * a.at - b.slope * b.at) / (a.slope - b.slope);
+    let between = if crossing > low && crossing < high { above(crossing) } else { f64::INFINITY };
+    above(low).min(above(high)).min(between)
+}
+
 /// A gap, as it was with one delay.
 #[derive(Clone, Debug)]
 struct Track {
@@ -278,9 +323,9 @@ struct Track {
     /// Points of the gap, of which so many are used.
     kept: Box<[Point; ROOM]>,
     used: usize,
-    /// Periods from one point to the next.
+    /// Periods from one point to the next, and until the next.
     stride: u64,
-    since: u64,
+    until: u64,
     /// The last sample, and the one before.
     now: Point,
     inner: Point,
@@ -323,7 +368,7 @@ impl Track {
             kept: Box::new([Point::default(); ROOM]),
             used: 0,
             stride: 1,
-            since: 0,
+            until: 0,
             now: Point::default(),
             inner: Point::default(),
             before: (0.0, 0.0),
@@ -340,7 +385,7 @@ impl Track {
 
     /// The shaft has entered a count.
     fn enter(&mut self) {
-        (self.used, self.stride, self.since) = (0, 1, 0);
+        (self.used, self.stride, self.until) = (0, 1, 0);
         self.before = self.acts;
         self.now = Point::default();
         self.inner = Point::default();
@@ -352,7 +397,7 @@ impl Track {
         let x = &mut self.now;
         (x.pull, x.load) = (pull, load);
         self.inner = *x;
-        if self.since.is_multiple_of(self.stride) {
+        if self.until == 0 {
             self.kept[self.used] = *x;
             self.used += 1;
             if self.used > POINTS {
@@ -362,8 +407,9 @@ impl Track {
                 self.used = self.used.div_ceil(2);
                 self.stride *= 2;
             }
+            self.until = self.stride;
         }
-        self.since += 1;
+        self.until -= 1;
         x.pulled_far += x.pulled + 0.5 * pull;
         x.loaded_far += x.loaded + 0.5 * load;
         x.pulled += pull;
@@ -420,6 +466,52 @@ mod tests {
         let gaps = even(|k| hold * if k < EVEN / 2 { 4.0 / 3.0 } else { 2.0 / 3.0 });
         assert_eq!(gaps.len(), 18);
         assert!(gaps.iter().all(|gap| gap.sure && gap.possible), "{gaps:?}");
+    }
+
+    /// [`Meter::slides`] without tangents: all steps of the search.
+    fn slides_by_search(meter: &Meter, track: &Track, sign: f64) -> bool {
+        let (mut low, mut high) = (1.0 / FRICTION_RANGE, FRICTION_RANGE);
+        (0..SEARCH).any(|_| {
+            let span = 0.381_966 * (high - low);
+            let (left, right) = (low + span, high - span);
+            let missing = [left, right].map(|h| meter.missing(track, sign, h).value);
+            if missing[0] < missing[1] {
+                high = right
+            } else {
+                low = left
+            }
+            missing[0] <= 0.0 || missing[1] <= 0.0
+        })
+    }
+
+    #[test]
+    fn tangents_decide_as_the_whole_search_does() {
+        let hold = Plant::<f64>::new(&PlantParams::default()).unwrap().holding_voltage_sliding();
+        let mut seed = 3_u64;
+        let mut random = move || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut slid = [0, 0];
+        for _ in 0..4000 {
+            let mut meter = meter();
+            meter.sample(0, Counts(0), hold);
+            meter.sample(1, Counts(1), hold);
+            // Braked, then let go, with a little noise: some such shafts slid, some stuck.
+            let (periods, swing) = (2 + (40.0 * random()) as u64, random());
+            let turn = 2 + (periods as f64 * random()) as u64;
+            for k in 2..2 + periods {
+                let share = if k < turn { swing } else { -swing } + 0.1 * random();
+                meter.sample(k, Counts(1), hold * (1.0 + share));
+            }
+            meter.tracks.iter_mut().for_each(Track::leave);
+            for track in &meter.tracks {
+                let slides = meter.slides(track, 1.0);
+                assert_eq!(slides, slides_by_search(&meter, track, 1.0), "{track:?}");
+                slid[usize::from(slides)] += 1;
+            }
+        }
+        assert!(slid[0] > 400 && slid[1] > 400, "{slid:?}");
     }
 
     #[test]

@@ -12,8 +12,9 @@
 //!
 //! A voltage above 0 resists with a brake and with both, and drives forwards with a motor. “A brake can only resist” is
 //! not a rule of its own: it follows from the interval of torque that an actuator can give at a velocity, its authority
-//! ([`Bounds::authority`](crate::Bounds::authority)). The check of a path asks for it; certificate, supervisor and safe
-//! state ask for its parts at the corner that is worst for each.
+//! ([`Bounds::authority`](crate::Bounds::authority), and its part that drives, [`Bounds::drives`](crate::Bounds::drives)). The
+//! check of a path asks for it; certificate, supervisor and safe state ask for its parts at the corner that is worst for each.
+//! A torque becomes volts in one place, [`Actuator::volts_for`]; the laws that the paper prints in volts stay in volts.
 
 mod geometry;
 
@@ -275,6 +276,17 @@ impl<T: Arithmetic> Actuator<T> {
     pub fn friction(&self, mu: T, volts: T) -> T {
         // In this order a brake without preload has the bits of the product.
         mu * self.brake * volts.max(T::ZERO) + mu * (self.preload + self.share * self.torque(volts).abs())
+    }
+
+    /// The way, 1 or −1 or 0, that friction is counted against where a path goes with a velocity: the path's with what drives
+    /// both ways; the others are for a shaft that is driven forwards.
+    #[inline]
+    #[must_use]
+    pub fn way(&self, target_velocity: T) -> T {
+        match self.kind {
+            ActuatorKind::Motor => target_velocity.sgn(),
+            ActuatorKind::Brake | ActuatorKind::Both => T::ONE,
+        }
     }
 
     /// The voltage at which torque and friction of a shaft that moves in a direction (`way`: 1 or −1, or 0 for none) with

@@ -55,11 +55,8 @@ impl<T: Real> Ctc<T> {
     ) -> Result<Self, ParamError<T>> {
         p.check_rows()?;
         let model = Plant::new(model)?;
-        let kind = model.actuator().kind();
-        if kind != ActuatorKind::Motor {
-            model.friction().check_divisor()?;
-        }
-        let printed = kind == ActuatorKind::Brake && model.actuator().preload() == T::ZERO;
+        model.check_solvable()?;
+        let printed = model.actuator().kind() == ActuatorKind::Brake && model.actuator().preload() == T::ZERO;
         let curve = model.friction().quick();
         let quick = printed && curve.is_some();
         let curve = match curve {
@@ -114,11 +111,7 @@ impl<T: Arithmetic> Ctc<T> {
     fn terms_for_any_actuator(&self, tick: &Tick<T>, mu: T) -> (T, [T; 3]) {
         let (friction_torque, terms) = self.demand(tick, mu);
         let actuator = self.model.actuator();
-        let way = match actuator.kind() {
-            ActuatorKind::Motor => tick.target_velocity.sgn(),
-            ActuatorKind::Brake | ActuatorKind::Both => T::ONE,
-        };
-        (actuator.volts_for(-friction_torque, mu, way), terms)
+        (actuator.volts_for(-friction_torque, mu, actuator.way(tick.target_velocity)), terms)
     }
 
     #[inline]

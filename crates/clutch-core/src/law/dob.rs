@@ -15,7 +15,7 @@
 use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputState, Seen, Tick};
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
-use crate::{ActuatorKind, ParamError, Plant, Real};
+use crate::{ParamError, Plant, Real};
 
 crate::params! {
     /// Proportional–derivative control with a disturbance observer: whatever torque the model does not explain is found from
@@ -68,9 +68,7 @@ impl<T: Real> Dob<T> {
         p.check_rows()?;
         let seconds = beside.period.period::<T>()?;
         let plant = Plant::new(beside.model)?;
-        if plant.actuator().kind() != ActuatorKind::Motor {
-            plant.friction().check_divisor()?;
-        }
+        plant.check_solvable()?;
         Ok(Dob {
             params: *p,
             mu: plant.friction().sliding(),
@@ -88,15 +86,6 @@ impl<T: Real> Dob<T> {
         actuator.torque(volts) - way * actuator.friction(self.mu, volts)
     }
 
-    /// Direction that friction is against: the path's with a motor; a brake resists a shaft that is driven forwards.
-    #[inline]
-    fn way(&self, tick: &Tick<T>) -> T {
-        match self.plant.actuator().kind() {
-            ActuatorKind::Motor => tick.target_velocity.sgn(),
-            ActuatorKind::Brake | ActuatorKind::Both => T::ONE,
-        }
-    }
-
     /// `J (θ̈_d + K_d ė + K_p e)`, N m.
     #[inline]
     fn tracking(&self, tick: &Tick<T>) -> T {
@@ -112,7 +101,7 @@ impl<T: Real> ControlLaw<T> for Dob<T> {
     const TERMS: &'static [&'static str] = &["tracking_nm", "disturbance_nm"];
 
     fn start(&self, tick: &Tick<T>, applied: T) -> DobState<T> {
-        let (tracking, way) = (self.tracking(tick), self.way(tick));
+        let (tracking, way) = (self.tracking(tick), self.plant.actuator().way(tick.target_velocity));
         let disturbance = self.torque(applied, way) - tracking;
         let disturbance = if disturbance.is_finite() { disturbance } else { T::ZERO };
         let demand = self.plant.actuator().volts_for(tracking + disturbance, self.mu, way);
@@ -126,7 +115,7 @@ impl<T: Real> ControlLaw<T> for Dob<T> {
 
     #[inline]
     fn update(&self, state: &mut DobState<T>, tick: &Tick<T>) -> Command<T, [T; 2]> {
-        let (tracking, way) = (self.tracking(tick), self.way(tick));
+        let (tracking, way) = (self.tracking(tick), self.plant.actuator().way(tick.target_velocity));
         let disturbance = state.disturbance;
         let demand = self.plant.actuator().volts_for(tracking + disturbance, self.mu, way);
         let (voltage, limit) = self.output.apply(&mut state.output, demand);

@@ -95,9 +95,7 @@ impl<T: Real> Glide<T> {
         p.check_rows()?;
         let seconds = beside.period.period::<T>()?;
         let plant = Plant::new(beside.model)?;
-        if plant.actuator().kind() != ActuatorKind::Motor {
-            plant.friction().check_divisor()?;
-        }
+        plant.check_solvable()?;
         let filters = BesideMap::new(&p.filter, &plant, beside.encoder, beside.period)?;
         let acceleration = seconds * seconds * filters.plain().counts_per_radian();
         let mut law = Glide {

@@ -39,10 +39,10 @@ impl<T: Real> Hold<T> {
         p.check_rows()?;
         let model = Plant::new(model)?;
         let (actuator, friction) = (model.actuator(), model.friction());
+        model.check_solvable()?;
         let volts = match actuator.kind() {
             ActuatorKind::Motor => model.holding_voltage_static(),
             ActuatorKind::Brake | ActuatorKind::Both => {
-                friction.check_divisor()?;
                 let torque = -(p.margin * model.params().drive_torque.abs());
                 actuator.volts_for(torque, friction.at_rest(), T::ONE).max(T::ZERO)
             }

@@ -76,6 +76,7 @@ built_in!(
     "motor_pid_coulomb",
     "motor_smc",
     "motor_ctc",
+    "slide_pid",
     "bench_pd_2",
     "bench_smc_2",
     "bench_glide_2",
@@ -669,8 +670,12 @@ impl Scenario {
                         available.to_degrees()
                     ),
                     Obstacle::Voltage if bounds.actuator == ActuatorKind::Motor => format!(
-                        "{at_time}: it needs {asked:.4} V, and output.{} = {available}; accelerate more slowly, raise the limit, or take a motor with a higher gain_nm_v",
-                        if asked < 0.0 { "lowest_v" } else { "highest_v" }
+                        "{at_time}: it needs {asked:.4} V, and output.{} the limit, hang less on it, or take a motor with a higher gain_nm_v",
+                        if asked < 0.0 {
+                            format!("lowest_v = {available}; accelerate more slowly, lower")
+                        } else {
+                            format!("highest_v = {available}; accelerate more slowly, raise")
+                        }
                     ),
                     Obstacle::Voltage if asked < 0.0 => format!(
                         "{at_time}: it needs {asked:.4} V of the motor, and output.lowest_v = {available}; accelerate more slowly, lower the limit, or take a motor with a higher motor_gain_nm_v"
