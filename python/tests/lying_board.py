@@ -41,9 +41,9 @@ class Shaft:
     position: float = 0.0
     speed: float = 0.0
 
-    def move(self, volts, time_s, steps=10):
-        """Moves under a voltage, by small steps."""
-        normal = GAIN * max(volts, 0.0)
+    def move(self, volts, time_s, steps=10, pad=1.0):
+        """Moves under a voltage that presses with a share of its force, by small steps."""
+        normal = GAIN * max(volts, 0.0) * pad
         step = time_s / steps
         for _ in range(steps):
             if self.speed <= 0.0 and STATIC * normal >= DRIVE:
@@ -63,6 +63,7 @@ class Lie:
     volts: object = None  # (asked, that at the onset) -> given
     clock: object = None  # (µs since the onset, random) -> said
     boot: int = 0
+    pad: object = None  # s since the onset -> share of the pad's force that is left
     found: bool = True
     within_ms: float = 10.0
     beyond_deg: float | None = None  # none: no brake can help
@@ -113,6 +114,9 @@ LIES = [
     Lie("converter at half its voltage", volts=lambda v, o: v / 2, found=None, within_ms=1000.0),
     Lie("converter at twice its voltage", volts=lambda v, o: 2 * v, found=None, within_ms=1000.0),
     Lie("converter the wrong way round", volts=lambda v, o: -v, within_ms=15.0),
+    Lie("lever broken", pad=lambda t: 0.0, within_ms=15.0),
+    Lie("contact lost for 50 ms", pad=lambda t: float(t >= 0.05), within_ms=15.0),
+    Lie("oil: a third of the pad's force is left", pad=lambda t: 1 / 3, found=None, within_ms=1000.0),
     Lie("time frozen", clock=lambda t, r: 0, within_ms=60.0, beyond_deg=0.25),
     Lie("time at half its rate", clock=lambda t, r: t // 2, within_ms=150.0, beyond_deg=0.25),
     Lie("time twice as fast", clock=lambda t, r: 2 * t, within_ms=150.0, beyond_deg=0.25),
@@ -155,6 +159,9 @@ class Outcome:
 class Board:
     """The board of one trial at a UNIX socket."""
 
+    # A simulated board's, whose clock may wait.
+    serial = 0
+
     def __init__(self, lie, seed, path):
         self.lie, self.random = lie, random.Random(seed)
         self.onset = self.random.uniform(0.25, 0.5)
@@ -174,6 +181,12 @@ class Board:
         if self.lied_from is None or self.lie.volts is None:
             return asked
         return self.lie.volts(asked, self.lied_from[2])
+
+    def pad(self, later=0.0):
+        """The share of its force with which the pad presses, so many seconds from now."""
+        if self.lied_from is None or self.lie.pad is None:
+            return 1.0
+        return self.lie.pad(self.time + later - self.outcome.lied)
 
     def send(self, name, **fields):
         """Puts a frame on the line."""
@@ -220,7 +233,13 @@ class Board:
     def message(self, name, m):
         """The duties of a board by docs/wire.md."""
         if name == "Discover":
-            hello = {"board": 0, "boot": 77, "counts_per_rev": COUNTS, "dac_bits": 12, "dac_lowest_mv": -10_000}
+            hello = {
+                "board": self.serial,
+                "boot": 77,
+                "counts_per_rev": COUNTS,
+                "dac_bits": 12,
+                "dac_lowest_mv": -10_000,
+            }
             hello |= {"dac_highest_mv": 10_000, "period_min_us": 100, "period_max_us": 1_000_000}
             hello |= {"watchdog_max_us": 10_000_000, "boot_code": self.code, "state": self.state}
             self.send("Hello", nonce=m["nonce"], version=m["version"], schema=m["schema"], run=0, config=0, **hello)
@@ -249,8 +268,8 @@ class Board:
         self.outcome.ended = self.time
         path = self.start + math.radians(RATE_DEG_S) * (self.time - self.armed_at)
         rest = Shaft(self.shaft.position, self.shaft.speed)
-        for _ in range(300):
-            rest.move(self.volts(), PERIOD)
+        for period in range(300):
+            rest.move(self.volts(), PERIOD, pad=self.pad(period * PERIOD))
         self.outcome.beyond_deg = math.degrees(rest.position - path)
 
     def serve(self):
@@ -272,7 +291,7 @@ class Board:
                 else:
                     self.hear(1.0)
                     continue
-                self.shaft.move(self.volts(), PERIOD)
+                self.shaft.move(self.volts(), PERIOD, pad=self.pad())
                 self.time += PERIOD
         except (EOFError, ConnectionError, TimeoutError):
             pass

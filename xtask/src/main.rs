@@ -150,7 +150,7 @@ enum Verb {
     /// docs/safety.md: some minutes.
     Lies {
         /// Trials.
-        #[arg(default_value_t = 2100)]
+        #[arg(default_value_t = 2400)]
         trials: u32,
     },
     /// Holds sampled-data certificates against simulations, an hour on two cores: the table of docs/certified.md, and a

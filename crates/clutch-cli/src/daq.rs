@@ -18,8 +18,8 @@ use std::path::PathBuf;
     after_help = "Examples:\n  clutch daq board_smc_2\n  clutch daq board_smc_2 --listen tcp://127.0.0.1:5000\n  \
     clutch daq board_smc_2 --fault freeze:at=2 --fault drop:p=0.01,way=up\n\n\
     Faults: drop, duplicate, corrupt, reorder, silence, delay (ms), jitter (ms), freeze, jump (counts), channel \
-    (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale, clock, prescaler, crystal \
-    (factor), reset; each with at (s after arming), for (s), p (probability), way (up, down, both)."
+    (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale, contact (factor), \
+    lever, clock, prescaler, crystal (factor), reset; each with at (s after arming), for (s), p (probability), way (up, down, both)."
 )]
 pub(crate) struct Daq {
     #[command(flatten)]

@@ -88,7 +88,7 @@ fn only(runs: &[String]) -> Failure {
             println!("  {trouble:?}: {:?}", oracle::Promise::of(&draw.setting, trouble));
         }
         println!(
-            "  {:?} hit {:?} tripped {:?} safe {:?} board {:?} error {:.3}° beyond {:.3}° (allowed {:?}) unanswered {}",
+            "  {:?} hit {:?} tripped {:?} safe {:?} board {:?} error {:.3}° beyond {:.3}° (allowed {:?}) unanswered {} kick {:.2} V",
             report.cause,
             report.hit,
             report.tripped,
@@ -98,6 +98,7 @@ fn only(runs: &[String]) -> Failure {
             report.overrun.to_degrees(),
             oracle::beyond_deg(&draw.setting, 0.01),
             report.unanswered,
+            report.kick,
         );
         let wrong = oracle::judge(&draw, &report);
         failures += u32::from(wrong.is_some());

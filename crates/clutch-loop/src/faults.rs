@@ -119,6 +119,10 @@ pub enum FaultKind {
     DacStuck(StuckAt),
     /// The converter's voltage is multiplied.
     DacScale(f64),
+    /// The pad presses with this share of its force: oil, or at 0 no contact. It comes back with the end of the fault.
+    Contact(f64),
+    /// The lever is broken: the pad never presses again.
+    Lever,
     /// The board's time passes this much faster than its periods.
     Clock(f64),
     /// The board's periods are longer by this factor, and its time shows it.
@@ -152,6 +156,8 @@ impl FaultKind {
             | FaultKind::EncoderLoss
             | FaultKind::DacStuck(_)
             | FaultKind::DacScale(_)
+            | FaultKind::Contact(_)
+            | FaultKind::Lever
             | FaultKind::Clock(_)
             | FaultKind::Prescaler(_)
             | FaultKind::Crystal(_) => false,
@@ -198,7 +204,7 @@ impl Fault {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "fault \"{text}\": {problem}\nexpected KIND:KEY=VALUE,…, as drop:p=0.05 or freeze:at=2 or delay:at=1,for=0.1,ms=5\n\
-         kinds: drop, duplicate, corrupt, reorder, silence, lie (says = idle, encoder, converter or run), echo (periods), foreign (periods), above-top, delay (ms), jitter (ms), freeze, jump (counts), channel (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale (factor), clock (factor), prescaler (factor), crystal (factor), reset\n\
+         kinds: drop, duplicate, corrupt, reorder, silence, lie (says = idle, encoder, converter or run), echo (periods), foreign (periods), above-top, delay (ms), jitter (ms), freeze, jump (counts), channel (dead = a or b), scale (factor), loss, dac-stuck (volts = a number or last), dac-scale (factor), contact (factor), lever, clock (factor), prescaler (factor), crystal (factor), reset\n\
          keys: at (s after arming), for (s), p (probability per frame or period), way (up = from the board, down = to it, both)"
 )]
 pub struct FaultError {
@@ -207,7 +213,7 @@ pub struct FaultError {
 }
 
 /// Names of kinds, as they are written.
-const KINDS: [&str; 22] = [
+const KINDS: [&str; 24] = [
     "drop",
     "duplicate",
     "corrupt",
@@ -226,6 +232,8 @@ const KINDS: [&str; 22] = [
     "loss",
     "dac-stuck",
     "dac-scale",
+    "contact",
+    "lever",
     "clock",
     "prescaler",
     "crystal",
@@ -358,6 +366,13 @@ impl Given {
             Some(x) => Err(format!("factor = {x}: expected 0.01 to 1000")),
             None => Err(needs("factor")),
         };
+        let share = |factor: Option<f64>| match factor {
+            Some(x) if (0.0..=1.0).contains(&x) => Ok(x),
+            Some(x) => {
+                Err(format!("factor = {x}: expected 0 to 1, the share of the pad's force that is left"))
+            }
+            None => Err(needs("factor")),
+        };
         Ok(match name {
             "drop" => FaultKind::Drop,
             "duplicate" => FaultKind::Duplicate,
@@ -379,6 +394,8 @@ impl Given {
             "loss" => FaultKind::EncoderLoss,
             "dac-stuck" => FaultKind::DacStuck(self.volts.take().ok_or_else(|| needs("volts"))?),
             "dac-scale" => FaultKind::DacScale(self.factor.take().ok_or_else(|| needs("factor"))?),
+            "contact" => FaultKind::Contact(share(self.factor.take())?),
+            "lever" => FaultKind::Lever,
             "clock" => FaultKind::Clock(self.factor.take().ok_or_else(|| needs("factor"))?),
             "prescaler" => FaultKind::Prescaler(period(self.factor.take())?),
             "crystal" => FaultKind::Crystal(period(self.factor.take())?),
@@ -443,6 +460,9 @@ impl fmt::Display for FaultKind {
             FaultKind::DacStuck(StuckAt::Last) => write!(f, "DAC stuck where it is"),
             FaultKind::DacStuck(StuckAt::Volts(v)) => write!(f, "DAC stuck at {v} V"),
             FaultKind::DacScale(factor) => write!(f, "DAC times {factor}"),
+            FaultKind::Contact(share) if *share <= 0.0 => write!(f, "contact lost"),
+            FaultKind::Contact(share) => write!(f, "pad's force times {share}"),
+            FaultKind::Lever => write!(f, "lever broken"),
             FaultKind::Clock(factor) => write!(f, "board's time times {factor}"),
             FaultKind::Prescaler(factor) => write!(f, "board's periods times {factor}"),
             FaultKind::Crystal(factor) => write!(f, "board's clock slower by {factor}"),
@@ -545,6 +565,8 @@ mod tests {
             ("scale:at=1", "scale needs factor"),
             ("prescaler:at=1,factor=0", "factor = 0: expected 0.01 to 1000"),
             ("dac-scale:at=1,factor=1,dead=a", "a key that dac-scale does not have"),
+            ("contact:at=1,factor=1.5", "factor = 1.5: expected 0 to 1"),
+            ("contact:at=1", "contact needs factor"),
             ("lie:at=1", "lie needs says"),
             ("lie:at=1,says=nothing", "says = nothing: expected idle, encoder, converter or run"),
             ("echo:at=1,periods=0", "periods = 0: expected 1 to 100"),

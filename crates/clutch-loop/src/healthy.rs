@@ -18,6 +18,10 @@ use rand_pcg::Pcg64;
 pub const ENVELOPE: [Cause; 5] =
     [Cause::StandStill, Cause::Channel, Cause::Reversed, Cause::TooSlow, Cause::TooFast];
 
+/// Switching gain that holds the heaviest shaft with the weakest brake of the bounds, V. With less the law lets such a shaft
+/// creep ahead of its path, and nothing is healthy any more: the 3 V of Table 2 are for the paper's load.
+const HOLDS_ALL: f64 = 9.0;
+
 /// A healthy run; everything follows from its seed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Healthy {
@@ -34,6 +38,10 @@ impl Healthy {
     /// # Errors
     /// None, unless a row of the tables is wrong.
     pub fn scenario(&self) -> Result<Scenario, ScenarioError> {
+        Scenario::parse("healthy", &self.text(), &[])
+    }
+
+    fn text(&self) -> String {
         let mut rng = Pcg64::seed_from_u64(self.seed ^ 0x6865_616c_7468);
         let mut within = |percent: f64| 1.0 + percent / 100.0 * rng.random_range(-1.0..=1.0_f64);
         let (friction, gain, inertia) = (within(40.0), within(10.0), within(10.0));
@@ -48,6 +56,7 @@ impl Healthy {
                 let steps = if rng.random_bool(0.5) { 0.95 } else { 0.0 };
                 format!("[law.glide]\nmicro_below_deg_s = {steps:?}\nfilter.delay_ticks = {delay}\n")
             }
+            "smc" => format!("[law.smc]\nkp_v = {HOLDS_ALL:?}\n"),
             _ => format!("[law.{law}]\n"),
         };
         let rate = [2.0, 5.0, 10.0, 20.0, 40.0, 60.0][rng.random_range(0..6)];
@@ -66,7 +75,7 @@ impl Healthy {
         let scalar = if rng.random_bool(0.5) { "f32" } else { "f64" };
         let observer = if rng.random_bool(0.25) { "[velocity.observer]\n" } else { "" };
         let start = if rng.random_bool(0.5) { "rest" } else { "on_path" };
-        let text = format!(
+        format!(
             "name = \"healthy\"\n[rig]\nbase = \"paper\"\ndelay_ticks = {delay}\n\
              inertia_kg_m2 = {:?}\nviscous_damping_nm_s_rad = {damping:?}\n\
              [rig.actuator.brake]\ngain_nm_v = {:?}\n\
@@ -84,8 +93,7 @@ impl Healthy {
             0.15 * friction,
             f64::from(self.seconds),
             self.seed,
-        );
-        Scenario::parse("healthy", &text, &[])
+        )
     }
 
     /// Runs it.
@@ -118,5 +126,47 @@ impl Healthy {
         let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
         let mut world = VirtualLoop::new(scenario, options, ControllerStation { node, path: &path })?;
         Ok(world.run(&path)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clutch_core::law::LawParams;
+
+    /// Runs under sliding mode that ended by [`Cause::Saturation`] with the gains of Table 2.
+    const TOO_WEAK: [u64; 3] = [11_175, 12_941, 17_998];
+
+    #[test]
+    fn sliding_mode_holds_every_shaft_of_the_bounds() {
+        let mut seen = 0;
+        for seed in 1..60 {
+            let scenario = Healthy { seed, seconds: 20 }.scenario().expect("a scenario");
+            let LawParams::Smc(p) = scenario.spec().law else { continue };
+            let bounds = scenario.plan().expect("a plan").bounds;
+            let needed = bounds.drive_torque.high / bounds.weakest_brake();
+            assert!(needed > 8.0 && p.kp > needed, "seed {seed}: {} V against {needed} V", p.kp);
+            seen += 1;
+        }
+        assert!(seen > 10, "{seen} runs");
+    }
+
+    #[test]
+    fn a_law_that_is_too_weak_to_hold_ends_by_saturation_far_ahead_and_one_that_holds_goes_on() {
+        for seed in TOO_WEAK {
+            let run = Healthy { seed, seconds: 20 };
+            assert_eq!(run.run().expect("a run").cause, None, "seed {seed}");
+            let weak = Scenario::parse("weak", &run.text(), &[("law.smc.kp_v".to_owned(), "3.0".to_owned())])
+                .expect("a scenario");
+            let report = match weak.scalar() {
+                ScalarKind::F32 => run.run_in::<f32>(&weak),
+                ScalarKind::F64 => run.run_in::<f64>(&weak),
+            };
+            let report = report.expect("a run");
+            assert_eq!(report.cause, Some(Cause::Saturation), "seed {seed}");
+            // It stands under the whole brake, and its path is long in coming.
+            let ahead = report.largest_error.to_degrees();
+            assert!((10.0..13.0).contains(&ahead), "seed {seed}: {ahead}°");
+        }
     }
 }

@@ -5,7 +5,7 @@
 //! | `from_scenario`, `build_error` | from a checked scenario to a run that is built; why it cannot be |
 //! | `station` | this machine at its line: the controller, or the host of a board controller |
 //! | `port`, `realtime` | the line's device; the machine's clock, priorities and memory |
-//! | `preflight` | what station and board say to each other before consent |
+//! | `preflight`, `board_clock` | what station and board say to each other before consent; the board's clock by this machine's |
 //! | `session`, `summary` | a scenario and options in; refusals, events and a summary out |
 //! | `release` | the test of encoder and brake that comes before a run |
 //! | `control_loop` | the run on its control thread |
@@ -25,6 +25,7 @@
 //!
 //! Ports, real time and emulators are of Linux; what computes its clock runs everywhere.
 
+pub mod board_clock;
 pub mod build_error;
 pub mod campaign;
 #[cfg(target_os = "linux")]

@@ -1,14 +1,24 @@
 //! Before a run: who is on the line, and does it fit.
 
+use crate::board_clock::{BoardClock, Look, Wrong};
 use crate::build_error::BuildError;
 use crate::port::{Port, PortError};
 use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
 use crate::station::{HostStation, Station, StationNotice};
 use crate::words::why;
+use clutch_core::Micros;
 use clutch_node::{Notice, Outbox, Settings};
+use clutch_sim::number;
 use clutch_wire::{Hello, Refusal, Refused};
 use rustix::fd::AsFd;
 use std::time::Duration;
+
+/// Looks at a board's clock, at least.
+const LOOKS: usize = 8;
+/// The longest time for which a board's clock is looked at, ns.
+const LONGEST_LOOK_NS: u64 = 2_000_000_000;
+/// Time between two looks that judge it.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(5);
 
 /// A run could not begin.
 #[derive(Debug, thiserror::Error)]
@@ -134,6 +144,32 @@ pub enum PreflightError {
         address: String,
         /// The number of its power-up, as `Configured` has it.
         now: u32,
+    },
+    /// The board samples at another rate than the scenario's.
+    #[error(
+        "{address}: the board takes {seen} samples a second by this machine's clock, expected {expected} to 5 % \
+         (sampling.period_us = {period}). Every velocity would be wrong by as much: correct the board's crystal, prescaler or timer"
+    )]
+    SampleRate {
+        /// The port.
+        address: String,
+        /// Samples a second.
+        seen: String,
+        /// Those of the scenario.
+        expected: String,
+        /// The scenario's period, µs.
+        period: u32,
+    },
+    /// The board's time passes at another rate than ours.
+    #[error(
+        "{address}: the board's time_us passes {seen} times as fast as this machine's clock, expected 1 to 5 %. Correct the \
+         board's crystal or prescaler"
+    )]
+    TimeRate {
+        /// The port.
+        address: String,
+        /// The rate.
+        seen: String,
     },
     /// The board stopped answering.
     #[error(
@@ -311,33 +347,60 @@ impl<'a, S: Station> Talk<'a, S> {
         }
     }
 
-    /// The board's clock against ours: the request with the shortest round trip of some.
+    /// The board's clock against ours: the request with the shortest round trip of some. Where `judged` is given, the
+    /// scenario's period, the board's time and its samples have to pass as they should, as far as that can be known within
+    /// two seconds: [`BoardClock`].
     ///
     /// # Errors
-    /// The board is silent.
-    pub fn clock(&mut self) -> Result<ClockOffset, PreflightError> {
+    /// The board is silent, or its clock is wrong.
+    pub fn clock(&mut self, judged: Option<Micros>) -> Result<ClockOffset, PreflightError> {
         let mut best: Option<ClockOffset> = None;
-        let mut sent = [0; 8];
-        for nonce in 0..8 {
-            sent[nonce as usize] = monotonic_ns();
+        let mut clock = judged.map(|period| BoardClock::new(period, !S::LOOKS_ON));
+        let mut sent = Vec::new();
+        let (mut newest, mut agrees) = (None, judged.is_none());
+        let until = monotonic_ns() + LONGEST_LOOK_NS;
+        // A board that does not answer is not asked for ever.
+        while sent.len() < LOOKS || !agrees && best.is_some() && monotonic_ns() < until {
+            let nonce = sent.len() as u32;
+            sent.push(monotonic_ns());
             let answer = self.exchange(
                 Duration::from_millis(90),
                 |station, out| station.ping(nonce, out),
                 |n| match n {
                     // On a slow line the answer to an earlier one.
-                    Notice::Pong(n, time_us) => {
-                        Some((*sent.get(*n as usize).filter(|_| *n <= nonce)?, *time_us, monotonic_ns()))
+                    Notice::Pong(n, time_us) => Some((*sent.get(*n as usize)?, *time_us, monotonic_ns())),
+                    Notice::Cycle(n) => {
+                        newest = Some(n.sample.sequence);
+                        None
                     }
                     _ => None,
                 },
             )?;
-            let Some((sent, time_us, received)) = answer else { continue };
-            let offset = ClockOffset::new(sent, received, time_us);
+            let Some((sent, board_us, received)) = answer else { continue };
+            let offset = ClockOffset::new(sent, received, board_us);
             if best.is_none_or(|b| offset.round_trip_us < b.round_trip_us) {
                 best = Some(offset);
             }
+            if let Some((clock, period)) = clock.as_mut().zip(judged) {
+                let look = Look { asked_ns: (sent, received), board_us, sample: newest };
+                agrees = clock.look(look).map_err(|wrong| self.wrong_clock(wrong, period))?;
+                std::thread::sleep(BETWEEN_LOOKS);
+            }
         }
         best.ok_or_else(|| PreflightError::Lost { address: self.address(), what: "asked for its time" })
+    }
+
+    fn wrong_clock(&self, wrong: Wrong, Micros(period): Micros) -> PreflightError {
+        let address = self.address();
+        let rounded = |x: f64| number((x * 1e3).round() / 1e3);
+        match wrong {
+            Wrong::Time(rate) => PreflightError::TimeRate { address, seen: rounded(rate) },
+            Wrong::Samples(rate) => {
+                let expected = 1e6 / f64::from(period);
+                let seen = rounded(rate * expected);
+                PreflightError::SampleRate { address, seen, expected: rounded(expected), period }
+            }
+        }
     }
 }
 

@@ -443,9 +443,10 @@ impl Course<'_> {
         let present = present_code(hello, built.supervisor.safe_codes().hold);
         let (gains, changes) = self.tuning(scenario, &built, receivers);
         let log = self.log(&built, present, &board_text(hello), receivers, gains)?;
+        let judged = self.has_a_clock(hello, port);
         let mut talk = Talk::new(port, &mut station);
         talk.configure(present)?;
-        let clock = talk.clock()?;
+        let clock = talk.clock(judged.then_some(built.servo.period()))?;
         let configured = ConfiguredRun {
             station: &mut station,
             port,
@@ -503,10 +504,11 @@ impl Course<'_> {
         let hold = built.supervisor.safe_codes().hold;
         let board = met.map_or_else(String::new, controller_text);
         let log = self.log(&built, present_code(hello, hold), &board, receivers, None)?;
+        let judged = self.has_a_clock(hello, port);
         let mut talk = Talk::new(port, &mut station);
         talk.upload(&settings)?;
         talk.configure(hold)?;
-        let clock = talk.clock()?;
+        let clock = talk.clock(judged.then_some(built.servo.period()))?;
         let configured = ConfiguredRun {
             station: &mut station,
             port,
@@ -567,6 +569,12 @@ impl Course<'_> {
             return Ok(());
         }
         Err(PreflightError::Misfit { address: self.address.to_string(), lines })
+    }
+
+    /// True if the board's clock is to be held against this machine's: that of a simulated board stands still where this
+    /// machine stalls, and a real port's board is never taken for one.
+    fn has_a_clock(&self, hello: &Hello, port: &Port) -> bool {
+        !self.session.patient() && (is_real(port) || !is_simulated(hello))
     }
 
     /// A new run on a board with this clock: when the clock waits, so does our patience.

@@ -2,7 +2,7 @@
 //! request. It knows no clock of its own: the times it is given are its time, ns.
 
 use crate::faults::{Fault, FaultKind, StuckAt};
-use clutch_core::{Counts, Dac, DacCode, FixedCounts, ParamError, SafeCodes};
+use clutch_core::{ActuatorKind, Counts, Dac, DacCode, FixedCounts, ParamError, SafeCodes};
 use clutch_node::{BoardNode, BoardParams, Outbox};
 use clutch_sim::engine::{EngineError, Event, Motion};
 use clutch_sim::rig::Rig;
@@ -29,6 +29,11 @@ pub enum SimBoardError {
     /// A converter cannot be stuck at a voltage that it has not, V.
     #[error("fault dac-stuck = {0}: expected a voltage that the scenario's converter has, V")]
     Stuck(f64),
+    /// There is no pad that could lose its contact.
+    #[error(
+        "fault {0}: expected a brake that lets go at 0 V, [rig.actuator.brake] with preload_nm = 0, or geometry"
+    )]
+    NoPad(String),
     /// The engine gave up.
     #[error(transparent)]
     Motion(#[from] EngineError),
@@ -59,6 +64,7 @@ pub struct SimBoard {
     since: Option<Counts>,
     stuck_at: Option<f64>,
     scaled: Option<f64>,
+    lever_broken: bool,
     /// Time by which the board's clock is behind, ns.
     behind_ns: i64,
     reset_done: bool,
@@ -97,6 +103,12 @@ impl SimBoard {
             {
                 return Err(SimBoardError::Stuck(volts));
             }
+            let actuator = rig.model.plant.actuator();
+            if matches!(fault.kind, FaultKind::Contact(_) | FaultKind::Lever)
+                && (actuator.kind() != ActuatorKind::Brake || actuator.normal(0.0) > 0.0)
+            {
+                return Err(SimBoardError::NoPad(fault.kind.to_string()));
+            }
         }
         let codes = SafeCodes::new(&safety.on_fault, &dac, spec.period, spec.model.actuator.kind())?;
         let params = BoardParams {
@@ -131,6 +143,7 @@ impl SimBoard {
             since: None,
             stuck_at: None,
             scaled: None,
+            lever_broken: false,
             behind_ns: 0,
             reset_done: false,
             first_hit_ns: None,
@@ -252,6 +265,7 @@ impl SimBoard {
         let now_us = self.clock_us(now_ns);
         let (mut loss, mut freeze, mut stick, mut reset) = (false, false, None, false);
         self.scaled = None;
+        let mut pressing = 1.0;
         for i in 0..self.faults.len() {
             let fault = self.faults[i];
             let active = time.is_some_and(|t| fault.active(t));
@@ -274,6 +288,8 @@ impl SimBoard {
                 FaultKind::EncoderLoss => loss = true,
                 FaultKind::DacStuck(at) => stick = Some(at),
                 FaultKind::DacScale(factor) => self.scaled = Some(factor),
+                FaultKind::Contact(share) => pressing = share.min(pressing),
+                FaultKind::Lever => self.lever_broken = true,
                 FaultKind::Clock(factor) => behind += 1.0 - factor,
                 FaultKind::Prescaler(factor) => longer *= factor,
                 FaultKind::Crystal(factor) => {
@@ -285,6 +301,7 @@ impl SimBoard {
             }
             self.first_hit_ns.get_or_insert(now_ns);
         }
+        self.rig.press(if self.lever_broken { 0.0 } else { pressing });
         self.next_sample_ns = Some(due + (period_ns * longer) as u64);
         self.stuck_at = match (stick, self.stuck_at) {
             (Some(StuckAt::Volts(v)), _) => Some(v),

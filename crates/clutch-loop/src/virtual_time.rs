@@ -95,6 +95,8 @@ pub struct VirtualReport {
     pub largest_error: f64,
     /// Lowest and highest voltage of the codes sent to the board, V.
     pub volts: (f64, f64),
+    /// Largest step between the voltages of two answers with a gap of at least one sample between them, V.
+    pub kick: f64,
     /// Ticks in which the law answered.
     pub answers: u64,
     /// Samples, from the first answer to the end or the safe output, that were left without one.
@@ -350,6 +352,8 @@ struct Course<'a, S: Station, B, P> {
     /// The station makes an answer until then.
     busy_until: u64,
     waiting: Option<Sampled>,
+    /// Number of the last sample that was answered, and the voltage, V.
+    answered: Option<(u16, f64)>,
     /// Samples that the board has taken.
     sampled: u64,
     /// The number that it had taken when control began.
@@ -377,6 +381,7 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
             safe_at: None,
             busy_until: 0,
             waiting: None,
+            answered: None,
             sampled: 0,
             first_sample: None,
             on,
@@ -512,6 +517,7 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
     fn hear(&mut self, now: u64, time_ns: u64) -> Heard<S::Scalar> {
         let VirtualLoop { board, station, up, .. } = &mut *self.on;
         let (hands, waiting, report) = (&mut self.hands, &mut self.waiting, &mut self.report);
+        let answered = &mut self.answered;
         let (dac, radians) = (*station.dac(), station.encoder().radians_per_count::<f64>());
         let mut heard = Heard { records: Vec::new(), ended: None, refused: None };
         let mut greeted = false;
@@ -525,6 +531,12 @@ impl<'a, S: Station, B: VirtualBoard, P: Planned<S::Scalar>> Course<'a, S, B, P>
                 }
                 report.answers += u64::from(n.cycle.answer.is_some());
                 let volts = dac.volts(n.cycle.code).to_f64();
+                if n.cycle.answer.is_some() {
+                    let last = answered.replace((n.sample.sequence, volts));
+                    let gap = last.filter(|(before, _)| n.sample.sequence.wrapping_sub(*before) > 1);
+                    report.kick =
+                        gap.map_or(report.kick, |(_, before)| report.kick.max((volts - before).abs()));
+                }
                 report.volts = (report.volts.0.min(volts), report.volts.1.max(volts));
                 let records = &mut heard.records;
                 records.push(Record::Sample(to_log::sample(time_ns, 0, &n)));

@@ -47,6 +47,8 @@ pub struct MovingRig {
     /// On the way to the pad, V.
     arriving: f64,
     commanded: f64,
+    /// Share of the voltage that presses.
+    share: f64,
     line: VecDeque<f64>,
     noise: Pcg64,
     torque_noise: f64,
@@ -103,6 +105,7 @@ impl MovingRig {
             volts,
             arriving: volts,
             commanded: volts,
+            share: 1.0,
             line: std::iter::repeat_n(volts, delay.saturating_sub(1)).collect(),
             noise: noise(seed),
             torque_noise: 0.0,
@@ -170,6 +173,12 @@ impl MovingRig {
         }
     }
 
+    /// The pad presses from now on with this share of its force; at 0 it has no contact. For a brake that lets go at 0 V. No
+    /// part of [`MovingRig::state`].
+    pub fn press(&mut self, share: f64) {
+        self.share = share;
+    }
+
     /// The converter's board was reset: it gives this voltage, V, and nothing is on its way any more. It has no periods until
     /// it is configured, with which a delay would end.
     pub fn reset(&mut self, volts: f64) {
@@ -185,14 +194,18 @@ impl MovingRig {
     pub fn advance(&mut self, duration: f64) -> Result<&[Event], EngineError> {
         self.events.clear();
         if duration > 0.0 {
+            let volts = |share: f64| match self.rig.params.actuator_time_constant {
+                None => Volts::Held(share * self.arriving),
+                Some(time_constant) => {
+                    Volts::Lag { from: share * self.volts, to: share * self.arriving, time_constant }
+                }
+            };
+            let at_the_pad = volts(1.0).at(duration);
             let input = Input {
                 time: self.time,
                 duration,
                 origin: self.origin,
-                volts: match self.rig.params.actuator_time_constant {
-                    None => Volts::Held(self.arriving),
-                    Some(time_constant) => Volts::Lag { from: self.volts, to: self.arriving, time_constant },
-                },
+                volts: volts(self.share),
                 drive: &self.rig.drive,
                 noise: self.torque_noise,
             };
@@ -202,7 +215,7 @@ impl MovingRig {
                 Moves::InSteps(engine) => engine.advance(model, &input, shaft, events)?,
                 Moves::Bending(engine) => engine.advance(model, &input, shaft, events)?,
             }
-            self.volts = input.volts.at(duration);
+            self.volts = at_the_pad;
             self.time += duration;
         }
         Ok(&self.events)

@@ -167,6 +167,7 @@ impl Trouble {
             What::Fault(FaultKind::DacScale(by), _) if by > 1.0 => "DAC too high".to_owned(),
             What::Fault(FaultKind::DacScale(by), _) if by >= 0.0 => "DAC too low".to_owned(),
             What::Fault(FaultKind::DacScale(_), _) => "DAC the wrong way round".to_owned(),
+            What::Fault(FaultKind::Contact(by), _) if by > 0.0 => "pad presses too little".to_owned(),
             What::Fault(FaultKind::Clock(_), _) => "board's time wrong".to_owned(),
             What::Fault(FaultKind::Prescaler(_), _) => "board's periods wrong".to_owned(),
             What::Fault(FaultKind::Crystal(_), _) => "board's whole clock wrong".to_owned(),
@@ -189,8 +190,8 @@ impl Trouble {
 }
 
 /// Parts of a draw that its minimal form may leave out, by the names that they have in the name of a run.
-pub const PLAIN: [&str; 10] =
-    ["second", "first", "bench", "wide", "observer", "single", "delay", "latency", "cycles", "path"];
+pub const PLAIN: [&str; 11] =
+    ["later", "second", "first", "bench", "wide", "observer", "single", "delay", "latency", "cycles", "path"];
 
 /// A run before it is run.
 #[derive(Clone, Debug, PartialEq)]
@@ -209,10 +210,13 @@ impl Draw {
         let mut setting = setting(&mut rng);
         let mut troubles = Vec::new();
         if rng.random_bool(0.95) {
-            troubles.push(trouble(&mut rng, &setting));
+            troubles.push(trouble(&mut rng, &setting, any));
             if rng.random_bool(0.2) {
-                troubles.push(trouble(&mut rng, &setting));
+                troubles.push(trouble(&mut rng, &setting, any));
             }
+        }
+        if !without.contains(&"later") {
+            later(seed, &mut setting, &mut troubles);
         }
         // A controller is slow in one way.
         if troubles.iter().all(|t| matches!(t.what, What::Slow(_) | What::ControllerDies)) {
@@ -311,36 +315,89 @@ fn setting(rng: &mut Pcg64) -> Setting {
     }
 }
 
+/// Draws that came later than the others, from a stream of their own: a seed keeps what it drew before, and a run whose name
+/// has `later` in it leaves these out.
+fn later(seed: u64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
+    let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x006c_6174_6572);
+    let rng = &mut rng;
+    if follows(setting.law) && rng.random_bool(0.25) {
+        setting.law = pick(rng, &["super_twisting", "smc_integral", "dob"], "dob");
+    }
+    let brake = setting.rig != RigName::Motor;
+    match rng.random_range(0..16) {
+        0 if brake && !troubles.is_empty() => troubles[0] = trouble(rng, setting, pad),
+        1 => gap(rng, setting, troubles),
+        _ => {}
+    }
+}
+
+/// The pad and what presses it.
+fn pad(rng: &mut Pcg64, _: &Setting) -> What {
+    let kind = match rng.random_range(0..3) {
+        0 => FaultKind::Lever,
+        1 => FaultKind::Contact(0.0),
+        _ => FaultKind::Contact(pick(rng, &[0.1, 0.3, 0.6, 0.9], 0.3)),
+    };
+    What::Fault(kind, Direction::Both)
+}
+
+/// Samples that are lost in a row, as many as a patient board bears, and no other trouble.
+fn gap(rng: &mut Pcg64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
+    setting.rig = RigName::Paper;
+    setting.law = pick(rng, &["pd", "ctc", "ctc", "smc"], "ctc");
+    setting.path = PathKind::Ramp(pick(rng, &[2.0, 5.0, 10.0, 20.0, 28.0], 20.0));
+    if matches!(setting.safe, Safe::Release) {
+        setting.safe = Safe::Hold(9.99);
+    }
+    (setting.delay, setting.observer, setting.cycles) = (0, false, 20);
+    let gap = Trouble {
+        periods: Some(rng.random_range(2..=LONGEST_GAP)),
+        often: 1.0,
+        ..trouble(rng, setting, |_, _| What::Fault(FaultKind::Drop, Direction::Up))
+    };
+    // Before the first sample there is nothing to reckon from.
+    *troubles = vec![Trouble { at: gap.at.max(0.15), ..gap }];
+}
+
+/// Samples that a steady law on a ramp can do without, one after another.
+pub(super) const LONGEST_GAP: u32 = 12;
+
 /// Number of the places at which trouble may be.
 const PLACES: usize = 6;
 
-fn trouble(rng: &mut Pcg64, setting: &Setting) -> Trouble {
-    let (from, to) = match setting.path {
-        PathKind::MinimumJerk(_) => (0.5, 1.2),
-        PathKind::Ramp(_) | PathKind::Sine(_) => (0.15, 0.5),
-    };
-    let mut at = rng.random_range(from..to);
-    let what = match rng.random_range(0..PLACES) {
+/// Trouble at any place.
+fn any(rng: &mut Pcg64, setting: &Setting) -> What {
+    match rng.random_range(0..PLACES) {
         0 | 1 => line(rng),
         2 => What::Fault(encoder(rng), Direction::Both),
         3 => What::Fault(converter(rng, setting), Direction::Both),
         4 => What::Fault(board(rng), Direction::Both),
         _ => inside(rng),
+    }
+}
+
+fn trouble(rng: &mut Pcg64, setting: &Setting, what: impl Fn(&mut Pcg64, &Setting) -> What) -> Trouble {
+    let (from, to) = match setting.path {
+        PathKind::MinimumJerk(_) => (0.5, 1.2),
+        PathKind::Ramp(_) | PathKind::Sine(_) => (0.15, 0.5),
     };
+    let mut at = rng.random_range(from..to);
+    let what = what(rng, setting);
     let faults = matches!(what, What::Fault(..));
+    let stays = needs_time(what) || matches!(what, What::Fault(FaultKind::Lever, _));
     // Armed, and not running yet.
     if faults && rng.random_bool(0.1) {
         at = 0.0;
     }
     let periods = match rng.random_range(0..10) {
-        _ if !faults || needs_time(what) => None,
+        _ if !faults || stays => None,
         0 | 1 => Some(1),
         2 => Some(rng.random_range(2..=8)),
         3 => Some(rng.random_range(9..=100)),
         _ => None,
     };
     let often = match rng.random_range(0..10) {
-        _ if !faults || needs_time(what) || periods == Some(1) => 1.0,
+        _ if !faults || stays || periods == Some(1) => 1.0,
         0 => 0.02,
         1 => 0.3,
         2 => 0.9,

@@ -134,8 +134,13 @@ impl Draw {
         let (cycles, good) = (s.cycles, s.good_samples.min(s.cycles - 2));
         // A slow drift is to reach the limit of the voltage's time, not that of the error.
         let error = if self.load().is_some() { 3.0 } else { oracle::following_deg(s) };
-        // A law with the sign function is at one limit or the other in every period.
-        let saturation = if s.law == "smc_sign" { 5.0 } else { 0.2 };
+        let saturation = match s.law {
+            // At one limit or the other in every period.
+            "smc_sign" => 5.0,
+            // It takes a shaft at rest for one that slides, and brakes with all it has until a slow path has come.
+            "dob" => 1.0,
+            _ => 0.2,
+        };
         let scalar = if s.single { "f32" } else { "f64" };
         let _ = write!(
             text,
@@ -174,6 +179,8 @@ impl Draw {
             // In one scalar with micro-steps, in the other without.
             "glide" if s.single => format!("micro_below_deg_s = 0.95\nfilter.delay_ticks = {}\n", s.delay),
             "glide" => format!("filter.delay_ticks = {}\n", s.delay),
+            // At rest under a safe state its integral is at most of the output, and has to let go in time.
+            "super_twisting" => "k2_v_s = 42.0\n".to_owned(),
             _ => String::new(),
         };
         let _ = writeln!(text, "[law.{}]\n{gains}", s.law);

@@ -3,7 +3,7 @@
 //! It shares nothing with the supervisor: the rig's physics are a few lines of its own, and the times are the promises of
 //! `docs/safety.md`.
 
-use super::grammar::{Draw, PathKind, RigName, Safe, Setting, Trouble, What, follows};
+use super::grammar::{Draw, LONGEST_GAP, PathKind, RigName, Safe, Setting, Trouble, What, follows};
 use crate::faults::{Direction, FaultKind, Forgery, Lie, StuckAt};
 use crate::virtual_time::VirtualReport;
 use clutch_core::supervisor::Cause;
@@ -39,21 +39,46 @@ pub struct Promise {
 /// Error at rest that ends control in a run, °: an integrator is slow to let go at the start.
 #[must_use]
 pub fn following_deg(s: &Setting) -> f64 {
-    if s.law == "pid" { 6.0 } else { 1.0 }
+    match s.law {
+        "pid" => 6.0,
+        "super_twisting" => 4.0,
+        _ => 1.0,
+    }
 }
 
-/// Periods in which frames may be lost without an end; both ways they are another period's. A law that is steady on a ramp
-/// leaves its brake where it is right for longer.
-fn borne(s: &Setting, way: Direction) -> u32 {
+/// True of a law that leaves its brake about where it is right: on a ramp, without delay.
+fn steady(s: &Setting) -> bool {
     let ramp = matches!(s.path, PathKind::Ramp(_)) && matches!(s.law, "pd" | "ctc" | "smc");
-    let steady = ramp && s.rig == RigName::Paper && s.delay == 0 && !s.observer;
-    let patient = (s.cycles - 2).min(if steady { 8 } else { 3 });
+    ramp && s.rig == RigName::Paper && s.delay == 0 && !s.observer
+}
+
+/// Periods in which frames may be lost without an end; both ways they are another period's. A law that is steady bears more.
+fn borne(s: &Setting, way: Direction) -> u32 {
+    let patient = (s.cycles - 2).min(match s.law {
+        _ if !steady(s) => 3,
+        // It swings: dead reckoning from its last period is off by more.
+        "pd" => 8,
+        _ => LONGEST_GAP,
+    });
     match way {
         Direction::Up => patient,
         // The controller does not hear of codes that are lost: of more than one the shaft tells, and that may be too much.
         Direction::Down => 1_u32.min(patient),
         Direction::Both => u32::from(patient > 1),
     }
+}
+
+/// Largest step of the voltage over samples that are lost in a row, V, where it is promised: with the shaft between them in
+/// its place, computed torque has little to correct.
+fn kick(draw: &Draw) -> Option<f64> {
+    let s = &draw.setting;
+    let [Trouble { what: What::Fault(FaultKind::Drop, Direction::Up), periods: Some(lost), often, at }] =
+        draw.troubles[..]
+    else {
+        return None;
+    };
+    (s.law == "ctc" && steady(s) && often >= 1.0 && at > 0.0 && lost <= borne(s, Direction::Up))
+        .then_some(1.5)
 }
 
 /// A trouble of an encoder that is found by the way of the shaft: time for which it may be open.
@@ -202,11 +227,12 @@ fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promis
         FaultKind::EncoderJump(by) if by.abs() >= 20 => jump(s, t, &way),
         FaultKind::EncoderFreeze | FaultKind::EncoderChannel(_) | FaultKind::EncoderJump(_) => way,
         FaultKind::EncoderScale(_) => blind,
+        // A lever never mends.
+        FaultKind::Lever => nothing_presses(s, t, &blind),
+        FaultKind::Contact(share) if stays && share <= 0.0 => nothing_presses(s, t, &blind),
+        FaultKind::Contact(_) => Promise { truthful: true, ..blind },
         FaultKind::DacStuck(StuckAt::Volts(v)) if stays && s.rig != RigName::Motor && v < 0.01 => {
-            // A path that begins with a jump asks for an open brake, until a shaft that falls is as fast.
-            let start = if t.at == 0.0 { 0.02 + s.path.top_deg_s() / 1587.0 } else { 0.0 };
-            let within = 2.0 * by_the_way(s) + PERIOD + start;
-            Promise { fate: Fate::Ends(within), causes: &[Cause::TooFast], ..blind }
+            nothing_presses(s, t, &blind)
         }
         FaultKind::DacStuck(StuckAt::Volts(v)) if stays && moves && v > 9.0 => {
             Promise { fate: Fate::Ends(0.5), ..blind }
@@ -223,6 +249,14 @@ fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promis
         FaultKind::Prescaler(by) | FaultKind::Crystal(by) => clock(s, t, by, by, &blind),
         _ => *base,
     }
+}
+
+/// A brake that does not press, whatever it is told to.
+fn nothing_presses(s: &Setting, t: &Trouble, blind: &Promise) -> Promise {
+    // A path that begins with a jump asks for an open brake, until a shaft that falls is as fast.
+    let start = if t.at == 0.0 { 0.02 + s.path.top_deg_s() / 1587.0 } else { 0.0 };
+    let within = 2.0 * by_the_way(s) + PERIOD + start;
+    Promise { fate: Fate::Ends(within), causes: &[Cause::TooFast], ..*blind }
 }
 
 /// Counts that are off by more than a shaft can be.
@@ -290,7 +324,11 @@ pub fn beyond_deg(s: &Setting, blind: f64) -> Option<f64> {
 
 /// Healthy error of a run, °: what its law and its path leave.
 fn healthy_deg(s: &Setting) -> f64 {
-    let law = if s.law == "pid" { 3.0 } else { 0.15 };
+    let law = match s.law {
+        "pid" => 3.0,
+        "super_twisting" => 2.5,
+        _ => 0.15,
+    };
     let uneven = if s.rig == RigName::Bench { 0.3 } else { 0.0 };
     law + uneven + 0.012 * s.path.top_deg_s()
 }
@@ -355,6 +393,11 @@ fn fate(draw: &Draw, promises: &[Promise], o: &VirtualReport) -> Option<String> 
         && o.unanswered != u64::from(s.good_samples)
     {
         return Some(format!("{} samples unanswered instead of {}", o.unanswered, s.good_samples));
+    }
+    if let Some(most) = kick(draw)
+        && o.kick > most
+    {
+        return Some(format!("the voltage jumps by {:.2} V over lost samples instead of {most} V", o.kick));
     }
     for (trouble, promise) in draw.troubles.iter().zip(promises) {
         let Fate::Ends(within) = promise.fate else { continue };

@@ -1,0 +1,263 @@
+//! A board's clock by this machine's, before consent: its time, and the samples that it takes.
+//!
+//! Each look is a request and its answer. Whatever the board did at the answer it did between the two, and the samples that
+//! came before the answer it took before. So two looks bound the board's rate from below and from above, however long a busy
+//! machine or a slow line held each of them up: a board that is right is never refused, and a look that says little is
+//! followed by another. A board may itself be held up between an answer and a sample; so it is believed soon, and refused
+//! only after a second, of which that is no share.
+
+use clutch_core::Micros;
+
+/// Share by which the board's rate may differ from this machine's.
+const TOLERANCE: f64 = 0.05;
+/// Looks that a board is believed by have so much time between them, ns: its clock may tick in milliseconds.
+const NEAR_NS: u64 = 50_000_000;
+/// Looks that a board is refused by, ns.
+const FAR_NS: u64 = 1_000_000_000;
+/// Samples that may change places with an answer.
+const OVERTAKEN: f64 = 2.0;
+
+/// A look at the board: a request and its answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    /// Times of the request and of its answer by this machine's clock, ns.
+    pub asked_ns: (u64, u64),
+    /// The board's time in the answer, µs.
+    pub board_us: u32,
+    /// Number of the newest sample before the answer; none where samples do not come here.
+    pub sample: Option<u16>,
+}
+
+/// Bounds of a rate, in parts of that which it should have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rate {
+    low: f64,
+    high: f64,
+}
+
+impl Rate {
+    const UNKNOWN: Rate = Rate { low: f64::NEG_INFINITY, high: f64::INFINITY };
+
+    /// Something has passed, `low` to `high` seconds of it, while `shortest` to `longest` seconds did here.
+    fn narrow(&mut self, (low, high): (f64, f64), (shortest, longest): (f64, f64)) {
+        self.low = self.low.max(if low > 0.0 { low / longest } else { low / shortest });
+        self.high = self.high.min(if high > 0.0 { high / shortest } else { high / longest });
+    }
+
+    /// True if it cannot be right.
+    fn is_wrong(self) -> bool {
+        self.low > 1.0 + TOLERANCE || self.high < 1.0 - TOLERANCE
+    }
+
+    /// True if it can only be right.
+    fn is_right(self) -> bool {
+        // Of a rate that is none, nothing is known.
+        self.low >= 1.0 - TOLERANCE && self.high <= 1.0 + TOLERANCE && self.low <= self.high
+    }
+
+    /// The middle of its bounds, or the bound that there is.
+    fn seen(self) -> f64 {
+        let middle = 0.5 * (self.low + self.high);
+        if middle.is_finite() { middle } else { self.low.max(0.0).min(self.high) }
+    }
+}
+
+/// The rate of a board that is wrong, in parts of what it should be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Wrong {
+    /// The board's time.
+    Time(f64),
+    /// The samples that it takes.
+    Samples(f64),
+}
+
+/// A rate by looks that are near, and by those that are far apart.
+#[derive(Clone, Copy, Debug)]
+struct Rates {
+    near: Rate,
+    far: Rate,
+}
+
+/// A board's clock by this machine's.
+#[derive(Clone, Debug)]
+pub struct BoardClock {
+    period: f64,
+    /// Its samples come here.
+    samples_come: bool,
+    looks: Vec<Look>,
+    time: Rates,
+    samples: Rates,
+}
+
+impl BoardClock {
+    /// Of a board that is to sample with this period; its samples come to this machine, or to another.
+    #[must_use]
+    pub fn new(period: Micros, samples_come: bool) -> Self {
+        let unknown = Rates { near: Rate::UNKNOWN, far: Rate::UNKNOWN };
+        let period = f64::from(period.0) * 1e-6;
+        BoardClock { period, samples_come, looks: Vec::new(), time: unknown, samples: unknown }
+    }
+
+    /// Takes a look in, later than those before. True if board and machine agree as far as can be seen, false if nobody can
+    /// say yet.
+    ///
+    /// # Errors
+    /// The rate that is wrong.
+    pub fn look(&mut self, look: Look) -> Result<bool, Wrong> {
+        let seconds = |from: u64, to: u64| to.saturating_sub(from) as f64 * 1e-9;
+        let (asked, answered) = look.asked_ns;
+        for before in &self.looks {
+            let apart = asked.saturating_sub(before.asked_ns.1);
+            if apart < NEAR_NS {
+                continue;
+            }
+            let passed = (seconds(before.asked_ns.1, asked), seconds(before.asked_ns.0, answered));
+            let by_the_board = f64::from(look.board_us.wrapping_sub(before.board_us).cast_signed()) * 1e-6;
+            let taken = match (before.sample, look.sample) {
+                (Some(from), Some(to)) => Some(f64::from(to.wrapping_sub(from).cast_signed())),
+                (None, None) => Some(0.0),
+                // The number before the first is not known.
+                _ => None,
+            };
+            let narrow = |time: &mut Rate, samples: &mut Rate| {
+                time.narrow((by_the_board, by_the_board), passed);
+                if let Some(taken) = taken {
+                    let (least, most) = (taken - OVERTAKEN, taken + OVERTAKEN);
+                    samples.narrow((least * self.period, most * self.period), passed);
+                }
+            };
+            narrow(&mut self.time.near, &mut self.samples.near);
+            if apart >= FAR_NS {
+                narrow(&mut self.time.far, &mut self.samples.far);
+            }
+        }
+        self.looks.push(look);
+        if self.samples_come && self.samples.far.is_wrong() {
+            return Err(Wrong::Samples(self.samples.far.seen()));
+        }
+        if self.time.far.is_wrong() {
+            return Err(Wrong::Time(self.time.far.seen()));
+        }
+        Ok(self.time.near.is_right() && (!self.samples_come || self.samples.near.is_right()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    /// Looks, 5 ms apart, at a board whose time and samples run at these rates, over a line that holds each way up by a random
+    /// time below `held_up_ms`. Gives the verdict and when it fell, ms; none within two seconds.
+    fn verdict(
+        (time, samples): (f64, f64),
+        period_us: u32,
+        held_up_ms: f64,
+        seed: u64,
+    ) -> (Option<Result<(), Wrong>>, f64) {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut clock = BoardClock::new(Micros(period_us), true);
+        let mut now = 1e9;
+        // Not in step with the samples.
+        let start = 1e9 - 1e6 * rng.random_range(0.0..1.0);
+        while now < 3e9 {
+            let asked = now;
+            let there = asked + 1e5 + 1e6 * held_up_ms * rng.random_range(0.0..1.0);
+            now = there + 1e5 + 1e6 * held_up_ms * rng.random_range(0.0..1.0);
+            let since = there - start;
+            let look = Look {
+                asked_ns: (asked as u64, now as u64),
+                board_us: (u32::MAX - 40_000).wrapping_add((since * time / 1e3) as i64 as u32),
+                sample: Some(65_500_u16.wrapping_add((since * samples / 1e3 / f64::from(period_us)) as u16)),
+            };
+            match clock.look(look) {
+                Ok(false) => now += 5e6,
+                Ok(true) => return (Some(Ok(())), (now - 1e9) / 1e6),
+                Err(wrong) => return (Some(Err(wrong)), (now - 1e9) / 1e6),
+            }
+        }
+        (None, 2e3)
+    }
+
+    #[test]
+    fn a_board_that_is_right_is_never_refused_however_busy_the_machine_is() {
+        for held_up_ms in [0.0, 1.0, 10.0, 50.0, 200.0] {
+            for (seed, drift) in (0..200).flat_map(|seed| [(seed, 0.99), (seed, 1.0), (seed, 1.01)]) {
+                for period_us in [100, 1000, 10_000, 250_000] {
+                    let (said, _) = verdict((drift, drift), period_us, held_up_ms, seed);
+                    assert!(
+                        said.is_none_or(|said| said == Ok(())),
+                        "{held_up_ms} ms, {seed}, {period_us} µs: {said:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_quiet_machine_knows_within_a_tenth_of_a_second_and_a_busy_one_within_two() {
+        for seed in 0..200 {
+            let (said, ms) = verdict((1.0, 1.0), 1000, 0.3, seed);
+            assert!(said == Some(Ok(())) && ms < 130.0, "{said:?} after {ms} ms");
+            let (said, ms) = verdict((1.0, 1.0), 1000, 20.0, seed);
+            assert!(said == Some(Ok(())), "{said:?} after {ms} ms");
+        }
+    }
+
+    #[test]
+    fn a_board_at_another_rate_is_refused_by_what_is_wrong_with_it() {
+        for rate in [1.0 / 155.0, 0.083, 0.5, 0.9, 1.1, 1.2, 2.0, 12.0] {
+            for seed in 0..50 {
+                for (held_up_ms, at_most) in [(0.3, 1020.0), (20.0, 2000.0)] {
+                    // The whole clock, samples alone, time alone.
+                    let all = [((rate, rate), true), ((1.0, rate), true), ((rate, 1.0), false)];
+                    for (rates, samples) in all {
+                        let (said, ms) = verdict(rates, 1000, held_up_ms, seed);
+                        let right = match said {
+                            // A board that takes a sample each 155 ms takes 13 in two seconds.
+                            Some(Err(Wrong::Samples(seen))) => {
+                                samples && (seen - rate).abs() < 0.05 * rate + 0.005
+                            }
+                            Some(Err(Wrong::Time(seen))) => (seen - rate).abs() < 0.05 * rate + 1e-3,
+                            _ => false,
+                        };
+                        assert!(right && ms <= at_most, "{rates:?}, {held_up_ms} ms: {said:?} after {ms} ms");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_board_that_is_held_up_before_its_samples_is_not_refused_and_one_without_samples_is() {
+        // Thirty samples come behind an answer, once: a second later that is no share.
+        let look = |ms: u64, sample| Look {
+            asked_ns: (ms * 1_000_000, ms * 1_000_000 + 200_000),
+            board_us: ms as u32 * 1000,
+            sample,
+        };
+        let mut clock = BoardClock::new(Micros(1000), true);
+        for ms in (0..2000).step_by(5) {
+            let late = if (40..70).contains(&ms) { 30 } else { 0 };
+            assert!(clock.look(look(ms, Some(100 + ms as u16 - late))).is_ok(), "at {ms} ms");
+        }
+        let mut clock = BoardClock::new(Micros(1000), true);
+        let said = (0..2000).step_by(5).map(|ms| clock.look(look(ms, None))).find(|said| *said != Ok(false));
+        assert!(matches!(said, Some(Err(Wrong::Samples(seen))) if seen < 0.01), "{said:?}");
+        // They go to another machine.
+        let mut clock = BoardClock::new(Micros(1000), false);
+        assert!((0..100).step_by(5).any(|ms| clock.look(look(ms, None)) == Ok(true)));
+    }
+
+    #[test]
+    fn a_time_that_stands_still_or_runs_backwards_is_refused() {
+        for rate in [0.0, -1.0] {
+            let (said, ms) = verdict((rate, 1.0), 1000, 0.3, 7);
+            assert!(
+                matches!(said, Some(Err(Wrong::Time(seen))) if seen <= 0.0) && ms < 1020.0,
+                "{said:?} after {ms} ms"
+            );
+        }
+    }
+}
