@@ -20,16 +20,6 @@ def smc_log(tmp_path_factory):
     return path
 
 
-@pytest.fixture
-def clutch_with_parquet(clutch, smc_log, tmp_path):
-    """The command, if it was built to write Parquet, as the released one is."""
-    done = clutch("log", "export", smc_log, "--out", tmp_path / "any.parquet", code=None)
-    if done.returncode:
-        assert "expected a name that ends with .csv;" in done.stderr
-        pytest.skip("the command is built without Parquet")
-    return clutch
-
-
 # --- A channel as Parquet and Arrow --------------------------------------------------------------
 
 

@@ -1,4 +1,4 @@
-//! A channel as Parquet, which the command writes only where it is built with it: read back by the library's reader.
+//! Tables as Parquet, which the command writes only where it is built with it: read back by the library's reader.
 
 use clutch_log::{Limits, TIME};
 use parquet::basic::Compression;
@@ -6,7 +6,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 /// A new folder of a test.
 fn folder(name: &str) -> PathBuf {
@@ -68,4 +68,62 @@ fn a_channel_as_parquet_has_the_cells_of_its_csv() {
         assert_eq!((kept("channel"), kept("source")), (Some(channel), Some("simulation")));
         assert_eq!(kept("scenario.toml"), Some(header.scenario_toml.as_str()));
     }
+}
+
+/// `clutch sweep` of twelve rows, four of which are refused, into a file.
+fn sweep(file: &Path, more: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_clutch"));
+    command.args(["sweep", "pd_2", "--set", "run.duration_s=1.2", "--over", "law.pd.kp_v_rad=500,-1,2000.5"]);
+    command.args(["--over", "run.start=on_path,rest", "--seeds", "2", "--out"]).arg(file).args(more);
+    command.output().expect("the command runs")
+}
+
+#[test]
+fn a_sweep_as_parquet_has_the_cells_of_its_csv_and_goes_on_where_it_was_cut_off() {
+    let dir = folder("sweep");
+    let (lines, table, cut) = (dir.join("a.csv"), dir.join("a.parquet"), dir.join("cut.parquet"));
+    for file in [&lines, &table] {
+        let o = sweep(file, &[]);
+        assert!(o.status.success(), "{}", String::from_utf8_lossy(&o.stderr));
+        let told = String::from_utf8_lossy(&o.stdout).into_owned();
+        assert!(told.starts_with("12 of 12 rows in ") && told.contains(&*file.to_string_lossy()), "{told}");
+    }
+    let mut csv = csv::Reader::from_path(&lines).expect("a table");
+    let file = SerializedFileReader::new(File::open(&table).expect("a file")).expect("a table");
+    let (mut rows, mut refused) = (0, 0);
+    for (row, line) in file.get_row_iter(None).expect("rows").zip(csv.records()) {
+        let (row, line) = (row.expect("a row"), line.expect("a line"));
+        for ((name, value), text) in row.get_column_iter().zip(line.iter()) {
+            match value {
+                Field::Double(x) if text.is_empty() => assert!(x.is_nan(), "row {rows}, {name}"),
+                Field::Double(x) => {
+                    let there: f64 = text.parse().expect("a number");
+                    assert_eq!(there.to_bits(), x.to_bits(), "row {rows}, {name}");
+                }
+                Field::Bool(x) => assert_eq!(x.to_string(), if text.is_empty() { "false" } else { text }),
+                other => assert_eq!(as_csv(other), text, "row {rows}, {name}"),
+            }
+        }
+        refused += u32::from(!line[line.len() - 1].is_empty());
+        rows += 1;
+    }
+    assert_eq!((rows, refused), (12, 4));
+
+    // What a kill leaves is the CSV beside it, and goes on to the same file.
+    let whole = std::fs::read(&table).expect("a file");
+    let text = std::fs::read(&lines).expect("a file");
+    let beside = cut.with_extension("parquet.part.csv");
+    for length in [text.len() / 2, text.len()] {
+        std::fs::write(&beside, &text[..length]).expect("a file");
+        std::fs::write(cut.with_extension("parquet.part"), b"PAR1").expect("a file");
+        let o = sweep(&cut, &["--resume"]);
+        assert!(o.status.success(), "{length} bytes: {}", String::from_utf8_lossy(&o.stderr));
+        assert!(std::fs::read(&cut).expect("a file") == whole, "{length} bytes: another file");
+        assert!(!beside.exists() && !cut.with_extension("parquet.part").exists());
+        std::fs::remove_file(&cut).expect("a file");
+    }
+    let again = sweep(&table, &["--resume"]);
+    let said = String::from_utf8_lossy(&again.stderr).into_owned();
+    assert!(again.status.code() == Some(1) && said.contains("a.parquet: exists already"), "{said}");
+    assert!(std::fs::read(&table).expect("a file") == whole);
 }
