@@ -58,6 +58,26 @@ def test_the_code_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path, m
     pyplot.close("all")
 
 
+def test_the_code_of_the_page_on_logs_reads_a_log_and_one_that_was_cut(tmp_path, monkeypatch):
+    for module in ("mcap", "mcap_protobuf"):
+        pytest.importorskip(module)
+    import clutch
+
+    monkeypatch.chdir(tmp_path)
+    clutch.simulate("smc_2").save("run.mcap")
+    whole = Path("run.mcap").read_bytes()
+    Path("cut.mcap").write_bytes(whole[: len(whole) // 2])
+    (_, read, *_), (_, read_cut, *_) = blocks((DOCS / "log.md").read_text(encoding="utf-8"))
+    printed, namespace = io.StringIO(), {}
+    with contextlib.redirect_stdout(printed):
+        exec(read, namespace)
+    command = clutch.read_log("run.mcap").channels["command"]
+    rows = [tuple(float(number) for number in line.split()[1:]) for line in printed.getvalue().splitlines()]
+    assert rows == list(zip(command["error_rad"].tolist(), command["voltage_v"].tolist(), strict=True))
+    exec(read_cut, namespace)
+    assert 0 < namespace["decoded"].tick < len(command) - 1
+
+
 def test_every_public_name_is_in_the_reference():
     import clutch
 
