@@ -71,6 +71,16 @@ def clutch(tmp_path_factory):
     return Clutch(binary.resolve(), tmp_path_factory.mktemp("clutch"))
 
 
+@pytest.fixture(scope="session")
+def clutch_with_parquet(clutch, tmp_path_factory):
+    """The command, if it was built to write Parquet, as the released one is."""
+    folder = tmp_path_factory.mktemp("parquet")
+    done = clutch("log", "export", folder / "none.mcap", "--out", folder / "none.parquet", code=1)
+    if "expected a name that ends with .csv;" in done.stderr:
+        pytest.skip("the command is built without Parquet")
+    return clutch
+
+
 @pytest.fixture(scope="module")
 def page():
     """A page in a browser."""

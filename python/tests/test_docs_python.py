@@ -4,6 +4,7 @@ On every page, the tests and cases that it cites exist; so do the names in the g
 """
 
 import contextlib
+import functools
 import io
 import os
 import re
@@ -19,8 +20,8 @@ FOLDERS = [DOCS / "python", DOCS / "start"]
 PAGES = [ROOT / "README.md", DOCS / "index.md", DOCS / "referee.md"]
 PAGES += [page for folder in FOLDERS for page in sorted(folder.glob("*.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-# A block that needs what a test machine has not: the comment names the file whose tests run it.
-ELSEWHERE = re.compile(r"<!-- not run here: (\S+) -->\n\Z")
+# A block that needs what a test machine has not: the comment says what, and names the file whose tests run it.
+ELSEWHERE = re.compile(r"<!-- not run here, [^:]+: (\S+) -->\n\Z")
 
 
 def blocks(text):
@@ -55,6 +56,26 @@ def test_the_code_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path, m
         if prints is not None or printed.getvalue():
             assert printed.getvalue().split("\n") == (prints or "").split("\n"), f"{page.name}:{line}"
     pyplot.close("all")
+
+
+def test_the_code_of_the_page_on_logs_reads_a_log_and_one_that_was_cut(tmp_path, monkeypatch):
+    for module in ("mcap", "mcap_protobuf"):
+        pytest.importorskip(module)
+    import clutch
+
+    monkeypatch.chdir(tmp_path)
+    clutch.simulate("smc_2").save("run.mcap")
+    whole = Path("run.mcap").read_bytes()
+    Path("cut.mcap").write_bytes(whole[: len(whole) // 2])
+    (_, read, *_), (_, read_cut, *_) = blocks((DOCS / "log.md").read_text(encoding="utf-8"))
+    printed, namespace = io.StringIO(), {}
+    with contextlib.redirect_stdout(printed):
+        exec(read, namespace)
+    command = clutch.read_log("run.mcap").channels["command"]
+    rows = [tuple(float(number) for number in line.split()[1:]) for line in printed.getvalue().splitlines()]
+    assert rows == list(zip(command["error_rad"].tolist(), command["voltage_v"].tolist(), strict=True))
+    exec(read_cut, namespace)
+    assert 0 < namespace["decoded"].tick < len(command) - 1
 
 
 def test_every_public_name_is_in_the_reference():
@@ -97,6 +118,38 @@ def test_the_tests_and_cases_that_a_page_cites_exist():
                 missing += [f"{page}:{number}: {name}" for name in names if name not in known]
     assert cited > 100
     assert not missing, "\n".join(missing)
+
+
+# Code of a page: a block, or within a line.
+CODE = re.compile(r"^ *```\w*\n(.*?)^ *```$|`([^`\n]+)`", re.MULTILINE | re.DOTALL)
+# A verb of the command, and what follows up to the end of the line.
+CALLED = re.compile(r"(?:^|[$;&|(]) *clutch ([a-z]+)((?: [^\n|;#&)]*)?)", re.MULTILINE)
+# Built into the released command, and into that of the tests; a user's may lack them.
+FEATURES = {"--foxglove", "--scope"}
+
+
+def test_the_verbs_and_options_of_the_command_that_a_page_names_exist(clutch):
+    @functools.cache
+    def options(*verb):
+        return set(re.findall(r"(?<!\w)--[a-z][a-z-]*", clutch(*verb, "--help").stdout))
+
+    verbs = set(re.findall(r"^  ([a-z]+)  ", clutch("--help").stdout, re.MULTILINE)) - {"help"}
+    of_two = {verb for verb in verbs if "Commands:" in clutch(verb, "--help").stdout}
+    assert of_two == {"friction", "log", "scenario"}
+    called, wrong = 0, []
+    for page, text in tracked(".md").items():
+        code = "\n".join(block + span for block, span in CODE.findall(text))
+        for verb, rest in CALLED.findall(re.sub(r"\\\n\s*", " ", code)):
+            if verb not in verbs:
+                wrong.append(f"{page}: no verb {verb}")
+                continue
+            second = [word for word in rest.split()[:1] if verb in of_two and word.isalpha()]
+            known = options(verb, *second) | FEATURES
+            given = [option.replace("_", "-") for option in re.findall(r"(?<=\s)--[a-z][a-z_-]*", rest)]
+            called += 1
+            wrong += [f"{page}: clutch {verb} has no {option}" for option in given if option not in known]
+    assert called > 200
+    assert not wrong, "\n".join(wrong)
 
 
 def test_the_names_in_the_glossary_are_those_of_the_code():

@@ -44,6 +44,19 @@ def test_an_exported_channel_has_every_number_with_its_unit_and_its_meaning(smc_
     assert list(tmp_path.iterdir()) == [file]
 
 
+@pytest.mark.parametrize("channel", ["sample", "command", "truth"])
+def test_the_command_writes_the_same_parquet(smc_log, tmp_path, channel, clutch_with_parquet):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    ours, its = tmp_path / "ours.parquet", tmp_path / "its.parquet"
+    clutch.read_log(smc_log).export(ours, channel)
+    clutch_with_parquet("log", "export", smc_log, "--channel", channel, "--out", its)
+    ours, its = parquet.read_table(ours), parquet.read_table(its)
+    # Names, types, units and meanings of the columns; the log's description of itself.
+    assert its.schema.equals(ours.schema, check_metadata=True)
+    assert its.schema.metadata == ours.schema.metadata
+    assert repr(its.to_pydict()) == repr(ours.to_pydict())
+
+
 def test_units_and_meanings_of_columns_come_from_the_tables_that_declare_them(smc_log):
     command = clutch.read_log(smc_log).channels["command"]
     rate = {"units": "rad/s", "long_name": "Rate of the error as the law saw it"}

@@ -1,4 +1,7 @@
-"""Pages for those who begin: every command of a page runs, in its order, and prints the lines that the page has."""
+"""Pages for those who begin, and the README's list of commands: every command runs, in its order.
+
+Where a page has lines that a command prints, it prints them.
+"""
 
 import os
 import re
@@ -34,12 +37,14 @@ def plain(text):
     return re.sub(r"\s+", " ", text)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_the_commands_of_a_page_run_and_print_what_the_page_says(page, clutch, tmp_path):
+@pytest.fixture
+def shell(clutch, tmp_path):
+    """Runs a script in a folder of its own, in which `clutch` is the command: what it says."""
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "clutch").symlink_to(clutch.binary)
     environment = {**os.environ, "PATH": f"{tmp_path / 'bin'}{os.pathsep}{os.environ['PATH']}"}
-    for line, script, prints in steps(page.read_text(encoding="utf-8")):
+
+    def run(script, place, code=0):
         done = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", script],
             cwd=tmp_path,
@@ -48,11 +53,41 @@ def test_the_commands_of_a_page_run_and_print_what_the_page_says(page, clutch, t
             encoding="utf-8",
             timeout=180,
         )
-        assert done.returncode == 0, f"{page.name}:{line}: {done.stdout}{done.stderr}"
-        rest = plain(done.stdout + done.stderr)
+        assert done.returncode == code, f"{place}: exit {done.returncode}: {done.stdout}{done.stderr}"
+        return done.stdout + done.stderr
+
+    return run
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_commands_of_a_page_run_and_print_what_the_page_says(page, shell):
+    for line, script, prints in steps(page.read_text(encoding="utf-8")):
+        rest = plain(shell(script, f"{page.name}:{line}"))
         for expected in map(plain, prints):
             assert expected in rest, f"{page.name}:{line}: no {expected!r} in {rest}"
             rest = rest.split(expected, 1)[1]
+
+
+# Lines of the README that these tests do not run, by how they begin, with the reason.
+NOT_HERE = {
+    "cargo install ": "it compiles the command that the tests have",
+    "clutch daq ": "it goes on until it is stopped; tests/loop stops it",
+    "clutch hil ": "it needs an emulator and an image for it; tests/hil has both",
+}
+
+
+def test_the_commands_of_the_readme_run_in_its_order(shell, tmp_path):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    lines = next(body for _, body in FENCE.findall(readme) if "clutch scenario new " in body).splitlines()
+    left_out = {begin for begin in NOT_HERE for line in lines if line.startswith(begin)}
+    assert left_out == NOT_HERE.keys()
+    run = [line for line in lines if not line.startswith(tuple(NOT_HERE))]
+    assert len(run) >= 18 and all(line.startswith("clutch ") for line in run)
+    for line in run:
+        shell(line, line)
+    made = "mine.svg laws.svg rows.csv rig.toml map.toml run.mcap run.csv reproduce/report.html"
+    for file in made.split():
+        assert (tmp_path / file).stat().st_size > 0, file
 
 
 # A picture that leads to a page: its words, its file, the page.

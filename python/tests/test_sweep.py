@@ -536,3 +536,19 @@ def test_more_rows_than_fit_are_refused_before_memory_is_taken():
     axes = {f"law.smc.{key}": range(10**4) for key in ("kp_v", "kd_v_s_rad", "slope_1_s")}
     with pytest.raises(ValueError, match="grid: 1000000000000 rows, expected at most 10000000"):
         clutch.grid(axes)
+
+
+def test_the_command_writes_the_same_table_as_parquet(clutch_with_parquet, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    scenario = clutch.Scenario.load("pd_2", {"run.duration_s": 1.2})
+    ours = clutch.sweep(scenario, {"law.pd.kp_v_rad": [500.0, -1.0, 2000.5]}, seeds=2, errors="keep").table.to_arrow()
+    file = tmp_path / "table.parquet"
+    over = "law.pd.kp_v_rad=500.0,-1.0,2000.5"
+    clutch_with_parquet("sweep", "pd_2", "--set", "run.duration_s=1.2", "--over", over, "--seeds", 2, "--out", file)
+    its = parquet.read_table(file)
+    for field in ours.schema:
+        if field.name not in ("row", "error"):  # a table has its rows in order; a reason names where it was written
+            assert its.schema.field(field.name).equals(field, check_metadata=True), field
+            assert repr(its[field.name].to_pylist()) == repr(ours[field.name].to_pylist()), field
+    assert [bool(text) for text in its["error"].to_pylist()] == [False, False, True, True, False, False]
+    assert clutch.Scenario.from_toml(its.schema.metadata[b"scenario.toml"].decode()) == scenario

@@ -18,7 +18,7 @@ pub(crate) fn check() -> Result<()> {
     program("chmod").arg("+x").arg(&compiler).run()?;
     for target in TARGETS {
         // The command as a release has it.
-        let options = ["--features", "clutch-cli/foxglove,clutch-cli/scope"];
+        let options = ["--features", "clutch-cli/foxglove,clutch-cli/parquet,clutch-cli/scope"];
         let check = cargo([
             "check",
             "--locked",

@@ -326,7 +326,7 @@ fn check() -> Result<()> {
     }
     cargo(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]).run()?;
     // The command as a release has it.
-    let released = ["--package", "clutch-cli", "--all-targets", "--features", "foxglove,scope"];
+    let released = ["--package", "clutch-cli", "--all-targets", "--features", "foxglove,parquet,scope"];
     cargo(["clippy"]).args(released).args(["--", "-D", "warnings"]).run()?;
     // Each feature of the core by itself: the workspace turns on what its crates ask for.
     for features in ["", "linalg", "terse"] {

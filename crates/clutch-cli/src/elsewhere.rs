@@ -1,7 +1,7 @@
-//! Verbs that are made for Linux, on another system: they say what is missing there.
+//! What is made for Linux, on another system: verbs and options say what is missing there.
 
 use crate::output::Exit;
-use anyhow::bail;
+use anyhow::anyhow;
 use clap::{Args, Subcommand};
 use std::ffi::OsString;
 
@@ -33,11 +33,36 @@ impl NotHere {
             NotHere::Daq(_) => ("daq", "its ports and pseudo-terminals"),
             NotHere::Hil(_) => ("hil", "its links to the emulators"),
         };
-        bail!(
-            "clutch {verb}: not on {}: {needs} are made for Linux. What needs no board runs here: sim, certify, tune, map, \
-             replay, log, identify with --from or on its simulated board; docs/platforms.md",
-            std::env::consts::OS
-        );
+        Err(not_here(verb, needs))
+    }
+}
+
+/// The refusal of what is asked for, and what it needs that is not here.
+pub(crate) fn not_here(asked: &str, needs: &str) -> anyhow::Error {
+    anyhow!(
+        "clutch {asked}: not on {}: {needs} are made for Linux. What needs no board runs here: sim, certify, tune, map, \
+         replay, log, identify with --from or on its simulated board; docs/platforms.md",
+        std::env::consts::OS
+    )
+}
+
+/// The options of a board at a port, which are taken so that the port is refused.
+#[derive(Args)]
+pub(crate) struct AtPort {
+    #[arg(long, hide = true)]
+    port: Option<OsString>,
+    #[arg(long, hide = true)]
+    uncertified: bool,
+    #[arg(long, hide = true, requires = "port")]
+    patient: bool,
+}
+
+impl AtPort {
+    pub(crate) fn refuse(&self, verb: &str) -> anyhow::Result<()> {
+        match self.port {
+            Some(_) => Err(not_here(&format!("{verb} --port"), "its ports and clock")),
+            None => Ok(()),
+        }
     }
 }
 
@@ -65,5 +90,24 @@ mod tests {
             assert!(said.starts_with(&format!("clutch {verb}: not on {here}: ")), "{said}");
             assert!(said.contains("made for Linux") && said.contains("docs/platforms.md"), "{said}");
         }
+    }
+
+    #[test]
+    fn a_board_at_a_port_is_refused_whatever_else_is_asked_of_it() {
+        #[derive(Parser)]
+        struct Verb {
+            #[command(flatten)]
+            at_port: AtPort,
+        }
+        let refused = |line: &[&str]| {
+            let verb = Verb::try_parse_from(["clutch"].iter().chain(line));
+            verb.unwrap_or_else(|e| panic!("{line:?}: {e}")).at_port.refuse("identify")
+        };
+        assert!(refused(&[]).is_ok() && refused(&["--uncertified"]).is_ok());
+        let said =
+            refused(&["--port", "COM3", "--uncertified", "--patient"]).expect_err("a refusal").to_string();
+        let here = std::env::consts::OS;
+        assert!(said.starts_with(&format!("clutch identify --port: not on {here}: ")), "{said}");
+        assert!(said.contains("made for Linux"), "{said}");
     }
 }

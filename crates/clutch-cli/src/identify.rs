@@ -57,6 +57,9 @@ pub(crate) struct Identify {
     #[cfg(target_os = "linux")]
     #[arg(long, requires = "port")]
     patient: bool,
+    #[cfg(not(target_os = "linux"))]
+    #[command(flatten)]
+    at_port: crate::elsewhere::AtPort,
     /// Folder for a log of each part; it may not hold them yet.
     #[arg(long, value_name = "FOLDER")]
     log: Option<PathBuf>,
@@ -88,6 +91,8 @@ pub(crate) struct Identify {
 
 impl Identify {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
+        #[cfg(not(target_os = "linux"))]
+        self.at_port.refuse("identify")?;
         let (scenario, set) = (self.scenario.clone(), self.set.clone());
         let args = ScenarioArgs { scenario, set, identified: None, map: None };
         let scenario = args.load()?;

@@ -51,8 +51,8 @@ pub(crate) fn image(named: PathBuf) -> anyhow::Result<PathBuf> {
     }
     let places: Vec<String> = places.iter().map(|place| format!("\n  {}", place.display())).collect();
     bail!(
-        "--image {}: no image of this name in\n{}\nbuild it in a checkout of clutch (cargo xtask firmware build), \
-         or name a file, or a folder of images by CLUTCH_IMAGES",
+        "--image {}: no image of this name in\n{}\nbuild it in a checkout of clutch (cargo xtask firmware build), or name a file,\n\
+         or a folder of images by CLUTCH_IMAGES",
         named.display(),
         places.concat().trim_start_matches('\n')
     )

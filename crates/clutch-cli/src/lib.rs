@@ -5,6 +5,8 @@
 mod args;
 mod c_header;
 pub mod certify;
+#[cfg(feature = "parquet")]
+mod columnar;
 mod compare;
 #[cfg(target_os = "linux")]
 mod daq;

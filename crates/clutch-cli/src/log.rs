@@ -34,9 +34,10 @@ enum Verb {
         #[arg(value_name = "NEW.mcap")]
         to: PathBuf,
     },
-    /// Writes a channel as a table in CSV: a row a record, units in the columns' names.
+    /// Writes a channel as a table, CSV or Parquet: a row a record, units in the columns' names.
     ///
-    /// Each number reads back as the same number. Exit code 5: the log ended early, or is damaged;
+    /// Each number reads back as the same number. Parquet has units and meanings of the columns, the log's description and
+    /// its scenario as well; a command that is built without it says so. Exit code 5: the log ended early, or is damaged;
     /// the table has what can be read.
     #[command(
         after_help = "Example:\n  clutch log export run.mcap --out run.csv\n  clutch log export run.mcap --channel sample --out samples.csv"

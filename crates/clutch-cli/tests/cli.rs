@@ -1042,9 +1042,14 @@ fn a_table_of_a_log_reads_back_as_the_logs_records_bit_for_bit() {
     assert_eq!(again.status.code(), Some(1));
     assert!(err(&again).contains("command.csv: exists already"), "{}", err(&again));
     assert!(std::fs::read(dir.join("command.csv")).expect("a table") == before);
-    let parquet = clutch(&["log", "export", &log, "--out", &path("run.parquet")]);
-    let advice = format!("clutch.read_log({log:?}).export({:?}, \"command\")", path("run.parquet"));
-    assert!(err(&parquet).contains(&advice), "{}", err(&parquet));
+    // Another form is another program's, which is named; Parquet where the command is built without it.
+    for name in if cfg!(feature = "parquet") { &["run.arrow"][..] } else { &["run.arrow", "run.parquet"] } {
+        let arrow = clutch(&["log", "export", &log, "--out", &path(name)]);
+        let advice = format!("clutch.read_log({log:?}).export({:?}, \"command\")", path(name));
+        assert!(arrow.status.code() == Some(1) && err(&arrow).contains(&advice), "{}", err(&arrow));
+    }
+    let other = clutch(&["log", "export", &log, "--out", &path("run.xlsx")]);
+    assert!(err(&other).contains("run.xlsx: expected a name that ends with .csv"), "{}", err(&other));
     let none = clutch(&["log", "export", &path("sample.csv"), "--out", &path("none.csv")]);
     assert_eq!(none.status.code(), Some(1), "{}", out(&none));
     assert!(!dir.join("none.csv").exists() && !dir.join("run.parquet").exists());

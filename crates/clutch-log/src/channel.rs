@@ -1,6 +1,7 @@
 //! A channel: its topic, its protobuf message, the fields of that.
 
 use crate::names::Names;
+use clutch_core::params::Unit;
 
 /// A field of a message, as viewers show it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +14,16 @@ pub struct Field {
     pub kind: Kind,
     /// Its meaning.
     pub meaning: &'static str,
+}
+
+impl Field {
+    /// Its meaning as a label: without the unit, which stands last, and the full stop.
+    #[must_use]
+    pub fn label(&self) -> &'static str {
+        let words = self.meaning.trim_end_matches('.');
+        let unit = Unit::of_key(self.name).map_or("", |unit| unit.text);
+        words.strip_suffix(unit).and_then(|words| words.strip_suffix(", ")).unwrap_or(words)
+    }
 }
 
 /// Protobuf type of a [`Field`].
@@ -83,6 +94,15 @@ impl Channel {
             columns.push((if taken { format!("{term}_{i}") } else { term.clone() }, field.kind));
         }
         columns
+    }
+
+    /// A column's meaning as a label; empty for a term of the law, which has a name alone.
+    #[must_use]
+    pub fn label(&self, column: &str) -> &'static str {
+        if column == TIME {
+            return "time since the start of the run";
+        }
+        self.fields.iter().find(|field| field.name == column).map_or("", Field::label)
     }
 }
 

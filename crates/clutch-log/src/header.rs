@@ -88,3 +88,22 @@ impl Default for Header {
         }
     }
 }
+
+impl Header {
+    /// What a table of a channel keeps of it, as texts: all but parameters, which are in the scenario, and terms, which are columns.
+    #[must_use]
+    pub fn described(&self) -> Vec<(String, String)> {
+        let mut all = vec![
+            ("scenario".to_owned(), self.scenario_name.clone()),
+            ("version".to_owned(), self.version.clone()),
+            ("law_hash".to_owned(), format!("{:016x}", self.law_hash)),
+            ("port".to_owned(), self.port.clone()),
+            ("source".to_owned(), self.source.name().to_owned()),
+            ("scalar".to_owned(), self.scalar.clone()),
+            ("period_us".to_owned(), self.period_us.to_string()),
+            ("started_unix_ns".to_owned(), self.started_unix_ns.to_string()),
+        ];
+        all.extend(self.extra.iter().cloned());
+        all
+    }
+}

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod cells;
 mod channel;
 mod error;
 mod format;
@@ -16,6 +17,7 @@ mod scan;
 mod sync;
 mod write;
 
+pub use cells::{Cells, word};
 pub use channel::{Channel, Field, Kind, TIME, Value};
 pub use error::LogError;
 pub use header::{Header, Source};

@@ -5,15 +5,12 @@ use crate::run::{go_on, stick_table, unless_interrupted, window_parts};
 use crate::scenario::Scenario;
 use crate::stepping::PythonLaw;
 use crate::table::{Column, Table, pairs};
-use clutch_core::params::Unit;
-use clutch_log::names::{Names, name_of};
-use clutch_log::{Field, InChannel, Kind, Limits, TIME, Value};
+use clutch_log::{Cells, InChannel, Limits, TIME};
 use clutch_loop::picture::pictured;
 use clutch_loop::replay;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::borrow::Cow;
 use std::iter;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -46,81 +43,33 @@ pub(crate) fn read_unless_interrupted(py: Python<'_>, path: &Path) -> PyResult<c
 /// Rows of a table between two questions whether a signal waits: milliseconds.
 const ASK_EVERY: usize = 1 << 14;
 
-/// A column that grows by a record.
-enum Growing {
-    Whole(Vec<i64>),
-    Real(Vec<f64>),
-    Flag(Vec<bool>),
-    Name(Names, Vec<Cow<'static, str>>),
-}
-
-impl Growing {
-    fn of(kind: Kind) -> Growing {
-        match kind {
-            Kind::Double => Growing::Real(Vec::new()),
-            Kind::Bool => Growing::Flag(Vec::new()),
-            Kind::Enum(_, names) => Growing::Name(names, Vec::new()),
-            Kind::Uint32 | Kind::Uint64 | Kind::Sint32 | Kind::Sint64 | Kind::String => {
-                Growing::Whole(Vec::new())
-            }
-        }
-    }
-
-    /// Appends a value; NaN for a term that the record does not have.
-    fn push(&mut self, value: Option<Value>) {
-        match (self, value) {
-            (Growing::Name(names, all), Some(Value::Whole(x))) => {
-                all.push(match u8::try_from(x).map_or("?", |x| name_of(names, x)) {
-                    "?" => x.to_string().into(), // of a later version
-                    name => name.into(),
-                });
-            }
-            (Growing::Whole(all), Some(Value::Whole(x))) => all.push(x),
-            (Growing::Flag(all), Some(Value::Flag(x))) => all.push(x),
-            (Growing::Real(all), Some(Value::Real(x))) => all.push(x),
-            (Growing::Real(all), _) => all.push(f64::NAN),
-            (Growing::Name(_, _) | Growing::Whole(_) | Growing::Flag(_), _) => {
-                unreachable!("a field's value is of its kind: both are made from one row")
-            }
-        }
-    }
-
-    fn column(self) -> Column {
-        match self {
-            Growing::Whole(all) => Column::own(all),
-            Growing::Real(all) => Column::own(all),
-            Growing::Flag(all) => Column::own(all),
-            Growing::Name(_, all) => Column::text(all),
-        }
+/// The values of a field as a column.
+fn column(cells: Cells) -> Column {
+    match cells {
+        Cells::Whole(all) => Column::own(all),
+        Cells::Real(all) => Column::own(all),
+        Cells::Flag(all) => Column::own(all),
+        Cells::Word(_, all) => Column::text(all),
     }
 }
 
 /// The records of a channel: the time, and the channel's fields. `terms` name the last ones of commands. Breaks when a
 /// signal waits.
 fn table<R: InChannel>(records: &[R], terms: &[String]) -> ControlFlow<(), Table> {
-    let mut columns: Vec<(String, Growing)> =
-        R::CHANNEL.columns(terms).into_iter().map(|(name, kind)| (name, Growing::of(kind))).collect();
+    let mut columns: Vec<(String, Cells)> =
+        R::CHANNEL.columns(terms).into_iter().map(|(name, kind)| (name, Cells::of(kind))).collect();
     for (i, record) in records.iter().enumerate() {
         if i.is_multiple_of(ASK_EVERY) {
             go_on()?;
         }
         let mut values = record.values();
-        columns.iter_mut().for_each(|(_, column)| column.push(values.next()));
+        columns.iter_mut().for_each(|(_, cells)| cells.push(values.next()));
     }
     let time = records.iter().map(|r| r.time_ns() as f64 / 1e9).collect::<Vec<f64>>();
-    let columns = columns.into_iter().map(|(name, column)| (name, column.column()));
+    let columns = columns.into_iter().map(|(name, cells)| (name, column(cells)));
     let table = Table::of(iter::once((TIME.to_owned(), Column::own(time))).chain(columns));
-    let meanings = R::CHANNEL.fields.iter().map(|f| (f.name, plain_meaning(f)));
-    ControlFlow::Continue(
-        table.meaning(iter::once((TIME, "time since the start of the run")).chain(meanings)),
-    )
-}
-
-/// The words of a field without its unit, which stands last, and the full stop.
-fn plain_meaning(field: &Field) -> &str {
-    let words = field.meaning.trim_end_matches('.');
-    let unit = Unit::of_key(field.name).map_or("", |unit| unit.text);
-    words.strip_suffix(unit).and_then(|words| words.strip_suffix(", ")).unwrap_or(words)
+    let names = iter::once(TIME).chain(R::CHANNEL.fields.iter().map(|field| field.name));
+    ControlFlow::Continue(table.meaning(names.map(|name| (name, R::CHANNEL.label(name)))))
 }
 
 /// The result of the work, or the signal's exception.
@@ -176,19 +125,7 @@ impl Log {
     /// The log's description of itself, as texts.
     #[getter]
     fn metadata<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let h = &self.log.header;
-        let mut all = vec![
-            ("scenario".to_owned(), h.scenario_name.clone()),
-            ("version".to_owned(), h.version.clone()),
-            ("law_hash".to_owned(), format!("{:016x}", h.law_hash)),
-            ("port".to_owned(), h.port.clone()),
-            ("source".to_owned(), h.source.name().to_owned()),
-            ("scalar".to_owned(), h.scalar.clone()),
-            ("period_us".to_owned(), h.period_us.to_string()),
-            ("started_unix_ns".to_owned(), h.started_unix_ns.to_string()),
-        ];
-        all.extend(h.extra.iter().cloned());
-        pairs(py, &all)
+        pairs(py, &self.log.header.described())
     }
 
     /// The scenario's file.

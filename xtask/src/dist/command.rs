@@ -8,7 +8,8 @@ use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 
 /// The program, as cargo's options name it, with all its options.
-const COMMAND: [&str; 6] = ["--package", "clutch-cli", "--bin", "clutch", "--features", "foxglove,scope"];
+const COMMAND: [&str; 6] =
+    ["--package", "clutch-cli", "--bin", "clutch", "--features", "foxglove,parquet,scope"];
 
 /// The one that runs here.
 pub(super) fn here(tools: &Tools) -> Result<PathBuf> {

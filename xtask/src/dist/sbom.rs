@@ -36,7 +36,7 @@ pub(super) fn make(tools: &Tools) -> Result<Vec<Made>> {
     let temporary = format!("bill-{}", std::process::id());
     // The command's bill is of the command with all its options, as a release has it.
     let workspaces = [
-        ("Cargo.toml", &["--features", "clutch-cli/foxglove,clutch-cli/scope"][..]),
+        ("Cargo.toml", &["--features", "clutch-cli/foxglove,clutch-cli/parquet,clutch-cli/scope"][..]),
         ("firmware/Cargo.toml", &[]),
     ];
     let described = workspaces.iter().try_for_each(|(workspace, features)| {

@@ -26,8 +26,13 @@ const SKIPPED_WITHOUT_TARGETS: u64 =
 
 /// The packages that are built for this machine, the command with all its options. Always the same selection: with another
 /// one cargo gives libraries other features, and compiles them once more. The wheel's module only links inside of Python.
-const WORKSPACE: [&str; 5] =
-    ["--workspace", "--exclude", "clutch-py", "--features", "clutch-cli/foxglove,clutch-cli/scope"];
+const WORKSPACE: [&str; 5] = [
+    "--workspace",
+    "--exclude",
+    "clutch-py",
+    "--features",
+    "clutch-cli/foxglove,clutch-cli/parquet,clutch-cli/scope",
+];
 
 /// Runs everything, counts, and fails at the end if anything failed.
 pub(crate) fn all() -> Result<()> {

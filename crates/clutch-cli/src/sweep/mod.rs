@@ -1,8 +1,11 @@
 //! `clutch sweep`.
 
+#[cfg(feature = "parquet")]
+mod columns;
+
 use crate::args::ScenarioArgs;
 use crate::map;
-use crate::output::{Exit, tell, with_progress};
+use crate::output::{Exit, new_file, tell, with_progress};
 use crate::signals::stop_flag;
 use anyhow::{Context, bail, ensure};
 use clap::Args;
@@ -19,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Runs a scenario with many values of its keys, and writes the figures of each run as a row of a CSV file.
+/// Runs a scenario with many values of its keys, and writes the figures of each run as a row of a table.
 ///
 /// Each --over is a key with its values; together they are a grid, of which the last key runs fastest. Rows are written in
 /// their order, some thousand at a time: what stops early goes on with --resume.
@@ -39,8 +42,9 @@ pub(crate) struct SweepVerb {
     /// Runs each row with the seeds 1 to N.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     seeds: Option<u64>,
-    /// The file that the rows are written to.
-    #[arg(long, value_name = "FILE.csv")]
+    /// The table, by its ending: Parquet where the command is built with it, which is made at the end, of a CSV beside it; else
+    /// CSV.
+    #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Goes on with a file that an earlier sweep of the same rows has begun.
     #[arg(long)]
@@ -204,7 +208,7 @@ impl SweepVerb {
         let origin = self.scenario.scenario.to_string_lossy().into_owned();
         let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         let threads = self.threads.map_or_else(cores, NonZeroUsize::get);
-        let (out, resume) = (self.out, self.resume);
+        let (out, resume) = (lines_of(&self.out)?, self.resume);
         let grid = Grid::new(origin, &scenario, self.over, self.seeds)?;
         let stop = stop_flag()?;
         let Begun { mut file, rows: before } =
@@ -237,7 +241,13 @@ impl SweepVerb {
             }
             Ok(true)
         })?;
-        let mut text = format!("{rows} of {} rows in {}", grid.rows, out.display());
+        let made = if done { &self.out } else { &out };
+        #[cfg(feature = "parquet")]
+        if done && out != self.out {
+            grid.convert(&out, &self.out)?;
+            drop(std::fs::remove_file(&out)); // every row of it is in the other
+        }
+        let mut text = format!("{rows} of {} rows in {}", grid.rows, made.display());
         if before > 0 {
             text += &format!(", {before} of them from before");
         }
@@ -250,6 +260,20 @@ impl SweepVerb {
         tell(&(text + "\n"))?;
         Ok(if done { Exit::Done } else { Exit::Stopped })
     }
+}
+
+/// The file that rows are added to as they come: the table itself, or of one that ends with its last row a CSV beside it.
+fn lines_of(out: &Path) -> anyhow::Result<PathBuf> {
+    if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
+        return Ok(out.to_owned());
+    }
+    ensure!(
+        cfg!(feature = "parquet"),
+        "{}: this command is built without Parquet, which the released one has; name a file that ends with .csv",
+        out.display()
+    );
+    new_file(out)?;
+    Ok(out.with_extension("parquet.part.csv"))
 }
 
 /// A new file.

@@ -1,0 +1,142 @@
+//! The rows of a sweep as Parquet, made of the CSV to which they were written as they came.
+
+use super::{Grid, Over, figures};
+use crate::columnar::{Column, Columnar, TOGETHER, field};
+use crate::output::BUILD;
+use anyhow::{Context, anyhow};
+use arrow_schema::{DataType, Field};
+use clutch_core::params::Unit;
+use clutch_sim::metrics::{Detected, Metrics};
+use clutch_sim::scenario::Value;
+use std::path::Path;
+
+/// Values of a column, as they are read.
+enum Cells {
+    Whole(Vec<i64>),
+    Real(Vec<f64>),
+    Flag(Vec<bool>),
+    Text(Vec<String>),
+}
+
+impl Cells {
+    /// Of a key with these values.
+    fn of(axis: &Over) -> Cells {
+        let all = |is: fn(&Value) -> bool| axis.values.iter().all(is);
+        if all(|value| matches!(value, Value::Integer(_))) {
+            Cells::Whole(Vec::new())
+        } else if all(|value| matches!(value, Value::Integer(_) | Value::Float(_))) {
+            Cells::Real(Vec::new())
+        } else {
+            Cells::Text(Vec::new())
+        }
+    }
+
+    /// Takes a cell of the CSV; false if it is none of this column. Of a row that was refused a figure is NaN, and it is not
+    /// certified, as in Python.
+    fn push(&mut self, cell: &str) -> bool {
+        match self {
+            Cells::Whole(all) => cell.parse().map(|x| all.push(x)).is_ok(),
+            Cells::Real(all) if cell.is_empty() => {
+                all.push(f64::NAN);
+                true
+            }
+            Cells::Real(all) => cell.parse().map(|x| all.push(x)).is_ok(),
+            Cells::Flag(all) if cell.is_empty() => {
+                all.push(false);
+                true
+            }
+            Cells::Flag(all) => cell.parse().map(|x| all.push(x)).is_ok(),
+            Cells::Text(all) => {
+                all.push(cell.to_owned());
+                true
+            }
+        }
+    }
+
+    fn column(&self) -> Column<'_> {
+        match self {
+            Cells::Whole(all) => Column::Whole(all),
+            Cells::Real(all) => Column::Real(all),
+            Cells::Flag(all) => Column::Flag(all),
+            Cells::Text(all) => Column::Text(all.iter().map(String::as_str).collect()),
+        }
+    }
+
+    fn clear(&mut self) {
+        match self {
+            Cells::Whole(all) => all.clear(),
+            Cells::Real(all) => all.clear(),
+            Cells::Flag(all) => all.clear(),
+            Cells::Text(all) => all.clear(),
+        }
+    }
+
+    fn field(&self, name: &str, about: (&str, &str)) -> Field {
+        let of = match self {
+            Cells::Whole(_) => DataType::Int64,
+            Cells::Real(_) => DataType::Float64,
+            Cells::Flag(_) => DataType::Boolean,
+            Cells::Text(_) => DataType::Utf8,
+        };
+        field(name, of, about)
+    }
+}
+
+impl Grid {
+    /// The columns in the order of [`Grid::header`].
+    fn columns(&self) -> Vec<(Field, Cells)> {
+        let mut columns: Vec<(Field, Cells)> = Vec::new();
+        let mut add = |name: &str, cells: Cells, about| columns.push((cells.field(name, about), cells));
+        for axis in &self.axes {
+            let unit = Unit::of_key(&axis.key).map_or("", |unit| unit.text);
+            add(&axis.key, Cells::of(axis), (unit, ""));
+        }
+        let of_motion = Metrics::FIGURES.iter().map(|f| (f.name, (f.unit, f.label)));
+        let about: Vec<_> =
+            of_motion.chain(Detected::FIGURES.iter().map(|f| (f.name, (f.unit, f.label)))).collect();
+        for (name, _) in figures(&Metrics::default(), &Detected::default()) {
+            let about =
+                about.iter().find(|(figure, _)| *figure == name).map_or(("", ""), |(_, about)| *about);
+            add(name, Cells::Real(Vec::new()), about);
+        }
+        add("certified", Cells::Flag(Vec::new()), ("", ""));
+        add("error", Cells::Text(Vec::new()), ("", ""));
+        columns
+    }
+
+    /// Makes the Parquet of the CSV; the file has its name only once it is whole.
+    pub(super) fn convert(&self, lines: &Path, out: &Path) -> anyhow::Result<()> {
+        let part = out.with_extension("parquet.part");
+        drop(std::fs::remove_file(&part)); // of a conversion that was cut off
+        let (fields, mut cells): (Vec<_>, Vec<_>) = self.columns().into_iter().unzip();
+        let names: Vec<String> = fields.iter().map(|field| field.name().clone()).collect();
+        let kept = [
+            ("scenario", self.origin.clone()),
+            ("version", BUILD.to_owned()),
+            ("scenario.toml", self.base.to_string()),
+        ];
+        let kept = kept.map(|(key, text)| (key.to_owned(), text)).to_vec();
+        let wrong = || format!("{}: cannot be written", out.display());
+        let mut file = Columnar::begin(&part, fields, kept).with_context(wrong)?;
+        let mut csv =
+            csv::Reader::from_path(lines).with_context(|| format!("{}: cannot be read", lines.display()))?;
+        let mut waiting = 0;
+        for (row, record) in csv.records().enumerate() {
+            for ((cells, cell), name) in cells.iter_mut().zip(&record?).zip(&names) {
+                let told =
+                    || anyhow!("{}: row {}, {name} = {cell}: is not of this sweep", lines.display(), row + 1);
+                cells.push(cell).then_some(()).ok_or_else(told)?;
+            }
+            waiting += 1;
+            if waiting == TOGETHER {
+                file.rows(cells.iter().map(Cells::column)).with_context(wrong)?;
+                cells.iter_mut().for_each(Cells::clear);
+                waiting = 0;
+            }
+        }
+        if waiting > 0 {
+            file.rows(cells.iter().map(Cells::column)).with_context(wrong)?;
+        }
+        file.end().and_then(|()| std::fs::rename(&part, out)).with_context(wrong)
+    }
+}
