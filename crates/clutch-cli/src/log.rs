@@ -1,7 +1,7 @@
 //! `clutch log`.
 
 use crate::export::Export;
-use crate::output::{Exit, new_file, print};
+use crate::output::{Exit, new_file, paragraph, print};
 use clap::{Args, Subcommand};
 use clutch_log::Limits;
 use std::path::PathBuf;
@@ -55,7 +55,7 @@ impl Log {
             }
             Verb::Recover { from, to } => {
                 new_file(&to)?;
-                clutch_log::recover(&from, &to, &Limits::default())?.to_string()
+                paragraph(&clutch_log::recover(&from, &to, &Limits::default())?.to_string())
             }
             Verb::Export(export) => return export.run(),
         };

@@ -44,6 +44,12 @@ fn foxgloves_layout_names_what_logs_have() {
     paths.iter().for_each(|path| is_in_logs(path, '.'));
     assert!(paths.len() >= 15, "{paths:?}");
 
+    // Each viewer looks for a panel's title under a key of its own.
+    for (name, panel) in layout["configById"].as_object().unwrap() {
+        let title = panel["foxglovePanelTitle"].as_str().unwrap_or_else(|| panic!("{name} has no title"));
+        assert_eq!(panel["lichtblickPanelTitle"], title);
+    }
+
     // Each panel stands somewhere, and each that stands somewhere is there.
     let panels: BTreeSet<&str> =
         layout["configById"].as_object().unwrap().keys().map(String::as_str).collect();

@@ -48,7 +48,7 @@ pub struct Header {
     pub scenario_name: String,
     /// The whole scenario, TOML.
     pub scenario_toml: String,
-    /// Every parameter, flattened: `law.kp` → `12.5`.
+    /// Every parameter, flattened: `law.smc.kp_v` → `2.5`.
     pub parameters: Vec<(String, String)>,
     /// Version of the build.
     pub version: String,

@@ -29,7 +29,7 @@ const PARAMETERS: Channel = Channel {
             number: 1,
             name: "key",
             kind: Kind::String,
-            meaning: "Name, as in the scenario file: `law.kp`.",
+            meaning: "Name, as in the scenario file: `law.smc.kp_v`.",
         },
         Field { number: 2, name: "value", kind: Kind::String, meaning: "Value, as in the scenario file." },
     ],
