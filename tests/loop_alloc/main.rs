@@ -122,7 +122,7 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     let mut station = ControllerStation { node, path: &path };
     let mut talk = Talk::new(&mut port, &mut station);
     talk.configure(DacCode(hello.boot_code)).unwrap();
-    let clock = talk.clock().unwrap();
+    let clock = talk.clock(None).unwrap();
 
     let watch = Arc::new(Watch::default());
     let header = from_scenario::header(&scenario, &built.servo, Source::Loop, &address.to_string(), "test");
