@@ -1,4 +1,4 @@
-//! A shaft is the system of one inertia and one row: the engines of the shaft and that of systems on the same intervals.
+//! A shaft is the system of one inertia and one row: its engines and that of systems on the same intervals.
 
 use crate::draw::Draw;
 use crate::parts::Interval;
@@ -52,8 +52,8 @@ impl OneRow<'_> {
     }
 }
 
-/// Largest differences of so many intervals: of positions, rad, and of the instants at which they begin and end to rest, s;
-/// they do so equally often.
+/// Largest differences of so many intervals: of positions, rad, and of the instants at which rests begin and end, s. They do
+/// so equally often.
 fn furthest_apart(
     (count, seed): (u32, u64),
     constant: bool,

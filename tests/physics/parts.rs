@@ -60,7 +60,7 @@ impl Interval {
         }
     }
 
-    /// One without lag, with an even disc and a torque without corners: what a system of one inertia and one row can say.
+    /// One without lag, with an even disc and a torque without corners: as a system of one inertia and one row.
     pub(crate) fn draw_smooth(draw: &mut Draw, friction: FrictionParams, constant: bool) -> Interval {
         loop {
             let drawn = Interval::draw(draw, friction, constant);

@@ -563,6 +563,34 @@ fn the_runs_of_the_motor_that_the_docs_show_are_the_runs_that_come() {
     assert_eq!(checked, 7);
 }
 
+/// The same page: its file in full, and the figures within its sentences.
+#[test]
+fn the_file_and_the_sentences_of_the_motors_evening_are_what_comes() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/axis.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
+    let told = |args: &[&str]| -> serde_json::Value {
+        serde_json::from_str(&out(&clutch(&[args, &["--json"]].concat()))).unwrap()
+    };
+    let file = folder("evening").join("motor.toml");
+    std::fs::write(&file, page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap()).unwrap();
+    let typed = told(&["sim", file.to_str().unwrap()]);
+    assert_eq!(typed["metrics"], told(&["sim", "motor_pid"])["metrics"]);
+
+    let largest = |args: &[&str]| told(args)["metrics"]["max_error_rad"].as_f64().unwrap().to_degrees();
+    let known = largest(&["sim", "motor_ctc"]);
+    let low = largest(&["sim", "motor_ctc", "--set", "model.actuator.motor.preload_nm=0.2"]);
+    let sentence = format!("its largest error grows from {known:.3}° to {low:.3}°");
+    assert!(words.contains(&sentence), "lacks: {sentence}");
+
+    let proven =
+        ["motor_pid", "motor_pid_coulomb", "motor_smc", "motor_ctc"].map(|name| told(&["certify", name]));
+    assert_eq!(proven.each_ref().map(|p| p["certified"] == true), [false, false, true, false]);
+    let bound = proven[2]["layer"]["error_bound_rad"].as_f64().unwrap().to_degrees();
+    let sentence = format!("certified, for an error below {bound:.2}°");
+    assert!(words.contains(&sentence), "lacks: {sentence}");
+}
+
 #[test]
 fn no_file_is_written_over_another_of_the_same_command() {
     let file = folder("same").join("mine.toml");

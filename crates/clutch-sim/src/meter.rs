@@ -41,7 +41,7 @@ const ROOM: usize = POINTS + 2;
 const FRICTIONS: usize = 40;
 /// Steps of a search by golden section: friction to a millionth.
 const SEARCH: usize = 30;
-/// Counts, and counts per period, that no rounding makes: a bound that decides by more than this decides as the search does.
+/// Counts, and counts per period, that no rounding makes: a bound that decides by more decides as the search does.
 const ROUNDING: f64 = 1e-9;
 
 /// A gap between two edges, judged.
@@ -255,8 +255,8 @@ impl Meter {
         let gain = 1.0 + GAIN_DOUBT;
         let end = &track.now;
         let bowed = |time: f64| 0.5 * slack * time * time;
-        // A way to a rest and on from it is at most what the largest acceleration makes of the whole time; that is convex in
-        // friction.
+        // A way to a rest and on from it is at most what the largest acceleration makes of the whole time; that is convex
+        // in friction.
         let comes_so_far = |h: f64| {
             let of = |pull: f64, load: f64| (sign * pull - h * load).abs();
             let most = track.points().iter().map(|x| of(x.pull, x.load)).fold(of(pull, load), f64::max);
