@@ -402,6 +402,22 @@ mod tests {
     }
 
     #[test]
+    fn computed_torque_as_printed_has_the_bits_of_the_actuators_equation() {
+        let law = Ctc::new(&CtcParams::default(), &PlantParams::default(), &OUTPUT, PERIOD).unwrap();
+        let actuator = law.model().actuator();
+        let mut within = 0;
+        for (i, j) in (-20..=20).flat_map(|i| (-20..=20).map(move |j| (i, j))) {
+            let tick = Tick { error_rate: f64::from(j) * 1e-3, ..behind(f64::from(i) * 1e-4) };
+            let command = law.update(&mut law.start(&tick, 0.0), &tick);
+            let [_, friction, mu] = command.terms;
+            let volts = actuator.volts_for(-friction, mu, actuator.way(tick.target_velocity));
+            assert_eq!(command.voltage.to_bits(), volts.max(0.0).min(9.0).to_bits(), "{tick:?}");
+            within += u32::from(command.limit == Limit::None);
+        }
+        assert!(within > 100, "{within}");
+    }
+
+    #[test]
     fn laws_turn_their_sign_round_for_a_motor() {
         let motor = MotorActuator { gain: 0.05, preload: 0.3, load_share: 0.0 };
         let model = PlantParams { actuator: motor.into(), ..PlantParams::default() };
