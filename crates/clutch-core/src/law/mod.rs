@@ -411,7 +411,7 @@ mod tests {
             let command = law.update(&mut law.start(&tick, 0.0), &tick);
             let [_, friction, mu] = command.terms;
             let volts = actuator.volts_for(-friction, mu, actuator.way(tick.target_velocity));
-            assert_eq!(command.voltage.to_bits(), volts.max(0.0).min(9.0).to_bits(), "{tick:?}");
+            assert_eq!(command.voltage.to_bits(), volts.clamp(0.0, 9.0).to_bits(), "{tick:?}");
             within += u32::from(command.limit == Limit::None);
         }
         assert!(within > 100, "{within}");
