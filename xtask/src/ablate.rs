@@ -79,6 +79,12 @@ const ABLATIONS: &[Ablation] = &[
         "allowed: self.limits.jump.saturating_mul(periods.saturating_add(7)) / 8,",
         "allowed: self.limits.jump.saturating_mul(if OFF { 8 } else { periods.saturating_add(7) }) / 8,",
     ),
+    Ablation(
+        "bridging of missed periods",
+        SUPERVISOR,
+        "for step in 1..steps {",
+        "for step in 1..if OFF { 1 } else { steps } {",
+    ),
     Ablation("counts against dead reckoning", SUPERVISOR, "if off > allowed {", "if off > allowed && !OFF {"),
     Ablation(
         "target against the last one",

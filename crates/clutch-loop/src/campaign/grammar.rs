@@ -327,6 +327,7 @@ fn later(seed: u64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
     match rng.random_range(0..16) {
         0 if brake && !troubles.is_empty() => troubles[0] = trouble(rng, setting, pad),
         1 => gap(rng, setting, troubles),
+        2 => gap_in_an_observer(rng, setting, troubles),
         _ => {}
     }
 }
@@ -358,6 +359,19 @@ fn gap(rng: &mut Pcg64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
     // Before the first sample there is nothing to reckon from.
     *troubles = vec![Trouble { at: gap.at.max(0.15), ..gap }];
 }
+
+/// A few of them, where the velocity is an observer's: it has to be led over them.
+fn gap_in_an_observer(rng: &mut Pcg64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
+    gap(rng, setting, troubles);
+    (setting.law, setting.observer) = ("smc", true);
+    setting.path = PathKind::Ramp(pick(rng, &[28.0, 40.0], 28.0));
+    for gap in troubles {
+        gap.periods = Some(rng.random_range(2..=2 * LED_OVER));
+    }
+}
+
+/// Samples over which an observer is led without a jump of the voltage; of more nothing is promised.
+pub(super) const LED_OVER: u32 = 2;
 
 /// Samples that a steady law on a ramp can do without, one after another.
 pub(super) const LONGEST_GAP: u32 = 12;

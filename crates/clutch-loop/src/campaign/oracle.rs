@@ -3,7 +3,7 @@
 //! It shares nothing with the supervisor: the rig's physics are a few lines of its own, and the times are the promises of
 //! `docs/safety.md`.
 
-use super::grammar::{Draw, LONGEST_GAP, PathKind, RigName, Safe, Setting, Trouble, What, follows};
+use super::grammar::{Draw, LED_OVER, LONGEST_GAP, PathKind, RigName, Safe, Setting, Trouble, What, follows};
 use crate::faults::{Direction, FaultKind, Forgery, Lie, StuckAt};
 use crate::virtual_time::VirtualReport;
 use clutch_core::supervisor::Cause;
@@ -68,8 +68,9 @@ fn borne(s: &Setting, way: Direction) -> u32 {
     }
 }
 
-/// Largest step of the voltage over samples that are lost in a row, V, where it is promised: with the shaft between them in
-/// its place, computed torque has little to correct.
+/// Largest step of the voltage over samples that are lost in a row, V, where it is promised: with the shaft about its path,
+/// and an observer that was led over them, sliding mode has little to correct. One that was not takes the way of several
+/// periods for that of one.
 fn kick(draw: &Draw) -> Option<f64> {
     let s = &draw.setting;
     let [Trouble { what: What::Fault(FaultKind::Drop, Direction::Up), periods: Some(lost), often, at }] =
@@ -77,8 +78,10 @@ fn kick(draw: &Draw) -> Option<f64> {
     else {
         return None;
     };
-    (s.law == "ctc" && steady(s) && often >= 1.0 && at > 0.0 && lost <= borne(s, Direction::Up))
-        .then_some(1.5)
+    let led = s.rig == RigName::Paper && s.law == "smc" && s.observer && s.delay == 0;
+    let ramp = matches!(s.path, PathKind::Ramp(_));
+    // The start is over.
+    (led && ramp && often >= 1.0 && at > 0.2 && lost <= LED_OVER).then_some(4.0)
 }
 
 /// A trouble of an encoder that is found by the way of the shaft: time for which it may be open.
