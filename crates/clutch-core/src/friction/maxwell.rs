@@ -12,7 +12,8 @@
 //! what one bristle lacks: it remembers where the motion turned round, so that a small loop inside a large one closes, and
 //! the large one goes on as if the small one had not been. With one coefficient it is Maxwell slip, which the way alone
 //! decides. It is for pre-sliding that was measured: stiffnesses and shares are the slopes and the bends of the first
-//! loading curve. The fourth element bears what the others leave; four are used as long as the others bear nothing. It is stiff, and takes some times as long as one bristle.
+//! loading curve. The fourth element bears what the others leave; four are used as long as the others bear nothing. It is
+//! stiff, and takes some times as long as one bristle.
 
 use super::StribeckParams;
 use super::bristles::{FEWEST, Way};
@@ -76,8 +77,8 @@ super::bristles::bristled! {
     /// Generalised Maxwell slip, checked.
     Maxwell MaxwellParams {
         mu_static, mu_dynamic, stribeck_velocity, stribeck_exponent, stiffness_a, stiffness_b, stiffness_c, stiffness_d,
-        stiffness_e, stiffness_f, stiffness_g, stiffness_h, share_a, share_b, share_c, share_e, share_f, share_g, share_h, attraction,
-        damping
+        stiffness_e, stiffness_f, stiffness_g, stiffness_h, share_a, share_b, share_c, share_e, share_f, share_g, share_h,
+        attraction, damping
     }
     p => StribeckParams {
         mu_static: p.mu_static,
