@@ -180,9 +180,17 @@ KEYS = {
     "rig.friction.maxwell.stiffness_b_1_rad": "1/rad",
     "rig.friction.maxwell.stiffness_c_1_rad": "1/rad",
     "rig.friction.maxwell.stiffness_d_1_rad": "1/rad",
+    "rig.friction.maxwell.stiffness_e_1_rad": "1/rad",
+    "rig.friction.maxwell.stiffness_f_1_rad": "1/rad",
+    "rig.friction.maxwell.stiffness_g_1_rad": "1/rad",
+    "rig.friction.maxwell.stiffness_h_1_rad": "1/rad",
     "rig.friction.maxwell.share_a": "",
     "rig.friction.maxwell.share_b": "",
     "rig.friction.maxwell.share_c": "",
+    "rig.friction.maxwell.share_e": "",
+    "rig.friction.maxwell.share_f": "",
+    "rig.friction.maxwell.share_g": "",
+    "rig.friction.maxwell.share_h": "",
     "rig.friction.maxwell.attraction_1_s": "1/s",
     "rig.friction.maxwell.damping_s_rad": "s/rad",
     "rig.drive.weight.mass_kg": "kg",
@@ -269,9 +277,17 @@ KEYS = {
     "model.friction.maxwell.stiffness_b_1_rad": "1/rad",
     "model.friction.maxwell.stiffness_c_1_rad": "1/rad",
     "model.friction.maxwell.stiffness_d_1_rad": "1/rad",
+    "model.friction.maxwell.stiffness_e_1_rad": "1/rad",
+    "model.friction.maxwell.stiffness_f_1_rad": "1/rad",
+    "model.friction.maxwell.stiffness_g_1_rad": "1/rad",
+    "model.friction.maxwell.stiffness_h_1_rad": "1/rad",
     "model.friction.maxwell.share_a": "",
     "model.friction.maxwell.share_b": "",
     "model.friction.maxwell.share_c": "",
+    "model.friction.maxwell.share_e": "",
+    "model.friction.maxwell.share_f": "",
+    "model.friction.maxwell.share_g": "",
+    "model.friction.maxwell.share_h": "",
     "model.friction.maxwell.attraction_1_s": "1/s",
     "model.friction.maxwell.damping_s_rad": "s/rad",
     "law.pd.kp_v_rad": "V/rad",
@@ -762,8 +778,8 @@ class ElastoPlasticFriction(_mixins.ElastoPlasticFriction):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class MaxwellFriction(_mixins.MaxwellFriction):
-    """Generalised Maxwell slip: four springs side by side that hold up to their shares of the friction and
-    then slide. It needs the engine `bristle`.
+    """Generalised Maxwell slip: up to eight springs side by side that hold up to their shares of the friction
+    and then slide. It needs the engine `bristle`.
 
     Parameters
     ----------
@@ -786,13 +802,29 @@ class MaxwellFriction(_mixins.MaxwellFriction):
         Stiffness of the third element. `k_c`: a finite number above 0 1/rad whose inverse is finite, too.
     stiffness_d_1_rad : float, default 200.0
         Stiffness of the fourth element. `k_d`: a finite number above 0 1/rad whose inverse is finite, too.
+    stiffness_e_1_rad : float, default 100.0
+        Stiffness of the fifth element. `k_e`: a finite number above 0 1/rad whose inverse is finite, too.
+    stiffness_f_1_rad : float, default 50.0
+        Stiffness of the sixth element. `k_f`: a finite number above 0 1/rad whose inverse is finite, too.
+    stiffness_g_1_rad : float, default 25.0
+        Stiffness of the seventh element. `k_g`: a finite number above 0 1/rad whose inverse is finite, too.
+    stiffness_h_1_rad : float, default 12.5
+        Stiffness of the eighth element. `k_h`: a finite number above 0 1/rad whose inverse is finite, too.
     share_a : float, default 0.25
         Share of the friction that the first element bears. `α_a`: a number from 0 to 1.
     share_b : float, default 0.25
         Share of the second element. `α_b`: a number from 0 to 1.
     share_c : float, default 0.25
-        Share of the third element; the fourth bears the rest. `α_c`: a number from 0 to 1; a share that
-        leaves share_a + share_b + share_c at 1 or below.
+        Share of the third element; the fourth bears what all others leave. `α_c`: a number from 0 to 1; a
+        share that leaves the sum of all shares at 1 or below.
+    share_e : float, default 0.0
+        Share of the fifth element. `α_e`: a number from 0 to 1.
+    share_f : float, default 0.0
+        Share of the sixth element. `α_f`: a number from 0 to 1.
+    share_g : float, default 0.0
+        Share of the seventh element. `α_g`: a number from 0 to 1.
+    share_h : float, default 0.0
+        Share of the eighth element. `α_h`: a number from 0 to 1.
     attraction_1_s : float, default 50.0
         Rate at which a sliding element comes to its share. `C`: a finite number of at least 0 1/s.
     damping_s_rad : float, default 1.0
@@ -823,9 +855,17 @@ class MaxwellFriction(_mixins.MaxwellFriction):
     stiffness_b_1_rad: float = 800.0
     stiffness_c_1_rad: float = 400.0
     stiffness_d_1_rad: float = 200.0
+    stiffness_e_1_rad: float = 100.0
+    stiffness_f_1_rad: float = 50.0
+    stiffness_g_1_rad: float = 25.0
+    stiffness_h_1_rad: float = 12.5
     share_a: float = 0.25
     share_b: float = 0.25
     share_c: float = 0.25
+    share_e: float = 0.0
+    share_f: float = 0.0
+    share_g: float = 0.0
+    share_h: float = 0.0
     attraction_1_s: float = 50.0
     damping_s_rad: float = 1.0
 

@@ -663,8 +663,8 @@ VALID = {
     clutch.ElastoPlasticFriction: each(**BRISTLES, mu_elastic=st.floats(0.01, 0.09)),
     clutch.MaxwellFriction: each(
         **{key: strategy for key, strategy in BRISTLES.items() if key != "stiffness_1_rad"},
-        **{f"stiffness_{element}_1_rad": POSITIVE for element in "abcd"},
-        **{f"share_{element}": st.floats(0, 0.33) for element in "abc"},
+        **{f"stiffness_{element}_1_rad": POSITIVE for element in "abcdefgh"},
+        **{f"share_{element}": st.floats(0, 0.14) for element in "abcefgh"},
         attraction_1_s=number(0, 1000),
     ),
     clutch.BrakeActuator: each(gain_nm_v=POSITIVE, preload_nm=number(0, 10)),

@@ -266,25 +266,12 @@ impl MovingRig {
     pub fn restore(&mut self, state: &[u64]) -> bool {
         let [begun, motion, slides, numbers @ ..] = state else { return false };
         let numbers: Vec<f64> = numbers.iter().map(|bits| f64::from_bits(*bits)).collect();
-        let [
-            position,
-            velocity,
-            origin,
-            time,
-            volts,
-            arriving,
-            commanded,
-            step,
-            from_rest,
-            a,
-            b,
-            c,
-            d,
-            line @ ..,
-        ] = &numbers[..]
+        let [position, velocity, origin, time, volts, arriving, commanded, step, from_rest, rest @ ..] =
+            &numbers[..]
         else {
             return false;
         };
+        let Some((each, line)) = rest.split_first_chunk::<ELEMENTS>() else { return false };
         let motion = match motion {
             0 => Motion::Stuck,
             1 => Motion::Forward,
@@ -295,7 +282,7 @@ impl MovingRig {
         {
             return false;
         }
-        let bend = Bend { each: [*a, *b, *c, *d], slides: std::array::from_fn(|i| slides >> i & 1 == 1) };
+        let bend = Bend { each: *each, slides: std::array::from_fn(|i| slides >> i & 1 == 1) };
         self.shaft = Shaft { position: *position, velocity: *velocity, motion, bend };
         (self.origin, self.time) = (*origin, *time);
         (self.volts, self.arriving, self.commanded) = (*volts, *arriving, *commanded);

@@ -155,9 +155,14 @@ def _maxwell(case: Case, m: Mechanism) -> Trajectory:
 
     n, row, inverse = len(m.position), m.rows[0], np.linalg.inv(m.inertia)
     p = row.parameters
-    stiff = np.array([p[f"stiffness_{e}_1_rad"] for e in "abcd"])
-    share = np.array([p["share_a"], p["share_b"], p["share_c"], 1 - p["share_a"] - p["share_b"] - p["share_c"]])
-    slides = np.zeros(4, dtype=bool)
+    shares = {e: p[f"share_{e}"] for e in "abcefgh"}
+    shares["d"] = 1 - sum(shares.values())
+    # Those that bear something.
+    elements = [e for e in sorted(shares) if shares[e] > 1e-9]
+    stiff = np.array([p[f"stiffness_{e}_1_rad"] for e in elements])
+    share = np.array([shares[e] for e in elements])
+    count = len(elements)
+    slides = np.zeros(count, dtype=bool)
 
     def bristles(t: float, y: _Vector) -> tuple[_Vector, float]:
         slip = float(row.joints @ y[n : 2 * n]) - row.base_velocity
@@ -183,18 +188,18 @@ def _maxwell(case: Case, m: Mechanism) -> Trajectory:
         return _started(lambda t, y: way * (float(row.joints @ y[n : 2 * n]) - row.base_velocity), begin)
 
     times = np.linspace(0.0, case.duration, case.samples + 1)
-    y, begin, written = np.concatenate((m.position, m.velocity, np.zeros(4))), 0.0, 0
+    y, begin, written = np.concatenate((m.position, m.velocity, np.zeros(count))), 0.0, 0
     states, torque = np.empty((len(y), len(times))), np.empty((1, len(times)))
     ends = [*(t for t in m.corners if t < case.duration), case.duration]
     least = float(np.min(share * _at_rest(row) / stiff))
-    atol = np.concatenate((np.full(n, 1e-9 * least), np.full(n, 1e-9 * least), np.full(4, 1e-9 * least)))
+    atol = np.concatenate((np.full(n, 1e-9 * least), np.full(n, 1e-9 * least), np.full(count, 1e-9 * least)))
     while begin < case.duration:
         end = next(t for t in ends if t > begin)
         slip = float(row.joints @ y[n : 2 * n]) - row.base_velocity
         # At rest the motion begins the way that the force goes.
         way = int(np.sign(slip)) or int(np.sign(row.joints @ rates(begin, y)[n : 2 * n])) or 1
-        watch = [turns(way)] + [spare(e, way) for e in range(4) if not slides[e] and share[e] > 0]
-        elements = [e for e in range(4) if not slides[e] and share[e] > 0]
+        held = [e for e in range(count) if not slides[e]]
+        watch = [turns(way)] + [spare(e, way) for e in held]
         done = solve_ivp(rates, (begin, end), y, "LSODA", dense_output=True, events=watch, rtol=1e-10, atol=atol)
         if not done.success:
             raise ArithmeticError(f"LSODA gave up: {done.message}")
@@ -207,7 +212,7 @@ def _maxwell(case: Case, m: Mechanism) -> Trajectory:
         happened = [i for i, at in enumerate(done.t_events) if len(at)]
         if 0 in happened:
             slides[:] = False
-        slides[[elements[i - 1] for i in happened if i]] = True
+        slides[[held[i - 1] for i in happened if i]] = True
     return Trajectory(states[:n], states[n : 2 * n], torque)
 
 

@@ -14,7 +14,9 @@ use super::{FrictionModel, Stribeck};
 use crate::Real;
 
 /// Elements of a friction at most.
-pub const ELEMENTS: usize = 4;
+pub const ELEMENTS: usize = 8;
+/// Elements of a friction that has several, at least.
+pub(super) const FEWEST: usize = 4;
 
 /// State of a friction's bristles: how far they are bent.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +55,8 @@ pub(super) enum Way<T> {
     },
     /// Each by itself.
     Elements {
+        /// Those from the first on that are used.
+        count: usize,
         /// `k_i`, 1/rad.
         stiffness: [T; ELEMENTS],
         /// `α_i`.
@@ -78,7 +82,7 @@ impl<T: Real> Bristles<T> {
     pub fn count(&self) -> usize {
         match self.way {
             Way::One { .. } => 1,
-            Way::Elements { .. } => ELEMENTS,
+            Way::Elements { count, .. } => count,
         }
     }
 
@@ -87,7 +91,9 @@ impl<T: Real> Bristles<T> {
     pub fn stiffness(&self) -> T {
         match self.way {
             Way::One { stiffness, .. } => stiffness,
-            Way::Elements { stiffness: [a, b, c, d], .. } => a + b + c + d,
+            Way::Elements { count, stiffness, .. } => {
+                stiffness.iter().take(count).fold(T::ZERO, |sum, k| sum + *k)
+            }
         }
     }
 
@@ -116,8 +122,9 @@ impl<T: Real> Bristles<T> {
                 let share = sliding_share(*stiffness, *elastic, z, curve, velocity);
                 rates[0] = velocity - share * (*stiffness * velocity.abs() * z / curve);
             }
-            Way::Elements { stiffness, share, attraction, .. } => {
-                let elements = stiffness.iter().zip(share).zip(bend.each.iter().zip(&bend.slides));
+            Way::Elements { count, stiffness, share, attraction, .. } => {
+                let elements =
+                    stiffness.iter().zip(share).zip(bend.each.iter().zip(&bend.slides)).take(*count);
                 for (rate, ((k, share), (z, slides))) in rates.iter_mut().zip(elements) {
                     *rate = if *slides {
                         // No spring is bent by more than the motion: friction gives no energy then.
@@ -138,9 +145,9 @@ impl<T: Real> Bristles<T> {
     pub fn coefficient(&self, bend: &Bend<T>, rate: &[T; ELEMENTS]) -> T {
         match &self.way {
             Way::One { stiffness, damping, .. } => *stiffness * bend.each[0] + *damping * rate[0],
-            Way::Elements { stiffness, share, damping, .. } => {
+            Way::Elements { count, stiffness, share, damping, .. } => {
                 let elements = stiffness.iter().zip(share).zip(bend.each.iter().zip(&bend.slides)).zip(rate);
-                elements.fold(T::ZERO, |sum, (((k, share), (z, slides)), rate)| {
+                elements.take(*count).fold(T::ZERO, |sum, (((k, share), (z, slides)), rate)| {
                     sum + *k * *z + if *slides { T::ZERO } else { *damping * *share * *rate }
                 })
             }
@@ -153,12 +160,13 @@ impl<T: Real> Bristles<T> {
         let mu = self.curve.coefficient(velocity);
         match &self.way {
             Way::One { stiffness, .. } => Bend::one(mu / *stiffness),
-            Way::Elements { stiffness, share, .. } => {
+            Way::Elements { count, stiffness, share, .. } => {
                 let mut bend = Bend::none();
-                for ((z, k), share) in bend.each.iter_mut().zip(stiffness).zip(share) {
+                let elements = bend.each.iter_mut().zip(&mut bend.slides).zip(stiffness).zip(share);
+                for (((z, slides), k), share) in elements.take(*count) {
                     *z = *share * mu / *k;
+                    *slides = velocity.abs() > T::ZERO;
                 }
-                bend.slides = [velocity.abs() > T::ZERO; ELEMENTS];
                 bend
             }
         }
@@ -171,14 +179,14 @@ impl<T: Real> Bristles<T> {
         let mu = mu.max(-most).min(most);
         match &self.way {
             Way::One { stiffness, .. } => Bend::one(mu / *stiffness),
-            Way::Elements { stiffness, share, .. } => {
+            Way::Elements { count, stiffness, share, .. } => {
                 let mut bend = Bend::none();
                 let way = mu.sgn();
                 // Each round finds the deflection of those that are not at their share yet.
                 let mut full = [false; ELEMENTS];
                 for _ in 0..=ELEMENTS {
                     let (mut left, mut stiff) = (mu.abs(), T::ZERO);
-                    for ((k, share), full) in stiffness.iter().zip(share).zip(&full) {
+                    for ((k, share), full) in stiffness.iter().zip(share).zip(&full).take(*count) {
                         if *full {
                             left -= *share * most;
                         } else {
@@ -187,7 +195,7 @@ impl<T: Real> Bristles<T> {
                     }
                     let deflection = if stiff > T::ZERO { left.max(T::ZERO) / stiff } else { T::ZERO };
                     let elements = stiffness.iter().zip(share).zip(bend.each.iter_mut().zip(&mut full));
-                    for ((k, share), (z, full)) in elements {
+                    for ((k, share), (z, full)) in elements.take(*count) {
                         *full |= *k * deflection >= *share * most;
                         *z = way * if *full { *share * most / *k } else { deflection };
                     }
@@ -221,10 +229,10 @@ impl<T: Real> Bristles<T> {
     #[must_use]
     pub fn settled(&self, bend: &Bend<T>, velocity: T) -> Bend<T> {
         let mut settled = *bend;
-        if let Way::Elements { stiffness, share, .. } = &self.way {
+        if let Way::Elements { count, stiffness, share, .. } = &self.way {
             let (level, way) = (self.curve.level(velocity), velocity.sgn());
             let elements = stiffness.iter().zip(share).zip(settled.each.iter().zip(&mut settled.slides));
-            for ((k, share), (z, slides)) in elements {
+            for ((k, share), (z, slides)) in elements.take(*count) {
                 *slides = if *slides { *z * way >= T::ZERO } else { *k * *z * way > *share * level };
             }
         }

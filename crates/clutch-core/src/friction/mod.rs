@@ -22,7 +22,7 @@ list::frictions! {
     lugre Lugre LugreParams "LuGre friction: bristles that bend, slide and damp.";
     dahl Dahl DahlParams "Dahl's friction: bristles that bend and slide.";
     elasto_plastic ElastoPlastic ElastoPlasticParams "Elasto-plastic friction: bristles that only bend below break-away.";
-    maxwell Maxwell MaxwellParams "Generalised Maxwell slip: four springs that hold up to their shares.";
+    maxwell Maxwell MaxwellParams "Generalised Maxwell slip: up to eight springs that hold up to their shares.";
 }
 
 /// A friction, as one that depends on the velocity alone; what else it has are its [`FrictionModel::bristles`].

@@ -17,6 +17,11 @@ fn all() -> Vec<FrictionParams<f64>> {
     all
 }
 
+/// Of four elements.
+fn four<V: Copy + Default>(each: [V; 4]) -> [V; ELEMENTS] {
+    core::array::from_fn(|i| each.get(i).copied().unwrap_or_default())
+}
+
 /// The four frictions with bristles.
 fn bristled() -> Vec<Bristles<f64>> {
     all().iter().filter_map(|p| Friction::build(p).unwrap().bristles()).collect()
@@ -94,6 +99,10 @@ fn each_bad_parameter_of_bristles_is_named() {
     assert_eq!(ElastoPlastic::<f64>::build(&elastic).unwrap_err().field(), "elastic");
     let shares = MaxwellParams { share_a: 0.6, ..MaxwellParams::default() };
     assert_eq!(Maxwell::<f64>::build(&shares).unwrap_err().field(), "share_c");
+    let shares = MaxwellParams { share_h: 0.26, ..MaxwellParams::default() };
+    assert_eq!(Maxwell::<f64>::build(&shares).unwrap_err().field(), "share_c");
+    let beyond = MaxwellParams { share_f: 1.5, ..MaxwellParams::default() };
+    assert_eq!(Maxwell::<f64>::build(&beyond).unwrap_err().field(), "share_f");
     let whole = MaxwellParams { share_a: 0.5, ..MaxwellParams::default() };
     assert!(Maxwell::<f64>::build(&whole).is_ok(), "the fourth may bear nothing");
     let stiff = DahlParams { stiffness: 0.0, ..DahlParams::default() };
@@ -102,7 +111,7 @@ fn each_bad_parameter_of_bristles_is_named() {
 
 #[test]
 fn bristles_begin_as_a_spring_that_bends_with_the_shaft() {
-    let names = [(1, 2000.0, true), (1, 2000.0, false), (1, 2000.0, true), (ELEMENTS, 3000.0, true)];
+    let names = [(1, 2000.0, true), (1, 2000.0, false), (1, 2000.0, true), (4, 3000.0, true)];
     for (bristles, (count, stiffness, damps)) in bristled().iter().zip(names) {
         assert_eq!((bristles.count(), bristles.stiffness(), bristles.damps()), (count, stiffness, damps));
         let none = Bend::none();
@@ -121,10 +130,10 @@ fn bristles_begin_as_a_spring_that_bends_with_the_shaft() {
 
 #[test]
 fn damping_is_that_of_bending_and_of_held_elements_by_their_shares() {
-    let four = bristled();
-    let (lugre, maxwell) = (four.first().unwrap(), four.last().unwrap());
+    let all = bristled();
+    let (lugre, maxwell) = (all.first().unwrap(), all.last().unwrap());
     let none = Bend::none();
-    assert!((lugre.coefficient(&none, &[0.01, 0.0, 0.0, 0.0]) - 5.0 * 0.01).abs() < 1e-15);
+    assert!((lugre.coefficient(&none, &four([0.01, 0.0, 0.0, 0.0])) - 5.0 * 0.01).abs() < 1e-15);
     let mut bend = none;
     assert!((maxwell.coefficient(&bend, &[0.01; ELEMENTS]) - 0.01).abs() < 1e-15);
     // One that slides is not damped.
@@ -174,17 +183,41 @@ fn a_held_load_is_carried_up_to_break_away_and_no_farther() {
 }
 
 #[test]
+fn as_many_elements_are_used_as_bear_something_and_never_below_four() {
+    let of = |p: MaxwellParams<f64>| Maxwell::build(&p).unwrap().bristles().unwrap();
+    let shares =
+        MaxwellParams { share_a: 0.1, share_b: 0.2, share_c: 0.1, share_e: 0.1, ..MaxwellParams::default() };
+    let five = of(shares);
+    assert_eq!((five.count(), five.stiffness()), (5, 3100.0));
+    let eight = of(MaxwellParams { share_h: 0.25, share_g: 0.05, ..shares });
+    assert_eq!((eight.count(), eight.stiffness()), (8, 3187.5));
+    assert_eq!(
+        of(MaxwellParams { share_a: 1.0, share_b: 0.0, share_c: 0.0, ..MaxwellParams::default() }).count(),
+        4
+    );
+    // Each bears its share of steady sliding; the fourth what the others leave, and the sixth nothing.
+    let bend = eight.steady(1.0);
+    let mu = |i: usize, k: f64| bend.each.get(i).unwrap() * k / 0.15;
+    for (i, k, share) in [(0, 1600.0, 0.1), (3, 200.0, 0.2), (4, 100.0, 0.1), (5, 50.0, 0.0), (7, 12.5, 0.25)]
+    {
+        assert!((mu(i, k) - share).abs() < 1e-12, "{i}");
+    }
+    // The softest gives way last: 0.25 · 0.2/12.5 rad.
+    assert!((eight.deflection() - 0.25 * 0.2 / 12.5).abs() < 1e-15);
+}
+
+#[test]
 fn elements_slide_beyond_their_share_and_hold_once_the_shaft_turns_round() {
     let maxwell = bristled().pop().unwrap();
     let (v, mut bend) = (1e-9, Bend::none());
-    bend.each = [0.06 / 1600.0, 0.04 / 800.0, 0.0, -0.06 / 200.0];
+    bend.each = four([0.06 / 1600.0, 0.04 / 800.0, 0.0, -0.06 / 200.0]);
     let slides = maxwell.settled(&bend, v).slides;
-    assert_eq!(slides, [true, false, false, false], "the last is bent the other way");
-    bend.slides = [true; ELEMENTS];
-    assert_eq!(maxwell.settled(&bend, v).slides, [true, true, true, false]);
-    assert_eq!(maxwell.settled(&bend, -v).slides, [false, false, true, true]);
+    assert_eq!(slides, four([true, false, false, false]), "the last is bent the other way");
+    bend.slides = four([true; 4]);
+    assert_eq!(maxwell.settled(&bend, v).slides, four([true, true, true, false]));
+    assert_eq!(maxwell.settled(&bend, -v).slides, four([false, false, true, true]));
     // A sliding element comes to its share at the rate C, and not faster than the shaft.
-    bend.each = [0.0, 0.045 / 800.0, 0.0, 0.0];
+    bend.each = four([0.0, 0.045 / 800.0, 0.0, 0.0]);
     let rate = maxwell.rate(&bend, 1e-3);
     assert_eq!(rate[0], 1e-3, "as fast as the shaft");
     let share = 0.25 - 0.045 / maxwell.curve.level(1e-3);

@@ -141,10 +141,10 @@ impl Engine for Bristle {
             return Err(EngineError::Refused("friction with bristles"));
         };
         let equations = Equations { model, input, bristles, origin: shaft.position };
-        if bristles.count() == 1 {
-            self.advance_states::<3>(&equations, shaft, events)
-        } else {
-            self.advance_states::<6>(&equations, shaft, events)
+        match bristles.count() {
+            1 => self.advance_states::<3>(&equations, shaft, events),
+            2..=4 => self.advance_states::<6>(&equations, shaft, events),
+            _ => self.advance_states::<{ 2 + ELEMENTS }>(&equations, shaft, events),
         }
     }
 }

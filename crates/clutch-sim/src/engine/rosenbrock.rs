@@ -42,7 +42,7 @@ macro_rules! linear {
         }
     )+};
 }
-linear!(3 6 12);
+linear!(3 6 10 12);
 
 /// The Jacobian, by columns, and the derivative by time. Differences are a millionth of `scale` or of the state, towards the
 /// sign of `away`: across rest a friction has a corner.

@@ -84,10 +84,11 @@ where
         let (q, v) = Self::split(state);
         let slip = self.system.rows(&q) * v - self.system.base(t);
         let normal = self.system.normal(t);
-        let one = |i: usize| Bend { each: [state[2 * N + i], 0.0, 0.0, 0.0], ..Bend::none() };
+        let first = |x: f64| core::array::from_fn(|element| if element == 0 { x } else { 0.0 });
+        let one = |i: usize| Bend { each: first(state[2 * N + i]), ..Bend::none() };
         let bends = SVector::from_fn(|i, _| self.bristles[i].rate(&one(i), slip[i])[0]);
         let rubs = SVector::from_fn(|i, _| {
-            self.bristles[i].coefficient(&one(i), &[bends[i], 0.0, 0.0, 0.0]) * normal[i].max(0.0)
+            self.bristles[i].coefficient(&one(i), &first(bends[i])) * normal[i].max(0.0)
         });
         (rubs, bends)
     }
