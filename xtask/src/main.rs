@@ -269,8 +269,10 @@ fn main() -> Result<()> {
         Verb::Smooth => smooth(),
         Verb::Meter => meter(),
         Verb::Drift => drift(),
-        Verb::Identify { rigs, seed } => random_rigs("clutch-identify", "docs/identify.md", rigs, seed),
-        Verb::Tune { rigs, seed } => random_rigs("clutch-tune", "docs/tune.md", rigs, seed),
+        Verb::Identify { rigs, seed } => {
+            random_rigs(["clutch-identify", "identified_rigs"], "docs/identify.md", rigs, seed)
+        }
+        Verb::Tune { rigs, seed } => random_rigs(["clutch-tune", "tuned_rigs"], "docs/tune.md", rigs, seed),
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
         Verb::Ablate { runs } => ablate::all(runs),
         Verb::Lies { trials } => lies(trials),
@@ -417,9 +419,9 @@ fn meter() -> Result<()> {
     Ok(())
 }
 
-/// The campaign of a package over random rigs, into its page.
-fn random_rigs(package: &str, page: &str, rigs: u64, seed: u64) -> Result<()> {
-    let example = ["run", "--release", "--package", package, "--example", "campaign", "--"];
+/// The campaign of a package's example over random rigs, into its page.
+fn random_rigs([package, example]: [&str; 2], page: &str, rigs: u64, seed: u64) -> Result<()> {
+    let example = ["run", "--release", "--package", package, "--example", example, "--"];
     let (mut table, mut last) = (Vec::new(), String::new());
     let done = cargo(example).args([rigs.to_string(), seed.to_string()]).lines(|line| {
         if line.starts_with('|') {

@@ -2,7 +2,7 @@
 //! identify`.
 //!
 //! ```sh
-//! cargo run --release --package clutch-identify --example campaign -- 200 10001
+//! cargo run --release --package clutch-identify --example identified_rigs -- 200 10001
 //! ```
 
 use clutch_identify::experiment::{Programme, VirtualBoard, experiment};

@@ -2,7 +2,7 @@
 //! tune`.
 //!
 //! ```sh
-//! cargo run --release --package clutch-tune --example campaign -- 50 30001
+//! cargo run --release --package clutch-tune --example tuned_rigs -- 50 30001
 //! ```
 
 #[path = "../../clutch-identify/examples/random_rig/mod.rs"]
