@@ -1,4 +1,4 @@
-"""What a built-in scenario costs in two builds of the command: processor time in turns, and instructions.
+"""Cost of the built-in scenarios in two builds of the command: processor time in turns, and instructions.
 
     python3 benches/before_after.py BEFORE AFTER [--turns 100] [--instructions]
 
@@ -88,7 +88,7 @@ def row(builds: list[pathlib.Path], scenario: str, options: argparse.Namespace) 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="What a built-in scenario costs in two builds of the command")
+    parser = argparse.ArgumentParser(description="Cost of the built-in scenarios in two builds of the command")
     parser.add_argument("before", type=pathlib.Path)
     parser.add_argument("after", type=pathlib.Path)
     parser.add_argument("--turns", type=int, default=100)

@@ -1,4 +1,4 @@
-"""What a step of many environments costs, and what lanes could save of it: CPU time on one thread.
+"""Cost of a step of many environments, and the part of it that lanes could save: CPU time on one thread.
 
     python benches/python/vector.py [--repeats 5]
 

@@ -222,7 +222,7 @@ def compare(program: str | Path, engine: str, cases: Sequence[Case], truths: Seq
         if engine == "system":
             row["errors"].append(max(abs(a - b) / max(1, abs(b)) for a, b in ends))
             continue
-        # What moves: of a break-away that has only begun, however little that is; of bristles, what bends them.
+        # The motion: of a break-away that has only begun, however little that is; of bristles, what bends them.
         least = max(1e-12 * case.stribeck_velocity, case.bend / case.seconds)
         fastest = max(abs(truth[1]), abs(case.velocity), least)
         way, speed = (abs(a - b) / fastest for a, b in ends)

@@ -55,7 +55,7 @@ RUN = [page for page, found in COMMANDS.items() if any(not left_out(command) for
 
 @pytest.fixture(scope="module")
 def begun(clutch, tmp_path_factory):
-    """What the pages take to be there: a scenario of one's own, logs of its rig, and the log of a run."""
+    """The files that the pages take to be there: a scenario of one's own, logs of its rig, and the log of a run."""
     folder = tmp_path_factory.mktemp("begun")
     mine = folder / "mine.toml"
     clutch("scenario", "new", mine, "--from", "board_smc_2")

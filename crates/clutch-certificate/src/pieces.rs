@@ -75,7 +75,7 @@ fn constant(u: &Units, id: u32, volts: f64, within: Vec<Line>) -> Piece {
     Piece { id, within, volts, next: [Line::default(); 2] }
 }
 
-/// A demand, and what the output's limits leave of it.
+/// A demand, and the part of it that the output's limits leave.
 fn linear(u: &Units, demand: Line) -> Vec<Piece> {
     let [low, high] = u.volts;
     let below = |limit: f64| demand.plus(Line::constant(1.0), -limit);

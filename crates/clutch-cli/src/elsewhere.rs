@@ -1,4 +1,4 @@
-//! What is made for Linux, on another system: verbs and options say what is missing there.
+//! Things made for Linux, on another system: verbs and options say what is missing there.
 
 use crate::output::Exit;
 use anyhow::anyhow;

@@ -109,7 +109,7 @@ fn a_sweep_as_parquet_has_the_cells_of_its_csv_and_goes_on_where_it_was_cut_off(
     }
     assert_eq!((rows, refused), (12, 4));
 
-    // What a kill leaves is the CSV beside it, and goes on to the same file.
+    // A kill leaves the CSV beside it, which goes on to the same file.
     let whole = std::fs::read(&table).expect("a file");
     let text = std::fs::read(&lines).expect("a file");
     let beside = cut.with_extension("parquet.part.csv");

@@ -90,7 +90,7 @@ impl Default for Header {
 }
 
 impl Header {
-    /// What a table of a channel keeps of it, as texts: all but parameters, which are in the scenario, and terms, which are columns.
+    /// Its parts that a table of a channel keeps, as texts: all but parameters, which are in the scenario, and terms, which are columns.
     #[must_use]
     pub fn described(&self) -> Vec<(String, String)> {
         let mut all = vec![

@@ -125,7 +125,7 @@ fn piece(id: u32, strip: &Strip, sigma: &Linear, rate: &Linear, off: Interval) -
     Piece { id, within, volts: [line(strip.least, -off), line(strip.most, off)], next: None }
 }
 
-/// What the output's ends leave of a demand.
+/// The part of a demand that the output's ends leave.
 fn limited(demand: &Linear, [low, high]: [Interval; 2], off: Interval) -> Vec<Piece> {
     let below = |limit: Interval| sum(demand, at(-1.0), &fixed(limit));
     let above = |limit: Interval| sum(&fixed(limit), at(-1.0), demand);
