@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 
 /// Python of this tree that is formatted and linted.
-pub(crate) const SOURCES: [&str; 5] = ["python", "benches/latency", "benches/python", "crates", "docs"];
+pub(crate) const SOURCES: [&str; 4] = ["python", "benches", "crates", "docs"];
 
 /// The interpreter of the environment with everything but the wheel, made and filled if need be.
 pub(crate) fn interpreter() -> Result<PathBuf> {

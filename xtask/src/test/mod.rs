@@ -363,8 +363,8 @@ fn wheel_of(tally: &mut Tally, tools: &Path, wheel: &python::Wheel) -> Result<bo
     tally.stage("build of the playground");
     let playground = playground::build()?;
     tally.stage("tests of the wheel");
-    // Two at a time: most wait for a process or a clock now and then.
-    let pytest = ["pytest", "--color=no", "-q", "-n", "2", "--dist", "loadfile"];
+    // One more than there are processors: most wait for a process or a clock now and then, and files differ in length.
+    let pytest = ["pytest", "--color=no", "-q", "-n", "3", "--dist", "loadfile"];
     let tests = python(&pytest)?.arg(root().join("python/tests"));
     let tests = match &playground {
         Some(built) => tests
