@@ -279,26 +279,30 @@ class Board:
             self.poll = selectors.DefaultSelector()
             self.poll.register(self.line, selectors.EVENT_READ)
             while True:
-                if self.state in (ARMED, RUNNING):
-                    wanted = self.sequence
-                    self.sample()
-                    until = time.monotonic() + 3.0
-                    while self.state in (ARMED, RUNNING) and self.answered != wanted and time.monotonic() < until:
-                        self.hear(0.2)
-                elif self.state != BOOT:
-                    self.sample()
-                    self.hear(0.001)
-                else:
-                    self.hear(1.0)
-                    continue
-                self.shaft.move(self.volts(), PERIOD, pad=self.pad())
-                self.time += PERIOD
+                self.go_on()
         except (EOFError, ConnectionError, TimeoutError):
             pass
         except Exception as error:  # told by the trial
             self.failure = error
         finally:
             self.listener.close()
+
+    def go_on(self):
+        """A period, in its own time; before it is set up, a message."""
+        if self.state in (ARMED, RUNNING):
+            wanted = self.sequence
+            self.sample()
+            until = time.monotonic() + 3.0
+            while self.state in (ARMED, RUNNING) and self.answered != wanted and time.monotonic() < until:
+                self.hear(0.2)
+        elif self.state != BOOT:
+            self.sample()
+            self.hear(0.001)
+        else:
+            self.hear(1.0)
+            return
+        self.shaft.move(self.volts(), PERIOD, pad=self.pad())
+        self.time += PERIOD
 
 
 def trial(clutch, lie, seed):

@@ -62,17 +62,32 @@ fn maxwell() -> MaxwellParams {
 
 /// Each of these four springs as two, half as stiff, which bear half.
 fn maxwell_in_eight() -> MaxwellParams {
-    let half = |k: f64| 0.5 * k;
     let p = maxwell();
+    let [a, b, c, d] = [p.stiffness_a, p.stiffness_b, p.stiffness_c, p.stiffness_d].map(|k| 0.5 * k);
+    of_eight([a, b, c, d, a, b, c, d])
+}
+
+/// Eight springs, each with an eighth of the friction.
+fn of_eight(stiffness: [f64; 8]) -> MaxwellParams {
+    let [
+        stiffness_a,
+        stiffness_b,
+        stiffness_c,
+        stiffness_d,
+        stiffness_e,
+        stiffness_f,
+        stiffness_g,
+        stiffness_h,
+    ] = stiffness;
     MaxwellParams {
-        stiffness_a: half(p.stiffness_a),
-        stiffness_b: half(p.stiffness_b),
-        stiffness_c: half(p.stiffness_c),
-        stiffness_d: half(p.stiffness_d),
-        stiffness_e: half(p.stiffness_a),
-        stiffness_f: half(p.stiffness_b),
-        stiffness_g: half(p.stiffness_c),
-        stiffness_h: half(p.stiffness_d),
+        stiffness_a,
+        stiffness_b,
+        stiffness_c,
+        stiffness_d,
+        stiffness_e,
+        stiffness_f,
+        stiffness_g,
+        stiffness_h,
         share_a: 0.125,
         share_b: 0.125,
         share_c: 0.125,
@@ -80,7 +95,7 @@ fn maxwell_in_eight() -> MaxwellParams {
         share_f: 0.125,
         share_g: 0.125,
         share_h: 0.125,
-        ..p
+        ..maxwell()
     }
 }
 
@@ -340,28 +355,7 @@ fn maxwell_slip_remembers_each_point_where_the_motion_turned_round() {
     remembers(maxwell(), std::array::from_fn(|i| four[i % 4]));
     // Eight that differ, and bear an eighth of 1 N each.
     let stiffness = [4e4, 2e4, 1e4, 5e3, 8e4, 3e4, 1.5e4, 7e3];
-    let [
-        stiffness_a,
-        stiffness_b,
-        stiffness_c,
-        stiffness_d,
-        stiffness_e,
-        stiffness_f,
-        stiffness_g,
-        stiffness_h,
-    ] = stiffness;
-    let eight = MaxwellParams {
-        stiffness_a,
-        stiffness_b,
-        stiffness_c,
-        stiffness_d,
-        stiffness_e,
-        stiffness_f,
-        stiffness_g,
-        stiffness_h,
-        ..maxwell_in_eight()
-    };
-    remembers(eight, stiffness.map(|k| 0.125 / k));
+    remembers(of_eight(stiffness), stiffness.map(|k| 0.125 / k));
 }
 
 fn remembers(params: MaxwellParams, limits: [f64; ELEMENTS]) {
