@@ -56,7 +56,7 @@ pub(crate) fn beside(python: &Path, name: &str) -> PathBuf {
     python.with_file_name(name)
 }
 
-/// The profile of the wheel that tests install: as the released one, which `cargo xtask dist` builds and tries, but for what
+/// The profile of the wheel that tests install: our crates as in the released one, which `cargo xtask dist` builds and tries, but for what
 /// takes long at its link.
 pub(crate) const PROFILE: &str = "tested";
 

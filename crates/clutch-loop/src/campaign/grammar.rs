@@ -2,6 +2,7 @@
 //!
 //! A trouble is where × what × from when × how long × how often. The tables below say which there are.
 
+use super::laws;
 use crate::faults::{Channel, Direction, Fault, FaultKind, Forgery, Lie, StuckAt};
 use clutch_core::law::LawParams;
 use rand::seq::IndexedRandom;
@@ -17,6 +18,11 @@ pub enum RigName {
     Bench,
     /// A geared motor axis with friction.
     Motor,
+}
+
+impl RigName {
+    /// Each of them.
+    pub(super) const ALL: [RigName; 3] = [RigName::Paper, RigName::Bench, RigName::Motor];
 }
 
 /// The safe state of a run.
@@ -240,7 +246,7 @@ impl Draw {
         // A load that is to be told by the voltage's limit: the law that goes there, and no other trouble.
         if let Some(load) = troubles.iter().find(|t| matches!(t.what, What::Load(_))).copied() {
             setting.rig = RigName::Paper;
-            setting.law = "pd";
+            setting.law = laws::TO_ITS_LIMIT;
             setting.path = PathKind::Ramp(20.0);
             setting.safe = Safe::Hold(9.99);
             (setting.wide, setting.observer, setting.delay) = (false, false, 0);
@@ -267,12 +273,7 @@ fn filters(law: &str) -> bool {
 fn setting(rng: &mut Pcg64) -> Setting {
     let rig = [RigName::Paper, RigName::Paper, RigName::Paper, RigName::Bench, RigName::Motor];
     let rig = pick(rng, &rig, RigName::Paper);
-    let laws: &[&str] = match rig {
-        RigName::Motor => &["pid", "smc", "ctc", "glide"],
-        RigName::Paper => &["pd", "ctc", "smc", "smc_sign", "pid", "hold", "glide"],
-        RigName::Bench => &["pd", "ctc", "smc", "glide"],
-    };
-    let law = pick(rng, laws, "pd");
+    let law = pick(rng, laws::drawn(rig), laws::TO_ITS_LIMIT);
     let follows = follows(law);
     let speed = match rig {
         RigName::Motor => pick(rng, &[1.0, 2.0, 4.0], 2.0),
@@ -296,8 +297,7 @@ fn setting(rng: &mut Pcg64) -> Setting {
     };
     let delay = match rig {
         RigName::Bench => 1,
-        // PD with a period of delay is unstable on the paper's rig, and the switching laws swing.
-        RigName::Paper if matches!(law, "ctc" | "smc" | "hold" | "glide") => rng.random_range(0..=1),
+        RigName::Paper if laws::of(law).bears_delay => rng.random_range(0..=1),
         _ => 0,
     };
     Setting {
@@ -321,7 +321,7 @@ fn later(seed: u64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
     let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x006c_6174_6572);
     let rng = &mut rng;
     if follows(setting.law) && rng.random_bool(0.25) {
-        setting.law = pick(rng, &["super_twisting", "smc_integral", "dob"], "dob");
+        setting.law = pick(rng, &laws::drawn_later(), setting.law);
     }
     let brake = setting.rig != RigName::Motor;
     match rng.random_range(0..16) {
@@ -345,7 +345,7 @@ fn pad(rng: &mut Pcg64, _: &Setting) -> What {
 /// Samples that are lost in a row, as many as a patient board bears, and no other trouble.
 fn gap(rng: &mut Pcg64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
     setting.rig = RigName::Paper;
-    setting.law = pick(rng, &["pd", "ctc", "ctc", "smc"], "ctc");
+    setting.law = pick(rng, &laws::STEADY, laws::LED);
     setting.path = PathKind::Ramp(pick(rng, &[2.0, 5.0, 10.0, 20.0, 28.0], 20.0));
     if matches!(setting.safe, Safe::Release) {
         setting.safe = Safe::Hold(9.99);
@@ -363,7 +363,7 @@ fn gap(rng: &mut Pcg64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
 /// A few of them, where the velocity is an observer's: it has to be led over them.
 fn gap_in_an_observer(rng: &mut Pcg64, setting: &mut Setting, troubles: &mut Vec<Trouble>) {
     gap(rng, setting, troubles);
-    (setting.law, setting.observer) = ("smc", true);
+    (setting.law, setting.observer) = (laws::LED, true);
     setting.path = PathKind::Ramp(pick(rng, &[28.0, 40.0], 28.0));
     for gap in troubles {
         gap.periods = Some(rng.random_range(2..=2 * LED_OVER));

@@ -5,6 +5,7 @@
 //! first seeds, and show that it fails when any one of the supervisor's checks is taken out.
 
 pub mod grammar;
+mod laws;
 pub mod oracle;
 pub mod table;
 
@@ -134,13 +135,7 @@ impl Draw {
         let (cycles, good) = (s.cycles, s.good_samples.min(s.cycles - 2));
         // A slow drift is to reach the limit of the voltage's time, not that of the error.
         let error = if self.load().is_some() { 3.0 } else { oracle::following_deg(s) };
-        let saturation = match s.law {
-            // At one limit or the other in every period.
-            "smc_sign" => 5.0,
-            // It takes a shaft at rest for one that slides, and brakes with all it has until a slow path has come.
-            "dob" => 1.0,
-            _ => 0.2,
-        };
+        let saturation = laws::of(s.law).saturated_s;
         let scalar = if s.single { "f32" } else { "f64" };
         let _ = write!(
             text,
@@ -174,15 +169,7 @@ impl Draw {
                  [output]\nhighest_v = 3.0\non_invalid_v = 3.0\n"
             );
         }
-        let gains = match s.law {
-            "pid" => "kp_v_rad = 170.0\nki_v_rad_s = 500.0\nkd_v_s_rad = 1.0\n".to_owned(),
-            // In one scalar with micro-steps, in the other without.
-            "glide" if s.single => format!("micro_below_deg_s = 0.95\nfilter.delay_ticks = {}\n", s.delay),
-            "glide" => format!("filter.delay_ticks = {}\n", s.delay),
-            // At rest under a safe state its integral is at most of the output, and has to let go in time.
-            "super_twisting" => "k2_v_s = 42.0\n".to_owned(),
-            _ => String::new(),
-        };
+        let gains = (laws::of(s.law).brake)(s);
         let _ = writeln!(text, "[law.{}]\n{gains}", s.law);
         let _ = match s.path {
             PathKind::Ramp(v) => writeln!(text, "[reference.ramp]\nrate_deg_s = {v:?}"),
@@ -213,13 +200,7 @@ impl Draw {
     /// A geared motor axis with friction, to and fro; as the built-in ones.
     fn motor(&self) -> String {
         let Setting { law, path, wide, .. } = self.setting;
-        let gains = match law {
-            "smc" => "kp_v = 1.5\nkd_v_s_rad = 4.0\nslope_1_s = 40.0\nboundary_rad_s = 0.3\n",
-            "pid" => "kp_v_rad = 200.0\nki_v_rad_s = 2000.0\nkd_v_s_rad = 4.0\n",
-            // Without them a motor under glide stands at each reversal.
-            "glide" => "micro_below_deg_s = 0.95\n",
-            _ => "",
-        };
+        let gains = laws::of(law).motor;
         let amplitude = path.top_deg_s() / (std::f64::consts::TAU * MOTOR_HZ);
         let axis = |of: &str| {
             format!(
@@ -366,7 +347,7 @@ impl<T: Real> ControlLaw<T> for BrokenLaw<T> {
         let broken = state.1 >= self.from;
         state.1 += 1;
         let nan = T::from_f64(f64::NAN);
-        // Glide has errors of its own, and takes the path's velocity only.
+        // A law may have errors of its own, and take the path's velocity only.
         let corrupt = Tick { error_rate: nan, error: nan, target_velocity: nan, ..*tick };
         self.law.update(&mut state.0, if broken { &corrupt } else { tick })
     }

@@ -3,7 +3,8 @@
 //! It shares nothing with the supervisor: the rig's physics are a few lines of its own, and the times are the promises of
 //! `docs/safety.md`.
 
-use super::grammar::{Draw, LED_OVER, LONGEST_GAP, PathKind, RigName, Safe, Setting, Trouble, What, follows};
+use super::grammar::{Draw, LED_OVER, PathKind, RigName, Safe, Setting, Trouble, What, follows};
+use super::laws;
 use crate::faults::{Direction, FaultKind, Forgery, Lie, StuckAt};
 use crate::virtual_time::VirtualReport;
 use clutch_core::supervisor::Cause;
@@ -36,30 +37,22 @@ pub struct Promise {
     pub truthful: bool,
 }
 
-/// Error at rest that ends control in a run, °: an integrator is slow to let go at the start.
+/// Error at rest that ends control in a run, °.
 #[must_use]
 pub fn following_deg(s: &Setting) -> f64 {
-    match s.law {
-        "pid" => 6.0,
-        "super_twisting" => 4.0,
-        _ => 1.0,
-    }
+    laws::of(s.law).following_deg
 }
 
-/// True of a law that leaves its brake about where it is right: on a ramp, without delay.
-fn steady(s: &Setting) -> bool {
-    let ramp = matches!(s.path, PathKind::Ramp(_)) && matches!(s.law, "pd" | "ctc" | "smc");
-    ramp && s.rig == RigName::Paper && s.delay == 0 && !s.observer
+/// Samples that may be lost in a row where the law leaves its brake about where it is right: on a ramp, without delay.
+fn steady(s: &Setting) -> Option<u32> {
+    let ramp = matches!(s.path, PathKind::Ramp(_));
+    let here = ramp && s.rig == RigName::Paper && s.delay == 0 && !s.observer;
+    laws::of(s.law).steady.filter(|_| here)
 }
 
 /// Periods in which frames may be lost without an end; both ways they are another period's. A law that is steady bears more.
 fn borne(s: &Setting, way: Direction) -> u32 {
-    let patient = (s.cycles - 2).min(match s.law {
-        _ if !steady(s) => 3,
-        // It swings: dead reckoning from its last period is off by more.
-        "pd" => 8,
-        _ => LONGEST_GAP,
-    });
+    let patient = (s.cycles - 2).min(steady(s).unwrap_or(3));
     match way {
         Direction::Up => patient,
         // The controller does not hear of codes that are lost: of more than one the shaft tells, and that may be too much.
@@ -78,7 +71,7 @@ fn kick(draw: &Draw) -> Option<f64> {
     else {
         return None;
     };
-    let led = s.rig == RigName::Paper && s.law == "smc" && s.observer && s.delay == 0;
+    let led = s.rig == RigName::Paper && s.law == laws::LED && s.observer && s.delay == 0;
     let ramp = matches!(s.path, PathKind::Ramp(_));
     // The start is over.
     (led && ramp && often >= 1.0 && at > 0.2 && lost <= LED_OVER).then_some(4.0)
@@ -191,30 +184,18 @@ fn line(s: &Setting, t: &Trouble, kind: FaultKind, way: Direction, base: &Promis
 fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promise {
     let ends = |within: f64, causes: &'static [Cause]| Promise { fate: Fate::Ends(within), causes, ..*base };
     let (stays, always) = (t.periods.is_none() && t.often >= 1.0, t.often >= 1.0);
+    let law = laws::of(s.law);
     // A shaft that a brake controls, and that moves.
-    let waits = s.law == "pid" && (s.path.top_deg_s() < 10.0 || t.at == 0.0);
+    let waits = law.waits && (s.path.top_deg_s() < 10.0 || t.at == 0.0);
     let moves = s.rig != RigName::Motor && follows(s.law) && !waits;
-    // A law lets go so little of a shaft that is slow, computed torque most of all, that friction of the bounds might still
-    // hold it.
-    let ctc = s.law == "ctc";
-    // Glide waits for the edges of a slow shaft, and for that of a first start; then it lets go for good.
-    let glide = s.law == "glide";
     // A path from rest asks for so little at first.
-    let from_rest = t.at == 0.0 && (ctc || glide || matches!(s.path, PathKind::MinimumJerk(_)));
-    let told = match s.law {
-        "ctc" => 10.0,
-        // Its error is in degrees, and its voltage as far off.
-        "pid" => 6.0,
-        _ => 3.0,
-    };
-    let hidden = from_rest || s.path.slowest_deg_s() < told;
-    let exact = s.rig == RigName::Paper && !s.wide && s.delay == 0 && s.law != "pid";
-    let open = by_the_way(s) + if glide { 0.08 } else { 0.0 };
+    let from_rest = t.at == 0.0 && (law.starts_late || matches!(s.path, PathKind::MinimumJerk(_)));
+    let hidden = from_rest || s.path.slowest_deg_s() < law.lets_go_above_deg_s;
+    let exact = s.rig == RigName::Paper && !s.wide && s.delay == 0 && !law.far_off;
+    let open = by_the_way(s) + law.silence_s;
     let way = Promise { blind: (!hidden).then_some(open), truthful: false, ..*base };
     let blind = Promise { blind: None, truthful: false, ..*base };
-    // Glide lets go for good after silence and two starts of 25 ms that brought no edge; a path from rest is slow first.
-    let within = if glide { 0.4 } else { 0.5 };
-    let found = |causes| Promise { fate: Fate::Ends(within), causes, ..way };
+    let found = |causes| Promise { fate: Fate::Ends(law.found_s), causes, ..way };
     match kind {
         // The board sees it, and does not ask.
         FaultKind::EncoderLoss => ends(0.1 * PERIOD, &[Cause::Board]),
@@ -258,9 +239,7 @@ fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promis
 fn nothing_presses(s: &Setting, t: &Trouble, blind: &Promise) -> Promise {
     // A path that begins with a jump asks for an open brake, until a shaft that falls is as fast.
     let start = if t.at == 0.0 { 0.02 + s.path.top_deg_s() / 1587.0 } else { 0.0 };
-    // With the sign function one run of a million was found 1.3 ms later than others may be.
-    let switches = if s.law == "smc_sign" { 0.005 } else { 0.0 };
-    let within = 2.0 * by_the_way(s) + PERIOD + start + switches;
+    let within = 2.0 * by_the_way(s) + PERIOD + start + laws::of(s.law).switches_s;
     Promise { fate: Fate::Ends(within), causes: &[Cause::TooFast], ..*blind }
 }
 
@@ -329,13 +308,8 @@ pub fn beyond_deg(s: &Setting, blind: f64) -> Option<f64> {
 
 /// Healthy error of a run, °: what its law and its path leave.
 fn healthy_deg(s: &Setting) -> f64 {
-    let law = match s.law {
-        "pid" => 3.0,
-        "super_twisting" => 2.5,
-        _ => 0.15,
-    };
     let uneven = if s.rig == RigName::Bench { 0.3 } else { 0.0 };
-    law + uneven + 0.012 * s.path.top_deg_s()
+    laws::of(s.law).healthy_deg + uneven + 0.012 * s.path.top_deg_s()
 }
 
 /// Checks that a report keeps the promises of its draw; says what is wrong if not.
