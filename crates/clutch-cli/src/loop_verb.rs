@@ -352,7 +352,7 @@ fn status(p: &Progress) {
 pub fn summary(s: &Summary) -> String {
     let r = &s.report;
     let (m, d) = (&r.metrics, &r.detected);
-    let latency = |s: &CycleSummary| [s.p50_ns, s.p99_ns, s.p99_9_ns, s.max_ns].map(us).join(" / ");
+    let latency = |s: &CycleSummary| times(&[s.p50_ns, s.p99_ns, s.p99_9_ns, s.max_ns].map(us));
     // A board whose clock waits for this machine says nothing of it.
     let late = if r.wake.count > 0 { latency(&r.wake) } else { "not told".to_owned() };
     let title = format!(
@@ -394,6 +394,12 @@ pub fn summary(s: &Summary) -> String {
     text
 }
 
+/// Times beside each other, narrow enough for the table to keep within 80 columns where each of them is of seconds.
+fn times(each: &[String]) -> String {
+    let wide = each.join(" / ");
+    if wide.len() <= 34 { wide } else { each.join("/") }
+}
+
 /// A time as µs, to three digits.
 fn us(ns: u64) -> String {
     let us = ns as f64 / 1e3;
@@ -407,4 +413,23 @@ pub fn plan(a: &Announcement) -> String {
     let rows = a.rows.iter().map(|(name, value)| beside(&format!("  {name:<11}"), value));
     let remarks = a.remarks.iter().map(|line| paragraph(line));
     std::iter::once(paragraph(&a.title)).chain(rows).chain(remarks).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_seconds_keep_the_table_within_80_columns() {
+        let late = quantities(
+            "t",
+            &[(
+                "wake-up late by p50 / p99 / p99.9 / max",
+                times(&[1_000_000_000, 1_001_000_000, 9_999_999_000, 99_999_999_000].map(us)),
+                "µs",
+            )],
+        );
+        assert!(late.lines().all(|line| line.chars().count() <= 80), "{late}");
+        assert_eq!(times(&[1000, 2000].map(us)), "1.00 / 2.00");
+    }
 }

@@ -365,7 +365,8 @@ fn wheel_of(tally: &mut Tally, tools: &Path, wheel: &python::Wheel) -> Result<bo
     tally.stage("tests of the wheel");
     // One more than there are processors: most wait for a process or a clock now and then, and files differ in length.
     let pytest = ["pytest", "--color=no", "-q", "-n", "3", "--dist", "loadfile"];
-    let tests = python(&pytest)?.arg(root().join("python/tests"));
+    let slowest = ["--durations=10", "--durations-min=5"];
+    let tests = python(&pytest)?.args(slowest).arg(root().join("python/tests"));
     let tests = match &playground {
         Some(built) => tests
             .env("CLUTCH_PLAYGROUND", &built.page)
