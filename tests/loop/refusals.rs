@@ -2,7 +2,7 @@
 //! nothing is armed.
 
 use crate::harness::{Board, Device, Done, Random, beside_others, folder, program, run, start};
-use clutch_wire::{Decoder, Discover, Hello, Message, Refusal, Refused, SCHEMA, VERSION, encode};
+use clutch_wire::{Decoder, Discover, Hello, Message, Refusal, Refused, ResetCause, SCHEMA, VERSION, encode};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
 
@@ -34,6 +34,8 @@ pub(crate) fn hello(asked: &Discover) -> Hello {
         period_max_us: 1_000_000,
         watchdog_max_us: 10_000_000,
         boot_code: 0,
+        started_by: ResetCause::Power as u8,
+        warnings: 0,
         state: 0,
         run: 0,
         config: 0,

@@ -2,7 +2,7 @@
 //! bytes reach it one after the other, so nothing is shared and nothing locks.
 
 use crate::board::{self, Board, CONTROL, Line, stop};
-use clutch_node::{Role, receive, tick};
+use clutch_node::{ResetCause, Role, receive, tick};
 use embassy_executor::{InterruptExecutor, SpawnError, SpawnToken};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::interrupt;
@@ -28,7 +28,7 @@ unsafe fn TIM20_UP() {
 pub fn begin<S: Send>(control: impl FnOnce(Board, Line) -> Result<SpawnToken<S>, SpawnError>) -> ! {
     let (board, line) = board::start();
     interrupt::TIM20_UP.set_priority(CONTROL);
-    let Ok(control) = control(board, line) else { stop() };
+    let Ok(control) = control(board, line) else { stop(ResetCause::Fault) };
     EXECUTOR.start(interrupt::TIM20_UP).spawn(control);
     loop {
         cortex_m::asm::wfi();

@@ -24,11 +24,13 @@ pub enum ChipFaultKind {
     SupplyLow,
     /// Both signals of the encoder change at once.
     EncoderSkip,
+    /// The chip's brown-out level is as its maker delivers it.
+    BrownOutLow,
 }
 
 impl ChipFaultKind {
     /// All, by name.
-    pub const ALL: [(&'static str, ChipFaultKind); 9] = [
+    pub const ALL: [(&'static str, ChipFaultKind); 10] = [
         ("converter-stuck", ChipFaultKind::ConverterStuck),
         ("crystal", ChipFaultKind::Crystal),
         ("overrun", ChipFaultKind::Overrun),
@@ -38,6 +40,7 @@ impl ChipFaultKind {
         ("unexpected", ChipFaultKind::Unexpected),
         ("supply-low", ChipFaultKind::SupplyLow),
         ("encoder-skip", ChipFaultKind::EncoderSkip),
+        ("brown-out-low", ChipFaultKind::BrownOutLow),
     ];
 
     /// Its name.
@@ -57,6 +60,7 @@ impl ChipFaultKind {
             ChipFaultKind::Unexpected => 1 << 6,
             ChipFaultKind::SupplyLow => 1 << 7,
             ChipFaultKind::EncoderSkip => 1 << 8,
+            ChipFaultKind::BrownOutLow => 1 << 9,
         }
     }
 }

@@ -113,6 +113,11 @@ impl ChipBoard {
         self.faults.push(ChipFault { kind, at: None });
     }
 
+    /// Ends all faults with the next exchange.
+    pub fn mend(&mut self) {
+        self.faults.clear();
+    }
+
     /// Resets since power-up.
     #[must_use]
     pub fn resets(&self) -> u32 {
