@@ -282,6 +282,26 @@ fn a_converter_that_does_not_follow_ends_the_run() {
 }
 
 #[test]
+fn an_amplifier_that_does_not_follow_ends_the_run_where_its_voltage_is_read_back() {
+    const READ_BACK: &str = "nucleo-daq-read-back";
+    let Some(wired) = image(READ_BACK) else { return };
+    // Without a fault it is as any other.
+    figures_and_codes_are_the_simulations(READ_BACK, ChipRole::Daq, "smc");
+    let _beside = beside();
+    let ChipReport { ran, resets, .. } = broken(&wired, ChipRole::Daq, ChipFaultKind::Amplifier, Some(0.3));
+    assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)));
+    assert_eq!(resets, 0);
+    // Three voltages in a row that are off, the first of which a period later.
+    let safe = ran.safe.expect("a safe output") - ran.hit.expect("a fault");
+    assert!((0.003..=0.0045).contains(&safe), "the safe output came after {safe} s");
+    // Elsewhere the shaft's motion shows it, later.
+    let Some(bare) = image("nucleo-daq") else { return };
+    let ChipReport { ran: later, .. } = broken(&bare, ChipRole::Daq, ChipFaultKind::Amplifier, Some(0.3));
+    assert_eq!((later.standing.state, later.standing.cause), (State::Faulted, Cause::TooFast));
+    assert!(later.safe.expect("a safe output") - later.hit.expect("a fault") > 2.0 * safe);
+}
+
+#[test]
 fn a_supply_that_is_too_low_for_the_converter_ends_the_run() {
     for (name, role) in IMAGES.into_iter().filter(|(name, _)| !pico(name)) {
         let Some(image) = image(name) else { return };

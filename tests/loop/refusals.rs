@@ -54,8 +54,8 @@ fn refusing(reason: Refusal, value: u32) -> Device {
 #[test]
 fn a_board_of_another_version_is_told_with_both_versions() {
     let _guard = beside_others();
-    let says =
-        ["speaks version 9 of the protocol", "this program version 3", "Flash a firmware of this release"];
+    let ours = format!("this program version {VERSION}");
+    let says = ["speaks version 9 of the protocol", &ours, "Flash a firmware of this release"];
     let _ = looped(refusing(Refusal::Version, 9).port()).expect(1).says(&says);
     // The same for a board that does not refuse.
     let careless = board_that_answers(|message| match message {

@@ -1,6 +1,7 @@
 //! The board: clocks, encoder, converter, serial line, watchdog. For another board, write another
 //! such file.
 
+use crate::read_back::ReadBack;
 use crate::stack_guard::guard_stack;
 use clutch_core::{Counts, DacCode};
 use clutch_node::{BoardParams, Hardware, ResetCause, WideCounter};
@@ -35,6 +36,10 @@ const COUNTS_PER_REV: u32 = 20_000;
 /// Voltage at the brake for code 0 and for code 4096, mV: 3.3 V times the driver's gain of 3.03.
 /// Enter the values that you measure at the brake's terminals, here and in the scenario.
 const DRIVER_MV: (i32, i32) = (0, 10_000);
+
+/// True if the brake's voltage comes back to PA0 by a divider of the amplifier's gain: docs/firmware.md. A voltage that does
+/// not follow the converter then ends a run.
+pub const READ_BACK: bool = false;
 
 /// Parameters of the board, but for those that each has of its own: serial number, and number of the power-up.
 const PARAMS: BoardParams = BoardParams {
@@ -90,7 +95,7 @@ pub const CONTROL: Priority = Priority::P6;
 const SERIAL: Priority = Priority::P7;
 
 /// The hardware as the node sees it.
-pub struct Board {
+pub struct Board<const READ_BACK: bool> {
     encoder: Qei<'static, peripherals::TIM3>,
     counter: WideCounter,
     converter: DacChannel<'static, Blocking>,
@@ -102,6 +107,7 @@ pub struct Board {
     /// A different number at each power-up.
     pub boot: u32,
     started_by: ResetCause,
+    read_back: Option<ReadBack>,
 }
 
 /// For a program that cannot continue: puts the safe output out, notes the reason for the program that starts next, and
@@ -163,7 +169,7 @@ fn full_speed() {
 }
 
 /// Starts the board, its output first.
-pub fn start() -> (Board, Line) {
+pub fn start<const READ_BACK: bool>() -> (Board<READ_BACK>, Line) {
     let mut config = embassy_stm32::Config::default();
     guard_stack();
     let started_by = started_by();
@@ -233,6 +239,7 @@ pub fn start() -> (Board, Line) {
         board,
         boot,
         started_by,
+        read_back: READ_BACK.then(ReadBack::start),
     };
     (board, from_host)
 }
@@ -355,7 +362,7 @@ impl Line {
     }
 }
 
-impl Board {
+impl<const READ_BACK: bool> Board<READ_BACK> {
     /// The board's parameters. They are constants, not a field: the compiler then does their
     /// checks, and no `f64` of an error's value is left in the image.
     #[must_use]
@@ -390,7 +397,7 @@ fn serial_number() -> u32 {
     (a ^ b ^ c).max(2)
 }
 
-impl Hardware for Board {
+impl<const READ_BACK: bool> Hardware for Board<READ_BACK> {
     fn now_us(&self) -> u64 {
         Instant::now().as_micros()
     }
@@ -406,9 +413,10 @@ impl Hardware for Board {
     }
 
     /// Its output register has another code: a converter that was reset or lost its clock. Or the supply, its
-    /// reference, is too low. The pin's voltage is not seen.
+    /// reference, is too low. The pin's voltage is seen where it is read back.
     fn converter_fault(&self) -> bool {
-        self.converter.read() != self.told.0 || pac::PWR.sr2().read().pvdo()
+        let strays = READ_BACK && self.read_back.as_ref().is_some_and(|it| it.strays(self.told));
+        strays || self.converter.read() != self.told.0 || pac::PWR.sr2().read().pvdo()
     }
 
     // A function of its own in machine code, too: the bound of the path from a sample to its code ends with it.

@@ -26,11 +26,13 @@ pub enum ChipFaultKind {
     EncoderSkip,
     /// The chip's brown-out level is as its maker delivers it.
     BrownOutLow,
+    /// The amplifier behind the converter gives 0 V.
+    Amplifier,
 }
 
 impl ChipFaultKind {
     /// All, by name.
-    pub const ALL: [(&'static str, ChipFaultKind); 10] = [
+    pub const ALL: [(&'static str, ChipFaultKind); 11] = [
         ("converter-stuck", ChipFaultKind::ConverterStuck),
         ("crystal", ChipFaultKind::Crystal),
         ("overrun", ChipFaultKind::Overrun),
@@ -41,6 +43,7 @@ impl ChipFaultKind {
         ("supply-low", ChipFaultKind::SupplyLow),
         ("encoder-skip", ChipFaultKind::EncoderSkip),
         ("brown-out-low", ChipFaultKind::BrownOutLow),
+        ("amplifier", ChipFaultKind::Amplifier),
     ];
 
     /// Its name.
@@ -61,6 +64,7 @@ impl ChipFaultKind {
             ChipFaultKind::SupplyLow => 1 << 7,
             ChipFaultKind::EncoderSkip => 1 << 8,
             ChipFaultKind::BrownOutLow => 1 << 9,
+            ChipFaultKind::Amplifier => 1 << 10,
         }
     }
 }

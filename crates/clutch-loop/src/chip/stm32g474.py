@@ -180,6 +180,37 @@ class Converter(Registers):
             self[self.DOR1] = self[self.DHR12R1]
 
 
+class Adc(Registers):
+    """ADC1, on the voltage behind the amplifier, divided by its gain. A conversion is done at once."""
+
+    ISR, CR, DR = 0x00, 0x08, 0x40
+    ADRDY, EOC = 1 << 0, 1 << 2
+    ADEN, ADSTART, ADVREGEN, DEEPPWD, ADCAL = 1 << 0, 1 << 2, 1 << 28, 1 << 29, 1 << 31
+    initial: ClassVar = {CR: DEEPPWD}
+
+    def __init__(self, chip: Stm32g474, page: Page, base: int) -> None:
+        super().__init__(chip, page, base)
+        self.on(self.ISR, write=self.clear)
+        self.on(self.CR, write=self.control)
+        self.on(self.DR, self.result)
+
+    def clear(self, value: int) -> None:
+        self[self.ISR] &= ~value
+
+    def control(self, value: int) -> None:
+        awake = value & self.ADVREGEN and not value & self.DEEPPWD
+        if awake and value & self.ADEN:
+            self[self.ISR] |= self.ADRDY
+        if awake and value & self.ADSTART and self[self.ISR] & self.ADRDY:
+            self[self.DR] = 0 if self.chip.faults & Fault.AMPLIFIER else self.chip.code()
+            self[self.ISR] |= self.EOC
+        self[self.CR] = value & ~(self.ADCAL | self.ADSTART)
+
+    def result(self) -> int:
+        self[self.ISR] &= ~self.EOC
+        return self[self.DR]
+
+
 class Watchdog(Registers):
     """IWDG, on the clock LSI of 32 kHz: it runs whatever happens to the core's."""
 
@@ -467,7 +498,9 @@ class Clocks(Registers):
             raise WrongClock(f"{mhz:g} MHz with {states} wait states of the flash")
         if self.core_hz < self.system_hz and self.counter is None:
             hook = uc_const.UC_HOOK_CODE
-            self.counter = self.chip.uc.hook_add(hook, self.count, None, self.chip.FLASH.start, self.chip.FLASH.stop - 1)
+            self.counter = self.chip.uc.hook_add(
+                hook, self.count, None, self.chip.FLASH.start, self.chip.FLASH.stop - 1
+            )
         if system_hz <= self.STEP_HZ < self.system_hz:
             self.executed = 0
             if self.core_hz == self.system_hz:
@@ -537,7 +570,16 @@ class Stm32g474(Chip):
         self.uc.mem_write(0x1FFF_7590, b"clutch model")  # UID, 96 bits
 
     def map_registers(self) -> None:
-        modelled = [0x4000_0000, 0x4000_2000, 0x4000_3000, 0x4000_8000, 0x4002_0000, 0x4002_1000, 0x5000_0000, 0x5006_0000]
+        modelled = [
+            0x4000_0000,
+            0x4000_2000,
+            0x4000_3000,
+            0x4000_8000,
+            0x4002_0000,
+            0x4002_1000,
+            0x5000_0000,
+            0x5006_0000,
+        ]
         pages = {at: Page(self, at) for at in [*modelled, 0xE000_1000]}
         self.plain((0x4000_0000, 0x4001_8000), (0x4002_0000, 0x4002_5000), (0x4800_0000, 0x4800_2000))
         self.plain((0x5000_0000, 0x5000_2000), (0x5006_0000, 0x5006_1000), (0xE000_0000, 0xE010_0000))
@@ -551,16 +593,18 @@ class Stm32g474(Chip):
         numbers = [[*range(27, 34), 112], [*range(72, 77), 113, 114, 115]]
         self.dma = [Dma(self, pages[0x4002_0000], 0x400 * n, 8 * n, numbers[n]) for n in range(2)]
         self.converter = Converter(self, pages[0x5000_0000], 0x800)
+        self.adc = Adc(self, pages[0x5000_0000], 0)
         self.noise = Noise(self, pages[0x5006_0000], 0x800)
         self.trace = Block(self, pages[0xE000_1000], 0)
         self.trace.on(0x04, lambda: self.meter.executed & WORD if self.meter else 0)  # CYCCNT
         self.blocks += [self.rcc, self.timer, self.encoder, self.watchdog, self.serial, self.mux]
-        self.blocks += [*self.dma, self.converter, self.noise, self.trace]
+        self.blocks += [*self.dma, self.converter, self.adc, self.noise, self.trace]
         # Offset in RCC and bit of a peripheral's reset.
         self.resettable: dict[tuple[int, int], list[Block]] = {
             (0x28, 0): [self.dma[0]],
             (0x28, 1): [self.dma[1]],
             (0x28, 2): [self.mux],
+            (0x2C, 13): [self.adc],
             (0x2C, 16): [self.converter],
             (0x38, 1): [self.encoder],
             (0x38, 3): [self.timer],
