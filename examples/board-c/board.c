@@ -173,6 +173,8 @@ static void discover(const clutch_discover_t *m)
     hello.period_max_us = b.params.period_max_us;
     hello.watchdog_max_us = b.params.watchdog_max_us;
     hello.boot_code = b.params.boot_code;
+    hello.started_by = b.params.started_by;
+    hello.warnings = b.params.warnings;
     hello.state = b.state;
     hello.run = b.set.run;
     hello.config = b.set.config;

@@ -1,4 +1,4 @@
-/* A board for the wire protocol of docs/wire.md, version 3: the state machine, in portable C99.
+/* A board for the wire protocol of docs/wire.md, version 4: the state machine, in portable C99.
  *
  * No malloc, no floating point, no library but <stdint.h>, <stddef.h> and <string.h>. It has one board, in
  * static memory, below 300 bytes. It reads no clock: all times are a counter of microseconds that wraps.
@@ -27,6 +27,8 @@ typedef struct {
     uint32_t period_max_us;   /* longest sampling period, us */
     uint32_t watchdog_max_us; /* longest watchdog time, us */
     uint16_t boot_code;       /* output at power-up: safe on this rig when nobody controls */
+    uint8_t started_by;       /* CLUTCH_RESET_CAUSE_... of clutch_wire.h, from the chip's register; else UNKNOWN, 0 */
+    uint8_t warnings;         /* bits CLUTCH_WARNING_..., or 0 */
 } board_params_t;
 
 /* ---- functions for you to call; all from one thread, none from an interrupt while another of them runs ----
@@ -62,7 +64,7 @@ int32_t read_encoder(void);
 /* Puts out a code, 0 to 2^dac_bits - 1. */
 void write_dac(uint16_t code);
 
-/* Sends bytes, at most 66: all of them or none. Must not wait for the line. */
+/* Sends bytes, at most 68: all of them or none. Must not wait for the line. */
 void serial_write(const uint8_t *bytes, size_t count);
 
 /* CLUTCH_STATUS_ENCODER_FAULT, CLUTCH_STATUS_DAC_FAULT, both, or 0: the hardware's report about itself.

@@ -213,6 +213,8 @@ int main(int argc, char **argv)
     params.period_max_us = 1000000;
     params.watchdog_max_us = 1000000;
     params.boot_code = BOOT_CODE;
+    params.started_by = CLUTCH_RESET_CAUSE_POWER;
+    params.warnings = 0;
     shaft.moved_ns = start;
     error = board_init(&params);
     if (error != NULL) {

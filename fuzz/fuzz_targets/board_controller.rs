@@ -15,7 +15,7 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, Built, ControllerNode, ControllerParams,
-    HostNode, OneChip, Outbox, Outboxes, Role, RunParams, RunTimes, SETTINGS, Settings,
+    HostNode, OneChip, Outbox, Outboxes, ResetCause, Role, RunParams, RunTimes, SETTINGS, Settings,
 };
 use clutch_wire::{Decoder, Message, StopReason, TABLE};
 use libfuzzer_sys::fuzz_target;
@@ -32,6 +32,8 @@ const BOARD: BoardParams = BoardParams {
     period_max_us: 10_000,
     watchdog_max_us: 30_000,
     boot_code: 2867,
+    started_by: ResetCause::Power,
+    brown_out_low: false,
 };
 const KNOTS: [Knot; 3] = [
     Knot { time_us: 0, position: FixedCounts(7) },

@@ -242,6 +242,7 @@ class Board:
             }
             hello |= {"dac_highest_mv": 10_000, "period_min_us": 100, "period_max_us": 1_000_000}
             hello |= {"watchdog_max_us": 10_000_000, "boot_code": self.code, "state": self.state}
+            hello |= {"started_by": 1, "warnings": 0}
             self.send("Hello", nonce=m["nonce"], version=m["version"], schema=m["schema"], run=0, config=0, **hello)
         elif name == "Configure":
             self.run, self.config, self.state, self.sequence = m["run"], m["config"], READY, 0

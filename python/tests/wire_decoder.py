@@ -24,7 +24,7 @@ LAYOUTS = {
         "Hello",
         "nonce:I version:B schema:Q board:I boot:I counts_per_rev:I dac_bits:B dac_lowest_mv:i"
         " dac_highest_mv:i period_min_us:I period_max_us:I watchdog_max_us:I"
-        " boot_code:H state:B run:H config:Q",
+        " boot_code:H started_by:B warnings:B state:B run:H config:Q",
     ),
     0x82: ("Configured", "run:H config:Q boot:I"),
     0x83: ("Armed", "run:H config:Q"),

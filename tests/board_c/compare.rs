@@ -4,8 +4,8 @@ use super::{Random, compiled};
 use clutch_core::Counts;
 use clutch_node::{BoardNode, BoardParams, Outbox};
 use clutch_wire::{
-    Actuate, Arm, BoardState, Configure, Decoder, Discover, Message, Ping, SCHEMA, STATUS_DAC_FAULT,
-    STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop, VERSION, encode,
+    Actuate, Arm, BoardState, Configure, Decoder, Discover, Message, Ping, ResetCause, SCHEMA,
+    STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Stop, VERSION, encode,
 };
 use std::collections::BTreeMap;
 use std::io::{Read as _, Write as _};
@@ -36,6 +36,7 @@ impl Event {
                     to.extend(number.to_le_bytes());
                 }
                 to.extend(p.boot_code.to_le_bytes());
+                to.extend([p.started_by as u8, u8::from(p.brown_out_low)]);
             }
             Event::Bytes { now, bytes } => {
                 to.push(b'B');
@@ -183,6 +184,8 @@ impl Host {
             period_max_us,
             watchdog_max_us: 2 * period_min_us + random.range(0, 10_000_000),
             boot_code: random.range(0, top) as u16,
+            started_by: ResetCause::from_u8(random.range(0, 6) as u8).unwrap_or(ResetCause::Unknown),
+            brown_out_low: random.chance(1, 2),
         }
     }
 
@@ -410,6 +413,8 @@ fn long_run() -> Vec<(Event, Shown)> {
         period_max_us: 10_000,
         watchdog_max_us: 100_000,
         boot_code: 2970,
+        started_by: ResetCause::Pin,
+        brown_out_low: true,
     };
     let node = BoardNode::new(&params).expect("the parameters are right");
     let mut board = RustBoard { node, out: Outbox::default() };

@@ -1,7 +1,8 @@
 /* Drives board.c from a pipe, for the comparison with the Rust board. Integers are little-endian.
  *
  *   'I' board u32, boot u32, counts_per_rev u32, dac_bits u8, lowest i32, highest i32, period_min u32,
- *       period_max u32, watchdog_max u32, boot_code u16      power-up
+ *       period_max u32, watchdog_max u32, boot_code u16,
+ *       started_by u8, brown-out low u8      power-up
  *   'B' now u32, length u16, bytes                           bytes come
  *   'T' now u32, counts i32, faults u8                       a period begins
  *   'P' now u32                                              the watchdog is checked
@@ -98,6 +99,8 @@ int main(void)
             p.period_max_us = take_u32();
             p.watchdog_max_us = take_u32();
             p.boot_code = take_u16();
+            p.started_by = take_u8();
+            p.warnings = take_u8() ? CLUTCH_WARNING_BROWN_OUT : 0;
             code = 0xffff;
             error = board_init(&p);
             if (error != NULL) { /* the text is the answer */

@@ -4,7 +4,7 @@ use super::compare::{Event, Shown, in_c};
 use super::compiled;
 use clutch_node::BoardParams;
 use clutch_wire::{
-    Actuate, Arm, BoardState, Configure, Message, STATUS_ENCODER_FAULT, STATUS_LATE, Stop, encode,
+    Actuate, Arm, BoardState, Configure, Message, ResetCause, STATUS_ENCODER_FAULT, STATUS_LATE, Stop, encode,
 };
 
 const BOARD: BoardParams = BoardParams {
@@ -18,6 +18,8 @@ const BOARD: BoardParams = BoardParams {
     period_max_us: 10_000,
     watchdog_max_us: 100_000,
     boot_code: 1844,
+    started_by: ResetCause::Power,
+    brown_out_low: false,
 };
 
 const RUN: Configure = Configure {

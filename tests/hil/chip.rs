@@ -12,7 +12,9 @@ use clutch_loop::virtual_time::{VirtualBoard, VirtualReport};
 use clutch_node::Outbox;
 use clutch_sim::Scenario;
 use clutch_tests::firmware::image;
-use clutch_wire::BoardState;
+use clutch_wire::{
+    BoardState, Decoder, Discover, Hello, Message, ResetCause, SCHEMA, VERSION, WARNING_BROWN_OUT, encode,
+};
 use std::path::Path;
 
 const IMAGES: [(&str, ChipRole); 3] = [
@@ -208,6 +210,65 @@ fn a_fault_handler_puts_the_boot_code_out_at_once() {
     }
 }
 
+/// What the chip says of itself to whoever asks.
+fn hello(board: &mut ChipBoard, now_ns: u64) -> Option<Hello> {
+    let ask = Message::Discover(Discover { nonce: 5, version: VERSION, schema: SCHEMA });
+    let mut out = Outbox::default();
+    board.receive(now_ns, encode(&ask).as_bytes(), &mut out).expect("the chip runs");
+    let mut decoder = Decoder::new();
+    let said = out.as_bytes().iter().filter_map(|byte| decoder.push(*byte)).filter_map(Result::ok);
+    said.filter_map(|message| if let Message::Hello(hello) = message { Some(hello) } else { None }).last()
+}
+
+fn started_by(board: &mut ChipBoard, now_ns: u64) -> Option<ResetCause> {
+    ResetCause::from_u8(hello(board, now_ns)?.started_by)
+}
+
+#[test]
+fn a_board_whose_brown_out_level_is_too_low_says_so() {
+    for (name, role) in IMAGES.into_iter().filter(|(name, _)| !pico(name)) {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        for (fault, warnings) in [(None, 0), (Some(ChipFaultKind::BrownOutLow), WARNING_BROWN_OUT)] {
+            let faults = fault.map(|kind| ChipFault { kind, at: None }).into_iter().collect();
+            let chip = ChipOptions { faults, until: Some(0.01), ..ChipOptions::default() };
+            let session = session(&scenario("smc", 1.5), role, chip);
+            let (_, mut board) = session.run_board(&image).expect("the chip runs");
+            let now_ns = board.next_ns().expect("it has a next period");
+            let hello = hello(&mut board, now_ns - 1).expect("a hello");
+            assert_eq!(hello.warnings, warnings, "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_board_says_why_it_started() {
+    for (name, role) in IMAGES {
+        let Some(image) = image(name) else { return };
+        let _beside = beside();
+        let (mut board, now_ns) = running(&image, role);
+        assert_eq!(started_by(&mut board, now_ns - 1), Some(ResetCause::Power), "{name}");
+        for (kind, cause) in [
+            (ChipFaultKind::Hang, ResetCause::Watchdog),
+            (ChipFaultKind::Undefined, ResetCause::Fault),
+            (ChipFaultKind::Nmi, ResetCause::Fault),
+            (ChipFaultKind::Unexpected, ResetCause::Fault),
+            (ChipFaultKind::Crystal, ResetCause::Clock),
+        ] {
+            let (mut board, mut now_ns) = running(&image, role);
+            board.inject(kind);
+            while board.resets() == 0 {
+                now_ns += 500_000;
+                board.step(now_ns, &mut Outbox::default()).expect("the chip runs");
+            }
+            // A crystal that comes again, and 5 ms for the start.
+            board.mend();
+            let asked = (1..=20).find_map(|k| started_by(&mut board, now_ns + k * 1_000_000));
+            assert_eq!(asked, Some(cause), "{kind:?} on {name}");
+        }
+    }
+}
+
 #[test]
 fn a_converter_that_does_not_follow_ends_the_run() {
     for (name, role) in IMAGES {
@@ -218,6 +279,26 @@ fn a_converter_that_does_not_follow_ends_the_run() {
         assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)), "{name}");
         assert_eq!((resets, dead), (0, false), "{name}");
     }
+}
+
+#[test]
+fn an_amplifier_that_does_not_follow_ends_the_run_where_its_voltage_is_read_back() {
+    const READ_BACK: &str = "nucleo-daq-read-back";
+    let Some(wired) = image(READ_BACK) else { return };
+    // Without a fault it is as any other.
+    figures_and_codes_are_the_simulations(READ_BACK, ChipRole::Daq, "smc");
+    let _beside = beside();
+    let ChipReport { ran, resets, .. } = broken(&wired, ChipRole::Daq, ChipFaultKind::Amplifier, Some(0.3));
+    assert_eq!(ends(&ran), (State::Faulted, Cause::Board, Some(BoardState::Faulted)));
+    assert_eq!(resets, 0);
+    // Three voltages in a row that are off, the first of which a period later.
+    let safe = ran.safe.expect("a safe output") - ran.hit.expect("a fault");
+    assert!((0.003..=0.0045).contains(&safe), "the safe output came after {safe} s");
+    // Elsewhere the shaft's motion shows it, later.
+    let Some(bare) = image("nucleo-daq") else { return };
+    let ChipReport { ran: later, .. } = broken(&bare, ChipRole::Daq, ChipFaultKind::Amplifier, Some(0.3));
+    assert_eq!((later.standing.state, later.standing.cause), (State::Faulted, Cause::TooFast));
+    assert!(later.safe.expect("a safe output") - later.hit.expect("a fault") > 2.0 * safe);
 }
 
 #[test]

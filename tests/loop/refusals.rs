@@ -2,7 +2,7 @@
 //! nothing is armed.
 
 use crate::harness::{Board, Device, Done, Random, beside_others, folder, program, run, start};
-use clutch_wire::{Decoder, Discover, Hello, Message, Refusal, Refused, SCHEMA, VERSION, encode};
+use clutch_wire::{Decoder, Discover, Hello, Message, Refusal, Refused, ResetCause, SCHEMA, VERSION, encode};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
 
@@ -34,6 +34,8 @@ pub(crate) fn hello(asked: &Discover) -> Hello {
         period_max_us: 1_000_000,
         watchdog_max_us: 10_000_000,
         boot_code: 0,
+        started_by: ResetCause::Power as u8,
+        warnings: 0,
         state: 0,
         run: 0,
         config: 0,
@@ -52,8 +54,8 @@ fn refusing(reason: Refusal, value: u32) -> Device {
 #[test]
 fn a_board_of_another_version_is_told_with_both_versions() {
     let _guard = beside_others();
-    let says =
-        ["speaks version 9 of the protocol", "this program version 3", "Flash a firmware of this release"];
+    let ours = format!("this program version {VERSION}");
+    let says = ["speaks version 9 of the protocol", &ours, "Flash a firmware of this release"];
     let _ = looped(refusing(Refusal::Version, 9).port()).expect(1).says(&says);
     // The same for a board that does not refuse.
     let careless = board_that_answers(|message| match message {

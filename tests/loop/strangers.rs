@@ -164,6 +164,24 @@ fn a_board_that_was_reset_before_it_was_configured_is_refused() {
 }
 
 #[test]
+fn a_board_that_its_watchdog_has_reset_is_announced_so() {
+    let _guard = beside_others();
+    let device = answering(|message| match message {
+        Message::Discover(m) => {
+            vec![Message::Hello(Hello { board: 42, started_by: 3, warnings: 1, ..hello(m) })]
+        }
+        _ => Vec::new(),
+    });
+    // It does not go on from there, since nothing answers; the plan is printed before.
+    let done = run(&["loop", "board_smc_2", "--port", device.port()]).expect(1);
+    let _ = done.prints(&[
+        "number 0000002a, started by its watchdog",
+        "note: the board was reset by its watchdog, since its program had hung",
+        "note: the board's brown-out level is lower",
+    ]);
+}
+
+#[test]
 fn a_board_gets_no_patience_for_its_serial_number() {
     let _alone = alone();
     // It falls silent with the first sample after consent.

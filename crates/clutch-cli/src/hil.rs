@@ -64,9 +64,9 @@ pub(crate) struct Hil {
     /// Injects a fault on line or rig, on the chip's model on the line; see `clutch daq --help`.
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
-    /// Injects a fault into the chip: converter-stuck, crystal, overrun, hang, undefined, nmi,
-    /// unexpected, supply-low (nucleo) or encoder-skip (pico); :at=SECONDS after arming, else from
-    /// power-up on.
+    /// Injects a fault into the chip: converter-stuck, amplifier, crystal, overrun, hang, undefined, nmi,
+    /// unexpected, supply-low, brown-out-low (both nucleo) or encoder-skip (pico); :at=SECONDS after
+    /// arming, else from power-up on.
     #[arg(long, value_name = "KIND[:at=S]")]
     chip_fault: Vec<ChipFault>,
     /// Counts the instructions on the chip's model, and writes the numbers as JSON; takes several

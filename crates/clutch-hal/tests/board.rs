@@ -5,7 +5,7 @@
 
 use clutch_core::{Counts, DacCode};
 use clutch_hal::{Board, Clock, CoarsePwm, Converter, Line, Pwm, Quadrature, SpiDac, SpiKind, Watchdog};
-use clutch_node::{BoardParams, DaqBoard, Hardware, receive, tick};
+use clutch_node::{BoardParams, DaqBoard, Hardware, ResetCause, receive, tick};
 use clutch_wire::{Configure, Decoder, Discover, Message, SCHEMA, VERSION, encode};
 use embedded_hal_mock::eh1::pwm::{Mock as PwmMock, Transaction as Duty};
 use embedded_hal_mock::eh1::spi::{Mock as SpiMock, Transaction as Spi};
@@ -186,6 +186,8 @@ fn a_role_runs_on_it_and_a_converter_that_fails_is_told() {
         period_max_us: 10_000,
         watchdog_max_us: 100_000,
         boot_code: boot.0,
+        started_by: ResetCause::Power,
+        brown_out_low: false,
     };
     let mut role = DaqBoard::new(&params).unwrap();
     let mut decoder = Decoder::new();

@@ -4,6 +4,7 @@
 //! who it is, says what it will do, makes a release test where that is asked for, configures and arms the board, runs to
 //! the path's end, and leaves the board in its safe state. Starting it is the consent.
 
+use crate::board_words::{board_text, controller_text, is_simulated, start_notes, started_text};
 use crate::build_error::BuildError;
 use crate::campaign::CampaignError;
 use crate::clearance::{ClearanceError, Cleared, check};
@@ -18,7 +19,7 @@ use crate::port::{Address, DeviceKind, Endpoint, Port, PortError, PseudoTerminal
 use crate::preflight::{PreflightError, Talk};
 use crate::realtime::{RealtimeOptions, WaitMode, describe_system};
 use crate::release::{self, NoRelease, ReleaseTest};
-use crate::sim_board::{PATIENT_BOARD, STRICT_BOARD};
+use crate::sim_board::PATIENT_BOARD;
 use crate::sim_board_server::{ServeError, ServeOptions, ServeReport, serve};
 use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, ControllerStation, HOST_SILENCE, HostStation, Station};
 use crate::summary::{LogSummary, SampledSummary, Summary};
@@ -502,7 +503,7 @@ impl Course<'_> {
             station.node.meet(met);
         }
         let hold = built.supervisor.safe_codes().hold;
-        let board = met.map_or_else(String::new, controller_text);
+        let board = met.map_or_else(String::new, controller_text) + &started_text(hello);
         let log = self.log(&built, present_code(hello, hold), &board, receivers, None)?;
         let judged = self.has_a_clock(hello, port);
         let mut talk = Talk::new(port, &mut station);
@@ -659,7 +660,7 @@ impl Course<'_> {
             ("watchdog", format!("{} cycles on the board", safety.limits.watchdog_cycles)),
         ];
         rows.extend(describe_system().first().map(|system| ("system", system.clone())));
-        let mut remarks = Vec::new();
+        let mut remarks = start_notes(hello);
         if !holds {
             let does = if plan.bounds.actuator == ActuatorKind::Motor { "drives" } else { "does not hold" };
             remarks.push(format!("note: the board powers up at a voltage that {does} the shaft; set its power-up output to the safe state's"));
@@ -798,24 +799,4 @@ fn host<'a>(
 /// True for a device, of which nobody knows how it is wired.
 fn is_real(port: &Port) -> bool {
     port.kind() != DeviceKind::PseudoTerminal && !port.kind().is_socket()
-}
-
-fn is_simulated(hello: &Hello) -> bool {
-    hello.board == PATIENT_BOARD || hello.board == STRICT_BOARD
-}
-
-fn controller_text(c: &ControllerHello) -> String {
-    let name =
-        if c.board <= STRICT_BOARD { "emulated".to_owned() } else { format!("number {:08x}", c.board) };
-    let clock =
-        if c.clock_hz > 0 { format!(", {} MHz", number(f64::from(c.clock_hz) / 1e6)) } else { String::new() };
-    format!("{name}{clock}")
-}
-
-fn board_text(hello: &Hello) -> String {
-    match hello.board {
-        PATIENT_BOARD => "simulated; its clock waits when this machine stalls".to_owned(),
-        STRICT_BOARD => "simulated, in real time".to_owned(),
-        serial => format!("number {serial:08x}"),
-    }
 }

@@ -7,7 +7,7 @@ use clutch_node::{BoardNode, BoardParams, Outbox};
 use clutch_sim::engine::{EngineError, Event, Motion};
 use clutch_sim::rig::Rig;
 use clutch_sim::{MovingRig, RunError, Scenario, ScenarioError};
-use clutch_wire::BoardState;
+use clutch_wire::{BoardState, ResetCause};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -122,6 +122,8 @@ impl SimBoard {
             period_max_us: 1_000_000,
             watchdog_max_us: 10_000_000,
             boot_code: codes.hold.0,
+            started_by: ResetCause::Power,
+            brown_out_low: false,
         };
         let node = BoardNode::new(&params)?;
         let start = spec.run.start_position().minus::<f64>(FixedCounts(0));

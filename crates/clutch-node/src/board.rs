@@ -16,8 +16,8 @@ use crate::outbox::Sink;
 use clutch_core::{Counts, DacCode, SafeCodes, SafeKind, SafeRun};
 use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, Hello,
-    Message, Pong, Refusal, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample,
-    StopReason, Stopped, VERSION, WATCHDOG_PERIODS,
+    Message, Pong, Refusal, Refused, ResetCause, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE,
+    Sample, StopReason, Stopped, VERSION, WARNING_BROWN_OUT, WATCHDOG_PERIODS,
 };
 
 /// Parameters of a board.
@@ -43,6 +43,10 @@ pub struct BoardParams {
     pub watchdog_max_us: u32,
     /// Output at power-up: the safe output of the rig that the board is built into.
     pub boot_code: u16,
+    /// The reason why its program started.
+    pub started_by: ResetCause,
+    /// Its supply may fall further before it is reset than its program asks for.
+    pub brown_out_low: bool,
 }
 
 impl BoardParams {
@@ -50,7 +54,7 @@ impl BoardParams {
     /// would leave an image that does nothing, and an optimiser removes the rest of it without a word.
     ///
     /// ```
-    /// # use clutch_node::BoardParams;
+    /// # use clutch_node::{BoardParams, ResetCause};
     /// const PARAMS: BoardParams = BoardParams {
     ///     board: 4711,
     ///     boot: 0,
@@ -62,6 +66,8 @@ impl BoardParams {
     ///     period_max_us: 4000,
     ///     watchdog_max_us: 100_000,
     ///     boot_code: 1844,
+    ///     started_by: ResetCause::Unknown,
+    ///     brown_out_low: false,
     /// };
     /// const _: () = assert!(PARAMS.check().is_ok());
     /// ```
@@ -382,6 +388,8 @@ impl BoardNode {
             period_max_us: p.period_max_us,
             watchdog_max_us: p.watchdog_max_us,
             boot_code: p.boot_code,
+            started_by: p.started_by as u8,
+            warnings: if p.brown_out_low { WARNING_BROWN_OUT } else { 0 },
             state: self.state as u8,
             run: self.run,
             config: self.config,

@@ -19,7 +19,6 @@ use crate::outbox::{Outbox, Sink};
 use crate::settings::{Built, MAX_KNOTS, Misfit, Path, Prepared, SETTINGS_HASH, Settings};
 use crate::telemetry::{frame, states};
 use clutch_core::law::LawTerms;
-use clutch_core::reference::Steepness;
 use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Micros};
 use clutch_wire::{
@@ -62,7 +61,7 @@ pub struct BoardController {
     settings: Settings,
     /// The run that the settings are for.
     settings_run: u16,
-    /// The steepness of a table, with which targets are computed.
+    /// What targets are computed with, of a table.
     prepared: Prepared,
     /// Hears encoder and converter while there is no run.
     introduced: Decoder,
@@ -103,7 +102,7 @@ impl BoardController {
             decoder: Decoder::new(),
             settings: Settings::default(),
             settings_run: 0,
-            prepared: [Steepness::default(); MAX_KNOTS],
+            prepared: Prepared::new(),
             introduced: Decoder::new(),
             hello: None,
             run: None,

@@ -46,6 +46,7 @@ mod wide_counter;
 
 pub use board::{BoardMisfit, BoardNode, BoardParams};
 pub use board_controller::{BoardController, BoardControllerParams, present_code};
+pub use clutch_wire::ResetCause;
 pub use controller::{ControllerNode, ControllerParams};
 pub use hardware::{DaqBoard, Hardware, Role, receive, tick};
 pub use host::HostNode;

@@ -6,8 +6,8 @@ use clutch_core::{Counts, DacCode};
 use clutch_node::{BoardMisfit, BoardNode, BoardParams, Outbox};
 use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, Message,
-    Ping, Pong, Refusal, Refused, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, SafeKind,
-    Sample, Stop, StopReason, Stopped, VERSION, encode,
+    Ping, Pong, Refusal, Refused, ResetCause, SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE,
+    SafeKind, Sample, Stop, StopReason, Stopped, VERSION, WARNING_BROWN_OUT, encode,
 };
 use proptest::prelude::*;
 
@@ -22,6 +22,8 @@ const PARAMS: BoardParams = BoardParams {
     period_max_us: 10_000,
     watchdog_max_us: 30_000,
     boot_code: 2867,
+    started_by: ResetCause::Watchdog,
+    brown_out_low: true,
 };
 const CONFIG: u64 = 0x0123_4567_89ab_cdef;
 const HOLD: u16 = 3072;
@@ -175,6 +177,7 @@ fn discover_is_answered_in_every_state_and_changes_nothing() {
         let heard = bench.hears(ask);
         let [Message::Hello(hello)] = heard[..] else { panic!("{heard:?}") };
         assert_eq!((hello.nonce, hello.version, hello.schema), (77, VERSION, SCHEMA));
+        assert_eq!((hello.started_by, hello.warnings), (ResetCause::Watchdog as u8, WARNING_BROWN_OUT));
         assert_eq!((hello.board, hello.boot, hello.boot_code), (42, 9, PARAMS.boot_code));
         assert_eq!((hello.state, hello.run), (state as u8, run));
         assert_eq!(hello.config, if run == 0 { 0 } else { CONFIG });

@@ -13,8 +13,8 @@ use clutch_node::{
 };
 use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configure, Configured, Decoder, Discover, Fault, FrameError,
-    Hello, Message, Ping, Pong, Refused, SCHEMA, STATUS_ENCODER_FAULT, STATUS_LATE, SafeKind, Sample, Stop,
-    StopReason, Stopped, VERSION, encode,
+    Hello, Message, Ping, Pong, Refused, ResetCause, SCHEMA, STATUS_ENCODER_FAULT, STATUS_LATE, SafeKind,
+    Sample, Stop, StopReason, Stopped, VERSION, encode,
 };
 use proptest::prelude::*;
 
@@ -485,6 +485,8 @@ fn hello() -> Message {
         period_max_us: 10_000,
         watchdog_max_us: 10_000,
         boot_code: SAFE,
+        started_by: ResetCause::Power as u8,
+        warnings: 0,
         state: 0,
         run: 0,
         config: 0,
@@ -526,6 +528,8 @@ fn controller_and_board_run_a_thousand_cycles_and_end_as_told() {
             period_max_us: 10_000,
             watchdog_max_us: 10_000,
             boot_code: SAFE,
+            started_by: ResetCause::Power,
+            brown_out_low: false,
         };
         let mut board = BoardNode::new(&params).unwrap();
         let (mut up, mut down) = (Outbox::default(), Outbox::default());

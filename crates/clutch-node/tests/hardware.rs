@@ -4,7 +4,7 @@
 
 use clutch_core::{Counts, DacCode, Micros};
 use clutch_node::{BoardParams, DaqBoard, Hardware, Outbox, Role, WideCounter, receive, tick};
-use clutch_wire::{Actuate, Arm, Configure, Decoder, Message, SafeKind, Sample, encode};
+use clutch_wire::{Actuate, Arm, Configure, Decoder, Message, ResetCause, SafeKind, Sample, encode};
 use core::mem::take;
 use proptest::prelude::*;
 
@@ -20,6 +20,8 @@ const PARAMS: BoardParams = BoardParams {
     period_max_us: 5000,
     watchdog_max_us: 100_000,
     boot_code: BOOT_CODE,
+    started_by: ResetCause::Power,
+    brown_out_low: false,
 };
 const CONFIGURE: Configure = Configure {
     run: 5,

@@ -12,9 +12,9 @@
 #include <stdint.h>
 #include <string.h>
 
-#define CLUTCH_VERSION 3u
+#define CLUTCH_VERSION 4u
 #define CLUTCH_WATCHDOG_PERIODS 100u
-#define CLUTCH_SCHEMA UINT64_C(0x22f2b95f25792755)
+#define CLUTCH_SCHEMA UINT64_C(0xa44cde503340b147)
 #define CLUTCH_MAX_BODY 87u  /* longest frame before stuffing, bytes */
 #define CLUTCH_MAX_FRAME 89u /* longest frame on the wire, bytes */
 #define CLUTCH_MAX_LIST 8u  /* most numbers of a list */
@@ -42,6 +42,15 @@
 #define CLUTCH_STOP_REASON_DONE 0u /* The run is over. */
 #define CLUTCH_STOP_REASON_OPERATOR 1u /* Somebody asked for it. */
 #define CLUTCH_STOP_REASON_FAULT 2u /* The host saw a fault; the board latches it. */
+
+/* ResetCause: The reason why the board's program started. */
+#define CLUTCH_RESET_CAUSE_UNKNOWN 0u /* The board cannot know. */
+#define CLUTCH_RESET_CAUSE_POWER 1u /* The supply came, or had been too low. */
+#define CLUTCH_RESET_CAUSE_PIN 2u /* The reset pin: a button, or a debugger. */
+#define CLUTCH_RESET_CAUSE_WATCHDOG 3u /* The hardware watchdog: the program had hung. */
+#define CLUTCH_RESET_CAUSE_SOFTWARE 4u /* The program or a debugger asked for it. */
+#define CLUTCH_RESET_CAUSE_FAULT 5u /* A fault of the processor, an unexpected interrupt, or a panic had stopped the program. */
+#define CLUTCH_RESET_CAUSE_CLOCK 6u /* A clock had stopped, and the program with it. */
 
 /* Refusal: The board's reason to refuse a frame. */
 #define CLUTCH_REFUSAL_VERSION 1u /* Another version of the protocol; value is the board's. */
@@ -73,6 +82,9 @@
 #define CLUTCH_TELEMETRY_ASKED 0x04u /* The law was asked: error, rate, terms and demand are set. */
 #define CLUTCH_TELEMETRY_TARGETED 0x08u /* The path was asked for its target. */
 #define CLUTCH_TELEMETRY_LIMIT 0x30u /* The limit that decided the voltage: 0 none, 1 the lowest, 2 the highest, 3 a demand that was not a number. */
+
+/* Bits of the field warnings of Hello. */
+#define CLUTCH_WARNING_BROWN_OUT 0x01u /* The supply may fall further before it resets the board than the board's program asks for. */
 
 /* Integers, little-endian. */
 static inline void clutch_put_u8(uint8_t *at, uint8_t value)
@@ -424,7 +436,7 @@ static inline void clutch_get_set(const uint8_t *body, clutch_set_t *m)
 
 /* Hello: The board's identity, abilities and present state. Answers Discover. */
 #define CLUTCH_HELLO_KIND 0x81u
-#define CLUTCH_HELLO_LENGTH 64u
+#define CLUTCH_HELLO_LENGTH 66u
 #define CLUTCH_HELLO_NONCE 1u
 #define CLUTCH_HELLO_VERSION 5u
 #define CLUTCH_HELLO_SCHEMA 6u
@@ -438,9 +450,11 @@ static inline void clutch_get_set(const uint8_t *body, clutch_set_t *m)
 #define CLUTCH_HELLO_PERIOD_MAX_US 39u
 #define CLUTCH_HELLO_WATCHDOG_MAX_US 43u
 #define CLUTCH_HELLO_BOOT_CODE 47u
-#define CLUTCH_HELLO_STATE 49u
-#define CLUTCH_HELLO_RUN 50u
-#define CLUTCH_HELLO_CONFIG 52u
+#define CLUTCH_HELLO_STARTED_BY 49u
+#define CLUTCH_HELLO_WARNINGS 50u
+#define CLUTCH_HELLO_STATE 51u
+#define CLUTCH_HELLO_RUN 52u
+#define CLUTCH_HELLO_CONFIG 54u
 typedef struct {
     uint32_t nonce; /* The nonce of Discover. */
     uint8_t version; /* The board's version of the protocol. */
@@ -455,6 +469,8 @@ typedef struct {
     uint32_t period_max_us; /* Longest period. [us] */
     uint32_t watchdog_max_us; /* Longest watchdog time. [us] */
     uint16_t boot_code; /* The code put out from power-up to the first safe output or run. [DAC code] */
+    uint8_t started_by; /* The reason why its program started: a ResetCause. */
+    uint8_t warnings; /* Conditions of the board that its owner should mend: bits. */
     uint8_t state; /* The present state of the board: a BoardState. */
     uint16_t run; /* The latched run; 0 if none since power-up. */
     uint64_t config; /* The latched hash; 0 if none since power-up. */
@@ -478,6 +494,8 @@ static inline size_t clutch_encode_hello(uint8_t wire[CLUTCH_MAX_FRAME], const c
     clutch_put_u32(body + CLUTCH_HELLO_PERIOD_MAX_US, m->period_max_us);
     clutch_put_u32(body + CLUTCH_HELLO_WATCHDOG_MAX_US, m->watchdog_max_us);
     clutch_put_u16(body + CLUTCH_HELLO_BOOT_CODE, m->boot_code);
+    clutch_put_u8(body + CLUTCH_HELLO_STARTED_BY, m->started_by);
+    clutch_put_u8(body + CLUTCH_HELLO_WARNINGS, m->warnings);
     clutch_put_u8(body + CLUTCH_HELLO_STATE, m->state);
     clutch_put_u16(body + CLUTCH_HELLO_RUN, m->run);
     clutch_put_u64(body + CLUTCH_HELLO_CONFIG, m->config);
@@ -500,6 +518,8 @@ static inline void clutch_get_hello(const uint8_t *body, clutch_hello_t *m)
     m->period_max_us = clutch_get_u32(body + CLUTCH_HELLO_PERIOD_MAX_US);
     m->watchdog_max_us = clutch_get_u32(body + CLUTCH_HELLO_WATCHDOG_MAX_US);
     m->boot_code = clutch_get_u16(body + CLUTCH_HELLO_BOOT_CODE);
+    m->started_by = clutch_get_u8(body + CLUTCH_HELLO_STARTED_BY);
+    m->warnings = clutch_get_u8(body + CLUTCH_HELLO_WARNINGS);
     m->state = clutch_get_u8(body + CLUTCH_HELLO_STATE);
     m->run = clutch_get_u16(body + CLUTCH_HELLO_RUN);
     m->config = clutch_get_u64(body + CLUTCH_HELLO_CONFIG);

@@ -109,6 +109,24 @@ codes! {
         Fault = 2,
     }
 
+    /// The reason why the board's program started.
+    ResetCause {
+        /// The board cannot know.
+        Unknown = 0,
+        /// The supply came, or had been too low.
+        Power = 1,
+        /// The reset pin: a button, or a debugger.
+        Pin = 2,
+        /// The hardware watchdog: the program had hung.
+        Watchdog = 3,
+        /// The program or a debugger asked for it.
+        Software = 4,
+        /// A fault of the processor, an unexpected interrupt, or a panic had stopped the program.
+        Fault = 5,
+        /// A clock had stopped, and the program with it.
+        Clock = 6,
+    }
+
     /// The board's reason to refuse a frame.
     Refusal {
         /// Another version of the protocol; `value` is the board's.
@@ -175,6 +193,13 @@ bits! {
     TELEMETRY_TARGETED = 0x08 "Targeted";
     /// The limit that decided the voltage: 0 none, 1 the lowest, 2 the highest, 3 a demand that was not a number.
     TELEMETRY_LIMIT = 0x30 "Limit";
+}
+
+bits! {
+    /// The bits of `Hello.warnings`.
+    WARNINGS
+    /// The supply may fall further before it resets the board than the board's program asks for.
+    WARNING_BROWN_OUT = 0x01 "BrownOut";
 }
 
 bits! {

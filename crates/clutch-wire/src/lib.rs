@@ -12,9 +12,9 @@ mod list;
 mod message;
 
 pub use codes::{
-    BoardFault, BoardState, CODES, CodeInfo, CodeValue, Refusal, STATUS, STATUS_DAC_FAULT,
+    BoardFault, BoardState, CODES, CodeInfo, CodeValue, Refusal, ResetCause, STATUS, STATUS_DAC_FAULT,
     STATUS_ENCODER_FAULT, STATUS_LATE, STATUS_STATE, SafeKind, StopReason, TELEMETRY, TELEMETRY_ANSWERED,
-    TELEMETRY_ASKED, TELEMETRY_LIMIT, TELEMETRY_SUPERSEDED, TELEMETRY_TARGETED,
+    TELEMETRY_ASKED, TELEMETRY_LIMIT, TELEMETRY_SUPERSEDED, TELEMETRY_TARGETED, WARNING_BROWN_OUT, WARNINGS,
 };
 pub use frame::{Decoder, Frame, FrameError, MAX_BODY, MAX_FRAME, encode, encode_into};
 pub use list::List;
@@ -26,7 +26,7 @@ pub use message::{
 
 /// Version of the protocol: of the rules, of the codes' meanings and of the framing. A change of
 /// the table alone shows in [`SCHEMA`].
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 
 /// Most periods that a host may ask a board's watchdog to wait for: a host that has gone does not leave a code on for
 /// longer.

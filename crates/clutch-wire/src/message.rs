@@ -300,6 +300,10 @@ messages! {
         watchdog_max_us: u32 ["µs"],
         /// The code put out from power-up to the first safe output or run.
         boot_code: u16 ["DAC code"],
+        /// The reason why its program started: a `ResetCause`.
+        started_by: u8,
+        /// Conditions of the board that its owner should mend: bits.
+        warnings: u8,
         /// The present state of the board: a `BoardState`.
         state: u8,
         /// The latched run; 0 if none since power-up.

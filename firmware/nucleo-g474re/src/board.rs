@@ -1,9 +1,10 @@
 //! The board: clocks, encoder, converter, serial line, watchdog. For another board, write another
 //! such file.
 
+use crate::read_back::ReadBack;
 use crate::stack_guard::guard_stack;
 use clutch_core::{Counts, DacCode};
-use clutch_node::{BoardParams, Hardware, WideCounter};
+use clutch_node::{BoardParams, Hardware, ResetCause, WideCounter};
 use core::future::poll_fn;
 use core::task::Poll;
 use cortex_m::peripheral::DWT;
@@ -11,8 +12,9 @@ use embassy_stm32::dac::{self, DacChannel, Value};
 use embassy_stm32::gpio::Pull;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::mode::Blocking;
-use embassy_stm32::pac::timer::vals::FilterValue;
-use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
+use embassy_stm32::pac::flash::vals::Latency;
+use embassy_stm32::pac::timer::vals::{FilterValue, Urs};
+use embassy_stm32::rcc::{AHBPrescaler, Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::qei::{self, Qei};
 use embassy_stm32::usart::{self, RxDma, TxDma, Uart};
@@ -35,6 +37,10 @@ const COUNTS_PER_REV: u32 = 20_000;
 /// Enter the values that you measure at the brake's terminals, here and in the scenario.
 const DRIVER_MV: (i32, i32) = (0, 10_000);
 
+/// True if the brake's voltage comes back to PA0 by a divider of the amplifier's gain: docs/firmware.md. A voltage that does
+/// not follow the converter then ends a run.
+pub const READ_BACK: bool = false;
+
 /// Parameters of the board, but for those that each has of its own: serial number, and number of the power-up.
 const PARAMS: BoardParams = BoardParams {
     board: 0,
@@ -47,6 +53,8 @@ const PARAMS: BoardParams = BoardParams {
     period_max_us: 4000,
     watchdog_max_us: 100_000,
     boot_code: BOOT_CODE.0,
+    started_by: ResetCause::Unknown,
+    brown_out_low: false,
 };
 const _: () = assert!(PARAMS.check().is_ok(), "a number above is out of range: see BoardParams::check");
 
@@ -60,6 +68,9 @@ const WATCHDOG_US: u32 = 10_000;
 /// Threshold of the supply monitor, by the chip's list: 2.9 V.
 const SUPPLY_2_9_V: u8 = 6;
 
+/// A note of [`stop`], and below it the reason: other contents of the register are none.
+const NOTED: u32 = 0xC10C_5E00;
+
 /// The DMA channels of the line, from 0; room for the frames of one period to the host, and for 11 ms from it.
 const TO_HOST: usize = 0;
 const FROM_HOST: usize = 1;
@@ -69,6 +80,14 @@ const RING: usize = 1024;
 /// The core's clock, Hz.
 pub const CLOCK_HZ: u32 = 170_000_000;
 
+/// The clock that the library is told of, and leaves the core with: half of it. The maker wants a microsecond there on the
+/// way from below 80 MHz to above, which the library does not give: [`full_speed`] does. What the library computes from
+/// it, for the timer of its time, for the line and for the converter, is set right by hand.
+const LIBRARY_HZ: u32 = CLOCK_HZ / 2;
+
+/// Level of the supply below which the chip is to be in reset, by its option bytes: 2.8 V.
+const BROWN_OUT_2_8_V: u8 = 4;
+
 /// Priority of the control task.
 pub const CONTROL: Priority = Priority::P6;
 
@@ -76,7 +95,7 @@ pub const CONTROL: Priority = Priority::P6;
 const SERIAL: Priority = Priority::P7;
 
 /// The hardware as the node sees it.
-pub struct Board {
+pub struct Board<const READ_BACK: bool> {
     encoder: Qei<'static, peripherals::TIM3>,
     counter: WideCounter,
     converter: DacChannel<'static, Blocking>,
@@ -87,22 +106,73 @@ pub struct Board {
     pub board: u32,
     /// A different number at each power-up.
     pub boot: u32,
+    started_by: ResetCause,
+    read_back: Option<ReadBack>,
 }
 
-/// For a program that cannot continue: puts the safe output out and waits for the reset. Trusts none of the contents
-/// of memory.
-pub fn stop() -> ! {
+/// For a program that cannot continue: puts the safe output out, notes the reason for the program that starts next, and
+/// waits for the reset. Trusts none of the contents of memory.
+pub fn stop(cause: ResetCause) -> ! {
     cortex_m::interrupt::disable();
     pac::DAC1.dhr12r(0).write(|w| w.set_dhr(BOOT_CODE.0));
+    pac::TAMP.bkpr(0).write(|w| w.set_bkp(NOTED | cause as u32));
     loop {
         cortex_m::asm::nop();
     }
 }
 
+/// The reason why the program starts, from the chip's flags, which are cleared for the next time: they add up. A reset by
+/// the watchdog may have a reason that [`stop`] has noted. From then on [`stop`] can note one: its register outlives a
+/// reset, and takes writes once it is told to.
+fn started_by() -> ResetCause {
+    let flags = pac::RCC.csr().read();
+    pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    pac::RCC.apb1enr1().modify(|w| {
+        w.set_pwren(true);
+        w.set_rtcapben(true);
+    });
+    pac::PWR.cr1().modify(|w| w.set_dbp(true));
+    let note = pac::TAMP.bkpr(0).read().bkp();
+    pac::TAMP.bkpr(0).write(|w| w.set_bkp(0));
+    // Each reset of the chip's own pulls its reset pin, too: that flag comes last.
+    if flags.borrstf() {
+        ResetCause::Power
+    } else if flags.iwdgrstf() || flags.wwdgrstf() {
+        match note ^ NOTED {
+            n if n == ResetCause::Fault as u32 => ResetCause::Fault,
+            n if n == ResetCause::Clock as u32 => ResetCause::Clock,
+            _ => ResetCause::Watchdog,
+        }
+    } else if flags.sftrstf() || flags.oblrstf() {
+        ResetCause::Software
+    } else if flags.pinrstf() && !flags.lpwrrstf() {
+        ResetCause::Pin
+    } else {
+        ResetCause::Unknown
+    }
+}
+
+/// From half of the clock, where the library has left the core, to all of it.
+fn full_speed() {
+    // The flash's wait states for the clock that comes, first.
+    pac::FLASH.acr().modify(|w| w.set_latency(Latency::WS4));
+    while pac::FLASH.acr().read().latency() != Latency::WS4 {}
+    // A microsecond at least: the clocks are those of the half.
+    cortex_m::asm::delay(LIBRARY_HZ / 1_000_000);
+    pac::RCC.cfgr().modify(|w| w.set_hpre(AHBPrescaler::DIV1));
+    // The library's time: its divider takes effect with an update, which is to be no overflow.
+    let time = pac::TIM5;
+    time.psc().write_value((CLOCK_HZ / 1_000_000 - 1) as u16);
+    time.cr1().modify(|w| w.set_urs(Urs::COUNTER_ONLY));
+    time.egr().write(|w| w.set_ug(true));
+    time.cr1().modify(|w| w.set_urs(Urs::ANY_EVENT));
+}
+
 /// Starts the board, its output first.
-pub fn start() -> (Board, Line) {
+pub fn start<const READ_BACK: bool>() -> (Board<READ_BACK>, Line) {
     let mut config = embassy_stm32::Config::default();
     guard_stack();
+    let started_by = started_by();
     // The crystal, not the internal oscillator: the host measures this clock, and an error of 1 %
     // is too much.
     config.rcc.hse = Some(Hse { freq: Hertz(24_000_000), mode: HseMode::Oscillator });
@@ -116,12 +186,15 @@ pub fn start() -> (Board, Line) {
     });
     config.rcc.sys = Sysclk::PLL1_R;
     config.rcc.boost = true;
+    config.rcc.ahb_pre = AHBPrescaler::DIV2;
     let p = embassy_stm32::init(config);
+    full_speed();
 
     // Without the chip's output buffer, which reaches neither 0 V nor the top: 0.2 V at the pin would
     // be 0.6 V at a brake that is to let go. Until the write the code is 0, for some clocks.
     let mut converter = DacChannel::new_blocking(p.DAC1, p.PA4);
     converter.set_mode(dac::Mode::NormalExternalUnbuffered);
+    pac::DAC1.mcr().modify(|w| w.set_hfsel(0b10)); // its bus is above 160 MHz
     converter.enable();
     converter.set(Value::Bit12Right(BOOT_CODE.0));
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
@@ -143,10 +216,10 @@ pub fn start() -> (Board, Line) {
     pac::TIM3.ccmr_input(0).modify(|w| [0, 1].map(|n| w.set_icf(n, FilterValue::FDTS_DIV8_N8)));
 
     let mut line = usart::Config::default();
-    line.baudrate = BAUD;
+    line.baudrate = BAUD / (CLOCK_HZ / LIBRARY_HZ);
     let line = Uart::new_blocking(p.LPUART1, p.PA3, p.PA2, line);
     let core = cortex_m::Peripherals::take();
-    let (Ok(line), Some(mut core), Some(boot)) = (line, core, random()) else { stop() };
+    let (Ok(line), Some(mut core), Some(boot)) = (line, core, random()) else { stop(ResetCause::Fault) };
     // Pins and baud rate stay; the bytes are the DMA's.
     core::mem::forget(line);
     let to_host = ToHost::new(TxDma::<peripherals::LPUART1>::request(&*p.DMA1_CH1));
@@ -156,7 +229,18 @@ pub fn start() -> (Board, Line) {
 
     let board = serial_number();
     let counter = WideCounter::new(encoder.count());
-    let board = Board { encoder, counter, converter, told: BOOT_CODE, watchdog, line: to_host, board, boot };
+    let board = Board {
+        encoder,
+        counter,
+        converter,
+        told: BOOT_CODE,
+        watchdog,
+        line: to_host,
+        board,
+        boot,
+        started_by,
+        read_back: READ_BACK.then(ReadBack::start),
+    };
     (board, from_host)
 }
 
@@ -278,12 +362,19 @@ impl Line {
     }
 }
 
-impl Board {
+impl<const READ_BACK: bool> Board<READ_BACK> {
     /// The board's parameters. They are constants, not a field: the compiler then does their
     /// checks, and no `f64` of an error's value is left in the image.
     #[must_use]
     pub fn params(&self) -> BoardParams {
-        BoardParams { board: self.board, boot: self.boot, ..PARAMS }
+        let brown_out_low = pac::FLASH.optr().read().bor_lev() < BROWN_OUT_2_8_V;
+        BoardParams {
+            board: self.board,
+            boot: self.boot,
+            started_by: self.started_by,
+            brown_out_low,
+            ..PARAMS
+        }
     }
 }
 
@@ -306,7 +397,7 @@ fn serial_number() -> u32 {
     (a ^ b ^ c).max(2)
 }
 
-impl Hardware for Board {
+impl<const READ_BACK: bool> Hardware for Board<READ_BACK> {
     fn now_us(&self) -> u64 {
         Instant::now().as_micros()
     }
@@ -322,9 +413,10 @@ impl Hardware for Board {
     }
 
     /// Its output register has another code: a converter that was reset or lost its clock. Or the supply, its
-    /// reference, is too low. The pin's voltage is not seen.
+    /// reference, is too low. The pin's voltage is seen where it is read back.
     fn converter_fault(&self) -> bool {
-        self.converter.read() != self.told.0 || pac::PWR.sr2().read().pvdo()
+        let strays = READ_BACK && self.read_back.as_ref().is_some_and(|it| it.strays(self.told));
+        strays || self.converter.read() != self.told.0 || pac::PWR.sr2().read().pvdo()
     }
 
     // A function of its own in machine code, too: the bound of the path from a sample to its code ends with it.

@@ -4,6 +4,7 @@
 
 pub mod board;
 pub mod fault;
+mod read_back;
 pub mod run;
 #[path = "../../shared/stack_guard.rs"]
 mod stack_guard;

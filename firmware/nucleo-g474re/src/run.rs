@@ -2,7 +2,7 @@
 //! bytes reach it one after the other, so nothing is shared and nothing locks.
 
 use crate::board::{self, Board, CONTROL, Line, stop};
-use clutch_node::{Role, receive, tick};
+use clutch_node::{ResetCause, Role, receive, tick};
 use embassy_executor::{InterruptExecutor, SpawnError, SpawnToken};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::interrupt;
@@ -25,10 +25,12 @@ unsafe fn TIM20_UP() {
 }
 
 /// Starts the board and its control task, and sleeps between interrupts for ever.
-pub fn begin<S: Send>(control: impl FnOnce(Board, Line) -> Result<SpawnToken<S>, SpawnError>) -> ! {
+pub fn begin<S: Send, const READ_BACK: bool>(
+    control: impl FnOnce(Board<READ_BACK>, Line) -> Result<SpawnToken<S>, SpawnError>,
+) -> ! {
     let (board, line) = board::start();
     interrupt::TIM20_UP.set_priority(CONTROL);
-    let Ok(control) = control(board, line) else { stop() };
+    let Ok(control) = control(board, line) else { stop(ResetCause::Fault) };
     EXECUTOR.start(interrupt::TIM20_UP).spawn(control);
     loop {
         cortex_m::asm::wfi();
@@ -36,7 +38,11 @@ pub fn begin<S: Send>(control: impl FnOnce(Board, Line) -> Result<SpawnToken<S>,
 }
 
 /// Runs a role, for ever.
-pub async fn run(role: &mut impl Role, mut board: Board, mut line: Line) -> ! {
+pub async fn run<const READ_BACK: bool>(
+    role: &mut impl Role,
+    mut board: Board<READ_BACK>,
+    mut line: Line,
+) -> ! {
     let mut bytes = [0; CHUNK];
     let mut period_us = BOOT_PERIOD_US;
     let mut beat = every(period_us);

@@ -4,7 +4,7 @@ use crate::line::{self, ToHost};
 use crate::quadrature::Quadrature;
 use crate::stack_guard::guard_stack;
 use clutch_core::{Counts, DacCode};
-use clutch_node::{BoardParams, Hardware, WideCounter};
+use clutch_node::{BoardParams, Hardware, ResetCause, WideCounter};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, Ordering};
 use pac::interrupt;
@@ -38,6 +38,8 @@ const PARAMS: BoardParams = BoardParams {
     period_max_us: 4000,
     watchdog_max_us: 100_000,
     boot_code: BOOT_CODE.0,
+    started_by: ResetCause::Unknown,
+    brown_out_low: false,
 };
 const _: () = assert!(PARAMS.check().is_ok(), "a number above is out of range: see BoardParams::check");
 
@@ -74,6 +76,9 @@ pub const CYCLES_HZ: u32 = 1_000_000;
 const WATCHDOG: u32 = 20_000;
 const RING_CLOCKS: u16 = 12;
 
+/// A note of [`stop`], and below it the reason: other contents of the register are none.
+const NOTED: u32 = 0xC10C_5E00;
+
 /// True when a period has begun that was not served.
 static BEGUN: AtomicBool = AtomicBool::new(false);
 
@@ -103,16 +108,18 @@ pub struct Board {
     told: DacCode,
     /// A different number at each power-up.
     boot: u32,
+    started_by: ResetCause,
 }
 
-/// For a program that cannot continue: lets the switch fall back, puts the safe output out behind it, and waits for
-/// the reset. Trusts none of the contents of memory: it runs from flash.
+/// For a program that cannot continue: lets the switch fall back, puts the safe output out behind it, notes the reason
+/// for the program that starts next, and waits for the reset. Trusts none of the contents of memory: it runs from flash.
 #[unsafe(link_section = ".HardFault.stop")]
 #[inline(never)]
-pub fn stop() -> ! {
+pub fn stop(cause: ResetCause) -> ! {
     cortex_m::interrupt::disable();
     pac::SIO.gpio_out(0).value_clr().write_value(1 << CONNECTED);
     pac::PWM.ch(CODE).cc().write(|w| w.set_a(BOOT_CODE.0));
+    pac::WATCHDOG.scratch0().write_value(NOTED | cause as u32);
     loop {
         cortex_m::asm::nop();
     }
@@ -153,9 +160,33 @@ fn start_clocks() {
     line::unmask(pac::Interrupt::CLOCKS_IRQ);
 }
 
+/// The reason why the program starts. A reset by the watchdog may have a reason that [`stop`] has noted, in a register
+/// that outlives it. What reset the chip as a whole is known until the next such reset, so the watchdog comes first.
+fn started_by() -> ResetCause {
+    let (watchdog, chip) = (pac::WATCHDOG.reason().read(), pac::VREG_AND_CHIP_RESET.chip_reset().read());
+    let note = pac::WATCHDOG.scratch0().read();
+    pac::WATCHDOG.scratch0().write_value(0);
+    if watchdog.timer() {
+        match note ^ NOTED {
+            n if n == ResetCause::Fault as u32 => ResetCause::Fault,
+            n if n == ResetCause::Clock as u32 => ResetCause::Clock,
+            _ => ResetCause::Watchdog,
+        }
+    } else if watchdog.force() || chip.had_psm_restart() {
+        ResetCause::Software
+    } else if chip.had_run() {
+        ResetCause::Pin
+    } else if chip.had_por() {
+        ResetCause::Power
+    } else {
+        ResetCause::Unknown
+    }
+}
+
 /// Starts the board, its output first.
 pub fn start() -> Board {
     guard_stack();
+    let started_by = started_by();
     // A debugger's reset leaves the clocks as they are: the core must not run from the PLL that is reset below.
     pac::CLOCKS.clk_sys_ctrl().modify(|w| w.set_src(pac::clocks::vals::ClkSysCtrlSrc::CLK_REF));
     while pac::CLOCKS.clk_sys_selected().read() != 1 {}
@@ -207,6 +238,7 @@ pub fn start() -> Board {
         period_us: 1000,
         told: BOOT_CODE,
         boot: random(),
+        started_by,
     };
     pac::PWM.inte().write(|w| w.0 = 1 << PERIOD);
     line::unmask(pac::Interrupt::PWM_IRQ_WRAP);
@@ -252,7 +284,7 @@ impl Board {
     /// The board's parameters.
     #[must_use]
     pub fn params(&self) -> BoardParams {
-        BoardParams { boot: self.boot, ..PARAMS }
+        BoardParams { boot: self.boot, started_by: self.started_by, ..PARAMS }
     }
 
     /// True once for each period that has begun. The next ones take so long from now on.

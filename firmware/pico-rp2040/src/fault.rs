@@ -3,6 +3,7 @@
 //! into its power-up state. A panic has no path to it: the image would not link.
 
 use crate::board::stop;
+use clutch_node::ResetCause;
 use cortex_m_rt::exception;
 
 /// The loader of the flash on a Pico, at the place where the chip looks for it.
@@ -36,12 +37,13 @@ unsafe extern "C" fn copy_program() {
 #[exception(trampoline = false)]
 #[unsafe(link_section = ".HardFault.user")]
 unsafe fn HardFault() -> ! {
-    stop()
+    stop(ResetCause::Fault)
 }
 
 // An unexpected interrupt, the one of a clock that has stopped, and the NMI.
 #[exception]
 #[unsafe(link_section = ".HardFault.others")]
-unsafe fn DefaultHandler(_: i16) -> ! {
-    stop()
+unsafe fn DefaultHandler(number: i16) -> ! {
+    let clock = number == rp_pac::Interrupt::CLOCKS_IRQ as i16;
+    stop(if clock { ResetCause::Clock } else { ResetCause::Fault })
 }

@@ -47,7 +47,7 @@ use clutch_node::{
     DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Path, Role, RunParams, Settings,
     WideCounter, present_code, receive, tick,
 };
-use clutch_wire::{BoardState, Configure, Decoder, Hello, StopReason, encode};
+use clutch_wire::{BoardState, Configure, Decoder, Hello, ResetCause, StopReason, encode};
 use core::hint::black_box;
 
 #[panic_handler]
@@ -555,6 +555,8 @@ fn board() {
         period_max_us: word() as u32,
         watchdog_max_us: word() as u32,
         boot_code: word() as u16,
+        started_by: ResetCause::from_u8(word() as u8).unwrap_or(ResetCause::Unknown),
+        brown_out_low: word() == 1,
     };
     runner(&params);
     let Some(mut node) = made(BoardNode::new(&params)) else { return };
@@ -692,6 +694,8 @@ fn numbers() {
         period_max_us: word() as u32,
         watchdog_max_us: word() as u32,
         boot_code: word() as u16,
+        started_by: word() as u8,
+        warnings: word() as u8,
         state: word() as u8,
         run: word() as u16,
         config: word(),

@@ -23,7 +23,7 @@ mod tests;
 mod wave;
 
 pub use profile::{JerkLimited, MinimumJerk, Trapezoid};
-pub use table::{Interpolation, Knot, Steepness, Table};
+pub use table::{Interpolation, Knot, Prepared, Steepness, Table};
 pub use wave::{Chirp, Sine};
 
 use crate::params::{Range, Table as _};

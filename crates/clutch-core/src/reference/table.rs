@@ -126,6 +126,15 @@ impl<T: Real> Interval<T> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Steepness(u128);
 
+/// What a table's targets are computed with where each point's share of it was computed before a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Prepared<'a, T> {
+    /// [`Table::steepness`] of each point.
+    pub steepness: &'a [Steepness],
+    /// [`Table::slope`] of each point.
+    pub slopes: &'a [T],
+}
+
 impl<'a> Table<'a> {
     /// The same: points are whole numbers.
     #[must_use]
@@ -156,7 +165,8 @@ impl<'a> Table<'a> {
 
     /// The slope at a point, counts/s: a weighted harmonic mean of both sides; 0 at an extremum
     /// and at the ends, where the path comes from rest and goes to rest.
-    fn slope<T: Real>(&self, at: usize) -> T {
+    #[must_use]
+    pub fn slope<T: Real>(&self, at: usize) -> T {
         let before = at.checked_sub(1).and_then(|i| self.interval::<T>(i));
         match (before, self.interval::<T>(at)) {
             (Some(l), Some(r)) => {
@@ -200,24 +210,29 @@ impl<'a> Table<'a> {
         Steepness(u128::from(whole) << 64 | u128::from(part))
     }
 
-    /// [`Table::at`] for who has the steepness behind each point.
+    /// [`Table::at`] for who has prepared each point.
     // A function of its own in machine code, as the other: the bound of a period with another path leaves it out.
     #[inline(never)]
     #[must_use]
     pub fn at_with<T: Real>(
         &self,
-        steepness: &[Steepness],
+        prepared: Prepared<'_, T>,
         tick: u64,
         encoder: Encoder,
         period: Micros,
     ) -> Target<T> {
-        let of = |point: usize| steepness.get(point).copied().unwrap_or_default();
-        self.on(tick, &Scale::new(encoder, period), |point, interval, us| interval.along_at(us, of(point)))
+        let of = |point: usize| prepared.steepness.get(point).copied().unwrap_or_default();
+        self.on(
+            tick,
+            &Scale::new(encoder, period),
+            |point, interval, us| interval.along_at(us, of(point)),
+            |point| prepared.slopes.get(point).copied().unwrap_or(T::ZERO),
+        )
     }
 
     #[inline(never)]
     pub(super) fn scaled<T: Real>(&self, tick: u64, scale: &Scale<T>) -> Target<T> {
-        self.on(tick, scale, |_, interval, us| interval.along(us))
+        self.on(tick, scale, |_, interval, us| interval.along(us), |point| self.slope(point))
     }
 
     #[inline]
@@ -226,6 +241,7 @@ impl<'a> Table<'a> {
         tick: u64,
         scale: &Scale<T>,
         along: impl Fn(usize, &Interval<T>, u64) -> FixedCounts,
+        slope: impl Fn(usize) -> T,
     ) -> Target<T> {
         let time = tick.saturating_mul(scale.period_us);
         let after = self.knots.partition_point(|k| k.time_us <= time);
@@ -249,7 +265,7 @@ impl<'a> Table<'a> {
                 let (two, three) = (T::from_i32(2), T::from_i32(3));
                 // Slopes at both points relative to the chord. Hermite:
                 // p = line + h s (1 − s) [(1 − s) m0 − s m1]
-                let (m0, m1) = (self.slope::<T>(last) - chord, self.slope::<T>(last.wrapping_add(1)) - chord);
+                let (m0, m1) = (slope(last) - chord, slope(last.wrapping_add(1)) - chord);
                 let (c2, c3) = (-(two * m0 + m1), m0 + m1);
                 let left = T::ONE - s;
                 (

@@ -454,7 +454,7 @@ fn anything(kind: u8, bits: [u64; 6], knots: &[Knot]) -> ReferenceParams<'_> {
 
 proptest! {
     #[test]
-    fn the_steepness_of_a_table_changes_no_bit_of_it(
+    fn the_preparation_of_a_table_changes_no_bit_of_it(
         times in prop::array::uniform4(1_u64..1 << 62), short in 0_u32..60, positions in prop::array::uniform4(any::<i64>()),
         part in 0.0..1.0_f64, period in 1_u32..1_000_000,
     ) {
@@ -466,10 +466,12 @@ proptest! {
         for interpolation in [Interpolation::Linear, Interpolation::Cubic] {
             let table = Table { knots: &knots, interpolation };
             let steepness = [0, 1, 2, 3].map(|k| table.steepness(k));
+            let slopes = [0, 1, 2, 3].map(|k| table.slope::<f32>(k));
+            let prepared = Prepared { steepness: &steepness, slopes: &slopes };
             let last = (part * time_us as f64) as u64 / u64::from(period);
             for tick in [last, last + 1, last / 2, 0] {
                 let (encoder, period) = (Encoder::PAPER, Micros(period));
-                let ours = table.at_with::<f32>(&steepness, tick, encoder, period);
+                let ours = table.at_with::<f32>(prepared, tick, encoder, period);
                 prop_assert_eq!(ours, table.at::<f32>(tick, encoder, period));
             }
         }

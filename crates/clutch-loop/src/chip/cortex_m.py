@@ -57,6 +57,8 @@ class Fault:
     UNEXPECTED = 1 << 6  # an interrupt that the program never enabled: number 0
     SUPPLY_LOW = 1 << 7  # the supply is below the monitor's threshold
     ENCODER_SKIP = 1 << 8  # both signals of the encoder change at once
+    BROWN_OUT_LOW = 1 << 9  # the level of the supply below which the chip is in reset is as the maker delivers it
+    AMPLIFIER = 1 << 10  # what is behind the converter gives 0 V
     METERED = 1 << 31  # no fault: the instructions of this request count
 
 

@@ -24,11 +24,15 @@ pub enum ChipFaultKind {
     SupplyLow,
     /// Both signals of the encoder change at once.
     EncoderSkip,
+    /// The chip's brown-out level is as its maker delivers it.
+    BrownOutLow,
+    /// The amplifier behind the converter gives 0 V.
+    Amplifier,
 }
 
 impl ChipFaultKind {
     /// All, by name.
-    pub const ALL: [(&'static str, ChipFaultKind); 9] = [
+    pub const ALL: [(&'static str, ChipFaultKind); 11] = [
         ("converter-stuck", ChipFaultKind::ConverterStuck),
         ("crystal", ChipFaultKind::Crystal),
         ("overrun", ChipFaultKind::Overrun),
@@ -38,6 +42,8 @@ impl ChipFaultKind {
         ("unexpected", ChipFaultKind::Unexpected),
         ("supply-low", ChipFaultKind::SupplyLow),
         ("encoder-skip", ChipFaultKind::EncoderSkip),
+        ("brown-out-low", ChipFaultKind::BrownOutLow),
+        ("amplifier", ChipFaultKind::Amplifier),
     ];
 
     /// Its name.
@@ -57,6 +63,8 @@ impl ChipFaultKind {
             ChipFaultKind::Unexpected => 1 << 6,
             ChipFaultKind::SupplyLow => 1 << 7,
             ChipFaultKind::EncoderSkip => 1 << 8,
+            ChipFaultKind::BrownOutLow => 1 << 9,
+            ChipFaultKind::Amplifier => 1 << 10,
         }
     }
 }

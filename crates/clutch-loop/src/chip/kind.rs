@@ -41,12 +41,12 @@ impl ChipKind {
         }
     }
 
-    /// True if it can have a fault: an RP2040 has no monitor of its supply, and only its encoder's counter tells of
+    /// True if it can have a fault: an RP2040 has no monitor of its supply and no such options, and only its encoder's counter tells of
     /// edges that it missed.
     #[must_use]
     pub const fn has(self, fault: ChipFaultKind) -> bool {
         match fault {
-            ChipFaultKind::SupplyLow => matches!(self, ChipKind::Stm32g474),
+            ChipFaultKind::SupplyLow | ChipFaultKind::BrownOutLow => matches!(self, ChipKind::Stm32g474),
             ChipFaultKind::EncoderSkip => matches!(self, ChipKind::Rp2040),
             _ => true,
         }

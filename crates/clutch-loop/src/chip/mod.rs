@@ -39,6 +39,7 @@ pub struct ChipBoard {
     dac: Dac<f64>,
     /// Voltage at the brake while the wiring alone decides, V: that of divider or switch, which holds.
     pull: f64,
+    amplifier_dead: bool,
     faults: Vec<ChipFault>,
     decoder: Decoder,
     state: BoardState,
@@ -90,6 +91,7 @@ impl ChipBoard {
             rig,
             dac,
             pull,
+            amplifier_dead: false,
             faults: faults.to_vec(),
             decoder: Decoder::new(),
             state: BoardState::Boot,
@@ -111,6 +113,11 @@ impl ChipBoard {
     /// Begins a fault with the next exchange.
     pub fn inject(&mut self, kind: ChipFaultKind) {
         self.faults.push(ChipFault { kind, at: None });
+    }
+
+    /// Ends all faults with the next exchange.
+    pub fn mend(&mut self) {
+        self.faults.clear();
     }
 
     /// Resets since power-up.
@@ -141,7 +148,13 @@ impl ChipBoard {
     /// Voltage at the brake now, V.
     #[must_use]
     pub fn volts_now(&self) -> f64 {
-        if self.floating() { self.pull } else { self.dac.volts(DacCode(self.last.code)) }
+        if self.amplifier_dead {
+            0.0
+        } else if self.floating() {
+            self.pull
+        } else {
+            self.dac.volts(DacCode(self.last.code))
+        }
     }
 
     /// Ends the chip: the numbers of instructions, if they were counted.
@@ -157,6 +170,7 @@ impl ChipBoard {
         let armed = self.armed_for(now_ns);
         let active = self.faults.iter().filter(|fault| fault.active(armed));
         let bits = active.fold(0, |bits, fault| bits | fault.kind.bit());
+        self.amplifier_dead = bits & ChipFaultKind::Amplifier.bit() != 0;
         if bits != 0 && armed.is_some() {
             self.first_hit_ns.get_or_insert(now_ns);
         }

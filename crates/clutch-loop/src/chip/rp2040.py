@@ -394,7 +394,7 @@ class Watchdog(Registers):
     """WATCHDOG, on ticks of the reference clock, which is the ring oscillator: it runs whatever happens to the core's.
     Its counter falls by two for each tick: erratum E1."""
 
-    CTRL, LOAD, REASON, TICK = 0x00, 0x04, 0x08, 0x2C
+    CTRL, LOAD, REASON, SCRATCH, TICK = 0x00, 0x04, 0x08, 0x0C, 0x2C
 
     def __init__(self, chip: Rp2040, page: Page) -> None:
         super().__init__(chip, page, 0)
@@ -402,7 +402,10 @@ class Watchdog(Registers):
         self.on(self.LOAD, write=self.load)
 
     def reset(self) -> None:
+        kept = [self[self.SCRATCH + 4 * n] for n in range(8)]
         super().reset()
+        for n, value in enumerate(kept):
+            self[self.SCRATCH + 4 * n] = value
         self.fires_ns = NEVER
         self.left = 0
 
@@ -418,6 +421,12 @@ class Watchdog(Registers):
         clocks = (self.left + 1) // 2 * (self[self.TICK] & 0x1FF)
         running = self[self.CTRL] >> 30 & 1 and self[self.TICK] >> 9 & 1 and self.chip.psm[0x08]
         self.fires_ns = self.chip.now_ns + clocks * 1_000_000_000 // RING_HZ if running else NEVER
+
+
+class Regulator(Registers):
+    """VREG_AND_CHIP_RESET: the cause of the last reset of the chip as a whole, here of its power-up."""
+
+    initial: ClassVar = {0x08: 1 << 8}  # CHIP_RESET.HAD_POR
 
 
 class Noise(Registers):
@@ -572,6 +581,7 @@ class Rp2040(Chip):
         self.slices = Pwm(self, pwm)
         self.pwm = [Slice(self, pwm, n) for n in range(8)]
         self.psm = Block(self, page(0x4001_0000), 0)
+        self.regulator = Regulator(self, page(0x4006_4000), 0)
         self.watchdog = Watchdog(self, page(0x4005_8000))
         self.noise = Noise(self, page(0x4006_0000))
         self.serial = Serial(self, page(0x4003_4000))

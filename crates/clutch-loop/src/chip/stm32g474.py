@@ -13,6 +13,7 @@ from functools import partial
 from typing import ClassVar
 
 from cortex_m import NEVER, NMI, WORD, Block, Chip, Fault, Meter, Page, segments, serve
+from unicorn import Uc
 from unicorn import arm_const as arm
 from unicorn import unicorn_const as uc_const
 
@@ -179,6 +180,37 @@ class Converter(Registers):
             self[self.DOR1] = self[self.DHR12R1]
 
 
+class Adc(Registers):
+    """ADC1, on the voltage behind the amplifier, divided by its gain. A conversion is done at once."""
+
+    ISR, CR, DR = 0x00, 0x08, 0x40
+    ADRDY, EOC = 1 << 0, 1 << 2
+    ADEN, ADSTART, ADVREGEN, DEEPPWD, ADCAL = 1 << 0, 1 << 2, 1 << 28, 1 << 29, 1 << 31
+    initial: ClassVar = {CR: DEEPPWD}
+
+    def __init__(self, chip: Stm32g474, page: Page, base: int) -> None:
+        super().__init__(chip, page, base)
+        self.on(self.ISR, write=self.clear)
+        self.on(self.CR, write=self.control)
+        self.on(self.DR, self.result)
+
+    def clear(self, value: int) -> None:
+        self[self.ISR] &= ~value
+
+    def control(self, value: int) -> None:
+        awake = value & self.ADVREGEN and not value & self.DEEPPWD
+        if awake and value & self.ADEN:
+            self[self.ISR] |= self.ADRDY
+        if awake and value & self.ADSTART and self[self.ISR] & self.ADRDY:
+            self[self.DR] = 0 if self.chip.faults & Fault.AMPLIFIER else self.chip.code()
+            self[self.ISR] |= self.EOC
+        self[self.CR] = value & ~(self.ADCAL | self.ADSTART)
+
+    def result(self) -> int:
+        self[self.ISR] &= ~self.EOC
+        return self[self.DR]
+
+
 class Watchdog(Registers):
     """IWDG, on the clock LSI of 32 kHz: it runs whatever happens to the core's."""
 
@@ -225,7 +257,8 @@ class Serial(Registers):
     """LPUART1: bytes by interrupt or by DMA. The transmitter is always empty, the line of the receiver idle once the
     bytes that came are read."""
 
-    CR1, CR3, RQR, ISR, ICR, RDR, TDR = 0x00, 0x08, 0x18, 0x1C, 0x20, 0x24, 0x28
+    CR1, CR3, BRR, RQR, ISR, ICR, RDR, TDR = 0x00, 0x08, 0x0C, 0x18, 0x1C, 0x20, 0x24, 0x28
+    BAUD = 921_600  # of the host
     ORE, IDLE, RXNE, TC, TXE = 1 << 3, 1 << 4, 1 << 5, 1 << 6, 1 << 7
     FIFO = 8  # bytes
     REQUEST_RX, REQUEST_TX = 34, 35
@@ -284,14 +317,24 @@ class Serial(Registers):
         self.chip.attend()
         return byte
 
+    def in_step(self) -> bool:
+        """True if the line has the host's rate, by 2 %: others make no bytes of it."""
+        divider = self[self.BRR]
+        return bool(divider) and abs(256 * self.chip.rcc.bus_hz / divider - self.BAUD) < 0.02 * self.BAUD
+
     def push(self, value: int) -> None:
-        self.sent.append(value & 0xFF)
-        self.kept |= self.TC
+        self.send(bytes([value & 0xFF]))
         self.chip.attend()
+
+    def send(self, data: bytes) -> None:
+        """Bytes leave over the line."""
+        self.kept |= self.TC
+        if self.in_step():
+            self.sent += data
 
     def take(self, data: bytes) -> None:
         """Bytes come over the line."""
-        if self[self.CR1] & 5 != 5 or not data:  # the receiver is off
+        if self[self.CR1] & 5 != 5 or not data or not self.in_step():  # the receiver is off, or hears noise
             return
         if self.chip.faults & Fault.OVERRUN and not self.chip.overrun:
             self.chip.overrun = True
@@ -365,16 +408,28 @@ class Dma(Registers):
         return moved
 
 
+class WrongClock(Exception):
+    """A clock that the maker does not allow: a chip may do anything there."""
+
+
 class Clocks(Registers):
-    """RCC: oscillators and PLL are ready at once, or never; the crystal can die."""
+    """RCC: oscillators and PLL are ready at once, or never; the crystal can die.
+
+    Above 80 MHz a chip comes from below with its core at half of that, or less, for a microsecond; and flash has wait
+    states for the core's clock. Code takes no time here: instructions are counted instead, which take a clock or more.
+    """
 
     CR, CFGR, PLLCFGR, CIFR, CICR, BDCR, CSR, CRRCR = 0x00, 0x08, 0x0C, 0x1C, 0x20, 0x90, 0x94, 0x98
     initial: ClassVar = {CR: 0x500, CFGR: 0x5, PLLCFGR: 0x1000}
     HSEON, CSSON, PLLON = 1 << 16, 1 << 19, 1 << 24
     CSSF = 1 << 8
+    STEP_HZ = 80_000_000  # of the system's clock
+    WAIT_STATE_HZ = 34_000_000  # another for each
 
     def __init__(self, chip: Stm32g474, page: Page, base: int) -> None:
         self.flags = 0x0C00_0000  # BORRSTF, PINRSTF: power-up
+        self.counter: int | None = None  # the hook that counts instructions
+        self.executed = 0  # since the system's clock has risen, at half of it for the core
         super().__init__(chip, page, base)
         self.on(self.CR, self.control, partial(self.change, self.CR))
         self.on(self.CFGR, write=self.configure)
@@ -413,9 +468,11 @@ class Clocks(Registers):
         """The clocks of the core, and of the timers on APB1, Hz; 0 if one stands still."""
         setting = self[self.CFGR]
         divided = {8: 1, 9: 2, 10: 3, 11: 4, 12: 6, 13: 7, 14: 8, 15: 9}.get(setting >> 4 & 15, 0)
-        self.core_hz = self.source_hz(setting >> 2 & 3) >> divided
+        self.system_hz = self.source_hz(setting >> 2 & 3)
+        self.core_hz = self.system_hz >> divided
         # A divided bus has timers at twice its clock.
         self.timer_hz = self.core_hz >> {5: 0, 6: 1, 7: 2}.get(setting >> 8 & 7, 0)
+        self.bus_hz = self.core_hz >> {4: 1, 5: 2, 6: 3, 7: 4}.get(setting >> 8 & 7, 0)
 
     def reset(self) -> None:
         super().reset()
@@ -429,7 +486,33 @@ class Clocks(Registers):
 
     def configure(self, value: int) -> None:
         source = value & 3 if self.source_hz(value & 3) else self[self.CFGR] >> 2 & 3
+        system_hz, core_hz = self.system_hz, self.core_hz
         self.change(self.CFGR, value & ~0xC | source << 2)
+        self.judge(system_hz, core_hz)
+
+    def judge(self, system_hz: int, core_hz: int) -> None:
+        """Whether the core may have the clock that it has, after these."""
+        mhz = self.core_hz / 1e6
+        states = self.chip.uc.mem_read(0x4002_2000, 1)[0] & 15  # FLASH_ACR.LATENCY
+        if self.core_hz > (states + 1) * self.WAIT_STATE_HZ:
+            raise WrongClock(f"{mhz:g} MHz with {states} wait states of the flash")
+        if self.core_hz < self.system_hz and self.counter is None:
+            hook = uc_const.UC_HOOK_CODE
+            self.counter = self.chip.uc.hook_add(
+                hook, self.count, None, self.chip.FLASH.start, self.chip.FLASH.stop - 1
+            )
+        if system_hz <= self.STEP_HZ < self.system_hz:
+            self.executed = 0
+            if self.core_hz == self.system_hz:
+                raise WrongClock(f"from {core_hz / 1e6:g} to {mhz:g} MHz in one step")
+        elif self.system_hz > self.STEP_HZ and core_hz < self.core_hz == self.system_hz and self.counter is not None:
+            if self.executed * 1_000_000 < core_hz:
+                raise WrongClock(f"{mhz:g} MHz after {self.executed} instructions at {core_hz / 1e6:g} MHz")
+            self.chip.uc.hook_del(self.counter)
+            self.counter = None
+
+    def count(self, _uc: Uc, _at: int, _size: int, _data: object) -> None:
+        self.executed += 1
 
     def clear(self, value: int) -> None:
         self[self.CIFR] &= ~value
@@ -452,6 +535,22 @@ class Clocks(Registers):
         self.settle()
 
 
+class Backup(Registers):
+    """TAMP: registers that outlive a reset, and take writes only when PWR_CR1.DBP is set."""
+
+    def __init__(self, chip: Stm32g474, page: Page, base: int) -> None:
+        super().__init__(chip, page, base)
+        for at in range(0x100, 0x180, 4):
+            self.on(at, write=partial(self.keep, at))
+
+    def reset(self) -> None:
+        pass
+
+    def keep(self, at: int, value: int) -> None:
+        if self.chip.uc.mem_read(0x4000_7001, 1)[0] & 1:  # PWR_CR1.DBP
+            self[at] = value
+
+
 class Stm32g474(Chip):
     """The chip."""
 
@@ -471,34 +570,47 @@ class Stm32g474(Chip):
         self.uc.mem_write(0x1FFF_7590, b"clutch model")  # UID, 96 bits
 
     def map_registers(self) -> None:
-        modelled = [0x4000_0000, 0x4000_3000, 0x4000_8000, 0x4002_0000, 0x4002_1000, 0x5000_0000, 0x5006_0000]
+        modelled = [
+            0x4000_0000,
+            0x4000_2000,
+            0x4000_3000,
+            0x4000_8000,
+            0x4002_0000,
+            0x4002_1000,
+            0x5000_0000,
+            0x5006_0000,
+        ]
         pages = {at: Page(self, at) for at in [*modelled, 0xE000_1000]}
         self.plain((0x4000_0000, 0x4001_8000), (0x4002_0000, 0x4002_5000), (0x4800_0000, 0x4800_2000))
         self.plain((0x5000_0000, 0x5000_2000), (0x5006_0000, 0x5006_1000), (0xE000_0000, 0xE010_0000))
         self.rcc = Clocks(self, pages[0x4002_1000], 0)
         self.timer = Timer(self, pages[0x4000_0000], 0xC00)
         self.encoder = Encoder(self, pages[0x4000_0000], 0x400)
+        self.backup = Backup(self, pages[0x4000_2000], 0x400)
         self.watchdog = Watchdog(self, pages[0x4000_3000], 0)
         self.serial = Serial(self, pages[0x4000_8000], 0)
         self.mux = Block(self, pages[0x4002_0000], 0x800)
         numbers = [[*range(27, 34), 112], [*range(72, 77), 113, 114, 115]]
         self.dma = [Dma(self, pages[0x4002_0000], 0x400 * n, 8 * n, numbers[n]) for n in range(2)]
         self.converter = Converter(self, pages[0x5000_0000], 0x800)
+        self.adc = Adc(self, pages[0x5000_0000], 0)
         self.noise = Noise(self, pages[0x5006_0000], 0x800)
         self.trace = Block(self, pages[0xE000_1000], 0)
         self.trace.on(0x04, lambda: self.meter.executed & WORD if self.meter else 0)  # CYCCNT
         self.blocks += [self.rcc, self.timer, self.encoder, self.watchdog, self.serial, self.mux]
-        self.blocks += [*self.dma, self.converter, self.noise, self.trace]
+        self.blocks += [*self.dma, self.converter, self.adc, self.noise, self.trace]
         # Offset in RCC and bit of a peripheral's reset.
         self.resettable: dict[tuple[int, int], list[Block]] = {
             (0x28, 0): [self.dma[0]],
             (0x28, 1): [self.dma[1]],
             (0x28, 2): [self.mux],
+            (0x2C, 13): [self.adc],
             (0x2C, 16): [self.converter],
             (0x38, 1): [self.encoder],
             (0x38, 3): [self.timer],
             (0x3C, 0): [self.serial],
         }
+        self.backup.page.gates[1] = partial(self.clocked, 0x58, 10)
         for (offset, bit), blocks in self.resettable.items():
             for block in blocks:
                 block.page.gates[block.base >> 10] = partial(self.clocked, offset + 0x20, bit)
@@ -511,12 +623,18 @@ class Stm32g474(Chip):
         for at in [0x4000_7000, 0x4002_2000]:
             self.uc.mem_write(at, bytes(0x400))
         self.uc.mem_write(0x4000_7080, b"\x00\x01")  # PWR_CR5.R1MODE
+        self.load_options()
         stack, self.pc = struct.unpack("<II", self.uc.mem_read(0x0800_0000, 8))
         self.uc.reg_write(arm.UC_ARM_REG_SP, stack)
 
+    def load_options(self) -> None:
+        """FLASH_OPTR.BOR_LEV: 2.8 V, or as the maker delivers it."""
+        level = 0 if self.faults & Fault.BROWN_OUT_LOW else 4
+        self.uc.mem_write(0x4002_2020, struct.pack("<I", level << 8))
+
     def reset(self, watchdog: bool = False) -> None:
         super().reset(watchdog)
-        self.rcc.flags |= 1 << 29 if watchdog else 1 << 28
+        self.rcc.flags |= 1 << 26 | (1 << 29 if watchdog else 1 << 28)  # PINRSTF comes with each
 
     def reset_blocks(self, at: int, value: int) -> None:
         for (offset, bit), blocks in self.resettable.items():
@@ -533,6 +651,7 @@ class Stm32g474(Chip):
         if new & Fault.CRYSTAL_DEAD:
             self.timer.rebase()
         super().set_faults(faults)
+        self.load_options()
         if new & Fault.CRYSTAL_DEAD:
             self.rcc.crystal_died()
 
@@ -557,8 +676,7 @@ class Stm32g474(Chip):
                 if not serial.received:
                     serial.kept |= Serial.IDLE
             while serial[Serial.CR3] & 1 << 7 and (n := dma.serves(Serial.REQUEST_TX)) is not None:
-                serial.sent += dma.move(n, None)
-                serial.kept |= Serial.TC
+                serial.send(dma.move(n, None))
                 if not serial[Serial.CR3] & 1 << 7:
                     break
         self.attend()

@@ -1,6 +1,6 @@
 //! The path of a run, with the points of a table kept elsewhere.
 
-use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Steepness, Table};
+use clutch_core::reference::{self, Interpolation, Knot, Reference, ReferenceParams, Steepness, Table};
 use clutch_core::{Encoder, FixedCounts, Micros, ParamError, Target};
 
 /// A path, without the points of a table.
@@ -40,7 +40,7 @@ impl Path {
         };
         let path = Path { kind, encoder, period, start, first: FixedCounts(0) };
         // No interval has begun, however steep it is.
-        let first = path.since_first(0, knots, |table| table.at_with(&[], 0, encoder, period));
+        let first = path.since_first(0, knots, |table| table.at_with(NOTHING, 0, encoder, period));
         let first = first.position.0 >> FixedCounts::FRACTION_BITS;
         Ok(Path { first: FixedCounts::from_counts(first), ..path })
     }
@@ -52,19 +52,24 @@ impl Path {
         self.since_first(tick, knots, |table| table.at(tick, self.encoder, self.period))
     }
 
-    /// The same, with the steepness of each interval of a table: [`Path::prepare`].
+    /// The same, with what [`Path::prepare`] has computed of a table.
     // A function of its own in machine code: it is called from many places.
     #[inline(never)]
-    pub(crate) fn target_with(&self, knots: &[Knot], steepness: &Prepared, tick: u64) -> Target<f32> {
-        self.since_first(tick, knots, |table| table.at_with(steepness, tick, self.encoder, self.period))
+    pub(crate) fn target_with(&self, knots: &[Knot], prepared: &Prepared, tick: u64) -> Target<f32> {
+        self.since_first(tick, knots, |table| {
+            let prepared = reference::Prepared { steepness: &prepared.steepness, slopes: &prepared.slopes };
+            table.at_with(prepared, tick, self.encoder, self.period)
+        })
     }
 
-    /// Computes the steepness of each interval of a table.
-    pub(crate) fn prepare(&self, knots: &[Knot], steepness: &mut Prepared) {
+    /// Computes what the targets of a table have of each point, so that no period does.
+    pub(crate) fn prepare(&self, knots: &[Knot], prepared: &mut Prepared) {
         if let Kind::Table(interpolation, points) = self.kind {
             let table = Table { knots: knots.get(..points).unwrap_or(&[]), interpolation };
-            for (point, of) in steepness.iter_mut().enumerate().take(points) {
-                *of = table.steepness(point);
+            let each = prepared.steepness.iter_mut().zip(&mut prepared.slopes);
+            for (point, (steepness, slope)) in each.enumerate().take(points) {
+                *steepness = table.steepness(point);
+                *slope = table.slope(point);
             }
         }
     }
@@ -83,5 +88,18 @@ impl Path {
     }
 }
 
-/// The steepness behind each point of a table.
-pub(crate) type Prepared = [Steepness; super::MAX_KNOTS];
+/// What the targets of a table have of each point.
+#[derive(Clone, Debug)]
+pub(crate) struct Prepared {
+    steepness: [Steepness; super::MAX_KNOTS],
+    slopes: [f32; super::MAX_KNOTS],
+}
+
+impl Prepared {
+    pub(crate) fn new() -> Self {
+        Prepared { steepness: [Steepness::default(); super::MAX_KNOTS], slopes: [0.0; super::MAX_KNOTS] }
+    }
+}
+
+/// Enough where no interval has begun.
+const NOTHING: reference::Prepared<'static, f32> = reference::Prepared { steepness: &[], slopes: &[] };

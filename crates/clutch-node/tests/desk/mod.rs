@@ -17,7 +17,7 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
-    HostNode, Notice, Outbox, Outboxes, RunParams, RunTimes, Setting, Settings,
+    HostNode, Notice, Outbox, Outboxes, ResetCause, RunParams, RunTimes, Setting, Settings,
 };
 use clutch_wire::{Decoder, Message, encode};
 use core::mem::take;
@@ -36,6 +36,8 @@ pub const BOARD: BoardParams = BoardParams {
     period_max_us: 10_000,
     watchdog_max_us: 30_000,
     boot_code: 2867,
+    started_by: ResetCause::Power,
+    brown_out_low: false,
 };
 pub const BOARD_CONTROLLER: BoardControllerParams =
     BoardControllerParams { board: 77, boot: 3, clock_hz: 25_000_000 };

@@ -2,7 +2,7 @@
 
 use clutch_wire::{
     CODES, FieldInfo, List, MAX_BODY, MAX_FRAME, MessageInfo, SCHEMA, STATUS, TABLE, TELEMETRY, VERSION,
-    WATCHDOG_PERIODS,
+    WARNINGS, WATCHDOG_PERIODS,
 };
 use std::fmt::Write as _;
 
@@ -55,9 +55,11 @@ fn write_all(out: &mut String) -> std::fmt::Result {
             writeln!(out, "#define {name} {}u /* {} */", v.value, ascii(v.doc))?;
         }
     }
-    for (field, prefix, bits) in
-        [("status of Sample", "STATUS", STATUS), ("flags of Telemetry", "TELEMETRY", TELEMETRY)]
-    {
+    for (field, prefix, bits) in [
+        ("status of Sample", "STATUS", STATUS),
+        ("flags of Telemetry", "TELEMETRY", TELEMETRY),
+        ("warnings of Hello", "WARNING", WARNINGS),
+    ] {
         writeln!(out, "\n/* Bits of the field {field}. */")?;
         for v in bits {
             let name = format!("CLUTCH_{prefix}_{}", upper(v.name));

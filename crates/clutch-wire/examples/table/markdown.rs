@@ -1,6 +1,8 @@
 //! The tables of docs/wire.md.
 
-use clutch_wire::{CODES, Direction, MAX_BODY, MAX_FRAME, SCHEMA, STATUS, TABLE, TELEMETRY, VERSION};
+use clutch_wire::{
+    CODES, Direction, MAX_BODY, MAX_FRAME, SCHEMA, STATUS, TABLE, TELEMETRY, VERSION, WARNINGS,
+};
 use std::fmt::Write as _;
 
 const BEGIN: &str = "<!-- table:begin -->\n";
@@ -45,7 +47,9 @@ fn write_all(out: &mut String) -> std::fmt::Result {
             writeln!(out, "| {} | {} | {} |", v.value, v.name, v.doc.trim())?;
         }
     }
-    for (field, bits) in [("Sample.status", STATUS), ("Telemetry.flags", TELEMETRY)] {
+    for (field, bits) in
+        [("Sample.status", STATUS), ("Telemetry.flags", TELEMETRY), ("Hello.warnings", WARNINGS)]
+    {
         writeln!(out, "\n### Bits of `{field}`\n")?;
         writeln!(out, "| bits | name | meaning |")?;
         writeln!(out, "|---|---|---|")?;

@@ -106,6 +106,8 @@ fn ordinary() -> Vec<(&'static str, Message)> {
                 period_max_us: 100_000,
                 watchdog_max_us: 1_000_000,
                 boot_code: 4095,
+                started_by: 1,
+                warnings: 0,
                 state: 0,
                 run: 0,
                 config: 0,

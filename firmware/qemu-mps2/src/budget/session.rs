@@ -11,7 +11,7 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardParams, ControllerNode, ControllerParams, OneChip, Outboxes,
-    RunParams, RunTimes, Settings,
+    ResetCause, RunParams, RunTimes, Settings,
 };
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configured, Decoder, Discover, Fault, Hello, Message, Pong, Refused,
@@ -76,6 +76,8 @@ const BOARD: BoardParams = BoardParams {
     period_max_us: 10_000,
     watchdog_max_us: 100_000,
     boot_code: 2048,
+    started_by: ResetCause::Power,
+    brown_out_low: false,
 };
 
 const CONTROLLER: BoardControllerParams = BoardControllerParams { board: 1, boot: BOOT, clock_hz: 0 };
@@ -219,6 +221,8 @@ fn hello(run: u16) -> Message {
         period_max_us,
         watchdog_max_us,
         boot_code,
+        started_by,
+        brown_out_low,
     } = BOARD;
     Message::Hello(Hello {
         nonce: 1,
@@ -234,6 +238,8 @@ fn hello(run: u16) -> Message {
         period_max_us,
         watchdog_max_us,
         boot_code,
+        started_by: started_by as u8,
+        warnings: u8::from(brown_out_low),
         state: BoardState::Running as u8,
         run,
         config: CONFIG,
