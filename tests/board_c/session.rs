@@ -90,7 +90,11 @@ fn configure(run: u16) -> Configure {
 fn the_board_in_c_runs_on_a_pseudo_terminal_and_holds_when_the_host_falls_silent() {
     let sources = ["examples/board-c/board.c", "examples/board-c/host_main.c"];
     let Some(program) = compiled("board_c_host", &sources) else { return };
-    let mut child = Command::new(program).args(["60", PATIENCE_S]).stdout(Stdio::piped()).spawn().expect("the board starts");
+    let mut child = Command::new(program)
+        .args(["60", PATIENCE_S])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the board starts");
     let mut path = String::new();
     BufReader::new(child.stdout.take().expect("it has an output")).read_line(&mut path).expect("a path");
     let board = Board(child);
