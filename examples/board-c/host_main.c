@@ -1,9 +1,11 @@
 /* board.c on Linux: a board on a pseudo-terminal, with a crude shaft, in real time.
  *
  *     gcc -std=c99 -O2 -Wall -Wextra -I ../../crates/clutch-wire/include board.c host_main.c -o board_host
- *     ./board_host [SECONDS]
+ *     ./board_host [SECONDS [PATIENCE]]
  *
- * Prints the path of the pseudo-terminal, then runs until it is interrupted, or for that many seconds.
+ * Prints the path of the pseudo-terminal, then runs until it is interrupted, or for that many seconds of its clock. With a patience
+ * of so many seconds, for tests on a busy machine, that clock stands still where the machine stalls, and while a host that has
+ * answered the last sample has not yet answered this one, for as long as that at most. Without, it is the machine's.
  * The shaft: inertia, a weight on a string, viscous drag, a brake with Coulomb friction that sticks.
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
@@ -58,11 +60,45 @@ static void move(double seconds)
     shaft.speed = next;
 }
 
-static uint64_t now_ns(void)
+/* ---- the clock ---- */
+
+static uint64_t patience_ns;
+/* With patience: time that the board has, what the machine's clock was then, and until when on it time stands still. */
+static uint64_t own_ns, seen_ns, still_until_ns;
+/* Bytes have come since the last sample. */
+static int answered;
+
+static uint64_t machine_ns(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
     return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
+}
+
+static uint64_t now_ns(void)
+{
+    const uint64_t stall_ns = 10000000; /* who looks again after more than that was not running */
+    uint64_t machine = machine_ns(), passed = machine - seen_ns;
+    if (patience_ns == 0)
+        return machine;
+    seen_ns = machine;
+    if (machine >= still_until_ns)
+        own_ns += passed < stall_ns ? passed : stall_ns;
+    return own_ns;
+}
+
+/* A sample is out: a host that has answered the last one owes an answer. */
+static void wait_for_answer(void)
+{
+    if (patience_ns != 0 && answered)
+        still_until_ns = machine_ns() + patience_ns;
+    answered = 0;
+}
+
+static void hear_answer(void)
+{
+    answered = 1;
+    still_until_ns = 0;
 }
 
 static void move_to(uint64_t ns)
@@ -154,16 +190,16 @@ static void listen(const char *path, uint64_t until)
         if (client)
             reset_line(path);
         client = 0;
-        span.tv_sec = (time_t)(until / 1000000000u);
-        span.tv_nsec = (long)(until % 1000000000u);
-        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &span, NULL);
+        clock_nanosleep(CLOCK_MONOTONIC, 0, &span, NULL);
         return;
     }
     client = 1;
     if ((fd.revents & POLLIN) == 0)
         return;
     got = read(line, bytes, sizeof bytes);
-    now = now_ns();
+    now = now_ns(); /* before time goes on: a host that is late is not late here */
+    if (got > 0)
+        hear_answer();
     move_to(now);
     for (i = 0; i < got; i++)
         board_byte(bytes[i], micros(now));
@@ -179,22 +215,33 @@ static int unguessable(uint32_t *number) {
     return got == 1;
 }
 
+/* 0 if it is not a time. */
+static uint64_t seconds_ns(const char *name, const char *text)
+{
+    char *rest;
+    double seconds = strtod(text, &rest);
+    if (*rest == 0 && seconds > 0 && seconds < 1e9)
+        return (uint64_t)(seconds * 1e9);
+    fprintf(stderr, "%s = %s: expected a number above 0 and below 1e9\n", name, text);
+    return 0;
+}
+
 int main(int argc, char **argv)
 {
     const uint64_t idle_ns = 10000000;
     board_params_t params;
     const char *path, *error;
-    uint64_t start = now_ns(), end = UINT64_MAX, next_tick = UINT64_MAX;
+    uint64_t start, end = UINT64_MAX, next_tick = UINT64_MAX;
     uint32_t configurations = 0;
-    if (argc > 1) {
-        char *rest;
-        double seconds = strtod(argv[1], &rest);
-        if (*rest != 0 || !(seconds > 0 && seconds < 1e9)) {
-            fprintf(stderr, "SECONDS = %s: expected a number above 0\n", argv[1]);
-            return 2;
-        }
-        end = start + (uint64_t)(seconds * 1e9);
-    }
+    if (argc > 1)
+        end = seconds_ns("SECONDS", argv[1]);
+    if (argc > 2)
+        patience_ns = seconds_ns("PATIENCE", argv[2]);
+    if (end == 0 || (argc > 2 && patience_ns == 0))
+        return 2;
+    own_ns = seen_ns = machine_ns();
+    start = now_ns();
+    end = end == UINT64_MAX ? end : start + end;
     path = open_line();
     if (path == NULL) {
         perror("pseudo-terminal");
@@ -239,6 +286,7 @@ int main(int argc, char **argv)
         if (configurations == board_configurations() && now >= next_tick) {
             uint64_t period = (uint64_t)board_period_us() * 1000u;
             board_tick(micros(now));
+            wait_for_answer();
             next_tick += period;
             if (next_tick < now) /* periods that the machine slept through stay out */
                 next_tick += (now - next_tick) / period * period + period;

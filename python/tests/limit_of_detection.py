@@ -4,7 +4,7 @@ A detector that ends no sound run has to wait until no shaft of the bounds could
 those shafts is followed: a polygon of positions and velocities, moved by every torque of the bounds and cut by every
 sample. A torque stays the same for a period, and no shaft of the set stops; so each point of the polygon is a shaft
 that the bounds hold, and until the polygon is empty nobody can know. The paper's rig on a ramp of 20 °/s without
-delay, PD (4) or sliding mode (31), the encoder's filter of the paper. Nothing is shared with the product.
+delay, PD (4) or sliding mode, (31) or (29), the encoder's filter of the paper. Nothing is shared with the product.
 
     python python/tests/limit_of_detection.py [RUNS]
 
@@ -63,7 +63,13 @@ def sliding_mode(error, rate):
     return -(3.0 * saturated + 400.0 * damped * rate)
 
 
-LAWS = {"PD": pd, "SMC": sliding_mode}
+def switching(error, rate):
+    """With the sign function, (29)."""
+    surface = 70.0 * error + rate
+    return -(3.0 * math.copysign(1.0, surface) + 400.0 * math.copysign(1.0, surface * rate) * rate)
+
+
+LAWS = {"PD": pd, "SMC": sliding_mode, "SMC, sign": switching}
 
 
 def hull(points):

@@ -17,6 +17,10 @@ def test_under_pd_no_detector_with_the_margins_can_have_10_ms_and_under_smc_one_
     assert min(pd + smc) > 0
 
 
+def test_with_the_sign_function_the_law_itself_hides_a_converter_at_0_v_for_longer_than_10_ms():
+    assert max(earliest("SMC, sign", EXACT)) > 10
+
+
 def test_who_knows_more_is_never_later():
     for law in limit.LAWS:
         for more, less in zip(earliest(law, EXACT), earliest(law, CODE_KNOWN), strict=True):

@@ -1,5 +1,5 @@
 //! The board in C of examples/board-c: it behaves like the Rust board, byte for byte, and runs a
-//! session in real time on a pseudo-terminal.
+//! session on a pseudo-terminal.
 
 mod compare;
 mod rules;

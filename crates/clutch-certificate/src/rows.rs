@@ -20,6 +20,8 @@ pub(crate) struct Fineness {
     /// Orbits are of brakes weaker and stronger than the middle one by at least this factor; 1: only of those that there are,
     /// of one where they hardly differ.
     pub(crate) spread: f64,
+    /// Orbits also of small shares of the law's gains, which limits leave where a count asks for several times the output.
+    pub(crate) saturated: bool,
 }
 
 /// The law near its steady voltage: volts per count, and per count per tick.
@@ -119,15 +121,15 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
         }
     }
     // Shares of the gains that a saturated loop, or a steeper part of the law, leaves.
-    let shares: &[f64] = match (u.law, form) {
-        (Gains::Pd { .. } | Gains::Pid { .. } | Gains::Shell { .. }, Form::Noise) => {
-            &[1.0, 0.8, 0.65, 0.5, 0.35, 0.25, 0.12]
-        }
-        (Gains::Pd { .. } | Gains::Pid { .. } | Gains::Shell { .. }, Form::Exact) => {
-            &[1.0, 0.7, 0.5, 0.35, 0.25]
-        }
-        (Gains::Smc { .. }, _) => &[1.0, 2.0, 4.0, 0.5],
+    let mut shares: Vec<f64> = match (u.law, form) {
+        (Gains::Smc { .. }, _) if fineness.saturated => vec![1.0, 2.0, 0.5, 0.25],
+        (Gains::Smc { .. }, _) => vec![1.0, 2.0, 4.0, 0.5],
+        (_, Form::Noise) => vec![1.0, 0.8, 0.65, 0.5, 0.35, 0.25, 0.12],
+        (_, Form::Exact) => vec![1.0, 0.7, 0.5, 0.35, 0.25],
     };
+    if fineness.saturated {
+        shares.extend([0.12, 0.06]);
+    }
     let middle = (u.brake[0] * u.brake[1]).sqrt();
     let spread = fineness.spread;
     let wide = u.brake[1] > 1.25 * u.brake[0] || spread > 1.0;
@@ -138,7 +140,7 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
         orbits.push(Vec::new());
     }
     for b in &brakes {
-        for share in shares {
+        for share in &shares {
             for seed in &seeds {
                 let mut c = *seed;
                 for orbit in orbits.iter_mut().skip(1) {

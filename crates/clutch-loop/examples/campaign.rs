@@ -3,9 +3,11 @@
 //!
 //! `cargo run --release -p clutch-loop --example campaign -- RUNS [SEED [FILE]]` makes runs from a seed on; with a file it
 //! goes on where it was ended. `… -- only RUN…` makes single runs, by name, and tells about them; `… -- until RUNS` makes so
-//! many, and ends with the first that fails.
+//! many, and ends with the first that fails. `… -- row LAW TROUBLE RUNS [SEED]` makes those runs alone that have this law and
+//! this trouble, named as in the table, and that have to end: those that came nearest to their promise.
 
 use clutch_core::supervisor::Checks;
+use clutch_loop::campaign::oracle::{Fate, Promise};
 use clutch_loop::campaign::table::Table;
 use clutch_loop::campaign::{RunId, oracle};
 use std::fmt::Write as _;
@@ -27,6 +29,12 @@ fn main() -> Failure {
         && verb == "until"
     {
         return until(runs.parse()?);
+    }
+    if let [verb, law, trouble, runs, rest @ ..] = &args[..]
+        && verb == "row"
+    {
+        let first = rest.first().map_or(Ok(1), |seed| seed.parse())?;
+        return row(law, trouble, runs.parse()?, first);
     }
     let number = |i: usize, otherwise| args.get(i).map_or(Ok(otherwise), |s: &String| s.parse::<u64>());
     let (runs, first) = (number(0, 10_000)?, number(1, 1)?);
@@ -77,6 +85,40 @@ fn until(runs: u64) -> Failure {
     }
 }
 
+/// Runs of one law with one trouble that has to end them, from a seed on.
+fn row(law: &str, trouble: &str, runs: usize, first: u64) -> Failure {
+    const SHOWN: usize = 5;
+    let (mut shown, mut failures, mut seed) = (Vec::new(), 0, first);
+    while shown.len() < runs {
+        let run = RunId::from(seed);
+        let draw = run.draw();
+        seed += 1;
+        if seed - first == 10_000_000 && shown.is_empty() {
+            return Err(format!("no run of ten million has to end by \"{trouble}\" under {law}").into());
+        }
+        let [only] = &draw.troubles[..] else { continue };
+        if draw.setting.law != law || only.kind() != trouble {
+            continue;
+        }
+        let Fate::Ends(within) = Promise::of(&draw.setting, only).fate else { continue };
+        let report = draw.run(run.seed, Checks::ALL, false)?;
+        if let Some(wrong) = oracle::judge(&draw, &report) {
+            failures += 1;
+            println!("{run}: {wrong}");
+        }
+        // As the oracle has it: from the draw's instant, not from the first frame that it hits.
+        let after = report.safe.map_or(f64::INFINITY, |safe| safe - only.at);
+        shown.push((1e3 * after, 1e3 * within, run));
+    }
+    println!("{} of the seeds {first} to {}: {failures} failures", shown.len(), seed - 1);
+    println!("the nearest to their promises:");
+    shown.sort_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
+    for (after, within, run) in shown.iter().take(SHOWN) {
+        println!("  {after:.2} of {within:.2} ms: {run}: {:?}", run.draw().setting);
+    }
+    if failures == 0 { Ok(()) } else { Err("the campaign failed".into()) }
+}
+
 fn only(runs: &[String]) -> Failure {
     let mut failures = 0;
     for name in runs {
@@ -85,7 +127,7 @@ fn only(runs: &[String]) -> Failure {
         let report = draw.run(run.seed, Checks::ALL, false)?;
         println!("{run}: {:?}", draw.setting);
         for trouble in &draw.troubles {
-            println!("  {trouble:?}: {:?}", oracle::Promise::of(&draw.setting, trouble));
+            println!("  {trouble:?}: {:?}", Promise::of(&draw.setting, trouble));
         }
         println!(
             "  {:?} hit {:?} tripped {:?} safe {:?} board {:?} error {:.3}° beyond {:.3}° (allowed {:?}) unanswered {} kick {:.2} V",

@@ -61,6 +61,16 @@ impl PathKind {
 }
 
 impl PathKind {
+    /// Largest acceleration, °/s².
+    pub(super) fn steepest_deg_s2(self) -> f64 {
+        match self {
+            PathKind::Ramp(_) => 0.0,
+            // 5.7735 times its distance, by the square of its 2 s.
+            PathKind::MinimumJerk(v) => 5.7735 * (v / 1.875 * 2.0) / 4.0,
+            PathKind::Sine(v) => v * SINE_DEG_PER_DEG_S * (std::f64::consts::TAU * 2.0).powi(2),
+        }
+    }
+
     /// Its lowest speed where troubles begin, °/s.
     #[must_use]
     pub fn slowest_deg_s(self) -> f64 {

@@ -235,11 +235,41 @@ fn hardware(s: &Setting, t: &Trouble, kind: FaultKind, base: &Promise) -> Promis
     }
 }
 
+/// Time in which counts show a brake that is told to press with 3 V or more, and does not, s.
+///
+/// With a grip of a sixth less than the bounds' 3 V slow the shaft by 3.2 rad/s² at least, and it gains 27.7: 0.098 counts/ms². That is
+/// as much as the counts leave open – 1.4 of position, and as much over 16 periods of velocity – after 6.3 ms. Then the
+/// last code may not have been in force yet, a sample has to come, and the answer to go.
+const SEEN: f64 = 0.0063 + 3.0 * PERIOD;
+
+/// The longest time for which sliding mode with the sign function leaves a brake open, s: until a shaft that its own bursts
+/// have made slow falls as fast as its path, and has caught up (docs/safety.md).
+///
+/// The filter of the rate lags by 4 periods, so that each burst of 9.995 V goes on until the shaft is 17.5 °/s slower than its path, or
+/// at rest, and 0.05° behind it; in a fall the rate that the law sees is by those 4 periods behind.
+fn catches_up(s: &Setting) -> f64 {
+    const SLOWER_DEG_S: f64 = 17.5;
+    const BEHIND_DEG: f64 = 0.05;
+    const SLOPE: f64 = 70.0;
+    const LAG: f64 = 4.0 * PERIOD;
+    let lost = SLOWER_DEG_S.min(s.path.top_deg_s()).to_radians();
+    let falls = 0.0471 / 0.0017 - s.path.steepest_deg_s2().to_radians();
+    // f (e₀ + w t − a t²/2) + w − a (t − lag) = 0.
+    let (square, linear) = (SLOPE * falls / 2.0, falls - SLOPE * lost);
+    let constant = SLOPE * BEHIND_DEG.to_radians() + lost + falls * LAG;
+    // And a count each for position and rate.
+    (linear.mul_add(linear, 4.0 * square * constant).sqrt() - linear) / (2.0 * square) + 2.0 * PERIOD
+}
+
 /// A brake that does not press, whatever it is told to.
 fn nothing_presses(s: &Setting, t: &Trouble, blind: &Promise) -> Promise {
     // A path that begins with a jump asks for an open brake, until a shaft that falls is as fast.
     let start = if t.at == 0.0 { 0.02 + s.path.top_deg_s() / 1587.0 } else { 0.0 };
-    let within = 2.0 * by_the_way(s) + PERIOD + start + laws::of(s.law).switches_s;
+    // An open brake that nobody has told to press shows nothing: it has to be told, and then to be seen. The sign function
+    // leaves it open for longer than others.
+    let others = 2.0 * by_the_way(s) + PERIOD;
+    let within =
+        if laws::of(s.law).switches { others.max(catches_up(s) + SEEN + PERIOD) } else { others } + start;
     Promise { fate: Fate::Ends(within), causes: &[Cause::TooFast], ..*blind }
 }
 
