@@ -773,6 +773,26 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
 }
 
 #[test]
+fn a_motor_axis_is_identified_and_its_file_is_taken() {
+    let dir = folder("identified_motor");
+    let path = |name: &str| dir.join(name).display().to_string();
+    let (rig, map) = (path("rig.toml"), path("map.toml"));
+    let o = clutch(&["identify", "motor_smc", "--set", "rig.base=bench", "--out", &rig, "--map", &map]);
+    assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+    assert!(out(&o).contains("J/K  ") && out(&o).contains("T_s/K backwards  "), "{}", out(&o));
+    assert!(narrow(&out(&o)) && narrow(&err(&o)), "{}{}", out(&o), err(&o));
+    let o = clutch(&["certify", "motor_smc", "--json", "--identified", &rig]);
+    let certificate: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");
+    let inertia = &certificate["bounds"]["inertia_kg_m2"];
+    let ends = [inertia[0].as_f64(), inertia[1].as_f64()].map(Option::unwrap);
+    assert!(ends[0] < 0.0017 && 0.0017 < ends[1] && ends[1] / ends[0] < 1.1, "{inertia}");
+    let o = clutch(&["sim", "motor_pid", "--identified", &rig, "--map", &map, "--json"]);
+    assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+    let o = clutch(&["identify", "motor_pid", "--fastest", "1"]);
+    assert!(err(&o).contains("fastest = 1 °/s: expected 15 to 3600 °/s"), "{}", err(&o));
+}
+
+#[test]
 fn identify_asks_for_consent_on_a_board_and_names_what_it_cannot_read() {
     let dir = folder("identify_refuses");
     let logs = dir.join("logs").display().to_string();
