@@ -8,10 +8,12 @@ use crate::table::number;
 use anyhow::{Context, bail};
 use clap::Args;
 use clutch_core::ActuatorKind;
+use clutch_identify::added::{Added, Separate, separate};
 use clutch_identify::experiment::{ExperimentError, VirtualBoard};
 use clutch_identify::{Consent, Finding, Identified, Plan, Recording, map_as_believed, map_file};
 use clutch_log::Limits;
 use clutch_sim::Scenario;
+use clutch_sim::drive::DriveParams;
 use serde_json::{Value, json as value};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -66,6 +68,15 @@ pub(crate) struct Identify {
     /// Reads these logs instead: MCAP, or CSV with --columns.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "log")]
     from: Vec<PathBuf>,
+    /// Logs of a second experiment, with a known mass added beside the weight: T, J and friction one by one.
+    #[arg(long, value_name = "FILE", num_args = 1.., requires_all = ["from", "mass", "radius"])]
+    loaded: Vec<PathBuf>,
+    /// The mass that was added, kg.
+    #[arg(long, value_name = "KG", requires = "loaded", allow_negative_numbers = true)]
+    mass: Option<f64>,
+    /// Radius of the pulley that it hangs from, m.
+    #[arg(long, value_name = "M", requires = "loaded", allow_negative_numbers = true)]
+    radius: Option<f64>,
     /// Columns of a CSV that hold counts and volts, one sample a row.
     #[arg(
         long,
@@ -115,8 +126,20 @@ impl Identify {
             read.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten().collect()
         };
         let report = Identified::of(&recordings)?;
+        let separate = self.separate(&report, &scenario)?;
         let file = self.out.as_deref().map(|path| (path, report.rig_file(&scenario)));
-        output::report(self.json, || json(&object(&report)), || text(&report))?;
+        output::report(
+            self.json,
+            || {
+                let mut object = object(&report);
+                if let Some(separate) = &separate {
+                    object["separate"] =
+                        separate.rows().iter().map(|row| (row.0.to_owned(), finding(row.3))).collect();
+                }
+                json(&object)
+            },
+            || text(&report) + &separate.as_ref().map_or_else(String::new, one_by_one),
+        )?;
         if let Some((path, file)) = file {
             write(path, file?)?;
         }
@@ -137,6 +160,26 @@ impl Identify {
         }
         let told = report.shown().iter().any(|row| row.finding.known().is_some());
         Ok(if told || (self.map.is_some() && self.out.is_none()) { Exit::Done } else { Exit::Failed })
+    }
+
+    /// Findings of both experiments together, if there is one with a mass added.
+    fn separate(&self, alone: &Identified, scenario: &Scenario) -> anyhow::Result<Option<Separate>> {
+        let (false, Some(mass), Some(radius)) = (self.loaded.is_empty(), self.mass, self.radius) else {
+            return Ok(None);
+        };
+        let gravity = match scenario.spec().rig.drive {
+            DriveParams::Weight(weight) => weight.gravity,
+            _ => 9.81,
+        };
+        let added = Added { mass, radius, gravity };
+        added.check()?;
+        let read = self.loaded.iter().map(|file| self.read(file, scenario));
+        let recordings: Vec<Recording> =
+            read.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten().collect();
+        match (alone, Identified::of(&recordings)?) {
+            (Identified::Brake(alone), Identified::Brake(with)) => Ok(Some(separate(alone, &with, &added))),
+            _ => bail!("--loaded: expected logs of a shaft with a brake and a weight, as --from"),
+        }
     }
 
     /// Runs the experiment, and says before what it does.
@@ -273,15 +316,33 @@ fn text(report: &Identified) -> String {
     if matches!(report, Identified::Brake(_)) { out } else { folded(&out) }
 }
 
+/// Torque, inertia and friction of both experiments together.
+fn one_by_one(separate: &Separate) -> String {
+    let mut out = String::new();
+    for (_, label, unit, finding) in separate.rows() {
+        match finding {
+            Finding::Known(e) => {
+                let interval = format!("{} … {}", number(e.low), number(e.high));
+                out += &format!("  {label:<26}{:>10}  {interval:<24}{unit}\n", number(e.value));
+            }
+            Finding::Refused(why) => out += &paragraph(&format!("{label}: not told; {why}")),
+        }
+    }
+    out
+}
+
+fn finding(finding: &Finding) -> Value {
+    match finding {
+        Finding::Known(e) => value!({ "value": e.value, "low": e.low, "high": e.high }),
+        Finding::Refused(why) => value!({ "refused": why }),
+    }
+}
+
 /// The result as `--json` prints it.
 #[must_use]
 pub fn object(report: &Identified) -> Value {
-    let of = |finding: &Finding| match finding {
-        Finding::Known(e) => value!({ "value": e.value, "low": e.low, "high": e.high }),
-        Finding::Refused(why) => value!({ "refused": why }),
-    };
     let parameters: serde_json::Map<String, Value> =
-        report.shown().iter().map(|row| (row.key.to_owned(), of(row.finding))).collect();
+        report.shown().iter().map(|row| (row.key.to_owned(), finding(row.finding))).collect();
     let (sets_off, slips, rates) = report.found();
     let brake = matches!(report, Identified::Brake(_));
     value!({

@@ -766,6 +766,17 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
     assert!(pull["low"].as_f64() < Some(truth) && Some(truth) < pull["high"].as_f64(), "{pull}");
     assert!(told["parameters"]["hold_v"]["refused"].is_string(), "{told}");
 
+    // The same logs are not those of a heavier rig; the mass has its radius.
+    let same = ["releases", "ride_5", "ride_20"].map(|part| format!("{logs}/{part}.mcap"));
+    let same: Vec<&str> = same.iter().map(String::as_str).collect();
+    let from = [&["identify", "--from"][..], &same, &["--loaded"], &same].concat();
+    let o = clutch(&[&from[..], &["--mass", "0.06", "--radius", "0.024", "--json"]].concat());
+    let told: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");
+    let why = told["separate"]["inertia_kg_m2"]["refused"].as_str().unwrap_or_default();
+    assert!(why.contains("a heavier mass"), "{told}");
+    let o = clutch(&[&from[..], &["--mass", "-1", "--radius", "0.024"]].concat());
+    assert!(err(&o).contains("mass = -1: expected a number above 0, in kg"), "{}", err(&o));
+
     let missing = path("none.toml");
     let o = clutch(&["certify", "board_smc_2", "--identified", &missing]);
     assert_eq!(o.status.code(), Some(1));

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+pub mod added;
 pub mod believed;
 pub mod break_away;
 pub mod experiment;

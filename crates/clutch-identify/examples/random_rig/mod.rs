@@ -5,6 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::error::Error;
 
+pub(crate) mod added;
 pub(crate) mod motor;
 
 /// A rig, and a campaign's findings of it.
