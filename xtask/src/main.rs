@@ -272,7 +272,7 @@ fn main() -> Result<()> {
         Verb::Identify { rigs, seed } => {
             let page = "docs/identify.md";
             random_rigs(["clutch-identify", "identified_rigs"], page, "campaign", rigs, seed)?;
-            random_rigs(["clutch-identify", "identified_motors"], page, "motors", rigs, seed)
+            random_rigs(["clutch-identify", "identified_motors"], page, "motors", rigs, seed + MOTORS)
         }
         Verb::Tune { rigs, seed } => {
             random_rigs(["clutch-tune", "tuned_rigs"], "docs/tune.md", "campaign", rigs, seed)
@@ -422,6 +422,9 @@ fn meter() -> Result<()> {
     }
     Ok(())
 }
+
+/// From the seeds of braked rigs to those of motor axes.
+const MOTORS: u64 = 20_000;
 
 /// The campaign of a package's example over random rigs, into its page.
 fn random_rigs([package, example]: [&str; 2], page: &str, part: &str, rigs: u64, seed: u64) -> Result<()> {
