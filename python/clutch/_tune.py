@@ -71,17 +71,19 @@ class Identified:
     ----------
     parameters : dict of str to Estimate
         The findings: ``pull_rad_s2`` (T/J), ``delay_s``, ``hold_v`` (T/(μ_d K)), ``ripple_rms``, ``ratio`` (μ_s/μ_d),
-        ``stribeck_velocity_rad_s``, ``damping_1_s`` (C/J).
+        ``stribeck_velocity_rad_s``, ``damping_1_s`` (C/J). Of a motor axis, torques over its torque per volt:
+        ``break_forwards_v``, ``break_backwards_v``, ``slide_forwards_v``, ``slide_backwards_v``, ``load_v``,
+        ``viscous_v_s_rad`` (C/K), ``inertia_v_s2_rad`` (J/K), and velocity, delay and ripple as above.
     refused : dict of str to str
         The parameters not found, by name, with the experiment that would find them.
     unexplained : tuple of str
         Ticks and recordings that the model does not explain.
     map : list of tuple of float
         Friction along the disc: angle in rad, and friction over its mean.
-    releases, break_aways : int
-        Numbers of each that were found.
+    releases, hops, break_aways : int
+        Numbers of each that were found: releases of a brake, hops of a motor.
     rides_rad_s : tuple of float
-        Rates of the rides, rad/s.
+        Rates of the rides, rad/s; of a motor axis that goes backwards below 0.
 
     Examples
     --------
@@ -100,6 +102,7 @@ class Identified:
         self.unexplained: tuple[str, ...] = tuple(told["unexplained"])
         self.map: list[tuple[float, float]] = [(angle, factor) for angle, factor in told["map"]]
         self.releases: int = told["releases"]
+        self.hops: int = told["hops"]
         self.break_aways: int = told["break_aways"]
         self.rides_rad_s: tuple[float, ...] = tuple(told["rides_rad_s"])
 
@@ -165,20 +168,27 @@ def identify(
     logs: Iterable[str | os.PathLike[str]] = (),
     columns: tuple[str, str] = ("counts", "volts"),
     log: str | os.PathLike[str] | None = None,
+    travel_deg: float | None = None,
+    fastest_deg_s: float | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> Identified:
     """Find out what a rig is: T/J, delay, friction, ripple, damping, each with an interval: ``clutch identify``.
 
+    A motor axis goes to and fro, and has parameters of its own.
+
     Parameters
     ----------
     scenario : Scenario, str or path, default "board_smc_2"
-        A scenario with ``[safety]``. Its simulated board is run in virtual time, 52 s of it, unless there are `logs`.
+        A scenario with ``[safety]``. Its simulated board is run in virtual time, 52 s of it (70 s with a motor), unless
+        there are `logs`.
     logs : iterable of path, optional
         Logs to read instead: MCAP, or CSV with one sample a row.
     columns : tuple of str, default ("counts", "volts")
         Columns of a CSV that hold counts, and volts given after them.
     log : path, optional
         Folder for a log of each part of the experiment.
+    travel_deg, fastest_deg_s : float, optional
+        Way that a motor axis goes forwards from where it rests (20°), and its highest rate (60 °/s).
     overrides : mapping, optional
         Values for dotted keys of the scenario.
 
@@ -194,7 +204,8 @@ def identify(
     LoopError
         A check ended a part of the experiment.
     ValueError
-        A log of another plant than a brake, or a table that cannot be read.
+        A log of another plant than a brake or a motor, or of both; a table that cannot be read; a limit out of its range, or
+        of a motor axis where there is none.
     OSError
         A file cannot be read or written.
 
@@ -208,7 +219,8 @@ def identify(
     checked = as_scenario(scenario, overrides)
     files = [os.fspath(path) for path in logs]
     folder = None if log is None else os.fspath(log)
-    return Identified(checked, _clutch.identify(checked._native, files, columns, folder))
+    told = _clutch.identify(checked._native, files, columns, folder, travel_deg, fastest_deg_s)
+    return Identified(checked, told)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -39,6 +39,20 @@ def test_identification_is_the_commands_and_holds_the_truth(rig):
     assert "[bounds]" in rig.to_toml()
 
 
+def test_a_motor_axis_is_identified_within_its_limits():
+    axis = clutch.identify("motor_pid", overrides={"rig.base": "bench"})
+    told = axis.parameters
+    assert told["inertia_v_s2_rad"].holds(0.0017 / 0.05) and told["break_backwards_v"].holds(1.0)
+    assert told["slide_forwards_v"].holds(0.6) and told["load_v"].holds(0.0) and axis.hops > 10 and axis.releases == 0
+    assert "known torque" in axis.refused["each"] and "[model.actuator.motor]" in axis.to_toml()
+    left, right = axis.plot().axes
+    assert len(left.get_yticklabels()) == len(told) and len(right.lines) == 1
+    with pytest.raises(ValueError, match="travel = 3 °: expected 10 to 3600 °"):
+        clutch.identify("motor_pid", travel_deg=3)
+    with pytest.raises(ValueError, match="fastest: is a limit"):
+        clutch.identify("board_smc_2", fastest_deg_s=30)
+
+
 def test_the_scenario_as_identified_moves_as_the_rig_does(rig):
     believed = rig.scenario
     assert believed.rig.inertia_kg_m2 == believed.model.inertia_kg_m2

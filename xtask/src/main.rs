@@ -169,8 +169,8 @@ enum Verb {
     /// Holds the watch over friction and load against rigs that drift and rigs that do not, half an hour: the tables of
     /// docs/loop.md.
     Drift,
-    /// Identifies random rigs, each from less than a minute of experiment on the simulated board: the table of
-    /// docs/identify.md, some minutes.
+    /// Identifies random rigs, and as many random motor axes, each from about a minute of experiment on the simulated board: the
+    /// tables of docs/identify.md, some minutes.
     Identify {
         /// Rigs.
         #[arg(default_value_t = 200)]
@@ -270,9 +270,13 @@ fn main() -> Result<()> {
         Verb::Meter => meter(),
         Verb::Drift => drift(),
         Verb::Identify { rigs, seed } => {
-            random_rigs(["clutch-identify", "identified_rigs"], "docs/identify.md", rigs, seed)
+            let page = "docs/identify.md";
+            random_rigs(["clutch-identify", "identified_rigs"], page, "campaign", rigs, seed)?;
+            random_rigs(["clutch-identify", "identified_motors"], page, "motors", rigs, seed + MOTORS)
         }
-        Verb::Tune { rigs, seed } => random_rigs(["clutch-tune", "tuned_rigs"], "docs/tune.md", rigs, seed),
+        Verb::Tune { rigs, seed } => {
+            random_rigs(["clutch-tune", "tuned_rigs"], "docs/tune.md", "campaign", rigs, seed)
+        }
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
         Verb::Ablate { runs } => ablate::all(runs),
         Verb::Lies { trials } => lies(trials),
@@ -419,8 +423,11 @@ fn meter() -> Result<()> {
     Ok(())
 }
 
+/// From the seeds of braked rigs to those of motor axes.
+const MOTORS: u64 = 20_000;
+
 /// The campaign of a package's example over random rigs, into its page.
-fn random_rigs([package, example]: [&str; 2], page: &str, rigs: u64, seed: u64) -> Result<()> {
+fn random_rigs([package, example]: [&str; 2], page: &str, part: &str, rigs: u64, seed: u64) -> Result<()> {
     let example = ["run", "--release", "--package", package, "--example", example, "--"];
     let (mut table, mut last) = (Vec::new(), String::new());
     let done = cargo(example).args([rigs.to_string(), seed.to_string()]).lines(|line| {
@@ -431,7 +438,7 @@ fn random_rigs([package, example]: [&str; 2], page: &str, rigs: u64, seed: u64) 
         }
     })?;
     anyhow::ensure!(done, "the campaign failed");
-    write_between(page, "campaign", &format!("{}\n\n{last}", table.join("\n")))
+    write_between(page, part, &format!("{}\n\n{last}", table.join("\n")))
 }
 
 /// The table that an example of the simulator prints.

@@ -7,12 +7,13 @@ use crate::signals::stop_flag;
 use crate::table::number;
 use anyhow::{Context, bail};
 use clap::Args;
-use clutch_identify::experiment::{ExperimentError, Programme, VirtualBoard, experiment};
-use clutch_identify::rig_file::rig_file;
-use clutch_identify::shown::ROWS;
-use clutch_identify::{Finding, Recording, Report, identify, map_as_believed, map_file};
+use clutch_core::ActuatorKind;
+use clutch_identify::added::{Added, Separate, separate};
+use clutch_identify::experiment::{ExperimentError, VirtualBoard};
+use clutch_identify::{Consent, Finding, Identified, Plan, Recording, map_as_believed, map_file};
 use clutch_log::Limits;
 use clutch_sim::Scenario;
+use clutch_sim::drive::DriveParams;
 use serde_json::{Value, json as value};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -27,9 +28,10 @@ use {
     std::sync::atomic::AtomicBool,
 };
 
-/// Finds out what a rig is: T/J, delay, friction, ripple, damping, each with an interval.
+/// Finds out what a rig is: T/J, delay, friction, ripple, damping, each with an interval; of a motor axis J/K and friction both
+/// ways.
 ///
-/// Runs an experiment of less than a minute through the loop, with all its checks: on the scenario's simulated board, in
+/// Runs an experiment of about a minute through the loop, with all its checks: on the scenario's simulated board, in
 /// virtual time, or with --port on a real one. With --from it reads logs instead. A parameter that cannot be found is
 /// refused, with the experiment that would find it.
 #[derive(Args)]
@@ -66,6 +68,15 @@ pub(crate) struct Identify {
     /// Reads these logs instead: MCAP, or CSV with --columns.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "log")]
     from: Vec<PathBuf>,
+    /// Logs of a second experiment, with a known mass added beside the weight: T, J and friction one by one.
+    #[arg(long, value_name = "FILE", num_args = 1.., requires_all = ["from", "mass", "radius"])]
+    loaded: Vec<PathBuf>,
+    /// The mass that was added, kg.
+    #[arg(long, value_name = "KG", requires = "loaded", allow_negative_numbers = true)]
+    mass: Option<f64>,
+    /// Radius of the pulley that it hangs from, m.
+    #[arg(long, value_name = "M", requires = "loaded", allow_negative_numbers = true)]
+    radius: Option<f64>,
     /// Columns of a CSV that hold counts and volts, one sample a row.
     #[arg(
         long,
@@ -75,6 +86,12 @@ pub(crate) struct Identify {
         default_value = "counts,volts"
     )]
     columns: Vec<String>,
+    /// Way that a motor axis may go forwards from where it rests, ° [default: 20].
+    #[arg(long, value_name = "DEG", conflicts_with = "from")]
+    travel: Option<f64>,
+    /// Highest rate of a motor axis, °/s [default: 60].
+    #[arg(long, value_name = "DEG_S", conflicts_with = "from")]
+    fastest: Option<f64>,
     /// Writes [model] and [bounds] for scenarios, with the intervals.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
@@ -108,15 +125,27 @@ impl Identify {
             let read = self.from.iter().map(|file| self.read(file, &scenario));
             read.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten().collect()
         };
-        let report = identify(&recordings);
-        let file = self.out.as_deref().map(|path| (path, rig_file(&report, &scenario)));
-        output::report(self.json, || json(&object(&report)), || text(&report))?;
+        let report = Identified::of(&recordings)?;
+        let separate = self.separate(&report, &scenario)?;
+        let file = self.out.as_deref().map(|path| (path, report.rig_file(&scenario)));
+        output::report(
+            self.json,
+            || {
+                let mut object = object(&report);
+                if let Some(separate) = &separate {
+                    object["separate"] =
+                        separate.rows().iter().map(|row| (row.0.to_owned(), finding(row.3))).collect();
+                }
+                json(&object)
+            },
+            || text(&report) + &separate.as_ref().map_or_else(String::new, one_by_one),
+        )?;
         if let Some((path, file)) = file {
             write(path, file?)?;
         }
         if let Some(path) = &self.map {
             let believed = || map_as_believed(&recordings, &scenario);
-            let map = if report.map.is_empty() { believed() } else { report.map.clone() };
+            let map = if report.map().is_empty() { believed() } else { report.map().to_vec() };
             if map.is_empty() {
                 bail!(
                     "{}: not written: no ride at an even rate was found; docs/identify.md says what is one",
@@ -129,15 +158,36 @@ impl Identify {
             let files = [&self.out, &self.map].into_iter().flatten();
             tell(&wrote(&files.map(PathBuf::as_path).collect::<Vec<_>>()))?;
         }
-        let told = ROWS.iter().any(|row| row.finding(&report).known().is_some());
+        let told = report.shown().iter().any(|row| row.finding.known().is_some());
         Ok(if told || (self.map.is_some() && self.out.is_none()) { Exit::Done } else { Exit::Failed })
+    }
+
+    /// Findings of both experiments together, if there is one with a mass added.
+    fn separate(&self, alone: &Identified, scenario: &Scenario) -> anyhow::Result<Option<Separate>> {
+        let (false, Some(mass), Some(radius)) = (self.loaded.is_empty(), self.mass, self.radius) else {
+            return Ok(None);
+        };
+        let gravity = match scenario.spec().rig.drive {
+            DriveParams::Weight(weight) => weight.gravity,
+            _ => 9.81,
+        };
+        let added = Added { mass, radius, gravity };
+        added.check()?;
+        let read = self.loaded.iter().map(|file| self.read(file, scenario));
+        let recordings: Vec<Recording> =
+            read.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten().collect();
+        match (alone, Identified::of(&recordings)?) {
+            (Identified::Brake(alone), Identified::Brake(with)) => Ok(Some(separate(alone, &with, &added))),
+            _ => bail!("--loaded: expected logs of a shaft with a brake and a weight, as --from"),
+        }
     }
 
     /// Runs the experiment, and says before what it does.
     fn experiment(&self, scenario: &Scenario) -> anyhow::Result<Vec<Recording>> {
-        let programme = Programme::default();
+        let consent = Consent { travel_deg: self.travel, fastest_deg_s: self.fastest };
+        let programme = Plan::of(scenario, &consent)?;
         let mut plan = format!("{:.0} s of experiment on {}\n", programme.seconds(), self.place());
-        programme.plan().iter().for_each(|line| plan += &format!("  {line}\n"));
+        programme.lines().iter().for_each(|line| plan += &format!("  {line}\n"));
         remark(&folded(&plan));
         if let Some(folder) = &self.log {
             std::fs::create_dir_all(folder)
@@ -152,7 +202,7 @@ impl Identify {
         // Ctrl-C ends it at once, unless a view is to see the end.
         let looking = if self.live.asked_for() { self.live.looking(&stop_flag()?)? } else { None };
         let mut board = board.looked_at(looking, BUILD);
-        Ok(experiment(scenario, &programme, &mut |name, part| board.run(name, part))?)
+        Ok(programme.run(scenario, &mut |name, part| board.run(name, part))?)
     }
 
     /// The board of the experiment, in words.
@@ -170,7 +220,7 @@ impl Identify {
         &self,
         port: &Address,
         scenario: &Scenario,
-        programme: &Programme,
+        programme: &Plan,
     ) -> anyhow::Result<Vec<Recording>> {
         if !self.uncertified {
             bail!(
@@ -185,7 +235,7 @@ impl Identify {
             let onlooker = live.clone().map(|live| live as Arc<dyn Onlooker>);
             self.on_board(port, &folder.join(format!("{name}.mcap")), (name, part), &stop, onlooker)
         };
-        Ok(experiment(scenario, programme, run)?)
+        Ok(programme.run(scenario, run)?)
     }
 
     /// One run of the loop on the board at the port, read from its log.
@@ -229,7 +279,8 @@ impl Identify {
             };
             let text = std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"))?;
             let spec = scenario.spec();
-            let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev);
+            let motor = spec.rig.actuator.kind() == ActuatorKind::Motor;
+            let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev, motor);
             return Ok(vec![Recording::from_csv(&name, &text, (counts, volts), scale)?]);
         }
         let log = clutch_log::read(file, &Limits::default())?;
@@ -237,16 +288,18 @@ impl Identify {
     }
 }
 
-fn text(report: &Report) -> String {
-    let (releases, slips, rates) = &report.found;
+fn text(report: &Identified) -> String {
+    let (sets_off, slips, rates) = report.found();
+    let of = if matches!(report, Identified::Brake(_)) { "releases" } else { "hops" };
     let rates: Vec<String> = rates.iter().map(|r| format!("{:.3}", r.to_degrees())).collect();
     let mut out = format!(
-        "{releases} releases, {slips} break-aways, {} rides{}\n",
+        "{sets_off} {of}, {slips} break-aways, {} rides{}\n",
         rates.len(),
         if rates.is_empty() { String::new() } else { format!(" at {} °/s", rates.join(", ")) }
     );
-    for row in &ROWS {
-        if let Some(e) = row.finding(report).known() {
+    let rows = report.shown();
+    for row in &rows {
+        if let Some(e) = row.finding.known() {
             let e = e.times(row.factor);
             let interval = format!("{} … {}", number(e.low), number(e.high));
             let line = format!("  {:<26}{:>10}  {interval:<24}{}", row.label, number(e.value), row.unit);
@@ -254,32 +307,53 @@ fn text(report: &Report) -> String {
             out.push('\n');
         }
     }
-    for row in &ROWS {
-        if let Finding::Refused(why) = row.finding(report) {
+    for row in &rows {
+        if let Finding::Refused(why) = row.finding {
             out += &paragraph(&format!("{}: not told; {why}", row.label));
         }
     }
-    report.unexplained.iter().for_each(|line| out += &paragraph(&format!("unexplained: {line}")));
+    report.unexplained().iter().for_each(|line| out += &paragraph(&format!("unexplained: {line}")));
+    if matches!(report, Identified::Brake(_)) { out } else { folded(&out) }
+}
+
+/// Torque, inertia and friction of both experiments together.
+fn one_by_one(separate: &Separate) -> String {
+    let mut out = String::new();
+    for (_, label, unit, finding) in separate.rows() {
+        match finding {
+            Finding::Known(e) => {
+                let interval = format!("{} … {}", number(e.low), number(e.high));
+                out += &format!("  {label:<26}{:>10}  {interval:<24}{unit}\n", number(e.value));
+            }
+            Finding::Refused(why) => out += &paragraph(&format!("{label}: not told; {why}")),
+        }
+    }
     out
+}
+
+fn finding(finding: &Finding) -> Value {
+    match finding {
+        Finding::Known(e) => value!({ "value": e.value, "low": e.low, "high": e.high }),
+        Finding::Refused(why) => value!({ "refused": why }),
+    }
 }
 
 /// The result as `--json` prints it.
 #[must_use]
-pub fn object(report: &Report) -> Value {
-    let of = |finding: &Finding| match finding {
-        Finding::Known(e) => value!({ "value": e.value, "low": e.low, "high": e.high }),
-        Finding::Refused(why) => value!({ "refused": why }),
-    };
+pub fn object(report: &Identified) -> Value {
     let parameters: serde_json::Map<String, Value> =
-        ROWS.iter().map(|row| (row.key.to_owned(), of(row.finding(report)))).collect();
-    let (releases, slips, rates) = &report.found;
+        report.shown().iter().map(|row| (row.key.to_owned(), finding(row.finding))).collect();
+    let (sets_off, slips, rates) = report.found();
+    let brake = matches!(report, Identified::Brake(_));
     value!({
         "version": env!("CARGO_PKG_VERSION"),
-        "releases": releases,
+        "actuator": if brake { "brake" } else { "motor" },
+        "releases": if brake { *sets_off } else { 0 },
+        "hops": if brake { 0 } else { *sets_off },
         "break_aways": slips,
         "rides_rad_s": rates,
         "parameters": parameters,
-        "unexplained": report.unexplained,
-        "map": report.map.iter().map(|p| [p.angle, p.factor]).collect::<Vec<_>>(),
+        "unexplained": report.unexplained(),
+        "map": report.map().iter().map(|p| [p.angle, p.factor]).collect::<Vec<_>>(),
     })
 }

@@ -766,10 +766,41 @@ fn a_rig_is_identified_and_its_file_is_what_other_verbs_take() {
     assert!(pull["low"].as_f64() < Some(truth) && Some(truth) < pull["high"].as_f64(), "{pull}");
     assert!(told["parameters"]["hold_v"]["refused"].is_string(), "{told}");
 
+    // The same logs are not those of a heavier rig; the mass has its radius.
+    let same = ["releases", "ride_5", "ride_20"].map(|part| format!("{logs}/{part}.mcap"));
+    let same: Vec<&str> = same.iter().map(String::as_str).collect();
+    let from = [&["identify", "--from"][..], &same, &["--loaded"], &same].concat();
+    let o = clutch(&[&from[..], &["--mass", "0.06", "--radius", "0.024", "--json"]].concat());
+    let told: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");
+    let why = told["separate"]["inertia_kg_m2"]["refused"].as_str().unwrap_or_default();
+    assert!(why.contains("a heavier mass"), "{told}");
+    let o = clutch(&[&from[..], &["--mass", "-1", "--radius", "0.024"]].concat());
+    assert!(err(&o).contains("mass = -1: expected a number above 0, in kg"), "{}", err(&o));
+
     let missing = path("none.toml");
     let o = clutch(&["certify", "board_smc_2", "--identified", &missing]);
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).contains("none.toml: cannot be read"), "{}", err(&o));
+}
+
+#[test]
+fn a_motor_axis_is_identified_and_its_file_is_taken() {
+    let dir = folder("identified_motor");
+    let path = |name: &str| dir.join(name).display().to_string();
+    let (rig, map) = (path("rig.toml"), path("map.toml"));
+    let o = clutch(&["identify", "motor_smc", "--set", "rig.base=bench", "--out", &rig, "--map", &map]);
+    assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+    assert!(out(&o).contains("J/K  ") && out(&o).contains("T_s/K backwards  "), "{}", out(&o));
+    assert!(narrow(&out(&o)) && narrow(&err(&o)), "{}{}", out(&o), err(&o));
+    let o = clutch(&["certify", "motor_smc", "--json", "--identified", &rig]);
+    let certificate: serde_json::Value = serde_json::from_slice(&o.stdout).expect("JSON");
+    let inertia = &certificate["bounds"]["inertia_kg_m2"];
+    let ends = [inertia[0].as_f64(), inertia[1].as_f64()].map(Option::unwrap);
+    assert!(ends[0] < 0.0017 && 0.0017 < ends[1] && ends[1] / ends[0] < 1.1, "{inertia}");
+    let o = clutch(&["sim", "motor_pid", "--identified", &rig, "--map", &map, "--json"]);
+    assert_eq!(o.status.code(), Some(0), "{}", err(&o));
+    let o = clutch(&["identify", "motor_pid", "--fastest", "1"]);
+    assert!(err(&o).contains("fastest = 1 °/s: expected 15 to 3600 °/s"), "{}", err(&o));
 }
 
 #[test]

@@ -10,34 +10,12 @@ use clutch_identify::{Estimate, Finding, Report, identify};
 use rayon::prelude::*;
 
 #[path = "random_rig/mod.rs"]
+#[allow(dead_code, reason = "its motors are of another example")]
 mod random_rig;
+#[path = "random_rig/rows.rs"]
+mod rows;
 use random_rig::{Outcome, Truth, truth};
-
-/// The form in which an error is told.
-#[derive(Clone, Copy)]
-enum As {
-    Percent,
-    Factor,
-    Times(f64, &'static str),
-}
-
-impl As {
-    fn error(self, found: f64, truth: f64) -> f64 {
-        match self {
-            As::Percent => 100.0 * (found / truth - 1.0).abs(),
-            As::Factor => (found / truth).max(truth / found),
-            As::Times(by, _) => by * (found - truth).abs(),
-        }
-    }
-
-    fn shown(self, error: f64) -> String {
-        match self {
-            As::Percent => format!("{error:.2} %"),
-            As::Factor => format!("× {error:.2}"),
-            As::Times(_, unit) => format!("{error:.3} {unit}").trim_end().to_owned(),
-        }
-    }
-}
+use rows::{As, print_row};
 
 type Get = (fn(&Report) -> &Finding, fn(&Truth) -> f64);
 
@@ -50,11 +28,6 @@ const ROWS: &[(&str, As, Get)] = &[
     ("Stribeck velocity", As::Factor, (|r| &r.stribeck, |t| t.stribeck)),
     ("C/J", As::Times(1.0, "1/s"), (|r| &r.damping, |t| t.damping)),
 ];
-
-fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let at = (share * sorted.len() as f64).ceil() as usize;
-    sorted.get(at.saturating_sub(1).min(sorted.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
-}
 
 fn main() -> Outcome<()> {
     let mut args = std::env::args().skip(1);
@@ -87,51 +60,18 @@ fn main() -> Outcome<()> {
             println!("{} {:?}", truth.scenario.name(), report.found);
             for (name, how, (get, of)) in ROWS {
                 match get(report) {
-                    Finding::Known(e) => println!(
-                        "  {name}: {:.6} for {:.6}, {}{} [{:.6}, {:.6}]",
-                        e.value,
-                        of(truth),
-                        how.shown(how.error(e.value, of(truth))),
-                        if e.holds(of(truth)) { "" } else { " MISSED" },
-                        e.low,
-                        e.high
-                    ),
+                    Finding::Known(e) => println!("  {name}: {}", how.detail(e, of(truth))),
                     Finding::Refused(why) => println!("  {name}: {why}"),
                 }
             }
             report.unexplained.iter().for_each(|line| println!("  unexplained: {line}"));
         }
     }
-    println!(
-        "| parameter | told | error, median | p90 | largest | interval holds it | half width of the interval, median |"
-    );
-    println!("|---|---|---|---|---|---|---|");
+    rows::print_head();
     for (name, how, (get, of)) in ROWS {
         let known: Vec<(Estimate, f64)> =
             done.iter().filter_map(|(truth, report)| Some((get(report).known()?, of(truth)))).collect();
-        let sorted = |mut values: Vec<f64>| {
-            values.sort_by(f64::total_cmp);
-            values
-        };
-        let errors = sorted(known.iter().map(|(e, truth)| how.error(e.value, *truth)).collect());
-        // The half of a factor is the larger end over the value.
-        let half = |e: &Estimate| match how {
-            As::Factor => e.high / e.value,
-            As::Percent => 50.0 * (e.high - e.low) / e.value,
-            As::Times(by, _) => 0.5 * by * (e.high - e.low),
-        };
-        let halves = sorted(known.iter().map(|(e, _)| half(e)).collect());
-        let held = known.iter().filter(|(e, truth)| e.holds(*truth)).count();
-        println!(
-            "| {name} | {} of {} | {} | {} | {} | {held} of {} | {} |",
-            known.len(),
-            done.len(),
-            how.shown(quantile(&errors, 0.5)),
-            how.shown(quantile(&errors, 0.9)),
-            how.shown(quantile(&errors, 1.0)),
-            known.len(),
-            how.shown(quantile(&halves, 0.5)),
-        );
+        print_row(name, *how, &known, done.len());
     }
     let flagged = done.iter().filter(|(_, report)| !report.unexplained.is_empty()).count();
     println!(

@@ -39,6 +39,7 @@ fn learnt(seed: u64, rate: f64) -> Outcome<Vec<Place>> {
     let trace = ridden(&scenario)?.trace;
     let ticks = trace.counts.iter().zip(&trace.voltage);
     let recording = Recording {
+        motor: false,
         name: "ride".to_owned(),
         period: scenario.spec().period.seconds(),
         counts_per_rev: scenario.spec().rig.encoder.sensor.counts_per_rev,

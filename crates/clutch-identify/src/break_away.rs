@@ -169,19 +169,19 @@ impl BreakAway<'_> {
 
 /// The curve of a likelihood over a parameter.
 #[derive(Clone, Debug)]
-struct Profile {
-    points: Vec<(f64, f64)>,
+pub(crate) struct Profile {
+    pub(crate) points: Vec<(f64, f64)>,
 }
 
 impl Profile {
-    fn best(&self) -> (f64, f64) {
+    pub(crate) fn best(&self) -> (f64, f64) {
         self.points.iter().copied().fold((f64::NAN, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a })
     }
 
     /// Mean under the curve, and the values at which it has fallen by `fall`; none at an end that it does not fall to. A peak
     /// below the best one lies between these ends, one above it does not: it sets off a whole step of the voltage earlier, and
     /// any curve has another one step on.
-    fn estimate(&self, fall: f64) -> (f64, Option<f64>, Option<f64>) {
+    pub(crate) fn estimate(&self, fall: f64) -> (f64, Option<f64>, Option<f64>) {
         let (_, top) = self.best();
         let level = top - fall;
         let at = self.points.iter().position(|p| p.1 == top).unwrap_or(0);
@@ -203,7 +203,7 @@ impl Profile {
 }
 
 /// Numbers from one to another, evenly in the logarithm.
-fn spaced(low: f64, high: f64, n: usize) -> impl Iterator<Item = f64> + Clone {
+pub(crate) fn spaced(low: f64, high: f64, n: usize) -> impl Iterator<Item = f64> + Clone {
     (0..n).map(move |i| low * libm::pow(high / low, i as f64 / (n - 1) as f64))
 }
 

@@ -125,6 +125,28 @@ pub enum ExperimentError {
     /// The output does not let go.
     #[error("output.lowest_v = {0}: expected 0, as a release lets the brake go, or at most 0")]
     NoRelease(f64),
+    /// The output of a motor goes one way, or the model's actuator is none.
+    #[error(
+        "output.lowest_v = {0}: expected below 0, and a motor as [model.actuator], as the axis goes both ways"
+    )]
+    OneWay(f64),
+    /// A limit that this rig's experiment has no use for.
+    #[error("{0}: is a limit of the experiment on a motor axis, and [rig.actuator] is none")]
+    OfMotors(&'static str),
+    /// A limit of the experiment.
+    #[error("{key} = {value} {unit}: expected {least} to {most} {unit}")]
+    Limit {
+        /// Its name.
+        key: &'static str,
+        /// What it was.
+        value: f64,
+        /// Least that it may be.
+        least: f64,
+        /// Most that it may be.
+        most: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
     /// The supervisor ended a part.
     #[error("the part \"{part}\" ended early: {cause}; it is in its safe state. {remedy}")]
     Ended {
@@ -176,12 +198,12 @@ pub fn experiment(
 }
 
 /// A table of one key after the other.
-fn table<const N: usize>(rows: [(&str, Value); N]) -> Value {
+pub(crate) fn table<const N: usize>(rows: [(&str, Value); N]) -> Value {
     Value::Table(rows.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
 }
 
 /// A part: the scenario with another law, path and length. Rig, model, bounds, safe state and checks stay.
-fn part(base: &Scenario, law: Value, path: Value, seconds: f64) -> Result<Table, ScenarioError> {
+pub(crate) fn part(base: &Scenario, law: Value, path: Value, seconds: f64) -> Result<Table, ScenarioError> {
     let mut t = base.table().clone();
     for other in ["velocity", "shell"] {
         t.remove(other);
@@ -202,7 +224,7 @@ fn part(base: &Scenario, law: Value, path: Value, seconds: f64) -> Result<Table,
     Ok(t)
 }
 
-fn checked(base: &Scenario, name: &str, table: Table) -> Result<Scenario, ScenarioError> {
+pub(crate) fn checked(base: &Scenario, name: &str, table: Table) -> Result<Scenario, ScenarioError> {
     let title = Value::String(format!("{}: {name}", base.name()));
     Scenario::from_table(&format!("{name} for {}", base.name()), table, &[("name".to_owned(), title)])
 }
@@ -242,7 +264,7 @@ fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, Scenario
     checked(base, "releases", part(base, law, path, programme.releases_s())?)
 }
 
-fn ramp(rate_deg_s: f64) -> Value {
+pub(crate) fn ramp(rate_deg_s: f64) -> Value {
     table([("ramp", table([("rate_deg_s", Value::Float(rate_deg_s))]))])
 }
 

@@ -17,8 +17,10 @@ pub type Spread = SMatrix<f64, 5, 5>;
 /// Numbers that stay.
 #[derive(Clone, Copy, Debug)]
 pub struct Shaft {
-    /// `G`, counts per period².
+    /// `G`, counts per period²; of a motor `K/J`, counts per period² and volt.
     pub pull: f64,
+    /// `true` if a voltage drives, and friction is in volts: `a = G [u − (h + r)] − c ω`.
+    pub motor: bool,
     /// `c`, per period.
     pub damping: f64,
     /// `k`, rad per count.
@@ -65,12 +67,13 @@ impl Belief {
     /// A time `dt` (in periods) under a voltage; the matrix of small departures.
     pub fn advance(&mut self, shaft: &Shaft, volts: f64, dt: f64) -> Spread {
         let [position, velocity, mean, ripple, slope] = self.mean.into();
-        let load = shaft.pull * volts;
-        let a = shaft.pull - load * (mean + ripple) - shaft.damping * velocity;
+        let (drive, load) =
+            if shaft.motor { (shaft.pull * volts, shaft.pull) } else { (shaft.pull, shaft.pull * volts) };
+        let a = drive - load * (mean + ripple) - shaft.damping * velocity;
         let way = velocity * dt + 0.5 * a * dt * dt;
         let (k2, decay) = (shaft.wave * shaft.wave, 2.0 * shaft.wave_damping * shaft.wave);
         // The wave turns by the way that is believed, of which no covariance is kept: through slopes that are believed with the
-        // way it would be taken for a measurement of them. A brake drives nothing back.
+        // way it would be taken for a measurement of them. A ride goes one way.
         let turned = way.max(0.0);
         let next = slope - turned * (k2 * ripple + decay * slope);
         self.mean = State::new(position + way, velocity + a * dt, mean, ripple + turned * next, next);

@@ -1,11 +1,14 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+pub mod added;
 pub mod believed;
 pub mod break_away;
 pub mod experiment;
 pub mod filter;
+pub mod identified;
 pub mod map_file;
+pub mod motor;
 pub mod recording;
 pub mod release;
 pub mod report;
@@ -14,6 +17,7 @@ pub mod rig_file;
 pub mod shown;
 
 pub use believed::{Believed, Corner, believed};
+pub use identified::{Consent, Identified, Plan};
 pub use map_file::{map_as_believed, map_file};
 pub use recording::{ReadError, Recording, Tick};
 pub use report::{Finding, Report, identify};

@@ -15,11 +15,13 @@ pub struct Tick {
     pub volts: f64,
 }
 
-/// A stretch of samples without a gap, forwards being the way that the shaft is driven.
+/// A stretch of samples without a gap; with a brake forwards is the way that the shaft is driven.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// Name for messages: a file, a part of the experiment.
     pub name: String,
+    /// `true` if a voltage drives the shaft, either way; else it brakes.
+    pub motor: bool,
     /// Sampling period, s.
     pub period: f64,
     /// Counts of the encoder in a turn.
@@ -49,8 +51,11 @@ pub enum ReadError {
         error: Box<ScenarioError>,
     },
     /// A log of another plant.
-    #[error("{0}: it is of {1}: expected a brake, which 0 V lets go")]
+    #[error("{0}: it is of {1}: expected a brake, which 0 V lets go, or a motor")]
     Actuator(String, &'static str),
+    /// Logs of both.
+    #[error("{0} is of another actuator than {1}: expected recordings of one rig, a brake or a motor")]
+    Mixed(String, String),
     /// A log without samples under control.
     #[error("{0}: has no samples under control")]
     Empty(String),
@@ -103,7 +108,7 @@ impl Recording {
     /// The recordings in a log: more than one where samples are missing. A weight that drives backwards is turned round.
     ///
     /// # Errors
-    /// No scenario, no brake, no samples.
+    /// No scenario, neither brake nor motor, no samples.
     pub fn from_log(name: &str, log: &Log) -> Result<Vec<Recording>, ReadError> {
         let scenario = Scenario::parse(name, &log.header.scenario_toml, &[])
             .map_err(|error| ReadError::Scenario { name: name.to_owned(), error: Box::new(error) })?;
@@ -119,7 +124,7 @@ impl Recording {
     /// The recordings in the records of a run; `before`: the voltage before it, if it is known, V.
     ///
     /// # Errors
-    /// No brake, no samples.
+    /// Neither brake nor motor, no samples.
     pub fn from_records(
         name: &str,
         scenario: &Scenario,
@@ -128,12 +133,13 @@ impl Recording {
     ) -> Result<Vec<Recording>, ReadError> {
         let spec = scenario.spec();
         let kind = spec.rig.actuator.kind();
-        if kind != ActuatorKind::Brake {
+        if kind == ActuatorKind::Both {
             return Err(ReadError::Actuator(name.to_owned(), kind.name()));
         }
         let dac = converter(name, scenario)?;
         let template = Recording {
             name: name.to_owned(),
+            motor: kind == ActuatorKind::Motor,
             period: spec.period.seconds(),
             counts_per_rev: spec.rig.encoder.sensor.counts_per_rev,
             step_volts: dac.volts(DacCode(1)) - dac.volts(DacCode(0)),
@@ -167,7 +173,7 @@ impl Recording {
         Ok(found)
     }
 
-    /// A table of columns, one sample a row; `counts` and `volts` are the names of its columns.
+    /// A table of columns, one sample a row; `counts` and `volts` are the names of its columns, `motor` as [`Self::motor`].
     ///
     /// # Errors
     /// The row, the column, and what is expected there.
@@ -175,7 +181,7 @@ impl Recording {
         name: &str,
         text: &str,
         (counts, volts): (&str, &str),
-        (period, counts_per_rev): (f64, u32),
+        (period, counts_per_rev, motor): (f64, u32, bool),
     ) -> Result<Recording, ReadError> {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
         let heads = reader.headers().map_err(|e| table(name, &e.to_string()))?.clone();
@@ -213,6 +219,7 @@ impl Recording {
         let step_volts = steps.into_iter().fold(f64::INFINITY, f64::min);
         Ok(Recording {
             name: name.to_owned(),
+            motor,
             period,
             counts_per_rev,
             step_volts: if step_volts.is_finite() { step_volts } else { 0.0 },
@@ -222,7 +229,17 @@ impl Recording {
         })
     }
 
-    /// Counts wrap at 2³², and a shaft that is driven backwards is turned round.
+    /// The same with the axis turned round.
+    #[must_use]
+    pub fn turned(&self) -> Recording {
+        let mut other = self.clone();
+        other.volts_before = -other.volts_before;
+        // −1 − n keeps counts that floor.
+        other.ticks.iter_mut().for_each(|t| *t = Tick { counts: -1 - t.counts, volts: -t.volts });
+        other
+    }
+
+    /// Counts wrap at 2³², and a shaft that a weight drives backwards is turned round.
     fn unwrap_counts(&mut self) {
         let Some(first) = self.ticks.first().map(|t| t.counts) else { return };
         let mut last = first;
@@ -231,7 +248,7 @@ impl Recording {
             tick.counts = last + i64::from(step);
             last = tick.counts;
         }
-        if last < first {
+        if last < first && !self.motor {
             // −1 − n keeps counts that floor.
             self.ticks.iter_mut().for_each(|tick| tick.counts = -1 - tick.counts);
         }

@@ -9,9 +9,9 @@ use serde::Serialize;
 
 /// Standard deviations on either side of a value whose distribution is nearly normal. Two cover 90 %, not 95: the
 /// ripple that the filter believes in is not quite the disc's.
-const DEVIATIONS: f64 = 2.5;
+pub(crate) const DEVIATIONS: f64 = 2.5;
 /// Fall of a logarithm of a likelihood at the ends of an interval.
-const FALL: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
+pub(crate) const FALL: f64 = 0.5 * DEVIATIONS * DEVIATIONS;
 /// Rates that tell C/J lie this far apart, rad/s.
 const RATES_APART: f64 = 0.5;
 /// Fewest break-aways that tell μ_s/μ_d.
@@ -23,7 +23,7 @@ const MOST: usize = 60;
 /// Ripple that is always reckoned with, as a share.
 const LEAST_RIPPLE: f64 = 0.03;
 /// Normalised innovation of an edge that no ride has: one in millions.
-const UNEXPLAINED: f64 = 7.0;
+pub(crate) const UNEXPLAINED: f64 = 7.0;
 
 /// The finding on a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,7 +46,7 @@ impl Finding {
     }
 }
 
-fn refused(why: &str) -> Finding {
+pub(crate) fn refused(why: &str) -> Finding {
     Finding::Refused(why.to_owned())
 }
 
@@ -208,7 +208,7 @@ impl Motion {
 }
 
 /// A ride's worst edge, if no ride has such a one.
-fn edge_off(told: &Told) -> Option<String> {
+pub(crate) fn edge_off(told: &Told) -> Option<String> {
     let (name, tick, off) = &told.worst;
     (*off > UNEXPLAINED).then(|| {
         format!(

@@ -12,6 +12,10 @@ const LONGEST_SILENCE: f64 = 6.0; // times the median time between edges
 const SETTLING_S: f64 = 0.5;
 const SHORTEST_S: f64 = 1.0;
 const SHORTEST_RAD: f64 = 0.17;
+/// The same of a motor, which goes to and fro: its passes are short, and its law is stiff.
+const PASS_SETTLING_S: f64 = 0.15;
+const SHORTEST_PASS_S: f64 = 0.1;
+const SHORTEST_PASS_RAD: f64 = 0.05;
 /// Waves per turn that a ripple is taken to have, and their damping: a wide band, as the law glide believes.
 pub const WAVES_PER_TURN: f64 = 340.0;
 /// See [`WAVES_PER_TURN`].
@@ -38,9 +42,9 @@ const CLOCKWORK: f64 = 3e-4;
 /// A ride at an even rate.
 #[derive(Clone, Debug)]
 pub struct Ride<'a> {
-    recording: &'a Recording,
+    pub(crate) recording: &'a Recording,
     /// First and last tick of the even part, of the recording.
-    ticks: (usize, usize),
+    pub(crate) ticks: (usize, usize),
     /// Tick at which a map begins.
     first: usize,
     /// Rate, rad/s.
@@ -61,7 +65,7 @@ pub struct Place {
 pub struct Told {
     /// Rate, rad/s.
     pub rate: f64,
-    /// `1/h_v`, V, and its standard deviation.
+    /// `1/h_v` of a brake, friction of a motor, V, and its standard deviation.
     pub hold: (f64, f64),
     /// Root mean square of the ripple, as a share of friction, and its standard deviation.
     pub ripple: (f64, f64),
@@ -84,14 +88,19 @@ pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
     let mut gaps: Vec<usize> = edges.windows(2).map(|w| w[1] - w[0]).collect();
     gaps.sort_unstable();
     let longest = LONGEST_SILENCE * gaps[gaps.len() / 2] as f64;
+    let (settling, shortest_s, shortest_rad) = if recording.motor {
+        (PASS_SETTLING_S, SHORTEST_PASS_S, SHORTEST_PASS_RAD)
+    } else {
+        (SETTLING_S, SHORTEST_S, SHORTEST_RAD)
+    };
     let mut found = Vec::new();
     let mut first = 0;
     for k in 1..=edges.len() {
         if k < edges.len() && ((edges[k] - edges[k - 1]) as f64) <= longest {
             continue;
         }
-        let mapped_from = edges[first] + (MAP_SETTLING_S / recording.period) as usize;
-        let begin = edges[first] + (SETTLING_S / recording.period) as usize;
+        let mapped_from = edges[first] + (MAP_SETTLING_S.min(settling) / recording.period) as usize;
+        let begin = edges[first] + (settling / recording.period) as usize;
         let begin = edges[first..k].iter().copied().find(|&e| e >= begin);
         let end = edges[k - 1];
         first = k;
@@ -99,7 +108,7 @@ pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
         let seconds = end.saturating_sub(begin) as f64 * recording.period;
         let way =
             |a: usize, b: usize| (ticks[b].counts - ticks[a].counts) as f64 * recording.radians_per_count();
-        if seconds < SHORTEST_S || way(begin, end) < SHORTEST_RAD {
+        if seconds < shortest_s || way(begin, end) < shortest_rad {
             continue;
         }
         let middle = begin.midpoint(end);
@@ -128,6 +137,7 @@ fn shaft_with(
     let walk = walk * recording.period.sqrt() * recording.period / recording.radians_per_count();
     Shaft {
         pull: pull * recording.per_rad_s2(),
+        motor: recording.motor,
         damping: damping * recording.period,
         wave: WAVES_PER_TURN * recording.radians_per_count(),
         wave_damping,
@@ -144,7 +154,8 @@ impl Ride<'_> {
         let r = self.recording;
         let (begin, end) = self.ticks;
         let volts = (begin..end).map(|i| r.ticks[i].volts).sum::<f64>() / (end - begin) as f64;
-        let mut friction = 1.0 / volts.max(1e-6);
+        let motor = r.motor;
+        let mut friction = if motor { volts.max(1e-6) } else { 1.0 / volts.max(1e-6) };
         let mut size = share.unwrap_or(FIRST_SHARE);
         let rounds = if share.is_some() { 1 } else { ROUNDS };
         let mut worst = (begin, 0.0);
@@ -169,7 +180,7 @@ impl Ride<'_> {
             let v = b.mean[1].max(0.0);
             (way + v, sum + v * (b.mean[2] + b.mean[3]))
         });
-        let hold = sums.0 / sums.1;
+        let hold = if motor { sums.1 / sums.0 } else { sums.0 / sums.1 };
         let radians =
             WAVES_PER_TURN * r.radians_per_count() * (r.ticks[end].counts - r.ticks[begin].counts) as f64;
         // A stretch of the disc does not hold whole waves.

@@ -2,15 +2,15 @@
 
 use crate::Estimate;
 use crate::report::{Finding, Report};
-use crate::shown::ROWS;
+use crate::shown::{ROWS, Row};
 use clutch_core::Actuator;
 use clutch_sim::Scenario;
 use toml::{Table, Value};
 
 /// Standard deviations of the ripple that friction's bounds hold.
-const RIPPLE: f64 = 3.0;
+pub(crate) const RIPPLE: f64 = 3.0;
 /// Largest tolerance that a scenario takes, %.
-const MOST_PERCENT: f64 = 99.9;
+pub(crate) const MOST_PERCENT: f64 = 99.9;
 
 /// A file cannot be written for want of a parameter.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -22,7 +22,7 @@ pub struct Lacks {
     pub why: String,
 }
 
-fn need(parameter: &'static str, finding: &Finding) -> Result<Estimate, Lacks> {
+pub(crate) fn need(parameter: &'static str, finding: &Finding) -> Result<Estimate, Lacks> {
     match finding {
         Finding::Known(estimate) => Ok(*estimate),
         Finding::Refused(why) => Err(Lacks { parameter, why: why.clone() }),
@@ -76,7 +76,7 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
     let file = Table::from_iter([
         ("model".to_owned(), Value::Table(model)),
         ("bounds".to_owned(), Value::Table(bounds)),
-        ("identified".to_owned(), Value::Table(intervals(report))),
+        ("identified".to_owned(), Value::Table(intervals(&ROWS, report))),
     ]);
     Ok(format!(
         "# What `clutch identify` found for: {}\n\
@@ -87,7 +87,7 @@ pub fn rig_file(report: &Report, scenario: &Scenario) -> Result<String, Lacks> {
 }
 
 /// Middle of an interval, and its half width as a share of that.
-fn around(low: f64, high: f64) -> (f64, f64) {
+pub(crate) fn around(low: f64, high: f64) -> (f64, f64) {
     let middle = 0.5 * (low + high);
     (middle, 0.5 * (high - low) / middle.max(f64::MIN_POSITIVE))
 }
@@ -164,8 +164,8 @@ impl RigFile {
 }
 
 /// The intervals, each with the unit in its key.
-fn intervals(report: &Report) -> Table {
-    ROWS.iter()
+pub(crate) fn intervals<R>(rows: &[Row<R>], report: &R) -> Table {
+    rows.iter()
         .map(|row| {
             let value = match row.finding(report) {
                 Finding::Refused(why) => Value::String(why.clone()),

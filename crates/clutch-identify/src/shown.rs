@@ -1,11 +1,12 @@
 //! Parameters as people are shown them.
 
+use crate::motor;
 use crate::report::{Finding, Report};
-use clutch_core::params::{MS, PER_S, PERCENT, RAD_S2, V};
+use clutch_core::params::{MS, PER_S, PERCENT, RAD_S2, V, V_S_RAD, V_S2_RAD};
 
-/// A parameter that recordings may tell.
+/// A parameter that recordings may tell, in a report of that kind.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct Row<R> {
     /// Key in files and JSON, SI.
     pub key: &'static str,
     /// Name for readers.
@@ -14,28 +15,28 @@ pub struct Row {
     pub unit: &'static str,
     /// Factor from SI to that unit.
     pub factor: f64,
-    of: fn(&Report) -> &Finding,
+    of: fn(&R) -> &Finding,
 }
 
-impl Row {
+impl<R> Row<R> {
     /// The finding on it.
     #[must_use]
-    pub fn finding<'a>(&self, report: &'a Report) -> &'a Finding {
+    pub fn finding<'a>(&self, report: &'a R) -> &'a Finding {
         (self.of)(report)
     }
 }
 
-const fn row(
+const fn row<R>(
     key: &'static str,
     label: &'static str,
     (unit, factor): (&'static str, f64),
-    of: fn(&Report) -> &Finding,
-) -> Row {
+    of: fn(&R) -> &Finding,
+) -> Row<R> {
     Row { key, label, unit, factor, of }
 }
 
-/// The parameters, in the order in which they are shown.
-pub const ROWS: [Row; 9] = [
+/// The parameters of a braked shaft, in the order in which they are shown.
+pub const ROWS: [Row<Report>; 9] = [
     row("pull_rad_s2", "T/J", (RAD_S2.text, 1.0), |r| &r.pull),
     row("delay_s", "delay, dead time and lag", (MS.text, 1e3), |r| &r.delay),
     row("hold_v", "v_hold = T/(μ_d K)", (V.text, 1.0), |r| &r.hold),
@@ -45,4 +46,20 @@ pub const ROWS: [Row; 9] = [
     row("damping_1_s", "C/J", (PER_S.text, 1.0), |r| &r.damping),
     row("lag_s", "lag", (MS.text, 1e3), |r| &r.lag),
     row("each", "J, T, K, μ one by one", ("", 1.0), |r| &r.each),
+];
+
+/// The same of a motor axis, torques in volts.
+pub const MOTOR_ROWS: [Row<motor::Report>; 12] = [
+    row("break_forwards_v", "T_s/K forwards", (V.text, 1.0), |r| &r.at_rest[0]),
+    row("break_backwards_v", "T_s/K backwards", (V.text, 1.0), |r| &r.at_rest[1]),
+    row("slide_forwards_v", "T_c/K forwards", (V.text, 1.0), |r| &r.sliding[0]),
+    row("slide_backwards_v", "T_c/K backwards", (V.text, 1.0), |r| &r.sliding[1]),
+    row("load_v", "load T/K", (V.text, 1.0), |r| &r.load),
+    row("viscous_v_s_rad", "C/K", (V_S_RAD.text, 1.0), |r| &r.viscous),
+    row("stribeck_velocity_rad_s", "Stribeck velocity", ("mrad/s", 1e3), |r| &r.stribeck),
+    row("inertia_v_s2_rad", "J/K", (V_S2_RAD.text, 1.0), |r| &r.inertia),
+    row("delay_s", "delay, dead time and lag", (MS.text, 1e3), |r| &r.delay),
+    row("ripple_rms", "ripple, rms", (PERCENT.text, 100.0), |r| &r.ripple),
+    row("lag_s", "lag", (MS.text, 1e3), |r| &r.lag),
+    row("each", "K, J, friction, load one by one", ("", 1.0), |r| &r.each),
 ];

@@ -113,7 +113,7 @@ fn a_count_that_no_fall_explains_is_named() {
 
 #[test]
 fn tables_of_others_are_read_and_their_mistakes_named() {
-    let scale = (0.001, 20_000);
+    let scale = (0.001, 20_000, false);
     let read = |text: &str| Recording::from_csv("t.csv", text, ("n", "u"), scale);
     let good = read("t,n,u\n0,0,4.5\n1,1,4.5\n2,3,4.4\n").unwrap();
     assert_eq!(good.ticks[2], Tick { counts: 3, volts: 4.4 });
@@ -144,6 +144,7 @@ fn nothing_panics_on_recordings_that_make_no_sense() {
             let ticks = ticks.collect();
             let recording = Recording {
                 name: "noise".to_owned(),
+                motor: false,
                 period: 0.001,
                 counts_per_rev: 20_000,
                 step_volts: 0.005,

@@ -4,11 +4,11 @@ use crate::convert::{from_json, log_error, loop_error, os_error, scenario_error}
 use crate::log::read_unless_interrupted;
 use crate::run::unless_interrupted;
 use crate::stepping::native;
-use clutch_identify::experiment::{ExperimentError, Programme, VirtualBoard, experiment};
+use clutch_core::ActuatorKind;
+use clutch_identify::experiment::{ExperimentError, VirtualBoard};
 use clutch_identify::recording::ReadError;
-use clutch_identify::rig_file::rig_file;
-use clutch_identify::shown::ROWS;
-use clutch_identify::{Recording, RigFile, believed};
+use clutch_identify::shown::{MOTOR_ROWS, ROWS};
+use clutch_identify::{Consent, Identified, Plan, Recording, RigFile, believed};
 use clutch_tune::Options;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -26,6 +26,7 @@ fn experiment_error(py: Python<'_>, e: &ExperimentError) -> PyErr {
         ExperimentError::Scenario(e) => scenario_error(py, e, None),
         ExperimentError::Read(e) => read_error(py, e),
         ExperimentError::Log(e) => log_error(py, e),
+        ExperimentError::Limit { .. } | ExperimentError::OfMotors(_) => PyValueError::new_err(e.to_string()),
         _ => loop_error(py, &e.to_string()),
     }
 }
@@ -33,13 +34,15 @@ fn experiment_error(py: Python<'_>, e: &ExperimentError) -> PyErr {
 /// Identifies a rig: the object that `clutch identify --json` prints, and the rig file, or why there is none. Without logs
 /// the scenario's simulated board is run, in virtual time.
 #[pyfunction]
-#[pyo3(signature = (scenario, logs, columns, log))]
+#[pyo3(signature = (scenario, logs, columns, log, travel_deg, fastest_deg_s))]
 pub(crate) fn identify<'py>(
     py: Python<'py>,
     scenario: &Bound<'py, PyAny>,
     logs: Vec<PathBuf>,
     columns: (String, String),
     log: Option<PathBuf>,
+    travel_deg: Option<f64>,
+    fastest_deg_s: Option<f64>,
 ) -> PyResult<(Bound<'py, PyAny>, Option<String>, Option<String>)> {
     let scenario = native(scenario)?;
     let mut recordings = Vec::new();
@@ -49,7 +52,8 @@ pub(crate) fn identify<'py>(
             let text =
                 std::fs::read_to_string(path).map_err(|e| os_error(py, path, &format!("{name}: {e}"), &e))?;
             let spec = scenario.0.spec();
-            let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev);
+            let motor = spec.rig.actuator.kind() == ActuatorKind::Motor;
+            let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev, motor);
             let read = Recording::from_csv(&name, &text, (&columns.0, &columns.1), scale);
             recordings.push(read.map_err(|e| read_error(py, &e))?);
         } else {
@@ -66,15 +70,16 @@ pub(crate) fn identify<'py>(
             let mut board = log.map_or_else(VirtualBoard::default, |folder| {
                 VirtualBoard::logging(folder, clutch_cli::BUILD)
             });
-            experiment(&scenario.0, &Programme::default(), &mut |name, part| board.run(name, part))?
+            let plan = Plan::of(&scenario.0, &Consent { travel_deg, fastest_deg_s })?;
+            plan.run(&scenario.0, &mut |name, part| board.run(name, part))?
         } else {
             recordings
         };
-        Ok(clutch_identify::identify(&recordings))
+        Ok(Identified::of(&recordings)?)
     });
     let report = found.map_err(|e| experiment_error(py, &e))?;
     let object = from_json(py, &clutch_cli::identify::object(&report))?;
-    let (file, why) = match rig_file(&report, &scenario.0) {
+    let (file, why) = match report.rig_file(&scenario.0) {
         Ok(file) => (Some(file), None),
         Err(why) => (None, Some(why.to_string())),
     };
@@ -85,7 +90,10 @@ pub(crate) fn identify<'py>(
 /// which they are shown.
 #[pyfunction]
 pub(crate) fn identified_rows() -> Vec<(&'static str, &'static str, &'static str, f64)> {
-    ROWS.iter().map(|row| (row.key, row.label, row.unit, row.factor)).collect()
+    let brake = ROWS.iter().map(|row| (row.key, row.label, row.unit, row.factor));
+    let motor = MOTOR_ROWS.iter().map(|row| (row.key, row.label, row.unit, row.factor));
+    let also = motor.filter(|row| ROWS.iter().all(|other| other.key != row.0));
+    brake.chain(also).collect()
 }
 
 /// A rig file that was made by this package.

@@ -6,6 +6,7 @@
 //! ```
 
 #[path = "../../clutch-identify/examples/random_rig/mod.rs"]
+#[allow(dead_code, reason = "its motors are of another example")]
 mod random_rig;
 
 use clutch_identify::experiment::{Programme, VirtualBoard, experiment};

@@ -5,6 +5,9 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::error::Error;
 
+pub(crate) mod added;
+pub(crate) mod motor;
+
 /// A rig, and a campaign's findings of it.
 pub(crate) type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 

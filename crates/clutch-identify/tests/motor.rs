@@ -1,0 +1,169 @@
+//! Estimates of motor axes that the estimators know nothing of, and refusals.
+
+use clutch_core::ActuatorKind;
+use clutch_identify::experiment::VirtualBoard;
+use clutch_identify::motor::Report;
+use clutch_identify::{Consent, Estimate, Finding, Identified, Plan, Recording, RigFile};
+use clutch_sim::Scenario;
+
+#[path = "../examples/random_rig/mod.rs"]
+#[allow(dead_code, reason = "its brakes are of other tests")]
+mod random_rig;
+use random_rig::motor::{Truth, truth};
+
+fn recordings(truth: &Truth) -> Vec<Recording> {
+    let plan = Plan::of(&truth.scenario, &Consent::default()).unwrap();
+    let mut board = VirtualBoard::default();
+    plan.run(&truth.scenario, &mut |name, part| board.run(name, part)).unwrap()
+}
+
+fn of(recordings: &[Recording]) -> Report {
+    match Identified::of(recordings).unwrap() {
+        Identified::Motor(report) => report,
+        Identified::Brake(_) => panic!("a brake"),
+    }
+}
+
+fn known(finding: &Finding, truth: f64, within: f64) -> Estimate {
+    let e = finding.known().unwrap_or_else(|| panic!("{finding:?}"));
+    assert!(e.holds(truth), "{truth}: {e:?}");
+    assert!((e.value - truth).abs() <= within, "{truth} ± {within}: {e:?}");
+    e
+}
+
+fn refusal(finding: &Finding) -> &str {
+    match finding {
+        Finding::Refused(why) => why,
+        Finding::Known(e) => panic!("{e:?}"),
+    }
+}
+
+#[test]
+fn hidden_axes_are_found_and_what_a_log_does_not_show_is_refused() {
+    // The first rigs of the campaign; docs/identify.md counts all of them.
+    for seed in [10_001, 10_002] {
+        let truth = truth(seed).unwrap();
+        let all = recordings(&truth);
+        let report = of(&all);
+        for (way, load) in [(0, -truth.load), (1, truth.load)] {
+            let _ = known(&report.at_rest[way], truth.at_rest + load, 0.03 * truth.at_rest);
+            let _ = known(&report.sliding[way], truth.sliding + load, 0.01 * truth.sliding);
+        }
+        let _ = known(&report.load, truth.load, 0.003);
+        let _ = known(&report.viscous, truth.viscous, 0.006);
+        let _ = known(&report.inertia, truth.inertia, 0.03 * truth.inertia);
+        let _ = known(&report.delay, truth.delay, 0.2e-3);
+        let _ = known(&report.ripple, truth.ripple, 0.02);
+        assert!(refusal(&report.each).contains("known torque"));
+        assert!(report.unexplained.is_empty(), "{:?}", report.unexplained);
+        the_map_is_the_discs(&truth, &report);
+        the_file_holds_the_rig(&truth, &report);
+        parts_tell_what_they_can(&all);
+    }
+}
+
+fn the_map_is_the_discs(truth: &Truth, report: &Report) {
+    let rig = clutch_sim::rig::Rig::new(&truth.scenario.spec().rig, truth.scenario.spec().run.seed).unwrap();
+    let disc = rig.model.ripple.as_ref().unwrap();
+    let ratios: Vec<f64> = report.map.iter().map(|p| p.factor / disc.factor(p.angle)).collect();
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    let square = ratios.iter().map(|r| (r / mean - 1.0).powi(2)).sum::<f64>() / ratios.len() as f64;
+    assert!(report.map.len() > 200, "{}", report.map.len());
+    // A tenth of what it would be without a map.
+    assert!(square.sqrt() < 0.15 * truth.ripple, "{} of {}", square.sqrt(), truth.ripple);
+}
+
+fn the_file_holds_the_rig(truth: &Truth, report: &Report) {
+    let text = Identified::Motor(report.clone()).rig_file(&truth.scenario).unwrap();
+    let file = RigFile::parse("rig.toml", &text).unwrap();
+    let mut table = truth.scenario.table().clone();
+    file.put_into(&mut table);
+    let told = Scenario::from_table("told", table, &[]).unwrap();
+    assert_eq!(told.spec().model.actuator.kind(), ActuatorKind::Motor);
+    let bounds = told.plan().unwrap().bounds;
+    let rig = truth.scenario.spec().rig;
+    let holds = |i: clutch_core::Interval, x: f64| assert!((i.low..=i.high).contains(&x), "{x}: {i:?}");
+    holds(bounds.inertia, rig.inertia);
+    holds(bounds.viscous_damping, rig.viscous_damping);
+    holds(bounds.friction_at_rest, 0.05 * truth.at_rest / bounds.preload);
+    holds(bounds.friction_sliding, 0.05 * truth.sliding / bounds.preload);
+    assert!(bounds.inertia.high / bounds.inertia.low < 1.1, "{:?}", bounds.inertia);
+}
+
+fn parts_tell_what_they_can(all: &[Recording]) {
+    let some = |of_it: &dyn Fn(&str) -> bool| {
+        of(&all.iter().filter(|r| of_it(&r.name)).cloned().collect::<Vec<_>>())
+    };
+    let without = |name: &str| some(&|other| !other.starts_with(name));
+    // Rides set off suddenly, too.
+    let no_hops = some(&|name| name == "crawl");
+    assert!(refusal(&no_hops.inertia).contains("sudden voltage"), "{no_hops:?}");
+    assert!(refusal(&no_hops.delay).contains("hop"), "{no_hops:?}");
+    // A slow ride of an integral law breaks away slowly, too.
+    let no_crawl = some(&|name| ["hops", "to_and_fro_20", "to_and_fro_60"].contains(&name));
+    assert!(refusal(&no_crawl.at_rest[0]).contains("a crawl at 0.5 °/s"), "{no_crawl:?}");
+    assert!(no_crawl.sliding[1].known().is_some() && no_crawl.inertia.known().is_some(), "{no_crawl:?}");
+    let no_rides = without("to_and_fro");
+    assert!(refusal(&no_rides.sliding[0]).contains("even rates both ways"), "{no_rides:?}");
+    // Hops alone may bound J/K or not; they are not said to be missing.
+    assert!(no_rides.found.0 > 10, "{no_rides:?}");
+    if let Finding::Refused(why) = &no_rides.inertia {
+        assert!(why.contains("rides at even rates"), "{why}");
+    }
+    assert!(Identified::Motor(no_rides).rig_file(&truth(1).unwrap().scenario).is_err());
+}
+
+#[test]
+fn limits_are_held_and_bad_ones_named() {
+    let truth = truth(10_003).unwrap();
+    let plan =
+        |travel, fastest| Plan::of(&truth.scenario, &Consent { travel_deg: travel, fastest_deg_s: fastest });
+    for (travel, fastest, said) in [
+        (Some(3.0), None, "travel = 3 °: expected 10 to 3600 °"),
+        (None, Some(f64::NAN), "fastest = NaN °/s: expected 15 to 3600 °/s"),
+    ] {
+        assert_eq!(plan(travel, fastest).unwrap_err().to_string(), said);
+    }
+    let brake = Scenario::load(std::path::Path::new("board_smc_2"), &[]).unwrap();
+    let consent = Consent { travel_deg: Some(30.0), fastest_deg_s: None };
+    assert!(Plan::of(&brake, &consent).unwrap_err().to_string().starts_with("travel: is a limit"));
+
+    // Nowhere does the shaft leave the way that was consented to by more than the law's own error.
+    let mut board = VirtualBoard::default();
+    let narrow = plan(Some(12.0), Some(30.0)).unwrap();
+    let all = narrow.run(&truth.scenario, &mut |name, part| board.run(name, part)).unwrap();
+    let degrees = |counts: i64| counts as f64 * 360.0 / 20_000.0;
+    let counts = || all.iter().flat_map(|r| r.ticks.iter().map(|t| t.counts));
+    assert!(degrees(counts().max().unwrap()) < 13.5 && degrees(counts().min().unwrap()) > -1.5);
+    assert!(of(&all).inertia.known().is_some());
+    let mixed = [all[0].clone(), Recording { motor: false, ..all[1].clone() }];
+    assert!(Identified::of(&mixed).unwrap_err().to_string().contains("expected recordings of one rig"));
+}
+
+#[test]
+fn nothing_panics_on_recordings_that_make_no_sense() {
+    use clutch_identify::Tick;
+    use rand::{RngExt, SeedableRng};
+    let mut rng = rand_pcg::Pcg64::seed_from_u64(6);
+    for n in [2_usize, 3, 50, 3000] {
+        for _ in 0..10 {
+            let mut counts = 0;
+            let ticks = (0..n).map(|_| {
+                counts += rng.random_range(-20..=20_i64) * i64::from(rng.random_bool(0.3));
+                let volts = [0.0, 2.0, -1.0, rng.random_range(-10.0..10.0)][rng.random_range(0..4)];
+                Tick { counts, volts }
+            });
+            let recording = Recording {
+                name: "noise".to_owned(),
+                motor: true,
+                period: 0.001,
+                counts_per_rev: 20_000,
+                step_volts: 0.005,
+                volts_before: 3.0,
+                first_tick: 0,
+                ticks: ticks.collect(),
+            };
+            let _ = of(&[recording.clone(), recording]);
+        }
+    }
+}
