@@ -189,6 +189,9 @@ enum Verb {
         #[arg(default_value_t = 30_001)]
         seed: u64,
     },
+    /// Counts the instructions of a law's step, a servo's tick, a frame and an engine's tick, and holds them against
+    /// benches/instructions.toml. Needs valgrind.
+    Instructions,
     /// Compares the engines with SciPy over random single intervals: the tables of docs/theory.md, section 10. Fails beyond the
     /// errors that these state.
     Intervals {
@@ -280,6 +283,9 @@ fn main() -> Result<()> {
         Verb::Campaign { runs, seed, resume, only } => campaign(runs, seed, resume, &only),
         Verb::Ablate { runs } => ablate::all(runs),
         Verb::Lies { trials } => lies(trials),
+        Verb::Instructions => {
+            cargo(["run", "--release", "--package", "clutch-sim", "--example", "instructions"]).run()
+        }
         Verb::Intervals { count } => {
             cargo(["build", "--release", "--package", "clutch-sim", "--example", "intervals"]).run()?;
             let script =

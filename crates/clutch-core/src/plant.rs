@@ -89,7 +89,9 @@ impl<T: Arithmetic> Plant<T> {
 
 impl<T: Arithmetic> Plant<T> {
     /// Largest torque that friction holds at rest, N m.
-    #[inline]
+    // Always, where lanes call it: a vector's instructions do not pass a call. For boards the compiler chooses.
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     #[must_use]
     pub fn break_away_torque(&self, volts: T) -> T {
         self.actuator.friction(self.friction.at_rest(), volts)

@@ -41,6 +41,13 @@ pub(crate) trait Lane: Arithmetic {
     fn log(self) -> Self;
     /// Natural logarithm of 1 + self, for self > −1.
     fn log1p(self) -> Self;
+    /// Sine.
+    #[inline(always)]
+    fn sin(self) -> Self {
+        self.sincos().0
+    }
+    /// Sine and cosine.
+    fn sincos(self) -> (Self, Self);
 }
 
 /// Does something for each lane whose bit is set.
@@ -90,5 +97,9 @@ impl Lane for f64 {
     fn bits(mask: bool) -> u64 {
         mask.into()
     }
-    libm! { floor exp expm1 log log1p }
+    #[inline]
+    fn sincos(self) -> (f64, f64) {
+        libm::sincos(self)
+    }
+    libm! { floor exp expm1 log log1p sin }
 }

@@ -1,5 +1,6 @@
 //! Friction that varies along the disc.
 
+use crate::lane::Lane;
 use clutch_core::params::{Range, Table};
 use clutch_core::{ParamError, params};
 use rand::{RngExt, SeedableRng};
@@ -65,12 +66,25 @@ params! {
     }
 }
 
-/// The factor on friction along a disc: 1, and what its patterns add.
+/// The factor on friction along a disc: 1, and what its patterns add. Of one disc, or of several that differ in their
+/// numbers alone.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ripple {
-    band: Option<Band>,
-    runout: Option<RunoutParams>,
+pub struct Ripple<T = f64> {
+    band: Option<Band<T>>,
+    runout: Option<Runout<T>>,
 }
+
+/// One wave, `amplitude sin(waves θ + phase)`.
+#[derive(Clone, Debug, PartialEq)]
+struct Runout<T> {
+    amplitude: T,
+    waves: T,
+    phase: T,
+}
+
+/// What discs have in common that go in the lanes of one vector: skipped waves and waves of the ripple, and whether there is
+/// a run-out.
+pub(crate) type Shape = (Option<(u32, usize)>, bool);
 
 impl Ripple {
     /// Checks the patterns; `seed` decides the phases of the ripple. None if there is no pattern: the disc is even.
@@ -84,7 +98,9 @@ impl Ripple {
     ) -> Result<Option<Ripple>, ParamError> {
         let band = ripple.map(|p| Band::new(p, seed)).transpose()?;
         runout.map_or(Ok(()), RunoutParams::check_rows)?;
-        let both = Ripple { band, runout: runout.cloned() };
+        let wave =
+            |r: &RunoutParams| Runout { amplitude: r.amplitude, waves: f64::from(r.waves), phase: r.phase };
+        let both = Ripple { band, runout: runout.map(wave) };
         if let Some(runout) = runout {
             RunoutParams::POSITIVE.require(runout.amplitude, both.largest() < 1.0)?;
         }
@@ -94,10 +110,7 @@ impl Ripple {
     /// The factor at a position.
     #[must_use]
     pub fn factor(&self, position: f64) -> f64 {
-        let even = self.band.as_ref().map_or(1.0, |band| 1.0 + band.at(position));
-        self.runout
-            .as_ref()
-            .map_or(even, |r| even + r.amplitude * libm::sin(f64::from(r.waves) * position + r.phase))
+        self.at(position)
     }
 
     /// Largest departure from 1 that the factor can have.
@@ -110,45 +123,100 @@ impl Ripple {
     #[must_use]
     pub fn slope(&self) -> f64 {
         let band = self.band.as_ref().map_or(0.0, Band::slope);
-        let runout = self.runout.as_ref().map_or(0.0, |r| r.amplitude * f64::from(r.waves));
+        let runout = self.runout.as_ref().map_or(0.0, |r| r.amplitude * r.waves);
         libm::sqrt(band * band + 0.5 * runout * runout)
+    }
+
+    /// Its shape.
+    pub(crate) fn shape(&self) -> Shape {
+        (self.band.as_ref().map(|band| (band.skipped, band.phases.len())), self.runout.is_some())
+    }
+}
+
+impl<T> Ripple<T> {
+    /// The factor at a position.
+    #[inline(always)]
+    pub(crate) fn at(&self, position: T) -> T
+    where
+        T: Lane,
+    {
+        let even = match &self.band {
+            None => T::ONE,
+            Some(band) => T::ONE + band.at(position),
+        };
+        match &self.runout {
+            None => even,
+            Some(r) => even + r.amplitude * (r.waves * position + r.phase).sin(),
+        }
+    }
+
+    /// Discs of several runs as one, whose shapes are those of the first.
+    pub(crate) fn in_lanes(each: &[&Ripple]) -> Option<Self>
+    where
+        T: Lane,
+    {
+        let first = each.first()?;
+        let mut all = Ripple {
+            band: first.band.as_ref().map(|band| Band {
+                amplitude: T::ZERO,
+                spacing: T::ZERO,
+                skipped: band.skipped,
+                phases: vec![(T::ZERO, T::ZERO); band.phases.len()],
+            }),
+            runout: first.runout.as_ref().map(|_| Runout {
+                amplitude: T::ZERO,
+                waves: T::ZERO,
+                phase: T::ZERO,
+            }),
+        };
+        all.take(|i| each.get(i).copied());
+        Some(all)
+    }
+
+    /// Takes the numbers of other discs of its shape; a disc of another shape counts as even.
+    #[inline(always)]
+    pub(crate) fn take<'r>(&mut self, each: impl Fn(usize) -> Option<&'r Ripple>)
+    where
+        T: Lane,
+    {
+        if let Some(all) = &mut self.band {
+            let bands: [_; 8] = std::array::from_fn(|i| each(i % T::WIDTH)?.band.as_ref());
+            let of = |get: fn(&Band<f64>) -> f64| T::of(|i| bands[i].map_or(0.0, get));
+            all.amplitude = of(|band| band.amplitude);
+            all.spacing = of(|band| band.spacing);
+            let phases = bands.map(|band| band.map_or(&[][..], |band| &band.phases[..]));
+            for (n, phase) in all.phases.iter_mut().enumerate() {
+                let of = |i: usize| phases[i].get(n).copied().unwrap_or_default();
+                *phase = (T::of(|i| of(i).0), T::of(|i| of(i).1));
+            }
+        }
+        if let Some(all) = &mut self.runout {
+            let of = |get: fn(&Runout<f64>) -> f64| {
+                T::of(|i| each(i).and_then(|r| r.runout.as_ref()).map_or(0.0, get))
+            };
+            *all = Runout { amplitude: of(|r| r.amplitude), waves: of(|r| r.waves), phase: of(|r| r.phase) };
+        }
     }
 }
 
 /// The waves `amplitude Σ_n sin(n θ + φ_n)`, `n = lowest … highest`.
 #[derive(Clone, Debug, PartialEq)]
-struct Band {
-    amplitude: f64,
-    spacing: f64,
+struct Band<T> {
+    amplitude: T,
+    spacing: T,
     /// Multiples of the spacing before the first wave.
     skipped: u32,
     /// Sine and cosine of each wave's phase.
-    phases: Vec<(f64, f64)>,
+    phases: Vec<(T, T)>,
 }
 
-impl Band {
-    fn new(p: &RippleParams, seed: u64) -> Result<Band, ParamError> {
+impl Band<f64> {
+    fn new(p: &RippleParams, seed: u64) -> Result<Self, ParamError> {
         p.check_rows()?;
         let (waves, amplitude) = (p.waves(), p.amplitude());
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x7269_7070_6c65);
         let phases = (0..waves).map(|_| libm::sincos(core::f64::consts::TAU * rng.random::<f64>())).collect();
         Ok(Band { amplitude, spacing: f64::from(p.spacing), skipped: p.lowest / p.spacing - 1, phases })
-    }
-
-    fn at(&self, position: f64) -> f64 {
-        // The sines of all multiples from one sine and cosine, by the addition theorem.
-        let (s1, c1) = libm::sincos(self.spacing * position);
-        let next = |(s, c): (f64, f64)| (s * c1 + c * s1, c * c1 - s * s1);
-        let mut wave = (s1, c1);
-        for _ in 0..self.skipped {
-            wave = next(wave);
-        }
-        let mut sum = 0.0;
-        for (sp, cp) in &self.phases {
-            sum += wave.0 * cp + wave.1 * sp;
-            wave = next(wave);
-        }
-        self.amplitude * sum
     }
 
     fn largest(&self) -> f64 {
@@ -159,6 +227,24 @@ impl Band {
     fn slope(&self) -> f64 {
         let waves = (1..=self.phases.len() as u32).map(|i| self.spacing * f64::from(self.skipped + i));
         self.amplitude * libm::sqrt(0.5 * waves.map(|n| n * n).sum::<f64>())
+    }
+}
+
+impl<T: Lane> Band<T> {
+    #[inline(always)]
+    fn at(&self, position: T) -> T {
+        // The sines of all multiples from one sine and cosine, by the addition theorem.
+        let (s1, c1) = (self.spacing * position).sincos();
+        let mut wave = (s1, c1);
+        for _ in 0..self.skipped {
+            wave = (wave.0 * c1 + wave.1 * s1, wave.1 * c1 - wave.0 * s1);
+        }
+        let mut sum = T::ZERO;
+        for (sp, cp) in &self.phases {
+            sum = sum + (wave.0 * *cp + wave.1 * *sp);
+            wave = (wave.0 * c1 + wave.1 * s1, wave.1 * c1 - wave.0 * s1);
+        }
+        self.amplitude * sum
     }
 }
 

@@ -396,16 +396,9 @@ pub struct Run {
 }
 
 impl Run {
-    /// A run of which only figures were kept, by the exact flow.
-    pub(crate) fn of_figures(metrics: Metrics, detected: Detected) -> Self {
-        Run {
-            trace: Trace::default(),
-            events: Vec::new(),
-            metrics,
-            detected,
-            detections: Vec::new(),
-            engine: EngineKind::ExactFlow,
-        }
+    /// A run of which only figures were kept.
+    pub(crate) fn of_figures(engine: EngineKind, metrics: Metrics, detected: Detected) -> Self {
+        Run { trace: Trace::default(), events: Vec::new(), metrics, detected, detections: Vec::new(), engine }
     }
 }
 

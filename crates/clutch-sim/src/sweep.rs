@@ -165,11 +165,15 @@ impl Sweep {
         if keep == Keep::Figures {
             let doubles = planned.iter().enumerate().filter(|(_, row)| row.2.scalar() == ScalarKind::F64);
             let specs: Vec<_> = doubles.map(|(place, row)| (place, row.2.spec())).collect();
-            let goes_on = lanes::run_all(Level::new(), &specs, &stopped, &mut |place, metrics, detected| {
-                let (i, certified, _) = &planned[place];
-                told[place] = true;
-                done(*i, Ok(Row { certified: *certified, run: Run::of_figures(metrics, detected) }));
-            });
+            let goes_on =
+                lanes::run_all(Level::new(), &specs, &stopped, &mut |place, engine, metrics, detected| {
+                    let (i, certified, _) = &planned[place];
+                    told[place] = true;
+                    done(
+                        *i,
+                        Ok(Row { certified: *certified, run: Run::of_figures(engine, metrics, detected) }),
+                    );
+                });
             if !goes_on {
                 return;
             }

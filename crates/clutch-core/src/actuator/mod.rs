@@ -257,21 +257,25 @@ impl<T: Arithmetic> Actuator<T> {
     }
 
     /// `T(u)`: torque that drives the shaft, N m.
-    #[inline]
+    // Always, where lanes call it: a vector's instructions do not pass a call. For boards the compiler chooses.
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     #[must_use]
     pub fn torque(&self, volts: T) -> T {
         self.above * volts.max(T::ZERO) + self.below * volts.min(T::ZERO)
     }
 
     /// `N(u)`: normal force, as torque per unit of μ, N m.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     #[must_use]
     pub fn normal(&self, volts: T) -> T {
         self.brake * volts.max(T::ZERO) + (self.preload + self.share * self.torque(volts).abs())
     }
 
     /// `μ N(u)`: torque of friction, N m.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     #[must_use]
     pub fn friction(&self, mu: T, volts: T) -> T {
         // In this order a brake without preload has the bits of the product.

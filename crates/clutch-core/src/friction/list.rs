@@ -64,7 +64,9 @@ macro_rules! frictions {
                     $(FrictionParams::$model(p) => Friction::$model($model::build(p)?),)+
                 })
             }
-            #[inline]
+            // Always, where lanes call it: a vector's instructions do not pass a call. For boards the compiler chooses.
+            #[cfg_attr(target_os = "none", inline)]
+            #[cfg_attr(not(target_os = "none"), inline(always))]
             fn level(&self, velocity: T) -> T {
                 match self {
                     $(Friction::$model(f) => f.level(velocity),)+
@@ -75,13 +77,15 @@ macro_rules! frictions {
                     $(Friction::$model(f) => f.quick(),)+
                 }
             }
-            #[inline]
+            #[cfg_attr(target_os = "none", inline)]
+            #[cfg_attr(not(target_os = "none"), inline(always))]
             fn at_rest(&self) -> T {
                 match self {
                     $(Friction::$model(f) => f.at_rest(),)+
                 }
             }
-            #[inline]
+            #[cfg_attr(target_os = "none", inline)]
+            #[cfg_attr(not(target_os = "none"), inline(always))]
             fn sliding(&self) -> T {
                 match self {
                     $(Friction::$model(f) => f.sliding(),)+

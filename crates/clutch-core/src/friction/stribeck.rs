@@ -101,12 +101,15 @@ impl<T: Arithmetic> Stribeck<T> {
     }
 
     /// The level if `δ` = 1, as for most pairs, and else another number. A power takes five times as long as the rest.
-    #[inline]
+    // Always, where lanes call it: a vector's instructions do not pass a call. For boards the compiler chooses.
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub(crate) fn quick_level(&self, velocity: T) -> T {
         self.falling(velocity.abs() * self.inverse_velocity)
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn falling(&self, exponent: T) -> T {
         let vanished = self.vanishes_at.less_or_equal(exponent);
         // In steady motion it mostly has vanished, and then costs nothing.
@@ -124,7 +127,8 @@ impl<T: Arithmetic> FrictionModel<T> for Stribeck<T> {
         Stribeck::new(p)
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn level(&self, velocity: T) -> T {
         if self.exponent_is_one {
             return self.quick_level(velocity);
@@ -139,12 +143,14 @@ impl<T: Arithmetic> FrictionModel<T> for Stribeck<T> {
         self.exponent_is_one.then_some(*self)
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn at_rest(&self) -> T {
         self.params.mu_static
     }
 
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn sliding(&self) -> T {
         self.params.mu_dynamic
     }

@@ -12,7 +12,7 @@
 //! [`Input`]; which one runs is chosen by [`EngineKind`].
 
 mod bristle;
-mod dormand_prince;
+pub(crate) mod dormand_prince;
 pub(crate) mod exact_flow;
 pub(crate) mod pair;
 pub(crate) mod rosenbrock;

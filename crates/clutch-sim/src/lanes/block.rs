@@ -3,10 +3,11 @@
 use super::elementary::Powers;
 use super::group::{Candidate, Common};
 use super::silence::Silence;
+use super::steps::{Gathered, InSteps, OnTheWay, step_by_step};
 use super::vector::InLanes;
 use crate::detected::STAIR;
 use crate::engine::exact_flow::{Bed, Flow, PIECE_LIMIT, Piece, Pushed, State};
-use crate::engine::{Event, EventKind, Motion, Shaft};
+use crate::engine::{EngineKind, Event, EventKind, Motion, Shaft};
 use crate::lane::{Lane, each};
 use crate::metrics::{Detected, Metrics, MetricsBuilder, Sampled, Sticks};
 use crate::run::REPORT_EVERY;
@@ -87,8 +88,18 @@ struct Targets<V> {
     acceleration: V,
 }
 
+/// What moves the shafts of a chunk.
+enum Moves<'a, V: Lane> {
+    Exactly {
+        bed: Bed<V>,
+        /// Lane by lane.
+        alone: Vec<Bed<f64>>,
+    },
+    InSteps(InSteps<'a, V>),
+}
+
 /// Runs in the lanes of one vector.
-struct Chunk<'a, V: Lane> {
+pub(super) struct Chunk<'a, V: Lane> {
     // Kept for the whole run.
     paths: Paths<'a>,
     /// Beginning of each path, in fixed point.
@@ -98,37 +109,32 @@ struct Chunk<'a, V: Lane> {
     /// Lowest voltage of the converter, its step, codes per volt, and its highest code.
     dac: [V; 4],
     filter: SmoothedDerivative<V>,
-    plant: Plant<V>,
-    bed: Bed<V>,
-    drive: V,
+    pub(super) plant: Plant<V>,
+    pub(super) drive: V,
     // Changed by each tick.
+    moves: Moves<'a, V>,
     law: LawInLanes<V>,
     /// Error of the last sample in fixed point, and its rate by (5).
     error: V,
     rate: V,
     counts: V,
-    position: V,
-    velocity: V,
+    pub(super) position: V,
+    pub(super) velocity: V,
     /// Way in which the shaft moves: 1, −1, or 0 while it is stuck.
-    sign: V,
+    pub(super) sign: V,
     /// Voltage since the last sample, as the law is told.
     applied: V,
     /// Voltages on their way to the actuator.
     line: Vec<V>,
-    arriving: V,
+    pub(super) arriving: V,
     // Results.
     sampled: Sampled<V>,
     silences: Silence<V>,
     stairs: Silence<V>,
     /// Lanes that lanes cannot do.
-    lost: u64,
-    lanes: Vec<Alone>,
-}
-
-/// The part of a run that is kept lane by lane.
-struct Alone {
-    bed: Bed<f64>,
-    sticks: Sticks,
+    pub(super) lost: u64,
+    /// Lane by lane.
+    pub(super) sticks: Vec<Sticks>,
 }
 
 /// A motion that begins in a chunk and ends in the layer, or with an event.
@@ -139,6 +145,8 @@ struct Waiting {
     flow: Flow<f64>,
     state: State<f64>,
     sign: f64,
+    /// Stribeck velocity, rad/s.
+    velocity: f64,
     /// It has been stuck until now.
     breaks_away: bool,
 }
@@ -148,7 +156,7 @@ pub(super) type Figures = Option<(Metrics, Detected)>;
 
 /// A block, not yet in lanes.
 pub(super) struct Block<'b, 'a> {
-    pub(super) rows: &'b [&'b Candidate<'a>],
+    pub(super) rows: &'b [&'a Candidate<'a>],
     pub(super) common: Common,
     /// True once it has to stop; asked now and then.
     pub(super) stop: &'b dyn Fn() -> bool,
@@ -165,7 +173,8 @@ impl InLanes for Block<'_, '_> {
         else {
             return Some(rows.iter().map(|_| None).collect());
         };
-        let (mut waiting, mut events) = (Vec::new(), Vec::new());
+        let (mut waiting, mut steps, mut events) = (Vec::new(), Vec::new(), Vec::new());
+        let mut gathered = Gathered::of(&chunks);
         let asks = (REPORT_EVERY / rows.len() as u64).max(1);
         for k in 0..common.ticks {
             if k % asks == 0 {
@@ -179,9 +188,12 @@ impl InLanes for Block<'_, '_> {
             let time = k as f64 * common.period;
             for (n, chunk) in chunks.iter_mut().enumerate() {
                 chunk.sample(k, time, &common);
-                chunk.advance(n, time, &common, &mut waiting);
+                chunk.advance(n, time, &common, &mut waiting, &mut steps);
             }
             through_the_layer(&mut chunks, &mut waiting, time, &common, &mut events);
+            if let Some(gathered) = &mut gathered {
+                step_by_step(&mut chunks, gathered, &mut steps, time, &common, &mut events);
+            }
         }
         let of = |(i, _): (usize, &&Candidate<'_>)| chunks[i / V::WIDTH].figures(i % V::WIDTH, &common);
         Some(rows.iter().enumerate().map(of).collect())
@@ -190,7 +202,7 @@ impl InLanes for Block<'_, '_> {
 
 impl<'a, V: Lane> Chunk<'a, V> {
     /// The runs as they begin; none if they have no lanes together.
-    fn of(rows: &[&Candidate<'a>], common: &Common) -> Option<Self> {
+    fn of(rows: &[&'a Candidate<'a>], common: &Common) -> Option<Self> {
         // Lanes that are left over begin as the last run, and are lost from there.
         let row = |i: usize| rows[i.min(rows.len() - 1)];
         let of = |get: &dyn Fn(&Candidate<'a>) -> f64| V::of(|i| get(row(i)));
@@ -205,7 +217,12 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let radians_per_count = of(&|r| r.rig().encoder.radians_per_count());
         let dac = |get: &dyn Fn(&clutch_core::Dac<f64>) -> f64| of(&|r| get(r.servo.dac()));
         let volts = of(&|r| r.prepared.volts);
-        let beds: Vec<Bed<f64>> = all().map(|r| Bed::of(&r.rig().model)).collect::<Option<_>>()?;
+        let moves = if common.engine == EngineKind::ExactFlow {
+            let alone: Vec<Bed<f64>> = all().map(|r| Bed::of(&r.rig().model)).collect::<Option<_>>()?;
+            Moves::Exactly { bed: Bed::in_lanes(&alone), alone }
+        } else {
+            Moves::InSteps(InSteps::of(&all().collect::<Vec<_>>()))
+        };
         let mut chunk = Chunk {
             paths,
             start: of(&|r| r.start.0 as f64),
@@ -219,7 +236,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
             ],
             filter: SmoothedDerivative::in_lanes(&|get| V::of(|i| get(&row(i).filter))),
             plant: Plant::in_lanes(&|get| V::of(|i| get(&row(i).rig().model.plant)))?,
-            bed: Bed::in_lanes(&beds),
+            moves,
             drive: of(&|r| r.rig().drive.torque(0.0, 0.0) + 0.0),
             law: LawInLanes::of(&all().map(|r| r.servo.law()).collect::<Vec<_>>())?,
             error: V::ZERO,
@@ -235,10 +252,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
             silences: Silence::new(&StickSlipParams::default(), counts_per_radian * V::splat(common.period)),
             stairs: Silence::new(&STAIR, counts_per_radian * V::splat(common.period)),
             lost: u64::MAX.unbounded_shl(rows.len() as u32),
-            lanes: beds
-                .into_iter()
-                .map(|bed| Alone { bed, sticks: Sticks::new(common.period, common.settle) })
-                .collect(),
+            sticks: vec![Sticks::new(common.period, common.settle); V::WIDTH],
         };
         let targets = chunk.targets(0);
         let (_, seen) = chunk.seen(common);
@@ -330,9 +344,20 @@ impl<'a, V: Lane> Chunk<'a, V> {
         }
     }
 
-    /// The period passes. Motions in the layer, and those that begin or end, wait.
+    /// The period passes. Motions in the layer, those that begin or end, and those that go in steps wait.
     #[inline(always)]
-    fn advance(&mut self, n: usize, time: f64, common: &Common, waiting: &mut Vec<Waiting>) {
+    fn advance(
+        &mut self,
+        n: usize,
+        time: f64,
+        common: &Common,
+        waiting: &mut Vec<Waiting>,
+        steps: &mut Vec<OnTheWay<'a>>,
+    ) {
+        let Moves::Exactly { bed, .. } = &self.moves else {
+            self.begin_steps(n, time, common, steps);
+            return;
+        };
         let (volts, rest) = (self.arriving, V::splat(common.period));
         let actuator = self.plant.actuator();
         let pushed = Pushed {
@@ -344,14 +369,14 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let breaks_away = !moves & pushed.holds.less(pushed.torque.abs());
         let stuck = !moves & !breaks_away;
         if V::any(stuck) {
-            each(V::bits(stuck) & !self.lost, |i| self.lanes[i].sticks.period(time, true, &[]));
+            each(V::bits(stuck) & !self.lost, |i| self.sticks[i].period(time, true, &[]));
         }
         if !V::any(!stuck) {
             return;
         }
         let sign = V::select(breaks_away, pushed.torque.sgn(), self.sign);
-        let flow = self.bed.flow(&pushed, sign, rest);
-        let v_s = self.bed.velocity();
+        let flow = bed.flow(&pushed, sign, rest);
+        let v_s = bed.velocity();
         let begin = State::at(sign * self.velocity / v_s);
         // Motions that no exponential here has room for.
         self.lost |= V::bits(!flow.edge.less(V::splat(700.0)) & !stuck);
@@ -375,6 +400,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
                     flow: flow.lane(lane),
                     state: state.lane(lane),
                     sign: sign.lane(lane),
+                    velocity: v_s.lane(lane),
                     breaks_away: breaks_away >> lane & 1 == 1,
                 });
             });
@@ -386,7 +412,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
         if self.lost >> i & 1 == 1 {
             return None;
         }
-        let sticks = self.lanes[i].sticks.clone();
+        let sticks = self.sticks[i].clone();
         let metrics = MetricsBuilder::of(self.sampled.lane(i), sticks).finish();
         let time = metrics.measured_s.max(common.period);
         let (cycles, stuck_ticks) = self.silences.since_settled(i);
@@ -460,15 +486,15 @@ fn through_the_layer<V: Lane>(
     waiting.drain(..).for_each(|w| chunks[w.chunk].lost |= 1 << w.lane);
 }
 
-impl<V: Lane> Chunk<'_, V> {
+impl<'a, V: Lane> Chunk<'a, V> {
     /// A motion that has come to the end of the period, with a speed and over a way in Stribeck velocities.
     #[inline(always)]
     fn ends(&mut self, w: &Waiting, (speed, way): (f64, f64), time: f64) {
-        let scale = w.sign * self.lanes[w.lane].bed.velocity();
+        let scale = w.sign * w.velocity;
         let position = self.position.lane(w.lane);
         if w.breaks_away {
             let begins = Event { time, kind: EventKind::BreakAway, position, torque: w.pushed.torque };
-            self.lanes[w.lane].sticks.period(time, true, &[begins]);
+            self.sticks[w.lane].period(time, true, &[begins]);
             self.sign.put(w.lane, w.sign);
         }
         self.position.put(w.lane, position + scale * way);
@@ -483,21 +509,50 @@ impl<V: Lane> Chunk<'_, V> {
         let mut shaft = Shaft::new(self.position.lane(lane), self.velocity.lane(lane));
         shaft.motion = if stuck { Motion::Stuck } else { Motion::along(w.sign) };
         events.clear();
-        let alone = &mut self.lanes[lane];
-        let moved = alone.bed.advance(
-            &w.pushed,
-            (time, common.period),
-            &mut shaft,
-            events,
-            Some((flow, state, stops)),
-        );
-        if moved.is_err() {
+        let moved = match &self.moves {
+            Moves::Exactly { alone, .. } => {
+                let begun = Some((flow, state, stops));
+                alone[lane].advance(&w.pushed, (time, common.period), &mut shaft, events, begun).is_ok()
+            }
+            Moves::InSteps(_) => false,
+        };
+        self.ended(lane, moved.then_some(&shaft), time, stuck, events);
+    }
+
+    /// A lane has come to the end of the period alone, or has not; what happened in it.
+    pub(super) fn ended(
+        &mut self,
+        lane: usize,
+        shaft: Option<&Shaft>,
+        time: f64,
+        stuck: bool,
+        events: &[Event],
+    ) {
+        let Some(shaft) = shaft else {
             self.lost |= 1 << lane;
             return;
-        }
-        alone.sticks.period(time, stuck, events);
+        };
+        self.sticks[lane].period(time, stuck, events);
         self.position.put(lane, shaft.position);
         self.velocity.put(lane, shaft.velocity);
         self.sign.put(lane, shaft.motion.sign());
+    }
+
+    /// What moves it in steps, if it is that.
+    #[inline(always)]
+    pub(super) fn steps(&self) -> Option<&InSteps<'a, V>> {
+        match &self.moves {
+            Moves::Exactly { .. } => None,
+            Moves::InSteps(steps) => Some(steps),
+        }
+    }
+
+    /// As [`Chunk::steps`].
+    #[inline(always)]
+    pub(super) fn steps_mut(&mut self) -> Option<&mut InSteps<'a, V>> {
+        match &mut self.moves {
+            Moves::Exactly { .. } => None,
+            Moves::InSteps(steps) => Some(steps),
+        }
     }
 }

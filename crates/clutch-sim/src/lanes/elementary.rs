@@ -1,7 +1,7 @@
-//! Exponential and logarithm in lanes, with the bits of `libm`, on whose scalars all results rest.
+//! Exponential, logarithm, sine and cosine in lanes, with the bits of `libm`, on whose scalars all results rest.
 //!
-//! The way is that of Sun Microsystems' fdlibm (1993), as `libm` and musl have it: reduce the argument by multiples of ln 2,
-//! a polynomial, and scale. A scalar branches; here both sides are computed and one is selected. Coefficients and the order
+//! The way is that of Sun Microsystems' fdlibm (1993), as `libm` and musl have it: reduce the argument by multiples of ln 2
+//! or of π/2, a polynomial, and scale. A scalar branches; here both sides are computed and one is selected. Coefficients and the order
 //! of operations are fdlibm's, or the last bit would differ.
 
 use crate::lane::Lane;
@@ -18,6 +18,8 @@ pub(super) trait Powers: Lane {
     fn power_of_two(self) -> Self;
     /// Whole part, towards 0.
     fn trunc(self) -> Self;
+    /// The power of two at or below a magnitude; 0 of 0.
+    fn binade(self) -> Self;
     /// Exponent and mantissa of a positive normal number, the mantissa between the square roots of 1/2 and of 2.
     fn split(self) -> (Self, Self);
 }
@@ -138,4 +140,106 @@ pub(super) fn log1p<V: Powers>(x: V) -> V {
     let (hfsq, s, r) = series(f);
     let y = s * (hfsq + r) + (k * V::splat(LN2_LO) + c) - hfsq + f + k * V::splat(LN2_HI);
     V::select(x.abs().less(V::splat(f64::from_bits(0x3ca0_0000_0000_0000))), x, y)
+}
+
+/// Magnitude below which an argument is reduced by π/2 in three parts; beyond it takes more digits of π than these.
+pub(super) const REDUCIBLE: f64 = f64::from_bits(0x4139_21fb_0000_0000);
+
+/// A number by the upper half of its bits.
+const fn upper(word: u64) -> f64 {
+    f64::from_bits(word << 32)
+}
+
+/// Quarters of a turn next to an argument below [`REDUCIBLE`], and what is left, in two parts.
+#[inline(always)]
+fn quarters<V: Powers>(x: V) -> (V, V, V) {
+    // π/2 in parts of 33 bits, and what follows each.
+    const PARTS: [(f64, f64); 3] = [
+        (1.570_796_326_734_125_6, 6.077_100_506_506_192e-11),
+        (6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21),
+        (2.022_266_248_711_166_5e-21, 8.478_427_660_368_9e-32),
+    ];
+    let (magnitude, sign) = (x.abs(), V::select(x.less(V::ZERO), -V::ONE, V::ONE));
+    let rounding = V::splat(1.5 / f64::EPSILON);
+    let n = (x * V::splat(core::f64::consts::FRAC_2_PI) + rounding) - rounding;
+    // Below 9π/4 a scalar looks up the number of quarters.
+    let from = |word: u64| V::select(magnitude.less(V::splat(upper(word))), V::ZERO, V::ONE);
+    let few = from(0x3fe9_21fc) + from(0x4002_d97d) + from(0x400f_6a7b) + from(0x4015_fdbd);
+    let small = magnitude.less(V::splat(upper(0x401c_463c)));
+    let n = V::select(small, sign * few, n);
+    let part = |i: usize| (V::splat(PARTS[i].0), V::splat(PARTS[i].1));
+    let (first, after) = part(0);
+    let (mut r, mut w) = (x - n * first, n * after);
+    let mut y = r - w;
+    // More digits where much cancels; below 9π/4 only next to a multiple of π/2.
+    let is = |word: u64| {
+        V::splat(upper(word)).less_or_equal(magnitude) & magnitude.less(V::splat(upper(word + 1)))
+    };
+    let near = is(0x3ff9_21fb) | is(0x4009_21fb) | is(0x4012_d97c) | is(0x4019_21fb) | !small;
+    let cancels = |y: V, bits: f64| (y.binade() * V::splat(bits)).less(x.binade()) & near;
+    let much = cancels(y, 65_536.0);
+    if V::any(much) {
+        let (next, after) = part(1);
+        let (t, down) = (r, n * next);
+        let finer = t - down;
+        let rest = n * after - ((t - finer) - down);
+        (r, w) = (V::select(much, finer, r), V::select(much, rest, w));
+        y = r - w;
+        let most = much & cancels(y, 562_949_953_421_312.0);
+        if V::any(most) {
+            let (next, after) = part(2);
+            let (t, down) = (r, n * next);
+            let finer = t - down;
+            let rest = n * after - ((t - finer) - down);
+            (r, w) = (V::select(most, finer, r), V::select(most, rest, w));
+            y = r - w;
+        }
+    }
+    let whole = magnitude.less(V::splat(upper(0x3fe9_21fc)));
+    (n, V::select(whole, x, y), V::select(whole, V::ZERO, (r - y) - w))
+}
+
+/// For magnitudes below [`REDUCIBLE`].
+#[inline(always)]
+pub(super) fn sincos<V: Powers>(x: V) -> (V, V) {
+    const S: [f64; 6] = [
+        -1.666_666_666_666_663_2e-1,
+        8.333_333_333_322_49e-3,
+        -1.984_126_982_985_795e-4,
+        2.755_731_370_707_006_8e-6,
+        -2.505_076_025_340_686_3e-8,
+        1.589_690_995_211_55e-10,
+    ];
+    const C: [f64; 6] = [
+        4.166_666_666_666_66e-2,
+        -1.388_888_888_887_411e-3,
+        2.480_158_728_947_673e-5,
+        -2.755_731_435_139_066_3e-7,
+        2.087_572_321_298_175e-9,
+        -1.135_964_755_778_819_5e-11,
+    ];
+    let (s, c) = (|i: usize| V::splat(S[i]), |i: usize| V::splat(C[i]));
+    let half = V::splat(0.5);
+    let (n, x0, x1) = quarters(x);
+    let z = x0 * x0;
+    let w = z * z;
+    let r = s(1) + z * (s(2) + z * s(3)) + z * w * (s(4) + z * s(5));
+    let v = z * x0;
+    let alone = x0 + v * (s(0) + z * r);
+    let reduced = x0 - ((z * (half * x1 - v * r) - x1) - v * s(0));
+    let sine = V::select(x.abs().less(V::splat(upper(0x3fe9_21fc))), alone, reduced);
+    let r = z * (c(0) + z * (c(1) + z * c(2))) + w * w * (c(3) + z * (c(4) + z * c(5)));
+    let hz = half * z;
+    let w = V::ONE - hz;
+    let cosine = w + (((V::ONE - w) - hz) + (z * r - x0 * x1));
+    // The quarter within its turn: 0, 1, 2, 3.
+    let quarter = n - (n * V::splat(0.25)).floor() * V::splat(4.0);
+    let (one, two, three) = (V::splat(0.5), V::splat(1.5), V::splat(2.5));
+    let odd = (one.less(quarter) & quarter.less(two)) | three.less(quarter);
+    let (a, b) = (V::select(odd, cosine, sine), V::select(odd, sine, cosine));
+    let below = two.less(quarter);
+    let turned = one.less(quarter) & quarter.less(three);
+    // Tiny arguments are their own sine.
+    let sine = V::select(below, -a, a);
+    (V::select(x.abs().less(V::splat(upper(0x3e46_a09e))), x, sine), V::select(turned, -b, b))
 }

@@ -5,6 +5,7 @@ use super::vector::at;
 use crate::engine::EngineKind;
 use crate::metrics::{Detected, Metrics};
 use crate::rig::Rig;
+use crate::ripple::{Ripple, Shape};
 use crate::run::{Prepared, RunSpec};
 use clutch_core::law::LawParams;
 use clutch_core::reference::Reference;
@@ -44,6 +45,10 @@ pub(super) struct Common {
     pub(super) delay: usize,
     pub(super) whole_counts: bool,
     pub(super) whole_codes: bool,
+    pub(super) engine: EngineKind,
+    /// Of Dormand–Prince: whether the actuator lags, and the shape of the friction along the disc.
+    pub(super) lags: bool,
+    shape: Option<Shape>,
     law: Discriminant<LawParams>,
     /// Actuator and friction of rig and model.
     plants: [(ActuatorKind, Discriminant<FrictionParams>); 2],
@@ -62,7 +67,9 @@ impl<'a> Candidate<'a> {
             return None;
         }
         let prepared = spec.prepare::<f64>().ok()?;
-        if prepared.engine != EngineKind::ExactFlow {
+        let in_steps =
+            prepared.engine == EngineKind::DormandPrince && prepared.moving.rig().drive.is_constant();
+        if prepared.engine != EngineKind::ExactFlow && !in_steps {
             return None;
         }
         let encoder = servo.encoder();
@@ -75,6 +82,9 @@ impl<'a> Candidate<'a> {
                 delay: rig.delay_ticks as usize,
                 whole_counts: rig.encoder.quantised,
                 whole_codes: rig.dac.quantised,
+                engine: prepared.engine,
+                lags: rig.actuator_time_constant.is_some(),
+                shape: prepared.moving.rig().model.ripple.as_ref().map(Ripple::shape),
                 law: discriminant(&spec.law),
                 plants: [
                     (rig.actuator.kind(), discriminant(&rig.friction)),
@@ -101,7 +111,7 @@ pub(crate) fn run_all(
     level: Level,
     runs: &[(usize, RunSpec<'_>)],
     stop: &dyn Fn() -> bool,
-    done: &mut dyn FnMut(usize, Metrics, Detected),
+    done: &mut dyn FnMut(usize, EngineKind, Metrics, Detected),
 ) -> bool {
     let mut candidates = Vec::new();
     for (place, spec) in runs {
@@ -124,7 +134,7 @@ pub(crate) fn run_all(
                     return false;
                 }
                 if let Some((metrics, detected)) = figures {
-                    done(row.place, metrics, detected);
+                    done(row.place, common.engine, metrics, detected);
                 }
             }
         }

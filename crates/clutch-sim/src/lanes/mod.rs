@@ -4,6 +4,7 @@
 //! rows of a sweep ─► group (same law, same length, …) ─► block of chunks of eight lanes
 //!     each period:  encoder ─► (5) ─► law ─► converter ─► linear motion          in lanes, every run
 //!                                                     └─► quadrature, series     in lanes, the runs in the layer
+//!                                                     └─► Dormand–Prince's steps in lanes, the runs that need them
 //!                                                     └─► what follows a stop    one by one
 //! ```
 //!
@@ -15,6 +16,7 @@ mod block;
 mod elementary;
 mod group;
 mod silence;
+mod steps;
 #[cfg(test)]
 mod tests;
 mod vector;

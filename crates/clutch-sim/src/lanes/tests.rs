@@ -22,6 +22,8 @@ enum Function {
     Expm1,
     Log,
     Log1p,
+    Sin,
+    Cos,
 }
 
 impl InLanes for Of<'_> {
@@ -36,6 +38,8 @@ impl InLanes for Of<'_> {
                 Function::Expm1 => x.expm1(),
                 Function::Log => x.log(),
                 Function::Log1p => x.log1p(),
+                Function::Sin => x.sin(),
+                Function::Cos => x.sincos().1,
             };
             (0..some.len()).map(|i| y.lane(i)).collect::<Vec<_>>()
         };
@@ -55,7 +59,10 @@ fn numbers(largest: f64, signs: &[f64]) -> Vec<f64> {
         })
         .collect();
     let edges = [0.5, 1.5, 1.0, 2.0, 19.5, 20.5, 55.5, 56.0, 57.0].map(|n| n * core::f64::consts::LN_2);
-    let edges = edges.into_iter().chain([
+    // Multiples of an eighth of a turn, and of half of that.
+    let eighths = (1..40).map(|n| f64::from(n) * core::f64::consts::FRAC_PI_8);
+    let far = [1e3, 1e5].map(|turns| turns * core::f64::consts::FRAC_PI_2);
+    let edges = edges.into_iter().chain(eighths).chain(far).chain([
         0.25,
         0.2929,
         0.414_213_6,
@@ -73,9 +80,9 @@ fn numbers(largest: f64, signs: &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn exponentials_and_logarithms_have_the_bits_of_libm_at_every_level() {
+fn elementary_functions_have_the_bits_of_libm_at_every_level() {
     type Alone = fn(f64) -> f64;
-    let cases: [(Function, Alone, Vec<f64>); 4] = [
+    let cases: [(Function, Alone, Vec<f64>); 8] = [
         (Function::Exp, libm::exp, numbers(700.0, &[1.0, -1.0])),
         (Function::Expm1, libm::expm1, numbers(700.0, &[1.0, -1.0])),
         (Function::Log, libm::log, numbers(1e300, &[1.0])),
@@ -84,6 +91,11 @@ fn exponentials_and_logarithms_have_the_bits_of_libm_at_every_level() {
             libm::log1p,
             numbers(1e300, &[1.0]).into_iter().chain(numbers(0.999_999, &[-1.0])).collect(),
         ),
+        (Function::Sin, libm::sin, numbers(1.6e6, &[1.0, -1.0])),
+        (Function::Cos, libm::cos, numbers(1.6e6, &[1.0, -1.0])),
+        // Some beyond what lanes reduce.
+        (Function::Sin, |x| libm::sincos(x).0, numbers(1e300, &[1.0, -1.0])),
+        (Function::Cos, |x| libm::sincos(x).1, numbers(60.0, &[1.0, -1.0])),
     ];
     for (function, alone, numbers) in cases {
         for level in levels() {
@@ -155,7 +167,7 @@ type Told = Vec<(usize, crate::Metrics, Detected)>;
 fn together(level: Level, scenarios: &[Scenario], stop: &dyn Fn() -> bool) -> (Told, bool) {
     let specs: Vec<_> = scenarios.iter().map(Scenario::spec).enumerate().collect();
     let mut told = Vec::new();
-    let whole = run_all(level, &specs, stop, &mut |place, m, d| told.push((place, m, d)));
+    let whole = run_all(level, &specs, stop, &mut |place, _, m, d| told.push((place, m, d)));
     (told, whole)
 }
 
@@ -242,6 +254,49 @@ fn runs_in_lanes_have_the_bits_of_runs_alone() {
 }
 
 #[test]
+fn runs_in_steps_have_the_bits_of_runs_alone() {
+    let pd = [("law.pd.kp_v_rad", 500.0, 8000.0), ("law.pd.kd_v_s_rad", 2.0, 80.0)];
+    let smc = [("law.smc.kp_v", 2.3, 6.0), ("law.smc.kd_v_s_rad", 1.0, 500.0)];
+    let rigs = [
+        ("rig.friction.stribeck.stribeck_velocity_rad_s", 1e-4, 0.02),
+        ("rig.friction.stribeck.mu_static", 0.12, 0.4),
+        ("rig.viscous_damping_nm_s_rad", 0.0, 0.3),
+        ("rig.ripple.rms", 0.0, 0.18),
+        ("reference.ramp.rate_deg_s", 0.5, 60.0),
+    ];
+    let motor = [("law.pid.kp_v_rad", 5.0, 60.0), ("rig.actuator_time_constant_s", 1e-7, 0.01)];
+    let bench = ("rig.base", "\"bench\"");
+    let runout = ("rig.runout", "{ amplitude = 0.05, waves_per_turn = 2, phase_deg = 30.0 }");
+    let lags = ("rig.actuator_time_constant_s", "0.002");
+    let dormand_prince = ("run.engine", "dormand_prince");
+    let cases: [Case<'_>; 12] = [
+        ("pd_2", &pd, &[bench]),
+        ("pd_2", &pd, &[bench, ("reference.ramp.rate_deg_s", "20")]),
+        ("pd_2", &rigs, &[bench]),
+        ("pd_2", &rigs, &[bench, runout, lags]),
+        ("pd_2", &[("rig.actuator_time_constant_s", 1e-7, 0.02)], &[]),
+        ("pd_2", &pd, &[runout]),
+        ("pd_2", &[("rig.friction.stribeck.stribeck_exponent", 0.5, 2.0)], &[]),
+        ("pd_2", &pd, &[bench, ("run.start", "rest"), ("rig.friction.coulomb.mu_static", "0.2")]),
+        ("pd_2", &pd, &[dormand_prince]),
+        ("smc_2", &smc, &[bench]),
+        ("ctc_2", &[("law.ctc.kp_1_s2", 500.0, 3000.0)], &[bench, lags]),
+        ("motor_pid", &motor, &[("run.settle_s", "0.5")]),
+    ];
+    for (name, keys, more) in cases {
+        let more: Vec<_> = more.iter().copied().chain([("run.duration_s", "1.6")]).collect();
+        assert_eq!(same_bits(&around(name, keys, &more, 19)), 19, "{name} {keys:?} {more:?}");
+    }
+}
+
+#[test]
+fn fifty_thousand_periods_on_a_rippled_disc_have_the_bits_of_runs_alone() {
+    let pd = [("law.pd.kp_v_rad", 4000.0, 6000.0), ("law.pd.kd_v_s_rad", 40.0, 60.0)];
+    let more = [("run.duration_s", "6"), ("rig.base", "\"bench\"")];
+    assert_eq!(same_bits(&around("pd_2", &pd, &more, 9)), 9);
+}
+
+#[test]
 fn a_million_periods_that_stick_have_the_bits_of_runs_alone() {
     let pd = [("law.pd.kp_v_rad", 4000.0, 6000.0), ("law.pd.kd_v_s_rad", 40.0, 60.0)];
     assert_eq!(same_bits(&around("pd_2", &pd, &[("run.duration_s", "65")], 16)), 16);
@@ -251,11 +306,10 @@ fn a_million_periods_that_stick_have_the_bits_of_runs_alone() {
 fn a_run_that_is_not_for_lanes_goes_alone() {
     for more in [
         ("rig.torque_noise_nm", "0.001"),
-        ("rig.actuator_time_constant_s", "0.001"),
         ("shell.boundary_rad_s", "0.1"),
-        ("rig.base", "\"bench\""),
         ("velocity.edge_timed", "{}"),
-        ("run.engine", "\"dormand_prince\""),
+        ("rig.friction", "{ dahl = {} }"),
+        ("rig.drive", "{ sine = { mean_nm = 0.05, amplitude_nm = 0.01, frequency_hz = 1.0 } }"),
     ] {
         let scenarios = around("pd_2", &[], &[more, ("run.duration_s", "1.5")], 3);
         assert_eq!(together(levels()[0], &scenarios, &|| false), (vec![], true), "{more:?}");

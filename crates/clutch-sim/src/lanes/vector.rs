@@ -266,6 +266,16 @@ impl<S: Instructions> Lane for Vector<S> {
     fn floor(self) -> Self {
         Vector(self.0.floor())
     }
+    #[inline(always)]
+    fn sincos(self) -> (Self, Self) {
+        if Self::all(self.abs().less(Self::splat(elementary::REDUCIBLE))) {
+            return Self::apart(
+                #[inline(always)]
+                || elementary::sincos(self),
+            );
+        }
+        (Self::of(|i| libm::sincos(self.lane(i)).0), Self::of(|i| libm::sincos(self.lane(i)).1))
+    }
     elementary! { exp expm1 log log1p }
 }
 
@@ -279,6 +289,11 @@ impl<S: Instructions> Powers for Vector<S> {
     #[inline(always)]
     fn trunc(self) -> Self {
         Vector(self.0.trunc())
+    }
+    #[inline(always)]
+    fn binade(self) -> Self {
+        let exponent = u64x8::splat(S::TOKEN, 0x7ff0_0000_0000_0000);
+        Vector((self.0.bitcast::<u64x8<S>>() & exponent).bitcast())
     }
     #[inline(always)]
     fn split(self) -> (Self, Self) {
