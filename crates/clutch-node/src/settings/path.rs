@@ -66,10 +66,12 @@ impl Path {
     pub(crate) fn prepare(&self, knots: &[Knot], prepared: &mut Prepared) {
         if let Kind::Table(interpolation, points) = self.kind {
             let table = Table { knots: knots.get(..points).unwrap_or(&[]), interpolation };
-            let each = prepared.steepness.iter_mut().zip(&mut prepared.slopes);
-            for (point, (steepness, slope)) in each.enumerate().take(points) {
-                *steepness = table.steepness(point);
-                *slope = table.slope(point);
+            // Two loops: the numbers of two lists side by side are not seen to end, and could overflow.
+            for (point, of) in prepared.steepness.iter_mut().enumerate().take(points) {
+                *of = table.steepness(point);
+            }
+            for (point, of) in prepared.slopes.iter_mut().enumerate().take(points) {
+                *of = table.slope(point);
             }
         }
     }
