@@ -204,8 +204,8 @@ def identify(
     LoopError
         A check ended a part of the experiment.
     ValueError
-        A log of another plant than a brake or a motor, or of both; a table that cannot be read; a limit out of its range, or
-        of a motor axis where there is none.
+        A log of another plant than a brake or a motor, or of both; a table that cannot be read; a limit out of its
+        range, or of a motor axis where there is none.
     OSError
         A file cannot be read or written.
 
