@@ -26,6 +26,7 @@
 //! Ports, real time and emulators are of Linux; what computes its clock runs everywhere.
 
 pub mod board_clock;
+#[cfg(target_os = "linux")]
 mod board_words;
 pub mod build_error;
 pub mod campaign;
