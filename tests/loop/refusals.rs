@@ -200,21 +200,21 @@ fn a_loop_arms_on_its_own_certificate_and_on_no_other() {
         args.extend(more);
         run(&args)
     };
-    let said = ["as sampled: |e| stays below 0.17", "from rest", "NOT certified"];
+    let said = ["as sampled: |e| stays below 0.16", "from rest", "NOT certified"];
     let _ = with("certify", gains, &["--sampled", "--save", file]).expect(0).prints(&said);
     let _ = with("loop", gains, &[]).expect(2).prints(&["not certified", "nothing was started"]);
     let log = folder.join("run.mcap");
     let more = ["--certificate", file, "--duration", "1.2", "--log", log.to_str().unwrap()];
     let _ = with("loop", gains, &more).expect(0).prints(&[
         "not certified in continuous time; certified as sampled",
-        "|e| below 0.17",
+        "|e| below 0.16",
         "certified for a ramp at 20 °/s, 0 ticks of delay",
         "sticks not excluded",
-        "as sampled: |e| stays below 0.17",
+        "as sampled: |e| stays below 0.16",
         "ramp at 20 °/s, from rest",
     ]);
     let _ =
-        run(&["log", "info", log.to_str().unwrap()]).expect(0).prints(&["as_sampled: |e| stays below 0.17"]);
+        run(&["log", "info", log.to_str().unwrap()]).expect(0).prints(&["as_sampled: |e| stays below 0.16"]);
     let done = with("loop", gains, &["--certificate", file, "--duration", "1.2", "--json"]).expect(0);
     assert!(done.json()["sampled"]["error_bound_rad"].as_f64().is_some_and(|bound| bound < 0.003));
 

@@ -140,10 +140,11 @@ fn a_release_test_comes_first_and_what_fails_it_is_not_started() {
     let (_, says) = announcement.rows.iter().find(|(name, _)| *name == "release").unwrap();
     assert!(says.contains("counts halved") && says.contains("at most 0.27°"), "{says}");
 
-    for (fault, cause) in [
-        ("scale:at=0,factor=2", Cause::TooFast),
-        ("scale:at=0,factor=0.5", Cause::TooSlow),
-        ("dac-scale:at=0,factor=-1", Cause::TooFast),
+    for (fault, causes) in [
+        ("scale:at=0,factor=2", &[Cause::TooFast][..]),
+        // Where a sample comes late, there is no count yet at which to see that they are too few.
+        ("scale:at=0,factor=0.5", &[Cause::TooSlow, Cause::StandStill]),
+        ("dac-scale:at=0,factor=-1", &[Cause::TooFast]),
     ] {
         let wired = Session::new(short(), SessionOptions { board: faults(fault), ..tested.clone() }).unwrap();
         let mut announced = 0;
@@ -151,7 +152,7 @@ fn a_release_test_comes_first_and_what_fails_it_is_not_started() {
             announced += u32::from(matches!(event, Event::Announced(_)));
         });
         assert!(
-            matches!(&ended, Err(SessionError::Released { cause: c, .. }) if *c == cause),
+            matches!(&ended, Err(SessionError::Released { cause, .. }) if causes.contains(cause)),
             "{fault}: {ended:?}"
         );
         assert_eq!(announced, 1);
