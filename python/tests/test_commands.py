@@ -24,6 +24,7 @@ NOT_HERE = {
     " --foxglove": "it is in the released command alone; crates/clutch-cli/tests/views.rs has it",
     "clutch daq": "it goes on until it is stopped; tests/loop stops it",
     "clutch hil": "it needs an emulator and an image for it; tests/hil has both",
+    " --loaded ": "it needs experiments on two rigs; crates/clutch-cli/tests/cli.rs has it",
     "=R ": "it has letters in place of numbers",
 }
 
