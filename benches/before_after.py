@@ -59,7 +59,7 @@ def instructions(command: Command) -> float:
 
 
 def measured(builds: list[pathlib.Path], scenario: str, turns: int) -> list[list[tuple[float, float]]]:
-    """Of each build, for each turn: milliseconds of the command, and of that with one period."""
+    """Times of each build, for each turn: milliseconds of the command, and of that with one period."""
     found: list[list[tuple[float, float]]] = [[], []]
     for turn in range(turns):
         for which in (0, 1) if turn % 2 == 0 else (1, 0):

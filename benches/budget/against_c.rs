@@ -7,11 +7,11 @@ use anyhow::{Context, Result, bail};
 use clutch_benches::machine_code::{Bounds, Cost, Image};
 use std::collections::BTreeMap;
 
-/// What was found out about the functions of the image that measures.
+/// Figures of the functions of the image that measures.
 pub(crate) struct Compared<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) image: &'a Image,
-    /// Of each item.
+    /// Figures of each item.
     pub(crate) bounds: &'a [Cost],
     pub(crate) measured: &'a Measured,
     /// Along the costliest path that was executed.

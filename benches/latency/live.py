@@ -1,4 +1,4 @@
-"""What the live view costs the loop: runs in pairs, with the view and without it, and a sign test.
+"""The cost of the live view to the loop: runs in pairs, with the view and without it, and a sign test.
 
     python3 benches/latency/live.py [--pairs 20] [--seconds 5] [--binary target/release/clutch]
 
@@ -44,7 +44,7 @@ ROWS = [
     ("answer after, longest, µs", ("response", "max_us")),
     ("from wake-up to wake-up, 99 %, µs", ("cycle", "p99_us")),
     ("from wake-up to wake-up, longest, µs", ("cycle", "max_us")),
-    # Of a board that was held up its clock is behind from then on: the lateness has that, too.
+    # The clock of a board that was held up is behind from then on: the lateness has that, too.
     ("wake-up late by, median, µs", ("wake", "p50_us")),
     ("wake-up late by, 99 %, µs", ("wake", "p99_us")),
     ("wake-up late by, longest, µs", ("wake", "max_us")),

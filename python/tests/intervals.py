@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 
 ENGINES = ("exact_flow", "dormand_prince", "system")
 KINDS = ("motion", "break-away", "soft break-away")
-# Of friction that is higher in motion, rest beyond its level at rest is an equilibrium, and not a stable one.
+# Where friction is higher in motion, rest beyond its level at rest is an equilibrium, and not a stable one.
 BRISTLES = ("bristles", "bristles that rise")
 # Excess over friction at rest below which a system holds, as a share of that friction: docs/systems.md.
 UNSEEN = 2.001e-12

@@ -27,7 +27,7 @@ PATIENCE = 200
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of a rig: how far friction may leave its two values, and an edge its place, in counts."""
+    """Knowledge of a rig: how far friction may leave its two values, and an edge its place, in counts."""
 
     name: str
     grip: float

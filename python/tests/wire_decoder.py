@@ -94,7 +94,7 @@ LONGEST_BODY = max(layout.longest for layout in BY_KIND.values())
 
 
 class FrameError(Exception):
-    """Why a frame was dropped: a name and numbers."""
+    """Reason why a frame was dropped: a name and numbers."""
 
     def __init__(self, name, **numbers):
         super().__init__(name, numbers)

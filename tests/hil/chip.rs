@@ -210,7 +210,7 @@ fn a_fault_handler_puts_the_boot_code_out_at_once() {
     }
 }
 
-/// What the chip says of itself to whoever asks.
+/// Words of the chip of itself, to whoever asks.
 fn hello(board: &mut ChipBoard, now_ns: u64) -> Option<Hello> {
     let ask = Message::Discover(Discover { nonce: 5, version: VERSION, schema: SCHEMA });
     let mut out = Outbox::default();

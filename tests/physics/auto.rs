@@ -1,4 +1,4 @@
-//! What `auto` gives against Dormand–Prince's pair with a thousandth of its tolerance: motions that once stalled the exact
+//! Figures of `auto` against Dormand–Prince's pair with a thousandth of its tolerance: motions that once stalled the exact
 //! flow, and scenarios drawn at random.
 
 use crate::draw::Draw;

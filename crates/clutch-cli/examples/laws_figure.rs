@@ -10,7 +10,7 @@ use clutch_cli::plot::{Cell, Cells, Figure, Panel};
 use serde::Deserialize;
 use std::path::Path;
 
-/// What the example `smooth` has found, law by law and rate by rate.
+/// Results of the example `smooth`, law by law and rate by rate.
 #[derive(Deserialize)]
 struct Found {
     laws: Vec<String>,

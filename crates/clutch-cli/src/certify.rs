@@ -247,7 +247,7 @@ fn behind(c: &Certificate, start_error_rate: f64, words: &Words) -> String {
     )
 }
 
-/// What follows for the error.
+/// Consequence for the error.
 fn with_both(c: &Certificate) -> String {
     let bound = if c.certified() { "error stays below" } else { "error bound, were it certified" };
     quantities(

@@ -71,7 +71,7 @@ struct Outcome {
     engine: RefereeEngine,
     verdicts: Vec<Verdict>,
     seconds: f64,
-    /// Why the engine gave up.
+    /// Reason why the engine gave up.
     error: Option<String>,
 }
 

@@ -64,7 +64,7 @@ impl Bound {
     }
 }
 
-/// What no verdict says.
+/// Questions that no verdict answers.
 const STICKS: &str = "sticks: not excluded, neither by a bound nor by stability";
 
 /// The verdicts of a run for which no bound was looked for, a paragraph each.

@@ -112,7 +112,7 @@ pub fn verdict(tuned: &Tuned) -> String {
     }
 }
 
-/// Why nothing is given out.
+/// Reason why nothing is given out.
 fn nothing(tuned: &Tuned) -> String {
     let first = |f: &dyn Fn(&Candidate) -> bool| tuned.candidates.iter().find(|c| f(c));
     let refused = |c: &Candidate| matches!(c.standing, Standing::Refused { .. });
@@ -135,7 +135,7 @@ fn nothing(tuned: &Tuned) -> String {
     }
 }
 
-/// Why a candidate lost.
+/// Reason why a candidate lost.
 fn lost(c: &Candidate) -> String {
     match &c.standing {
         Standing::Chosen => "chosen".to_owned(),

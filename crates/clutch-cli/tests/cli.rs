@@ -309,7 +309,7 @@ fn a_quiet_command_tells_nothing_but_what_was_asked_for() {
     );
 }
 
-/// What a command prints on a terminal, made by `script`; none where that program is missing.
+/// Output of a command on a terminal, made by `script`; none where that program is missing.
 fn on_a_terminal(command: &str, environment: &[(&str, &str)]) -> Option<String> {
     on_a_terminal_in(Path::new("."), command, environment)
 }

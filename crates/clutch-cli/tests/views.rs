@@ -38,7 +38,7 @@ impl Running {
     }
 }
 
-/// What is read, as it comes.
+/// Text that is read, as it comes.
 fn reading(mut from: impl Read + Send + 'static) -> Receiver<Vec<u8>> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {

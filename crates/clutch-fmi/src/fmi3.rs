@@ -135,7 +135,7 @@ unsafe extern "C" fn fmi3DoStep(
     instance.told(stepped)
 }
 
-/// Why a list of values is refused.
+/// Refusal of a list of values.
 const FEWER: &str = "fewer values than variables";
 
 /// Reads variables.

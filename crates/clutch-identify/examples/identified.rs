@@ -20,7 +20,7 @@ const DISCS: std::ops::Range<u64> = 3001..3041;
 /// Inertia − 20 %, friction − 20 %, load + 10 %.
 const RIG: &str = "[rig]\nbase = \"bench\"\ninertia_kg_m2 = 0.00136\n\n[rig.friction.stribeck]\nmu_static = 0.1624\n\
     mu_dynamic = 0.0832\n\n[rig.drive.weight]\nmass_kg = 0.23034\n";
-/// What is known before: Table 1, and how far a rig may be from it.
+/// Knowledge before: Table 1, and how far a rig may be from it.
 const KNOWN: &str = "[bounds]\nfriction_percent = 60.0\ninertia_percent = 40.0\ndrive_torque_percent = 25.0\n\
     viscous_damping_percent = 99.0\n\n[safety]\nreason = \"a weight drives the shaft\"\n\n[safety.on_fault.hold]\nvolts_v = 9.99\n";
 

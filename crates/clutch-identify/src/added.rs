@@ -21,7 +21,7 @@ pub struct Added {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key} = {value}: expected a number above 0, in {unit}")]
 pub struct NoMass {
-    /// Which of its numbers.
+    /// Name of the number.
     pub key: &'static str,
     /// Its value.
     pub value: f64,
@@ -29,7 +29,7 @@ pub struct NoMass {
     pub unit: &'static str,
 }
 
-/// What both experiments tell together.
+/// Findings of both experiments together.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Separate {
     /// T, N m.

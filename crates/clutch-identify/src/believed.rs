@@ -12,7 +12,7 @@ use toml::{Table, Value};
 pub struct Believed {
     /// `[rig]` is `[model]`, with sensor, converter and torque noise of the scenario's rig; it begins at rest.
     pub scenario: Scenario,
-    /// Why the delay told is no whole number of periods, which all that is certified assumes; none if it is one.
+    /// Reason why the delay told is no whole number of periods, which all that is certified assumes; none if it is one.
     pub delay_between: Option<String>,
     /// T/J and T/(μ_d K) of the corners of the bounds, as shares of the believed ones.
     pub corners: Vec<Corner>,

@@ -138,7 +138,7 @@ pub enum ExperimentError {
     Limit {
         /// Its name.
         key: &'static str,
-        /// What it was.
+        /// Its value.
         value: f64,
         /// Least that it may be.
         least: f64,

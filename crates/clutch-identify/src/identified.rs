@@ -84,9 +84,9 @@ impl Plan {
 /// Findings of either.
 #[derive(Clone, Debug)]
 pub enum Identified {
-    /// Of a shaft that a brake restrains.
+    /// Report of a shaft that a brake restrains.
     Brake(Report),
-    /// Of a motor axis.
+    /// Report of a motor axis.
     Motor(motor::Report),
 }
 

@@ -31,7 +31,7 @@ pub(crate) const UNEXPLAINED: f64 = 7.0;
 pub enum Finding {
     /// A value with its interval.
     Known(Estimate),
-    /// Why it cannot be found, and the experiment that would find it.
+    /// Reason why it cannot be found, and the experiment that would find it.
     Refused(String),
 }
 
@@ -119,7 +119,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
     }
 }
 
-/// What releases and rides tell.
+/// Findings of releases and rides.
 struct Motion {
     /// The rides, the slowest first.
     told: Vec<Told>,

@@ -18,7 +18,7 @@ pub(crate) const MOST_PERCENT: f64 = 99.9;
 pub struct Lacks {
     /// The parameter.
     pub parameter: &'static str,
-    /// Why it is not.
+    /// Reason why it is not.
     pub why: String,
 }
 

@@ -1,4 +1,4 @@
-//! What makes an MCAP file a log of clutch: names, version, checksums.
+//! Marks by which an MCAP file is a log of clutch: names, version, checksums.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use std::collections::BTreeMap;

@@ -90,7 +90,7 @@ pub struct BoardClock {
 }
 
 impl BoardClock {
-    /// Of a board that is to sample with this period; its samples come to this machine, or to another.
+    /// Clock of a board that is to sample with this period; its samples come to this machine, or to another.
     #[must_use]
     pub fn new(period: Micros, samples_come: bool) -> Self {
         let unknown = Rates { near: Rate::UNKNOWN, far: Rate::UNKNOWN };

@@ -44,7 +44,7 @@ pub(crate) fn started_text(hello: &Hello) -> String {
     format!(", started by {by}")
 }
 
-/// What the owner of the board should know before a run.
+/// Notes for the owner of the board, before a run.
 pub(crate) fn start_notes(hello: &Hello) -> Vec<String> {
     let mut notes = Vec::new();
     let ended = match ResetCause::from_u8(hello.started_by) {

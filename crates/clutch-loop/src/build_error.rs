@@ -1,4 +1,4 @@
-//! Why a run cannot be set up.
+//! Reasons why a run cannot be set up.
 
 use clutch_core::ParamError;
 use clutch_node::Unsupported;

@@ -276,7 +276,7 @@ fn read(kind: &str, keys: &str) -> Result<Fault, String> {
 
 /// Values by their keys, of which a kind takes its own.
 struct Given {
-    /// What every kind has.
+    /// The part that every kind has.
     fault: Fault,
     /// It is said when the fault comes.
     when: bool,

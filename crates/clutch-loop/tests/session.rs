@@ -142,7 +142,7 @@ fn a_release_test_comes_first_and_what_fails_it_is_not_started() {
 
     for (fault, causes) in [
         ("scale:at=0,factor=2", &[Cause::TooFast][..]),
-        // Where a sample comes late, there is no count yet at which to see that they are too few.
+        // Too few counts, or none in the last two samples: where this machine stalls, the shaft falls a period later.
         ("scale:at=0,factor=0.5", &[Cause::TooSlow, Cause::StandStill]),
         ("dac-scale:at=0,factor=-1", &[Cause::TooFast]),
     ] {

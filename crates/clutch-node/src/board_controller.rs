@@ -61,7 +61,7 @@ pub struct BoardController {
     settings: Settings,
     /// The run that the settings are for.
     settings_run: u16,
-    /// What targets are computed with, of a table.
+    /// Numbers with which the targets of a table are computed.
     prepared: Prepared,
     /// Hears encoder and converter while there is no run.
     introduced: Decoder,

@@ -32,7 +32,7 @@ struct Plan {
     budget: BTreeMap<String, f64>,
 }
 
-/// What is counted: steps, and nothing of what prepares them.
+/// Steps that are counted, and nothing of their preparation.
 #[inline(never)]
 fn counted(mut step: impl FnMut(u32)) {
     for i in 0..STEPS {

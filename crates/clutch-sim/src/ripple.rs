@@ -82,7 +82,7 @@ struct Runout<T> {
     phase: T,
 }
 
-/// What discs have in common that go in the lanes of one vector: skipped waves and waves of the ripple, and whether there is
+/// Shape that all discs in the lanes of one vector share: skipped waves and waves of the ripple, and whether there is
 /// a run-out.
 pub(crate) type Shape = (Option<(u32, usize)>, bool);
 

@@ -3,6 +3,7 @@
 #![no_std]
 
 pub mod board;
+mod daq;
 pub mod fault;
 mod read_back;
 pub mod run;

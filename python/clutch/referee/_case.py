@@ -242,7 +242,7 @@ class Engine(Protocol):
         """The package that it needs and that is not installed; None if all is there."""
 
     def refuses(self, case: Case) -> str | None:
-        """Why it does not take a case; None if it does."""
+        """Reason why it does not take a case; None if it does."""
 
     def run(self, case: Case) -> Trajectory:
         """The result of a case that it takes."""

@@ -52,7 +52,7 @@ def substeps(case: Case) -> int:
 
 
 def refuses_length(case: Case, most: int) -> str | None:
-    """Why a case is too long for so many steps."""
+    """Reason why a case is too long for so many steps."""
     if case.mechanism is None:
         return "a scenario has an encoder and a law"
     steps = case.samples * substeps(case)

@@ -44,7 +44,7 @@ class Kamino(OneLevel):
         return missing("newton", "warp")
 
     def refuses(self, case: Case) -> str | None:
-        """Why it does not take a case; None if it does."""
+        """Reason why it does not take a case; None if it does."""
         if (m := case.mechanism) is None:
             return "a scenario has an encoder and a law"
         if any(row.bristled for row in m.rows):

@@ -46,7 +46,7 @@ class MuJoCo(OneLevel):
         return missing("mujoco")
 
     def refuses(self, case: Case) -> str | None:
-        """Why it does not take a case; None if it does."""
+        """Reason why it does not take a case; None if it does."""
         if (why := refuses_length(case, MOST_STEPS)) or (m := case.mechanism) is None:
             return why
         if any(row.bristled for row in m.rows):
@@ -94,7 +94,7 @@ class MuJoCoLuGre:
         return missing("mujoco")
 
     def refuses(self, case: Case) -> str | None:
-        """Why it does not take a case; None if it does."""
+        """Reason why it does not take a case; None if it does."""
         if (why := refuses_length(case, MOST_STEPS)) or (m := case.mechanism) is None:
             return why
         if any(row.friction != "lugre" for row in m.rows):

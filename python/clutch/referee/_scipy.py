@@ -55,7 +55,7 @@ class SciPy:
         return missing("scipy")
 
     def refuses(self, case: Case) -> str | None:
-        """Why it does not take a case."""
+        """Reason why it does not take a case."""
         if case.mechanism is None:
             return "a scenario has an encoder and a law"
         if any(row.friction == "maxwell" for row in case.mechanism.rows):

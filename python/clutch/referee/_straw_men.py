@@ -53,7 +53,7 @@ class _Smooth(ABC):
         return missing("scipy")
 
     def refuses(self, case: Case) -> str | None:
-        """Why it does not take a case."""
+        """Reason why it does not take a case."""
         if (why := _of_sliding(case)) is not None:
             return why
         return "an hour of a stiff model" if case.duration > 1000 else None
@@ -127,7 +127,7 @@ class _Modes(ABC):
         return None
 
     def refuses(self, case: Case) -> str | None:
-        """Why it does not take a case."""
+        """Reason why it does not take a case."""
         if (why := _of_sliding(case)) is not None:
             return why
         assert case.mechanism is not None

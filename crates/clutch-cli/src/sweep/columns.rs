@@ -19,7 +19,7 @@ enum Cells {
 }
 
 impl Cells {
-    /// Of a key with these values.
+    /// Column of a key with these values.
     fn of(axis: &Over) -> Cells {
         let all = |is: fn(&Value) -> bool| axis.values.iter().all(is);
         if all(|value| matches!(value, Value::Integer(_))) {

@@ -17,7 +17,7 @@ fn all() -> Vec<FrictionParams<f64>> {
     all
 }
 
-/// Of four elements.
+/// Parameters of four elements.
 fn four<V: Copy + Default>(each: [V; 4]) -> [V; ELEMENTS] {
     core::array::from_fn(|i| each.get(i).copied().unwrap_or_default())
 }

@@ -206,7 +206,7 @@ impl<T: Real> Listed<T> for Pid<T> {
         Some(Damping::Voltage(p.kd))
     }
 
-    /// Of a derivative without filter.
+    /// Sampled form, where the derivative has no filter.
     fn sampled(p: &PidParams<T>) -> Option<SampledForm<T>> {
         let PidParams { kp, ki, tracking_time, kd, bias, coulomb, velocity, .. } = *p;
         let form = SampledForm::Linear { kp, ki, tracking_time, kd, bias, coulomb, velocity };

@@ -126,7 +126,7 @@ impl<T: Real> Interval<T> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Steepness(u128);
 
-/// What a table's targets are computed with where each point's share of it was computed before a run.
+/// Numbers for a table's targets, where each point's share of them was computed before a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared<'a, T> {
     /// [`Table::steepness`] of each point.

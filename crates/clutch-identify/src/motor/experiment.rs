@@ -196,7 +196,7 @@ pub fn experiment(
 struct Axis {
     /// J/K, V s²/rad.
     inertia: f64,
-    /// What breaks it away, and what it slides at.
+    /// Voltages at which it breaks away, and at which it slides.
     at_rest: f64,
     sliding: f64,
     /// C/K, V s/rad.

@@ -1,7 +1,7 @@
 //! J/K and the delay of a motor axis, from hops: a shaft that sets off under a sudden voltage.
 //!
 //! `θ̈ = (K/J) (u − (h + r) − (C/K) θ̇)` with friction `h + r` in volts, which the filter of [`crate::filter`] follows along the way.
-//! What K/J and which delay explain the times of the edges best is a matter of their density, over all hops.
+//! K/J and delay that explain the times of the edges best: a matter of their density, over all hops.
 
 use crate::Estimate;
 use crate::break_away::{Profile, spaced};

@@ -30,7 +30,7 @@ const LEFT_OVER: f64 = 2.0;
 pub struct Pass {
     /// 0 forwards, 1 backwards.
     pub way: usize,
-    /// What it tells, the axis turned so that it goes forwards.
+    /// Friction that it shows, the axis turned so that it goes forwards.
     pub told: Told,
     /// First and last angle, rad.
     stretch: (f64, f64),

@@ -24,9 +24,9 @@ const LEAST_FALL: f64 = 0.05;
 /// All that recordings of a motor axis show, in volts: torques over K.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// What breaks the shaft away, forwards and backwards, V.
+    /// Voltage that breaks the shaft away, forwards and backwards, V.
     pub at_rest: [Finding; 2],
-    /// What keeps a fast shaft at its rate, without viscous drag, forwards and backwards, V.
+    /// Voltage that keeps a fast shaft at its rate, without viscous drag, forwards and backwards, V.
     pub sliding: [Finding; 2],
     /// Torque that drives forwards by itself, over K, V: half of what backwards takes more.
     pub load: Finding,
@@ -78,7 +78,7 @@ pub fn identify(recordings: &[Recording]) -> Report {
     told.report(all.len())
 }
 
-/// What hops and passes tell.
+/// Findings of hops and passes.
 struct Motion {
     /// The recordings as they are, and turned round.
     views: [Vec<Recording>; 2],

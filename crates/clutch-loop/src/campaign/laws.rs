@@ -1,4 +1,4 @@
-//! What the campaign knows of single laws: on which rigs one is drawn, its gains there, and the promises that are its own.
+//! Knowledge of single laws in the campaign: rigs on which one is drawn, its gains there, the promises that are its own.
 //!
 //! A law of the list that has no row is drawn all the same, with its own gains, and held to the promises of all.
 
@@ -6,7 +6,7 @@ use super::grammar::{LONGEST_GAP, RigName, Setting};
 use clutch_core::law::LawParams;
 use clutch_core::params::Choice;
 
-/// Where a law differs from others.
+/// Differences of a law from others.
 pub(super) struct OfLaw {
     /// Its keys on a brake.
     pub(super) brake: fn(&Setting) -> String,
@@ -81,7 +81,7 @@ pub(super) const LED: &str = "smc";
 /// The law that a load that grows drives to its limit.
 pub(super) const TO_ITS_LIMIT: &str = "pd";
 
-/// What is known of the law of a name.
+/// Knowledge of the law of a name.
 pub(super) fn of(law: &str) -> OfLaw {
     match law {
         // It swings: dead reckoning from its last period is off by more.

@@ -224,7 +224,7 @@ impl Chip {
         Ok(())
     }
 
-    /// Why it has ended.
+    /// Reason for its end.
     fn ended(&mut self) -> ChipError {
         self.requests = None;
         let _ = self.child.kill(); // it has closed a line, so that nothing more is to come of it

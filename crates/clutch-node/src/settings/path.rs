@@ -90,7 +90,7 @@ impl Path {
     }
 }
 
-/// What the targets of a table have of each point.
+/// Share of each point in the targets of a table.
 #[derive(Clone, Debug)]
 pub(crate) struct Prepared {
     steepness: [Steepness; super::MAX_KNOTS],

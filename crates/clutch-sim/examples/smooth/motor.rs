@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::ops::Range;
 
-/// What an axis may have.
+/// Properties that an axis may have.
 pub(super) struct Axis {
     /// Counts of the encoder per turn.
     pub(super) counts: f64,

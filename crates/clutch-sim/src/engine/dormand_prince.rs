@@ -64,7 +64,7 @@ impl DormandPrince {
 /// Position and velocity, or their rates.
 pub(crate) type State<V> = [V; 2];
 
-/// What acts on the shaft during an interval, or on several.
+/// Torques and voltages on the shaft during an interval, or on several.
 pub(crate) trait Push<V> {
     /// Voltage `s` seconds after the sample, V.
     fn volts(&self, s: V) -> V;
@@ -346,8 +346,8 @@ impl DormandPrince {
     }
 }
 
-/// What the error of a step leaves of the next one, to the order of the pair; a bound of it where 0.9 of it is above 5
-/// or below 0.2, which is all that is asked there.
+/// Length of the next step over that of the last, to the order of the pair, for the last one's error; a bound of it where
+/// 0.9 of it is above 5 or below 0.2, which is all that is asked there.
 #[inline]
 fn power(error: f64) -> f64 {
     if error < 1.8e-4 {

@@ -88,7 +88,7 @@ struct Targets<V> {
     acceleration: V,
 }
 
-/// What moves the shafts of a chunk.
+/// Engine that moves the shafts of a chunk.
 enum Moves<'a, V: Lane> {
     Exactly {
         bed: Bed<V>,
@@ -538,7 +538,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
         self.sign.put(lane, shaft.motion.sign());
     }
 
-    /// What moves it in steps, if it is that.
+    /// Steps that move it, if it is moved in steps.
     #[inline(always)]
     pub(super) fn steps(&self) -> Option<&InSteps<'a, V>> {
         match &self.moves {

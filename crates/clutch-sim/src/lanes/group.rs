@@ -46,7 +46,7 @@ pub(super) struct Common {
     pub(super) whole_counts: bool,
     pub(super) whole_codes: bool,
     pub(super) engine: EngineKind,
-    /// Of Dormand–Prince: whether the actuator lags, and the shape of the friction along the disc.
+    /// Dormand–Prince: whether the actuator lags, and the shape of the friction along the disc.
     pub(super) lags: bool,
     shape: Option<Shape>,
     law: Discriminant<LawParams>,

@@ -15,7 +15,7 @@ use clutch_core::Plant;
 /// Shafts that Dormand and Prince's steps move.
 pub(super) struct InSteps<'a, V: Lane> {
     ripple: Option<Ripple<V>>,
-    /// Of the actuators' lag, s.
+    /// Time constants of the actuators' lag, s.
     time_constant: V,
     /// Voltage at the pads, V.
     pad: V,
@@ -30,7 +30,7 @@ struct Alone<'a> {
     engine: DormandPrince,
 }
 
-/// What pushes several shafts: a weight each, and a voltage that is held or lags.
+/// Drive of several shafts: a weight each, and a voltage that is held or lags.
 #[derive(Clone, Copy)]
 struct Steady<V> {
     drive: V,
@@ -226,7 +226,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
     }
 }
 
-/// What the motions of one vector have of their own, or of all.
+/// Numbers of the motions of one vector: of each of them, or of all.
 pub(super) struct Gathered<V: Lane> {
     plant: Plant<V>,
     ripple: Option<Ripple<V>>,

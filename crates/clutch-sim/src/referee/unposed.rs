@@ -1,4 +1,4 @@
-//! What a case may ask for and no engine here follows: told by its key, before any other mistake of the file.
+//! Demands of a case that no engine here follows: told by its key, before any other mistake of the file.
 
 use toml::{Table, Value};
 
@@ -45,7 +45,7 @@ fn in_value(path: &str, key: &str, value: &Value) -> Option<(String, &'static st
     }
 }
 
-/// What the last key of a path asks for, if it cannot be posed.
+/// Demand of the last key of a path, if it cannot be posed.
 fn asks(path: &str, key: &str) -> Option<&'static str> {
     let key = key.to_ascii_lowercase();
     let within_normal = path.split('.').rev().skip(1).any(|part| part.starts_with("normal"));

@@ -49,7 +49,7 @@ pub struct Evidence {
     pub causes: Vec<Cause>,
     /// Spectral radius of the linear sampled loop with the rig's mean friction; none where it is not known.
     pub spectral_radius: Option<f64>,
-    /// Why the spectral radius is not known.
+    /// Reason why the spectral radius is not known.
     pub not_covered: Option<String>,
     /// Rate below which friction falls faster than the law brakes, °/s, 0 if it nowhere does; none where it is not known.
     pub stribeck_edge_deg_s: Option<f64>,

@@ -1,4 +1,4 @@
-//! Which rows hold: Gauss's principle of least constraint, as a problem with bounds.
+//! Rows that hold: Gauss's principle of least constraint, as a problem with bounds.
 //!
 //! For rows at rest, with `A = J M⁻¹ Jᵀ` and `b` their acceleration without friction, the torques that friction takes
 //! minimise `½ λᵀAλ − bᵀλ` within `|λ_i| ≤ h_i`. The accelerations are unique where the torques are not: redundant rows make
