@@ -43,7 +43,7 @@ def test_a_motor_axis_is_identified_within_its_limits():
     axis = clutch.identify("motor_pid", overrides={"rig.base": "bench"})
     told = axis.parameters
     assert told["inertia_v_s2_rad"].holds(0.0017 / 0.05)
-    # No interval of that: five of 200 miss, and this disc is uneven by 15 %.
+    # Its interval misses where the Stribeck velocity is as large as here: docs/identify.md.
     assert told["break_backwards_v"].value == pytest.approx(1.0, rel=0.04)
     assert told["slide_forwards_v"].holds(0.6) and told["load_v"].holds(0.0) and axis.hops > 10 and axis.releases == 0
     assert "known torque" in axis.refused["each"] and "[model.actuator.motor]" in axis.to_toml()
