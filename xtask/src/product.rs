@@ -247,7 +247,7 @@ mod tests {
         for path in [
             "crates/clutch-sim/examples/generate/metrics.rs",
             "crates/clutch-core/src/supervisor/tests.rs",
-            "crates/clutch-node/tests/board.rs",
+            "crates/clutch-node/tests/node/board.rs",
             "python/clutch/_clutch.pyi",
             "python/tests/test_run.py",
             "docs/conf.py",

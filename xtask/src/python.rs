@@ -56,9 +56,13 @@ pub(crate) fn beside(python: &Path, name: &str) -> PathBuf {
     python.with_file_name(name)
 }
 
-/// The profile of the wheel that tests install: our crates as in the released one, which `cargo xtask dist` builds and tries, but for what
-/// takes long at its link.
-pub(crate) const PROFILE: &str = "tested";
+/// The profile of the wheel that tests install: packages of others are as in the other tests, and compiled once for both.
+pub(crate) const PROFILE: &str = "dev";
+
+/// Our crates in that wheel are with all optimisations, as in the released one, which `cargo xtask dist` builds and tries.
+pub(crate) fn optimised(program: Program) -> Program {
+    program.env("CARGO_PROFILE_DEV_OPT_LEVEL", "3").env("CARGO_PROFILE_DEV_DEBUG", "none")
+}
 
 /// The wheel in an environment of its own, outside of this tree.
 pub(crate) struct Wheel {
@@ -94,13 +98,11 @@ impl Wheel {
         let wheel = Wheel { folder, source, python: environment.join("bin/python") };
         let pip = |python: &Path| program(python).args(["-m", "pip", "--disable-pip-version-check"]);
         // A separate build environment would download maturin once more.
-        wheel
-            .built(pip(tools), tools)?
+        optimised(wheel.built(pip(tools), tools)?)
             .args(["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"])
             .arg(&dist)
             .arg(&wheel.source)
             .env("MATURIN_PEP517_ARGS", format!("--profile {PROFILE}"))
-            .giving_way()
             .run()?;
         make_environment(tools, &environment, &["--without-pip"])?;
         pip(tools)

@@ -1,7 +1,7 @@
 //! The type stub of the native module: generated from the Rust docs; this module fills in the types
 //! that PyO3 cannot name.
 
-use crate::python::{self, PROFILE, Wheel};
+use crate::python::{self, PROFILE, Wheel, optimised};
 use crate::run::{Program, program, root};
 use anyhow::{Context, Result, bail};
 use std::path::Path;
@@ -139,7 +139,7 @@ pub(crate) fn generate(python: &Path) -> Result<()> {
 /// True if the stub is the one of the wheel's module, whose build serves here.
 pub(crate) fn hold(python: &Path, wheel: &Wheel) -> Result<bool> {
     let maturin = program(python::beside(python, "maturin")).args(["generate-stubs", "--profile", PROFILE]);
-    let made = text(wheel.built(maturin, python)?)?;
+    let made = text(optimised(wheel.built(maturin, python)?))?;
     let holds = std::fs::read_to_string(root().join(STUB)).is_ok_and(|kept| kept == made);
     if !holds {
         println!("{STUB} differs from the module: run `cargo xtask stubs`");

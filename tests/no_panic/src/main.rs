@@ -16,7 +16,7 @@
 //! To find a surviving path, link anyway and look for the callers of `core::panicking`:
 //!
 //! ```text
-//! RUSTFLAGS="-C link-arg=--defsym=__panic_path_survived=0" cargo build …
+//! cargo rustc … -- -C link-arg=--defsym=__panic_path_survived=0
 //! llvm-objdump -d -l --demangle <image>
 //! ```
 //!

@@ -34,6 +34,10 @@ const WORKSPACE: [&str; 5] = [
     "clutch-cli/foxglove,clutch-cli/parquet,clutch-cli/scope",
 ];
 
+/// What is tested: all that says so in its manifest. Examples that no test runs are left to `check`, which compiles them,
+/// too, and does not link each with the whole house.
+const TESTS: &str = "--tests";
+
 /// Runs everything, counts, and fails at the end if anything failed.
 pub(crate) fn all() -> Result<()> {
     let mut tally = Tally::new();
@@ -48,16 +52,11 @@ pub(crate) fn all() -> Result<()> {
     let boards = beside("boards")?;
     tally.stage("Python packages");
     let tools = python::interpreter()?;
-    let wheel = std::thread::spawn({
-        let tools = tools.clone();
-        move || python::Wheel::install(&tools)
-    });
+    // Before the tests: it takes packages of others from their build, in the same folder, which has one build at a time.
+    tally.stage("build of the wheel");
+    let wheel = python::Wheel::install(&tools);
     let host = if built { host(&mut tally) } else { Ok(false) };
-    tally.stage("build of the wheel, begun beside the tests");
-    let wheel = match wheel.join() {
-        Ok(wheel) => wheel.and_then(|wheel| wheel_of(&mut tally, &tools, &wheel)),
-        Err(_) => bail!("the build of the wheel panicked"),
-    };
+    let wheel = wheel.and_then(|wheel| wheel_of(&mut tally, &tools, &wheel));
     // Also where something above could not be run: what runs beside it comes to its end.
     tally.stage("boards, beside all that");
     let (ended, text) = boards.output()?;
@@ -162,7 +161,7 @@ pub(crate) fn targets() -> Result<&'static [&'static str]> {
 fn build(tally: &mut Tally) -> Result<bool> {
     tally.stage("build of the tests");
     compared()?;
-    let built = cargo(["test"]).args(WORKSPACE).arg("--no-run").lines(|_| ())?;
+    let built = cargo(["test"]).args(WORKSPACE).arg(TESTS).arg("--no-run").lines(|_| ())?;
     tally.check("the tests build", built);
     Ok(built)
 }
@@ -172,11 +171,13 @@ fn host(tally: &mut Tally) -> Result<bool> {
     tally.stage("tests");
     let tests = ["test", "--no-fail-fast"];
     // Some run the command: the one that was built with them. And some a model of a chip, in Python.
-    let tested = cargo(tests).args(WORKSPACE).env("CLUTCH_BIN", command());
+    let tested = cargo(tests).args(WORKSPACE).arg(TESTS).env("CLUTCH_BIN", command());
     let tested = tested.env("CLUTCH_PYTHON", python::interpreter()?);
     let unpacked = linuxcnc_folder();
     let tested = if unpacked.exists() { tested.env("CLUTCH_LINUXCNC", unpacked) } else { tested };
     let sound = tested.lines(|l| tally.read(l))?;
+    tally.stage("examples in docstrings");
+    let sound = sound & cargo(tests).args(WORKSPACE).arg("--doc").lines(|l| tally.read(l))?;
     tally.stage("tests of the core as firmware takes it");
     // Without the features that the workspace turns on.
     let core = ["--package", "clutch-core", "--lib"];
@@ -211,18 +212,19 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
         return Ok(());
     }
     tally.stage("builds of the core for boards");
-    // A folder of their own, or they would wait while the wheel is built.
-    let folder = ["build", "--release", "--target-dir", "target/embedded", "--package", "clutch-core"];
-    let core = |args: &[&str]| cargo(folder).args(args).quietly();
+    // A folder of their own, or they would wait while the wheel is built. Machine code of theirs is made for libclutch and
+    // the images, below.
+    let folder = ["check", "--release", "--target-dir", "target/embedded"];
+    let part = |package: &str, args: &[&str]| cargo(folder).args(["--package", package]).args(args).quietly();
+    let core = |args: &[&str]| part("clutch-core", args);
     for target in embedded {
         for features in ["", "linalg", "defmt"] {
             let with = if features.is_empty() { "no feature" } else { features };
             let built = core(&["--target", target, "--features", features])?;
-            tally.check_quiet(&format!("clutch-core builds for {target} with {with}"), built);
+            tally.check_quiet(&format!("clutch-core compiles for {target} with {with}"), built);
         }
-        let parts = ["build", "--release", "--target-dir", "target/embedded", "--package", "clutch-hal"];
-        let built = cargo(parts).args(["--target", target]).quietly()?;
-        tally.check_quiet(&format!("clutch-hal builds for {target}"), built);
+        let built = part("clutch-hal", &["--target", target])?;
+        tally.check_quiet(&format!("clutch-hal compiles for {target}"), built);
     }
     no_panic(tally)?;
     libraries(tally)?;
@@ -250,23 +252,22 @@ const SMALL: [&str; 2] = ["--config", "profile.release.opt-level=\"s\""];
 /// The core links without a reachable panic, at both levels that firmware is built at; with one put in it does not, and the
 /// function that has it is named.
 fn no_panic(tally: &mut Tally) -> Result<()> {
-    let image = |args: &[&str], folder: &str| {
-        cargo(["build", "--release", "--manifest-path", "tests/no_panic/Cargo.toml"])
-            .args(["--target", firmware::TARGET, "--target-dir", folder])
-            .args(args)
+    let image = |verb: &str, args: &[&str]| {
+        let manifest = ["--release", "--manifest-path", "tests/no_panic/Cargo.toml", "--target", firmware::TARGET];
+        cargo([verb]).args(manifest).args(["--target-dir", NO_PANIC]).args(args)
     };
     for (level, args) in [("3", &[][..]), ("s", &SMALL[..])] {
-        let (links, text) = image(args, "target/no_panic").quietly()?;
-        let text = if links { text } else { text + &panicking(&|folder| image(args, folder))? };
+        let (links, text) = image("build", args).quietly()?;
+        let text = if links { text } else { text + &panicking(image("rustc", args))? };
         tally.check_quiet(
             &format!("no panic is reachable in clutch-core at opt-level {level} (link test)"),
             (links, text),
         );
     }
     let with_one = ["--features", "control"];
-    let (links, text) = image(&with_one, "target/no_panic").quietly()?;
+    let (links, text) = image("build", &with_one).quietly()?;
     let refused = !links && text.contains("__panic_path_survived");
-    let named = panicking(&|folder| image(&with_one, folder))?;
+    let named = panicking(image("rustc", &with_one))?;
     // The one that is put in is compiled into its caller.
     tally.check(
         "the link test sees a panic that is put in, and names its function (control)",
@@ -275,15 +276,17 @@ fn no_panic(tally: &mut Tally) -> Result<()> {
     Ok(())
 }
 
+/// The folder of the link test's builds.
+const NO_PANIC: &str = "target/no_panic";
+
 /// The functions of the link test's image that call for a panic: the image is linked all the same, and read.
-fn panicking(image: &dyn Fn(&str) -> Program) -> Result<String> {
-    let folder = "target/no_panic_linked";
-    let (built, text) =
-        image(folder).env("RUSTFLAGS", "-C link-arg=--defsym=__panic_path_survived=0").silently()?;
+fn panicking(image: Program) -> Result<String> {
+    let survives = ["--", "-C", "link-arg=--defsym=__panic_path_survived=0"];
+    let (built, text) = image.args(survives).silently()?;
     if !built {
         return Ok(text);
     }
-    let linked = root().join(folder).join(firmware::TARGET).join("release/no-panic");
+    let linked = root().join(NO_PANIC).join(firmware::TARGET).join("release/no-panic");
     let Ok((true, code)) = program("arm-none-eabi-objdump").args(["-d", "-C"]).arg(linked).silently() else {
         return Ok(
             "arm-none-eabi-objdump would name the functions that panic; it is not installed".to_owned()

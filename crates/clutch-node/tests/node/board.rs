@@ -1,6 +1,4 @@
 //! The board by the rules of docs/wire.md: what each frame does in each state, and its watchdog.
-#![allow(missing_docs, reason = "the tests' names say what holds")]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
 use clutch_core::{Counts, DacCode};
 use clutch_node::{BoardMisfit, BoardNode, BoardParams, Outbox};

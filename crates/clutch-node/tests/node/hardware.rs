@@ -1,6 +1,4 @@
 //! The work of a board's program in each period and with each byte, and a counter of 16 bits.
-#![allow(missing_docs, reason = "the tests' names say what holds")]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
 use clutch_core::{Counts, DacCode, Micros};
 use clutch_node::{BoardParams, DaqBoard, Hardware, Outbox, Role, WideCounter, receive, tick};

@@ -1,6 +1,4 @@
 //! The controller: handshake, one answer per batch, stop until the board has heard.
-#![allow(missing_docs, reason = "the tests' names say what holds")]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
 use clutch_core::law::{LawParams, LawTerms, PdParams};
 use clutch_core::supervisor::{Arrival, Cause, State};

@@ -1,9 +1,6 @@
 //! A run as numbers: what the host planned is what the board builds, or it is refused.
-#![allow(missing_docs, reason = "the tests' names say what holds")]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
-mod desk;
-
+use crate::desk::{Plan, key};
 use clutch_core::law::{
     CtcParams, DobParams, LawParams, OutputParams, PdParams, PidParams, SmcIntegralParams, SmcParams,
     SmcSignParams, SuperTwistingParams,
@@ -20,7 +17,6 @@ use clutch_core::{
 use clutch_node::{
     Built, MAX_KNOTS, Misfit, Refusing, RunSettings, SETTINGS, SETTINGS_HASH, Setting, Settings, Unsupported,
 };
-use desk::{Plan, key};
 use proptest::prelude::*;
 
 const FIRST_KNOT: u16 = 0x1000;

@@ -1,6 +1,4 @@
 //! Lockstep: what is written is read, and half of it is not.
-#![allow(missing_docs, reason = "the tests' names say what holds")]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
 use clutch_node::lockstep::{Exchange, HEAD, LONGEST};
 use proptest::prelude::*;

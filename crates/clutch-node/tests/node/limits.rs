@@ -1,11 +1,8 @@
 //! Every setting of a run, as it comes over the wire: below, at and above its limits, and as no number. What is out of
 //! range is refused, and the host's words on it have key, value and unit; what is in range is taken, or a relation with
 //! other settings speaks against it.
-#![allow(missing_docs, reason = "the tests' names say what holds")]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
-mod desk;
-
+use crate::desk::{Plan, paper};
 use clutch_core::law::{LawParams, OutputParams, PdParams};
 use clutch_core::params::{Conversion, Kind, Range, Row, Unit};
 use clutch_core::reference::{
@@ -17,7 +14,6 @@ use clutch_core::{
     ServoParams, SupervisorParams, Tolerances,
 };
 use clutch_node::{Declared, MAX_KNOTS, Misfit, Refusing, SETTINGS, Setting, Settings};
-use desk::{Plan, paper};
 use std::collections::BTreeSet;
 
 const KNOTS: [Knot; 3] = [

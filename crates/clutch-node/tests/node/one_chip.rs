@@ -1,9 +1,6 @@
 //! Controller, encoder and converter on one chip: the loop closes within a sample.
-#![allow(missing_docs, reason = "the tests' names say what holds")]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests fail by panics")]
 
-mod desk;
-
+use crate::desk::{BOARD, BOARD_CONTROLLER, CONFIG, Plan, drain, frames, paper};
 use clutch_core::law::LawParams;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Counts, Dac, DacCode, Encoder, LimitParams, Micros, Plant, PlantParams, SupervisorParams};
@@ -12,7 +9,6 @@ use clutch_wire::{
     Actuate, Arm, Armed, BoardFault, BoardState, Configured, Message, Sample, StopReason, TELEMETRY_ANSWERED,
     Telemetry, encode,
 };
-use desk::{BOARD, BOARD_CONTROLLER, CONFIG, Plan, drain, frames, paper};
 
 /// A shaft of the paper's, a tenth of a period at a time.
 struct Shaft {
@@ -48,7 +44,7 @@ struct Bench {
     host: HostNode,
     shaft: Shaft,
     now_us: u64,
-    notices: Vec<desk::Heard>,
+    notices: Vec<crate::desk::Heard>,
 }
 
 impl Bench {
