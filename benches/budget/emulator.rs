@@ -64,30 +64,24 @@ pub(crate) fn no_target() -> Option<String> {
     Some(format!("a target is not there: rustup target add {missing}"))
 }
 
-/// Builds the images of a board; the folder that they are in.
+/// Builds the images of a board; the folder that they are in. With `peer` the one that measures has the laws in C, too; the
+/// others stay those that are tested and flashed.
 pub(crate) fn build(firmware: &Path, (package, goal): (&str, &str), peer: bool) -> Result<PathBuf> {
-    // With laws in C the emulated board's are others than those that are tested: they may have a folder of their own.
-    let own = std::env::var_os("CLUTCH_FIRMWARE_TARGET_DIR").filter(|_| peer).map(PathBuf::from);
-    let target = own.unwrap_or(firmware.join("../target/firmware"));
+    let target = firmware.join("../target/firmware");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut command = Command::new(cargo);
-    command.current_dir(firmware).args([
-        "build",
-        "--release",
-        "--locked",
-        "--package",
-        package,
-        "--target",
-        goal,
-        "--target-dir",
-    ]);
-    command.arg(&target).args(if peer { &["--features", "peer"][..] } else { &[] });
-    // Flags and targets that were meant for the host.
-    for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET"] {
-        command.env_remove(name);
-    }
-    if !command.status().context("cargo cannot be started")?.success() {
-        bail!("the images cannot be built");
+    let all: &[&str] = &[];
+    let measuring: &[&str] = &["--bin", "budget", "--features", "peer"];
+    for selected in [all, measuring].into_iter().take(if peer { 2 } else { 1 }) {
+        let mut command = Command::new(&cargo);
+        command.current_dir(firmware).args(["build", "--release", "--locked", "--package", package]);
+        command.args(["--target", goal, "--target-dir"]).arg(&target).args(selected);
+        // Flags and targets that were meant for the host.
+        for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET"] {
+            command.env_remove(name);
+        }
+        if !command.status().context("cargo cannot be started")?.success() {
+            bail!("the images cannot be built");
+        }
     }
     Ok(target.join(goal).join("release"))
 }

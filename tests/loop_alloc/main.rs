@@ -117,7 +117,8 @@ fn watched(name: &str, pace: Pace, spoilt: Option<u64>) -> Watched {
     assert_eq!(hello.board, PATIENT_BOARD);
     let mut built = BuiltRun::<f64>::new(&scenario, hello.run.wrapping_add(1).max(1)).unwrap();
     built.controller.boot = hello.boot;
-    built.controller.silence = clutch_core::Micros(400_000);
+    // As much as a session gives a patient board: a stalled machine is not the subject.
+    built.controller.silence = clutch_core::Micros(5_500_000);
     let node = ControllerNode::new(built.controller, built.servo, built.supervisor);
     let mut station = ControllerStation { node, path: &path };
     let mut talk = Talk::new(&mut port, &mut station);

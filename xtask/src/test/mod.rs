@@ -47,9 +47,10 @@ pub(crate) fn all() -> Result<()> {
     }
     // Before the tests: some build images for an emulated board.
     targets()?;
-    let built = build(&mut tally)?;
-    // Mostly builds, which link for long on one core, beside tests that wait. Those with a clock hold on a loaded machine.
+    // Mostly builds, which link for long on one core, beside those of the tests, and beside tests that wait. Those with a
+    // clock hold on a loaded machine.
     let boards = beside("boards")?;
+    let built = build(&mut tally)?;
     tally.stage("Python packages");
     let tools = python::interpreter()?;
     // Before the tests: it takes packages of others from their build, in the same folder, which has one build at a time.
@@ -238,10 +239,7 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     }
     tally.stage("budgets");
     // As a test, not as a benchmark: the figures are the machine code's, not this machine's.
-    // Its images have the laws in C, too: not where tests beside it run theirs.
-    let folder = root().join("target/firmware-budget");
-    let budget = cargo(["test"]).args(WORKSPACE).args(["--bench", "budget"]);
-    let budget = budget.env("CLUTCH_FIRMWARE_TARGET_DIR", folder).lines(|_| ())?;
+    let budget = cargo(["test"]).args(WORKSPACE).args(["--bench", "budget"]).lines(|_| ())?;
     tally.check("bounds, measurements, memory and stack keep their budgets", budget);
     Ok(())
 }
@@ -253,7 +251,8 @@ const SMALL: [&str; 2] = ["--config", "profile.release.opt-level=\"s\""];
 /// function that has it is named.
 fn no_panic(tally: &mut Tally) -> Result<()> {
     let image = |verb: &str, args: &[&str]| {
-        let manifest = ["--release", "--manifest-path", "tests/no_panic/Cargo.toml", "--target", firmware::TARGET];
+        let manifest =
+            ["--release", "--manifest-path", "tests/no_panic/Cargo.toml", "--target", firmware::TARGET];
         cargo([verb]).args(manifest).args(["--target-dir", NO_PANIC]).args(args)
     };
     for (level, args) in [("3", &[][..]), ("s", &SMALL[..])] {
