@@ -2,7 +2,7 @@
 //! request. It knows no clock of its own: the times it is given are its time, ns.
 
 use crate::faults::{Fault, FaultKind, StuckAt};
-use clutch_core::{ActuatorKind, Counts, Dac, DacCode, FixedCounts, ParamError, SafeCodes};
+use clutch_core::{Counts, Dac, DacCode, FixedCounts, ParamError, SafeCodes};
 use clutch_node::{BoardNode, BoardParams, Outbox};
 use clutch_sim::engine::{EngineError, Event, Motion};
 use clutch_sim::rig::Rig;
@@ -105,7 +105,7 @@ impl SimBoard {
             }
             let actuator = rig.model.plant.actuator();
             if matches!(fault.kind, FaultKind::Contact(_) | FaultKind::Lever)
-                && (actuator.kind() != ActuatorKind::Brake || actuator.normal(0.0) > 0.0)
+                && (actuator.motor_gain() > 0.0 || actuator.preload() > 0.0)
             {
                 return Err(SimBoardError::NoPad(fault.kind.to_string()));
             }
