@@ -354,3 +354,27 @@ impl SimBoard {
         self.node.code()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn a_pad_can_lose_its_contact_where_nothing_else_stops_or_drives() {
+        let brake =
+            ["rig", "model"].map(|of| (format!("{of}.actuator"), "{brake={gain_nm_v=0.14}}".to_owned()));
+        let drags = ["rig", "model"].map(|of| (format!("{of}.actuator.brake.preload_nm"), "0.01".to_owned()));
+        let dragging: Vec<_> = brake.iter().chain(&drags).cloned().collect();
+        let cases =
+            [("board_smc_2", &brake[..], true), ("board_smc_2", &dragging, false), ("motor_pid", &[], false)];
+        for (name, set, has_a_pad) in cases {
+            let scenario = Scenario::load(Path::new(name), set).unwrap();
+            for fault in ["lever:at=0.5", "contact:at=0.5,factor=0.5"] {
+                let board = SimBoard::new(&scenario, &[fault.parse().unwrap()], 1, false);
+                let refused = matches!(board.err(), Some(SimBoardError::NoPad(_)));
+                assert_eq!(refused, !has_a_pad, "{name} {set:?} {fault}");
+            }
+        }
+    }
+}
