@@ -114,6 +114,7 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
         None => BTreeMap::new(),
     };
     over.extend(table(&plan, &image, &bounds, measured.as_ref(), &cycles));
+    measured.iter().for_each(frictions);
     let compared = |m: &&Measured| plan.in_c().any(|symbol| m.counts.contains_key(symbol));
     if let Some(measured) = measured.as_ref().filter(compared) {
         let compared = Compared { plan: &plan, image: &image, bounds: &bounds, measured, cycles: &cycles };
@@ -121,6 +122,18 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
         compared.servos()?;
     }
     Ok(over)
+}
+
+/// Prints the counts of one evaluation of each friction model. A board evaluates curves within its laws and no bristles at
+/// all, so that none has a bound or a budget.
+fn frictions(measured: &Measured) {
+    println!("\nOne evaluation of each friction model, instructions measured:\n");
+    println!("| model | least / mean / most |\n|---|---|");
+    for name in &measured.names {
+        if let Some(model) = name.strip_prefix("friction_") {
+            println!("| {model} | {} |", measured.counts[name]);
+        }
+    }
 }
 
 fn told(faults: Vec<Fault>) -> anyhow::Error {

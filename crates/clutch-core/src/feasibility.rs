@@ -127,6 +127,9 @@ pub fn check_path<T: Real>(
     let limits = (output.lowest(), output.highest());
     let drives = bounds.drives(limits.0, limits.1);
     let reverses = drives.low < T::ZERO;
+    // The same at each tick: at rest, forwards, backwards.
+    let at_rest = bounds.authority_at_rest(limits.0, limits.1);
+    let [onwards, back] = [true, false].map(|forwards| bounds.authority(forwards, limits.0, limits.1));
     let mut envelope = Envelope { holding_voltage: holding_voltage(bounds), ..Envelope::default() };
     let (mut last_velocity, mut last_acceleration) = (start_velocity, T::ZERO);
     for tick in 0..ticks {
@@ -143,10 +146,10 @@ pub fn check_path<T: Real>(
         let resting = v.abs() <= still && a.abs() <= still;
         let needed = needed(bounds, v, a);
         let forwards = v >= -still;
-        let authority = if resting {
-            bounds.authority_at_rest(limits.0, limits.1)
-        } else {
-            bounds.authority(forwards, limits.0, limits.1)
+        let authority = match (resting, forwards) {
+            (true, _) => &at_rest,
+            (false, true) => &onwards,
+            (false, false) => &back,
         };
         if resting && reverses {
             if needed.high > authority.high {

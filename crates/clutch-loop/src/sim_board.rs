@@ -2,7 +2,7 @@
 //! request. It knows no clock of its own: the times it is given are its time, ns.
 
 use crate::faults::{Fault, FaultKind, StuckAt};
-use clutch_core::{ActuatorKind, Counts, Dac, DacCode, FixedCounts, ParamError, SafeCodes};
+use clutch_core::{Counts, Dac, DacCode, FixedCounts, ParamError, SafeCodes};
 use clutch_node::{BoardNode, BoardParams, Outbox};
 use clutch_sim::engine::{EngineError, Event, Motion};
 use clutch_sim::rig::Rig;
@@ -105,7 +105,7 @@ impl SimBoard {
             }
             let actuator = rig.model.plant.actuator();
             if matches!(fault.kind, FaultKind::Contact(_) | FaultKind::Lever)
-                && (actuator.kind() != ActuatorKind::Brake || actuator.normal(0.0) > 0.0)
+                && (actuator.motor_gain() > 0.0 || actuator.preload() > 0.0)
             {
                 return Err(SimBoardError::NoPad(fault.kind.to_string()));
             }
@@ -352,5 +352,29 @@ impl SimBoard {
     #[must_use]
     pub fn code(&self) -> DacCode {
         self.node.code()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn a_pad_can_lose_its_contact_where_nothing_else_stops_or_drives() {
+        let brake =
+            ["rig", "model"].map(|of| (format!("{of}.actuator"), "{brake={gain_nm_v=0.14}}".to_owned()));
+        let drags = ["rig", "model"].map(|of| (format!("{of}.actuator.brake.preload_nm"), "0.01".to_owned()));
+        let dragging: Vec<_> = brake.iter().chain(&drags).cloned().collect();
+        let cases =
+            [("board_smc_2", &brake[..], true), ("board_smc_2", &dragging, false), ("motor_pid", &[], false)];
+        for (name, set, has_a_pad) in cases {
+            let scenario = Scenario::load(Path::new(name), set).unwrap();
+            for fault in ["lever:at=0.5", "contact:at=0.5,factor=0.5"] {
+                let board = SimBoard::new(&scenario, &[fault.parse().unwrap()], 1, false);
+                let refused = matches!(board.err(), Some(SimBoardError::NoPad(_)));
+                assert_eq!(refused, !has_a_pad, "{name} {set:?} {fault}");
+            }
+        }
     }
 }

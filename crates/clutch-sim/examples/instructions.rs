@@ -8,10 +8,15 @@
 use clutch_core::law::{Beside, ControlLaw, Law, LawParams, OutputParams, Tick};
 use clutch_core::params::Choice;
 use clutch_core::reference::ReferenceParams;
-use clutch_core::{Counts, FixedCounts, PlantParams, Servo, ServoParams, Target};
-use clutch_sim::engine::EngineKind;
+use clutch_core::{
+    Counts, FixedCounts, Friction, Plant, PlantParams, Servo, ServoParams, StribeckParams, Target,
+};
+use clutch_sim::drive::{Drive, DriveParams, SineDrive};
+use clutch_sim::engine::{DormandPrince, Engine, EngineKind, Input, Model, Shaft, Volts};
+use clutch_sim::system::{Motion, State, System};
 use clutch_sim::{RigParams, RunSpec};
 use clutch_wire::{Actuate, Decoder, Message, Sample, encode};
+use nalgebra::{SMatrix, SVector};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -48,7 +53,8 @@ fn items() -> Vec<String> {
     let others = ["encode_sample", "decode_sample", "encode_actuate", "decode_actuate"];
     let engines = ["exact_flow_20", "exact_flow_2", "dormand_prince_2", "dormand_prince_rippled_2"];
     let engines = engines.iter().map(|name| format!("engine_{name}"));
-    laws.into_iter().chain(others.map(str::to_owned)).chain(engines).collect()
+    let shaft = ["shaft_by_dormand_prince", "shaft_by_system"].map(str::to_owned);
+    laws.into_iter().chain(others.map(str::to_owned)).chain(engines).chain(shaft).collect()
 }
 
 /// Does the work of an item; false if there is none of that name.
@@ -68,6 +74,7 @@ fn work(name: &str) -> Result<bool, Box<dyn Error>> {
         }
         Some((way @ ("encode" | "decode"), message)) => codec(way, message),
         Some(("engine", which)) => return engine(which),
+        Some(("shaft", which)) => return shaft(which),
         _ => return Ok(false),
     }
     Ok(true)
@@ -170,6 +177,70 @@ fn engine(which: &str) -> Result<bool, Box<dyn Error>> {
     counted(|k| tick(STEPS + k));
     failed?;
     Ok(true)
+}
+
+/// The paper's shaft with 2 V, under a torque that swings across break-away: a period of the engine of shafts, and the same as
+/// a system of one inertia and one row, which stops at no period.
+fn shaft(which: &str) -> Result<bool, Box<dyn Error>> {
+    let params = StribeckParams { stribeck_velocity: 0.01, ..StribeckParams::default() };
+    let params = PlantParams { friction: params.into(), ..PlantParams::default() };
+    let plant = Plant::new(&params)?;
+    let sine = SineDrive { mean: 0.03, amplitude: 0.05, frequency: 3.0, phase_turns: 0.0 };
+    let drive = Drive::new(&DriveParams::Sine(sine), 0)?;
+    match which {
+        "by_dormand_prince" => {
+            let model = Model { plant, ripple: None };
+            let (mut engine, mut shaft, mut events) =
+                (DormandPrince::default(), Shaft::new(0.0, 0.0), Vec::new());
+            let mut done = Ok(());
+            counted(|k| {
+                let (time, volts) = (f64::from(k) * 1e-3, Volts::Held(2.0));
+                let input = Input { time, duration: 1e-3, origin: 0.0, volts, drive: &drive, noise: 0.0 };
+                if let Err(e) = engine.advance(&model, &input, &mut shaft, &mut events) {
+                    done = Err(e);
+                }
+            });
+            done?;
+        }
+        "by_system" => {
+            let system = OneRow { plant, drive };
+            let begin = State { time: 0.0, position: SVector::zeros(), velocity: SVector::zeros() };
+            let mut motion = Motion::new(&system, begin)?;
+            let mut done = Ok(());
+            counted(|k| {
+                if k == 0 {
+                    done = motion.advance(1.0, &mut Vec::new());
+                }
+            });
+            done?;
+        }
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// A shaft as a system.
+struct OneRow {
+    plant: Plant<f64>,
+    drive: Drive,
+}
+
+impl System<1, 1> for OneRow {
+    fn inertia(&self, _: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
+        SMatrix::from([[self.plant.params().inertia]])
+    }
+    fn applied(&self, t: f64, q: &SVector<f64, 1>, v: &SVector<f64, 1>) -> SVector<f64, 1> {
+        SVector::from([self.drive.torque(t, q[0]) - self.plant.params().viscous_damping * v[0]])
+    }
+    fn rows(&self, _: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
+        SMatrix::from([[1.0]])
+    }
+    fn normal(&self, _: f64) -> SVector<f64, 1> {
+        SVector::from([self.plant.actuator().normal(2.0)])
+    }
+    fn friction(&self, _: usize) -> &Friction<f64> {
+        self.plant.friction()
+    }
 }
 
 /// Instructions of a step, as valgrind counts them.

@@ -90,7 +90,7 @@ pub struct Meter {
     /// One for each delay.
     tracks: Vec<Track>,
     /// For [`Meter::stops`]: ways from rest at a point to the end of a gap.
-    scratch: Vec<f64>,
+    scratch: Vec<Onwards>,
     last: Option<Counts>,
     /// Counts by which the gap was entered; 0 before the first edge.
     entered: i32,
@@ -128,7 +128,7 @@ impl Meter {
             slack: (ROUGHNESS * count).min(1.0) * carried * per_torque,
             frictions: std::array::from_fn(|i| libm::exp(step * i as f64) / FRICTION_RANGE),
             tracks: (0..=told.max(DELAY)).map(Track::new).collect(),
-            scratch: vec![0.0; ROOM],
+            scratch: vec![Onwards::default(); ROOM],
             last: None,
             entered: 0,
             begin: 0,
@@ -239,59 +239,106 @@ impl Meter {
     }
 
     /// True if there is a friction with which the shaft came to rest and broke away, one count further in all.
-    fn stops(&self, track: &Track, sign: f64, after: &mut [f64]) -> bool {
-        let (slack, ratio) = (self.slack, self.ratio);
-        let lets_go = |x: &Point, h: f64| ratio * h * x.load <= sign * x.pull + slack;
+    fn stops(&self, track: &Track, sign: f64, after: &mut [Onwards]) -> bool {
+        let slack = self.slack;
         // Friction has to be so high that it slows the shaft somewhere, and so low that it lets it go somewhere.
         let (pull, load) = track.before;
-        let (mut low, mut high) = ((sign * pull - slack) / load, 0.0_f64);
+        let (mut low, mut high) = (lesser((sign * pull - slack) / load, f64::INFINITY), 0.0_f64);
         for x in track.points() {
-            low = low.min((sign * x.pull - slack) / x.load);
-            high = high.max((sign * x.pull + slack) / (ratio * x.load));
+            low = lesser((sign * x.pull - slack) / x.load, low);
+            high = greater((sign * x.pull + slack) / (self.ratio * x.load), high);
+        }
+        if low > high {
+            return false;
         }
         let tried =
             self.frictions.partition_point(|h| *h < low)..self.frictions.partition_point(|h| *h <= high);
-        let (Some(frictions), true) = (self.frictions.get(tried), low <= high) else { return false };
-        let gain = 1.0 + GAIN_DOUBT;
-        let end = &track.now;
-        let bowed = |time: f64| 0.5 * slack * time * time;
+        let Some(frictions) = self.frictions.get(tried) else { return false };
         // A way to a rest and on from it is at most what the largest acceleration makes of the whole time; that is convex
         // in friction.
-        let comes_so_far = |h: f64| {
+        let (gain, whole) = (1.0 + GAIN_DOUBT, track.now.time + 1.0);
+        let comes_so_far = |h: &f64| {
             let of = |pull: f64, load: f64| (sign * pull - h * load).abs();
-            let most = track.points().iter().map(|x| of(x.pull, x.load)).fold(of(pull, load), f64::max);
-            0.5 * (gain * most + slack) * (end.time + 1.0) * (end.time + 1.0) > 1.0 - ROUNDING
+            let most =
+                track.points().iter().fold(of(pull, load), |most, x| greater(of(x.pull, x.load), most));
+            0.5 * (gain * most + slack) * whole * whole > 1.0 - ROUNDING
         };
-        let ends = [frictions.first(), frictions.last()];
-        if !ends.into_iter().flatten().any(|&h| comes_so_far(h)) {
+        if ![frictions.first(), frictions.last()].into_iter().flatten().any(comes_so_far) {
             return false;
         }
-        frictions.iter().filter(|h| comes_so_far(**h)).any(|&h| {
-            // From rest at a point to the end: it goes on if nowhere later the velocity is lower.
-            let mut lowest = f64::INFINITY;
-            for (x, way) in track.points().iter().zip(after.iter_mut()).rev() {
-                let (speed, left) = (gain * x.speed(sign, h), end.time - x.time);
-                let goes_on = speed <= lowest + slack * left;
-                lowest = lowest.min(speed);
-                let far = gain * (end.way(sign, h) - x.way(sign, h)) - speed * left + bowed(left);
-                *way = if goes_on && lets_go(x, h) { far } else { f64::NEG_INFINITY };
-            }
-            // From the edge to rest at a point: it came so far if nowhere earlier the velocity was lower.
-            let (mut lowest, mut farthest) = (f64::INFINITY, f64::NEG_INFINITY);
-            let first = sign * pull - h * load;
-            let (mut slows, first) = (first <= slack, 0.5 * gain * first);
-            track.points().iter().zip(after.iter()).any(|(x, way)| {
-                let speed = gain * x.speed(sign, h);
-                if slows && speed <= lowest + slack * x.time {
-                    let far = gain * x.way(sign, h) - speed * x.time + bowed(x.time);
-                    farthest = farthest.max(far + (-speed - first).max(0.0));
+        // The least and the highest allow the longest ways: inwards from either end, until ways are too short.
+        let mut left = frictions.iter();
+        for from_above in [false, true] {
+            while let Some(h) = if from_above { left.next_back() } else { left.next() } {
+                let (stops, longest) = self.stops_with(*h, track, sign, after);
+                if stops {
+                    return true;
                 }
-                lowest = lowest.min(speed);
-                slows |= sign * x.pull - h * x.load <= slack;
-                farthest + way >= 1.0
-            })
-        })
+                if longest < 1.0 - ROUNDING {
+                    break;
+                }
+            }
+        }
+        false
     }
+
+    /// True if the shaft can have come to rest and broken away with a friction, one count further in all. With it the
+    /// longest way to a point and on from one, as if it were at rest there: a convex function of friction, that no way with
+    /// a rest exceeds.
+    fn stops_with(&self, h: f64, track: &Track, sign: f64, after: &mut [Onwards]) -> (bool, f64) {
+        let (slack, gain, end) = (self.slack, 1.0 + GAIN_DOUBT, &track.now);
+        let bowed = |time: f64| 0.5 * slack * time * time;
+        // From rest at a point to the end: it goes on if nowhere later the velocity is lower.
+        let (mut lowest, mut longest) = (f64::INFINITY, f64::NEG_INFINITY);
+        let all = end.way(sign, h);
+        for (x, onwards) in track.points().iter().zip(after.iter_mut()).rev() {
+            let (speed, left) = (gain * x.speed(sign, h), end.time - x.time);
+            let goes_on = speed <= lowest + slack * left;
+            lowest = lesser(speed, lowest);
+            let lets_go = self.ratio * h * x.load <= sign * x.pull + slack;
+            let far = gain * (all - x.way(sign, h)) - speed * left + bowed(left);
+            longest = greater(far, longest);
+            *onwards = Onwards { way: if goes_on && lets_go { far } else { f64::NEG_INFINITY }, longest };
+        }
+        // From the edge to rest at a point: it came so far if nowhere earlier the velocity was lower.
+        let (pull, load) = track.before;
+        let (mut lowest, mut farthest, mut longest) = (f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY);
+        let first = sign * pull - h * load;
+        let (mut slows, first) = (first <= slack, 0.5 * gain * first);
+        let stops = track.points().iter().zip(after.iter()).any(|(x, onwards)| {
+            let speed = gain * x.speed(sign, h);
+            let far = gain * x.way(sign, h) - speed * x.time + bowed(x.time);
+            let far = far + greater(-speed - first, 0.0);
+            longest = greater(far + onwards.longest, longest);
+            if slows && speed <= lowest + slack * x.time {
+                farthest = greater(far, farthest);
+            }
+            lowest = lesser(speed, lowest);
+            slows |= sign * x.pull - h * x.load <= slack;
+            farthest + onwards.way >= 1.0
+        });
+        (stops, longest)
+    }
+}
+
+/// Ways from rest at a point of a gap to its end, counts.
+#[derive(Clone, Copy, Debug, Default)]
+struct Onwards {
+    /// Where the shaft can break away, and goes on; else none at all.
+    way: f64,
+    /// The longest of those from this point and the later ones, whether it can or not.
+    longest: f64,
+}
+
+/// The greater of a number and one that it knows; one instruction, where [`f64::max`] minds what is no number. That leaves
+/// `known`.
+fn greater(new: f64, known: f64) -> f64 {
+    if new > known { new } else { known }
+}
+
+/// The lesser, likewise.
+fn lesser(new: f64, known: f64) -> f64 {
+    if new < known { new } else { known }
 }
 
 /// A convex function of friction at a friction, and its slope there.
@@ -484,15 +531,21 @@ mod tests {
         })
     }
 
+    /// [`Meter::stops`] with each friction that there is.
+    fn stops_by_search(meter: &Meter, track: &Track, sign: f64) -> bool {
+        let mut after = vec![Onwards::default(); ROOM];
+        meter.frictions.iter().any(|h| meter.stops_with(*h, track, sign, &mut after).0)
+    }
+
     #[test]
-    fn tangents_decide_as_the_whole_search_does() {
+    fn bounds_decide_as_the_whole_search_does() {
         let hold = Plant::<f64>::new(&PlantParams::default()).unwrap().holding_voltage_sliding();
         let mut seed = 3_u64;
         let mut random = move || {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (seed >> 11) as f64 / (1_u64 << 53) as f64
         };
-        let mut slid = [0, 0];
+        let (mut slid, mut stopped) = ([0, 0], [0, 0]);
         for _ in 0..4000 {
             let mut meter = meter();
             meter.sample(0, Counts(0), hold);
@@ -505,13 +558,17 @@ mod tests {
                 meter.sample(k, Counts(1), hold * (1.0 + share));
             }
             meter.tracks.iter_mut().for_each(Track::leave);
+            let mut after = std::mem::take(&mut meter.scratch);
             for track in &meter.tracks {
-                let slides = meter.slides(track, 1.0);
+                let (slides, stops) = (meter.slides(track, 1.0), meter.stops(track, 1.0, &mut after));
                 assert_eq!(slides, slides_by_search(&meter, track, 1.0), "{track:?}");
+                assert_eq!(stops, stops_by_search(&meter, track, 1.0), "{track:?}");
                 slid[usize::from(slides)] += 1;
+                stopped[usize::from(stops)] += 1;
             }
         }
         assert!(slid[0] > 400 && slid[1] > 400, "{slid:?}");
+        assert!(stopped[0] > 400 && stopped[1] > 400, "{stopped:?}");
     }
 
     #[test]

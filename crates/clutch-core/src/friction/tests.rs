@@ -252,3 +252,56 @@ fn damped_bristles_with_a_falling_curve_need_viscous_damping_to_be_passive() {
     assert!((from[0] - 5.0 / 3.0).abs() < 1e-12 && from[0] == from[2], "{from:?}");
     assert_eq!((from[1], from[3]), (0.0, 0.0));
 }
+
+/// docs/friction.md, "Numbers to begin with": each set that a model is published with can be written down, and is stiff and
+/// strong as its source says.
+#[test]
+fn published_sets_of_bristles_are_in_range() {
+    let curve = |mu_static, mu_dynamic, stribeck_velocity| LugreParams {
+        mu_static,
+        mu_dynamic,
+        stribeck_velocity,
+        ..LugreParams::default()
+    };
+    // For 1 kg, 1000 N, 1 N and 1000 N.
+    let lugre = LugreParams { stiffness: 1e5, damping: 1e5_f64.sqrt(), ..curve(1.5, 1.0, 1e-3) };
+    let dahl = DahlParams { mu_dynamic: 0.8, stiffness: 1e5 / 1000.0 };
+    let elasto_plastic = ElastoPlasticParams {
+        mu_static: 0.8,
+        mu_dynamic: 0.2,
+        stribeck_velocity: 0.1,
+        stribeck_exponent: 2.0,
+        stiffness: 1000.0,
+        damping: 10.0,
+        elastic: 0.02,
+    };
+    let maxwell = MaxwellParams {
+        mu_static: 0.8,
+        mu_dynamic: 0.4,
+        stribeck_velocity: 0.5,
+        stiffness_a: 12e6 / 1000.0,
+        stiffness_b: 2.5e6 / 1000.0,
+        stiffness_c: 0.71e6 / 1000.0,
+        stiffness_d: 0.79e6 / 1000.0,
+        share_a: 0.067,
+        share_b: 0.056,
+        share_c: 0.047,
+        ..MaxwellParams::default()
+    };
+    let sets: [(FrictionParams<f64>, [f64; 3]); 4] = [
+        (lugre.into(), [1.5, 1.0, 1e5]),
+        (dahl.into(), [0.8, 0.8, 100.0]),
+        (elasto_plastic.into(), [0.8, 0.2, 1000.0]),
+        (maxwell.into(), [0.8, 0.4, 16_000.0]),
+    ];
+    for (params, [at_rest, sliding, stiffness]) in sets {
+        let friction = Friction::<f64>::build(&params).unwrap();
+        let bristles = friction.bristles().unwrap();
+        assert_eq!((friction.at_rest(), friction.sliding()), (at_rest, sliding), "{}", params.name());
+        assert!((bristles.stiffness() - stiffness).abs() < 1e-9, "{}", params.name());
+        // Far beyond all bends each bears its share of the friction in motion.
+        let bend = bristles.steady(1e3);
+        let borne = bristles.coefficient(&bend, &bristles.rate(&bend, 1e3));
+        assert!((borne - sliding).abs() < 1e-9, "{}: {borne}", params.name());
+    }
+}

@@ -8,6 +8,8 @@
 #[path = "../../../shared/panic.rs"]
 mod panic;
 
+#[path = "../budget/friction.rs"]
+mod friction;
 #[path = "../budget/inputs.rs"]
 mod inputs;
 #[path = "../budget/kernels.rs"]
@@ -39,6 +41,7 @@ fn measure() -> Option<()> {
     meter::start()?;
     laws::measure()?;
     servos::measure()?;
+    friction::measure()?;
     #[cfg(feature = "peer")]
     peer::measure()?;
     #[cfg(feature = "peer")]
