@@ -802,10 +802,10 @@ def identified_rows() -> list[tuple[str, str, str, float]]:
     which they are shown.
     """
 
-def identify(scenario: _model.Scenario | Scenario, logs: Sequence[str | PathLike[str]], columns: tuple[str, str], log: str | PathLike[str] | None, travel_deg: SupportsFloat | SupportsIndex | None, fastest_deg_s: SupportsFloat | SupportsIndex | None) -> tuple[dict[str, Any], str | None, str | None]:
+def identify(scenario: _model.Scenario | Scenario, logs: Sequence[str | PathLike[str]], columns: tuple[str, str], loaded: tuple[Sequence[str | PathLike[str]], SupportsFloat | SupportsIndex, SupportsFloat | SupportsIndex] | None, log: str | PathLike[str] | None, travel_deg: SupportsFloat | SupportsIndex | None, fastest_deg_s: SupportsFloat | SupportsIndex | None) -> tuple[dict[str, Any], str | None, str | None]:
     """
     Identifies a rig: the object that `clutch identify --json` prints, and the rig file, or why there is none. Without logs
-    the scenario's simulated board is run, in virtual time.
+    the scenario's simulated board is run, in virtual time. `loaded`: logs with a mass added, the mass (kg), its radius (m).
     """
 
 def lowest_smooth_speed(scenario: _model.Scenario | Scenario, rates: Sequence[float] | None, discs: SupportsIndex) -> dict[str, Any]:

@@ -76,6 +76,9 @@ class Identified:
         ``viscous_v_s_rad`` (C/K), ``inertia_v_s2_rad`` (J/K), and velocity, delay and ripple as above.
     refused : dict of str to str
         The parameters not found, by name, with the experiment that would find them.
+    separate : dict of str to Estimate
+        With logs of a known mass added: ``drive_torque_nm`` (T), ``inertia_kg_m2`` (J), ``grip_nm_v`` (μ_d K),
+        ``grip_at_rest_nm_v`` (μ_s K), ``viscous_damping_nm_s_rad`` (C); those not found are in `refused`.
     unexplained : tuple of str
         Ticks and recordings that the model does not explain.
     map : list of tuple of float
@@ -99,6 +102,9 @@ class Identified:
         parameters: dict[str, dict[str, Any]] = told["parameters"]
         self.parameters = {key: Estimate(**row) for key, row in parameters.items() if "value" in row}
         self.refused: dict[str, str] = {key: row["refused"] for key, row in parameters.items() if "refused" in row}
+        apart: dict[str, dict[str, Any]] = told.get("separate", {})
+        self.separate = {key: Estimate(**row) for key, row in apart.items() if "value" in row}
+        self.refused |= {key: row["refused"] for key, row in apart.items() if "refused" in row}
         self.unexplained: tuple[str, ...] = tuple(told["unexplained"])
         self.map: list[tuple[float, float]] = [(angle, factor) for angle, factor in told["map"]]
         self.releases: int = told["releases"]
@@ -162,11 +168,27 @@ class Identified:
         return "Identified(" + ", ".join(rows) + ")"
 
 
+def _heavier(
+    loaded: list[str], mass_kg: float | None, radius_m: float | None, *, alone: bool
+) -> tuple[list[str], float, float] | None:
+    """The second experiment, or none; a part of it is refused."""
+    if not loaded and mass_kg is None and radius_m is None:
+        return None
+    given = {"logs": alone, "loaded": bool(loaded), "mass_kg": mass_kg is not None, "radius_m": radius_m is not None}
+    missing = [name for name, there in given.items() if not there]
+    if missing or mass_kg is None or radius_m is None:
+        raise ValueError(f"{', '.join(missing)}: expected beside loaded, mass_kg and radius_m, which go together with logs")
+    return loaded, mass_kg, radius_m
+
+
 def identify(
     scenario: ScenarioLike = "board_smc_2",
     *,
     logs: Iterable[str | os.PathLike[str]] = (),
     columns: tuple[str, str] = ("counts", "volts"),
+    loaded: Iterable[str | os.PathLike[str]] = (),
+    mass_kg: float | None = None,
+    radius_m: float | None = None,
     log: str | os.PathLike[str] | None = None,
     travel_deg: float | None = None,
     fastest_deg_s: float | None = None,
@@ -179,12 +201,17 @@ def identify(
     Parameters
     ----------
     scenario : Scenario, str or path, default "board_smc_2"
-        A scenario with ``[safety]``. Its simulated board is run in virtual time, 52 s of it (70 s with a motor), unless
+        A scenario with ``[safety]``. Its simulated board is run in virtual time, 54 s of it (70 s with a motor), unless
         there are `logs`.
     logs : iterable of path, optional
         Logs to read instead: MCAP, or CSV with one sample a row.
     columns : tuple of str, default ("counts", "volts")
         Columns of a CSV that hold counts, and volts given after them.
+    loaded : iterable of path, optional
+        Logs of a second experiment, with a known mass added beside the weight: T, J and friction one by one. They go with
+        `logs`, `mass_kg` and `radius_m`.
+    mass_kg, radius_m : float, optional
+        The mass that was added, and the radius of the pulley that it hangs from.
     log : path, optional
         Folder for a log of each part of the experiment.
     travel_deg, fastest_deg_s : float, optional
@@ -205,7 +232,8 @@ def identify(
         A check ended a part of the experiment.
     ValueError
         A log of another plant than a brake or a motor, or of both; a table that cannot be read; a limit out of its
-        range, or of a motor axis where there is none.
+        range, or of a motor axis where there is none; `loaded` without `logs`, mass or radius, or the reverse; a mass
+        that is none.
     OSError
         A file cannot be read or written.
 
@@ -219,7 +247,8 @@ def identify(
     checked = as_scenario(scenario, overrides)
     files = [os.fspath(path) for path in logs]
     folder = None if log is None else os.fspath(log)
-    told = _clutch.identify(checked._native, files, columns, folder, travel_deg, fastest_deg_s)
+    heavier = _heavier([os.fspath(path) for path in loaded], mass_kg, radius_m, alone=bool(files))
+    told = _clutch.identify(checked._native, files, columns, heavier, folder, travel_deg, fastest_deg_s)
     return Identified(checked, told)
 
 

@@ -55,6 +55,27 @@ def test_a_motor_axis_is_identified_within_its_limits():
         clutch.identify("board_smc_2", fastest_deg_s=30)
 
 
+def test_a_known_mass_tells_torque_and_inertia_one_by_one(tmp_path):
+    alone, loaded = tmp_path / "alone", tmp_path / "loaded"
+    mass, radius = 0.06, 0.024
+    heavier = {"rig.drive.weight.mass_kg": 0.2 + mass, "rig.inertia_kg_m2": 0.0017 + mass * radius**2}
+    clutch.identify("board_smc_2", log=alone)
+    clutch.identify("board_smc_2", log=loaded, overrides=heavier)
+    logs, others = ([str(f) for f in sorted(folder.glob("*.mcap"))] for folder in (alone, loaded))
+    found = clutch.identify(logs=logs, loaded=others, mass_kg=mass, radius_m=radius)
+    assert found.separate["drive_torque_nm"].holds(0.2 * 9.81 * radius)
+    assert found.separate["inertia_kg_m2"].holds(0.0017) and not found.separate["inertia_kg_m2"].holds(0.0019)
+    told = command("identify", "--from", *logs, "--loaded", *others, "--mass", "0.06", "--radius", "0.024", "--json")
+    assert {key: vars(e) for key, e in found.separate.items()} == told["separate"]
+    releases = [f for f in logs if "releases" in f]
+    unknown = clutch.identify(logs=releases, loaded=others, mass_kg=mass, radius_m=radius)
+    assert unknown.separate == {} and "a ride" in unknown.refused["inertia_kg_m2"]
+    with pytest.raises(ValueError, match="mass = -1: expected a number above 0, in kg"):
+        clutch.identify(logs=logs, loaded=others, mass_kg=-1, radius_m=radius)
+    with pytest.raises(ValueError, match="logs, radius_m: expected beside"):
+        clutch.identify(loaded=others, mass_kg=mass)
+
+
 def test_the_scenario_as_identified_moves_as_the_rig_does(rig):
     believed = rig.scenario
     assert believed.rig.inertia_kg_m2 == believed.model.inertia_kg_m2

@@ -169,7 +169,7 @@ enum Verb {
     /// Holds the watch over friction and load against rigs that drift and rigs that do not, half an hour: the tables of
     /// docs/loop.md.
     Drift,
-    /// Identifies random rigs, and as many random motor axes, each from about a minute of experiment on the simulated board: the
+    /// Identifies random rigs, rigs unlike the model, and as many random motor axes, each from about a minute of experiment on the simulated board: the
     /// tables of docs/identify.md, some minutes.
     Identify {
         /// Rigs.
@@ -275,6 +275,7 @@ fn main() -> Result<()> {
         Verb::Identify { rigs, seed } => {
             let page = "docs/identify.md";
             random_rigs(["clutch-identify", "identified_rigs"], page, "campaign", rigs, seed)?;
+            random_rigs(["clutch-identify", "unlike_rigs"], page, "unlike", rigs.div_ceil(4), seed + UNLIKE)?;
             random_rigs(["clutch-identify", "identified_motors"], page, "motors", rigs, seed + MOTORS)
         }
         Verb::Tune { rigs, seed } => {
@@ -431,6 +432,7 @@ fn meter() -> Result<()> {
 
 /// From the seeds of braked rigs to those of motor axes.
 const MOTORS: u64 = 20_000;
+const UNLIKE: u64 = 40_000;
 
 /// The campaign of a package's example over random rigs, into its page.
 fn random_rigs([package, example]: [&str; 2], page: &str, part: &str, rigs: u64, seed: u64) -> Result<()> {

@@ -8,12 +8,11 @@ use crate::table::number;
 use anyhow::{Context, bail};
 use clap::Args;
 use clutch_core::ActuatorKind;
-use clutch_identify::added::{Added, Separate, separate};
+use clutch_identify::added::{Added, Separate};
 use clutch_identify::experiment::{ExperimentError, VirtualBoard};
 use clutch_identify::{Consent, Finding, Identified, Plan, Recording, map_as_believed, map_file};
 use clutch_log::Limits;
 use clutch_sim::Scenario;
-use clutch_sim::drive::DriveParams;
 use serde_json::{Value, json as value};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -130,14 +129,7 @@ impl Identify {
         let file = self.out.as_deref().map(|path| (path, report.rig_file(&scenario)));
         output::report(
             self.json,
-            || {
-                let mut object = object(&report);
-                if let Some(separate) = &separate {
-                    object["separate"] =
-                        separate.rows().iter().map(|row| (row.0.to_owned(), finding(row.3))).collect();
-                }
-                json(&object)
-            },
+            || json(&object(&report, separate.as_ref())),
             || text(&report) + &separate.as_ref().map_or_else(String::new, one_by_one),
         )?;
         if let Some((path, file)) = file {
@@ -167,19 +159,11 @@ impl Identify {
         let (false, Some(mass), Some(radius)) = (self.loaded.is_empty(), self.mass, self.radius) else {
             return Ok(None);
         };
-        let gravity = match scenario.spec().rig.drive {
-            DriveParams::Weight(weight) => weight.gravity,
-            _ => 9.81,
-        };
-        let added = Added { mass, radius, gravity };
-        added.check()?;
+        let added = Added::on(scenario, mass, radius)?;
         let read = self.loaded.iter().map(|file| self.read(file, scenario));
         let recordings: Vec<Recording> =
             read.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten().collect();
-        match (alone, Identified::of(&recordings)?) {
-            (Identified::Brake(alone), Identified::Brake(with)) => Ok(Some(separate(alone, &with, &added))),
-            _ => bail!("--loaded: expected logs of a shaft with a brake and a weight, as --from"),
-        }
+        Ok(Some(alone.separate(&Identified::of(&recordings)?, &added)?))
     }
 
     /// Runs the experiment, and says before what it does.
@@ -340,12 +324,12 @@ fn finding(finding: &Finding) -> Value {
 
 /// The result as `--json` prints it.
 #[must_use]
-pub fn object(report: &Identified) -> Value {
+pub fn object(report: &Identified, separate: Option<&Separate>) -> Value {
     let parameters: serde_json::Map<String, Value> =
         report.shown().iter().map(|row| (row.key.to_owned(), finding(row.finding))).collect();
     let (sets_off, slips, rates) = report.found();
     let brake = matches!(report, Identified::Brake(_));
-    value!({
+    let mut object = value!({
         "version": env!("CARGO_PKG_VERSION"),
         "actuator": if brake { "brake" } else { "motor" },
         "releases": if brake { *sets_off } else { 0 },
@@ -355,5 +339,9 @@ pub fn object(report: &Identified) -> Value {
         "parameters": parameters,
         "unexplained": report.unexplained(),
         "map": report.map().iter().map(|p| [p.angle, p.factor]).collect::<Vec<_>>(),
-    })
+    });
+    if let Some(separate) = separate {
+        object["separate"] = separate.rows().iter().map(|row| (row.0.to_owned(), finding(row.3))).collect();
+    }
+    object
 }

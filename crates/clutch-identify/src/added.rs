@@ -5,6 +5,8 @@
 
 use crate::Estimate;
 use crate::report::{Finding, Report, refused};
+use clutch_sim::Scenario;
+use clutch_sim::drive::{DriveParams, WeightDrive};
 
 /// A mass that hangs from the pulley beside what is there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +47,20 @@ pub struct Separate {
 }
 
 impl Added {
+    /// A mass (kg) on a pulley of a radius (m), under the gravity of a scenario's weight.
+    ///
+    /// # Errors
+    /// A number that is not above 0.
+    pub fn on(scenario: &Scenario, mass: f64, radius: f64) -> Result<Added, NoMass> {
+        let gravity = match scenario.spec().rig.drive {
+            DriveParams::Weight(weight) => weight.gravity,
+            _ => WeightDrive::default().gravity,
+        };
+        let added = Added { mass, radius, gravity };
+        added.check()?;
+        Ok(added)
+    }
+
     /// # Errors
     /// A number that is not above 0.
     pub fn check(&self) -> Result<(), NoMass> {

@@ -5,6 +5,7 @@
 //! | `releases` | PID without an integral on a path of steps | the brake lets go for some 40 ms: free falls |
 //! | `crawl` | a soft PD far below the rate at which it sticks | break-aways under a voltage that falls slowly |
 //! | `ride …` | glide, with what the releases told | mean friction at a rate, ripple |
+//! | `releases_behind` | as `releases` | whether the torque is what it was |
 
 use crate::recording::{ReadError, Recording};
 use crate::release;
@@ -29,6 +30,8 @@ use toml::{Table, Value};
 pub struct Programme {
     /// Releases.
     pub releases: u32,
+    /// Releases behind the rides.
+    pub releases_behind: u32,
     /// Way from one release to the next, °.
     pub step_deg: f64,
     /// Length of the crawl, s.
@@ -42,6 +45,7 @@ impl Default for Programme {
     fn default() -> Self {
         Programme {
             releases: 12,
+            releases_behind: 4,
             step_deg: 2.5,
             crawl_s: 24.0,
             rides: vec![(5.0, 10.0), (20.0, 7.0), (60.0, 5.0)],
@@ -64,31 +68,33 @@ impl Programme {
     /// Its length, s.
     #[must_use]
     pub fn seconds(&self) -> f64 {
-        self.releases_s() + self.crawl_s + self.rides.iter().map(|ride| ride.1).sum::<f64>()
-    }
-
-    fn releases_s(&self) -> f64 {
-        PACE_S * (f64::from(self.releases) + 1.0)
+        let releases = releases_s(self.releases) + releases_s(self.releases_behind);
+        releases + self.crawl_s + self.rides.iter().map(|ride| ride.1).sum::<f64>()
     }
 
     /// The way that the shaft is turned by, °, beyond which only a fault goes.
     #[must_use]
     pub fn way_deg(&self) -> f64 {
         let rides: f64 = self.rides.iter().map(|(rate, seconds)| rate * seconds).sum();
-        let parts = 2.0 + self.rides.len() as f64;
-        f64::from(self.releases) * self.step_deg + CRAWL_DEG_S * self.crawl_s + rides + parts * FOLLOWING_DEG
+        let parts = 3.0 + self.rides.len() as f64;
+        f64::from(self.releases + self.releases_behind) * self.step_deg
+            + CRAWL_DEG_S * self.crawl_s
+            + rides
+            + parts * FOLLOWING_DEG
     }
 
     /// The plan, a line for each part: what it does, for how long, and how far.
     #[must_use]
     pub fn plan(&self) -> Vec<String> {
-        let mut lines = vec![
+        let releases = |number: u32| {
             format!(
-                "releases    {} times 0 V until the shaft has fallen by about {} °, {:.1} s",
-                self.releases,
+                "releases    {number} times 0 V until the shaft has fallen by about {} °, {:.1} s",
                 self.step_deg,
-                self.releases_s()
-            ),
+                releases_s(number)
+            )
+        };
+        let mut lines = vec![
+            releases(self.releases),
             format!("crawl       {CRAWL_DEG_S} °/s under a soft PD, it sticks and slips, {} s", self.crawl_s),
         ];
         lines.extend(
@@ -96,12 +102,18 @@ impl Programme {
                 .iter()
                 .map(|(rate, seconds)| format!("ride        {rate} °/s under glide, {seconds} s")),
         );
+        lines.push(releases(self.releases_behind));
         lines.push(format!(
             "limits      {:.0}° in all; a part ends {FOLLOWING_DEG}° off its path, and by any other check",
             self.way_deg()
         ));
         lines
     }
+}
+
+/// Length of so many releases, s.
+fn releases_s(number: u32) -> f64 {
+    PACE_S * (f64::from(number) + 1.0)
 }
 
 /// The experiment could not be made.
@@ -186,14 +198,16 @@ pub fn experiment(
     if lowest > 0.0 {
         return Err(ExperimentError::NoRelease(lowest));
     }
-    let mut recordings = run("releases", &releases(base, programme)?)?;
-    let releases: Vec<_> = recordings.iter().flat_map(release::releases).collect();
-    let fall = release::fall(&releases, crate::DAMPINGS).ok();
+    let mut recordings = run("releases", &releases(base, programme.releases, programme)?)?;
+    let found: Vec<_> = recordings.iter().flat_map(release::releases).collect();
+    let fall = release::fall(&found, crate::DAMPINGS).ok();
     recordings.extend(run("crawl", &crawl(base, programme)?)?);
     for ride in &programme.rides {
         let name = format!("ride_{}", ride.0);
         recordings.extend(run(&name, &glide(base, *ride, fall.as_ref())?)?);
     }
+    let behind = releases(base, programme.releases_behind, programme)?;
+    recordings.extend(run("releases_behind", &behind)?);
     Ok(recordings)
 }
 
@@ -229,7 +243,7 @@ pub(crate) fn checked(base: &Scenario, name: &str, table: Table) -> Result<Scena
     Scenario::from_table(&format!("{name} for {}", base.name()), table, &[("name".to_owned(), title)])
 }
 
-fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, ScenarioError> {
+fn releases(base: &Scenario, number: u32, programme: &Programme) -> Result<Scenario, ScenarioError> {
     let spec = base.spec();
     let rate = STEP_RATE * spec.rig.speed.speed_limit; // rad/s
     // The voltage that holds the shaft while it waits.
@@ -249,7 +263,7 @@ fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, Scenario
     )]);
     let rise = programme.step_deg / rate.to_degrees();
     let mut points = vec![(0.0, 0.0)];
-    for k in 0..programme.releases {
+    for k in 0..number {
         let (time, angle) = (PACE_S * f64::from(k + 1), programme.step_deg * f64::from(k));
         points.extend([(time, angle), (time + rise, angle + programme.step_deg)]);
     }
@@ -261,7 +275,7 @@ fn releases(base: &Scenario, programme: &Programme) -> Result<Scenario, Scenario
             ("interpolation", Value::String("linear".to_owned())),
         ]),
     )]);
-    checked(base, "releases", part(base, law, path, programme.releases_s())?)
+    checked(base, "releases", part(base, law, path, releases_s(number))?)
 }
 
 pub(crate) fn ramp(rate_deg_s: f64) -> Value {

@@ -1,5 +1,6 @@
 //! A shaft with a brake or a motor, whichever it is: its experiment, its findings, its file.
 
+use crate::added::{Added, Separate, separate};
 use crate::experiment::{self, ExperimentError, Runs};
 use crate::motor;
 use crate::recording::{ReadError, Recording};
@@ -80,6 +81,11 @@ impl Plan {
         }
     }
 }
+
+/// A mass was added to a motor axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("loaded: expected logs of a shaft with a brake and a weight, as those without the mass")]
+pub struct OfMotor;
 
 /// Findings of either.
 #[derive(Clone, Debug)]
@@ -164,6 +170,17 @@ impl Identified {
         match self {
             Identified::Brake(report) => &report.found,
             Identified::Motor(report) => &report.found,
+        }
+    }
+
+    /// Torque, inertia and friction one by one, with the findings of a second experiment with a mass added.
+    ///
+    /// # Errors
+    /// One of them is of a motor.
+    pub fn separate(&self, loaded: &Identified, added: &Added) -> Result<Separate, OfMotor> {
+        match (self, loaded) {
+            (Identified::Brake(alone), Identified::Brake(with)) => Ok(separate(alone, with, added)),
+            _ => Err(OfMotor),
         }
     }
 

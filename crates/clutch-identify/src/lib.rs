@@ -15,6 +15,7 @@ pub mod report;
 pub mod ride;
 pub mod rig_file;
 pub mod shown;
+pub mod unlike;
 
 pub use believed::{Believed, Corner, believed};
 pub use identified::{Consent, Identified, Plan};

@@ -24,11 +24,11 @@ const LONGEST_DELAY: f64 = 16.0;
 /// Steps of the delay and of C/J, periods and number. [`SLACK`] covers what lies between.
 const DELAY_STEP: f64 = 0.025;
 const DAMPINGS: usize = 12;
+/// Periods by which delays of releases may be apart: a lag as long as that shows in the falls themselves.
+const MOST_APART: f64 = 3.0;
 /// Counts by which an edge of the encoder may be off, half a step of the delay among them.
 const SLACK: f64 = 0.06;
-/// Periods by which delays of releases may be apart.
-const MOST_APART: f64 = 3.0;
-/// The same where each release has a delay of its own: at first, and where that explains nothing.
+/// Counts by which it may be off where each release has a delay of its own: at first, and where that explains nothing.
 const LOOSER: [f64; 2] = [SLACK, 0.5];
 
 /// A fall from rest.
@@ -61,6 +61,19 @@ pub struct Unexplained {
     pub name: String,
     /// Tick of the run.
     pub tick: u64,
+    /// The way in which releases differ from each other or from a fall, if that is seen.
+    pub apart: Option<Apart>,
+}
+
+/// Releases that no one torque with one delay explains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Apart {
+    /// T/J, rad/s²: one release has at most the first, another at least the second.
+    Pulls(f64, f64),
+    /// Least and greatest delay with one T/J for all, s.
+    Delays(f64, f64),
+    /// So many releases are no fall under a steady torque, even by themselves.
+    Within(usize),
 }
 
 /// The releases in a recording.
@@ -137,13 +150,67 @@ impl Release {
 
 /// The set of T/J and delay that explains every count of all releases, with C/J between two values, 1/s. If there is none
 /// with one delay, each release has its own, as with a lag of the actuator; if there is none with sharp edges, they may be
-/// off by more.
+/// off by more. A T/J of its own for each release is a torque that varies, and no T/J at all.
 ///
 /// # Errors
-/// The tick that nothing explains, of the values that explain most.
+/// The tick that nothing explains, of the values that explain most, and whether the releases differ.
 pub fn fall(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Unexplained> {
-    let looser = || LOOSER.into_iter().find_map(|slack| with_own_delays(releases, dampings, slack));
-    with_one_delay(releases, dampings).or_else(|at| looser().ok_or(at))
+    let mut at = match with_one_delay(releases, dampings) {
+        Ok(fall) => return Ok(fall),
+        Err(at) => at,
+    };
+    let period = releases.first().map_or(1e-3, |r| r.units.0);
+    for (slack, own) in [(LOOSER[0], false), (LOOSER[1], true)] {
+        at.apart = match with_own_delays(releases, dampings, slack) {
+            Some(late) if late.delay.high - late.delay.low <= MOST_APART * period => return Ok(late),
+            Some(late) => Some(Apart::Delays(late.delay.low, late.delay.high)),
+            None => with_own_pulls(releases, dampings, slack, own),
+        };
+        if at.apart.is_some() {
+            return Err(at);
+        }
+    }
+    // One that is no fall by itself may have lost a count.
+    let (alone, rest): (Vec<Release>, Vec<Release>) = releases
+        .iter()
+        .cloned()
+        .partition(|r| with_own_delays(std::slice::from_ref(r), dampings, LOOSER[1]).is_none());
+    at.apart = match alone.len() {
+        0 => None,
+        1 => with_own_delays(&rest, dampings, LOOSER[1])
+            .is_none()
+            .then(|| with_own_pulls(&rest, dampings, LOOSER[1], true))
+            .flatten(),
+        number => Some(Apart::Within(number)),
+    };
+    Err(at)
+}
+
+/// T/J of releases, each of which has its own, and its own delay or the one that leaves them closest: the least that one of them
+/// needs, and the most that another one allows.
+fn with_own_pulls(releases: &[Release], dampings: (f64, f64), slack: f64, own_delays: bool) -> Option<Apart> {
+    let bounds = |release: &Release, delay: f64, damping: f64| {
+        let mut own = (0.0, f64::INFINITY);
+        release.narrow(delay, damping, slack, &mut own).ok().map(|()| own)
+    };
+    let apart = |of: &dyn Fn(&Release) -> Option<(f64, f64)>| {
+        releases.iter().try_fold((0.0_f64, f64::INFINITY), |ends, release| {
+            of(release).map(|own| (ends.0.max(own.0), ends.1.min(own.1)))
+        })
+    };
+    let all = (0..DAMPINGS).map(|k| between(dampings, k));
+    let found: Vec<(f64, f64)> = if own_delays {
+        let union = |release: &Release, damping: f64| {
+            let each = delays(releases).filter_map(|delay| bounds(release, delay, damping));
+            each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        };
+        all.filter_map(|damping| apart(&|release| union(release, damping))).collect()
+    } else {
+        let grid = all.flat_map(|damping| delays(releases).map(move |delay| (delay, damping)));
+        grid.filter_map(|(delay, damping)| apart(&|release| bounds(release, delay, damping))).collect()
+    };
+    let closest = found.into_iter().min_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
+    Some(Apart::Pulls(closest.1, closest.0))
 }
 
 /// A value between two, of so many.
@@ -177,11 +244,6 @@ fn with_own_delays(releases: &[Release], dampings: (f64, f64), slack: f64) -> Op
             (low, high) = (low.min(common.0), high.max(common.1));
             (soonest, latest) = (soonest.min(ends.0), latest.max(ends.1));
         }
-    }
-    // A lag as long as that shows in the falls themselves.
-    let period = releases.first().map_or(1e-3, |r| r.units.0);
-    if latest - soonest > MOST_APART * period {
-        return None;
     }
     let middle = |low: f64, high: f64| Estimate { value: 0.5 * (low + high), low, high };
     (low < high && high.is_finite()).then(|| Fall {
@@ -223,7 +285,7 @@ fn with_one_delay(releases: &[Release], dampings: (f64, f64)) -> Result<Fall, Un
     let Some([low, high, soonest, latest]) = set else {
         let (_, n, at) = longest;
         let (name, tick) = releases.get(n).map_or_else(Default::default, |r| r.place.clone());
-        return Err(Unexplained { name, tick: tick + at as u64 });
+        return Err(Unexplained { name, tick: tick + at as u64, apart: None });
     };
     let half = 0.5 * DELAY_STEP * period;
     Ok(Fall {

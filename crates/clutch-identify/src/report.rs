@@ -3,8 +3,8 @@
 use crate::break_away::{self, BreakAway, Known, break_aways};
 use crate::recording::Recording;
 use crate::release::{self, Fall, Release};
-use crate::ride::{Place, Ride, Told, rides};
-use crate::{DAMPINGS, Estimate};
+use crate::ride::{Place, Ride, Told, rides, uneven};
+use crate::{DAMPINGS, Estimate, unlike};
 use serde::Serialize;
 
 /// Standard deviations on either side of a value whose distribution is nearly normal. Two cover 90 %, not 95: the
@@ -24,6 +24,10 @@ const MOST: usize = 60;
 const LEAST_RIPPLE: f64 = 0.03;
 /// Normalised innovation of an edge that no ride has: one in millions.
 pub(crate) const UNEXPLAINED: f64 = 7.0;
+
+/// Rides and releases that do not go together.
+const CONTRADICTED: &str = "C/J of the rides is none that the releases allow: friction differs between the places of the rides, or the \
+     torque between their times; rides over the same whole turns, and releases behind them, tell which";
 
 /// The finding on a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -90,9 +94,12 @@ pub fn identify(recordings: &[Recording]) -> Report {
     let slips: Vec<BreakAway<'_>> = recordings.iter().flat_map(break_aways).take(MOST).collect();
     let rides: Vec<Ride<'_>> = recordings.iter().flat_map(rides).collect();
     let found = (releases.len(), slips.len(), rides.iter().map(|r| r.rate).collect());
-    let motion = Motion::of(&releases, rides);
+    let motion = Motion::of(&releases, rides, &recordings.iter().flat_map(uneven).collect::<Vec<_>>());
     let (ratio, stribeck) = motion.at_rest(&slips);
-    let no_ride = "a ride at an even rate, as 5 °/s for 8 s, and releases for T/J tell it";
+    let no_ride = motion
+        .cause
+        .as_deref()
+        .unwrap_or("a ride at an even rate, as 5 °/s for 8 s, and releases for T/J tell it");
     let slowest = motion.told.first();
     Report {
         pull: motion.of_fall(|fall| fall.pull),
@@ -102,7 +109,10 @@ pub fn identify(recordings: &[Recording]) -> Report {
         ratio,
         stribeck,
         damping: motion.damping.map_or_else(
-            || refused("it takes a fast ride beside a slow one: 60 °/s beside 20 °/s tell it"),
+            || {
+                let slow = "it takes a fast ride beside a slow one: 60 °/s beside 20 °/s tell it";
+                refused(motion.cause.as_deref().unwrap_or(slow))
+            },
             Finding::Known,
         ),
         lag: refused(
@@ -127,45 +137,66 @@ struct Motion {
     fall: Option<Fall>,
     damping: Option<Estimate>,
     hold: Option<Estimate>,
+    /// The way in which the rig is unlike the model, so that its friction is not told.
+    cause: Option<String>,
     unexplained: Vec<String>,
 }
 
 impl Motion {
-    fn of(releases: &[Release], rides: Vec<Ride<'_>>) -> Motion {
-        let first = release::fall(releases, DAMPINGS);
-        let told: Vec<Told> = match (&first, releases.is_empty()) {
-            (Ok(fall), false) => tell(rides, fall),
-            _ => Vec::new(),
+    fn of(releases: &[Release], mut rides: Vec<Ride<'_>>, stretches: &[Ride<'_>]) -> Motion {
+        let unknown = |cause: Option<String>| Motion {
+            told: Vec::new(),
+            fall: None,
+            damping: None,
+            hold: None,
+            unexplained: cause.iter().cloned().collect(),
+            cause,
         };
+        if releases.is_empty() {
+            return unknown(None);
+        }
+        let mut fall = match release::fall(releases, DAMPINGS) {
+            Ok(fall) => fall,
+            Err(at) => return unknown(Some(unlike::fall_refused(&at))),
+        };
+        rides.sort_by(|a, b| a.rate.total_cmp(&b.rate));
+        let mut told = tell(&rides, &fall);
+        if let Some(cause) = told.first().and_then(|slow| unlike::bristles(stretches, slow, &fall)) {
+            return Motion { fall: Some(fall), ..unknown(Some(cause)) };
+        }
         let mut unexplained: Vec<String> = told.iter().filter_map(edge_off).collect();
-        let line = Line::through(&told);
-        let damping = match (&first, &line) {
-            (Ok(fall), Some(line)) => line.damping(fall),
-            _ => None,
-        };
-        // With C/J, releases tell T/J more closely.
-        let fall = match damping {
-            Some(c) => {
-                let within = (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0));
-                release::fall(releases, within).or(first)
+        if let Some(share) = unlike::runout(&told) {
+            for (ride, told) in rides.iter().zip(&mut told) {
+                told.hold.1 = told.hold.1.hypot(told.hold.0 * unlike::left_of_runout(share, ride.way()));
             }
-            None => first,
-        };
-        if let (Err(at), false) = (&fall, releases.is_empty()) {
             unexplained.push(format!(
-                "{}: no free fall with any delay explains the counts up to tick {}",
-                at.name, at.tick
+                "rides: friction differs by {:.1} % from section to section of the turn, as of a disc that is not square to its \
+                 shaft: v_hold and C/J are as wide as that; rides over whole turns tell them more closely",
+                100.0 * share
             ));
         }
-        let fall = fall.ok().filter(|_| !releases.is_empty());
-        if let Some(slack) = fall.as_ref().and_then(|f| f.looser) {
+        let line = Line::through(&told);
+        let damping = line.as_ref().and_then(|line| line.damping(&fall));
+        // With C/J, releases tell T/J more closely.
+        if let Some(c) = damping {
+            let within = (c.low.min(DAMPINGS.1), c.high.clamp(0.01, DAMPINGS.1 + 1.0));
+            match release::fall(releases, within) {
+                Ok(closer) if closer.looser <= fall.looser => fall = closer,
+                _ => {
+                    let cause = unknown(Some(CONTRADICTED.to_owned()));
+                    unexplained.extend(cause.unexplained.clone());
+                    return Motion { fall: Some(fall), unexplained, ..cause };
+                }
+            }
+        }
+        if let Some(slack) = fall.looser {
             unexplained.push(format!(
                 "releases: no one delay explains their counts; one for each does, edges being off by {slack} counts: a lag of the \
                  actuator, or a torque that varies"
             ));
         }
-        let hold = hold(&told, line.as_ref(), fall.as_ref());
-        Motion { told, fall, damping, hold, unexplained }
+        let hold = hold(&told, line.as_ref(), Some(&fall));
+        Motion { told, fall: Some(fall), damping, hold, cause: None, unexplained }
     }
 
     /// μ_s/μ_d and the Stribeck velocity, which take all that motion tells.
@@ -179,6 +210,9 @@ impl Motion {
             // No disc is so even that a model holds to the last count.
             ripple: slow.ripple.0.max(LEAST_RIPPLE) / hold.value,
         });
+        if let Some(cause) = &self.cause {
+            return (refused(cause), refused(cause));
+        }
         let mut ratio = ratio(slips, known.as_ref());
         let even = slowest.is_some_and(|slow| slow.ripple.0 < LEAST_RIPPLE);
         if let (true, Finding::Known(e)) = (even, &mut ratio) {
@@ -199,9 +233,9 @@ impl Motion {
 
     /// A finding of the releases.
     fn of_fall(&self, value: impl Fn(&Fall) -> Estimate) -> Finding {
-        match (&self.fall, self.unexplained.last()) {
+        match (&self.fall, &self.cause) {
             (Some(fall), _) => Finding::Known(value(fall)),
-            (None, Some(what)) => refused(&format!("{what}: was it at rest before, and let go at once?")),
+            (None, Some(cause)) => refused(cause),
             (None, None) => refused("no release: 0 V for 30 ms from rest tells it"),
         }
     }
@@ -225,8 +259,7 @@ fn ripple(slow: &Told) -> Estimate {
 }
 
 /// Findings of the rides, the slowest first: a fast one does not see the ripple, and takes its size from that.
-fn tell(mut rides: Vec<Ride<'_>>, fall: &Fall) -> Vec<Told> {
-    rides.sort_by(|a, b| a.rate.total_cmp(&b.rate));
+fn tell(rides: &[Ride<'_>], fall: &Fall) -> Vec<Told> {
     let mut share = None;
     rides
         .iter()

@@ -7,15 +7,28 @@
 use crate::filter::{Belief, Passed, Shaft, Spread, smooth};
 use crate::recording::Recording;
 
+/// Longest silence in a ride, times the median time between edges.
+const LONGEST_SILENCE: f64 = 6.0;
+
 /// Conditions of a ride.
-const LONGEST_SILENCE: f64 = 6.0; // times the median time between edges
-const SETTLING_S: f64 = 0.5;
-const SHORTEST_S: f64 = 1.0;
-const SHORTEST_RAD: f64 = 0.17;
+struct Conditions {
+    /// Time behind its first edge at which the even part begins, and what that takes at least, s.
+    settling_s: f64,
+    shortest_s: f64,
+    /// Way of the even part at least, rad.
+    shortest_rad: f64,
+    /// Way of its first half over that of its second.
+    halves: (f64, f64),
+}
+
+const RIDE: Conditions =
+    Conditions { settling_s: 0.5, shortest_s: 1.0, shortest_rad: 0.17, halves: (0.9, 1.1) };
 /// The same of a motor, which goes to and fro: its passes are short, and its law is stiff.
-const PASS_SETTLING_S: f64 = 0.15;
-const SHORTEST_PASS_S: f64 = 0.1;
-const SHORTEST_PASS_RAD: f64 = 0.05;
+const PASS: Conditions =
+    Conditions { settling_s: 0.15, shortest_s: 0.1, shortest_rad: 0.05, halves: (0.9, 1.1) };
+/// Motion between two sticks, uneven as it is.
+const STRETCH: Conditions =
+    Conditions { settling_s: 0.1, shortest_s: 0.2, shortest_rad: 0.02, halves: (0.5, 2.0) };
 /// Waves per turn that a ripple is taken to have, and their damping: a wide band, as the law glide believes.
 pub const WAVES_PER_TURN: f64 = 340.0;
 /// See [`WAVES_PER_TURN`].
@@ -36,6 +49,8 @@ const LEFT_OVER: f64 = 2.0;
 const UNSEEN: f64 = 0.04;
 /// Points of a map per turn: of the waves of a disc, each has fifteen.
 const PER_TURN: f64 = 5000.0;
+/// Sections of a turn, of which each has some ten waves of a ripple and more.
+const SECTIONS: f64 = 12.0;
 /// Share by which the mean of a ride is off for other reasons: delay and T/J as known, steps of the converter.
 const CLOCKWORK: f64 = 3e-4;
 
@@ -71,15 +86,36 @@ pub struct Told {
     pub ripple: (f64, f64),
     /// Friction along the way, but for its very beginning.
     pub map: Vec<Place>,
+    /// Mean friction of each whole section of a turn, one behind the other, 1/V or V.
+    pub sections: Vec<f64>,
     /// The most that friction departs from its mean, as a share, while the ride is even.
     pub uneven: f64,
     /// Recording, tick and normalised innovation of the edge that fits worst.
     pub worst: (String, u64, f64),
 }
 
+/// The share that a ripple leaves in the mean over a stretch, which does not hold whole waves; radians of the wave.
+fn left_over(ripple: f64, radians: f64) -> f64 {
+    LEFT_OVER * ripple / radians.max(1.0)
+}
+
+/// The same of a section.
+pub(crate) fn section_rest(ripple: f64) -> f64 {
+    left_over(ripple, WAVES_PER_TURN * core::f64::consts::TAU / SECTIONS)
+}
+
 /// The rides in a recording.
 #[must_use]
 pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
+    stretches(recording, if recording.motor { &PASS } else { &RIDE })
+}
+
+/// Stretches of motion without a stick, even or not.
+pub(crate) fn uneven(recording: &Recording) -> Vec<Ride<'_>> {
+    stretches(recording, &STRETCH)
+}
+
+fn stretches<'a>(recording: &'a Recording, conditions: &Conditions) -> Vec<Ride<'a>> {
     let ticks = &recording.ticks;
     let edges: Vec<usize> = (1..ticks.len()).filter(|&i| ticks[i].counts > ticks[i - 1].counts).collect();
     if edges.len() < 20 {
@@ -88,11 +124,7 @@ pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
     let mut gaps: Vec<usize> = edges.windows(2).map(|w| w[1] - w[0]).collect();
     gaps.sort_unstable();
     let longest = LONGEST_SILENCE * gaps[gaps.len() / 2] as f64;
-    let (settling, shortest_s, shortest_rad) = if recording.motor {
-        (PASS_SETTLING_S, SHORTEST_PASS_S, SHORTEST_PASS_RAD)
-    } else {
-        (SETTLING_S, SHORTEST_S, SHORTEST_RAD)
-    };
+    let Conditions { settling_s: settling, shortest_s, shortest_rad, halves: (least, most) } = *conditions;
     let mut found = Vec::new();
     let mut first = 0;
     for k in 1..=edges.len() {
@@ -113,7 +145,7 @@ pub fn rides(recording: &Recording) -> Vec<Ride<'_>> {
         }
         let middle = begin.midpoint(end);
         let halves = way(begin, middle) / way(middle, end).max(1e-9);
-        if (0.9..1.1).contains(&halves) {
+        if (least..most).contains(&halves) {
             let rate = way(begin, end) / seconds;
             found.push(Ride { recording, ticks: (begin, end), first: mapped_from, rate });
         }
@@ -181,14 +213,13 @@ impl Ride<'_> {
             (way + v, sum + v * (b.mean[2] + b.mean[3]))
         });
         let hold = if motor { sums.1 / sums.0 } else { sums.0 / sums.1 };
-        let radians =
-            WAVES_PER_TURN * r.radians_per_count() * (r.ticks[end].counts - r.ticks[begin].counts) as f64;
-        // A stretch of the disc does not hold whole waves.
-        let uneven = LEFT_OVER * size / radians.max(1.0);
+        let radians = WAVES_PER_TURN * self.way();
+        let uneven = left_over(size, radians);
         // Volts that follow the ripple, and a filter that sees a part of it, are off by its square.
         let unseen = UNSEEN * size * size;
         Told {
             rate: self.rate,
+            sections: self.sections(&beliefs),
             hold: (hold, hold * (uneven * uneven + unseen * unseen + CLOCKWORK * CLOCKWORK).sqrt()),
             // Independent places: one for two radians of the wave.
             ripple: (size, size / (0.5 * radians).max(1.0).sqrt()),
@@ -200,6 +231,29 @@ impl Ride<'_> {
             ),
             worst: (r.name.clone(), r.first_tick + worst.0 as u64, worst.1),
         }
+    }
+
+    /// Way of the even part, rad.
+    pub(crate) fn way(&self) -> f64 {
+        let (begin, end) = self.ticks;
+        (self.recording.ticks[end].counts - self.recording.ticks[begin].counts) as f64
+            * self.recording.radians_per_count()
+    }
+
+    /// Mean friction of each whole section of the way.
+    fn sections(&self, beliefs: &[Belief]) -> Vec<f64> {
+        let length = f64::from(self.recording.counts_per_rev) / SECTIONS;
+        let mut means = Vec::new();
+        let (mut begun, mut sums) = (beliefs[0].mean[0], (0.0, 0.0));
+        for belief in beliefs {
+            let way = belief.mean[1].max(0.0);
+            sums = (sums.0 + way, sums.1 + way * (belief.mean[2] + belief.mean[3]));
+            if belief.mean[0] - begun >= length {
+                means.push(sums.1 / sums.0);
+                (begun, sums) = (belief.mean[0], (0.0, 0.0));
+            }
+        }
+        means
     }
 
     /// The filter along the ride: as [`smooth`] takes it, and the tick with the largest normalised innovation.
@@ -225,6 +279,32 @@ impl Ride<'_> {
             out.push((belief, predicted, f));
         }
         (out, (worst.0, f64::sqrt(worst.1)))
+    }
+
+    /// Logarithm of the density of the edges, with friction as another ride has [told](Self::told) it, where a voltage takes effect over a way, rad.
+    #[must_use]
+    pub fn density(&self, told: &Told, pull: f64, delay: f64, over: f64) -> f64 {
+        let r = self.recording;
+        let (begin, end) = self.ticks;
+        let origin = r.ticks[begin].counts;
+        let rate = self.rate * r.period / r.radians_per_count();
+        let friction = 1.0 / told.hold.0;
+        let shaft = shaft(r, pull, 0.0, told.ripple.0 * friction);
+        let mut belief = Belief::new(&shaft, 0.5, (rate, rate), (friction, 0.5 * friction));
+        let mut acts = r.ticks[begin].volts;
+        let mut log = 0.0;
+        for i in begin..end {
+            let volts = r.at_pad(i, (0.0, 1.0), delay / r.period);
+            let way = belief.mean[1].max(0.0) * r.radians_per_count();
+            let left = if over > 0.0 { libm::exp(-way / over) } else { 0.0 };
+            acts = volts + (acts - volts) * left;
+            belief.advance(&shaft, acts, 1.0);
+            let (before, now) = (r.ticks[i].counts, r.ticks[i + 1].counts);
+            if now > before {
+                log += belief.cross((now - origin) as f64, 0.5 * rate).density;
+            }
+        }
+        log
     }
 
     /// Friction each [`PER_TURN`]th of a turn, where the shaft has been.

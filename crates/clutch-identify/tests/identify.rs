@@ -5,6 +5,11 @@ use clutch_identify::release::{fall, releases};
 use clutch_identify::{DAMPINGS, Finding, Recording, Report, Tick, identify};
 use clutch_sim::Scenario;
 
+#[path = "../examples/random_rig/mod.rs"]
+#[allow(dead_code, reason = "its motors are of other tests")]
+mod random_rig;
+use random_rig::unlike::{Unlike, recordings as unlike};
+
 /// A rig that is not as the scenario's model has it: T/J, v_hold, μ_s/μ_d, C/J follow.
 const RIG: &str = r#"
 name = "unlike Table 1"
@@ -109,6 +114,30 @@ fn a_count_that_no_fall_explains_is_named() {
     assert!((first..first + 40).contains(&(at.tick as usize)), "{at:?} for {first}");
     let report = identify(&bad);
     assert!(refusal(&report.pull).contains(&format!("tick {}", at.tick)), "{report:?}");
+}
+
+#[test]
+fn a_rig_that_is_unlike_the_model_is_refused_with_its_cause_and_the_experiment_that_tells_it() {
+    let of = |kind, seed| {
+        let (truth, parts) = unlike(kind, seed).unwrap();
+        (truth, identify(&parts.unwrap()))
+    };
+    for kind in [Unlike::Ramp, Unlike::Hand] {
+        let (_, report) = of(kind, 201);
+        for finding in [&report.pull, &report.hold, &report.ratio, &report.stribeck, &report.damping] {
+            let why = refusal(finding);
+            assert!(why.contains("a torque that varies") && why.contains("a weight"), "{kind:?}: {why}");
+        }
+    }
+    let (truth, report) = of(Unlike::Stiff, 205);
+    let why = refusal(&report.hold);
+    assert!(why.contains("the later the slower") && why.contains("bristles"), "{why}");
+    assert_eq!((refusal(&report.ratio), report.map.len()), (why, 0));
+    assert_known(&report.pull, truth.pull, 0.01 * truth.pull);
+    let (truth, report) = of(Unlike::Runout, 201);
+    assert!(report.unexplained[0].contains("not square to its shaft"), "{:?}", report.unexplained);
+    assert_known(&report.hold, truth.hold, 0.1 * truth.hold);
+    assert!(report.hold.known().unwrap().share() > 0.02, "{:?}", report.hold);
 }
 
 #[test]

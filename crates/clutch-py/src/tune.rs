@@ -5,10 +5,12 @@ use crate::log::read_unless_interrupted;
 use crate::run::unless_interrupted;
 use crate::stepping::native;
 use clutch_core::ActuatorKind;
+use clutch_identify::added::Added;
 use clutch_identify::experiment::{ExperimentError, VirtualBoard};
 use clutch_identify::recording::ReadError;
 use clutch_identify::shown::{MOTOR_ROWS, ROWS};
 use clutch_identify::{Consent, Identified, Plan, Recording, RigFile, believed};
+use clutch_sim::Scenario;
 use clutch_tune::Options;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -31,27 +33,20 @@ fn experiment_error(py: Python<'_>, e: &ExperimentError) -> PyErr {
     }
 }
 
-/// Identifies a rig: the object that `clutch identify --json` prints, and the rig file, or why there is none. Without logs
-/// the scenario's simulated board is run, in virtual time.
-#[pyfunction]
-#[pyo3(signature = (scenario, logs, columns, log, travel_deg, fastest_deg_s))]
-pub(crate) fn identify<'py>(
-    py: Python<'py>,
-    scenario: &Bound<'py, PyAny>,
-    logs: Vec<PathBuf>,
-    columns: (String, String),
-    log: Option<PathBuf>,
-    travel_deg: Option<f64>,
-    fastest_deg_s: Option<f64>,
-) -> PyResult<(Bound<'py, PyAny>, Option<String>, Option<String>)> {
-    let scenario = native(scenario)?;
+/// The recordings in logs and tables; of a table period and encoder are the scenario's.
+fn read(
+    py: Python<'_>,
+    scenario: &Scenario,
+    logs: &[PathBuf],
+    columns: &(String, String),
+) -> PyResult<Vec<Recording>> {
     let mut recordings = Vec::new();
-    for path in &logs {
+    for path in logs {
         let name = path.display().to_string();
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
             let text =
                 std::fs::read_to_string(path).map_err(|e| os_error(py, path, &format!("{name}: {e}"), &e))?;
-            let spec = scenario.0.spec();
+            let spec = scenario.spec();
             let motor = spec.rig.actuator.kind() == ActuatorKind::Motor;
             let scale = (spec.period.seconds(), spec.rig.encoder.sensor.counts_per_rev, motor);
             let read = Recording::from_csv(&name, &text, (&columns.0, &columns.1), scale);
@@ -61,6 +56,33 @@ pub(crate) fn identify<'py>(
             recordings.extend(Recording::from_log(&name, &whole).map_err(|e| read_error(py, &e))?);
         }
     }
+    Ok(recordings)
+}
+
+/// Identifies a rig: the object that `clutch identify --json` prints, and the rig file, or why there is none. Without logs
+/// the scenario's simulated board is run, in virtual time. `loaded`: logs with a mass added, the mass (kg), its radius (m).
+#[pyfunction]
+#[pyo3(signature = (scenario, logs, columns, loaded, log, travel_deg, fastest_deg_s))]
+pub(crate) fn identify<'py>(
+    py: Python<'py>,
+    scenario: &Bound<'py, PyAny>,
+    logs: Vec<PathBuf>,
+    columns: (String, String),
+    loaded: Option<(Vec<PathBuf>, f64, f64)>,
+    log: Option<PathBuf>,
+    travel_deg: Option<f64>,
+    fastest_deg_s: Option<f64>,
+) -> PyResult<(Bound<'py, PyAny>, Option<String>, Option<String>)> {
+    let scenario = native(scenario)?;
+    let recordings = read(py, &scenario.0, &logs, &columns)?;
+    let loaded = match loaded {
+        Some((logs, mass, radius)) => {
+            let added = Added::on(&scenario.0, mass, radius);
+            let added = added.map_err(|e| PyValueError::new_err(e.to_string()))?;
+            Some((read(py, &scenario.0, &logs, &columns)?, added))
+        }
+        None => None,
+    };
     if let Some(folder) = &log {
         std::fs::create_dir_all(folder)
             .map_err(|e| os_error(py, folder, &format!("{}: cannot be made", folder.display()), &e))?;
@@ -75,10 +97,16 @@ pub(crate) fn identify<'py>(
         } else {
             recordings
         };
-        Ok(Identified::of(&recordings)?)
+        let loaded = match loaded {
+            Some((recordings, added)) => Some((Identified::of(&recordings)?, added)),
+            None => None,
+        };
+        Ok((Identified::of(&recordings)?, loaded))
     });
-    let report = found.map_err(|e| experiment_error(py, &e))?;
-    let object = from_json(py, &clutch_cli::identify::object(&report))?;
+    let (report, loaded) = found.map_err(|e| experiment_error(py, &e))?;
+    let separate = loaded.map(|(loaded, added)| report.separate(&loaded, &added)).transpose();
+    let separate = separate.map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let object = from_json(py, &clutch_cli::identify::object(&report, separate.as_ref()))?;
     let (file, why) = match report.rig_file(&scenario.0) {
         Ok(file) => (Some(file), None),
         Err(why) => (None, Some(why.to_string())),
@@ -136,8 +164,7 @@ pub(crate) fn tune<'py>(
     }
     let tuned = found.map_err(|e| scenario.error(py, &e))?;
     let object = serde_json::to_value(&tuned).map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
-    let files =
-        tuned.candidates.iter().map(|c| c.scenario.as_ref().map(clutch_sim::Scenario::canonical)).collect();
+    let files = tuned.candidates.iter().map(|c| c.scenario.as_ref().map(Scenario::canonical)).collect();
     let proof = tuned.certificate.as_ref().map(serde_json::to_string).transpose();
     let proof = proof.map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
     Ok((from_json(py, &object)?, files, clutch_cli::tune::verdict(&tuned), proof))

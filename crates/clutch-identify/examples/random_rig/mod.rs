@@ -6,7 +6,9 @@ use rand_pcg::Pcg64;
 use std::error::Error;
 
 pub(crate) mod added;
+pub(crate) mod bristles;
 pub(crate) mod motor;
+pub(crate) mod unlike;
 
 /// A rig, and a campaign's findings of it.
 pub(crate) type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;

@@ -1,0 +1,95 @@
+//! Rigs that are unlike the model, and the experiments that show in which way.
+//!
+//! | the rig | shows in |
+//! |---|---|
+//! | a torque that varies | releases, each of which has another T/J |
+//! | bristles whose stiffness does not scale with the brake's force | rides: a voltage takes effect over a way, and so the later the slower the shaft |
+//! | a disc that is not square to its shaft | rides: friction differs from section to section of the turn |
+
+use crate::release::{Apart, Fall, Unexplained};
+use crate::report::FALL;
+use crate::ride::{Ride, Told};
+
+/// Ways over which a voltage may take effect, counts.
+const WAYS: [f64; 7] = [0.1, 0.2, 0.4, 0.7, 1.0, 2.0, 4.0];
+/// Fastest ride that shows it, rad/s: a faster one leaves more than such a way in a period.
+const SLOW: f64 = 0.5;
+/// Times that what a ripple leaves in the mean of a section may be exceeded, and what it is at least, as a share.
+const EXCEEDED: f64 = 4.0;
+const LEAST_RUNOUT: f64 = 5e-3;
+
+/// The words on a torque that varies.
+const VARIES: &str = "a torque that varies, as a hand's, and nothing is told under it; a weight as the drive does, and releases before \
+     and behind the rides that agree show that the torque is steady";
+
+/// The reason why releases tell no T/J.
+#[must_use]
+pub fn fall_refused(at: &Unexplained) -> String {
+    match at.apart {
+        Some(Apart::Pulls(low, high)) => format!(
+            "a release needs a T/J of at least {high:.2} rad/s², another allows at most {low:.2}: {VARIES}"
+        ),
+        Some(Apart::Within(number)) => {
+            format!("{number} releases are no free fall under a steady torque: {VARIES}")
+        }
+        Some(Apart::Delays(low, high)) => format!(
+            "the releases have delays between {:.1} and {:.1} ms: an actuator with a lag; one with a lag of less than two periods, \
+             or releases from one voltage alone, tell it",
+            1e3 * low,
+            1e3 * high
+        ),
+        None => format!(
+            "{}: no free fall with any delay explains the counts up to tick {}: a count that was lost, a \
+             shaft that was not at rest before or not let go at once, or a torque that varies; releases from a longer rest tell which",
+            at.name, at.tick
+        ),
+    }
+}
+
+/// The reason why friction is not told, if in stretches of motion, uneven ones among them, a voltage takes effect over a way;
+/// `told`: friction, by a ride.
+#[must_use]
+pub fn bristles(stretches: &[Ride<'_>], told: &Told, fall: &Fall) -> Option<String> {
+    let density = |counts: f64| -> f64 {
+        let slow = stretches.iter().filter(|ride| ride.rate < SLOW);
+        slow.map(|ride| {
+            let way = counts * ride.recording.radians_per_count();
+            ride.density(told, fall.pull.value, fall.delay.value, way)
+        })
+        .sum()
+    };
+    let at_once = density(0.0);
+    let best = |best: (f64, f64), next: (f64, f64)| if next.1 > best.1 { next } else { best };
+    let (counts, by_way) = WAYS.into_iter().map(|n| (n, density(n))).fold((0.0, at_once), best);
+    if by_way - at_once <= FALL {
+        return None;
+    }
+    Some(format!(
+        "a voltage takes effect over some {counts} counts of the way, and so the later the slower the shaft: bristles that do not scale \
+         with the brake's force, or play of the pad; a pad that is held more stiffly tells friction, and a ride at 5 °/s then shows \
+         no such way"
+    ))
+}
+
+/// Root mean square by which friction differs from section to section of the turn, as a share, if that is more than a ripple's
+/// rest.
+#[must_use]
+pub fn runout(told: &[Told]) -> Option<f64> {
+    let most = told.iter().map(|ride| {
+        let n = ride.sections.len() as f64;
+        let mean = ride.sections.iter().sum::<f64>() / n.max(1.0);
+        let square = ride.sections.iter().map(|h| (h / mean - 1.0) * (h / mean - 1.0)).sum::<f64>();
+        (square / n.max(1.0)).sqrt()
+    });
+    let most = most.fold(0.0, f64::max);
+    let ripple = told.first()?.ripple.0;
+    (most > (EXCEEDED * crate::ride::section_rest(ripple)).max(LEAST_RUNOUT)).then_some(most)
+}
+
+/// The share that a run-out leaves in the mean over a way, rad, for one wave in a turn and for two.
+#[must_use]
+pub fn left_of_runout(share: f64, way: f64) -> f64 {
+    let half = [0.5 * way, way];
+    let left = half.map(|x| if x > 0.0 { (libm::sin(x) / x).abs() } else { 1.0 });
+    share * left[0].max(left[1])
+}
