@@ -177,7 +177,9 @@ def _heavier(
     given = {"logs": alone, "loaded": bool(loaded), "mass_kg": mass_kg is not None, "radius_m": radius_m is not None}
     missing = [name for name, there in given.items() if not there]
     if missing or mass_kg is None or radius_m is None:
-        raise ValueError(f"{', '.join(missing)}: expected beside loaded, mass_kg and radius_m, which go together with logs")
+        raise ValueError(
+            f"{', '.join(missing)}: expected beside loaded, mass_kg and radius_m, which go together with logs"
+        )
     return loaded, mass_kg, radius_m
 
 
