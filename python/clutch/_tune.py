@@ -210,8 +210,8 @@ def identify(
     columns : tuple of str, default ("counts", "volts")
         Columns of a CSV that hold counts, and volts given after them.
     loaded : iterable of path, optional
-        Logs of a second experiment, with a known mass added beside the weight: T, J and friction one by one. They go with
-        `logs`, `mass_kg` and `radius_m`.
+        Logs of a second experiment, with a known mass added beside the weight: T, J and friction one by one. They go
+        with `logs`, `mass_kg` and `radius_m`.
     mass_kg, radius_m : float, optional
         The mass that was added, and the radius of the pulley that it hangs from.
     log : path, optional
