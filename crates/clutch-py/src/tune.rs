@@ -61,6 +61,7 @@ fn read(
 
 /// Identifies a rig: the object that `clutch identify --json` prints, and the rig file, or why there is none. Without logs
 /// the scenario's simulated board is run, in virtual time. `loaded`: logs with a mass added, the mass (kg), its radius (m).
+#[allow(clippy::too_many_arguments, reason = "Python names them")]
 #[pyfunction]
 #[pyo3(signature = (scenario, logs, columns, loaded, log, travel_deg, fastest_deg_s))]
 pub(crate) fn identify<'py>(
