@@ -26,6 +26,10 @@ const NAMED: &[(&str, &str)] = &[
     ("SupportsGetItem[int, str]", "Sequence[str]"),
     ("SupportsGetItem[int, SupportsIndex]", "Sequence[int]"),
     ("logs: SupportsGetItem[int, str | PathLike[str]]", "logs: Sequence[str | PathLike[str]]"),
+    (
+        "loaded: tuple[SupportsGetItem[int, str | PathLike[str]],",
+        "loaded: tuple[Sequence[str | PathLike[str]],",
+    ),
     ("rates_deg_s: SupportsGetItem[int, SupportsFloat | SupportsIndex]", "rates_deg_s: Sequence[float]"),
     (
         "scenario: Scenario | None = None, law: Any | None = None)",
