@@ -1,5 +1,6 @@
 //! The board by the rules of docs/wire.md: what each frame does in each state, and its watchdog.
 
+use crate::desk::{BOARD, CONFIG};
 use clutch_core::{Counts, DacCode};
 use clutch_node::{BoardMisfit, BoardNode, BoardParams, Outbox};
 use clutch_wire::{
@@ -9,21 +10,7 @@ use clutch_wire::{
 };
 use proptest::prelude::*;
 
-const PARAMS: BoardParams = BoardParams {
-    board: 42,
-    boot: 9,
-    counts_per_rev: 20_000,
-    dac_bits: 12,
-    dac_lowest_mv: -10_000,
-    dac_highest_mv: 10_000,
-    period_min_us: 500,
-    period_max_us: 10_000,
-    watchdog_max_us: 30_000,
-    boot_code: 2867,
-    started_by: ResetCause::Watchdog,
-    brown_out_low: true,
-};
-const CONFIG: u64 = 0x0123_4567_89ab_cdef;
+const PARAMS: BoardParams = BoardParams { started_by: ResetCause::Watchdog, brown_out_low: true, ..BOARD };
 const HOLD: u16 = 3072;
 const RELEASE: u16 = 2048;
 const CONFIGURE: Configure = Configure {

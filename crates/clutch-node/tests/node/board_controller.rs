@@ -1,7 +1,8 @@
 //! Whole conversations: a host, a board in the controller role, and encoder and converter.
 
 use crate::desk::{
-    ALIVE_NS, BOARD, BOARD_CONTROLLER, BOARD_SILENCE_NS, CONFIG, Desk, MS, Plan, frames, key, paper, words,
+    self, ALIVE_NS, BOARD, BOARD_CONTROLLER, BOARD_SILENCE_NS, CONFIG, Desk, MS, Plan, frames, key, paper,
+    words,
 };
 use clutch_core::law::{LawParams, Limit, SmcParams};
 use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
@@ -618,7 +619,7 @@ fn what_the_line_has_carried_is_told_each_second() {
 // Frames that get lost on the way to the host.
 
 /// A host's view of frames: how often it was told of a sample, and where it thinks control stands.
-fn replay(desk: &Desk, bytes: &[u8]) -> (Vec<crate::desk::Heard>, clutch_node::HostNode) {
+fn replay(desk: &Desk, bytes: &[u8]) -> (Vec<desk::Heard>, clutch_node::HostNode) {
     let (mut host, mut notices) = (desk.plan.host(), Vec::new());
     host.receive(0, bytes, &desk.plan.path(), &mut |n| notices.push(n));
     (notices, host)
@@ -684,7 +685,7 @@ proptest! {
         let (mut board_controller, mut outboxes, mut taken) = (BoardController::new(BOARD_CONTROLLER), Outboxes::default(), Vec::new());
         for byte in line {
             board_controller.host(0, &[byte], &mut outboxes.host, &mut outboxes.daq);
-            taken.extend(frames(&crate::desk::drain(&mut outboxes.host)));
+            taken.extend(frames(&desk::drain(&mut outboxes.host)));
         }
         prop_assert!(taken.len() + lost >= sets.len());
         for m in taken {

@@ -1,5 +1,6 @@
 //! The controller: handshake, one answer per batch, stop until the board has heard.
 
+use crate::desk::BOARD;
 use clutch_core::law::{LawParams, LawTerms, PdParams};
 use clutch_core::supervisor::{Arrival, Cause, State};
 use clutch_core::{
@@ -518,16 +519,10 @@ fn controller_and_board_run_a_thousand_cycles_and_end_as_told() {
         let params = BoardParams {
             board: 0,
             boot: 1,
-            counts_per_rev: 20_000,
-            dac_bits: 12,
-            dac_lowest_mv: -10_000,
-            dac_highest_mv: 10_000,
             period_min_us: 100,
-            period_max_us: 10_000,
             watchdog_max_us: 10_000,
             boot_code: SAFE,
-            started_by: ResetCause::Power,
-            brown_out_low: false,
+            ..BOARD
         };
         let mut board = BoardNode::new(&params).unwrap();
         let (mut up, mut down) = (Outbox::default(), Outbox::default());

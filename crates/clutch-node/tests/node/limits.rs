@@ -2,12 +2,10 @@
 //! range is refused, and the host's words on it have key, value and unit; what is in range is taken, or a relation with
 //! other settings speaks against it.
 
-use crate::desk::{Plan, paper};
+use crate::desk::{PATHS, Plan, paper};
 use clutch_core::law::{LawParams, OutputParams, PdParams};
 use clutch_core::params::{Conversion, Kind, Range, Row, Unit};
-use clutch_core::reference::{
-    Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, ReferenceParams, Sine, Table, Trapezoid,
-};
+use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
 use clutch_core::{
     ActuatorParams, BothActuator, Bounds, BrakeGeometry, CoulombParams, DahlParams, ElastoPlasticParams,
     FixedCounts, FrictionParams, LugreParams, MaxwellParams, MotorActuator, PlantParams, SafeState,
@@ -52,28 +50,9 @@ fn plans() -> Vec<Plan> {
     let laws = LawParams::all().map(|law| Plan { servo: paper(law), ..Plan::new() });
     let safe = [SafeState::ramp(100.0, 5.5), SafeState::Release, SafeState::hold_then_release(5.0, 1.5)]
         .map(|on_fault| Plan { limits: SupervisorParams::new(on_fault), ..Plan::new() });
-    let paths = [
-        ReferenceParams::Hold,
-        ReferenceParams::Trapezoid(Trapezoid { distance: 0.2, speed: 0.5, acceleration: 5.0 }),
-        ReferenceParams::JerkLimited(JerkLimited {
-            distance: 0.2,
-            speed: 0.5,
-            acceleration: 5.0,
-            jerk: 90.0,
-        }),
-        ReferenceParams::MinimumJerk(MinimumJerk { distance: 0.2, duration: 0.75 }),
-        ReferenceParams::Sine(Sine { rate: 0.3, amplitude: 0.01, frequency: 3.0, phase: -0.25 }),
-        ReferenceParams::Chirp(Chirp {
-            rate: 0.3,
-            amplitude: 0.01,
-            from: 1.0,
-            to: 9.0,
-            duration: 0.5,
-            phase: 0.125,
-        }),
-        ReferenceParams::Table(Table { knots: &KNOTS, interpolation: Interpolation::Linear }),
-    ]
-    .map(|reference| Plan { reference, ..Plan::new() });
+    let table = ReferenceParams::Table(Table { knots: &KNOTS, interpolation: Interpolation::Linear });
+    let paths = [ReferenceParams::Hold, table].into_iter().chain(PATHS);
+    let paths = paths.map(|reference| Plan { reference, ..Plan::new() });
     let frictions: [FrictionParams<f32>; 5] = [
         CoulombParams::default().into(),
         DahlParams::default().into(),

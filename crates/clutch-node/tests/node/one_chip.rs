@@ -1,6 +1,6 @@
 //! Controller, encoder and converter on one chip: the loop closes within a sample.
 
-use crate::desk::{BOARD, BOARD_CONTROLLER, CONFIG, Plan, drain, frames, paper};
+use crate::desk::{self, BOARD, BOARD_CONTROLLER, CONFIG, Plan, drain, frames, paper};
 use clutch_core::law::LawParams;
 use clutch_core::supervisor::{Cause, State};
 use clutch_core::{Counts, Dac, DacCode, Encoder, LimitParams, Micros, Plant, PlantParams, SupervisorParams};
@@ -44,7 +44,7 @@ struct Bench {
     host: HostNode,
     shaft: Shaft,
     now_us: u64,
-    notices: Vec<crate::desk::Heard>,
+    notices: Vec<desk::Heard>,
 }
 
 impl Bench {

@@ -1,14 +1,12 @@
 //! A run as numbers: what the host planned is what the board builds, or it is refused.
 
-use crate::desk::{Plan, key};
+use crate::desk::{PATHS, Plan, key};
 use clutch_core::law::{
     CtcParams, DobParams, LawParams, OutputParams, PdParams, PidParams, SmcIntegralParams, SmcParams,
     SmcSignParams, SuperTwistingParams,
 };
 use clutch_core::params::Params;
-use clutch_core::reference::{
-    Chirp, Interpolation, JerkLimited, Knot, MinimumJerk, ReferenceParams, Sine, Table, Trapezoid,
-};
+use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
 use clutch_core::{FNV_64, LimitParams, fnv1a_64};
 use clutch_core::{
     FixedCounts, Micros, ObserverParams, SafeState, Servo, ServoParams, SmoothedDerivativeParams,
@@ -104,30 +102,13 @@ fn each_safe_state_is_built_as_it_was_planned() {
 #[test]
 fn each_path_is_the_planned_one_bit_for_bit_from_its_first_whole_count_on() {
     let table = |interpolation| ReferenceParams::Table(Table { knots: &KNOTS, interpolation });
-    let paths = [
+    let others = [
         ReferenceParams::Hold,
         ReferenceParams::ramp(0.3),
-        ReferenceParams::Trapezoid(Trapezoid { distance: 0.2, speed: 0.5, acceleration: 5.0 }),
-        ReferenceParams::JerkLimited(JerkLimited {
-            distance: 0.2,
-            speed: 0.5,
-            acceleration: 5.0,
-            jerk: 90.0,
-        }),
-        ReferenceParams::MinimumJerk(MinimumJerk { distance: 0.2, duration: 0.75 }),
-        ReferenceParams::Sine(Sine { rate: 0.3, amplitude: 0.01, frequency: 3.0, phase: -0.25 }),
-        ReferenceParams::Chirp(Chirp {
-            rate: 0.3,
-            amplitude: 0.01,
-            from: 1.0,
-            to: 9.0,
-            duration: 0.5,
-            phase: 0.125,
-        }),
         table(Interpolation::Linear),
         table(Interpolation::Cubic),
     ];
-    for reference in paths {
+    for reference in others.into_iter().chain(PATHS) {
         // Within a count; and far off, where the whole counts do not fit an encoder's 32 bits.
         for start in [0, 40_000, -40_000, (-3_000_000_000 << 16) + 5] {
             let plan = Plan { reference, start: FixedCounts(start), ..Plan::new() };

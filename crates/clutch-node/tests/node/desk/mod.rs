@@ -6,10 +6,10 @@
 //! ```
 //!
 //! Frames are passed by hand and times are computed.
-#![allow(dead_code, unreachable_pub, reason = "each test takes what it needs")]
+#![allow(unreachable_pub, reason = "a module of one program")]
 
 use clutch_core::law::{LawParams, LawTerms, OutputParams, PdParams};
-use clutch_core::reference::{Reference, ReferenceParams};
+use clutch_core::reference::{Chirp, JerkLimited, MinimumJerk, Reference, ReferenceParams, Sine, Trapezoid};
 use clutch_core::supervisor::State;
 use clutch_core::{
     Bounds, Counts, DacCode, FixedCounts, Micros, PlantParams, SafeState, Servo, ServoParams, Supervisor,
@@ -45,6 +45,22 @@ pub const MS: u64 = 1_000_000;
 /// The host pings so often, and believes in the board for so long.
 pub const ALIVE_NS: u64 = 20 * MS;
 pub const BOARD_SILENCE_NS: u64 = 200 * MS;
+
+/// A path of each kind that a few numbers make and that moves.
+pub const PATHS: [ReferenceParams<'static, f32>; 5] = [
+    ReferenceParams::Trapezoid(Trapezoid { distance: 0.2, speed: 0.5, acceleration: 5.0 }),
+    ReferenceParams::JerkLimited(JerkLimited { distance: 0.2, speed: 0.5, acceleration: 5.0, jerk: 90.0 }),
+    ReferenceParams::MinimumJerk(MinimumJerk { distance: 0.2, duration: 0.75 }),
+    ReferenceParams::Sine(Sine { rate: 0.3, amplitude: 0.01, frequency: 3.0, phase: -0.25 }),
+    ReferenceParams::Chirp(Chirp {
+        rate: 0.3,
+        amplitude: 0.01,
+        from: 1.0,
+        to: 9.0,
+        duration: 0.5,
+        phase: 0.125,
+    }),
+];
 
 /// A run as a host plans it.
 #[derive(Clone, Copy)]
