@@ -69,9 +69,7 @@ pub(crate) fn no_target() -> Option<String> {
 pub(crate) fn build(firmware: &Path, (package, goal): (&str, &str), peer: bool) -> Result<PathBuf> {
     let target = firmware.join("../target/firmware");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let all: &[&str] = &[];
-    let measuring: &[&str] = &["--bin", "budget", "--features", "peer"];
-    for selected in [all, measuring].into_iter().take(if peer { 2 } else { 1 }) {
+    let build = |selected: &[&str]| -> Result<()> {
         let mut command = Command::new(&cargo);
         command.current_dir(firmware).args(["build", "--release", "--locked", "--package", package]);
         command.args(["--target", goal, "--target-dir"]).arg(&target).args(selected);
@@ -82,6 +80,11 @@ pub(crate) fn build(firmware: &Path, (package, goal): (&str, &str), peer: bool) 
         if !command.status().context("cargo cannot be started")?.success() {
             bail!("the images cannot be built");
         }
+        Ok(())
+    };
+    build(&[])?;
+    if peer {
+        build(&["--bin", "budget", "--features", "peer"])?;
     }
     Ok(target.join(goal).join("release"))
 }

@@ -169,8 +169,8 @@ enum Verb {
     /// Holds the watch over friction and load against rigs that drift and rigs that do not, half an hour: the tables of
     /// docs/loop.md.
     Drift,
-    /// Identifies random rigs, rigs unlike the model, and as many random motor axes, each from about a minute of experiment on the simulated board: the
-    /// tables of docs/identify.md, some minutes.
+    /// Identifies random rigs, a quarter as many of each kind that is unlike the model, and as many random motor axes, each from
+    /// about a minute of experiment on the simulated board: the tables of docs/identify.md, some minutes.
     Identify {
         /// Rigs.
         #[arg(default_value_t = 200)]
@@ -432,6 +432,7 @@ fn meter() -> Result<()> {
 
 /// From the seeds of braked rigs to those of motor axes.
 const MOTORS: u64 = 20_000;
+/// And to those of rigs that are unlike the model.
 const UNLIKE: u64 = 40_000;
 
 /// The campaign of a package's example over random rigs, into its page.

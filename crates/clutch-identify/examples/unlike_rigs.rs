@@ -72,7 +72,6 @@ fn main() -> Outcome<()> {
     );
     println!("|---|---|---|---|---|---|---|");
     for (kind, name, word) in KINDS {
-        // False alarms are counted on as many rigs as there are in the first table.
         let runs = (first..first + rigs).into_par_iter().map(|seed| {
             let (truth, parts) = recordings(kind, seed).map_err(|e| format!("{name}, rig {seed}: {e}"))?;
             Ok((truth, parts.map(|parts| identify(&parts))))

@@ -213,19 +213,18 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
         return Ok(());
     }
     tally.stage("builds of the core for boards");
-    // A folder of their own, or they would wait while the wheel is built. Machine code of theirs is made for libclutch and
-    // the images, below.
-    let folder = ["check", "--release", "--target-dir", "target/embedded"];
+    // A folder of their own, or they would wait while the wheel is built.
+    let folder = ["build", "--release", "--target-dir", "target/embedded"];
     let part = |package: &str, args: &[&str]| cargo(folder).args(["--package", package]).args(args).quietly();
     let core = |args: &[&str]| part("clutch-core", args);
     for target in embedded {
         for features in ["", "linalg", "defmt"] {
             let with = if features.is_empty() { "no feature" } else { features };
             let built = core(&["--target", target, "--features", features])?;
-            tally.check_quiet(&format!("clutch-core compiles for {target} with {with}"), built);
+            tally.check_quiet(&format!("clutch-core builds for {target} with {with}"), built);
         }
         let built = part("clutch-hal", &["--target", target])?;
-        tally.check_quiet(&format!("clutch-hal compiles for {target}"), built);
+        tally.check_quiet(&format!("clutch-hal builds for {target}"), built);
     }
     no_panic(tally)?;
     libraries(tally)?;
