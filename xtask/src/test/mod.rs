@@ -47,10 +47,9 @@ pub(crate) fn all() -> Result<()> {
     }
     // Before the tests: some build images for an emulated board.
     targets()?;
-    // Mostly builds, which link for long on one core, beside those of the tests, and beside tests that wait. Those with a
-    // clock hold on a loaded machine.
-    let boards = beside("boards")?;
     let built = build(&mut tally)?;
+    // Mostly builds, which link for long on one core, beside tests that wait. Those with a clock hold on a loaded machine.
+    let boards = beside("boards")?;
     tally.stage("Python packages");
     let tools = python::interpreter()?;
     // Before the tests: it takes packages of others from their build, in the same folder, which has one build at a time.
