@@ -262,6 +262,14 @@ mod tests {
         assert_eq!(Encoder::new::<f64>(3).unwrap_err().field(), "counts_per_rev");
     }
 
+    #[test]
+    fn a_converter_has_its_highest_code_at_its_highest_voltage() {
+        let dac = Dac::<f64>::new(&DacParams::default()).unwrap();
+        assert_eq!(dac.top(), DacCode(4095));
+        assert!((dac.volts(dac.top()) + dac.step() - 10.0).abs() < 1e-12);
+        assert!((dac.per_volt() * dac.step() - 1.0).abs() < 1e-12);
+    }
+
     proptest! {
         #[test]
         fn a_code_survives_the_way_to_volts_and_back(code in 0_u16..4096, bits in 1_u8..=16) {

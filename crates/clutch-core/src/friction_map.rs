@@ -211,6 +211,7 @@ mod tests {
         use std::string::ToString;
         assert_eq!(of(4, &[4096; 3]), "3 points: expected four or more");
         assert_eq!(of(0, &[4096; 4]), "points 0 counts apart: expected 1 to 10000 counts");
+        assert_eq!(of(10_001, &[4096; 4]), "points 10001 counts apart: expected 1 to 10000 counts");
         assert_eq!(of(4, &[4096, 4096, 0, 4096]), "the factor of point 2: expected 0.1 to 10");
     }
 }

@@ -366,6 +366,21 @@ mod tests {
     }
 
     #[test]
+    fn a_start_between_two_counts_is_one_at_a_count_with_the_rest_as_error() {
+        let servo = servo();
+        let half = FixedCounts(FixedCounts::from_counts(7).0 + (1 << (FixedCounts::FRACTION_BITS - 1)));
+        let mut between = servo.start_at(half, &target(7), 0.0);
+        let mut at = servo.start(Counts(7), &target(7), 0.0);
+        let there = servo.tick_at(&mut between, half, &target(7), off_map);
+        let here = servo.tick(&mut at, Counts(7), &target(7));
+        // Half a count ahead, without a rate.
+        assert_eq!((there.tick.error_rate, here.tick.error), (0.0, 0.0));
+        let count: f64 = servo.encoder().radians_per_count();
+        assert!((there.tick.error + 0.5 * count).abs() < 1e-12);
+        assert!((there.command.voltage - 0.5 * count * 5000.0).abs() < 1e-9);
+    }
+
+    #[test]
     fn counts_that_wrap_are_a_shaft_that_turns_on() {
         let servo = servo();
         let start = i64::from(i32::MAX);

@@ -11,7 +11,10 @@ use clutch_core::law::{
     ControlLaw, Ctc, CtcParams, Hold, HoldParams, Limit, OutputParams, Pd, PdParams, Pid, PidParams, Smc,
     SmcParams, SmcSign, SmcSignParams, Terms, Tick, Voltage, VoltageParams,
 };
-use clutch_core::{Arithmetic, Each, Micros, PlantParams, StribeckParams};
+use clutch_core::{
+    Arithmetic, Each, Encoder, Micros, PlantParams, SmoothedDerivative, SmoothedDerivativeParams,
+    StribeckParams,
+};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 const N: usize = 4;
@@ -257,5 +260,23 @@ fn each_law_has_in_each_lane_the_bits_of_the_scalar() {
             }),
             |each| Ctc::in_lanes(each).unwrap(),
         );
+    }
+}
+
+#[test]
+fn the_smoothed_derivative_has_in_each_lane_the_bits_of_the_scalar() {
+    let filters: [SmoothedDerivative<f64>; N] = std::array::from_fn(|i| {
+        let p = SmoothedDerivativeParams { smoothing: 0.2 * scaled(i) };
+        SmoothedDerivative::new(&p, Encoder::PAPER, PERIOD).unwrap()
+    });
+    let together = SmoothedDerivative::in_lanes(&|get| Lanes(std::array::from_fn(|i| get(&filters[i]))));
+    let (mut rates, mut rate) = ([0.0; N], Lanes::default());
+    for k in 0..1000 {
+        let differences: [f64; N] = std::array::from_fn(|i| libm::sin(f64::from(k) * 0.37 * scaled(i)));
+        rate = together.smooth(rate, Lanes(differences));
+        for i in 0..N {
+            rates[i] = filters[i].smooth(rates[i], differences[i]);
+            assert_eq!(rates[i].to_bits(), rate.0[i].to_bits(), "sample {k}, lane {i}");
+        }
     }
 }

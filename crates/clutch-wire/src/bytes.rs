@@ -27,3 +27,17 @@ pub(crate) fn next<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     *rest = tail;
     Some(*head)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_that_does_not_fit_is_left_out() {
+        let mut place = [7; 3];
+        let mut put = Put::new(&mut place);
+        put.bytes([1, 2]);
+        put.bytes([3, 4]);
+        assert_eq!(place, [1, 2, 7]);
+    }
+}

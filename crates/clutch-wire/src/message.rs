@@ -539,8 +539,18 @@ pub const SCHEMA: u64 = {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kind_that_is_not_in_the_table_is_no_message() {
+        let kinds = (0..=u8::MAX).filter(|kind| TABLE.iter().all(|message| message.kind != *kind));
+        for kind in kinds {
+            assert_eq!((Message::length(kind, &[0; 64]), Message::take(kind, &[0; 64])), (None, None));
+        }
+    }
+
     #[test]
     fn the_schema_writes_kinds_in_hexadecimal() {
-        assert_eq!([0, 9, 10, 15].map(super::digit), *b"09af");
+        assert_eq!([0, 9, 10, 15].map(digit), *b"09af");
     }
 }

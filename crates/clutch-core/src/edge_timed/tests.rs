@@ -1,5 +1,5 @@
 use super::*;
-use crate::PlantParams;
+use crate::{CoulombParams, MotorActuator, PlantParams};
 use std::vec::Vec;
 
 const PERIOD: Micros = Micros(1000);
@@ -141,6 +141,47 @@ fn a_shaft_is_let_go_for_the_time_that_the_drive_takes_and_until_an_edge_comes()
     f.let_go(&mut state, 20.0_f64.to_radians());
     f.update(&mut state, FixedCounts::from_counts(1), 0.0, 20.0_f64.to_radians());
     assert!(!state.lets_go() && !state.starts());
+}
+
+#[test]
+fn a_brake_that_two_starts_did_not_move_is_let_go_for_a_count_and_a_half_and_a_motor_is_not() {
+    let motor = MotorActuator { gain: 0.05, preload: 0.25, load_share: 0.0 };
+    let motor = PlantParams { actuator: motor.into(), drive_torque: 0.0, ..PlantParams::default() };
+    // A fall of a count and a half takes 5.8 periods, and one more is for what is not known. Nothing but the motor drives the
+    // other: it has the longest time from the first.
+    for (model, periods) in [(PlantParams::default(), [1, 1, 7]), (motor, [250; 3])] {
+        let f =
+            EdgeTimed::new(&EdgeTimedParams::default(), &Plant::new(&model).unwrap(), Encoder::PAPER, PERIOD)
+                .unwrap();
+        let rate = 0.5_f64.to_radians();
+        let mut state = f.start(FixedCounts(0), 5.0, rate);
+        for expected in periods {
+            f.let_go(&mut state, rate);
+            let (mut released, mut n) = (0, 0);
+            while !state.rests() {
+                released += i32::from(state.lets_go());
+                f.update(&mut state, FixedCounts(0), 0.9, rate);
+                n += 1;
+                assert!(n < 1000, "never");
+            }
+            assert_eq!(released, expected);
+        }
+    }
+}
+
+#[test]
+fn friction_without_a_curve_has_one_shape_at_all_velocities() {
+    let model = PlantParams { friction: CoulombParams::default().into(), ..PlantParams::default() };
+    let f = EdgeTimed::<f64>::new(
+        &EdgeTimedParams::default(),
+        &Plant::new(&model).unwrap(),
+        Encoder::PAPER,
+        PERIOD,
+    )
+    .unwrap();
+    assert_eq!((f.shape(0.0), f.shape(0.01), f.shape(10.0)), (1.0, 1.0, 1.0));
+    let stribeck = filter::<f64>();
+    assert!(stribeck.shape(1e-3) > 1.05 && (stribeck.shape(10.0) - 1.0).abs() < 1e-6);
 }
 
 #[test]

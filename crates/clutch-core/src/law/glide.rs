@@ -338,7 +338,7 @@ impl<T: Real> Listed<T> for Glide<T> {
 mod tests {
     use super::*;
     use crate::law::OutputParams;
-    use crate::{MotorActuator, PlantParams};
+    use crate::{BothActuator, MotorActuator, PlantParams};
 
     fn glide(p: GlideParams, model: &PlantParams) -> Glide<f64> {
         let two_sided = model.actuator.kind().two_sided();
@@ -405,6 +405,21 @@ mod tests {
         assert_eq!(backwards, -forwards);
         // Faster than that takes more: 87 rad/s² for 5 °/s in a period.
         assert!((volts(5.0) - (0.0375 + 0.0017 * 87.27) / 0.05).abs() < 0.05, "{} V", volts(5.0));
+    }
+
+    #[test]
+    fn a_motor_beside_a_brake_starts_below_0_volts() {
+        let actuator = BothActuator { brake_gain: 0.14, motor_gain: 0.05, preload: 0.25 };
+        let model = PlantParams { actuator: actuator.into(), drive_torque: 0.0, ..PlantParams::default() };
+        let law = glide(GlideParams::default(), &model);
+        let count = core::f64::consts::TAU / 20_000.0;
+        let volts = |rate: f64| {
+            let tick = Tick { error: 2.0 * count, ..at(rate) };
+            law.update(&mut law.start(&tick, 0.0), &tick).voltage
+        };
+        // As the motor alone, with the other sign: friction at rest, then the acceleration of 5 °/s in a period.
+        assert!((volts(0.5) + 1.1).abs() < 0.2, "{} V", volts(0.5));
+        assert!((volts(5.0) + (0.0375 + 0.0017 * 87.27) / 0.05).abs() < 0.05, "{} V", volts(5.0));
     }
 
     #[test]

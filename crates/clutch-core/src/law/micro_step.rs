@@ -345,6 +345,61 @@ mod tests {
     }
 
     #[test]
+    fn a_motor_whose_steps_are_most_of_a_count_pushes_less() {
+        let motor = MicroStep::new(1.0, (0.6, 0.6), 0.0, (0.0, 0.0));
+        let (_, state) = errors(&motor, &mut shaft(0.6, 0.6), 0.005);
+        assert_eq!(state.push, PUSHES.0);
+        let fine = MicroStep::new(1.0, (0.09, 0.17), 0.0, (0.0, 0.0));
+        let (_, state) = errors(&fine, &mut shaft(0.09, 0.17), 0.005);
+        assert_eq!(state.push, PUSHED);
+    }
+
+    #[test]
+    fn edges_without_a_step_between_them_teach_nothing_of_its_way() {
+        let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, (0.0, 0.0));
+        let mut state = MicroStepState::default();
+        state.begin(0.5, 0.0);
+        for _ in 0..100 {
+            // The shaft creeps on ahead of a path that it has to wait for.
+            assert_eq!(steps.demand(&mut state, 1.0, -3.0, 0.001), Stepping::Hold);
+            assert_eq!(state.scale, 1.0);
+        }
+    }
+
+    #[test]
+    fn an_edge_against_the_step_teaches_nothing_of_its_way() {
+        let steps = MicroStep::new(1.0, (0.09, 0.17), 0.0, (0.0, 0.0));
+        let mut state = MicroStepState::default();
+        state.begin(0.5, 0.0);
+        let mut back = 0;
+        // Each tenth period the shaft is a count further back, however it is pushed.
+        for k in 1..1000 {
+            let moved = if k % 10 == 0 { -1.0 } else { 0.0 };
+            let demand = steps.demand(&mut state, moved, 5.0, 0.01);
+            back += i32::from(demand == Stepping::Go(state.push));
+            assert_eq!(state.scale, 1.0);
+        }
+        assert!(back > 50, "{back} periods of a push forwards");
+    }
+
+    #[test]
+    fn friction_is_told_by_how_much_shorter_or_longer_steps_are_than_believed() {
+        let (go, stop) = (0.09, 0.17);
+        let steps = MicroStep::new(1.0, (go, stop), 1.0, (0.0, 0.0));
+        let told = |scale: f64| steps.friction(&MicroStepState { scale, ..MicroStepState::default() });
+        // Held, a shaft loses what the pad has more than the drive: k = go (1 + go/stop)/2.
+        for friction in [0.7, 0.9, 1.2, 2.0] {
+            let stops = friction * (stop + go) - go;
+            let scale = (1.0 + go / stops) / (1.0 + go / stop);
+            assert!((told(scale) - friction).abs() < 1e-12, "{friction}: {}", told(scale));
+        }
+        assert_eq!((told(1.0), told(0.3)), (1.0, 1.0), "nothing learnt; less than no time to stop");
+        assert_eq!((told(0.66), told(4.9)), (3.0, (0.3_f64).max(told(4.9))));
+        let motor = MicroStep::new(1.0, (go, stop), 0.0, (0.0, 0.0));
+        assert_eq!(motor.friction(&MicroStepState { scale: 2.0, ..MicroStepState::default() }), 1.0);
+    }
+
+    #[test]
     fn nothing_that_is_no_number_is_remembered() {
         let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, (1.0, 0.0));
         let mut state = MicroStepState::default();

@@ -126,16 +126,9 @@ macro_rules! __choice {
                 },)+],
             };
 
-            #[allow(unused_assignments, unused_mut, reason = "the last option ends the count")]
             fn chosen(&self) -> usize {
-                let mut place = 0;
-                $($(#[cfg($cfg)])? {
-                    if matches!(self, $name::$option { .. }) {
-                        return place;
-                    }
-                    place += 1;
-                })+
-                place
+                let each = [$($(#[cfg($cfg)])? matches!(self, $name::$option { .. }),)+];
+                each.iter().position(|is| *is).unwrap_or_default()
             }
         }
 

@@ -180,6 +180,10 @@ fn each_kind_of_value_has_its_words() {
     assert_eq!(words(Kind::Points, Range::ANY, &S_DEG, false), points);
     let from_0 = words(Kind::Points, Range::at_least(0.0), &S_DEG, false);
     assert_eq!(from_0, format!("{points} from 0 s on"));
+    let angles = "a list of at least one pair [°, 1] of finite numbers, with angles that rise";
+    let along = Unit { text: "°, 1", ..S_DEG };
+    let turn = words(Kind::Points, Range::within(0.0, 360.0), &along, false);
+    assert_eq!(turn, format!("{angles} from 0 to 360 °"));
     // The ends in the key's unit, or in the struct's.
     let range = Range::above(0.0).below(90.0);
     assert_eq!(words(Kind::Real, range, &DEG, false), "a number above 0 and below 90 °");

@@ -478,6 +478,25 @@ proptest! {
     }
 }
 
+#[test]
+fn where_a_line_meets_a_unit_exactly_a_prepared_table_meets_it_too() {
+    // A third of a unit for each millisecond: rounded down, its steepness falls short of the unit by a hair.
+    for rise in [2, -2, 2_000_000, -2_000_000] {
+        let knots = [
+            Knot { time_us: 0, position: FixedCounts(0) },
+            Knot { time_us: 6000, position: FixedCounts(rise) },
+        ];
+        let table = Table { knots: &knots, interpolation: Interpolation::Linear };
+        let (steepness, slopes) = ([0, 1].map(|k| table.steepness(k)), [0, 1].map(|k| table.slope::<f64>(k)));
+        let prepared = Prepared { steepness: &steepness, slopes: &slopes };
+        let at = |tick| table.at_with::<f64>(prepared, tick, Encoder::PAPER, Micros(1000)).position;
+        assert_eq!(at(3), FixedCounts(rise / 2));
+        for tick in 0..8 {
+            assert_eq!(at(tick), table.at::<f64>(tick, Encoder::PAPER, Micros(1000)).position, "tick {tick}");
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn a_trapezoid_keeps_its_bounds_and_arrives(d in distance(), v in bound(-3.0..2.0), a in bound(-2.0..4.0)) {

@@ -812,6 +812,20 @@ in_both_scalars! {
         assert_eq!(rig.off(1_000_000).code.0, 2457);
     }
 
+    fn a_period_without_a_sample_is_a_step_of_the_safe_state_and_nothing_while_control_goes_on<T>() {
+        let on_fault = SafeState::ramp(T::from_i32(1000), T::from_i32(5));
+        let mut rig = Rig::<T>::with(&SupervisorParams { on_fault, ..params() }, &paper()).arm().warm();
+        rig.supervisor.pass(&mut rig.state);
+        assert_eq!((rig.state.state(), rig.state.code()), (State::Running, ZERO_VOLTS));
+        rig.supervisor.stop(&mut rig.state, Cause::Done);
+        let mut codes = Vec::from([rig.state.code().0]);
+        for _ in 0..2 {
+            rig.supervisor.pass(&mut rig.state);
+            codes.push(rig.state.code().0);
+        }
+        assert_eq!(codes, [2252, 2457, 2662]);
+    }
+
     fn hold_then_release_lets_go_after_its_time_and_says_released_when_it_does<T>() {
         let on_fault = SafeState::hold_then_release(T::from_i32(5), T::from_f64(0.003));
         let mut rig = Rig::<T>::with(&SupervisorParams { on_fault, ..params() }, &paper()).arm().warm();

@@ -326,6 +326,19 @@ fn a_frozen_encoder_of_a_resting_shaft_is_found_as_soon_as_the_brake_has_been_op
 }
 
 #[test]
+fn a_motor_axis_that_runs_against_its_voltage_is_too_fast_whichever_way_it_goes() {
+    for way in [1, -1] {
+        let envelope = envelope::<f64>(1, &LimitParams::default());
+        let mut s = envelope.start(0.0);
+        let ended = (1..100).find_map(|k| {
+            s.sends(6.0 * f64::from(way));
+            envelope.judge(&mut s, false, -way * k, 1)
+        });
+        assert_eq!(ended.map(|(cause, _)| cause), Some(Cause::TooFast), "{way}");
+    }
+}
+
+#[test]
 fn a_shaft_that_nothing_drives_may_stand_for_ever() {
     let envelope = envelope::<f32>(1, &LimitParams::default());
     let mut s = envelope.start(0.0);
