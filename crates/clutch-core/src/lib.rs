@@ -19,6 +19,7 @@
 //! no board has: the observer, on nalgebra, and the edge-timed filter for any law).
 //! Formatting of errors is outside of the no-panic promise: `core` formats floats.
 #![no_std]
+#![forbid(unsafe_code)]
 #![cfg_attr(
     test,
     allow(

@@ -29,6 +29,7 @@
 //! | `settings`, `telemetry` | both | a run on its way to a board controller, and its cycles on their way back |
 //! | `notice`, `outbox`, `pace` | both | what a node reports, its frames on their way out, and the pace of the samples |
 #![no_std]
+#![forbid(unsafe_code)]
 
 mod board;
 mod board_controller;
