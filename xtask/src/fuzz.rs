@@ -5,16 +5,36 @@ use crate::run::{Program, program, root};
 use anyhow::{Result, bail};
 use std::time::Instant;
 
-/// Targets in `fuzz/fuzz_targets`, each with the number of inputs that tests try, those of the corpus among them: as many as take 20 s at most.
+/// Targets in `fuzz/fuzz_targets`, each with the number of inputs that tests try, those of the corpus among them: as many
+/// as took 20 s at most with the memory watched.
 pub(crate) const TARGETS: [(&str, u32); 4] =
     [("decoder", 700_000), ("log", 110_000), ("request", 200_000), ("board_controller", 7000)];
+
+/// What a fuzzed target is watched for.
+#[derive(Clone, Copy)]
+pub(crate) enum Watched {
+    /// Panics, and each access of memory, by the address sanitizer.
+    Memory,
+    /// Panics alone: what is fuzzed has no unsafe code but that of its libraries, and builds and runs take half the time.
+    Panics,
+}
+
+impl Watched {
+    /// The sanitizer, as cargo-fuzz has its name.
+    fn sanitizer(self) -> &'static str {
+        match self {
+            Watched::Memory => "address",
+            Watched::Panics => "none",
+        }
+    }
+}
 
 /// Fuzzes every target, or only one, for `seconds` each; or for so many executions, told in docs/proof.md.
 pub(crate) fn all(seconds: u32, executions: Option<u64>, only: Option<&str>) -> Result<()> {
     install()?;
     for (target, _) in TARGETS.iter().filter(|(t, _)| only.is_none_or(|o| o == *t)) {
         match executions {
-            None if one(target, &[&format!("-max_total_time={seconds}")])? => {}
+            None if one(target, Watched::Memory, &[&format!("-max_total_time={seconds}")])? => {}
             Some(executions) => counted(target, executions)?,
             None => bail!("fuzzing {target} found something: see above"),
         }
@@ -29,7 +49,7 @@ fn counted(target: &str, executions: u64) -> Result<()> {
     let mut held = true;
     while held && done < executions {
         let step = STEP.min(executions - done);
-        held = one(target, &[&format!("-runs={step}")])?;
+        held = one(target, Watched::Memory, &[&format!("-runs={step}")])?;
         done += step;
         println!("{target}: {done} executions, {} s", begun.elapsed().as_secs());
     }
@@ -41,13 +61,13 @@ fn counted(target: &str, executions: u64) -> Result<()> {
 }
 
 /// Fuzzes one target until `end`, options of libFuzzer; true if it held.
-pub(crate) fn one(target: &str, end: &[&str]) -> Result<bool> {
+pub(crate) fn one(target: &str, watched: Watched, end: &[&str]) -> Result<bool> {
     // The first of its two folders is what libFuzzer fills; the one in the tree is only read.
     let (found, seeds) = (format!("target/corpus/{target}"), format!("fuzz/corpus/{target}"));
     std::fs::create_dir_all(root().join(&found))?;
     // A target need not have any.
     let seeds = root().join(&seeds).is_dir().then_some(seeds);
-    cargo_fuzz(&["run", target, &found])
+    cargo_fuzz(&["run", "--sanitizer", watched.sanitizer(), target, &found])
         .args(seeds)
         .arg("--")
         .args(end)
@@ -56,8 +76,8 @@ pub(crate) fn one(target: &str, end: &[&str]) -> Result<bool> {
 }
 
 /// Builds every target.
-pub(crate) fn build() -> Result<()> {
-    cargo_fuzz(&["build"]).run()
+pub(crate) fn build(watched: Watched) -> Result<()> {
+    cargo_fuzz(&["build", "--sanitizer", watched.sanitizer()]).run()
 }
 
 fn cargo_fuzz(args: &[&str]) -> Program {

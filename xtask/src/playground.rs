@@ -13,9 +13,18 @@ pub(crate) struct Playground {
     pub(crate) module: PathBuf,
 }
 
-/// Adds the module's target, builds the module, and the page with an example that is built already. None without rustup on
-/// a user's machine.
+/// Builds the module, and the page with an example that is built already. None without rustup on a user's machine.
 pub(crate) fn build() -> Result<Option<Playground>> {
+    let Some(module) = module()? else { return Ok(None) };
+    let out = root().join("target/playground");
+    std::fs::create_dir_all(&out)?;
+    let page = out.join("stick-slip.html");
+    program(root().join("target/debug/examples/page")).arg(&module).arg(&page).run()?;
+    Ok(Some(Playground { page, module }))
+}
+
+/// Adds the module's target, and builds the module. None without rustup on a user's machine.
+pub(crate) fn module() -> Result<Option<PathBuf>> {
     match program("rustup").args(["target", "add", TARGET]).quietly() {
         Ok((true, _)) => {}
         other if std::env::var_os("CI").is_none() => {
@@ -30,12 +39,7 @@ pub(crate) fn build() -> Result<Option<Playground>> {
     let packages = ["--package", "clutch-web", "--package", "clutch-core", "--features", "clutch-core/terse"];
     let build = cargo(["build", "--lib", "--locked", "--profile", "web", "--target", TARGET]).args(packages);
     build.args(["--target-dir"]).arg(&folder).run()?;
-    let module = folder.join(TARGET).join("web/clutch_web.wasm");
-    let out = root().join("target/playground");
-    std::fs::create_dir_all(&out)?;
-    let page = out.join("stick-slip.html");
-    program(root().join("target/debug/examples/page")).arg(&module).arg(&page).run()?;
-    Ok(Some(Playground { page, module }))
+    Ok(Some(folder.join(TARGET).join("web/clutch_web.wasm")))
 }
 
 /// Sizes of page and module, also as a server sends them, if there is a Node to tell.

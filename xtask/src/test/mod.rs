@@ -65,9 +65,12 @@ pub(crate) fn all() -> Result<()> {
     tally.end(host? & wheel?)
 }
 
-/// The checks for boards, and the fuzzing, alone.
+/// All that runs beside the other tests, alone: the checks for boards, the module of the playground, the fuzzing.
 pub(crate) fn boards() -> Result<()> {
     let mut tally = Tally::new();
+    // Tests of the wheel want it; built here, it is there when they come.
+    tally.stage("module of the playground");
+    playground::module()?;
     boards_of(&mut tally, targets()?)?;
     fuzzing(&mut tally)?;
     tally.end(true)
@@ -325,7 +328,10 @@ fn libraries(tally: &mut Tally) -> Result<()> {
     Ok(())
 }
 
-/// Each reader of bytes from outside, with a number of inputs, those of the corpus among them, that took 20 s when counted.
+/// What the tests' fuzzing is watched for; `cargo xtask fuzz` watches the memory, too.
+const WATCHED: fuzz::Watched = fuzz::Watched::Panics;
+
+/// Each reader of bytes from outside.
 fn fuzzing(tally: &mut Tally) -> Result<()> {
     if std::env::var_os("CI").is_none() {
         println!(
@@ -336,10 +342,10 @@ fn fuzzing(tally: &mut Tally) -> Result<()> {
     }
     tally.stage("build of the fuzz targets");
     fuzz::install()?;
-    fuzz::build()?;
+    fuzz::build(WATCHED)?;
     tally.stage("fuzzing");
     for (target, runs) in fuzz::TARGETS {
-        let held = fuzz::one(target, &[&format!("-runs={runs}"), "-seed=1"])?;
+        let held = fuzz::one(target, WATCHED, &[&format!("-runs={runs}"), "-seed=1"])?;
         tally.check(&format!("fuzzing {target} with {runs} inputs finds nothing"), held);
     }
     Ok(())
@@ -349,12 +355,6 @@ fn fuzzing(tally: &mut Tally) -> Result<()> {
 fn wheel_of(tally: &mut Tally, tools: &Path, wheel: &python::Wheel) -> Result<bool> {
     tally.stage("types of the wheel");
     tally.check("the type stub is what the native module gives", stubs::hold(tools, wheel)?);
-    let settings = root().join("pyproject.toml");
-    let python = |args: &[&str]| -> Result<Program> { Ok(wheel.program(tools)?.arg("-m").args(args)) };
-    let strict = python(&["mypy", "--strict", "-p", "clutch", "--config-file"])?.arg(&settings);
-    tally.check_quiet("mypy --strict finds nothing in the installed package", strict.quietly()?);
-    let stubtest = python(&["mypy.stubtest", "clutch._clutch", "--mypy-config-file"])?.arg(&settings);
-    tally.check_quiet("the type stub agrees with the module at run time", stubtest.quietly()?);
     tally.stage("what the wheel is compared with");
     compared()?;
     let bits = root().join("target/bits");
@@ -364,9 +364,9 @@ fn wheel_of(tally: &mut Tally, tools: &Path, wheel: &python::Wheel) -> Result<bo
     let playground = playground::build()?;
     tally.stage("tests of the wheel");
     // One more than there are processors: most wait for a process or a clock now and then, and files differ in length.
-    let pytest = ["pytest", "--color=no", "-q", "-n", "3", "--dist", "loadfile"];
+    let pytest = ["-m", "pytest", "--color=no", "-q", "-n", "3", "--dist", "loadfile"];
     let slowest = ["--durations=10", "--durations-min=5"];
-    let tests = python(&pytest)?.args(slowest).arg(root().join("python/tests"));
+    let tests = wheel.program(tools)?.args(pytest).args(slowest).arg(root().join("python/tests"));
     let tests = match &playground {
         Some(built) => tests
             .env("CLUTCH_PLAYGROUND", &built.page)
