@@ -6,7 +6,7 @@
 
 use crate::modes::{Affine, E, Mode, S};
 use crate::setup::{Contradiction, Form, Proof};
-use crate::simplex::{Constraints, Dual, Program, Scratch};
+use crate::simplex::{Constraints, Dual, Program};
 use crate::units::Units;
 
 /// Effort of a search.
@@ -45,7 +45,8 @@ pub(crate) struct Search<'a, const N: usize> {
     duals: Vec<Dual<N>>,
     /// Part of each program's value that no constraint bounds.
     constants: Vec<f64>,
-    scratch: Scratch,
+    /// Constraints that programs have compared so far.
+    compared: u64,
     /// Sweeps so far.
     swept: usize,
 }
@@ -90,7 +91,7 @@ impl<'a, const N: usize> Search<'a, N> {
                 constants.push(next.constant);
             }
         }
-        Search { units, modes, set, start, duals, constants, scratch: Scratch::default(), swept: 0 }
+        Search { units, modes, set, start, duals, constants, compared: 0, swept: 0 }
     }
 
     /// Bound of a row after a tick in a mode, good enough or best.
@@ -103,7 +104,7 @@ impl<'a, const N: usize> Search<'a, N> {
             return quick;
         }
         let c = self.modes[mode].next(self.units, &self.set.row(row)).weights;
-        program.improve(&c, dual, enough - constant, &mut self.scratch) + constant
+        program.improve(&c, dual, enough - constant, &mut self.compared) + constant
     }
 
     /// Lets each radius grow to what a tick needs; `true` if none had to.
@@ -147,7 +148,7 @@ impl<'a, const N: usize> Search<'a, N> {
             if self.error() > effort.error_limit || !self.error().is_finite() {
                 return Err(Open::Grows);
             }
-            if self.scratch.work > effort.work {
+            if self.compared > effort.work {
                 return Err(Open::Slow);
             }
         }
@@ -158,7 +159,7 @@ impl<'a, const N: usize> Search<'a, N> {
         for _ in 0..effort.shrinks {
             self.shrink();
             let less = self.error();
-            if less > error * (1.0 - effort.settled) || self.scratch.work > 2 * effort.work {
+            if less > error * (1.0 - effort.settled) || self.compared > 2 * effort.work {
                 break;
             }
             error = less;

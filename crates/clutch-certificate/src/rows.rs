@@ -45,11 +45,11 @@ fn integral(u: &Units) -> (f64, f64) {
     }
 }
 
-/// `c A` for the closed loop with `b` counts per tick² and volt; `share` is what limits leave of the law's demand. The state
-/// may end with the last measured error.
-pub(crate) fn back(u: &Units, b: f64, share: f64, c: &[f64]) -> Vec<f64> {
+/// `c A` for the closed loop with `b` counts per tick² and volt; `share` is what limits leave of the law's demand, and `of_rate`
+/// of its part by the rate. The state may end with the last measured error.
+pub(crate) fn back(u: &Units, b: f64, (share, of_rate): (f64, f64), c: &[f64]) -> Vec<f64> {
     let ((kp, kd), (ki, follows)) = (linear(u), integral(u));
-    let kd = kd * u.kappa;
+    let kd = kd * u.kappa * of_rate;
     let mut out = vec![0.0; c.len()];
     let last = P + u.delay + usize::from(u.memory().is_some());
     out[E] = c[E] + u.kappa * c[Z] + c.get(last).unwrap_or(&0.0);
@@ -130,6 +130,11 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
     if fineness.saturated {
         shares.extend([0.12, 0.06]);
     }
+    // In a saturated loop the slope of (31) by the error and that by the rate are not left alike.
+    let of_rate: &[f64] = match u.law {
+        Gains::Smc { .. } if fineness.saturated => &[0.0, 0.25, 0.5, 1.0],
+        _ => &[1.0],
+    };
     let middle = (u.brake[0] * u.brake[1]).sqrt();
     let spread = fineness.spread;
     let wide = u.brake[1] > 1.25 * u.brake[0] || spread > 1.0;
@@ -140,11 +145,11 @@ pub(crate) fn rows<const N: usize>(u: &Units, form: Form, fineness: Fineness) ->
         orbits.push(Vec::new());
     }
     for b in &brakes {
-        for share in &shares {
+        for left in shares.iter().flat_map(|share| of_rate.iter().map(move |rate| (*share, *rate))) {
             for seed in &seeds {
                 let mut c = *seed;
                 for orbit in orbits.iter_mut().skip(1) {
-                    let next = back(u, *b, *share, &c);
+                    let next = back(u, *b, left, &c);
                     c.copy_from_slice(&next);
                     // In the set's coordinates the last measured error is another way to write the error.
                     orbit.push(c);

@@ -309,6 +309,8 @@ fn with_cap<const N: usize>(p: &Parts<'_>, cap: f64) -> Result<Cell, (Open, f64)
     let (sweeps, shrinks, settled, work) = match p.setup.law {
         Gains::Pid { .. } => (1500, 400, 1e-5, 6 * p.options.work),
         Gains::Shell { .. } => (600, 40, 1e-4, p.options.work),
+        // Four times the directions, and hundreds of modes.
+        Gains::Smc { .. } if p.fineness.saturated => (300, 40, 1e-4, 8 * p.options.work),
         Gains::Pd { .. } | Gains::Smc { .. } => (300, 40, 1e-4, p.options.work),
     };
     let effort = Effort {

@@ -8,6 +8,9 @@
 //! A library's solver would set up and factorise each of these programs anew: the search asks 10⁵ to 10⁷ of them, nearly all of
 //! which a dozen multiplications answer, and it needs the multipliers of bounds that are not yet optimal.
 
+/// Constraints that are compared at once: as many as a wide vector holds.
+const AT_ONCE: usize = 8;
+
 /// Constraints by column: their products with a vector are sums of few long columns.
 #[derive(Clone, Debug)]
 pub(crate) struct Constraints<const N: usize> {
@@ -36,32 +39,41 @@ impl<const N: usize> Constraints<N> {
         std::array::from_fn(|i| self.columns[i][j])
     }
 
-    /// The constraint that `y` breaks most, and by how much.
-    fn most_broken(&self, y: &[f64; N], scratch: &mut Scratch) -> (usize, f64) {
-        scratch.work += self.len() as u64;
-        let scratch = &mut scratch.sums;
-        scratch.clear();
-        scratch.extend(self.rhs.iter().map(|b| -b));
+    /// The constraint that `y` breaks most, the first of equals, and by how much. `compared` counts constraints.
+    fn most_broken(&self, y: &[f64; N], compared: &mut u64) -> (usize, f64) {
+        *compared += self.len() as u64;
+        let whole = self.len() - self.len() % AT_ONCE;
+        // The worst of each place of a vector: compared apart, they need no order among each other.
+        let (mut places, mut worst) = ([usize::MAX; AT_ONCE], [f64::NEG_INFINITY; AT_ONCE]);
+        for begin in (0..whole).step_by(AT_ONCE) {
+            let by: [f64; AT_ONCE] = self.broken(y, begin);
+            for k in 0..AT_ONCE {
+                let more = by[k] > worst[k];
+                worst[k] = if more { by[k] } else { worst[k] };
+                places[k] = if more { begin + k } else { places[k] };
+            }
+        }
+        let found = places.into_iter().zip(worst);
+        let rest = (whole..self.len()).map(|j| (j, self.broken::<1>(y, j)[0]));
+        found.chain(rest).fold((usize::MAX, f64::NEG_INFINITY), |(i, a), (j, b)| {
+            if b > a || (b == a && j < i) { (j, b) } else { (i, a) }
+        })
+    }
+
+    /// How much `y` breaks some constraints, from one on.
+    #[inline]
+    fn broken<const K: usize>(&self, y: &[f64; N], begin: usize) -> [f64; K] {
+        let mut sums = [0.0; K];
+        for (sum, b) in sums.iter_mut().zip(&self.rhs[begin..begin + K]) {
+            *sum = -b;
+        }
         for (column, y) in self.columns.iter().zip(y) {
-            for (sum, x) in scratch.iter_mut().zip(column) {
+            for (sum, x) in sums.iter_mut().zip(&column[begin..begin + K]) {
                 *sum += x * y;
             }
         }
-        let mut worst = (usize::MAX, f64::NEG_INFINITY);
-        for (j, by) in scratch.iter().enumerate() {
-            if *by > worst.1 {
-                worst = (j, *by);
-            }
-        }
-        worst
+        sums
     }
-}
-
-/// Room for sums, and the number of comparisons so far.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Scratch {
-    sums: Vec<f64>,
-    pub(crate) work: u64,
 }
 
 /// A program: constraints of the set, which all share, and those of a mode.
@@ -135,14 +147,8 @@ impl<const N: usize> Program<'_, N> {
         out
     }
 
-    /// Improves a dual point until its bound is at most `enough`, or optimal; the bound.
-    pub(crate) fn improve(
-        &self,
-        c: &[f64; N],
-        dual: &mut Dual<N>,
-        enough: f64,
-        scratch: &mut Scratch,
-    ) -> f64 {
+    /// Improves a dual point until its bound is at most `enough`, or optimal; the bound. `compared` counts constraints.
+    pub(crate) fn improve(&self, c: &[f64; N], dual: &mut Dual<N>, enough: f64, compared: &mut u64) -> f64 {
         let bound = self.bound(dual);
         if bound <= enough {
             return bound;
@@ -162,8 +168,8 @@ impl<const N: usize> Program<'_, N> {
             if value <= enough {
                 break;
             }
-            let (a, by_a) = self.set.most_broken(&y, scratch);
-            let (b, by_b) = self.mode.most_broken(&y, scratch);
+            let (a, by_a) = self.set.most_broken(&y, compared);
+            let (b, by_b) = self.mode.most_broken(&y, compared);
             let (entering, by) = if by_a >= by_b { (a, by_a) } else { (self.set.len() + b, by_b) };
             if by <= FEASIBLE {
                 break;

@@ -45,7 +45,7 @@ pub fn largest(radii: &[Stability; 3]) -> f64 {
 fn closed_loop(u: &Units, b: f64) -> Vec<Vec<f64>> {
     let n = 3 + u.delay + usize::from(u.memory().is_some());
     let unit = |i: usize| (0..n).map(|k| f64::from(i == k)).collect::<Vec<_>>();
-    (0..n).map(|i| back(u, b, 1.0, &unit(i))).collect()
+    (0..n).map(|i| back(u, b, (1.0, 1.0), &unit(i))).collect()
 }
 
 /// `lim ‖A^k‖^(1/k)` by squaring: `k = 2³⁰`.

@@ -89,7 +89,7 @@ impl Belief {
         f[(4, 4)] = 1.0 - turned * decay;
         f[(3, 3)] = 1.0 + turned * f[(4, 3)];
         f[(3, 4)] = turned * f[(4, 4)];
-        self.spread = f * self.spread * f.transpose();
+        self.spread = carried(&f, &self.spread);
         self.spread[(1, 1)] += shaft.walk * dt;
         // With it the wave's variance stays what it is.
         self.spread[(4, 4)] += 2.0 * decay * k2 * shaft.ripple * shaft.ripple * turned;
@@ -120,6 +120,29 @@ impl Belief {
     }
 }
 
+/// `f P fᵀ` of the `f` that [`Belief::advance`] gives, without its zeros: in the order of the whole product, whose figures it
+/// has. A likelihood is millions of these.
+fn carried(f: &Spread, spread: &Spread) -> Spread {
+    /// `f x`, of a column `x`.
+    fn times(f: &Spread, x: [f64; 5]) -> [f64; 5] {
+        [
+            x[0] + f[(0, 1)] * x[1] + f[(0, 2)] * x[2] + f[(0, 3)] * x[3],
+            f[(1, 1)] * x[1] + f[(1, 2)] * x[2] + f[(1, 3)] * x[3],
+            x[2],
+            f[(3, 3)] * x[3] + f[(3, 4)] * x[4],
+            f[(4, 3)] * x[3] + f[(4, 4)] * x[4],
+        ]
+    }
+    let columns: [[f64; 5]; 5] = spread.data.0.map(|column| times(f, column));
+    // Rows of f P: each times fᵀ is f times it.
+    let mut out = Spread::zeros();
+    for i in 0..5 {
+        let row = times(f, columns.map(|column| column[i]));
+        (0..5).for_each(|j| out[(i, j)] = row[j]);
+    }
+    out
+}
+
 /// A period: the belief at its end from the samples up to that, the one that was predicted, and the matrix of small
 /// departures over the period.
 pub type Passed = (Belief, Belief, Spread);
@@ -138,4 +161,34 @@ pub fn smooth(passed: &[Passed]) -> Vec<Belief> {
         out[i].spread = now.spread + gain * (later.spread - predicted.spread) * gain.transpose();
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_covariance_is_carried_as_by_the_whole_product() {
+        for motor in [false, true] {
+            let shaft = Shaft {
+                pull: 0.03,
+                motor,
+                damping: 1e-3,
+                wave: 0.02,
+                wave_damping: 0.1,
+                ripple: 0.05,
+                walk: 1e-6,
+            };
+            let mut belief = Belief::new(&shaft, 0.0, (0.1, 0.02), (0.4, 0.1));
+            for k in 0..500 {
+                let before = belief.spread;
+                let volts = 1.5 + libm::sin(0.1 * f64::from(k));
+                let f = belief.advance(&shaft, volts, 1.0);
+                assert_eq!(carried(&f, &before), f * before * f.transpose(), "period {k}");
+                if k % 7 == 0 {
+                    belief.cross(0.1 * f64::from(k), 0.02);
+                }
+            }
+        }
+    }
 }
