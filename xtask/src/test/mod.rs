@@ -41,17 +41,16 @@ const TESTS: &str = "--tests";
 /// Runs everything, counts, and fails at the end if anything failed.
 pub(crate) fn all() -> Result<()> {
     let mut tally = Tally::new();
-    tally.stage("programs that tests need");
-    if std::env::var_os("CI").is_some() {
-        programs()?;
-    }
-    // Before the tests: some build images for an emulated board.
-    targets()?;
-    let built = build(&mut tally)?;
+    // What has to come from elsewhere comes while processors build.
+    let (built, tools) = std::thread::scope(|scope| {
+        let needs = scope.spawn(needs);
+        let built = build(&mut tally)?;
+        tally.stage("what tests need, beside their build");
+        let tools = needs.join().unwrap_or_else(|_| bail!("what tests need could not be had: see above"))?;
+        anyhow::Ok((built, tools))
+    })?;
     // Mostly builds, which link for long on one core, beside tests that wait. Those with a clock hold on a loaded machine.
     let boards = beside("boards")?;
-    tally.stage("Python packages");
-    let tools = python::interpreter()?;
     // Before the tests: it takes packages of others from their build, in the same folder, which has one build at a time.
     tally.stage("build of the wheel");
     let wheel = python::Wheel::install(&tools);
@@ -93,6 +92,15 @@ pub(crate) fn playground() -> Result<Option<PathBuf>> {
     let Some(built) = playground::build()? else { return Ok(None) };
     playground::sizes(&built)?;
     Ok(Some(built.page))
+}
+
+/// Programs, targets and packages of Python that tests need; the interpreter that has the packages.
+fn needs() -> Result<PathBuf> {
+    if std::env::var_os("CI").is_some() {
+        programs()?;
+    }
+    targets()?;
+    python::interpreter()
 }
 
 /// Installs the programs without which tests skip themselves on a user's machine.
@@ -351,6 +359,18 @@ fn fuzzing(tally: &mut Tally) -> Result<()> {
     Ok(())
 }
 
+/// Files of the wheel's tests that take a minute and more: they come first, or the last of them runs alone at the end.
+const LONGEST: [&str; 8] = [
+    "test_docs_python.py",
+    "test_start.py",
+    "test_model.py",
+    "test_commands.py",
+    "test_plot.py",
+    "test_examples.py",
+    "test_referee.py",
+    "test_types.py",
+];
+
 /// The wheel, built from its source distribution and installed outside of this tree, tested there.
 fn wheel_of(tally: &mut Tally, tools: &Path, wheel: &python::Wheel) -> Result<bool> {
     tally.stage("types of the wheel");
@@ -364,9 +384,12 @@ fn wheel_of(tally: &mut Tally, tools: &Path, wheel: &python::Wheel) -> Result<bo
     let playground = playground::build()?;
     tally.stage("tests of the wheel");
     // One more than there are processors: most wait for a process or a clock now and then, and files differ in length.
-    let pytest = ["-m", "pytest", "--color=no", "-q", "-n", "3", "--dist", "loadfile"];
+    let pytest =
+        ["-m", "pytest", "--color=no", "-q", "-n", "3", "--dist", "loadfile", "--no-loadscope-reorder"];
     let slowest = ["--durations=10", "--durations-min=5"];
-    let tests = wheel.program(tools)?.args(pytest).args(slowest).arg(root().join("python/tests"));
+    let folder = root().join("python/tests");
+    let tests = wheel.program(tools)?.args(pytest).args(slowest);
+    let tests = tests.args(LONGEST.map(|file| folder.join(file))).arg(folder);
     let tests = match &playground {
         Some(built) => tests
             .env("CLUTCH_PLAYGROUND", &built.page)
