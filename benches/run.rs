@@ -117,17 +117,26 @@ fn systems(c: &mut Criterion) {
 fn lanes(c: &mut Criterion) {
     let mut group = c.benchmark_group("sweep_256_x_10_s");
     group.sample_size(10);
-    for (rig, rate) in [("paper", 20.0), ("paper", 2.0), ("bench", 2.0)] {
-        let base = format!("name = \"PD\"\n[rig]\nbase = \"{rig}\"\n[law.pd]\n[run]\nduration_s = 10.0\n");
+    // A gain of each law, its least value, and the range of values.
+    let laws = [
+        ("pd", "kp_v_rad", 4000.0, 2048.0),
+        ("super_twisting", "k1_v_rt_s_rad", 4.0, 1.0),
+        ("smc_integral", "kp_v", 6.5, 1.0),
+        ("dob", "kp_1_s2", 9000.0, 2000.0),
+    ];
+    let on = [("paper", 20.0), ("paper", 2.0), ("bench", 2.0)];
+    for ((law, gain, least, range), (rig, rate)) in laws.iter().flat_map(|law| on.map(|on| (*law, on))) {
+        let base =
+            format!("name = \"{law}\"\n[rig]\nbase = \"{rig}\"\n[law.{law}]\n[run]\nduration_s = 10.0\n");
         let table = format!("{base}[reference.ramp]\nrate_deg_s = {rate}\n").parse().expect("a table");
-        let keys = vec!["law.pd.kp_v_rad".to_owned()];
-        let rows = (0..256).map(|i| vec![Value::Float(4000.0 + 8.0 * f64::from(i))]).collect();
-        let sweep = Sweep::new("PD", table, keys, rows).expect("a value for the key in each row");
+        let keys = vec![format!("law.{law}.{gain}")];
+        let rows = (0..256).map(|i| vec![Value::Float(least + range * f64::from(i) / 256.0)]).collect();
+        let sweep = Sweep::new(law, table, keys, rows).expect("a value for the key in each row");
         let never = AtomicBool::new(false);
-        group.bench_function(format!("in_lanes/{rig}/pd_{rate}_deg_s"), |b| {
+        group.bench_function(format!("in_lanes/{rig}/{law}_{rate}_deg_s"), |b| {
             b.iter(|| sweep.run(1, Keep::Figures, &never, &|_, row| assert!(row.is_ok())));
         });
-        group.bench_function(format!("one_by_one/{rig}/pd_{rate}_deg_s"), |b| {
+        group.bench_function(format!("one_by_one/{rig}/{law}_{rate}_deg_s"), |b| {
             b.iter(|| {
                 for i in 0..sweep.len() {
                     let scenario = sweep.scenario(i).expect("in range");

@@ -43,6 +43,8 @@ pub trait Arithmetic:
     fn limit_of(limit: Limit) -> Self::Limit;
     /// `a` where the mask is true, `b` elsewhere.
     fn select_limit(mask: Self::Mask, a: Self::Limit, b: Self::Limit) -> Self::Limit;
+    /// True where something decided: the limit is not [`Limit::None`].
+    fn decided(limit: Self::Limit) -> Self::Mask;
     /// `true` if the mask is true in every lane: work that no lane needs can be left out.
     fn all(mask: Self::Mask) -> bool;
     /// |self|.
@@ -52,6 +54,8 @@ pub trait Arithmetic:
     ///
     /// Outside that range the result is not an exponential.
     fn exp_neg(self) -> Self;
+    /// Square root; NaN for a negative argument.
+    fn sqrt(self) -> Self;
     /// self to the power of `n`.
     fn powf(self, n: Self) -> Self;
     /// The larger of the two; the other one if one is NaN.
@@ -60,6 +64,18 @@ pub trait Arithmetic:
     fn min(self, other: Self) -> Self;
     /// Neither infinite nor NaN.
     fn is_finite(self) -> Self::Mask;
+
+    /// What `a` gives where the mask is true, what `b` gives elsewhere. A scalar asks the one that it needs, a vector both.
+    #[inline(always)]
+    fn branch(mask: Self::Mask, a: impl FnOnce() -> Self, b: impl FnOnce() -> Self) -> Self {
+        Self::select(mask, a(), b())
+    }
+
+    /// Puts what `value` gives into `to` where the mask is true. A scalar asks for it there alone.
+    #[inline(always)]
+    fn put_where(mask: Self::Mask, to: &mut Self, value: impl FnOnce() -> Self) {
+        *to = Self::select(mask, value(), *to);
+    }
 
     /// `self` between `lowest` and `highest`, the nearer of them beyond, `invalid` for NaN; and the limit that decided.
     #[inline]

@@ -28,7 +28,7 @@
 
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
-use crate::{Actuator, Encoder, FixedCounts, Micros, ParamError, Plant, Real};
+use crate::{Actuator, Arithmetic, Encoder, FixedCounts, Micros, ParamError, Plant, Real};
 use nalgebra::{Matrix3, Vector3};
 
 crate::params! {
@@ -311,7 +311,7 @@ fn design(walk: f64, inertia: f64, damping: f64, count: f64, period: f64) -> Opt
     // The state that a step of the torque, s before the end of the period, has made by then;
     // integrated over the period by Gauss and Legendre's three points, exact without damping.
     let mut q = Matrix3::zeros();
-    let off_centre = Real::sqrt(0.15_f64);
+    let off_centre = Arithmetic::sqrt(0.15_f64);
     for (s, weight) in [(0.5 - off_centre, 5.0), (0.5, 8.0), (0.5 + off_centre, 5.0)] {
         let (g1, g2) = decay_integrals(x * s);
         let reached = Vector3::new(s * s * g2, s * g1, 1.0);

@@ -59,8 +59,6 @@ pub trait Real:
     fn exp(self) -> Self;
     /// Natural logarithm; −∞ for 0, NaN for a negative argument.
     fn ln(self) -> Self;
-    /// Square root; NaN for a negative argument.
-    fn sqrt(self) -> Self;
     /// Largest integer not above self.
     fn floor(self) -> Self;
     /// Sine and cosine for |self| ≤ π/4, without double precision in `f32`.
@@ -82,7 +80,7 @@ fn seldom() {}
 
 /// The arithmetic of a scalar, but for what its precision decides.
 macro_rules! scalar {
-    ($scalar:ident: $abs:ident $pow:ident $max:ident $min:ident) => {
+    ($scalar:ident: $abs:ident $sqrt:ident $pow:ident $max:ident $min:ident) => {
         type Mask = bool;
         type Limit = Limit;
         const ZERO: $scalar = 0.0;
@@ -100,6 +98,17 @@ macro_rules! scalar {
         fn select(mask: bool, a: $scalar, b: $scalar) -> $scalar {
             if mask { a } else { b }
         }
+        // Always, as the next: a function of its own would become a selection before its caller sees the branch.
+        #[inline(always)]
+        fn branch(mask: bool, a: impl FnOnce() -> $scalar, b: impl FnOnce() -> $scalar) -> $scalar {
+            if mask { a() } else { b() }
+        }
+        #[inline(always)]
+        fn put_where(mask: bool, to: &mut $scalar, value: impl FnOnce() -> $scalar) {
+            if mask {
+                *to = value();
+            }
+        }
         #[inline]
         fn limit_of(limit: Limit) -> Limit {
             limit
@@ -109,12 +118,20 @@ macro_rules! scalar {
             if mask { a } else { b }
         }
         #[inline]
+        fn decided(limit: Limit) -> bool {
+            limit != Limit::None
+        }
+        #[inline]
         fn all(mask: bool) -> bool {
             mask
         }
         #[inline]
         fn abs(self) -> $scalar {
             libm::$abs(self)
+        }
+        #[inline]
+        fn sqrt(self) -> $scalar {
+            libm::$sqrt(self)
         }
         #[inline]
         fn powf(self, n: $scalar) -> $scalar {
@@ -165,7 +182,7 @@ macro_rules! scalar {
 }
 
 impl Arithmetic for f64 {
-    scalar!(f64: fabs pow fmax fmin);
+    scalar!(f64: fabs sqrt pow fmax fmin);
 
     #[inline]
     fn splat(x: f64) -> f64 {
@@ -219,10 +236,6 @@ impl Real for f64 {
         libm::log(self)
     }
     #[inline]
-    fn sqrt(self) -> f64 {
-        libm::sqrt(self)
-    }
-    #[inline]
     fn floor(self) -> f64 {
         libm::floor(self)
     }
@@ -233,7 +246,7 @@ impl Real for f64 {
 }
 
 impl Arithmetic for f32 {
-    scalar!(f32: fabsf powf fmaxf fminf);
+    scalar!(f32: fabsf sqrtf powf fmaxf fminf);
 
     #[inline]
     fn splat(x: f64) -> f32 {
@@ -339,10 +352,6 @@ impl Real for f32 {
     #[inline]
     fn ln(self) -> f32 {
         libm::logf(self)
-    }
-    #[inline]
-    fn sqrt(self) -> f32 {
-        libm::sqrtf(self)
     }
     #[inline]
     fn floor(self) -> f32 {

@@ -8,12 +8,13 @@
 )]
 
 use clutch_core::law::{
-    ControlLaw, Ctc, CtcParams, Hold, HoldParams, Limit, OutputParams, Pd, PdParams, Pid, PidParams, Smc,
-    SmcParams, SmcSign, SmcSignParams, Terms, Tick, Voltage, VoltageParams,
+    Beside, ControlLaw, Ctc, CtcParams, Dob, DobParams, Hold, HoldParams, Limit, Listed, OutputParams, Pd,
+    PdParams, Pid, PidParams, Seen, Smc, SmcIntegral, SmcIntegralParams, SmcParams, SmcSign, SmcSignParams,
+    SuperTwisting, SuperTwistingParams, Terms, Tick, Voltage, VoltageParams,
 };
 use clutch_core::{
-    Arithmetic, Each, Encoder, Micros, PlantParams, SmoothedDerivative, SmoothedDerivativeParams,
-    StribeckParams,
+    ActuatorParams, Arithmetic, BothActuator, BrakeActuator, Each, Encoder, Micros, MotorActuator,
+    PlantParams, SmoothedDerivative, SmoothedDerivativeParams, StribeckParams,
 };
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -98,6 +99,9 @@ impl Arithmetic for Lanes {
     fn select_limit(mask: Mask, a: [Limit; N], b: [Limit; N]) -> [Limit; N] {
         std::array::from_fn(|i| if mask.0[i] { a[i] } else { b[i] })
     }
+    fn decided(limit: [Limit; N]) -> Mask {
+        Mask(limit.map(|limit| limit != Limit::None))
+    }
     fn all(mask: Mask) -> bool {
         mask.0.iter().all(|a| *a)
     }
@@ -106,6 +110,9 @@ impl Arithmetic for Lanes {
     }
     fn exp_neg(self) -> Lanes {
         self.each(Arithmetic::exp_neg)
+    }
+    fn sqrt(self) -> Lanes {
+        self.each(Arithmetic::sqrt)
     }
     fn powf(self, n: Lanes) -> Lanes {
         self.with(n, Arithmetic::powf)
@@ -160,11 +167,14 @@ where
     let (ticks, all) = at(0);
     let mut states: Vec<S::State> = (0..N).map(|i| laws[i].start(&ticks[i], 2.25)).collect();
     let mut state = vector.start(&all, Lanes::splat(2.25));
-    let mut limits = [0; 4];
+    let (mut limits, mut applied) = ([0; 4], Lanes::splat(2.25));
     for k in 0..20_000 {
         let (ticks, all) = at(k);
+        let seen = |applied| Seen { applied, ..Seen::default() };
+        vector.sees(&mut state, &Seen { applied, ..Seen::default() });
         let together = vector.update(&mut state, &all);
         for i in 0..N {
+            laws[i].sees(&mut states[i], &seen(applied.0[i]));
             let alone = laws[i].update(&mut states[i], &ticks[i]);
             limits[alone.limit as usize] += 1;
             assert_eq!(alone.voltage.to_bits(), together.voltage.0[i].to_bits(), "tick {k}, lane {i}");
@@ -174,6 +184,7 @@ where
                 assert_eq!(bits(a), bits(&b.0[i]), "tick {k}, lane {i}");
             }
         }
+        applied = together.voltage;
     }
     limits
 }
@@ -186,6 +197,61 @@ fn output() -> OutputParams {
 
 fn scaled(i: usize) -> f64 {
     1.0 + 0.3 * i as f64
+}
+
+/// A plant with an actuator, and the output stage for it.
+fn with(actuator: impl Into<ActuatorParams<f64>>) -> (PlantParams<f64>, OutputParams) {
+    let actuator = actuator.into();
+    let two_sided = OutputParams { lowest: -8.0, on_invalid: 0.0, ..output() };
+    let output = if actuator.kind().two_sided() { two_sided } else { output() };
+    (PlantParams { actuator, ..PlantParams::default() }, output)
+}
+
+/// Laws whose integral or observer limits hold, with each actuator.
+fn laws_that_remember() {
+    let both = BothActuator { brake_gain: 0.14, motor_gain: 0.02, preload: 0.01 };
+    for (model, output) in [
+        with(BrakeActuator { gain: 0.14, preload: 0.02 }),
+        with(MotorActuator { gain: 0.05, preload: 0.3, load_share: 0.4 }),
+        with(both),
+    ] {
+        let beside = Beside::paper(&model, &output);
+        for boundary in [0.0, 0.1] {
+            same_bits(
+                std::array::from_fn(|i| {
+                    let p = SuperTwistingParams {
+                        k1: 20.0 * scaled(i),
+                        k2: 200.0 * scaled(i),
+                        // A layer in some lanes alone.
+                        boundary: if i % 2 == 0 { boundary } else { 0.0 },
+                        ..SuperTwistingParams::default()
+                    };
+                    SuperTwisting::build(&p, &beside).unwrap()
+                }),
+                |each| SuperTwisting::in_lanes(each),
+            );
+        }
+        same_bits(
+            std::array::from_fn(|i| {
+                let p = SmcIntegralParams {
+                    kp: 9.5 * scaled(i),
+                    kd: 5.0 * scaled(i),
+                    // One lane keeps no integral.
+                    integral: 3000.0 * i as f64,
+                    ..SmcIntegralParams::default()
+                };
+                SmcIntegral::build(&p, &beside).unwrap()
+            }),
+            |each| SmcIntegral::in_lanes(each),
+        );
+        same_bits(
+            std::array::from_fn(|i| {
+                let p = DobParams { kp: 1e4, kd: 2000.0 * scaled(i), bandwidth: 33.0 * scaled(i) };
+                Dob::build(&p, &beside).unwrap()
+            }),
+            |each| Dob::in_lanes(each).unwrap(),
+        );
+    }
 }
 
 #[test]
@@ -223,6 +289,7 @@ fn each_law_has_in_each_lane_the_bits_of_the_scalar() {
         }),
         |each| Pid::in_lanes(each),
     );
+    laws_that_remember();
     // Open-loop laws, which meet no limit.
     open_loop(
         std::array::from_fn(|i| {

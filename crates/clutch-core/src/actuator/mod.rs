@@ -284,7 +284,8 @@ impl<T: Arithmetic> Actuator<T> {
 
     /// The way, 1 or −1 or 0, that friction is counted against where a path goes with a velocity: the path's with what drives
     /// both ways; the others are for a shaft that is driven forwards.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     #[must_use]
     pub fn way(&self, target_velocity: T) -> T {
         match self.kind {
@@ -296,7 +297,8 @@ impl<T: Arithmetic> Actuator<T> {
     /// The voltage at which torque and friction of a shaft that moves in a direction (`way`: 1 or −1, or 0 for none) with
     /// a coefficient `mu` add up to `torque`, V. No limits; where an actuator cannot give the torque, as a brake one
     /// that drives, the voltage is one at which it gives the least.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     #[must_use]
     pub fn volts_for(&self, torque: T, mu: T, way: T) -> T {
         let resists = -(way * torque) - mu * self.preload;

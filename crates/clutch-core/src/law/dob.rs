@@ -15,7 +15,7 @@
 use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputState, Seen, Tick};
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
-use crate::{ParamError, Plant, Real};
+use crate::{Arithmetic, Each, ParamError, Plant, Real};
 
 crate::params! {
     /// Proportional–derivative control with a disturbance observer: whatever torque the model does not explain is found from
@@ -78,16 +78,39 @@ impl<T: Real> Dob<T> {
             output: Output::new(beside.output, beside.period)?,
         })
     }
+}
+
+impl<T: Arithmetic> Dob<T> {
+    /// The laws of several lanes as one; none if actuators or frictions that they believe in are not of one kind.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> Option<Dob<L>> {
+        let params = DobParams {
+            kp: each(&|law| law.params.kp),
+            kd: each(&|law| law.params.kd),
+            bandwidth: each(&|law| law.params.bandwidth),
+        };
+        Some(Dob {
+            params,
+            plant: Plant::in_lanes(&|get| each(&|law| get(&law.plant)))?,
+            mu: each(&|law| law.mu),
+            newest: each(&|law| law.newest),
+            per_change: each(&|law| law.per_change),
+            output: Output::in_lanes(&|get| each(&|law| get(&law.output))),
+        })
+    }
 
     /// `T(u)` of a shaft that goes a way, N m.
-    #[inline]
+    // Always, where lanes call it: a vector's instructions do not pass a call. For boards the compiler chooses.
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn torque(&self, volts: T, way: T) -> T {
         let actuator = self.plant.actuator();
         actuator.torque(volts) - way * actuator.friction(self.mu, volts)
     }
 
     /// `J (θ̈_d + K_d ė + K_p e)`, N m.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline)]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn tracking(&self, tick: &Tick<T>) -> T {
         let p = &self.params;
         let acceleration = tick.target_acceleration + (p.kd * tick.error_rate + p.kp * tick.error);
@@ -95,7 +118,7 @@ impl<T: Real> Dob<T> {
     }
 }
 
-impl<T: Real> ControlLaw<T> for Dob<T> {
+impl<T: Arithmetic> ControlLaw<T> for Dob<T> {
     type State = DobState<T>;
     type Terms = [T; 2];
     const TERMS: &'static [&'static str] = &["tracking_nm", "disturbance_nm"];
@@ -103,7 +126,7 @@ impl<T: Real> ControlLaw<T> for Dob<T> {
     fn start(&self, tick: &Tick<T>, applied: T) -> DobState<T> {
         let (tracking, way) = (self.tracking(tick), self.plant.actuator().way(tick.target_velocity));
         let disturbance = self.torque(applied, way) - tracking;
-        let disturbance = if disturbance.is_finite() { disturbance } else { T::ZERO };
+        let disturbance = T::select(disturbance.is_finite(), disturbance, T::ZERO);
         let demand = self.plant.actuator().volts_for(tracking + disturbance, self.mu, way);
         DobState { disturbance, velocity: tick.velocity(), applied, output: self.output.start(demand, applied) }
     }
@@ -123,14 +146,12 @@ impl<T: Real> ControlLaw<T> for Dob<T> {
         let velocity = tick.velocity();
         let found = self.torque(state.applied, way) - self.per_change * (velocity - state.velocity);
         let next = disturbance + self.newest * (found - disturbance);
-        if next.is_finite() {
+        T::put_where(next.is_finite(), &mut state.disturbance, || {
             // No more than the output can answer.
             let ends = (self.torque(self.output.lowest(), way), self.torque(self.output.highest(), way));
-            state.disturbance = next.limit(ends.0.min(ends.1), ends.0.max(ends.1));
-        }
-        if velocity.is_finite() {
-            state.velocity = velocity;
-        }
+            next.max(ends.0.min(ends.1)).min(ends.0.max(ends.1))
+        });
+        T::put_where(velocity.is_finite(), &mut state.velocity, || velocity);
         Command { voltage, limit, terms: [tracking, disturbance] }
     }
 }

@@ -29,9 +29,9 @@ list::laws! {
     smc Smc SmcParams "Sliding mode with the boundary layer (31)." in lanes;
     smc_sign SmcSign SmcSignParams "Sliding mode with the sign function (29)." in lanes;
     pid Pid PidParams "Proportional–integral–derivative control with feed-forward." in lanes;
-    super_twisting SuperTwisting SuperTwistingParams "Super-twisting: sliding mode of second order.";
-    smc_integral SmcIntegral SmcIntegralParams "Sliding mode with a boundary layer and an integral in its surface.";
-    dob Dob DobParams "Proportional–derivative control with a disturbance observer.";
+    super_twisting SuperTwisting SuperTwistingParams "Super-twisting: sliding mode of second order." in lanes;
+    smc_integral SmcIntegral SmcIntegralParams "Sliding mode with a boundary layer and an integral in its surface." in lanes;
+    dob Dob DobParams "Proportional–derivative control with a disturbance observer." in lanes;
     glide Glide GlideParams "Friction inverted by an edge-timed filter: smooth at low rates.";
     voltage Voltage VoltageParams "Open-loop voltage." in lanes;
     hold Hold HoldParams "Open-loop voltage that holds the resting shaft." in lanes;

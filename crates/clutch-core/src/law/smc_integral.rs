@@ -12,9 +12,9 @@
 //! run begins with the integral at which the switching part demands the voltage that the brake has.
 
 use super::smc::switched;
-use super::{Beside, Command, ControlLaw, Damping, Limit, Listed, Output, OutputParams, OutputState, Tick};
+use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputParams, OutputState, Tick};
 use crate::params::{Range, Table};
-use crate::{Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
     /// Sliding-mode control with a boundary layer, whose surface has the integral of the error: it keeps no offset.
@@ -69,6 +69,26 @@ impl<T: Real> SmcIntegral<T> {
         let inverse_boundary = T::ONE / p.boundary;
         Ok(SmcIntegral { params: *p, inverse_boundary, step, output: Output::new(output, period)? })
     }
+}
+
+impl<T: Arithmetic> SmcIntegral<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> SmcIntegral<L> {
+        let params = SmcIntegralParams {
+            kp: each(&|law| law.params.kp),
+            kd: each(&|law| law.params.kd),
+            slope: each(&|law| law.params.slope),
+            integral: each(&|law| law.params.integral),
+            boundary: each(&|law| law.params.boundary),
+        };
+        SmcIntegral {
+            params,
+            inverse_boundary: each(&|law| law.inverse_boundary),
+            step: each(&|law| law.step),
+            output: Output::in_lanes(&|get| each(&|law| get(&law.output))),
+        }
+    }
 
     #[inline]
     fn terms(&self, integral: T, tick: &Tick<T>) -> (T, [T; 3]) {
@@ -78,17 +98,18 @@ impl<T: Real> SmcIntegral<T> {
     }
 }
 
-impl<T: Real> ControlLaw<T> for SmcIntegral<T> {
+impl<T: Arithmetic> ControlLaw<T> for SmcIntegral<T> {
     type State = SmcIntegralState<T>;
     type Terms = [T; 4];
     const TERMS: &'static [&'static str] = &["surface_rad_s", "integral_rad_s", "switching_v", "damping_v"];
 
     fn start(&self, tick: &Tick<T>, applied: T) -> SmcIntegralState<T> {
         let SmcIntegralParams { kp, slope, boundary, .. } = self.params;
-        let wanted = (-(applied * boundary / kp)).limit(-boundary, boundary);
+        let wanted = (-(applied * boundary / kp)).max(-boundary).min(boundary);
         let integral = wanted - (slope * tick.error + tick.error_rate);
-        let found = self.step > T::ZERO && integral.is_finite();
-        let integral = if found { integral.limit(-boundary, boundary) } else { T::ZERO };
+        let within = || integral.max(-boundary).min(boundary);
+        let found = T::ZERO.less(self.step) & integral.is_finite();
+        let integral = T::branch(found, within, || T::ZERO);
         SmcIntegralState { integral, output: self.output.start(self.terms(integral, tick).0, applied) }
     }
 
@@ -99,10 +120,12 @@ impl<T: Real> ControlLaw<T> for SmcIntegral<T> {
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
         let step = self.step * tick.error;
         let boundary = self.params.boundary;
-        let full = limit != Limit::None || surface.abs() >= boundary;
-        if !(full && step * surface > T::ZERO) && step.is_finite() {
-            state.integral = (integral + step).limit(-boundary, boundary);
-        }
+        let stays = || integral;
+        let moves = || (integral + step).max(-boundary).min(boundary);
+        let full = || T::branch(T::ZERO.less(step * surface), stays, moves);
+        let unlimited = || T::branch(boundary.less_or_equal(surface.abs()), full, moves);
+        let next = || T::branch(T::decided(limit), full, unlimited);
+        T::put_where(step.is_finite(), &mut state.integral, next);
         Command { voltage, limit, terms: [surface, integral, switching, damping] }
     }
 }
@@ -135,7 +158,7 @@ impl<T: Real> Listed<T> for SmcIntegral<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Smc, SmcParams};
+    use crate::law::{Limit, Smc, SmcParams};
 
     const PERIOD: Micros = Micros(1000);
 

@@ -14,7 +14,7 @@
 
 use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputParams, OutputState, Tick};
 use crate::params::{Range, Table};
-use crate::{Micros, ParamError, Real};
+use crate::{Arithmetic, Each, Micros, ParamError, Real};
 
 crate::params! {
     /// Super-twisting, a sliding mode of second order: a root and the integral of a sign, which switches behind an integral and
@@ -66,22 +66,36 @@ impl<T: Real> SuperTwisting<T> {
         let seconds = period.period::<T>()?;
         Ok(SuperTwisting { params: *p, twist: p.k2 * seconds, output: Output::new(output, period)? })
     }
+}
+
+impl<T: Arithmetic> SuperTwisting<T> {
+    /// The laws of several lanes as one.
+    #[must_use]
+    pub fn in_lanes<L: Arithmetic>(each: Each<'_, Self, T, L>) -> SuperTwisting<L> {
+        let params = SuperTwistingParams {
+            k1: each(&|law| law.params.k1),
+            k2: each(&|law| law.params.k2),
+            slope: each(&|law| law.params.slope),
+            boundary: each(&|law| law.params.boundary),
+        };
+        let output = Output::in_lanes(&|get| each(&|law| get(&law.output)));
+        SuperTwisting { params, twist: each(&|law| law.twist), output }
+    }
 
     /// `σ`, `√|σ| sgn σ` and `sgn σ`, both linear within the layer.
     #[inline]
     fn surface(&self, tick: &Tick<T>) -> (T, T, T) {
         let surface = self.params.slope * tick.error + tick.error_rate;
         let size = surface.abs().max(self.params.boundary);
-        if size > T::ZERO {
-            (surface, surface / size.sqrt(), surface / size)
-        } else {
-            // 0, or no number.
-            (surface, surface, surface)
-        }
+        // Elsewhere it is 0, or no number.
+        let sized = T::ZERO.less(size);
+        let root = T::branch(sized, || surface / size.sqrt(), || surface);
+        let sign = T::branch(sized, || surface / size, || surface);
+        (surface, root, sign)
     }
 }
 
-impl<T: Real> ControlLaw<T> for SuperTwisting<T> {
+impl<T: Arithmetic> ControlLaw<T> for SuperTwisting<T> {
     type State = SuperTwistingState<T>;
     type Terms = [T; 3];
     const TERMS: &'static [&'static str] = &["surface_rad_s", "root_v", "integral_v"];
@@ -90,7 +104,7 @@ impl<T: Real> ControlLaw<T> for SuperTwisting<T> {
         let (_, root, _) = self.surface(tick);
         let root = -(self.params.k1 * root);
         let integral = applied - root;
-        let integral = if integral.is_finite() { integral } else { T::ZERO };
+        let integral = T::select(integral.is_finite(), integral, T::ZERO);
         SuperTwistingState { integral, output: self.output.start(root + integral, applied) }
     }
 
@@ -103,10 +117,13 @@ impl<T: Real> ControlLaw<T> for SuperTwisting<T> {
         let (voltage, limit) = self.output.apply(&mut state.output, demand);
         let step = -(self.twist * sign);
         let (lowest, highest) = self.output.limits();
-        let further = (demand >= highest && step > T::ZERO) || (demand <= lowest && step < T::ZERO);
-        if !further && step.is_finite() {
-            state.integral = (integral + step).limit(lowest, highest);
-        }
+        let stays = || integral;
+        let moves = || (integral + step).max(lowest).min(highest);
+        let at_highest = || T::branch(T::ZERO.less(step), stays, moves);
+        let at_lowest = || T::branch(step.less(T::ZERO), stays, moves);
+        let below = || T::branch(demand.less_or_equal(lowest), at_lowest, moves);
+        let next = || T::branch(highest.less_or_equal(demand), at_highest, below);
+        T::put_where(step.is_finite(), &mut state.integral, next);
         Command { voltage, limit, terms: [surface, root, integral] }
     }
 }

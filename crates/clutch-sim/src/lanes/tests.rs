@@ -8,6 +8,7 @@ use crate::metrics::Detected;
 use crate::progress::UNWATCHED;
 use crate::run::Keep;
 use crate::scenario::{BUILT_IN, Scenario};
+use clutch_core::law::Limit;
 use fearless_simd::Level;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -251,6 +252,95 @@ fn runs_in_lanes_have_the_bits_of_runs_alone() {
         went += n;
     }
     assert_eq!(went, 19 * cases.len());
+}
+
+/// Laws whose memory limits hold: their name, what a case draws for them, and the same for one that saturates.
+type Remembers<'a> = (&'a str, &'a [(&'a str, f64, f64)], &'a [(&'a str, f64, f64)]);
+
+const REMEMBER: [Remembers<'static>; 3] = [
+    (
+        "{ super_twisting = {} }",
+        &[
+            ("law.super_twisting.k1_v_rt_s_rad", 1.0, 6.0),
+            ("law.super_twisting.k2_v_s", 5.0, 40.0),
+            ("law.super_twisting.boundary_rad_s", 0.0, 0.05),
+        ],
+        &[("law.super_twisting.k1_v_rt_s_rad", 10.0, 100.0), ("law.super_twisting.k2_v_s", 100.0, 1000.0)],
+    ),
+    (
+        "{ smc_integral = {} }",
+        &[
+            ("law.smc_integral.kp_v", 3.0, 8.0),
+            ("law.smc_integral.kd_v_s_rad", 0.0, 40.0),
+            ("law.smc_integral.integral_1_s2", 0.0, 6000.0),
+        ],
+        &[("law.smc_integral.kp_v", 20.0, 80.0), ("law.smc_integral.boundary_rad_s", 0.01, 0.3)],
+    ),
+    (
+        "{ dob = {} }",
+        &[
+            ("law.dob.kp_1_s2", 3000.0, 20_000.0),
+            ("law.dob.kd_1_s", 100.0, 400.0),
+            ("law.dob.bandwidth_rad_s", 5.0, 60.0),
+        ],
+        &[("law.dob.kp_1_s2", 1e5, 1e6), ("law.dob.bandwidth_rad_s", 100.0, 500.0)],
+    ),
+];
+
+/// Values that all runs of a case have.
+type Values<'a> = &'a [(&'a str, &'a str)];
+
+/// How often runs alone got what the law asked for, the lowest voltage, and the highest.
+fn limits(scenarios: &[Scenario]) -> [usize; 3] {
+    let traces: Vec<_> = scenarios.iter().map(|s| s.run(Keep::Trace, UNWATCHED).unwrap().trace).collect();
+    [Limit::None, Limit::Lowest, Limit::Highest]
+        .map(|limit| traces.iter().flat_map(|t| &t.limit).filter(|l| **l == limit).count())
+}
+
+#[test]
+fn laws_whose_memory_limits_hold_have_the_bits_of_runs_alone() {
+    let sine = ("reference", "{ sine = { rate_deg_s = 15.0, amplitude_deg = 2.0, frequency_hz = 1.0 } }");
+    let to_and_fro =
+        ("reference", "{ sine = { rate_deg_s = 0.0, amplitude_deg = 5.0, frequency_hz = 0.8 } }");
+    let narrow = [("output.highest_v", "2.6"), ("output.on_invalid_v", "2.6")];
+    let rest = ("run.start", "rest");
+    let bench = ("rig.base", "\"bench\"");
+    let late = [("rig.delay_ticks", "3"), ("output.bumpless_time_s", "0.1")];
+    let both = "{ both = { brake_gain_nm_v = 0.14, motor_gain_nm_v = 0.02, preload_nm = 0.01 } }";
+    let both = [("rig.actuator", both), ("model.actuator", both), ("output.lowest_v", "-10.0")];
+    let gear =
+        [("rig.actuator.motor.load_share", "0.2"), ("model.actuator.motor.load_share", "0.2"), to_and_fro];
+    let narrow_motor = [("output.lowest_v", "-1.3"), ("output.highest_v", "1.2"), to_and_fro];
+    for (law, usual, saturates) in REMEMBER {
+        let law = [("law", law)];
+        let cases: [(&str, bool, &[Values<'_>]); 10] = [
+            ("pd_2", false, &[]),
+            ("pd_2", false, &[&[sine, rest], &narrow]),
+            ("pd_2", false, &[&late, &[("reference.ramp.rate_deg_s", "20")]]),
+            ("pd_2", false, &[&[bench]]),
+            ("pd_2", true, &[&[sine]]),
+            ("pd_2", true, &[&[bench, rest]]),
+            ("pd_2", true, &[&both, &[sine]]),
+            ("motor_pid", false, &[&[to_and_fro]]),
+            ("motor_pid", true, &[&gear]),
+            ("motor_pid", true, &[&narrow_motor, &late[..1]]),
+        ];
+        let mut met = [0; 3];
+        for (name, full, more) in cases {
+            let keys = if full { saturates } else { usual };
+            let keys: Vec<_> = keys.iter().copied().chain([("run.start_counts", -5000.0, 5000.0)]).collect();
+            let short = [("run.duration_s", "1.6"), ("run.settle_s", "0.2")];
+            let more = [&law[..], &more.concat(), &short].concat();
+            let scenarios = around(name, &keys, &more, 11);
+            assert_eq!(same_bits(&scenarios), 11, "{name} {more:?}");
+            let found = limits(&scenarios);
+            if full {
+                assert!(found.iter().all(|n| *n > 0), "{name} {more:?}: {found:?}");
+            }
+            met = [0, 1, 2].map(|i| met[i] + found[i]);
+        }
+        assert!(met.iter().all(|n| *n > 1000), "{law:?}: {met:?}");
+    }
 }
 
 #[test]

@@ -136,8 +136,8 @@ impl<S: Instructions> Neg for Vector<S> {
 
 impl<S: Instructions> Arithmetic for Vector<S> {
     type Mask = mask64x8<S>;
-    /// Nobody asks: figures have no limits.
-    type Limit = ();
+    /// Number of the limit in each lane.
+    type Limit = Self;
     const ZERO: Self = constant(0.0);
     const ONE: Self = constant(1.0);
 
@@ -158,9 +158,17 @@ impl<S: Instructions> Arithmetic for Vector<S> {
         Vector(mask.select(a.0, b.0))
     }
     #[inline(always)]
-    fn limit_of(_: Limit) {}
+    fn limit_of(limit: Limit) -> Self {
+        Self::splat(f64::from(limit as u8))
+    }
     #[inline(always)]
-    fn select_limit(_: Self::Mask, (): (), (): ()) {}
+    fn select_limit(mask: Self::Mask, a: Self, b: Self) -> Self {
+        Self::select(mask, a, b)
+    }
+    #[inline(always)]
+    fn decided(limit: Self) -> Self::Mask {
+        Self::limit_of(Limit::None).less(limit)
+    }
     #[inline(always)]
     fn all(mask: Self::Mask) -> bool {
         mask.all_true()
@@ -175,6 +183,10 @@ impl<S: Instructions> Arithmetic for Vector<S> {
             return (-self).exp();
         }
         Self::of(|i| Arithmetic::exp_neg(self.lane(i)))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Vector(self.0.sqrt())
     }
     #[inline(always)]
     fn powf(self, n: Self) -> Self {
@@ -195,10 +207,13 @@ impl<S: Instructions> Arithmetic for Vector<S> {
         self.abs().less_or_equal(Self::splat(f64::MAX))
     }
     #[inline(always)]
-    fn limited(self, lowest: Self, highest: Self, invalid: Self) -> (Self, ()) {
-        let (below, above) = (self.less(lowest), highest.less(self));
+    fn limited(self, lowest: Self, highest: Self, invalid: Self) -> (Self, Self) {
+        let (below, above, number) = (self.less(lowest), highest.less(self), self.0.simd_eq(self.0));
+        let of = Self::limit_of;
+        let limit =
+            Self::select(above, of(Limit::Highest), Self::select(below, of(Limit::Lowest), of(Limit::None)));
         let value = Self::select(above, highest, Self::select(below, lowest, self));
-        (Self::select(self.0.simd_eq(self.0), value, invalid), ())
+        (Self::select(number, value, invalid), Self::select(number, limit, of(Limit::Invalid)))
     }
     #[inline(always)]
     fn sgn(self) -> Self {
