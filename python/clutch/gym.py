@@ -409,10 +409,10 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 class TrackingVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """Many shafts at once, each with an agent's voltage: the environments of :class:`TrackingEnv` in one call.
 
-    A step computes a period of every shaft in the native module, eight shafts in the lanes of a vector, on all processors
-    and without Python's lock; each goes its way bit for bit as in a :class:`TrackingEnv`. Rigs and laws that have no
-    lanes are computed one by one. A shaft whose episode has ended is reset by the next step, which answers with its
-    first sample and the reward 0: ``AutoresetMode.NEXT_STEP``.
+    A step computes a period of every shaft in the native module, eight shafts in the lanes of a vector, on all
+    processors and without Python's lock; each goes its way bit for bit as in a :class:`TrackingEnv`. Rigs and laws
+    that have no lanes are computed one by one. A shaft whose episode has ended is reset by the next step, which answers
+    with its first sample and the reward 0: ``AutoresetMode.NEXT_STEP``.
 
     Parameters
     ----------
@@ -558,7 +558,7 @@ class TrackingVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
         return problem.observation(self._seen), rewards, terminated, truncated, self._infos()
 
     def _infos(self) -> dict[str, Any]:
-        infos = {name: values.copy() for name, values in self._problem.info(self._seen).items()}
+        infos = self._problem.info(self._seen.copy())
         whole = {"stuck": infos["stuck"] > 0, "sticks": infos["sticks"].astype(np.int64), "seed": self._seeds.copy()}
         return infos | whole
 

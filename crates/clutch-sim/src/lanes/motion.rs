@@ -135,7 +135,7 @@ impl<V: Lane> Motions<V> {
     pub(super) fn begin_anew(&mut self, n: usize, lane: usize, rig: Begin<'_>, sticks: &Sticks) {
         self.shafts[n].begin_anew(lane, rig, sticks);
         if let Some(gathered) = &mut self.gathered {
-            gathered.begun_anew(&self.shafts[n], lane);
+            gathered.begun_anew(&self.shafts[n], n, lane);
         }
     }
 }
@@ -186,9 +186,14 @@ impl<V: Lane> Shafts<V> {
     /// The converters give these voltages from now on, V.
     #[inline(always)]
     pub(super) fn command(&mut self, volts: V) {
-        // The voltage that was commanded as many ticks ago as the line is long.
-        self.line.push_back(volts);
-        self.arriving = self.line.pop_front().unwrap_or(volts);
+        self.arriving = match self.line.pop_front() {
+            None => volts,
+            // The voltage that was commanded as many ticks ago as the line is long.
+            Some(arrives) => {
+                self.line.push_back(volts);
+                arrives
+            }
+        };
     }
 
     /// The period passes. Motions in the layer, those that begin or end, and those that go in steps wait.

@@ -243,8 +243,9 @@ impl<V: Lane> Shafts<V> {
 pub(super) struct Gathered<V: Lane> {
     plant: Plant<V>,
     ripple: Option<Ripple<V>>,
-    /// A shaft of the block; whether plants differ from it, and discs.
-    first: Model,
+    /// Models of the block's shafts, lane by lane of each vector.
+    each: Vec<Model>,
+    /// Plants have differed from one another, and discs.
     differ: (bool, bool),
 }
 
@@ -253,46 +254,55 @@ impl<V: Lane> Gathered<V> {
     pub(super) fn of(all: &[Shafts<V>]) -> Option<Self> {
         let first = all.first()?;
         let own = first.steps()?;
-        let mut gathered = Gathered {
+        let lanes = all.iter().filter_map(Shafts::steps).flat_map(|own| &own.alone);
+        let each: Vec<Model> = lanes.map(|alone| alone.model.clone()).collect();
+        let differ = |same: fn(&Model, &Model) -> bool| each.iter().any(|model| !same(model, &each[0]));
+        Some(Gathered {
             plant: first.plant,
             ripple: own.ripple.clone(),
-            first: own.alone.first()?.model.clone(),
-            differ: (false, false),
-        };
-        let lanes = all.iter().filter_map(Shafts::steps).flat_map(|own| &own.alone);
-        lanes.for_each(|alone| gathered.joins(&alone.model));
-        Some(gathered)
-    }
-
-    /// A shaft is one of the block.
-    fn joins(&mut self, model: &Model) {
-        self.differ.0 |= model.plant != self.first.plant;
-        self.differ.1 |= model.ripple != self.first.ripple;
+            differ: (differ(|a, b| a.plant == b.plant), differ(|a, b| a.ripple == b.ripple)),
+            each,
+        })
     }
 
     /// A lane of a vector has begun anew.
-    pub(super) fn begun_anew(&mut self, shafts: &Shafts<V>, lane: usize) {
-        if let Some(own) = shafts.steps() {
-            self.joins(&own.alone[lane].model);
-        }
+    pub(super) fn begun_anew(&mut self, shafts: &Shafts<V>, n: usize, lane: usize) {
+        let Some(own) = shafts.steps() else { return };
+        let (anew, before) = (&own.alone[lane].model, &mut self.each[n * V::WIDTH + lane]);
+        self.differ.0 |= anew.plant != before.plant;
+        self.differ.1 |= anew.ripple != before.ripple;
+        *before = anew.clone();
     }
 
-    /// Takes what so many motions have of their own.
+    /// Plants and discs of so many motions: those of the vector that they fill, each in its lane, or taken one by one.
     #[inline(always)]
-    fn take(&mut self, some: &[OnTheWay], all: &[Shafts<V>]) {
+    fn take<'g>(
+        &'g mut self,
+        some: &[OnTheWay],
+        all: &'g [Shafts<V>],
+    ) -> (&'g Plant<V>, Option<&'g Ripple<V>>) {
+        let first = &some[0];
+        let filled = some.iter().enumerate().all(|(lane, m)| (m.shafts, m.lane) == (first.shafts, lane));
+        if filled
+            && some.len() == V::WIDTH
+            && let Some(own) = all[first.shafts].steps()
+        {
+            return (&all[first.shafts].plant, own.ripple.as_ref());
+        }
         let model = |i: usize| {
             let m = &some[i.min(some.len() - 1)];
-            all[m.shafts].steps().map(|own| &own.alone[m.lane].model)
+            &self.each[m.shafts * V::WIDTH + m.lane]
         };
         if let Some(ripple) = &mut self.ripple
             && self.differ.1
         {
-            ripple.take(|i| model(i)?.ripple.as_ref());
+            ripple.take(|i| model(i).ripple.as_ref());
         }
         if self.differ.0 {
-            let of = |get: &dyn Fn(&Plant<f64>) -> f64| V::of(|i| model(i).map_or(0.0, |m| get(&m.plant)));
+            let of = |get: &dyn Fn(&Plant<f64>) -> f64| V::of(|i| get(&model(i).plant));
             self.plant = Plant::in_lanes(&of).unwrap_or(self.plant);
         }
+        (&self.plant, self.ripple.as_ref())
     }
 }
 
@@ -310,8 +320,8 @@ pub(super) fn step_by_step<V: Lane>(
         let mut left = 0;
         for first in (0..moving.len()).step_by(V::WIDTH) {
             let some = first..(first + V::WIDTH).min(moving.len());
-            gathered.take(&moving[some.clone()], all);
-            let step = one_step(gathered, &moving[some.clone()], alike);
+            let (plant, ripple) = gathered.take(&moving[some.clone()], all);
+            let step = one_step(plant, ripple, &moving[some.clone()], alike);
             for (i, at) in some.enumerate() {
                 let m = &mut moving[at];
                 let shafts = &mut all[m.shafts];
@@ -344,13 +354,18 @@ pub(super) fn step_by_step<V: Lane>(
 
 /// A step of so many motions.
 #[inline(always)]
-fn one_step<V: Lane>(all: &Gathered<V>, some: &[OnTheWay], alike: &Alike) -> Step<V> {
+fn one_step<V: Lane>(
+    plant: &Plant<V>,
+    ripple: Option<&Ripple<V>>,
+    some: &[OnTheWay],
+    alike: &Alike,
+) -> Step<V> {
     let at = |i: usize| &some[i.min(some.len() - 1)];
     let of = |get: fn(&OnTheWay) -> f64| V::of(|i| get(at(i)));
     let lengths = V::of(|i| at(i).course.next(alike.period).0);
     let slip = Slip {
-        plant: &all.plant,
-        ripple: all.ripple.as_ref(),
+        plant,
+        ripple,
         push: Steady {
             drive: of(|m| m.drive),
             from: of(|m| m.volts[0]),
