@@ -118,17 +118,29 @@ impl<V: Lane> Motions<V> {
     #[inline(always)]
     pub(super) fn begin(&mut self, n: usize, time: f64) {
         let Motions { alike, shafts, waiting, steps, .. } = self;
-        shafts[n].advance(n, time, alike, waiting, steps);
+        // In a function of its own, with all that it calls: runs and fleets share it.
+        V::apart(
+            #[inline(always)]
+            || shafts[n].advance(n, time, alike, waiting, steps),
+        );
     }
 
     /// The period that all vectors have begun at `time` ends.
     #[inline(always)]
     pub(super) fn end(&mut self, time: f64) {
         let Motions { alike, shafts, waiting, steps, gathered, events } = self;
-        through_the_layer(shafts, waiting, time, alike, events);
-        if let Some(gathered) = gathered {
-            step_by_step(shafts, gathered, steps, time, alike, events);
+        if waiting.is_empty() && steps.is_empty() {
+            return;
         }
+        V::apart(
+            #[inline(always)]
+            || {
+                through_the_layer(shafts, waiting, time, alike, events);
+                if let Some(gathered) = gathered {
+                    step_by_step(shafts, gathered, steps, time, alike, events);
+                }
+            },
+        );
     }
 
     /// A lane of a vector begins anew, with a rig of the same scenario.

@@ -48,13 +48,10 @@ macro_rules! laws {
             fn update(&mut self, tick: &Tick<V>, applied: V) -> V {
                 let seen = Seen { applied, ..Seen::default() };
                 match self {
-                    $(LawInLanes::$law(law, state) => V::apart(
-                        #[inline(always)]
-                        || {
-                            law.sees(state, &seen);
-                            law.update(state, tick).voltage
-                        },
-                    ),)+
+                    $(LawInLanes::$law(law, state) => {
+                        law.sees(state, &seen);
+                        law.update(state, tick).voltage
+                    })+
                 }
             }
         }
