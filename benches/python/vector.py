@@ -1,10 +1,10 @@
-"""Cost of a step of many environments, and the part of it that lanes could save: CPU time on one thread.
+"""Cost of a step of many environments, and the part of rigs and laws in it: CPU time on one thread.
 
     python benches/python/vector.py [--repeats 5]
 
 A row is a scenario and a number of shafts: a step of `TrackingVectorEnv` under the scenario's own law; the part of it
-in the native module, rig and law; and as much motion by `clutch.sweep`, law and figures included, whose runs go in
-lanes where lanes can do them. The smallest of the repeats. Prints a table in Markdown.
+in the native module, rig and law; and as much motion by `clutch.sweep`, law and figures included. The
+smallest of the repeats. Prints a table in Markdown.
 """
 
 import argparse
@@ -12,8 +12,6 @@ import os
 import time
 
 os.environ["RAYON_NUM_THREADS"] = "1"  # before the module makes its threads
-
-import numpy as np
 
 import clutch
 import clutch.gym
@@ -46,14 +44,14 @@ def step(name: str, shafts: int, repeats: int) -> tuple[float, float]:
             *_, infos = envs.step(envs.scales.action(infos["law_voltage_v"])[:, None])
 
     whole = seconds(steps, repeats)
-    native, all_of_them = envs._shafts, np.ones(shafts, dtype=bool)
+    native = envs._shafts
     law = native.QUANTITIES.index("law_voltage_v")
     seen = native.seen()
 
     def native_steps() -> None:
         nonlocal seen
         for _ in range(STEPS):
-            seen = native.step(seen[law].copy(), all_of_them)
+            seen = native.step(seen[law].copy())
 
     return whole / STEPS, seconds(native_steps, repeats) / STEPS
 

@@ -444,24 +444,27 @@ class Shafts:
     """
     Rigs with their laws, which agents step together.
 
-    A period of all takes one call, on all processors and without Python's lock.
+    A period of all takes one call, in the lanes of vectors, on all processors and without Python's lock.
     """
     QUANTITIES: Final[list[str]]
     """
     Names of the rows of what is seen.
     """
-    def __new__(cls, /, scenarios: Sequence[_model.Scenario | Scenario]) -> Shafts: ...
-    def reset(self, /, index: int, scenario: _model.Scenario | Scenario) -> None:
+    def __new__(cls, /, scenario: _model.Scenario | Scenario, seeds: Sequence[int]) -> Shafts:
         """
-        Begins one of them anew.
+        A shaft for each seed, which takes the place of the scenario's.
+        """
+    def reset(self, /, index: int, seed: int) -> None:
+        """
+        One of them begins anew with the next step, which does not move it.
         """
     def seen(self, /) -> NDArray[np.float64]:
         """
         A row for each quantity, a column for each shaft.
         """
-    def step(self, /, volts: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def step(self, /, volts: NDArray[np.float64]) -> NDArray[np.float64]:
         """
-        A period of those shafts that are chosen, each under its voltage, V; then as `seen`.
+        A period of each shaft under its voltage, V; then as `seen`.
         """
 
 @final

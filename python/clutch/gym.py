@@ -159,9 +159,6 @@ class _Tracking:
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
         self.observation_space = gymnasium.spaces.Box(-_LIMIT, _LIMIT, (len(_SEEN),), np.float32)
 
-    def seeded(self, seed: int) -> Scenario:
-        return self.scenario.override({"run.seed": seed})
-
     def error(self, seen: _Array) -> _Array:
         """The true errors, rad."""
         error: _Array = seen[_ROW["target_counts"]] * self.count_rad - seen[_ROW["position_rad"]]
@@ -294,7 +291,7 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         super().reset(seed=seed)
         self._seed = int(self.np_random.integers(1 << 31)) if seed is None else seed
-        self._shafts = _clutch.Shafts([self._problem.seeded(self._seed)])
+        self._shafts = _clutch.Shafts(self.scenario, [self._seed])
         self._tick = 0
         self._past.clear()
         self._seen = self._shafts.seen()
@@ -334,7 +331,7 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if not self._tick < problem.steps:
             raise gymnasium.error.ResetNeeded("call reset before the first step, and after an episode's last")
         volts = self.scales.volts(action).reshape(1)
-        before, self._seen = self._seen, self._shafts.step(volts, np.ones(1, dtype=bool))
+        before, self._seen = self._seen, self._shafts.step(volts)
         self._tick += 1
         (reward,), (terminated,) = problem.judged(before, self._seen, np.array([self._tick]))
         truncated = self._tick >= problem.steps and not bool(terminated)
@@ -412,10 +409,10 @@ class TrackingEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 class TrackingVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """Many shafts at once, each with an agent's voltage: the environments of :class:`TrackingEnv` in one call.
 
-    A step computes a period of every shaft in the native module, on all processors and without Python's lock; each
-    goes its way bit for bit as in a :class:`TrackingEnv`. (A sweep's lanes compute whole runs under laws of the
-    package; they ask no agent.) A shaft whose episode has ended is reset by the next step, which answers with its
-    first sample and the reward 0: ``AutoresetMode.NEXT_STEP``.
+    A step computes a period of every shaft in the native module, eight shafts in the lanes of a vector, on all
+    processors and without Python's lock; each goes its way bit for bit as in a :class:`TrackingEnv`. Rigs and laws
+    that have no lanes are computed one by one. A shaft whose episode has ended is reset by the next step, which answers
+    with its first sample and the reward 0: ``AutoresetMode.NEXT_STEP``.
 
     Parameters
     ----------
@@ -499,8 +496,10 @@ class TrackingVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
             seeds = list(seed)
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed: expected {self.num_envs} seeds, got {len(seeds)}")
+        if wrong := [s for s in seeds if s is not None and s < 0]:
+            raise ValueError(f"seed = {wrong[0]}: expected at least 0")
         self._seeds = np.array([self._drawn() if s is None else s for s in seeds], dtype=np.int64)
-        self._shafts = _clutch.Shafts([self._problem.seeded(int(s)) for s in self._seeds])
+        self._shafts = _clutch.Shafts(self.scenario, self._seeds.tolist())
         self._tick = np.zeros(self.num_envs, dtype=np.int64)
         self._ended = np.zeros(self.num_envs, dtype=bool)
         self._seen = self._shafts.seen()
@@ -549,8 +548,8 @@ class TrackingVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
             raise ValueError("actions: expected numbers, got NaN")
         for i in np.flatnonzero(begins):
             self._seeds[i] = self._drawn()
-            self._shafts.reset(int(i), problem.seeded(int(self._seeds[i])))
-        before, self._seen = self._seen, self._shafts.step(volts, ~begins)
+            self._shafts.reset(int(i), int(self._seeds[i]))
+        before, self._seen = self._seen, self._shafts.step(volts)
         self._tick = np.where(begins, 0, self._tick + 1)
         rewards, terminated = problem.judged(before, self._seen, self._tick)
         rewards, terminated = np.where(begins, 0.0, rewards), terminated & ~begins
@@ -559,7 +558,7 @@ class TrackingVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
         return problem.observation(self._seen), rewards, terminated, truncated, self._infos()
 
     def _infos(self) -> dict[str, Any]:
-        infos = {name: values.copy() for name, values in self._problem.info(self._seen).items()}
+        infos = self._problem.info(self._seen.copy())
         whole = {"stuck": infos["stuck"] > 0, "sticks": infos["sticks"].astype(np.int64), "seed": self._seeds.copy()}
         return infos | whole
 

@@ -160,6 +160,8 @@ def test_bad_arguments_are_named():
         TrackingVectorEnv(0)
     with pytest.raises(ValueError, match="expected 2 seeds, got 1"):
         TrackingVectorEnv(2).reset(seed=[1])
+    with pytest.raises(ValueError, match="seed = -3: expected at least 0"):
+        TrackingVectorEnv(2).reset(seed=[1, -3])
     with pytest.raises(clutch.ParamError):
         TrackingEnv("smc_2", overrides={"law.smc.kp_v": -1})
 
@@ -239,6 +241,35 @@ def test_many_shafts_in_one_call_go_each_as_one_alone_and_begin_anew():
                 tick, ended = tick + 1, any(ends)
             tick += 1
     assert len(np.unique(seeds[-1])) == n
+
+
+@pytest.mark.parametrize(
+    ("scenario", "overrides"),
+    [
+        ("smc_2", {}),
+        ("motor_pid", {"rig.delay_ticks": 2}),
+        ("bench_pd_2", {"rig.actuator_time_constant_s": 0.002}),
+        # A law without lanes, and a rig without.
+        ("f32_smc_2", {}),
+        ("smc_2", {"rig.torque_noise_nm": 0.001}),
+    ],
+)
+def test_a_shaft_among_nine_has_the_observations_of_one_alone(scenario, overrides):
+    envs = TrackingVectorEnv(9, scenario, overrides=overrides)
+    observations, infos = envs.reset(seed=[5, 1, 5, 8, 2, 13, 3, 21, 34])
+    others = [TrackingEnv(scenario, overrides=overrides) for _ in range(9)]
+    begun = [env.reset(seed=int(seed)) for env, seed in zip(others, infos["seed"], strict=True)]
+    np.testing.assert_array_equal(observations, [observation for observation, _ in begun])
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        actions = envs.scales.action(infos["law_voltage_v"])[:, None] + rng.normal(0.0, 0.02, (9, 1))
+        observations, rewards, terminated, truncated, infos = envs.step(actions)
+        alone = [env.step(action) for env, action in zip(others, actions, strict=True)]
+        np.testing.assert_array_equal(observations, [step[0] for step in alone])
+        np.testing.assert_array_equal(rewards, [step[1] for step in alone])
+        assert not (terminated | truncated).any()
+        for key, values in infos.items():
+            np.testing.assert_array_equal(values, [step[4][key] for step in alone], err_msg=key)
 
 
 def test_an_environment_is_drawn_and_told():

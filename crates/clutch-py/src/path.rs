@@ -55,7 +55,7 @@ impl Target {
 
     /// Target position, counts.
     #[getter]
-    pub(crate) fn position_counts(&self) -> f64 {
+    fn position_counts(&self) -> f64 {
         fixed_to_counts(self.0.position)
     }
 
@@ -99,11 +99,6 @@ pub(crate) struct Path {
 }
 
 impl Path {
-    /// The target at a tick; none behind the last.
-    pub(crate) fn target(&self, tick: usize) -> Option<clutch_core::Target<f64>> {
-        self.targets.get(tick).copied()
-    }
-
     /// `wrong` is the package's exception for a path that the scenario's parameters do not make.
     pub(crate) fn new(
         py: Python<'_>,

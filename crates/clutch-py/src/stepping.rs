@@ -149,7 +149,7 @@ fn checked_counts(counts: f64, whole: bool) -> PyResult<f64> {
 #[pymethods]
 impl Servo {
     #[new]
-    pub(crate) fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Servo> {
+    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Servo> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         Ok(Servo {
@@ -257,16 +257,11 @@ impl Servo {
 impl Servo {
     /// One sampling period: counts that are known to be good and the target in, the voltage as the converter gives it
     /// out, V.
-    pub(crate) fn answer(&mut self, counts: f64, target: &Target) -> f64 {
+    fn answer(&mut self, counts: f64, target: &Target) -> f64 {
         let whole = self.whole;
         let map = self.map.as_ref().and_then(|grid| grid.map());
         let (code, volts) = either!(&mut self.running, r => r.step(counts, whole, target, map));
         if self.rounds { self.dac.volts(clutch_core::DacCode(code)) } else { volts }
-    }
-
-    /// Position error, rad, and its rate, rad/s, as the law saw them at the last step.
-    pub(crate) fn seen(&self) -> [f64; 2] {
-        [self.error(), self.error_rate()]
     }
 }
 
@@ -425,7 +420,7 @@ pub(crate) struct Plant {
 #[pymethods]
 impl Plant {
     #[new]
-    pub(crate) fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Plant> {
+    fn new(py: Python<'_>, scenario: &Bound<'_, PyAny>) -> PyResult<Plant> {
         let scenario = native(scenario)?;
         let spec = scenario.0.spec();
         let begun = match scenario.0.scalar() {
@@ -598,7 +593,7 @@ impl Plant {
 
 impl Plant {
     /// One sampling period with a finite voltage commanded.
-    pub(crate) fn advance(&mut self, voltage: f64) -> Result<(), EngineError> {
+    fn advance(&mut self, voltage: f64) -> Result<(), EngineError> {
         let (period, moving) = (self.period, &mut self.moving);
         let dac = moving.rig().dac;
         let volts = if self.rounds { dac.volts(dac.code(voltage)) } else { voltage };
@@ -617,25 +612,6 @@ impl Plant {
         moving.set_time(self.tick as f64 * period);
         moving.begin_period();
         Ok(())
-    }
-
-    /// Counts of the encoder; a fraction if the sensor is ideal.
-    pub(crate) fn seen(&self) -> f64 {
-        if self.whole { f64::from(self.moving.counts().0) } else { self.fine_counts() }
-    }
-
-    /// Time, s; position, rad; velocity, rad/s; counts; 1 at rest; sticks so far; voltage as the converter gives it, V.
-    pub(crate) fn told(&self) -> [f64; 7] {
-        let at_rest = f64::from(u8::from(self.stuck()));
-        [
-            self.time(),
-            self.position(),
-            self.velocity(),
-            self.seen(),
-            at_rest,
-            self.sticks as f64,
-            self.voltage,
-        ]
     }
 }
 

@@ -3,7 +3,7 @@
 use clutch_core::Arithmetic;
 
 /// A number, or a vector of them: what flow and figures need besides what laws need.
-pub(crate) trait Lane: Arithmetic {
+pub(crate) trait Lane: Arithmetic<Mask: Send + Sync> + Send + Sync {
     /// Lanes.
     const WIDTH: usize;
     /// Magnitude of what asks an exponential, beyond which a motion goes on alone; 100 below where exponentials end here.

@@ -3,6 +3,7 @@
 pub mod detected;
 pub mod drive;
 pub mod engine;
+mod fleet;
 pub mod friction_lab;
 pub mod friction_map;
 #[cfg_attr(target_family = "wasm", allow(dead_code, reason = "it has no vectors for lanes"))]
@@ -31,6 +32,7 @@ pub mod sweep;
 pub mod system;
 mod tables;
 
+pub use fleet::Fleet;
 pub use metrics::Metrics;
 pub use moving_rig::MovingRig;
 pub use number::number;

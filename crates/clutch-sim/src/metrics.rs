@@ -288,6 +288,11 @@ impl Sticks {
         }
     }
 
+    /// The number of sticks.
+    pub(crate) fn count(&self) -> u64 {
+        self.sticks
+    }
+
     /// An event between samples.
     fn event(&mut self, e: &Event) {
         if e.time < self.settle {

@@ -372,7 +372,7 @@ impl Trace {
 }
 
 /// A column with room for so many samples.
-fn room<T>(n: u64) -> Result<Vec<T>, RunError> {
+pub(crate) fn room<T>(n: u64) -> Result<Vec<T>, RunError> {
     let mut column = Vec::new();
     let fits = usize::try_from(n).is_ok_and(|n| column.try_reserve_exact(n).is_ok());
     if fits { Ok(column) } else { Err(RunError::Memory(n)) }

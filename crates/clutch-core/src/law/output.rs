@@ -106,6 +106,14 @@ pub struct OutputState<T> {
     offset: T,
 }
 
+impl<T: Arithmetic> OutputState<T> {
+    /// The memory `a` where the mask is true, `b` elsewhere.
+    #[must_use]
+    pub fn select(mask: T::Mask, a: &Self, b: &Self) -> Self {
+        OutputState { offset: T::select(mask, a.offset, b.offset) }
+    }
+}
+
 impl<T: Real> Output<T> {
     /// Checks the parameters.
     ///

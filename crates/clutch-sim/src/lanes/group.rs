@@ -1,15 +1,15 @@
 //! The runs that go together in lanes, and those that go alone.
 
-use super::block::{Block, has_lanes};
+use super::block::Block;
+use super::motion::Alike;
+use super::servo::servo_for_lanes;
 use super::vector::at;
 use crate::engine::EngineKind;
 use crate::metrics::{Detected, Metrics};
-use crate::rig::Rig;
-use crate::ripple::{Ripple, Shape};
 use crate::run::{Prepared, RunSpec};
 use clutch_core::law::LawParams;
 use clutch_core::reference::Reference;
-use clutch_core::{ActuatorKind, FixedCounts, FrictionParams, Servo, SmoothedDerivative, VelocityParams};
+use clutch_core::{ActuatorKind, FixedCounts, FrictionParams, Servo, SmoothedDerivative};
 use fearless_simd::Level;
 use std::mem::{Discriminant, discriminant};
 
@@ -38,69 +38,40 @@ pub(super) struct Candidate<'a> {
 /// Settings that the runs of a block have in common.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) struct Common {
-    pub(super) period: f64,
+    pub(super) motion: Alike,
     pub(super) ticks: u64,
     pub(super) settle: f64,
-    /// Periods from sample to voltage.
-    pub(super) delay: usize,
     pub(super) whole_counts: bool,
     pub(super) whole_codes: bool,
-    pub(super) engine: EngineKind,
-    /// Dormand–Prince: whether the actuator lags, and the shape of the friction along the disc.
-    pub(super) lags: bool,
-    shape: Option<Shape>,
     law: Discriminant<LawParams>,
-    /// Actuator and friction of rig and model.
-    plants: [(ActuatorKind, Discriminant<FrictionParams>); 2],
+    /// Actuator and friction of the model.
+    model: (ActuatorKind, Discriminant<FrictionParams>),
 }
 
 impl<'a> Candidate<'a> {
     /// A run that lanes can do; none if it has to go alone, be it to say what is wrong with it.
     fn of(place: usize, spec: &RunSpec<'a>) -> Option<Self> {
-        let VelocityParams::SmoothedDerivative(filter) = &spec.velocity else { return None };
-        let rig = &spec.rig;
-        if spec.shell.boundary > 0.0 || spec.friction_map.is_some() || rig.torque_noise > 0.0 {
-            return None;
-        }
-        let servo = Servo::<f64>::new(&spec.servo().ok()?).ok()?;
-        if !has_lanes(servo.law()) {
-            return None;
-        }
+        let (servo, filter) = servo_for_lanes(spec)?;
         let prepared = spec.prepare::<f64>().ok()?;
-        let in_steps =
-            prepared.engine == EngineKind::DormandPrince && prepared.moving.rig().drive.is_constant();
-        if prepared.engine != EngineKind::ExactFlow && !in_steps {
-            return None;
-        }
+        let rig = prepared.moving.rig();
         let encoder = servo.encoder();
         Some(Candidate {
             place,
             common: Common {
-                period: spec.period.seconds(),
+                motion: Alike::of(rig, prepared.engine, spec.period.seconds())?,
                 ticks: spec.run.ticks(spec.period),
                 settle: spec.run.settle,
-                delay: rig.delay_ticks as usize,
-                whole_counts: rig.encoder.quantised,
-                whole_codes: rig.dac.quantised,
-                engine: prepared.engine,
-                lags: rig.actuator_time_constant.is_some(),
-                shape: prepared.moving.rig().model.ripple.as_ref().map(Ripple::shape),
+                whole_counts: rig.params.encoder.quantised,
+                whole_codes: rig.params.dac.quantised,
                 law: discriminant(&spec.law),
-                plants: [
-                    (rig.actuator.kind(), discriminant(&rig.friction)),
-                    (spec.model.actuator.kind(), discriminant(&spec.model.friction)),
-                ],
+                model: (spec.model.actuator.kind(), discriminant(&spec.model.friction)),
             },
-            filter: SmoothedDerivative::new(filter, encoder, spec.period).ok()?,
             path: Reference::new(&spec.reference, FixedCounts(0), encoder, spec.period).ok()?,
             start: spec.run.start_position(),
             servo,
+            filter,
             prepared,
         })
-    }
-
-    pub(super) fn rig(&self) -> &Rig {
-        self.prepared.moving.rig()
     }
 }
 
@@ -134,7 +105,7 @@ pub(crate) fn run_all(
                     return false;
                 }
                 if let Some((metrics, detected)) = figures {
-                    done(row.place, common.engine, metrics, detected);
+                    done(row.place, common.motion.engine, metrics, detected);
                 }
             }
         }

@@ -1,4 +1,5 @@
-//! Many runs at once: eight of them in the lanes of a vector, each with the bits of its run alone.
+//! Many runs at once: eight of them in the lanes of a vector, each with the bits of its run alone. Shafts under the voltages
+//! of agents ([`Fleet`](crate::Fleet)) go through a period by the same code.
 //!
 //! ```text
 //! rows of a sweep ─► group (same law, same length, …) ─► block of chunks of eight lanes
@@ -10,11 +11,15 @@
 //!
 //! Arithmetic, law, output stage, actuator and the pieces of the exact flow are the very functions of one run, over
 //! [`Lane`](crate::lane::Lane) instead of `f64`. Nothing is fused, and nothing is summed across lanes; each elementary function has the bits
-//! of `libm`. A run that leaves what lanes can do (a position beyond ±2³⁰ counts, a number that is none) runs again alone.
+//! of `libm`. A run or a shaft that leaves what lanes can do (a position beyond ±2³⁰ counts, a number that is none) runs again
+//! alone.
 
 mod block;
 mod elementary;
+pub(crate) mod fleet;
 mod group;
+mod motion;
+mod servo;
 mod silence;
 mod steps;
 #[cfg(test)]
@@ -22,3 +27,5 @@ mod tests;
 mod vector;
 
 pub(crate) use group::run_all;
+#[cfg(test)]
+pub(crate) use vector::levels;

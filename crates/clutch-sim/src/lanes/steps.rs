@@ -1,32 +1,32 @@
 //! Dormand and Prince's steps in lanes: what they cost most is friction along the disc, at six stages each.
 //!
-//! A step is done for as many motions as a vector has lanes, from any chunk of the block, and judged lane by lane, as
+//! A step is done for as many motions as a vector has lanes, from any vector of the block, and judged lane by lane, as
 //! alone: each motion has its own steps, and ends when it ends.
 
-use super::block::Chunk;
-use super::group::{Candidate, Common};
+use super::motion::{Alike, Begin, Shafts};
 use crate::drive::Drive;
 use crate::engine::dormand_prince::{Course, Outcome, Push, Slip, Step, rounding};
 use crate::engine::{DormandPrince, Engine, Event, EventKind, Input, Model, Motion, Shaft, Volts};
 use crate::lane::{Lane, each};
+use crate::rig::Rig;
 use crate::ripple::Ripple;
 use clutch_core::Plant;
 
 /// Shafts that Dormand and Prince's steps move.
-pub(super) struct InSteps<'a, V: Lane> {
+pub(super) struct InSteps<V: Lane> {
     ripple: Option<Ripple<V>>,
     /// Time constants of the actuators' lag, s.
     time_constant: V,
     /// Voltage at the pads, V.
     pad: V,
     /// Lane by lane.
-    alone: Vec<Alone<'a>>,
+    alone: Vec<Alone>,
 }
 
 /// A shaft as one that moves alone.
-struct Alone<'a> {
-    model: &'a Model,
-    drive: &'a Drive,
+struct Alone {
+    model: Model,
+    drive: Drive,
     engine: DormandPrince,
 }
 
@@ -59,9 +59,9 @@ impl<V: Lane> Push<V> for Steady<V> {
 }
 
 /// A motion between two of its steps.
-pub(super) struct OnTheWay<'a> {
-    model: &'a Model,
-    chunk: usize,
+pub(super) struct OnTheWay {
+    /// Place of its vector.
+    shafts: usize,
     lane: usize,
     course: Course,
     sign: f64,
@@ -77,57 +77,73 @@ pub(super) struct OnTheWay<'a> {
     breaks_away: bool,
 }
 
-impl OnTheWay<'_> {
+impl OnTheWay {
     /// Its break-away.
     fn begins(&self, time: f64, position: f64) -> Event {
         Event { time, kind: EventKind::BreakAway, position, torque: self.torque }
     }
 }
 
-impl<'a, V: Lane> InSteps<'a, V> {
-    /// The shafts as they begin.
-    pub(super) fn of(rows: &[&'a Candidate<'a>]) -> Self {
-        let discs: Option<Vec<&Ripple>> = rows.iter().map(|r| r.rig().model.ripple.as_ref()).collect();
-        let lag = |r: &Candidate<'_>| r.rig().params.actuator_time_constant.unwrap_or(1.0);
+impl<V: Lane> InSteps<V> {
+    /// The shafts of rigs as they begin, one for each lane.
+    pub(super) fn of(rigs: &[Begin<'_>]) -> Self {
+        let alone: Vec<Alone> = rigs.iter().map(|(moving, _)| Alone::of(moving.rig())).collect();
+        let discs: Option<Vec<&Ripple>> = alone.iter().map(|a| a.model.ripple.as_ref()).collect();
+        let lag = |i: usize| rigs[i].0.rig().params.actuator_time_constant.unwrap_or(1.0);
         InSteps {
             ripple: discs.and_then(|discs| Ripple::in_lanes(&discs)),
-            time_constant: V::of(|i| lag(rows[i])),
-            pad: V::of(|i| rows[i].prepared.volts),
-            alone: rows
-                .iter()
-                .map(|r| Alone {
-                    model: &r.rig().model,
-                    drive: &r.rig().drive,
-                    engine: DormandPrince::default(),
-                })
-                .collect(),
+            time_constant: V::of(lag),
+            pad: V::of(|i| rigs[i].1),
+            alone,
+        }
+    }
+
+    /// A lane begins anew, with a rig of the same scenario.
+    pub(super) fn begin_anew(&mut self, lane: usize, (moving, volts): Begin<'_>) {
+        self.pad.put(lane, volts);
+        self.alone[lane] = Alone::of(moving.rig());
+        if let Some(ripple) = &mut self.ripple {
+            ripple.take(|i| self.alone[i].model.ripple.as_ref());
         }
     }
 }
 
-impl<'a> Alone<'a> {
-    /// The interval that begins at `time`, s.
-    fn input(&self, time: f64, common: &Common, [from, to]: [f64; 2], time_constant: f64) -> Input<'a> {
-        let volts = if common.lags { Volts::Lag { from, to, time_constant } } else { Volts::Held(to) };
-        Input { time, duration: common.period, origin: 0.0, volts, drive: self.drive, noise: 0.0 }
+impl Alone {
+    fn of(rig: &Rig) -> Self {
+        let Rig { model, drive, .. } = rig;
+        Alone { model: model.clone(), drive: drive.clone(), engine: DormandPrince::default() }
+    }
+
+    /// Its engine moves it through the interval that begins at `time`, s.
+    fn moves(
+        &mut self,
+        time: f64,
+        alike: &Alike,
+        ([from, to], time_constant): ([f64; 2], f64),
+        shaft: &mut Shaft,
+        events: &mut Vec<Event>,
+        begun: Option<(Course, f64)>,
+    ) -> bool {
+        let volts = if alike.lags { Volts::Lag { from, to, time_constant } } else { Volts::Held(to) };
+        let Alone { model, drive, engine } = self;
+        let input = Input { time, duration: alike.period, origin: 0.0, volts, drive, noise: 0.0 };
+        match begun {
+            Some(_) => engine.follow(model, &input, shaft, events, begun),
+            None => engine.advance(model, &input, shaft, events),
+        }
+        .is_ok()
     }
 }
 
-impl<'a, V: Lane> Chunk<'a, V> {
+impl<V: Lane> Shafts<V> {
     /// The period begins: motions get their first step; a shaft that is stuck, and may stay so, does.
     #[inline(always)]
-    pub(super) fn begin_steps(
-        &mut self,
-        n: usize,
-        time: f64,
-        common: &Common,
-        steps: &mut Vec<OnTheWay<'a>>,
-    ) {
+    pub(super) fn begin_steps(&mut self, n: usize, time: f64, alike: &Alike, steps: &mut Vec<OnTheWay>) {
         let (to, position, velocity, sign) = (self.arriving, self.position, self.velocity, self.sign);
         let (drive, lost) = (self.drive, self.lost);
         let plant = self.plant;
         let Some(own) = self.steps_mut() else { return };
-        let push = Steady { drive, from: own.pad, to, time_constant: own.time_constant, lags: common.lags };
+        let push = Steady { drive, from: own.pad, to, time_constant: own.time_constant, lags: alike.lags };
         let from = push.volts(V::ZERO);
         let torque = drive + plant.actuator().torque(from);
         let factor = match &own.ripple {
@@ -138,7 +154,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let moves = sign.less(V::ZERO) | V::ZERO.less(sign);
         let breaks_away = !moves & holds.less(torque.abs());
         // An actuator that lags may let go within the period, and one that turns round begins anew there.
-        let turns = if common.lags { (own.pad * to).less(V::ZERO) } else { V::none() };
+        let turns = if alike.lags { (own.pad * to).less(V::ZERO) } else { V::none() };
         let rests = !moves & !breaks_away;
         let stuck = rests & !turns;
         let sign = V::select(breaks_away, torque.sgn(), sign);
@@ -146,15 +162,14 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let rounding = rounding(torque.abs() + holds, inverse_inertia);
         let slip = Slip { plant: &plant, ripple: None, push, sign, inverse_inertia, share: 1.0, rounding };
         let rate = slip.rate_at(V::ZERO, [position, velocity], factor);
-        let alone = V::bits(turns | if common.lags { stuck } else { V::none() }) & !lost;
+        let alone = V::bits(turns | if alike.lags { stuck } else { V::none() }) & !lost;
         let begins = V::bits(breaks_away);
         each(!V::bits(rests | turns) & !lost, |i| {
             let state = [position.lane(i), velocity.lane(i)];
             let course =
-                own.alone[i].engine.course(0.0, common.period, state, [rate[0].lane(i), rate[1].lane(i)]);
+                own.alone[i].engine.course(0.0, alike.period, state, [rate[0].lane(i), rate[1].lane(i)]);
             steps.push(OnTheWay {
-                model: own.alone[i].model,
-                chunk: n,
+                shafts: n,
                 lane: i,
                 course,
                 sign: sign.lane(i),
@@ -168,8 +183,8 @@ impl<'a, V: Lane> Chunk<'a, V> {
             });
         });
         each(V::bits(stuck) & !alone & !lost, |i| self.sticks[i].period(time, true, &[]));
-        self.whole_periods(alone, time, common, &push);
-        let pad = push.volts(V::splat(common.period));
+        self.whole_periods(alone, time, alike, &push);
+        let pad = push.volts(V::splat(alike.period));
         if let Some(own) = self.steps_mut() {
             own.pad = pad;
         }
@@ -177,7 +192,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
 
     /// Periods that lanes do alone.
     #[inline(never)]
-    fn whole_periods(&mut self, lanes: u64, time: f64, common: &Common, push: &Steady<V>) {
+    fn whole_periods(&mut self, lanes: u64, time: f64, alike: &Alike, push: &Steady<V>) {
         let mut events = Vec::new();
         each(lanes, |i| {
             let motion = match self.sign.lane(i) {
@@ -188,17 +203,16 @@ impl<'a, V: Lane> Chunk<'a, V> {
             let volts = [push.from.lane(i), push.to.lane(i)];
             events.clear();
             let Some(own) = self.steps_mut() else { return };
-            let alone = &mut own.alone[i];
-            let input = alone.input(time, common, volts, push.time_constant.lane(i));
-            let moved = alone.engine.advance(alone.model, &input, &mut shaft, &mut events);
+            let volts = (volts, push.time_constant.lane(i));
+            let moved = own.alone[i].moves(time, alike, volts, &mut shaft, &mut events, None);
             let was = motion == Motion::Stuck;
-            self.ended(i, moved.is_ok().then_some(&shaft), time, was, &events);
+            self.ended(i, moved.then_some(&shaft), time, was, &events);
         });
     }
 
     /// A motion has come to its end.
     #[inline(always)]
-    fn arrives(&mut self, m: &OnTheWay<'_>, time: f64) {
+    fn arrives(&mut self, m: &OnTheWay, time: f64) {
         if m.breaks_away {
             let begins = m.begins(time, self.position.lane(m.lane));
             self.sticks[m.lane].period(time, true, &[begins]);
@@ -210,7 +224,7 @@ impl<'a, V: Lane> Chunk<'a, V> {
 
     /// A motion whose next step would stop: it goes on alone.
     #[inline(never)]
-    fn stops(&mut self, m: &OnTheWay<'_>, time: f64, common: &Common, events: &mut Vec<Event>) {
+    fn stops(&mut self, m: &OnTheWay, time: f64, alike: &Alike, events: &mut Vec<Event>) {
         events.clear();
         if m.breaks_away {
             events.push(m.begins(time, self.position.lane(m.lane)));
@@ -218,11 +232,10 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let [position, velocity] = m.course.state;
         let mut shaft = Shaft { motion: Motion::along(m.sign), ..Shaft::new(position, velocity) };
         let Some(own) = self.steps_mut() else { return };
-        let alone = &mut own.alone[m.lane];
-        let input = alone.input(time, common, m.volts, m.time_constant);
         let begun = Some((m.course, m.rounding));
-        let moved = alone.engine.follow(alone.model, &input, &mut shaft, events, begun);
-        self.ended(m.lane, moved.is_ok().then_some(&shaft), time, m.breaks_away, events);
+        let volts = (m.volts, m.time_constant);
+        let moved = own.alone[m.lane].moves(time, alike, volts, &mut shaft, events, begun);
+        self.ended(m.lane, moved.then_some(&shaft), time, m.breaks_away, events);
     }
 }
 
@@ -230,31 +243,56 @@ impl<'a, V: Lane> Chunk<'a, V> {
 pub(super) struct Gathered<V: Lane> {
     plant: Plant<V>,
     ripple: Option<Ripple<V>>,
-    /// Plants differ from run to run, and discs.
+    /// Models of the block's shafts, lane by lane of each vector.
+    each: Vec<Model>,
+    /// Plants have differed from one another, and discs.
     differ: (bool, bool),
 }
 
 impl<V: Lane> Gathered<V> {
-    /// For the runs of a block; none if they move otherwise.
-    pub(super) fn of(chunks: &[Chunk<'_, V>]) -> Option<Self> {
-        let first = chunks.first()?;
+    /// For the shafts of a block; none if they move otherwise.
+    pub(super) fn of(all: &[Shafts<V>]) -> Option<Self> {
+        let first = all.first()?;
         let own = first.steps()?;
-        let model = own.alone.first()?.model;
-        let differ = |same: fn(&Model, &Model) -> bool| {
-            let all = chunks.iter().filter_map(|chunk| chunk.steps()).flat_map(|own| &own.alone);
-            all.into_iter().any(|alone| !same(alone.model, model))
-        };
+        let lanes = all.iter().filter_map(Shafts::steps).flat_map(|own| &own.alone);
+        let each: Vec<Model> = lanes.map(|alone| alone.model.clone()).collect();
+        let differ = |same: fn(&Model, &Model) -> bool| each.iter().any(|model| !same(model, &each[0]));
         Some(Gathered {
             plant: first.plant,
             ripple: own.ripple.clone(),
             differ: (differ(|a, b| a.plant == b.plant), differ(|a, b| a.ripple == b.ripple)),
+            each,
         })
     }
 
-    /// Takes what so many motions have of their own.
+    /// A lane of a vector has begun anew.
+    pub(super) fn begun_anew(&mut self, shafts: &Shafts<V>, n: usize, lane: usize) {
+        let Some(own) = shafts.steps() else { return };
+        let (anew, before) = (&own.alone[lane].model, &mut self.each[n * V::WIDTH + lane]);
+        self.differ.0 |= anew.plant != before.plant;
+        self.differ.1 |= anew.ripple != before.ripple;
+        *before = anew.clone();
+    }
+
+    /// Plants and discs of so many motions: those of the vector that they fill, each in its lane, or taken one by one.
     #[inline(always)]
-    fn take(&mut self, some: &[OnTheWay<'_>]) {
-        let model = |i: usize| some[i.min(some.len() - 1)].model;
+    fn take<'g>(
+        &'g mut self,
+        some: &[OnTheWay],
+        all: &'g [Shafts<V>],
+    ) -> (&'g Plant<V>, Option<&'g Ripple<V>>) {
+        let first = &some[0];
+        let filled = some.iter().enumerate().all(|(lane, m)| (m.shafts, m.lane) == (first.shafts, lane));
+        if filled
+            && some.len() == V::WIDTH
+            && let Some(own) = all[first.shafts].steps()
+        {
+            return (&all[first.shafts].plant, own.ripple.as_ref());
+        }
+        let model = |i: usize| {
+            let m = &some[i.min(some.len() - 1)];
+            &self.each[m.shafts * V::WIDTH + m.lane]
+        };
         if let Some(ripple) = &mut self.ripple
             && self.differ.1
         {
@@ -264,48 +302,49 @@ impl<V: Lane> Gathered<V> {
             let of = |get: &dyn Fn(&Plant<f64>) -> f64| V::of(|i| get(&model(i).plant));
             self.plant = Plant::in_lanes(&of).unwrap_or(self.plant);
         }
+        (&self.plant, self.ripple.as_ref())
     }
 }
 
 /// The motions, step by step, as many at once as there are lanes.
 #[inline(always)]
 pub(super) fn step_by_step<V: Lane>(
-    chunks: &mut [Chunk<'_, V>],
-    all: &mut Gathered<V>,
-    moving: &mut Vec<OnTheWay<'_>>,
+    all: &mut [Shafts<V>],
+    gathered: &mut Gathered<V>,
+    moving: &mut Vec<OnTheWay>,
     time: f64,
-    common: &Common,
+    alike: &Alike,
     events: &mut Vec<Event>,
 ) {
     while !moving.is_empty() {
         let mut left = 0;
         for first in (0..moving.len()).step_by(V::WIDTH) {
             let some = first..(first + V::WIDTH).min(moving.len());
-            all.take(&moving[some.clone()]);
-            let step = one_step(all, &moving[some.clone()], common);
+            let (plant, ripple) = gathered.take(&moving[some.clone()], all);
+            let step = one_step(plant, ripple, &moving[some.clone()], alike);
             for (i, at) in some.enumerate() {
                 let m = &mut moving[at];
-                let chunk = &mut chunks[m.chunk];
+                let shafts = &mut all[m.shafts];
                 let step = Step {
                     to: [step.to[0].lane(i), step.to[1].lane(i)],
                     error: step.error.lane(i),
                     rate: [step.rate[0].lane(i), step.rate[1].lane(i)],
                 };
-                let Some(own) = chunk.steps_mut() else { continue };
+                let Some(own) = shafts.steps_mut() else { continue };
                 let engine = &mut own.alone[m.lane].engine;
                 let before = m.course;
-                match engine.judge(&mut m.course, &step, m.sign, (time, common.period)) {
-                    Ok(Outcome::On) if m.course.s < common.period => {
+                match engine.judge(&mut m.course, &step, m.sign, (time, alike.period)) {
+                    Ok(Outcome::On) if m.course.s < alike.period => {
                         moving.swap(left, at);
                         left += 1;
                     }
-                    Ok(Outcome::On) => chunk.arrives(m, time),
+                    Ok(Outcome::On) => shafts.arrives(m, time),
                     Ok(Outcome::Stops) => {
                         // Its last step is done again by who goes on.
                         m.course = before;
-                        chunk.stops(m, time, common, events);
+                        shafts.stops(m, time, alike, events);
                     }
-                    Err(_) => chunk.lost |= 1 << m.lane,
+                    Err(_) => shafts.lost |= 1 << m.lane,
                 }
             }
         }
@@ -315,19 +354,24 @@ pub(super) fn step_by_step<V: Lane>(
 
 /// A step of so many motions.
 #[inline(always)]
-fn one_step<V: Lane>(all: &Gathered<V>, some: &[OnTheWay<'_>], common: &Common) -> Step<V> {
+fn one_step<V: Lane>(
+    plant: &Plant<V>,
+    ripple: Option<&Ripple<V>>,
+    some: &[OnTheWay],
+    alike: &Alike,
+) -> Step<V> {
     let at = |i: usize| &some[i.min(some.len() - 1)];
-    let of = |get: fn(&OnTheWay<'_>) -> f64| V::of(|i| get(at(i)));
-    let lengths = V::of(|i| at(i).course.next(common.period).0);
+    let of = |get: fn(&OnTheWay) -> f64| V::of(|i| get(at(i)));
+    let lengths = V::of(|i| at(i).course.next(alike.period).0);
     let slip = Slip {
-        plant: &all.plant,
-        ripple: all.ripple.as_ref(),
+        plant,
+        ripple,
         push: Steady {
             drive: of(|m| m.drive),
             from: of(|m| m.volts[0]),
             to: of(|m| m.volts[1]),
             time_constant: of(|m| m.time_constant),
-            lags: common.lags,
+            lags: alike.lags,
         },
         sign: of(|m| m.sign),
         inverse_inertia: of(|m| m.inverse_inertia),

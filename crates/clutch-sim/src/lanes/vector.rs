@@ -2,7 +2,8 @@
 //!
 //! The only unsafe code of this crate: a vector of a set of instructions is made out of nothing, as [`Arithmetic`] asks, and
 //! not out of the token that proves the set to be there. [`at`] has seen the token before any vector is made. Nothing outside
-//! of this file can name a vector, and [`InLanes`] is given one by [`at`] alone; its result must hold none.
+//! of this file can name a vector, and [`InLanes`] is given one by [`at`] alone. Its result may hold vectors for later – the
+//! processor stays the one that it is –, but where they are used only [`Lane::apart`] brings their instructions back.
 
 use super::elementary::{self, Powers};
 use crate::lane::Lane;
@@ -67,7 +68,7 @@ instructions! {
 
 /// The levels that this processor has, the lowest first.
 #[cfg(test)]
-pub(super) fn levels() -> Vec<Level> {
+pub(crate) fn levels() -> Vec<Level> {
     let best = Level::new();
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     let lower = [

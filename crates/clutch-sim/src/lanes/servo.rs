@@ -1,0 +1,195 @@
+//! Servos of shafts in lanes: sensor, filter (5), law, converter.
+
+use crate::lane::Lane;
+use crate::run::RunSpec;
+use clutch_core::law::{self, ControlLaw, Law, Seen, Tick};
+use clutch_core::{DacCode, FixedCounts, Servo, SmoothedDerivative, Target, VelocityParams};
+
+/// Counts of an encoder beyond which a run goes alone: what wraps, wraps there.
+const FARTHEST: f64 = (1 << 30) as f64;
+/// A count in the fixed point of positions.
+pub(super) const FIXED: f64 = (1 << FixedCounts::FRACTION_BITS) as f64;
+
+macro_rules! laws {
+    ($(lanes $law:ident;)+) => {
+        /// A law of several runs, and its memory.
+        #[derive(Clone)]
+        enum LawInLanes<V: Lane> {
+            $($law(law::$law<V>, <law::$law<V> as ControlLaw<V>>::State),)+
+        }
+
+        impl<V: Lane> LawInLanes<V> {
+            /// The laws of the runs as one; none if they are not of one kind, or of a kind that has no lanes.
+            fn of(laws: &[&Law<f64>]) -> Option<Self> {
+                match laws.first()? {
+                    $(Law::$law(_) => {
+                        let own = |law: &&Law<f64>| if let Law::$law(law) = law { Some(*law) } else { None };
+                        let own: Vec<law::$law<f64>> = laws.iter().map(own).collect::<Option<_>>()?;
+                        let law: Option<law::$law<V>> =
+                            law::$law::in_lanes(&|get| V::of(|i| get(&own[i]))).into();
+                        Some(LawInLanes::$law(law?, Default::default()))
+                    })+
+                    _ => None,
+                }
+            }
+
+            /// Begins at a tick in some lanes, with so many volts on the actuator.
+            fn start(&mut self, which: V::Mask, tick: &Tick<V>, applied: V) {
+                match self {
+                    $(LawInLanes::$law(law, state) => {
+                        let begun = law.start(tick, applied);
+                        *state = <law::$law<V> as ControlLaw<V>>::State::select(which, &begun, state);
+                    })+
+                }
+            }
+
+            /// A period, with so many volts on the actuator since the last one.
+            #[inline(always)]
+            fn update(&mut self, tick: &Tick<V>, applied: V) -> V {
+                let seen = Seen { applied, ..Seen::default() };
+                match self {
+                    $(LawInLanes::$law(law, state) => {
+                        law.sees(state, &seen);
+                        law.update(state, tick).voltage
+                    })+
+                }
+            }
+        }
+
+        /// The laws that run in lanes.
+        fn has_lanes(law: &Law<f64>) -> bool {
+            matches!(law, $(Law::$law(_))|+)
+        }
+    };
+}
+clutch_core::each_law_in_lanes!(laws);
+
+/// The servo of a specification with its filter (5), if both run in lanes.
+pub(super) fn servo_for_lanes(spec: &RunSpec<'_>) -> Option<(Servo<f64>, SmoothedDerivative<f64>)> {
+    let VelocityParams::SmoothedDerivative(filter) = &spec.velocity else { return None };
+    if spec.shell.boundary > 0.0 || spec.friction_map.is_some() {
+        return None;
+    }
+    let servo = Servo::<f64>::new(&spec.servo().ok()?).ok()?;
+    let filter = SmoothedDerivative::new(filter, servo.encoder(), spec.period).ok()?;
+    has_lanes(servo.law()).then_some((servo, filter))
+}
+
+/// The target of each lane; its position in fixed point.
+pub(super) struct Targets<V> {
+    pub(super) position: V,
+    pub(super) velocity: V,
+    pub(super) acceleration: V,
+}
+
+impl<V: Lane> Targets<V> {
+    /// Of at most as many lanes as there are; those that are left over have the last.
+    #[inline(always)]
+    pub(super) fn of(each: &[Target<f64>]) -> Self {
+        let at = |i: usize| &each[i.min(each.len() - 1)];
+        Targets {
+            position: V::of(|i| at(i).position.0 as f64),
+            velocity: V::of(|i| at(i).velocity),
+            acceleration: V::of(|i| at(i).acceleration),
+        }
+    }
+}
+
+/// Encoders of the shafts in the lanes of one vector.
+#[derive(Clone, Copy)]
+pub(super) struct Sensors<V> {
+    pub(super) counts_per_radian: V,
+    /// Else they are ideal.
+    pub(super) whole_counts: bool,
+}
+
+impl<V: Lane> Sensors<V> {
+    /// Counts of the encoder, and the position that the servo sees, in fixed point.
+    #[inline(always)]
+    pub(super) fn read(&self, position: V) -> (V, V) {
+        let fine = position * self.counts_per_radian;
+        let counts = fine.floor();
+        let fixed = V::splat(FIXED);
+        (counts, if self.whole_counts { counts * fixed } else { (fine * fixed).floor() })
+    }
+}
+
+/// Lanes whose counts or whose targets, in fixed point, are beyond what lanes do, or no number.
+#[inline(always)]
+pub(super) fn beyond<V: Lane>(counts: V, target: V) -> u64 {
+    let near = counts.abs().less(V::splat(FARTHEST)) & target.abs().less(V::splat(FARTHEST * FIXED));
+    V::bits(!near)
+}
+
+/// Servos of the shafts in the lanes of one vector.
+pub(super) struct Servos<V: Lane> {
+    pub(super) radians_per_count: V,
+    /// Lowest voltage of the converter, its step, codes per volt, and its highest code.
+    dac: [V; 4],
+    /// Else the law's own voltage goes out.
+    whole_codes: bool,
+    filter: SmoothedDerivative<V>,
+    law: LawInLanes<V>,
+    /// Error of the last sample in fixed point, and its rate by (5).
+    error: V,
+    rate: V,
+    /// Voltage since the last sample, as the law is told.
+    applied: V,
+}
+
+impl<V: Lane> Servos<V> {
+    /// Servos with their filters, one for each lane; none if they have no lanes together.
+    pub(super) fn of(servos: &[(&Servo<f64>, SmoothedDerivative<f64>)], whole_codes: bool) -> Option<Self> {
+        let of = |get: &dyn Fn(&Servo<f64>) -> f64| V::of(|i| get(servos[i].0));
+        Some(Servos {
+            radians_per_count: of(&|s| s.encoder().radians_per_count()),
+            dac: [
+                of(&|s| s.dac().volts(DacCode(0))),
+                of(&|s| s.dac().step()),
+                of(&|s| s.dac().per_volt()),
+                of(&|s| f64::from(s.dac().top().0)),
+            ],
+            whole_codes,
+            filter: SmoothedDerivative::in_lanes(&|get| V::of(|i| get(&servos[i].1))),
+            law: LawInLanes::of(&servos.iter().map(|(servo, _)| servo.law()).collect::<Vec<_>>())?,
+            error: V::ZERO,
+            rate: V::ZERO,
+            applied: V::ZERO,
+        })
+    }
+
+    /// Begins in some lanes, at the position that is seen, with so many volts on the actuator.
+    pub(super) fn start(&mut self, which: V::Mask, seen: V, targets: &Targets<V>, volts: V) {
+        self.error = V::select(which, targets.position - seen, self.error);
+        self.rate = V::select(which, V::ZERO, self.rate);
+        self.applied = V::select(which, volts, self.applied);
+        let tick = self.tick(targets);
+        self.law.start(which, &tick, volts);
+    }
+
+    #[inline(always)]
+    fn tick(&self, targets: &Targets<V>) -> Tick<V> {
+        Tick {
+            error: self.error * V::splat(1.0 / FIXED) * self.radians_per_count,
+            error_rate: self.rate,
+            target_velocity: targets.velocity,
+            target_acceleration: targets.acceleration,
+        }
+    }
+
+    /// A tick, with the position that is seen: the law's input, and the voltage that goes out, V.
+    #[inline(always)]
+    pub(super) fn sample(&mut self, seen: V, targets: &Targets<V>) -> (Tick<V>, V) {
+        let error = targets.position - seen;
+        let difference = (error - self.error) * V::splat(1.0 / FIXED);
+        self.error = error;
+        self.rate = self.filter.smooth(self.rate, difference);
+        let tick = self.tick(targets);
+        let demand = self.law.update(&tick, self.applied);
+        let [lowest, step, per_volt, top] = self.dac;
+        let code = ((demand - lowest) * per_volt + V::splat(0.5)).floor();
+        // A law is told of the converter's voltage, though a rig's may round nothing.
+        self.applied = lowest + step * code.max(V::ZERO).min(top);
+        (tick, if self.whole_codes { self.applied } else { demand })
+    }
+}
