@@ -90,7 +90,7 @@ fn shafts_in_lanes_have_the_bits_of_shafts_alone() {
     let runout = ("rig.runout", "{ amplitude = 0.05, waves_per_turn = 2, phase_deg = 30.0 }");
     let bumpless = ("output.bumpless_time_s", "0.1");
     let jerk = ("reference", "{ minimum_jerk = { distance_deg = 8.0, duration_s = 0.4 } }");
-    let cases: [Case<'_>; 18] = [
+    let cases: [Case<'_>; 21] = [
         ("pd_2", &[]),
         ("pd_2", &[("rig.delay_ticks", "1"), bumpless]),
         ("pd_2", &[("rig.delay_ticks", "7"), jerk]),
@@ -101,6 +101,9 @@ fn shafts_in_lanes_have_the_bits_of_shafts_alone() {
         ("pd_2", &[("law", "{ hold = {} }")]),
         ("smc_2", &[]),
         ("smc_2", &[("law", "{ smc_sign = {} }"), ("rig.base", "\"paper\"")]),
+        ("smc_2", &[("law", "{ super_twisting = {} }"), bumpless]),
+        ("smc_2", &[("law", "{ smc_integral = {} }"), bench]),
+        ("smc_2", &[("law", "{ dob = {} }"), ("rig.delay_ticks", "1")]),
         ("ctc_2", &[]),
         ("pid_2", &[("rig.base", "\"paper\""), ("law.pid.derivative_time_s", "0.002"), bumpless]),
         ("motor_pid", &[]),
