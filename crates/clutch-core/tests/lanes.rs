@@ -136,21 +136,40 @@ fn tick(k: u32, lane: usize) -> Tick<f64> {
     Tick { error, error_rate, target_velocity: 0.035, target_acceleration: 0.1 * x }
 }
 
+/// A law's memory, of which a lane begins anew.
+trait Memory {
+    fn select(mask: Mask, a: &Self, b: &Self) -> Self;
+}
+
+macro_rules! memories {
+    ($($law:ident)+) => { $(
+        impl Memory for <$law<Lanes> as ControlLaw<Lanes>>::State {
+            fn select(mask: Mask, a: &Self, b: &Self) -> Self {
+                Self::select(mask, a, b)
+            }
+        }
+    )+ };
+}
+// PD's is that of each law which remembers its output stage alone.
+memories! { Pd Pid SuperTwisting SmcIntegral Dob Voltage }
+
 /// As [`open_loop`], of a law that meets every way out of its output stage.
 fn same_bits<S, V>(laws: [S; N], as_one: impl Fn(Each<'_, S, f64, Lanes>) -> V)
 where
     S: ControlLaw<f64>,
     V: ControlLaw<Lanes>,
+    V::State: Memory,
 {
     let limits = open_loop(laws, as_one);
     assert!(limits.iter().all(|n| *n > 0), "each way out of the output stage is met: {limits:?}");
 }
 
-/// Runs a law of each lane by itself and all of them as one, and compares bits; how often each limit decided.
+/// Runs a law of each lane by itself and all of them as one, of which now and then a lane begins anew, and compares bits; how often each limit decided.
 fn open_loop<S, V>(laws: [S; N], as_one: impl Fn(Each<'_, S, f64, Lanes>) -> V) -> [u32; 4]
 where
     S: ControlLaw<f64>,
     V: ControlLaw<Lanes>,
+    V::State: Memory,
 {
     let vector = as_one(&|get| Lanes(std::array::from_fn(|i| get(&laws[i]))));
     let at = |k: u32| -> ([Tick<f64>; N], Tick<Lanes>) {
@@ -170,6 +189,13 @@ where
     let (mut limits, mut applied) = ([0; 4], Lanes::splat(2.25));
     for k in 0..20_000 {
         let (ticks, all) = at(k);
+        if k % 1000 == 999 {
+            // One lane begins anew, with a voltage of its own.
+            let lane = (k / 1000) as usize % N;
+            states[lane] = laws[lane].start(&ticks[lane], 3.5);
+            let begun = vector.start(&all, Lanes::splat(3.5));
+            state = Memory::select(Mask(std::array::from_fn(|i| i == lane)), &begun, &state);
+        }
         let seen = |applied| Seen { applied, ..Seen::default() };
         vector.sees(&mut state, &Seen { applied, ..Seen::default() });
         let together = vector.update(&mut state, &all);

@@ -497,6 +497,25 @@ fn where_a_line_meets_a_unit_exactly_a_prepared_table_meets_it_too() {
     }
 }
 
+#[test]
+fn an_interval_of_half_a_million_years_is_prepared_to_the_last_bit() {
+    // Beyond 2⁶³ µs the rest of the division does not fit into a word that it is doubled in.
+    let knots = [
+        Knot { time_us: 0, position: FixedCounts(0) },
+        Knot { time_us: 3 << 62, position: FixedCounts(i64::MAX) },
+    ];
+    let table = Table { knots: &knots, interpolation: Interpolation::Linear };
+    let (steepness, slopes) = ([0, 1].map(|k| table.steepness(k)), [0, 1].map(|k| table.slope::<f64>(k)));
+    let prepared = Prepared { steepness: &steepness, slopes: &slopes };
+    let period = Micros(1_000_000);
+    for tick in [1, 1 << 20, (1 << 43) - 1, 12_345_678_901_234] {
+        let ours = table.at_with::<f64>(prepared, tick, Encoder::PAPER, period);
+        assert_eq!(ours, table.at::<f64>(tick, Encoder::PAPER, period), "tick {tick}");
+        let exact = i128::from(i64::MAX) * i128::from(tick) * 1_000_000 / (3 << 62);
+        assert_eq!(i128::from(ours.position.0), exact, "tick {tick}");
+    }
+}
+
 proptest! {
     #[test]
     fn a_trapezoid_keeps_its_bounds_and_arrives(d in distance(), v in bound(-3.0..2.0), a in bound(-2.0..4.0)) {
