@@ -47,7 +47,8 @@ enum Verb {
     Test,
     /// Runs only the tests of the wheel: builds it, installs it outside this tree, tests it there.
     Wheel,
-    /// Runs only the tests of what boards take (the core for their targets, link tests, images, budgets), and fuzzing.
+    /// Runs only what the tests run beside the others: what boards take (the core for their targets, link tests, images,
+    /// budgets), the playground's module, fuzzing.
     Boards,
     /// Runs the steps of CI: check, package, msrv, semver, then test.
     Ci,

@@ -59,18 +59,7 @@ pub struct DobState<T> {
     output: OutputState<T>,
 }
 
-impl<T: Arithmetic> DobState<T> {
-    /// The memory `a` where the mask is true, `b` elsewhere.
-    #[must_use]
-    pub fn select(mask: T::Mask, a: &Self, b: &Self) -> Self {
-        DobState {
-            disturbance: T::select(mask, a.disturbance, b.disturbance),
-            velocity: T::select(mask, a.velocity, b.velocity),
-            applied: T::select(mask, a.applied, b.applied),
-            output: OutputState::select(mask, &a.output, &b.output),
-        }
-    }
-}
+super::list::selected! { DobState: disturbance velocity applied }
 
 impl<T: Real> Dob<T> {
     /// Checks gains, the plant that the law believes in, and output stage.

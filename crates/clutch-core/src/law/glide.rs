@@ -338,7 +338,7 @@ impl<T: Real> Listed<T> for Glide<T> {
 mod tests {
     use super::*;
     use crate::law::OutputParams;
-    use crate::{BothActuator, MotorActuator, PlantParams};
+    use crate::{ActuatorParams, BothActuator, MotorActuator, PlantParams};
 
     fn glide(p: GlideParams, model: &PlantParams) -> Glide<f64> {
         let two_sided = model.actuator.kind().two_sided();
@@ -388,17 +388,18 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_motor_starts_against_its_friction_at_rest_either_way() {
-        let actuator = MotorActuator { gain: 0.05, preload: 0.25, load_share: 0.0 };
+    /// The first voltage for a shaft that nothing but its actuator drives, and whose path has left its count.
+    fn first_volts(actuator: impl Into<ActuatorParams<f64>>, rate: f64) -> f64 {
         let model = PlantParams { actuator: actuator.into(), drive_torque: 0.0, ..PlantParams::default() };
         let law = glide(GlideParams::default(), &model);
-        // The path has left the count.
         let count = core::f64::consts::TAU / 20_000.0;
-        let volts = |rate: f64| {
-            let tick = Tick { error: 2.0 * rate.signum() * count, ..at(rate) };
-            law.update(&mut law.start(&tick, 0.0), &tick).voltage
-        };
+        let tick = Tick { error: 2.0 * rate.signum() * count, ..at(rate) };
+        law.update(&mut law.start(&tick, 0.0), &tick).voltage
+    }
+
+    #[test]
+    fn a_motor_starts_against_its_friction_at_rest_either_way() {
+        let volts = |rate| first_volts(MotorActuator { gain: 0.05, preload: 0.25, load_share: 0.0 }, rate);
         let (forwards, backwards) = (volts(0.5), volts(-0.5));
         // 1.1 · 0.2 · 0.25 N m / 0.05 N m/V
         assert!((forwards - 1.1).abs() < 0.2, "{forwards} V");
@@ -408,16 +409,8 @@ mod tests {
     }
 
     #[test]
-    fn a_motor_beside_a_brake_starts_below_0_volts() {
-        let actuator = BothActuator { brake_gain: 0.14, motor_gain: 0.05, preload: 0.25 };
-        let model = PlantParams { actuator: actuator.into(), drive_torque: 0.0, ..PlantParams::default() };
-        let law = glide(GlideParams::default(), &model);
-        let count = core::f64::consts::TAU / 20_000.0;
-        let volts = |rate: f64| {
-            let tick = Tick { error: 2.0 * count, ..at(rate) };
-            law.update(&mut law.start(&tick, 0.0), &tick).voltage
-        };
-        // As the motor alone, with the other sign: friction at rest, then the acceleration of 5 °/s in a period.
+    fn a_motor_beside_a_brake_starts_as_alone_below_0_volts() {
+        let volts = |rate| first_volts(BothActuator { brake_gain: 0.14, motor_gain: 0.05, preload: 0.25 }, rate);
         assert!((volts(0.5) + 1.1).abs() < 0.2, "{} V", volts(0.5));
         assert!((volts(5.0) + (0.0375 + 0.0017 * 87.27) / 0.05).abs() < 0.05, "{} V", volts(5.0));
     }

@@ -285,3 +285,20 @@ macro_rules! laws {
     };
 }
 pub(super) use laws;
+
+/// `select` of the memory of a law that runs in lanes: by it one lane begins anew. The fields are those beside its output's.
+macro_rules! selected {
+    ($state:ident: $($field:ident)+) => {
+        impl<T: $crate::Arithmetic> $state<T> {
+            /// The memory `a` where the mask is true, `b` elsewhere.
+            #[must_use]
+            pub fn select(mask: T::Mask, a: &Self, b: &Self) -> Self {
+                $state {
+                    $($field: T::select(mask, a.$field, b.$field),)+
+                    output: $crate::law::OutputState::select(mask, &a.output, &b.output),
+                }
+            }
+        }
+    };
+}
+pub(super) use selected;

@@ -258,8 +258,7 @@ mod tests {
 
     /// Largest error behind the tenth count, and what was learnt.
     fn errors(steps: &MicroStep<f64>, shaft: &mut Shaft, pace: f64) -> (f64, MicroStepState<f64>) {
-        let mut state = MicroStepState::default();
-        state.begin(0.5, 0.0);
+        let mut state = begun();
         let (mut most, mut counts) = (0.0_f64, 0.0);
         for k in 0..200_000 {
             let path = 0.5 + pace * f64::from(k);
@@ -272,6 +271,13 @@ mod tests {
             shaft.period(if demand == Stepping::Hold { -shaft.stop } else { shaft.go });
         }
         (most, state)
+    }
+
+    /// Steps that begin in the middle of a count.
+    fn begun() -> MicroStepState<f64> {
+        let mut state = MicroStepState::default();
+        state.begin(0.5, 0.0);
+        state
     }
 
     fn shaft(go: f64, stop: f64) -> Shaft {
@@ -313,8 +319,7 @@ mod tests {
     #[test]
     fn a_brake_never_steps_back_and_waits_for_a_path_that_is_behind() {
         let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, (0.0, 0.0));
-        let mut state = MicroStepState::default();
-        state.begin(0.5, 0.0);
+        let mut state = begun();
         for _ in 0..100 {
             assert_eq!(steps.demand(&mut state, 0.0, -3.0, 0.001), Stepping::Hold);
         }
@@ -332,8 +337,7 @@ mod tests {
     fn where_no_edge_comes_a_motor_pushes_harder_and_a_brake_lets_go_for_longer() {
         for (only, what) in [(0.0, "motor"), (1.0, "brake")] {
             let steps = MicroStep::new(1.0, (0.09, 0.17), only, (0.0, 0.0));
-            let mut state = MicroStepState::default();
-            state.begin(0.5, 0.0);
+            let mut state = begun();
             for k in 0..2000 {
                 steps.demand(&mut state, 0.0, 0.5 + 0.01 * f64::from(k), 0.01);
             }
@@ -357,8 +361,7 @@ mod tests {
     #[test]
     fn edges_without_a_step_between_them_teach_nothing_of_its_way() {
         let steps = MicroStep::new(1.0, (0.09, 0.17), 1.0, (0.0, 0.0));
-        let mut state = MicroStepState::default();
-        state.begin(0.5, 0.0);
+        let mut state = begun();
         for _ in 0..100 {
             // The shaft creeps on ahead of a path that it has to wait for.
             assert_eq!(steps.demand(&mut state, 1.0, -3.0, 0.001), Stepping::Hold);
@@ -369,8 +372,7 @@ mod tests {
     #[test]
     fn an_edge_against_the_step_teaches_nothing_of_its_way() {
         let steps = MicroStep::new(1.0, (0.09, 0.17), 0.0, (0.0, 0.0));
-        let mut state = MicroStepState::default();
-        state.begin(0.5, 0.0);
+        let mut state = begun();
         let mut back = 0;
         // Each tenth period the shaft is a count further back, however it is pushed.
         for k in 1..1000 {

@@ -3,8 +3,8 @@
 //!
 //! A law is a file of this folder and a line in the list below: its parameters (`Default` = Table 2), what it
 //! remembers, its terms, and what it has, as a sliding surface, a damping or a filter of its own ([`Listed`]). A line that
-//! ends with `in lanes` says that the law runs in the lanes of a vector, too; its memory then has `select`, by which one lane
-//! begins anew. Three tiers: parameters → `new`, the only step that can fail → the law, with its state apart. `self` never
+//! ends with `in lanes` says that the law runs in the lanes of a vector, too; its memory then has `select` (`selected!`), by which
+//! one lane begins anew. Three tiers: parameters → `new`, the only step that can fail → the law, with its state apart. `self` never
 //! changes in a tick, so one law serves many runs, and a clone of the state is a snapshot.
 //!
 //! Sign convention everywhere: `e = θ_d − θ`; `e > 0` means the shaft lags and the brake has to

@@ -72,17 +72,7 @@ pub struct PidState<T> {
     output: OutputState<T>,
 }
 
-impl<T: Arithmetic> PidState<T> {
-    /// The memory `a` where the mask is true, `b` elsewhere.
-    #[must_use]
-    pub fn select(mask: T::Mask, a: &Self, b: &Self) -> Self {
-        PidState {
-            integral: T::select(mask, a.integral, b.integral),
-            rate: T::select(mask, a.rate, b.rate),
-            output: OutputState::select(mask, &a.output, &b.output),
-        }
-    }
-}
+super::list::selected! { PidState: integral rate }
 
 impl<T: Real> Pid<T> {
     /// Checks gains and output stage.

@@ -54,16 +54,7 @@ pub struct SmcIntegralState<T> {
     output: OutputState<T>,
 }
 
-impl<T: Arithmetic> SmcIntegralState<T> {
-    /// The memory `a` where the mask is true, `b` elsewhere.
-    #[must_use]
-    pub fn select(mask: T::Mask, a: &Self, b: &Self) -> Self {
-        SmcIntegralState {
-            integral: T::select(mask, a.integral, b.integral),
-            output: OutputState::select(mask, &a.output, &b.output),
-        }
-    }
-}
+super::list::selected! { SmcIntegralState: integral }
 
 impl<T: Real> SmcIntegral<T> {
     /// Checks gains and output stage.

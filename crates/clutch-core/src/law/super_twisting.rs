@@ -52,16 +52,7 @@ pub struct SuperTwistingState<T> {
     output: OutputState<T>,
 }
 
-impl<T: Arithmetic> SuperTwistingState<T> {
-    /// The memory `a` where the mask is true, `b` elsewhere.
-    #[must_use]
-    pub fn select(mask: T::Mask, a: &Self, b: &Self) -> Self {
-        SuperTwistingState {
-            integral: T::select(mask, a.integral, b.integral),
-            output: OutputState::select(mask, &a.output, &b.output),
-        }
-    }
-}
+super::list::selected! { SuperTwistingState: integral }
 
 impl<T: Real> SuperTwisting<T> {
     /// Checks gains and output stage.

@@ -65,18 +65,7 @@ pub struct VoltageState<T> {
     output: OutputState<T>,
 }
 
-impl<T: Arithmetic> VoltageState<T> {
-    /// The memory `a` where the mask is true, `b` elsewhere.
-    #[must_use]
-    pub fn select(mask: T::Mask, a: &Self, b: &Self) -> Self {
-        VoltageState {
-            way: T::select(mask, a.way, b.way),
-            back: T::select(mask, a.back, b.back),
-            waited: T::select(mask, a.waited, b.waited),
-            output: OutputState::select(mask, &a.output, &b.output),
-        }
-    }
-}
+super::list::selected! { VoltageState: way back waited }
 
 impl<T: Real> Voltage<T> {
     /// Checks parameters and output stage.

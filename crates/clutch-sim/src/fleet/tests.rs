@@ -2,22 +2,15 @@
 
 use super::*;
 use crate::lanes::levels;
+use crate::lanes::tests::built_in;
 use crate::progress::UNWATCHED;
 use crate::run::Keep;
-use crate::scenario::BUILT_IN;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 fn scenario(name: &str, set: &[(&str, &str)]) -> Scenario {
-    let built_in = BUILT_IN.iter().find(|b| b.name == name).unwrap();
     let set: Vec<_> = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
-    // The drive of a fleet in lanes is a weight.
-    let weight = "[rig.drive.weight]\nmass_kg = 0.001\n";
-    let toml = built_in
-        .toml
-        .replace("points_s_nm = [[0.0, 0.0]]", "")
-        .replace("[rig.drive.table]        # no load\n", weight);
-    Scenario::parse(name, &toml, &set).unwrap()
+    built_in(name, &set)
 }
 
 /// All that is told of a fleet, as bits; shaft by shaft within a quantity.

@@ -23,7 +23,7 @@ mod servo;
 mod silence;
 mod steps;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod vector;
 
 pub(crate) use group::run_all;

@@ -140,9 +140,19 @@ fn a_motion_that_stops_just_as_the_period_ends_stops_in_lanes_too() {
     }
 }
 
+/// A built-in scenario with values for some keys. The drive of what goes in lanes is a weight.
+pub(crate) fn built_in(name: &str, set: &[(String, String)]) -> Scenario {
+    let built_in = BUILT_IN.iter().find(|b| b.name == name).unwrap();
+    let weight = "[rig.drive.weight]\nmass_kg = 0.001\n";
+    let toml = built_in
+        .toml
+        .replace("points_s_nm = [[0.0, 0.0]]", "")
+        .replace("[rig.drive.table]        # no load\n", weight);
+    Scenario::parse(name, &toml, set).unwrap()
+}
+
 /// Scenarios around a built-in one, each with other values for some keys.
 fn around(name: &str, keys: &[(&str, f64, f64)], more: &[(&str, &str)], n: u64) -> Vec<Scenario> {
-    let built_in = BUILT_IN.iter().find(|b| b.name == name).unwrap();
     let mut rng = Pcg64::seed_from_u64(11);
     let mut one = |i: u64| {
         let mut set: Vec<(String, String)> =
@@ -151,13 +161,7 @@ fn around(name: &str, keys: &[(&str, f64, f64)], more: &[(&str, &str)], n: u64) 
             ((*key).to_owned(), format!("{}", low + (high - low) * rng.random::<f64>()))
         }));
         set.push(("run.seed".into(), (i + 1).to_string()));
-        // The drive of a run in lanes is a weight.
-        let weight = "[rig.drive.weight]\nmass_kg = 0.001\n";
-        let toml = built_in
-            .toml
-            .replace("points_s_nm = [[0.0, 0.0]]", "")
-            .replace("[rig.drive.table]        # no load\n", weight);
-        Scenario::parse(name, &toml, &set).unwrap()
+        built_in(name, &set)
     };
     (0..n).map(&mut one).collect()
 }
