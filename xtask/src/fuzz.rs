@@ -15,7 +15,7 @@ pub(crate) const TARGETS: [(&str, u32); 4] =
 pub(crate) enum Watched {
     /// Panics, and each access of memory, by the address sanitizer.
     Memory,
-    /// Panics alone: what is fuzzed has no unsafe code but that of its libraries, and builds and runs take half the time.
+    /// Panics alone, which takes less time: what is fuzzed has no unsafe code but that of its libraries.
     Panics,
 }
 
