@@ -7,7 +7,7 @@ use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{
     DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto,
-    FileDescriptorProto, FileDescriptorSet,
+    FileDescriptorProto, FileDescriptorSet, OneofDescriptorProto,
 };
 use std::fmt::Write as _;
 
@@ -84,12 +84,14 @@ pub fn channel_table() -> String {
 }
 
 /// The schema of a channel: a `FileDescriptorSet`. `terms` name the last fields of `/command`, which has as many.
+///
+/// A term is `optional`: a command without an answer of the law has none, which is not a term of 0.
 #[must_use]
 pub fn schema(channel: &Channel, terms: &[String]) -> Vec<u8> {
     let short = channel.message.trim_start_matches("clutch.");
     let mut names: Vec<String> = channel.fields.iter().map(|f| f.name.to_owned()).collect();
+    let first = names.len() - channel.terms;
     if channel.terms > 0 {
-        let first = names.len() - channel.terms;
         names.truncate(first + terms.len());
         for (i, term) in terms.iter().enumerate() {
             let mut name = field_name(term, i);
@@ -101,8 +103,8 @@ pub fn schema(channel: &Channel, terms: &[String]) -> Vec<u8> {
         }
     }
     let mut enums: Vec<EnumDescriptorProto> = Vec::new();
-    let mut field = Vec::new();
-    for (f, name) in channel.fields.iter().zip(names) {
+    let (mut field, mut oneof_decl) = (Vec::new(), Vec::new());
+    for (i, (f, name)) in channel.fields.iter().zip(names).enumerate() {
         let (kind, type_name) = match f.kind {
             Kind::Uint32 => (Type::Uint32, None),
             Kind::Uint64 => (Type::Uint64, None),
@@ -129,6 +131,12 @@ pub fn schema(channel: &Channel, terms: &[String]) -> Vec<u8> {
                 (Type::Enum, Some(format!(".{}.{enum_name}", channel.message)))
             }
         };
+        // An optional field of proto3 is one of a group of its own.
+        let optional = (i >= first).then_some(true);
+        let oneof_index = optional.map(|_| oneof_decl.len() as i32);
+        if optional.is_some() {
+            oneof_decl.push(OneofDescriptorProto { name: Some(format!("_{name}")), options: None });
+        }
         field.push(FieldDescriptorProto {
             json_name: Some(name.clone()), // otherwise JSON would show errorRateRadS
             name: Some(name),
@@ -136,6 +144,8 @@ pub fn schema(channel: &Channel, terms: &[String]) -> Vec<u8> {
             label: Some(Label::Optional as i32),
             r#type: Some(kind as i32),
             type_name,
+            oneof_index,
+            proto3_optional: optional,
             ..FieldDescriptorProto::default()
         });
     }
@@ -146,6 +156,7 @@ pub fn schema(channel: &Channel, terms: &[String]) -> Vec<u8> {
             name: Some(short.into()),
             field,
             enum_type: enums,
+            oneof_decl,
             ..DescriptorProto::default()
         }],
         syntax: Some("proto3".into()),
@@ -224,6 +235,7 @@ mod tests {
             let fields = &set.file[0].message_type[0].field;
             let mut all: Vec<_> = fields.iter().map(|f| f.name().to_owned()).collect();
             let terms = all[13..].to_vec();
+            assert!(fields.iter().enumerate().all(|(i, f)| f.proto3_optional() == (i >= 13)), "{terms:?}");
             all.sort_unstable();
             all.dedup();
             assert_eq!(all.len(), 13 + terms.len(), "{terms:?}");
