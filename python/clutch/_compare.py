@@ -68,15 +68,25 @@ class Comparison:
         return f"<Comparison of {', '.join(self.labels)}>"
 
     def __str__(self) -> str:
-        """The figures side by side, a column for each run."""
+        """The figures side by side in at most 80 columns, a column for each run; runs that do not fit stand below."""
         rows = [(f"{label} ({unit})" if unit else label, values) for label, unit, values in self._rows()]
         wide = max(len(name) for name, _ in rows)
-        widths = [max(len(label), *(len(row[i]) for _, row in rows)) for i, label in enumerate(self.labels)]
+        # Long names stand above the table, and numbers over its columns.
+        short = all(len(label) <= 12 for label in self.labels)
+        heads = self.labels if short else [f"[{number}]" for number in range(1, len(self) + 1)]
+        widths = [max(len(head), *(len(row[i]) for _, row in rows)) for i, head in enumerate(heads)]
+        blocks: list[list[int]] = [[]]
+        for i, width in enumerate(widths):
+            if blocks[-1] and wide + sum(widths[j] + 2 for j in blocks[-1]) + width + 2 > 80:
+                blocks.append([])
+            blocks[-1].append(i)
 
-        def line(name: str, cells: Sequence[str]) -> str:
-            return name.ljust(wide) + "".join(f"  {cell:>{w}}" for cell, w in zip(cells, widths, strict=True))
+        def line(name: str, cells: Sequence[str], block: Sequence[int]) -> str:
+            return name.ljust(wide) + "".join(f"  {cells[i]:>{widths[i]}}" for i in block)
 
-        return "\n".join([line("", self.labels), *(line(name, values) for name, values in rows)])
+        legend = [] if short else [f"{head} {label}" for head, label in zip(heads, self.labels, strict=True)]
+        tables = [[line("", heads, b), *(line(name, values, b) for name, values in rows)] for b in blocks]
+        return "\n".join(legend + [text for table in tables for text in table])
 
     def _repr_html_(self) -> str:
         head = "".join(f"<th>{escape(label)}</th>" for label in self.labels)

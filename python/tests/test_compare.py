@@ -38,6 +38,15 @@ def test_its_print_has_a_column_for_each_run_in_the_units_that_people_are_shown(
     assert repr(both) == "<Comparison of PD, sliding mode>"
 
 
+def test_its_print_stays_within_80_columns_with_long_names_and_many_runs():
+    many = compare(*["pd_2", "smc_2"] * 3, overrides=SHORT)
+    lines = str(many).splitlines()
+    assert lines[:2] == [f"[{i + 1}] {label}" for i, label in enumerate(many.labels[:2])]
+    assert max(map(len, lines)) <= 80
+    rows = [line for line in lines if line.startswith("max |error| (°)")]
+    assert len(rows) > 1 and sum(len(row.split()) - 3 for row in rows) == 6
+
+
 def test_scenarios_of_one_name_are_told_apart_and_results_are_taken_as_they_are():
     one = simulate("smc_2", overrides=SHORT)
     two = compare(one, Scenario.load("smc_2").override({**SHORT, "run.seed": 2}))

@@ -511,6 +511,13 @@ def test_the_wheels_command_is_the_binary(clutch, arguments):
     assert (ours.returncode, ours.stdout, ours.stderr) == (theirs.returncode, theirs.stdout, theirs.stderr)
 
 
+@pytest.mark.parametrize("view", ["foxglove", "scope"])
+def test_the_wheels_command_says_where_a_view_is_that_it_is_built_without(view):
+    done = subprocess.run([COMMAND, "sim", "smc_2", f"--{view}"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert f"--{view}: this command is built without it; the released command has it" in done.stderr
+
+
 def test_the_wheels_command_runs_the_loop_and_ends_it_on_ctrl_c(tmp_path):
     import signal
     import time

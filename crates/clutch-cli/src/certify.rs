@@ -1,7 +1,7 @@
 //! `clutch certify`.
 
 use crate::args::ScenarioArgs;
-use crate::output::{Exit, beside, json, paragraph, report};
+use crate::output::{Exit, beside, json, paragraph, report, wrote};
 use crate::sampled::{self, Bound};
 use crate::table::{number, quantities};
 use clap::Args;
@@ -13,7 +13,7 @@ use clutch_core::{ActuatorKind, Bounds, Interval};
 use clutch_sim::scenario::{Plan, Sampled};
 use clutch_sim::{Scenario, ScenarioError};
 use serde_json::{Value, json as value};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Checks a scenario's gains against every plant within its bounds.
 ///
@@ -52,10 +52,12 @@ impl Certify {
             (None, true) => Bound::search(&sampled, self.save.as_deref())?,
             (None, false) => Bound::NotLookedFor,
         };
+        let saved: Vec<&Path> = self.save.iter().map(PathBuf::as_path).collect();
+        let saved = if bound.proven().is_some() { saved } else { Vec::new() };
         report(
             self.json,
             || json(&whole(&scenario, &sampled, &bound)?),
-            || text(&scenario, &plan, &outside) + &sampled::lines(&sampled, &bound),
+            || text(&scenario, &plan, &outside) + &sampled::lines(&sampled, &bound) + &wrote(&saved),
         )?;
         if let (Some(file), None) = (&self.save, bound.proven()) {
             eprintln!("{}: not written: nothing is proven", file.display());
@@ -157,7 +159,9 @@ fn text(scenario: &Scenario, plan: &Plan, outside: &[String]) -> String {
     out += &assumed(plan);
     out += &ahead(c, &words);
     out += &behind(c, plan.demand.start_error_rate, &words);
-    out += &with_both(c);
+    if has_surface(c) {
+        out += &with_both(c);
+    }
     if let Some(paper) = &plan.paper {
         out += &printed(paper);
     }
@@ -222,9 +226,11 @@ fn ahead(c: &Certificate, words: &Words) -> String {
             row(if is_smc { "K_p given" } else { words.given }, c.kp_given, &V),
             row("    margin", c.kp_given / c.kp_required - 1.0, &PERCENT),
             row("reaching rate γ possible", c.reach_rate_possible, &RAD_S2),
-            row("holds up to an error rate of", c.error_rate_ahead, &DEG_S),
         ],
     );
+    if has_surface(c) {
+        out += &more(&[row("valid up to an error rate of", c.error_rate_ahead, &DEG_S)]);
+    }
     if is_smc {
         out += &more(&[
             row("K_d required", c.kd_required, &V_S_RAD),
@@ -237,27 +243,27 @@ fn ahead(c: &Certificate, words: &Words) -> String {
 
 /// A shaft behind its path.
 fn behind(c: &Certificate, start_error_rate: f64, words: &Words) -> String {
-    quantities(
-        words.behind,
-        &[
-            row("worst corner: torque", c.least_torque, &NM),
-            row("holds up to an error rate of", c.error_rate_behind, &DEG_S),
-            row("error rate at the start", start_error_rate, &DEG_S),
-        ],
-    )
+    let mut rows = vec![row("worst corner: torque", c.least_torque, &NM)];
+    if has_surface(c) {
+        rows.push(row("valid up to an error rate of", c.error_rate_behind, &DEG_S));
+    }
+    rows.push(row("error rate at the start", start_error_rate, &DEG_S));
+    quantities(words.behind, &rows)
+}
+
+/// True for a law with a sliding surface: for another, figures about one would mean nothing.
+fn has_surface(c: &Certificate) -> bool {
+    c.shortfall != Some(Shortfall::Surface)
 }
 
 /// Consequence for the error.
 fn with_both(c: &Certificate) -> String {
-    let bound = if c.certified() { "error stays below" } else { "error bound, were it certified" };
-    quantities(
-        "\nWith both",
-        &[
-            row("sliding surface: slope f", c.slope, &PER_S),
-            row("layer around it", c.layer, &RAD_S),
-            row(bound, c.error_bound, &DEG),
-        ],
-    )
+    let mut rows =
+        vec![row("sliding surface: slope f", c.slope, &PER_S), row("layer around it", c.layer, &RAD_S)];
+    if c.certified() {
+        rows.push(row("error stays below", c.error_bound, &DEG));
+    }
+    quantities("\nWith both", &rows)
 }
 
 /// The paper's conditions.

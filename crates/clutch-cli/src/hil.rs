@@ -33,10 +33,10 @@ use std::path::PathBuf;
     after_help = "Examples:\n  cargo xtask firmware build && clutch hil\n  clutch hil board_smc_2 --log run.mcap && \
     clutch replay run.mcap\n  clutch hil --fault silence:at=2\n  \
     clutch hil examples/nucleo_smc_2.toml --image nucleo-controller\n  \
-    clutch hil examples/nucleo_smc_2.toml --image nucleo-daq --chip-fault hang:at=2\n  \
+    clutch hil examples/nucleo_smc_2.toml \\\n      --image nucleo-daq --chip-fault hang:at=2\n  \
     clutch hil examples/pico_smc_2.toml --image pico-controller\n\n\
-    The chip's model needs Python with the module unicorn (pip install unicorn); CLUTCH_PYTHON names another\n\
-    interpreter than python3. Images are in $CLUTCH_IMAGES if it is set, else in target/firmware, else in\n\
+    The chip's model needs Python with the module unicorn (pip install unicorn); CLUTCH_PYTHON names another \
+    interpreter than python3. Images are in $CLUTCH_IMAGES if it is set, else in target/firmware, else in \
     share/clutch/images beside the command.\n\n\
     Exit codes: 0 the path is done; 1 an error; 2 not certified; 3 a fault ended the run. docs/firmware.md is the guide."
 )]
@@ -97,6 +97,7 @@ enum Link {
 
 impl Hil {
     pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
+        self.live.check()?;
         self.image = image(self.image)?;
         if let Some(kind) = ChipKind::of(&self.image) {
             return self.on_chip(kind);

@@ -109,6 +109,7 @@ impl Identify {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
         #[cfg(not(target_os = "linux"))]
         self.at_port.refuse("identify")?;
+        self.live.check()?;
         let (scenario, set) = (self.scenario.clone(), self.set.clone());
         let args = ScenarioArgs { scenario, set, identified: None, map: None };
         let scenario = args.load()?;

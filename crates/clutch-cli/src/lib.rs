@@ -110,7 +110,7 @@ enum Verb {
     Man(shell::Man),
 }
 
-/// A verb or an option written in other letters is that one: clap compares them as they are.
+/// A verb, an option or a value written in other letters is that one: clap compares them as they are.
 fn suggest(e: &mut clap::Error, args: &[OsString]) {
     let mut command = Cli::command();
     command.build(); // options of all verbs are options of each
@@ -118,6 +118,13 @@ fn suggest(e: &mut clap::Error, args: &[OsString]) {
         let meant = unknown.to_lowercase();
         if e.get(ContextKind::SuggestedSubcommand).is_none() && command.find_subcommand(&meant).is_some() {
             e.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![meant]));
+        }
+    } else if let (Some(ContextValue::String(unknown)), Some(ContextValue::Strings(valid))) =
+        (e.get(ContextKind::InvalidValue), e.get(ContextKind::ValidValue))
+    {
+        let meant = valid.iter().find(|value| value.to_lowercase() == unknown.to_lowercase()).cloned();
+        if let (None, Some(meant)) = (e.get(ContextKind::SuggestedValue), meant) {
+            e.insert(ContextKind::SuggestedValue, ContextValue::String(meant));
         }
     } else if let Some(ContextValue::String(unknown)) = e.get(ContextKind::InvalidArg) {
         let meant = unknown.to_lowercase();
@@ -191,7 +198,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
                     text += &format!(": {source}");
                 }
             }
-            output::complain(&format!("clutch: {text}"));
+            output::complain(&format!("{} {text}", output::SPEAKER));
             1
         }
     }

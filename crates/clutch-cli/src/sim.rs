@@ -15,7 +15,7 @@ use clutch_loop::to_log;
 use clutch_sim::engine::EngineKind;
 use clutch_sim::friction_map::MapInRun;
 use clutch_sim::metrics::Detected;
-use clutch_sim::picture::Envelope;
+use clutch_sim::picture::{Envelope, Window};
 use clutch_sim::progress::UNWATCHED;
 use clutch_sim::reaching::Reaching;
 use clutch_sim::rig::{Rig, not_passive};
@@ -83,6 +83,7 @@ struct Path {
 
 impl Sim {
     pub(crate) fn run(self) -> anyhow::Result<Exit> {
+        self.live.check()?;
         if let Some(file) = &self.plot {
             plot::figure_format(file)?; // before a long run, not after
         }
@@ -114,7 +115,7 @@ impl Sim {
         let summary = Summary::of(&scenario, &run)?;
         let files: Vec<&std::path::Path> =
             [&self.csv, &self.log, &self.plot].into_iter().flatten().map(PathBuf::as_path).collect();
-        report(self.json, || json(&summary), || text(&summary, &run) + &wrote(&files))?;
+        report(self.json, || json(&summary), || text(&summary, &scenario, &run) + &wrote(&files))?;
         if self.live.asked_for() {
             self.play(&scenario, &run)?;
         }
@@ -177,7 +178,7 @@ pub(crate) fn figures(m: &Metrics) -> Vec<(&'static str, String, &'static str)> 
     Metrics::FIGURES.iter().filter(|f| f.name != Metrics::MEASURED.name).map(|f| row(f, m)).collect()
 }
 
-fn text(s: &Summary<'_>, run: &Run) -> String {
+fn text(s: &Summary<'_>, scenario: &Scenario, run: &Run) -> String {
     let m = &s.metrics;
     let engine = match run.engine {
         EngineKind::ExactFlow => "exact flow",
@@ -213,6 +214,7 @@ fn text(s: &Summary<'_>, run: &Run) -> String {
     let largest = largest_errors(run);
     let most = largest.iter().copied().fold(0.0, f64::max);
     text += &format!("   |error| of the whole run, up to {} °:\n   {}\n", number(most), bars(&largest, most));
+    text += &closely(scenario, run);
     text += &paragraph(&format!("gains, continuous time: {certified}"));
     text += &s.as_sampled;
     if let Some(reason) = s.detected.reason() {
@@ -255,6 +257,24 @@ const BARS: usize = 72;
 pub(crate) fn largest_errors(run: &Run) -> Vec<f64> {
     let errors = Envelope::new(&run.trace.time, &run.trace.error, BARS);
     errors.low.iter().zip(&errors.high).map(|(low, high)| low.abs().max(high.abs()).to_degrees()).collect()
+}
+
+/// The error in the window that a picture of the run shows, as bars from its lowest to its highest.
+fn closely(scenario: &Scenario, run: &Run) -> String {
+    let Some(window) = Window::of(scenario, run) else { return String::new() };
+    let samples = window.samples(&run.trace);
+    let errors = Envelope::new(&run.trace.time[samples.clone()], &run.trace.error[samples], BARS);
+    let lowest = errors.mean.iter().copied().fold(f64::INFINITY, f64::min);
+    let highest = errors.mean.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let above: Vec<f64> = errors.mean.iter().map(|mean| mean - lowest).collect();
+    format!(
+        "   error {},\n   {} s in all, from {} to {} °:\n   {}\n",
+        window.words(),
+        number(window.to - window.from),
+        number(lowest.to_degrees()),
+        number(highest.to_degrees()),
+        bars(&above, highest - lowest)
+    )
 }
 
 fn csv(run: &Run, file: &std::path::Path) -> anyhow::Result<()> {

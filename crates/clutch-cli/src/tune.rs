@@ -2,7 +2,7 @@
 
 use crate::args::{ScenarioArgs, read_rig_file};
 use crate::map::{List, values};
-use crate::output::{Exit, Forms, json, paragraph, with_progress, write};
+use crate::output::{Exit, Forms, json, paragraph, tell, with_progress, write, wrote};
 use crate::plot::{Figure, Panel, Series};
 use crate::report::{Page, ReportFigure, ReportTable};
 use crate::table::number;
@@ -15,7 +15,7 @@ use clutch_sim::smooth_speed::RATE;
 use clutch_sim::{Keep, Scenario, ScenarioError};
 use clutch_tune::{Candidate, Options, Standing, Tuned, Verdict, tune};
 use comfy_table::{CellAlignment, ContentArrangement, Table, TableStyle};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Finds the law and the gains that move a rig most smoothly, certified.
 ///
@@ -77,10 +77,17 @@ impl Tune {
         if let Some(path) = &self.out {
             write(path, scenario_file(&tuned, winner))?;
         }
+        let mut written: Vec<&Path> = self.out.iter().map(PathBuf::as_path).collect();
         match (&self.save, &tuned.certificate) {
-            (Some(path), Some(certificate)) => file::write(path, certificate)?,
+            (Some(path), Some(certificate)) => {
+                file::write(path, certificate)?;
+                written.push(path);
+            }
             (Some(path), None) => eprintln!("{}: not written: nothing is proven", path.display()),
             _ => {}
+        }
+        if !self.forms.json() {
+            tell(&wrote(&written))?;
         }
         Ok(Exit::Done)
     }

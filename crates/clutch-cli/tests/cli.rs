@@ -1,7 +1,7 @@
 //! The command as a user meets it.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn clutch(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_clutch")).args(args).output().expect("the command starts")
@@ -433,6 +433,11 @@ fn a_name_in_other_letters_is_recognised() {
         (&["sim", "smc_2", "--SET", "a=1"], 64, "similar argument exists: '--set'"),
         (&["log", "export", "run.mcap", "--Channel", "sample"], 64, "similar argument exists: '--channel'"),
         (&["--QUIET", "sim", "smc_2"], 64, "similar argument exists: '--quiet'"),
+        (
+            &["log", "export", "r.mcap", "--out", "r.csv", "--channel", "TRUTH"],
+            64,
+            "similar value exists: 'truth'",
+        ),
     ] {
         let o = clutch(args);
         assert_eq!(o.status.code(), Some(code), "{args:?}: {}", err(&o));
@@ -610,6 +615,9 @@ fn the_referee_prints_a_table_of_80_columns_and_fails_where_a_case_is_missed() {
     assert_eq!(o.status.code(), Some(0), "{}", err(&o));
     assert!(out(&o).contains("P3  A brake that closes at 0.1 s stops a sliding mass"), "{}", out(&o));
     assert!(narrow(&out(&o)), "{}", out(&o));
+    // Three engines, with names that --engine takes.
+    let o = out(&clutch(&["referee", "A1"]));
+    assert!(o.contains("  system  dormand_prince  exact_flow\n") && narrow(&o), "{o}");
     let text = out(&clutch(&["referee", "--show", "P3"]));
     let file = folder("referee").join("mine.toml");
     std::fs::write(&file, text.replace("value = 1.1", "value = 1.2")).expect("the folder is there");
@@ -621,6 +629,47 @@ fn the_referee_prints_a_table_of_80_columns_and_fails_where_a_case_is_missed() {
     let o = clutch(&["referee", "P9"]);
     assert_eq!(o.status.code(), Some(1));
     assert!(err(&o).starts_with("clutch: P9: no such file, and no built-in case"), "{}", err(&o));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_export_that_is_stopped_leaves_no_file() {
+    let dir = folder("stopped_export");
+    let (log, table) = (dir.join("run.mcap"), dir.join("run.csv"));
+    let log = log.to_str().expect("UTF-8");
+    let long = ["sim", "smc_2", "-q", "--set", "run.duration_s=60", "--log", log];
+    assert!(clutch(&long).status.success());
+    for _ in 0..20 {
+        let mut export = Command::new(env!("CARGO_BIN_EXE_clutch"))
+            .args(["log", "export", log, "--out", table.to_str().expect("UTF-8")])
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        while !table.exists() && export.try_wait().expect("a child").is_none() {
+            std::thread::yield_now();
+        }
+        let id = export.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().expect("the program kill").success());
+        let o = export.wait_with_output().expect("a child");
+        if o.status.code() == Some(4) {
+            assert!(out(&o).starts_with("stopped; ") && !table.exists(), "{}", out(&o));
+            return;
+        }
+        // The signal came too late.
+        assert_eq!(o.status.code(), Some(0), "{}", out(&o));
+        std::fs::remove_file(&table).expect("a whole table");
+    }
+    panic!("no export was stopped");
+}
+
+#[test]
+fn figures_of_a_surface_are_not_given_of_a_law_without_one() {
+    for (name, has) in [("smc_2", true), ("bench_glide_2", false)] {
+        let text = out(&clutch(&["certify", name]));
+        for row in ["valid up to an error rate of", "sliding surface: slope f", "layer around it"] {
+            assert_eq!(text.contains(row), has, "{name}: {row}:\n{text}");
+        }
+    }
 }
 
 #[test]

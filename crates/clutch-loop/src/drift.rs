@@ -131,12 +131,13 @@ impl DriftReport {
     pub fn words(&self) -> String {
         match &self.last {
             Some(last) => format!(
-                "{} of the model's, {} to {} in the run; bounds {} to {}{}",
+                "{} of the model's, {} to {} in the run; bounds {} to {}, {}left{}",
                 number(last.friction),
                 number(self.range.0),
                 number(self.range.1),
                 number(last.low),
                 number(last.high),
+                if self.alarms > 0 { "" } else { "not " },
                 if self.one_sided == self.windows { "; sticks hide what is below" } else { "" }
             ),
             None if self.has_friction => "not told: too little motion without a stand".to_owned(),

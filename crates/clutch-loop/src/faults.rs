@@ -1,6 +1,6 @@
 //! Faults on request: what, when, how often.
 
-use clutch_sim::nearest;
+use clutch_sim::{expected, nearest};
 use std::fmt;
 use std::str::FromStr;
 
@@ -422,7 +422,7 @@ impl Given {
 
 /// A name that is none, and the probable meaning.
 fn unknown(what: &str, word: &str, known: &[&str]) -> String {
-    format!("unknown {what} {word}{}; expected one of: {}", nearest(word, known), known.join(", "))
+    format!("unknown {what} {word}{}", expected(&nearest(word, known), known))
 }
 
 fn number(key: &str, value: &str) -> Result<f64, String> {
@@ -513,7 +513,7 @@ mod tests {
         for kind in KINDS {
             assert!(!problem(kind).starts_with("unknown"), "{kind}: {}", problem(kind));
             let other = kind.to_uppercase();
-            let asked = format!("unknown kind {other}: did you mean {kind}?; expected one of: drop, ");
+            let asked = format!("unknown kind {other}: did you mean {kind}? Expected one of: drop, ");
             assert!(problem(&other).starts_with(&asked), "{}", problem(&other));
         }
         for key in KEYS {

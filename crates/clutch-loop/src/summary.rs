@@ -160,9 +160,10 @@ impl Summary {
             lines.push(format!("the line took {} frames only in part: its buffer was full", r.cut_writes));
         }
         if let Some(board) = self.board.filter(|b| b.waits > 0) {
+            let times = if board.waits == 1 { "once".to_owned() } else { format!("{} times", board.waits) };
             lines.push(format!(
-                "the simulated board's clock waited {} times for the loop, {:.3} s in all: this machine stalled",
-                board.waits, board.waited
+                "the simulated board's clock waited {times} for the loop, {} ms in all: this machine stalled",
+                number(1e3 * board.waited)
             ));
         }
         if self.board.is_some_and(|b| b.hits == 0) && self.faults > 0 {

@@ -88,6 +88,7 @@ fn what_comes_back_within_the_bounds_and_leaves_again_is_told_again() {
     assert!((3_000..6_100).contains(&below.tick) && below.seen.most < below.seen.low, "{below:?}");
     assert!((10_000..13_000).contains(&above.tick) && above.seen.least > above.seen.high, "{above:?}");
     let line = report.alarm_line().unwrap();
+    assert!(report.words().contains(", left"), "{}", report.words());
     assert!(line.starts_with("DRIFT at ") && line.ends_with("; 2 times in all"), "{line}");
     assert!(
         line.contains("friction over load is 0.8") && line.contains(", below the bound of 0.90"),
@@ -148,6 +149,7 @@ fn shafts_that_stick_lose_samples_or_start_from_rest_are_no_drift() {
     assert!(one_sided > 0);
     let (alarms, report) = run(&built_in("board_minimum_jerk", &[]), &[]);
     assert!(alarms.is_empty() && report.windows > 20, "{alarms:?} {report:?}");
+    assert!(report.words().contains("; bounds 1 to 1, not left"), "{}", report.words());
 }
 
 #[test]

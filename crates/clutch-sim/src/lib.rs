@@ -43,4 +43,4 @@ pub use run::{
 };
 pub use scenario::Scenario;
 pub use scenario_error::ScenarioError;
-pub use tables::{Points, Text, nearest};
+pub use tables::{Points, Text, expected, nearest};

@@ -5,12 +5,14 @@ mod columns;
 mod lines;
 
 use crate::output::{Exit, new_file, tell, warn, wrote};
+use crate::signals::stop_flag;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use clutch_log::{CHANNELS, Channel, Header, InChannel, Limits, LogError, Record, Value};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 #[derive(Args)]
 pub(crate) struct Export {
@@ -79,7 +81,9 @@ impl Export {
         let begin = self.begin()?;
         let Export { log, out, channel } = self;
         new_file(&out)?;
-        let mut rows = Rows { topic: format!("/{channel}"), out: &out, begin, table: None, number: 0 };
+        let stop = stop_flag()?;
+        let mut rows =
+            Rows { topic: format!("/{channel}"), out: &out, begin, stop: &stop, table: None, number: 0 };
         let scanned = clutch_log::scan(&log, &Limits::default(), |header, record| match record {
             Record::Sample(r) => rows.add(header, &r),
             Record::Command(r) => rows.add(header, &r),
@@ -98,6 +102,10 @@ impl Export {
             (Ok(scanned), Ok(())) => scanned,
             (scanned, written) => {
                 let _ = std::fs::remove_file(&out); // the error is what counts, and half a table is none
+                if stop.load(Ordering::Relaxed) {
+                    warn(&format!("stopped; {} was not written\n", out.display()))?;
+                    return Ok(Exit::Stopped);
+                }
                 scanned?;
                 return written.map(|()| Exit::Failed);
             }
@@ -119,6 +127,8 @@ struct Rows<'a> {
     topic: String,
     out: &'a Path,
     begin: Begin,
+    /// Set by Ctrl-C.
+    stop: &'a AtomicBool,
     table: Option<Box<dyn Table>>,
     number: u64,
 }
@@ -133,6 +143,9 @@ impl Rows<'_> {
             Some(table) => table,
             none => none.insert((self.begin)(self.out, header, &R::CHANNEL).map_err(io)?),
         };
+        if self.stop.load(Ordering::Relaxed) {
+            return Err(io(io::ErrorKind::Interrupted.into()));
+        }
         table.row(record.time_ns() as f64 / 1e9, &mut record.values()).map_err(io)?;
         self.number += 1;
         Ok(())

@@ -28,9 +28,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// their order, some thousand at a time: what stops early goes on with --resume.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  clutch sweep pd_2 --over law.pd.kp_v_rad=500:5000:50 --over law.pd.kd_v_s_rad=5,10,20,50 \\\n      \
+    after_help = "Example:\n  clutch sweep pd_2 --over law.pd.kp_v_rad=500:5000:50 \\\n      --over law.pd.kd_v_s_rad=5,10,20,50 \
     --seeds 10 --out pd.csv\n\n\
-    Columns are the keys in the units of their names, then figures in SI units and radians (docs/scenario.md), `certified` in\n\
+    Columns are the keys in the units of their names, then figures in SI units and radians (docs/scenario.md), `certified` in \
     continuous time, and `error`, the reason where a row is refused."
 )]
 pub(crate) struct SweepVerb {

@@ -123,9 +123,9 @@ pub enum LoadError {
 fn io_text(name: &str, e: &std::io::Error) -> String {
     match e.kind() {
         ErrorKind::NotFound => format!(
-            "no such file, and no built-in scenario of that name; `clutch scenario list` shows those, \
-             `clutch scenario new FILE` writes one to begin with{}",
-            BuiltIn::like(name)
+            "no such file, and no built-in scenario of that name{} `clutch scenario list` shows those, `clutch scenario new \
+             FILE` writes one to begin with",
+            Some(BuiltIn::like(name)).filter(|like| !like.is_empty()).unwrap_or_else(|| ";".to_owned())
         ),
         ErrorKind::InvalidData => "not a text file: expected TOML in UTF-8".to_owned(),
         _ => e.to_string(),

@@ -1,7 +1,7 @@
 //! A table of a file against its declaration: unknown and missing keys, kinds, ranges; defaults filled in.
 
 use super::Points;
-use super::suggest::{correction, nearest};
+use super::suggest::{correction, expected, nearest};
 use crate::scenario_error::ScenarioError;
 use clutch_core::params::{ChoiceInfo, Info, Kind, Row, TableInfo};
 use toml::{Table, Value};
@@ -138,7 +138,7 @@ fn complete_choice(
             Some(option) => format!(": did you mean {path}.{}.{unknown}?", option.key),
             None => correction(unknown, table.get(unknown), &names),
         };
-        let message = format!("unknown key{hint}; expected one of: {}", names.join(", "));
+        let message = format!("unknown key{}", expected(&hint, &names));
         return Err(ScenarioError::new(origin, &at, &value, message));
     }
     if table.len() != 1 {
@@ -194,7 +194,7 @@ fn unknown_key(
     let moved = former.map(|(_, new)| format!(": did you mean {new}?")).or(moved);
     let hint = moved.unwrap_or_else(|| correction(unknown, value, &names));
     let shown = value.filter(|v| !v.is_table()).map(shown).unwrap_or_default();
-    let message = format!("unknown key{hint}; expected one of: {}", names.join(", "));
+    let message = format!("unknown key{}", expected(&hint, &names));
     ScenarioError::new(origin, &whole, &shown, message)
 }
 

@@ -15,4 +15,4 @@ pub(crate) use complete::{checked, complete, complete_table, default_of, find, l
 pub use leaves::{Points, Text};
 pub(crate) use read::{read, read_known};
 pub(crate) use set::{row_at, set};
-pub use suggest::nearest;
+pub use suggest::{expected, nearest};

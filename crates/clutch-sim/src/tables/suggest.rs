@@ -34,6 +34,14 @@ pub(super) fn correction(unknown: &str, value: Option<&Value>, known: &[String])
     nearest(unknown, known)
 }
 
+/// What was expected, behind the probable meaning: `: did you mean kp_v? Expected one of: kp_v, kd_v_s_rad`.
+#[must_use]
+pub fn expected(meaning: &str, known: &[impl AsRef<str>]) -> String {
+    let begin = if meaning.ends_with('?') { " Expected" } else { "; expected" };
+    let known: Vec<&str> = known.iter().map(AsRef::as_ref).collect();
+    format!("{meaning}{begin} one of: {}", known.join(", "))
+}
+
 /// Splits a key into stem and a unit that is easily taken for another.
 fn unit_of(key: &str) -> Option<(&str, &'static Unit)> {
     let unit = Unit::of_key(key).filter(|u| !u.quantity.is_empty())?;
