@@ -28,7 +28,8 @@ struct Chunk<'a, V: Lane> {
     start: V,
     sensors: Sensors<V>,
     // Changed by each tick.
-    servos: Servos<V>,
+    servos: Servos<'a, V>,
+    radians_per_count: V,
     counts: V,
     // Results.
     sampled: Sampled<V>,
@@ -103,13 +104,14 @@ impl<'a, V: Lane> Chunk<'a, V> {
             Paths::Each(all().map(|r| r.path).collect())
         };
         let period = common.motion.period;
-        let counts_per_radian = V::of(|i| row(i).servo.encoder().counts_per_radian());
-        let servos: Vec<_> = all().map(|r| (&r.servo, r.filter)).collect();
+        let counts_per_radian = V::of(|i| row(i).steered.servo.encoder().counts_per_radian());
+        let servos: Vec<_> = all().map(|r| &r.steered).collect();
         let mut chunk = Chunk {
             paths,
             start: V::of(|i| row(i).start.0 as f64),
             sensors: Sensors { counts_per_radian, whole_counts: common.whole_counts },
-            servos: Servos::of(&servos, common.whole_codes)?,
+            servos: Servos::of(&servos, common.whole_counts, common.whole_codes)?,
+            radians_per_count: V::of(|i| row(i).steered.servo.encoder().radians_per_count()),
             counts: V::ZERO,
             sampled: Sampled::new(period, common.settle),
             silences: Silence::new(&StickSlipParams::default(), counts_per_radian * V::splat(period)),
@@ -150,8 +152,8 @@ impl<'a, V: Lane> Chunk<'a, V> {
         let targets = self.targets(k);
         let (counts, seen) = self.sensors.read(shafts.position);
         shafts.lost |= beyond(counts, targets.position);
-        let (_, commanded) = self.servos.sample(seen, &targets);
-        let target = targets.position * V::splat(1.0 / FIXED) * self.servos.radians_per_count;
+        let (_, commanded) = self.servos.sample(shafts.lost, seen, &targets);
+        let target = targets.position * V::splat(1.0 / FIXED) * self.radians_per_count;
         self.sampled.sample(time, target - shafts.position, shafts.velocity, commanded);
         let rests = if k == 0 { V::none() } else { V::same(counts, self.counts) };
         self.counts = counts;

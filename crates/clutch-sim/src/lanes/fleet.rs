@@ -2,7 +2,7 @@
 
 use super::elementary::Powers;
 use super::motion::{Alike, Motions};
-use super::servo::{FIXED, Sensors, Servos, Targets, beyond, servo_for_lanes};
+use super::servo::{FIXED, Sensors, Steered, Targets, Together as Laws, beyond};
 use super::vector::{InLanes, at};
 use crate::engine::EngineKind;
 use crate::fleet::{Begun, Quantity, Told};
@@ -10,7 +10,7 @@ use crate::lane::Lane;
 use crate::metrics::Sticks;
 use crate::run::RunSpec;
 use crate::scenario::ScalarKind;
-use clutch_core::{Servo, SmoothedDerivative, Target};
+use clutch_core::Target;
 use fearless_simd::Level;
 
 /// Shafts in the lanes of vectors, by whatever instructions.
@@ -33,19 +33,20 @@ pub(crate) struct Gathered<'a> {
     alike: Alike,
     whole_counts: bool,
     whole_codes: bool,
-    /// The servo with its filter, if it runs in lanes.
-    servo: Option<(Servo<f64>, SmoothedDerivative<f64>)>,
+    /// The servo, if it runs in lanes.
+    servo: Option<Steered<'a>>,
 }
 
 impl<'a> Gathered<'a> {
     /// Shafts of a specification that an engine moves; none if that has to be alone.
     pub(crate) fn of(
-        spec: &RunSpec<'_>,
+        spec: &RunSpec<'a>,
         scalar: ScalarKind,
         engine: EngineKind,
         begun: &'a [Begun],
     ) -> Option<Self> {
-        let servo = if scalar == ScalarKind::F64 { servo_for_lanes(spec) } else { None };
+        // One by one they are no faster here than alone.
+        let servo = Steered::of(spec).filter(|servo| scalar == ScalarKind::F64 && servo.in_lanes());
         Some(Gathered {
             begun,
             alike: Alike::of(begun.first()?.moving.rig(), engine, spec.period.seconds())?,
@@ -74,9 +75,9 @@ impl InLanes for Gathered<'_> {
         let motions = Motions::<V>::of(&rigs, &alike, &sticks)?;
         let laws = match servo {
             None => None,
-            Some((servo, filter)) => {
-                let each = vec![(&servo, filter); V::WIDTH];
-                let laws = motions.shafts.iter().map(|_| Servos::of(&each, whole_codes));
+            Some(servo) => {
+                let each = vec![&servo; V::WIDTH];
+                let laws = motions.shafts.iter().map(|_| Laws::of(&each, whole_codes));
                 Some(laws.collect::<Option<Vec<_>>>()?)
             }
         };
@@ -91,7 +92,7 @@ struct Group<V: Lane> {
     motions: Motions<V>,
     sensors: Sensors<V>,
     /// Vector by vector.
-    laws: Option<Vec<Servos<V>>>,
+    laws: Option<Vec<Laws<V>>>,
     /// None so far.
     sticks: Sticks,
 }

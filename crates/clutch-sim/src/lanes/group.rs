@@ -2,14 +2,14 @@
 
 use super::block::Block;
 use super::motion::Alike;
-use super::servo::servo_for_lanes;
+use super::servo::Steered;
 use super::vector::at;
 use crate::engine::EngineKind;
 use crate::metrics::{Detected, Metrics};
 use crate::run::{Prepared, RunSpec};
 use clutch_core::law::LawParams;
 use clutch_core::reference::Reference;
-use clutch_core::{ActuatorKind, FixedCounts, FrictionParams, Servo, SmoothedDerivative};
+use clutch_core::{ActuatorKind, FixedCounts, FrictionParams};
 use fearless_simd::Level;
 use std::mem::{Discriminant, discriminant};
 
@@ -18,7 +18,7 @@ const BLOCK: usize = 256;
 /// Periods of all runs of a block together, so that each block ends within a second or so.
 const LONGEST: u64 = 1 << 22;
 /// Lanes of the widest vector.
-const MOST_LANES: usize = 8;
+pub(super) const MOST_LANES: usize = 8;
 /// Runs below which lanes would stay empty: they are faster alone.
 const FEWEST: usize = 3;
 
@@ -27,8 +27,7 @@ pub(super) struct Candidate<'a> {
     /// Its place among the runs that were handed in.
     place: usize,
     common: Common,
-    pub(super) servo: Servo<f64>,
-    pub(super) filter: SmoothedDerivative<f64>,
+    pub(super) steered: Steered<'a>,
     pub(super) prepared: Prepared<'a, f64>,
     /// The path as it would be from 0, and its beginning.
     pub(super) path: Reference<'a, f64>,
@@ -43,6 +42,7 @@ pub(super) struct Common {
     pub(super) settle: f64,
     pub(super) whole_counts: bool,
     pub(super) whole_codes: bool,
+    laws_in_lanes: bool,
     law: Discriminant<LawParams>,
     /// Actuator and friction of the model.
     model: (ActuatorKind, Discriminant<FrictionParams>),
@@ -51,10 +51,10 @@ pub(super) struct Common {
 impl<'a> Candidate<'a> {
     /// A run that lanes can do; none if it has to go alone, be it to say what is wrong with it.
     fn of(place: usize, spec: &RunSpec<'a>) -> Option<Self> {
-        let (servo, filter) = servo_for_lanes(spec)?;
+        let steered = Steered::of(spec)?;
         let prepared = spec.prepare::<f64>().ok()?;
         let rig = prepared.moving.rig();
-        let encoder = servo.encoder();
+        let encoder = steered.servo.encoder();
         Some(Candidate {
             place,
             common: Common {
@@ -63,13 +63,13 @@ impl<'a> Candidate<'a> {
                 settle: spec.run.settle,
                 whole_counts: rig.params.encoder.quantised,
                 whole_codes: rig.params.dac.quantised,
+                laws_in_lanes: steered.in_lanes(),
                 law: discriminant(&spec.law),
                 model: (spec.model.actuator.kind(), discriminant(&spec.model.friction)),
             },
             path: Reference::new(&spec.reference, FixedCounts(0), encoder, spec.period).ok()?,
             start: spec.run.start_position(),
-            servo,
-            filter,
+            steered,
             prepared,
         })
     }

@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! rows of a sweep ─► group (same law, same length, …) ─► block of chunks of eight lanes
-//!     each period:  encoder ─► (5) ─► law ─► converter ─► linear motion          in lanes, every run
+//!     each period:  encoder ─► (5) ─► law ─► converter ─► linear motion          in lanes, every run; servos one by one
+//!                                                     │                          where they have no lanes
 //!                                                     └─► quadrature, series     in lanes, the runs in the layer
 //!                                                     └─► Dormand–Prince's steps in lanes, the runs that need them
 //!                                                     └─► what follows a stop    one by one

@@ -1,9 +1,13 @@
 //! Servos of shafts in lanes: sensor, filter (5), law, converter.
 
-use crate::lane::Lane;
+use super::group::MOST_LANES;
+use crate::lane::{Lane, each};
 use crate::run::RunSpec;
-use clutch_core::law::{self, ControlLaw, Law, Seen, Tick};
-use clutch_core::{DacCode, FixedCounts, Servo, SmoothedDerivative, Target, VelocityParams};
+use clutch_core::law::{self, ControlLaw, Law, LawState, Seen, Tick};
+use clutch_core::{
+    Counts, DacCode, FixedCounts, FrictionMap, Place, Servo, ServoState, SmoothedDerivative, Target,
+    VelocityParams,
+};
 
 /// Counts of an encoder beyond which a run goes alone: what wraps, wraps there.
 const FARTHEST: f64 = (1 << 30) as f64;
@@ -64,15 +68,42 @@ macro_rules! laws {
 }
 clutch_core::each_law_in_lanes!(laws);
 
-/// The servo of a specification with its filter (5), if both run in lanes.
-pub(super) fn servo_for_lanes(spec: &RunSpec<'_>) -> Option<(Servo<f64>, SmoothedDerivative<f64>)> {
-    let VelocityParams::SmoothedDerivative(filter) = &spec.velocity else { return None };
-    if spec.shell.boundary > 0.0 || spec.friction_map.is_some() {
-        return None;
+/// A servo as lanes take it.
+#[derive(Clone, Copy)]
+pub(super) struct Steered<'a> {
+    pub(super) servo: Servo<f64>,
+    pub(super) by: Steering<'a>,
+}
+
+/// How servos of one vector are computed.
+#[derive(Clone, Copy)]
+pub(super) enum Steering<'a> {
+    /// In its lanes, with their filter (5).
+    Together(SmoothedDerivative<f64>),
+    /// One after the other, beside motion in lanes: with another filter, with a shell, or under a law that has no lanes.
+    /// Some know a map of the disc.
+    Each(Option<FrictionMap<'a>>),
+}
+
+impl<'a> Steered<'a> {
+    /// The servo of a specification; none if it cannot be built.
+    pub(super) fn of(spec: &RunSpec<'a>) -> Option<Self> {
+        let servo = Servo::<f64>::new(&spec.servo().ok()?).ok()?;
+        let by = match &spec.velocity {
+            VelocityParams::SmoothedDerivative(filter)
+                if spec.shell.boundary <= 0.0 && has_lanes(servo.law()) =>
+            {
+                Steering::Together(SmoothedDerivative::new(filter, servo.encoder(), spec.period).ok()?)
+            }
+            _ => Steering::Each(spec.friction_map),
+        };
+        Some(Steered { servo, by })
     }
-    let servo = Servo::<f64>::new(&spec.servo().ok()?).ok()?;
-    let filter = SmoothedDerivative::new(filter, servo.encoder(), spec.period).ok()?;
-    has_lanes(servo.law()).then_some((servo, filter))
+
+    /// True if they are computed in lanes.
+    pub(super) fn in_lanes(&self) -> bool {
+        matches!(self.by, Steering::Together(_))
+    }
 }
 
 /// The target of each lane; its position in fixed point.
@@ -91,6 +122,15 @@ impl<V: Lane> Targets<V> {
             position: V::of(|i| at(i).position.0 as f64),
             velocity: V::of(|i| at(i).velocity),
             acceleration: V::of(|i| at(i).acceleration),
+        }
+    }
+
+    /// The target of a lane.
+    fn lane(&self, i: usize) -> Target<f64> {
+        Target {
+            position: FixedCounts(self.position.lane(i) as i64),
+            velocity: self.velocity.lane(i),
+            acceleration: self.acceleration.lane(i),
         }
     }
 }
@@ -122,8 +162,41 @@ pub(super) fn beyond<V: Lane>(counts: V, target: V) -> u64 {
 }
 
 /// Servos of the shafts in the lanes of one vector.
-pub(super) struct Servos<V: Lane> {
-    pub(super) radians_per_count: V,
+pub(super) enum Servos<'a, V: Lane> {
+    Together(Together<V>),
+    Each(Each<'a>),
+}
+
+impl<'a, V: Lane> Servos<'a, V> {
+    /// Servos, one for each lane; none if they have no lanes together.
+    pub(super) fn of(servos: &[&Steered<'a>], whole_counts: bool, whole_codes: bool) -> Option<Self> {
+        if servos.iter().all(|steered| steered.in_lanes()) {
+            return Together::of(servos, whole_codes).map(Servos::Together);
+        }
+        Some(Servos::Each(Each::of(servos, whole_counts, whole_codes)))
+    }
+
+    /// Begins in some lanes, at the position that is seen, with so many volts on the actuator.
+    pub(super) fn start(&mut self, which: V::Mask, seen: V, targets: &Targets<V>, volts: V) {
+        match self {
+            Servos::Together(servos) => servos.start(which, seen, targets, volts),
+            Servos::Each(servos) => servos.start(which, seen, targets, volts),
+        }
+    }
+
+    /// A tick, with the position that is seen, in lanes that are not lost: the law's input, and the voltage that goes out, V.
+    #[inline(always)]
+    pub(super) fn sample(&mut self, lost: u64, seen: V, targets: &Targets<V>) -> (Tick<V>, V) {
+        match self {
+            Servos::Together(servos) => servos.sample(seen, targets),
+            Servos::Each(servos) => servos.sample(lost, seen, targets),
+        }
+    }
+}
+
+/// Servos that are computed in the lanes.
+pub(super) struct Together<V: Lane> {
+    radians_per_count: V,
     /// Lowest voltage of the converter, its step, codes per volt, and its highest code.
     dac: [V; 4],
     /// Else the law's own voltage goes out.
@@ -137,11 +210,16 @@ pub(super) struct Servos<V: Lane> {
     applied: V,
 }
 
-impl<V: Lane> Servos<V> {
-    /// Servos with their filters, one for each lane; none if they have no lanes together.
-    pub(super) fn of(servos: &[(&Servo<f64>, SmoothedDerivative<f64>)], whole_codes: bool) -> Option<Self> {
-        let of = |get: &dyn Fn(&Servo<f64>) -> f64| V::of(|i| get(servos[i].0));
-        Some(Servos {
+impl<V: Lane> Together<V> {
+    /// Servos, one for each lane; none if one is not computed in lanes, or if their laws have none together.
+    pub(super) fn of(all: &[&Steered<'_>], whole_codes: bool) -> Option<Self> {
+        let filter = |one: &&Steered<'_>| match one.by {
+            Steering::Together(filter) => Some(filter),
+            Steering::Each(_) => None,
+        };
+        let filters = all.iter().map(filter).collect::<Option<Vec<_>>>()?;
+        let of = |get: &dyn Fn(&Servo<f64>) -> f64| V::of(|i| get(&all[i].servo));
+        Some(Together {
             radians_per_count: of(&|s| s.encoder().radians_per_count()),
             dac: [
                 of(&|s| s.dac().volts(DacCode(0))),
@@ -150,8 +228,8 @@ impl<V: Lane> Servos<V> {
                 of(&|s| f64::from(s.dac().top().0)),
             ],
             whole_codes,
-            filter: SmoothedDerivative::in_lanes(&|get| V::of(|i| get(&servos[i].1))),
-            law: LawInLanes::of(&servos.iter().map(|(servo, _)| servo.law()).collect::<Vec<_>>())?,
+            filter: SmoothedDerivative::in_lanes(&|get| V::of(|i| get(&filters[i]))),
+            law: LawInLanes::of(&all.iter().map(|one| one.servo.law()).collect::<Vec<_>>())?,
             error: V::ZERO,
             rate: V::ZERO,
             applied: V::ZERO,
@@ -192,4 +270,78 @@ impl<V: Lane> Servos<V> {
         self.applied = lowest + step * code.max(V::ZERO).min(top);
         (tick, if self.whole_codes { self.applied } else { demand })
     }
+}
+
+/// Servos that are computed one after the other.
+pub(super) struct Each<'a> {
+    lanes: Vec<Single<'a>>,
+    whole_counts: bool,
+    whole_codes: bool,
+}
+
+/// A servo with its memory.
+struct Single<'a> {
+    servo: Servo<f64>,
+    state: ServoState<f64, LawState<f64>>,
+    map: Option<FrictionMap<'a>>,
+}
+
+impl<'a> Each<'a> {
+    fn of(all: &[&Steered<'a>], whole_counts: bool, whole_codes: bool) -> Self {
+        let single = |one: &&Steered<'a>| Single {
+            servo: one.servo,
+            state: ServoState::default(),
+            map: match one.by {
+                Steering::Together(_) => None,
+                Steering::Each(map) => map,
+            },
+        };
+        Each { lanes: all.iter().map(single).collect(), whole_counts, whole_codes }
+    }
+
+    fn start<V: Lane>(&mut self, which: V::Mask, seen: V, targets: &Targets<V>, volts: V) {
+        each(V::bits(which), |i| {
+            let Single { servo, state, .. } = &mut self.lanes[i];
+            let (position, target) = (FixedCounts(seen.lane(i) as i64), targets.lane(i));
+            *state = if self.whole_counts {
+                servo.start(whole(position), &target, volts.lane(i))
+            } else {
+                servo.start_at(position, &target, volts.lane(i))
+            };
+        });
+    }
+
+    // Once, by the instructions of a run alone: nothing of it is in lanes.
+    #[inline(never)]
+    fn sample<V: Lane>(&mut self, lost: u64, seen: V, targets: &Targets<V>) -> (Tick<V>, V) {
+        let mut ticks = [Tick::default(); MOST_LANES];
+        let mut volts = [0.0; MOST_LANES];
+        for (i, Single { servo, state, map }) in self.lanes.iter_mut().enumerate() {
+            if lost >> i & 1 == 1 {
+                continue;
+            }
+            let (position, target) = (FixedCounts(seen.lane(i) as i64), targets.lane(i));
+            let place = |position| map.map_or_else(Place::default, |map| map.at(position));
+            let out = if self.whole_counts {
+                servo.tick_on(state, whole(position), &target, place)
+            } else {
+                servo.tick_at(state, position, &target, place)
+            };
+            ticks[i] = out.tick;
+            volts[i] = if self.whole_codes { servo.dac().volts(out.code) } else { out.command.voltage };
+        }
+        let of = |get: fn(&Tick<f64>) -> f64| V::of(|i| get(&ticks[i]));
+        let tick = Tick {
+            error: of(|t| t.error),
+            error_rate: of(|t| t.error_rate),
+            target_velocity: of(|t| t.target_velocity),
+            target_acceleration: of(|t| t.target_acceleration),
+        };
+        (tick, V::of(|i| volts[i]))
+    }
+}
+
+/// A whole position, which is near, as the encoder's word.
+fn whole(position: FixedCounts) -> Counts {
+    Counts((position.0 >> FixedCounts::FRACTION_BITS) as i32)
 }

@@ -348,6 +348,36 @@ fn laws_whose_memory_limits_hold_have_the_bits_of_runs_alone() {
 }
 
 #[test]
+fn servos_that_are_computed_one_by_one_beside_motion_in_lanes_have_the_bits_of_runs_alone() {
+    let bench = ("rig.base", "\"bench\"");
+    let sine = ("reference", "{ sine = { rate_deg_s = 2.0, amplitude_deg = 0.3, frequency_hz = 1.0 } }");
+    let drag = [("rig.friction.stribeck.mu_dynamic", 0.12, 0.18)];
+    let fine = [("rig.encoder.quantised", "false"), ("rig.dac.quantised", "false")];
+    let points: Vec<String> =
+        (0..720).map(|i| format!("[{}, {}]", f64::from(i) / 2.0, 1.0 + 0.1 * f64::from(i % 7))).collect();
+    let map = format!("{{ rig = \"another\", points_deg_factor = [{}] }}", points.join(", "));
+    let map = [("friction_map", map.as_str())];
+    let late = [("rig.delay_ticks", "2"), ("output.bumpless_time_s", "0.1"), ("run.start", "rest")];
+    let cases: [(&str, &[(&str, f64, f64)], &[Values<'_>]); 11] = [
+        ("bench_glide_2", &[("reference.ramp.rate_deg_s", 0.1, 5.0)], &[]),
+        ("bench_glide_2", &[("run.start_counts", -5000.0, 5000.0)], &[&late]),
+        ("bench_glide_2", &[("run.start_counts", -5000.0, 5000.0)], &[&map]),
+        ("pd_2", &drag, &[&[("law", "{ glide = {} }")]]),
+        ("pd_2", &drag, &[&[("law", "{ glide = {} }"), sine, bench]]),
+        ("pd_2", &drag, &[&[("velocity.edge_timed", "{}"), bench]]),
+        ("pd_2", &drag, &[&[("velocity.edge_timed", "{}")], &fine]),
+        ("smc_2", &[("law.smc.kp_v", 2.3, 6.0)], &[&[("velocity.observer", "{}")], &late]),
+        ("smc_2", &[("shell.boundary_rad_s", 0.05, 0.3)], &[&[bench]]),
+        ("motor_pid", &[("shell.boundary_rad_s", 0.5, 3.0)], &[]),
+        ("motor_pid", &[("rig.inertia_kg_m2", 1e-4, 1e-3)], &[&[("law", "{ glide = {} }")]]),
+    ];
+    for (name, keys, more) in cases {
+        let more = [&more.concat()[..], &[("run.duration_s", "1.5"), ("run.settle_s", "0.2")]].concat();
+        assert_eq!(same_bits(&around(name, keys, &more, 11)), 11, "{name} {keys:?} {more:?}");
+    }
+}
+
+#[test]
 fn runs_in_steps_have_the_bits_of_runs_alone() {
     let pd = [("law.pd.kp_v_rad", 500.0, 8000.0), ("law.pd.kd_v_s_rad", 2.0, 80.0)];
     let smc = [("law.smc.kp_v", 2.3, 6.0), ("law.smc.kd_v_s_rad", 1.0, 500.0)];
@@ -400,8 +430,6 @@ fn a_million_periods_that_stick_have_the_bits_of_runs_alone() {
 fn a_run_that_is_not_for_lanes_goes_alone() {
     for more in [
         ("rig.torque_noise_nm", "0.001"),
-        ("shell.boundary_rad_s", "0.1"),
-        ("velocity.edge_timed", "{}"),
         ("rig.friction", "{ dahl = {} }"),
         ("rig.drive", "{ sine = { mean_nm = 0.05, amplitude_nm = 0.01, frequency_hz = 1.0 } }"),
     ] {
