@@ -5,7 +5,7 @@ use crate::run::{Program, program, root};
 use anyhow::{Result, bail};
 use std::time::Instant;
 
-/// Targets in `fuzz/fuzz_targets`, each with the number of inputs that tests try, those of the corpus among them: as many
+/// Targets in `fuzz/fuzz_targets`, each with the number of inputs that CI tries, those of the corpus among them: as many
 /// as took 20 s at most with the memory watched.
 pub(crate) const TARGETS: [(&str, u32); 4] =
     [("decoder", 700_000), ("log", 110_000), ("request", 200_000), ("board_controller", 7000)];
@@ -15,7 +15,7 @@ pub(crate) const TARGETS: [(&str, u32); 4] =
 pub(crate) enum Watched {
     /// Panics, and each access of memory, by the address sanitizer.
     Memory,
-    /// Panics alone, which takes less time: what is fuzzed has no unsafe code but that of its libraries.
+    /// Panics alone, which takes less time and is what CI does: what is fuzzed has no unsafe code but that of its libraries.
     Panics,
 }
 

@@ -48,9 +48,13 @@ enum Verb {
     /// Runs only the tests of the wheel: builds it, installs it outside this tree, tests it there.
     Wheel,
     /// Runs only what the tests run beside the others: what boards take (the core for their targets, link tests, images,
-    /// budgets), the playground's module, fuzzing.
-    Boards,
-    /// Runs the steps of CI: check, package, msrv, semver, then test.
+    /// budgets), the playground's module.
+    Boards {
+        /// Then fuzzes each reader of bytes with a fixed number of inputs, as CI does; installs what `fuzz` does.
+        #[arg(long)]
+        fuzz: bool,
+    },
+    /// Runs the steps of CI: check, package, msrv, semver, then test, with fuzzing beside it.
     Ci,
     /// Runs the benchmarks (criterion) with the arguments that follow: `cargo xtask bench -- law`.
     Bench {
@@ -242,16 +246,16 @@ enum Verb {
 fn main() -> Result<()> {
     match Cli::parse().verb {
         Verb::Check => check(),
-        Verb::Test => test::all(),
+        Verb::Test => test::all(&[]),
         Verb::Wheel => test::wheel(),
-        Verb::Boards => test::boards(),
+        Verb::Boards { fuzz } => test::boards(fuzz),
         Verb::Ci => {
             test::targets()?; // the lints of the images need theirs
             check()?;
             release::package()?;
             release::msrv()?;
             release::semver()?;
-            test::all()
+            test::all(&["--fuzz"])
         }
         Verb::Bench { rest } => cargo(["bench", "--package", "clutch-benches", "--"]).args(rest).run(),
         Verb::Firmware { verb } => firmware::run(&verb),

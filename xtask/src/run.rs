@@ -27,10 +27,10 @@ pub(crate) fn cargo<const N: usize>(args: [&str; N]) -> Program {
 
 /// A verb of this program that runs in the background, its output unseen until the end. It gives way to what else runs:
 /// some tests are of a loop in real time, and no machine has to let them have its priority.
-pub(crate) fn beside(verb: &str) -> Result<Beside> {
+pub(crate) fn beside(verb: &str, options: &[&str]) -> Result<Beside> {
     let path = root().join("target").join(format!("{verb}.log"));
     let log = std::fs::File::create(&path).with_context(|| path.display().to_string())?;
-    let mut verb = program(std::env::current_exe()?).arg(verb).giving_way();
+    let mut verb = program(std::env::current_exe()?).arg(verb).args(options).giving_way();
     verb.announce();
     let child = verb.0.stdout(log.try_clone()?).stderr(log).spawn()?;
     Ok(Beside { child, path })

@@ -19,10 +19,10 @@ use tally::Tally;
 /// and RISC-V.
 const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
 
-/// Checks that need the targets: three builds of the core and one of the parts of boards each, the three link tests, the
+/// Checks that need the targets: two builds of the core and one of the parts of boards each, the three link tests, the
 /// libraries with their control, the example, two boards, the budgets.
 const SKIPPED_WITHOUT_TARGETS: u64 =
-    4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 2 * firmware::BOARDS.len() as u64 + 6;
+    3 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 2 * firmware::BOARDS.len() as u64 + 6;
 
 /// The packages that are built for this machine, the command with all its options. Always the same selection: with another
 /// one cargo gives libraries other features, and compiles them once more. The wheel's module only links inside of Python.
@@ -38,8 +38,8 @@ const WORKSPACE: [&str; 5] = [
 /// too, and does not link each with the whole house.
 const TESTS: &str = "--tests";
 
-/// Runs everything, counts, and fails at the end if anything failed.
-pub(crate) fn all() -> Result<()> {
+/// Runs everything, counts, and fails at the end if anything failed; `more` are options of what runs beside it, [`boards`].
+pub(crate) fn all(more: &[&str]) -> Result<()> {
     let mut tally = Tally::new();
     // What has to come from elsewhere comes while processors build.
     let (built, tools) = std::thread::scope(|scope| {
@@ -50,7 +50,7 @@ pub(crate) fn all() -> Result<()> {
         anyhow::Ok((built, tools))
     })?;
     // Mostly builds, which link for long on one core, beside tests that wait. Those with a clock hold on a loaded machine.
-    let boards = beside("boards")?;
+    let boards = beside("boards", more)?;
     // Before the tests: it takes packages of others from their build, in the same folder, which has one build at a time.
     tally.stage("build of the wheel");
     let wheel = python::Wheel::install(&tools);
@@ -64,14 +64,16 @@ pub(crate) fn all() -> Result<()> {
     tally.end(host? & wheel?)
 }
 
-/// All that runs beside the other tests, alone: the checks for boards, the module of the playground, the fuzzing.
-pub(crate) fn boards() -> Result<()> {
+/// All that runs beside the other tests, alone: the checks for boards, the module of the playground; in CI fuzzing.
+pub(crate) fn boards(fuzz: bool) -> Result<()> {
     let mut tally = Tally::new();
     // Tests of the wheel want it; built here, it is there when they come.
     tally.stage("module of the playground");
     playground::module()?;
     boards_of(&mut tally, targets()?)?;
-    fuzzing(&mut tally)?;
+    if fuzz {
+        fuzzing(&mut tally)?;
+    }
     tally.end(true)
 }
 
@@ -228,8 +230,8 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
     let part = |package: &str, args: &[&str]| cargo(folder).args(["--package", package]).args(args).quietly();
     let core = |args: &[&str]| part("clutch-core", args);
     for target in embedded {
-        for features in ["", "linalg", "defmt"] {
-            let with = if features.is_empty() { "no feature" } else { features };
+        for features in ["", "linalg,defmt"] {
+            let with = if features.is_empty() { "no feature" } else { "every feature" };
             let built = core(&["--target", target, "--features", features])?;
             tally.check_quiet(&format!("clutch-core builds for {target} with {with}"), built);
         }
@@ -336,24 +338,17 @@ fn libraries(tally: &mut Tally) -> Result<()> {
     Ok(())
 }
 
-/// What the tests' fuzzing is watched for; `cargo xtask fuzz` watches the memory, too.
+/// What fuzzing beside the tests is watched for; `cargo xtask fuzz` watches the memory, too.
 const WATCHED: fuzz::Watched = fuzz::Watched::Panics;
 
 /// Each reader of bytes from outside.
 fn fuzzing(tally: &mut Tally) -> Result<()> {
-    if std::env::var_os("CI").is_none() {
-        println!(
-            "skipped: fuzzing, which needs a nightly compiler; `cargo xtask fuzz` installs it and fuzzes"
-        );
-        tally.skip(fuzz::TARGETS.len() as u64);
-        return Ok(());
-    }
     tally.stage("build of the fuzz targets");
     fuzz::install()?;
     fuzz::build(WATCHED)?;
     tally.stage("fuzzing");
     for (target, runs) in fuzz::TARGETS {
-        let held = fuzz::one(target, WATCHED, &[&format!("-runs={runs}"), "-seed=1"])?;
+        let held = fuzz::one(target, WATCHED, &[&format!("-runs={runs}"), "-seed=1", "-verbosity=0"])?;
         tally.check(&format!("fuzzing {target} with {runs} inputs finds nothing"), held);
     }
     Ok(())
