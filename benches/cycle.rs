@@ -122,7 +122,7 @@ fn log<T: Real>(group: &mut Group<'_>, built: &BuiltRun<T>, path: &(impl Planned
             let bytes = frame(tick);
             controller.receive(tick * 1_000_000, bytes.as_bytes(), path, &mut out, &mut |n| {
                 if let Notice::Cycle(n) = n {
-                    let _ = ring.push(Record::Sample(to_log::sample(tick, 0, &n)));
+                    let _ = ring.push(Record::Sample(to_log::sample(tick, 0, &n, radians)));
                     let _ = ring.push(Record::Command(to_log::command(tick, &n.cycle, servo.dac(), radians)));
                 }
             });

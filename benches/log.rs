@@ -34,6 +34,7 @@ fn records() -> Vec<Record> {
                 counts: (tick / 9) as i32,
                 age_us: 110 + (tick * 7919 % 23) as u32,
                 lateness_us: 4 + (tick * 104_729 % 11) as u32,
+                position: (tick / 9) as f64 * 0.000_314,
                 ..SampleRecord::default()
             };
             let command = CommandRecord {

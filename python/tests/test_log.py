@@ -82,6 +82,7 @@ def test_samples_have_their_numbers_and_the_arrival_by_name(log):
         assert envelope.sequence == s.tick == tick
         assert (s.sequence, s.board_time_us, s.counts) == (tick, tick * 1000, tick * 3 - 500)
         assert (s.status, s.age_us, s.lateness_us) == (1, 120, tick % 7)
+        assert s.position_rad == 0.25 * (tick * 1e-3) - 0.001
         assert s.Arrival.Name(s.arrival) == ("Missing" if tick % 100 == 99 else "Fresh")
 
 

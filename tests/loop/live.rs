@@ -135,6 +135,11 @@ fn a_page_sees_the_run_from_its_beginning_to_its_end() {
     let by_law = read.commands.iter().zip(&positions).filter(|(c, _)| c.source == 0);
     let apart = by_law.map(|(c, p)| (c.target_position - c.error).to_degrees() - p);
     assert!(apart.map(f64::abs).fold(0.0, f64::max) < 1e-5);
+    // So is the one in the log.
+    let answered = read.samples.iter().zip(&read.commands).filter(|(_, c)| c.source == 0);
+    let apart = answered.map(|(s, c)| (c.target_position - c.error - s.position).abs());
+    assert!(apart.fold(0.0, f64::max) < 1e-12);
+    assert!(read.samples.iter().any(|s| s.position > 0.01));
     let cycles = frames.last().unwrap()["cycles"].as_u64().unwrap();
     assert!((10..200).contains(&cycles), "{cycles} sticks in 2 s");
 }

@@ -42,6 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             lateness_us: (tick % 7) as u32,
             superseded: false,
             wake_us: 0,
+            position: 0.25 * t - 0.001,
         }))?;
         log.write(&Record::Command(CommandRecord {
             tick,

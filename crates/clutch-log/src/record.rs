@@ -297,6 +297,8 @@ records! {
         9 superseded = superseded: bool, bool;
         /// Lateness of the wake-up that brought it, µs; 0 where it is not known.
         10 wake_us = wake_us: u32, uint32;
+        /// Position that the counts show, on the target's turn of the counter, rad.
+        11 position_rad = position: f64, double (optional);
     }
     /// A command, with the values that led the law to it.
     Command = CommandRecord, "/command", "The command of a tick, with every term of the law." {

@@ -438,7 +438,7 @@ impl<'a, S: Station> Control<'a, S> {
         for n in batch.cycles.iter().take(batch.used).flatten().filter(of_run) {
             let age = self.clock.age_us(n.sample.time_us, now);
             let wake_us = u32::try_from(late / 1000).unwrap_or(u32::MAX);
-            let sample = SampleRecord { wake_us, ..to_log::sample(time_ns, age, n) };
+            let sample = SampleRecord { wake_us, ..to_log::sample(time_ns, age, n, self.radians) };
             let mut records = [Record::Sample(sample); 3];
             let command = to_log::command(time_ns, &n.cycle, &self.dac, self.radians);
             records[1] = Record::Command(command);

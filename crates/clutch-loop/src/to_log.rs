@@ -27,7 +27,12 @@ pub const FOREIGN_LAW: &str = "foreign_law";
 
 /// A sample as it came.
 #[must_use]
-pub fn sample<T: Real, X>(time_ns: u64, age_us: u32, n: &CycleNotice<T, X>) -> SampleRecord {
+pub fn sample<T: Real, X>(
+    time_ns: u64,
+    age_us: u32,
+    n: &CycleNotice<T, X>,
+    radians_per_count: f64,
+) -> SampleRecord {
     SampleRecord {
         tick: n.cycle.tick,
         time_ns,
@@ -40,7 +45,18 @@ pub fn sample<T: Real, X>(time_ns: u64, age_us: u32, n: &CycleNotice<T, X>) -> S
         lateness_us: n.lateness.0,
         superseded: n.superseded,
         wake_us: 0,
+        position: position(n.sample.counts, n.cycle.target.position, radians_per_count),
     }
+}
+
+/// The position that counts show, rad. They wrap at 2³² and a target does not: of the positions that they can be it is the
+/// one nearest to the target.
+fn position(counts: i32, target: FixedCounts, radians_per_count: f64) -> f64 {
+    const WRAPS: u32 = i64::BITS - i32::BITS - FixedCounts::FRACTION_BITS;
+    let counts = FixedCounts::from_counts(i64::from(counts));
+    let behind = target.0.wrapping_sub(counts.0) << WRAPS >> WRAPS;
+    let position = FixedCounts(target.0.wrapping_sub(behind));
+    position.minus::<f64>(FixedCounts(0)) * radians_per_count
 }
 
 /// The command that a sample led to. Every real is a double; a number in single precision is one
@@ -119,6 +135,7 @@ fn event<T: Real>(kind: EventKind, time_ns: u64, e: &Ending<T>) -> Record {
 fn of_simulation<T: Real>(
     run: &clutch_sim::Run,
     dac: Dac<T>,
+    radians_per_count: f64,
     period: clutch_core::Micros,
 ) -> impl Iterator<Item = [Record; 3]> {
     let t = &run.trace;
@@ -136,6 +153,7 @@ fn of_simulation<T: Real>(
                 board_time_us: (time_ns / 1000) as u32,
                 counts: t.counts[i],
                 status: clutch_wire::BoardState::Running as u8,
+                position: position(t.counts[i], t.target_fixed[i], radians_per_count),
                 ..SampleRecord::default()
             }),
             Record::Command(CommandRecord {
@@ -254,7 +272,7 @@ fn simulation<'a, T: Real>(
         header.term_names = run.trace.terms.iter().map(|(name, _)| (*name).to_owned()).collect();
         (header.law_hash, header.scalar) = (0, "f64".to_owned());
     }
-    Ok((header, of_simulation(run, *servo.dac(), spec.period)))
+    Ok((header, of_simulation(run, *servo.dac(), servo.encoder().radians_per_count(), spec.period)))
 }
 
 fn save_in<T: Real>(
@@ -321,5 +339,23 @@ pub fn truth(time_ns: u64, tick: u64, rig: &MovingRig) -> TruthRecord {
         position: shaft.position,
         velocity: shaft.velocity,
         stuck: shaft.motion == Motion::Stuck,
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_that_wrapped_are_positions_beside_the_target() {
+        let at = |counts, target| position(counts, FixedCounts::from_counts(target), 0.5);
+        assert_eq!((at(7, 9), at(-7, 9)), (3.5, -3.5));
+        let turn = 1_i64 << 32;
+        assert_eq!(at(i32::MIN, i64::from(i32::MAX)), (turn / 2) as f64 * 0.5);
+        assert_eq!(at(i32::MAX, -turn / 2), (-turn / 2 - 1) as f64 * 0.5);
+        assert_eq!(at(-3, 5 * turn), (5 * turn - 3) as f64 * 0.5);
+        // The target's fraction is not the encoder's.
+        assert_eq!(position(7, FixedCounts(9 << 16 | 0xffff), 0.5), 3.5);
     }
 }

@@ -102,6 +102,7 @@ pub fn record(n: &mut Numbers, tick: u64, time_ns: u64) -> Record {
             lateness_us: whole(n) as u32,
             superseded: n.below(2) == 0,
             wake_us: whole(n) as u32,
+            position: real(n),
         }),
         1 => Record::Command(CommandRecord {
             tick,
@@ -175,6 +176,7 @@ pub fn bits(record: &Record) -> Vec<u64> {
             r.lateness_us.into(),
             r.superseded.into(),
             r.wake_us.into(),
+            r.position.to_bits(),
         ],
         Record::Command(r) => vec![
             1,
