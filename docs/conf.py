@@ -1,10 +1,8 @@
 """Configuration of the documentation.
 
-Build it in the folder above, with the package installed::
+Build it in the folder above, with wheel and playground, in target/site::
 
-    cargo xtask playground
-    pip install . -r docs/requirements.txt
-    sphinx-build -W --keep-going -b html docs target/docs-html
+    cargo xtask site
 """
 
 from pathlib import Path

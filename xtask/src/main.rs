@@ -18,6 +18,7 @@ mod proof;
 mod python;
 mod release;
 mod run;
+mod site;
 mod size;
 mod stubs;
 mod test;
@@ -86,6 +87,8 @@ enum Verb {
     Playground,
     /// Builds the API documentation, in target/doc.
     Docs,
+    /// Builds the documentation as a site with gallery and playground, in target/site; builds playground and wheel for it.
+    Site,
     /// Packs the libraries that others build on, and checks them as they were packed.
     Package,
     /// Checks what users build with the oldest Rust that the manifests name; installs it.
@@ -260,6 +263,7 @@ fn main() -> Result<()> {
         Verb::Bench { rest } => cargo(["bench", "--package", "clutch-benches", "--"]).args(rest).run(),
         Verb::Firmware { verb } => firmware::run(&verb),
         Verb::Docs => docs(),
+        Verb::Site => site::build().map(drop),
         Verb::Package => release::package(),
         Verb::Msrv => release::msrv(),
         Verb::Semver => release::semver(),
@@ -384,7 +388,7 @@ fn figures() -> Result<()> {
 }
 
 fn screenshots() -> Result<()> {
-    let page = test::playground()?.context("there is no playground to take")?;
+    let page = test::playground()?.context("there is no playground to take")?.page;
     cargo(["build", "--release", "--package", "clutch-cli"]).run()?;
     let take =
         run::program(python::interpreter()?).arg("python/tests/screenshots.py").arg("target/release/clutch");

@@ -2,10 +2,13 @@
 
 use crate::run::{cargo, program, root};
 use anyhow::{Result, bail};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The target of the page's module.
 const TARGET: &str = "wasm32-unknown-unknown";
+
+/// The page's file.
+pub(crate) const PAGE: &str = "stick-slip.html";
 
 /// The page, and the module that is within it.
 pub(crate) struct Playground {
@@ -18,7 +21,7 @@ pub(crate) fn build() -> Result<Option<Playground>> {
     let Some(module) = module()? else { return Ok(None) };
     let out = root().join("target/playground");
     std::fs::create_dir_all(&out)?;
-    let page = out.join("stick-slip.html");
+    let page = out.join(PAGE);
     program(root().join("target/debug/examples/page")).arg(&module).arg(&page).run()?;
     Ok(Some(Playground { page, module }))
 }
@@ -44,15 +47,21 @@ pub(crate) fn module() -> Result<Option<PathBuf>> {
 
 /// Sizes of page and module, also as a server sends them, if there is a Node to tell.
 pub(crate) fn sizes(built: &Playground) -> Result<()> {
-    const COMPRESSED: &str =
-        "console.log(require('zlib').brotliCompressSync(require('fs').readFileSync(process.argv[1])).length)";
     for file in [&built.module, &built.page] {
         let raw = std::fs::metadata(file)?.len();
-        let brotli = match program("node").args(["-e", COMPRESSED]).arg(file).silently() {
-            Ok((true, bytes)) => format!("{} bytes", bytes.trim()),
-            _ => "unknown: Node is not installed".to_owned(),
+        let brotli = match compressed(file) {
+            Ok(bytes) => format!("{bytes} bytes"),
+            Err(why) => format!("unknown: {why:#}"),
         };
         println!("{}: {raw} bytes; compressed (brotli): {brotli}", file.display());
     }
     Ok(())
+}
+
+/// Size of a file as a server sends it, compressed by Node.
+pub(crate) fn compressed(file: &Path) -> Result<u64> {
+    const COMPRESSED: &str =
+        "console.log(require('zlib').brotliCompressSync(require('fs').readFileSync(process.argv[1])).length)";
+    let told = program("node").args(["-e", COMPRESSED]).arg(file).output()?;
+    Ok(String::from_utf8_lossy(&told).trim().parse()?)
 }

@@ -3,14 +3,16 @@
 mod command;
 mod images;
 mod machine;
+mod pages;
 mod sbom;
 mod tools;
 mod wheels;
 
 use crate::run::{program, root};
 use crate::{fmu, libclutch};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use clap::ValueEnum;
+use std::cell::LazyCell;
 use std::path::{Path, PathBuf};
 use tools::{LINUX, LINUX_ARM64, Tools, WINDOWS, names_no_folder};
 
@@ -27,7 +29,11 @@ pub(crate) enum Part {
     Firmware,
     /// Units for simulators.
     Fmu,
-    /// Bills of materials of command, libclutch, units and images; a wheel has its own within.
+    /// The page that simulates in a browser.
+    Playground,
+    /// The documentation, with the playground.
+    Docs,
+    /// Bills of materials of command, libclutch, units, images and playground; a wheel has its own within.
     Sbom,
 }
 
@@ -54,16 +60,20 @@ pub(crate) fn run(parts: &[Part]) -> Result<()> {
     let out = folder();
     let _ = std::fs::remove_dir_all(&out);
     std::fs::create_dir_all(&out)?;
-    let tools = Tools::new()?;
+    // Installed for the parts that take them.
+    let tools = LazyCell::new(Tools::new);
+    let tools = || tools.as_ref().map_err(|why| anyhow!("{why:#}"));
     let mut made = Vec::new();
     for part in parts {
         made.extend(match part {
-            Part::Wheels => wheels::make(&tools)?,
-            Part::Command => command::make(&tools)?,
+            Part::Wheels => wheels::make(tools()?)?,
+            Part::Command => command::make(tools()?)?,
             Part::C => vec![c()?],
-            Part::Firmware => vec![images::make(&tools)?],
-            Part::Fmu => units(&tools)?,
-            Part::Sbom => sbom::make(&tools)?,
+            Part::Firmware => vec![images::make(tools()?)?],
+            Part::Fmu => units(tools()?)?,
+            Part::Playground => vec![pages::playground()?],
+            Part::Docs => vec![pages::documentation()?],
+            Part::Sbom => sbom::make(tools()?)?,
         });
     }
     let sums = checksums(&made)?;

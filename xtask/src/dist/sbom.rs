@@ -8,10 +8,11 @@ use anyhow::{Context, Result};
 const TOOL: (&str, &str) = ("cargo-cyclonedx", "0.5.9");
 
 /// Described folders, and names of their bills.
-const DESCRIBED: [(&str, &str); 6] = [
+const DESCRIBED: [(&str, &str); 7] = [
     ("crates/clutch-cli", "clutch"),
     ("crates/clutch-c", "libclutch"),
     ("crates/clutch-fmi", "clutch-fmi"),
+    ("crates/clutch-web", "clutch-playground"),
     ("firmware/nucleo-g474re", "clutch-firmware-nucleo"),
     ("firmware/pico-rp2040", "clutch-firmware-pico"),
     ("firmware/qemu-mps2", "clutch-firmware-mps2"),

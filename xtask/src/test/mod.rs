@@ -7,7 +7,7 @@ use crate::firmware;
 use crate::fmu;
 use crate::fuzz;
 use crate::libclutch;
-use crate::playground;
+use crate::playground::{self, Playground};
 use crate::python;
 use crate::run::{Program, beside, cargo, program, root};
 use crate::stubs;
@@ -88,12 +88,29 @@ pub(crate) fn wheel() -> Result<()> {
     tally.end(sound)
 }
 
-/// Builds the playground alone; its page, if its target is there.
-pub(crate) fn playground() -> Result<Option<PathBuf>> {
+/// Builds the playground alone, if its target is there.
+pub(crate) fn playground() -> Result<Option<Playground>> {
     cargo(["build"]).args(WORKSPACE).args(["--example", "page"]).run()?;
-    let Some(built) = playground::build()? else { return Ok(None) };
-    playground::sizes(&built)?;
-    Ok(Some(built.page))
+    let built = playground::build()?;
+    built.as_ref().map(playground::sizes).transpose()?;
+    Ok(built)
+}
+
+/// Runs the tests of a playground alone, with the command that [`compared`] builds.
+pub(crate) fn of_playground(built: &Playground) -> Result<()> {
+    compared()?;
+    let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
+    let tests = program(python::interpreter()?).args(pytest);
+    let tests = tests.arg(root().join("python/tests/test_playground.py"));
+    tried(tests, built).env("CLUTCH_BIN", command()).env("PYTHONDONTWRITEBYTECODE", "1").run()
+}
+
+/// Tests that are told of a playground.
+fn tried(tests: Program, built: &Playground) -> Program {
+    tests
+        .env("CLUTCH_PLAYGROUND", &built.page)
+        .env("CLUTCH_PLAYGROUND_MODULE", &built.module)
+        .env("CLUTCH_PLAYGROUND_HERE", example("ask"))
 }
 
 /// Programs, targets and packages of Python that tests need; the interpreter that has the packages.
@@ -386,10 +403,7 @@ fn wheel_of(tally: &mut Tally, tools: &Path, wheel: &python::Wheel) -> Result<bo
     let tests = wheel.program(tools)?.args(pytest).args(slowest);
     let tests = tests.args(LONGEST.map(|file| folder.join(file))).arg(folder);
     let tests = match &playground {
-        Some(built) => tests
-            .env("CLUTCH_PLAYGROUND", &built.page)
-            .env("CLUTCH_PLAYGROUND_MODULE", &built.module)
-            .env("CLUTCH_PLAYGROUND_HERE", example("ask")),
+        Some(built) => tried(tests, built),
         None => tests,
     };
     tests
