@@ -14,15 +14,18 @@ from test_docs_python import DOCS, ELSEWHERE, FENCE, ROOT
 PAGES = sorted((DOCS / "start").glob("*.md"))
 
 
-def steps(text):
+def steps(page):
     """A page's commands in order: line of the page, script, lines that it prints."""
+    text = page.read_text(encoding="utf-8")
     found, end_of_last = [], None
     for fence in FENCE.finditer(text):
         language, body = fence.groups()
         if language == "sh":
             elsewhere = ELSEWHERE.search(text[: fence.start()])
             if elsewhere:
-                assert (ROOT / elsewhere[1]).is_file(), elsewhere[1]
+                # The tests there read the page, and run what it says.
+                read = page.relative_to(ROOT).as_posix()
+                assert read in (ROOT / elsewhere[1]).read_text(encoding="utf-8"), f"{elsewhere[1]} lacks {read}"
                 end_of_last = None
                 continue
             found.append([text[: fence.start()].count("\n") + 1, body, []])
@@ -61,7 +64,7 @@ def shell(clutch, tmp_path):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_commands_of_a_page_run_and_print_what_the_page_says(page, shell):
-    for line, script, prints in steps(page.read_text(encoding="utf-8")):
+    for line, script, prints in steps(page):
         rest = plain(shell(script, f"{page.name}:{line}"))
         for expected in map(plain, prints):
             assert expected in rest, f"{page.name}:{line}: no {expected!r} in {rest}"

@@ -100,3 +100,37 @@ fn outside_of_a_checkout_the_image_beside_the_command_runs_and_without_one_all_p
         assert!(text.contains("cargo xtask firmware build") && text.contains("CLUTCH_IMAGES"), "{text}");
     }
 }
+
+/// The commands of a page's block behind a comment that says where they are run: here.
+fn block_that_names_this_file(page: &str) -> Vec<&str> {
+    let here = "tests/hil/verb.rs -->\n```sh\n";
+    let (_, block) = page.split_once(here).expect("a block that names this file");
+    let (block, _) = block.split_once("```\n").expect("its end");
+    block.lines().collect()
+}
+
+/// The page docs/start/embedded.md, followed: its images are built, and its commands run in this tree as they stand there.
+#[test]
+fn the_page_for_an_embedded_engineer_is_true() {
+    // Without these nothing can be followed.
+    let (Some(_), Some(_)) = (image("mps2-controller"), image("nucleo-controller")) else { return };
+    let lines = block_that_names_this_file(include_str!("../../docs/start/embedded.md"));
+    let (build, runs) = lines.split_first().expect("commands");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let _beside = beside();
+    assert_eq!(*build, "cargo xtask firmware build");
+    let mut words = build.split(' ').skip(1);
+    let built =
+        Command::new(env!("CARGO")).args(&mut words).current_dir(&root).output().expect("cargo starts");
+    assert!(built.status.success(), "{build}: {}", shown(&built));
+    assert!(runs.iter().any(|line| line.contains("examples/nucleo_smc_2.toml --image nucleo-controller")));
+    for line in runs {
+        let args = line.strip_prefix("clutch ").expect("a verb of the command");
+        let mut run = Command::new(command());
+        run.args(args.split(' ')).arg("--json").current_dir(&root).env_remove("CLUTCH_IMAGES");
+        let done = run.stdin(Stdio::null()).output().expect("the command starts");
+        assert_eq!(done.status.code(), Some(0), "{line}: {}", shown(&done));
+        let report: Value = serde_json::from_slice(&done.stdout).expect("JSON");
+        assert_eq!(report["cause"], "Done", "{line}: {report}");
+    }
+}
