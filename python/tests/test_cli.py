@@ -172,21 +172,45 @@ def test_figures_are_valid_files(reproduced, figure):
     check_png(reproduced[0] / f"{figure}.png")
 
 
+def until_drawn(page):
+    for _ in range(500):
+        if page.run("document.readyState == 'complete' && document.querySelector('figure svg') != null"):
+            return
+        time.sleep(0.02)
+    pytest.fail("no figure")
+
+
 def test_the_first_figure_of_the_report_is_on_a_phones_first_screen(reproduced, page):
     width, height = 390, 844
     for scheme in ("light", "dark"):
         page.size(width, height, scheme)
         page.call("Page.navigate", url="about:blank")
         page.call("Page.navigate", url=(reproduced[0] / "report.html").as_uri())
-        for _ in range(500):
-            if page.run("document.readyState == 'complete' && document.querySelector('figure svg') != null"):
-                break
-            time.sleep(0.02)
+        until_drawn(page)
         figure = page.run("document.querySelector('figure svg').getBoundingClientRect().toJSON()")
         # Enough of it that one sees what it is.
         assert figure["top"] < height - 100 and figure["height"] > 200, (scheme, figure)
         assert figure["left"] >= 0 and figure["right"] <= width
         assert page.run("document.documentElement.scrollWidth") <= width
+
+
+def test_the_figures_of_the_report_are_dark_where_the_page_is(reproduced, page, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    lightness = {}
+    for scheme in ("light", "dark"):
+        page.size(1280, 900, scheme)
+        page.call("Page.navigate", url="about:blank")
+        page.call("Page.navigate", url=(reproduced[0] / "report.html").as_uri())
+        until_drawn(page)
+        box = page.run("document.querySelector('figure svg').getBoundingClientRect().toJSON()")
+        page.screenshot(tmp_path / f"{scheme}.png", whole=True)
+        shot = image.open(tmp_path / f"{scheme}.png").convert("L")
+        # A figure is mostly paper: the median is its lightness, beside that of the page.
+        figure = shot.crop([round(box[side]) for side in ("left", "top", "right", "bottom")])
+        lightness[scheme] = [np.median(np.asarray(figure)), shot.getpixel((2, 2))]
+    assert lightness["light"] == [255, 255]
+    on_figure, on_page = lightness["dark"]
+    assert on_page < 40 and abs(on_figure - on_page) < 8
 
 
 def test_the_report_is_one_page_that_needs_no_network(reproduced):

@@ -261,6 +261,11 @@ def test_it_fits_both_sizes_and_both_schemes(page, size, scheme, tmp_path):
         box = page.run(f"document.querySelector('#{place} svg').getBoundingClientRect().toJSON()")
         assert box["left"] >= 0 and box["right"] <= size[0] and box["height"] > 100
     assert page.run("document.getElementById('wrong').hidden")
+    # The step of the lesson that is pressed is seen: the third, and any other.
+    for press in ("null", *(f"document.querySelectorAll('#steps button')[{step}].click()" for step in (0, 4))):
+        page.run(press)
+        box = page.run("document.querySelector('#steps [aria-pressed=true]').getBoundingClientRect().toJSON()")
+        assert box["left"] >= 0 and box["right"] <= size[0], press
     # Whoever moves a slider on a phone sees what it does.
     page.run("document.getElementById('law-glide-kp_1_s').scrollIntoView({block: 'center'})")
     top = page.run("document.querySelector('#position').getBoundingClientRect().toJSON()")

@@ -241,8 +241,8 @@ enum Verb {
     },
     /// Draws the README's figures again, with `clutch reproduce`.
     Figures,
-    /// Takes live view and playground in Chromium, at the sizes of a desktop and a phone, in light and in dark, into
-    /// target/screenshots; keeps the documentation's pictures of them. Needs Chromium.
+    /// Takes live view, playground and report in Chromium, at the sizes of a desktop and a phone, in light and in dark, and the
+    /// scope, into target/screenshots; keeps the first screens in docs/figures. Needs Chromium.
     Screenshots,
 }
 
@@ -389,7 +389,7 @@ fn figures() -> Result<()> {
 
 fn screenshots() -> Result<()> {
     let page = test::playground()?.context("there is no playground to take")?.page;
-    cargo(["build", "--release", "--package", "clutch-cli"]).run()?;
+    cargo(["build", "--release", "--package", "clutch-cli", "--features", "scope"]).run()?;
     let take =
         run::program(python::interpreter()?).arg("python/tests/screenshots.py").arg("target/release/clutch");
     take.arg(page).arg("target/screenshots").run()

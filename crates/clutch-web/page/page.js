@@ -108,9 +108,17 @@ function show() {
     at("steps").children[i].firstChild.setAttribute("aria-pressed", here);
     if (here) at("sentence").textContent = step.says;
   });
+  showStep();
   // A line ends before a setting, not within.
   const parts = (line) => line.split(/(?= --set )/).map((part) => make("span", { textContent: part }));
   at("command").replaceChildren(...command().split("\n").flatMap((line, i) => [i > 0 ? "\n" : "", ...parts(line)]));
+}
+
+/** The step that is pressed goes to the middle of the row, which is wider than a phone. */
+function showStep() {
+  const middle = (element) => element.getBoundingClientRect().left + element.getBoundingClientRect().width / 2;
+  const pressed = at("steps").querySelector("[aria-pressed=true]");
+  if (pressed) at("steps").scrollLeft += middle(pressed) - middle(at("steps"));
 }
 
 // ---- questions: one at a time, the latest first
@@ -373,6 +381,7 @@ let width = innerWidth;
 addEventListener("resize", () => {
   if (innerWidth !== width && answer) draw();
   width = innerWidth;
+  showStep();
 });
 fromFragment();
 changed();
