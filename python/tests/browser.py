@@ -88,6 +88,15 @@ class Page:
         assert "exceptionDetails" not in done, done["exceptionDetails"]
         return done["result"].get("value")
 
+    def processor_s(self):
+        """Processor time that all processes of the browser have taken so far."""
+        session, self._session = self._session, None  # the browser's, not the page's
+        try:
+            processes = self.call("SystemInfo.getProcessInfo")["processInfo"]
+        finally:
+            self._session = session
+        return sum(process["cpuTime"] for process in processes)
+
     def screenshot(self, path, whole=False):
         shot = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
         path.write_bytes(base64.b64decode(shot["data"]))
