@@ -154,6 +154,11 @@ fn the_button_is_the_operators_stop() {
     let (code, out) = viewed.done();
     assert_eq!(code, Some(4));
     assert!(out.contains("stopped by the operator; the board is in its safe state"), "{out}");
+
+    let viewed = Viewed::start(&["sim", "pd_2", "--set", "run.duration_s=60"]);
+    assert!(viewed.events().any(|(kind, _)| kind == "frame"));
+    assert_eq!(viewed.post("/stop").0, 200);
+    assert_eq!(viewed.done().0, Some(4), "a simulation that is played is stopped as a loop is");
 }
 
 #[test]

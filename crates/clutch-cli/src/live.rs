@@ -13,12 +13,13 @@ use std::sync::atomic::AtomicBool;
 pub(crate) struct LiveArg {
     /// Shows the run in a browser while it goes on, at an address of this machine that is printed: PORT, or a free one
     /// (docs/live.md).
-    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0",
+        value_parser = port)]
     live: Option<u16>,
     /// Serves the run's records to Foxglove while it goes on, at an address of this machine that is printed: PORT, 0 for a
     /// free one (docs/foxglove.md).
     #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "8765",
-        hide = cfg!(not(feature = "foxglove")))]
+        value_parser = port, hide = cfg!(not(feature = "foxglove")))]
     foxglove: Option<u16>,
     /// Draws the run in the terminal while it goes on; q or Esc ends it as Ctrl-C does.
     #[arg(long, hide = cfg!(not(feature = "scope")))]
@@ -28,6 +29,10 @@ pub(crate) struct LiveArg {
 /// The port of Foxglove is the one that it proposes.
 #[cfg(feature = "foxglove")]
 const _: () = assert!(clutch_live::foxglove::PORT == 8765);
+
+fn port(text: &str) -> Result<u16, String> {
+    text.parse().map_err(|_| "expected a port from 1 to 65535, or 0 for a free one".to_owned())
+}
 
 impl LiveArg {
     pub(crate) fn asked_for(&self) -> bool {

@@ -22,6 +22,7 @@ use clutch_sim::rig::{Rig, not_passive};
 use clutch_sim::{Keep, Metrics, Run, SAMPLE_COLUMNS, Scenario};
 use serde::Serialize;
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 
 /// Simulates a scenario and prints figures of the shaft's motion along its path.
 #[derive(Args)]
@@ -117,21 +118,21 @@ impl Sim {
             [&self.csv, &self.log, &self.plot].into_iter().flatten().map(PathBuf::as_path).collect();
         report(self.json, || json(&summary), || text(&summary, &scenario, &run) + &wrote(&files))?;
         if self.live.asked_for() {
-            self.play(&scenario, &run)?;
+            return self.play(&scenario, &run);
         }
         Ok(Exit::Done)
     }
 
-    /// Plays the run at its own pace, once somebody looks on.
-    fn play(&self, scenario: &Scenario, run: &Run) -> anyhow::Result<()> {
+    /// Plays the run at its own pace, once somebody looks on; to its end, or until an operator stops it.
+    fn play(&self, scenario: &Scenario, run: &Run) -> anyhow::Result<Exit> {
         let stop = stop_flag()?;
-        let Some(live) = self.live.start(&stop)? else { return Ok(()) };
+        let Some(live) = self.live.start(&stop)? else { return Ok(Exit::Done) };
         remark("it plays once somebody looks on; Ctrl-C ends it\n");
         if live.wait_for_reader(&stop) {
-            let looking = Looking { onlooker: live, stop };
+            let looking = Looking { onlooker: live, stop: stop.clone() };
             to_log::play_simulation(&looking, scenario, run, BUILD)?;
         }
-        Ok(())
+        Ok(if stop.load(Ordering::Relaxed) { Exit::Stopped } else { Exit::Done })
     }
 }
 

@@ -103,6 +103,13 @@ fn a_command_line_that_is_not_understood_exits_with_64() {
         assert_eq!(o.status.code(), Some(64), "{args:?}");
         assert!(!err(&o).is_empty());
     }
+    let o = clutch(&["sim", "smc_2", "--live=80x"]);
+    assert_eq!(o.status.code(), Some(64));
+    assert!(
+        err(&o).contains("invalid value '80x' for '--live[=<PORT>]': expected a port from 1 to 65535"),
+        "{}",
+        err(&o)
+    );
 }
 
 #[test]
