@@ -294,6 +294,9 @@ const REMEMBER: [Remembers<'static>; 3] = [
 /// Values that all runs of a case have.
 type Values<'a> = &'a [(&'a str, &'a str)];
 
+/// Keys of which a case draws values, with their ranges.
+type Drawn<'a> = &'a [(&'a str, f64, f64)];
+
 /// How often runs alone got what the law asked for, the lowest voltage, and the highest.
 fn limits(scenarios: &[Scenario]) -> [usize; 3] {
     let traces: Vec<_> = scenarios.iter().map(|s| s.run(Keep::Trace, UNWATCHED).unwrap().trace).collect();
@@ -358,7 +361,7 @@ fn servos_that_are_computed_one_by_one_beside_motion_in_lanes_have_the_bits_of_r
     let map = format!("{{ rig = \"another\", points_deg_factor = [{}] }}", points.join(", "));
     let map = [("friction_map", map.as_str())];
     let late = [("rig.delay_ticks", "2"), ("output.bumpless_time_s", "0.1"), ("run.start", "rest")];
-    let cases: [(&str, &[(&str, f64, f64)], &[Values<'_>]); 11] = [
+    let cases: [(&str, Drawn<'_>, &[Values<'_>]); 11] = [
         ("bench_glide_2", &[("reference.ramp.rate_deg_s", 0.1, 5.0)], &[]),
         ("bench_glide_2", &[("run.start_counts", -5000.0, 5000.0)], &[&late]),
         ("bench_glide_2", &[("run.start_counts", -5000.0, 5000.0)], &[&map]),
