@@ -26,7 +26,7 @@ pub(super) fn cycles(i: &Instruction) -> Option<u64> {
         "dmb" | "dsb" | "isb" => 4,
         "mla" | "mls" => 2,
         "sdiv" | "udiv" => 12,
-        "b" | "bl" | "bx" | "cbz" | "cbnz" => 1,
+        "b" | "bl" | "blx" | "bx" | "cbz" | "cbnz" => 1,
         "ldrb" | "ldrsb" | "strb" => 2,
         // Away from a multiple of their size, a word is moved in up to three pieces, a half-word in two.
         "ldr" | "str" => 2 + if aligned(i) { 0 } else { 2 },

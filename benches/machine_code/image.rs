@@ -1,6 +1,7 @@
 //! A linked image: its functions, their code, its sections.
 
 use super::Fault;
+use super::constant;
 use super::decode::{Decoder, Instruction};
 use addr2line::Loader;
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
@@ -245,6 +246,7 @@ impl Image {
             }
             from = (next, code);
         }
+        constant::resolve(&mut all, |address| self.word(address));
         Ok(all)
     }
 

@@ -8,9 +8,11 @@
 //! ```
 //!
 //! Everything that cannot be followed is a [`Fault`]: a loop without a stated bound, a jump into
-//! the middle of one, recursion, a call or jump through a register, an instruction without a cost.
+//! the middle of one, recursion, a call or jump through a register that the code does not show, an instruction without a
+//! cost.
 
 mod bound;
+mod constant;
 mod cost;
 mod decode;
 mod facts;

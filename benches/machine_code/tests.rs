@@ -51,6 +51,18 @@ fn what_a_condition_switches_off_is_charged() {
 }
 
 #[test]
+fn a_call_through_a_register_that_holds_a_constant_on_every_way_is_one() {
+    let g: (&str, &[u16]) = ("g", &[0x2001, BX_LR]);
+    // movw r4, #0x100d; blx r4; mov r2, r4; blx r2; bx lr, with g at 0x100c: movs r0, #1; bx lr
+    let f: (&str, &[u16]) = ("f", &[0xf241, 0x040d, 0x47a0, 0x4622, 0x4790, BX_LR]);
+    assert_eq!(bound(&image(&[f, g])), Ok(cost(9, 24)));
+    // cmp r0, #0; beq 1f; movw r4, #0x100d; 1: blx r4; bx lr
+    let one_way: (&str, &[u16]) = ("f", &[0x2800, 0xd001, 0xf241, 0x040d, 0x47a0, BX_LR]);
+    let refused = bound(&image(&[one_way, g])).unwrap_err();
+    assert!(matches!(refused.as_slice(), [Fault::Indirect { address: 0x1008, .. }]), "{refused:?}");
+}
+
+#[test]
 fn a_result_that_the_next_instruction_takes_costs_a_cycle() {
     // vmul.f32 s0, s0, s1; vadd.f32 s0, s0, s2; bx lr
     let image = image(&[("f", &[0xee20, 0x0a20, 0xee30, 0x0a01, BX_LR])]);

@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 mod table;
 
 #[allow(dead_code, reason = "likewise")]
-#[path = "../../crates/clutch-node/examples/settings.rs"]
+#[path = "../../crates/clutch-settings/examples/settings.rs"]
 mod settings;
 
 const VECTORS: &str = include_str!("vectors.csv");
@@ -88,7 +88,7 @@ fn committed_files_are_what_the_table_gives_now() {
     assert_eq!(
         block,
         settings::text().trim(),
-        "`cargo run -p clutch-node --example settings` prints the table"
+        "`cargo run -p clutch-settings --example settings` prints the table"
     );
 }
 

@@ -7,7 +7,7 @@ use crate::servo::clutch_output;
 use crate::settings::{build, clutch_misfit, clutch_run};
 use clutch_core::law::LawState;
 use clutch_core::supervisor::{BoardMode, Cause, Cycle, Sample, State, SupervisorState};
-use clutch_core::{BeginningAt, Counts, DacCode, FixedCounts, Micros, Servo, Supervisor};
+use clutch_core::{BeginningAt, Counts, Dac, DacCode, FixedCounts, Micros, Servo, Supervisor};
 
 /// A sample of the encoder. Fill it with zeros, then set what you know.
 #[derive(Clone, Copy, Debug)]
@@ -272,11 +272,11 @@ impl Kept {
         if self.state.state() == State::Running && self.state.tick().saturating_add(1) >= self.ticks {
             self.supervisor.stop(&mut self.state, Cause::Done);
         }
-        told(&cycle)
+        told(&cycle, self.servo.dac())
     }
 }
 
-fn told(cycle: &Cycle<f32>) -> clutch_cycle {
+fn told(cycle: &Cycle<f32>, dac: &Dac<f32>) -> clutch_cycle {
     clutch_cycle {
         tick: cycle.tick,
         code: cycle.code.0,
@@ -288,6 +288,6 @@ fn told(cycle: &Cycle<f32>) -> clutch_cycle {
         asked: cycle.output.is_some().into(),
         value: cycle.value,
         target: clutch_target::of(&cycle.target),
-        output: cycle.output.as_ref().map(clutch_output::of).unwrap_or_default(),
+        output: cycle.output.as_ref().map(|out| clutch_output::of(out, dac)).unwrap_or_default(),
     }
 }

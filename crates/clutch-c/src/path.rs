@@ -3,7 +3,7 @@
 use crate::memory::{clutch_result, kept, object, outcome, output};
 use crate::settings::{Knots, build, clutch_misfit, clutch_run, fixed};
 use clutch_core::Target;
-use clutch_node::Path;
+use clutch_settings::Path;
 
 /// The target of a shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

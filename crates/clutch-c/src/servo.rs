@@ -5,7 +5,7 @@ use crate::memory::{clutch_result, input, kept, object, outcome, output, room};
 use crate::path::clutch_target;
 use crate::settings::{build, clutch_misfit, clutch_run};
 use clutch_core::law::{LawState, LawTerms};
-use clutch_core::{Counts, Servo, ServoOutput, ServoState};
+use clutch_core::{Counts, Dac, Servo, ServoOutput, ServoState};
 
 /// The output of a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,11 +22,11 @@ pub struct clutch_output {
 }
 
 impl clutch_output {
-    pub(crate) fn of(output: &ServoOutput<f32, LawTerms<f32>>) -> clutch_output {
+    pub(crate) fn of(output: &ServoOutput<f32, LawTerms<f32>>, dac: &Dac<f32>) -> clutch_output {
         clutch_output {
             tick: clutch_tick::of(&output.tick),
             command: clutch_command::of(&output.command),
-            voltage: output.voltage,
+            voltage: dac.volts(output.code),
             code: output.code.0,
         }
     }
@@ -89,6 +89,6 @@ pub unsafe extern "C" fn clutch_servo_tick(
         let state = kept.state.as_mut().ok_or(clutch_result::CLUTCH_WRONG_STATE)?;
         let ticked = kept.servo.tick(state, Counts(counts), &target.target());
         // SAFETY: the caller's promise.
-        unsafe { output(out, clutch_output::of(&ticked)) }
+        unsafe { output(out, clutch_output::of(&ticked, kept.servo.dac())) }
     })
 }

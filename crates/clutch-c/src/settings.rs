@@ -5,7 +5,7 @@ use core::mem::offset_of;
 
 use clutch_core::reference::Knot;
 use clutch_core::{FixedCounts, ParamError};
-use clutch_node::{Built, MAX_KNOTS, Misfit, SETTINGS_HASH};
+use clutch_settings::{Built, MAX_KNOTS, Misfit, SETTINGS_HASH};
 
 /// A number of a run, under its key. `clutch scenario header FILE` prints those of a scenario, in order of their keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

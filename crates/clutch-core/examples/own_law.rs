@@ -80,7 +80,7 @@ fn run<C: ControlLaw<f64>>(servo: &Servo<f64, C>) -> Result<(f64, u32), ParamErr
     for tick in 0..10_000 {
         let counts = (shaft.angle * encoder.counts_per_radian::<f64>()).floor();
         let out = servo.tick(&mut state, Counts(counts as i32), &path.at(tick));
-        shaft.advance(out.voltage);
+        shaft.advance(servo.dac().volts(out.code));
         if tick < 1000 {
             sticks = shaft.sticks;
         } else {

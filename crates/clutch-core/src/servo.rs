@@ -110,6 +110,20 @@ pub struct Servo<T, C = Law<T>> {
     radians_per_count: T,
 }
 
+/// The actuator's voltage since the last tick, as the servo was told or as its own code.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Applied<T> {
+    Volts(T),
+    /// Few ask for its voltage: it is computed where one does.
+    Code(DacCode),
+}
+
+impl<T: Default> Default for Applied<T> {
+    fn default() -> Self {
+        Applied::Volts(T::default())
+    }
+}
+
 /// Memory of a servo; a clone is a snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ServoState<T, S> {
@@ -120,16 +134,14 @@ pub struct ServoState<T, S> {
     error: FixedCounts,
     velocity: VelocityState<T>,
     law: S,
-    applied: T,
+    applied: Applied<T>,
 }
 
 /// The output of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ServoOutput<T: Arithmetic, Terms> {
-    /// The code for the converter.
+    /// The code for the converter; [`Dac::volts`] gives its voltage.
     pub code: DacCode,
-    /// The voltage that the code stands for, V.
-    pub voltage: T,
     /// The law's input.
     pub tick: Tick<T>,
     /// The law's answer.
@@ -233,8 +245,8 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
         state.error = FixedCounts(target.position.0.wrapping_sub(position.0));
         state.velocity = self.velocity.start(position, target, applied);
         self.law.restart(&mut state.law, &self.measure(position, target, T::ZERO), applied);
-        self.law.sees(&mut state.law, &Seen { position, applied, place: Place::default() });
-        state.applied = applied;
+        self.law.sees(&mut state.law, || Seen { position, applied, place: Place::default() });
+        state.applied = Applied::Volts(applied);
     }
 
     /// One period.
@@ -285,13 +297,18 @@ impl<T: Real, C: ControlLaw<T>> Servo<T, C> {
     ) -> ServoOutput<T, C::Terms> {
         state.position = position;
         state.error = FixedCounts(target.position.0.wrapping_sub(position.0));
-        let error_rate = self.velocity.update(&mut state.velocity, position, target, state.applied);
+        let before = state.applied;
+        let applied = || match before {
+            Applied::Volts(volts) => volts,
+            Applied::Code(code) => self.dac.volts(code),
+        };
+        let error_rate = self.velocity.update(&mut state.velocity, position, target, applied);
         let tick = self.measure(position, target, error_rate);
-        self.law.sees(&mut state.law, &Seen { position, applied: state.applied, place });
+        self.law.sees(&mut state.law, || Seen { position, applied: applied(), place });
         let command = self.shell.around(self.law.update(&mut state.law, &tick), &tick);
         let code = self.dac.code(command.voltage);
-        state.applied = self.dac.volts(code);
-        ServoOutput { code, voltage: state.applied, tick, command }
+        state.applied = Applied::Code(code);
+        ServoOutput { code, tick, command }
     }
 
     /// Catches up with a sample that the link lost: `step` of `steps` periods lie between the

@@ -100,21 +100,21 @@ impl<T: Real> VelocitySource<T> {
         state: &mut VelocityState<T>,
         position: FixedCounts,
         target: &Target<T>,
-        volts: T,
+        volts: impl FnOnce() -> T,
     ) -> T {
-        let _ = volts;
+        let _ = &volts;
         match self {
             VelocitySource::SmoothedDerivative(d) => {
                 d.update(&mut state.derivative, FixedCounts(target.position.0.wrapping_sub(position.0)))
             }
             #[cfg(feature = "linalg")]
             VelocitySource::EdgeTimed(f) => {
-                f.update(&mut state.edge_timed, position, volts, target.velocity);
+                f.update(&mut state.edge_timed, position, volts(), target.velocity);
                 target.velocity - f.rad_per_s(state.edge_timed.velocity())
             }
             #[cfg(feature = "linalg")]
             VelocitySource::Observer(o) => {
-                target.velocity - o.update(&mut state.observer, position, volts).velocity
+                target.velocity - o.update(&mut state.observer, position, volts()).velocity
             }
         }
     }
@@ -144,7 +144,7 @@ mod tests {
         let mut rate = 0.0;
         for k in 1..3000 {
             let read = FixedCounts::from_counts(counts(shaft, k).floor() as i64);
-            rate = source.update(&mut state, read, &target(k), volts);
+            rate = source.update(&mut state, read, &target(k), || volts);
         }
         assert!((rate - (path - shaft)).to_degrees().abs() < 0.2, "{} °/s", rate.to_degrees());
     }

@@ -152,7 +152,7 @@ impl Run {
                 if parts.last() != Some(&part) {
                     parts.push(part);
                 }
-                line.push_back(answer.voltage);
+                line.push_back(servo.dac().volts(answer.code));
                 let before = self.shaft.position;
                 self.shaft.period(line.pop_front().unwrap());
                 tick += 1;

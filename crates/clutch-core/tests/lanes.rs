@@ -197,10 +197,10 @@ where
             state = Memory::select(Mask(std::array::from_fn(|i| i == lane)), &begun, &state);
         }
         let seen = |applied| Seen { applied, ..Seen::default() };
-        vector.sees(&mut state, &Seen { applied, ..Seen::default() });
+        vector.sees(&mut state, || Seen { applied, ..Seen::default() });
         let together = vector.update(&mut state, &all);
         for i in 0..N {
-            laws[i].sees(&mut states[i], &seen(applied.0[i]));
+            laws[i].sees(&mut states[i], || seen(applied.0[i]));
             let alone = laws[i].update(&mut states[i], &ticks[i]);
             limits[alone.limit as usize] += 1;
             assert_eq!(alone.voltage.to_bits(), together.voltage.0[i].to_bits(), "tick {k}, lane {i}");

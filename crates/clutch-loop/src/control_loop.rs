@@ -458,7 +458,7 @@ impl<'a, S: Station> Control<'a, S> {
                 let time = n.cycle.tick as f64 * self.period;
                 let error = out.tick.error.to_f64();
                 let velocity = out.tick.velocity().to_f64();
-                let voltage = out.voltage.to_f64();
+                let voltage = self.dac.volts(out.code).to_f64();
                 self.answers += 1;
                 self.figures.sample(time, MetricsSample { error, velocity, voltage });
                 let counts = clutch_core::Counts(n.sample.counts);

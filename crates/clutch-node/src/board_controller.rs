@@ -16,11 +16,11 @@ use crate::board::misunderstood;
 use crate::controller::{ControllerNode, ControllerParams};
 use crate::notice::{Ending, Notice};
 use crate::outbox::{Outbox, Sink};
-use crate::settings::{Built, MAX_KNOTS, Misfit, Path, Prepared, SETTINGS_HASH, Settings};
 use crate::telemetry::{frame, states};
 use clutch_core::law::LawTerms;
 use clutch_core::supervisor::State;
 use clutch_core::{DacCode, Micros};
+use clutch_settings::{Built, MAX_KNOTS, Misfit, Path, Prepared, SETTINGS_HASH, Settings};
 use clutch_wire::{
     Armed, BoardState, Configure, Configured, ControllerHello, Decoder, Discover, Ended, Hello, Link,
     Message, Pong, Refusal, Refused, SCHEMA, Sample, Set, Stop, StopReason, Taken, VERSION,
@@ -102,7 +102,7 @@ impl BoardController {
             decoder: Decoder::new(),
             settings: Settings::default(),
             settings_run: 0,
-            prepared: Prepared::new(),
+            prepared: Prepared::default(),
             introduced: Decoder::new(),
             hello: None,
             run: None,

@@ -26,7 +26,7 @@
 //! | `hardware` | board | what a board's program does each period, in either role |
 //! | `wide_counter` | board | a counter of 16 bits as one of 32 |
 //! | `lockstep` | both | a board controller that is asked instead of keeping time |
-//! | `settings`, `telemetry` | both | a run on its way to a board controller, and its cycles on their way back |
+//! | `telemetry` | both | a run's cycles on their way to the host; on its way to the board it is [`Settings`] |
 //! | `notice`, `outbox`, `pace` | both | what a node reports, its frames on their way out, and the pace of the samples |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -41,12 +41,15 @@ mod notice;
 mod one_chip;
 mod outbox;
 mod pace;
-mod settings;
 mod telemetry;
 mod wide_counter;
 
 pub use board::{BoardMisfit, BoardNode, BoardParams};
 pub use board_controller::{BoardController, BoardControllerParams, present_code};
+pub use clutch_settings::{
+    Built, Declared, MAX_KNOTS, Misfit, Name, Path, Refusing, RunParams, RunSettings, RunTimes, SETTINGS,
+    SETTINGS_HASH, Setting, Settings, Unsupported,
+};
 pub use clutch_wire::ResetCause;
 pub use controller::{ControllerNode, ControllerParams};
 pub use hardware::{DaqBoard, Hardware, Role, receive, tick};
@@ -55,8 +58,4 @@ pub use lockstep::Outboxes;
 pub use notice::{CycleNotice, Ending, LinkCounts, Notice, Standing};
 pub use one_chip::OneChip;
 pub use outbox::{Outbox, Sink};
-pub use settings::{
-    Built, Declared, MAX_KNOTS, Misfit, Name, Path, Refusing, RunParams, RunSettings, RunTimes, SETTINGS,
-    SETTINGS_HASH, Setting, Settings, Unsupported,
-};
 pub use wide_counter::WideCounter;

@@ -83,7 +83,6 @@ pub(crate) fn notice(
     };
     let output = asked.then(|| ServoOutput {
         code: given,
-        voltage: dac.volts(given),
         tick: Tick {
             error: real(m.error),
             error_rate: real(m.error_rate),

@@ -889,8 +889,8 @@ impl ControlLaw<f64> for PythonLaw {
         PythonState::default()
     }
 
-    fn sees(&self, state: &mut PythonState, seen: &Seen<f64>) {
-        state.seen = *seen;
+    fn sees(&self, state: &mut PythonState, seen: impl FnOnce() -> Seen<f64>) {
+        state.seen = seen();
     }
 
     fn update(&self, state: &mut PythonState, tick: &law::Tick<f64>) -> Command<f64, [f64; 1]> {

@@ -250,7 +250,7 @@ fn velocity<T: Real>() {
         made(VelocitySource::new(&any::<T, VelocityParams<T>>(), &plant, encoder::<T>(), micros()))
     {
         let mut state = opaque(v.start(fixed(), &target(), real()));
-        sink(v.update(&mut state, fixed(), &target(), real()));
+        sink(v.update(&mut state, fixed(), &target(), real::<T>));
         sink(state);
     }
 }

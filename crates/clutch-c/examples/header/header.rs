@@ -3,7 +3,7 @@
 use cbindgen::{Builder, Config, Language, Style};
 use clutch_core::params::Kind;
 use clutch_core::supervisor::{Arrival, Cause, State};
-use clutch_node::{Declared, SETTINGS_HASH, Setting};
+use clutch_settings::{Declared, SETTINGS_HASH, Setting};
 use std::fmt::{Debug, Write as _};
 use std::path::Path;
 

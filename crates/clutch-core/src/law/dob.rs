@@ -134,8 +134,8 @@ impl<T: Arithmetic> ControlLaw<T> for Dob<T> {
     }
 
     #[inline]
-    fn sees(&self, state: &mut DobState<T>, seen: &Seen<T>) {
-        state.applied = seen.applied;
+    fn sees(&self, state: &mut DobState<T>, seen: impl FnOnce() -> Seen<T>) {
+        state.applied = seen().applied;
     }
 
     #[inline]
@@ -190,7 +190,7 @@ mod tests {
     }
 
     fn told(law: &Dob<f64>, state: &mut DobState<f64>, tick: &Tick<f64>, applied: f64) -> Command<f64, [f64; 2]> {
-        law.sees(state, &Seen { applied, ..Seen::default() });
+        law.sees(state, || Seen { applied, ..Seen::default() });
         law.update(state, tick)
     }
 

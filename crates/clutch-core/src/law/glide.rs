@@ -288,8 +288,8 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
         GlideState { seen, output: self.output.start(demand, applied), ..GlideState::default() }
     }
 
-    fn sees(&self, state: &mut GlideState<T>, seen: &Seen<T>) {
-        state.seen = *seen;
+    fn sees(&self, state: &mut GlideState<T>, seen: impl FnOnce() -> Seen<T>) {
+        state.seen = seen();
     }
 
     #[inline(never)] // by itself a board's bound counts a step or a slide, and no other law's frame grows

@@ -251,7 +251,7 @@ macro_rules! laws {
             }
 
             #[inline]
-            fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
+            fn sees(&self, state: &mut Self::State, seen: impl FnOnce() -> Seen<T>) {
                 match self {
                     $(Law::$law(law) => {
                         if let LawState::$law(own) = state {

@@ -135,9 +135,9 @@ pub trait ControlLaw<T: Arithmetic> {
     }
 
     /// Called before each period, and once after [`ControlLaw::start`], with the facts behind the measurement. Most laws need
-    /// none of them.
+    /// none of them, and do not ask: the voltage of a code is computed for who does.
     #[inline]
-    fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
+    fn sees(&self, state: &mut Self::State, seen: impl FnOnce() -> Seen<T>) {
         let _ = (state, seen);
     }
 
@@ -160,7 +160,7 @@ impl<T: Arithmetic, C: ControlLaw<T>> ControlLaw<T> for &C {
     }
 
     #[inline]
-    fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
+    fn sees(&self, state: &mut Self::State, seen: impl FnOnce() -> Seen<T>) {
         (**self).sees(state, seen);
     }
 
@@ -362,8 +362,8 @@ mod tests {
         let tick = behind(-1e-3);
         let (mut one, mut other) = (law.start(&tick, 2.0), ControlLaw::start(&by, &tick, 2.0));
         let seen = Seen { position: FixedCounts::from_counts(3), applied: 2.0, ..Seen::default() };
-        law.sees(&mut one, &seen);
-        ControlLaw::sees(&by, &mut other, &seen);
+        law.sees(&mut one, || seen);
+        ControlLaw::sees(&by, &mut other, || seen);
         assert_eq!(one, other);
         assert_eq!(law.update(&mut one, &tick), ControlLaw::update(&by, &mut other, &tick));
     }
@@ -375,7 +375,7 @@ mod tests {
         for law in &laws {
             for other in &laws {
                 let mut foreign = other.start(&tick, 3.0);
-                law.sees(&mut foreign, &Seen { applied: 1.0, ..Seen::default() });
+                law.sees(&mut foreign, || Seen { applied: 1.0, ..Seen::default() });
                 let command = law.update(&mut foreign, &tick);
                 assert!((0.0..=9.0).contains(&command.voltage), "{command:?}");
             }

@@ -21,7 +21,7 @@ use super::params::LimitParams;
 use super::state::Cause;
 use crate::actuator::ActuatorKind;
 use crate::law::OutputParams;
-use crate::{Bounds, Real};
+use crate::{Bounds, Dac, DacCode, Real};
 
 /// Share of a count by which the window may blur the velocity before a younger one takes its place; a quarter, since the
 /// blur grows with the square of the age and the younger is to be half as old.
@@ -30,12 +30,13 @@ const BLUR: f64 = 0.4;
 const LONGEST: f64 = 16.0;
 /// Counts per period of a velocity that nobody knows yet, at least.
 const FASTEST: f64 = 1000.0;
-/// Voltages that are kept; a power of two.
+/// Codes that are kept; a power of two.
 const SENT: usize = 16;
 
 /// Accelerations within the bounds; in counts, periods and, where a side of it is meant, `[least, most]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Envelope<T> {
+    dac: Dac<T>,
     kind: ActuatorKind,
     /// Drive with the highest inertia, counts per period².
     drive: [T; 2],
@@ -65,6 +66,7 @@ impl<T: Real> Envelope<T> {
     /// `scale` is counts per radian times period²; `speed` are counts per period of the fastest path.
     pub(super) fn new(
         p: &LimitParams<T>,
+        dac: Dac<T>,
         output: &OutputParams<T>,
         b: &Bounds<T>,
         scale: T,
@@ -80,6 +82,7 @@ impl<T: Real> Envelope<T> {
             [a * c * scale, b * d * scale]
         };
         Envelope {
+            dac,
             kind: b.actuator,
             drive: [b.drive_torque.low, b.drive_torque.high].map(|x| x * scale),
             motor: motor.map(|x| x * scale),
@@ -105,12 +108,12 @@ impl<T: Real> Envelope<T> {
 
     /// The same where the state is to stay.
     #[inline(never)]
-    pub(super) fn restart(&self, s: &mut EnvelopeState<T>, applied: T) {
+    pub(super) fn restart(&self, s: &mut EnvelopeState<T>, applied: DacCode) {
         *s = self.start(applied);
     }
 
-    /// The envelope of a shaft of which nothing is known but a count, and the voltage `applied`.
-    pub(super) fn start(&self, applied: T) -> EnvelopeState<T> {
+    /// The envelope of a shaft of which nothing is known but a count, and the code `applied`.
+    pub(super) fn start(&self, applied: DacCode) -> EnvelopeState<T> {
         let (fastest, edge) = (self.fastest, self.edge);
         let from = |position, other: T, velocity| {
             let window = Window { from: -other, age: T::ZERO, moment: T::ZERO };
@@ -168,20 +171,16 @@ impl<T: Real> Envelope<T> {
         let reach = if losses { lossy } else { sound };
         if reach > SENT {
             // Older than those that are kept: any of the output, or what was there before the first.
-            return [self.output[0].min(s.applied), self.output[1].max(s.applied)];
+            let applied = self.dac.volts(s.applied);
+            return [self.output[0].min(applied), self.output[1].max(applied)];
         }
         let (newest, others) = s.newest(reach);
         let mut range = [newest; 2];
-        for &volts in others {
-            // Not `min`, `max`: these are numbers, and a comparison is cheaper.
-            if volts < range[0] {
-                range[0] = volts;
-            }
-            if volts > range[1] {
-                range[1] = volts;
-            }
+        for &code in others {
+            range = [range[0].min(code), range[1].max(code)];
         }
-        range
+        // A higher code is a higher voltage.
+        range.map(|code| self.dac.volts(code))
     }
 
     /// Computes before a sample comes, so many periods after the last one that passed, what it will be judged by.
@@ -338,12 +337,12 @@ pub(super) struct EnvelopeState<T> {
     expected: Option<bool>,
     /// Counts of the newest sample, and the periods that it took; nothing in none once that is noted.
     came: (i32, u32),
-    /// The voltage that answered it, V, until it is kept.
-    sending: Option<T>,
-    /// Voltage before the first that was sent, V.
-    applied: T,
-    /// Voltages that were sent, V: a ring, and the same once more, so that those of any span are in a row.
-    sent: [T; 2 * SENT],
+    /// The code that answered it, until it is kept.
+    sending: Option<DacCode>,
+    /// The code before the first that was sent.
+    applied: DacCode,
+    /// Codes that were sent: a ring, and the same once more, so that those of any span are in a row.
+    sent: [DacCode; 2 * SENT],
     /// Place of the newest in the first.
     last: usize,
     /// A bit for each of the last periods: the counts turned round in it.
@@ -355,33 +354,33 @@ pub(super) struct EnvelopeState<T> {
 }
 
 impl<T: Real> EnvelopeState<T> {
-    /// A voltage is sent. It is kept later: what is on its way to the converter does not wait for that.
+    /// A code is sent. It is kept later: what is on its way to the converter does not wait for that.
     #[inline]
-    pub(super) fn sends(&mut self, volts: T) {
-        self.sending = Some(volts);
+    pub(super) fn sends(&mut self, code: DacCode) {
+        self.sending = Some(code);
     }
 
     /// Remembers the newest sample and its answer.
     fn catch_up(&mut self) {
         let (moved, periods) = core::mem::take(&mut self.came);
         self.note(moved, periods);
-        if let Some(volts) = self.sending.take() {
-            self.keep(volts);
+        if let Some(code) = self.sending.take() {
+            self.keep(code);
         }
     }
 
-    fn keep(&mut self, volts: T) {
+    fn keep(&mut self, code: DacCode) {
         self.last = self.last.wrapping_add(1) % SENT;
         let (ring, again) = self.sent.split_at_mut(SENT);
         for places in [ring, again] {
             if let Some(place) = places.get_mut(self.last) {
-                *place = volts;
+                *place = code;
             }
         }
     }
 
-    /// The newest voltage of so many that were sent, and the others; before the first, the one that was there.
-    fn newest(&self, count: usize) -> (T, &[T]) {
+    /// The newest code of so many that were sent, and the others; before the first, the one that was there.
+    fn newest(&self, count: usize) -> (DacCode, &[DacCode]) {
         let end = (self.last % SENT).wrapping_add(SENT);
         let others = self.sent.get(end.wrapping_add(1).wrapping_sub(count)..end);
         (self.sent.get(end).copied().unwrap_or(self.applied), others.unwrap_or(&[]))

@@ -79,7 +79,7 @@ impl<T: Real> Supervisor<T> {
         let dac = Dac::new(&servo.dac)?;
         Ok(Supervisor {
             safe: SafeCodes::new(&p.on_fault, &dac, servo.period, bounds.actuator)?,
-            limits: Limits::new(p, servo, bounds)?,
+            limits: Limits::new(p, servo, dac, bounds)?,
             checks: Checks::ALL,
         })
     }
@@ -265,7 +265,7 @@ impl<T: Real> Supervisor<T> {
         self.check_output(s, &out, &goal, since_served.max(1));
         if s.state == State::Running && !sample.superseded {
             s.code = out.code;
-            s.envelope.sends(out.voltage);
+            s.envelope.sends(out.code);
             cycle.answer = Some(out.code);
         }
     }
@@ -484,7 +484,7 @@ impl<T: Real> Supervisor<T> {
     ) {
         let applied = servo.dac().volts(s.code);
         servo.restart(&mut s.servo, counts, goal, applied);
-        self.limits.envelope.restart(&mut s.envelope, applied);
+        self.limits.envelope.restart(&mut s.envelope, s.code);
     }
 
     /// [`Cause::NotFinite`], [`Cause::FollowingError`] and [`Cause::Saturation`].
@@ -572,7 +572,8 @@ struct Reckoned {
 #[inline]
 fn finite<T: Real, X: Terms<T>>(out: &ServoOutput<T, X>) -> bool {
     let t = &out.tick;
-    let rest = [t.error, t.error_rate, out.command.voltage, out.voltage];
+    // A code stands for a number of volts, whichever it is.
+    let rest = [t.error, t.error_rate, out.command.voltage];
     out.command.limit != Limit::Invalid && rest.are_finite() && out.command.terms.are_finite()
 }
 

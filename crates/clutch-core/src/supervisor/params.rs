@@ -3,7 +3,9 @@
 use super::envelope::Envelope;
 use crate::params::{Range, Table};
 use crate::safe_state::SafeState;
-use crate::{ActuatorKind, Bounds, FixedCounts, Interval, Micros, ParamError, Real, ServoParams, Target};
+use crate::{
+    ActuatorKind, Bounds, Dac, FixedCounts, Interval, Micros, ParamError, Real, ServoParams, Target,
+};
 
 crate::params! {
     /// Limits that the supervisor watches. The defaults are for the paper's shaft at 1 kHz.
@@ -128,6 +130,7 @@ impl<T: Real> Limits<T> {
     pub(super) fn new(
         p: &SupervisorParams<T>,
         servo: &ServoParams<T>,
+        dac: Dac<T>,
         bounds: &Bounds<T>,
     ) -> Result<Self, ParamError<T>> {
         let period = servo.period.period::<T>()?;
@@ -180,6 +183,7 @@ impl<T: Real> Limits<T> {
             actuator: bounds.actuator,
             envelope: Envelope::new(
                 p,
+                dac,
                 &servo.output,
                 bounds,
                 per_radian * period * period,

@@ -55,9 +55,10 @@ pub(crate) fn bristled(
         if out.tick.error.abs() > ASTRAY {
             return Err(ExperimentError::Ended { part: name.to_owned(), cause: "astray".into(), remedy: "" });
         }
-        ticks.push(Tick { counts: counts(angle), volts: out.voltage });
-        line.push_back(out.voltage);
-        let volts = line.pop_front().unwrap_or(out.voltage);
+        let sent = servo.dac().volts(out.code);
+        ticks.push(Tick { counts: counts(angle), volts: sent });
+        line.push_back(sent);
+        let volts = line.pop_front().unwrap_or(sent);
         let dt = period / STEPS as f64;
         for _ in 0..STEPS {
             let normal =

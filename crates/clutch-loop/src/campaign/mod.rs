@@ -339,7 +339,7 @@ impl<T: Real> ControlLaw<T> for BrokenLaw<T> {
         (self.law.start(tick, applied), 0)
     }
 
-    fn sees(&self, state: &mut Self::State, seen: &Seen<T>) {
+    fn sees(&self, state: &mut Self::State, seen: impl FnOnce() -> Seen<T>) {
         self.law.sees(&mut state.0, seen);
     }
 

@@ -688,17 +688,21 @@ class FlashMeter(Meter):
     The estimate assumes: one cycle for an instruction, two for a load, more for what moves several registers,
     divides, or multiplies and adds in floating point, as the core's manual has them; two for a branch that is taken;
     12 and 10 for a handler's begin and end. Flash is read by 64 bits with four wait states, into an instruction
-    cache of 1 KB and a data cache of 256 bytes, each by least recent use. No account is taken of the prefetch, which
-    the image switches on, of how instructions overlap, nor of waits for the peripherals' buses.
+    cache of 1 KB and a data cache of 256 bytes, each by least recent use. The prefetch, which the image switches on,
+    is taken to read the next 64 bits while those before are executed, and to be held up by no load and no jump: a best
+    case. With PREFETCH = False there is none: a worst case. Which of them the chip is nearer to was not measured. No
+    account is taken of how instructions overlap, nor of waits for the peripherals' buses.
     """
 
     BRANCH, CLOCK_MHZ, ENTRY, EXIT = 2, 170, 12, 10
     WAIT_STATES = 4
+    PREFETCH = True
     CODE_WORDS, DATA_WORDS = 128, 32  # of 64 bits
 
     def __init__(self, chip: Chip) -> None:
         super().__init__(chip)
         self.word = -1
+        self.ahead = 0  # cycles at which the next word will have been read
         self.code: OrderedDict[int, None] = OrderedDict()
         self.data: OrderedDict[int, None] = OrderedDict()
 
@@ -706,18 +710,24 @@ class FlashMeter(Meter):
         return cycles_of(code)
 
     def fetched(self, at: int) -> None:
-        if at >> 3 != self.word:
-            self.word = at >> 3
-            self.fetch(self.code, self.word, self.CODE_WORDS)
+        word = at >> 3
+        if word == self.word:
+            return
+        waits = self.WAIT_STATES
+        if self.PREFETCH and word == self.word + 1:
+            waits = min(waits, max(0, self.ahead - self.cycles))
+        self.word = word
+        self.fetch(self.code, word, self.CODE_WORDS, waits)
+        self.ahead = self.cycles + self.WAIT_STATES
 
     def loaded(self, at: int) -> None:
-        self.fetch(self.data, at >> 3, self.DATA_WORDS)
+        self.fetch(self.data, at >> 3, self.DATA_WORDS, self.WAIT_STATES)
 
-    def fetch(self, cache: OrderedDict[int, None], word: int, words: int) -> None:
+    def fetch(self, cache: OrderedDict[int, None], word: int, words: int, waits: int) -> None:
         if word in cache:
             cache.move_to_end(word)
             return
-        self.cycles += self.WAIT_STATES
+        self.cycles += waits
         cache[word] = None
         if len(cache) > words:
             cache.popitem(last=False)

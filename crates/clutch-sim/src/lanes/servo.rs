@@ -50,10 +50,9 @@ macro_rules! laws {
             /// A period, with so many volts on the actuator since the last one.
             #[inline(always)]
             fn update(&mut self, tick: &Tick<V>, applied: V) -> V {
-                let seen = Seen { applied, ..Seen::default() };
                 match self {
                     $(LawInLanes::$law(law, state) => {
-                        law.sees(state, &seen);
+                        law.sees(state, || Seen { applied, ..Seen::default() });
                         law.update(state, tick).voltage
                     })+
                 }

@@ -122,10 +122,11 @@ impl Writer {
     }
 }
 
-/// The outputs of a tick, in the order of [`FIELDS`].
+/// The outputs of a tick, and the code's voltage, in the order of [`FIELDS`].
 pub(crate) fn record(
     target: &Target<f32>,
     output: &ServoOutput<f32, LawTerms<f32>>,
+    voltage: f32,
     sticks: &StickSlipState<f32>,
 ) -> [u8; RECORD] {
     let mut terms = [0.0; MAX_TERMS];
@@ -141,7 +142,7 @@ pub(crate) fn record(
         .put(output.tick.error_rate.to_le_bytes());
     let writer = reals(writer, within)
         .put(output.command.voltage.to_le_bytes())
-        .put(output.voltage.to_le_bytes())
+        .put(voltage.to_le_bytes())
         .put(output.code.0.to_le_bytes())
         .put([output.command.limit as u8])
         .put([u8::from(sticks.stuck())])

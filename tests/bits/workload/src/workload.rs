@@ -68,6 +68,6 @@ impl<'a> Workload<'a> {
         let output = self.servo.tick(&mut self.state, counts, &target);
         self.detector.update(&mut self.sticks, counts, target.velocity);
         self.tick = self.tick.wrapping_add(1);
-        record(&target, &output, &self.sticks)
+        record(&target, &output, self.servo.dac().volts(output.code), &self.sticks)
     }
 }

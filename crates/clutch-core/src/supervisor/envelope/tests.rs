@@ -147,7 +147,8 @@ fn limits_of<T: Real>(bounds: &Bounds<T>, limits: &LimitParams<T>) -> Limits<T> 
         speed: SpeedLimit::default(),
         limits: *limits,
     };
-    Limits::new(&p, &ServoParams::paper(LawParams::Pd(PdParams::default())), bounds).unwrap()
+    let servo = ServoParams::paper(LawParams::Pd(PdParams::default()));
+    Limits::new(&p, &servo, Dac::new(&servo.dac).unwrap(), bounds).unwrap()
 }
 
 /// No margins: the bounds alone.
@@ -161,6 +162,11 @@ fn bare<T: Real>() -> LimitParams<T> {
     }
 }
 
+/// The code next to the volts.
+fn code<T: Real>(envelope: &Envelope<T>, volts: f64) -> DacCode {
+    envelope.dac.code(T::from_f64(volts))
+}
+
 /// The volts of a period: `late` of it is the code before still in force. Gives the envelope's verdict at its end.
 fn follow<T: Real>(
     envelope: &Envelope<T>,
@@ -169,9 +175,12 @@ fn follow<T: Real>(
     mut see: impl FnMut(usize, i32) -> i32,
 ) -> Option<(usize, Cause)> {
     let highest = if d.kind == 0 { 10.0 } else { 6.0 };
-    let volts = |u: f64| if d.kind == 0 { highest * u.abs() } else { highest * u };
+    let volts = |u: f64| {
+        let asked = if d.kind == 0 { highest * u.abs() } else { highest * u };
+        envelope.dac.volts(code(envelope, asked)).to_f64()
+    };
     let first = volts(d.volts[0].0);
-    let mut s = envelope.start(T::from_f64(first));
+    let mut s = envelope.start(code(envelope, first));
     let lossy = d.lost != [0; 2];
     let lost = |k: usize, which: usize, one_in: u64| lossy && (d.lost[which] >> (k % 61)) & one_in == one_in;
     // The voltage that the board took last, and those on their way to the pad.
@@ -182,7 +191,7 @@ fn follow<T: Real>(
         // A sample that is lost is not answered; a code may be lost as well, as long as the watchdog waits.
         let answered = elapsed == 0;
         if answered {
-            s.sends(T::from_f64(volts(*u)));
+            s.sends(code(envelope, volts(*u)));
         }
         (taken, missed) =
             if !answered || missed < 2 && lost(k, 1, 3) { (taken, missed + 1) } else { (volts(*u), 0) };
@@ -254,7 +263,7 @@ fn seen_after<T: Real>(then: (f64, f64), lie: impl Fn(i32, i32) -> i32) -> Optio
         x: 0.0,
         v: 20.0_f64.to_radians(),
     };
-    let (mut s, mut seen, mut since) = (envelope.start(T::from_f64(BALANCES)), 0, 0);
+    let (mut s, mut seen, mut since) = (envelope.start(code(&envelope, BALANCES)), 0, 0);
     for k in 0..200_usize {
         let broken = k >= 60;
         let (volts, at_pad) = if broken { then } else { (BALANCES, BALANCES) };
@@ -264,7 +273,7 @@ fn seen_after<T: Real>(then: (f64, f64), lie: impl Fn(i32, i32) -> i32) -> Optio
             since = true_counts;
         }
         let counts = if broken { since + lie(true_counts - since, k as i32) } else { true_counts };
-        s.sends(T::from_f64(volts));
+        s.sends(code(&envelope, volts));
         if let Some((cause, _)) = envelope.judge(&mut s, false, counts - seen, 1) {
             return Some((k + 1 - 60, cause));
         }
@@ -314,7 +323,7 @@ fn a_frozen_encoder_of_a_resting_shaft_is_found_as_soon_as_the_brake_has_been_op
     for edge in [0.0, 0.2, 1.0, 3.0] {
         let limits = LimitParams { edge_counts: edge, ..LimitParams::default() };
         let envelope = limits_of::<f64>(&bounds, &limits).envelope;
-        let mut s = envelope.start(0.0);
+        let mut s = envelope.start(code(&envelope, 0.0));
         let seen = (1..).find(|_| envelope.judge(&mut s, false, 0, 1).is_some()).unwrap();
         let count = Encoder::PAPER.radians_per_count::<f64>();
         let p = PlantParams::<f64>::default();
@@ -329,9 +338,9 @@ fn a_frozen_encoder_of_a_resting_shaft_is_found_as_soon_as_the_brake_has_been_op
 fn a_motor_axis_that_runs_against_its_voltage_is_too_fast_whichever_way_it_goes() {
     for way in [1, -1] {
         let envelope = envelope::<f64>(1, &LimitParams::default());
-        let mut s = envelope.start(0.0);
+        let mut s = envelope.start(code(&envelope, 0.0));
         let ended = (1..100).find_map(|k| {
-            s.sends(6.0 * f64::from(way));
+            s.sends(code(&envelope, 6.0 * f64::from(way)));
             envelope.judge(&mut s, false, -way * k, 1)
         });
         assert_eq!(ended.map(|(cause, _)| cause), Some(Cause::TooFast), "{way}");
@@ -341,7 +350,7 @@ fn a_motor_axis_that_runs_against_its_voltage_is_too_fast_whichever_way_it_goes(
 #[test]
 fn a_shaft_that_nothing_drives_may_stand_for_ever() {
     let envelope = envelope::<f32>(1, &LimitParams::default());
-    let mut s = envelope.start(0.0);
+    let mut s = envelope.start(code(&envelope, 0.0));
     for _ in 0..100_000 {
         assert_eq!(envelope.judge(&mut s, false, 0, 1), None);
     }
@@ -350,7 +359,7 @@ fn a_shaft_that_nothing_drives_may_stand_for_ever() {
 #[test]
 fn counts_that_dither_about_an_edge_at_rest_are_an_edge() {
     let envelope = envelope::<f32>(0, &LimitParams::default());
-    let mut s = envelope.start(9.0);
+    let mut s = envelope.start(code(&envelope, 9.0));
     for k in 0..10_000 {
         assert_eq!(envelope.judge(&mut s, false, if k % 2 == 0 { 1 } else { -1 }, 1), None);
     }
@@ -361,14 +370,15 @@ fn volts_in_force_are_the_last_two_and_more_with_a_delay_or_losses() {
     let in_force = |delay_cycles, silence_cycles, losses| {
         let limits = LimitParams { delay_cycles, silence_cycles, ..LimitParams::default() };
         let envelope = envelope::<f64>(0, &limits);
-        let mut s = envelope.start(9.5);
+        let mut s = envelope.start(DacCode(4000));
         // Ever lower, so that the highest is the oldest.
-        (0..20).for_each(|k| s.keep(9.0 - 0.25 * f64::from(k)));
+        (0..20).for_each(|k| s.keep(DacCode(3900 - 50 * k)));
         let [low, high] = envelope.in_force(&s, losses);
-        assert_eq!(low, 4.25, "the newest");
+        assert_eq!(low, envelope.dac.volts(DacCode(2950)), "the newest");
         high
     };
-    let back = |codes: u32| 4.25 + 0.25 * f64::from(codes);
+    // 12 bit over ±10 V.
+    let back = |codes: u32| f64::from(2950 + 50 * codes) * 20.0 / 4096.0 - 10.0;
     for silence in [2, 3, 8] {
         for delay in [0, 1, 2, 5] {
             assert_eq!(in_force(delay, silence, false), back(1 + delay));
@@ -382,15 +392,15 @@ fn volts_in_force_are_the_last_two_and_more_with_a_delay_or_losses() {
 
 #[test]
 fn volts_older_than_those_kept_may_be_any_of_the_output_or_what_was_there() {
-    let in_force = |delay_cycles, applied: f64, losses| {
+    let in_force = |delay_cycles, applied, losses| {
         let envelope = envelope::<f64>(0, &LimitParams { delay_cycles, ..LimitParams::default() });
-        let mut s = envelope.start(applied);
-        s.keep(3.0);
+        let mut s = envelope.start(DacCode(applied));
+        s.keep(DacCode(2560));
         envelope.in_force(&s, losses)
     };
     // Before the first that was sent was what is there.
-    assert_eq!(in_force(14, 5.0, false), [3.0, 5.0]);
-    assert_eq!(in_force(15, 5.0, false), [0.0, 10.0]);
-    assert_eq!(in_force(15, 5.0, true), [0.0, 10.0]);
-    assert_eq!(in_force(1000, 12.0, true), [0.0, 12.0]);
+    assert_eq!(in_force(14, 3072, false), [2.5, 5.0]);
+    assert_eq!(in_force(15, 3072, false), [0.0, 10.0]);
+    assert_eq!(in_force(15, 3072, true), [0.0, 10.0]);
+    assert_eq!(in_force(1000, 1024, true), [-5.0, 10.0]);
 }

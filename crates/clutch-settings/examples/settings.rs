@@ -1,9 +1,9 @@
 //! Prints the table of settings of docs/wire.md; a test holds the page against it.
 //!
-//! `cargo run -p clutch-node --example settings`
+//! `cargo run -p clutch-settings --example settings`
 #![allow(clippy::std_instead_of_core, clippy::alloc_instead_of_core, reason = "it runs on the host")]
 
-use clutch_node::{MAX_KNOTS, SETTINGS, SETTINGS_HASH, Setting};
+use clutch_settings::{MAX_KNOTS, SETTINGS, SETTINGS_HASH, Setting};
 
 fn main() {
     print!("{}", text());

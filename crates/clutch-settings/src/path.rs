@@ -39,8 +39,9 @@ impl Path {
             formula => Kind::Formula(Reference::new(formula, start, encoder, period)?),
         };
         let path = Path { kind, encoder, period, start, first: FixedCounts(0) };
-        // No interval has begun, however steep it is.
-        let first = path.since_first(0, knots, |table| table.at_with(NOTHING, 0, encoder, period));
+        // At its begin a table is at its first point, whenever that comes.
+        let position = knots.first().map_or(FixedCounts(0), |knot| knot.position);
+        let first = path.since_first(0, knots, |_| Target { position, ..Target::default() });
         let first = first.position.0 >> FixedCounts::FRACTION_BITS;
         Ok(Path { first: FixedCounts::from_counts(first), ..path })
     }
@@ -48,14 +49,15 @@ impl Path {
     /// The target of the shaft at a tick, from the count on which the run begins; `knots` are the
     /// points of a table, and may have more behind them.
     #[must_use]
+    #[inline] // into its user, which is compiled for speed
     pub fn target(&self, knots: &[Knot], tick: u64) -> Target<f32> {
         self.since_first(tick, knots, |table| table.at(tick, self.encoder, self.period))
     }
 
     /// The same, with what [`Path::prepare`] has computed of a table.
-    // A function of its own in machine code: it is called from many places.
-    #[inline(never)]
-    pub(crate) fn target_with(&self, knots: &[Knot], prepared: &Prepared, tick: u64) -> Target<f32> {
+    #[must_use]
+    #[inline] // as the one above
+    pub fn target_with(&self, knots: &[Knot], prepared: &Prepared, tick: u64) -> Target<f32> {
         self.since_first(tick, knots, |table| {
             let prepared = reference::Prepared { steepness: &prepared.steepness, slopes: &prepared.slopes };
             table.at_with(prepared, tick, self.encoder, self.period)
@@ -63,7 +65,8 @@ impl Path {
     }
 
     /// Computes what the targets of a table have of each point, so that no period does.
-    pub(crate) fn prepare(&self, knots: &[Knot], prepared: &mut Prepared) {
+    #[inline(never)]
+    pub fn prepare(&self, knots: &[Knot], prepared: &mut Prepared) {
         if let Kind::Table(interpolation, points) = self.kind {
             let table = Table { knots: knots.get(..points).unwrap_or(&[]), interpolation };
             // Two loops: the numbers of two lists side by side are not seen to end, and could overflow.
@@ -92,16 +95,15 @@ impl Path {
 
 /// Share of each point in the targets of a table.
 #[derive(Clone, Debug)]
-pub(crate) struct Prepared {
+pub struct Prepared {
     steepness: [Steepness; super::MAX_KNOTS],
     slopes: [f32; super::MAX_KNOTS],
 }
 
-impl Prepared {
-    pub(crate) fn new() -> Self {
+impl Default for Prepared {
+    /// Of no table.
+    #[inline] // in place: a copy of it would be on the stack of who keeps it
+    fn default() -> Self {
         Prepared { steepness: [Steepness::default(); super::MAX_KNOTS], slopes: [0.0; super::MAX_KNOTS] }
     }
 }
-
-/// Enough where no interval has begun.
-const NOTHING: reference::Prepared<'static, f32> = reference::Prepared { steepness: &[], slopes: &[] };

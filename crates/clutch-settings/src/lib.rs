@@ -4,6 +4,12 @@
 //! and sends it number by number; the board builds the same servo, supervisor and path from the same
 //! numbers with the same constructors. The settings follow from the declarations of the parameters ([`RunSettings`]):
 //! a walk over them gives the keys, at both ends. A real number travels as the bits of an `f32`.
+//!
+//! All but the targets of a path runs once a run. An image therefore compiles this crate for size; what its users, compiled
+//! for speed, call once is never inlined, or it would be theirs.
+
+#![no_std]
+#![forbid(unsafe_code)]
 
 mod declared;
 mod path;
@@ -11,8 +17,7 @@ mod refused;
 mod walk;
 
 pub use declared::{Declared, Name, RunSettings, RunTimes, SETTINGS, SETTINGS_HASH, Setting};
-pub use path::Path;
-pub(crate) use path::Prepared;
+pub use path::{Path, Prepared};
 pub use refused::Refusing;
 
 use clutch_core::params::{Params, Table as _};
@@ -88,6 +93,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
+    #[inline] // in place: a copy of it would be on the stack of who keeps it
     fn default() -> Self {
         const NONE: Knot = Knot { time_us: 0, position: FixedCounts(0) };
         Settings {
@@ -197,6 +203,7 @@ impl Settings {
     }
 
     /// Takes a setting; true if there is such a one. The build of a run shows whether it fits.
+    #[inline(never)]
     pub fn set(&mut self, key: u16, value: u64) -> bool {
         if let Some(number) = key.checked_sub(FIRST_KNOT) {
             let Some(knot) = self.knots.get_mut(usize::from(number / 2)) else { return false };
@@ -238,6 +245,7 @@ impl Settings {
     ///
     /// # Errors
     /// As [`Built::new`].
+    #[inline(never)]
     pub fn build(&self) -> Result<Built, Misfit> {
         let whole = usize::from(self.set_knots / 2);
         let lacks = FIRST_KNOT.wrapping_add(self.set_knots);
