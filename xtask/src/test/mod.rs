@@ -252,6 +252,8 @@ fn boards_of(tally: &mut Tally, embedded: &[&str]) -> Result<()> {
             let built = core(&["--target", target, "--features", features])?;
             tally.check_quiet(&format!("clutch-core builds for {target} with {with}"), built);
         }
+        let built = part("clutch-node", &["--target", target, "--features", "defmt"])?;
+        tally.check_quiet(&format!("clutch-node builds for {target} with defmt"), built);
         let built = part("clutch-hal", &["--target", target])?;
         tally.check_quiet(&format!("clutch-hal builds for {target}"), built);
     }
