@@ -68,8 +68,7 @@ fn after(i: &Instruction, mut known: Known, word: &impl Fn(u32) -> Option<u32>) 
     };
     let value = match (i.name.as_str(), i.operands.as_slice()) {
         _ if i.conditional => None,
-        ("movw", [_, low]) => number(low),
-        ("mov", [_, from]) => known.get(from).copied(),
+        ("mov" | "movw", [_, from]) => number(from).or_else(|| known.get(from).copied()),
         ("movt", [to, high]) => number(high).zip(known.get(to)).map(|(high, low)| high << 16 | low & 0xffff),
         ("ldr", [_, base, offset]) if base == "[pc" => {
             number(offset).and_then(|n| word(((i.address + 4) & !3).checked_add(n)?))
