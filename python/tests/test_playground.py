@@ -19,8 +19,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = os.environ.get("CLUTCH_PLAYGROUND")
 MOST_BYTES = 250_000
-#: Processor time of a step of all three laws in the browser, drawn, over that of its runs natively as tests build them: 1.7 to
-#: 2.0 in ten series.
+#: Processor time of a step of all three laws in the browser, drawn, over that of its runs natively as tests build them:
+#: 1.7 to 2.0 in ten series.
 MOST_TIMES_NATIVE = 3.5
 DESKTOP, PHONE = (1280, 900), (390, 844)
 
