@@ -19,10 +19,10 @@ use tally::Tally;
 /// and RISC-V.
 const TARGETS: [&str; 3] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf", "riscv32imac-unknown-none-elf"];
 
-/// Checks that need the targets: two builds of the core and one of the parts of boards each, the three link tests, the
+/// Checks that need the targets: two builds of the core, one of the nodes and one of the parts of boards each, the three link tests, the
 /// libraries with their control, the example, two boards, the budgets.
 const SKIPPED_WITHOUT_TARGETS: u64 =
-    3 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 2 * firmware::BOARDS.len() as u64 + 6;
+    4 * TARGETS.len() as u64 + libclutch::TARGETS.len() as u64 + 2 * firmware::BOARDS.len() as u64 + 6;
 
 /// The packages that are built for this machine, the command with all its options. Always the same selection: with another
 /// one cargo gives libraries other features, and compiles them once more. The wheel's module only links inside of Python.
