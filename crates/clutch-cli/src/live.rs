@@ -54,6 +54,7 @@ impl LiveArg {
     }
 
     /// True if the terminal is the scope's while a run goes on.
+    #[cfg(target_os = "linux")]
     pub(crate) fn has_terminal(&self) -> bool {
         self.scope
     }
