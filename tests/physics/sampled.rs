@@ -215,7 +215,7 @@ fn certify_saves_a_certificate_checks_it_and_refuses_it_for_another_loop() {
         assert!(text.contains(said), "{text}");
     }
     let (code, again, _) = run(&["--check", path]);
-    assert_eq!((code, &again), (Some(0), &text));
+    assert_eq!((code, format!("{again}wrote {path}\n")), (Some(0), text));
     let (code, _, told) = run(&["--check", path, "--set", "law.pd.kp_v_rad=4999"]);
     assert!(code == Some(1) && told.contains("law: ") && told.contains("4999"), "{told}");
     let (code, text, _) = run(&["--sampled", "--set", "rig.delay_ticks=1"]);
