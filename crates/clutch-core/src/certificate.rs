@@ -394,7 +394,7 @@ mod tests {
         )
         .unwrap();
         // c = J f/(μK) = 0.119/0.021; c²/(4·400)
-        assert!((c.kp_for_boundary - (0.119_f64 / 0.021).powi(2) / 1600.0).abs() < 1e-12);
+        assert!((c.kp_for_boundary - libm::pow(0.119 / 0.021, 2.0) / 1600.0).abs() < 1e-12);
         assert!((c.kp_required - 2.242286 - c.kp_for_boundary).abs() < 1e-6);
         assert!((c.error_bound.to_degrees() - (0.1_f64 / 70.0).to_degrees()).abs() < 1e-12);
     }
