@@ -6,7 +6,7 @@ use clutch_core::law::LawParams;
 use clutch_core::params::Choice;
 use clutch_core::{Counts, FixedCounts, Micros};
 use clutch_loop::from_scenario::{self, BuiltRun};
-use clutch_node::Settings;
+use clutch_settings::Settings;
 use clutch_sim::run::{Keep, Trace, simulate_watched};
 use clutch_sim::{Scenario, progress::UNWATCHED};
 use std::fmt;

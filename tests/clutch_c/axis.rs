@@ -3,7 +3,7 @@
 use clutch::*;
 use clutch_core::Micros;
 use clutch_loop::from_scenario::{self, BuiltRun};
-use clutch_node::Settings;
+use clutch_settings::Settings;
 use clutch_sim::run::{Keep, Trace, simulate_watched};
 use clutch_sim::{Scenario, progress::UNWATCHED};
 use std::mem::MaybeUninit;

@@ -2,7 +2,7 @@
 
 use crate::axis::{build, run, scenario};
 use clutch::*;
-use clutch_node::Setting;
+use clutch_settings::Setting;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
@@ -44,7 +44,7 @@ fn a_path_from_a_table_says_which_point_it_lacks() {
     let (mut settings, _) = scenario(&[]);
     // A ramp becomes a table of three points.
     let (path, ramp) = (key("reference"), key("reference.ramp.rate_deg_s"));
-    let Some(clutch_node::Declared::Choice(choice)) = Setting::of(path).map(|s| s.declared) else {
+    let Some(clutch_settings::Declared::Choice(choice)) = Setting::of(path).map(|s| s.declared) else {
         panic!("a path is a choice")
     };
     let place = choice.options.iter().position(|o| o.key == "table").unwrap() as u64;

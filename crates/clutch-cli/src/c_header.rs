@@ -8,7 +8,7 @@ use clutch_core::Micros;
 use clutch_core::params::Kind;
 use clutch_loop::clearance::{ClearanceError, check};
 use clutch_loop::from_scenario::{self, BuiltRun};
-use clutch_node::{Declared, SETTINGS_HASH, Setting, Settings};
+use clutch_settings::{Declared, SETTINGS_HASH, Setting, Settings};
 use clutch_sim::Scenario;
 use std::fmt::Write as _;
 

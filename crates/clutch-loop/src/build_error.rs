@@ -1,7 +1,7 @@
 //! Reasons why a run cannot be set up.
 
 use clutch_core::ParamError;
-use clutch_node::Unsupported;
+use clutch_settings::Unsupported;
 use clutch_sim::ScenarioError;
 
 /// A run could not be set up.

@@ -9,7 +9,8 @@ use clutch_core::{
     fnv1a_64,
 };
 use clutch_log::{Header, Source};
-use clutch_node::{ControllerParams, RunParams, RunTimes, Settings};
+use clutch_node::ControllerParams;
+use clutch_settings::{RunParams, RunTimes, Settings};
 use clutch_sim::detected::Detector;
 use clutch_sim::scenario::{Plan, ScalarKind};
 use clutch_sim::{Keep, Scenario, ScenarioError};

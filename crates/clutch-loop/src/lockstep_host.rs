@@ -7,7 +7,8 @@ use crate::station::{ALIVE_NS, BOARD_SILENCE_NS, HOST_SILENCE, Station, StationN
 use clutch_core::law::LawTerms;
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned};
 use clutch_node::lockstep::Exchange;
-use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Settings, Standing};
+use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
+use clutch_settings::Settings;
 use clutch_sim::Scenario;
 use clutch_wire::{Arm, Configure, Refused, StopReason};
 use std::convert::Infallible;

@@ -7,7 +7,8 @@ use crate::realtime::{Readiness, WaitMode, monotonic_ns, wait_readable};
 use crate::station::{HostStation, Station, StationNotice};
 use crate::words::why;
 use clutch_core::Micros;
-use clutch_node::{Notice, Outbox, Settings};
+use clutch_node::{Notice, Outbox};
+use clutch_settings::Settings;
 use clutch_sim::number;
 use clutch_wire::{Hello, Refusal, Refused};
 use rustix::fd::AsFd;
@@ -127,7 +128,7 @@ pub enum PreflightError {
     #[error(
         "{address}: the controller's table of settings differs (its hash is {board:016x}, this program's {:016x}). \
          Flash a firmware of this release, or use the release that fits the board",
-        clutch_node::SETTINGS_HASH
+        clutch_settings::SETTINGS_HASH
     )]
     Settings {
         /// The port.
@@ -292,7 +293,7 @@ impl<'a, S: Station> Talk<'a, S> {
             Some(Said::Hello(hello)) => match (controller, S::LOOKS_ON) {
                 (Some(_), false) => Err(PreflightError::IsController { address }),
                 (None, true) => Err(PreflightError::IsNoController { address }),
-                (Some(m), true) if m.settings != clutch_node::SETTINGS_HASH => {
+                (Some(m), true) if m.settings != clutch_settings::SETTINGS_HASH => {
                     Err(PreflightError::Settings { address, board: m.settings })
                 }
                 _ => Ok(*hello),

@@ -6,7 +6,8 @@
 use crate::words::why;
 use clutch_core::law::{ControlLaw, LawTerms, Terms};
 use clutch_core::{Dac, DacCode, Encoder, FixedCounts, Micros, Planned, Real, Servo};
-use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Settings, Standing};
+use clutch_node::{ControllerNode, HostNode, LinkCounts, Notice, Outbox, Standing};
+use clutch_settings::Settings;
 use clutch_wire::{Set, StopReason};
 use std::collections::VecDeque;
 use std::convert::Infallible;

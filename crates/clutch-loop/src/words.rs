@@ -1,7 +1,7 @@
 //! Words for what a board refuses, and for what ends control.
 
 use clutch_core::supervisor::Cause;
-use clutch_node::{Refusing, Settings};
+use clutch_settings::{Refusing, Settings};
 use clutch_sim::number;
 use clutch_wire::{Refusal, Refused};
 

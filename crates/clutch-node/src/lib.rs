@@ -26,7 +26,7 @@
 //! | `hardware` | board | what a board's program does each period, in either role |
 //! | `wide_counter` | board | a counter of 16 bits as one of 32 |
 //! | `lockstep` | both | a board controller that is asked instead of keeping time |
-//! | `telemetry` | both | a run's cycles on their way to the host; on its way to the board it is [`Settings`] |
+//! | `telemetry` | both | a run's cycles on their way to the host; on its way to the board it is [`Settings`](clutch_settings::Settings) |
 //! | `notice`, `outbox`, `pace` | both | what a node reports, its frames on their way out, and the pace of the samples |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -46,10 +46,6 @@ mod wide_counter;
 
 pub use board::{BoardMisfit, BoardNode, BoardParams};
 pub use board_controller::{BoardController, BoardControllerParams, present_code};
-pub use clutch_settings::{
-    Built, Declared, MAX_KNOTS, Misfit, Name, Path, Refusing, RunParams, RunSettings, RunTimes, SETTINGS,
-    SETTINGS_HASH, Setting, Settings, Unsupported,
-};
 pub use clutch_wire::ResetCause;
 pub use controller::{ControllerNode, ControllerParams};
 pub use hardware::{DaqBoard, Hardware, Role, receive, tick};

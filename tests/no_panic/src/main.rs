@@ -42,11 +42,8 @@ use clutch_core::{
     off_map, sin_cos_turns,
 };
 use clutch_node::lockstep::Exchange;
-use clutch_node::{
-    BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
-    DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Path, Role, RunParams, Settings,
-    WideCounter, present_code, receive, tick,
-};
+use clutch_node::{BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams, DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Role, WideCounter, present_code, receive, tick};
+use clutch_settings::{Path, RunParams, Settings};
 use clutch_wire::{BoardState, Configure, Decoder, Hello, ResetCause, StopReason, encode};
 use core::hint::black_box;
 

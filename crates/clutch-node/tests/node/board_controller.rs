@@ -8,7 +8,8 @@ use clutch_core::law::{LawParams, Limit, SmcParams};
 use clutch_core::reference::{Interpolation, Knot, ReferenceParams, Table};
 use clutch_core::supervisor::{Arrival, Cause, State};
 use clutch_core::{FixedCounts, LimitParams, Micros, SafeState, SupervisorParams};
-use clutch_node::{BoardController, Ending, MAX_KNOTS, Notice, Outbox, Outboxes, SETTINGS, SETTINGS_HASH};
+use clutch_node::{BoardController, Ending, Notice, Outbox, Outboxes};
+use clutch_settings::{MAX_KNOTS, SETTINGS, SETTINGS_HASH};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configure, Configured, ControllerHello, Discover, Message, Ping,
     Refusal, Refused, SCHEMA, Set, Stop, StopReason, Stopped, Taken, VERSION, encode,

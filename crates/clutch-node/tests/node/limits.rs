@@ -11,7 +11,7 @@ use clutch_core::{
     FixedCounts, FrictionParams, LugreParams, MaxwellParams, MotorActuator, PlantParams, SafeState,
     ServoParams, SupervisorParams, Tolerances,
 };
-use clutch_node::{Declared, MAX_KNOTS, Misfit, Refusing, SETTINGS, Setting, Settings};
+use clutch_settings::{Declared, MAX_KNOTS, Misfit, Refusing, SETTINGS, Setting, Settings};
 use std::collections::BTreeSet;
 
 const KNOTS: [Knot; 3] = [

@@ -12,7 +12,7 @@ use clutch_core::{
     FixedCounts, Micros, ObserverParams, SafeState, Servo, ServoParams, SmoothedDerivativeParams,
     SupervisorParams, VelocityParams,
 };
-use clutch_node::{
+use clutch_settings::{
     Built, MAX_KNOTS, Misfit, Refusing, RunSettings, SETTINGS, SETTINGS_HASH, Setting, Settings, Unsupported,
 };
 use proptest::prelude::*;

@@ -2,7 +2,7 @@
 
 use super::elementary::Powers;
 use super::motion::{Alike, Motions};
-use super::servo::{FIXED, Sensors, Steered, Targets, Together as Laws, beyond};
+use super::servo::{FIXED, LaneServos, Sensors, Steered, Targets, beyond};
 use super::vector::{InLanes, at};
 use crate::engine::EngineKind;
 use crate::fleet::{Begun, Quantity, Told};
@@ -77,7 +77,7 @@ impl InLanes for Gathered<'_> {
             None => None,
             Some(servo) => {
                 let each = vec![&servo; V::WIDTH];
-                let laws = motions.shafts.iter().map(|_| Laws::of(&each, whole_codes));
+                let laws = motions.shafts.iter().map(|_| LaneServos::of(&each, whole_codes));
                 Some(laws.collect::<Option<Vec<_>>>()?)
             }
         };
@@ -92,7 +92,7 @@ struct Group<V: Lane> {
     motions: Motions<V>,
     sensors: Sensors<V>,
     /// Vector by vector.
-    laws: Option<Vec<Laws<V>>>,
+    laws: Option<Vec<LaneServos<V>>>,
     /// None so far.
     sticks: Sticks,
 }

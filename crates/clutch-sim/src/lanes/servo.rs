@@ -78,10 +78,10 @@ pub(super) struct Steered<'a> {
 #[derive(Clone, Copy)]
 pub(super) enum Steering<'a> {
     /// In its lanes, with their filter (5).
-    Together(SmoothedDerivative<f64>),
+    InLanes(SmoothedDerivative<f64>),
     /// One after the other, beside motion in lanes: with another filter, with a shell, or under a law that has no lanes.
     /// Some know a map of the disc.
-    Each(Option<FrictionMap<'a>>),
+    InTurn(Option<FrictionMap<'a>>),
 }
 
 impl<'a> Steered<'a> {
@@ -92,16 +92,16 @@ impl<'a> Steered<'a> {
             VelocityParams::SmoothedDerivative(filter)
                 if spec.shell.boundary <= 0.0 && has_lanes(servo.law()) =>
             {
-                Steering::Together(SmoothedDerivative::new(filter, servo.encoder(), spec.period).ok()?)
+                Steering::InLanes(SmoothedDerivative::new(filter, servo.encoder(), spec.period).ok()?)
             }
-            _ => Steering::Each(spec.friction_map),
+            _ => Steering::InTurn(spec.friction_map),
         };
         Some(Steered { servo, by })
     }
 
     /// True if they are computed in lanes.
     pub(super) fn in_lanes(&self) -> bool {
-        matches!(self.by, Steering::Together(_))
+        matches!(self.by, Steering::InLanes(_))
     }
 }
 
@@ -162,24 +162,24 @@ pub(super) fn beyond<V: Lane>(counts: V, target: V) -> u64 {
 
 /// Servos of the shafts in the lanes of one vector.
 pub(super) enum Servos<'a, V: Lane> {
-    Together(Together<V>),
-    Each(Each<'a>),
+    InLanes(LaneServos<V>),
+    InTurn(SingleServos<'a>),
 }
 
 impl<'a, V: Lane> Servos<'a, V> {
     /// Servos, one for each lane; none if they have no lanes together.
     pub(super) fn of(servos: &[&Steered<'a>], whole_counts: bool, whole_codes: bool) -> Option<Self> {
         if servos.iter().all(|steered| steered.in_lanes()) {
-            return Together::of(servos, whole_codes).map(Servos::Together);
+            return LaneServos::of(servos, whole_codes).map(Servos::InLanes);
         }
-        Some(Servos::Each(Each::of(servos, whole_counts, whole_codes)))
+        Some(Servos::InTurn(SingleServos::of(servos, whole_counts, whole_codes)))
     }
 
     /// Begins in some lanes, at the position that is seen, with so many volts on the actuator.
     pub(super) fn start(&mut self, which: V::Mask, seen: V, targets: &Targets<V>, volts: V) {
         match self {
-            Servos::Together(servos) => servos.start(which, seen, targets, volts),
-            Servos::Each(servos) => servos.start(which, seen, targets, volts),
+            Servos::InLanes(servos) => servos.start(which, seen, targets, volts),
+            Servos::InTurn(servos) => servos.start(which, seen, targets, volts),
         }
     }
 
@@ -187,14 +187,14 @@ impl<'a, V: Lane> Servos<'a, V> {
     #[inline(always)]
     pub(super) fn sample(&mut self, lost: u64, seen: V, targets: &Targets<V>) -> (Tick<V>, V) {
         match self {
-            Servos::Together(servos) => servos.sample(seen, targets),
-            Servos::Each(servos) => servos.sample(lost, seen, targets),
+            Servos::InLanes(servos) => servos.sample(seen, targets),
+            Servos::InTurn(servos) => servos.sample(lost, seen, targets),
         }
     }
 }
 
 /// Servos that are computed in the lanes.
-pub(super) struct Together<V: Lane> {
+pub(super) struct LaneServos<V: Lane> {
     radians_per_count: V,
     /// Lowest voltage of the converter, its step, codes per volt, and its highest code.
     dac: [V; 4],
@@ -209,16 +209,16 @@ pub(super) struct Together<V: Lane> {
     applied: V,
 }
 
-impl<V: Lane> Together<V> {
+impl<V: Lane> LaneServos<V> {
     /// Servos, one for each lane; none if one is not computed in lanes, or if their laws have none together.
     pub(super) fn of(all: &[&Steered<'_>], whole_codes: bool) -> Option<Self> {
         let filter = |one: &&Steered<'_>| match one.by {
-            Steering::Together(filter) => Some(filter),
-            Steering::Each(_) => None,
+            Steering::InLanes(filter) => Some(filter),
+            Steering::InTurn(_) => None,
         };
         let filters = all.iter().map(filter).collect::<Option<Vec<_>>>()?;
         let of = |get: &dyn Fn(&Servo<f64>) -> f64| V::of(|i| get(&all[i].servo));
-        Some(Together {
+        Some(LaneServos {
             radians_per_count: of(&|s| s.encoder().radians_per_count()),
             dac: [
                 of(&|s| s.dac().volts(DacCode(0))),
@@ -272,7 +272,7 @@ impl<V: Lane> Together<V> {
 }
 
 /// Servos that are computed one after the other.
-pub(super) struct Each<'a> {
+pub(super) struct SingleServos<'a> {
     lanes: Vec<Single<'a>>,
     whole_counts: bool,
     whole_codes: bool,
@@ -285,17 +285,17 @@ struct Single<'a> {
     map: Option<FrictionMap<'a>>,
 }
 
-impl<'a> Each<'a> {
+impl<'a> SingleServos<'a> {
     fn of(all: &[&Steered<'a>], whole_counts: bool, whole_codes: bool) -> Self {
         let single = |one: &&Steered<'a>| Single {
             servo: one.servo,
             state: ServoState::default(),
             map: match one.by {
-                Steering::Together(_) => None,
-                Steering::Each(map) => map,
+                Steering::InLanes(_) => None,
+                Steering::InTurn(map) => map,
             },
         };
-        Each { lanes: all.iter().map(single).collect(), whole_counts, whole_codes }
+        SingleServos { lanes: all.iter().map(single).collect(), whole_counts, whole_codes }
     }
 
     fn start<V: Lane>(&mut self, which: V::Mask, seen: V, targets: &Targets<V>, volts: V) {

@@ -11,8 +11,9 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardParams, ControllerNode, ControllerParams, OneChip, Outboxes,
-    ResetCause, RunParams, RunTimes, Settings,
+    ResetCause,
 };
+use clutch_settings::{RunParams, RunTimes, Settings};
 use clutch_wire::{
     Arm, Armed, BoardFault, BoardState, Configured, Decoder, Discover, Fault, Hello, Message, Pong, Refused,
     SCHEMA, STATUS_DAC_FAULT, STATUS_ENCODER_FAULT, STATUS_LATE, Sample, Set, Stop, StopReason, Stopped,

@@ -2,7 +2,7 @@
 
 use crate::{HEADER, Job, RECORD, SETTING, Workload, hash, setting_from_bytes};
 use clutch_core::Counts;
-use clutch_node::Settings;
+use clutch_settings::Settings;
 
 /// Bytes requested at once.
 const ROOM: usize = 4096;

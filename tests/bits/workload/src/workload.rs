@@ -5,7 +5,7 @@ use clutch_core::law::{ControlLaw, LawState};
 use clutch_core::{
     Counts, FixedCounts, ParamError, Servo, ServoState, StickSlip, StickSlipParams, StickSlipState, Target,
 };
-use clutch_node::{Misfit, Path, Settings};
+use clutch_settings::{Misfit, Path, Settings};
 
 /// A servo, its path and the stick-slip detector, in `f32`.
 pub struct Workload<'a> {

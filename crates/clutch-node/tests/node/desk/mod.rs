@@ -17,8 +17,9 @@ use clutch_core::{
 };
 use clutch_node::{
     BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
-    HostNode, Notice, Outbox, Outboxes, ResetCause, RunParams, RunTimes, Setting, Settings,
+    HostNode, Notice, Outbox, Outboxes, ResetCause,
 };
+use clutch_settings::{RunParams, RunTimes, Setting, Settings};
 use clutch_wire::{Decoder, Message, encode};
 use core::mem::take;
 
