@@ -1,5 +1,6 @@
 //! The longest path through a function.
 
+use super::constant::{number, only_reads};
 use super::cost::{cycles, refill, stall};
 use super::decode::{Flow, Instruction};
 use super::facts::{Facts, means};
@@ -479,21 +480,17 @@ fn length_register(name: &str) -> Option<&'static str> {
 
 /// The constant that a register has been given last, under any condition.
 fn constant(before: &[Instruction], register: &str) -> Option<u64> {
-    // Instructions that only read their operands and name none of them twice.
-    let reads = |i: &Instruction| {
-        ["str", "strb", "strh", "strd", "cmp", "cmn", "tst", "teq", "push"].contains(&i.name.as_str())
-            && !i.text.contains('!')
-            && !i.text.contains("], #")
+    let names = |i: &Instruction| i.operands.iter().any(|o| o.trim_matches(['[', ']', '^']) == register);
+    let changes = |i: &&Instruction| match i.flow {
+        Flow::Call(_) | Flow::Indirect => true,
+        _ => names(i) && !only_reads(i),
     };
-    let names =
-        |i: &Instruction| i.operands.iter().any(|o| o.trim_matches(['[', ']', '^']) == register) && !reads(i);
-    let last = before.iter().rev().find(|i| matches!(i.flow, Flow::Call(_)) || names(i))?;
+    let last = before.iter().rev().find(changes)?;
     let [to, value] = &last.operands[..] else { return None };
     if !["mov", "movs", "movw"].contains(&last.name.as_str()) || last.conditional || to != register {
         return None;
     }
-    let digits = value.strip_prefix('#')?;
-    digits.strip_prefix("0x").map_or_else(|| digits.parse().ok(), |h| u64::from_str_radix(h, 16).ok())
+    number(value).map(u64::from)
 }
 
 /// The longest ways from a block within `only`, to each block and out of the function; the ways

@@ -55,6 +55,20 @@ pub(super) fn resolve(all: &mut [Instruction], word: impl Fn(u32) -> Option<u32>
     }
 }
 
+/// An instruction that changes none of the registers that it names.
+pub(super) fn only_reads(i: &Instruction) -> bool {
+    match i.name.as_str() {
+        "cmp" | "cmn" | "tst" | "teq" | "push" | "b" | "bl" | "blx" | "bx" | "cbz" | "cbnz" | "it" => true,
+        name => name.starts_with("str") && !i.text.contains('!') && !i.text.contains("], "),
+    }
+}
+
+/// The number of an operand, if it is one.
+pub(super) fn number(operand: &str) -> Option<u32> {
+    let digits = operand.trim_end_matches(']').strip_prefix('#')?;
+    digits.strip_prefix("0x").map_or_else(|| digits.parse().ok(), |h| u32::from_str_radix(h, 16).ok())
+}
+
 fn is_call(i: &Instruction) -> bool {
     i.name == "blx" && i.flow == Flow::Indirect
 }
@@ -62,10 +76,6 @@ fn is_call(i: &Instruction) -> bool {
 /// What is known after an instruction. Each register that it names may be changed, if it is not one of those that
 /// change none.
 fn after(i: &Instruction, mut known: Known, word: &impl Fn(u32) -> Option<u32>) -> Known {
-    let number = |text: &str| {
-        let digits = text.trim_end_matches(']').strip_prefix('#')?;
-        digits.strip_prefix("0x").map_or_else(|| digits.parse().ok(), |h| u32::from_str_radix(h, 16).ok())
-    };
     let value = match (i.name.as_str(), i.operands.as_slice()) {
         _ if i.conditional => None,
         ("mov" | "movw", [_, from]) => number(from).or_else(|| known.get(from).copied()),
@@ -75,13 +85,9 @@ fn after(i: &Instruction, mut known: Known, word: &impl Fn(u32) -> Option<u32>) 
         }
         _ => None,
     };
-    let only_reads = match i.name.as_str() {
-        "cmp" | "cmn" | "tst" | "teq" | "push" | "b" | "bl" | "blx" | "bx" | "cbz" | "cbnz" | "it" => true,
-        name => name.starts_with("str") && !i.text.contains('!') && !i.text.contains("], "),
-    };
     if matches!(i.flow, Flow::Call(_) | Flow::Indirect) {
         known.retain(|register, _| !CHANGED.contains(&register.as_str()));
-    } else if !only_reads {
+    } else if !only_reads(i) {
         let written = if i.name == "mov" { &i.operands[..1] } else { &i.operands[..] };
         let named = |register: &String| written.iter().any(|o| o.trim_matches(['[', ']']) == register);
         known.retain(|register, _| !named(register));
