@@ -64,9 +64,13 @@ pub(crate) fn no_target() -> Option<String> {
     Some(format!("a target is not there: rustup target add {missing}"))
 }
 
-/// Builds the images of a board; the folder that they are in. With `peer` the one that measures has the laws in C, too; the
-/// others stay those that are tested and flashed.
-pub(crate) fn build(firmware: &Path, (package, goal): (&str, &str), peer: bool) -> Result<PathBuf> {
+/// Builds the images of a board, those that are tested and flashed; the folder that they are in. With `features` also the
+/// one that measures, which has no other builder: tests beside may build the board's images at any time.
+pub(crate) fn build(
+    firmware: &Path,
+    (package, goal): (&str, &str),
+    features: Option<&str>,
+) -> Result<PathBuf> {
     let target = firmware.join("../target/firmware");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let build = |selected: &[&str]| -> Result<()> {
@@ -83,8 +87,8 @@ pub(crate) fn build(firmware: &Path, (package, goal): (&str, &str), peer: bool) 
         Ok(())
     };
     build(&[])?;
-    if peer {
-        build(&["--bin", "budget", "--features", "peer"])?;
+    if let Some(features) = features {
+        build(&["--bin", "budget", "--features", features])?;
     }
     Ok(target.join(goal).join("release"))
 }

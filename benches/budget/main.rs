@@ -64,9 +64,10 @@ fn run(part: Option<&str>) -> Result<Vec<String>> {
         skipped(&why)?;
         return Ok(Vec::new());
     }
-    let images = emulator::build(&firmware, EMULATED, no_gcc.is_none())?;
-    let flashed = emulator::build(&firmware, FLASHED, false)?;
-    let without_fpu = emulator::build(&firmware, WITHOUT_FPU, false)?;
+    let images =
+        emulator::build(&firmware, EMULATED, Some(if no_gcc.is_none() { "peer" } else { "measure" }))?;
+    let flashed = emulator::build(&firmware, FLASHED, None)?;
+    let without_fpu = emulator::build(&firmware, WITHOUT_FPU, None)?;
     let controller = Image::read(&images.join("mps2-controller"))?;
     let mut over = Vec::new();
     let [first, rest @ ..] = &plan.memory[..] else { bail!("firmware/budget.toml has no [[memory]]") };

@@ -358,7 +358,9 @@ fn check() -> Result<()> {
     // The images, where their targets are; tests build them in any case.
     for (board, target) in firmware::BOARDS.into_iter().filter(|(_, target)| firmware::has(target)) {
         let lint = ["clippy", "--release", "--locked", "--package", board, "--target", target];
-        firmware::in_firmware(lint).args(["--", "-D", "warnings"]).run()?;
+        // With the image that measures, which `benches/budget` alone builds.
+        let measures: &[&str] = if board == firmware::BOARDS[0].0 { &["--features", "measure"] } else { &[] };
+        firmware::in_firmware(lint).args(measures).args(["--", "-D", "warnings"]).run()?;
     }
     elsewhere::check()?;
     docs()

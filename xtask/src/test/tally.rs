@@ -11,12 +11,37 @@ struct Stage {
     processor: f64,
 }
 
+/// A test that failed, and the end of what it said.
+struct Failure {
+    name: String,
+    said: Vec<String>,
+}
+
+impl Failure {
+    fn new(name: &str, said: &str) -> Failure {
+        let mut failure = Failure { name: name.to_owned(), said: Vec::new() };
+        said.lines().for_each(|line| failure.says(line));
+        failure
+    }
+
+    fn says(&mut self, line: &str) {
+        self.said.push(line.to_owned());
+        if self.said.len() > SAID {
+            self.said.remove(0);
+        }
+    }
+}
+
+/// Lines of a failed test's message that are repeated at the end, the last ones.
+const SAID: usize = 40;
+
 pub(super) struct Tally {
     passed: u64,
     failed: u64,
     skipped: u64,
-    /// The failed tests, by name.
-    failures: Vec<String>,
+    failures: Vec<Failure>,
+    /// The failed test whose message the lines that are read belong to.
+    speaks: Option<usize>,
     begin: Instant,
     stage: Option<Stage>,
     /// Name, time and processors' time of the stages that have ended, s.
@@ -27,6 +52,9 @@ pub(super) struct Tally {
 
 /// Before the name of each test that failed.
 const FAILED: &str = "failed: ";
+
+/// Before each line that it said.
+const SAYS: &str = "    | ";
 
 /// Head of the table of stages.
 fn head() -> String {
@@ -40,6 +68,7 @@ impl Tally {
             failed: 0,
             skipped: 0,
             failures: Vec::new(),
+            speaks: None,
             begin: Instant::now(),
             stage: None,
             times: Vec::new(),
@@ -48,13 +77,20 @@ impl Tally {
     }
 
     /// Reads the closing lines of libtest (`test result: ok. 3 passed; 0 failed; …`) and of
-    /// pytest (`3 passed, 1 skipped in 2.1s`), and the names of the failed tests
-    /// (`test NAME ... FAILED`, `FAILED NAME - why`).
+    /// pytest (`3 passed, 1 skipped in 2.1s`), the names of the failed tests
+    /// (`test NAME ... FAILED`, `FAILED NAME - why`) and libtest's messages (behind `---- NAME stdout ----`).
     pub(super) fn read(&mut self, line: &str) {
+        let message = line.strip_prefix("---- ").and_then(|l| l.strip_suffix(" stdout ----"));
         if let Some(name) = line.strip_prefix("test ").and_then(|l| l.strip_suffix(" ... FAILED")) {
-            self.failures.push(name.to_owned());
+            self.failures.push(Failure::new(name, ""));
         } else if line.starts_with("FAILED ") || line.starts_with("ERROR ") {
-            self.failures.push(line.to_owned());
+            self.failures.push(Failure::new(line, ""));
+        } else if let Some(name) = message {
+            self.speaks = self.failures.iter().rposition(|failure| failure.name == name);
+        } else if line == "failures:" {
+            self.speaks = None;
+        } else if let Some(failure) = self.speaks.and_then(|k| self.failures.get_mut(k)) {
+            failure.says(line);
         }
         let closing = line.starts_with("test result:") || (line.contains(" in ") && line.contains("passed"));
         if !closing {
@@ -79,13 +115,7 @@ impl Tally {
     }
 
     pub(super) fn check(&mut self, name: &str, holds: bool) {
-        println!("{name}: {}", if holds { "ok" } else { "FAILED" });
-        if holds {
-            self.passed += 1;
-        } else {
-            self.failed += 1;
-            self.failures.push(name.to_owned());
-        }
+        self.check_seen(name, (holds, String::new()));
     }
 
     /// As [`Tally::check`], of a program that ran unseen: its output is shown if it failed.
@@ -93,7 +123,18 @@ impl Tally {
         if !holds {
             println!("{text}");
         }
-        self.check(name, holds);
+        self.check_seen(name, (holds, text));
+    }
+
+    /// As [`Tally::check`], of a program whose output has been shown.
+    pub(super) fn check_seen(&mut self, name: &str, (holds, text): (bool, String)) {
+        println!("{name}: {}", if holds { "ok" } else { "FAILED" });
+        if holds {
+            self.passed += 1;
+        } else {
+            self.failed += 1;
+            self.failures.push(Failure::new(name, &text));
+        }
     }
 
     /// Adds the end of another run of tests, as [`Tally::end`] printed it.
@@ -103,12 +144,16 @@ impl Tally {
         if let Some(counts) = lines.next() {
             self.count(counts);
         }
-        let (failures, others): (Vec<&str>, Vec<&str>) =
-            text.lines().partition(|line| line.starts_with(FAILED));
-        self.failures.extend(failures.iter().filter_map(|line| line.strip_prefix(FAILED)).map(str::to_owned));
+        for line in text.lines() {
+            if let Some(name) = line.strip_prefix(FAILED) {
+                self.failures.push(Failure::new(name, ""));
+            } else if let (Some(said), Some(failure)) = (line.strip_prefix(SAYS), self.failures.last_mut()) {
+                failure.says(said);
+            }
+        }
         let rows =
-            others.iter().skip_while(|line| **line != head()).skip(1).take_while(|line| !line.is_empty());
-        self.beside.extend(rows.map(|&row| row.to_owned()));
+            text.lines().skip_while(|line| *line != head()).skip(1).take_while(|line| !line.is_empty());
+        self.beside.extend(rows.map(str::to_owned));
         if !ended_well && self.failed == before {
             self.check("the tests beside come to their end", false);
         }
@@ -145,11 +190,12 @@ impl Tally {
             self.beside.iter().for_each(|row| println!("{row}"));
         }
         println!();
-        for name in &self.failures {
+        for Failure { name, said } in &self.failures {
             println!("{FAILED}{name}");
+            said.iter().for_each(|line| println!("{SAYS}{line}"));
         }
         if !sound {
-            println!("tests failed; what they said is above");
+            println!("tests failed; all that they said is above");
         }
         println!("{} passed, {} failed, {} skipped", self.passed, self.failed, self.skipped);
         if sound { Ok(()) } else { std::process::exit(1) }
@@ -170,4 +216,33 @@ fn processor_s() -> f64 {
     // The name stands in brackets and may hold anything. `cutime` and `cstime` are the 16th and 17th values.
     let values = stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_ascii_whitespace();
     values.skip(13).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / TICKS_PER_S
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_test_keeps_what_it_said() {
+        let mut tally = Tally::new();
+        let libtest = "test a::b ... FAILED\ntest c ... ok\n\nfailures:\n\n---- a::b stdout ----\nthread panicked:\n1 != 2\n\nfailures:\n    a::b\n\ntest result: FAILED. 1 passed; 1 failed; 0 ignored";
+        libtest.lines().for_each(|line| tally.read(line));
+        tally
+            .check_seen("budgets", (false, (0..=SAID).fold(String::new(), |text, k| format!("{text}{k}\n"))));
+        assert_eq!((tally.passed, tally.failed), (1, 2));
+        let [test, budgets] = &tally.failures[..] else { panic!("{} failures", tally.failures.len()) };
+        assert_eq!(
+            (test.name.as_str(), test.said.join(" ")),
+            ("a::b", "thread panicked: 1 != 2 ".to_owned())
+        );
+        // The end of a long message is what matters.
+        assert_eq!((budgets.said.len(), budgets.said[0].as_str()), (SAID, "1"));
+
+        // And those of the tests beside, from their text.
+        let beside = format!("{FAILED}fuzzing\n{SAYS}panicked\n1 passed, 1 failed, 0 skipped");
+        tally.add(false, &beside);
+        let last = tally.failures.last().expect("three");
+        assert_eq!((last.name.as_str(), &last.said[..]), ("fuzzing", &["panicked".to_owned()][..]));
+        assert_eq!((tally.passed, tally.failed), (2, 3));
+    }
 }
