@@ -160,8 +160,11 @@ fn a_program_that_cannot_go_on_is_reset_into_its_boot_code() {
     for (name, role) in IMAGES {
         let Some(image) = image(name) else { return };
         let _beside = beside();
-        use ChipFaultKind::{Hang, Nmi, Undefined, Unexpected};
-        for kind in [Hang, Undefined, Nmi, Unexpected] {
+        use ChipFaultKind::{Hang, Nmi, Panic, StackOverflow, Undefined, Unexpected};
+        for kind in [Hang, Undefined, Nmi, Unexpected, StackOverflow, Panic] {
+            if kind == Panic && pico(name) {
+                continue; // its image has none
+            }
             let what = format!("{kind:?} on {name}");
             let ChipReport { ran, resets, dead, floating, .. } = broken(&image, role, kind, Some(0.3));
             let expected = (State::Faulted, Cause::Silence, Some(BoardState::Boot));
@@ -190,16 +193,20 @@ fn a_fault_handler_puts_the_boot_code_out_at_once() {
         let Some(image) = image(name) else { return };
         let _beside = beside();
         // A crystal that stops is an NMI, too, by the clock security.
-        for kind in
-            [ChipFaultKind::Undefined, ChipFaultKind::Nmi, ChipFaultKind::Unexpected, ChipFaultKind::Crystal]
-        {
+        use ChipFaultKind::{Crystal, Nmi, Panic, StackOverflow, Undefined, Unexpected};
+        for kind in [Undefined, Nmi, Unexpected, Crystal, StackOverflow, Panic] {
+            if kind == Panic && pico(name) {
+                continue; // its image has none
+            }
             let (mut board, now_ns) = running(&image, role);
             board.inject(kind);
             board.step(now_ns - 1, &mut Outbox::default()).expect("the chip runs");
             assert_eq!((board.code().0, board.resets()), (BOOT_CODE, 0), "{kind:?} on {name}");
-            // The Pico's clock that has stopped calls an interrupt, and its switch falls back.
-            let interrupt = kind == ChipFaultKind::Unexpected || pico(name) && kind == ChipFaultKind::Crystal;
-            assert_eq!((board.in_fault(), board.floating()), (!interrupt, pico(name)), "{kind:?} on {name}");
+            // The Pico's clock that has stopped calls an interrupt, and its switch falls back. A panic is no exception.
+            let elsewhere = matches!(kind, Unexpected | Panic) || pico(name) && kind == Crystal;
+            assert_eq!((board.in_fault(), board.floating()), (!elsewhere, pico(name)), "{kind:?} on {name}");
+            // The guard ends a stack that grows without an end, before it is in the statics.
+            assert_eq!(board.guarded(), kind == StackOverflow, "{kind:?} on {name}");
         }
         // One that hangs puts out what it did last, until the watchdog.
         let (mut board, now_ns) = running(&image, role);
@@ -253,8 +260,13 @@ fn a_board_says_why_it_started() {
             (ChipFaultKind::Undefined, ResetCause::Fault),
             (ChipFaultKind::Nmi, ResetCause::Fault),
             (ChipFaultKind::Unexpected, ResetCause::Fault),
+            (ChipFaultKind::StackOverflow, ResetCause::Fault),
+            (ChipFaultKind::Panic, ResetCause::Fault),
             (ChipFaultKind::Crystal, ResetCause::Clock),
         ] {
+            if kind == ChipFaultKind::Panic && pico(name) {
+                continue; // its image has none
+            }
             let (mut board, mut now_ns) = running(&image, role);
             board.inject(kind);
             while board.resets() == 0 {

@@ -65,8 +65,8 @@ pub(crate) struct Hil {
     #[arg(long, value_name = "KIND:KEY=VALUE,…")]
     fault: Vec<Fault>,
     /// Injects a fault into the chip: converter-stuck, amplifier, crystal, overrun, hang, undefined, nmi,
-    /// unexpected, supply-low, brown-out-low (both nucleo) or encoder-skip (pico); :at=SECONDS after
-    /// arming, else from power-up on.
+    /// unexpected, stack-overflow, panic, supply-low, brown-out-low (these three nucleo) or encoder-skip
+    /// (pico); :at=SECONDS after arming, else from power-up on.
     #[arg(long, value_name = "KIND[:at=S]")]
     chip_fault: Vec<ChipFault>,
     /// Counts the instructions on the chip's model, and writes the numbers as JSON; takes several

@@ -6,8 +6,8 @@ What Unicorn leaves out is here. Code takes no time. Time goes on only while the
 or spins for ever. An interrupt is taken when the core sleeps, when a handler returns, and after an instruction that may
 unmask it. Bytes that the serial line sends are gone at once; bytes for its receiver come when the host gives them.
 
-Not modelled: pins and what is analogue, process stack (PSP), memory protection, breakpoints. A register without a model
-is plain memory.
+Not modelled: pins and what is analogue, process stack (PSP), memory protection but for regions that nobody may access,
+breakpoints. A register without a model is plain memory.
 
 Protocol, little-endian. The host writes requests to standard input, and gets an answer to each on standard output:
 
@@ -45,8 +45,8 @@ from unicorn import unicorn_const as uc_const
 
 
 class Fault:
-    """Bits for the chip's faults; those from OVERRUN to UNEXPECTED, and ENCODER_SKIP, happen once, when their bit is
-    set. The host asks a chip for those alone that it can have."""
+    """Bits for the chip's faults; those from OVERRUN to UNEXPECTED, and from STACK_OVERFLOW on with ENCODER_SKIP,
+    happen once, when their bit is set. The host asks a chip for those alone that it can have."""
 
     CONVERTER_STUCK = 1 << 0  # the converter's output does not follow its register
     CRYSTAL_DEAD = 1 << 1  # the crystal stops, or never starts
@@ -59,6 +59,8 @@ class Fault:
     ENCODER_SKIP = 1 << 8  # both signals of the encoder change at once
     BROWN_OUT_LOW = 1 << 9  # the level of the supply below which the chip is in reset is as the maker delivers it
     AMPLIFIER = 1 << 10  # what is behind the converter gives 0 V
+    STACK_OVERFLOW = 1 << 11  # a function calls itself without an end
+    PANIC = 1 << 12  # the program comes to its panic handler
     METERED = 1 << 31  # no fault: the instructions of this request count
 
 
@@ -73,6 +75,7 @@ class Flag:
     LOCKUP = 1 << 5  # a fault in a fault handler
     FLOATING = 1 << 6  # the converter decides nothing: what it leaves to the wiring does
     STOPPED = 1 << 7  # the core has no clock
+    GUARDED = 1 << 8  # it is in HardFault because of memory that nobody may access
 
 
 NEVER = (1 << 64) - 1
@@ -80,7 +83,8 @@ WORD = 0xFFFF_FFFF
 PATIENCE_S = 0.1  # time of this machine after which code is suspected to spin; counting all would slow all of it
 BUDGET = 2_000_000  # further instructions without sleep after which it does: 12 ms and more
 AGAIN = 20_000  # instructions that a spinning core gets each time that something falls due
-FAULTY = b"\xfe\xe7\x00\xde"  # two instructions for faults, in the chip's own ROM: `b .` and `udf`
+# Instructions for faults, in the chip's own ROM: `b .`, `udf`; `push {r0-r7, lr}` and a branch back to it.
+FAULTY = b"\xfe\xe7\x00\xde\xff\xb5\xfd\xe7"
 THREAD, HANDLER = 0xFFFF_FFF9, 0xFFFF_FFF1  # EXC_RETURN without floating-point state
 HARD_FAULT, NMI, SVCALL, PENDSV = 3, 2, 11, 14
 CALLEE = [arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12]
@@ -162,10 +166,16 @@ class System(Block):
     """SCS: NVIC and system control block."""
 
     ICSR, VTOR, AIRCR, CFSR, HFSR, BFAR, STIR = 0xD04, 0xD08, 0xD0C, 0xD28, 0xD2C, 0xD38, 0xF00
-    initial: ClassVar = {AIRCR: 0xFA05_0000, 0xF34: 0xC000_0000}
+    MPU_TYPE, MPU_CTRL, RNR, RBAR, RASR = 0xD90, 0xD94, 0xD98, 0xD9C, 0xDA0
+    initial: ClassVar = {AIRCR: 0xFA05_0000, 0xF34: 0xC000_0000, MPU_TYPE: 8 << 8}
 
     def __init__(self, chip: Chip, page: Page, base: int) -> None:
+        self.regions: dict[int, range] = {}  # of the memory protection, by number
+        self.protected: list[range] = []
         super().__init__(chip, page, base)
+        self.on(self.MPU_CTRL, write=self.set_protection)
+        self.on(self.RBAR, write=self.set_base)
+        self.on(self.RASR, lambda: 0, self.set_region)
         for n in range(4):
             for begin in (0x100, 0x200):  # ISER, ICER; ISPR, ICPR
                 read = partial(self.bits, begin, n)
@@ -181,6 +191,38 @@ class System(Block):
         self.page.words.clear()
         super().reset()
         self[0xD00] = self.chip.CPUID
+        self.regions.clear()
+        self.protect()
+
+    def set_base(self, value: int) -> None:
+        if value & 0x10:  # VALID: of another region
+            self[self.RNR] = value & 15
+        self[self.RBAR] = value & ~0x1F
+
+    def set_region(self, value: int) -> None:
+        if value & 1 and value >> 8 & 0x7_00FF:
+            raise NotModelled(f"memory protection other than of a region without access: MPU_RASR = {value:#010x}")
+        begin = self[self.RBAR]
+        self.regions[self[self.RNR]] = range(begin, begin + (2 << (value >> 1 & 31)) if value & 1 else begin)
+        self.protect()
+
+    def set_protection(self, value: int) -> None:
+        self[self.MPU_CTRL] = value
+        self.protect()
+
+    def protect(self) -> None:
+        """Memory that nobody may access now. HFNMIENA: a fault handler may, where it is not set."""
+        on = self[self.MPU_CTRL] & 1 and (self[self.MPU_CTRL] & 2 or not self.chip.in_fault())
+        wanted = [region for region in self.regions.values() if region] if on else []
+        if wanted == self.protected:
+            return
+        for regions, rights in [(self.protected, uc_const.UC_PROT_ALL), (wanted, uc_const.UC_PROT_NONE)]:
+            for region in regions:
+                self.chip.uc.mem_protect(region.start, len(region), rights)
+        self.protected = wanted
+
+    def guards(self, at: int) -> bool:
+        return any(at in region for region in self.protected)
 
     def numbers(self, begin: int) -> set[int]:
         return self.chip.enabled if begin == 0x100 else self.chip.pended
@@ -260,6 +302,7 @@ class Chip(ABC):
         self.faults = self.flags = 0
         self.uc = uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(self.CORE)
+        self.image = image
         self.memory: list[Any] = []
         self.vectors: dict[int, int] = {}  # those in flash, which stay
         self.meter: Meter | None = None
@@ -348,7 +391,7 @@ class Chip(ABC):
         self.active: list[int] = []
         self.returns: list[int] = []  # EXC_RETURN of each
         self.waiting = self.asleep = self.spinning = self.locked = self.reset_wanted = self.overrun = False
-        self.returning = self.called = False
+        self.returning = self.called = self.guarded = False
         for block in self.blocks:
             block.reset()
         self.uc.reg_write(arm.UC_ARM_REG_CONTROL, 0)
@@ -377,13 +420,29 @@ class Chip(ABC):
         if new & Fault.UNDEFINED:
             self.pc = self.ROM + 6
             self.asleep = False
+        if new & Fault.STACK_OVERFLOW:
+            self.pc = self.ROM + 8
+            self.asleep = False
+        if new & Fault.PANIC:
+            self.pc = self.panic_handler()
+            self.asleep = False
         if new & Fault.NMI:
             self.pended.add(NMI)
         if new & Fault.UNEXPECTED:
             self.enabled.add(16)
             self.pended.add(16)
 
+    def panic_handler(self) -> int:
+        at = next((at for name, at in symbols(self.image) if b"rust_begin_unwind" in name), None)
+        if at is None:
+            raise NotModelled("the image names no panic handler: it has none, or was stripped of its symbols")
+        return at & ~1
+
     # Exceptions.
+
+    def in_fault(self) -> bool:
+        """True in HardFault or NMI."""
+        return any(number in (HARD_FAULT, NMI) for number in self.active)
 
     def level(self) -> int:
         """Priority of what runs."""
@@ -437,8 +496,13 @@ class Chip(ABC):
         uc = self.uc
         if not tail:
             tail = self.push()
+            if number > HARD_FAULT and self.system.guards(uc.reg_read(arm.UC_ARM_REG_SP)):
+                self.guarded, number = True, HARD_FAULT  # the frame cannot be put there; what came waits
+                self.system[System.CFSR] |= 1 << 4  # MSTKERR
+                self.system[System.HFSR] |= 1 << 30
         self.pended.discard(number)
         self.active.append(number)
+        self.system.protect()
         self.asleep = self.spinning = False
         if self.meter:
             self.meter.wakes()
@@ -463,7 +527,10 @@ class Chip(ABC):
             uc.reg_write(arm.UC_ARM_REG_CONTROL, 0)
             uc.reg_write(arm.UC_ARM_REG_FPSCR, 0)
         stack -= align + len(frame)
-        uc.mem_write(stack, frame)
+        try:
+            uc.mem_write(stack, frame)
+        except UcError:  # there is no memory: the handler cannot run, either
+            self.locked = True
         uc.reg_write(arm.UC_ARM_REG_SP, stack)
         return (HANDLER if self.active else THREAD) & ~(0x10 if floats else 0)
 
@@ -472,6 +539,7 @@ class Chip(ABC):
         uc = self.uc
         value = self.returns.pop()
         self.active.pop()
+        self.system.protect()
         number = self.next_exception()
         if number:
             self.enter(number, value)
@@ -495,9 +563,10 @@ class Chip(ABC):
 
     def hard_fault(self, error: UcError) -> None:
         undefined = error.errno == uc_const.UC_ERR_INSN_INVALID
-        self.system[System.CFSR] |= 1 << 16 if undefined else 1 << 9
+        self.guarded = error.errno in (uc_const.UC_ERR_READ_PROT, uc_const.UC_ERR_WRITE_PROT)
+        self.system[System.CFSR] |= 1 << (16 if undefined else 1 if self.guarded else 9)
         self.system[System.HFSR] |= 1 << 30  # FORCED
-        if any(number in (HARD_FAULT, NMI) for number in self.active):
+        if self.in_fault():
             self.locked = True
         else:
             self.enter(HARD_FAULT)
@@ -554,7 +623,8 @@ class Chip(ABC):
                 self.uc.emu_stop()
 
     def next_ns(self) -> int:
-        return min(self.timers_ns(), self.watchdog.fires_ns)
+        # A core that has locked up looks at no interrupt.
+        return self.watchdog.fires_ns if self.locked else min(self.timers_ns(), self.watchdog.fires_ns)
 
     def go_to(self, now_ns: int) -> None:
         """Time passes, and what falls due on the way is done."""
@@ -577,8 +647,8 @@ class Chip(ABC):
     def state(self) -> int:
         flags = self.flags
         self.flags = 0
-        if any(number in (HARD_FAULT, NMI) for number in self.active):
-            flags |= Flag.IN_FAULT
+        if self.in_fault():
+            flags |= Flag.IN_FAULT | (Flag.GUARDED if self.guarded else 0)
         flags |= Flag.SPINNING if self.spinning else 0
         flags |= Flag.LOCKUP if self.locked else 0
         flags |= 0 if self.core_hz() else Flag.STOPPED
@@ -619,6 +689,19 @@ def statics_end(image: bytes) -> int:
     table, size, count = (*struct.unpack_from("<I", image, 28), *struct.unpack_from("<HH", image, 42))
     headers = [struct.unpack_from("<6I", image, table + size * n) for n in range(count)]
     return max([at + size for kind, _, at, _, _, size in headers if kind == 1 and at >> 28 == 2], default=0x2000_0000)
+
+
+def symbols(image: bytes) -> list[tuple[bytes, int]]:
+    """Names and values of an ELF image's symbols."""
+    table, size, count = (*struct.unpack_from("<I", image, 32), *struct.unpack_from("<HH", image, 46))
+    sections = [struct.unpack_from("<10I", image, table + size * n) for n in range(count)]
+    found = []
+    for _, kind, _, _, at, length, names, *_ in sections:
+        if kind == 2:
+            begin = sections[names][4]
+            for name, value in struct.iter_unpack("<II8x", image[at : at + length]):
+                found.append((image[begin + name : image.index(0, begin + name)], value))
+    return found
 
 
 class Meter(ABC):

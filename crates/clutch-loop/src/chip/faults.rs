@@ -28,11 +28,15 @@ pub enum ChipFaultKind {
     BrownOutLow,
     /// The amplifier behind the converter gives 0 V.
     Amplifier,
+    /// A function calls itself without an end.
+    StackOverflow,
+    /// The program comes to its panic handler.
+    Panic,
 }
 
 impl ChipFaultKind {
     /// All, by name.
-    pub const ALL: [(&'static str, ChipFaultKind); 11] = [
+    pub const ALL: [(&'static str, ChipFaultKind); 13] = [
         ("converter-stuck", ChipFaultKind::ConverterStuck),
         ("crystal", ChipFaultKind::Crystal),
         ("overrun", ChipFaultKind::Overrun),
@@ -44,6 +48,8 @@ impl ChipFaultKind {
         ("encoder-skip", ChipFaultKind::EncoderSkip),
         ("brown-out-low", ChipFaultKind::BrownOutLow),
         ("amplifier", ChipFaultKind::Amplifier),
+        ("stack-overflow", ChipFaultKind::StackOverflow),
+        ("panic", ChipFaultKind::Panic),
     ];
 
     /// Its name.
@@ -65,6 +71,8 @@ impl ChipFaultKind {
             ChipFaultKind::EncoderSkip => 1 << 8,
             ChipFaultKind::BrownOutLow => 1 << 9,
             ChipFaultKind::Amplifier => 1 << 10,
+            ChipFaultKind::StackOverflow => 1 << 11,
+            ChipFaultKind::Panic => 1 << 12,
         }
     }
 }

@@ -41,12 +41,14 @@ impl ChipKind {
         }
     }
 
-    /// True if it can have a fault: an RP2040 has no monitor of its supply and no such options, and only its encoder's counter tells of
-    /// edges that it missed.
+    /// True if it can have a fault: an RP2040 has no monitor of its supply and no such options, and only its encoder's
+    /// counter tells of edges that it missed. Its images have no panic handler: with a path to a panic they would not link.
     #[must_use]
     pub const fn has(self, fault: ChipFaultKind) -> bool {
         match fault {
-            ChipFaultKind::SupplyLow | ChipFaultKind::BrownOutLow => matches!(self, ChipKind::Stm32g474),
+            ChipFaultKind::SupplyLow | ChipFaultKind::BrownOutLow | ChipFaultKind::Panic => {
+                matches!(self, ChipKind::Stm32g474)
+            }
             ChipFaultKind::EncoderSkip => matches!(self, ChipKind::Rp2040),
             _ => true,
         }

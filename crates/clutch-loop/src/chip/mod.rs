@@ -145,6 +145,12 @@ impl ChipBoard {
         self.last.flags.has(Flags::IN_FAULT)
     }
 
+    /// True if it is there because of memory that nobody may access, the guard below the stack.
+    #[must_use]
+    pub fn guarded(&self) -> bool {
+        self.last.flags.has(Flags::GUARDED)
+    }
+
     /// Voltage at the brake now, V.
     #[must_use]
     pub fn volts_now(&self) -> f64 {
