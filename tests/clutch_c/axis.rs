@@ -15,6 +15,12 @@ pub(super) fn scenario(set: &[(&str, &str)]) -> (Vec<clutch_setting>, Trace) {
     let mut set: Vec<(String, String)> =
         set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
     set.push(("sampling.scalar".to_owned(), "f32".to_owned()));
+    if cfg!(miri) {
+        // Short, where each step is interpreted.
+        set.extend(
+            [("run.duration_s", "0.2"), ("run.settle_s", "0")].map(|(k, v)| (k.to_owned(), v.to_owned())),
+        );
+    }
     let scenario = Scenario::load(Path::new("board_smc_2"), &set).unwrap();
     let run = BuiltRun::new(&scenario, 0).unwrap();
     let settings = from_scenario::settings(&scenario, &run, Micros(0), run.ticks).unwrap();

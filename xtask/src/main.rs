@@ -129,8 +129,13 @@ enum Verb {
         #[arg(long, default_value = "0/20")]
         shard: String,
     },
-    /// Runs the tests of core, wire and node in Miri, as on a machine of the other byte order; adds a row to docs/proof.md.
-    Miri,
+    /// Runs tests in Miri: those of core and wire as on a machine of the other byte order, those of the lanes, of libclutch
+    /// and of the FMI units for their unsafe code; adds a row for each to docs/proof.md.
+    Miri {
+        /// Those alone whose name has this part: wire, core, lanes, clutch-c, fmi.
+        #[arg(default_value = "", hide_default_value = true)]
+        part: String,
+    },
     /// Runs the tests of lanes with NEON, on an emulated 64-bit Arm processor: five minutes.
     Neon,
     /// Runs the fault campaign on all cores, and rewrites its table in docs/safety.md: a million runs, half an hour.
@@ -275,7 +280,7 @@ fn main() -> Result<()> {
         Verb::Coverage => coverage::run(),
         Verb::Prove { names } => proof::prove(&names),
         Verb::Mutants { shard } => mutants::run(&shard),
-        Verb::Miri => miri::run(),
+        Verb::Miri { part } => miri::run(&part),
         Verb::Neon => neon::run(),
         Verb::Certified { runs } => certified(runs),
         Verb::Smooth => smooth(),

@@ -4,24 +4,123 @@ use crate::proof::add_row;
 use crate::run::program;
 use anyhow::{Result, ensure};
 
-/// A machine of the other byte order.
-const BIG_ENDIAN: &str = "s390x-unknown-linux-gnu";
+/// Tests that run in Miri.
+struct Part {
+    /// Their name in the table.
+    name: &'static str,
+    /// The machine, by the compiler's word, and its processor.
+    machine: &'static str,
+    processor: Option<&'static str>,
+    packages: &'static [&'static str],
+    /// Which tests of them, by options of cargo, and of the test's program.
+    which: &'static [&'static str],
+    filter: &'static [&'static str],
+}
 
-/// Tests that take millions of steps, by a part of their names: Miri is some hundred times slower than a machine.
-const LONG: [&str; 8] =
-    ["feasibility", "observer", "reference", "real::", "stick_slip", "supervisor", "any_", "no_flip"];
+/// A machine of the other byte order, for what has no `unsafe`; this one for what has it.
+const PARTS: [Part; 6] = [
+    Part {
+        name: "`clutch-wire`",
+        machine: "s390x-unknown-linux-gnu",
+        processor: None,
+        packages: &["clutch-wire"],
+        which: &["--lib"],
+        filter: &LONG,
+    },
+    Part {
+        name: "`clutch-core`",
+        machine: "s390x-unknown-linux-gnu",
+        processor: None,
+        packages: &["clutch-core"],
+        which: &["--lib"],
+        filter: &LONG,
+    },
+    Part {
+        name: "lanes of `clutch-sim`",
+        machine: "x86_64-unknown-linux-gnu",
+        processor: None,
+        packages: &["clutch-sim"],
+        which: &["--lib", SOFT],
+        filter: &LANES,
+    },
+    Part {
+        name: "lanes of `clutch-sim`",
+        machine: "x86_64-unknown-linux-gnu",
+        processor: Some("x86-64-v3"),
+        packages: &["clutch-sim"],
+        which: &["--lib", SOFT],
+        filter: &LANES,
+    },
+    Part {
+        name: "`clutch-c`",
+        machine: "x86_64-unknown-linux-gnu",
+        processor: None,
+        // The second for its features: the first names no libm.
+        packages: &["clutch-tests", "clutch-sim"],
+        which: &["--test=clutch_c", SOFT],
+        filter: &["axis::", "misuse::"],
+    },
+    Part {
+        name: "`clutch-fmi`",
+        machine: "x86_64-unknown-linux-gnu",
+        processor: None,
+        packages: &["clutch-fmi"],
+        which: &["--lib"],
+        filter: &[],
+    },
+];
 
-/// Runs the unit tests of core and wire as on a machine of the other byte order, but for the long ones, and adds a row for
-/// each to the table.
-pub(crate) fn run() -> Result<()> {
+/// Without it a square root is an instruction, which Miri does not know.
+const SOFT: &str = "--features=libm/force-soft-floats";
+
+/// Tests that take millions of steps are left out, by a part of their names: Miri is some hundred times slower than a
+/// machine.
+const LONG: [&str; 16] = [
+    "--skip",
+    "feasibility",
+    "--skip",
+    "observer",
+    "--skip",
+    "reference",
+    "--skip",
+    "real::",
+    "--skip",
+    "stick_slip",
+    "--skip",
+    "supervisor",
+    "--skip",
+    "any_",
+    "--skip",
+    "no_flip",
+];
+
+/// Those that do little in an interpreter.
+const LANES: [&str; 3] =
+    ["lanes::tests::elementary", "lanes::tests::a_few_periods", "lanes::tests::a_motion_that_stops"];
+
+/// Runs each part whose name has a text in it, and adds a row for it to the table.
+pub(crate) fn run(part: &str) -> Result<()> {
     let add = ["component", "add", "miri", "rust-src", "--toolchain", "nightly"];
     program("rustup").args(add).run()?;
-    for package in ["clutch-wire", "clutch-core"] {
+    ensure!(
+        PARTS.iter().any(|p| p.name.contains(part)),
+        "miri {part}: expected a part of {}",
+        PARTS.map(|p| p.name).join(", ")
+    );
+    for Part { name, machine, processor, packages, which, filter } in
+        PARTS.into_iter().filter(|p| p.name.contains(part))
+    {
         let (mut passed, mut left_out) = (0_u64, 0_u64);
+        let folder = format!("target/miri/{}", processor.unwrap_or(machine));
+        let flags = processor.map(|processor| format!("-Ctarget-cpu={processor}")).unwrap_or_default();
         let held = program("rustup")
-            .args(["run", "nightly", "cargo", "miri", "test", "--lib", "--target", BIG_ENDIAN])
-            .args(["--target-dir", "target/miri", "--package", package, "--"])
-            .args(LONG.iter().flat_map(|long| ["--skip", long]))
+            .args(["run", "nightly", "cargo", "miri", "test", "--target", machine, "--target-dir"])
+            .arg(folder)
+            .args(packages.iter().flat_map(|package| ["--package", package]))
+            .args(which)
+            .arg("--")
+            .args(filter)
+            .env("RUSTFLAGS", flags)
             .env("MIRIFLAGS", "-Zmiri-disable-isolation")
             .env("PROPTEST_CASES", "4")
             .env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "1")
@@ -38,7 +137,8 @@ pub(crate) fn run() -> Result<()> {
                 left_out += number(" filtered out").unwrap_or(0);
             })?;
         ensure!(held, "Miri found something: see above");
-        add_row("miri", &format!("| `{package}` | {BIG_ENDIAN} | {passed} passed, {left_out} left out |"))?;
+        let on = processor.map_or(String::new(), |processor| format!(", {processor}"));
+        add_row("miri", &format!("| {name} | {machine}{on} | {passed} passed, {left_out} left out |"))?;
     }
     Ok(())
 }

@@ -29,17 +29,22 @@ unsafe fn list<'a, T>(pointer: *const T, count: usize) -> &'a [T] {
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn fmi3GetVersion() -> *const c_char {
+pub(crate) extern "C" fn fmi3GetVersion() -> *const c_char {
     c"3.0".as_ptr()
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn fmi3SetDebugLogging(_: *mut Instance, _: u8, _: usize, _: *const *const c_char) -> Status {
+pub(crate) extern "C" fn fmi3SetDebugLogging(
+    _: *mut Instance,
+    _: u8,
+    _: usize,
+    _: *const *const c_char,
+) -> Status {
     Status::Ok
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3InstantiateCoSimulation(
+pub(crate) unsafe extern "C" fn fmi3InstantiateCoSimulation(
     _name: *const c_char,
     token: *const c_char,
     resources: *const c_char,
@@ -70,7 +75,7 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3FreeInstance(instance: *mut Instance) {
+pub(crate) unsafe extern "C" fn fmi3FreeInstance(instance: *mut Instance) {
     if !instance.is_null() {
         // SAFETY: it came from the instantiation, and nobody uses it any more.
         drop(unsafe { Box::from_raw(instance) });
@@ -84,7 +89,7 @@ unsafe fn of<'a>(instance: *mut Instance) -> Option<&'a mut Instance> {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3EnterInitializationMode(
+pub(crate) unsafe extern "C" fn fmi3EnterInitializationMode(
     instance: *mut Instance,
     _tolerance_defined: u8,
     _tolerance: f64,
@@ -99,7 +104,7 @@ unsafe extern "C" fn fmi3EnterInitializationMode(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3Reset(instance: *mut Instance) -> Status {
+pub(crate) unsafe extern "C" fn fmi3Reset(instance: *mut Instance) -> Status {
     // SAFETY: the simulator's.
     let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
     instance.reset();
@@ -107,7 +112,7 @@ unsafe extern "C" fn fmi3Reset(instance: *mut Instance) -> Status {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3DoStep(
+pub(crate) unsafe extern "C" fn fmi3DoStep(
     instance: *mut Instance,
     now: f64,
     step: f64,
@@ -183,7 +188,7 @@ unsafe fn set<T>(
 macro_rules! getter {
     ($name:ident, $type:ty, $value:expr) => {
         #[unsafe(no_mangle)]
-        unsafe extern "C" fn $name(
+        pub(crate) unsafe extern "C" fn $name(
             instance: *mut Instance,
             references: *const Reference,
             count: usize,
@@ -200,7 +205,7 @@ macro_rules! getter {
 macro_rules! setter {
     ($name:ident, $type:ty, $take:expr) => {
         #[unsafe(no_mangle)]
-        unsafe extern "C" fn $name(
+        pub(crate) unsafe extern "C" fn $name(
             instance: *mut Instance,
             references: *const Reference,
             count: usize,
@@ -228,7 +233,7 @@ fn take_text(unit: &mut Instance, reference: Reference, value: &*const c_char) -
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3GetFMUState(instance: *mut Instance, state: *mut *mut Kept) -> Status {
+pub(crate) unsafe extern "C" fn fmi3GetFMUState(instance: *mut Instance, state: *mut *mut Kept) -> Status {
     // SAFETY: the simulator's.
     let Some(instance) = (unsafe { of(instance) }) else { return Status::Error };
     if state.is_null() {
@@ -246,7 +251,7 @@ unsafe extern "C" fn fmi3GetFMUState(instance: *mut Instance, state: *mut *mut K
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3SetFMUState(instance: *mut Instance, state: *mut Kept) -> Status {
+pub(crate) unsafe extern "C" fn fmi3SetFMUState(instance: *mut Instance, state: *mut Kept) -> Status {
     // SAFETY: the simulator's.
     let (Some(instance), Some(state)) = (unsafe { (of(instance), state.as_ref()) }) else {
         return Status::Error;
@@ -256,7 +261,7 @@ unsafe extern "C" fn fmi3SetFMUState(instance: *mut Instance, state: *mut Kept) 
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3FreeFMUState(_: *mut Instance, state: *mut *mut Kept) -> Status {
+pub(crate) unsafe extern "C" fn fmi3FreeFMUState(_: *mut Instance, state: *mut *mut Kept) -> Status {
     // SAFETY: the simulator's place for a state of ours.
     unsafe {
         if !state.is_null() && !(*state).is_null() {
@@ -271,7 +276,7 @@ unsafe extern "C" fn fmi3FreeFMUState(_: *mut Instance, state: *mut *mut Kept) -
 macro_rules! nothing {
     ($($name:ident)+) => {
         $(#[unsafe(no_mangle)]
-        extern "C" fn $name(_: *mut Instance) -> Status {
+        pub(crate) extern "C" fn $name(_: *mut Instance) -> Status {
             Status::Ok
         })+
     };

@@ -12,6 +12,8 @@
 
 mod fmi3;
 mod instance;
+#[cfg(test)]
+mod tests;
 mod unit;
 mod variables;
 
