@@ -4,7 +4,7 @@
 use crate::{beside, equal, on, simulate};
 use clutch_core::supervisor::{Cause, State};
 use clutch_loop::chip::{
-    ChipBoard, ChipFault, ChipFaultKind, ChipOptions, ChipReport, ChipRole, ChipSession,
+    ChipBoard, ChipFault, ChipFaultKind, ChipKind, ChipOptions, ChipReport, ChipRole, ChipSession,
 };
 use clutch_loop::lockstep_board::InProcessBoard;
 use clutch_loop::lockstep_session::LockstepOptions;
@@ -28,6 +28,12 @@ const PICO_DAQ: (&str, ChipRole) = ("pico-daq", ChipRole::Daq);
 /// True for an image of the Pico.
 fn pico(image: &str) -> bool {
     image.starts_with("pico-")
+}
+
+/// Those of some faults that the chip of an image can have.
+fn could_be<const N: usize>(image: &str, faults: [ChipFaultKind; N]) -> impl Iterator<Item = ChipFaultKind> {
+    let chip = ChipKind::of(Path::new(image)).expect("an image's chip");
+    faults.into_iter().filter(move |fault| chip.has(*fault))
 }
 
 /// `BOOT_CODE` of the images.
@@ -161,10 +167,7 @@ fn a_program_that_cannot_go_on_is_reset_into_its_boot_code() {
         let Some(image) = image(name) else { return };
         let _beside = beside();
         use ChipFaultKind::{Hang, Nmi, Panic, StackOverflow, Undefined, Unexpected};
-        for kind in [Hang, Undefined, Nmi, Unexpected, StackOverflow, Panic] {
-            if kind == Panic && pico(name) {
-                continue; // its image has none
-            }
+        for kind in could_be(name, [Hang, Undefined, Nmi, Unexpected, StackOverflow, Panic]) {
             let what = format!("{kind:?} on {name}");
             let ChipReport { ran, resets, dead, floating, .. } = broken(&image, role, kind, Some(0.3));
             let expected = (State::Faulted, Cause::Silence, Some(BoardState::Boot));
@@ -194,10 +197,7 @@ fn a_fault_handler_puts_the_boot_code_out_at_once() {
         let _beside = beside();
         // A crystal that stops is an NMI, too, by the clock security.
         use ChipFaultKind::{Crystal, Nmi, Panic, StackOverflow, Undefined, Unexpected};
-        for kind in [Undefined, Nmi, Unexpected, Crystal, StackOverflow, Panic] {
-            if kind == Panic && pico(name) {
-                continue; // its image has none
-            }
+        for kind in could_be(name, [Undefined, Nmi, Unexpected, Crystal, StackOverflow, Panic]) {
             let (mut board, now_ns) = running(&image, role);
             board.inject(kind);
             board.step(now_ns - 1, &mut Outbox::default()).expect("the chip runs");
@@ -255,18 +255,13 @@ fn a_board_says_why_it_started() {
         let _beside = beside();
         let (mut board, now_ns) = running(&image, role);
         assert_eq!(started_by(&mut board, now_ns - 1), Some(ResetCause::Power), "{name}");
-        for (kind, cause) in [
-            (ChipFaultKind::Hang, ResetCause::Watchdog),
-            (ChipFaultKind::Undefined, ResetCause::Fault),
-            (ChipFaultKind::Nmi, ResetCause::Fault),
-            (ChipFaultKind::Unexpected, ResetCause::Fault),
-            (ChipFaultKind::StackOverflow, ResetCause::Fault),
-            (ChipFaultKind::Panic, ResetCause::Fault),
-            (ChipFaultKind::Crystal, ResetCause::Clock),
-        ] {
-            if kind == ChipFaultKind::Panic && pico(name) {
-                continue; // its image has none
-            }
+        use ChipFaultKind::{Crystal, Hang, Nmi, Panic, StackOverflow, Undefined, Unexpected};
+        for kind in could_be(name, [Hang, Undefined, Nmi, Unexpected, StackOverflow, Panic, Crystal]) {
+            let cause = match kind {
+                Hang => ResetCause::Watchdog,
+                Crystal => ResetCause::Clock,
+                _ => ResetCause::Fault,
+            };
             let (mut board, mut now_ns) = running(&image, role);
             board.inject(kind);
             while board.resets() == 0 {
