@@ -3,9 +3,10 @@
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Lines};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::rc::Rc;
 
 /// The targets of the boards' cores: a Cortex-M4F, and a Cortex-M0+.
 pub(crate) const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi"];
@@ -133,20 +134,29 @@ pub(crate) fn measure(image: &Path) -> Result<Measured> {
     Ok(measured)
 }
 
-/// Runs the image; the addresses executed within the given ranges, in their order.
-pub(crate) fn trace(image: &Path, ranges: &[(u32, u32)]) -> Result<Vec<u32>> {
-    let log = image.with_extension("trace");
+/// Runs the image, and hands over the addresses executed within the given ranges, in their order, while it runs: the
+/// emulator's log of them has more than a gigabyte.
+pub(crate) fn trace<T>(
+    image: &Path,
+    ranges: &[(u32, u32)],
+    follow: impl FnOnce(&mut dyn Iterator<Item = u32>) -> T,
+) -> Result<T> {
     let filter: Vec<String> = ranges.iter().map(|(a, n)| format!("{a:#x}+{n:#x}")).collect();
-    let run = qemu(image)
-        .args(["-d", "in_asm,exec,nochain", "-dfilter", &filter.join(","), "-D"])
-        .arg(&log)
-        .output()?;
+    let mut run = qemu(image)
+        .args(["-d", "in_asm,exec,nochain", "-dfilter", &filter.join(","), "-D", "/dev/stdout"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped()) // some lines, the console of the board
+        .spawn()?;
+    let log = run.stdout.take().context("the emulator has no output")?;
+    let mut executed = Executed::new(BufReader::new(log));
+    let followed = follow(&mut executed);
+    executed.by_ref().for_each(drop);
+    let failure = executed.failure;
+    let run = run.wait_with_output()?;
     if !run.status.success() {
         bail!("the traced image ended with {}: {}", run.status, String::from_utf8_lossy(&run.stderr));
     }
-    let addresses = executed(BufReader::new(std::fs::File::open(&log)?))?;
-    std::fs::remove_file(&log)?;
-    Ok(addresses)
+    failure.map_or(Ok(followed), Err)
 }
 
 /// The executed addresses of a log, which has a block's instructions when it is translated, and a line whenever it is
@@ -158,30 +168,71 @@ pub(crate) fn trace(image: &Path, ranges: &[(u32, u32)]) -> Result<Vec<u32>> {
 ///
 /// Trace 0: 0x7f821c000240 [00400000/00007da0/00000b01/ff000200] step_pd
 /// ```
-fn executed(log: impl BufRead) -> Result<Vec<u32>> {
-    let (mut addresses, mut translated) = (Vec::new(), Vec::new());
-    // By the place of their translation, which another block may take later.
-    let mut blocks: BTreeMap<String, Vec<u32>> = BTreeMap::new();
-    for line in log.lines() {
-        let line = line?;
+struct Executed<R> {
+    lines: Lines<R>,
+    /// The block that is being translated.
+    translated: Vec<u32>,
+    /// By the place of their translation, which another block may take later.
+    blocks: BTreeMap<String, Rc<[u32]>>,
+    /// The block that is executed, and how much of it has been.
+    block: Option<(Rc<[u32]>, usize)>,
+    /// The reason why the log went no further.
+    failure: Option<anyhow::Error>,
+}
+
+impl<R: BufRead> Executed<R> {
+    fn new(log: R) -> Self {
+        Executed {
+            lines: log.lines(),
+            translated: Vec::new(),
+            blocks: BTreeMap::new(),
+            block: None,
+            failure: None,
+        }
+    }
+
+    fn read(&mut self, line: &str) -> Result<()> {
         let hex = |text: &str| u32::from_str_radix(text, 16).ok();
         if let Some(rest) = line.strip_prefix("Trace 0: ") {
             let place = rest.split(' ').next().unwrap_or_default();
             let begin = rest.split('/').nth(1).and_then(hex);
-            if translated.first().copied() == begin {
-                blocks.insert(place.to_owned(), std::mem::take(&mut translated));
+            if self.translated.first().copied() == begin {
+                self.blocks.insert(place.to_owned(), std::mem::take(&mut self.translated).into());
             }
-            let block = blocks.get(place).filter(|block| block.first().copied() == begin);
-            addresses.extend(block.with_context(|| format!("no block for {line}"))?);
+            let block = self.blocks.get(place).filter(|block| block.first().copied() == begin);
+            self.block = Some((block.with_context(|| format!("no block for {line}"))?.clone(), 0));
         } else if let Some((address, _)) = line.strip_prefix("0x").and_then(|rest| rest.split_once(": ")) {
             // Without a disassembler a block is one line of bytes.
             let one = !line.contains("OBJD");
-            translated.push(hex(address).filter(|_| one).with_context(|| format!("no instruction: {line}"))?);
+            let address = hex(address).filter(|_| one).with_context(|| format!("no instruction: {line}"))?;
+            self.translated.push(address);
         } else if line.starts_with("IN: ") {
-            translated.clear();
+            self.translated.clear();
         } else if !line.trim_matches('-').is_empty() {
             bail!("not a line of a trace: {line}");
         }
+        Ok(())
     }
-    Ok(addresses)
+}
+
+impl<R: BufRead> Iterator for Executed<R> {
+    type Item = u32;
+
+    fn next(&mut self) -> Option<u32> {
+        while self.failure.is_none() {
+            if let Some((block, done)) = &mut self.block {
+                if let Some(address) = block.get(*done) {
+                    *done += 1;
+                    return Some(*address);
+                }
+                self.block = None;
+            }
+            let read = match self.lines.next()? {
+                Ok(line) => self.read(&line),
+                Err(error) => Err(error.into()),
+            };
+            self.failure = read.err();
+        }
+        None
+    }
 }

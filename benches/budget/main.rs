@@ -213,7 +213,7 @@ fn gone(path: &Path, image: &Image, plan: &Plan, measured: &Measured) -> Result<
     }
     let ranges: Vec<(u32, u32)> = ranges.into_iter().collect();
     let addresses: Vec<u32> = entries.values().copied().collect();
-    let mut calls = traced(image, &addresses, emulator::trace(path, &ranges)?.into_iter())?;
+    let mut calls = emulator::trace(path, &ranges, |executed| traced(image, &addresses, executed))??;
     let mut most = BTreeMap::new();
     // One function may have been measured under several names, one after the other.
     for name in &measured.names {
