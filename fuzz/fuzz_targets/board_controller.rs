@@ -13,7 +13,10 @@ use clutch_core::reference::{
 use clutch_core::{
     Bounds, Counts, FixedCounts, Micros, PlantParams, SafeState, ServoParams, SupervisorParams, Tolerances,
 };
-use clutch_node::{BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams, HostNode, OneChip, Outbox, Outboxes, ResetCause, Role};
+use clutch_node::{
+    BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
+    HostNode, OneChip, Outbox, Outboxes, ResetCause, Role,
+};
 use clutch_settings::{Built, RunParams, RunTimes, SETTINGS, Settings};
 use clutch_wire::{Decoder, Message, StopReason, TABLE};
 use libfuzzer_sys::fuzz_target;

@@ -332,6 +332,10 @@ fn check() -> Result<()> {
     cargo(["fmt", "--all", "--check"]).run()?;
     // The images: a workspace of their own.
     firmware::in_firmware(["fmt", "--all", "--check"]).run()?;
+    // And others.
+    for manifest in ["fuzz/Cargo.toml", "proofs/Cargo.toml", "tests/no_panic/Cargo.toml"] {
+        cargo(["fmt", "--manifest-path", manifest, "--all", "--check"]).run()?;
+    }
     let tool = python::checkers()?;
     tool("ruff").args(["format", "--check"]).args(python::SOURCES).run()?;
     tool("ruff").arg("check").args(python::SOURCES).run()?;

@@ -8,95 +8,65 @@ use anyhow::{Result, ensure};
 struct Part {
     /// Their name in the table.
     name: &'static str,
-    /// The machine, by the compiler's word, and its processor.
-    machine: &'static str,
-    processor: Option<&'static str>,
-    packages: &'static [&'static str],
-    /// Which tests of them, by options of cargo, and of the test's program.
-    which: &'static [&'static str],
-    filter: &'static [&'static str],
+    /// The machine that they run as, by the compiler's word, and its processor.
+    machine: (&'static str, Option<&'static str>),
+    /// Which tests, by options of cargo, and by those of the tests' program.
+    tests: &'static [&'static str],
+    only: &'static [&'static str],
 }
 
-/// A machine of the other byte order, for what has no `unsafe`; this one for what has it.
+/// A machine of the other byte order, for what has no `unsafe`.
+const BIG_ENDIAN: (&str, Option<&str>) = ("s390x-unknown-linux-gnu", None);
+/// This one, for what has it; and as its processor may be.
+const THIS: (&str, Option<&str>) = ("x86_64-unknown-linux-gnu", None);
+const WITH_AVX2: (&str, Option<&str>) = (THIS.0, Some("x86-64-v3"));
+
 const PARTS: [Part; 6] = [
     Part {
         name: "`clutch-wire`",
-        machine: "s390x-unknown-linux-gnu",
-        processor: None,
-        packages: &["clutch-wire"],
-        which: &["--lib"],
-        filter: &LONG,
+        machine: BIG_ENDIAN,
+        tests: &["--package=clutch-wire", "--lib"],
+        only: LONG,
     },
     Part {
         name: "`clutch-core`",
-        machine: "s390x-unknown-linux-gnu",
-        processor: None,
-        packages: &["clutch-core"],
-        which: &["--lib"],
-        filter: &LONG,
+        machine: BIG_ENDIAN,
+        tests: &["--package=clutch-core", "--lib"],
+        only: LONG,
     },
-    Part {
-        name: "lanes of `clutch-sim`",
-        machine: "x86_64-unknown-linux-gnu",
-        processor: None,
-        packages: &["clutch-sim"],
-        which: &["--lib", SOFT],
-        filter: &LANES,
-    },
-    Part {
-        name: "lanes of `clutch-sim`",
-        machine: "x86_64-unknown-linux-gnu",
-        processor: Some("x86-64-v3"),
-        packages: &["clutch-sim"],
-        which: &["--lib", SOFT],
-        filter: &LANES,
-    },
+    Part { name: "lanes of `clutch-sim`", machine: THIS, tests: SIM, only: LANES },
+    Part { name: "lanes of `clutch-sim`", machine: WITH_AVX2, tests: SIM, only: LANES },
     Part {
         name: "`clutch-c`",
-        machine: "x86_64-unknown-linux-gnu",
-        processor: None,
-        // The second for its features: the first names no libm.
-        packages: &["clutch-tests", "clutch-sim"],
-        which: &["--test=clutch_c", SOFT],
-        filter: &["axis::", "misuse::"],
+        machine: THIS,
+        // The second package has the feature, the first names no libm.
+        tests: &["--package=clutch-tests", "--package=clutch-sim", "--test=clutch_c", SOFT],
+        only: &["axis::", "misuse::"],
     },
-    Part {
-        name: "`clutch-fmi`",
-        machine: "x86_64-unknown-linux-gnu",
-        processor: None,
-        packages: &["clutch-fmi"],
-        which: &["--lib"],
-        filter: &[],
-    },
+    Part { name: "`clutch-fmi`", machine: THIS, tests: &["--package=clutch-fmi", "--lib"], only: &[] },
 ];
+
+const SIM: &[&str] = &["--package=clutch-sim", "--lib", SOFT];
 
 /// Without it a square root is an instruction, which Miri does not know.
 const SOFT: &str = "--features=libm/force-soft-floats";
 
 /// Tests that take millions of steps are left out, by a part of their names: Miri is some hundred times slower than a
 /// machine.
-const LONG: [&str; 16] = [
-    "--skip",
-    "feasibility",
-    "--skip",
-    "observer",
-    "--skip",
-    "reference",
-    "--skip",
-    "real::",
-    "--skip",
-    "stick_slip",
-    "--skip",
-    "supervisor",
-    "--skip",
-    "any_",
-    "--skip",
-    "no_flip",
+const LONG: &[&str] = &[
+    "--skip=feasibility",
+    "--skip=observer",
+    "--skip=reference",
+    "--skip=real::",
+    "--skip=stick_slip",
+    "--skip=supervisor",
+    "--skip=any_",
+    "--skip=no_flip",
 ];
 
 /// Those that do little in an interpreter.
-const LANES: [&str; 3] =
-    ["lanes::tests::elementary", "lanes::tests::a_few_periods", "lanes::tests::a_motion_that_stops"];
+const LANES: &[&str] =
+    &["lanes::tests::elementary", "lanes::tests::a_few_periods", "lanes::tests::a_motion_that_stops"];
 
 /// Runs each part whose name has a text in it, and adds a row for it to the table.
 pub(crate) fn run(part: &str) -> Result<()> {
@@ -107,7 +77,7 @@ pub(crate) fn run(part: &str) -> Result<()> {
         "miri {part}: expected a part of {}",
         PARTS.map(|p| p.name).join(", ")
     );
-    for Part { name, machine, processor, packages, which, filter } in
+    for Part { name, machine: (machine, processor), tests, only } in
         PARTS.into_iter().filter(|p| p.name.contains(part))
     {
         let (mut passed, mut left_out) = (0_u64, 0_u64);
@@ -116,10 +86,9 @@ pub(crate) fn run(part: &str) -> Result<()> {
         let held = program("rustup")
             .args(["run", "nightly", "cargo", "miri", "test", "--target", machine, "--target-dir"])
             .arg(folder)
-            .args(packages.iter().flat_map(|package| ["--package", package]))
-            .args(which)
+            .args(tests)
             .arg("--")
-            .args(filter)
+            .args(only)
             .env("RUSTFLAGS", flags)
             .env("MIRIFLAGS", "-Zmiri-disable-isolation")
             .env("PROPTEST_CASES", "4")

@@ -27,22 +27,25 @@
 
 use clutch_core::certificate::{Demand, certify, paper_conditions};
 use clutch_core::law::{
-    Beside, Command, ControlLaw, Ctc, Dob, Glide, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid, Shell, ShellParams,
-    Smc, SmcIntegral, SmcSign, SuperTwisting, Terms, Tick,
+    Beside, Command, ControlLaw, Ctc, Dob, Glide, Law, LawParams, LawTerms, Output, OutputParams, Pd, Pid,
+    Shell, ShellParams, Smc, SmcIntegral, SmcSign, SuperTwisting, Terms, Tick,
 };
 use clutch_core::params::{self, Choice, Editor, Params};
 use clutch_core::reference::{Interpolation, Knot, Reference, ReferenceParams, Table};
 use clutch_core::supervisor::{Arrival, BoardMode, Cause, Checks, Sample, State, SupervisorState};
 use clutch_core::{
-    Actuator, ActuatorKind, ActuatorParams, Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams, DerivativeState, Encoder, FixedCounts, Friction,
-    FrictionMap, FrictionModel, FrictionParams, Interval, Micros, Observer, ObserverGains, ObserverParams, Plant,
-    PlantParams, Real, SafeCodes, SafeKind, SafeRun, SafeState, Servo, ServoParams, SmoothedDerivative,
-    SmoothedDerivativeParams, StickSlip, StickSlipParams, StickSlipState, Stribeck, StribeckParams,
-    Supervisor, SupervisorParams, Target, Tolerances, VelocityParams, VelocitySource, check_path,
-    off_map, sin_cos_turns,
+    Actuator, ActuatorKind, ActuatorParams, Bounds, BrakeGeometry, Counts, Dac, DacCode, DacParams,
+    DerivativeState, Encoder, FixedCounts, Friction, FrictionMap, FrictionModel, FrictionParams, Interval,
+    Micros, Observer, ObserverGains, ObserverParams, Plant, PlantParams, Real, SafeCodes, SafeKind, SafeRun,
+    SafeState, Servo, ServoParams, SmoothedDerivative, SmoothedDerivativeParams, StickSlip, StickSlipParams,
+    StickSlipState, Stribeck, StribeckParams, Supervisor, SupervisorParams, Target, Tolerances,
+    VelocityParams, VelocitySource, check_path, off_map, sin_cos_turns,
 };
 use clutch_node::lockstep::Exchange;
-use clutch_node::{BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams, DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Role, WideCounter, present_code, receive, tick};
+use clutch_node::{
+    BoardController, BoardControllerParams, BoardNode, BoardParams, ControllerNode, ControllerParams,
+    DaqBoard, Hardware, HostNode, OneChip, Outbox, Outboxes, Role, WideCounter, present_code, receive, tick,
+};
 use clutch_settings::{Path, RunParams, Settings};
 use clutch_wire::{BoardState, Configure, Decoder, Hello, ResetCause, StopReason, encode};
 use core::hint::black_box;
@@ -219,14 +222,23 @@ fn actuator<T: Real>() {
     if let Some(a) = made(Actuator::new(&p)) {
         sink((a.kind().drives_above_0(), a.params(), made(a.check_share(real()))));
         sink([a.brake_gain(), a.motor_gain(), a.preload(), a.load_share()]);
-        sink([a.torque(real()), a.normal(real()), a.friction(real(), real()), a.volts_for(real(), real(), real())]);
+        sink([
+            a.torque(real()),
+            a.normal(real()),
+            a.friction(real(), real()),
+            a.volts_for(real(), real(), real()),
+        ]);
     }
 }
 
 fn plant<T: Real>() {
     if let Some(p) = made(Plant::new(&any::<T, PlantParams<T>>())) {
         sink((*p.params(), *p.friction(), *p.actuator()));
-        sink([p.friction_torque(real(), real()), p.break_away_torque(real()), p.acceleration(real(), real())]);
+        sink([
+            p.friction_torque(real(), real()),
+            p.break_away_torque(real()),
+            p.acceleration(real(), real()),
+        ]);
         sink([p.holding_voltage_static(), p.holding_voltage_sliding()]);
     }
 }
@@ -328,7 +340,11 @@ fn certificate<T: Real>() {
     sink(Demand::<T>::default());
     let Some(b) = bounds::<T>() else { return };
     sink([b.weakest_brake(), b.strongest_brake(), b.left_over(real())]);
-    sink([b.torque(flag(), real()), b.authority(flag(), real(), real()), b.authority_at_rest(real(), real())]);
+    sink([
+        b.torque(flag(), real()),
+        b.authority(flag(), real(), real()),
+        b.authority_at_rest(real(), real()),
+    ]);
     let demand = Demand {
         velocity: real::<T>(),
         acceleration: real(),
@@ -338,11 +354,13 @@ fn certificate<T: Real>() {
     };
     sink(paper_conditions(&b, &demand, real(), real()));
     let (model, output) = (any::<T, PlantParams<T>>(), any::<T, OutputParams<T>>());
-    let beside = Beside { encoder: opaque(Encoder::PAPER), period: micros(), ..Beside::paper(&model, &output) };
+    let beside =
+        Beside { encoder: opaque(Encoder::PAPER), period: micros(), ..Beside::paper(&model, &output) };
     let Some(law) = made(Law::new(&any::<T, LawParams<T>>(), &beside)) else {
         return;
     };
-    let Some(shell) = made(Shell::new(&any::<T, ShellParams<T>>(), &any::<T, OutputParams<T>>(), kind())) else {
+    let Some(shell) = made(Shell::new(&any::<T, ShellParams<T>>(), &any::<T, OutputParams<T>>(), kind()))
+    else {
         return;
     };
     if let Some(c) = made(certify(&law, &shell, &b, &demand)) {

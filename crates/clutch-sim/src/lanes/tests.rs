@@ -74,10 +74,10 @@ fn numbers(largest: f64, signs: &[f64]) -> Vec<f64> {
         3.725_290_298_461_914e-9,
         5.551_115_123_125_783e-17,
     ]);
+    let steps: i64 = if FEW { 1 } else { 2000 };
     for edge in edges.filter(|edge| *edge < largest) {
-        let steps = if FEW { 1 } else { 2000 };
         for step in -steps..steps {
-            let near = f64::from_bits(edge.to_bits().wrapping_add_signed(step * 2_097_152_i64 + step));
+            let near = f64::from_bits(edge.to_bits().wrapping_add_signed(step * 2_097_152 + step));
             all.extend(signs.iter().map(|sign| sign * near));
         }
     }
