@@ -62,6 +62,11 @@ pub trait Arithmetic:
     fn max(self, other: Self) -> Self;
     /// The smaller of the two; the other one if one is NaN.
     fn min(self, other: Self) -> Self;
+    /// `self` between `lo` and `hi`, which are numbers, and the nearer of them beyond; `lo` for NaN. Never panics.
+    #[inline]
+    fn limit(self, lo: Self, hi: Self) -> Self {
+        self.max(lo).min(hi)
+    }
     /// Neither infinite nor NaN.
     fn is_finite(self) -> Self::Mask;
 

@@ -122,12 +122,6 @@ pub struct Place<T> {
 }
 
 impl<T: Real> Place<T> {
-    /// Friction is the same all around.
-    #[must_use]
-    pub fn even() -> Self {
-        Place { factor: T::ONE, ..Place::default() }
-    }
-
     /// `true` if friction is known here.
     #[inline]
     #[must_use]
@@ -185,7 +179,6 @@ mod tests {
         let map = FrictionMap::new(0, 4, &[4096, 4096, 5000, 7000, 9000]).unwrap();
         let place = map.at::<f64>(FixedCounts::from_counts(5));
         assert_eq!(place.friction(1e9), place.friction(4.0));
-        assert_eq!(Place::<f64>::even().friction(1e30), 1.0);
     }
 
     proptest::proptest! {

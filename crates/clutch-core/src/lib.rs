@@ -16,10 +16,12 @@
 //!
 //! No allocation, no `unsafe`, no reachable panic (a link test shows it), and the same bits on
 //! every target for one scalar type. Features: `linalg` (velocity sources that
-//! no board has: the observer, on nalgebra, and the edge-timed filter for any law).
+//! no board has: the observer, on nalgebra, and the edge-timed filter for any law), `vsqrt` (on Arm with a unit for floats, the
+//! square root by its one instruction, the only `unsafe` of the crate), `defmt`.
 //! Formatting of errors is outside of the no-panic promise: `core` formats floats.
 #![no_std]
-#![forbid(unsafe_code)]
+#![cfg_attr(not(feature = "vsqrt"), forbid(unsafe_code))]
+#![deny(unsafe_code)]
 #![cfg_attr(
     test,
     allow(

@@ -65,12 +65,6 @@ pub trait Real:
     ///
     /// Outside that range the result is not a sine.
     fn sin_cos_octant(self) -> (Self, Self);
-
-    /// Limits self to `[lo, hi]` and never panics; NaN gives `lo`.
-    #[inline]
-    fn limit(self, lo: Self, hi: Self) -> Self {
-        self.max(lo).min(hi)
-    }
 }
 
 /// Marks a path that is seldom taken: on a board a jump past it is cheaper than to compute it and select.
@@ -80,7 +74,7 @@ fn seldom() {}
 
 /// The arithmetic of a scalar, but for what its precision decides.
 macro_rules! scalar {
-    ($scalar:ident: $abs:ident $sqrt:ident $pow:ident $max:ident $min:ident) => {
+    ($scalar:ident: $abs:ident $sqrt:path, $pow:ident) => {
         type Mask = bool;
         type Limit = Limit;
         const ZERO: $scalar = 0.0;
@@ -131,19 +125,25 @@ macro_rules! scalar {
         }
         #[inline]
         fn sqrt(self) -> $scalar {
-            libm::$sqrt(self)
+            $sqrt(self)
         }
         #[inline]
         fn powf(self, n: $scalar) -> $scalar {
             libm::$pow(self, n)
         }
+        // The bits of libm's, in one comparison where the other is a number that the compiler knows.
         #[inline]
         fn max(self, other: $scalar) -> $scalar {
-            libm::$max(self, other)
+            if self >= other || other.is_nan() { self } else { other }
         }
         #[inline]
         fn min(self, other: $scalar) -> $scalar {
-            libm::$min(self, other)
+            if self < other || other.is_nan() { self } else { other }
+        }
+        #[inline]
+        fn limit(self, lo: $scalar, hi: $scalar) -> $scalar {
+            let above = if self >= lo { self } else { lo };
+            if above < hi { above } else { hi }
         }
         #[inline]
         fn is_finite(self) -> bool {
@@ -182,7 +182,7 @@ macro_rules! scalar {
 }
 
 impl Arithmetic for f64 {
-    scalar!(f64: fabs sqrt pow fmax fmin);
+    scalar!(f64: fabs libm::sqrt, pow);
 
     #[inline]
     fn splat(x: f64) -> f64 {
@@ -245,8 +245,24 @@ impl Real for f64 {
     }
 }
 
+#[cfg(not(all(feature = "vsqrt", target_arch = "arm", target_abi = "eabihf")))]
+use libm::sqrtf as root;
+
+/// The square root, rounded as IEEE 754 has it, and so as [`libm::sqrtf`] rounds it.
+#[cfg(all(feature = "vsqrt", target_arch = "arm", target_abi = "eabihf"))]
+#[allow(unsafe_code)]
+fn root(x: f32) -> f32 {
+    // A call, for rustc 1.95 lets no other assembly have a register of floats here (rust-lang/rust#159976).
+    #[unsafe(naked)]
+    extern "C" fn vsqrt(x: f32) -> f32 {
+        // By this ABI the argument and the result are in `s0`, and every core that has the ABI has the instruction.
+        core::arch::naked_asm!(".fpu fpv4-sp-d16", "vsqrt.f32 s0, s0", "bx lr")
+    }
+    vsqrt(x)
+}
+
 impl Arithmetic for f32 {
-    scalar!(f32: fabsf sqrtf powf fmaxf fminf);
+    scalar!(f32: fabsf root, powf);
 
     #[inline]
     fn splat(x: f64) -> f32 {
@@ -511,6 +527,28 @@ mod tests {
             found, guaranteed,
             "other last bits, by our own functions or by another libm than 0.2.16: docs/bits.md"
         );
+    }
+
+    #[test]
+    fn the_larger_and_the_smaller_of_two_are_those_of_libm() {
+        // A number has inherent methods of these names, which are the platform's.
+        fn limited<T: Real>(x: T, (lo, hi): (T, T)) -> [T; 2] {
+            [Arithmetic::limit(x, lo, hi), Arithmetic::min(Arithmetic::max(x, lo), hi)]
+        }
+        let values = [0.0, -0.0, 1.0, -1.0, 1e-40, f64::MAX, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
+        for (a, b) in values.into_iter().flat_map(|a| values.map(|b| (a, b))) {
+            assert_eq!(Arithmetic::max(a, b).to_bits(), libm::fmax(a, b).to_bits(), "{a}, {b}");
+            assert_eq!(Arithmetic::min(a, b).to_bits(), libm::fmin(a, b).to_bits(), "{a}, {b}");
+            let (c, d) = (a as f32, b as f32);
+            assert_eq!(Arithmetic::max(c, d).to_bits(), libm::fmaxf(c, d).to_bits(), "{c}, {d} in f32");
+            assert_eq!(Arithmetic::min(c, d).to_bits(), libm::fminf(c, d).to_bits(), "{c}, {d} in f32");
+            for x in values.into_iter().filter(|_| a <= b) {
+                let [limit, both] = limited(x, (a, b)).map(f64::to_bits);
+                assert_eq!(limit, both, "{x} in [{a}, {b}]");
+                let [limit, both] = limited(x as f32, (c, d)).map(f32::to_bits);
+                assert_eq!(limit, both, "{x} in [{c}, {d}] in f32");
+            }
+        }
     }
 
     #[test]

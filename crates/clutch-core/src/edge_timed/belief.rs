@@ -37,14 +37,32 @@ pub(crate) struct Surprise<T> {
     pub(crate) variance: T,
 }
 
-/// Means and covariance of position `t`, velocity `w`, mean friction `h`, ripple `r` and its slope `s`.
+/// Means of position and velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Belief<T> {
+pub(super) struct Motion<T> {
     pub(super) position: T,
     pub(super) velocity: T,
+}
+
+/// Mean friction `h`, ripple `r` and its slope `s`: means and covariance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Friction<T> {
     pub(super) mean: T,
     pub(super) ripple: T,
     pub(super) slope: T,
+    pub(super) hh: T,
+    pub(super) hr: T,
+    pub(super) hs: T,
+    pub(super) rr: T,
+    pub(super) rs: T,
+    pub(super) ss: T,
+}
+
+/// Means and covariance of position `t`, velocity `w`, and friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Belief<T> {
+    pub(super) motion: Motion<T>,
+    pub(super) friction: Friction<T>,
     pub(super) tt: T,
     pub(super) tw: T,
     pub(super) th: T,
@@ -54,34 +72,16 @@ pub(super) struct Belief<T> {
     pub(super) wh: T,
     pub(super) wr: T,
     pub(super) ws: T,
-    pub(super) hh: T,
-    pub(super) hr: T,
-    pub(super) hs: T,
-    pub(super) rr: T,
-    pub(super) rs: T,
-    pub(super) ss: T,
 }
 
-impl<T: Real> Belief<T> {
-    /// Friction at the pad: `h + r`, never so small that a voltage for a torque is without bounds.
-    #[inline]
-    pub(super) fn friction(&self) -> T {
-        (self.mean + self.ripple).max(T::splat(0.05))
-    }
-
-    /// Its variance.
-    #[inline]
-    pub(super) fn friction_variance(&self) -> T {
-        (self.hh + (self.hr + self.hr) + self.rr).max(T::ZERO)
-    }
-
-    /// One period without covariances: the way, counts, the acceleration, and the velocity that the shaft lacks to
-    /// have gone on, 0 if it goes on.
-    #[inline(never)]
-    pub(super) fn glide(&mut self, shaft: &Shaft<T>, pull: T, load: T) -> (T, T, T) {
+impl<T: Real> Motion<T> {
+    /// One period without covariances, with a friction at the pad: the way, counts, the acceleration, and the velocity that
+    /// the shaft lacks to have gone on, 0 if it goes on.
+    #[inline(always)] // in two places, which have the sign, and go on with the way
+    pub(super) fn glide(&mut self, shaft: &Shaft<T>, pull: T, load: T, friction: T) -> (T, T, T) {
         let half = T::splat(0.5);
         let sign = self.direction(pull);
-        let acceleration = pull - shaft.damping * self.velocity - sign * load * self.friction();
+        let acceleration = pull - shaft.damping * self.velocity - sign * load * friction;
         let next = self.velocity + acceleration;
         let lacks = (-(next * sign)).max(T::ZERO);
         let way = if lacks > T::ZERO {
@@ -101,14 +101,45 @@ impl<T: Real> Belief<T> {
     fn direction(&self, pull: T) -> T {
         if self.velocity == T::ZERO { pull.sgn() } else { self.velocity.sgn() }
     }
+}
 
+/// Friction at the pad, `h + r`, never so small that a voltage for a torque is without bounds.
+#[inline]
+pub(super) fn at_pad<T: Real>(mean: T, ripple: T) -> T {
+    (mean + ripple).max(T::splat(0.05))
+}
+
+impl<T: Real> Friction<T> {
+    /// Friction at the pad.
+    #[inline]
+    pub(super) fn level(&self) -> T {
+        at_pad(self.mean, self.ripple)
+    }
+
+    /// Its variance.
+    #[inline]
+    pub(super) fn variance(&self) -> T {
+        (self.hh + (self.hr + self.hr) + self.rr).max(T::ZERO)
+    }
+
+    /// Friction here is `level`, with a standard deviation; the mean stays.
+    pub(super) fn know(&mut self, level: T, deviation: T) {
+        self.ripple = level - self.mean;
+        self.slope = T::ZERO;
+        (self.hr, self.rs) = (T::ZERO, T::ZERO);
+        self.rr = deviation * deviation;
+    }
+}
+
+impl<T: Real> Belief<T> {
     /// One period: the way, counts. `fall`: what the load loses per count per period, with friction as the model has
     /// it. `moves`: the shaft is known to move.
     #[inline(never)]
     pub(super) fn advance(&mut self, shaft: &Shaft<T>, pull: T, (load, fall): (T, T), moves: bool) -> T {
-        let sign = self.direction(pull);
-        let fall = fall * self.friction();
-        let (way, acceleration, lacks) = self.glide(shaft, pull, load);
+        let sign = self.motion.direction(pull);
+        let friction = self.friction.level();
+        let (way, acceleration, lacks) = self.motion.glide(shaft, pull, load, friction);
+        let fall = fall * friction;
         self.spread(shaft, -(sign * load), acceleration, fall);
         if moves && lacks > T::ZERO {
             self.keep_moving(sign, lacks);
@@ -123,7 +154,7 @@ impl<T: Real> Belief<T> {
         let deviation = self.ww.sqrt();
         if deviation > T::ZERO {
             let (lambda, _) = cut_off(-lacks / deviation);
-            self.velocity = -(sign * lacks);
+            self.motion.velocity = -(sign * lacks);
             let column = [self.tw, self.ww, self.wh, self.wr, self.ws];
             // This cuts the means alone: a period in which it went on is no measurement, and a thousand of them are not a
             // thousand.
@@ -137,7 +168,8 @@ impl<T: Real> Belief<T> {
         let keep = T::ONE - shaft.damping + fall;
         // Covariances with the friction h + r.
         let (nt, nw) = (self.th + self.tr, self.wh + self.wr);
-        let (nh, nr, ns) = (self.hh + self.hr, self.hr + self.rr, self.hs + self.rs);
+        let f = &self.friction;
+        let (nh, nr, ns) = (f.hh + f.hr, f.hr + f.rr, f.hs + f.rs);
         let nf = nh + nr;
         let off = shaft.gain_doubt * acceleration;
         let tt = self.tt + (self.tw + self.tw) + self.ww + b * (nt + nw) + half_b * half_b * nf;
@@ -159,21 +191,22 @@ impl<T: Real> Belief<T> {
         let far = way.abs();
         let b = -(way * shaft.stiffness);
         let d = T::ONE - far * shaft.decay;
-        self.slope = b * self.ripple + d * self.slope;
-        self.ripple += way * self.slope;
         self.ts = b * self.tr + d * self.ts;
         self.tr += way * self.ts;
         self.ws = b * self.wr + d * self.ws;
         self.wr += way * self.ws;
-        self.hs = b * self.hr + d * self.hs;
-        self.hr += way * self.hs;
-        let (sr, s) = (b * self.rr + d * self.rs, b * self.rs + d * self.ss);
+        let f = &mut self.friction;
+        f.slope = b * f.ripple + d * f.slope;
+        f.ripple += way * f.slope;
+        f.hs = b * f.hr + d * f.hs;
+        f.hr += way * f.hs;
+        let (sr, s) = (b * f.rr + d * f.rs, b * f.rs + d * f.ss);
         let ss = b * sr + d * s;
         let rs = sr + way * ss;
-        self.rr += way * (sr + rs);
-        self.rs = rs;
+        f.rr += way * (sr + rs);
+        f.rs = rs;
         // Ripple is a share of friction: what is believed of the one goes for the other.
-        self.ss = ss + shaft.roughness * far * (self.mean * self.mean);
+        f.ss = ss + shaft.roughness * far * (f.mean * f.mean);
     }
 
     /// Takes a measurement of one of the means, whose covariances with all are `column`: innovation `y`, its variance
@@ -183,12 +216,13 @@ impl<T: Real> Belief<T> {
         let gain = T::ONE / s;
         let [t, w, h, r, slope] = column;
         let step = gain * y;
-        self.position += t * step;
-        self.velocity += w * step;
-        self.mean = (self.mean + h * step).limit(T::splat(0.1), T::splat(10.0));
-        let most = T::splat(0.6) * self.mean;
-        self.ripple = (self.ripple + r * step).limit(-most, most);
-        self.slope += slope * step;
+        self.motion.position += t * step;
+        self.motion.velocity += w * step;
+        let f = &mut self.friction;
+        f.mean = (f.mean + h * step).limit(T::splat(0.1), T::splat(10.0));
+        let most = T::splat(0.6) * f.mean;
+        f.ripple = (f.ripple + r * step).limit(-most, most);
+        f.slope += slope * step;
         let gone = gain * share;
         let (kt, kw, kh, kr, ks) = (t * gone, w * gone, h * gone, r * gone, slope * gone);
         self.tt -= kt * t;
@@ -200,14 +234,14 @@ impl<T: Real> Belief<T> {
         self.wh -= kw * h;
         self.wr -= kw * r;
         self.ws -= kw * slope;
-        self.hh -= kh * h;
-        self.hr -= kh * r;
-        self.hs -= kh * slope;
-        self.rr -= kr * r;
-        self.rs -= kr * slope;
-        self.ss -= ks * slope;
+        f.hh -= kh * h;
+        f.hr -= kh * r;
+        f.hs -= kh * slope;
+        f.rr -= kr * r;
+        f.rs -= kr * slope;
+        f.ss -= ks * slope;
         // Rounding would make a variance negative that is all but gone.
-        for variance in [&mut self.tt, &mut self.ww, &mut self.hh, &mut self.rr, &mut self.ss] {
+        for variance in [&mut self.tt, &mut self.ww, &mut f.hh, &mut f.rr, &mut f.ss] {
             *variance = variance.max(T::ZERO);
         }
     }
@@ -220,7 +254,7 @@ impl<T: Real> Belief<T> {
     /// beyond what is believed widens the belief first.
     #[inline(never)]
     pub(super) fn correct(&mut self, measured: T, variance: T) -> Surprise<T> {
-        let y = measured - self.position;
+        let y = measured - self.motion.position;
         let surprise = Surprise { square: y * y, variance: self.tt + variance };
         if y * y > T::splat(25.0) * (self.tt + variance) {
             self.tt += y * y;
@@ -235,7 +269,7 @@ impl<T: Real> Belief<T> {
     #[inline(never)]
     pub(super) fn keep_within(&mut self, end: T, side: T, blur: T) {
         let s = self.tt + blur;
-        let away = side * (end - self.position);
+        let away = side * (end - self.motion.position);
         // So far away that nothing is cut off.
         if away > T::ZERO && away * away > T::splat(3.5 * 3.5) * s {
             return;
@@ -248,25 +282,18 @@ impl<T: Real> Belief<T> {
 
     /// The shaft rests somewhere in its count.
     pub(super) fn rest(&mut self) {
-        self.position = T::splat(0.5);
-        self.velocity = T::ZERO;
+        self.motion.position = T::splat(0.5);
+        self.motion.velocity = T::ZERO;
         (self.th, self.tr, self.ts) = (T::ZERO, T::ZERO, T::ZERO);
         (self.tw, self.ww, self.wh, self.wr, self.ws) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO, T::ZERO);
         self.tt = T::ONE / T::from_i32(12);
     }
 
-    /// Friction here is `friction`, with a standard deviation; the mean stays.
-    pub(super) fn know_friction(&mut self, friction: T, deviation: T) {
-        self.ripple = friction - self.mean;
-        self.slope = T::ZERO;
-        (self.tr, self.wr, self.hr, self.rs) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
-        self.rr = deviation * deviation;
-    }
-
     /// `true` while every mean, and the variance that divides, is a number.
     pub(super) fn is_finite(&self) -> bool {
-        let means = self.position + self.velocity + (self.mean + self.ripple + self.slope);
-        let variances = self.tt + self.ww + (self.hh + self.rr + self.ss);
+        let (motion, f) = (&self.motion, &self.friction);
+        let means = motion.position + motion.velocity + (f.mean + f.ripple + f.slope);
+        let variances = self.tt + self.ww + (f.hh + f.rr + f.ss);
         means.is_finite() && variances.is_finite() && self.tt >= T::ZERO
     }
 }

@@ -99,39 +99,60 @@ impl<T: Real> BesideMap<T> {
     pub(crate) fn driving<'s>(
         &self,
         state: &'s BesideMapState<T>,
-    ) -> (&EdgeTimed<T>, &'s EdgeTimedState<T>, Place<T>) {
+    ) -> (&EdgeTimed<T>, &'s EdgeTimedState<T>, Option<&'s Place<T>>) {
         if state.map_drives() {
-            (&self.mapped, &state.mapped, state.place)
+            (&self.mapped, &state.mapped, Some(&state.place))
         } else {
-            (&self.plain, &state.plain, Place::even())
+            (&self.plain, &state.plain, None)
         }
     }
 
     /// As [`EdgeTimed::start`].
     pub(crate) fn start(&self, position: FixedCounts, applied: T, target_velocity: T) -> BesideMapState<T> {
-        let plain = self.plain.start(position, applied, target_velocity);
-        BesideMapState { plain, ..BesideMapState::default() }
+        let mut state = BesideMapState::default();
+        self.plain.start_in(&mut state.plain, position, applied, target_velocity);
+        state
+    }
+
+    /// As [`BesideMap::start`], in its place.
+    #[inline(never)] // of a name, for a board's bound
+    pub(crate) fn start_in(
+        &self,
+        state: &mut BesideMapState<T>,
+        position: FixedCounts,
+        applied: T,
+        target_velocity: T,
+    ) {
+        self.plain.start_in(&mut state.plain, position, applied, target_velocity);
+        // What is of the map is written when that begins.
+        (state.place, state.part) = (Place::default(), T::splat(NONE));
     }
 
     /// As [`EdgeTimed::let_go`], of both.
     pub(crate) fn let_go(&self, state: &mut BesideMapState<T>, target_velocity: T) {
         self.plain.let_go(&mut state.plain, target_velocity);
         if state.map_counts() {
-            self.mapped.let_go(&mut state.mapped, target_velocity);
+            self.let_go_mapped(state, target_velocity);
         }
+    }
+
+    #[cold]
+    #[inline(never)] // of a name, for a board has no map
+    fn let_go_mapped(&self, state: &mut BesideMapState<T>, target_velocity: T) {
+        self.mapped.let_go(&mut state.mapped, target_velocity);
     }
 
     /// As [`EdgeTimed::stand_aside`], of both.
     pub(crate) fn stand_aside(
         &self,
         state: &mut BesideMapState<T>,
-        (position, place): (FixedCounts, Place<T>),
+        (position, place): (FixedCounts, &Place<T>),
         applied: T,
     ) -> T {
         let begins = Self::look(state, place);
         let moved = self.plain.stand_aside(&mut state.plain, position, applied);
         if begins {
-            state.mapped = self.mapped.known_from(&state.plain, &place);
+            self.begin_mapped(state, place);
         } else if state.map_counts() {
             self.mapped.stand_aside(&mut state.mapped, position, applied);
         }
@@ -142,9 +163,15 @@ impl<T: Real> BesideMap<T> {
     pub(crate) fn take_over(&self, state: &mut BesideMapState<T>, position: T, friction: T) {
         self.plain.take_over(&mut state.plain, position, friction);
         if state.map_counts() {
-            let mean = friction / state.place.friction(position);
-            self.mapped.take_over(&mut state.mapped, position, mean);
+            self.take_over_mapped(state, position, friction);
         }
+    }
+
+    #[cold]
+    #[inline(never)] // likewise
+    fn take_over_mapped(&self, state: &mut BesideMapState<T>, position: T, friction: T) {
+        let mean = friction / state.place.friction(position);
+        self.mapped.take_over(&mut state.mapped, position, mean);
     }
 
     /// As [`EdgeTimed::update`], of both; `place`: friction around the shaft, by the map.
@@ -152,34 +179,43 @@ impl<T: Real> BesideMap<T> {
     pub(crate) fn update(
         &self,
         state: &mut BesideMapState<T>,
-        (position, place): (FixedCounts, Place<T>),
+        (position, place): (FixedCounts, &Place<T>),
         applied: T,
         target_velocity: T,
     ) {
         let begins = Self::look(state, place);
         self.plain.update(&mut state.plain, position, applied, target_velocity);
         if begins {
-            state.mapped = self.mapped.known_from(&state.plain, &place);
+            self.begin_mapped(state, place);
         } else if state.map_counts() {
             self.update_mapped(state, position, applied, target_velocity);
         }
     }
 
     /// Looks up the map around the shaft, where it may have an end; `true` if it begins here.
-    fn look(state: &mut BesideMapState<T>, place: Place<T>) -> bool {
-        let dropped = state.part == T::splat(DROPPED);
-        let begins = place.is_known() && state.part == T::splat(NONE);
-        state.place = place;
+    fn look(state: &mut BesideMapState<T>, place: &Place<T>) -> bool {
+        if !place.is_known() {
+            if state.map_counts() {
+                state.part = T::splat(NONE);
+            }
+            return false;
+        }
+        state.place = *place;
+        let begins = state.part == T::splat(NONE);
         if begins {
             state.part = T::splat(TRIED);
             (state.edges, state.evidence) = (T::ZERO, T::ZERO);
-        } else if !place.is_known() && !dropped {
-            state.part = T::splat(NONE);
         }
         begins
     }
 
-    #[inline(never)] // likewise: a board has no map
+    #[cold]
+    #[inline(never)] // likewise
+    fn begin_mapped(&self, state: &mut BesideMapState<T>, place: &Place<T>) {
+        state.mapped = self.mapped.known_from(&state.plain, place);
+    }
+
+    #[inline(never)] // likewise
     fn update_mapped(
         &self,
         state: &mut BesideMapState<T>,
@@ -187,7 +223,7 @@ impl<T: Real> BesideMap<T> {
         applied: T,
         target_velocity: T,
     ) {
-        self.mapped.update_on(&mut state.mapped, position, applied, target_velocity, &state.place);
+        self.mapped.update_on(&mut state.mapped, position, applied, target_velocity, Some(&state.place));
         let (plain, mapped) = (state.plain.surprise(), state.mapped.surprise());
         if plain.variance > T::ZERO && mapped.variance > T::ZERO {
             let says =
@@ -255,7 +291,7 @@ mod tests {
             let place =
                 map.map_or_else(Place::default, |points| FrictionMap::new(0, 4, points).unwrap().at(read));
             let applied = T::from_f64(volts / disc(counts - 0.5 * pace));
-            f.update(&mut state, (read, place), applied, rate);
+            f.update(&mut state, (read, &place), applied, rate);
             states.push(state);
         }
         states
@@ -267,7 +303,7 @@ mod tests {
         let half = &states[states.len() / 2..];
         let squares = half.iter().map(|state| {
             let (filter, belief, place) = f.driving(state);
-            let ahead = filter.ahead_on(belief, &place);
+            let ahead = filter.ahead_on(belief, place);
             let counts = belief.counts as f64 + ahead.position.to_f64();
             let error = ahead.friction.to_f64() / disc(counts + 0.5 * ahead.velocity.to_f64()) - 1.0;
             error * error
@@ -315,7 +351,7 @@ mod tests {
         let points = points(0.0);
         let read = FixedCounts::from_counts(200);
         let place = FrictionMap::new(0, 4, &points).unwrap().at(read);
-        f.update(&mut state, (read, place), 2.0, 0.035);
+        f.update(&mut state, (read, &place), 2.0, 0.035);
         assert_eq!(state.part(), TRIED);
     }
 
@@ -326,9 +362,9 @@ mod tests {
         let state = ride::<f64>(Some(&points), 1500)[1499];
         let told = |counts: i64| {
             let (mut state, read) = (state, FixedCounts::from_counts(counts));
-            f.update(&mut state, (read, map.at(read)), 2.2, 0.035);
+            f.update(&mut state, (read, &map.at(read)), 2.2, 0.035);
             let (filter, belief, place) = f.driving(&state);
-            filter.ahead_on(belief, &place).friction
+            filter.ahead_on(belief, place).friction
         };
         let counts = state.mapped.counts;
         let (still, back) = (told(counts), told(counts - 1));
@@ -342,7 +378,7 @@ mod tests {
         let read = FixedCounts::from_counts(state.plain.counts);
         let place = FrictionMap::new(0, 4, &points).unwrap().at(read);
         for _ in 0..60 {
-            f.update(&mut state, (read, place), 4.0, 0.035);
+            f.update(&mut state, (read, &place), 4.0, 0.035);
         }
         assert!(state.plain.rests() && state.mapped.rests());
         f.let_go(&mut state, 0.035);

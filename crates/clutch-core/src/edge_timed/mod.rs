@@ -23,7 +23,7 @@ mod beside_map;
 use crate::friction::{FrictionModel, Stribeck};
 use crate::params::{Range, Table};
 use crate::{Actuator, ActuatorKind, Encoder, FixedCounts, Micros, ParamError, Place, Plant, Real};
-use belief::{Belief, Shaft, Surprise};
+use belief::{Belief, Friction, Shaft, Surprise, at_pad};
 pub(crate) use beside_map::{BesideMap, BesideMapState};
 
 crate::params! {
@@ -84,6 +84,7 @@ pub struct EdgeTimed<T> {
     drive_torque: T,
     /// Acceleration of a torque, counts per period² and N m.
     per_torque: T,
+    brake: Option<Brake<T>>,
     counts_per_radian: T,
     radians_per_count: T,
     /// Counts per period of 1 rad/s, and one over it.
@@ -105,6 +106,15 @@ pub struct EdgeTimed<T> {
     blur: T,
 }
 
+/// What a brake does to the shaft, counts per period²: the pull of the drive, and the load of the pad per volt and
+/// without one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Brake<T> {
+    pull: T,
+    gain: T,
+    preload: T,
+}
+
 /// Motion, as far as the filter knows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)] // a board copies a state without bytes of its own by words
@@ -122,8 +132,8 @@ enum Phase {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EdgeTimedState<T> {
     belief: Belief<T>,
-    /// The belief at the last edge.
-    at_edge: Belief<T>,
+    /// What was believed of friction at the last edge.
+    at_edge: Friction<T>,
     /// Whole counts of the last sample; of a brake's shaft, before a single count back.
     counts: i64,
     /// Position above them, for a sensor finer than a count.
@@ -166,7 +176,7 @@ impl<T: Real> EdgeTimedState<T> {
 
     /// Friction, as a multiple of the model's, and its variance.
     pub(crate) fn friction(&self) -> (T, T) {
-        (self.belief.friction(), self.belief.friction_variance())
+        (self.belief.friction.level(), self.belief.friction.variance())
     }
 
     /// Distance of the last period's edge from where it was foreseen; no variance without one that a sliding shaft crossed.
@@ -177,7 +187,7 @@ impl<T: Real> EdgeTimedState<T> {
     /// Velocity, counts per period.
     #[must_use]
     pub fn velocity(&self) -> T {
-        self.belief.velocity
+        self.belief.motion.velocity
     }
 
     /// Position of the sensor above the lower edge of its count, counts: 0 for an encoder, and −1 where that has come
@@ -203,6 +213,12 @@ pub struct Ahead<T> {
     pub pad: T,
 }
 
+/// Friction so many counts above the edge, over its mean: of a map, if there is one.
+#[inline]
+pub(crate) fn friction_at<T: Real>(place: Option<&Place<T>>, counts: T) -> T {
+    place.map_or(T::ONE, |place| place.friction(counts))
+}
+
 impl<T: Real> EdgeTimed<T> {
     /// Checks the parameters. Drive torque, inertia, damping and actuator are those of `plant`, its friction the first
     /// guess.
@@ -226,6 +242,14 @@ impl<T: Real> EdgeTimed<T> {
         let wave = p.waves * radians_per_count;
         let decay = (p.ripple_damping + p.ripple_damping) * wave;
         let walk = p.walk * seconds.sqrt() * seconds / radians_per_count;
+        let (actuator, mu) = (*plant.actuator(), plant.friction().sliding());
+        let per_torque = seconds * seconds / (model.inertia * radians_per_count);
+        let pressed = mu * per_torque;
+        let brake = Brake {
+            pull: model.drive_torque * per_torque,
+            gain: pressed * actuator.brake_gain(),
+            preload: pressed * actuator.preload(),
+        };
         Ok(EdgeTimed {
             shaft: Shaft {
                 damping: model.viscous_damping * seconds / model.inertia,
@@ -236,12 +260,13 @@ impl<T: Real> EdgeTimed<T> {
                 // With it the wave's variance stays what it is.
                 roughness: (decay + decay) * (wave * wave) * (p.ripple * p.ripple),
             },
-            actuator: *plant.actuator(),
+            actuator,
             curve: plant.friction().quick(),
             drive_torque: model.drive_torque,
-            per_torque: seconds * seconds / (model.inertia * radians_per_count),
-            mu: plant.friction().sliding(),
-            per_mu: T::ONE / plant.friction().sliding(),
+            per_torque,
+            brake: (actuator.kind() == ActuatorKind::Brake).then_some(brake),
+            mu,
+            per_mu: T::ONE / mu,
             counts_per_radian: encoder.counts_per_radian(),
             radians_per_count,
             per_rad_per_s: seconds / radians_per_count,
@@ -296,22 +321,37 @@ impl<T: Real> EdgeTimed<T> {
     /// The state for a shaft at `position`, with `applied` volts on the actuator since long. Nobody knows whether it
     /// rests or moves with the path, at `target_velocity`, rad/s.
     #[must_use]
-    #[inline(never)]
     pub fn start(&self, position: FixedCounts, applied: T, target_velocity: T) -> EdgeTimedState<T> {
-        let mut belief = Belief { mean: T::ONE, ..Belief::default() };
+        let mut state = EdgeTimedState::default();
+        self.start_in(&mut state, position, applied, target_velocity);
+        state
+    }
+
+    /// As [`EdgeTimed::start`], in its place: no second state is on the stack of a board, and none is copied.
+    #[inline(never)]
+    pub(crate) fn start_in(
+        &self,
+        state: &mut EdgeTimedState<T>,
+        position: FixedCounts,
+        applied: T,
+        target_velocity: T,
+    ) {
+        *state = EdgeTimedState::default();
+        let belief = &mut state.belief;
         belief.rest();
         let pace = self.per_period(target_velocity);
         // A target that is not a number, or beyond measure, is none that it moves with.
         belief.ww = if pace.abs() < T::splat(1e6) { pace * pace } else { T::ZERO };
-        belief.hh = self.doubt * self.doubt;
-        belief.rr = self.ripple * self.ripple;
-        belief.ss = belief.rr * self.wave * self.wave;
-        let counts = position.0 >> FixedCounts::FRACTION_BITS;
-        let mut state = EdgeTimedState { belief, at_edge: belief, counts, ..EdgeTimedState::default() };
+        let friction = &mut belief.friction;
+        friction.mean = T::ONE;
+        friction.hh = self.doubt * self.doubt;
+        friction.rr = self.ripple * self.ripple;
+        friction.ss = friction.rr * self.wave * self.wave;
+        state.at_edge = *friction;
+        state.counts = position.0 >> FixedCounts::FRACTION_BITS;
         state.line = [applied; 3];
         state.pad = applied;
-        self.place(&mut state, position);
-        state
+        self.place(state, position);
     }
 
     /// Lets a resting shaft go: for as many periods as the drive takes to bring it to the path's velocity, rad/s, and
@@ -320,6 +360,7 @@ impl<T: Real> EdgeTimed<T> {
     ///
     /// A brake lets go until an edge comes, after two starts in a row that brought none: no shaft falls for longer than a
     /// count, so that a fall of which nothing comes is a broken encoder, which a supervisor then sees.
+    #[inline(never)] // seldom, and of two filters
     pub fn let_go(&self, state: &mut EdgeTimedState<T>, target_velocity: T) {
         let pull = self.forces(T::ZERO).0.abs().max(T::splat(1e-6));
         let needed = if state.unmoved >= T::splat(2.0) && self.actuator.kind() == ActuatorKind::Brake {
@@ -338,36 +379,35 @@ impl<T: Real> EdgeTimed<T> {
     #[must_use]
     #[inline(never)]
     pub fn ahead(&self, state: &EdgeTimedState<T>) -> Ahead<T> {
-        self.ahead_on(state, &Place::even())
+        self.ahead_on(state, None)
     }
 
     /// As [`EdgeTimed::ahead`], where friction is known beside its mean.
     #[inline(never)]
-    pub(crate) fn ahead_on(&self, state: &EdgeTimedState<T>, place: &Place<T>) -> Ahead<T> {
-        let mut belief = state.belief;
+    pub(crate) fn ahead_on(&self, state: &EdgeTimedState<T>, place: Option<&Place<T>>) -> Ahead<T> {
+        let friction = &state.belief.friction;
+        let (mut motion, mut ripple) = (state.belief.motion, friction.ripple);
         let back = Self::back(state);
         let mut pad = state.pad;
-        let [newest, middle, oldest] = state.line;
         // The voltages on their way, the oldest first.
-        for (left, arrived) in [(3, oldest), (2, middle), (1, newest)] {
-            if left <= self.delay {
-                let (volts, end) = self.at_pad(pad, arrived);
-                pad = end;
-                let (pull, load) = self.forces(volts);
-                let load = load * place.friction(belief.position + back) * self.shape(belief.velocity);
-                let (way, ..) = belief.glide(&self.shaft, pull, load);
-                belief.ripple += way * belief.slope;
-            }
+        let line = state.line.get(..self.delay as usize).unwrap_or(&state.line);
+        for arrived in line.iter().rev() {
+            let (volts, end) = self.at_pad(pad, *arrived);
+            pad = end;
+            let (pull, load) = self.forces(volts);
+            let load = load * friction_at(place, motion.position + back) * self.shape(motion.velocity);
+            let (way, ..) = motion.glide(&self.shaft, pull, load, at_pad(friction.mean, ripple));
+            ripple += way * friction.slope;
         }
         // In the middle of the period.
-        let way = T::splat(0.5) * belief.velocity;
-        belief.ripple += way * belief.slope;
-        let here = place.friction(belief.position + way + back);
+        let way = T::splat(0.5) * motion.velocity;
+        ripple += way * friction.slope;
+        let here = friction_at(place, motion.position + way + back);
         Ahead {
-            position: belief.position,
-            velocity: belief.velocity,
-            friction: belief.friction() * here,
-            variance: belief.friction_variance() * (here * here),
+            position: motion.position,
+            velocity: motion.velocity,
+            friction: at_pad(friction.mean, ripple) * here,
+            variance: friction.variance() * (here * here),
             pad,
         }
     }
@@ -416,21 +456,38 @@ impl<T: Real> EdgeTimed<T> {
     }
 
     /// Pull of drive and motor, and load of the pad, at a voltage there, counts per period².
-    #[inline(never)]
+    #[inline]
     pub(crate) fn forces(&self, volts: T) -> (T, T) {
+        match &self.brake {
+            // The same numbers, of which most stay.
+            Some(brake) => (brake.pull, brake.gain * volts.max(T::ZERO) + brake.preload),
+            None => self.forces_of_motor(volts),
+        }
+    }
+
+    #[inline(never)]
+    fn forces_of_motor(&self, volts: T) -> (T, T) {
         let pull = (self.drive_torque + self.actuator.torque(volts)) * self.per_torque;
         (pull, self.actuator.friction(self.mu * self.per_torque, volts))
     }
 
     /// Friction at a velocity, counts per period, as a multiple of that of a fast shaft, where the model's curve is
     /// Stribeck's with the exponent 1; else 1.
+    #[inline]
     #[must_use]
-    #[inline(never)] // asked for in several places: a board needs the code once
     pub fn shape(&self, velocity: T) -> T {
         match &self.curve {
-            Some(curve) => curve.quick_level(self.rad_per_s(velocity)) * self.per_mu,
+            Some(curve) if !curve.quick_has_vanished(self.rad_per_s(velocity)) => {
+                self.falling_shape(curve, velocity)
+            }
+            Some(_) => self.mu * self.per_mu,
             None => T::ONE,
         }
+    }
+
+    #[inline(never)] // asked for in several places: a board needs the code once
+    fn falling_shape(&self, curve: &Stribeck<T>, velocity: T) -> T {
+        curve.quick_level(self.rad_per_s(velocity)) * self.per_mu
     }
 
     /// The shape, and what it loses per count per period: a shaft that gains speed loses friction. One that is
@@ -438,7 +495,8 @@ impl<T: Real> EdgeTimed<T> {
     fn shape_and_fall(&self, velocity: T) -> (T, T) {
         let shape = self.shape(velocity);
         // The curve falls no more where it has ended.
-        if velocity == T::ZERO || shape == T::ONE {
+        let ended = |curve: &Stribeck<T>| curve.quick_has_vanished(self.rad_per_s(velocity));
+        if velocity == T::ZERO || self.curve.as_ref().is_none_or(ended) {
             return (shape, T::ZERO);
         }
         let step = T::splat(0.01);
@@ -478,15 +536,15 @@ impl<T: Real> EdgeTimed<T> {
     pub(crate) fn take_over(&self, state: &mut EdgeTimedState<T>, position: T, friction: T) {
         let belief = &mut state.belief;
         belief.rest();
-        let share = belief.hh / (belief.hh + T::splat(0.2 * 0.2));
-        belief.mean += share * (friction - belief.mean);
-        belief.hh = belief.hh * (T::ONE - share);
-        (belief.hr, belief.hs) = (T::ZERO, T::ZERO);
-        belief.position = position;
+        let share = belief.friction.hh / (belief.friction.hh + T::splat(0.2 * 0.2));
+        belief.friction.mean += share * (friction - belief.friction.mean);
+        belief.friction.hh = belief.friction.hh * (T::ONE - share);
+        (belief.friction.hr, belief.friction.hs) = (T::ZERO, T::ZERO);
+        belief.motion.position = position;
         // Known to the way of a step or two.
         belief.tt = T::splat(0.02);
-        belief.know_friction(belief.mean, self.ripple * belief.mean);
-        state.at_edge = state.belief;
+        belief.friction.know(belief.friction.mean, self.ripple * belief.friction.mean);
+        state.at_edge = state.belief.friction;
         state.silent = T::ZERO;
         state.release = T::ZERO;
         state.phase = Phase::Resting;
@@ -495,21 +553,23 @@ impl<T: Real> EdgeTimed<T> {
     /// The state of a filter that knows friction along the disc but for its mean, where `other` knows nothing of the disc.
     pub(crate) fn known_from(&self, other: &EdgeTimedState<T>, place: &Place<T>) -> EdgeTimedState<T> {
         let mut state = *other;
-        let friction = other.belief.friction() / place.friction(other.belief.position);
-        for belief in [&mut state.belief, &mut state.at_edge] {
-            belief.hh += belief.rr;
-            belief.mean = friction;
-            (belief.th, belief.wh, belief.hr, belief.hs) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
-            belief.know_friction(friction, self.ripple * friction);
-            (belief.ts, belief.ws) = (T::ZERO, T::ZERO);
-            belief.ss = belief.rr * self.wave * self.wave;
+        let friction = other.belief.friction.level() / place.friction(other.belief.motion.position);
+        for known in [&mut state.belief.friction, &mut state.at_edge] {
+            known.hh += known.rr;
+            known.mean = friction;
+            known.hs = T::ZERO;
+            known.know(friction, self.ripple * friction);
+            known.ss = known.rr * self.wave * self.wave;
         }
+        let belief = &mut state.belief;
+        (belief.th, belief.tr, belief.ts) = (T::ZERO, T::ZERO, T::ZERO);
+        (belief.wh, belief.wr, belief.ws) = (T::ZERO, T::ZERO, T::ZERO);
         state
     }
 
     /// One sample: the position now, the voltage that the converter gave since the last sample, and the path's
     /// velocity, rad/s.
-    #[inline(never)]
+    #[inline]
     pub fn update(
         &self,
         state: &mut EdgeTimedState<T>,
@@ -517,7 +577,7 @@ impl<T: Real> EdgeTimed<T> {
         applied: T,
         target_velocity: T,
     ) {
-        self.update_on(state, position, applied, target_velocity, &Place::even());
+        self.update_on(state, position, applied, target_velocity, None);
     }
 
     /// As [`EdgeTimed::update`], where friction is known beside its mean: around the count of this sample.
@@ -528,19 +588,19 @@ impl<T: Real> EdgeTimed<T> {
         position: FixedCounts,
         applied: T,
         target_velocity: T,
-        place: &Place<T>,
+        place: Option<&Place<T>>,
     ) {
         let (moved, volts) = self.hear(state, position, applied);
         state.surprise = Surprise::default();
         let (pull, load) = self.forces(volts);
         // In the middle of the period that has passed, above the edge of this sample's count.
         let belief = &state.belief;
-        let here = belief.position + T::splat(0.5) * belief.velocity - moved;
-        let load = load * place.friction(here + Self::back(state));
+        let here = belief.motion.position + T::splat(0.5) * belief.motion.velocity - moved;
+        let load = load * friction_at(place, here + Self::back(state));
         let way = match state.phase {
             Phase::Resting => T::ZERO,
             Phase::Starting | Phase::Sliding => {
-                let (shape, fall) = self.shape_and_fall(state.belief.velocity);
+                let (shape, fall) = self.shape_and_fall(state.belief.motion.velocity);
                 let fall = (load * fall).min(T::splat(FASTEST_FALL));
                 let moves = state.phase == Phase::Sliding;
                 state.belief.advance(&self.shaft, pull, (load * shape, fall), moves)
@@ -552,32 +612,25 @@ impl<T: Real> EdgeTimed<T> {
             state.silent += T::ONE;
             // It says nothing about where a shaft rests.
             if state.phase != Phase::Resting {
-                let backward = state.belief.velocity < T::ZERO;
+                let backward = state.belief.motion.velocity < T::ZERO;
                 let (end, side) = if backward { (T::ZERO, -T::ONE) } else { (T::ONE, T::ONE) };
                 state.belief.keep_within(end, side, self.blur);
             }
         }
         // A brake that only resists turns no shaft round.
         if !self.actuator.kind().two_sided() {
-            state.belief.velocity = state.belief.velocity.max(T::ZERO);
+            state.belief.motion.velocity = state.belief.motion.velocity.max(T::ZERO);
         }
         self.look_for_rest(state, self.per_period(target_velocity), place);
         if !state.belief.is_finite() {
-            self.restart(state, position, applied, target_velocity);
+            self.start_in(state, position, applied, target_velocity);
         }
-    }
-
-    // A function of its own: the second state is not on the stack of a period that goes on.
-    #[cold]
-    #[inline(never)]
-    fn restart(&self, state: &mut EdgeTimedState<T>, position: FixedCounts, applied: T, target_velocity: T) {
-        *state = self.start(position, applied, target_velocity);
     }
 
     /// An edge was crossed in the period that has passed, at most its way ago.
     fn crossed(&self, state: &mut EdgeTimedState<T>, moved: T, way: T) {
         let belief = &mut state.belief;
-        belief.position -= moved;
+        belief.motion.position -= moved;
         let span = if state.phase == Phase::Resting {
             // It moves after all, nobody knows how fast, nor how far beyond the edge.
             belief.ww += moved * moved;
@@ -591,7 +644,7 @@ impl<T: Real> EdgeTimed<T> {
         if state.phase == Phase::Sliding {
             state.surprise = surprise;
         }
-        state.at_edge = *belief;
+        state.at_edge = belief.friction;
         state.silent = T::ZERO;
         state.release = T::ZERO;
         state.rests = (state.rests - T::splat(0.25)).max(T::ZERO);
@@ -606,17 +659,17 @@ impl<T: Real> EdgeTimed<T> {
     }
 
     /// A shaft that is silent for too long rests. `pace`: the path's velocity, counts per period.
-    fn look_for_rest(&self, state: &mut EdgeTimedState<T>, pace: T, place: &Place<T>) {
+    fn look_for_rest(&self, state: &mut EdgeTimedState<T>, pace: T, place: Option<&Place<T>>) {
         match state.phase {
             Phase::Resting => {}
             Phase::Sliding if self.too_long(state.silent, pace) => {
                 // All learnt since the last edge is the friction of a shaft at rest.
-                state.belief = state.at_edge;
+                state.belief.friction = state.at_edge;
                 state.belief.rest();
                 // The more so, the less the last ones have helped.
                 state.rests += T::ONE;
-                let more = T::splat(0.1) * state.belief.mean * state.rests;
-                state.belief.hh += more * more;
+                let more = T::splat(0.1) * state.belief.friction.mean * state.rests;
+                state.belief.friction.hh += more * more;
                 state.phase = Phase::Resting;
             }
             Phase::Sliding => {}
@@ -629,11 +682,11 @@ impl<T: Real> EdgeTimed<T> {
             Phase::Starting if state.silent > self.patience => {
                 // The voltage has stopped it before the next edge: it would have carried no more friction than this.
                 let (pull, load) = self.forces(state.pad);
-                let load = load * place.friction(state.belief.position + Self::back(state));
+                let load = load * friction_at(place, state.belief.motion.position + Self::back(state));
                 let carried = T::splat(ABOVE) * pull.abs() / load.max(T::splat(1e-6));
-                let friction = state.belief.friction().max(carried.min(T::splat(10.0)));
+                let friction = state.belief.friction.level().max(carried.min(T::splat(10.0)));
                 state.belief.rest();
-                state.belief.know_friction(friction, T::splat(0.15) * state.belief.mean);
+                state.belief.friction.know(friction, T::splat(0.15) * state.belief.friction.mean);
                 state.phase = Phase::Resting;
                 state.unmoved += T::ONE;
             }

@@ -75,7 +75,7 @@ fn silence_keeps_the_position_within_its_count() {
     let volts = 2.2;
     for _ in 0..20 {
         f.update(&mut state, at, volts, 2.0_f64.to_radians());
-        assert!(state.belief.position < 1.2, "{} counts", state.belief.position);
+        assert!(state.belief.motion.position < 1.2, "{} counts", state.belief.motion.position);
     }
     assert!(f.rad_per_s(state.velocity()).to_degrees() < 1.2);
 }
@@ -96,7 +96,10 @@ fn a_shaft_that_is_silent_for_three_counts_rests_and_its_friction_is_that_before
     }
     // Three counts at 2 °/s are 27 periods.
     assert_eq!(f64::from(periods) + silent_before, 28.0);
-    assert_eq!((state.belief.mean, state.belief.velocity, state.belief.position), (friction, 0.0, 0.5));
+    assert_eq!(
+        (state.belief.friction.mean, state.belief.motion.velocity, state.belief.motion.position),
+        (friction, 0.0, 0.5)
+    );
 }
 
 #[test]
@@ -199,7 +202,7 @@ fn friction_that_stops_a_shaft_before_its_first_edge_is_above_what_the_voltage_c
     }
     // It carries 2.2423/0.9 times the model's friction.
     let carried = 2.242286 / volts;
-    assert!(state.belief.friction() > 1.13 * carried, "{}", state.belief.friction());
+    assert!(state.belief.friction.level() > 1.13 * carried, "{}", state.belief.friction.level());
 }
 
 #[test]

@@ -108,6 +108,12 @@ impl<T: Arithmetic> Stribeck<T> {
         self.falling(velocity.abs() * self.inverse_velocity)
     }
 
+    /// True where that has come down to its sliding level.
+    #[inline]
+    pub(crate) fn quick_has_vanished(&self, velocity: T) -> T::Mask {
+        self.vanishes_at.less_or_equal(velocity.abs() * self.inverse_velocity)
+    }
+
     #[cfg_attr(target_os = "none", inline)]
     #[cfg_attr(not(target_os = "none"), inline(always))]
     fn falling(&self, exponent: T) -> T {

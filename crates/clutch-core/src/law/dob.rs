@@ -151,7 +151,7 @@ impl<T: Arithmetic> ControlLaw<T> for Dob<T> {
         T::put_where(next.is_finite(), &mut state.disturbance, || {
             // No more than the output can answer.
             let ends = (self.torque(self.output.lowest(), way), self.torque(self.output.highest(), way));
-            next.max(ends.0.min(ends.1)).min(ends.0.max(ends.1))
+            next.limit(ends.0.min(ends.1), ends.0.max(ends.1))
         });
         T::put_where(velocity.is_finite(), &mut state.velocity, || velocity);
         Command { voltage, limit, terms: [tracking, disturbance] }

@@ -12,8 +12,8 @@
 //! little voltage costs an overshoot of parts of a count, too much a stick.
 
 use super::micro_step::{MicroStep, MicroStepState, Stepping};
-use super::{Beside, Command, ControlLaw, Damping, Listed, Output, OutputState, Seen, Tick};
-use crate::edge_timed::{BesideMap, BesideMapState, EdgeTimedParams};
+use super::{Beside, Command, ControlLaw, Damping, Limit, Listed, Output, OutputState, Seen, Tick};
+use crate::edge_timed::{BesideMap, BesideMapState, EdgeTimedParams, friction_at};
 use crate::friction::FrictionModel;
 use crate::params::{Range, Table};
 use crate::{ActuatorKind, FixedCounts, ParamError, Plant, Real};
@@ -142,16 +142,16 @@ impl<T: Real> Glide<T> {
 
     /// Demand of a period in which the shaft goes in steps, V, and terms.
     #[inline(never)]
-    fn step(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> (T, [T; 7]) {
+    fn step(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> Command<T, [T; 7]> {
         let filter = self.filters.plain();
-        let Seen { position, applied, place } = state.seen;
+        let Seen { position, applied, ref place } = state.seen;
         if !begun {
-            self.begin(&mut state.filters, &state.seen, tick.target_velocity);
+            self.filters.start_in(&mut state.filters, position, applied, tick.target_velocity);
         }
         let pace = filter.per_period(tick.target_velocity);
         if !state.steps.active() {
             let (driving, belief, here) = self.filters.driving(&state.filters);
-            let ahead = driving.ahead_on(belief, &here).position;
+            let ahead = driving.ahead_on(belief, here).position;
             state.steps.begin(ahead, filter.delay());
         }
         let moved = self.filters.stand_aside(&mut state.filters, (position, place), applied);
@@ -161,7 +161,7 @@ impl<T: Real> Glide<T> {
         let demand = self.stepping(self.steps.demand(&mut state.steps, moved, target, pace));
         let error = target - state.steps.position();
         let (friction, variance) = belief.friction();
-        let mu = filter.mu() * place.friction(state.steps.position());
+        let mu = filter.mu() * friction_at(place, state.steps.position());
         let terms = [
             T::ZERO,
             mu * friction,
@@ -171,7 +171,7 @@ impl<T: Real> Glide<T> {
             T::from_i32(3),
             state.filters.part(),
         ];
-        (demand, terms)
+        Command { voltage: demand, limit: Limit::None, terms }
     }
 
     /// Voltage for a torque on a shaft that goes a way, with a multiple of the model's friction, V.
@@ -203,33 +203,33 @@ impl<T: Real> Glide<T> {
 
     /// Demand of a period in which the shaft slides, V, and terms.
     #[inline(never)]
-    fn slide(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> (T, [T; 7]) {
-        let Seen { position, applied, place } = state.seen;
+    fn slide(&self, state: &mut GlideState<T>, tick: &Tick<T>, begun: bool) -> Command<T, [T; 7]> {
+        let Seen { position, applied, ref place } = state.seen;
         let filters = &mut state.filters;
         if begun {
             if state.steps.active() {
-                state.steps.end();
-                let friction = self.steps.friction(&state.steps);
-                self.filters.take_over(filters, state.steps.position(), friction);
+                self.leave_steps(&mut state.steps, filters);
             }
             self.filters.update(filters, (position, place), applied, tick.target_velocity);
         } else {
-            self.begin(filters, &state.seen, tick.target_velocity);
+            self.filters.start_in(filters, position, applied, tick.target_velocity);
         }
         self.demand(filters, tick)
     }
 
-    // A function of its own: the second state is not on the stack of a period that goes on.
+    /// Steps have ended where they have: the filters go on from there.
+    #[cold]
     #[inline(never)]
-    fn begin(&self, filters: &mut BesideMapState<T>, seen: &Seen<T>, target_velocity: T) {
-        *filters = self.filters.start(seen.position, seen.applied, target_velocity);
+    fn leave_steps(&self, steps: &mut MicroStepState<T>, filters: &mut BesideMapState<T>) {
+        steps.end();
+        self.filters.take_over(filters, steps.position(), self.steps.friction(steps));
     }
 
     /// Demand of a period, V, and terms.
     #[inline(never)]
-    fn demand(&self, filters: &mut BesideMapState<T>, tick: &Tick<T>) -> (T, [T; 7]) {
+    fn demand(&self, filters: &mut BesideMapState<T>, tick: &Tick<T>) -> Command<T, [T; 7]> {
         let (filter, belief, place) = self.filters.driving(filters);
-        let ahead = filter.ahead_on(belief, &place);
+        let ahead = filter.ahead_on(belief, place);
         let pace = filter.per_period(tick.target_velocity);
         let (way, fast) = (pace.sgn(), pace.abs());
         let from_edge = tick.error * filter.counts_per_radian() + belief.fraction();
@@ -270,7 +270,7 @@ impl<T: Real> Glide<T> {
             phase,
             filters.part(),
         ];
-        (demand, terms)
+        Command { voltage: demand, limit: Limit::None, terms }
     }
 }
 
@@ -283,7 +283,7 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
     fn start(&self, tick: &Tick<T>, applied: T) -> GlideState<T> {
         // The first period's demand does not depend on where the shaft is.
         let mut filters = self.filters.start(FixedCounts(0), applied, tick.target_velocity);
-        let (demand, _) = self.demand(&mut filters, tick);
+        let demand = self.demand(&mut filters, tick).voltage;
         let seen = Seen { applied, ..Seen::default() };
         GlideState { seen, output: self.output.start(demand, applied), ..GlideState::default() }
     }
@@ -296,13 +296,13 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
     fn update(&self, state: &mut GlideState<T>, tick: &Tick<T>) -> Command<T, [T; 7]> {
         let begun = core::mem::replace(&mut state.begun, T::ONE) > T::ZERO;
         let pace = self.filters.plain().per_period(tick.target_velocity);
-        let (demand, terms) = if self.steps.takes(&state.steps, pace) {
+        let mut command = if self.steps.takes(&state.steps, pace) {
             self.step(state, tick, begun)
         } else {
             self.slide(state, tick, begun)
         };
-        let (voltage, limit) = self.output.apply(&mut state.output, demand);
-        Command { voltage, limit, terms }
+        (command.voltage, command.limit) = self.output.apply(&mut state.output, command.voltage);
+        command
     }
 }
 

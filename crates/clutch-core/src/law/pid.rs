@@ -164,8 +164,8 @@ impl<T: Arithmetic> ControlLaw<T> for Pid<T> {
         // One measurement that is no number, or beyond measure, spoils one tick and not the run: what is remembered
         // stays within what the output can answer.
         let (low, high) = (self.output.lowest() - forward, self.output.highest() - forward);
-        state.integral = T::select(next.is_finite(), next.max(low).min(high), state.integral);
-        let rate = state.rate.max(-self.fastest).min(self.fastest);
+        state.integral = T::select(next.is_finite(), next.limit(low, high), state.integral);
+        let rate = state.rate.limit(-self.fastest, self.fastest);
         state.rate = T::select(state.rate.is_finite(), rate, T::ZERO);
         Command { voltage, limit, terms: [proportional, integral, derivative, forward, cut_off] }
     }

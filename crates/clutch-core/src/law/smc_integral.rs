@@ -107,9 +107,9 @@ impl<T: Arithmetic> ControlLaw<T> for SmcIntegral<T> {
 
     fn start(&self, tick: &Tick<T>, applied: T) -> SmcIntegralState<T> {
         let SmcIntegralParams { kp, slope, boundary, .. } = self.params;
-        let wanted = (-(applied * boundary / kp)).max(-boundary).min(boundary);
+        let wanted = (-(applied * boundary / kp)).limit(-boundary, boundary);
         let integral = wanted - (slope * tick.error + tick.error_rate);
-        let within = || integral.max(-boundary).min(boundary);
+        let within = || integral.limit(-boundary, boundary);
         let found = T::ZERO.less(self.step) & integral.is_finite();
         let integral = T::branch(found, within, || T::ZERO);
         SmcIntegralState { integral, output: self.output.start(self.terms(integral, tick).0, applied) }
@@ -123,7 +123,7 @@ impl<T: Arithmetic> ControlLaw<T> for SmcIntegral<T> {
         let step = self.step * tick.error;
         let boundary = self.params.boundary;
         let stays = || integral;
-        let moves = || (integral + step).max(-boundary).min(boundary);
+        let moves = || (integral + step).limit(-boundary, boundary);
         let full = || T::branch(T::ZERO.less(step * surface), stays, moves);
         let unlimited = || T::branch(boundary.less_or_equal(surface.abs()), full, moves);
         let next = || T::branch(T::decided(limit), full, unlimited);

@@ -120,7 +120,7 @@ impl<T: Arithmetic> ControlLaw<T> for SuperTwisting<T> {
         let step = -(self.twist * sign);
         let (lowest, highest) = self.output.limits();
         let stays = || integral;
-        let moves = || (integral + step).max(lowest).min(highest);
+        let moves = || (integral + step).limit(lowest, highest);
         let at_highest = || T::branch(T::ZERO.less(step), stays, moves);
         let at_lowest = || T::branch(step.less(T::ZERO), stays, moves);
         let below = || T::branch(demand.less_or_equal(lowest), at_lowest, moves);

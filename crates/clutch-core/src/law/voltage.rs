@@ -121,7 +121,7 @@ impl<T: Arithmetic> ControlLaw<T> for Voltage<T> {
 
     #[inline]
     fn update(&self, state: &mut VoltageState<T>, _: &Tick<T>) -> Command<T, [T; 1]> {
-        let level = (self.start + state.way).max(self.lowest).min(self.highest);
+        let level = (self.start + state.way).limit(self.lowest, self.highest);
         let back = T::ZERO.less(state.back);
         state.waited = state.waited + T::ONE;
         let waits = state.waited.less(self.wait);
