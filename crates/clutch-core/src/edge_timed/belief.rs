@@ -131,9 +131,6 @@ impl<T: Real> Friction<T> {
     }
 }
 
-/// Standard deviation that the mean friction gains by a measurement far beyond what is believed, as a share of it.
-const WIDENED: f64 = 0.3;
-
 impl<T: Real> Belief<T> {
     /// One period: the way, counts. `fall`: what the load loses per count per period, with friction as the model has
     /// it. `moves`: the shaft is known to move.
@@ -254,7 +251,7 @@ impl<T: Real> Belief<T> {
     }
 
     /// The position was measured, with a variance: what it was off by, squared, and the variance of that. A measurement far
-    /// beyond what is believed widens the belief first, in friction as well: a shaft that runs away has less of it.
+    /// beyond what is believed widens the belief first.
     #[inline(never)]
     pub(super) fn correct(&mut self, measured: T, variance: T) -> Surprise<T> {
         let y = measured - self.motion.position;
@@ -262,8 +259,6 @@ impl<T: Real> Belief<T> {
         if y * y > T::splat(25.0) * (self.tt + variance) {
             self.tt += y * y;
             self.ww += T::splat(0.25) * (y * y);
-            let doubt = T::splat(WIDENED) * self.friction.mean;
-            self.friction.hh += doubt * doubt;
         }
         self.take(self.at_position(), self.tt + variance, y, T::ONE);
         surprise

@@ -75,15 +75,11 @@ pub struct GlideState<T> {
     /// 1 once the filters have begun, else 0.
     begun: T,
     steps: MicroStepState<T>,
-    /// Counts that the shaft was to gain on the path in the last period.
-    gains: T,
     output: OutputState<T>,
 }
 
 /// Share of the believed friction with which a resting shaft is held.
 const HELD: f64 = 0.5;
-/// Share of the velocity that is asked for with which an edge is waited for behind a rest.
-const HURRIED: f64 = 0.7;
 /// Multiple of the believed friction at rest with which a motor starts.
 const PUSHED: f64 = 1.1;
 
@@ -214,11 +210,11 @@ impl<T: Real> Glide<T> {
             if state.steps.active() {
                 self.leave_steps(&mut state.steps, filters);
             }
-            self.filters.update(filters, (position, place), applied, (tick.target_velocity, state.gains));
+            self.filters.update(filters, (position, place), applied, tick.target_velocity);
         } else {
             self.filters.start_in(filters, position, applied, tick.target_velocity);
         }
-        self.demand(filters, &mut state.gains, tick)
+        self.demand(filters, tick)
     }
 
     /// Steps have ended where they have: the filters go on from there.
@@ -231,7 +227,7 @@ impl<T: Real> Glide<T> {
 
     /// Demand of a period, V, and terms.
     #[inline(never)]
-    fn demand(&self, filters: &mut BesideMapState<T>, gains: &mut T, tick: &Tick<T>) -> Command<T, [T; 7]> {
+    fn demand(&self, filters: &mut BesideMapState<T>, tick: &Tick<T>) -> Command<T, [T; 7]> {
         let (filter, belief, place) = self.filters.driving(filters);
         let ahead = filter.ahead_on(belief, place);
         let pace = filter.per_period(tick.target_velocity);
@@ -246,9 +242,6 @@ impl<T: Real> Glide<T> {
         let belief = filters.driving();
         let p = &self.params;
         let wanted = way * (fast + self.kp * way * error).limit(p.floor * fast, p.cap * fast);
-        // A shaft that has just rested may soon do so again, and is missed the more the farther it is behind.
-        let hurried = T::splat(HURRIED) * wanted.abs() - fast;
-        *gains = if belief.has_rested() { hurried.max(T::ZERO) } else { T::ZERO };
         let friction = if belief.starts() {
             ahead.friction + p.optimism * ahead.variance.sqrt()
         } else {
@@ -290,7 +283,7 @@ impl<T: Real> ControlLaw<T> for Glide<T> {
     fn start(&self, tick: &Tick<T>, applied: T) -> GlideState<T> {
         // The first period's demand does not depend on where the shaft is.
         let mut filters = self.filters.start(FixedCounts(0), applied, tick.target_velocity);
-        let demand = self.demand(&mut filters, &mut T::default(), tick).voltage;
+        let demand = self.demand(&mut filters, tick).voltage;
         let seen = Seen { applied, ..Seen::default() };
         GlideState { seen, output: self.output.start(demand, applied), ..GlideState::default() }
     }

@@ -150,13 +150,13 @@ fn plants() -> Outcome<()> {
     println!("| the rig | cycles/s | discs of 40 | largest error | RMS | V/s |");
     println!("|---|---|---|---|---|---|");
     for (title, keys) in PLANTS {
-        print_row(title, &runs(GLIDE, keys, 7001..7041)?);
+        print_row(title, &runs(GLIDE, keys, 3001..3041)?);
     }
     let minute = [("run.duration_s", 61.0)];
     for (title, scalar) in
         [("a minute each", ""), ("a minute each, `f32`", "\n\n[sampling]\nscalar = \"f32\"")]
     {
-        print_row(title, &runs(&format!("{GLIDE}{scalar}"), &minute, 7001..7041)?);
+        print_row(title, &runs(&format!("{GLIDE}{scalar}"), &minute, 3001..3041)?);
     }
     Ok(())
 }
@@ -183,8 +183,8 @@ fn rest() -> Outcome<()> {
                 ("model.friction.stribeck.mu_dynamic", *sliding),
             ]
         };
-        let all = Summary::of(&runs(&glide, &keys(0.0), 7001..7201)?);
-        let later = Summary::of(&runs(&glide, &keys(0.15), 7001..7201)?);
+        let all = Summary::of(&runs(&glide, &keys(0.0), 1..201)?);
+        let later = Summary::of(&runs(&glide, &keys(0.15), 1..201)?);
         println!("| {title} | {:.2} | {:.0} | {} | {:.3}° |", all.cycles, all.most, later.discs, all.error);
     }
     Ok(())
